@@ -1,0 +1,1 @@
+"""Actuators: from the force that a law asks for to the force on the hull."""

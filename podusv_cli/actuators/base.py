@@ -1,0 +1,35 @@
+"""What every actuator offers."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import numpy as np
+
+from podusv_cli.kernels import Vector
+from podusv_cli.registry import Component
+
+
+class Actuator(Component):
+    """What turns a demand (tau_u, tau_r) into loads on the hull.
+
+    `drive(t, x, state, demand, k, table, tau, rate, signals)` is a kernel: from the vessel's state
+    x, the actuator's own `state` and the `demand` (tau_u [N], tau_r [N m]) it writes the loads
+    (tau_u, tau_v, tau_r) into `tau`, the rate of its state into `rate`, and one number for each
+    name in `signals`. Limits act here, inside the right-hand side.
+    """
+
+    states: ClassVar[tuple[str, ...]] = ()
+    signals: ClassVar[tuple[str, ...]] = ()
+
+    @staticmethod
+    def drive(
+        t: float, x: Vector, state: Vector, demand: Vector, k: Any, table: Vector,
+        tau: Vector, rate: Vector, signals: Vector,
+    ) -> None:  # fmt: skip
+        """Write loads, rates and signals; every actuator has its own."""
+        raise NotImplementedError
+
+    def rest(self) -> Vector:
+        """The state at the start of a run."""
+        return np.zeros(len(self.states))

@@ -1,0 +1,119 @@
+"""The scenario: everything that a run depends on, as one frozen value."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from podusv_cli.actuators.base import Actuator
+from podusv_cli.controllers.base import Controller
+from podusv_cli.disturbances.base import Disturbance
+from podusv_cli.engine.grid import TimeGrid, whole_steps
+from podusv_cli.engine.simulate import ClosedLoop
+from podusv_cli.paths.base import Path
+from podusv_cli.registry import Component, any_of, value
+from podusv_cli.vessels.vessel import Vessel
+
+if TYPE_CHECKING:
+    AnyActuator = Actuator
+    AnyController = Controller
+    AnyDisturbance = Disturbance
+    AnyPath = Path
+else:
+    AnyActuator = any_of("podusv_cli.actuators", Actuator)
+    AnyController = any_of("podusv_cli.controllers", Controller)
+    AnyDisturbance = any_of("podusv_cli.disturbances", Disturbance)
+    AnyPath = any_of("podusv_cli.paths", Path)
+
+
+class Start(Component):
+    """The vessel's state at t = 0."""
+
+    x: float = value(0.0, "m", "north")
+    y: float = value(0.0, "m", "east")
+    psi: float = value(0.0, "rad", "heading, from north towards east")
+    u: float = value(0.0, "m/s", "surge velocity")
+    v: float = value(0.0, "m/s", "sway velocity")
+    r: float = value(0.0, "rad/s", "yaw rate")
+
+
+class Simulation(Component):
+    """How the closed loop is integrated."""
+
+    step: float = value(0.01, "s", "step of the classical Runge-Kutta method", gt=0)
+    duration: float = value(310.0, "s", "simulated time, a whole number of steps", gt=0)
+    compiled: bool = value(True, "", "machine code, or (slowly, same result) plain Python")
+
+
+class Control(Component):
+    """When the law acts."""
+
+    period: float = value(
+        0.0, "s", "0: continuously; else the law is evaluated once a period, a whole number of steps, "
+        "and its output held", ge=0,
+    )  # fmt: skip
+
+
+class Log(Component):
+    """What is written to log.h5."""
+
+    every: int = value(1, "steps", "every n-th step is logged; metrics always see every step", ge=1)
+
+
+class MetricSettings(Component):
+    """Windows and thresholds of the metrics."""
+
+    steady_fraction: float = value(
+        0.2, "", "the last part of the run that counts as settled", gt=0, le=1
+    )
+    settling_radius: float = value(
+        1.0, "m", "settled when the distance to the target stays below this", gt=0
+    )
+
+
+class Scenario(Component):
+    """A vessel, its surroundings, its task, its controller, and how the run is done."""
+
+    name: str = value(..., "", "what the results are filed under", pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,79}$")
+    description: str = value("", "", "what the scenario is for, in a sentence")
+    vessel: Vessel = value(..., "", "the vessel that is simulated")
+    nominal: Vessel = value(..., "", "the vessel that the controller is told about; the same by default")
+    start: Start = value(Start(), "", "state at t = 0")
+    path: AnyPath = value(..., "", "how the target moves")
+    disturbance: AnyDisturbance = value(..., "", "what the sea does")
+    actuator: AnyActuator = value(..., "", "from the law's demand to the load on the hull")
+    controller: AnyController = value(..., "", "the law")
+    simulation: Simulation = value(Simulation(), "", "integration")
+    control: Control = value(Control(), "", "sampling of the law")
+    log: Log = value(Log(), "", "logging")
+    metrics: MetricSettings = value(MetricSettings(), "", "windows and thresholds of the metrics")
+
+    def closed_loop(self) -> ClosedLoop:
+        """The parts that move."""
+        start = self.start
+        return ClosedLoop(
+            vessel=self.vessel, nominal=self.nominal, path=self.path, disturbance=self.disturbance,
+            actuator=self.actuator, controller=self.controller,
+            start=(start.x, start.y, start.psi, start.u, start.v, start.r),
+        )  # fmt: skip
+
+    def time_grid(self) -> TimeGrid:
+        """The instants of the run; call `misfits` first."""
+        step = self.simulation.step
+        steps = whole_steps(self.simulation.duration, step) or 0
+        return TimeGrid(step, steps, self.log.every, whole_steps(self.control.period, step) or 0)
+
+    def misfits(self) -> list[tuple[str, str]]:
+        """Key and sentence for every pair of values that cannot go together."""
+        step = self.simulation.step
+        found: list[tuple[str, str]] = []
+        times: dict[str, Any] = {
+            "simulation.duration": self.simulation.duration,
+            "control.period": self.control.period,
+            "controller.difference_step": self.controller.sample_period(),
+        }
+        for key, time in times.items():
+            if time and not whole_steps(time, step):
+                below = max(1, int(time / step)) * step
+                text = f"{time:g} s is no whole number of steps of {step:g} s; try {below:.10g}"
+                found.append((key, text))
+        return found

@@ -1,0 +1,1 @@
+"""Control laws, one file a law, on shared parts: errors, network, differentiators."""

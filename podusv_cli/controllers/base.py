@@ -1,0 +1,64 @@
+"""What every control law offers."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from podusv_cli.kernels import Vector
+from podusv_cli.registry import Component
+from podusv_cli.vessels.vessel import Vessel
+
+Slots = tuple[tuple[str, int], ...]
+
+
+class Controller(Component):
+    """A law from (state, target) to a demand (tau_u [N], tau_r [N m]).
+
+    `law(t, x, memory, target, k, table, tau, rate, signals, work)` is a kernel. It reads the time
+    t [s], the state x = (x, y, psi, u, v, r), its own `memory`, the `target` (see
+    `paths.base.TARGET`) and its constants `k`, which hold its fields and the *nominal* vessel's
+    coefficients. It writes the demand into `tau`, the rate of its memory into `rate`, and one
+    number for each name in `signals`; `work` is scratch of `workspace()` numbers.
+
+    `sample(t, x, memory, target, k, table)` is a kernel that may change `memory`; it is called at
+    every multiple of `sample_period()`, before anything else sees that instant.
+    """
+
+    signals: ClassVar[tuple[str, ...]] = ()
+
+    @staticmethod
+    def law(
+        t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
+        tau: Vector, rate: Vector, signals: Vector, work: Vector,
+    ) -> None:  # fmt: skip
+        """Write demand, rates and signals; every law has its own."""
+        raise NotImplementedError
+
+    @staticmethod
+    def sample(t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector) -> None:
+        """Change the memory at a sampling instant."""
+        raise NotImplementedError
+
+    def sample_period(self) -> float:
+        """Seconds between two calls of `sample`; 0 where the law needs none."""
+        return 0.0
+
+    def slots(self) -> Slots:
+        """Name and length of every part of the memory, in order."""
+        return ()
+
+    def workspace(self) -> int:
+        """How many numbers of scratch the law needs."""
+        return 1
+
+    def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
+        """The memory at t = 0 for the state x and the target there."""
+        raise NotImplementedError
+
+    def fixed_signals(self) -> dict[str, Vector]:
+        """Arrays worth logging that do not change during a run."""
+        return {}
+
+    def informed(self, nominal: Vessel) -> dict[str, float]:
+        """The law's constants together with those of the vessel it is told about."""
+        return nominal.constants() | self.constants()

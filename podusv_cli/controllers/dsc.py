@@ -1,0 +1,39 @@
+"""Dynamic surface control: the same law with a first-order filter of the virtual control."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from podusv_cli.controllers.polar_backstepping import FilteredBackstepping, polar_backstepping
+from podusv_cli.controllers.tracking import Tracking
+from podusv_cli.kernels import Vector, kernel, specialise
+from podusv_cli.registry import value
+
+
+@kernel
+def surge_lag(
+    e: Tracking, x: Vector, target: Vector, beta: Vector, rate: Vector, k: Any
+) -> tuple[float, float]:
+    """T_u beta_u' = alpha_u - beta_u."""
+    rate[0] = (e.alpha_u - beta[0]) / k.T_u
+    return beta[0], rate[0]
+
+
+@kernel
+def yaw_lag(
+    e: Tracking, x: Vector, target: Vector, beta: Vector, rate: Vector, k: Any, tau_u: float
+) -> tuple[float, float]:
+    """T_r beta_r' = alpha_r - beta_r."""
+    rate[1] = (e.alpha_r - beta[1]) / k.T_r
+    return beta[1], rate[1]
+
+
+class DynamicSurface(FilteredBackstepping):
+    """Backstepping with a first-order lag of the virtual control, the paper's reference [26]."""
+
+    kind: Literal["dsc"] = "dsc"
+    T_u: float = value(0.2, "s", "time constant in surge", gt=0)
+    T_r: float = value(0.2, "s", "time constant in yaw", gt=0)
+    law = staticmethod(
+        specialise(polar_backstepping, "dsc", surge=surge_lag, yaw=yaw_lag)
+    )

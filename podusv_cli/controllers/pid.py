@@ -1,0 +1,74 @@
+"""PID on the velocity errors, the paper's reference [35]."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from podusv_cli.controllers.base import Slots
+from podusv_cli.controllers.tracking import HELD, TrackingController, track
+from podusv_cli.kernels import Vector, bundle, kernel
+from podusv_cli.registry import value
+from podusv_cli.vessels.vessel import Vessel
+
+INTEGRAL_U, INTEGRAL_R, LAG_U, LAG_R = 2, 3, 4, 5
+
+
+class Pid(TrackingController):
+    """Two PID loops on u_p = alpha_u - u and r_p = alpha_r - r with a lagged derivative.
+
+    The paper's u_d and r_d are taken to be the virtual controls; with the path's own speeds no
+    position error would be fed back. A difference quotient of the error is unstable with the printed
+    gains at any step (K_Du/m11 and K_Dr/m33 exceed 1), hence the derivative (e - lag)/T_d.
+    """
+
+    kind: Literal["pid"] = "pid"
+    signals: ClassVar[tuple[str, ...]] = (
+        "z_e", "psi_d", "psi_e", "alpha_u", "alpha_r", "u_e", "r_e",
+    )  # fmt: skip
+    K_Pu: float = value(1100.0, "kg/s", "proportional gain in surge", ge=0)
+    K_Iu: float = value(10.0, "kg/s2", "integral gain in surge", ge=0)
+    K_Du: float = value(90.0, "kg", "derivative gain in surge", ge=0)
+    K_Pr: float = value(80.0, "kg m2/s", "proportional gain in yaw", ge=0)
+    K_Ir: float = value(1.0, "kg m2/s2", "integral gain in yaw", ge=0)
+    K_Dr: float = value(10.0, "kg m2", "derivative gain in yaw", ge=0)
+    T_d: float = value(0.1, "s", "time constant of the derivative's lag", gt=0)
+    lag_start: Literal["zero", "error"] = value(
+        "error", "", "lagged error at the start: 0 (a kick at once), or the error (none)"
+    )
+
+    def slots(self) -> Slots:
+        """Held direction, integrals and lagged errors."""
+        names = ("integral_u", "integral_r", "lag_u", "lag_r")
+        return HELD + tuple((name, 1) for name in names)
+
+    def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
+        """Integrals at zero, lagged errors at zero or at the error."""
+        memory = super().start(x, target, nominal)
+        if self.lag_start == "error":
+            k, seen = bundle(self.informed(nominal)), np.array(memory)
+            self.sample(0.0, x, seen, target, k, self.table())
+            e = track(x, seen, target, k)
+            memory[[LAG_U, LAG_R]] = e.alpha_u - x[3], e.alpha_r - x[5]
+        return memory
+
+    @staticmethod
+    @kernel
+    def law(
+        t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
+        tau: Vector, rate: Vector, signals: Vector, work: Vector,
+    ) -> None:  # fmt: skip
+        """tau = K_P e + K_I integral + K_D (e - lag)/T_d on both axes."""
+        e = track(x, memory, target, k)
+        u_p = e.alpha_u - x[3]
+        r_p = e.alpha_r - x[5]
+        rate[0] = rate[1] = 0.0
+        rate[INTEGRAL_U], rate[INTEGRAL_R] = u_p, r_p
+        rate[LAG_U] = (u_p - memory[LAG_U]) / k.T_d
+        rate[LAG_R] = (r_p - memory[LAG_R]) / k.T_d
+        tau[0] = k.K_Pu * u_p + k.K_Iu * memory[INTEGRAL_U] + k.K_Du * rate[LAG_U]
+        tau[1] = k.K_Pr * r_p + k.K_Ir * memory[INTEGRAL_R] + k.K_Dr * rate[LAG_R]
+        signals[0], signals[1], signals[2] = e.distance, e.psi_d, e.psi_e
+        signals[3], signals[4] = e.alpha_u, e.alpha_r
+        signals[5], signals[6] = -u_p, -r_p

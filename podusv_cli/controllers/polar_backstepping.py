@@ -1,0 +1,150 @@
+"""The adaptive backstepping law of the paper, (23)-(28) and (32)-(37), for any differentiator.
+
+Laws of this family differ only in how the virtual control is differentiated: by the shunting
+model, by a first-order filter (DSC), or in full.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from podusv_cli.controllers.base import Slots
+from podusv_cli.controllers.network import Network, activate, adapt, weigh
+from podusv_cli.controllers.tracking import HELD, TrackingController, track
+from podusv_cli.kernels import Vector, bundle, kernel, tail
+from podusv_cli.registry import value
+from podusv_cli.vessels.vessel import Vessel
+
+B_HAT_U, B_HAT_R, WEIGHTS = 2, 3, 4
+
+# The differentiator, put in by each law with `specialise`: kernels that give (beta, beta_dot) and
+# write the rate of beta where beta is memory.
+surge: Callable[..., tuple[float, float]]
+yaw: Callable[..., tuple[float, float]]
+
+
+@kernel
+def lemma(error: float, k: Any) -> float:
+    """phi(xi) = xi/(4 partial) of Lemma 1 and Remark 1."""
+    return float(error / (4.0 * k.partial))
+
+
+@kernel
+def polar_backstepping(
+    t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
+    tau: Vector, rate: Vector, signals: Vector, work: Vector,
+) -> None:  # fmt: skip
+    """Demand (26), (35) and memory rates (27), (28), (36), (37), see `controllers.base`.
+
+    The sign s of the coupling is -1 as printed, +1 where the cross terms are to cancel in V'.
+    """
+    count = int(k.network_count)
+    W_hat_u, W_hat_r = tail(memory, WEIGHTS), tail(memory, WEIGHTS + count)
+    filtered = WEIGHTS + 2 * count
+    phi = work
+    activate(x, k, table, phi, tail(work, count))
+    f_hat_u, f_hat_r = weigh(count, W_hat_u, phi), weigh(count, W_hat_r, phi)
+    e = track(x, memory, target, k)
+    s = 2.0 * k.coupling - 1.0
+
+    beta_u, beta_u_dot = surge(e, x, target, tail(memory, filtered), tail(rate, filtered), k)
+    u_e = x[3] - beta_u
+    tau[0] = (
+        -k.k_ue * u_e - k.m11 * f_hat_u - memory[B_HAT_U] * lemma(u_e, k)
+        + k.m11 * beta_u_dot + s * e.z_e * math.cos(e.psi_e)
+    )  # fmt: skip
+    beta_r, beta_r_dot = yaw(e, x, target, tail(memory, filtered), tail(rate, filtered), k, tau[0])
+    r_e = x[5] - beta_r
+    tau[1] = (
+        -k.k_re * r_e - k.m33 * f_hat_r - memory[B_HAT_R] * lemma(r_e, k)
+        + k.m33 * beta_r_dot + s * e.psi_e
+    )  # fmt: skip
+
+    rate[0] = rate[1] = 0.0
+    rate[B_HAT_U] = k.gamma_u * (u_e * lemma(u_e, k) - k.sigma_bu * (memory[B_HAT_U] - k.b_hat_u0))
+    rate[B_HAT_R] = k.gamma_r * (r_e * lemma(r_e, k) - k.sigma_br * (memory[B_HAT_R] - k.b_hat_r0))
+    W_0 = k.network_initial_weight
+    adapt(count, W_hat_u, phi, u_e * k.m11, k.Gamma_u, k.sigma_u, W_0, tail(rate, WEIGHTS))
+    adapt(count, W_hat_r, phi, r_e * k.m33, k.Gamma_r, k.sigma_r, W_0, tail(rate, WEIGHTS + count))
+
+    signals[0], signals[1], signals[2] = e.distance, e.psi_d, e.psi_e
+    signals[3], signals[4] = e.alpha_u, e.alpha_r
+    signals[5], signals[6] = u_e, r_e
+    signals[7], signals[8] = f_hat_u, f_hat_r
+
+
+class PolarBackstepping(TrackingController):
+    """Gains and options of the adaptive backstepping laws; gains are the paper's section 6."""
+
+    signals: ClassVar[tuple[str, ...]] = (
+        "z_e", "psi_d", "psi_e", "alpha_u", "alpha_r", "u_e", "r_e", "f_hat_u", "f_hat_r",
+    )  # fmt: skip
+    k_ue: float = value(4.0, "kg/s", "gain of the surge velocity error in (26)", ge=0)
+    k_re: float = value(40.0, "kg m2/s", "gain of the yaw rate error in (35)", ge=0)
+    Gamma_u: float = value(100.0, "1/(kg s2)", "adaptation gain of the surge network (27)", ge=0)
+    Gamma_r: float = value(100.0, "1/(kg m2 s2)", "adaptation gain of the yaw network (36)", ge=0)
+    sigma_u: float = value(0.1, "kg s", "leakage of the surge network (27)", ge=0)
+    sigma_r: float = value(0.1, "kg m2 s", "leakage of the yaw network (36)", ge=0)
+    gamma_u: float = value(1000.0, "kg/s2", "adaptation gain of the surge bound (28)", ge=0)
+    gamma_r: float = value(1000.0, "kg m2/s2", "adaptation gain of the yaw bound (37)", ge=0)
+    sigma_bu: float = value(0.01, "s/kg", "leakage of the surge bound (28)", ge=0)
+    sigma_br: float = value(0.01, "s/(kg m2)", "leakage of the yaw bound (37)", ge=0)
+    b_hat_u0: float = value(0.0, "N", "surge bound at the start, and what leakage pulls it to", ge=0)
+    b_hat_r0: float = value(0.0, "N m", "yaw bound at the start, and what leakage pulls it to", ge=0)
+    partial: float = value(0.1, "m/s, rad/s", "Lemma 1's constant; phi(xi) = xi/(4 partial)", gt=0)
+    coupling: Literal["printed", "corrected"] = value(
+        "corrected", "", "sign of z_e cos psi_e and psi_e in (26), (35): -1 printed, +1 corrected"
+    )
+    network: Network = value(Network(), "", "nodes and widths of the two networks")
+
+    def slots(self) -> Slots:
+        """Held direction, bounds and weights."""
+        count = self.network.count
+        bounds = (("b_hat_u", 1), ("b_hat_r", 1))
+        return HELD + bounds + (("W_hat_u", count), ("W_hat_r", count))
+
+    def workspace(self) -> int:
+        """The nodes' outputs and the exponentials of the grid's axes."""
+        return self.network.count + sum(self.network.nodes)
+
+    def table(self) -> Vector:
+        """The network's centres."""
+        return self.network.table()
+
+    def fixed_signals(self) -> dict[str, Vector]:
+        """Centres, shape (node, 3), and widths, shape (3,), of the networks."""
+        network = self.network
+        return {"rbf_center": network.center_array(), "rbf_width": network.width_array()}
+
+    def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
+        """Bounds and weights at what leakage pulls them to."""
+        memory = super().start(x, target, nominal)
+        memory[B_HAT_U], memory[B_HAT_R] = self.b_hat_u0, self.b_hat_r0
+        memory[WEIGHTS : WEIGHTS + 2 * self.network.count] = self.network.initial_weight
+        return memory
+
+
+class FilteredBackstepping(PolarBackstepping):
+    """A law whose virtual control goes through a filter with memory (beta_u, beta_r)."""
+
+    filter_start: Literal["zero", "alpha"] = value(
+        "alpha", "", "filter output at the start: 0, or the virtual control"
+    )
+
+    def slots(self) -> Slots:
+        """The filter's output comes last."""
+        return super().slots() + (("beta_u", 1), ("beta_r", 1))
+
+    def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
+        """The filter at zero or settled on the virtual control."""
+        memory = super().start(x, target, nominal)
+        if self.filter_start == "alpha":
+            k, seen = bundle(self.informed(nominal)), np.array(memory)
+            self.sample(0.0, x, seen, target, k, self.table())
+            e = track(x, seen, target, k)
+            memory[-2:] = e.alpha_u, e.alpha_r
+        return memory

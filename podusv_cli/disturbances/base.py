@@ -1,0 +1,21 @@
+"""What every disturbance offers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from podusv_cli.kernels import Vector
+from podusv_cli.registry import Component
+
+
+class Disturbance(Component):
+    """A load on the hull in the body frame.
+
+    `evaluate(t, x, k, table, b)` is a kernel that writes (b_u [N], b_v [N], b_r [N m]) at time
+    t [s] and state x = (x, y, psi, u, v, r) into `b`.
+    """
+
+    @staticmethod
+    def evaluate(t: float, x: Vector, k: Any, table: Vector, b: Vector) -> None:
+        """Write the load; every disturbance has its own."""
+        raise NotImplementedError

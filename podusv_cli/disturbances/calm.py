@@ -1,0 +1,20 @@
+"""Calm water."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from podusv_cli.disturbances.base import Disturbance
+from podusv_cli.kernels import Vector, kernel
+
+
+class Calm(Disturbance):
+    """No load at all."""
+
+    kind: Literal["none"] = "none"
+
+    @staticmethod
+    @kernel
+    def evaluate(t: float, x: Vector, k: Any, table: Vector, b: Vector) -> None:
+        """Zero."""
+        b[0] = b[1] = b[2] = 0.0

@@ -1,0 +1,183 @@
+"""The closed loop as kernels: right-hand side, RK4 step, and the march along the time grid.
+
+State s: the vessel's (x, y, psi, u, v, r), then the actuator's states, then the law's memory.
+Row: target, law's signals, demand, tau, b, actuator's signals; offsets are in `Plan`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from podusv_cli.kernels import Vector, address, kernel, tail, unpacker
+from podusv_cli.vessels.plant import plant
+from podusv_cli.vessels.vessel import COEFFICIENTS
+
+Function = Callable[..., None]
+LARGEST = 1e300
+
+
+class Plan(NamedTuple):
+    """Sizes, offsets and periods of a closed loop, all whole numbers."""
+
+    states: int  # length of s
+    memory: int  # offset of the law's memory in s
+    signals: int  # offsets in the row
+    demand: int
+    tau: int
+    b: int
+    flags: int
+    columns: int  # length of the row
+    steps: int
+    log_every: int
+    hold_every: int  # 0: the law acts continuously
+    sample_every: int  # 0: the law takes no samples
+
+
+class Wires(NamedTuple):
+    """Vectors of a closed loop: constants of every part, then what the march writes to."""
+
+    path: Vector
+    path_table: Vector
+    disturbance: Vector
+    disturbance_table: Vector
+    law: Vector
+    law_table: Vector
+    actuator: Vector
+    actuator_table: Vector
+    vessel: Vector
+    observer: Vector
+    s: Vector
+    row: Vector
+    stages: Vector  # four rates and one intermediate state
+    held: Vector  # t, x, target of the last sample; demand and signals that nobody reads
+    work: Vector
+    seen: Vector  # the observer's
+    log: Vector  # rows of t, s, row
+
+
+HELD_X, HELD_TARGET, HELD_DEMAND, HELD_SIGNALS = 1, 7, 13, 15
+
+
+# Vector to named coefficients of the vessel; the plant is the one part that never varies.
+coefficients = unpacker(COEFFICIENTS)
+
+
+@kernel
+def rates(
+    t: float, s: Vector, ds: Vector,
+    path: Function, disturbance: Function, law: Function, actuator: Function, c: Wires, n: Plan,
+) -> None:  # fmt: skip
+    """Right-hand side of the closed loop at time t; leaves all signals in the row."""
+    row = address(c.row)
+    demand, tau, b = tail(row, n.demand), tail(row, n.tau), tail(row, n.b)
+    memory, memory_rate = tail(s, n.memory), tail(ds, n.memory)
+    p, table, work = address(c.law), address(c.law_table), address(c.work)
+    path(t, address(c.path), address(c.path_table), row)
+    disturbance(t, s, address(c.disturbance), address(c.disturbance_table), b)
+    if n.hold_every > 0:
+        held = address(c.held)
+        law(
+            held[0], tail(held, HELD_X), memory, tail(held, HELD_TARGET), p, table,
+            tail(held, HELD_DEMAND), memory_rate, tail(held, HELD_SIGNALS), work,
+        )  # fmt: skip
+    else:
+        law(t, s, memory, row, p, table, demand, memory_rate, tail(row, n.signals), work)
+    actuator(
+        t, s, tail(s, 6), demand, address(c.actuator), address(c.actuator_table),
+        tau, tail(ds, 6), tail(row, n.flags),
+    )  # fmt: skip
+    plant(s, tau, b, coefficients(address(c.vessel)), ds)
+
+
+@kernel
+def sample_and_hold(
+    k: int, t: float, path: Function, law: Function, sample: Function, c: Wires, n: Plan
+) -> None:
+    """What happens at instants only: the law's own samples, and the hold of sampled control."""
+    s, row, held = address(c.s), address(c.row), address(c.held)
+    memory = tail(s, n.memory)
+    p, table = address(c.law), address(c.law_table)
+    path(t, address(c.path), address(c.path_table), row)
+    if n.sample_every > 0 and k % n.sample_every == 0:
+        sample(t, s, memory, row, p, table)
+    if n.hold_every > 0 and k % n.hold_every == 0:
+        held[0] = t
+        for i in range(6):
+            held[HELD_X + i] = s[i]
+            held[HELD_TARGET + i] = row[i]
+        law(
+            t, s, memory, row, p, table, tail(row, n.demand), tail(address(c.stages), n.memory),
+            tail(row, n.signals), address(c.work),
+        )  # fmt: skip
+
+
+@kernel
+def shifted(count: int, s: Vector, h: float, ds: Vector, out: Vector) -> None:
+    """out = s + h ds."""
+    for i in range(count):
+        out[i] = s[i] + h * ds[i]
+
+
+@kernel
+def step(
+    t: float, h: float,
+    path: Function, disturbance: Function, law: Function, actuator: Function, c: Wires, n: Plan,
+) -> None:  # fmt: skip
+    """Classical RK4 from t to t + h; the first stage has been evaluated already."""
+    s, count = address(c.s), n.states
+    k1 = address(c.stages)
+    k2, k3, k4 = tail(k1, count), tail(k1, 2 * count), tail(k1, 3 * count)
+    y = tail(k1, 4 * count)
+    shifted(count, s, 0.5 * h, k1, y)
+    rates(t + 0.5 * h, y, k2, path, disturbance, law, actuator, c, n)
+    shifted(count, s, 0.5 * h, k2, y)
+    rates(t + 0.5 * h, y, k3, path, disturbance, law, actuator, c, n)
+    shifted(count, s, h, k3, y)
+    rates(t + h, y, k4, path, disturbance, law, actuator, c, n)
+    for i in range(count):
+        s[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
+
+
+@kernel
+def finite(count: int, vector: Vector) -> bool:
+    """Whether all entries are numbers that can still be worked with."""
+    bad = 0
+    for i in range(count):
+        bad += 0 if abs(vector[i]) <= LARGEST else 1
+    return bad == 0
+
+
+@kernel
+def write_row(k: int, t: float, c: Wires, n: Plan) -> None:
+    """Log t, s and the row."""
+    s, row = address(c.s), address(c.row)
+    out = tail(address(c.log), k // n.log_every * (1 + n.states + n.columns))
+    out[0] = t
+    for i in range(n.states):
+        out[1 + i] = s[i]
+    for i in range(n.columns):
+        out[1 + n.states + i] = row[i]
+
+
+@kernel
+def advance(
+    path: Function, disturbance: Function, law: Function, sample: Function, actuator: Function,
+    observe: Function, first: int, last: int, h: float, c: Wires, n: Plan,
+) -> int:  # fmt: skip
+    """March over the instants first .. last - 1; the first instant that is not finite, or `last`."""
+    s, row = address(c.s), address(c.row)
+    for k in range(first, last):
+        t = k * h
+        if n.sample_every > 0 or n.hold_every > 0:
+            sample_and_hold(k, t, path, law, sample, c, n)
+        rates(t, s, address(c.stages), path, disturbance, law, actuator, c, n)
+        if not (finite(n.states, s) and finite(n.columns, row)):
+            return k
+        weight = 0.5 * h if k == 0 or k == n.steps else h
+        observe(t, weight, s, row, address(c.observer), address(c.seen))
+        if k % n.log_every == 0:
+            write_row(k, t, c, n)
+        if k < n.steps:
+            step(t, h, path, disturbance, law, actuator, c, n)
+    return last

@@ -1,0 +1,154 @@
+"""Kernels to machine code, cached on disk and never stale.
+
+numba notices a change in the file of a cached function, not in the files of what that function
+calls. So the cache lives in a folder named after a digest of every source file of the package.
+"""
+
+from __future__ import annotations
+
+import dis
+import hashlib
+import os
+import re
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from numba import config, njit, types
+from numba.extending import intrinsic
+
+from podusv_cli import kernels
+from podusv_cli.engine import signatures
+from podusv_cli.engine.closed_loop import Plan, Wires, advance
+
+OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": False}
+KEPT = 8  # caches of this many states of the source stay on disk
+
+NUMBER = types.float64
+VECTOR = types.CPointer(NUMBER)
+ARRAY = types.Array(NUMBER, 1, "C")
+
+SIGNATURES = {
+    signatures.path_entry: types.void(NUMBER, *[VECTOR] * 3),
+    signatures.disturbance_entry: types.void(NUMBER, *[VECTOR] * 4),
+    signatures.law_entry: types.void(NUMBER, *[VECTOR] * 9),
+    signatures.sample_entry: types.void(NUMBER, *[VECTOR] * 5),
+    signatures.actuator_entry: types.void(NUMBER, *[VECTOR] * 8),
+    signatures.observer_entry: types.void(NUMBER, NUMBER, *[VECTOR] * 4),
+}
+LOOP = (
+    signatures.path_entry,
+    signatures.disturbance_entry,
+    signatures.law_entry,
+    signatures.sample_entry,
+    signatures.actuator_entry,
+    signatures.observer_entry,
+)
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _tail(typing: Any, vector: Any, start: Any) -> Any:
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.gep(arguments[0], [arguments[1]])
+
+    return vector(vector, types.int64), code
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _address(typing: Any, array: Any) -> Any:
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return context.make_array(signature.args[0])(context, builder, arguments[0]).data
+
+    return VECTOR(array), code
+
+
+@cache
+def machine(function: Any) -> Any:
+    """The kernel and all kernels it names, ready to be compiled into their caller."""
+    if function is kernels.tail:
+        return _tail
+    if function is kernels.address:
+        return _address
+    seen = function.__globals__
+    named = {i.argval for i in dis.get_instructions(function) if i.opname == "LOAD_GLOBAL"}
+    inner = {name: machine(seen[name]) for name in named if kernels.is_kernel(seen.get(name))}
+    return njit(**OPTIONS)(kernels.with_globals(function, function.__qualname__, **inner))
+
+
+@cache
+def entry(door: Any, inner: Any, names: tuple[str, ...]) -> Any:
+    """Machine code of a component's kernel behind its door, callable by the loop."""
+    label = re.sub(r"\W", "_", f"{door.__name__}_{inner.__module__}_{inner.__qualname__}")
+    named = machine(kernels.unpacker(names))
+    bound = kernels.with_globals(door, label, kernel=machine(inner), named=named)
+    return _stored(SIGNATURES[door], bound)
+
+
+@cache
+def march() -> Any:
+    """Machine code of `closed_loop.advance`."""
+    functions = [types.FunctionType(SIGNATURES[door]) for door in LOOP]
+    wires = types.NamedUniTuple(ARRAY, len(Wires._fields), Wires)
+    plan = types.NamedUniTuple(types.int64, len(Plan._fields), Plan)
+    signature = types.int64(*functions, types.int64, types.int64, NUMBER, wires, plan)
+    return _stored(signature, machine(advance).py_func)
+
+
+def _stored(signature: Any, function: Any) -> Any:
+    folder = cache_folder()
+    with _caching_in(folder):
+        return njit(signature, cache=folder is not None, **OPTIONS)(function)
+
+
+@contextmanager
+def _caching_in(folder: Path | None) -> Iterator[None]:
+    # numba reads its cache folder when a function is decorated; other users of numba in this
+    # process keep theirs.
+    before = config.CACHE_DIR
+    config.CACHE_DIR = str(folder or before)
+    try:
+        yield
+    finally:
+        config.CACHE_DIR = before
+
+
+@cache
+def source_digest() -> str:
+    """Digest of every source file of the package."""
+    digest = hashlib.sha256()
+    package = Path(__file__).resolve().parent.parent
+    for path in sorted(package.rglob("*.py")):
+        digest.update(path.relative_to(package).as_posix().encode() + b"\0")
+        digest.update(path.read_bytes() + b"\0")
+    return digest.hexdigest()[:16]
+
+
+@cache
+def cache_folder() -> Path | None:
+    """Where compiled code of this state of the source is kept; None where nothing can be written.
+
+    $PODUSV_CACHE, else podusv under $XDG_CACHE_HOME or ~/.cache, else under the temporary folder.
+    """
+    home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    private = f"podusv-{os.getuid() if hasattr(os, 'getuid') else 'user'}"
+    roots = [os.environ.get("PODUSV_CACHE"), f"{home}/podusv", f"{tempfile.gettempdir()}/{private}"]
+    for root in filter(None, roots):
+        folder = Path(root) / source_digest()
+        try:
+            folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+            tempfile.TemporaryFile(dir=folder).close()
+        except OSError:
+            continue
+        _forget_old(folder)
+        return folder
+    return None
+
+
+def _forget_old(current: Path) -> None:
+    caches = sorted(current.parent.iterdir(), key=lambda path: path.stat().st_mtime, reverse=True)
+    for old in [path for path in caches if path != current and path.is_dir()][KEPT:]:
+        shutil.rmtree(old, ignore_errors=True)

@@ -1,0 +1,26 @@
+"""Time as whole numbers of steps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+def whole_steps(duration: float, step: float) -> int | None:
+    """How many steps make `duration` (both in s), or None where it is no whole number of them."""
+    count = round(duration / step)
+    return count if abs(count * step - duration) <= 1e-9 * max(duration, step) else None
+
+
+@dataclass(frozen=True)
+class TimeGrid:
+    """Instants k * step for k = 0 .. steps; `log_every`, `hold_every` in steps, 0 for no hold."""
+
+    step: float
+    steps: int
+    log_every: int = 1
+    hold_every: int = 0
+
+    @property
+    def rows(self) -> int:
+        """How many instants are logged: every `log_every`-th from the start."""
+        return self.steps // self.log_every + 1

@@ -1,0 +1,206 @@
+"""From components to a recording: lay out the loop, march in blocks, name the columns."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from podusv_cli.actuators.base import Actuator
+from podusv_cli.controllers.base import Controller
+from podusv_cli.disturbances.base import Disturbance
+from podusv_cli.engine import closed_loop, signatures
+from podusv_cli.engine.closed_loop import Plan, Wires
+from podusv_cli.engine.grid import TimeGrid, whole_steps
+from podusv_cli.kernels import Vector, bundle, kernel
+from podusv_cli.paths.base import TARGET, Path
+from podusv_cli.recording import Recording, Status
+from podusv_cli.vessels.vessel import Vessel
+
+STATE = ("x", "y", "psi", "u", "v", "r")
+DEMAND = ("tau_u_cmd", "tau_r_cmd")
+LOADS = ("tau_u", "tau_v", "tau_r", "b_u", "b_v", "b_r")
+FIRST_BLOCK = 256  # steps
+LONGEST_BLOCK = 0.05  # s; a key press or a progress bar waits no longer
+
+
+@kernel
+def _see_nothing(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
+    pass
+
+
+@kernel
+def _no_sample(t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector) -> None:
+    pass
+
+
+@dataclass(frozen=True)
+class Observer:
+    """A kernel `watch(t, weight, s, row, k, seen)` that sees every instant, its constants, its memory."""
+
+    watch: Callable[..., None] = _see_nothing
+    constants: dict[str, float] = field(default_factory=lambda: {"nothing": 0.0})
+    size: int = 1
+
+
+@dataclass(frozen=True)
+class ClosedLoop:
+    """Everything that moves, as values; `nominal` is the vessel that the law is told about."""
+
+    vessel: Vessel
+    nominal: Vessel
+    path: Path
+    disturbance: Disturbance
+    actuator: Actuator
+    controller: Controller
+    start: tuple[float, float, float, float, float, float]
+
+    def first_memory(self) -> Vector:
+        """The law's memory at t = 0."""
+        target = np.zeros(len(TARGET))
+        self.path.evaluate(0.0, bundle(self.path.constants()), self.path.table(), target)
+        return self.controller.start(np.array(self.start), target, self.nominal)
+
+    def layout(self, grid: TimeGrid) -> Plan:
+        """Sizes and offsets of the loop on this grid."""
+        law, actuator = self.controller, self.actuator
+        memory = 6 + len(actuator.states)
+        sizes = [len(TARGET), len(law.signals), len(DEMAND), 3, 3, len(actuator.signals)]
+        signals, demand, tau, b, flags, columns = np.cumsum(sizes).tolist()
+        period = law.sample_period()
+        return Plan(
+            states=memory + sum(size for _, size in law.slots()), memory=memory,
+            signals=signals, demand=demand, tau=tau, b=b, flags=flags, columns=columns,
+            steps=grid.steps, log_every=grid.log_every, hold_every=grid.hold_every,
+            sample_every=whole_steps(period, grid.step) or 0,
+        )  # fmt: skip
+
+
+def simulate(
+    loop: ClosedLoop,
+    grid: TimeGrid,
+    *,
+    observer: Observer | None = None,
+    compiled: bool = True,
+    progress: Callable[[float], None] | None = None,
+) -> Recording:
+    """Integrate the closed loop over the grid.
+
+    `progress` is called between blocks with the fraction done. KeyboardInterrupt ends the march
+    and keeps what was logged; `compiled=False` runs the same kernels as plain Python.
+    """
+    observer = observer or Observer()
+    plan = loop.layout(grid)
+    wires = _wire(loop, grid, plan, observer)
+    march = _marcher(loop, observer, compiled)
+    with np.errstate(all="ignore"):
+        reached, status = _in_blocks(lambda a, b: march(a, b, grid.step, wires, plan), plan, progress)
+    return _record(loop, grid, plan, wires, reached, status)
+
+
+def entries(loop: ClosedLoop, observer: Observer) -> Iterator[tuple[Any, Any, tuple[str, ...]]]:
+    """Door, kernel and constants' names of every part, in the order in which the loop takes them."""
+    law, path, disturbance, actuator = loop.controller, loop.path, loop.disturbance, loop.actuator
+    informed = tuple(law.informed(loop.nominal))
+    sample = law.sample if law.sample_period() > 0 else _no_sample
+    yield signatures.path_entry, path.evaluate, tuple(path.constants())
+    yield signatures.disturbance_entry, disturbance.evaluate, tuple(disturbance.constants())
+    yield signatures.law_entry, law.law, informed
+    yield signatures.sample_entry, sample, informed
+    yield signatures.actuator_entry, actuator.drive, tuple(actuator.constants())
+    yield signatures.observer_entry, observer.watch, tuple(observer.constants)
+
+
+def _marcher(loop: ClosedLoop, observer: Observer, compiled: bool) -> Callable[..., int]:
+    if not compiled:
+        doors = [signatures.bind(*part) for part in entries(loop, observer)]
+        return lambda *rest: closed_loop.advance(*doors, *rest)
+    from podusv_cli.engine import compiling  # numba is slow to import and not always wanted
+
+    doors = [compiling.entry(*part) for part in entries(loop, observer)]
+    march = compiling.march()
+    return lambda *rest: int(march(*doors, *rest))
+
+
+def _wire(loop: ClosedLoop, grid: TimeGrid, plan: Plan, observer: Observer) -> Wires:
+    def numbers(constants: dict[str, float]) -> Vector:
+        return np.array(list(constants.values()) or [0.0])
+
+    law, path, disturbance, actuator = loop.controller, loop.path, loop.disturbance, loop.actuator
+    width = 1 + plan.states + plan.columns
+    return Wires(
+        path=numbers(path.constants()), path_table=path.table(),
+        disturbance=numbers(disturbance.constants()), disturbance_table=disturbance.table(),
+        law=numbers(law.informed(loop.nominal)), law_table=law.table(),
+        actuator=numbers(actuator.constants()), actuator_table=actuator.table(),
+        vessel=numbers(loop.vessel.constants()), observer=numbers(observer.constants),
+        s=np.concatenate([loop.start, actuator.rest(), loop.first_memory()]),
+        row=np.zeros(plan.columns), stages=np.zeros(5 * plan.states),
+        held=np.zeros(closed_loop.HELD_SIGNALS + len(law.signals)),
+        work=np.zeros(law.workspace()), seen=np.zeros(observer.size),
+        log=np.empty(grid.rows * width),
+    )  # fmt: skip
+
+
+def _in_blocks(
+    march: Callable[[int, int], int], plan: Plan, progress: Callable[[float], None] | None
+) -> tuple[int, Status]:
+    """March until the end or trouble; how many instants are good, and the status."""
+    end, size, done = plan.steps + 1, FIRST_BLOCK, 0
+    try:
+        while done < end:
+            began = time.perf_counter()
+            goal = min(done + size, end)
+            reached = march(done, goal)
+            if reached < goal:
+                return reached, "diverged"
+            done = goal
+            if progress:
+                progress(done / end)
+            took = time.perf_counter() - began
+            size = max(1, int(size * min(4.0, 0.7 * LONGEST_BLOCK / max(took, 1e-9))))
+    except KeyboardInterrupt:
+        return done, "interrupted"
+    return done, "finished"
+
+
+def names(loop: ClosedLoop) -> list[str]:
+    """Names of a logged row's columns: time, state, row; a slot of size n has n columns."""
+    slots = [name for name, size in loop.controller.slots() for _ in range(size)]
+    signals = [*TARGET, *loop.controller.signals, *DEMAND, *LOADS, *loop.actuator.signals]
+    return ["time", *STATE, *loop.actuator.states, *slots, *signals]
+
+
+def _record(
+    loop: ClosedLoop, grid: TimeGrid, plan: Plan, wires: Wires, reached: int, status: Status
+) -> Recording:
+    rows = (reached + grid.log_every - 1) // grid.log_every
+    table = wires.log.reshape(grid.rows, -1)[:rows]
+    labels = names(loop)
+    vectors = {name for name, size in loop.controller.slots() if name.startswith("W_hat")}
+    signals: dict[str, Vector] = {}
+    for name in dict.fromkeys(labels):
+        columns = [i for i, label in enumerate(labels) if label == name]
+        part = table[:, columns[0] : columns[-1] + 1]
+        signals[name] = part if name in vectors else part[:, 0]
+    for hidden in TARGET[2:]:
+        del signals[hidden]
+    message = ""
+    if status == "diverged":
+        message = _last_words(wires, labels, signals, reached * grid.step)
+    fixed = loop.controller.fixed_signals()
+    return Recording(status, loop.controller.kind, signals, fixed, wires.seen, message)
+
+
+def _last_words(wires: Wires, labels: list[str], signals: dict[str, Vector], at: float) -> str:
+    now = np.concatenate([[at], wires.s, wires.row])
+    bad = next((name for name, number in zip(labels, now, strict=True)
+                if not abs(number) <= closed_loop.LARGEST), "?")  # fmt: skip
+    last = ", ".join(
+        f"{name} {signals[name][-1]:.4g}" for name in ("time", *STATE, *DEMAND) if len(signals[name])
+    )
+    return f"diverged at t = {at:.6g} s: {bad} is not finite; last logged values: {last or 'none'}"

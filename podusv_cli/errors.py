@@ -1,0 +1,39 @@
+"""What can go wrong, as values with an exit code and a sentence for the user."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+class PodusvError(Exception):
+    """A failure that podusv explains in one line; anything else is a bug (exit code 1)."""
+
+    exit_code = 1
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One fault of a scenario: where it stands, which key, what is wrong and what would be right."""
+
+    where: str  # "configs/a.yaml:12:5", "--set vessel.m=0", or a data file
+    key: str  # dotted path of the key, "" for the file as a whole
+    text: str
+
+    def __str__(self) -> str:
+        return ": ".join(part for part in (self.where, self.key, self.text) if part)
+
+
+class ScenarioError(PodusvError):
+    """A scenario that cannot be run; carries every finding at once."""
+
+    exit_code = 2
+
+    def __init__(self, findings: list[Finding]) -> None:
+        self.findings = findings
+        super().__init__("\n".join(str(finding) for finding in findings))
+
+
+class StorageError(PodusvError):
+    """Reading or writing failed: disk full, not writable, missing or damaged file."""
+
+    exit_code = 5

@@ -1,0 +1,83 @@
+"""The convention for code that runs inside the compiled loop.
+
+A kernel is a plain Python function on floats and vectors. It can be called as it is (tests and
+the uncompiled engine do), and `engine.compiling` turns it, with every kernel it calls, into
+machine code. Inside compiled code a vector is a bare pointer: index it, pass `tail(v, n)` for the
+part from n on, and never ask for its length.
+"""
+
+from __future__ import annotations
+
+from collections import namedtuple
+from collections.abc import Callable, Mapping
+from functools import cache
+from types import FunctionType
+from typing import Any, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+Vector = npt.NDArray[np.float64]
+Function = TypeVar("Function", bound=Callable[..., object])
+
+
+def kernel(function: Function) -> Function:
+    """Mark a function as code for the compiled loop; the function itself stays as it is."""
+    function.__kernel__ = True  # type: ignore[attr-defined]
+    return function
+
+
+def is_kernel(thing: object) -> bool:
+    """Whether `thing` was marked with `kernel`."""
+    return getattr(thing, "__kernel__", False) is True
+
+
+@kernel
+def tail(vector: Vector, start: int) -> Vector:
+    """The part of `vector` from index `start` on, sharing its memory."""
+    return vector[start:]
+
+
+@kernel
+def address(vector: Vector) -> Vector:
+    """`vector` as kernels take it: itself here, a bare pointer in compiled code."""
+    return vector
+
+
+def with_globals(function: Any, name: str, **replaced: Any) -> Any:
+    """A copy of `function`, called `name`, that sees `replaced` in place of its globals."""
+    copy = FunctionType(function.__code__, {**function.__globals__, **replaced}, name)
+    copy.__qualname__ = name
+    copy.__module__ = function.__module__
+    copy.__doc__ = function.__doc__
+    return copy
+
+
+def specialise(function: Any, name: str, **parts: Any) -> Any:
+    """A kernel that is `function` with these kernels put in for globals of the same names.
+
+    Compiled code cannot be cached when it takes a kernel as an argument; this is the way around.
+    """
+    return kernel(with_globals(function, name, **parts))
+
+
+@cache
+def constants_type(names: tuple[str, ...]) -> type[Any]:
+    """The named tuple type with these fields; the same type for the same names."""
+    return namedtuple("Constants", names)
+
+
+def bundle(constants: Mapping[str, float]) -> Any:
+    """Constants as kernels take them: `k.m11` instead of `constants["m11"]`."""
+    return constants_type(tuple(constants))(**constants)
+
+
+def unpacker(names: tuple[str, ...]) -> Callable[[Vector], Any]:
+    """A kernel from a vector to the named tuple of these constants.
+
+    Its source is written out, one index a field: compiled code has no calls of variable length.
+    """
+    fields = ", ".join(f"p[{i}]" for i in range(len(names)))
+    scope: dict[str, Any] = {"Constants": constants_type(names)}
+    exec(f"def named(p):\n    return Constants({fields})", scope)  # noqa: S102
+    return kernel(scope["named"])  # type: ignore[no-any-return]

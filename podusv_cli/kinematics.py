@@ -1,0 +1,23 @@
+"""Frames and angles. Angles in rad, x north, y east, psi from x towards y."""
+
+from __future__ import annotations
+
+import math
+
+from podusv_cli.kernels import Vector, kernel
+
+
+@kernel
+def wrap(angle: float) -> float:
+    """`angle` [rad] brought into (-pi, pi]."""
+    return angle - 2.0 * math.pi * math.ceil((angle - math.pi) / (2.0 * math.pi))
+
+
+@kernel
+def earth_velocity(x: Vector, rate: Vector) -> None:
+    """Rates of (x, y, psi) from the state (x, y, psi, u, v, r); paper (3)."""
+    cos_psi = math.cos(x[2])
+    sin_psi = math.sin(x[2])
+    rate[0] = x[3] * cos_psi - x[4] * sin_psi
+    rate[1] = x[3] * sin_psi + x[4] * cos_psi
+    rate[2] = x[5]

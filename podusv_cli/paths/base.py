@@ -1,0 +1,36 @@
+"""What every path offers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from podusv_cli.kernels import Vector
+from podusv_cli.registry import Component
+
+TARGET = ("x_d", "y_d", "x_d_dot", "y_d_dot", "x_d_ddot", "y_d_ddot")
+
+
+@dataclass(frozen=True)
+class Break:
+    """A time [s] at which the target's position, velocity or acceleration jumps."""
+
+    time: float
+    what: Literal["position", "velocity", "acceleration"]
+
+
+class Path(Component):
+    """A target moving in the plane.
+
+    `evaluate(t, k, table, target)` is a kernel that writes position [m], velocity [m/s] and
+    acceleration [m/s2] at time t [s] into `target`, in the order of `TARGET`.
+    """
+
+    @staticmethod
+    def evaluate(t: float, k: Any, table: Vector, target: Vector) -> None:
+        """Write the target at time t; every path has its own."""
+        raise NotImplementedError
+
+    def breaks(self) -> tuple[Break, ...]:
+        """Times at which the target is not smooth, in order."""
+        return ()

@@ -1,0 +1,85 @@
+"""A smooth path through given points."""
+
+from __future__ import annotations
+
+from typing import Any, Literal, Self
+
+import numpy as np
+from pydantic import model_validator
+
+from podusv_cli.kernels import Vector, kernel
+from podusv_cli.paths.base import Path
+from podusv_cli.registry import value
+
+Point = tuple[float, float]
+
+
+@kernel
+def _segment(t: float, count: int, table: Vector) -> int:
+    """Index of the last of `count` knots at or before t, by bisection; 0 before the first."""
+    low = 0
+    high = count
+    while high - low > 1:
+        middle = (low + high) // 2
+        if table[middle] <= t:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+class Waypoints(Path):
+    """A natural cubic spline through the points, in the time that chords at `speed` would take.
+
+    Position, velocity and acceleration are continuous, so the speed varies a little in bends.
+    After the last point the target goes straight on with the speed it has there.
+    """
+
+    kind: Literal["waypoints"] = "waypoints"
+    file: str | None = value(
+        None, "", "CSV file with one `x,y` [m] a line, beside the scenario; read into `points`"
+    )
+    points: tuple[Point, ...] = value(
+        (), "m", "list of [x, y], at least two, neighbours apart", strict=False
+    )
+    speed: float = value(0.5, "m/s", "speed along the chords between the points", gt=0)
+
+    @model_validator(mode="after")
+    def _travelled(self) -> Self:
+        if len(self.points) < 2:
+            raise ValueError(f"needs at least two points, has {len(self.points)}")
+        if np.any(np.diff(self._knots()) <= 0):
+            raise ValueError("two neighbouring points are the same")
+        return self
+
+    def _knots(self) -> Vector:
+        """Time [s] at which the target passes each point."""
+        chords = np.hypot(*np.diff(np.asarray(self.points), axis=0).T)
+        return np.concatenate([[0.0], np.cumsum(chords)]) / self.speed
+
+    def constants(self) -> dict[str, float]:
+        """The speed and the number of points."""
+        return super().constants() | {"count": float(len(self.points))}
+
+    def table(self) -> Vector:
+        """The knots, then eight coefficients a knot: cubic in x, cubic in y, highest power first."""
+        from scipy.interpolate import CubicSpline
+
+        knots = self._knots()
+        spline = CubicSpline(knots, np.asarray(self.points), bc_type="natural")
+        last = np.concatenate([[0, 0], spline(knots[-1], 1), spline(knots[-1])])
+        cubic = np.vstack([spline.c.transpose(1, 2, 0).reshape(-1, 8), last[[0, 1, 2, 4, 0, 1, 3, 5]]])
+        return np.concatenate([knots, cubic.ravel()])
+
+    @staticmethod
+    @kernel
+    def evaluate(t: float, k: Any, table: Vector, target: Vector) -> None:
+        """The spline and its derivatives, by Horner's rule."""
+        count = int(k.count)
+        i = _segment(t, count, table)
+        s = t - table[i]
+        for axis in range(2):
+            c = count + 8 * i + 4 * axis
+            target[axis] = ((table[c] * s + table[c + 1]) * s + table[c + 2]) * s + table[c + 3]
+            target[2 + axis] = (3.0 * table[c] * s + 2.0 * table[c + 1]) * s + table[c + 2]
+            target[4 + axis] = 6.0 * table[c] * s + 2.0 * table[c + 1]

@@ -1,0 +1,66 @@
+"""Every signal that podusv logs: one table for logs, metrics, axes and documentation.
+
+Symbols are LaTeX as matplotlib reads it. `axes` names the dimensions after `time`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A logged quantity."""
+
+    name: str
+    symbol: str
+    unit: str
+    meaning: str
+    axes: tuple[str, ...] = ()
+
+
+_ROWS = (
+    Signal("time", "t", "s", "time since the start of the run"),
+    Signal("x", "x", "m", "vessel position, north"),
+    Signal("y", "y", "m", "vessel position, east"),
+    Signal("psi", r"\psi", "rad", "heading, from north towards east, not wrapped"),
+    Signal("u", "u", "m/s", "surge velocity"),
+    Signal("v", "v", "m/s", "sway velocity"),
+    Signal("r", "r", "rad/s", "yaw rate"),
+    Signal("x_d", "x_d", "m", "target position, north"),
+    Signal("y_d", "y_d", "m", "target position, east"),
+    Signal("z_e", "z_e", "m", "distance to the target (18)"),
+    Signal("psi_d", r"\psi_d", "rad", "direction of the target (19), in (-pi, pi]"),
+    Signal("psi_e", r"\psi_e", "rad", "heading error that the law acts on, after folding"),
+    Signal("alpha_u", r"\alpha_u", "m/s", "virtual surge velocity (21)"),
+    Signal("alpha_r", r"\alpha_r", "rad/s", "virtual yaw rate (30)"),
+    Signal("beta_u", r"\beta_u", "m/s", "filtered virtual surge velocity (22)"),
+    Signal("beta_r", r"\beta_r", "rad/s", "filtered virtual yaw rate (31)"),
+    Signal("u_e", "u_e", "m/s", "surge velocity error (23)"),
+    Signal("r_e", "r_e", "rad/s", "yaw rate error (32)"),
+    Signal("tau_u_cmd", r"\tau_{u,\mathrm{cmd}}", "N", "surge force that the law asked for"),
+    Signal("tau_r_cmd", r"\tau_{r,\mathrm{cmd}}", "N m", "yaw moment that the law asked for"),
+    Signal("tau_u", r"\tau_u", "N", "surge force on the hull"),
+    Signal("tau_v", r"\tau_v", "N", "sway force on the hull"),
+    Signal("tau_r", r"\tau_r", "N m", "yaw moment on the hull"),
+    Signal("b_u", "b_u", "N", "disturbance force in surge"),
+    Signal("b_v", "b_v", "N", "disturbance force in sway"),
+    Signal("b_r", "b_r", "N m", "disturbance moment in yaw"),
+    Signal("b_hat_u", r"\hat b_u", "N", "estimated bound of b_u (28)"),
+    Signal("b_hat_r", r"\hat b_r", "N m", "estimated bound of b_r (37)"),
+    Signal("W_hat_u", r"\hat W_u", "m/s2", "surge network weights (27)", ("node",)),
+    Signal("W_hat_r", r"\hat W_r", "rad/s2", "yaw network weights (36)", ("node",)),
+    Signal("f_hat_u", r"\hat f_u", "m/s2", "network's estimate of f_u (25)"),
+    Signal("f_hat_r", r"\hat f_r", "rad/s2", "network's estimate of f_r (34)"),
+    Signal("psi_d_held", r"\psi_d^-", "rad", "target direction at the law's last sample"),
+    Signal("psi_d_rate_held", r"\dot\psi_d^-", "rad/s", "difference quotient held by the law"),
+    Signal("integral_u", r"\int u_p", "m", "integral of the surge velocity error (PID)"),
+    Signal("integral_r", r"\int r_p", "rad", "integral of the yaw rate error (PID)"),
+    Signal("lag_u", "u_{p,f}", "m/s", "lagged surge velocity error (PID derivative)"),
+    Signal("lag_r", "r_{p,f}", "rad/s", "lagged yaw rate error (PID derivative)"),
+    Signal("saturated", "sat", "1", "1 while the actuator limits what the law asked for"),
+    Signal("rbf_center", "c", "1", "network centres in (u, v, r) [m/s, m/s, rad/s]"),
+    Signal("rbf_width", r"\sigma", "1", "Gaussian widths in (u, v, r) [m/s, m/s, rad/s]"),
+)
+
+SIGNALS: dict[str, Signal] = {row.name: row for row in _ROWS}
