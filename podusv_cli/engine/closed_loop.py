@@ -64,19 +64,31 @@ coefficients = unpacker(COEFFICIENTS)
 
 
 @kernel
+def pointers(c: Wires) -> Wires:
+    """The same vectors as kernels take them; handing on whole arrays costs more than a law."""
+    return Wires(
+        address(c.path), address(c.path_table), address(c.disturbance),
+        address(c.disturbance_table), address(c.law), address(c.law_table), address(c.actuator),
+        address(c.actuator_table), address(c.vessel), address(c.observer), address(c.s),
+        address(c.row), address(c.stages), address(c.held), address(c.work), address(c.seen),
+        address(c.log),
+    )  # fmt: skip
+
+
+@kernel
 def rates(
     t: float, s: Vector, ds: Vector,
     path: Function, disturbance: Function, law: Function, actuator: Function, c: Wires, n: Plan,
 ) -> None:  # fmt: skip
     """Right-hand side of the closed loop at time t; leaves all signals in the row."""
-    row = address(c.row)
+    row = c.row
     demand, tau, b = tail(row, n.demand), tail(row, n.tau), tail(row, n.b)
     memory, memory_rate = tail(s, n.memory), tail(ds, n.memory)
-    p, table, work = address(c.law), address(c.law_table), address(c.work)
-    path(t, address(c.path), address(c.path_table), row)
-    disturbance(t, s, address(c.disturbance), address(c.disturbance_table), b)
+    p, table, work = c.law, c.law_table, c.work
+    path(t, c.path, c.path_table, row)
+    disturbance(t, s, c.disturbance, c.disturbance_table, b)
     if n.hold_every > 0:
-        held = address(c.held)
+        held = c.held
         law(
             held[0], tail(held, HELD_X), memory, tail(held, HELD_TARGET), p, table,
             tail(held, HELD_DEMAND), memory_rate, tail(held, HELD_SIGNALS), work,
@@ -84,10 +96,10 @@ def rates(
     else:
         law(t, s, memory, row, p, table, demand, memory_rate, tail(row, n.signals), work)
     actuator(
-        t, s, tail(s, 6), demand, address(c.actuator), address(c.actuator_table),
+        t, s, tail(s, 6), demand, c.actuator, c.actuator_table,
         tau, tail(ds, 6), tail(row, n.flags),
     )  # fmt: skip
-    plant(s, tau, b, coefficients(address(c.vessel)), ds)
+    plant(s, tau, b, coefficients(c.vessel), ds)
 
 
 @kernel
@@ -95,10 +107,10 @@ def sample_and_hold(
     k: int, t: float, path: Function, law: Function, sample: Function, c: Wires, n: Plan
 ) -> None:
     """What happens at instants only: the law's own samples, and the hold of sampled control."""
-    s, row, held = address(c.s), address(c.row), address(c.held)
+    s, row, held = c.s, c.row, c.held
     memory = tail(s, n.memory)
-    p, table = address(c.law), address(c.law_table)
-    path(t, address(c.path), address(c.path_table), row)
+    p, table = c.law, c.law_table
+    path(t, c.path, c.path_table, row)
     if n.sample_every > 0 and k % n.sample_every == 0:
         sample(t, s, memory, row, p, table)
     if n.hold_every > 0 and k % n.hold_every == 0:
@@ -107,8 +119,8 @@ def sample_and_hold(
             held[HELD_X + i] = s[i]
             held[HELD_TARGET + i] = row[i]
         law(
-            t, s, memory, row, p, table, tail(row, n.demand), tail(address(c.stages), n.memory),
-            tail(row, n.signals), address(c.work),
+            t, s, memory, row, p, table, tail(row, n.demand), tail(c.stages, n.memory),
+            tail(row, n.signals), c.work,
         )  # fmt: skip
 
 
@@ -125,8 +137,8 @@ def step(
     path: Function, disturbance: Function, law: Function, actuator: Function, c: Wires, n: Plan,
 ) -> None:  # fmt: skip
     """Classical RK4 from t to t + h; the first stage has been evaluated already."""
-    s, count = address(c.s), n.states
-    k1 = address(c.stages)
+    s, count = c.s, n.states
+    k1 = c.stages
     k2, k3, k4 = tail(k1, count), tail(k1, 2 * count), tail(k1, 3 * count)
     y = tail(k1, 4 * count)
     shifted(count, s, 0.5 * h, k1, y)
@@ -151,8 +163,8 @@ def finite(count: int, vector: Vector) -> bool:
 @kernel
 def write_row(k: int, t: float, c: Wires, n: Plan) -> None:
     """Log t, s and the row."""
-    s, row = address(c.s), address(c.row)
-    out = tail(address(c.log), k // n.log_every * (1 + n.states + n.columns))
+    s, row = c.s, c.row
+    out = tail(c.log, k // n.log_every * (1 + n.states + n.columns))
     out[0] = t
     for i in range(n.states):
         out[1 + i] = s[i]
@@ -163,21 +175,40 @@ def write_row(k: int, t: float, c: Wires, n: Plan) -> None:
 @kernel
 def advance(
     path: Function, disturbance: Function, law: Function, sample: Function, actuator: Function,
-    observe: Function, first: int, last: int, h: float, c: Wires, n: Plan,
+    observe: Function, first: int, last: int, h: float, wires: Wires, n: Plan,
 ) -> int:  # fmt: skip
     """March over the instants first .. last - 1; the first instant that is not finite, or `last`."""
-    s, row = address(c.s), address(c.row)
+    c = pointers(wires)
+    s, row = c.s, c.row
     for k in range(first, last):
         t = k * h
         if n.sample_every > 0 or n.hold_every > 0:
             sample_and_hold(k, t, path, law, sample, c, n)
-        rates(t, s, address(c.stages), path, disturbance, law, actuator, c, n)
+        rates(t, s, c.stages, path, disturbance, law, actuator, c, n)
         if not (finite(n.states, s) and finite(n.columns, row)):
             return k
         weight = 0.5 * h if k == 0 or k == n.steps else h
-        observe(t, weight, s, row, address(c.observer), address(c.seen))
+        observe(t, weight, s, row, c.observer, c.seen)
         if k % n.log_every == 0:
             write_row(k, t, c, n)
         if k < n.steps:
             step(t, h, path, disturbance, law, actuator, c, n)
     return last
+
+
+@kernel
+def evaluate_all(
+    law: Function, rounds: int, count: int, width: int,
+    rows: Vector, p: Vector, table: Vector, tau: Vector, out: Vector,
+) -> None:  # fmt: skip
+    """Call the law `rounds` times on each of `count` rows of (t, target, x, memory).
+
+    `out` takes rate, signals and scratch, each up to `width` numbers.
+    """
+    for _ in range(rounds):
+        for i in range(count):
+            row = tail(address(rows), i * width)
+            law(
+                row[0], tail(row, 7), tail(row, 13), tail(row, 1), address(p), address(table),
+                address(tau), address(out), tail(address(out), width), tail(address(out), 2 * width),
+            )  # fmt: skip

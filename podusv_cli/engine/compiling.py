@@ -23,7 +23,7 @@ from numba.extending import intrinsic
 
 from podusv_cli import kernels
 from podusv_cli.engine import signatures
-from podusv_cli.engine.closed_loop import Plan, Wires, advance
+from podusv_cli.engine.closed_loop import Plan, Wires, advance, evaluate_all
 
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": False}
 KEPT = 8  # caches of this many states of the source stay on disk
@@ -96,6 +96,14 @@ def march() -> Any:
     plan = types.NamedUniTuple(types.int64, len(Plan._fields), Plan)
     signature = types.int64(*functions, types.int64, types.int64, NUMBER, wires, plan)
     return _stored(signature, machine(advance).py_func)
+
+
+@cache
+def replay() -> Any:
+    """Machine code of `replay.evaluate_all`."""
+    law = types.FunctionType(SIGNATURES[signatures.law_entry])
+    signature = types.void(law, *[types.int64] * 3, *[ARRAY] * 5)
+    return _stored(signature, machine(evaluate_all).py_func)
 
 
 def _stored(signature: Any, function: Any) -> Any:

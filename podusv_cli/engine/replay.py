@@ -1,0 +1,58 @@
+"""Evaluate a law again and again over logged states, to see what one evaluation costs."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from podusv_cli.engine import signatures
+from podusv_cli.engine.closed_loop import Function
+from podusv_cli.engine.simulate import STATE, ClosedLoop
+from podusv_cli.kernels import Vector, bundle
+from podusv_cli.paths.base import TARGET
+from podusv_cli.recording import Recording
+
+
+def _rows(loop: ClosedLoop, recording: Recording, most: int) -> Vector:
+    times = recording["time"]
+    chosen = np.unique(np.linspace(0, len(times) - 1, min(most, len(times))).astype(int))
+    names = [*STATE, *(name for name, _ in loop.controller.slots())]
+    logged = np.column_stack([recording[name][chosen] for name in names])
+    k, table = bundle(loop.path.constants()), loop.path.table()
+    targets = np.zeros((len(chosen), len(TARGET)))
+    for t, target in zip(times[chosen], targets, strict=True):
+        loop.path.evaluate(float(t), k, table, target)
+    return np.column_stack([times[chosen], targets, logged])
+
+
+def law_times(
+    loop: ClosedLoop, recording: Recording, *, most: int = 1000, rounds: int = 10, repeats: int = 9
+) -> Vector:
+    """Time of one evaluation of the law [ns], once for each of `repeats` replays.
+
+    A replay goes `rounds` times over at most `most` logged rows, in machine code.
+    """
+    from podusv_cli.engine import compiling  # numba is slow to import and not always wanted
+
+    rows = _rows(loop, recording, most)
+    count, width = rows.shape
+    room = max(width, len(loop.controller.signals)) * 2 + loop.controller.workspace()
+    informed = loop.controller.informed(loop.nominal)
+    p = np.array(list(informed.values()))
+    buffers = (rows.ravel(), p, loop.controller.table(), np.zeros(2), np.zeros(room))
+    replay: Callable[..., None] = compiling.replay()
+    law = compiling.entry(signatures.law_entry, loop.controller.law, tuple(informed))
+    return np.array(
+        [_timed(replay, law, rounds, count, width, buffers) / (rounds * count) for _ in range(repeats)]
+    )
+
+
+def _timed(
+    replay: Callable[..., None], law: Function, rounds: int, count: int, width: int,
+    buffers: tuple[Vector, ...],
+) -> float:  # fmt: skip
+    began = time.perf_counter_ns()
+    replay(law, rounds, count, width, *buffers)
+    return float(time.perf_counter_ns() - began)

@@ -1,0 +1,35 @@
+"""Every metric: one table for computing, printing and documentation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Metric:
+    """A number that sums up a run; smaller is better for all of them."""
+
+    name: str
+    unit: str
+    meaning: str
+
+
+_ROWS = (
+    Metric("iae", "m s", "integral of z_e"),
+    Metric("ise", "m2 s", "integral of z_e^2"),
+    Metric("itae", "m s2", "integral of t z_e"),
+    Metric("rmse", "m", "root of the mean of z_e^2"),
+    Metric("z_e_steady", "m", "mean of z_e over the steady window"),
+    Metric("settling_time", "s", "when z_e comes within the settling radius to stay"),
+    Metric("peak_tau_u", "N", "largest |tau_u| that the law asked for"),
+    Metric("peak_tau_r", "N m", "largest |tau_r| that the law asked for"),
+    Metric("effort_u", "N2 s", "integral of tau_u^2 on the hull"),
+    Metric("effort_r", "N2 m2 s", "integral of tau_r^2 on the hull"),
+    Metric("energy", "J", "integral of |tau_u u| + |tau_r r|, tau on the hull"),
+    Metric("tv_tau_u", "N", "total variation of the demanded tau_u in the steady window"),
+    Metric("tv_tau_r", "N m", "total variation of the demanded tau_r in the steady window"),
+    Metric("saturated_fraction", "1", "part of the time in which the actuator limits the law"),
+    Metric("law_ns", "ns", "median time of one evaluation of the law over its logged states"),
+)
+
+METRICS: dict[str, Metric] = {row.name: row for row in _ROWS}
