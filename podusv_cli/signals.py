@@ -29,6 +29,8 @@ _ROWS = (
     Signal("r", "r", "rad/s", "yaw rate"),
     Signal("x_d", "x_d", "m", "target position, north"),
     Signal("y_d", "y_d", "m", "target position, east"),
+    Signal("x_e", "x_e", "m", "target ahead of the vessel, north (18); derived, not logged"),
+    Signal("y_e", "y_e", "m", "target ahead of the vessel, east (18); derived, not logged"),
     Signal("z_e", "z_e", "m", "distance to the target (18)"),
     Signal("psi_d", r"\psi_d", "rad", "direction of the target (19), in (-pi, pi]"),
     Signal("psi_e", r"\psi_e", "rad", "heading error that the law acts on, after folding"),

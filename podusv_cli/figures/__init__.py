@@ -1,0 +1,1 @@
+"""Figures from recordings: one file a family, one style for all."""

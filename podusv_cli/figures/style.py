@@ -1,0 +1,130 @@
+"""The look that all figures share: sizes, colours, line styles, labels, thinning, saving."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from podusv_cli.kernels import Vector
+from podusv_cli.recording import Recording
+from podusv_cli.signals import SIGNALS
+
+FORMATS = ("png", "pdf", "svg")
+WIDTHS = {1: 3.46, 2: 7.09}  # inches: one column and two columns of a journal page
+
+# Okabe and Ito's palette, with line styles that tell the curves apart in grey print too.
+LOOKS: tuple[tuple[str, Any], ...] = (
+    ("#0072B2", "-"),
+    ("#D55E00", (0, (5, 1.5))),
+    ("#009E73", (0, (1.2, 1.2))),
+    ("#CC79A7", (0, (6, 1.5, 1.2, 1.5))),
+    ("#56B4E9", (0, (3, 1, 1, 1, 1, 1))),
+    ("#E69F00", (0, (9, 2))),
+)
+TARGET_LOOK: dict[str, Any] = {"color": "#444444", "linewidth": 0.8, "linestyle": "-"}
+NO_STAMP: dict[str, dict[str, Any]] = {
+    "png": {"Software": None},
+    "pdf": {"CreationDate": None, "Producer": None, "Creator": None},
+    "svg": {"Date": None, "Creator": None},
+}
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A recording with the name, colour and line style under which every figure shows it.
+
+    `length` and `beam` [m] are the vessel's, `limits` the actuator's (surge [N], yaw [N m]).
+    """
+
+    label: str
+    recording: Recording
+    color: str
+    linestyle: Any
+    length: float
+    beam: float
+    steady_from: float
+
+    @property
+    def look(self) -> dict[str, Any]:
+        """Keyword arguments of `Axes.plot`."""
+        return {"color": self.color, "linestyle": self.linestyle, "label": self.label}
+
+    def signal(self, name: str) -> Vector:
+        """A logged signal, or x_e and y_e (18)."""
+        derived = {"x_e": ("x_d", "x"), "y_e": ("y_d", "y")}
+        if name not in derived:
+            return self.recording[name]
+        target, own = derived[name]
+        return self.recording[target] - self.recording[own]
+
+
+@contextmanager
+def house_style() -> Iterator[None]:
+    """matplotlib's settings as in podusv.mplstyle, for figures made inside."""
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        settings = mpl.rc_params_from_file(
+            Path(__file__).with_name("podusv.mplstyle"), use_default_template=False
+        )
+        mpl.rcParams.update(settings)
+        yield
+
+
+def new_figure(columns: int, height: float) -> Figure:
+    """An empty figure, `columns` journal columns wide and `height` inches high, without pyplot."""
+    figure = Figure(figsize=(WIDTHS[columns], height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def axis_label(name: str) -> str:
+    """Symbol and unit of a signal as an axis shows them."""
+    signal = SIGNALS[name]
+    return f"${signal.symbol}$ [{signal.unit}]"
+
+
+def thinned(t: Vector, y: Vector, points: int = 1500) -> tuple[Vector, Vector]:
+    """At most about `points` samples that keep every extreme: the least and largest of each bin."""
+    if len(t) <= points:
+        return t, y
+    edges = np.linspace(0, len(t), points // 2 + 1).astype(int)
+    kept = {0, len(t) - 1}
+    for low, high in zip(edges[:-1], edges[1:], strict=True):
+        kept |= {low + int(np.argmin(y[low:high])), low + int(np.argmax(y[low:high]))}
+    chosen = np.array(sorted(kept))
+    return t[chosen], y[chosen]
+
+
+def draw_signal(
+    axes: Axes, shown: Shown, name: str, *, between: tuple[float, float] | None = None, **look: Any
+) -> None:
+    """Plot a signal over time, or over a part of it [s]; does nothing where it was not logged."""
+    if name not in shown.recording and name not in ("x_e", "y_e"):
+        return
+    t, y = shown.recording["time"], shown.signal(name)
+    if between:
+        inside = (t >= between[0]) & (t <= between[1])
+        t, y = t[inside], y[inside]
+    axes.plot(*thinned(t, y), **{**shown.look, **look})
+
+
+def time_axis(axes: Sequence[Axes]) -> None:
+    """Label the lowest of a column of axes with time."""
+    axes[-1].set_xlabel("time [s]")
+
+
+def image(figure: Figure, form: str) -> bytes:
+    """The figure as a file's content: png, pdf or svg, the same bytes for the same figure."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format=form, metadata=NO_STAMP[form])
+    return buffer.getvalue()
