@@ -13,13 +13,14 @@ class PodusvError(Exception):
 
 @dataclass(frozen=True)
 class Finding:
-    """One fault of a scenario: where it stands, which key, what is wrong and what would be right."""
+    """One fault of a scenario: where it stands, which key, what is wrong, what would be right."""
 
     where: str  # "configs/a.yaml:12:5", "--set vessel.m=0", or a data file
     key: str  # dotted path of the key, "" for the file as a whole
     text: str
 
     def __str__(self) -> str:
+        """One line: place, key, text."""
         return ": ".join(part for part in (self.where, self.key, self.text) if part)
 
 
@@ -29,6 +30,7 @@ class ScenarioError(PodusvError):
     exit_code = 2
 
     def __init__(self, findings: list[Finding]) -> None:
+        """Take the findings; the message has one line each."""
         self.findings = findings
         super().__init__("\n".join(str(finding) for finding in findings))
 

@@ -28,7 +28,9 @@ class Recording:
     message: str = ""
 
     def __getitem__(self, name: str) -> Vector:
-        return self.signals[name]
+        """A signal or fixed array; KeyError where there is none."""
+        return self.signals[name] if name in self.signals else self.fixed[name]
 
     def __contains__(self, name: str) -> bool:
-        return name in self.signals
+        """Whether there is a signal or fixed array of this name."""
+        return name in self.signals or name in self.fixed

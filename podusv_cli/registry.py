@@ -37,7 +37,9 @@ def _numbers(component: Component) -> Iterator[tuple[str, float]]:
     for name, field in type(component).model_fields.items():
         content = getattr(component, name)
         if isinstance(content, Component):
-            yield from ((f"{name}_{inner}", number) for inner, number in content.constants().items())
+            yield from (
+                (f"{name}_{inner}", number) for inner, number in content.constants().items()
+            )
         elif isinstance(content, (bool, int, float)):
             yield name, float(content)
         elif get_origin(field.annotation) is Literal and name != "kind":
@@ -76,4 +78,5 @@ def catalogue(package: str, base: type[Kind]) -> dict[str, type[Kind]]:
 def any_of(package: str, base: type[Kind]) -> Any:
     """The type of a field that takes any component of `package`, told apart by `kind`."""
     choices = tuple(catalogue(package, base).values())
-    return Annotated[Union[choices], Field(discriminator="kind")]
+    union = Union.__getitem__(choices)  # a union whose members are known at run time only
+    return Annotated[union, Field(discriminator="kind")]

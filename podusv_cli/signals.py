@@ -52,6 +52,15 @@ _ROWS = (
     Signal("b_hat_r", r"\hat b_r", "N m", "estimated bound of b_r (37)"),
     Signal("W_hat_u", r"\hat W_u", "m/s2", "surge network weights (27)", ("node",)),
     Signal("W_hat_r", r"\hat W_r", "rad/s2", "yaw network weights (36)", ("node",)),
+    Signal(
+        "W_norm_u", r"|\hat W_u|", "m/s2", "norm of the surge network weights; derived, not logged"
+    ),
+    Signal(
+        "W_norm_r", r"|\hat W_r|", "rad/s2", "norm of the yaw network weights; derived, not logged"
+    ),
+    Signal(
+        "activation", r"\max\Phi", "1", "largest output of a network node (14); derived, not logged"
+    ),
     Signal("f_hat_u", r"\hat f_u", "m/s2", "network's estimate of f_u (25)"),
     Signal("f_hat_r", r"\hat f_r", "rad/s2", "network's estimate of f_r (34)"),
     Signal("psi_d_held", r"\psi_d^-", "rad", "target direction at the law's last sample"),

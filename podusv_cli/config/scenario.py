@@ -73,10 +73,14 @@ class MetricSettings(Component):
 class Scenario(Component):
     """A vessel, its surroundings, its task, its controller, and how the run is done."""
 
-    name: str = value(..., "", "what the results are filed under", pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,79}$")
+    name: str = value(
+        ..., "", "what the results are filed under", pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,79}$"
+    )
     description: str = value("", "", "what the scenario is for, in a sentence")
     vessel: Vessel = value(..., "", "the vessel that is simulated")
-    nominal: Vessel = value(..., "", "the vessel that the controller is told about; the same by default")
+    nominal: Vessel = value(
+        ..., "", "the vessel that the controller is told about; the same by default"
+    )
     start: Start = value(Start(), "", "state at t = 0")
     path: AnyPath = value(..., "", "how the target moves")
     disturbance: AnyDisturbance = value(..., "", "what the sea does")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Literal
+from collections.abc import Callable
+from typing import Any, ClassVar, Literal
 
 from podusv_cli.controllers.polar_backstepping import FilteredBackstepping, polar_backstepping
 from podusv_cli.controllers.tracking import Tracking
@@ -52,6 +53,6 @@ class AdaptiveNeural(FilteredBackstepping):
     B_r: Literal["adaptive"] | float = value(
         "adaptive", "1/s", "bounds B_2 = D_2 in yaw: `adaptive` is A + |alpha| as printed"
     )
-    law = staticmethod(
+    law: ClassVar[Callable[..., None]] = staticmethod(
         specialise(polar_backstepping, "adaptive_neural", surge=surge_shunting, yaw=yaw_shunting)
     )

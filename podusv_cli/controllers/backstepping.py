@@ -8,7 +8,8 @@ coupling between sway and yaw.
 from __future__ import annotations
 
 import math
-from typing import Any, Literal
+from collections.abc import Callable
+from typing import Any, ClassVar, Literal
 
 from podusv_cli.controllers.polar_backstepping import PolarBackstepping, polar_backstepping
 from podusv_cli.controllers.tracking import Tracking, exact_rate
@@ -71,6 +72,6 @@ class Backstepping(PolarBackstepping):
     """Li-type adaptive backstepping without a filter, the paper's reference [25]."""
 
     kind: Literal["backstepping"] = "backstepping"
-    law = staticmethod(
+    law: ClassVar[Callable[..., None]] = staticmethod(
         specialise(polar_backstepping, "backstepping", surge=surge_full, yaw=yaw_full)
     )

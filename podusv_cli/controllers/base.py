@@ -26,6 +26,11 @@ class Controller(Component):
 
     signals: ClassVar[tuple[str, ...]] = ()
 
+    @property
+    def label(self) -> str:
+        """The law's kind."""
+        return str(type(self).model_fields["kind"].default)
+
     @staticmethod
     def law(
         t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from collections.abc import Callable
+from typing import Any, ClassVar, Literal
 
 from podusv_cli.controllers.polar_backstepping import FilteredBackstepping, polar_backstepping
 from podusv_cli.controllers.tracking import Tracking
@@ -34,6 +35,6 @@ class DynamicSurface(FilteredBackstepping):
     kind: Literal["dsc"] = "dsc"
     T_u: float = value(0.2, "s", "time constant in surge", gt=0)
     T_r: float = value(0.2, "s", "time constant in yaw", gt=0)
-    law = staticmethod(
+    law: ClassVar[Callable[..., None]] = staticmethod(
         specialise(polar_backstepping, "dsc", surge=surge_lag, yaw=yaw_lag)
     )

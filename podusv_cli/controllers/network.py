@@ -1,4 +1,4 @@
-"""Gaussian radial basis network over (u, v, r): the paper's (13)-(15), and its adaptation (27), (36)."""
+"""Gaussian radial basis network over (u, v, r), the paper's (13)-(15), and its adaptation."""
 
 from __future__ import annotations
 
@@ -21,30 +21,40 @@ class Network(Component):
     Neither nodes nor widths are printed in the paper; the defaults are podusv's choice.
     """
 
-    nodes: tuple[int, int, int] = value(
-        (3, 3, 3), "", "grid nodes along u, v, r", strict=False
+    nodes: tuple[int, int, int] = value((3, 3, 3), "", "grid nodes along u, v, r", strict=False)
+    low: Triple = value(
+        (-1.0, -1.0, -1.0), "m/s, m/s, rad/s", "first grid node along u, v, r", strict=False
     )
-    low: Triple = value((-1.0, -1.0, -1.0), "m/s, m/s, rad/s", "first grid node along u, v, r", strict=False)
-    high: Triple = value((2.5, 1.0, 1.0), "m/s, m/s, rad/s", "last grid node along u, v, r", strict=False)
-    spread: float = value(0.7, "", "Gaussian width in units of the grid's spacing, axis by axis", gt=0)
+    high: Triple = value(
+        (2.5, 1.0, 1.0), "m/s, m/s, rad/s", "last grid node along u, v, r", strict=False
+    )
+    spread: float = value(
+        0.7, "", "Gaussian width in units of the grid's spacing, axis by axis", gt=0
+    )
     centers: tuple[Triple, ...] = value(
         (), "m/s, m/s, rad/s", "centres (u, v, r) that replace the grid", strict=False
     )
     widths: Triple | None = value(
         None, "m/s, m/s, rad/s", "Gaussian widths along u, v, r that replace `spread`", strict=False
     )
-    initial_weight: float = value(0.0, "", "every weight at the start, and what leakage pulls it to")
+    initial_weight: float = value(
+        0.0, "", "every weight at the start, and what leakage pulls it to"
+    )
 
     @model_validator(mode="after")
     def _spanned(self) -> Self:
         if not self.centers and any(n < 1 for n in self.nodes):
             raise ValueError(f"every axis needs at least one node, got {list(self.nodes)}")
         if self.widths is None and (self.centers or any(n < 2 for n in self.nodes)):
-            raise ValueError("widths must be given for listed centres and for an axis with one node")
+            raise ValueError(
+                "widths must be given for listed centres and for an axis with one node"
+            )
         if self.widths is not None and min(self.widths) <= 0:
             raise ValueError(f"widths must be positive, got {list(self.widths)}")
         if not self.centers and any(a >= b for a, b in zip(self.low, self.high, strict=True)):
-            raise ValueError(f"low {list(self.low)} must lie below high {list(self.high)} on every axis")
+            raise ValueError(
+                f"low {list(self.low)} must lie below high {list(self.high)} on every axis"
+            )
         return self
 
     @property
@@ -72,7 +82,12 @@ class Network(Component):
         """Node counts (grid counts are 0 for listed centres) and exponents 1/(2 width^2)."""
         n_u, n_v, n_r = (0, 0, 0) if self.centers else self.nodes
         e_u, e_v, e_r = 1.0 / (2.0 * self.width_array() ** 2)
-        counts = {"count": float(self.count), "n_u": float(n_u), "n_v": float(n_v), "n_r": float(n_r)}
+        counts = {
+            "count": float(self.count),
+            "n_u": float(n_u),
+            "n_v": float(n_v),
+            "n_r": float(n_r),
+        }
         exponents = {"e_u": float(e_u), "e_v": float(e_v), "e_r": float(e_r)}
         return counts | exponents | {"initial_weight": self.initial_weight}
 
@@ -90,7 +105,9 @@ def _bells(at: float, exponent: float, count: int, centers: Vector, out: Vector)
 
 
 @kernel
-def _on_grid(u: float, v: float, r: float, k: Any, table: Vector, phi: Vector, work: Vector) -> None:
+def _on_grid(
+    u: float, v: float, r: float, k: Any, table: Vector, phi: Vector, work: Vector
+) -> None:
     # The Gaussian of a grid node is the product of three one-dimensional ones: n_u + n_v + n_r
     # exponentials instead of their product.
     n_u, n_v, n_r = int(k.network_n_u), int(k.network_n_v), int(k.network_n_r)
@@ -110,7 +127,9 @@ def _on_grid(u: float, v: float, r: float, k: Any, table: Vector, phi: Vector, w
 def _on_list(u: float, v: float, r: float, k: Any, table: Vector, phi: Vector) -> None:
     for i in range(int(k.network_count)):
         du, dv, dr = u - table[3 * i], v - table[3 * i + 1], r - table[3 * i + 2]
-        phi[i] = math.exp(-k.network_e_u * du * du - k.network_e_v * dv * dv - k.network_e_r * dr * dr)
+        phi[i] = math.exp(
+            -k.network_e_u * du * du - k.network_e_v * dv * dv - k.network_e_r * dr * dr
+        )
 
 
 @kernel
@@ -136,7 +155,7 @@ def adapt(
     count: int, weights: Vector, phi: Vector, drive: float, Gamma: float, sigma: float,
     initial: float, rate: Vector,
 ) -> None:  # fmt: skip
-    """Weights' rate Gamma (drive Phi - sigma (W - W0)), with drive = u_e m11 or r_e m33; (27), (36)."""
+    """Weights' rate Gamma (drive Phi - sigma (W - W0)), drive u_e m11 or r_e m33; (27), (36)."""
     for i in range(count):
         rate[i] = Gamma * (drive * phi[i] - sigma * (weights[i] - initial))
 

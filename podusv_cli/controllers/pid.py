@@ -19,8 +19,8 @@ class Pid(TrackingController):
     """Two PID loops on u_p = alpha_u - u and r_p = alpha_r - r with a lagged derivative.
 
     The paper's u_d and r_d are taken to be the virtual controls; with the path's own speeds no
-    position error would be fed back. A difference quotient of the error is unstable with the printed
-    gains at any step (K_Du/m11 and K_Dr/m33 exceed 1), hence the derivative (e - lag)/T_d.
+    position error would be fed back. A difference quotient of the error is unstable with the
+    printed gains at any step (K_Du/m11, K_Dr/m33 > 1), hence the derivative (e - lag)/T_d.
     """
 
     kind: Literal["pid"] = "pid"

@@ -7,24 +7,35 @@ model, by a first-order filter (DSC), or in full.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from podusv_cli.controllers.base import Slots
 from podusv_cli.controllers.network import Network, activate, adapt, weigh
-from podusv_cli.controllers.tracking import HELD, TrackingController, track
+from podusv_cli.controllers.tracking import HELD, Tracking, TrackingController, track
 from podusv_cli.kernels import Vector, bundle, kernel, tail
 from podusv_cli.registry import value
 from podusv_cli.vessels.vessel import Vessel
 
 B_HAT_U, B_HAT_R, WEIGHTS = 2, 3, 4
 
-# The differentiator, put in by each law with `specialise`: kernels that give (beta, beta_dot) and
-# write the rate of beta where beta is memory.
-surge: Callable[..., tuple[float, float]]
-yaw: Callable[..., tuple[float, float]]
+
+def surge(
+    e: Tracking, x: Vector, target: Vector, beta: Vector, rate: Vector, k: Any
+) -> tuple[float, float]:
+    """Stands for a law's differentiator in surge, put in with `specialise`: (beta_u, beta_u').
+
+    `beta` and `rate` are the filter's part of the memory (beta_u, beta_r) and of its rate.
+    """
+    raise NotImplementedError
+
+
+def yaw(
+    e: Tracking, x: Vector, target: Vector, beta: Vector, rate: Vector, k: Any, tau_u: float
+) -> tuple[float, float]:
+    """Stands for a law's differentiator in yaw: (beta_r, beta_r'); tau_u is known by then."""
+    raise NotImplementedError
 
 
 @kernel
@@ -93,8 +104,12 @@ class PolarBackstepping(TrackingController):
     gamma_r: float = value(1000.0, "kg m2/s2", "adaptation gain of the yaw bound (37)", ge=0)
     sigma_bu: float = value(0.01, "s/kg", "leakage of the surge bound (28)", ge=0)
     sigma_br: float = value(0.01, "s/(kg m2)", "leakage of the yaw bound (37)", ge=0)
-    b_hat_u0: float = value(0.0, "N", "surge bound at the start, and what leakage pulls it to", ge=0)
-    b_hat_r0: float = value(0.0, "N m", "yaw bound at the start, and what leakage pulls it to", ge=0)
+    b_hat_u0: float = value(
+        0.0, "N", "surge bound at the start, and what leakage pulls it to", ge=0
+    )
+    b_hat_r0: float = value(
+        0.0, "N m", "yaw bound at the start, and what leakage pulls it to", ge=0
+    )
     partial: float = value(0.1, "m/s, rad/s", "Lemma 1's constant; phi(xi) = xi/(4 partial)", gt=0)
     coupling: Literal["printed", "corrected"] = value(
         "corrected", "", "sign of z_e cos psi_e and psi_e in (26), (35): -1 printed, +1 corrected"
@@ -137,7 +152,7 @@ class FilteredBackstepping(PolarBackstepping):
 
     def slots(self) -> Slots:
         """The filter's output comes last."""
-        return super().slots() + (("beta_u", 1), ("beta_r", 1))
+        return (*super().slots(), ("beta_u", 1), ("beta_r", 1))
 
     def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
         """The filter at zero or settled on the virtual control."""

@@ -104,7 +104,7 @@ def track(x: Vector, memory: Vector, target: Vector, k: Any) -> Tracking:
 @kernel
 def hold(t: float, x: Vector, memory: Vector, target: Vector, k: Any) -> None:
     """Remember psi_d and form its wrapped backward difference (Remark 5), once a sample."""
-    distance, psi_d, held = bearing(x, memory, target, k)
+    _, psi_d, held = bearing(x, memory, target, k)
     before = memory[PSI_D_HELD]
     if t == 0.0:
         before = 0.0 if k.first_difference == FROM_ZERO else psi_d
@@ -118,7 +118,10 @@ class TrackingController(Controller):
     k_ze: float = value(0.1, "1/s", "gain of the distance in (21)", ge=0)
     k_psie: float = value(0.1, "1/s", "gain of the heading error in (30)", ge=0)
     standoff: float = value(
-        0.5, "m", "distance that is kept to the target; 0 as printed, where z_e = 0 is singular", ge=0
+        0.5,
+        "m",
+        "distance that is kept to the target; 0 as printed, where z_e = 0 is singular",
+        ge=0,
     )
     hold_below: float = value(
         0.0, "m", "distance below which the direction of the target is held; 0 as printed", ge=0
@@ -151,8 +154,10 @@ class TrackingController(Controller):
         hold(t, x, memory, target, k)
 
     def start(self, x: Vector, target: Vector, nominal: Any) -> Vector:
-        """All zero but the held direction: of the target, or of its motion when right on top of it."""
+        """All zero but the held direction: to the target, or its course where it is right here."""
         memory = np.zeros(sum(size for _, size in self.slots()))
         x_e, y_e = target[:2] - x[:2]
-        memory[PSI_D_HELD] = math.atan2(y_e, x_e) if x_e or y_e else math.atan2(target[3], target[2])
+        memory[PSI_D_HELD] = (
+            math.atan2(y_e, x_e) if x_e or y_e else math.atan2(target[3], target[2])
+        )
         return memory

@@ -177,7 +177,7 @@ def advance(
     path: Function, disturbance: Function, law: Function, sample: Function, actuator: Function,
     observe: Function, first: int, last: int, h: float, wires: Wires, n: Plan,
 ) -> int:  # fmt: skip
-    """March over the instants first .. last - 1; the first instant that is not finite, or `last`."""
+    """March over the instants first .. last - 1; gives the first that is not finite, or `last`."""
     c = pointers(wires)
     s, row = c.s, c.row
     for k in range(first, last):

@@ -18,18 +18,20 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from numba import config, njit, types
+from numba import njit, types
+from numba.core import config as numba_config
 from numba.extending import intrinsic
 
 from podusv_cli import kernels
 from podusv_cli.engine import signatures
 from podusv_cli.engine.closed_loop import Plan, Wires, advance, evaluate_all
 
+config: Any = numba_config  # its settings are made at run time
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": False}
 KEPT = 8  # caches of this many states of the source stay on disk
 
 NUMBER = types.float64
-VECTOR = types.CPointer(NUMBER)
+VECTOR: Any = types.CPointer(NUMBER)  # type: ignore[no-untyped-call]
 ARRAY = types.Array(NUMBER, 1, "C")
 
 SIGNATURES = {
@@ -50,7 +52,7 @@ LOOP = (
 )
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def _tail(typing: Any, vector: Any, start: Any) -> Any:
     def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return builder.gep(arguments[0], [arguments[1]])
@@ -58,7 +60,7 @@ def _tail(typing: Any, vector: Any, start: Any) -> Any:
     return vector(vector, types.int64), code
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def _address(typing: Any, array: Any) -> Any:
     def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return context.make_array(signature.args[0])(context, builder, arguments[0]).data
@@ -92,10 +94,14 @@ def entry(door: Any, inner: Any, names: tuple[str, ...]) -> Any:
 def march() -> Any:
     """Machine code of `closed_loop.advance`."""
     functions = [types.FunctionType(SIGNATURES[door]) for door in LOOP]
-    wires = types.NamedUniTuple(ARRAY, len(Wires._fields), Wires)
-    plan = types.NamedUniTuple(types.int64, len(Plan._fields), Plan)
+    wires = _tuple_of(ARRAY, Wires)
+    plan = _tuple_of(types.int64, Plan)
     signature = types.int64(*functions, types.int64, types.int64, NUMBER, wires, plan)
     return _stored(signature, machine(advance).py_func)
+
+
+def _tuple_of(each: Any, kind: Any) -> Any:
+    return types.NamedUniTuple(each, len(kind._fields), kind)  # type: ignore[no-untyped-call]
 
 
 @cache

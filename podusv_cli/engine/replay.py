@@ -45,7 +45,10 @@ def law_times(
     replay: Callable[..., None] = compiling.replay()
     law = compiling.entry(signatures.law_entry, loop.controller.law, tuple(informed))
     return np.array(
-        [_timed(replay, law, rounds, count, width, buffers) / (rounds * count) for _ in range(repeats)]
+        [
+            _timed(replay, law, rounds, count, width, buffers) / (rounds * count)
+            for _ in range(repeats)
+        ]
     )
 
 

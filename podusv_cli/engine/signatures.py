@@ -8,13 +8,19 @@ kernel and for the unpacking of its constants; `bind` puts them in, here as Pyth
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 from podusv_cli.kernels import Vector, unpacker, with_globals
 
-kernel: Callable[..., Any]
-named: Callable[[Vector], Any]
+
+def kernel(*arguments: Any) -> None:
+    """Stands for a component's kernel."""
+    raise NotImplementedError
+
+
+def named(p: Vector) -> Any:
+    """Stands for the unpacking of its constants."""
+    raise NotImplementedError
 
 
 def path_entry(t: float, p: Vector, table: Vector, target: Vector) -> None:
@@ -50,7 +56,9 @@ def actuator_entry(
     kernel(t, x, state, demand, named(p), table, tau, rate, signals)
 
 
-def observer_entry(t: float, weight: float, s: Vector, row: Vector, p: Vector, seen: Vector) -> None:
+def observer_entry(
+    t: float, weight: float, s: Vector, row: Vector, p: Vector, seen: Vector
+) -> None:
     """An observer's door: state and signals at an instant, and its weight [s] in an integral."""
     kernel(t, weight, s, row, named(p), seen)
 

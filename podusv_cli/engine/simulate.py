@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -40,7 +39,7 @@ def _no_sample(t: float, x: Vector, memory: Vector, target: Vector, k: Any, tabl
 
 @dataclass(frozen=True)
 class Observer:
-    """A kernel `watch(t, weight, s, row, k, seen)` that sees every instant, its constants, its memory."""
+    """A kernel `watch(t, weight, s, row, k, seen)` that sees every instant, and its constants."""
 
     watch: Callable[..., None] = _see_nothing
     constants: dict[str, float] = field(default_factory=lambda: {"nothing": 0.0})
@@ -96,14 +95,16 @@ def simulate(
     observer = observer or Observer()
     plan = loop.layout(grid)
     wires = _wire(loop, grid, plan, observer)
-    march = _marcher(loop, observer, compiled)
+    march = marcher(loop, observer, compiled)
     with np.errstate(all="ignore"):
-        reached, status = _in_blocks(lambda a, b: march(a, b, grid.step, wires, plan), plan, progress)
+        reached, status = _in_blocks(
+            lambda a, b: march(a, b, grid.step, wires, plan), plan, progress
+        )
     return _record(loop, grid, plan, wires, reached, status)
 
 
 def entries(loop: ClosedLoop, observer: Observer) -> Iterator[tuple[Any, Any, tuple[str, ...]]]:
-    """Door, kernel and constants' names of every part, in the order in which the loop takes them."""
+    """Door, kernel and constants' names of every part, in the order the loop takes them."""
     law, path, disturbance, actuator = loop.controller, loop.path, loop.disturbance, loop.actuator
     informed = tuple(law.informed(loop.nominal))
     sample = law.sample if law.sample_period() > 0 else _no_sample
@@ -115,7 +116,8 @@ def entries(loop: ClosedLoop, observer: Observer) -> Iterator[tuple[Any, Any, tu
     yield signatures.observer_entry, observer.watch, tuple(observer.constants)
 
 
-def _marcher(loop: ClosedLoop, observer: Observer, compiled: bool) -> Callable[..., int]:
+def marcher(loop: ClosedLoop, observer: Observer, compiled: bool) -> Callable[..., int]:
+    """The march of this loop, `closed_loop.advance` less its functions; compiles what is not yet."""
     if not compiled:
         doors = [signatures.bind(*part) for part in entries(loop, observer)]
         return lambda *rest: closed_loop.advance(*doors, *rest)
@@ -193,7 +195,7 @@ def _record(
     if status == "diverged":
         message = _last_words(wires, labels, signals, reached * grid.step)
     fixed = loop.controller.fixed_signals()
-    return Recording(status, loop.controller.kind, signals, fixed, wires.seen, message)
+    return Recording(status, loop.controller.label, signals, fixed, wires.seen, message)
 
 
 def _last_words(wires: Wires, labels: list[str], signals: dict[str, Vector], at: float) -> str:
@@ -201,6 +203,8 @@ def _last_words(wires: Wires, labels: list[str], signals: dict[str, Vector], at:
     bad = next((name for name, number in zip(labels, now, strict=True)
                 if not abs(number) <= closed_loop.LARGEST), "?")  # fmt: skip
     last = ", ".join(
-        f"{name} {signals[name][-1]:.4g}" for name in ("time", *STATE, *DEMAND) if len(signals[name])
+        f"{name} {signals[name][-1]:.4g}"
+        for name in ("time", *STATE, *DEMAND)
+        if len(signals[name])
     )
     return f"diverged at t = {at:.6g} s: {bad} is not finite; last logged values: {last or 'none'}"

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-
-from matplotlib.figure import Figure
+from collections.abc import Iterable, Iterator, Sequence
 
 from podusv_cli.figures.controls import controls
-from podusv_cli.figures.errors import errors
+from podusv_cli.figures.panels import Family, signals_over_time
 from podusv_cli.figures.style import LOOKS, Shown, house_style, image
 from podusv_cli.figures.trajectory import trajectory
 from podusv_cli.recording import Recording
 
-FIGURES: dict[str, Callable[[Sequence[Shown], int], Figure]] = {
+FIGURES: dict[str, Family] = {
     "trajectory": trajectory,
-    "errors": errors,
+    "errors": signals_over_time("x_e", "y_e", "z_e", "psi_e", logarithmic=("z_e",)),
     "controls": controls,
+    "filters": signals_over_time("alpha_u", "beta_u", "alpha_r", "beta_r"),
+    "adaptation": signals_over_time(
+        "W_norm_u", "W_norm_r", "b_hat_u", "b_hat_r", "f_hat_u", "f_hat_r", "activation"
+    ),
+    "velocities": signals_over_time("u", "v", "r", "psi"),
+    "loads": signals_over_time("b_u", "b_v", "b_r", "saturated"),
 }
 
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +41,29 @@ NO_STAMP: dict[str, dict[str, Any]] = {
 
 
 @dataclass(frozen=True)
+class Derived:
+    """A signal computed from logged ones."""
+
+    needs: tuple[str, ...]
+    compute: Callable[[Recording], Vector] = lambda log: log["time"]
+
+
+def _activation(log: Recording) -> Vector:
+    nu = np.column_stack([log["u"], log["v"], log["r"]])
+    scaled = (nu[:, None, :] - log["rbf_center"]) / log["rbf_width"]
+    return np.asarray(np.exp(-0.5 * np.sum(scaled**2, axis=2)).max(axis=1))
+
+
+DERIVED: dict[str, Derived] = {
+    "x_e": Derived(("x_d", "x"), lambda log: log["x_d"] - log["x"]),
+    "y_e": Derived(("y_d", "y"), lambda log: log["y_d"] - log["y"]),
+    "W_norm_u": Derived(("W_hat_u",), lambda log: np.linalg.norm(log["W_hat_u"], axis=1)),
+    "W_norm_r": Derived(("W_hat_r",), lambda log: np.linalg.norm(log["W_hat_r"], axis=1)),
+    "activation": Derived(("rbf_center", "rbf_width", "u"), _activation),
+}
+
+
+@dataclass(frozen=True)
 class Shown:
     """A recording with the name, colour and line style under which every figure shows it.
 
@@ -59,13 +83,15 @@ class Shown:
         """Keyword arguments of `Axes.plot`."""
         return {"color": self.color, "linestyle": self.linestyle, "label": self.label}
 
+    def has(self, name: str) -> bool:
+        """Whether the run has the signal, logged or derivable."""
+        return all(part in self.recording for part in DERIVED.get(name, Derived((name,))).needs)
+
     def signal(self, name: str) -> Vector:
-        """A logged signal, or x_e and y_e (18)."""
-        derived = {"x_e": ("x_d", "x"), "y_e": ("y_d", "y")}
-        if name not in derived:
+        """A logged or derived signal."""
+        if name not in DERIVED:
             return self.recording[name]
-        target, own = derived[name]
-        return self.recording[target] - self.recording[own]
+        return DERIVED[name].compute(self.recording)
 
 
 @contextmanager
@@ -99,7 +125,7 @@ def thinned(t: Vector, y: Vector, points: int = 1500) -> tuple[Vector, Vector]:
         return t, y
     edges = np.linspace(0, len(t), points // 2 + 1).astype(int)
     kept = {0, len(t) - 1}
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
+    for low, high in pairwise(edges):
         kept |= {low + int(np.argmin(y[low:high])), low + int(np.argmax(y[low:high]))}
     chosen = np.array(sorted(kept))
     return t[chosen], y[chosen]
@@ -109,18 +135,13 @@ def draw_signal(
     axes: Axes, shown: Shown, name: str, *, between: tuple[float, float] | None = None, **look: Any
 ) -> None:
     """Plot a signal over time, or over a part of it [s]; does nothing where it was not logged."""
-    if name not in shown.recording and name not in ("x_e", "y_e"):
+    if not shown.has(name):
         return
     t, y = shown.recording["time"], shown.signal(name)
     if between:
         inside = (t >= between[0]) & (t <= between[1])
         t, y = t[inside], y[inside]
     axes.plot(*thinned(t, y), **{**shown.look, **look})
-
-
-def time_axis(axes: Sequence[Axes]) -> None:
-    """Label the lowest of a column of axes with time."""
-    axes[-1].set_xlabel("time [s]")
 
 
 def image(figure: Figure, form: str) -> bytes:

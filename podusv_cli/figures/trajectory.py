@@ -49,13 +49,13 @@ def _map(axes: Axes, runs: Sequence[Shown]) -> None:
 
 
 def trajectory(runs: Sequence[Shown], columns: int) -> Figure:
-    """Tracks and target on a map, hulls drawn larger so that the heading shows, settled part aside."""
+    """Tracks and target on a map, hulls enlarged to show the heading; the settled part aside."""
     figure = new_figure(columns, 3.4 if columns == 2 else 4.6)
     shape = (1, 2) if columns == 2 else (2, 1)
     whole, settled = figure.subplots(*shape)
     _map(whole, runs)
     spread = np.ptp(runs[0].recording["x_d"]) + np.ptp(runs[0].recording["y_d"])
-    scale = max(1.0, 0.035 * spread / runs[0].length)
+    scale = max(1.0, 0.05 * spread / runs[0].length)
     for shown in runs:
         _draw_hulls(whole, shown, scale)
     start = runs[0].recording

@@ -31,7 +31,9 @@ class Circle(Path):
     y: float = value(0.0, "m", "centre, east")
     radius: float = value(10.0, "m", "radius", gt=0)
     speed: float = value(0.5, "m/s", "speed of the target", ge=0)
-    angle: float = value(0.0, "rad", "where on the circle the target starts, 0 is north of the centre")
+    angle: float = value(
+        0.0, "rad", "where on the circle the target starts, 0 is north of the centre"
+    )
     turn: Literal["starboard", "port"] = value("starboard", "", "sense of rotation seen from above")
 
     @staticmethod

@@ -62,13 +62,15 @@ class Waypoints(Path):
         return super().constants() | {"count": float(len(self.points))}
 
     def table(self) -> Vector:
-        """The knots, then eight coefficients a knot: cubic in x, cubic in y, highest power first."""
+        """The knots, then eight coefficients a knot: cubic in x and in y, highest power first."""
         from scipy.interpolate import CubicSpline
 
         knots = self._knots()
         spline = CubicSpline(knots, np.asarray(self.points), bc_type="natural")
         last = np.concatenate([[0, 0], spline(knots[-1], 1), spline(knots[-1])])
-        cubic = np.vstack([spline.c.transpose(1, 2, 0).reshape(-1, 8), last[[0, 1, 2, 4, 0, 1, 3, 5]]])
+        cubic = np.vstack(
+            [spline.c.transpose(1, 2, 0).reshape(-1, 8), last[[0, 1, 2, 4, 0, 1, 3, 5]]]
+        )
         return np.concatenate([knots, cubic.ravel()])
 
     @staticmethod

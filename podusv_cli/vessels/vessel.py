@@ -8,7 +8,6 @@ from pydantic import model_validator
 
 from podusv_cli.registry import Component, value
 
-
 INERTIA = ("m11", "m22", "m23", "m32", "m33")
 
 
@@ -94,6 +93,7 @@ class Vessel(Component):
 
 
 # The names of a vessel's constants, the same for every vessel and in the same order.
-COEFFICIENTS = tuple(
-    name for name, field in Vessel.model_fields.items() if field.annotation is float
-) + INERTIA
+COEFFICIENTS = (
+    tuple(name for name, field in Vessel.model_fields.items() if field.annotation is float)
+    + INERTIA
+)

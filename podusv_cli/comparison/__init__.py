@@ -1,0 +1,1 @@
+"""Several runs side by side: tables, differences, and verdicts on claims."""

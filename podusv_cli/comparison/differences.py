@@ -1,0 +1,33 @@
+"""What compared runs differ in besides the controller."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+IGNORED = ("name", "description", "controller", "controllers", "claims", "log")
+
+
+def flat(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Dotted keys and values of a nested mapping."""
+    for key, value in tree.items():
+        if isinstance(value, Mapping):
+            yield from flat(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value
+
+
+def differences(scenarios: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Keys outside the controller whose values differ, with the value of every run.
+
+    `scenarios` are resolved scenarios by the runs' labels. A key that a run lacks counts as None.
+    """
+    flattened = {
+        label: dict(flat({key: part for key, part in tree.items() if key not in IGNORED}))
+        for label, tree in scenarios.items()
+    }
+    keys = dict.fromkeys(key for values in flattened.values() for key in values)
+    found = {key: {label: v.get(key) for label, v in flattened.items()} for key in keys}
+    return {
+        key: values for key, values in found.items() if len({repr(v) for v in values.values()}) > 1
+    }

@@ -1,0 +1,192 @@
+"""From a claim's text to an expression; every misunderstanding is a sentence."""
+
+from __future__ import annotations
+
+import ast
+import difflib
+import operator
+from collections.abc import Callable, Collection
+from functools import singledispatchmethod
+
+import numpy as np
+
+from podusv_cli.comparison.expressions import (
+    CHECKS,
+    MAPPERS,
+    REDUCERS,
+    Applied,
+    Checked,
+    Compared,
+    Condition,
+    Denied,
+    Joined,
+    MetricOf,
+    Number,
+    Rate,
+    Reduced,
+    SignalOf,
+    Term,
+)
+from podusv_cli.metrics.table import METRICS
+from podusv_cli.signals import SIGNALS
+
+LONGEST = 500  # characters of an expression
+SIGNS: dict[type[ast.cmpop], str] = {
+    ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==",
+}  # fmt: skip
+ARITHMETIC: dict[type[ast.operator], Callable[..., object]] = {
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: np.divide,
+}  # fmt: skip
+
+
+class ExpressionError(ValueError):
+    """An expression that means nothing; the text says what would."""
+
+
+def parse(text: str, runs: Collection[str]) -> Condition:
+    """The condition that `text` puts about these runs; raises ExpressionError."""
+    if len(text) > LONGEST:
+        raise ExpressionError(f"is longer than {LONGEST} characters")
+    try:
+        tree = ast.parse(text.strip(), mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        raise ExpressionError(
+            f"cannot read {text!r}; example: a.iae < b.iae"
+        ) from error
+    return _Reader(runs).condition(tree)
+
+
+def _known(name: str, names: Collection[str], what: str) -> str:
+    if name in names:
+        return name
+    near = difflib.get_close_matches(name, names, n=1)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    raise ExpressionError(f"unknown {what} {name!r}{hint} (allowed: {', '.join(sorted(names))})")
+
+
+class _Reader:
+    """Turns Python's syntax tree into conditions and terms, refusing all that has no meaning here."""
+
+    def __init__(self, runs: Collection[str]) -> None:
+        self.runs = runs
+
+    @singledispatchmethod
+    def condition(self, node: ast.AST) -> Condition:
+        """A condition; comparisons, checks, `not`, `and`."""
+        raise ExpressionError(f"{_text(node)!r} is no condition: it must compare, or be a check")
+
+    @condition.register
+    def _(self, node: ast.Compare) -> Condition:
+        sides = [node.left, *node.comparators]
+        for sign in node.ops:
+            if type(sign) not in SIGNS:
+                raise ExpressionError(f"{_text(node)!r}: compare with {', '.join(SIGNS.values())}")
+        terms = tuple(self.number(side) for side in sides)
+        signs = tuple(SIGNS[type(sign)] for sign in node.ops)
+        return Compared(terms, signs, tuple(_text(side) for side in sides))
+
+    @condition.register
+    def _(self, node: ast.BoolOp) -> Condition:
+        if not isinstance(node.op, ast.And):
+            raise ExpressionError(f"{_text(node)!r}: conditions are joined with `and` only")
+        return Joined(tuple(self.condition(part) for part in node.values))
+
+    @condition.register
+    def _(self, node: ast.UnaryOp) -> Condition:
+        if not isinstance(node.op, ast.Not):
+            raise ExpressionError(
+                f"{_text(node)!r} is no condition: it must compare, or be a check"
+            )
+        return Denied(self.condition(node.operand))
+
+    @condition.register
+    def _(self, node: ast.Call) -> Condition:
+        name = _known(_function(node), CHECKS, "check")
+        if len(node.args) != 1 or not isinstance(node.args[0], ast.Name):
+            raise ExpressionError(f"{_text(node)!r}: a check takes the name of one run")
+        return Checked(name, _known(node.args[0].id, self.runs, "run"))
+
+    def number(self, node: ast.AST) -> Term:
+        """A term that is a number."""
+        term = self.term(node)
+        if term.curve:
+            names = ", ".join(sorted(REDUCERS))
+            raise ExpressionError(f"{_text(node)!r} runs over time: sum it up with one of {names}")
+        return term
+
+    @singledispatchmethod
+    def term(self, node: ast.AST) -> Term:
+        """A number or a curve."""
+        raise ExpressionError(
+            f"{_text(node)!r} has no meaning here; write run.metric or run.signal"
+        )
+
+    @term.register
+    def _(self, node: ast.Constant) -> Term:
+        if isinstance(node.value, bool) or not isinstance(node.value, (int, float)):
+            raise ExpressionError(f"{_text(node)!r} is no number")
+        return Number(float(node.value))
+
+    @term.register
+    def _(self, node: ast.Attribute) -> Term:
+        if not isinstance(node.value, ast.Name):
+            raise ExpressionError(f"{_text(node)!r}: write run.metric or run.signal")
+        run = _known(node.value.id, self.runs, "run")
+        if node.attr in METRICS:
+            return MetricOf(run, node.attr)
+        return SignalOf(run, _known(node.attr, [*SIGNALS, *METRICS], "signal or metric"))
+
+    @term.register
+    def _(self, node: ast.UnaryOp) -> Term:
+        if not isinstance(node.op, ast.USub):
+            raise ExpressionError(f"{_text(node)!r} has no meaning here")
+        return Applied(operator.neg, (self.term(node.operand),))
+
+    @term.register
+    def _(self, node: ast.BinOp) -> Term:
+        if type(node.op) not in ARITHMETIC:
+            raise ExpressionError(f"{_text(node)!r}: calculate with + - * / only")
+        return Applied(ARITHMETIC[type(node.op)], (self.term(node.left), self.term(node.right)))
+
+    @term.register
+    def _(self, node: ast.Call) -> Term:
+        name = _known(_function(node), [*REDUCERS, *MAPPERS, "rate"], "function")
+        if name in REDUCERS:
+            return self._reduced(name, node)
+        count, operation = MAPPERS.get(name, (1, None))
+        if len(node.args) != count:
+            raise ExpressionError(f"{_text(node)!r}: {name} takes {count} argument(s)")
+        parts = tuple(self.term(argument) for argument in node.args)
+        if operation:
+            return Applied(operation, parts)
+        return Rate(self._curve(node.args[0]))
+
+    def _curve(self, node: ast.AST) -> Term:
+        term = self.term(node)
+        if not term.curve:
+            raise ExpressionError(f"{_text(node)!r} is a number, a signal is wanted")
+        return term
+
+    def _reduced(self, name: str, node: ast.Call) -> Term:
+        if len(node.args) not in (1, 3):
+            raise ExpressionError(
+                f"{_text(node)!r}: {name} takes a signal, or a signal and two times"
+            )
+        part = self._curve(node.args[0])
+        ends = [self.term(argument) for argument in node.args[1:]]
+        if not all(isinstance(end, Number) for end in ends):
+            raise ExpressionError(f"{_text(node)!r}: times are plain numbers in s")
+        times = [end.number for end in ends if isinstance(end, Number)]
+        if times and not 0 <= times[0] < times[1]:
+            raise ExpressionError(f"{_text(node)!r}: the first time must lie before the second")
+        return Reduced(REDUCERS[name], part, (times[0], times[1]) if times else None)
+
+
+def _function(node: ast.Call) -> str:
+    if not isinstance(node.func, ast.Name) or node.keywords:
+        raise ExpressionError(f"{_text(node)!r}: functions are called by name, without keywords")
+    return node.func.id
+
+
+def _text(node: ast.AST) -> str:
+    return ast.unparse(node)

@@ -1,0 +1,76 @@
+"""The comparison table: every metric, the best marked, ratios to the first run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import pandas as pd
+
+from podusv_cli.metrics.table import METRICS
+
+RUN, METRIC = "run", "metric"
+
+
+def table(metrics: Mapping[str, Mapping[str, float]]) -> pd.DataFrame:
+    """Metrics of runs by label: one row a metric, one column a run."""
+    known = [name for name in METRICS if any(name in numbers for numbers in metrics.values())]
+    rows = {name: [numbers.get(name, math.nan) for numbers in metrics.values()] for name in known}
+    frame = pd.DataFrame.from_dict(rows, orient="index", columns=list(metrics), dtype=float)
+    return frame.rename_axis(METRIC)
+
+
+def with_ratios(frame: pd.DataFrame) -> pd.DataFrame:
+    """The table with units, and a column of ratios to the first run for each further run."""
+    first = frame.columns[0]
+    full = frame.copy()
+    full.insert(0, "unit", [METRICS[name].unit for name in frame.index])
+    for label in frame.columns[1:]:
+        full[f"{label}/{first}"] = frame[label] / frame[first].where(frame[first] != 0)
+    return full
+
+
+def as_csv(frame: pd.DataFrame) -> str:
+    """Full precision, ratios last."""
+    return with_ratios(frame).to_csv(lineterminator="\n")
+
+
+def cells(frame: pd.DataFrame) -> list[list[str]]:
+    """Rows of text: metric, unit, then number and ratio to the first run; best marked with *."""
+    rows = []
+    for name, numbers in frame.iterrows():
+        best, first = numbers.min(), numbers.iloc[0]
+        texts = [_cell(number, first, best, i) for i, number in enumerate(numbers)]
+        rows.append([str(name), METRICS[str(name)].unit, *texts])
+    return rows
+
+
+def _cell(number: float, first: float, best: float, position: int) -> str:
+    if math.isnan(number):
+        return "-"
+    mark = "*" if number == best else ""
+    ratio = f" ({number / first:.3g})" if position and first and not math.isnan(first) else ""
+    return f"{number:.5g}{mark}{ratio}"
+
+
+def as_markdown(frame: pd.DataFrame) -> str:
+    """The table for people, in Markdown."""
+    head = ["metric", "unit", *map(str, frame.columns)]
+    lines = [head, ["---", "---", *["---:"] * len(frame.columns)], *cells(frame)]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
+
+
+def as_latex(frame: pd.DataFrame) -> str:
+    """The table for a paper, with booktabs; the best in bold face."""
+    head = ["metric", "unit", *map(str, frame.columns)]
+    body = [[_latex(cell) for cell in row] for row in [head, *cells(frame)]]
+    lines = [" & ".join(row) + r" \\" for row in body]
+    columns = "ll" + "r" * len(frame.columns)
+    opening = [rf"\begin{{tabular}}{{{columns}}}", r"\toprule", lines[0], r"\midrule"]
+    return "\n".join([*opening, *lines[1:], r"\bottomrule", r"\end{tabular}", ""])
+
+
+def _latex(cell: str) -> str:
+    escaped = cell.replace("_", r"\_").replace("%", r"\%").replace("&", r"\&").replace("#", r"\#")
+    number, marked, ratio = escaped.partition("*")
+    return rf"\textbf{{{number}}}{ratio}" if marked else escaped

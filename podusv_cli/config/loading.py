@@ -1,0 +1,123 @@
+"""Scenario files in, one validated scenario out, and the way back to a file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import yaml
+
+from podusv_cli.config.checking import check
+from podusv_cli.config.composing import composed
+from podusv_cli.config.references import complete
+from podusv_cli.config.scenario import Scenario
+from podusv_cli.config.source import read_text, resolve
+from podusv_cli.config.tree import Fault, Mark, Node, find
+from podusv_cli.errors import Finding, ScenarioError
+
+HEADING = "# A complete scenario, every value written out; it runs again to the same log.\n"
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """A scenario with where its values came from.
+
+    `origins` maps every dotted key to "configs/a.yaml:12:5", "--set a.b=v", "vessel file
+    paper.yaml" or "default"; `text` is the scenario file as given.
+    """
+
+    scenario: Scenario
+    origins: Mapping[str, str]
+    text: str
+
+
+def load(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> Loaded:
+    """The scenario of a file, with overrides such as `vessel.m=24`.
+
+    Raises ScenarioError with everything that is wrong, also where the file cannot be read.
+    """
+    faults: list[Fault] = []
+    source = os.fspath(path)
+    text = read_text(source, Mark(source), "", faults)
+    if text is None:
+        raise ScenarioError(_findings(faults))
+    return load_text(text, source, overrides)
+
+
+def load_text(text: str, source: str, overrides: Sequence[str] = ()) -> Loaded:
+    """The scenario of a text; `source` names it in messages and is where its file names start.
+
+    Raises ScenarioError with everything that is wrong.
+    """
+    faults: list[Fault] = []
+    root = composed(text, source, overrides, faults)
+    root = root and complete(root, faults)
+    scenario = check(root, faults) if root else None
+    if scenario is None or root is None or faults:
+        raise ScenarioError(_findings(faults))
+    return Loaded(scenario, _origins(scenario, root), text)
+
+
+def _findings(faults: list[Fault]) -> list[Finding]:
+    """Findings file by file, in the order of lines."""
+    sources = list(dict.fromkeys(fault.mark.source for fault in faults))
+    ordered = sorted(
+        faults, key=lambda f: (sources.index(f.mark.source), f.mark.line, f.mark.column)
+    )
+    return [Finding(str(fault.mark), fault.key, fault.text) for fault in ordered]
+
+
+def values(scenario: Scenario) -> dict[str, Any]:
+    """Every value of a scenario by its dotted key, in the order of the fields."""
+    return dict(_leaves(scenario.model_dump(), ""))
+
+
+def _leaves(data: dict[str, Any], prefix: str) -> Iterator[tuple[str, Any]]:
+    for name, content in data.items():
+        if isinstance(content, dict):
+            yield from _leaves(content, f"{prefix}{name}.")
+        else:
+            yield prefix + name, content
+
+
+def _origins(scenario: Scenario, root: Node) -> dict[str, str]:
+    nodes = {key: find(root, tuple(key.split("."))) for key in values(scenario)}
+    return {key: str(node.mark) if node else "default" for key, node in nodes.items()}
+
+
+def resolved_yaml(scenario: Scenario) -> str:
+    """The scenario as a file with every value in it; loading it gives an equal scenario."""
+    body = yaml.dump(
+        scenario.model_dump(), Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=1 << 30
+    )
+    return HEADING + body
+
+
+class _Dumper(yaml.SafeDumper):
+    """Blocks for mappings, brackets for lists of scalars, quotes around all text but plain words."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+
+def _text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
+    is_word = text.replace("_", "").isalnum() and isinstance(resolve(text), str) and text.isascii()
+    style = None if is_word else '"'
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
+
+
+def _list(dumper: yaml.SafeDumper, items: tuple[Any, ...]) -> yaml.SequenceNode:
+    flat = not any(isinstance(part, tuple) for part in items)
+    return dumper.represent_sequence("tag:yaml.org,2002:seq", items, flow_style=flat)
+
+
+def _kind_first(dumper: yaml.SafeDumper, data: dict[str, Any]) -> yaml.MappingNode:
+    ordered = sorted(data.items(), key=lambda entry: entry[0] != "kind")
+    return dumper.represent_mapping("tag:yaml.org,2002:map", ordered, flow_style=False)
+
+
+_Dumper.add_representer(str, _text)
+_Dumper.add_representer(tuple, _list)
+_Dumper.add_representer(dict, _kind_first)

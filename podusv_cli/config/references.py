@@ -1,0 +1,144 @@
+"""What a scenario refers to and what it may leave out: vessel files, waypoints, its own name."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+
+from podusv_cli.config.fields import PATTERNS_IN_WORDS, limits
+from podusv_cli.config.scenario import Scenario
+from podusv_cli.config.source import MAX_NODES, read, read_text, resolve
+from podusv_cli.config.tree import Fault, Mark, Node, merge
+from podusv_cli.config.words import found, quoted, unknown
+
+MAX_POINTS = MAX_NODES // 4  # a point is three values, and the resolved scenario has to be readable
+MOST_FAULTS = 10  # in one file of points
+HEADER = re.compile(r'\s*"?(?!nan|inf)[a-z]', re.IGNORECASE)
+VESSELS = files("podusv_cli.vessels")
+
+
+@cache
+def vessel_names() -> tuple[str, ...]:
+    """Names of the vessels that podusv brings along, sorted."""
+    names = (Path(entry.name) for entry in VESSELS.iterdir())
+    return tuple(sorted(name.stem for name in names if name.suffix == ".yaml"))
+
+
+def vessel_file(name: str, faults: list[Fault]) -> Node | None:
+    """The parameters of a vessel by its name, one of `vessel_names()`."""
+    text = VESSELS.joinpath(f"{name}.yaml").read_text("utf-8")
+    return read(text, f"vessel file {name}.yaml", faults, placed=False)
+
+
+def complete(root: Node, faults: list[Fault]) -> Node:
+    """The tree with everything filled in that it takes from elsewhere."""
+    for fill in (_name, _vessel, _nominal, _points):
+        root = fill(root, faults)
+    return root
+
+
+def _name(root: Node, faults: list[Fault]) -> Node:
+    """`name` is the file's name without suffix unless given."""
+    if "name" in root.mapping:
+        return root
+    stem = Path(root.mark.source).stem
+    pattern = limits(Scenario.model_fields["name"])["pattern"]
+    usable = re.fullmatch(pattern, stem)
+    if not usable:
+        text = f"cannot be the file's name {quoted(stem)}; give one {PATTERNS_IN_WORDS[pattern]}"
+        faults.append(Fault(root.mark, "name", text))
+    return root.with_entry("name", Node(stem if usable else None, root.mark, faulty=not usable))
+
+
+def _vessel(root: Node, faults: list[Fault]) -> Node:
+    given = root.mapping.get("vessel")
+    if given is None:
+        if not root.faulty:
+            known = ", ".join(vessel_names())
+            faults.append(Fault(root.mark, "vessel.preset", f"missing (allowed: {known})"))
+        return root.with_entry("vessel", Node({}, root.mark, faulty=True))
+    if not isinstance(given.content, dict):
+        return root
+    return root.with_entry("vessel", _from_preset(given, "vessel", faults))
+
+
+def _nominal(root: Node, faults: list[Fault]) -> Node:
+    """`nominal` is the vessel unless given; with a preset of its own it starts from that."""
+    vessel = root.mapping["vessel"]
+    given = root.mapping.get("nominal")
+    if given is None:
+        return root.with_entry("nominal", vessel)
+    if not isinstance(given.content, dict):
+        return root
+    if "preset" in given.content:
+        return root.with_entry("nominal", _from_preset(given, "nominal", faults))
+    return root.with_entry("nominal", merge(vessel, given))
+
+
+def _from_preset(given: Node, key: str, faults: list[Fault]) -> Node:
+    """The vessel's values over those of its preset."""
+    preset = given.mapping.get("preset")
+    if preset and preset.content in vessel_names():
+        base = vessel_file(preset.content, faults)
+        assert base
+        return merge(base, given)
+    if preset is None and not given.faulty:
+        known = ", ".join(vessel_names())
+        faults.append(Fault(given.mark, f"{key}.preset", f"missing (allowed: {known})"))
+    elif preset and not preset.faulty:
+        what = f"vessel {found(preset.content, preset.text)}"
+        text = unknown(what, str(preset.content), vessel_names())
+        faults.append(Fault(preset.mark, f"{key}.preset", text))
+        given = given.with_entry("preset", replace(preset, content=None, faulty=True))
+    return replace(given, faulty=True)
+
+
+def _points(root: Node, faults: list[Fault]) -> Node:
+    """Waypoints from the CSV file that `path.file` names, in place of the name."""
+    path = root.mapping.get("path")
+    file = path.mapping.get("file") if path else None
+    if not path or not file or path.get("kind") != "waypoints" or not isinstance(file.content, str):
+        return root
+    if path.get("points"):
+        faults.append(Fault(file.mark, "path.file", "give either file or points, not both"))
+        return root
+    name = os.path.join(os.path.dirname(file.mark.source) if file.mark.line else "", file.content)
+    before = len(faults)
+    text = read_text(name, file.mark, "path.file", faults)
+    rows = list(_rows(text or "", name, faults))
+    points = Node(tuple(rows), Mark(name), faulty=len(faults) > before)
+    rest = {key: entry for key, entry in path.mapping.items() if key != "file"}
+    filled = replace(path, content=rest | {"points": points}, faulty=path.faulty or points.faulty)
+    return root.with_entry("path", filled)
+
+
+def _rows(text: str, name: str, faults: list[Fault]) -> Iterator[Node]:
+    """A node for every line `x,y`; a first line of words is a header, # starts a comment."""
+    lines = [line.partition("#")[0] for line in text.removeprefix("\ufeff").splitlines()]
+    filled = [(number, line) for number, line in enumerate(lines, 1) if line.strip()]
+    if filled and all(HEADER.match(cell) for cell in filled[0][1].split(",")):
+        del filled[0]
+    if len(filled) > MAX_POINTS:
+        faults.append(Fault(Mark(name), "", f"more than {MAX_POINTS:,} points"))
+        return
+    most = len(faults) + MOST_FAULTS
+    for number, line in filled:
+        row = _row(line, Mark(name, number, 1), faults)
+        if len(faults) > most:
+            return
+        yield row
+
+
+def _row(line: str, mark: Mark, faults: list[Fault]) -> Node:
+    cells = [cell.strip().strip('"') for cell in line.split(",")]
+    numbers = [resolve(cell) for cell in cells]
+    if len(numbers) != 2 or any(isinstance(n, (str, bool)) or n is None for n in numbers):
+        text = f"must be two numbers x,y [m], found {quoted(line.strip())}"
+        faults.append(Fault(mark, "", text))
+    pairs = zip(numbers, cells, strict=True)
+    return Node(tuple(Node(number, mark, text=cell) for number, cell in pairs), mark)

@@ -1,0 +1,121 @@
+"""Plain data that remembers where every key and value was written."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+Route = tuple[str | int, ...]
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A place: a file with line and column, both from 1, or (line 0) something without lines."""
+
+    source: str
+    line: int = 0
+    column: int = 0
+
+    def __str__(self) -> str:
+        return f"{self.source}:{self.line}:{self.column}" if self.line else self.source
+
+
+@dataclass(frozen=True)
+class Fault:
+    """What is wrong, where, and with which key."""
+
+    mark: Mark
+    key: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Node:
+    """A value: a scalar, a tuple of nodes, or a mapping from key to node.
+
+    `key_mark` is where the key of this value stands. `text` is a scalar as written. `faulty` says
+    that a fault here was told already: the scalar or list has no content, the mapping may lack keys.
+    """
+
+    content: Any
+    mark: Mark
+    key_mark: Mark | None = None
+    text: str = ""
+    faulty: bool = False
+
+    @property
+    def mapping(self) -> dict[str, Node]:
+        """The entries, none where this is no mapping."""
+        return self.content if isinstance(self.content, dict) else {}
+
+    def get(self, key: str) -> Any:
+        """The plain content of an entry; None where there is no such entry."""
+        entry = self.mapping.get(key)
+        return entry.content if entry else None
+
+    def with_entry(self, key: str, entry: Node) -> Node:
+        """This mapping with an entry put in or replaced."""
+        return replace(self, content={**self.mapping, key: entry})
+
+
+def dotted(route: Route) -> str:
+    """`network.nodes[0]` for ("network", "nodes", 0)."""
+    parts = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in route)
+    return (parts if parts.isprintable() else ascii(parts)[1:-1]).removeprefix(".")
+
+
+def follow(root: Node, route: Route) -> list[Node]:
+    """The nodes from the root along the route, as far as it goes."""
+    nodes = [root]
+    for step in route:
+        content = nodes[-1].content
+        if isinstance(content, dict) and step in content:
+            nodes.append(content[step])
+        elif isinstance(content, tuple) and isinstance(step, int) and step < len(content):
+            nodes.append(content[step])
+        else:
+            break
+    return nodes
+
+
+def find(root: Node, route: Route) -> Node | None:
+    """The node at the end of the route, or None."""
+    nodes = follow(root, route)
+    return nodes[-1] if len(nodes) == len(route) + 1 else None
+
+
+def plain(node: Node) -> Any:
+    """Data without marks: dicts, tuples, scalars. Values with a fault are left out."""
+    if isinstance(node.content, dict):
+        return {
+            key: plain(entry)
+            for key, entry in node.content.items()
+            if entry.mapping or not entry.faulty
+        }
+    if isinstance(node.content, tuple):
+        return tuple(plain(item) for item in node.content)
+    return node.content
+
+
+def overlay(base: Node, top: Node, replaces: Callable[[Node, Node], bool]) -> Node:
+    """`top` over `base`, mapping by mapping; lists, scalars and what `replaces` says whole."""
+    if not (isinstance(base.content, dict) and isinstance(top.content, dict)) or replaces(
+        base, top
+    ):
+        return top
+    entries = dict(base.content)
+    for key, entry in top.content.items():
+        entries[key] = overlay(entries[key], entry, replaces) if key in entries else entry
+    return replace(top, content=entries, faulty=top.faulty or base.faulty)
+
+
+def another_kind(base: Node, top: Node) -> bool:
+    """Whether `top` names another kind or preset than `base`, whose other keys then mean nothing."""
+    pairs = ((base.get(key), top.get(key)) for key in ("kind", "preset"))
+    return any(None not in pair and pair[0] != pair[1] for pair in pairs)
+
+
+def merge(base: Node, top: Node) -> Node:
+    """`top` over `base`; a mapping of another kind or preset replaces the base's whole."""
+    return overlay(base, top, another_kind)

@@ -1,0 +1,63 @@
+"""Words for messages: what was found, what was probably meant, how to write it instead."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from difflib import get_close_matches
+from typing import Any
+
+
+def quoted(text: str) -> str:
+    """The text in quotes on one line, cut where it is long."""
+    return repr(text if len(text) <= 60 else text[:57] + "...")
+
+
+def found(content: Any, text: str) -> str:
+    """A value as its writer would recognise it; `text` is a scalar as written."""
+    if isinstance(content, dict):
+        return "a mapping of keys" if content else "an empty mapping"
+    if isinstance(content, tuple):
+        return f"a list of {len(content)}"
+    if isinstance(content, str):
+        return quoted(content)
+    return f"{text:.60}" or "nothing"
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """`; did you mean 'length'?`, or nothing where no known word is close."""
+    words = list(known)
+    alike = [other for other in words if other.casefold() == word.casefold()]
+    close = alike or get_close_matches(word, words, n=1)
+    return f"; did you mean '{close[0]}'?" if close else ""
+
+
+def unknown(what: str, word: str, known: Iterable[str]) -> str:
+    """`unknown key; did you mean 'length'? (allowed: ...)`."""
+    words = list(known)
+    return f"unknown {what}{did_you_mean(word, words)} (allowed: {', '.join(words)})"
+
+
+# Text that looks like a value of another type, and how to write that value.
+NUMBER_HINTS = (
+    (r"[-+]?0\d+(\.\d*)?", "numbers have no leading zeros"),
+    (r"[-+]?[\d.]+([eE][-+]?\d+)?", "leave out the quotes"),
+    (r"[-+]?\d+(:\d+)+", "write the number out, colons are not read as minutes"),
+    (r"[-+]?\d+,\d+", "write a decimal point"),
+    (r"[-+]?\d[\d_]*(\.\d*)?", "leave out the underscores"),
+    (r"0[xob][\da-fA-F]+", "write it in decimal"),
+    (r"[-+]?\.?(nan|inf|infinity)", "numbers must be finite"),
+    (r"[-+]?\d\S*\s*[a-zA-Z°%][\w/^°%]*", "leave out the unit"),
+)
+TRUTH_HINTS = (
+    (r"yes|on|y|true|1", "write true"),
+    (r"no|off|n|false|0", "write false"),
+)
+LIST_HINTS = ((r"[^,]+(,[^,]+)+", "write a list as [1, 2, 3]"),)
+
+
+def hint(text: str, hints: tuple[tuple[str, str], ...]) -> str:
+    """`; leave out the unit`, or nothing where no hint fits."""
+    fitting = (said for form, said in hints if re.fullmatch(form, text.strip(), re.IGNORECASE))
+    said = next(fitting, "")
+    return f"; {said}" if said else ""

@@ -1,0 +1,150 @@
+"""Run folders: named, filled, finished, opened again."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import cached_property
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from podusv_cli.errors import StorageError
+from podusv_cli.logbook import atomic, jsonfile, manifest, reading
+from podusv_cli.logbook.regular import read_text
+from podusv_cli.logbook.staging import Staging, sweep
+from podusv_cli.recording import Recording, Status
+
+NEEDED = ("log.h5", "metrics.json", "provenance.json", "resolved.yaml")
+
+
+def default_folder(root: Path, name: str, resolved_yaml: str) -> Path:
+    """`<root>/<name>/<UTC time>-<first 8 hex digits of the resolved scenario's SHA-256>`.
+
+    A number is appended where a run of the same scenario in the same second has that name.
+    """
+    stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
+    digest = hashlib.sha256(resolved_yaml.encode()).hexdigest()[:8]
+    folder, count = root / name / f"{stamp}-{digest}", 1
+    while folder.exists():
+        count += 1
+        folder = folder.with_name(f"{stamp}-{digest}-{count}")
+    return folder
+
+
+class RunWriter:
+    """Fills a folder that appears under its final name only when `finish` is called.
+
+    Made before the simulation, so that a place that cannot be written to is known at once; leaving
+    the `with` block without `finish` leaves nothing behind. A run folder that exists is replaced,
+    whole, only with `force`; anything else, except an empty folder, never is. A run folder is one
+    with a readable manifest, damaged files or not. Every method raises StorageError.
+    """
+
+    def __init__(self, final: Path, *, force: bool = False) -> None:
+        """Check that `final` can be made, and make the hidden folder beside it."""
+        self.final, self._force = final, force
+        sweep(final.parent)  # may put back a run folder that a killed run was replacing
+        _refuse(final, force)
+        self._staging = Staging(final)
+
+    @property
+    def folder(self) -> Path:
+        """Where the files are until `finish`; a RunWriter for a folder in here nests a run."""
+        return self._staging.folder
+
+    def add(self, name: str, content: bytes) -> None:
+        """Write a new file; `name` is relative, with `/` for a file in a folder inside."""
+        path = manifest.place(self.folder, name)
+        with atomic.explained(f"cannot make {path.parent}"):
+            path.parent.mkdir(parents=True, exist_ok=True)
+        atomic.create(path, content)
+
+    def add_json(self, name: str, content: Mapping[str, Any]) -> None:
+        """Write a new JSON file, null for numbers that are not finite."""
+        self.add(name, jsonfile.encode(content))
+
+    def finish(self, status: Status) -> Path:
+        """Write the manifest and give the folder its name, which is returned."""
+        manifest.write(self.folder, status)
+        for inner, _, _ in os.walk(self.folder):
+            atomic.sync_folder(Path(inner))
+        _refuse(self.final, self._force)
+        self._staging.publish(replace=self._force)
+        return self.final
+
+    def __enter__(self) -> Self:
+        """The writer itself."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Remove what was not finished."""
+        self._staging.discard()
+
+
+def _refuse(final: Path, force: bool) -> None:
+    """StorageError where `final` is something that must not be replaced."""
+    if final.name in ("", ".."):
+        raise StorageError(f"cannot make {final}: a folder's own name is needed")
+    with atomic.explained(f"cannot make {final}"):
+        if not os.path.lexists(final):
+            return
+        if final.is_symlink() or not final.is_dir():
+            raise StorageError(f"{final} exists and is not a folder")
+        if not any(final.iterdir()):
+            return
+    try:
+        manifest.read(final)
+    except StorageError as error:
+        raise StorageError(f"{final} exists and is not a finished run folder") from error
+    if not force:
+        raise StorageError(f"{final} exists already; --force replaces it")
+
+
+@dataclass(frozen=True)
+class Run:
+    """A finished run folder. `metrics` has None where a number was not finite."""
+
+    folder: Path
+    status: Status
+    metrics: dict[str, float | None]
+    provenance: dict[str, Any]
+    resolved_yaml: str
+
+    @cached_property
+    def recording(self) -> Recording:
+        """What log.h5 holds, read when first asked for. Raises StorageError."""
+        return reading.read_log(self.folder / "log.h5")
+
+
+def open_run(folder: Path) -> Run:
+    """A run folder, all of whose files are as they were when it was finished.
+
+    Raises StorageError for anything else, naming the first fault.
+    """
+    found = manifest.check(folder)
+    missing = [name for name in NEEDED if name not in found.files]
+    if missing:
+        raise StorageError(f"{folder} is not the folder of a run: it has no {missing[0]}")
+    return Run(
+        folder=folder,
+        status=found.status,
+        metrics=_metrics(folder / "metrics.json"),
+        provenance=jsonfile.read(folder / "provenance.json"),
+        resolved_yaml=read_text(folder / "resolved.yaml"),
+    )
+
+
+def _metrics(path: Path) -> dict[str, float | None]:
+    metrics = jsonfile.read(path).get("metrics")
+    if not isinstance(metrics, dict):
+        raise StorageError(f"{path} holds no metrics")
+    return metrics

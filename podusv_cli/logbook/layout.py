@@ -1,0 +1,35 @@
+"""The shape of log.h5, format 1, as writer and reader share it."""
+
+from __future__ import annotations
+
+import math
+
+from podusv_cli.signals import SIGNALS
+
+FORMAT = 1
+CONVENTIONS = "CF-1.11"
+PROVENANCE, RESOLVED = "provenance", "resolved_yaml"
+CHUNK_BYTES = 2**20  # HDF5's default chunk cache
+
+# Axes besides time, each a dataset of the integers 0, 1, ..., with what they count.
+AXES = {
+    "node": "network node",
+    "input": "network input: u, v, r",
+}
+
+# Arrays that do not run over time, and their axes.
+FIXED_AXES = {
+    "rbf_center": ("node", "input"),
+    "rbf_width": ("input",),
+}
+
+
+def axes(name: str) -> tuple[str, ...]:
+    """Names of a signal's axes, `time` first where it has one. KeyError for an unknown signal."""
+    return FIXED_AXES.get(name, ("time", *SIGNALS[name].axes))
+
+
+def chunk(shape: tuple[int, ...]) -> tuple[int, ...]:
+    """Rows that are compressed together, with everything in them."""
+    rows = max(1, CHUNK_BYTES // (8 * math.prod(shape[1:])))
+    return (min(shape[0], rows), *shape[1:])

@@ -1,0 +1,77 @@
+"""Where a result comes from: versions, source tree, platform, command and times."""
+
+from __future__ import annotations
+
+import os
+import platform
+import subprocess
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import podusv_cli
+
+PACKAGES = ("numpy", "scipy", "numba", "h5py", "pydantic")  # those that can move a number
+GIT_PATIENCE = 5.0  # s
+
+
+def collect(argv: Sequence[str], started: datetime, finished: datetime) -> dict[str, Any]:
+    """Facts about a run for provenance.json; times are aware datetimes.
+
+    `git` is None where podusv does not run from a git checkout or git is missing; a version is
+    None where a package is not installed.
+    """
+    return {
+        "podusv": podusv_cli.__version__,
+        "python": platform.python_version(),
+        "packages": {name: _version(name) for name in PACKAGES},
+        "platform": {
+            "system": platform.system(),
+            "release": platform.release(),
+            "machine": platform.machine(),
+        },
+        "git": source_tree(Path(podusv_cli.__file__).parent),
+        "argv": list(argv),
+        "started": _utc(started),
+        "finished": _utc(finished),
+        "duration_s": round((finished - started).total_seconds(), 6),
+    }
+
+
+def source_tree(package: Path) -> dict[str, Any] | None:
+    """Commit of the checkout that `package` is part of, and whether the package differs from it."""
+    # A package installed somewhere below an unrelated checkout is not tracked there.
+    if _git(package, "ls-files", "--error-unmatch", "__init__.py") is None:
+        return None
+    commit = _git(package, "rev-parse", "HEAD")
+    changes = _git(package, "status", "--porcelain", "--untracked-files=normal", "--", ".")
+    if commit is None or changes is None:
+        return None
+    return {"commit": commit, "dirty": bool(changes)}
+
+
+def _git(folder: Path, *words: str) -> str | None:
+    # Variables that git itself sets, in its hooks for instance, would point to another checkout.
+    environment = {key: word for key, word in os.environ.items() if not key.startswith("GIT_")}
+    environment["GIT_OPTIONAL_LOCKS"] = "0"
+    try:
+        done = subprocess.run(
+            ["git", *words], cwd=folder, env=environment, stdin=subprocess.DEVNULL,
+            capture_output=True, text=True, timeout=GIT_PATIENCE, check=True,
+        )  # fmt: skip
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return done.stdout.strip()
+
+
+def _version(package: str) -> str | None:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None
+
+
+def _utc(time: datetime) -> str:
+    return time.astimezone(UTC).isoformat(timespec="milliseconds")

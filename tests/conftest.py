@@ -1,0 +1,175 @@
+"""Values and measurements that the tests of the numerical rooms share."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path as File
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+import pytest
+import yaml
+
+import podusv_cli
+from podusv_cli.actuators.base import Actuator
+from podusv_cli.actuators.ideal import Ideal
+from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
+from podusv_cli.controllers.base import Controller, Slots
+from podusv_cli.disturbances.base import Disturbance
+from podusv_cli.disturbances.calm import Calm
+from podusv_cli.disturbances.harmonic import HarmonicDisturbance
+from podusv_cli.engine.grid import TimeGrid
+from podusv_cli.engine.simulate import STATE, ClosedLoop, simulate
+from podusv_cli.kernels import Vector, bundle, kernel
+from podusv_cli.paths.base import TARGET, Path
+from podusv_cli.paths.line import Line
+from podusv_cli.paths.line_circle import LineCircle
+from podusv_cli.recording import Recording
+from podusv_cli.registry import Component, catalogue, value
+from podusv_cli.vessels.vessel import Vessel
+
+PACKAGE = File(podusv_cli.__file__).parent
+ROOMS: dict[str, Any] = {
+    "paths": Path, "disturbances": Disturbance, "actuators": Actuator, "controllers": Controller,
+}  # fmt: skip
+# What a component needs that has no default; a new kind without an entry fails its contract test.
+REQUIRED: dict[str, dict[str, Any]] = {
+    "waypoints": {"points": ((0.0, 0.0), (10.0, 1.0), (18.0, 6.0), (20.0, 15.0))},
+}
+PRINTED_START = (-10.0, -10.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Keep the machine code that tests compile, out of the user's own cache."""
+    os.environ.setdefault("PODUSV_CACHE", str(config.cache.mkdir("podusv")))
+
+
+def vessel(name: str) -> Vessel:
+    """The vessel of that parameter file."""
+    return Vessel(preset=name, **yaml.safe_load((PACKAGE / f"vessels/{name}.yaml").read_text()))
+
+
+VESSELS = {path.stem: vessel(path.stem) for path in sorted((PACKAGE / "vessels").glob("*.yaml"))}
+PAPER, NONLINEAR = VESSELS["paper"], VESSELS["paper_nonlinear"]
+
+
+def kinds(room: str) -> dict[str, type[Component]]:
+    """Everything registered in a room, by kind."""
+    return catalogue(f"podusv_cli.{room}", ROOMS[room])
+
+
+def example(kind: type[Component], **fields: Any) -> Any:
+    """A component of this class with its defaults, and what it cannot do without."""
+    return kind(**REQUIRED.get(kind.model_fields["kind"].default, {}) | fields)
+
+
+def target_at(path: Path, t: float) -> Vector:
+    """Position, velocity and acceleration of the target at time t [s]."""
+    target = np.full(len(TARGET), np.nan)
+    path.evaluate(t, *_numbers(path), target)
+    return target
+
+
+@cache
+def _numbers(path: Path) -> tuple[Any, Vector]:
+    return bundle(path.constants()), path.table()
+
+
+def load_at(disturbance: Disturbance, t: float, x: Vector | None = None) -> Vector:
+    """(b_u, b_v, b_r) at time t [s]."""
+    b = np.full(3, np.nan)
+    state = np.zeros(6) if x is None else x
+    disturbance.evaluate(t, state, bundle(disturbance.constants()), disturbance.table(), b)
+    return b
+
+
+class Answer(NamedTuple):
+    """What a law returns for one state."""
+
+    tau: Vector
+    rate: Vector
+    signals: dict[str, float]
+
+
+def ask(law: Controller, x: Vector, memory: Vector, target: Vector, nominal: Vessel) -> Answer:
+    """Evaluate a law once, as plain Python; what it does not write stays NaN."""
+    tau, rate = np.full(2, np.nan), np.full(len(memory), np.nan)
+    signals, work = np.full(len(law.signals), np.nan), np.full(law.workspace(), np.nan)
+    k = bundle(law.informed(nominal))
+    law.law(1.0, x, memory, target, k, law.table(), tau, rate, signals, work)
+    return Answer(tau, rate, dict(zip(law.signals, signals, strict=True)))
+
+
+class Situation(NamedTuple):
+    """Arguments of one evaluation of a law."""
+
+    x: Vector
+    memory: Vector
+    target: Vector
+
+
+def situations(law: Controller, count: int, seed: int = 1) -> Iterator[Situation]:
+    """Random states, targets and memories, all far from the singularity at the target."""
+    random = np.random.default_rng(seed)
+    for _ in range(count):
+        x = random.uniform(-1, 1, 6) * [20, 20, 7, 1.5, 0.5, 0.8]
+        bearing, distance = random.uniform(-np.pi, np.pi), random.uniform(1, 20)
+        ahead = [x[0] + distance * np.cos(bearing), x[1] + distance * np.sin(bearing)]
+        target = np.concatenate([ahead, random.uniform(-1, 1, 4) * [0.7, 0.7, 0.1, 0.1]])
+        memory = law.start(x, target, NONLINEAR)
+        yield Situation(x, memory + random.normal(0, 0.3, len(memory)), target)
+
+
+def corrected(**parts: Any) -> ClosedLoop:
+    """The corrected closed loop without limits, from the printed start, with parts replaced."""
+    defaults: dict[str, Any] = {
+        "vessel": NONLINEAR, "path": LineCircle(), "disturbance": HarmonicDisturbance(),
+        "actuator": Ideal(), "controller": AdaptiveNeural(), "start": PRINTED_START,
+    }  # fmt: skip
+    chosen = defaults | parts
+    return ClosedLoop(**{"nominal": chosen["vessel"]} | chosen)
+
+
+def adrift(**parts: Any) -> ClosedLoop:
+    """A vessel in calm water with a constant demand (zero), with parts replaced."""
+    return corrected(**{"controller": Constant(), "path": Line(), "disturbance": Calm()} | parts)
+
+
+def run(loop: ClosedLoop, duration: float, step: float = 0.01, **options: Any) -> Recording:
+    """Simulate for `duration` [s]; `log_every` and `hold_every` go to the grid."""
+    periods = {name: options.pop(name) for name in ("log_every", "hold_every") if name in options}
+    return simulate(loop, TimeGrid(step, round(duration / step), **periods), **options)
+
+
+def last_state(recording: Recording, loop: ClosedLoop) -> Vector:
+    """Vessel's state and law's memory in the last row."""
+    names = [*STATE, *dict.fromkeys(name for name, _ in loop.controller.slots())]
+    return np.concatenate([np.ravel(recording[name][-1]) for name in names])
+
+
+class Constant(Controller):
+    """A law for tests: the same demand whatever happens."""
+
+    kind: Literal["constant"] = "constant"
+    surge: float = value(0.0, "N", "surge force")
+    yaw: float = value(0.0, "N m", "yaw moment")
+
+    @staticmethod
+    @kernel
+    def law(
+        t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
+        tau: Vector, rate: Vector, signals: Vector, work: Vector,
+    ) -> None:  # fmt: skip
+        """The demand."""
+        tau[0] = k.surge
+        tau[1] = k.yaw
+
+    def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
+        """No memory."""
+        return np.zeros(0)
+
+    def slots(self) -> Slots:
+        """No memory."""
+        return ()

@@ -1,0 +1,51 @@
+"""The sea: (52) at instants worked out by hand, its scale, its bounds."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from conftest import load_at
+
+from podusv_cli.disturbances.calm import Calm
+from podusv_cli.disturbances.harmonic import Harmonic, HarmonicDisturbance
+
+# sin and cos are 0 or +-1 at these times, except where the numbers are written out.
+BY_HAND = [
+    (0.0, (0.8, 0.6, 0.6)),
+    (5 * math.pi, (0.5, 0.6, 0.5)),
+    (10 * math.pi, (0.2, 0.6, 0.6)),
+    (2.5 * math.pi, (0.6 - 0.3 * math.sqrt(0.5), 0.6, 0.5 + 0.1 * math.sqrt(0.5))),
+]
+
+
+@pytest.mark.parametrize(("t", "load"), BY_HAND)
+def test_the_defaults_are_equation_52(t: float, load: tuple[float, float, float]) -> None:
+    np.testing.assert_allclose(load_at(HarmonicDisturbance(), t), load, atol=1e-14)
+
+
+def test_every_axis_has_its_own_numbers() -> None:
+    surge = Harmonic(mean=1.0, sin=2.0, sin_rate=0.3, cos=4.0, cos_rate=0.7)
+    sway = Harmonic(mean=-1.0, sin=0.5, sin_rate=1.1, cos=0.25, cos_rate=1.3)
+    sea = HarmonicDisturbance(b_u=surge, b_v=sway, b_r=Harmonic(mean=7.0))
+    t = 2.7
+    b_u = 1 + 2 * math.sin(0.3 * t) + 4 * math.cos(0.7 * t)
+    b_v = -1 + 0.5 * math.sin(1.1 * t) + 0.25 * math.cos(1.3 * t)
+    np.testing.assert_allclose(load_at(sea, t), [b_u, b_v, 7.0], rtol=1e-14)
+
+
+def test_scale_multiplies_everything_and_zero_is_calm_water() -> None:
+    for t in (0.0, 3.3, 200.0):
+        once = load_at(HarmonicDisturbance(), t)
+        np.testing.assert_allclose(load_at(HarmonicDisturbance(scale=2.5), t), 2.5 * once)
+        np.testing.assert_array_equal(
+            load_at(HarmonicDisturbance(scale=0.0), t), load_at(Calm(), t)
+        )
+
+
+def test_the_load_is_bounded_as_assumption_1_wants() -> None:
+    loads = np.array([load_at(HarmonicDisturbance(), t) for t in np.linspace(0, 400, 4001)])
+    assert np.all(np.abs(loads).max(axis=0) <= [0.9, 0.8, 0.7])
+    # A nonzero mean, as the paper says: about 0.5 on every axis.
+    np.testing.assert_allclose(loads.mean(axis=0), 0.5, atol=0.02)

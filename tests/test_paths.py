@@ -1,0 +1,153 @@
+"""Paths: derivatives, breaks, the three readings of (53), and splines through waypoints."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import example, kinds, target_at
+from pydantic import ValidationError
+from scipy.interpolate import CubicSpline
+
+from podusv_cli.paths.base import Path
+from podusv_cli.paths.circle import Circle
+from podusv_cli.paths.line import Line
+from podusv_cli.paths.line_circle import LineCircle
+from podusv_cli.paths.waypoints import Waypoints
+
+POINTS = ((0.0, 0.0), (5.0, 1.0), (8.0, 6.0), (8.0, 12.0), (3.0, 15.0))
+ORDERS = ("position", "velocity", "acceleration")
+
+PATHS: dict[str, Any] = {name: example(kind) for name, kind in kinds("paths").items()} | {
+    "literal": LineCircle(reading="literal"),
+    "sine": LineCircle(reading="sine"),
+    "velocity, other speed": LineCircle(speed=0.4),
+    "early switch": LineCircle(switch=20.0),
+    "port circle": Circle(turn="port", x=3.0, angle=1.0),
+    "oblique line": Line(course=2.0, x=1.0, y=-4.0),
+    "bends": Waypoints(points=POINTS),
+    "two points": Waypoints(points=POINTS[:2]),
+}
+every_path = pytest.mark.parametrize("path", PATHS.values(), ids=PATHS.keys())
+
+
+def jumps(path: Path, until: float) -> Iterator[tuple[float, str]]:
+    """Times where a component of the target jumps, found by bisection, and the lowest that does."""
+    for start in np.arange(0.0, until, 1.0):
+        for axes, order in zip((slice(0, 2), slice(2, 4), slice(4, 6)), ORDERS, strict=True):
+            low, high = start, start + 1.0
+            for _ in range(36):
+                middle = 0.5 * (low + high)
+                a, b, c = (target_at(path, t)[axes] for t in (low, middle, high))
+                low, high = (low, middle) if abs(b - a).sum() > abs(c - b).sum() else (middle, high)
+            if abs(target_at(path, high) - target_at(path, low))[axes].max() > 1e-6:
+                yield 0.5 * (low + high), order
+                break
+
+
+@every_path
+def test_breaks_are_exactly_the_jumps(path: Path) -> None:
+    found = list(jumps(path, 130.0))
+    stated = [(known.time, known.what) for known in path.breaks()]
+    assert [order for _, order in found] == [order for _, order in stated]
+    assert [t for t, _ in found] == pytest.approx([t for t, _ in stated], abs=1e-9)
+
+
+@every_path
+def test_velocity_and_acceleration_are_derivatives(path: Path) -> None:
+    h = 1e-3
+    broken = [known.time for known in path.breaks()]
+    for t in np.random.default_rng(3).uniform(h, 150.0, 200):
+        if any(abs(t - time) < 3 * h for time in broken):
+            continue
+        before, now, after = (target_at(path, t + shift) for shift in (-h, 0.0, h))
+        np.testing.assert_allclose(now[2:], (after - before)[:4] / (2 * h), atol=2e-6)
+
+
+def test_the_straight_part_is_the_first_line_of_53() -> None:
+    for reading in ("literal", "velocity", "sine"):
+        for t in (0.0, 37.5, 100.0):
+            found = target_at(LineCircle(reading=reading), t)
+            np.testing.assert_array_equal(found, [0.5 * t, 0, 0.5, 0, 0, 0])
+
+
+def test_the_literal_reading_is_the_second_line_of_53_and_jumps_half_a_metre() -> None:
+    path = LineCircle(reading="literal")
+    for s in (0.25, 20.0, 150.0):
+        expected = [50 + 0.5 * math.cos(0.03 * s), 0.5 * math.sin(0.03 * s)]
+        np.testing.assert_allclose(target_at(path, 100 + s)[:2], expected, rtol=1e-12)
+    gap = target_at(path, 100 + 1e-9) - target_at(path, 100.0)
+    assert math.hypot(gap[0], gap[1]) == pytest.approx(0.5, abs=1e-8)
+    assert math.hypot(*target_at(path, 170.0)[2:4]) == pytest.approx(0.015)
+
+
+def test_the_velocity_reading_is_the_printed_terms_integrated() -> None:
+    path = LineCircle()
+    for s in (1e-6, 20.0, 150.0):
+        now = target_at(path, 100 + s)
+        np.testing.assert_allclose(
+            now[2:4], 0.5 * np.array([math.cos(0.03 * s), math.sin(0.03 * s)])
+        )
+        assert math.hypot(now[0] - 50, now[1] - 0.5 / 0.03) == pytest.approx(0.5 / 0.03, rel=1e-12)
+    turned = 100 + 2 * math.pi / 0.03
+    assert turned == pytest.approx(309.4395, abs=1e-4)
+    np.testing.assert_allclose(target_at(path, turned)[:4], [50, 0, 0.5, 0], atol=1e-10)
+
+
+def test_only_the_sine_reading_keeps_the_speed_along_x() -> None:
+    times = np.linspace(0, 309, 200)
+    speeds = {reading: {round(target_at(LineCircle(reading=reading), t)[2], 12) for t in times}
+              for reading in ("literal", "velocity", "sine")}  # fmt: skip
+    assert speeds["sine"] == {0.5}
+    assert len(speeds["literal"]) > 2
+    assert len(speeds["velocity"]) > 2
+
+
+@pytest.mark.parametrize(("turn", "sense"), [("starboard", 1.0), ("port", -1.0)])
+def test_a_circle_turns_the_named_way_at_constant_speed(turn: Any, sense: float) -> None:
+    path = Circle(x=1.0, y=-2.0, radius=8.0, speed=0.4, turn=turn)
+    for t in np.linspace(0, 200, 50):
+        now = target_at(path, t)
+        assert math.hypot(now[0] - 1, now[1] + 2) == pytest.approx(8.0, rel=1e-12)
+        assert math.hypot(now[2], now[3]) == pytest.approx(0.4, rel=1e-12)
+        # Positive where the heading grows, x north and y east: to starboard.
+        assert np.sign(now[2] * now[5] - now[3] * now[4]) == sense
+
+
+def test_a_spline_passes_its_points_when_chords_at_speed_would() -> None:
+    path = Waypoints(points=POINTS, speed=0.8)
+    chords = [math.dist(a, b) for a, b in pairwise(POINTS)]
+    knots = np.concatenate([[0.0], np.cumsum(chords)]) / 0.8
+    for knot, point in zip(knots, POINTS, strict=True):
+        np.testing.assert_allclose(target_at(path, knot)[:2], point, atol=1e-12)
+    natural = CubicSpline(knots, POINTS, bc_type="natural")
+    for t in np.random.default_rng(5).uniform(0, knots[-1], 50):
+        expected = np.concatenate([natural(t), natural(t, 1), natural(t, 2)])
+        np.testing.assert_allclose(target_at(path, t), expected, atol=1e-12)
+
+
+def test_after_the_last_point_the_target_goes_straight_on() -> None:
+    path = Waypoints(points=POINTS)
+    end = sum(math.dist(a, b) for a, b in pairwise(POINTS)) / 0.5
+    last = target_at(path, end)
+    np.testing.assert_allclose(last[4:], 0.0, atol=1e-12)
+    later = target_at(path, end + 40.0)
+    np.testing.assert_allclose(later[:2], last[:2] + 40.0 * last[2:4], rtol=1e-12)
+    np.testing.assert_array_equal(later[2:], [*last[2:4], 0.0, 0.0])
+
+
+def test_two_points_make_a_line() -> None:
+    straight = Line(course=math.atan2(3, 4), speed=0.5)
+    path = Waypoints(points=((0.0, 0.0), (4.0, 3.0)))
+    for t in (0.0, 3.3, 10.0, 55.0):
+        np.testing.assert_allclose(target_at(path, t), target_at(straight, t), atol=1e-12)
+
+
+@pytest.mark.parametrize("points", [(), ((1.0, 2.0),), ((0.0, 0.0), (1.0, 1.0), (1.0, 1.0))])
+def test_points_without_a_way_are_refused(points: Any) -> None:
+    with pytest.raises(ValidationError):
+        Waypoints(points=points)
