@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
-from conftest import NONLINEAR, PAPER, corrected, example, kinds, last_state, run
+from conftest import PAPER, corrected, example, kinds, last_state, run
 from scipy.integrate import solve_ivp
 
 from podusv_cli.actuators.saturated import Saturated
@@ -35,7 +36,7 @@ def end(loop: ClosedLoop, step: float, **options: Any) -> Vector:
 
 def order(ends: list[Vector]) -> float:
     """Mean order from ends at halved steps (Richardson: differences shrink as errors do)."""
-    gaps = [abs(a - b).max() for a, b in zip(ends, ends[1:], strict=False)]
+    gaps = [abs(a - b).max() for a, b in pairwise(ends)]
     return float(-np.polyfit(range(len(gaps)), np.log2(gaps), 1)[0])
 
 
@@ -182,10 +183,3 @@ def test_the_printed_first_difference_blows_up_within_a_second() -> None:
     assert f"t = {out['time'][-1] + 0.01:.6g} s" in out.message
     assert "x is not finite" in out.message
     assert all(np.isfinite(signal).all() for signal in out.signals.values())
-
-
-def test_the_nominal_vessel_is_all_that_a_law_knows_of_the_plant() -> None:
-    # A law told of another vessel still faces the true one.
-    out = run(corrected(vessel=NONLINEAR, nominal=PAPER), 1.0)
-    same = run(corrected(vessel=NONLINEAR), 1.0)
-    np.testing.assert_array_equal(out["x"], same["x"])

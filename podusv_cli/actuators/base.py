@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from podusv_cli.kernels import Vector
+from podusv_cli.kernels import Vector, bundle
 from podusv_cli.registry import Component
 
 
@@ -33,3 +33,21 @@ class Actuator(Component):
     def rest(self) -> Vector:
         """The state at the start of a run."""
         return np.zeros(len(self.states))
+
+    def input_matrix(self) -> Vector:
+        """How loads (tau_u, tau_v, tau_r) follow small demands (tau_u, tau_r) at rest, shape (3, 2).
+
+        By central differences. A rank below 3 is what the paper's section 2 calls underactuated.
+        """
+        small, k, table = 1e-3, bundle(self.constants()), self.table()
+        loads = np.zeros((2, 2, 3))
+        for axis in range(2):
+            for side, sign in enumerate((1.0, -1.0)):
+                demand = np.zeros(2)
+                demand[axis] = sign * small
+                rate, signals = np.zeros(len(self.states)), np.zeros(len(self.signals))
+                self.drive(
+                    0.0, np.zeros(6), self.rest(), demand, k, table,
+                    loads[axis, side], rate, signals,
+                )  # fmt: skip
+        return np.asarray(((loads[:, 0] - loads[:, 1]) / (2.0 * small)).T)

@@ -111,7 +111,6 @@ def wanted(field: FieldInfo) -> str:
         return f"a mapping of keys with kind {joined(list(kinds))}"
     bounds = limits(field)
     ranges = [f"{BOUNDS_IN_WORDS[name]} {bounds[name]:g}" for name in BOUNDS if name in bounds]
-    form = PATTERNS_IN_WORDS.get(bounds.get("pattern", ""), "")
     unit = f"[{unit_of(field)}]" if unit_of(field) and not kinds else ""
     return " ".join(
         part for part in (noun(field.annotation), form, " and ".join(ranges), unit) if part
@@ -120,29 +119,30 @@ def wanted(field: FieldInfo) -> str:
 
 @dataclass(frozen=True)
 class Key:
-    """A key of a scenario: `path` as in files, `route` with the kinds of sections in between."""
+    """A key of a scenario: `path` as in files, `route` with the kinds of sections in between.
+
+    `kind` is the innermost kind on the way, "" where there is none.
+    """
 
     path: tuple[str, ...]
     route: tuple[str, ...]
+    kind: str
     field: FieldInfo
     default: Any
 
 
-def keys(
-    model: type[Component],
-    path: tuple[str, ...] = (),
-    route: tuple[str, ...] = (),
-    defaults: Any = None,
-) -> Iterator[Key]:
-    """Every key of a model, sections before what is in them.
-
-    `defaults` is the component that a section is when it is left out of the scenario.
-    """
+def keys(model: type[Component]) -> Iterator[Key]:
+    """Every key of a model, sections before what is in them, kind after kind."""
     for name, field in model.model_fields.items():
-        default = field.default if defaults is None else getattr(defaults, name)
-        key = Key((*path, name), (*route, name), field, default)
-        yield key
-        for kind, part in sections(field).items():
-            inner = (*key.route, kind) if kind else key.route
-            whole = default if isinstance(default, part) else None
-            yield from keys(part, key.path, inner, whole)
+        yield from _branch(Key((name,), (name,), "", field, field.default))
+
+
+def _branch(key: Key) -> Iterator[Key]:
+    yield key
+    for kind, part in sections(key.field).items():
+        route = (*key.route, kind) if kind else key.route
+        for name, field in part.model_fields.items():
+            # A section that is left out is its default, whatever its own class would start with.
+            default = getattr(key.default, name) if isinstance(key.default, part) else field.default
+            inner = Key((*key.path, name), (*route, name), kind or key.kind, field, default)
+            yield from _branch(inner)

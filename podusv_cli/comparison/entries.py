@@ -1,0 +1,62 @@
+"""Finished runs as comparison sees them: a label, a folder, a scenario, numbers and signals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from podusv_cli.config.scenario import Scenario
+from podusv_cli.figures.style import DERIVED
+from podusv_cli.kernels import Vector
+from podusv_cli.logbook.folder import Run
+from podusv_cli.recording import Recording
+
+
+def input_rank(scenario: Scenario) -> int:
+    """Rank of the map from what the actuator can do to loads (tau_u, tau_v, tau_r), at rest.
+
+    By central differences of the actuator's kernel about zero demand; below 3 the vessel is
+    underactuated, which is the paper's title claim for Y_p = 0.
+    """
+    return int(np.linalg.matrix_rank(scenario.actuator.input_matrix()))
+
+
+CHECKS: dict[str, Callable[[Entry], bool]] = {
+    "finished": lambda entry: entry.recording.status == "finished",
+    "underactuated": lambda entry: input_rank(entry.scenario) < 3,
+}
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A run in a comparison; what `expressions.Source` asks for."""
+
+    label: str
+    run: Run
+    scenario: Scenario
+
+    @cached_property
+    def recording(self) -> Recording:
+        """The log."""
+        return self.run.recording
+
+    def metric(self, name: str) -> float:
+        """A metric; NaN where it is undefined, and for any run that did not reach its end."""
+        number = self.run.metrics.get(name)
+        whole = self.recording.status == "finished"
+        return float(number) if number is not None and whole else math.nan
+
+    def signal(self, name: str) -> Vector:
+        """A logged or derived signal; empty where the run has none of this name."""
+        if name in DERIVED:
+            has = all(part in self.recording for part in DERIVED[name].needs)
+            return DERIVED[name].compute(self.recording) if has else np.empty(0)
+        return self.recording[name] if name in self.recording else np.empty(0)
+
+    def check(self, name: str) -> bool:
+        """Whether a named property holds."""
+        return CHECKS[name](self)

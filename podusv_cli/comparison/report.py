@@ -1,0 +1,167 @@
+"""The HTML report of a comparison: one file that needs nothing else."""
+
+from __future__ import annotations
+
+import base64
+import html
+import inspect
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import pandas as pd
+
+from podusv_cli.comparison.claims import Verdict
+from podusv_cli.comparison.differences import flat
+from podusv_cli.comparison.table import cells
+from podusv_cli.config.scenario import Scenario
+from podusv_cli.registry import Component
+
+STYLE = """
+body { font: 15px/1.45 system-ui, sans-serif; max-width: 62rem; margin: 2rem auto; padding: 0 1rem;
+       color: #1a1a1a; background: #fff; }
+h1 { font-size: 1.6rem; } h2 { font-size: 1.2rem; margin-top: 2.2rem; }
+table { border-collapse: collapse; font-size: 0.85rem; } .wide { overflow-x: auto; }
+th, td { padding: 0.25rem 0.7rem; border-bottom: 1px solid #ddd; text-align: left;
+         vertical-align: top; }
+td.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
+th { border-bottom: 2px solid #444; } code { font-size: 0.82rem; }
+.reproduced { color: #00694e; } .not { color: #a33c00; } .cannot { color: #555; }
+.warning { border-left: 4px solid #d55e00; padding: 0.4rem 1rem; background: #fdf3ec; }
+figure { margin: 1.2rem 0; } img { max-width: 100%; } figcaption { font-size: 0.85rem; color: #444; }
+small { color: #555; }
+"""
+SECTIONS = ("vessel", "start", "path", "disturbance", "actuator", "simulation", "control")
+
+
+@dataclass(frozen=True)
+class Story:
+    """What a report tells."""
+
+    title: str
+    scenario: Scenario
+    controllers: Mapping[str, Component]
+    endings: Mapping[str, str]  # how each run ended
+    differences: Mapping[str, Mapping[str, Any]]
+    table: pd.DataFrame
+    verdicts: Sequence[Verdict]
+    figures: Sequence[tuple[str, str, bytes]]  # name, caption, SVG
+    provenance: Mapping[str, Any]
+
+
+def page(story: Story) -> str:
+    """The whole report."""
+    title = html.escape(story.title)
+    body = "\n".join(
+        part
+        for part in (
+            f"<h1>{title}</h1>",
+            f"<p>{html.escape(story.scenario.description)}</p>",
+            _endings(story),
+            _differences(story),
+            "<h2>Comparison</h2>",
+            _numbers(story.table),
+            _claims(story.verdicts),
+            "<h2>Figures</h2>",
+            *(_figure(*figure) for figure in story.figures),
+            "<h2>Scenario</h2>",
+            _scenario(story),
+            "<h2>Provenance</h2>",
+            _rows(("", ""), flat(story.provenance)),
+        )
+        if part
+    )
+    head = f'<meta charset="utf-8"><title>{title}</title><style>{STYLE}</style>'
+    viewport = '<meta name="viewport" content="width=device-width">'
+    return (
+        f'<!doctype html>\n<html lang="en"><head>{viewport}{head}</head>\n<body>{body}</body></html>\n'
+    )
+
+
+def _table(head: Iterable[str], rows: Iterable[Iterable[str]], numeric_from: int = 99) -> str:
+    top = "".join(f"<th>{html.escape(cell)}</th>" for cell in head)
+    lines = []
+    for row in rows:
+        tags = ("<td class=number>" if i >= numeric_from else "<td>" for i in range(99))
+        cells_ = (f"{tag}{cell}</td>" for tag, cell in zip(tags, row, strict=False))
+        lines.append("<tr>" + "".join(cells_) + "</tr>")
+    return f"<div class=wide><table><tr>{top}</tr>" + "\n".join(lines) + "</table></div>"
+
+
+def _rows(head: tuple[str, str], pairs: Iterable[tuple[str, Any]]) -> str:
+    return _table(head, ((html.escape(key), html.escape(_short(value))) for key, value in pairs))
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, (list, tuple)):
+        return " ".join(map(_short, value))
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _endings(story: Story) -> str:
+    bad = {label: ending for label, ending in story.endings.items() if ending}
+    lines = (
+        f"<li><b>{html.escape(label)}</b>: {html.escape(text)}</li>" for label, text in bad.items()
+    )
+    return f"<div class=warning>Not all runs finished:<ul>{''.join(lines)}</ul></div>" if bad else ""
+
+
+def _differences(story: Story) -> str:
+    if not story.differences:
+        return ""
+    labels = list(next(iter(story.differences.values())))
+    rows = (
+        [html.escape(key), *(html.escape(_short(values[label])) for label in labels)]
+        for key, values in story.differences.items()
+    )
+    text = "These runs differ in more than the controller:"
+    return f"<div class=warning><p>{text}</p>{_table(['key', *labels], rows)}</div>"
+
+
+def _numbers(frame: pd.DataFrame) -> str:
+    rows = (
+        [
+            f"<b>{html.escape(cell.replace('*', ''))}</b>" if "*" in cell else html.escape(cell)
+            for cell in row
+        ]
+        for row in cells(frame)
+    )
+    note = (
+        "<p><small>Bold: smallest of its row. In brackets: ratio to the first run. A dash: not "
+        "defined, or the run did not finish.</small></p>"
+    )
+    return _table(["metric", "unit", *map(str, frame.columns)], rows, numeric_from=2) + note
+
+
+def _claims(verdicts: Sequence[Verdict]) -> str:
+    if not verdicts:
+        return ""
+    rows = []
+    for v in verdicts:
+        remark = f"<br><small>{html.escape(v.claim.remark)}</small>" if v.claim.remark else ""
+        says = f"{html.escape(v.claim.says)} <small>({html.escape(v.claim.source)})</small>{remark}"
+        mark = f"<b class='{v.answer.split()[0]}'>{v.answer}</b>"
+        put = f"<code>{html.escape(v.claim.expect)}</code>, tolerance {v.claim.tolerance:g}"
+        rows.append([v.claim.id, says, mark, f"{put}<br>{html.escape(v.shown())}"])
+    return "<h2>Claims</h2>" + _table(("", "claim", "verdict", "put as, and the numbers"), rows)
+
+
+def _figure(name: str, caption: str, svg: bytes) -> str:
+    # As data rather than inline markup: the figures' internal names would collide in one page.
+    data = base64.b64encode(svg).decode()
+    text = html.escape(f"{name}: {caption}")
+    image = f'<img alt="{html.escape(name)}" src="data:image/svg+xml;base64,{data}">'
+    return f"<figure>{image}<figcaption>{text}</figcaption></figure>"
+
+
+def _scenario(story: Story) -> str:
+    parts: dict[str, Component] = {name: getattr(story.scenario, name) for name in SECTIONS}
+    parts |= {f"controller {label}": part for label, part in story.controllers.items()}
+    rows = ([f"<b>{html.escape(name)}</b>", _in_words(part)] for name, part in parts.items())
+    return _table(("", ""), rows)
+
+
+def _in_words(part: Component) -> str:
+    said = (inspect.getdoc(type(part)) or "").partition("\n")[0]
+    values = ", ".join(f"{key} {_short(value)}" for key, value in flat(part.model_dump()))
+    return f"{html.escape(said)}<br><small>{html.escape(values)}</small>"

@@ -1,0 +1,163 @@
+"""What every key of a scenario means, read from the models, and what every signal means."""
+
+from __future__ import annotations
+
+import inspect
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import cache
+
+from podusv_cli.config.fields import (
+    MISSING,
+    Key,
+    choices,
+    joined,
+    keys,
+    noun,
+    range_of,
+    sections,
+)
+from podusv_cli.config.references import vessel_names
+from podusv_cli.config.scenario import Scenario
+from podusv_cli.config.words import did_you_mean
+from podusv_cli.errors import PodusvError
+from podusv_cli.registry import Component, unit_of
+from podusv_cli.signals import SIGNALS
+
+# What a file may leave out although the model has no default for it, and where it comes from.
+FILLED_IN = {("name",): "the file's name", ("nominal",): "the vessel"}
+FROM_PRESET = {"vessel": "the preset's", "nominal": "the vessel's"}
+
+
+class UnknownKeyError(PodusvError):
+    """Neither a key nor a signal has that name."""
+
+    exit_code = 2
+
+
+@dataclass(frozen=True)
+class Row:
+    """A key, kind or signal in words; empty where there is nothing to say.
+
+    `type` is what a value may be, or says what `choices` are: the "kinds" of a section or the
+    "keys" in it. `kinds` are those of a section in which the key is the same.
+    """
+
+    key: str
+    meaning: str
+    type: str = ""
+    unit: str = ""
+    range: str = ""
+    default: str = ""
+    choices: tuple[str, ...] = ()
+    kinds: tuple[str, ...] = ()
+
+
+EXTENDS = Row("extends", "scenario that this one changes, a file name relative to it", "text")
+
+
+def explain(key: str | None = None) -> list[Row]:
+    """Rows for a key, a kind, a section, a signal or, with None, the sections of a scenario.
+
+    `controller` gives its kinds, `controller.pid` that kind's keys, `controller.k_ze` or just
+    `k_ze` one key. Raises UnknownKeyError, with what was probably meant.
+    """
+    if key is None:
+        return [EXTENDS, *_together(entry for entry in _keys() if len(entry.path) == 1)]
+    if key == EXTENDS.key:
+        return [EXTENDS]
+    found = _at(tuple(key.split("."))) or [*_signal(key), *_named(key)]
+    if not found:
+        raise UnknownKeyError(f"{key}: no such key or signal{did_you_mean(key, _names())}")
+    return found
+
+
+def summary(model: type[Component]) -> str:
+    """The first sentence of a component's documentation."""
+    return first_sentence(inspect.getdoc(model) or "")
+
+
+def first_sentence(text: str) -> str:
+    """The first paragraph's first sentence, on one line."""
+    paragraph = " ".join(text.split("\n\n")[0].split())
+    return paragraph.partition(". ")[0].removesuffix(".") + "."
+
+
+@cache
+def _keys() -> tuple[Key, ...]:
+    return tuple(keys(Scenario))
+
+
+def _names() -> list[str]:
+    """Everything that can be asked for."""
+    asked = [(e.path, e.route, e.path[-1:], (*e.path[:1], e.kind)[: 1 + bool(e.kind)]) for e in _keys()]
+    return list(dict.fromkeys([".".join(name) for names in asked for name in names] + [*SIGNALS]))
+
+
+def _at(place: tuple[str, ...]) -> list[Row]:
+    """The section, kind or key at a place, and what is in it."""
+    entries = [entry for entry in _keys() if place in (entry.path, entry.route)]
+    kinds = [(kind, part) for e in entries for kind, part in sections(e.field).items() if kind]
+    if kinds:
+        rows = {kind: _kind_row((*place, kind), part) for kind, part in kinds}
+        return [*_together(entries), *rows.values()]
+    if not entries:
+        return _of_kind(place)
+    inside = (entry for entry in _keys() if place in (entry.path[:-1], entry.route[:-1]))
+    return [*_together(entries), *_together(inside)]
+
+
+def _of_kind(place: tuple[str, ...]) -> list[Row]:
+    """One kind of a section and its keys."""
+    inside = [entry for entry in _keys() if place == entry.route[:-1]]
+    above = [entry for entry in _keys() if place[:-1] in (entry.path, entry.route)]
+    heads = [_kind_row(place, sections(entry.field)[place[-1]]) for entry in above if inside]
+    return [*heads, *(replace(row, kinds=()) for row in _together(inside))]
+
+
+def _named(name: str) -> list[Row]:
+    """Every key whose last word this is."""
+    return _together(entry for entry in _keys() if entry.path[-1] == name)
+
+
+def _signal(name: str) -> list[Row]:
+    signal = SIGNALS.get(name)
+    return [Row(name, signal.meaning, "signal", signal.unit)] if signal else []
+
+
+def _together(entries: Iterable[Key]) -> list[Row]:
+    """A row for each key, one for all kinds in which it is the same."""
+    kinds: dict[Row, list[str]] = {}
+    for entry in entries:
+        kinds.setdefault(_row(entry), []).append(entry.kind)
+    return [replace(row, kinds=tuple(filter(None, found))) for row, found in kinds.items()]
+
+
+def _kind_row(place: tuple[str, ...], model: type[Component]) -> Row:
+    return Row(".".join(place), summary(model), "keys", choices=tuple(model.model_fields))
+
+
+def _row(entry: Key) -> Row:
+    field, name = entry.field, entry.path[-1]
+    key, meaning = ".".join(entry.path), field.description or f"which {entry.path[-2]} it is"
+    parts = sections(field)
+    if parts:
+        inside = tuple(parts[""].model_fields) if "" in parts else tuple(parts)
+        return Row(key, meaning, "keys" if "" in parts else "kinds", choices=inside)
+    words = vessel_names() if name == "preset" else choices(field.annotation)
+    return Row(
+        key, meaning, joined(words) if name == "preset" else noun(field.annotation),
+        unit_of(field), range_of(field), _default(entry), words,
+    )  # fmt: skip
+
+
+def _default(entry: Key) -> str:
+    """What the value is when it is left out, as it would be written."""
+    if entry.path in FILLED_IN:
+        return FILLED_IN[entry.path]
+    if entry.path[0] in FROM_PRESET and entry.path != ("vessel", "preset"):
+        return FROM_PRESET[entry.path[0]]
+    if entry.default is MISSING or entry.path[-1] == "kind":
+        return "required"
+    return entry.default if entry.default and isinstance(entry.default, str) else json.dumps(entry.default)

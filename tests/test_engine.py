@@ -1,0 +1,243 @@
+"""The engine: what is logged, when the law acts, how a run ends, and both ways of running it."""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import Any, Literal
+
+import numpy as np
+import pytest
+from conftest import (
+    NONLINEAR,
+    ROOMS,
+    VESSELS,
+    Constant,
+    adrift,
+    ask,
+    corrected,
+    example,
+    kinds,
+    load_at,
+    run,
+    target_at,
+)  # fmt: skip
+from hypothesis import given
+from hypothesis import strategies as st
+
+from podusv_cli.actuators.saturated import Saturated
+from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
+from podusv_cli.controllers.backstepping import Backstepping
+from podusv_cli.controllers.pid import Pid
+from podusv_cli.disturbances.harmonic import HarmonicDisturbance
+from podusv_cli.engine.grid import TimeGrid, whole_steps
+from podusv_cli.engine.simulate import STATE, ClosedLoop, Observer, simulate
+from podusv_cli.kernels import Vector, kernel
+from podusv_cli.paths.line_circle import LineCircle
+from podusv_cli.recording import Recording
+
+PARTS = [
+    pytest.param({room[:-1]: example(kind)}, id=f"{room}-{name}")
+    for room in ROOMS for name, kind in kinds(room).items()
+]  # fmt: skip
+OTHER_WAYS = [
+    pytest.param({"controller": AdaptiveNeural(rate="difference", B_u=5.0)}, id="difference"),
+    pytest.param({"controller": AdaptiveNeural(hold_below=20.0)}, id="held direction"),
+    pytest.param({"controller": Backstepping(fold="printed"), "start": (9.0, -9.0, -2.0, 0.3, 0.1, 0)},
+                 id="folded"),
+    pytest.param({"path": LineCircle(switch=0.2, reading="literal")}, id="literal path"),
+]  # fmt: skip
+
+
+def same(one: Recording, other: Recording) -> bool:
+    """Whether every number of two recordings is the same to the last bit."""
+    assert one.signals.keys() == other.signals.keys()
+    return all(np.array_equal(one[name], other[name]) for name in one.signals)
+
+
+@kernel
+def _integrate(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
+    seen[0] += weight
+    seen[1] += weight * s[0]
+    seen[2] += 1.0
+
+
+WATCH = Observer(_integrate, {"nothing": 0.0}, 3)
+
+
+@pytest.mark.parametrize("hold_every", [0, 10])
+@pytest.mark.parametrize("parts", PARTS + OTHER_WAYS)
+def test_machine_code_and_plain_python_agree(parts: dict[str, Any], hold_every: int) -> None:
+    # Bit for bit where this was written; libm may differ by a rounding elsewhere.
+    loop = corrected(**parts)
+    fast, slow = (run(loop, 0.5, hold_every=hold_every, compiled=c) for c in (True, False))
+    for name in slow.signals:
+        size = np.abs(slow[name]).max()
+        np.testing.assert_allclose(fast[name], slow[name], rtol=1e-11, atol=1e-12 * size)
+
+
+def test_the_same_loop_gives_the_same_bits_whatever_the_blocks() -> None:
+    loop = corrected(actuator=Saturated())
+    once = run(loop, 20.0)
+    assert same(once, run(loop, 20.0))
+    assert same(once, run(loop, 20.0, progress=lambda _: time.sleep(0.06)))
+
+
+def test_time_is_a_whole_number_of_steps() -> None:
+    out = run(adrift(), 60.0, 0.1)
+    np.testing.assert_array_equal(out["time"], [k * 0.1 for k in range(601)])
+
+
+@given(steps=st.integers(0, 10**6), step=st.sampled_from([0.001, 0.01, 0.02, 0.1, 1 / 3]))
+def test_whole_steps_are_found_and_nothing_else(steps: int, step: float) -> None:
+    assert whole_steps(steps * step, step) == steps
+    assert whole_steps((steps + 0.3) * step, step) is None
+
+
+def test_every_row_is_one_instant() -> None:
+    """Each column of a row belongs to the row's own time and state, not to a stage in between."""
+    law = Backstepping()
+    loop = corrected(controller=law, nominal=VESSELS["cybership2"], actuator=Saturated())
+    out = run(loop, 0.5, compiled=False)
+    for i, t in enumerate(out["time"]):
+        x = np.array([out[name][i] for name in STATE])
+        target = target_at(loop.path, t)
+        assert [out["x_d"][i], out["y_d"][i]] == target[:2].tolist()
+        assert [out[name][i] for name in ("b_u", "b_v", "b_r")] == load_at(
+            loop.disturbance, t
+        ).tolist()
+        memory = np.concatenate([np.ravel(out[name][i]) for name, _ in law.slots()])
+        # The law knows the nominal vessel only: another one than is simulated here.
+        said = ask(law, x, memory, target, VESSELS["cybership2"])
+        assert [out["tau_u_cmd"][i], out["tau_r_cmd"][i]] == said.tau.tolist()
+        assert {name: out[name][i] for name in law.signals} == said.signals
+        assert out["tau_u"][i] == np.clip(said.tau[0], -8, 8)
+        assert not np.array_equal(said.tau, ask(law, x, memory, target, NONLINEAR).tau)
+
+
+@pytest.mark.parametrize("log_every", [7, 10, 64])
+def test_thinning_the_log_drops_rows_and_changes_nothing(log_every: int) -> None:
+    full = run(corrected(), 3.0, observer=WATCH)
+    thin = run(corrected(), 3.0, observer=WATCH, log_every=log_every)
+    assert len(thin["time"]) == 300 // log_every + 1
+    for name in full.signals:
+        np.testing.assert_array_equal(thin[name], full[name][::log_every])
+    assert full.seen is not None
+    np.testing.assert_array_equal(thin.seen, full.seen)
+
+
+def test_an_observer_sees_every_instant_with_trapezoidal_weights() -> None:
+    out = run(corrected(), 3.0, observer=WATCH, log_every=100)
+    full = run(corrected(), 3.0)
+    assert out.seen is not None
+    integral = np.trapezoid(full["x"], full["time"])
+    np.testing.assert_allclose(out.seen, [3.0, integral, 301], rtol=1e-12)
+
+
+def test_sampled_control_is_the_law_at_samples_held_in_between() -> None:
+    law = AdaptiveNeural()
+    loop = corrected(controller=law)
+    out = run(loop, 1.0, hold_every=20)
+    for name in ("tau_u_cmd", "tau_r_cmd", "alpha_u", "alpha_r", "psi_e", "u_e", "f_hat_r"):
+        assert all(len(set(out[name][k : k + 20])) == 1 for k in range(0, 100, 20))
+    for i in range(0, 101, 20):
+        x = np.array([out[name][i] for name in STATE])
+        memory = np.concatenate([np.ravel(out[name][i]) for name, _ in law.slots()])
+        said = ask(law, x, memory, target_at(loop.path, out["time"][i]), NONLINEAR)
+        assert [out["tau_u_cmd"][i], out["tau_r_cmd"][i]] == pytest.approx(said.tau, rel=1e-12)
+    # The memory goes on between samples, with the measurement held: beta' = decay (alpha - beta).
+    alpha, beta = out["alpha_u"], out["beta_u"]
+    decay = (law.A_u + abs(alpha[:-1])) * 0.01
+    expected = alpha[:-1] + (beta[:-1] - alpha[:-1]) * np.exp(-decay)
+    np.testing.assert_allclose(beta[1:], expected, rtol=1e-8)
+
+
+def test_the_logged_distance_is_the_distance_of_its_row_in_sampled_control_too() -> None:
+    out = run(corrected(), 3.0, hold_every=100)
+    true = np.hypot(out["x_d"] - out["x"], out["y_d"] - out["y"])
+    np.testing.assert_allclose(out["z_e"], true, rtol=1e-12)
+
+
+def test_a_difference_that_fits_no_step_is_refused() -> None:
+    loop = corrected(controller=AdaptiveNeural(rate="difference", difference_step=0.015))
+    with pytest.raises(ValueError, match=r"0\.015"):
+        simulate(loop, TimeGrid(0.01, 10), compiled=False)
+
+
+class Exploding(Constant):
+    """A demand that is no number any more from t = 0.5 s on."""
+
+    kind: Literal["exploding"] = "exploding"
+
+    @staticmethod
+    @kernel
+    def law(
+        t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
+        tau: Vector, rate: Vector, signals: Vector, work: Vector,
+    ) -> None:  # fmt: skip
+        """1 N, then infinity."""
+        tau[0] = 1.0 if t < 0.4999 else math.inf
+        tau[1] = 0.0
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+@pytest.mark.parametrize(("hold_every", "culprit"), [(0, "u"), (10, "tau_u_cmd")])
+def test_divergence_is_reported_where_it_happens(
+    hold_every: int, culprit: str, compiled: bool
+) -> None:
+    # Continuously, the last stage of the step to 0.5 s has seen it; sampled, only the law has.
+    loop = adrift(controller=Exploding())
+    out = run(loop, 5.0, hold_every=hold_every, compiled=compiled)
+    assert out.status == "diverged"
+    assert out.message.startswith(f"diverged at t = 0.5 s: {culprit} is not finite")
+    assert f"time 0.49, x {out['x'][-1]:.4g}" in out.message
+    assert len(out["time"]) == 50
+    assert all(np.isfinite(signal).all() for signal in out.signals.values())
+    whole = run(adrift(controller=Constant(surge=1.0)), 0.49)
+    np.testing.assert_array_equal(out["x"], whole["x"])
+    assert len(run(loop, 5.0, log_every=7, compiled=False)["time"]) == 8
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_a_run_that_leaves_the_numbers_ends_alike_in_both_ways(compiled: bool) -> None:
+    # Plain Python's sin, cos and ceil raise where machine code returns no number.
+    law = AdaptiveNeural(rate="difference", first_difference="from_zero", k_psie=0.01)
+    out = run(corrected(controller=law, start=(-10, -10, 0, 0, 0, 1e5)), 5.0, compiled=compiled)
+    assert out.status == "diverged"
+    assert "is not finite" in out.message
+
+
+def test_an_interrupt_keeps_the_rows_so_far() -> None:
+    def press(_: float) -> None:
+        raise KeyboardInterrupt
+
+    loop = corrected(controller=Pid())
+    out = run(loop, 100.0, progress=press)
+    assert out.status == "interrupted"
+    assert 0 < len(out["time"]) < 10001
+    whole = run(loop, 100.0)
+    for name in out.signals:
+        np.testing.assert_array_equal(out[name], whole[name][: len(out["time"])])
+    # As `Recording` promises: the message says how a run ended that did not finish.
+    assert f"{out['time'][-1]:.6g}" in out.message
+
+
+def test_progress_grows_to_one_and_the_log_takes_no_notice() -> None:
+    fractions: list[float] = []
+    loop = corrected(disturbance=HarmonicDisturbance(scale=0.5))
+    assert same(run(loop, 60.0, progress=fractions.append), run(loop, 60.0))
+    assert fractions == sorted(fractions)
+    assert fractions[-1] == 1.0
+
+
+def test_no_steps_is_the_start_alone() -> None:
+    out = run(corrected(), 0.0)
+    assert (out.status, out["time"].tolist(), out["x"].tolist()) == ("finished", [0.0], [-10.0])
+
+
+def test_a_run_leaves_its_loop_as_it_was() -> None:
+    loop = corrected()
+    before = loop.first_memory()
+    run(loop, 1.0)
+    assert isinstance(loop, ClosedLoop)
+    np.testing.assert_array_equal(loop.first_memory(), before)
