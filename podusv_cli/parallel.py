@@ -98,9 +98,7 @@ def _work(job: Job, channel: Connection) -> None:
     channel.send(outcome)
 
 
-def _listen(
-    shift: _Shift, worker: _Worker, progress: Callable[[int, float], None] | None
-) -> None:
+def _listen(shift: _Shift, worker: _Worker, progress: Callable[[int, float], None] | None) -> None:
     try:
         said = worker.channel.recv()
     except EOFError:

@@ -38,12 +38,18 @@ ROOMS: dict[str, Any] = {
 REQUIRED: dict[str, dict[str, Any]] = {
     "waypoints": {"points": ((0.0, 0.0), (10.0, 1.0), (18.0, 6.0), (20.0, 15.0))},
 }
+# Slow enough an adaptation for a law that is evaluated only now and then.
+GENTLE = AdaptiveNeural(Gamma_u=1.0, Gamma_r=1.0, gamma_u=10.0, gamma_r=10.0)
+# Behind a target that goes north, facing it, and moving: nothing is folded or passes through zero.
+SMOOTH_START = (-8.0, -4.0, 0.1, 0.4, 0.05, 0.02)
 PRINTED_START = (-10.0, -10.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def pytest_configure(config: pytest.Config) -> None:
     """Keep the machine code that tests compile, out of the user's own cache."""
-    os.environ.setdefault("PODUSV_CACHE", str(config.cache.mkdir("podusv")))
+    cache = getattr(config, "cache", None)  # absent under `-p no:cacheprovider`
+    if cache is not None:
+        os.environ.setdefault("PODUSV_CACHE", str(cache.mkdir("podusv")))
 
 
 def vessel(name: str) -> Vessel:

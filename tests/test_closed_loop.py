@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import PAPER, corrected, example, kinds, last_state, run
+from conftest import GENTLE, PAPER, SMOOTH_START, corrected, example, kinds, last_state, run
 from scipy.integrate import solve_ivp
 
 from podusv_cli.actuators.saturated import Saturated
@@ -19,10 +19,6 @@ from podusv_cli.paths.circle import Circle
 from podusv_cli.paths.line import Line
 from podusv_cli.paths.line_circle import LineCircle
 
-# Behind the target and facing it, moving: no error is folded, no |x| passes through zero at once.
-SMOOTH_START = (-8.0, -4.0, 0.1, 0.4, 0.05, 0.02)
-# Slow enough an adaptation for a law that is evaluated only now and then.
-GENTLE = AdaptiveNeural(Gamma_u=1.0, Gamma_r=1.0, gamma_u=10.0, gamma_r=10.0)
 every_law = pytest.mark.parametrize("kind", kinds("controllers").values(), ids=kinds("controllers"))
 
 

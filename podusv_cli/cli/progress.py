@@ -6,31 +6,46 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from functools import partial
 
 PATIENCE = 0.7  # s before a bar appears
 
 
 @contextmanager
-def progress_bar(label: str, *, wanted: bool) -> Iterator[Callable[[float], None] | None]:
-    """A function to call with the fraction done; it draws on stderr where that is a terminal."""
+def progress_bars(*, wanted: bool) -> Iterator[Callable[[str, float], None] | None]:
+    """A function to call with a run's name and the fraction done; a bar a run, on stderr.
+
+    None where stderr is no terminal.
+    """
     if not (wanted and sys.stderr.isatty()):
         yield None
         return
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
     began = time.monotonic()
-    bar = Progress(
+    # Drawn from here only: a thread that draws would not survive the forks of a comparison.
+    bars = Progress(
         TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn(),
-        console=Console(stderr=True), transient=True,
+        console=Console(stderr=True), transient=True, auto_refresh=False,
     )  # fmt: skip
+    tasks: dict[str, TaskID] = {}
     with ExitStack() as stack:
 
-        def advance(fraction: float) -> None:
-            if not bar.task_ids and time.monotonic() - began > PATIENCE:
-                stack.enter_context(bar)
-                bar.add_task(label, total=1.0)
-            for task in bar.task_ids:
-                bar.update(task, completed=fraction)
+        def advance(name: str, fraction: float) -> None:
+            if not bars.live.is_started and time.monotonic() - began > PATIENCE:
+                stack.enter_context(bars)
+            if bars.live.is_started:
+                if name not in tasks:
+                    tasks[name] = bars.add_task(name, total=1.0)
+                bars.update(tasks[name], completed=fraction)
+                bars.refresh()
 
         yield advance
+
+
+@contextmanager
+def progress_bar(label: str, *, wanted: bool) -> Iterator[Callable[[float], None] | None]:
+    """The same for one run."""
+    with progress_bars(wanted=wanted) as advance:
+        yield advance and partial(advance, label)

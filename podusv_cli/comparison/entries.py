@@ -60,3 +60,19 @@ class Entry:
     def check(self, name: str) -> bool:
         """Whether a named property holds."""
         return CHECKS[name](self)
+
+
+class Absent:
+    """A run that failed before it left anything: nothing can be told of it."""
+
+    def metric(self, name: str) -> float:
+        """NaN."""
+        return math.nan
+
+    def signal(self, name: str) -> Vector:
+        """Empty."""
+        return np.empty(0)
+
+    def check(self, name: str) -> bool:
+        """It did not finish, and has no other property."""
+        return False

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import difflib
 import operator
 from collections.abc import Callable, Collection
 from functools import singledispatchmethod
@@ -27,6 +26,7 @@ from podusv_cli.comparison.expressions import (
     SignalOf,
     Term,
 )
+from podusv_cli.config.words import unknown
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.signals import SIGNALS
 
@@ -50,18 +50,14 @@ def parse(text: str, runs: Collection[str]) -> Condition:
     try:
         tree = ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        raise ExpressionError(
-            f"cannot read {text!r}; example: a.iae < b.iae"
-        ) from error
+        raise ExpressionError(f"cannot read {text!r}; example: a.iae < b.iae") from error
     return _Reader(runs).condition(tree)
 
 
 def _known(name: str, names: Collection[str], what: str) -> str:
     if name in names:
         return name
-    near = difflib.get_close_matches(name, names, n=1)
-    hint = f"; did you mean {near[0]!r}?" if near else ""
-    raise ExpressionError(f"unknown {what} {name!r}{hint} (allowed: {', '.join(sorted(names))})")
+    raise ExpressionError(unknown(f"{what} {name!r}", name, sorted(names)))
 
 
 class _Reader:

@@ -73,9 +73,7 @@ def page(story: Story) -> str:
     )
     head = f'<meta charset="utf-8"><title>{title}</title><style>{STYLE}</style>'
     viewport = '<meta name="viewport" content="width=device-width">'
-    return (
-        f'<!doctype html>\n<html lang="en"><head>{viewport}{head}</head>\n<body>{body}</body></html>\n'
-    )
+    return f'<!doctype html>\n<html lang="en"><head>{viewport}{head}</head>\n<body>{body}</body></html>\n'
 
 
 def _table(head: Iterable[str], rows: Iterable[Iterable[str]], numeric_from: int = 99) -> str:
@@ -103,7 +101,9 @@ def _endings(story: Story) -> str:
     lines = (
         f"<li><b>{html.escape(label)}</b>: {html.escape(text)}</li>" for label, text in bad.items()
     )
-    return f"<div class=warning>Not all runs finished:<ul>{''.join(lines)}</ul></div>" if bad else ""
+    return (
+        f"<div class=warning>Not all runs finished:<ul>{''.join(lines)}</ul></div>" if bad else ""
+    )
 
 
 def _differences(story: Story) -> str:

@@ -2,105 +2,116 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any, get_origin
 
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
 from podusv_cli.config import words
-from podusv_cli.config.fields import choices, is_component, item, members, noun, sections, wanted
+from podusv_cli.config.annotations import choices, inside, is_component, members, noun, sections
+from podusv_cli.config.fields import wanted
 from podusv_cli.config.scenario import Scenario
-from podusv_cli.config.tree import Fault, Node, Route, dotted, find, follow, plain
+from podusv_cli.config.tree import Fault, Node, Route, dotted, follow, plain
 from podusv_cli.registry import Component
 
 
 @dataclass(frozen=True)
 class Spot:
-    """Where one of pydantic's complaints points: the route without kinds and union members.
+    """Where a complaint points: the route without kinds and union members, and the type there.
 
-    `model` is the class whose keys are at the end of the route, None at a value; `field` is the
-    last field on the way, `annotation` the type wanted at the end.
+    `field` is the one at the end of the route, None at the item of a list or an unknown key.
     """
 
     route: Route
-    model: type[Component] | None
-    field: FieldInfo | None
     annotation: Any
+    field: FieldInfo | None = None
+
+    @property
+    def must_be(self) -> str:
+        """What is wanted there."""
+        return wanted(self.field) if self.field else noun(self.annotation)
 
 
-def check(root: Node, faults: list[Fault]) -> Scenario | None:
+Check = Callable[[Scenario], list[tuple[str, str]]]  # keys, and what is wrong with them
+
+
+def check(root: Node, faults: list[Fault], more: Sequence[Check] = ()) -> Scenario | None:
     """The scenario of a complete tree, or None with every fault appended to `faults`."""
     try:
-        scenario = Scenario.model_validate(with_defaults(Scenario, plain(root)))
+        scenario = Scenario.model_validate(filled(Scenario, plain(root)))
     except ValidationError as error:
         faults.extend(dict.fromkeys(_faults(root, error)))
         return None
-    for key, text in scenario.misfits():
-        faults.append(Fault(follow(root, tuple(key.split(".")))[-1].mark, key, text))
+    for key, text in chain(scenario.misfits(), *(look(scenario) for look in more)):
+        route = tuple(int(step) if step.isdigit() else step for step in key.split("."))
+        faults.append(Fault(follow(root, route)[-1].mark, dotted(route), text))
     return scenario
 
 
-def with_defaults(
-    model: type[Component], data: dict[str, Any], whole: Component | None = None
-) -> dict[str, Any]:
-    """The data over the values of `whole`, which is what the section is when it is left out.
+def filled(annotation: Any, data: Any, whole: Any = None) -> Any:
+    """The data over the values of `whole`, which is what a section is when it is left out.
 
     Otherwise one key given under `disturbance.b_u` would silently set the others to zero.
     """
-    filled = dict(whole or {}) | data
-    for name, field in model.model_fields.items():
-        given = data.get(name)
-        if isinstance(given, dict):
-            part = sections(field).get("") or sections(field).get(str(given.get("kind")))
-            inner = getattr(whole, name) if whole else field.default
-            is_whole = part is not None and isinstance(inner, part)
-            filled[name] = (
-                with_defaults(part, given, inner if is_whole else None) if part else given
-            )
-    return filled
+    if isinstance(data, tuple):
+        return tuple(filled(inside(annotation, i), item) for i, item in enumerate(data))
+    if not isinstance(data, dict):
+        return data
+    parts = {"": annotation} if is_component(annotation) else sections(annotation)
+    part = parts.get("") or parts.get(str(data.get("kind")))
+    if not part:
+        return {name: filled(inside(annotation, name), entry) for name, entry in data.items()}
+    under = whole if isinstance(whole, part) else None
+    fields = part.model_fields
+    return dict(under or {}) | {
+        name: filled(
+            fields[name].annotation, entry, getattr(under, name) if under else fields[name].default
+        )
+        if name in fields
+        else entry
+        for name, entry in data.items()
+    }
 
 
 def _faults(root: Node, error: ValidationError) -> Iterator[Fault]:
     for complaint in error.errors(include_url=False):
         spot = _spot(complaint["loc"])
-        is_copy = spot.route[:1] == ("nominal",) and _copied(root, spot.route)
-        if not is_copy:
+        if not _copied(root, spot.route):
             yield from SENTENCES.get(complaint["type"], _wrong)(root, spot, complaint)
 
 
 def _copied(root: Node, route: Route) -> bool:
-    """Whether a value of the nominal vessel is the true vessel's, which is complained of already."""
-    original = follow(root, ("vessel", *route[1:]))
-    return follow(root, route)[-1] is original[-1] and len(original) == len(follow(root, route))
+    """Whether a value was taken over from another section, which is complained of already."""
+    if route[:1] not in (("nominal",), ("controllers",)):
+        return False
+    source: Route = ("vessel", *route[1:]) if route[0] == "nominal" else ("controller", *route[2:])
+    return follow(root, route)[-1] is follow(root, source)[-1]
+
+
+def _model(annotation: Any, kind: object = None) -> type[Component] | None:
+    """The class whose keys a mapping has; of several, the one that `kind` tells."""
+    if is_component(annotation):
+        return annotation
+    return sections(annotation).get("" if kind is None else str(kind))
 
 
 def _spot(location: tuple[int | str, ...]) -> Spot:
-    """Follow pydantic's location through the models, dropping its tags."""
-    spot = Spot((), Scenario, None, Scenario)
-    steps = list(location)
-    while steps:
-        step = steps.pop(0)
-        if spot.model and step in spot.model.model_fields:
-            spot = _entered(spot, str(step), steps)
-        elif spot.model:
-            return Spot((*spot.route, step), None, None, None)
-        elif isinstance(step, int):
-            inner = item(spot.annotation, step)
-            spot = Spot((*spot.route, step), None, spot.field, inner)
+    """Follow pydantic's location through the models; kinds and union members do not count."""
+    spot = Spot((), Scenario)
+    for step in location:
+        model = _model(spot.annotation)
+        inner = inside(spot.annotation, step)
+        if model:
+            field = model.model_fields.get(str(step))
+            spot = Spot((*spot.route, step), field and field.annotation, field)
+        elif kind := _model(spot.annotation, step):
+            spot = Spot(spot.route, kind, spot.field)
+        elif inner is not None:
+            spot = Spot((*spot.route, step), inner)
     return spot
-
-
-def _entered(spot: Spot, name: str, steps: list[int | str]) -> Spot:
-    """The spot one field further; a kind that comes next in `steps` is taken off."""
-    assert spot.model
-    field = spot.model.model_fields[name]
-    parts = sections(field)
-    model = parts.get("")
-    if not model and steps and steps[0] in parts:
-        model = parts[str(steps.pop(0))]
-    return Spot((*spot.route, name), model, field, field.annotation)
 
 
 def _told(root: Node, route: Route) -> bool:
@@ -110,10 +121,9 @@ def _told(root: Node, route: Route) -> bool:
 
 def _unknown_key(root: Node, spot: Spot, complaint: Any) -> Iterator[Fault]:
     *above, key = complaint["loc"]
-    model = _spot(tuple(above)).model
-    node = find(root, spot.route)
-    assert node and model
-    text = words.unknown("key", str(key), model.model_fields)
+    model = _model(_spot(tuple(above)).annotation)
+    node = follow(root, spot.route)[-1]
+    text = words.unknown("key", str(key), model.model_fields if model else ())
     yield Fault(node.key_mark or node.mark, dotted(spot.route), text)
 
 
@@ -121,26 +131,23 @@ def _missing(root: Node, spot: Spot, complaint: Any) -> Iterator[Fault]:
     if isinstance(spot.route[-1], int):
         yield from _wrong(root, _spot(complaint["loc"][:-1]), complaint)
     elif not _told(root, spot.route):
-        assert spot.field
-        mark = follow(root, spot.route[:-1])[-1].mark
-        yield Fault(mark, dotted(spot.route), f"missing; must be {wanted(spot.field)}")
+        mark = follow(root, spot.route)[-1].mark
+        yield Fault(mark, dotted(spot.route), f"missing; must be {spot.must_be}")
 
 
 def _no_kind(root: Node, spot: Spot, complaint: Any) -> Iterator[Fault]:
     route = (*spot.route, "kind")
     if not _told(root, route):
-        assert spot.field
-        kinds = ", ".join(sections(spot.field))
+        kinds = ", ".join(sections(spot.annotation))
         mark = follow(root, spot.route)[-1].mark
         yield Fault(mark, dotted(route), f"missing (allowed: {kinds})")
 
 
 def _unknown_kind(root: Node, spot: Spot, complaint: Any) -> Iterator[Fault]:
     route = (*spot.route, "kind")
-    node = find(root, route)
-    assert node and spot.field
+    node = follow(root, route)[-1]
     what = f"kind {words.found(node.content, node.text)}"
-    text = words.unknown(what, str(node.content), sections(spot.field))
+    text = words.unknown(what, str(node.content), sections(spot.annotation))
     yield Fault(node.mark, dotted(route), text)
 
 
@@ -151,31 +158,23 @@ def _impossible(root: Node, spot: Spot, complaint: Any) -> Iterator[Fault]:
 
 
 def _wrong(root: Node, spot: Spot, complaint: Any) -> Iterator[Fault]:
-    node = find(root, spot.route)
-    if node is None or spot.field is None:
-        raise AssertionError(f"unexpected complaint {complaint}")
-    at_item = bool(spot.route) and isinstance(spot.route[-1], int)
-    must_be = noun(spot.annotation) if at_item else wanted(spot.field)
-    annotation = spot.annotation if at_item else spot.field.annotation
-    text = f"must be {must_be}, found {words.found(node.content, node.text)}"
-    yield Fault(node.mark, dotted(spot.route), text + _hint(node, annotation, spot.field))
+    node = follow(root, spot.route)[-1]
+    what = words.found(node.content, node.text)
+    text = f"must be {spot.must_be}, found {what}{_hint(node, spot.annotation)}"
+    yield Fault(node.mark, dotted(spot.route), text)
 
 
-def _hint(node: Node, annotation: Any, field: FieldInfo) -> str:
+def _hint(node: Node, annotation: Any) -> str:
     """How the value should have been written, where its looks tell."""
-    types = members(annotation)
+    types = [get_origin(member) or member for member in members(annotation)]
     if isinstance(node.content, float) and node.content % 1 == 0 and int in types:
         return f"; write {int(node.content)}"
-    text = node.content if isinstance(node.content, str) else node.text
-    if any(is_component(part) for part in types):
-        return f"; write {{kind: {text}}}" if text and text in sections(field) else ""
     if not isinstance(node.content, str):
-        return words.hint(text, words.TRUTH_HINTS) if bool in types else ""
-    fitting = [
-        hints for kind, hints in HINTS.items() if kind in [get_origin(t) or t for t in types]
-    ]
-    said = next((s for s in (words.hint(text, hints) for hints in fitting) if s), "")
-    return said or words.did_you_mean(text, choices(annotation))
+        return words.hint(node.text, words.TRUTH_HINTS) if bool in types else ""
+    if node.content and node.content in sections(annotation):
+        return f"; write {{kind: {node.content}}}"
+    said = (words.hint(node.content, hints) for kind, hints in HINTS.items() if kind in types)
+    return next(filter(None, said), "") or words.did_you_mean(node.content, choices(annotation))
 
 
 HINTS = {

@@ -70,7 +70,9 @@ def _base(above: Node, sources: list[str], faults: list[Fault]) -> tuple[str, st
         return None
     path = os.path.join(os.path.dirname(sources[-1]), above.content)
     text = read_text(path, above.mark, "extends", faults)
-    if text is not None and os.path.realpath(path) in [os.path.realpath(source) for source in sources]:
+    if text is not None and os.path.realpath(path) in [
+        os.path.realpath(source) for source in sources
+    ]:
         way = " -> ".join([*sources, path])
         faults.append(Fault(above.mark, "extends", f"goes round in a circle: {way}"))
         return None
@@ -78,7 +80,7 @@ def _base(above: Node, sources: list[str], faults: list[Fault]) -> tuple[str, st
 
 
 def _setting(override: str, faults: list[Fault]) -> Node:
-    """The tree that `a.b=v` stands for; v is a plain scalar, text in quotes, a list or a mapping."""
+    """The tree that `a.b=v` stands for; v is a scalar, text in quotes, a list or a mapping."""
     name, equals, text = override.partition("=")
     shown = override if override.isprintable() else ascii(override)
     mark = Mark(f"--set {shown}")

@@ -3,24 +3,15 @@
 from __future__ import annotations
 
 import inspect
-import json
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cache
 
-from podusv_cli.config.fields import (
-    MISSING,
-    Key,
-    choices,
-    joined,
-    keys,
-    noun,
-    range_of,
-    sections,
-)
+from podusv_cli.config.annotations import choices, joined, sections
+from podusv_cli.config.fields import MISSING, Key, keys, range_of, type_of
 from podusv_cli.config.references import vessel_names
 from podusv_cli.config.scenario import Scenario
-from podusv_cli.config.words import did_you_mean
+from podusv_cli.config.words import as_written, did_you_mean
 from podusv_cli.errors import PodusvError
 from podusv_cli.registry import Component, unit_of
 from podusv_cli.signals import SIGNALS
@@ -73,6 +64,16 @@ def explain(key: str | None = None) -> list[Row]:
     return found
 
 
+def kinds() -> dict[str, dict[str, str]]:
+    """For every section that has kinds, what each kind is, in a sentence."""
+    parts = {name: sections(field.annotation) for name, field in Scenario.model_fields.items()}
+    return {
+        name: {kind: summary(model) for kind, model in found.items()}
+        for name, found in parts.items()
+        if found and "" not in found
+    }
+
+
 def summary(model: type[Component]) -> str:
     """The first sentence of a component's documentation."""
     return first_sentence(inspect.getdoc(model) or "")
@@ -91,29 +92,39 @@ def _keys() -> tuple[Key, ...]:
 
 def _names() -> list[str]:
     """Everything that can be asked for."""
-    asked = [(e.path, e.route, e.path[-1:], (*e.path[:1], e.kind)[: 1 + bool(e.kind)]) for e in _keys()]
+    asked = [
+        (e.path, e.route, e.path[-1:], (*e.path[:1], e.kind)[: 1 + bool(e.kind)]) for e in _keys()
+    ]
     return list(dict.fromkeys([".".join(name) for names in asked for name in names] + [*SIGNALS]))
 
 
 def _at(place: tuple[str, ...]) -> list[Row]:
     """The section, kind or key at a place, and what is in it."""
     entries = [entry for entry in _keys() if place in (entry.path, entry.route)]
-    kinds = [(kind, part) for e in entries for kind, part in sections(e.field).items() if kind]
+    kinds = [
+        (kind, part) for e in entries for kind, part in sections(e.field.annotation).items() if kind
+    ]
     if kinds:
         rows = {kind: _kind_row((*place, kind), part) for kind, part in kinds}
         return [*_together(entries), *rows.values()]
     if not entries:
         return _of_kind(place)
-    inside = (entry for entry in _keys() if place in (entry.path[:-1], entry.route[:-1]))
-    return [*_together(entries), *_together(inside)]
+    inside = [entry for entry in _keys() if place in (entry.path[:-1], entry.route[:-1])]
+    heads = (replace(row, choices=() if inside else row.choices) for row in _together(entries))
+    return [*heads, *_together(inside)]
 
 
 def _of_kind(place: tuple[str, ...]) -> list[Row]:
     """One kind of a section and its keys."""
     inside = [entry for entry in _keys() if place == entry.route[:-1]]
     above = [entry for entry in _keys() if place[:-1] in (entry.path, entry.route)]
-    heads = [_kind_row(place, sections(entry.field)[place[-1]]) for entry in above if inside]
-    return [*heads, *(replace(row, kinds=()) for row in _together(inside))]
+    heads = [
+        _kind_row(place, sections(entry.field.annotation)[place[-1]]) for entry in above if inside
+    ]
+    return [
+        *(replace(head, choices=()) for head in heads),
+        *(replace(row, kinds=()) for row in _together(inside)),
+    ]
 
 
 def _named(name: str) -> list[Row]:
@@ -141,15 +152,23 @@ def _kind_row(place: tuple[str, ...], model: type[Component]) -> Row:
 def _row(entry: Key) -> Row:
     field, name = entry.field, entry.path[-1]
     key, meaning = ".".join(entry.path), field.description or f"which {entry.path[-2]} it is"
-    parts = sections(field)
+    parts = sections(field.annotation)
     if parts:
         inside = tuple(parts[""].model_fields) if "" in parts else tuple(parts)
         return Row(key, meaning, "keys" if "" in parts else "kinds", choices=inside)
-    words = vessel_names() if name == "preset" else choices(field.annotation)
-    return Row(
-        key, meaning, joined(words) if name == "preset" else noun(field.annotation),
-        unit_of(field), range_of(field), _default(entry), words,
-    )  # fmt: skip
+    words = _choices(entry)
+    kind = joined(words) if name in ("preset", "kind") else type_of(field)
+    return Row(key, meaning, kind, unit_of(field), range_of(field), _default(entry), words)
+
+
+def _choices(entry: Key) -> tuple[str, ...]:
+    """The words that a value may be; of a kind, all that its section has."""
+    if entry.path[-1] == "preset":
+        return vessel_names()
+    if entry.path[-1] == "kind":
+        above = (other for other in _keys() if other.path == entry.path[:-1])
+        return tuple(kind for other in above for kind in sections(other.field.annotation))
+    return choices(entry.field.annotation)
 
 
 def _default(entry: Key) -> str:
@@ -160,4 +179,4 @@ def _default(entry: Key) -> str:
         return FROM_PRESET[entry.path[0]]
     if entry.default is MISSING or entry.path[-1] == "kind":
         return "required"
-    return entry.default if entry.default and isinstance(entry.default, str) else json.dumps(entry.default)
+    return as_written(entry.default)

@@ -9,7 +9,7 @@ from typing import Any
 
 import yaml
 
-from podusv_cli.config.checking import check
+from podusv_cli.config.checking import Check, check
 from podusv_cli.config.composing import composed
 from podusv_cli.config.references import complete
 from podusv_cli.config.scenario import Scenario
@@ -33,20 +33,25 @@ class Loaded:
     text: str
 
 
-def load(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> Loaded:
+def load(
+    path: str | os.PathLike[str], overrides: Sequence[str] = (), checks: Sequence[Check] = ()
+) -> Loaded:
     """The scenario of a file, with overrides such as `vessel.m=24`.
 
-    Raises ScenarioError with everything that is wrong, also where the file cannot be read.
+    `checks` look for what this room cannot know to be wrong. Raises ScenarioError with everything
+    that is wrong, also where the file cannot be read.
     """
     faults: list[Fault] = []
     source = os.fspath(path)
     text = read_text(source, Mark(source), "", faults)
     if text is None:
-        raise ScenarioError(_findings(faults))
-    return load_text(text, source, overrides)
+        raise ScenarioError(_findings(faults, source))
+    return load_text(text, source, overrides, checks)
 
 
-def load_text(text: str, source: str, overrides: Sequence[str] = ()) -> Loaded:
+def load_text(
+    text: str, source: str, overrides: Sequence[str] = (), checks: Sequence[Check] = ()
+) -> Loaded:
     """The scenario of a text; `source` names it in messages and is where its file names start.
 
     Raises ScenarioError with everything that is wrong.
@@ -54,15 +59,15 @@ def load_text(text: str, source: str, overrides: Sequence[str] = ()) -> Loaded:
     faults: list[Fault] = []
     root = composed(text, source, overrides, faults)
     root = root and complete(root, faults)
-    scenario = check(root, faults) if root else None
+    scenario = check(root, faults, checks) if root else None
     if scenario is None or root is None or faults:
-        raise ScenarioError(_findings(faults))
+        raise ScenarioError(_findings(faults, source))
     return Loaded(scenario, _origins(scenario, root), text)
 
 
-def _findings(faults: list[Fault]) -> list[Finding]:
-    """Findings file by file, in the order of lines."""
-    sources = list(dict.fromkeys(fault.mark.source for fault in faults))
+def _findings(faults: list[Fault], first: str) -> list[Finding]:
+    """Findings file by file, the file called `first` ahead, in the order of lines."""
+    sources = list(dict.fromkeys([first, *(fault.mark.source for fault in faults)]))
     ordered = sorted(
         faults, key=lambda f: (sources.index(f.mark.source), f.mark.line, f.mark.column)
     )
@@ -76,7 +81,7 @@ def values(scenario: Scenario) -> dict[str, Any]:
 
 def _leaves(data: dict[str, Any], prefix: str) -> Iterator[tuple[str, Any]]:
     for name, content in data.items():
-        if isinstance(content, dict):
+        if isinstance(content, dict) and content:
             yield from _leaves(content, f"{prefix}{name}.")
         else:
             yield prefix + name, content
@@ -96,7 +101,7 @@ def resolved_yaml(scenario: Scenario) -> str:
 
 
 class _Dumper(yaml.SafeDumper):
-    """Blocks for mappings, brackets for lists of scalars, quotes around all text but plain words."""
+    """Blocks for mappings, brackets for lists of scalars, quotes around all text but words."""
 
     def ignore_aliases(self, data: Any) -> bool:
         return True
@@ -109,7 +114,7 @@ def _text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
 
 
 def _list(dumper: yaml.SafeDumper, items: tuple[Any, ...]) -> yaml.SequenceNode:
-    flat = not any(isinstance(part, tuple) for part in items)
+    flat = not any(isinstance(part, (tuple, dict)) for part in items)
     return dumper.represent_sequence("tag:yaml.org,2002:seq", items, flow_style=flat)
 
 

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
+from podusv_cli.config.annotations import sections
 from podusv_cli.config.fields import PATTERNS_IN_WORDS, limits
 from podusv_cli.config.scenario import Scenario
 from podusv_cli.config.source import MAX_NODES, read, read_text, resolve
-from podusv_cli.config.tree import Fault, Mark, Node, merge
+from podusv_cli.config.tree import Fault, Mark, Node, merge, overlay
 from podusv_cli.config.words import found, quoted, unknown
+from podusv_cli.registry import Component
 
 MAX_POINTS = MAX_NODES // 4  # a point is three values, and the resolved scenario has to be readable
 MOST_FAULTS = 10  # in one file of points
@@ -35,9 +37,15 @@ def vessel_file(name: str, faults: list[Fault]) -> Node | None:
     return read(text, f"vessel file {name}.yaml", faults, placed=False)
 
 
+def vessel_text(name: str, key: str) -> str:
+    """A text, such as `source`, from a vessel's file."""
+    node = vessel_file(name, [])
+    return str(node.get(key)) if node else ""
+
+
 def complete(root: Node, faults: list[Fault]) -> Node:
     """The tree with everything filled in that it takes from elsewhere."""
-    for fill in (_name, _vessel, _nominal, _points):
+    for fill in (_name, _vessel, _nominal, _points, _controllers):
         root = fill(root, faults)
     return root
 
@@ -115,6 +123,24 @@ def _points(root: Node, faults: list[Fault]) -> Node:
     rest = {key: entry for key, entry in path.mapping.items() if key != "file"}
     filled = replace(path, content=rest | {"points": points}, faulty=path.faulty or points.faulty)
     return root.with_entry("path", filled)
+
+
+def _controllers(root: Node, faults: list[Fault]) -> Node:
+    """Each of `controllers` over those keys of `controller` that its kind has too."""
+    base, several = root.mapping.get("controller"), root.mapping.get("controllers")
+    if not base or not several:
+        return root
+    models = sections(Scenario.model_fields["controller"].annotation)
+    filled = {name: _like(base, own, models) for name, own in several.mapping.items()}
+    return root.with_entry("controllers", replace(several, content=filled))
+
+
+def _like(base: Node, own: Node, models: Mapping[str, type[Component]]) -> Node:
+    model = models.get(str(own.get("kind") or base.get("kind")))
+    if not model or not isinstance(own.content, dict):
+        return own
+    shared = {key: part for key, part in base.mapping.items() if key in model.model_fields}
+    return overlay(replace(base, content=shared), own, lambda *_: False)
 
 
 def _rows(text: str, name: str, faults: list[Fault]) -> Iterator[Node]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import re
+from typing import TYPE_CHECKING
 
 from podusv_cli.actuators.base import Actuator
 from podusv_cli.controllers.base import Controller
@@ -23,6 +24,10 @@ else:
     AnyController = any_of("podusv_cli.controllers", Controller)
     AnyDisturbance = any_of("podusv_cli.disturbances", Disturbance)
     AnyPath = any_of("podusv_cli.paths", Path)
+
+
+LABEL = re.compile(r"[a-z][a-z0-9_]{0,29}")  # usable as a name in claims and as a folder
+LABEL_IN_WORDS = "a name here is at most 30 of a-z, 0-9 and _, starting with a letter"
 
 
 class Start(Component):
@@ -70,6 +75,19 @@ class MetricSettings(Component):
     )
 
 
+class Claim(Component):
+    """A published sentence, and how the runs are to decide on it."""
+
+    id: str = value(..., "", "what the claim is called in tables")
+    says: str = value(..., "", "the claim, in a sentence of your own")
+    source: str = value(..., "", "where it was published: section, figure, equation")
+    expect: str = value(..., "", "the claim as an expression over runs; see docs/claims.md")
+    tolerance: float = value(
+        0.05, "", "relative: how near `==` is, and how clear `<` and `>` have to be", ge=0, lt=1
+    )
+    remark: str = value("", "", "choices made where the source is silent")
+
+
 class Scenario(Component):
     """A vessel, its surroundings, its task, its controller, and how the run is done."""
 
@@ -86,10 +104,26 @@ class Scenario(Component):
     disturbance: AnyDisturbance = value(..., "", "what the sea does")
     actuator: AnyActuator = value(..., "", "from the law's demand to the load on the hull")
     controller: AnyController = value(..., "", "the law")
+    controllers: dict[str, AnyController] = value(
+        {},
+        "",
+        "laws to compare, by name; each starts from those keys of `controller` that it has too",
+    )
+    claims: tuple[Claim, ...] = value((), "", "what `podusv compare` is to judge", strict=False)
     simulation: Simulation = value(Simulation(), "", "integration")
     control: Control = value(Control(), "", "sampling of the law")
     log: Log = value(Log(), "", "logging")
     metrics: MetricSettings = value(MetricSettings(), "", "windows and thresholds of the metrics")
+
+    def labels(self) -> tuple[str, ...]:
+        """The names of the runs that a comparison of this scenario has."""
+        return tuple(self.controllers) or (self.controller.label,)
+
+    def singles(self) -> dict[str, Scenario]:
+        """A scenario for each run of a comparison, by label, without controllers and claims."""
+        laws = self.controllers or {self.controller.label: self.controller}
+        alone = self.model_copy(update={"controllers": {}, "claims": ()})
+        return {label: alone.model_copy(update={"controller": law}) for label, law in laws.items()}
 
     def closed_loop(self) -> ClosedLoop:
         """The parts that move."""
@@ -110,14 +144,19 @@ class Scenario(Component):
         """Key and sentence for every pair of values that cannot go together."""
         step = self.simulation.step
         found: list[tuple[str, str]] = []
-        times: dict[str, Any] = {
+        laws = {"controller": self.controller}
+        laws |= {f"controllers.{label}": law for label, law in self.controllers.items()}
+        times: dict[str, float] = {
             "simulation.duration": self.simulation.duration,
             "control.period": self.control.period,
-            "controller.difference_step": self.controller.sample_period(),
+            **{f"{key}.difference_step": law.sample_period() for key, law in laws.items()},
         }
         for key, time in times.items():
             if time and not whole_steps(time, step):
                 below = max(1, int(time / step)) * step
                 text = f"{time:g} s is no whole number of steps of {step:g} s; try {below:.10g}"
                 found.append((key, text))
+        for label in self.controllers:
+            if not LABEL.fullmatch(label):
+                found.append((f"controllers.{label}", LABEL_IN_WORDS))
         return found

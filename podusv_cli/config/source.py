@@ -39,10 +39,12 @@ NOT_FINITE = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
 SYNTAX = {
     r"'\t' that cannot start": "a tab; use spaces",
     "that cannot start any token": "{problem}; put the value in quotes",
-    "mapping values are not allowed": "a colon where no key can be; check the indentation, the space "
-    "after every colon, and quote text with a colon in it",
+    "mapping values are not allowed": "a colon where no key can be; check the indentation, the "
+    "space after every colon, and quote text with a colon in it",
     "unexpected end of stream": "the text in quotes that starts here never ends",
     "but got '<stream end>'": "the bracket opened here is never closed",
+    "but found '<stream end>'": "the file ends in the middle of a list or mapping",
+    "but found ':'": "a colon without a key before it",
     "<block end>, but found": "does not line up with the lines above; check the indentation",
     "expected '<document start>'": "text after the end of the document",
 }
@@ -77,7 +79,7 @@ def _place(source: str, before: str) -> Mark:
     return Mark(source, before.count("\n") + 1, len(last_line) + 1)
 
 
-def resolve(text: str) -> None | bool | int | float | str:
+def resolve(text: str) -> bool | int | float | str | None:
     """What a plain scalar means; a number that is too large becomes infinite."""
     if text in WORDS:
         return WORDS[text]
@@ -153,15 +155,14 @@ class _Reader:
 
     def _next(self) -> Any:
         try:
-            event = next(self._events)
+            event: Any = next(self._events)
         except yaml.MarkedYAMLError as error:
             raise self._syntax_error(error) from None
         except yaml.reader.ReaderError as error:
             place = _place(self._source, self._text[: error.position])
-            raise _Stop(
-                place if self._placed else Mark(self._source),
-                f"character U+{ord(self._text[error.position]):04X} cannot stand in YAML",
-            ) from None
+            code = ord(self._text[error.position])
+            place = place if self._placed else Mark(self._source)
+            raise _Stop(place, f"character U+{code:04X} cannot stand in YAML") from None
         except (ValueError, IndexError, AttributeError, OverflowError, TypeError):
             # PyYAML lets these escape for impossible escapes, versions and code points.
             raise _Stop(self._last, "what follows is not valid YAML") from None
@@ -174,7 +175,8 @@ class _Reader:
         opened = any(part in problem for part in OPENING)
         mark = error.context_mark if opened else error.problem_mark
         text = known[0] if known else "not valid YAML: {problem}"
-        return _Stop(self._mark(mark.line, mark.column), text.format(problem=problem))
+        place = self._mark(mark.line, mark.column) if mark else self._last
+        return _Stop(place, text.format(problem=problem))
 
     def _mark(self, line: int, column: int) -> Mark:
         return Mark(self._source, line + 1, column + 1) if self._placed else Mark(self._source)
@@ -231,8 +233,9 @@ class _Reader:
 
     def _key(self, event: Any, route: Route) -> str | None:
         """The key, or None after a fault."""
-        node = self._node(event, route)
-        if isinstance(event, yaml.ScalarEvent) and isinstance(node.content, str):
+        is_word = isinstance(event, yaml.ScalarEvent)
+        node = self._node(event, route if is_word else (*route, "?"))
+        if is_word and isinstance(node.content, str):
             return node.content
         if not node.faulty:
             self._fault(event, route, f"keys are words, found {found(node.content, node.text)}")

@@ -18,6 +18,7 @@ class Mark:
     column: int = 0
 
     def __str__(self) -> str:
+        """`file:line:column`, or just the source."""
         return f"{self.source}:{self.line}:{self.column}" if self.line else self.source
 
 
@@ -35,7 +36,7 @@ class Node:
     """A value: a scalar, a tuple of nodes, or a mapping from key to node.
 
     `key_mark` is where the key of this value stands. `text` is a scalar as written. `faulty` says
-    that a fault here was told already: the scalar or list has no content, the mapping may lack keys.
+    that a fault here was told already: a scalar or list has no content, a mapping may lack keys.
     """
 
     content: Any
@@ -70,13 +71,15 @@ def follow(root: Node, route: Route) -> list[Node]:
     nodes = [root]
     for step in route:
         content = nodes[-1].content
-        if isinstance(content, dict) and step in content:
-            nodes.append(content[step])
-        elif isinstance(content, tuple) and isinstance(step, int) and step < len(content):
-            nodes.append(content[step])
-        else:
+        steps = content if isinstance(content, dict) else range(len(_items(content)))
+        if step not in steps:
             break
+        nodes.append(content[step])
     return nodes
+
+
+def _items(content: Any) -> tuple[Node, ...]:
+    return content if isinstance(content, tuple) else ()
 
 
 def find(root: Node, route: Route) -> Node | None:
@@ -111,7 +114,7 @@ def overlay(base: Node, top: Node, replaces: Callable[[Node, Node], bool]) -> No
 
 
 def another_kind(base: Node, top: Node) -> bool:
-    """Whether `top` names another kind or preset than `base`, whose other keys then mean nothing."""
+    """Whether `top` names another kind or preset than `base`, whose other keys then say nothing."""
     pairs = ((base.get(key), top.get(key)) for key in ("kind", "preset"))
     return any(None not in pair and pair[0] != pair[1] for pair in pairs)
 

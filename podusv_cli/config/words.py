@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterable
 from difflib import get_close_matches
@@ -22,6 +23,12 @@ def found(content: Any, text: str) -> str:
     if isinstance(content, str):
         return quoted(content)
     return f"{text:.60}" or "nothing"
+
+
+def as_written(content: Any) -> str:
+    """A plain value as it would stand in a scenario, cut where it is long."""
+    text = content if isinstance(content, str) and content else json.dumps(content)
+    return quoted(text) if len(text) > 60 or not text.isprintable() else text
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:

@@ -18,10 +18,16 @@ from podusv_cli.vessels.plant import surge_force, sway_force
 
 
 @kernel
+def direction_rate(e: Tracking, x: Vector, target: Vector, k: Any) -> float:
+    """Exact rate of psi_d [rad/s]; zero where the direction is held."""
+    return 0.0 if e.distance <= k.hold_below else exact_rate(e.distance, e.psi_d, x, target)
+
+
+@kernel
 def alpha_u_rate(e: Tracking, x: Vector, target: Vector, k: Any) -> float:
     """Rate of alpha_u (21), the expansion that the paper calls X_1 in (40)."""
     u, v, r = x[3], x[4], x[5]
-    w = exact_rate(e.distance, e.psi_d, x, target)
+    w = direction_rate(e, x, target, k)
     v_dot = sway_force(u, v, r, k) / k.m22
     cos_e, sin_e = math.cos(e.psi_e), math.sin(e.psi_e)
     # Folding jointly turns psi_d with psi_e; folding as printed turns psi_e alone. P and z_e carry
@@ -38,7 +44,7 @@ def alpha_u_rate(e: Tracking, x: Vector, target: Vector, k: Any) -> float:
 def alpha_r_rate(e: Tracking, x: Vector, target: Vector, k: Any, tau_u: float) -> float:
     """Rate of alpha_r (30), the paper's X_2 in (44), for the surge force tau_u [N]."""
     u, v, r = x[3], x[4], x[5]
-    w = exact_rate(e.distance, e.psi_d, x, target)
+    w = direction_rate(e, x, target, k)
     u_dot = (surge_force(u, v, r, k) + tau_u) / k.m11
     v_dot = sway_force(u, v, r, k) / k.m22
     psi_e = e.psi_e - e.half_turn
@@ -48,6 +54,8 @@ def alpha_r_rate(e: Tracking, x: Vector, target: Vector, k: Any, tau_u: float) -
     across = -target[4] * sin_d + target[5] * cos_d
     distance_rate = P - u * cos_e - v * sin_e
     swing = (u * cos_e + v * sin_e) * (w - r)
+    if e.distance <= k.hold_below:
+        return float(-k.k_psie * r)
     turn = across - P * w + u_dot * sin_e - v_dot * cos_e + swing - w * distance_rate
     return float(turn / e.distance + k.k_psie * (w - r))
 

@@ -3,46 +3,81 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 
+from podusv_cli.config.scenario import Scenario
 from podusv_cli.figures.controls import controls
 from podusv_cli.figures.panels import Family, signals_over_time
 from podusv_cli.figures.style import LOOKS, Shown, house_style, image
 from podusv_cli.figures.trajectory import trajectory
 from podusv_cli.recording import Recording
 
-FIGURES: dict[str, Family] = {
-    "trajectory": trajectory,
-    "errors": signals_over_time("x_e", "y_e", "z_e", "psi_e", logarithmic=("z_e",)),
-    "controls": controls,
-    "filters": signals_over_time("alpha_u", "beta_u", "alpha_r", "beta_r"),
-    "adaptation": signals_over_time(
-        "W_norm_u", "W_norm_r", "b_hat_u", "b_hat_r", "f_hat_u", "f_hat_r", "activation"
+
+@dataclass(frozen=True)
+class Sheet:
+    """A figure that podusv can draw: what it shows, in signals and in words."""
+
+    caption: str
+    signals: tuple[str, ...]
+    family: Family
+
+    def fits(self, runs: Sequence[Shown]) -> bool:
+        """Whether any run has anything to show here."""
+        return any(run.has(name) for run in runs for name in self.signals)
+
+
+def _grid(caption: str, *signals: str, logarithmic: tuple[str, ...] = ()) -> Sheet:
+    return Sheet(caption, signals, signals_over_time(*signals, logarithmic=logarithmic))
+
+
+FIGURES: dict[str, Sheet] = {
+    "trajectory": Sheet(
+        "tracks and target on a map; right, the end of the run close up", ("x", "y"), trajectory
     ),
-    "velocities": signals_over_time("u", "v", "r", "psi"),
-    "loads": signals_over_time("b_u", "b_v", "b_r", "saturated"),
-}
+    "errors": _grid(
+        "tracking errors (18) over time, the distance on a logarithmic axis",
+        "x_e", "y_e", "z_e", "psi_e", logarithmic=("z_e",),
+    ),
+    "controls": Sheet(
+        "surge force and yaw moment on the hull, thin what the law asked for; left the first "
+        "moments, right the settled part",
+        ("tau_u", "tau_r"),
+        controls,
+    ),
+    "filters": _grid(
+        "virtual controls (21), (30) and what the filter makes of them (22), (31)",
+        "alpha_u", "beta_u", "alpha_r", "beta_r",
+    ),
+    "adaptation": _grid(
+        "norms of the network weights, estimated bounds, network outputs, largest node output",
+        "W_norm_u", "W_norm_r", "b_hat_u", "b_hat_r", "f_hat_u", "f_hat_r", "activation",
+    ),
+    "velocities": _grid("velocities and heading", "u", "v", "r", "psi"),
+    "loads": _grid(
+        "disturbance, and when the actuator limits the law", "b_u", "b_v", "b_r", "saturated"
+    ),
+}  # fmt: skip
+FIRST = ("trajectory", "errors", "controls", "adaptation")  # what `run` draws
 
 
-def dressed(
-    runs: Sequence[tuple[str, Recording]], *, length: float, beam: float, steady_fraction: float
-) -> list[Shown]:
-    """Recordings with their looks, in order."""
+def dressed(runs: Sequence[tuple[str, Recording, Scenario]]) -> list[Shown]:
+    """Labelled recordings with their looks, in order."""
     return [
         Shown(
-            label, recording, *LOOKS[i % len(LOOKS)], length=length, beam=beam,
-            steady_from=(1.0 - steady_fraction) * float(recording["time"][-1]),
+            label, recording, *LOOKS[i % len(LOOKS)],
+            length=scenario.vessel.length, beam=scenario.vessel.beam,
+            steady_from=(1.0 - scenario.metrics.steady_fraction) * scenario.simulation.duration,
         )
-        for i, (label, recording) in enumerate(runs)
+        for i, (label, recording, scenario) in enumerate(runs)
     ]  # fmt: skip
 
 
 def draw(
-    runs: Sequence[Shown], names: Iterable[str], formats: Iterable[str], columns: int = 2
+    runs: Sequence[Shown], names: Iterable[str], formats: Sequence[str], columns: int = 2
 ) -> Iterator[tuple[str, bytes]]:
-    """File name and content of each figure in each format."""
-    formats = tuple(formats)
+    """File name and content of each figure that fits the runs, in each format."""
     with house_style():
-        for name in names:
-            figure = FIGURES[name](runs, columns)
+        for name in (name for name in names if FIGURES[name].fits(runs)):
+            figure = FIGURES[name].family(runs, columns)
             for form in formats:
                 yield f"{name}.{form}", image(figure, form)

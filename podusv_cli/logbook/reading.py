@@ -124,6 +124,8 @@ def _dataset(group: h5py.h5g.GroupID, name: str) -> h5py.h5d.DatasetID:
         raise ValueError(f"{name} keeps its data in another file")
     if not {made.get_filter(i)[0] for i in range(made.get_nfilters())} <= _FILTERS:
         raise ValueError(f"{name} is packed in an unknown way")
+    if dataset.shape is None:
+        raise ValueError(f"{name} is empty")
     return dataset
 
 

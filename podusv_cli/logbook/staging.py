@@ -34,10 +34,14 @@ class Staging:
         owner = f"{_machine()}-{os.getpid()}-{secrets.token_hex(4)}"
         self.final = final
         self._box = final.with_name(f".{final.name}.podusv-{owner}.part")
-        with atomic.explained(f"cannot make {final}"):
-            final.parent.mkdir(parents=True, exist_ok=True)
-            self._box.mkdir()
-            self.folder.mkdir()
+        try:
+            with atomic.explained(f"cannot make {final}"):
+                final.parent.mkdir(parents=True, exist_ok=True)
+                self._box.mkdir()
+                self.folder.mkdir()
+        except BaseException:
+            self.discard()
+            raise
 
     @property
     def folder(self) -> Path:

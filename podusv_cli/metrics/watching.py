@@ -29,8 +29,10 @@ def _track(t: float, weight: float, z_e: float, k: Any, seen: Vector) -> None:
     if z_e > k.settling_radius:
         seen[OUTSIDE] = t
     if t >= k.steady_from:
-        seen[STEADY] += weight * z_e
-        seen[STEADY_TIME] += weight
+        opens = seen[STEADY_TIME] == 0.0 and t > 0.0  # half a weight where the window begins
+        part = 0.5 * weight if opens else weight
+        seen[STEADY] += part * z_e
+        seen[STEADY_TIME] += part
 
 
 @kernel

@@ -1,0 +1,57 @@
+"""The command line: one file a command; it parses, prints and sets exit codes.
+
+Commands import what they need when they run, so that help and mistyped options answer at once.
+"""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from typing import Annotated
+
+import typer
+
+from podusv_cli import __version__
+from podusv_cli.cli.guard import flushed, guarded
+
+# NAME is the function NAME of cli/NAME.py
+COMMANDS = ("run", "compare", "validate", "explain", "list", "schema")
+
+app = typer.Typer(
+    name="podusv",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+for _name in COMMANDS:
+    app.command(_name)(guarded(getattr(import_module(f"podusv_cli.cli.{_name}"), _name)))
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"podusv {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", help="Show the version and exit.", callback=_show_version, is_eager=True
+        ),
+    ] = False,
+) -> None:
+    """Experiments with controllers for pod-propelled surface vessels."""
+
+
+def main() -> None:
+    """Run the command line and leave with its exit code."""
+    for stream in (sys.stdout, sys.stderr):
+        # A file name or text that the terminal's encoding lacks must not end in a traceback.
+        getattr(stream, "reconfigure", lambda errors: None)(errors="backslashreplace")
+    try:
+        app()
+    except SystemExit as end:
+        sys.exit(flushed(end.code))

@@ -1,0 +1,73 @@
+"""`podusv compare`: several runs side by side."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from podusv_cli.cli.options import AsJson, Assignments, Figures, Force, Out, Quiet, Verbose
+
+if TYPE_CHECKING:
+    from podusv_cli.workflows import Compared
+
+SOME_FAILED = 3
+
+
+def compare(
+    items: Annotated[
+        list[str],
+        typer.Argument(metavar="CONFIG_OR_RUN...", help="Scenarios, run folders, comparisons."),
+    ],
+    assign: Assignments = None,
+    out: Out = None,
+    force: Force = False,
+    figures: Figures = True,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """Run what has to be run, and compare: table, claims, figures, report.
+
+    One scenario with `controllers`, several scenarios, finished runs, or any mixture. Exit code 3
+    when a run failed or diverged; the others are compared all the same.
+    """
+    from podusv_cli import workflows  # heavy imports only when they are needed
+    from podusv_cli.cli.progress import progress_bars
+
+    request = workflows.Request(tuple(assign or ()), out, force, figures, tuple(sys.argv))
+    with progress_bars(wanted=not (quiet or as_json)) as progress:
+        done = workflows.compare([Path(item) for item in items], request, progress)
+    if as_json:
+        typer.echo(json.dumps(done.as_json(), indent=2, ensure_ascii=False))
+    elif quiet:
+        typer.echo(done.folder)
+    else:
+        _report(done, verbose)
+    raise typer.Exit(SOME_FAILED if any(done.result.endings.values()) else 0)
+
+
+def _report(done: Compared, verbose: bool) -> None:
+    from podusv_cli.cli.layout import echo_table
+    from podusv_cli.comparison.table import cells
+
+    result = done.result
+    for key, values in result.differences.items():
+        shown = ", ".join(f"{label} {value}" for label, value in values.items())
+        typer.echo(f"the runs differ in {key}: {shown}", err=True)
+    echo_table(["metric", "unit", *map(str, result.table.columns)], cells(result.table))
+    if result.verdicts:
+        typer.echo()
+        rows = [[v.claim.id, v.answer, v.claim.says, v.shown()] for v in result.verdicts]
+        echo_table(["", "verdict", "claim", "numbers"], rows)
+    for label, ending in result.endings.items():
+        if ending:
+            typer.echo(f"{label}: {ending}", err=True)
+    if verbose:
+        for label, timing in result.timings.items():
+            shown = ", ".join(f"{name} {seconds:.3f}" for name, seconds in timing.items())
+            typer.echo(f"{label}: {shown}")
+    typer.echo(f"compared {len(result.entries)} runs: {done.folder}")

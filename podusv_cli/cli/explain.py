@@ -1,0 +1,45 @@
+"""`podusv explain`: keys, kinds and signals in words."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from podusv_cli.cli.layout import echo_entry
+
+if TYPE_CHECKING:
+    from podusv_cli.config.explain import Row
+
+
+def explain(
+    key: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="KEY",
+            help="A section (controller), a kind (controller.pid), a key (controller.k_ze or k_ze) "
+            "or a signal (z_e).",
+            show_default=False,
+        ),
+    ] = None,
+) -> None:
+    """Explain keys, kinds and signals in words.
+
+    Without a key: the sections of a scenario.
+    """
+    from podusv_cli.config.explain import explain as rows
+
+    for row in rows(key):
+        _echo(row)
+
+
+def _echo(row: Row) -> None:
+    where = f"in {', '.join(row.kinds)}" if row.kinds else ""
+    if row.type in ("keys", "kinds"):
+        inside = f"{row.type}: {', '.join(row.choices)}" if row.choices else ""
+        echo_entry(row.key, row.meaning, inside, where)
+        return
+    unit = f"[{row.unit}]" if row.unit else ""
+    default = row.default if row.default in ("", "required") else f"default {row.default}"
+    value = " ".join(filter(None, (row.type, row.range, unit)))
+    echo_entry(row.key, row.meaning, where, facts=", ".join(filter(None, (value, default))))

@@ -1,0 +1,67 @@
+"""What failures look like: a line for what was foreseen, a trace for what was not."""
+
+from __future__ import annotations
+
+import os
+import sys
+import traceback
+from collections.abc import Callable
+from functools import wraps
+from typing import ParamSpec
+
+import typer
+
+from podusv_cli.errors import PodusvError, StorageError
+
+Given = ParamSpec("Given")
+INTERRUPTED = 130
+PIPE_CLOSED = 141  # what a shell reports for a program that SIGPIPE ended
+BUG = 1
+PLEASE_REPORT = "This is a bug in podusv. Please report it with the lines above."
+
+
+def guarded(command: Callable[Given, None]) -> Callable[Given, None]:
+    """The command, ending with an exit code and, where one helps, a message on stderr."""
+
+    @wraps(command)
+    def run(*args: Given.args, **kwargs: Given.kwargs) -> None:
+        try:
+            command(*args, **kwargs)
+        except (typer.Exit, typer.Abort, typer.BadParameter):
+            raise
+        except (Exception, KeyboardInterrupt) as error:
+            raise typer.Exit(_exit_code(error)) from error
+
+    return run
+
+
+def _exit_code(error: BaseException) -> int:
+    """Tell about an error; the exit code it stands for."""
+    if isinstance(error, KeyboardInterrupt):
+        return INTERRUPTED
+    if isinstance(error, BrokenPipeError):
+        _silence()
+        return PIPE_CLOSED
+    if isinstance(error, PodusvError):
+        typer.echo(str(error), err=True)
+        return error.exit_code
+    if isinstance(error, OSError):
+        typer.echo(f"podusv: {error}", err=True)
+        return StorageError.exit_code
+    traceback.print_exception(error)
+    typer.echo(PLEASE_REPORT, err=True)
+    return BUG
+
+
+def flushed(code: str | int | None) -> str | int | None:
+    """The exit code after everything is printed; another one where printing failed."""
+    try:
+        sys.stdout.flush()
+    except OSError as error:
+        return _exit_code(error)
+    return code
+
+
+def _silence() -> None:
+    """Nobody reads stdout any more; keep Python from complaining about it at the very end."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -1,0 +1,21 @@
+"""`podusv list`: what there is to choose from."""
+
+from __future__ import annotations
+
+import typer
+
+from podusv_cli.cli.layout import echo_entry
+
+
+def list() -> None:
+    """List the kinds of components, and the vessels."""
+    from podusv_cli.config.explain import first_sentence, kinds
+    from podusv_cli.config.references import vessel_names, vessel_text
+
+    for section, summaries in kinds().items():
+        typer.echo(f"{section}:")
+        for kind, summary in summaries.items():
+            echo_entry(f"  {kind}", summary)
+    typer.echo("vessel:")
+    for name in vessel_names():
+        echo_entry(f"  {name}", first_sentence(vessel_text(name, "source")))

@@ -1,0 +1,23 @@
+"""Arguments and options that several commands share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+Config = Annotated[str, typer.Argument(metavar="CONFIG", help="The scenario, a YAML file.")]
+Assignments = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Replace a value of the scenario; repeatable."),
+]
+Out = Annotated[
+    Path | None,
+    typer.Option(help="Folder for the results.", show_default="results/<name>/<time>-<digest>"),
+]
+Force = Annotated[bool, typer.Option("--force", help="Replace finished results.")]
+Figures = Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the results.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print the results' folder only.")]
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Print where the time went.")]

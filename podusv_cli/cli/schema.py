@@ -1,0 +1,12 @@
+"""`podusv schema`: the JSON schema of a scenario file."""
+
+from __future__ import annotations
+
+import typer
+
+
+def schema() -> None:
+    """Print the JSON schema of scenarios, for editors."""
+    from podusv_cli.config.schema import schema_text
+
+    typer.echo(schema_text(), nl=False)

@@ -1,0 +1,32 @@
+"""`podusv validate`: is a scenario sound, and where does every value come from."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from podusv_cli.cli.options import Assignments, Config
+
+
+def validate(
+    config: Config,
+    assign: Assignments = None,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", "-v", help="Show every value and where it comes from.")
+    ] = False,
+) -> None:
+    """Check a scenario and show every fault at once.
+
+    Exit code 0, or 2 with a line for each fault.
+    """
+    from podusv_cli.config.loading import load, values
+    from podusv_cli.config.words import as_written
+
+    loaded = load(config, assign or ())
+    scenario = loaded.scenario
+    steps = scenario.time_grid().steps
+    typer.echo(f"{config}: ok ({scenario.name}, {scenario.controller.label}, {steps} steps)")
+    if verbose:
+        for key, content in values(scenario).items():
+            typer.echo(f"{key}: {as_written(content)}  # {loaded.origins[key]}")

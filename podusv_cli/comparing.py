@@ -1,0 +1,149 @@
+"""Several runs made side by side, and what they say together written into one folder."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from podusv_cli.comparison import claims, report, table
+from podusv_cli.comparison.differences import differences
+from podusv_cli.comparison.entries import Absent, Entry
+from podusv_cli.config.loading import load_text
+from podusv_cli.config.scenario import Scenario
+from podusv_cli.logbook.folder import Run, RunWriter, open_run
+from podusv_cli.parallel import Outcome, run_all
+from podusv_cli.running import Finished, Stopwatch, Task, execute, warm_up
+
+
+@dataclass(frozen=True)
+class Part:
+    """One run of a comparison: to be made from a scenario, or there already."""
+
+    label: str
+    scenario: Scenario
+    text: str = ""
+    run: Run | None = None
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a comparison found. `endings` says for each run why it did not finish, "" if it did."""
+
+    entries: Sequence[Entry]
+    endings: Mapping[str, str]
+    differences: Mapping[str, Mapping[str, Any]]
+    table: pd.DataFrame
+    verdicts: Sequence[claims.Verdict]
+    timings: Mapping[str, Mapping[str, float]]
+
+
+def from_folder(path: Path) -> list[Part]:
+    """The finished runs of a folder: one run, or all those of a comparison."""
+    inner = sorted(child for child in path.iterdir() if (child / "log.h5").is_file())
+    return [_from_run(child) for child in (inner or [path])]
+
+
+def _from_run(path: Path) -> Part:
+    run = open_run(path)
+    scenario = load_text(run.resolved_yaml, str(path / "resolved.yaml")).scenario
+    return Part(path.name, scenario, run=run)
+
+
+def distinct(parts: Iterable[Part]) -> list[Part]:
+    """The parts with labels that tell them apart."""
+    found: dict[str, Part] = {}
+    for part in parts:
+        label, count = part.label, 1
+        while label in found:
+            count += 1
+            label = f"{part.label}_{count}"
+        found[label] = Part(label, part.scenario, part.text, part.run)
+    return list(found.values())
+
+
+def make_runs(
+    parts: Sequence[Part], folder: Path, *, figures: bool, argv: Sequence[str],
+    progress: Callable[[str, float], None] | None = None,
+) -> dict[str, Outcome]:  # fmt: skip
+    """Execute the parts that are scenarios, in parallel, each into its own folder in `folder`."""
+    wanted = [part for part in parts if part.run is None]
+    for part in wanted:
+        warm_up(part.scenario)
+    tasks = [
+        Task(part.scenario, part.text, folder / part.label, figures=figures, argv=argv)
+        for part in wanted
+    ]
+    told = progress and (lambda position, done: progress(wanted[position].label, done))
+    outcomes = run_all([partial(execute, task) for task in tasks], told)
+    return {part.label: outcome for part, outcome in zip(wanted, outcomes, strict=True)}
+
+
+def collect(
+    parts: Sequence[Part], outcomes: Mapping[str, Outcome], stated: Sequence[Any]
+) -> Result:
+    """Open the runs that were made, and compare."""
+    entries, endings, timings = [], {}, {}
+    for part in parts:
+        outcome = outcomes.get(part.label, Outcome())
+        done: Finished | None = outcome.result
+        run = open_run(done.folder) if done else part.run
+        endings[part.label] = outcome.failure or (run.recording.message if run else "")
+        if run:
+            entries.append(Entry(part.label, run, part.scenario))
+        if done:
+            timings[part.label] = done.timing
+    sources = {part.label: Absent() for part in parts} | {e.label: e for e in entries}
+    differing = differences({part.label: part.scenario.model_dump() for part in parts})
+    measured = {entry.label: {n: entry.metric(n) for n in entry.run.metrics} for entry in entries}
+    verdicts = claims.judge(stated, sources)
+    return Result(entries, endings, differing, table.table(measured), verdicts, timings)
+
+
+def numbers(frame: pd.DataFrame) -> dict[str, dict[str, float | None]]:
+    """The table as plain data: metric, run, number or None."""
+    return {
+        str(name): {str(label): None if math.isnan(x) else float(x) for label, x in row.items()}
+        for name, row in frame.iterrows()
+    }
+
+
+def write(writer: RunWriter, result: Result) -> None:
+    """Table and verdicts, in every form, into the comparison's folder."""
+    forms = {
+        "comparison.csv": table.as_csv(result.table),
+        "comparison.md": table.as_markdown(result.table),
+        "comparison.tex": table.as_latex(result.table),
+    }
+    for name, text in forms.items():
+        writer.add(name, text.encode())
+    if result.verdicts:
+        writer.add("claims.md", claims.as_markdown(result.verdicts).encode())
+        verdicts = [verdict.as_json() for verdict in result.verdicts]
+        writer.add_json("claims.json", {"format": 1, "claims": verdicts})
+
+
+def draw_all(writer: RunWriter, result: Result, title: str, provenance: Mapping[str, Any]) -> None:
+    """Shared figures in every format, and the report."""
+    from podusv_cli.figures.drawing import FIGURES, draw, dressed  # matplotlib is slow to import
+
+    shown = dressed([(e.label, e.recording, e.scenario) for e in result.entries])
+    pictures = []
+    for name, content in draw(shown, FIGURES, ("png", "pdf", "svg")):
+        writer.add(f"figures/{name}", content)
+        if name.endswith(".svg"):
+            figure = name.removesuffix(".svg")
+            pictures.append((figure, FIGURES[figure].caption, content))
+    first = result.entries[0].scenario
+    story = report.Story(
+        title=title, scenario=first,
+        controllers={e.label: e.scenario.controller for e in result.entries},
+        endings=result.endings, differences=result.differences, table=result.table,
+        verdicts=result.verdicts, figures=pictures, provenance=provenance,
+    )  # fmt: skip
+    writer.add("report.html", report.page(story).encode())

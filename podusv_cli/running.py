@@ -1,0 +1,162 @@
+"""One scenario simulated, measured, written and drawn into one finished folder."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from podusv_cli import __version__
+from podusv_cli.config.loading import resolved_yaml
+from podusv_cli.config.scenario import Scenario
+from podusv_cli.engine.simulate import Observer, marcher, simulate
+from podusv_cli.logbook import folder, hdf5, provenance
+from podusv_cli.metrics.cost import law_cost
+from podusv_cli.metrics.table import METRICS
+from podusv_cli.metrics.watching import observer, summarise
+from podusv_cli.recording import Recording, Status
+
+Progress = Callable[[float], None]
+
+
+@dataclass
+class Stopwatch:
+    """Seconds spent in each part of a pipeline."""
+
+    seconds: dict[str, float] = field(default_factory=dict)
+    began: float = field(default_factory=time.perf_counter)
+
+    @contextmanager
+    def part(self, name: str) -> Iterator[None]:
+        """Add what happens inside to `<name>_s`."""
+        start = time.perf_counter()
+        try:
+            yield
+        finally:
+            key = f"{name}_s"
+            self.seconds[key] = self.seconds.get(key, 0.0) + time.perf_counter() - start
+
+    def total(self) -> dict[str, float]:
+        """All parts and the time since the start."""
+        return self.seconds | {"total_s": time.perf_counter() - self.began}
+
+
+@dataclass(frozen=True)
+class Task:
+    """A scenario, its file's text, where its run folder goes, and how it is drawn."""
+
+    scenario: Scenario
+    text: str
+    target: Path
+    force: bool = False
+    figures: bool = True
+    argv: Sequence[str] = ()
+
+
+@dataclass(frozen=True)
+class Finished:
+    """A run that is over: where it lies, how it ended, its numbers."""
+
+    folder: Path
+    controller: str
+    status: Status
+    message: str
+    metrics: dict[str, float]
+    timing: dict[str, float]
+
+    def as_json(self) -> dict[str, Any]:
+        """What `--json` prints of a run."""
+        return {
+            "format": 1,
+            "status": self.status,
+            "run": str(self.folder),
+            "controller": self.controller,
+            "metrics": self.metrics,
+            "timing": self.timing,
+        }
+
+
+def execute(
+    task: Task, progress: Progress | None = None, watch: Stopwatch | None = None
+) -> Finished:
+    """Simulate, measure, write, draw; `target` is there only when all of it is.
+
+    A run that diverges or is interrupted is written like any other; its status tells. Raises
+    StorageError.
+    """
+    started, watch = datetime.now(UTC), watch or Stopwatch()
+    with folder.RunWriter(task.target, force=task.force) as writer:
+        recording, metrics = measured(task.scenario, watch, progress)
+        with watch.part("write"):
+            _write(writer, task, recording, metrics)
+        with watch.part("figures"):
+            if task.figures:
+                _draw(writer, task.scenario, recording)
+        with watch.part("write"):
+            origin = provenance.collect(list(task.argv), started, datetime.now(UTC))
+            writer.add_json("provenance.json", origin)
+            final = writer.finish(recording.status)
+    return Finished(
+        final, recording.controller, recording.status, recording.message, metrics, watch.total()
+    )
+
+
+def warm_up(scenario: Scenario) -> None:
+    """Have all code of this scenario's loop compiled and loaded."""
+    marcher(scenario.closed_loop(), _observer(scenario), scenario.simulation.compiled)
+
+
+def _observer(scenario: Scenario) -> Observer:
+    settings = scenario.metrics
+    return observer(
+        scenario.closed_loop(), scenario.time_grid(),
+        steady_fraction=settings.steady_fraction, settling_radius=settings.settling_radius,
+    )  # fmt: skip
+
+
+def measured(
+    scenario: Scenario, watch: Stopwatch, progress: Progress | None = None
+) -> tuple[Recording, dict[str, float]]:
+    """Simulate a scenario and sum it up in metrics."""
+    loop, grid, seeing = scenario.closed_loop(), scenario.time_grid(), _observer(scenario)
+    compiled = scenario.simulation.compiled
+    with watch.part("compile"):
+        marcher(loop, seeing, compiled)
+    with watch.part("engine"):
+        recording = simulate(loop, grid, observer=seeing, compiled=compiled, progress=progress)
+    with watch.part("metrics"):
+        metrics = summarise(recording.seen, grid.step) if recording.seen is not None else {}
+        cost = law_cost(loop, recording) if compiled and len(recording["time"]) else {}
+    return recording, metrics | cost
+
+
+def _write(
+    writer: folder.RunWriter, task: Task, recording: Recording, metrics: dict[str, float]
+) -> None:
+    scenario, resolved = task.scenario, resolved_yaml(task.scenario)
+    log = hdf5.encode(
+        recording, resolved_yaml=resolved, title=scenario.description or scenario.name,
+        source=scenario.vessel.source, version=__version__,
+    )  # fmt: skip
+    writer.add("scenario.yaml", task.text.encode())
+    writer.add("resolved.yaml", resolved.encode())
+    writer.add("log.h5", log)
+    status = {"status": recording.status, "controller": recording.controller}
+    writer.add_json("metrics.json", {**status, "metrics": metrics})
+    rows = [f"{name},{metrics[name]!r},{METRICS[name].unit}" for name in METRICS if name in metrics]
+    writer.add("metrics.csv", "\n".join(["metric,value,unit", *rows, ""]).encode())
+
+
+def _draw(writer: folder.RunWriter, scenario: Scenario, recording: Recording) -> None:
+    from podusv_cli.figures.drawing import FIRST, draw, dressed  # matplotlib is slow to import
+
+    if len(recording["time"]) < 2:
+        return
+    for name, content in draw(
+        dressed([(recording.controller, recording, scenario)]), FIRST, ("png",)
+    ):
+        writer.add(f"figures/{name}", content)

@@ -1,0 +1,30 @@
+"""Scenario texts that the tests of configuration and commands start from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from podusv_cli.config.loading import Loaded, load_text
+from podusv_cli.errors import ScenarioError
+
+SOUND = """\
+vessel: {preset: paper}
+path: {kind: line}
+disturbance: {kind: none}
+actuator: {kind: ideal}
+controller: {kind: pid}
+"""
+
+
+def loaded(text: str = SOUND, overrides: Sequence[str] = ()) -> Loaded:
+    """The text as the scenario `a.yaml`."""
+    return load_text(text, "a.yaml", overrides)
+
+
+def told(text: str = SOUND, overrides: Sequence[str] = ()) -> list[str]:
+    """What is wrong with the text as the scenario `a.yaml`, a line each."""
+    try:
+        loaded(text, overrides)
+    except ScenarioError as error:
+        return str(error).splitlines()
+    return []

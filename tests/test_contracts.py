@@ -1,0 +1,237 @@
+"""What every registered component promises, asked of each by being registered."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import NONLINEAR, PACKAGE, ROOMS, VESSELS, corrected, example, kinds, situations
+from pydantic import BaseModel, ValidationError
+
+from podusv_cli.controllers.base import Controller
+from podusv_cli.engine.simulate import names
+from podusv_cli.kernels import Vector, bundle, is_kernel
+from podusv_cli.registry import Component, catalogue, unit_of
+from podusv_cli.signals import SIGNALS
+from podusv_cli.vessels.vessel import COEFFICIENTS, Vessel
+
+EVERY = [(room, name, kind) for room in ROOMS for name, kind in kinds(room).items()]
+every_kind = pytest.mark.parametrize(
+    ("room", "kind"), [(r, k) for r, _, k in EVERY], ids=[f"{r}-{n}" for r, n, _ in EVERY]
+)
+KERNELS = {
+    "paths": "evaluate",
+    "disturbances": "evaluate",
+    "actuators": "drive",
+    "controllers": "law",
+}
+
+
+def parts(kind: type[BaseModel]) -> Iterator[type[BaseModel]]:
+    """A component's class and those of the components in its fields."""
+    yield kind
+    for field in kind.model_fields.values():
+        inner = field.annotation
+        if isinstance(inner, type) and issubclass(inner, BaseModel):
+            yield from parts(inner)
+
+
+class Call:
+    """A kernel's arguments at a random instant: what it reads, and what it must fill."""
+
+    def __init__(self, room: str, component: Any, seed: int) -> None:
+        random = np.random.default_rng(seed)
+        law = component if room == "controllers" else kinds("controllers")["pid"]()
+        at = next(situations(law, 1, seed))
+        self.t = float(random.uniform(0, 300))
+        self.reads, sizes = self._shape(room, component, at, random)
+        self.writes = [np.full(size, np.nan) for size in sizes]
+        self.kernel: Callable[..., None] = getattr(component, KERNELS[room])
+
+    def _shape(
+        self, room: str, component: Any, at: Any, random: Any
+    ) -> tuple[list[Any], list[int]]:
+        k, table = bundle(component.constants()), component.table()
+        if room == "paths":
+            return [k, table], [6]
+        if room == "disturbances":
+            return [at.x, k, table], [3]
+        if room == "actuators":
+            count = len(component.states)
+            state = component.rest() + random.normal(0, 0.1, count)
+            reads = [at.x, state, random.normal(0, 5, 2), k, table]
+            return reads, [3, count, len(component.signals)]
+        k = bundle(component.informed(NONLINEAR))
+        reads = [at.x, at.memory, at.target, k, table]
+        return reads, [2, len(at.memory), len(component.signals), component.workspace()]
+
+    def __call__(self) -> list[Vector]:
+        """Fresh outputs, without the scratch."""
+        written = [w.copy() for w in self.writes]
+        self.kernel(self.t, *self.reads, *written)
+        return written[:3]
+
+
+def calls(room: str, kind: type[Component], count: int) -> list[Call]:
+    return [Call(room, example(kind), seed) for seed in range(count)]
+
+
+@every_kind
+def test_every_output_is_written_and_finite(room: str, kind: type[Component]) -> None:
+    for call in calls(room, kind, 100):
+        assert all(np.isfinite(out).all() for out in call())
+
+
+@every_kind
+def test_nothing_is_remembered_between_evaluations(room: str, kind: type[Component]) -> None:
+    asked = calls(room, kind, 20)
+    first = [call() for call in asked]
+    again = [call() for call in reversed(asked)][::-1]
+    for one, other in zip(first, again, strict=True):
+        for a, b in zip(one, other, strict=True):
+            np.testing.assert_array_equal(a, b)
+
+
+@every_kind
+def test_inputs_are_left_as_they_are(room: str, kind: type[Component]) -> None:
+    for call in calls(room, kind, 20):
+        before = [np.array(argument) for argument in call.reads]
+        call()
+        for argument, was in zip(call.reads, before, strict=True):
+            np.testing.assert_array_equal(np.array(argument), was)
+
+
+@every_kind
+def test_the_kernels_are_marked_for_the_compiler(room: str, kind: type[Component]) -> None:
+    assert is_kernel(getattr(kind, KERNELS[room]))
+    component = example(kind)
+    if isinstance(component, Controller) and component.sample_period() > 0:
+        assert is_kernel(component.sample)
+
+
+@every_kind
+def test_documentation_is_complete(room: str, kind: type[Component]) -> None:
+    for part in parts(kind):
+        assert part.__doc__
+        assert part.__doc__ != Component.__doc__
+        assert "__doc__" in vars(part)
+        for name, field in part.model_fields.items():
+            if name != "kind":
+                assert field.description, f"{part.__name__}.{name} says nothing"
+                assert isinstance((field.json_schema_extra or {}).get("unit"), str), name
+                assert unit_of(field) == unit_of(field).strip()
+
+
+@every_kind
+def test_a_component_is_a_frozen_value_without_surprises(room: str, kind: type[Component]) -> None:
+    component = example(kind)
+    assert component == example(kind)
+    hash(component)
+    for name in kind.model_fields:
+        with pytest.raises(ValidationError):
+            setattr(component, name, getattr(component, name))
+    with pytest.raises(ValidationError):
+        example(kind, no_such_field=1.0)
+
+
+@every_kind
+def test_a_component_survives_being_written_out(room: str, kind: type[Component]) -> None:
+    component = example(kind)
+    assert kind.model_validate(component.model_dump()) == component
+    assert kind.model_validate_json(component.model_dump_json()) == component
+
+
+@every_kind
+def test_numbers_that_are_none_are_refused(room: str, kind: type[Component]) -> None:
+    for part in parts(kind):
+        for name, field in part.model_fields.items():
+            if field.annotation is float:
+                for wrong in (math.nan, math.inf, "1.0", True):
+                    given = (
+                        {name: wrong}
+                        if part is not kind
+                        else example(kind).model_dump() | {name: wrong}
+                    )
+                    with pytest.raises(ValidationError, match=name):
+                        part.model_validate(given)
+
+
+@every_kind
+def test_constants_are_numbers_under_names_that_kernels_can_read(
+    room: str, kind: type[Component]
+) -> None:
+    constants = example(kind).constants()
+    assert all(name.isidentifier() and isinstance(n, float) for name, n in constants.items())
+    table = example(kind).table()
+    assert table.dtype == np.float64
+    assert table.ndim == 1
+    assert len(table) > 0
+
+
+def test_kinds_and_class_names_are_unique() -> None:
+    classes = [
+        thing
+        for room, base in ROOMS.items()
+        for path in (PACKAGE / room).glob("*.py")
+        for thing in vars(__import__(f"podusv_cli.{room}.{path.stem}", fromlist=["_"])).values()
+        if isinstance(thing, type) and issubclass(thing, base) and "kind" in thing.model_fields
+        and thing.__module__ == f"podusv_cli.{room}.{path.stem}"
+    ]  # fmt: skip
+    assert len(classes) == len(EVERY)
+    for room in ROOMS:
+        mine = [c for c in classes if c.__module__.startswith(f"podusv_cli.{room}.")]
+        kinds_here = Counter(c.model_fields["kind"].default for c in mine)
+        assert kinds_here == Counter(kinds(room).keys())
+    assert set(Counter(c.__name__ for c in classes).values()) == {1}
+
+
+@pytest.mark.parametrize("kind", kinds("controllers").values(), ids=kinds("controllers"))
+def test_a_law_s_own_constants_do_not_hide_the_vessel_s(kind: type[Controller]) -> None:
+    law = example(kind)
+    assert not set(law.constants()) & set(NONLINEAR.constants())
+    assert law.informed(NONLINEAR) == NONLINEAR.constants() | law.constants()
+
+
+@pytest.mark.parametrize("kind", kinds("controllers").values(), ids=kinds("controllers"))
+def test_a_law_s_memory_has_the_declared_size_and_is_made_anew(kind: type[Controller]) -> None:
+    law = example(kind)
+    at = next(situations(law, 1))
+    one, other = (law.start(at.x, at.target, NONLINEAR) for _ in range(2))
+    assert len(one) == sum(size for _, size in law.slots())
+    assert not np.shares_memory(one, other)
+    np.testing.assert_array_equal(one, other)
+    before = one.copy()
+    other += 1.0
+    np.testing.assert_array_equal(law.start(at.x, at.target, NONLINEAR), before)
+
+
+@every_kind
+def test_every_logged_column_has_one_meaning(room: str, kind: type[Component]) -> None:
+    loop = corrected(**{room[:-1]: example(kind)})
+    wide = {name: size for name, size in loop.controller.slots() if size > 1}
+    for name, count in Counter(names(loop)).items():
+        assert count == wide.get(name, 1), f"{name} is logged twice"
+        if name not in ("x_d_dot", "y_d_dot", "x_d_ddot", "y_d_ddot"):
+            assert name in SIGNALS, f"{name} is in no table of signals"
+            assert bool(SIGNALS[name].axes) == name.startswith("W_hat")
+    assert all(name in SIGNALS for name in loop.controller.fixed_signals())
+
+
+def test_every_vessel_has_the_same_constants_in_the_same_order() -> None:
+    for vessel in VESSELS.values():
+        assert tuple(vessel.constants()) == COEFFICIENTS
+        assert vessel.source
+        assert vessel.validity
+        assert Vessel.model_validate(vessel.model_dump()) == vessel
+
+
+def test_the_catalogue_is_sorted_and_leaves_out_what_has_no_kind() -> None:
+    for room, base in ROOMS.items():
+        found = catalogue(f"podusv_cli.{room}", base)
+        assert list(found) == sorted(found)
+        assert base not in found.values()
+        assert all(kind.model_fields["kind"].default == name for name, kind in found.items())

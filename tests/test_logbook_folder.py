@@ -1,0 +1,428 @@
+"""Run folders appear whole, are never lost, and open again."""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+import shutil
+import subprocess
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from datetime import UTC, datetime
+from pathlib import Path
+from threading import Barrier
+
+import pytest
+from logbook_samples import (
+    ENVIRONMENT,
+    PYTHON,
+    YAML,
+    Deed,
+    Saboteur,
+    assert_same,
+    durable_steps,
+    fails,
+    files,
+    interrupts,
+    kills,
+    log,
+    recording,
+    until_nothing_breaks,
+)
+
+from podusv_cli.errors import StorageError
+from podusv_cli.logbook import manifest
+from podusv_cli.logbook.folder import RunWriter, default_folder, open_run
+from podusv_cli.logbook.staging import Staging
+
+OLD = {"log.h5": b"old log", "figures/old.png": b"old figure"}
+NEW = {"log.h5": b"new log", "figures/new.png": b"new figure", "metrics.csv": b""}
+CALLS = ("mkdir", "write", "fsync", "replace", "rename")
+DEADLY = (*CALLS, "open", "unlink", "rmdir")
+
+
+@pytest.fixture
+def final(tmp_path: Path) -> Path:
+    return tmp_path / "results" / "run"
+
+
+def write(final: Path, content: dict[str, bytes], *, force: bool = False) -> Path:
+    with RunWriter(final, force=force) as writer:
+        for name, part in content.items():
+            writer.add(name, part)
+        return writer.finish("finished")
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    """The files of a finished folder, without its manifest; StorageError for any other folder."""
+    manifest.check(folder)
+    found = files(folder)
+    del found["manifest.json"]
+    return found
+
+
+def beside(folder: Path) -> set[str]:
+    return {path.name for path in folder.parent.iterdir()} - {folder.name}
+
+
+def run_to(final: Path, **how: bool) -> Path:
+    """A complete run folder."""
+    with RunWriter(final, **how) as writer:
+        writer.add("scenario.yaml", b"name: a\n")
+        writer.add("resolved.yaml", YAML.encode())
+        writer.add("log.h5", log())
+        writer.add_json(
+            "metrics.json", {"status": "finished", "metrics": {"iae": 1.5, "ise": None}}
+        )
+        writer.add_json("provenance.json", {"podusv": "1.2.3"})
+        return writer.finish("finished")
+
+
+def test_a_folder_appears_only_when_it_is_finished(final: Path) -> None:
+    with RunWriter(final) as writer:
+        for name, part in NEW.items():
+            writer.add(name, part)
+        assert not final.exists()
+        assert all(name.startswith(".") for name in beside(final))
+        assert writer.finish("finished") == final
+    assert content(final) == NEW
+    assert beside(final) == set()
+    assert manifest.read(final).status == "finished"
+
+
+def test_everything_in_it_lasts_before_it_has_its_name(
+    final: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    steps = durable_steps(monkeypatch)
+    with RunWriter(final) as writer:
+        for name, part in NEW.items():
+            writer.add(name, part)
+        making = writer.folder
+        writer.finish("finished")
+    named = steps.index(("name", str(final)))
+    before = {path for step, path in steps[:named] if step == "sync"}
+    assert {str(making), str(making / "figures"), *(str(making / name) for name in NEW)} <= before
+    assert ("sync", str(final.parent)) in steps[named:]
+
+
+def test_without_finish_nothing_is_left(final: Path) -> None:
+    with RunWriter(final) as writer:
+        writer.add("log.h5", b"new log")
+    assert list(final.parent.iterdir()) == []
+
+
+def test_a_file_is_written_once_and_only_inside(final: Path) -> None:
+    with RunWriter(final) as writer:
+        writer.add("figures/a.png", b"a")
+        for name in ("../a", "/tmp/a", "a/../../a", "", ".", "manifest.json", "a\0b", "figures/"):
+            with pytest.raises(StorageError, match="is no file of this folder"):
+                writer.add(name, b"b")
+        with pytest.raises(StorageError, match="exists"):
+            writer.add("figures/a.png", b"b")
+        assert files(writer.folder) == {"figures/a.png": b"a"}
+
+
+def test_a_finished_folder_needs_force(final: Path) -> None:
+    write(final, OLD)
+    with pytest.raises(StorageError, match="exists already; --force replaces it"):
+        RunWriter(final)
+    assert content(final) == OLD
+    write(final, NEW, force=True)
+    assert content(final) == NEW
+    assert beside(final) == set()
+
+
+def test_a_damaged_run_folder_can_be_replaced_too(final: Path) -> None:
+    write(final, OLD)
+    (final / "log.h5").write_bytes(b"rotten")
+    write(final, NEW, force=True)
+    assert content(final) == NEW
+
+
+@pytest.mark.parametrize("force", [False, True])
+def test_what_is_no_run_folder_is_never_replaced(final: Path, force: bool) -> None:
+    final.mkdir(parents=True)
+    (final / "thesis.tex").write_text("ten years")
+    with pytest.raises(StorageError, match="not a finished run folder"):
+        RunWriter(final, force=force)
+    (final / "manifest.json").write_text('{"files": {}}')  # of some other program
+    with pytest.raises(StorageError, match="not a finished run folder"):
+        RunWriter(final, force=force)
+    assert beside(final) == set()
+    assert (final / "thesis.tex").read_text() == "ten years"
+
+
+@pytest.mark.parametrize("force", [False, True])
+def test_what_became_no_run_folder_meanwhile_is_not_replaced(final: Path, force: bool) -> None:
+    with RunWriter(final, force=force) as writer:
+        writer.add("log.h5", b"new log")
+        final.mkdir()
+        (final / "thesis.tex").write_text("ten years")
+        with pytest.raises(StorageError, match="not a finished run folder"):
+            writer.finish("finished")
+    assert files(final) == {"thesis.tex": b"ten years"}
+    assert beside(final) == set()
+
+
+@pytest.mark.parametrize("force", [False, True])
+def test_an_empty_folder_may_be_filled(final: Path, force: bool) -> None:
+    final.mkdir(parents=True)
+    write(final, NEW, force=force)
+    assert content(final) == NEW
+
+
+@pytest.mark.parametrize("force", [False, True])
+def test_files_and_links_are_not_replaced(final: Path, force: bool) -> None:
+    final.parent.mkdir()
+    final.write_text("precious")
+    link = final.with_name("latest")
+    link.symlink_to(write(final.with_name("real"), OLD))
+    for place in (final, link, final.parent / "..", Path("/")):
+        with pytest.raises(StorageError, match=r"is not a folder|own name is needed"):
+            RunWriter(place, force=force)
+    assert final.read_text() == "precious"
+    assert content(link.resolve()) == OLD
+
+
+def test_a_place_that_cannot_be_written_to_is_known_at_once(
+    final: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    final.parent.write_text("a file")
+    with pytest.raises(StorageError, match=r"is a file, not a folder|exists"):
+        RunWriter(final)
+    Saboteur(fails(errno.EACCES), 1).watch(monkeypatch, "mkdir")
+    with pytest.raises(StorageError, match="not permitted"):
+        RunWriter(final.parent.with_name("elsewhere") / "run")
+
+
+def test_of_two_writers_the_first_to_finish_wins(final: Path) -> None:
+    with RunWriter(final) as one, RunWriter(final) as other:
+        one.add("log.h5", b"one")
+        other.add("log.h5", b"other")
+        other.finish("finished")
+        with pytest.raises(StorageError, match="exists already"):
+            one.finish("finished")
+    assert content(final) == {"log.h5": b"other"}
+    assert beside(final) == set()
+
+
+@pytest.mark.parametrize("force", [False, True])
+def test_writers_that_finish_at_the_same_time(final: Path, force: bool) -> None:
+    writers = [RunWriter(final, force=force) for _ in range(8)]
+    for number, writer in enumerate(writers):
+        writer.add("log.h5", bytes([number]) * 1000)
+    start = Barrier(len(writers))
+
+    def race(number: int) -> int | None:
+        with writers[number] as writer:
+            start.wait()
+            try:
+                writer.finish("finished")
+            except StorageError:
+                return None
+        return number
+
+    with ThreadPoolExecutor(len(writers)) as pool:
+        winners = [number for number in pool.map(race, range(8)) if number is not None]
+    found = content(final)["log.h5"]
+    assert found in [bytes([number]) * 1000 for number in winners]
+    assert force or len(winners) == 1
+    assert beside(final) == set()
+
+
+@pytest.mark.parametrize("deed", [fails(errno.ENOSPC), interrupts])
+@pytest.mark.parametrize("before", [None, OLD])
+def test_a_failure_at_any_step_leaves_the_old_run_or_the_new_one(
+    final: Path, before: dict[str, bytes] | None, deed: Deed
+) -> None:
+    def attempt(saboteur: Saboteur) -> None:
+        shutil.rmtree(final, ignore_errors=True)
+        if before:
+            write(final, before)
+        with pytest.MonkeyPatch.context() as patch:
+            saboteur.watch(patch, *CALLS)
+            try:
+                write(final, NEW, force=True)
+            except (StorageError, KeyboardInterrupt):
+                assert saboteur.struck
+
+    seen = []
+    for _ in until_nothing_breaks(attempt, deed):
+        assert not final.parent.exists() or beside(final) == set()
+        seen.append(content(final) if final.exists() else None)
+    assert len(seen) > 15
+    assert before in seen
+    assert seen[-1] == NEW
+    assert all(found in (before, NEW) for found in seen)
+
+
+def in_a_child(work: Callable[[], object]) -> None:
+    """Do something in a process of its own and wait for its end, however it comes."""
+    child = os.fork()
+    if child == 0:
+        try:
+            work()
+        finally:
+            os._exit(0)
+    os.waitpid(child, 0)
+
+
+def test_a_folder_made_by_others_at_the_last_moment_is_left_as_it_is(final: Path) -> None:
+    staging = Staging(final)
+    final.mkdir()
+    (final / "thesis.tex").write_text("ten years")
+    with pytest.raises(StorageError, match="made by somebody else in the meantime"):
+        staging.publish(replace=False)
+    assert files(final) == {"thesis.tex": b"ten years"}
+    assert beside(final) == set()
+
+
+@pytest.mark.parametrize("lost", [False, True])
+def test_killed_at_any_step_the_old_run_or_the_new_one_comes_back(final: Path, lost: bool) -> None:
+    """`lost`: somebody deletes the folder before the next run clears up; no half of one appears."""
+    other = final.with_name("other")
+
+    def attempt(saboteur: Saboteur) -> None:
+        write(final, OLD, force=True)
+
+        def replace() -> None:
+            with pytest.MonkeyPatch.context() as patch:
+                saboteur.watch(patch, *DEADLY)
+                write(final, NEW, force=True)
+            os.write(survived, b"!")
+
+        alive, survived = os.pipe()
+        in_a_child(replace)
+        os.close(survived)
+        saboteur.left = 1 if os.read(alive, 1) else 0
+        os.close(alive)
+
+    seen = []
+    for _ in until_nothing_breaks(attempt, kills):
+        if lost:
+            shutil.rmtree(final, ignore_errors=True)
+        write(other, NEW, force=True)  # the next run to the same place clears up
+        assert beside(final) == {"other"}
+        seen.append(content(final) if final.exists() else None)
+    assert len(seen) > 30
+    assert OLD in seen
+    assert seen[-1] == (None if lost else NEW)
+    assert all(found in ((None, OLD) if lost else (OLD, NEW)) for found in seen)
+
+
+def test_what_a_live_run_is_making_is_left_alone(final: Path) -> None:
+    code = (
+        "import sys; from pathlib import Path; from podusv_cli.logbook.folder import RunWriter\n"
+        "writer = RunWriter(Path(sys.argv[1])); writer.add('log.h5', b'live')\n"
+        "print('ready', flush=True); sys.stdin.read(); writer.finish('finished')\n"
+    )
+    with subprocess.Popen(
+        [PYTHON, "-c", code, str(final)],
+        env=ENVIRONMENT, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+    ) as live:  # fmt: skip
+        assert live.stdout is not None
+        assert live.stdout.readline() == b"ready\n"
+        write(final.with_name("other"), NEW)
+        live.communicate(b"", timeout=60)
+    assert content(final) == {"log.h5": b"live"}
+    assert beside(final) == {"other"}
+
+
+def test_what_is_not_a_dead_run_of_this_machine_is_left_alone(final: Path) -> None:
+    with RunWriter(final) as writer:
+        mine = writer.folder.parent.name
+    machine, process = re.findall(r"podusv-(\w{8})-(\d+)-", mine)[0]
+    dead = subprocess.Popen(["true"])
+    dead.wait()
+    kept = [
+        mine.replace(machine, "0" * 8).replace(process, str(dead.pid)),
+        mine.replace(process, "9" * 40),
+        ".run.podusv-notes.part",
+        "run.part",
+    ]
+    gone = mine.replace(process, str(dead.pid))
+    for name in (*kept, gone):
+        (final.parent / name / "new").mkdir(parents=True)
+    write(final, NEW)
+    assert beside(final) == set(kept)
+
+
+def test_a_name_that_is_too_long(final: Path) -> None:
+    with pytest.raises(StorageError, match="the name is too long"):
+        RunWriter(final.with_name("n" * 250))
+
+
+def test_runs_can_be_made_inside_a_folder_in_the_making(final: Path) -> None:
+    with RunWriter(final) as several:
+        for name in ("pid", "shunting"):
+            run_to(several.folder / name)
+        several.add("comparison.csv", b"controller,iae\n")
+        several.finish("finished")
+    assert beside(final) == set()
+    names = set(manifest.check(final).files)
+    assert {"comparison.csv", "pid/manifest.json", "shunting/log.h5"} <= names
+    assert open_run(final / "pid").status == "finished"
+
+
+def test_a_finished_run_opens_with_all_that_plots_and_comparisons_need(final: Path) -> None:
+    run = open_run(run_to(final))
+    assert run.folder == final
+    assert run.status == "finished"
+    assert run.metrics == {"iae": 1.5, "ise": None}
+    assert run.provenance == {"podusv": "1.2.3"}
+    assert run.resolved_yaml == YAML
+    assert_same(recording(), run.recording)
+    assert run.recording is run.recording
+
+
+def test_only_finished_runs_open(final: Path, tmp_path: Path) -> None:
+    with pytest.raises(StorageError, match="no such file"):
+        open_run(tmp_path / "nowhere")
+    with pytest.raises(StorageError, match="no such file"):
+        open_run(tmp_path)
+    write(final, OLD)
+    with pytest.raises(StorageError, match=r"not the folder of a run: it has no metrics\.json"):
+        open_run(final)
+    run_to(final, force=True)
+    (final / "resolved.yaml").unlink()
+    with pytest.raises(StorageError, match=r"resolved\.yaml is missing"):
+        open_run(final)
+
+
+@pytest.mark.parametrize("metrics", [{}, {"metrics": [1.0]}])
+def test_metrics_of_another_shape_do_not_open(final: Path, metrics: dict[str, object]) -> None:
+    with RunWriter(final) as writer:
+        for name in ("resolved.yaml", "log.h5", "provenance.json"):
+            writer.add(name, b"{}")
+        writer.add_json("metrics.json", metrics)
+        writer.finish("finished")
+    with pytest.raises(StorageError, match="holds no metrics"):
+        open_run(final)
+
+
+def test_the_default_folder_tells_time_and_scenario(tmp_path: Path) -> None:
+    before = datetime.now(UTC).replace(microsecond=0)
+    folder = default_folder(tmp_path, "ferry", YAML)
+    assert folder.parent == tmp_path / "ferry"
+    stamp, digest = folder.name.split("-")
+    when = datetime.strptime(stamp, "%Y%m%dT%H%M%SZ").replace(tzinfo=UTC)
+    assert before <= when <= datetime.now(UTC)
+    assert re.fullmatch("[0-9a-f]{8}", digest)
+    assert digest == default_folder(tmp_path, "tug", YAML).name.split("-")[1]
+    assert digest != default_folder(tmp_path, "tug", YAML + " ").name.split("-")[1]
+
+
+def test_a_second_run_in_the_same_second_has_a_name_of_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Clock(datetime):
+        @classmethod
+        def now(cls, tz: object = None) -> Clock:
+            return cls(2026, 1, 1, 12, tzinfo=UTC)
+
+    monkeypatch.setattr("podusv_cli.logbook.folder.datetime", Clock)
+    for ending in ("", "-2", "-3"):
+        folder = default_folder(tmp_path, "ferry", YAML)
+        assert folder.name == f"20260101T120000Z-{folder.name[17:25]}{ending}"
+        folder.mkdir(parents=True)

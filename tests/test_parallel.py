@@ -1,0 +1,93 @@
+"""Jobs in processes of their own."""
+
+import os
+import signal
+import time
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from podusv_cli.errors import StorageError
+from podusv_cli.parallel import run_all
+
+
+def square(number, progress):
+    progress(0.5)
+    return number**2
+
+
+def fail(progress):
+    raise StorageError("the disk is full")
+
+
+def crash(progress):
+    raise ZeroDivisionError
+
+
+def die(progress):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def die_once(marker: Path, progress):
+    if not marker.exists():
+        marker.touch()
+        die(progress)
+    return "second try"
+
+
+def process_id(progress):
+    time.sleep(0.05)
+    return os.getpid()
+
+
+def test_results_come_in_the_order_of_jobs():
+    outcomes = run_all([partial(square, n) for n in range(7)], workers=3)
+    assert [outcome.result for outcome in outcomes] == [n**2 for n in range(7)]
+
+
+def test_every_job_has_a_process_of_its_own():
+    outcomes = run_all([process_id] * 3, workers=2)
+    assert len({outcome.result for outcome in outcomes} | {os.getpid()}) == 4
+
+
+def test_progress_is_passed_on():
+    seen = []
+    run_all([partial(square, 1), partial(square, 2)], lambda at, done: seen.append((at, done)))
+    assert sorted(seen) == [(0, 0.5), (1, 0.5)]
+
+
+def test_a_failing_job_hides_no_other():
+    outcomes = run_all([fail, crash, partial(square, 3)], workers=2)
+    assert outcomes[0].failure == "the disk is full"
+    assert "ZeroDivisionError" in outcomes[1].failure
+    assert outcomes[2].result == 9
+
+
+def test_a_killed_worker_is_replaced_once(tmp_path):
+    outcomes = run_all([partial(die_once, tmp_path / "died"), partial(square, 2), die], workers=2)
+    assert outcomes[0].result == "second try"
+    assert outcomes[1].result == 4
+    assert "2 times" in outcomes[2].failure
+
+
+def test_an_interrupted_caller_leaves_no_process(tmp_path):
+    started = []
+
+    def interrupt(position, done):
+        raise KeyboardInterrupt
+
+    def linger(progress):
+        (tmp_path / str(os.getpid())).touch()
+        progress(0.1)
+        time.sleep(60)
+
+    began = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        run_all([linger, linger], interrupt, workers=2)
+    assert time.monotonic() - began < 5
+    started = [int(path.name) for path in tmp_path.iterdir()]
+    assert started
+    for process in started:
+        with pytest.raises(ProcessLookupError):
+            os.kill(process, 0)
