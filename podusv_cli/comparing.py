@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -15,8 +15,9 @@ from podusv_cli.comparison import claims, report, table
 from podusv_cli.comparison.differences import differences
 from podusv_cli.comparison.entries import Absent, Entry
 from podusv_cli.config.loading import load_text
-from podusv_cli.config.scenario import Scenario
+from podusv_cli.config.scenario import Claim, Scenario
 from podusv_cli.logbook.folder import Run, RunWriter, open_run
+from podusv_cli.metrics.cost import law_costs
 from podusv_cli.parallel import Outcome, run_all
 from podusv_cli.running import Finished, Stopwatch, Task, execute, warm_up
 
@@ -85,10 +86,11 @@ def make_runs(
 
 
 def collect(
-    parts: Sequence[Part], outcomes: Mapping[str, Outcome], stated: Sequence[Any]
+    parts: Sequence[Part], outcomes: Mapping[str, Outcome], stated: Mapping[str, Claim]
 ) -> Result:
     """Open the runs that were made, and compare."""
-    entries, endings, timings = [], {}, {}
+    entries: list[Entry] = []
+    endings, timings = {}, {}
     for part in parts:
         outcome = outcomes.get(part.label, Outcome())
         done: Finished | None = outcome.result
@@ -98,11 +100,23 @@ def collect(
             entries.append(Entry(part.label, run, part.scenario))
         if done:
             timings[part.label] = done.timing
+    entries = _timed(entries)
     sources = {part.label: Absent() for part in parts} | {e.label: e for e in entries}
     differing = differences({part.label: part.scenario.model_dump() for part in parts})
     measured = {entry.label: {n: entry.metric(n) for n in entry.run.metrics} for entry in entries}
     verdicts = claims.judge(stated, sources)
     return Result(entries, endings, differing, table.table(measured), verdicts, timings)
+
+
+def _timed(entries: Sequence[Entry]) -> list[Entry]:
+    """The entries with the laws' cost measured here and now, side by side.
+
+    What a run measured for itself stems from another moment, perhaps another machine.
+    """
+    timed = [e for e in entries if e.scenario.simulation.compiled and len(e.recording["time"])]
+    costs = law_costs([(e.scenario.closed_loop(), e.recording) for e in timed])
+    by_label = {entry.label: cost for entry, cost in zip(timed, costs, strict=True)}
+    return [replace(entry, cost=by_label.get(entry.label, {})) for entry in entries]
 
 
 def numbers(frame: pd.DataFrame) -> dict[str, dict[str, float | None]]:

@@ -15,7 +15,7 @@ from podusv_cli.config.loading import resolved_yaml
 from podusv_cli.config.scenario import Scenario
 from podusv_cli.engine.simulate import Observer, marcher, simulate
 from podusv_cli.logbook import folder, hdf5, provenance
-from podusv_cli.metrics.cost import law_cost
+from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.metrics.watching import observer, summarise
 from podusv_cli.recording import Recording, Status
@@ -130,7 +130,8 @@ def measured(
         recording = simulate(loop, grid, observer=seeing, compiled=compiled, progress=progress)
     with watch.part("metrics"):
         metrics = summarise(recording.seen, grid.step) if recording.seen is not None else {}
-        cost = law_cost(loop, recording) if compiled and len(recording["time"]) else {}
+        timed = compiled and len(recording["time"])
+        cost = law_costs([(loop, recording)])[0] if timed else {}
     return recording, metrics | cost
 
 

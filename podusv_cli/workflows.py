@@ -35,9 +35,9 @@ def run(config: Path, request: Request, progress: Progress | None = None) -> Fin
     watch = Stopwatch()
     with watch.part("load"):
         loaded = load(config, request.overrides)
-        resolved = resolved_yaml(loaded.scenario)
-    name = loaded.scenario.name
-    target = request.out or folder.default_folder(RESULTS, name, resolved)
+        scenario = loaded.scenario.alone()
+        resolved = resolved_yaml(scenario)
+    target = request.out or folder.default_folder(RESULTS, scenario.name, resolved)
     task = Task(loaded.scenario, loaded.text, target, request.force, request.figures, request.argv)
     return execute(task, progress, watch)
 
@@ -103,10 +103,10 @@ def compare(
 
 def _parts(
     items: Sequence[Path], request: Request
-) -> tuple[list[comparing.Part], tuple[Claim, ...], str]:
+) -> tuple[list[comparing.Part], dict[str, Claim], str]:
     """What is to be compared, the claims about it, and a name for it all."""
     parts: list[comparing.Part] = []
-    stated: tuple[Claim, ...] = ()
+    stated: dict[str, Claim] = {}
     names = []
     for item in items:
         if item.is_dir():
@@ -118,7 +118,7 @@ def _parts(
         for label, scenario in loaded.scenario.singles().items():
             name = label if alone else scenario.name
             parts.append(comparing.Part(name, scenario, loaded.text))
-        stated += loaded.scenario.claims
+        stated |= loaded.scenario.claims
         names.append(loaded.scenario.name)
     title = "-".join(dict.fromkeys(names))[:80]
     return comparing.distinct(parts), stated, title

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
-from podusv_cli.config.loading import Loaded, load_text
+from podusv_cli.config.loading import Loaded, load, load_text
 from podusv_cli.errors import ScenarioError
 
 SOUND = """\
@@ -25,6 +26,20 @@ def told(text: str = SOUND, overrides: Sequence[str] = ()) -> list[str]:
     """What is wrong with the text as the scenario `a.yaml`, a line each."""
     try:
         loaded(text, overrides)
+    except ScenarioError as error:
+        return str(error).splitlines()
+    return []
+
+
+def write(name: str, text: str) -> None:
+    """A file with that text."""
+    Path(name).write_text(text, encoding="utf-8")
+
+
+def findings(name: str, *overrides: str) -> list[str]:
+    """What is wrong with the scenario file, a line each."""
+    try:
+        load(name, overrides)
     except ScenarioError as error:
         return str(error).splitlines()
     return []

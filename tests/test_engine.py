@@ -131,6 +131,13 @@ def test_every_row_is_one_instant() -> None:
         assert not np.array_equal(said.tau, ask(law, x, memory, target, NONLINEAR).tau)
 
 
+def test_the_plant_is_the_vessel_whatever_the_law_is_told() -> None:
+    start = (0.0, 0.0, 0.3, 1.0, 0.2, 0.1)
+    for told in VESSELS.values():
+        out = run(adrift(vessel=NONLINEAR, nominal=told, start=start), 2.0)
+        assert same(out, run(adrift(vessel=NONLINEAR, start=start), 2.0))
+
+
 @pytest.mark.parametrize("log_every", [7, 10, 64])
 def test_thinning_the_log_drops_rows_and_changes_nothing(log_every: int) -> None:
     full = run(corrected(), 3.0, observer=WATCH)

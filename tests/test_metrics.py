@@ -9,7 +9,7 @@ from podusv_cli.controllers.backstepping import Backstepping
 from podusv_cli.controllers.pid import Pid
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import simulate
-from podusv_cli.metrics.cost import law_cost
+from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.metrics.watching import observer, summarise
 
@@ -77,7 +77,7 @@ def test_settled_from_the_start_is_zero():
 
 def test_every_metric_is_computed_and_documented(limited):
     log, got = limited
-    cost = law_cost(corrected(), log)
+    (cost,) = law_costs([(corrected(), log)])
     assert set(METRICS) <= set(got | cost)
     assert all(metric.unit and metric.meaning for metric in METRICS.values())
 
@@ -85,5 +85,5 @@ def test_every_metric_is_computed_and_documented(limited):
 def test_full_derivatives_cost_more_than_pid():
     """A replay that timed nothing would not tell the cheapest law from the dearest."""
     dear, cheap = corrected(controller=Backstepping()), corrected(controller=Pid())
-    costs = [law_cost(loop, gathered(loop, steps=500)[0])["law_ns"] for loop in (dear, cheap)]
-    assert costs[0] > 1.3 * costs[1] > 0
+    costs = law_costs([(loop, gathered(loop, steps=500)[0]) for loop in (dear, cheap)])
+    assert costs[0]["law_ns"] > 1.3 * costs[1]["law_ns"] > 0

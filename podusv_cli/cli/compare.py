@@ -61,7 +61,7 @@ def _report(done: Compared, verbose: bool) -> None:
     echo_table(["metric", "unit", *map(str, result.table.columns)], cells(result.table))
     if result.verdicts:
         typer.echo()
-        rows = [[v.claim.id, v.answer, v.claim.says, v.shown()] for v in result.verdicts]
+        rows = [[v.name, v.answer, v.claim.says, v.shown()] for v in result.verdicts]
         echo_table(["", "verdict", "claim", "numbers"], rows)
     for label, ending in result.endings.items():
         if ending:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -33,11 +33,15 @@ CHECKS: dict[str, Callable[[Entry], bool]] = {
 
 @dataclass(frozen=True)
 class Entry:
-    """A run in a comparison; what `expressions.Source` asks for."""
+    """A run in a comparison; what `expressions.Source` asks for.
+
+    `cost` holds metrics that were measured for this comparison and replace the run's own.
+    """
 
     label: str
     run: Run
     scenario: Scenario
+    cost: Mapping[str, float] = field(default_factory=dict)
 
     @cached_property
     def recording(self) -> Recording:
@@ -46,7 +50,7 @@ class Entry:
 
     def metric(self, name: str) -> float:
         """A metric; NaN where it is undefined, and for any run that did not reach its end."""
-        number = self.run.metrics.get(name)
+        number = self.cost.get(name, self.run.metrics.get(name))
         whole = self.recording.status == "finished"
         return float(number) if number is not None and whole else math.nan
 

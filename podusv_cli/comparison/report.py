@@ -142,7 +142,7 @@ def _claims(verdicts: Sequence[Verdict]) -> str:
         says = f"{html.escape(v.claim.says)} <small>({html.escape(v.claim.source)})</small>{remark}"
         mark = f"<b class='{v.answer.split()[0]}'>{v.answer}</b>"
         put = f"<code>{html.escape(v.claim.expect)}</code>, tolerance {v.claim.tolerance:g}"
-        rows.append([v.claim.id, says, mark, f"{put}<br>{html.escape(v.shown())}"])
+        rows.append([v.name, says, mark, f"{put}<br>{html.escape(v.shown())}"])
     return "<h2>Claims</h2>" + _table(("", "claim", "verdict", "put as, and the numbers"), rows)
 
 

@@ -78,7 +78,6 @@ class MetricSettings(Component):
 class Claim(Component):
     """A published sentence, and how the runs are to decide on it."""
 
-    id: str = value(..., "", "what the claim is called in tables")
     says: str = value(..., "", "the claim, in a sentence of your own")
     source: str = value(..., "", "where it was published: section, figure, equation")
     expect: str = value(..., "", "the claim as an expression over runs; see docs/claims.md")
@@ -109,7 +108,7 @@ class Scenario(Component):
         "",
         "laws to compare, by name; each starts from those keys of `controller` that it has too",
     )
-    claims: tuple[Claim, ...] = value((), "", "what `podusv compare` is to judge", strict=False)
+    claims: dict[str, Claim] = value({}, "", "what `podusv compare` is to judge, by name")
     simulation: Simulation = value(Simulation(), "", "integration")
     control: Control = value(Control(), "", "sampling of the law")
     log: Log = value(Log(), "", "logging")
@@ -119,11 +118,17 @@ class Scenario(Component):
         """The names of the runs that a comparison of this scenario has."""
         return tuple(self.controllers) or (self.controller.label,)
 
+    def alone(self) -> Scenario:
+        """The scenario of one run: with `controller`, without anything to compare it to."""
+        return self.model_copy(update={"controllers": {}, "claims": {}})
+
     def singles(self) -> dict[str, Scenario]:
         """A scenario for each run of a comparison, by label, without controllers and claims."""
         laws = self.controllers or {self.controller.label: self.controller}
-        alone = self.model_copy(update={"controllers": {}, "claims": ()})
-        return {label: alone.model_copy(update={"controller": law}) for label, law in laws.items()}
+        return {
+            label: self.alone().model_copy(update={"controller": law})
+            for label, law in laws.items()
+        }
 
     def closed_loop(self) -> ClosedLoop:
         """The parts that move."""

@@ -8,7 +8,6 @@ from collections.abc import Callable
 import numpy as np
 
 from podusv_cli.engine import signatures
-from podusv_cli.engine.closed_loop import Function
 from podusv_cli.engine.simulate import STATE, ClosedLoop
 from podusv_cli.kernels import Vector, bundle
 from podusv_cli.paths.base import TARGET
@@ -27,10 +26,10 @@ def _rows(loop: ClosedLoop, recording: Recording, most: int) -> Vector:
     return np.column_stack([times[chosen], targets, logged])
 
 
-def law_times(
-    loop: ClosedLoop, recording: Recording, *, most: int = 1000, rounds: int = 10, repeats: int = 9
-) -> Vector:
-    """Time of one evaluation of the law [ns], once for each of `repeats` replays.
+def replayer(
+    loop: ClosedLoop, recording: Recording, *, most: int = 1000, rounds: int = 4
+) -> Callable[[], float]:
+    """A function that times one evaluation of the law [ns], as the mean of one replay.
 
     A replay goes `rounds` times over at most `most` logged rows, in machine code.
     """
@@ -44,18 +43,10 @@ def law_times(
     buffers = (rows.ravel(), p, loop.controller.table(), np.zeros(2), np.zeros(room))
     replay: Callable[..., None] = compiling.replay()
     law = compiling.entry(signatures.law_entry, loop.controller.law, tuple(informed))
-    return np.array(
-        [
-            _timed(replay, law, rounds, count, width, buffers) / (rounds * count)
-            for _ in range(repeats)
-        ]
-    )
 
+    def timed() -> float:
+        began = time.perf_counter_ns()
+        replay(law, rounds, count, width, *buffers)
+        return (time.perf_counter_ns() - began) / (rounds * count)
 
-def _timed(
-    replay: Callable[..., None], law: Function, rounds: int, count: int, width: int,
-    buffers: tuple[Vector, ...],
-) -> float:  # fmt: skip
-    began = time.perf_counter_ns()
-    replay(law, rounds, count, width, *buffers)
-    return float(time.perf_counter_ns() - began)
+    return timed

@@ -27,6 +27,7 @@ from podusv_cli.signals import SIGNALS
 LARGEST_FILE = 2 * 2**30  # bytes
 LARGEST_CONTENT = 4 * 2**30  # bytes, unpacked
 _FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32}
+_CHECKSUM = 4  # bytes that Fletcher's adds to a chunk
 # What h5py raises on damaged files; ValueError includes text that is not UTF-8.
 _DAMAGE = (OSError, RuntimeError, ValueError, KeyError, TypeError, MemoryError, OverflowError)
 
@@ -168,7 +169,8 @@ def _check_numbers(name: str, dataset: h5py.h5d.DatasetID, lengths: dict[str, in
 def _check_chunks(name: str, dataset: h5py.h5d.DatasetID) -> None:
     """Every chunk can be found and went through every filter, so that its checksum counts.
 
-    HDF5 itself would quietly fill in zeros for a chunk whose entry is damaged.
+    The index of chunks has no checksum. Where an entry is damaged, HDF5 itself would quietly fill
+    in zeros, or end the process for a chunk that is shorter than its own checksum.
     """
     shape, made = dataset.shape, dataset.get_create_plist()
     if math.prod(shape) == 0:
@@ -181,6 +183,6 @@ def _check_chunks(name: str, dataset: h5py.h5d.DatasetID) -> None:
     if dataset.get_num_chunks() != count or any(part > size for size, part in sides):
         raise ValueError(f"{name} is incomplete")
     for corner in product(*(range(0, size, part) for size, part in sides)):
-        left_out, _ = dataset.read_direct_chunk(corner)
-        if left_out:
+        left_out, content = dataset.read_direct_chunk(corner)
+        if left_out or len(content) <= _CHECKSUM:
             raise ValueError(f"{name} is packed in an unknown way")

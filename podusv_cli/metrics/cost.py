@@ -2,14 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from podusv_cli.engine.replay import law_times
+from podusv_cli.engine.replay import replayer
 from podusv_cli.engine.simulate import ClosedLoop
 from podusv_cli.recording import Recording
 
+REPLAYS = 25
 
-def law_cost(loop: ClosedLoop, recording: Recording) -> dict[str, float]:
-    """Median time of one evaluation of the law [ns], and its quartiles over repeated replays."""
-    low, middle, high = np.percentile(law_times(loop, recording), [25, 50, 75])
-    return {"law_ns": float(middle), "law_ns_low": float(low), "law_ns_high": float(high)}
+
+def law_costs(runs: Sequence[tuple[ClosedLoop, Recording]]) -> list[dict[str, float]]:
+    """Median time of one evaluation of each law [ns], and its quartiles over repeated replays.
+
+    The laws take turns, so that a machine whose speed drifts treats them alike.
+    """
+    replays = [replayer(loop, recording) for loop, recording in runs]
+    times = np.array([[replay() for replay in replays] for _ in range(REPLAYS)])
+    quartiles = np.percentile(times, [25, 50, 75], axis=0)
+    return [
+        {"law_ns": float(middle), "law_ns_low": float(low), "law_ns_high": float(high)}
+        for low, middle, high in quartiles.T
+    ]

@@ -30,6 +30,8 @@ _ROWS = (
     Metric("tv_tau_r", "N m", "total variation of the demanded tau_r in the steady window"),
     Metric("saturated_fraction", "1", "part of the time in which the actuator limits the law"),
     Metric("law_ns", "ns", "median time of one evaluation of the law over its logged states"),
+    Metric("law_ns_low", "ns", "lower quartile of that time over the replays"),
+    Metric("law_ns_high", "ns", "upper quartile of that time over the replays"),
 )
 
 METRICS: dict[str, Metric] = {row.name: row for row in _ROWS}

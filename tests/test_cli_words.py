@@ -1,0 +1,294 @@
+"""Commands that answer in words: validate, explain, list, schema; exit codes, pipes, help."""
+
+from __future__ import annotations
+
+import ast
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+import typer
+from config_samples import SOUND, write
+
+import podusv_cli
+from podusv_cli import cli
+from podusv_cli.cli.guard import PLEASE_REPORT, flushed, guarded
+from podusv_cli.config.references import vessel_names
+from podusv_cli.config.scenario import Scenario
+from podusv_cli.config.schema import schema_text
+from podusv_cli.errors import Finding, ScenarioError, StorageError
+
+HEAVY = {"numpy", "scipy", "numba", "pandas", "matplotlib", "h5py", "pydantic", "yaml"}
+ROOT = Path(podusv_cli.__file__).parents[1]
+
+
+class Said(NamedTuple):
+    """What a command left behind."""
+
+    code: object
+    out: str
+    err: str
+
+
+@pytest.fixture
+def podusv(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Callable[..., Said]:
+    """The command line, in a folder of its own with one sound scenario."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "80")
+    write("a.yaml", SOUND)
+
+    def run(*words: str) -> Said:
+        monkeypatch.setattr(sys, "argv", ["podusv", *words])
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        return Said(ended.value.code, *capsys.readouterr())
+
+    return run
+
+
+def python(*words: str, stdout: int = subprocess.PIPE) -> subprocess.CompletedProcess[str]:
+    """A Python process of its own."""
+    return subprocess.run(
+        [sys.executable, *words],
+        stdout=stdout,
+        stderr=subprocess.PIPE,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        text=True,
+        check=False,
+        timeout=60,
+    )
+
+
+def podusv_process(*words: str, stdout: int = subprocess.PIPE) -> subprocess.CompletedProcess[str]:
+    """The command line in a process of its own."""
+    return python("-m", "podusv_cli", *words, stdout=stdout)
+
+
+# --- validate
+
+
+def test_a_sound_scenario_is_one_line(podusv: Callable[..., Said]) -> None:
+    assert podusv("validate", "a.yaml") == (0, "a.yaml: ok (a, pid, 31000 steps)\n", "")
+
+
+def test_every_fault_is_a_line_on_stderr(podusv: Callable[..., Said]) -> None:
+    write("bad.yaml", SOUND + "start: {x: no, z: 1}\n")
+    assert podusv("validate", "bad.yaml", "--set", "log.every=0") == (
+        2,
+        "",
+        "bad.yaml:6:12: start.x: must be a number [m], found 'no'\n"
+        "bad.yaml:6:16: start.z: unknown key (allowed: x, y, psi, u, v, r)\n"
+        "--set log.every=0: log.every: must be a whole number not below 1 [steps], found 0\n",
+    )
+
+
+def test_a_missing_file_is_a_line_on_stderr(podusv: Callable[..., Said]) -> None:
+    said = podusv("validate", "nope.yaml")
+    assert said == (2, "", "nope.yaml: cannot be read: no such file or directory\n")
+
+
+def test_verbose_shows_every_value_and_where_it_comes_from(podusv: Callable[..., Said]) -> None:
+    said = podusv("validate", "a.yaml", "-v", "--set", "start.x=-5", "--set", "name=b")
+    assert said.code == 0
+    lines = said.out.splitlines()
+    assert lines[0] == "a.yaml: ok (b, pid, 31000 steps)"
+    assert "start.x: -5.0  # --set start.x=-5" in lines
+    assert "start.y: 0.0  # default" in lines
+    assert "path.kind: line  # a.yaml:2:14" in lines
+    assert "vessel.m: 23.8  # vessel file paper.yaml" in lines
+    assert all("  # " in line for line in lines[1:])
+
+
+# --- explain, list, schema
+
+
+def test_explain_shows_everything_about_a_key(podusv: Callable[..., Said]) -> None:
+    assert podusv("explain", "controller.K_Pu") == (
+        0,
+        "controller.K_Pu  a number >= 0 [kg/s], default 1100.0\n"
+        "    proportional gain in surge\n"
+        "    in pid\n",
+        "",
+    )
+
+
+def test_explain_shows_the_sections_without_a_key(podusv: Callable[..., Said]) -> None:
+    out = podusv("explain").out
+    assert [line for line in out.splitlines() if line in Scenario.model_fields] == [
+        "vessel", "nominal", "start", "path", "disturbance", "actuator", "controller", "simulation",
+        "control", "log", "metrics",
+    ]  # fmt: skip
+    assert "    kinds: circle, line, line_circle, waypoints\n" in out
+
+
+def test_explain_knows_signals(podusv: Callable[..., Said]) -> None:
+    assert podusv("explain", "z_e").out == "z_e  signal [m]\n    distance to the target (18)\n"
+
+
+def test_explain_tells_an_unknown_key(podusv: Callable[..., Said]) -> None:
+    said = podusv("explain", "contoller")
+    assert said == (2, "", "contoller: no such key or signal; did you mean 'controller'?\n")
+
+
+@pytest.mark.parametrize("columns", ["20", "40", "300"])
+def test_text_fits_the_terminal(
+    podusv: Callable[..., Said], monkeypatch: pytest.MonkeyPatch, columns: str
+) -> None:
+    monkeypatch.setenv("COLUMNS", columns)
+    out = podusv("explain", "metrics").out
+    assert max(map(len, out.splitlines())) <= min(int(columns) + len("steady_fraction"), 100)
+    assert "the last part of the run" in " ".join(out.split())
+
+
+def test_nothing_but_plain_text_goes_into_a_pipe(podusv: Callable[..., Said]) -> None:
+    for words in (["explain"], ["explain", "controller"], ["list"], ["--help"], ["schema"]):
+        assert "\x1b" not in podusv(*words).out
+
+
+def test_list_names_every_kind_and_every_vessel(podusv: Callable[..., Said]) -> None:
+    out = podusv("list").out
+    for kind in ("line_circle", "harmonic", "saturated", "adaptive_neural", *vessel_names()):
+        assert f"\n  {kind}\n" in out
+    assert "CyberShip II" in out
+
+
+def test_schema_prints_the_schema(podusv: Callable[..., Said]) -> None:
+    assert podusv("schema") == (0, schema_text(), "")
+
+
+# --- help and usage
+
+
+@pytest.mark.parametrize("name", cli.COMMANDS)
+def test_every_command_and_option_has_help(name: str, podusv: Callable[..., Said]) -> None:
+    command = typer.main.get_command(cli.app).commands[name]
+    assert command.help
+    assert all(getattr(option, "help", "") for option in command.params), name
+    said = podusv(name, "--help")
+    assert said.code == 0
+    assert command.help.splitlines()[0] in said.out
+
+
+def test_a_command_is_a_function_of_its_name() -> None:
+    assert {"validate", "explain", "list", "schema"} <= set(cli.COMMANDS)
+    for name in cli.COMMANDS:
+        assert callable(getattr(import_module(f"podusv_cli.cli.{name}"), name))
+
+
+def test_version(podusv: Callable[..., Said]) -> None:
+    assert podusv("--version") == (0, f"podusv {podusv_cli.__version__}\n", "")
+
+
+@pytest.mark.parametrize(
+    "words", [["validate"], ["valdate", "a.yaml"], ["validate", "a.yaml", "--x"]]
+)
+def test_wrong_usage_exits_with_2(podusv: Callable[..., Said], words: list[str]) -> None:
+    said = podusv(*words)
+    assert said.code == 2
+    assert said.out == ""
+    assert "Error: " in said.err
+    assert "Traceback" not in said.err
+
+
+# --- failures
+
+
+def outcome(error: BaseException) -> object:
+    """The exit code of a command that fails so."""
+
+    def command() -> None:
+        raise error
+
+    with pytest.raises(typer.Exit) as ended:
+        guarded(command)()
+    return ended.value.exit_code
+
+
+def test_a_foreseen_failure_is_its_message_and_exit_code(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert (
+        outcome(ScenarioError([Finding("a.yaml:1:1", "m", "bad"), Finding("", "", "worse")])) == 2
+    )
+    assert outcome(StorageError("results: disk full")) == 5
+    assert outcome(OSError(28, "No space left on device", "results/log.h5")) == 5
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err == (
+        "a.yaml:1:1: m: bad\nworse\nresults: disk full\n"
+        "podusv: [Errno 28] No space left on device: 'results/log.h5'\n"
+    )
+
+
+def test_an_interrupt_is_130_and_silent(capsys: pytest.CaptureFixture[str]) -> None:
+    assert outcome(KeyboardInterrupt()) == 130
+    assert capsys.readouterr() == ("", "")
+
+
+def test_a_bug_shows_its_trace_and_asks_for_a_report(capsys: pytest.CaptureFixture[str]) -> None:
+    assert outcome(ZeroDivisionError("oops")) == 1
+    err = capsys.readouterr().err
+    assert err.startswith("Traceback (most recent call last):\n")
+    assert err.endswith(f"ZeroDivisionError: oops\n{PLEASE_REPORT}\n")
+
+
+def test_the_exit_code_of_a_command_is_kept() -> None:
+    assert outcome(typer.Exit(4)) == 4
+
+
+def test_a_full_disk_behind_stdout_is_told(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    class Full:
+        def flush(self) -> None:
+            raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(sys, "stdout", Full())
+    assert flushed(0) == 5
+    assert capsys.readouterr().err == "podusv: [Errno 28] No space left on device\n"
+
+
+@pytest.mark.parametrize("words", [["explain", "vessel"], ["schema"], ["--help"]])
+def test_a_closed_pipe_ends_quietly(words: list[str]) -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    process = podusv_process(*words, stdout=writing)
+    os.close(writing)
+    assert process.stderr == ""
+    assert process.returncode != 0
+
+
+def test_a_name_that_is_no_text_is_shown_escaped(tmp_path: Path) -> None:
+    path = os.fsencode(tmp_path) + b"/\xff.yaml"
+    with open(path, "w", encoding="utf-8") as file:
+        file.write(SOUND + "name: a\n")
+    process = podusv_process("validate", os.fsdecode(path))
+    assert (process.returncode, process.stderr) == (0, "")
+    assert process.stdout.endswith("/\\udcff.yaml: ok (a, pid, 31000 steps)\n")
+
+
+LOADED = """
+import sys
+from podusv_cli.cli import main
+try:
+    main()
+except SystemExit:
+    print(sorted(sys.modules))
+"""
+
+
+@pytest.mark.parametrize("words", [["--help"], ["--version"], ["validate", "--help"], ["nonsense"]])
+def test_help_and_mistakes_import_nothing_heavy(words: list[str]) -> None:
+    process = python("-c", LOADED, *words)
+    modules = set(ast.literal_eval(process.stdout.splitlines()[-1]))
+    assert "podusv_cli.cli.validate" in modules
+    # Typer itself takes pydantic to convert what is given to a command.
+    expected = set() if words[0].startswith("--") else {"pydantic"} & modules
+    assert HEAVY & modules == expected

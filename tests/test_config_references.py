@@ -1,0 +1,164 @@
+"""What a scenario takes from elsewhere: vessel files, waypoints, the file's name, shared keys."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from config_samples import SOUND, findings, loaded, told, write
+
+from podusv_cli.config.loading import load, load_text
+from podusv_cli.config.references import MAX_POINTS, vessel_file, vessel_names
+from podusv_cli.config.tree import plain
+from podusv_cli.errors import ScenarioError
+from podusv_cli.vessels.vessel import Vessel
+
+
+@pytest.fixture(autouse=True)
+def _in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Messages show file names as a user gives them."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "sub").mkdir()
+
+
+@pytest.mark.parametrize("name", vessel_names())
+def test_a_preset_is_its_file(name: str) -> None:
+    faults: list[object] = []
+    node = vessel_file(name, faults)
+    assert node is not None
+    assert faults == []
+    vessel = loaded(SOUND.replace("preset: paper", f"preset: {name}")).scenario.vessel
+    assert vessel == Vessel(preset=name, **plain(node))
+
+
+def test_a_vessel_can_change_some_values_of_its_preset() -> None:
+    got = loaded(SOUND.replace("preset: paper", "preset: paper, X_u: -2"))
+    assert (got.scenario.vessel.X_u, got.scenario.vessel.Y_v) == (-2.0, -0.8896)
+    assert got.origins["vessel.X_u"] == "a.yaml:1:30"
+    assert got.origins["vessel.Y_v"] == "vessel file paper.yaml"
+    assert got.origins["vessel.N_vv"] == "default"
+
+
+def test_the_nominal_vessel_is_the_vessel_with_its_changes() -> None:
+    got = loaded(SOUND.replace("preset: paper", "preset: paper, m: 30"))
+    assert got.scenario.nominal == got.scenario.vessel
+    assert got.origins["nominal.m"] == got.origins["vessel.m"]
+
+
+def test_a_nominal_vessel_without_preset_is_the_vessel_but_for_what_it_says() -> None:
+    got = loaded(SOUND, ["vessel.m=30", "nominal.X_u=-1"]).scenario
+    assert got.nominal == got.vessel.model_copy(update={"X_u": -1.0})
+
+
+def test_a_nominal_vessel_with_preset_starts_from_it() -> None:
+    got = loaded(SOUND, ["vessel.m=30", "nominal={preset: cybership2, X_u: -1}"]).scenario
+    whole = loaded(SOUND.replace("paper", "cybership2")).scenario.vessel
+    assert got.nominal == whole.model_copy(update={"X_u": -1.0})
+
+
+def test_a_wrong_nominal_value_is_told_at_its_place() -> None:
+    assert told(SOUND + "nominal: {X_u: 1, preset: x}\n") == [
+        "a.yaml:6:16: nominal.X_u: must be a number not above 0 [kg/s], found 1",
+        "a.yaml:6:27: nominal.preset: unknown vessel 'x' "
+        "(allowed: cybership2, paper, paper_nonlinear)",
+    ]
+
+
+def test_one_key_of_a_disturbance_leaves_the_others_at_the_papers_values() -> None:
+    text = SOUND.replace("{kind: none}", "{kind: harmonic, b_u: {mean: 0}}")
+    b_u = loaded(text).scenario.disturbance.b_u
+    assert (b_u.mean, b_u.sin, b_u.cos, b_u.cos_rate) == (0.0, 0.1, 0.3, 0.5)
+
+
+def test_the_name_is_that_of_the_file_unless_given() -> None:
+    assert load_text(SOUND, "dir/my-run.v2.yaml").scenario.name == "my-run.v2"
+    assert load_text(SOUND + "name: other\n", "dir/my-run.yaml").scenario.name == "other"
+
+
+def test_a_file_name_that_is_no_name_is_told() -> None:
+    with pytest.raises(ScenarioError) as raised:
+        load_text(SOUND, "my run.yaml")
+    assert str(raised.value) == (
+        "my run.yaml: name: cannot be the file's name 'my run'; give one of letters, digits, '_', "
+        "'.' and '-', starting with a letter or digit, at most 80 long"
+    )
+
+
+ROUTE = "path: {kind: waypoints, file: route.csv}\n"
+
+
+def with_route(text: str = ROUTE) -> str:
+    return SOUND.replace("path: {kind: line}\n", text)
+
+
+def test_waypoints_come_from_a_file_beside_the_scenario() -> None:
+    write("sub/route.csv", 'x, "y"\n# first leg\n0, 0\n\n10.5,-1e1  # bend\n"20",5\n')
+    write("sub/a.yaml", with_route())
+    got = load("sub/a.yaml")
+    assert got.scenario.path.points == ((0.0, 0.0), (10.5, -10.0), (20.0, 5.0))
+    assert got.scenario.path.file is None
+    assert got.origins["path.points"] == "sub/route.csv"
+    assert got.origins["path.file"] == "default"
+
+
+def test_a_route_is_beside_the_file_that_names_it() -> None:
+    write("sub/route.csv", "0,0\n1,1\n")
+    write("sub/base.yaml", with_route())
+    write("a.yaml", "extends: sub/base.yaml\n")
+    assert len(load("a.yaml").scenario.path.points) == 2
+    assert len(load("a.yaml", ["path.file=sub/route.csv"]).scenario.path.points) == 2
+
+
+def test_a_file_saved_by_a_spreadsheet_is_read() -> None:
+    Path("route.csv").write_bytes(b"\xef\xbb\xbfx,y\r\n0,0\r\n3,4\r\n")
+    write("a.yaml", with_route())
+    assert load("a.yaml").scenario.path.points == ((0.0, 0.0), (3.0, 4.0))
+
+
+@pytest.mark.parametrize(
+    ("rows", "says"),
+    [
+        ("0,0\n1;1\n", ["route.csv:2:1: must be two numbers x,y [m], found '1;1'"]),
+        ("0,0\n1,1,1\n2\n", [
+            "route.csv:2:1: must be two numbers x,y [m], found '1,1,1'",
+            "route.csv:3:1: must be two numbers x,y [m], found '2'",
+        ]),
+        ("nan,0\n1,1\n", ["route.csv:1:1: must be two numbers x,y [m], found 'nan,0'"]),
+        ("0,0\n017,1\n", ["route.csv:2:1: must be two numbers x,y [m], found '017,1'"]),
+        ("0,0\n1e999,1\n", ["route.csv:2:1: path.points[1][0]: must be a number, found 1e999"]),
+        ("x,y\n0,0\n", ["a.yaml:2:7: path: needs at least two points, has 1"]),
+        ("0,0\n0,0\n", ["a.yaml:2:7: path: two neighbouring points are the same"]),
+        ("", ["a.yaml:2:7: path: needs at least two points, has 0"]),
+    ],
+)  # fmt: skip
+def test_a_wrong_row_is_told_at_its_line(rows: str, says: list[str]) -> None:
+    write("route.csv", rows)
+    write("a.yaml", with_route())
+    assert findings("a.yaml") == says
+
+
+def test_faults_of_a_route_end_before_they_fill_the_screen() -> None:
+    write("route.csv", "a;b\n" * 5000)
+    write("a.yaml", with_route())
+    assert len(findings("a.yaml")) < 20
+
+
+def test_a_missing_route_is_told_at_the_key() -> None:
+    write("a.yaml", with_route())
+    assert findings("a.yaml") == [
+        "a.yaml:2:31: path.file: 'route.csv' cannot be read: no such file or directory"
+    ]
+
+
+def test_points_and_file_together_are_told() -> None:
+    write("route.csv", "0,0\n1,1\n")
+    write(
+        "a.yaml", with_route("path: {kind: waypoints, file: route.csv, points: [[0, 0], [1, 1]]}\n")
+    )
+    assert findings("a.yaml") == ["a.yaml:2:31: path.file: give either file or points, not both"]
+
+
+def test_a_route_stays_short_enough_to_be_written_out() -> None:
+    write("route.csv", "".join(f"{i},0\n" for i in range(MAX_POINTS + 1)))
+    write("a.yaml", with_route())
+    assert findings("a.yaml") == [f"route.csv: more than {MAX_POINTS:,} points"]
