@@ -46,7 +46,8 @@ class Result:
 
 def from_folder(path: Path) -> list[Part]:
     """The finished runs of a folder: one run, or all those of a comparison."""
-    inner = sorted(child for child in path.iterdir() if (child / "log.h5").is_file())
+    children = path.iterdir() if path.is_dir() else ()
+    inner = sorted(child for child in children if (child / "log.h5").is_file())
     return [_from_run(child) for child in (inner or [path])]
 
 

@@ -35,6 +35,12 @@ class ScenarioError(PodusvError):
         super().__init__("\n".join(str(finding) for finding in findings))
 
 
+class UsageError(PodusvError):
+    """A command that was asked for what it does not have."""
+
+    exit_code = 2
+
+
 class StorageError(PodusvError):
     """Reading or writing failed: disk full, not writable, missing or damaged file."""
 

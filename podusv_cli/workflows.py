@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -13,7 +13,9 @@ from podusv_cli.comparison.claims import misfits
 from podusv_cli.comparison.entries import Entry
 from podusv_cli.config.loading import load, resolved_yaml
 from podusv_cli.config.scenario import Claim
-from podusv_cli.logbook import folder, provenance
+from podusv_cli.config.words import unknown
+from podusv_cli.errors import UsageError
+from podusv_cli.logbook import atomic, folder, provenance
 from podusv_cli.running import Finished, Progress, Stopwatch, Task, execute
 
 RESULTS = Path("results")
@@ -122,3 +124,44 @@ def _parts(
         names.append(loaded.scenario.name)
     title = "-".join(dict.fromkeys(names))[:80]
     return comparing.distinct(parts), stated, title
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """What to draw of finished runs, how, and into which folder."""
+
+    figures: Sequence[str]
+    formats: Sequence[str]
+    columns: int
+    animate: bool
+    out: Path
+
+
+def plot(runs: Sequence[Path], drawing: Drawing) -> list[Path]:
+    """Draw finished runs, overlaid; the files that were written.
+
+    Raises UsageError for a figure or format that there is not, and StorageError.
+    """
+    from podusv_cli.figures.animation import animate  # matplotlib is slow to import
+    from podusv_cli.figures.drawing import FIGURES, draw, dressed
+    from podusv_cli.figures.style import FORMATS
+
+    _all_known("figure", drawing.figures, FIGURES)
+    _all_known("format", drawing.formats, FORMATS)
+    parts = comparing.distinct(part for path in runs for part in comparing.from_folder(path))
+    shown = dressed([(p.label, p.run.recording, p.scenario) for p in parts if p.run])
+    names = drawing.figures or tuple(FIGURES)
+    drawn = list(draw(shown, names, drawing.formats, drawing.columns))
+    if drawing.animate:
+        drawn.append(("animation.gif", animate(shown)))
+    atomic.make_folder(drawing.out)
+    for name, content in drawn:
+        atomic.write_bytes(drawing.out / name, content)
+    return [drawing.out / name for name, _ in drawn]
+
+
+def _all_known(what: str, names: Sequence[str], known: Iterable[str]) -> None:
+    known = tuple(known)
+    for name in names:
+        if name not in known:
+            raise UsageError(unknown(f"{what} {name!r}", name, known))

@@ -11,6 +11,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import pytest
 import yaml
+from hypothesis import settings
 
 import podusv_cli
 from podusv_cli.actuators.base import Actuator
@@ -46,7 +47,9 @@ PRINTED_START = (-10.0, -10.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Keep the machine code that tests compile, out of the user's own cache."""
+    """Keep what tests compile out of the user's cache; ask no speed of a property."""
+    settings.register_profile("podusv", deadline=None)
+    settings.load_profile("podusv")
     cache = getattr(config, "cache", None)  # absent under `-p no:cacheprovider`
     if cache is not None:
         os.environ.setdefault("PODUSV_CACHE", str(cache.mkdir("podusv")))

@@ -8,6 +8,7 @@ import pytest
 from config_samples import SOUND, findings, loaded, told
 
 from podusv_cli.config.loading import load_text, values
+from podusv_cli.config.scenario import Scenario
 from podusv_cli.controllers.pid import Pid
 from podusv_cli.errors import ScenarioError
 
@@ -75,23 +76,24 @@ def test_a_fault_of_the_controller_is_told_once_however_many_laws_take_it_over()
     ]
 
 
-def test_faults_of_claims_are_told_at_their_item() -> None:
-    claims = (
-        "claims:\n- {id: C1, says: s, source: p, expect: e}\n- {id: 2, sayz: s, tolerance: 1}\n"
-    )
-    assert told(SOUND + claims) == [
-        "a.yaml:8:3: claims[1].says: missing; must be text",
-        "a.yaml:8:3: claims[1].source: missing; must be text",
-        "a.yaml:8:3: claims[1].expect: missing; must be text",
-        "a.yaml:8:8: claims[1].id: must be text, found 2",
-        "a.yaml:8:11: claims[1].sayz: unknown key; did you mean 'says'? "
-        "(allowed: id, says, source, expect, tolerance, remark)",
-        "a.yaml:8:31: claims[1].tolerance: must be a number not below 0 and below 1, found 1",
+def test_faults_of_claims_are_told_at_their_name() -> None:
+    sound = "claims:\n C1: {says: s, source: p, expect: e}\n"
+    assert told(SOUND + sound + " C2: {sayz: s, source: 2, tolerance: 1}\n") == [
+        "a.yaml:8:6: claims.C2.says: missing; must be text",
+        "a.yaml:8:6: claims.C2.expect: missing; must be text",
+        "a.yaml:8:7: claims.C2.sayz: unknown key; did you mean 'says'? "
+        "(allowed: says, source, expect, tolerance, remark)",
+        "a.yaml:8:24: claims.C2.source: must be text, found 2",
+        "a.yaml:8:38: claims.C2.tolerance: must be a number not below 0 and below 1, found 1",
     ]
 
 
 def test_further_checks_are_told_at_the_place_of_the_key() -> None:
-    claims = "claims:\n- {id: C1, says: s, source: p, expect: e}\n"
+    claims = "claims:\n  C1: {says: s, source: p, expect: e}\n"
+
+    def look(scenario: Scenario) -> list[tuple[str, str]]:
+        return [(f"claims.{name}.expect", "no such run") for name in scenario.claims]
+
     with pytest.raises(ScenarioError) as raised:
-        load_text(SOUND + claims, "a.yaml", checks=[lambda _: [("claims.0.expect", "no such run")]])
-    assert str(raised.value) == "a.yaml:7:40: claims[0].expect: no such run"
+        load_text(SOUND + claims, "a.yaml", checks=[look])
+    assert str(raised.value) == "a.yaml:7:36: claims.C1.expect: no such run"

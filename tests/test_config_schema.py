@@ -10,7 +10,7 @@ import pytest
 
 import podusv_cli
 from podusv_cli.config.annotations import sections
-from podusv_cli.config.fields import Key, keys
+from podusv_cli.config.fields import NAME, Key, keys
 from podusv_cli.config.references import vessel_names
 from podusv_cli.config.scenario import Scenario
 from podusv_cli.config.schema import json_schema, schema_text
@@ -55,7 +55,9 @@ def places(schema: dict[str, Any], path: tuple[str, ...]) -> list[dict[str, Any]
     found = [target(schema)]
     for step in path:
         inside = [target(part) for one in found for part in one.get("anyOf", [one])]
-        inside = [target(one["items"]) if "items" in one else one for one in inside]
+        if step == NAME:
+            found = [target(one["additionalProperties"]) for one in inside]
+            continue
         found = [one["properties"][step] for one in inside if step in one.get("properties", {})]
     return found
 

@@ -15,7 +15,7 @@ from podusv_cli import __version__
 from podusv_cli.cli.guard import flushed, guarded
 
 # NAME is the function NAME of cli/NAME.py
-COMMANDS = ("run", "compare", "validate", "explain", "list", "schema")
+COMMANDS = ("run", "compare", "plot", "validate", "explain", "list", "schema")
 
 app = typer.Typer(
     name="podusv",

@@ -20,13 +20,14 @@ def validate(
 
     Exit code 0, or 2 with a line for each fault.
     """
+    from podusv_cli.comparison.claims import misfits
     from podusv_cli.config.loading import load, values
     from podusv_cli.config.words import as_written
 
-    loaded = load(config, assign or ())
+    loaded = load(config, assign or (), checks=(misfits,))
     scenario = loaded.scenario
-    steps = scenario.time_grid().steps
-    typer.echo(f"{config}: ok ({scenario.name}, {scenario.controller.label}, {steps} steps)")
+    laws, steps = ", ".join(scenario.labels()), scenario.time_grid().steps
+    typer.echo(f"{config}: ok ({scenario.name}, {laws}, {steps} steps)")
     if verbose:
         for key, content in values(scenario).items():
             typer.echo(f"{key}: {as_written(content)}  # {loaded.origins[key]}")

@@ -46,8 +46,7 @@ def check(root: Node, faults: list[Fault], more: Sequence[Check] = ()) -> Scenar
         faults.extend(dict.fromkeys(_faults(root, error)))
         return None
     for key, text in chain(scenario.misfits(), *(look(scenario) for look in more)):
-        route = tuple(int(step) if step.isdigit() else step for step in key.split("."))
-        faults.append(Fault(follow(root, route)[-1].mark, dotted(route), text))
+        faults.append(Fault(follow(root, tuple(key.split(".")))[-1].mark, key, text))
     return scenario
 
 

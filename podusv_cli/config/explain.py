@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 from podusv_cli.config.annotations import choices, joined, sections
-from podusv_cli.config.fields import MISSING, Key, keys, range_of, type_of
+from podusv_cli.config.fields import MISSING, NAME, Key, keys, range_of, type_of
 from podusv_cli.config.references import vessel_names
 from podusv_cli.config.scenario import Scenario
 from podusv_cli.config.words import as_written, did_you_mean
@@ -109,7 +109,8 @@ def _at(place: tuple[str, ...]) -> list[Row]:
         return [*_together(entries), *rows.values()]
     if not entries:
         return _of_kind(place)
-    inside = [entry for entry in _keys() if place in (entry.path[:-1], entry.route[:-1])]
+    places = (place, (*place, NAME))
+    inside = [e for e in _keys() if e.path[:-1] in places or e.route[:-1] in places]
     heads = (replace(row, choices=() if inside else row.choices) for row in _together(entries))
     return [*heads, *_together(inside)]
 

@@ -12,6 +12,7 @@ from pydantic_core import PydanticUndefined
 from podusv_cli.config.annotations import inside, noun, sections
 from podusv_cli.registry import Component, unit_of
 
+NAME = "NAME"
 MISSING = PydanticUndefined  # the default of a field that has none
 BOUNDS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 BOUNDS_IN_WORDS = {"gt": "above", "ge": "not below", "lt": "below", "le": "not above"}
@@ -56,8 +57,8 @@ def wanted(field: FieldInfo) -> str:
 class Key:
     """A key of a scenario: `path` as in files, `route` with the kinds of sections in between.
 
-    `kind` is the innermost kind on the way, "" where there is none. Of a list of sections the
-    keys are those of its items.
+    `kind` is the innermost kind on the way, "" where there is none. In a mapping of names to
+    sections all alike, NAME stands for the names.
     """
 
     path: tuple[str, ...]
@@ -75,11 +76,14 @@ def keys(model: type[Component]) -> Iterator[Key]:
 
 def _branch(key: Key) -> Iterator[Key]:
     yield key
-    annotation = key.field.annotation
-    for kind, part in (sections(annotation) or sections(inside(annotation, 0))).items():
+    for kind, part in sections(key.field.annotation).items():
         route = (*key.route, kind) if kind else key.route
         for name, field in part.model_fields.items():
             # A section that is left out is its default, whatever its own class would start with.
             default = getattr(key.default, name) if isinstance(key.default, part) else field.default
             inner = Key((*key.path, name), (*route, name), kind or key.kind, field, default)
             yield from _branch(inner)
+    alike = sections(inside(key.field.annotation, NAME)).get("")
+    for name, field in alike.model_fields.items() if alike else ():
+        path = (*key.path, NAME, name)
+        yield from _branch(Key(path, path, "", field, field.default))

@@ -14,7 +14,7 @@ from podusv_cli.config.composing import composed
 from podusv_cli.config.references import complete
 from podusv_cli.config.scenario import Scenario
 from podusv_cli.config.source import read_text, resolve
-from podusv_cli.config.tree import Fault, Mark, Node, find
+from podusv_cli.config.tree import Fault, Mark, Node, Route, dotted, find
 from podusv_cli.errors import Finding, ScenarioError
 
 HEADING = "# A complete scenario, every value written out; it runs again to the same log.\n"
@@ -76,20 +76,20 @@ def _findings(faults: list[Fault], first: str) -> list[Finding]:
 
 def values(scenario: Scenario) -> dict[str, Any]:
     """Every value of a scenario by its dotted key, in the order of the fields."""
-    return dict(_leaves(scenario.model_dump(), ""))
+    return {dotted(route): content for route, content in _leaves(scenario.model_dump(), ())}
 
 
-def _leaves(data: dict[str, Any], prefix: str) -> Iterator[tuple[str, Any]]:
+def _leaves(data: dict[str, Any], above: Route) -> Iterator[tuple[Route, Any]]:
     for name, content in data.items():
         if isinstance(content, dict) and content:
-            yield from _leaves(content, f"{prefix}{name}.")
+            yield from _leaves(content, (*above, name))
         else:
-            yield prefix + name, content
+            yield (*above, name), content
 
 
 def _origins(scenario: Scenario, root: Node) -> dict[str, str]:
-    nodes = {key: find(root, tuple(key.split("."))) for key in values(scenario)}
-    return {key: str(node.mark) if node else "default" for key, node in nodes.items()}
+    nodes = {route: find(root, route) for route, _ in _leaves(scenario.model_dump(), ())}
+    return {dotted(route): str(node.mark) if node else "default" for route, node in nodes.items()}
 
 
 def resolved_yaml(scenario: Scenario) -> str:
@@ -114,7 +114,7 @@ def _text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
 
 
 def _list(dumper: yaml.SafeDumper, items: tuple[Any, ...]) -> yaml.SequenceNode:
-    flat = not any(isinstance(part, (tuple, dict)) for part in items)
+    flat = not any(isinstance(part, tuple) for part in items)
     return dumper.represent_sequence("tag:yaml.org,2002:seq", items, flow_style=flat)
 
 

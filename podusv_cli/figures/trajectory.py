@@ -24,6 +24,13 @@ def hull(x: float, y: float, psi: float, *, length: float, beam: float) -> Vecto
     return np.column_stack([east, north])
 
 
+def enlargement(runs: Sequence[Shown]) -> float:
+    """How many times larger than life hulls must be drawn to be seen on a map of the whole run."""
+    target = runs[0].recording
+    spread = float(np.ptp(target["x_d"]) + np.ptp(target["y_d"]))
+    return max(1.0, round(0.05 * spread / runs[0].length))
+
+
 def _draw_track(axes: Axes, shown: Shown) -> None:
     # Thin in steps, not by extremes: a track may run in any direction.
     stride = max(1, len(shown.recording["time"]) // 3000)
@@ -54,8 +61,7 @@ def trajectory(runs: Sequence[Shown], columns: int) -> Figure:
     shape = (1, 2) if columns == 2 else (2, 1)
     whole, settled = figure.subplots(*shape)
     _map(whole, runs)
-    spread = np.ptp(runs[0].recording["x_d"]) + np.ptp(runs[0].recording["y_d"])
-    scale = max(1.0, 0.05 * spread / runs[0].length)
+    scale = enlargement(runs)
     for shown in runs:
         _draw_hulls(whole, shown, scale)
     start = runs[0].recording

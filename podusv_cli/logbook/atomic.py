@@ -61,6 +61,12 @@ def create(path: Path, content: bytes) -> None:
         _create(path, content)
 
 
+def make_folder(path: Path) -> None:
+    """Make a folder with all above it, where it is not there yet. Raises StorageError."""
+    with explained(f"cannot make the folder {path}"):
+        path.mkdir(parents=True, exist_ok=True)
+
+
 def sync_folder(folder: Path) -> None:
     """Make the names in `folder` durable. Raises StorageError."""
     with explained(f"cannot write {folder} to the disk"):

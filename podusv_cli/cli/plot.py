@@ -1,0 +1,29 @@
+"""`podusv plot`: draw finished runs again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def plot(
+    runs: Annotated[list[str], typer.Argument(metavar="RUN...", help="Finished run folders.")],
+    figure: Annotated[
+        list[str] | None, typer.Option(help="What to draw; repeatable, all by default.")
+    ] = None,
+    form: Annotated[
+        str, typer.Option("--format", help="png, pdf, svg; several with commas.")
+    ] = "png",
+    columns: Annotated[int, typer.Option(min=1, max=2, help="Width in columns of a page.")] = 2,
+    animate: Annotated[bool, typer.Option("--animate", help="A GIF of the chase as well.")] = False,
+    out: Annotated[Path, typer.Option(help="Folder for the figures.")] = Path("figures"),
+) -> None:
+    """Draw finished runs, several in one figure; needs their folders and nothing else."""
+    from podusv_cli import workflows  # heavy imports only when they are needed
+
+    formats = tuple(name.strip() for name in form.split(","))
+    drawing = workflows.Drawing(tuple(figure or ()), formats, columns, animate, out)
+    for path in workflows.plot([Path(run) for run in runs], drawing):
+        typer.echo(path)
