@@ -19,7 +19,7 @@ from podusv_cli.config.scenario import Claim, Scenario
 from podusv_cli.logbook.folder import Run, RunWriter, open_run
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.parallel import Outcome, run_all
-from podusv_cli.running import Finished, Stopwatch, Task, execute, warm_up
+from podusv_cli.running import Finished, Task, execute, warm_up
 
 
 @dataclass(frozen=True)
@@ -81,8 +81,12 @@ def make_runs(
         Task(part.scenario, part.text, folder / part.label, figures=figures, argv=argv)
         for part in wanted
     ]
-    told = progress and (lambda position, done: progress(wanted[position].label, done))
-    outcomes = run_all([partial(execute, task) for task in tasks], told)
+
+    def tell(position: int, fraction: float) -> None:
+        if progress:
+            progress(wanted[position].label, fraction)
+
+    outcomes = run_all([partial(execute, task) for task in tasks], tell)
     return {part.label: outcome for part, outcome in zip(wanted, outcomes, strict=True)}
 
 

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from podusv_cli.kernels import Vector, kernel
 
 
 @kernel
 def wrap(angle: float) -> float:
     """`angle` [rad] brought into (-pi, pi]."""
-    return angle - 2.0 * math.pi * math.ceil((angle - math.pi) / (2.0 * math.pi))
+    # np.ceil, since the other one makes a whole number of its argument and 1e20 is too large.
+    turns = np.ceil((angle - math.pi) / (2.0 * math.pi))
+    return float(angle - 2.0 * math.pi * turns)
 
 
 @kernel

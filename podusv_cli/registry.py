@@ -44,7 +44,7 @@ def _numbers(component: Component) -> Iterator[tuple[str, float]]:
             yield name, float(content)
         elif get_origin(field.annotation) is Literal and name != "kind":
             yield name, float(get_args(field.annotation).index(content))
-        elif float in get_args(field.annotation):
+        elif {float, Positive} & set(get_args(field.annotation)):
             yield name, math.nan
 
 
@@ -61,6 +61,8 @@ def unit_of(field: FieldInfo) -> str:
     extra = field.json_schema_extra
     return str(extra.get("unit", "")) if isinstance(extra, dict) else ""
 
+
+Positive = Annotated[float, Field(gt=0)]
 
 Kind = TypeVar("Kind", bound=Component)
 

@@ -83,7 +83,7 @@ def compare(
     """Run what has to be run, and compare it with what is there.
 
     Each item is a scenario (all its `controllers`, or its one controller), a run folder or the
-    folder of a comparison. Claims are those of the scenarios. Raises ScenarioError and StorageError.
+    folder of a comparison. Claims are those of the scenarios. Raises ScenarioError, StorageError.
     """
     started, argv = datetime.now(UTC), list(request.argv)
     parts, stated, title = _parts(items, request)

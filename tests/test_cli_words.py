@@ -138,10 +138,6 @@ def test_explain_shows_the_sections_without_a_key(podusv: Callable[..., Said]) -
     assert "    kinds: circle, line, line_circle, waypoints\n" in out
 
 
-def test_explain_knows_signals(podusv: Callable[..., Said]) -> None:
-    assert podusv("explain", "z_e").out == "z_e  signal [m]\n    distance to the target (18)\n"
-
-
 def test_explain_tells_an_unknown_key(podusv: Callable[..., Said]) -> None:
     said = podusv("explain", "contoller")
     assert said == (2, "", "contoller: no such key or signal; did you mean 'controller'?\n")

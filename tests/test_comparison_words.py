@@ -1,4 +1,4 @@
-"""The language of claims: what it computes, what it refuses, and every verdict planted both ways."""
+"""The language of claims: what it computes, what it refuses, every verdict planted both ways."""
 
 import math
 

@@ -108,6 +108,17 @@ def test_a_flipped_bit_in_the_index_of_chunks_is_refused_or_harmless(path: Path)
         outcome(path, bytes(damaged), TINY)
 
 
+@pytest.mark.parametrize("size", range(5))
+def test_a_chunk_too_short_for_its_checksum_is_refused(path: Path, size: int) -> None:
+    # Handed to HDF5 it would end the process.
+    damaged = bytearray(log(TINY))
+    entry = damaged.rindex(b"TREE") + 24
+    assert damaged[entry : entry + 4] != bytes(4)
+    damaged[entry : entry + 4] = size.to_bytes(4, "little")
+    with pytest.raises(StorageError, match="packed in an unknown way"):
+        read(path, bytes(damaged))
+
+
 def test_bursts_of_rubbish_are_refused(path: Path) -> None:
     content, random = log(TINY), np.random.default_rng(23)
     for _ in range(150):

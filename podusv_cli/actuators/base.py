@@ -35,7 +35,7 @@ class Actuator(Component):
         return np.zeros(len(self.states))
 
     def input_matrix(self) -> Vector:
-        """How loads (tau_u, tau_v, tau_r) follow small demands (tau_u, tau_r) at rest, shape (3, 2).
+        """How loads (tau_u, tau_v, tau_r) follow small demands at rest, shape (3, 2).
 
         By central differences. A rank below 3 is what the paper's section 2 calls underactuated.
         """

@@ -61,7 +61,7 @@ def _known(name: str, names: Collection[str], what: str) -> str:
 
 
 class _Reader:
-    """Turns Python's syntax tree into conditions and terms, refusing all that has no meaning here."""
+    """Turns Python's syntax tree into conditions and terms; refuses what has no meaning here."""
 
     def __init__(self, runs: Collection[str]) -> None:
         self.runs = runs

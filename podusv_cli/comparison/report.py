@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import html
 import inspect
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -24,11 +25,12 @@ h1 { font-size: 1.6rem; } h2 { font-size: 1.2rem; margin-top: 2.2rem; }
 table { border-collapse: collapse; font-size: 0.85rem; } .wide { overflow-x: auto; }
 th, td { padding: 0.25rem 0.7rem; border-bottom: 1px solid #ddd; text-align: left;
          vertical-align: top; }
-td.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
+.number { text-align: right !important; font-variant-numeric: tabular-nums; white-space: nowrap; }
 th { border-bottom: 2px solid #444; } code { font-size: 0.82rem; }
 .reproduced { color: #00694e; } .not { color: #a33c00; } .cannot { color: #555; }
 .warning { border-left: 4px solid #d55e00; padding: 0.4rem 1rem; background: #fdf3ec; }
-figure { margin: 1.2rem 0; } img { max-width: 100%; } figcaption { font-size: 0.85rem; color: #444; }
+figure { margin: 1.2rem 0; } img { width: 100%; max-width: 56rem; }
+figcaption { font-size: 0.85rem; color: #444; }
 small { color: #555; }
 """
 SECTIONS = ("vessel", "start", "path", "disturbance", "actuator", "simulation", "control")
@@ -73,11 +75,15 @@ def page(story: Story) -> str:
     )
     head = f'<meta charset="utf-8"><title>{title}</title><style>{STYLE}</style>'
     viewport = '<meta name="viewport" content="width=device-width">'
-    return f'<!doctype html>\n<html lang="en"><head>{viewport}{head}</head>\n<body>{body}</body></html>\n'
+    whole = f'<html lang="en"><head>{viewport}{head}</head>\n<body>{body}</body></html>'
+    return f"<!doctype html>\n{whole}\n"
 
 
 def _table(head: Iterable[str], rows: Iterable[Iterable[str]], numeric_from: int = 99) -> str:
-    top = "".join(f"<th>{html.escape(cell)}</th>" for cell in head)
+    kinds = (" class=number" if i >= numeric_from else "" for i in range(99))
+    top = "".join(
+        f"<th{kind}>{html.escape(cell)}</th>" for kind, cell in zip(kinds, head, strict=False)
+    )
     lines = []
     for row in rows:
         tags = ("<td class=number>" if i >= numeric_from else "<td>" for i in range(99))
@@ -164,4 +170,5 @@ def _scenario(story: Story) -> str:
 def _in_words(part: Component) -> str:
     said = (inspect.getdoc(type(part)) or "").partition("\n")[0]
     values = ", ".join(f"{key} {_short(value)}" for key, value in flat(part.model_dump()))
-    return f"{html.escape(said)}<br><small>{html.escape(values)}</small>"
+    told = re.sub(r"`([^`]+)`", r"<code>\1</code>", html.escape(said))
+    return f"{told}<br><small>{html.escape(values)}</small>"

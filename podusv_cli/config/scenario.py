@@ -53,8 +53,8 @@ class Control(Component):
     """When the law acts."""
 
     period: float = value(
-        0.0, "s", "0: continuously; else the law is evaluated once a period, a whole number of steps, "
-        "and its output held", ge=0,
+        0.0, "s", "0: continuously; else the law is evaluated once a period, a whole number of "
+        "steps, and its output held", ge=0,
     )  # fmt: skip
 
 
@@ -161,6 +161,11 @@ class Scenario(Component):
                 below = max(1, int(time / step)) * step
                 text = f"{time:g} s is no whole number of steps of {step:g} s; try {below:.10g}"
                 found.append((key, text))
+        period = self.control.period
+        for key, law in laws.items():
+            if period and not whole_steps(law.sample_period(), period) and law.sample_period():
+                text = f"{law.sample_period():g} s is no whole number of periods of {period:g} s"
+                found.append((f"{key}.difference_step", text))
         for label in self.controllers:
             if not LABEL.fullmatch(label):
                 found.append((f"controllers.{label}", LABEL_IN_WORDS))

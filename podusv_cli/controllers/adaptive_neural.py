@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Literal
 from podusv_cli.controllers.polar_backstepping import FilteredBackstepping, polar_backstepping
 from podusv_cli.controllers.tracking import Tracking
 from podusv_cli.kernels import Vector, kernel, specialise
-from podusv_cli.registry import value
+from podusv_cli.registry import Positive, value
 
 
 @kernel
@@ -47,10 +47,10 @@ class AdaptiveNeural(FilteredBackstepping):
     kind: Literal["adaptive_neural"] = "adaptive_neural"
     A_u: float = value(5.0, "1/s", "passive decay A_1 of the shunting model in surge", gt=0)
     A_r: float = value(5.0, "1/s", "passive decay A_2 of the shunting model in yaw", gt=0)
-    B_u: Literal["adaptive"] | float = value(
+    B_u: Literal["adaptive"] | Positive = value(
         "adaptive", "1/s", "bounds B_1 = D_1 in surge: `adaptive` is A + |alpha| as printed"
     )
-    B_r: Literal["adaptive"] | float = value(
+    B_r: Literal["adaptive"] | Positive = value(
         "adaptive", "1/s", "bounds B_2 = D_2 in yaw: `adaptive` is A + |alpha| as printed"
     )
     law: ClassVar[Callable[..., None]] = staticmethod(

@@ -64,7 +64,11 @@ class Network(Component):
 
     def axes(self) -> list[Vector]:
         """The grid's coordinates along u, v, r."""
-        return [np.linspace(*ends) for ends in zip(self.low, self.high, self.nodes, strict=True)]
+        ranges = zip(self.low, self.high, self.nodes, strict=True)
+        return [
+            np.linspace(low, high, count) if count > 1 else np.array([(low + high) / 2])
+            for low, high, count in ranges
+        ]
 
     def center_array(self) -> Vector:
         """Centres, shape (q, 3), in the order of the weights."""

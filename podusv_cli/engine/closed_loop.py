@@ -6,6 +6,7 @@ Row: target, law's signals, demand, tau, b, actuator's signals; offsets are in `
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -173,26 +174,55 @@ def write_row(k: int, t: float, c: Wires, n: Plan) -> None:
 
 
 @kernel
+def instant(
+    k: int, h: float, path: Function, disturbance: Function, law: Function, sample: Function,
+    actuator: Function, observe: Function, c: Wires, n: Plan,
+) -> bool:  # fmt: skip
+    """Sample, evaluate, observe and log instant k; whether all its numbers are finite."""
+    t = k * h
+    if n.sample_every > 0 or n.hold_every > 0:
+        sample_and_hold(k, t, path, law, sample, c, n)
+    rates(t, c.s, c.stages, path, disturbance, law, actuator, c, n)
+    if not (finite(n.states, c.s) and finite(n.columns, c.row)):
+        return False
+    weight = 0.5 * h if k == 0 or k == n.steps else h
+    observe(t, weight, c.s, c.row, c.observer, c.seen)
+    if k % n.log_every == 0:
+        write_row(k, t, c, n)
+    return True
+
+
+@kernel
 def advance(
     path: Function, disturbance: Function, law: Function, sample: Function, actuator: Function,
     observe: Function, first: int, last: int, h: float, wires: Wires, n: Plan,
 ) -> int:  # fmt: skip
     """March over the instants first .. last - 1; gives the first that is not finite, or `last`."""
     c = pointers(wires)
-    s, row = c.s, c.row
     for k in range(first, last):
-        t = k * h
-        if n.sample_every > 0 or n.hold_every > 0:
-            sample_and_hold(k, t, path, law, sample, c, n)
-        rates(t, s, c.stages, path, disturbance, law, actuator, c, n)
-        if not (finite(n.states, s) and finite(n.columns, row)):
+        if not instant(k, h, path, disturbance, law, sample, actuator, observe, c, n):
             return k
-        weight = 0.5 * h if k == 0 or k == n.steps else h
-        observe(t, weight, s, row, c.observer, c.seen)
-        if k % n.log_every == 0:
-            write_row(k, t, c, n)
         if k < n.steps:
-            step(t, h, path, disturbance, law, actuator, c, n)
+            step(k * h, h, path, disturbance, law, actuator, c, n)
+    return last
+
+
+def advance_plainly(
+    path: Function, disturbance: Function, law: Function, sample: Function, actuator: Function,
+    observe: Function, first: int, last: int, h: float, c: Wires, n: Plan,
+) -> int:  # fmt: skip
+    """`advance` as plain Python, whose `math` raises where machine code gives no number."""
+    for k in range(first, last):
+        try:
+            if not instant(k, h, path, disturbance, law, sample, actuator, observe, c, n):
+                return k
+        except (ArithmeticError, ValueError):
+            return k
+        try:
+            if k < n.steps:
+                step(k * h, h, path, disturbance, law, actuator, c, n)
+        except (ArithmeticError, ValueError):
+            c.s[:] = math.nan
     return last
 
 
@@ -207,8 +237,8 @@ def evaluate_all(
     """
     for _ in range(rounds):
         for i in range(count):
-            row = tail(address(rows), i * width)
+            row, rate = tail(address(rows), i * width), address(out)
             law(
                 row[0], tail(row, 7), tail(row, 13), tail(row, 1), address(p), address(table),
-                address(tau), address(out), tail(address(out), width), tail(address(out), 2 * width),
+                address(tau), rate, tail(rate, width), tail(rate, 2 * width),
             )  # fmt: skip

@@ -1,7 +1,10 @@
 """Kernels to machine code, cached on disk and never stale.
 
-numba notices a change in the file of a cached function, not in the files of what that function
-calls. So the cache lives in a folder named after a digest of every source file of the package.
+numba tells cached functions apart by name and byte code, and notices a change in the file of a
+function, not in what that function calls. So the cache lives in a folder named after a digest of
+every source file of the package, and the name of every cached function ends in a digest of all that
+goes into its machine code: kernels of one name, laws that live elsewhere, and a process that
+imported the source before it was edited do not get into each other's way.
 """
 
 from __future__ import annotations
@@ -13,9 +16,10 @@ import re
 import shutil
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
+from types import CodeType
 from typing import Any
 
 from numba import njit, types
@@ -28,8 +32,10 @@ from podusv_cli.engine.closed_loop import Plan, Wires, advance, evaluate_all
 
 config: Any = numba_config  # its settings are made at run time
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": False}
+OWN = re.compile(r"[0-9a-f]{16}")
 KEPT = 8  # caches of this many states of the source stay on disk
 
+NUMBERS = (bool, int, float, str, tuple)
 NUMBER = types.float64
 VECTOR: Any = types.CPointer(NUMBER)  # type: ignore[no-untyped-call]
 ARRAY = types.Array(NUMBER, 1, "C")
@@ -68,6 +74,30 @@ def _address(typing: Any, array: Any) -> Any:
     return VECTOR(array), code
 
 
+def ingredients(function: Any) -> Iterator[str]:
+    """Everything that the machine code of a kernel depends on, the kernels it calls included."""
+    code, seen = function.__code__, function.__globals__
+    yield code.co_code.hex()
+    yield repr([c for c in code.co_consts if not isinstance(c, CodeType)])
+    yield repr((code.co_names, code.co_varnames))
+    for name in sorted(_named(function) & seen.keys()):
+        thing = seen[name]
+        if kernels.is_kernel(thing):
+            yield from ingredients(thing)
+        else:
+            yield repr(getattr(thing, "_fields", thing if isinstance(thing, NUMBERS) else name))
+
+
+def fingerprint(*functions: Any) -> str:
+    """A short digest of the ingredients of these kernels."""
+    text = "\n".join(part for function in functions for part in ingredients(function))
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _named(function: Any) -> set[str]:
+    return {i.argval for i in dis.get_instructions(function) if i.opname == "LOAD_GLOBAL"}
+
+
 @cache
 def machine(function: Any) -> Any:
     """The kernel and all kernels it names, ready to be compiled into their caller."""
@@ -76,18 +106,19 @@ def machine(function: Any) -> Any:
     if function is kernels.address:
         return _address
     seen = function.__globals__
-    named = {i.argval for i in dis.get_instructions(function) if i.opname == "LOAD_GLOBAL"}
-    inner = {name: machine(seen[name]) for name in named if kernels.is_kernel(seen.get(name))}
+    inner = {
+        name: machine(seen[name]) for name in _named(function) if kernels.is_kernel(seen.get(name))
+    }
     return njit(**OPTIONS)(kernels.with_globals(function, function.__qualname__, **inner))
 
 
 @cache
 def entry(door: Any, inner: Any, names: tuple[str, ...]) -> Any:
     """Machine code of a component's kernel behind its door, callable by the loop."""
-    label = re.sub(r"\W", "_", f"{door.__name__}_{inner.__module__}_{inner.__qualname__}")
-    named = machine(kernels.unpacker(names))
-    bound = kernels.with_globals(door, label, kernel=machine(inner), named=named)
-    return _stored(SIGNATURES[door], bound)
+    named = kernels.unpacker(names)
+    label = f"{door.__name__}_{inner.__module__}_{inner.__qualname__}"
+    bound = kernels.with_globals(door, label, kernel=machine(inner), named=machine(named))
+    return _stored(SIGNATURES[door], _labelled(bound, fingerprint(door, inner, named)))
 
 
 @cache
@@ -97,7 +128,7 @@ def march() -> Any:
     wires = _tuple_of(ARRAY, Wires)
     plan = _tuple_of(types.int64, Plan)
     signature = types.int64(*functions, types.int64, types.int64, NUMBER, wires, plan)
-    return _stored(signature, machine(advance).py_func)
+    return _stored(signature, _labelled(machine(advance).py_func, fingerprint(advance)))
 
 
 def _tuple_of(each: Any, kind: Any) -> Any:
@@ -109,7 +140,11 @@ def replay() -> Any:
     """Machine code of `replay.evaluate_all`."""
     law = types.FunctionType(SIGNATURES[signatures.law_entry])
     signature = types.void(law, *[types.int64] * 3, *[ARRAY] * 5)
-    return _stored(signature, machine(evaluate_all).py_func)
+    return _stored(signature, _labelled(machine(evaluate_all).py_func, fingerprint(evaluate_all)))
+
+
+def _labelled(function: Any, mark: str) -> Any:
+    return kernels.with_globals(function, re.sub(r"\W", "_", f"{function.__qualname__}_{mark}"))
 
 
 def _stored(signature: Any, function: Any) -> Any:
@@ -152,17 +187,18 @@ def cache_folder() -> Path | None:
     roots = [os.environ.get("PODUSV_CACHE"), f"{home}/podusv", f"{tempfile.gettempdir()}/{private}"]
     for root in filter(None, roots):
         folder = Path(root) / source_digest()
-        try:
+        with suppress(OSError):
             folder.mkdir(parents=True, exist_ok=True, mode=0o700)
             tempfile.TemporaryFile(dir=folder).close()
-        except OSError:
-            continue
-        _forget_old(folder)
-        return folder
+            if folder.stat().st_uid == os.getuid():  # never run code that someone else put there
+                _forget_old(folder)
+                return folder
     return None
 
 
 def _forget_old(current: Path) -> None:
-    caches = sorted(current.parent.iterdir(), key=lambda path: path.stat().st_mtime, reverse=True)
+    # The folder may be shared: only what bears a digest's name is a cache.
+    found = (path for path in current.parent.iterdir() if OWN.fullmatch(path.name))
+    caches = sorted(found, key=lambda path: path.stat().st_mtime, reverse=True)
     for old in [path for path in caches if path != current and path.is_dir()][KEPT:]:
         shutil.rmtree(old, ignore_errors=True)

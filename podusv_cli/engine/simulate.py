@@ -18,6 +18,7 @@ from podusv_cli.engine.grid import TimeGrid, whole_steps
 from podusv_cli.kernels import Vector, bundle, kernel
 from podusv_cli.paths.base import TARGET, Path
 from podusv_cli.recording import Recording, Status
+from podusv_cli.signals import SIGNALS
 from podusv_cli.vessels.vessel import Vessel
 
 STATE = ("x", "y", "psi", "u", "v", "r")
@@ -70,13 +71,27 @@ class ClosedLoop:
         memory = 6 + len(actuator.states)
         sizes = [len(TARGET), len(law.signals), len(DEMAND), 3, 3, len(actuator.signals)]
         signals, demand, tau, b, flags, columns = np.cumsum(sizes).tolist()
-        period = law.sample_period()
         return Plan(
             states=memory + sum(size for _, size in law.slots()), memory=memory,
             signals=signals, demand=demand, tau=tau, b=b, flags=flags, columns=columns,
             steps=grid.steps, log_every=grid.log_every, hold_every=grid.hold_every,
-            sample_every=whole_steps(period, grid.step) or 0,
+            sample_every=_sample_steps(law.sample_period(), grid),
         )  # fmt: skip
+
+
+def _sample_steps(period: float, grid: TimeGrid) -> int:
+    count = whole_steps(period, grid.step)
+    if count is None or (period > 0 and count == 0):
+        raise ValueError(
+            f"the law samples every {period:g} s, no whole number of steps of {grid.step:g} s"
+        )
+    if grid.hold_every and count % grid.hold_every:
+        held = grid.hold_every * grid.step
+        raise ValueError(
+            f"the law samples every {period:g} s, no whole number of the {held:g} s for which "
+            "its measurement is held"
+        )
+    return count
 
 
 def simulate(
@@ -117,10 +132,10 @@ def entries(loop: ClosedLoop, observer: Observer) -> Iterator[tuple[Any, Any, tu
 
 
 def marcher(loop: ClosedLoop, observer: Observer, compiled: bool) -> Callable[..., int]:
-    """The march of this loop, `closed_loop.advance` less its functions; compiles what is not yet."""
+    """The march of this loop, `closed_loop.advance` less its functions, compiled if need be."""
     if not compiled:
         doors = [signatures.bind(*part) for part in entries(loop, observer)]
-        return lambda *rest: closed_loop.advance(*doors, *rest)
+        return lambda *rest: closed_loop.advance_plainly(*doors, *rest)
     from podusv_cli.engine import compiling  # numba is slow to import and not always wanted
 
     doors = [compiling.entry(*part) for part in entries(loop, observer)]
@@ -160,10 +175,9 @@ def _in_blocks(
             reached = march(done, goal)
             if reached < goal:
                 return reached, "diverged"
-            done = goal
+            done, took = goal, time.perf_counter() - began
             if progress:
                 progress(done / end)
-            took = time.perf_counter() - began
             size = max(1, int(size * min(4.0, 0.7 * LONGEST_BLOCK / max(took, 1e-9))))
     except KeyboardInterrupt:
         return done, "interrupted"
@@ -183,7 +197,7 @@ def _record(
     rows = (reached + grid.log_every - 1) // grid.log_every
     table = wires.log.reshape(grid.rows, -1)[:rows]
     labels = names(loop)
-    vectors = {name for name, size in loop.controller.slots() if name.startswith("W_hat")}
+    vectors = {name for name in labels if name in SIGNALS and SIGNALS[name].axes}
     signals: dict[str, Vector] = {}
     for name in dict.fromkeys(labels):
         columns = [i for i, label in enumerate(labels) if label == name]
@@ -191,7 +205,12 @@ def _record(
         signals[name] = part if name in vectors else part[:, 0]
     for hidden in TARGET[2:]:
         del signals[hidden]
+    if "z_e" in signals:  # in sampled control the law's own goes back to its last sample
+        x_e, y_e = (signals[f"{axis}_d"] - signals[axis] for axis in "xy")
+        signals["z_e"] = np.sqrt(x_e * x_e + y_e * y_e)
     message = ""
+    if status == "interrupted":
+        message = f"interrupted after t = {max(reached - 1, 0) * grid.step:.6g} s"
     if status == "diverged":
         message = _last_words(wires, labels, signals, reached * grid.step)
     fixed = loop.controller.fixed_signals()

@@ -21,7 +21,7 @@ DPI = 110
 
 
 def animate(runs: Sequence[Shown]) -> bytes:
-    """A GIF: tracks grow, hulls (enlarged) and the target move; the same bytes for the same runs."""
+    """A GIF: tracks grow, hulls (enlarged) and target move; same runs, same bytes."""
     with house_style():
         figure = Figure(figsize=(SIZE, SIZE), dpi=DPI, layout="constrained")
         canvas = FigureCanvasAgg(figure)
@@ -30,8 +30,9 @@ def animate(runs: Sequence[Shown]) -> bytes:
         frames = []
         for t in np.linspace(0.0, longest, FRAMES):
             move(float(t))
-            canvas.draw()
-            picture = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+            canvas.draw()  # type: ignore[no-untyped-call]
+            pixels = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
+            picture = Image.fromarray(pixels).convert("RGB")
             frames.append(picture.quantize(colors=64, dither=Image.Dither.NONE))
     buffer = io.BytesIO()
     frames[0].save(
@@ -48,7 +49,9 @@ def _stage(figure: Figure, runs: Sequence[Shown]) -> Callable[[float], None]:
     (target,) = axes.plot([], [], "o", color=TARGET_LOOK["color"], markersize=4)
     scale = enlargement(runs)
     tracks = [axes.plot([], [], **run.look)[0] for run in runs]
-    hulls = [axes.add_patch(Polygon(np.zeros((5, 2)), color=run.color)) for run in runs]
+    hulls = [Polygon(np.zeros((5, 2)), color=run.color) for run in runs]
+    for outline in hulls:
+        axes.add_patch(outline)
     every = [run.recording[name] for run in runs for name in ("x", "y", "x_d", "y_d")]
     north, east = np.concatenate(every[0::2]), np.concatenate(every[1::2])
     axes.set_xlim(east.min() - 3, east.max() + 3)

@@ -43,7 +43,7 @@ def _compress(early: Axes, settled: Axes) -> None:
 
 def controls(runs: Sequence[Shown], columns: int) -> Figure:
     """Surge force and yaw moment: what acts on the hull, and thin what the law asked for."""
-    figure = new_figure(columns, 3.4)
+    figure = new_figure(columns, 3.9)
     panels = figure.subplots(2, 2, sharex="col")
     end = max(float(shown.recording["time"][-1]) for shown in runs)
     start = min(shown.steady_from for shown in runs)
@@ -57,5 +57,6 @@ def controls(runs: Sequence[Shown], columns: int) -> Figure:
         axes.set_title(title)
     for axes in panels[1]:
         axes.set_xlabel("time [s]")
-    panels[0][0].legend(loc="best")
+    handles, labels = panels[0][0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=2 * columns)
     return figure

@@ -21,13 +21,13 @@ def signals_over_time(*names: str, logarithmic: Collection[str] = ()) -> Family:
     def family(runs: Sequence[Shown], columns: int) -> Figure:
         shown = [name for name in names if any(run.has(name) for run in runs)]
         rows = math.ceil(len(shown) / columns)
-        figure = new_figure(columns, 0.45 + PANEL_HEIGHT * rows)
+        figure = new_figure(columns, 0.7 + PANEL_HEIGHT * rows)
         panels = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
         for axes, name in zip(panels, shown, strict=False):
             _panel(axes, runs, name)
             if name in logarithmic:
                 axes.set_yscale("log")
-        _finish(panels.tolist(), len(shown), columns)
+        _finish(figure, panels.tolist(), len(shown), columns)
         return figure
 
     return family
@@ -39,10 +39,11 @@ def _panel(axes: Axes, runs: Sequence[Shown], name: str) -> None:
     axes.set_ylabel(axis_label(name))
 
 
-def _finish(panels: list[Axes], used: int, columns: int) -> None:
+def _finish(figure: Figure, panels: list[Axes], used: int, columns: int) -> None:
     for spare in panels[used:]:
         spare.set_axis_off()
     for axes in panels[max(0, used - columns) : used]:
         axes.set_xlabel("time [s]")
         axes.tick_params(labelbottom=True)
-    panels[0].legend(loc="best")
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
