@@ -1,4 +1,4 @@
-"""A small recording, its log, and ways to break the writing of it, for the tests of the logbook."""
+"""A small recording, its log, its folder, and ways to break them, for the tests of the logbook."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ import pytest
 from numpy.testing import assert_array_equal
 
 import podusv_cli
-from podusv_cli.logbook import hdf5
+from podusv_cli.logbook import hdf5, manifest
+from podusv_cli.logbook.folder import RunWriter
 from podusv_cli.recording import Recording
 
 YAML = "name: kleine Fähre\nstart: {x: -10.0}\n"
@@ -27,6 +28,9 @@ TEXTS = {"resolved_yaml": YAML, "title": "Größe ψ_e", "source": "a towing tan
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(podusv_cli.__file__).parents[1])}
 PYTHON = sys.executable
 Deed = Callable[[], None]
+# Two small folders, for tests in which one replaces the other.
+OLD = {"log.h5": b"old log", "figures/old.png": b"old figure"}
+NEW = {"log.h5": b"new log", "figures/new.png": b"new figure", "metrics.csv": b""}
 
 
 def recording(rows: int = 50, nodes: int = 8, **changes: Any) -> Recording:
@@ -111,6 +115,27 @@ def until_nothing_breaks(attempt: Callable[[Saboteur], None], deed: Deed) -> Ite
             assert nth > 1, "nothing was sabotaged"
             return
         yield nth
+
+
+def write(final: Path, content: dict[str, bytes], *, force: bool = False) -> Path:
+    """Make a finished folder of these files."""
+    with RunWriter(final, force=force) as writer:
+        for name, part in content.items():
+            writer.add(name, part)
+        return writer.finish("finished")
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    """The files of a finished folder, without its manifest; StorageError for any other folder."""
+    manifest.check(folder)
+    found = files(folder)
+    del found["manifest.json"]
+    return found
+
+
+def beside(folder: Path) -> set[str]:
+    """What else is in the folder above, hidden or not."""
+    return {path.name for path in folder.parent.iterdir()} - {folder.name}
 
 
 @contextmanager

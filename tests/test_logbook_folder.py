@@ -1,69 +1,37 @@
-"""Run folders appear whole, are never lost, and open again."""
+"""Run folders appear whole, replace only what they may, and open again."""
 
 from __future__ import annotations
 
 import errno
-import os
 import re
-import shutil
-import subprocess
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime
 from pathlib import Path
-from threading import Barrier
 
 import pytest
 from logbook_samples import (
-    ENVIRONMENT,
-    PYTHON,
+    NEW,
+    OLD,
     YAML,
-    Deed,
     Saboteur,
     assert_same,
+    beside,
+    content,
     durable_steps,
     fails,
     files,
-    interrupts,
-    kills,
     log,
     recording,
-    until_nothing_breaks,
+    write,
 )
 
 from podusv_cli.errors import StorageError
 from podusv_cli.logbook import manifest
 from podusv_cli.logbook.folder import RunWriter, default_folder, open_run
-from podusv_cli.logbook.staging import Staging
-
-OLD = {"log.h5": b"old log", "figures/old.png": b"old figure"}
-NEW = {"log.h5": b"new log", "figures/new.png": b"new figure", "metrics.csv": b""}
-CALLS = ("mkdir", "write", "fsync", "replace", "rename")
-DEADLY = (*CALLS, "open", "unlink", "rmdir")
 
 
 @pytest.fixture
 def final(tmp_path: Path) -> Path:
     return tmp_path / "results" / "run"
-
-
-def write(final: Path, content: dict[str, bytes], *, force: bool = False) -> Path:
-    with RunWriter(final, force=force) as writer:
-        for name, part in content.items():
-            writer.add(name, part)
-        return writer.finish("finished")
-
-
-def content(folder: Path) -> dict[str, bytes]:
-    """The files of a finished folder, without its manifest; StorageError for any other folder."""
-    manifest.check(folder)
-    found = files(folder)
-    del found["manifest.json"]
-    return found
-
-
-def beside(folder: Path) -> set[str]:
-    return {path.name for path in folder.parent.iterdir()} - {folder.name}
 
 
 def run_to(final: Path, **how: bool) -> Path:
@@ -194,158 +162,6 @@ def test_a_place_that_cannot_be_written_to_is_known_at_once(
     Saboteur(fails(errno.EACCES), 1).watch(monkeypatch, "mkdir")
     with pytest.raises(StorageError, match="not permitted"):
         RunWriter(final.parent.with_name("elsewhere") / "run")
-
-
-def test_of_two_writers_the_first_to_finish_wins(final: Path) -> None:
-    with RunWriter(final) as one, RunWriter(final) as other:
-        one.add("log.h5", b"one")
-        other.add("log.h5", b"other")
-        other.finish("finished")
-        with pytest.raises(StorageError, match="exists already"):
-            one.finish("finished")
-    assert content(final) == {"log.h5": b"other"}
-    assert beside(final) == set()
-
-
-@pytest.mark.parametrize("force", [False, True])
-def test_writers_that_finish_at_the_same_time(final: Path, force: bool) -> None:
-    writers = [RunWriter(final, force=force) for _ in range(8)]
-    for number, writer in enumerate(writers):
-        writer.add("log.h5", bytes([number]) * 1000)
-    start = Barrier(len(writers))
-
-    def race(number: int) -> int | None:
-        with writers[number] as writer:
-            start.wait()
-            try:
-                writer.finish("finished")
-            except StorageError:
-                return None
-        return number
-
-    with ThreadPoolExecutor(len(writers)) as pool:
-        winners = [number for number in pool.map(race, range(8)) if number is not None]
-    found = content(final)["log.h5"]
-    assert found in [bytes([number]) * 1000 for number in winners]
-    assert force or len(winners) == 1
-    assert beside(final) == set()
-
-
-@pytest.mark.parametrize("deed", [fails(errno.ENOSPC), interrupts])
-@pytest.mark.parametrize("before", [None, OLD])
-def test_a_failure_at_any_step_leaves_the_old_run_or_the_new_one(
-    final: Path, before: dict[str, bytes] | None, deed: Deed
-) -> None:
-    def attempt(saboteur: Saboteur) -> None:
-        shutil.rmtree(final, ignore_errors=True)
-        if before:
-            write(final, before)
-        with pytest.MonkeyPatch.context() as patch:
-            saboteur.watch(patch, *CALLS)
-            try:
-                write(final, NEW, force=True)
-            except (StorageError, KeyboardInterrupt):
-                assert saboteur.struck
-
-    seen = []
-    for _ in until_nothing_breaks(attempt, deed):
-        assert not final.parent.exists() or beside(final) == set()
-        seen.append(content(final) if final.exists() else None)
-    assert len(seen) > 15
-    assert before in seen
-    assert seen[-1] == NEW
-    assert all(found in (before, NEW) for found in seen)
-
-
-def in_a_child(work: Callable[[], object]) -> None:
-    """Do something in a process of its own and wait for its end, however it comes."""
-    child = os.fork()
-    if child == 0:
-        try:
-            work()
-        finally:
-            os._exit(0)
-    os.waitpid(child, 0)
-
-
-def test_a_folder_made_by_others_at_the_last_moment_is_left_as_it_is(final: Path) -> None:
-    staging = Staging(final)
-    final.mkdir()
-    (final / "thesis.tex").write_text("ten years")
-    with pytest.raises(StorageError, match="made by somebody else in the meantime"):
-        staging.publish(replace=False)
-    assert files(final) == {"thesis.tex": b"ten years"}
-    assert beside(final) == set()
-
-
-@pytest.mark.parametrize("lost", [False, True])
-def test_killed_at_any_step_the_old_run_or_the_new_one_comes_back(final: Path, lost: bool) -> None:
-    """`lost`: somebody deletes the folder before the next run clears up; no half of one appears."""
-    other = final.with_name("other")
-
-    def attempt(saboteur: Saboteur) -> None:
-        write(final, OLD, force=True)
-
-        def replace() -> None:
-            with pytest.MonkeyPatch.context() as patch:
-                saboteur.watch(patch, *DEADLY)
-                write(final, NEW, force=True)
-            os.write(survived, b"!")
-
-        alive, survived = os.pipe()
-        in_a_child(replace)
-        os.close(survived)
-        saboteur.left = 1 if os.read(alive, 1) else 0
-        os.close(alive)
-
-    seen = []
-    for _ in until_nothing_breaks(attempt, kills):
-        if lost:
-            shutil.rmtree(final, ignore_errors=True)
-        write(other, NEW, force=True)  # the next run to the same place clears up
-        assert beside(final) == {"other"}
-        seen.append(content(final) if final.exists() else None)
-    assert len(seen) > 30
-    assert OLD in seen
-    assert seen[-1] == (None if lost else NEW)
-    assert all(found in ((None, OLD) if lost else (OLD, NEW)) for found in seen)
-
-
-def test_what_a_live_run_is_making_is_left_alone(final: Path) -> None:
-    code = (
-        "import sys; from pathlib import Path; from podusv_cli.logbook.folder import RunWriter\n"
-        "writer = RunWriter(Path(sys.argv[1])); writer.add('log.h5', b'live')\n"
-        "print('ready', flush=True); sys.stdin.read(); writer.finish('finished')\n"
-    )
-    with subprocess.Popen(
-        [PYTHON, "-c", code, str(final)],
-        env=ENVIRONMENT, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-    ) as live:  # fmt: skip
-        assert live.stdout is not None
-        assert live.stdout.readline() == b"ready\n"
-        write(final.with_name("other"), NEW)
-        live.communicate(b"", timeout=60)
-    assert content(final) == {"log.h5": b"live"}
-    assert beside(final) == {"other"}
-
-
-def test_what_is_not_a_dead_run_of_this_machine_is_left_alone(final: Path) -> None:
-    with RunWriter(final) as writer:
-        mine = writer.folder.parent.name
-    machine, process = re.findall(r"podusv-(\w{8})-(\d+)-", mine)[0]
-    dead = subprocess.Popen(["true"])
-    dead.wait()
-    kept = [
-        mine.replace(machine, "0" * 8).replace(process, str(dead.pid)),
-        mine.replace(process, "9" * 40),
-        ".run.podusv-notes.part",
-        "run.part",
-    ]
-    gone = mine.replace(process, str(dead.pid))
-    for name in (*kept, gone):
-        (final.parent / name / "new").mkdir(parents=True)
-    write(final, NEW)
-    assert beside(final) == set(kept)
 
 
 def test_a_name_that_is_too_long(final: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from podusv_cli.actuators.base import Actuator
@@ -26,6 +27,8 @@ else:
     AnyPath = any_of("podusv_cli.paths", Path)
 
 
+Misfits = Iterator[tuple[str, str]]  # keys, and what is wrong with them
+MOST_GIGABYTES = 4.0  # of a log, which is held in memory
 LABEL = re.compile(r"[a-z][a-z0-9_]{0,29}")  # usable as a name in claims and as a folder
 LABEL_IN_WORDS = "a name here is at most 30 of a-z, 0-9 and _, starting with a letter"
 
@@ -147,26 +150,50 @@ class Scenario(Component):
 
     def misfits(self) -> list[tuple[str, str]]:
         """Key and sentence for every pair of values that cannot go together."""
+        return [*self._times(), *self._samples(), *self._names(), *self._size()]
+
+    def _laws(self) -> dict[str, Controller]:
+        several = {f"controllers.{label}": law for label, law in self.controllers.items()}
+        return {"controller": self.controller} | several
+
+    def _times(self) -> Misfits:
         step = self.simulation.step
-        found: list[tuple[str, str]] = []
-        laws = {"controller": self.controller}
-        laws |= {f"controllers.{label}": law for label, law in self.controllers.items()}
-        times: dict[str, float] = {
+        times = {
             "simulation.duration": self.simulation.duration,
             "control.period": self.control.period,
-            **{f"{key}.difference_step": law.sample_period() for key, law in laws.items()},
+            **{f"{key}.difference_step": law.sample_period() for key, law in self._laws().items()},
         }
         for key, time in times.items():
             if time and not whole_steps(time, step):
-                below = max(1, int(time / step)) * step
-                text = f"{time:g} s is no whole number of steps of {step:g} s; try {below:.10g}"
-                found.append((key, text))
+                yield (
+                    key,
+                    f"{time:g} s is no whole number of steps of {step:g} s{_near(time, step)}",
+                )
+
+    def _samples(self) -> Misfits:
         period = self.control.period
-        for key, law in laws.items():
-            if period and not whole_steps(law.sample_period(), period) and law.sample_period():
-                text = f"{law.sample_period():g} s is no whole number of periods of {period:g} s"
-                found.append((f"{key}.difference_step", text))
+        for key, law in self._laws().items():
+            sample = law.sample_period()
+            if period and sample and not whole_steps(sample, period):
+                text = f"{sample:g} s is no whole number of control periods of {period:g} s"
+                yield f"{key}.difference_step", text + _near(sample, period)
+
+    def _names(self) -> Misfits:
         for label in self.controllers:
             if not LABEL.fullmatch(label):
-                found.append((f"controllers.{label}", LABEL_IN_WORDS))
-        return found
+                yield f"controllers.{label}", LABEL_IN_WORDS
+
+    def _size(self) -> Misfits:
+        columns = 40 + max(sum(n for _, n in law.slots()) for law in self._laws().values())
+        gigabytes = (
+            self.simulation.duration / self.simulation.step / self.log.every * columns * 8e-9
+        )
+        if gigabytes > MOST_GIGABYTES:
+            text = f"the log would take about {gigabytes:.3g} GB, at most {MOST_GIGABYTES:g} fit"
+            yield "log.every", f"{text}; log less often, or simulate less"
+
+
+def _near(time: float, step: float) -> str:
+    """The next smaller time that fits, as a hint, where it can be told."""
+    count = time / step
+    return f"; try {max(1, int(count)) * step:.10g}" if count < 1e12 else ""

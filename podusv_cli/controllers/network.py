@@ -12,6 +12,7 @@ from pydantic import model_validator
 from podusv_cli.kernels import Vector, kernel, tail
 from podusv_cli.registry import Component, value
 
+MOST_NODES = 10_000
 Triple = tuple[float, float, float]
 
 
@@ -45,6 +46,8 @@ class Network(Component):
     def _spanned(self) -> Self:
         if not self.centers and any(n < 1 for n in self.nodes):
             raise ValueError(f"every axis needs at least one node, got {list(self.nodes)}")
+        if self.count > MOST_NODES:
+            raise ValueError(f"has {self.count:,} nodes, at most {MOST_NODES:,} are possible")
         if self.widths is None and (self.centers or any(n < 2 for n in self.nodes)):
             raise ValueError(
                 "widths must be given for listed centres and for an axis with one node"

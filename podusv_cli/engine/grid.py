@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 
 def whole_steps(duration: float, step: float) -> int | None:
     """How many steps make `duration` (both in s), or None where it is no whole number of them."""
-    count = round(duration / step)
+    steps = duration / step
+    if not math.isfinite(steps):
+        return None
+    count = round(steps)
     return count if abs(count * step - duration) <= 1e-9 * max(duration, step) else None
 
 

@@ -47,6 +47,6 @@ def replayer(
     def timed() -> float:
         began = time.perf_counter_ns()
         replay(law, rounds, count, width, *buffers)
-        return float(time.perf_counter_ns() - began) / (rounds * count)
+        return float((time.perf_counter_ns() - began) / (rounds * count))
 
     return timed

@@ -69,6 +69,7 @@ class RunWriter:
 
     def finish(self, status: Status) -> Path:
         """Write the manifest and give the folder its name, which is returned."""
+        sweep(self.folder)  # of runs nested in here whose process was killed
         manifest.write(self.folder, status)
         for inner, _, _ in os.walk(self.folder):
             atomic.sync_folder(Path(inner))

@@ -123,11 +123,15 @@ def _dataset(group: h5py.h5g.GroupID, name: str) -> h5py.h5d.DatasetID:
     made = dataset.get_create_plist()
     if made.get_layout() == h5py.h5d.VIRTUAL or made.get_external_count():
         raise ValueError(f"{name} keeps its data in another file")
-    if not {made.get_filter(i)[0] for i in range(made.get_nfilters())} <= _FILTERS:
+    if not set(_filters(made)) <= _FILTERS:
         raise ValueError(f"{name} is packed in an unknown way")
     if dataset.shape is None:
         raise ValueError(f"{name} is empty")
     return dataset
+
+
+def _filters(made: h5py.h5p.PropDCID) -> list[int]:
+    return [made.get_filter(i)[0] for i in range(made.get_nfilters())]
 
 
 def _arrays(file: h5py.File) -> dict[str, Vector]:
@@ -175,7 +179,7 @@ def _check_chunks(name: str, dataset: h5py.h5d.DatasetID) -> None:
     shape, made = dataset.shape, dataset.get_create_plist()
     if math.prod(shape) == 0:
         return
-    if made.get_layout() != h5py.h5d.CHUNKED or made.get_nfilters() != len(_FILTERS):
+    if sorted(_filters(made)) != sorted(_FILTERS):
         raise ValueError(f"{name} has no checksums")
     sides = list(zip(shape, made.get_chunk(), strict=True))
     count = math.prod(-(-size // part) for size, part in sides)

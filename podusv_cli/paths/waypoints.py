@@ -48,7 +48,11 @@ class Waypoints(Path):
     def _travelled(self) -> Self:
         if len(self.points) < 2:
             raise ValueError(f"needs at least two points, has {len(self.points)}")
-        if np.any(np.diff(self._knots()) <= 0):
+        with np.errstate(all="ignore"):
+            knots = self._knots()
+        if not np.all(np.isfinite(knots)):
+            raise ValueError("the points are too far apart, or the speed is too small, for numbers")
+        if np.any(np.diff(knots) <= 0):
             raise ValueError("two neighbouring points are the same")
         return self
 

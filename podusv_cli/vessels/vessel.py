@@ -54,7 +54,7 @@ class Vessel(Component):
     @model_validator(mode="after")
     def _possible(self) -> Self:
         m11, m22, m33, symmetric = self.m11, self.m22, self.m33, (self.m23 + self.m32) / 2
-        if m11 <= 0 or m22 <= 0 or m22 * m33 <= symmetric**2:
+        if m11 <= 0 or m22 <= 0 or m22 * m33 <= symmetric * symmetric:
             raise ValueError(
                 "the mass matrix is not positive definite: "
                 f"m11 = {m11:g} kg, m22 = {m22:g} kg, m33 = {m33:g} kg m2, "
