@@ -1,0 +1,222 @@
+"""Comparisons from scenario or folder to table, verdicts, figures and report."""
+
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from podusv_cli import workflows
+from podusv_cli.comparison import table
+from podusv_cli.comparison.differences import differences
+from podusv_cli.errors import ScenarioError, StorageError, UsageError
+
+SCENARIO = """
+vessel: {preset: paper_nonlinear}
+path: {kind: line}
+disturbance: {kind: none}
+actuator: {kind: saturated}
+start: {x: -5.0, y: -2.0, u: 0.3}
+simulation: {duration: 20.0}
+metrics: {settling_radius: 2.0}
+controller: {kind: adaptive_neural, k_ze: 0.2}
+controllers:
+  fast: {}
+  slow: {k_ze: 0.02}
+  pid: {kind: pid, K_Pu: 100.0}
+claims:
+  planted_true: {says: Fast is faster., source: here, expect: fast.iae < slow.iae}
+  planted_false: {says: Slow is faster., source: here, expect: slow.iae < fast.iae}
+"""
+
+
+@pytest.fixture(scope="module")
+def config(tmp_path_factory):
+    path = tmp_path_factory.mktemp("scenario") / "three.yaml"
+    path.write_text(SCENARIO)
+    return path
+
+
+@pytest.fixture(scope="module")
+def done(config, tmp_path_factory):
+    target = tmp_path_factory.mktemp("compared") / "all"
+    return workflows.compare([config], workflows.Request(out=target))
+
+
+def quick(*overrides, out):
+    return workflows.Request(overrides, out, figures=False)
+
+
+def test_every_controller_is_run_from_the_shared_keys(done):
+    laws = {entry.label: entry.scenario.controller for entry in done.result.entries}
+    assert list(laws) == ["fast", "slow", "pid"]
+    assert (laws["fast"].k_ze, laws["slow"].k_ze, laws["pid"].k_ze) == (0.2, 0.02, 0.2)
+
+
+def test_planted_claims_get_their_verdicts_with_numbers(done):
+    verdicts = json.loads((done.folder / "claims.json").read_text())["claims"]
+    assert [v["verdict"] for v in verdicts] == ["reproduced", "not reproduced"]
+    iae = {e.label: e.metric("iae") for e in done.result.entries}
+    assert verdicts[0]["numbers"] == pytest.approx(
+        {"fast.iae": iae["fast"], "slow.iae": iae["slow"]}
+    )
+
+
+def test_the_verdict_changes_with_the_data(config, tmp_path):
+    swapped = quick("controllers.fast.k_ze=0.01", "controllers.slow.k_ze=0.3", out=tmp_path / "x")
+    verdicts = workflows.compare([config], swapped).result.verdicts
+    assert [v.answer for v in verdicts] == ["not reproduced", "reproduced"]
+
+
+def test_the_table_is_the_same_in_every_form(done):
+    frame = pd.read_csv(done.folder / "comparison.csv", index_col=0)
+    iae = {entry.label: entry.metric("iae") for entry in done.result.entries}
+    assert frame.loc["iae", ["fast", "slow", "pid"]].to_dict() == pytest.approx(iae)
+    assert frame.loc["iae", "slow/fast"] == pytest.approx(iae["slow"] / iae["fast"])
+    best = min(iae, key=iae.get)
+    markdown = (done.folder / "comparison.md").read_text()
+    row = next(line for line in markdown.splitlines() if line.startswith("| iae"))
+    cells = dict(zip(["fast", "slow", "pid"], row.split("|")[3:6], strict=True))
+    assert [label for label, cell in cells.items() if "*" in cell] == [best]
+    latex = (done.folder / "comparison.tex").read_text()
+    assert r"\toprule" in latex
+    assert rf"\textbf{{{iae[best]:.5g}}}" in latex
+
+
+def test_one_diverging_run_hides_no_other(config, tmp_path):
+    request = quick("controllers.pid.T_d=1e-5", out=tmp_path / "x")
+    result = workflows.compare([config], request).result
+    assert result.endings["pid"].startswith("diverged at t = ")
+    assert np.isnan(result.table.loc["iae", "pid"])
+    assert not result.table.loc["iae", ["fast", "slow"]].isna().any()
+
+
+def test_finished_runs_and_scenarios_mix(config, done, tmp_path):
+    items = [done.folder / "slow", config]
+    result = workflows.compare(items, quick(out=tmp_path / "mix")).result
+    assert [entry.label for entry in result.entries] == ["slow", "fast", "slow_2", "pid"]
+    assert result.table.loc["iae", "slow"] == result.table.loc["iae", "slow_2"]
+
+
+def test_several_scenarios_are_named_by_themselves(config, tmp_path):
+    for name in ("one", "two"):
+        text = SCENARIO[: SCENARIO.index("controllers:")]
+        (tmp_path / f"{name}.yaml").write_text(text)
+    items = [tmp_path / "one.yaml", tmp_path / "two.yaml"]
+    result = workflows.compare(items, quick("simulation.duration=2", out=tmp_path / "x")).result
+    assert list(result.table.columns) == ["one", "two"]
+
+
+def test_other_differences_are_named(done, config, tmp_path):
+    limits = quick("actuator.surge_limit=4", out=tmp_path / "x")
+    other = workflows.compare([config, done.folder / "fast"], limits).result
+    assert other.differences == {
+        "actuator.surge_limit": {"fast": 4.0, "slow": 4.0, "pid": 4.0, "fast_2": 8.0}
+    }
+    assert not done.result.differences
+
+
+def test_differences_see_every_key_but_the_controllers():
+    first = {"start": {"x": 0.0}, "controller": {"k": 1}, "name": "a", "path": {"kind": "line"}}
+    second = {"start": {"x": 1.0}, "controller": {"k": 2}, "name": "b", "path": {"kind": "circle"}}
+    assert differences({"a": first, "b": second}) == {
+        "start.x": {"a": 0.0, "b": 1.0},
+        "path.kind": {"a": "line", "b": "circle"},
+    }
+
+
+def test_costs_are_measured_side_by_side(done):
+    entry = done.result.entries[0]
+    assert entry.metric("law_ns") == entry.cost["law_ns"] != entry.run.metrics["law_ns"]
+
+
+def test_a_wrong_expression_is_an_error_at_its_line(tmp_path):
+    path = tmp_path / "wrong.yaml"
+    path.write_text(SCENARIO.replace("fast.iae < slow.iae", "fast.iea < slow.iae"))
+    with pytest.raises(ScenarioError) as error:
+        workflows.compare([path], quick(out=tmp_path / "x"))
+    line = SCENARIO.splitlines().index(
+        "  planted_true: {says: Fast is faster., source: here, expect: fast.iae < slow.iae}"
+    )
+    assert str(error.value).startswith(f"{path}:{line + 1}:")
+    assert "claims.planted_true.expect: unknown signal or metric 'iea'" in str(error.value)
+
+
+def test_something_that_is_no_run_is_refused(tmp_path):
+    with pytest.raises(StorageError):
+        workflows.compare([tmp_path], quick(out=tmp_path / "x"))
+
+
+class Links(HTMLParser):
+    """Everything that a page would load."""
+
+    def __init__(self):
+        super().__init__()
+        self.found = []
+
+    def handle_starttag(self, tag, attributes):
+        self.found += [v for name, v in attributes if name in ("src", "href", "data") and v]
+
+
+def test_the_report_needs_nothing_from_outside(done):
+    page = (done.folder / "report.html").read_text()
+    links = Links()
+    links.feed(page)
+    assert links.found
+    assert all(link.startswith("data:") for link in links.found)
+    assert not re.search(r"url\(|@import|<script", page)
+
+
+def test_the_report_tells_everything(done):
+    page = (done.folder / "report.html").read_text()
+    for expected in ("Fast is faster.", "not reproduced", "fast.iae = ", "controller slow", "0.02"):
+        assert expected in page
+
+
+def test_the_report_escapes_what_it_is_given(config, tmp_path):
+    request = workflows.Request(("description='<b>&'", "simulation.duration=1"), tmp_path / "x")
+    page = (workflows.compare([config], request).folder / "report.html").read_text()
+    assert "&lt;b&gt;&amp;" in page
+
+
+def test_plot_draws_finished_runs_again(done, tmp_path):
+    runs = [done.folder / "fast", done.folder / "pid"]
+    drawing = workflows.Drawing(("errors",), ("png", "svg"), 1, False, tmp_path / "drawn")
+    first = {path.name: path.read_bytes() for path in workflows.plot(runs, drawing)}
+    assert set(first) == {"errors.png", "errors.svg"}
+    again = {path.name: path.read_bytes() for path in workflows.plot(runs, drawing)}
+    assert first == again
+
+
+def test_plot_refuses_what_there_is_not(done, tmp_path):
+    drawing = workflows.Drawing(("trajectry",), ("png",), 1, False, tmp_path)
+    with pytest.raises(UsageError, match="did you mean 'trajectory'"):
+        workflows.plot([done.folder / "fast"], drawing)
+
+
+def test_the_animation_moves(done, tmp_path):
+    from PIL import Image
+
+    drawing = workflows.Drawing(("errors",), ("png",), 1, True, tmp_path)
+    path = next(p for p in workflows.plot([done.folder / "fast"], drawing) if p.suffix == ".gif")
+    with Image.open(path) as film:
+        assert film.n_frames > 50
+        first = np.asarray(film.convert("L")).astype(int)
+        film.seek(film.n_frames - 1)
+        assert np.abs(np.asarray(film.convert("L")) - first).max() > 50
+
+
+def test_ratios_to_a_first_run_that_is_zero_are_left_out():
+    frame = table.table({"a": {"iae": 0.0}, "b": {"iae": 2.0}})
+    assert np.isnan(table.with_ratios(frame).loc["iae", "b/a"])
+    assert table.cells(frame)[0][2:] == ["0*", "2"]
+
+
+def test_figures_exist_for_all_paths_named(done):
+    stems = {path.stem for path in (Path(done.folder) / "figures").iterdir()}
+    assert stems == {
+        "trajectory", "errors", "controls", "filters", "adaptation", "velocities", "loads",
+    }  # fmt: skip

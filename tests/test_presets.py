@@ -1,0 +1,132 @@
+"""The paper's presets, run as a user runs them, against what docs/model.md says of them."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from podusv_cli import workflows
+from podusv_cli.config.loading import load, load_text
+from podusv_cli.logbook.folder import open_run
+
+CONFIGS = Path(__file__).parent.parent / "configs"
+PRESETS = ("printed", "printed_from_zero", "figures", "corrected")
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    root = tmp_path_factory.mktemp("runs")
+    request = {name: workflows.Request(out=root / name, figures=False) for name in PRESETS}
+    return {name: workflows.run(CONFIGS / f"paper/{name}.yaml", request[name]) for name in PRESETS}
+
+
+def test_figures_recovers_the_papers_peaks(runs):
+    metrics = runs["figures"].metrics
+    assert 300 <= metrics["peak_tau_u"] <= 320
+    assert 1050 <= metrics["peak_tau_r"] <= 1100
+    assert 0.5 <= metrics["z_e_steady"] <= 0.6
+
+
+def test_the_offset_of_figures_is_the_filters(runs):
+    """A gain B/(A + |alpha|) below 1 leaves k_ze z_e undelivered."""
+    log = open_run(runs["figures"].folder).recording
+    steady = log["time"] >= 248
+    alpha, beta = log["alpha_u"][steady], log["beta_u"][steady]
+    assert np.mean(beta) == pytest.approx(np.mean(5.0 * alpha / (5.0 + alpha)), rel=1e-3)
+    assert np.mean(alpha - beta) == pytest.approx(
+        0.1 * runs["figures"].metrics["z_e_steady"], rel=0.05
+    )
+
+
+def test_corrected_holds_its_standoff_within_its_limits(runs):
+    log = open_run(runs["corrected"].folder).recording
+    assert np.abs(log["tau_u"]).max() <= 8.0
+    assert np.abs(log["tau_r"]).max() <= 2.5
+    assert np.abs(log["z_e"][log["time"] >= 248] - 0.5).max() < 0.05
+
+
+def test_printed_orbits_and_never_tracks(runs):
+    log = open_run(runs["printed"].folder).recording
+    z_e = log["z_e"][log["time"] >= 155]
+    assert runs["printed"].status == "finished"
+    assert 1.3 < z_e.min() < z_e.max() < 2.7
+    bearing = np.unwrap(log["psi_d"][log["time"] >= 155])
+    assert abs(bearing[-1] - bearing[0]) > 2 * np.pi
+
+
+def test_printed_from_zero_diverges_at_once_and_is_kept(runs):
+    done = runs["printed_from_zero"]
+    assert done.status == "diverged"
+    assert done.message.startswith("diverged at t = 0.09 s: ")
+    log = open_run(done.folder).recording
+    assert len(log["time"]) == 9
+    assert all(np.isfinite(log[name]).all() for name in ("x", "u", "tau_u_cmd", "W_hat_u"))
+
+
+def test_the_printed_bound_does_not_recover_the_peaks(tmp_path):
+    adaptive = ("controller.B_u=adaptive", "controller.B_r=adaptive", "simulation.duration=1")
+    request = workflows.Request(adaptive, tmp_path / "run", figures=False)
+    assert workflows.run(CONFIGS / "paper/figures.yaml", request).status == "diverged"
+
+
+@pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4"])
+def test_the_log_opens_in_xarray_with_units(runs, engine):
+    with xr.open_dataset(runs["corrected"].folder / "log.h5", engine=engine) as log:
+        assert log.sizes["time"] == 31001
+        assert log.z_e.attrs["units"] == "m"
+        assert log.W_hat_u.dims == ("time", "node")
+        assert float(log.z_e[-1]) == pytest.approx(0.5, abs=0.05)
+
+
+def test_the_same_scenario_gives_the_same_bytes(runs, tmp_path):
+    request = workflows.Request(out=tmp_path / "again", figures=False)
+    again = workflows.run(CONFIGS / "paper/corrected.yaml", request)
+    first, second = (d.folder / "log.h5" for d in (runs["corrected"], again))
+    assert first.read_bytes() == second.read_bytes()
+
+
+def test_a_resolved_scenario_runs_again_to_the_same_log(runs, tmp_path):
+    resolved = runs["figures"].folder / "resolved.yaml"
+    again = workflows.run(resolved, workflows.Request(out=tmp_path / "again", figures=False))
+    assert (again.folder / "log.h5").read_bytes() == (
+        runs["figures"].folder / "log.h5"
+    ).read_bytes()
+
+
+def test_a_thinned_log_is_every_nth_row_and_changes_no_metric(runs, tmp_path):
+    request = workflows.Request(("log.every=100",), tmp_path / "thin", figures=False)
+    thin = workflows.run(CONFIGS / "paper/corrected.yaml", request)
+    full, every = (open_run(d.folder).recording for d in (runs["corrected"], thin))
+    assert np.array_equal(every["z_e"], full["z_e"][::100])
+    timed = {"law_ns", "law_ns_low", "law_ns_high"}
+    assert {k: v for k, v in thin.metrics.items() if k not in timed} == {
+        k: v for k, v in runs["corrected"].metrics.items() if k not in timed
+    }
+
+
+def test_a_run_folder_has_what_is_promised(runs):
+    folder = runs["corrected"].folder
+    promised = {
+        "scenario.yaml", "resolved.yaml", "log.h5", "metrics.json", "metrics.csv",
+        "provenance.json", "manifest.json",
+    }  # fmt: skip
+    assert promised <= {path.name for path in folder.iterdir()}
+    assert (folder / "scenario.yaml").read_text() == (CONFIGS / "paper/corrected.yaml").read_text()
+    metrics = json.loads((folder / "metrics.json").read_text())
+    assert metrics["status"] == "finished"
+    assert metrics["metrics"]["iae"] == runs["corrected"].metrics["iae"]
+
+
+@pytest.mark.parametrize("path", sorted(CONFIGS.rglob("*.yaml")), ids=lambda path: path.stem)
+def test_every_config_says_what_it_is_for_and_is_sound(path):
+    first, second, *_ = path.read_text().splitlines()
+    assert first.startswith("# ")
+    prefix = "# yaml-language-server: $schema="
+    assert second.startswith(prefix)
+    assert (path.parent / second.removeprefix(prefix)).resolve().name == "schema.json"
+    if "not meant to be run" not in first:
+        scenario = load(path).scenario
+        assert scenario.description
+        assert load_text(path.read_text(), str(path)).scenario == scenario
