@@ -18,17 +18,21 @@ def explain(
         typer.Argument(
             metavar="KEY",
             help="A section (controller), a kind (controller.pid), a key (controller.k_ze or k_ze) "
-            "or a signal (z_e).",
+            "a signal (z_e) or a metric (iae).",
             show_default=False,
         ),
     ] = None,
 ) -> None:
-    """Explain keys, kinds and signals in words.
+    """Explain keys, kinds, signals and metrics in words.
 
     Without a key: the sections of a scenario.
     """
     from podusv_cli.config.explain import explain as rows
+    from podusv_cli.metrics.table import METRICS
 
+    if key in METRICS:
+        echo_entry(key, METRICS[key].meaning, facts=f"metric [{METRICS[key].unit}]")
+        return
     for row in rows(key):
         _echo(row)
 
