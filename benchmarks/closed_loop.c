@@ -356,7 +356,7 @@ static double march(Law law, const Network *net, int steps, int log_every, doubl
 
 static double at(int count, int i, double low, double high)
 {
-    return count > 1 ? low + (high - low) * i / (count - 1) : low;
+    return count > 1 ? low + (high - low) * i / (count - 1) : (low + high) / 2.0;
 }
 
 static void make_grid(Network *net, int n_u, int n_v, int n_r)

@@ -149,15 +149,19 @@ def write(writer: RunWriter, result: Result) -> None:
 
 def draw_all(writer: RunWriter, result: Result, title: str, provenance: Mapping[str, Any]) -> None:
     """Shared figures in every format, and the report."""
-    from podusv_cli.figures.drawing import FIGURES, draw, dressed  # matplotlib is slow to import
+    # matplotlib is slow to import
+    from podusv_cli.figures.drawing import FIGURES, draw_in_parallel, dressed
+    from podusv_cli.figures.style import FORMATS
 
     shown = dressed([(e.label, e.recording, e.scenario) for e in result.entries])
-    pictures = []
-    for name, content in draw(shown, FIGURES, ("png", "pdf", "svg")):
+    drawn = dict(draw_in_parallel(shown, FIGURES, FORMATS))
+    for name, content in drawn.items():
         writer.add(f"figures/{name}", content)
-        if name.endswith(".svg"):
-            figure = name.removesuffix(".svg")
-            pictures.append((figure, FIGURES[figure].caption, content))
+    pictures = [
+        (name, sheet.caption, drawn[f"{name}.svg"])
+        for name, sheet in FIGURES.items()
+        if f"{name}.svg" in drawn
+    ]
     first = result.entries[0].scenario
     story = report.Story(
         title=title, scenario=first,

@@ -143,7 +143,7 @@ def plot(runs: Sequence[Path], drawing: Drawing) -> list[Path]:
     Raises UsageError for a figure or format that there is not, and StorageError.
     """
     from podusv_cli.figures.animation import animate  # matplotlib is slow to import
-    from podusv_cli.figures.drawing import FIGURES, draw, dressed
+    from podusv_cli.figures.drawing import FIGURES, draw_in_parallel, dressed
     from podusv_cli.figures.style import FORMATS
 
     _all_known("figure", drawing.figures, FIGURES)
@@ -151,7 +151,7 @@ def plot(runs: Sequence[Path], drawing: Drawing) -> list[Path]:
     parts = comparing.distinct(part for path in runs for part in comparing.from_folder(path))
     shown = dressed([(p.label, p.run.recording, p.scenario) for p in parts if p.run])
     names = drawing.figures or tuple(FIGURES)
-    drawn = list(draw(shown, names, drawing.formats, drawing.columns))
+    drawn = list(draw_in_parallel(shown, names, drawing.formats, drawing.columns))
     if drawing.animate:
         drawn.append(("animation.gif", animate(shown)))
     atomic.make_folder(drawing.out)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from podusv_cli.config.scenario import Scenario
 from podusv_cli.figures.controls import controls
 from podusv_cli.figures.panels import Family, signals_over_time
 from podusv_cli.figures.style import LOOKS, Shown, house_style, image
 from podusv_cli.figures.trajectory import trajectory
+from podusv_cli.parallel import run_all
 from podusv_cli.recording import Recording
 
 
@@ -81,3 +83,18 @@ def draw(
             figure = FIGURES[name].family(runs, columns)
             for form in formats:
                 yield f"{name}.{form}", image(figure, form)
+
+
+def draw_in_parallel(
+    runs: Sequence[Shown], names: Iterable[str], formats: Sequence[str], columns: int = 2
+) -> Iterator[tuple[str, bytes]]:
+    """The same as `draw`, each figure in a process of its own; raises RuntimeError if one fails."""
+
+    def job(name: str, progress: Callable[[float], None]) -> list[tuple[str, bytes]]:
+        return list(draw(runs, [name], formats, columns))
+
+    names = tuple(names)
+    for name, outcome in zip(names, run_all([partial(job, name) for name in names]), strict=True):
+        if outcome.failure:
+            raise RuntimeError(f"drawing {name} failed: {outcome.failure}")
+        yield from outcome.result
