@@ -52,15 +52,10 @@ def run(program: Path, case: Case, *, repeats: int = 1, steps: int | None = None
     """Run a program on a case, `repeats` times over; see closed_loop.c for its arguments."""
     steps = grid().steps if steps is None else steps
     command = [str(program), case.law, str(repeats), "1", str(steps)]
-    network, centers = NETWORKS.get(case.network or "27 grid"), ""
-    if network is None:
-        raise KeyError(case.network)
-    widths = [repr(float(width)) for width in network.width_array()]
-    if network.centers:
-        centers = "\n".join(" ".join(map(repr, center)) for center in network.centers)
-        command += ["list", *widths]
-    else:
-        command += ["grid", *map(str, network.nodes), *widths]
+    network = NETWORKS[case.network or "27 grid"]  # a law without one does not look at it
+    centers = "\n".join(" ".join(map(repr, center)) for center in network.centers)
+    command += ["list"] if centers else ["grid", *map(str, network.nodes)]
+    command += [repr(float(width)) for width in network.width_array()]
     done = subprocess.run(command, check=True, capture_output=True, text=True, input=centers)
     seconds, iae, *state = map(float, done.stdout.split())
     return Outcome(iae, np.array(state), seconds)
