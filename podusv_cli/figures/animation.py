@@ -12,7 +12,7 @@ from matplotlib.patches import Polygon
 from PIL import Image
 
 from podusv_cli.figures.style import TARGET_LOOK, Shown, house_style
-from podusv_cli.figures.trajectory import enlargement, hull
+from podusv_cli.figures.trajectory import bounds, enlargement, hull
 
 FRAMES = 120
 FRAME_MS = 80
@@ -52,10 +52,9 @@ def _stage(figure: Figure, runs: Sequence[Shown]) -> Callable[[float], None]:
     hulls = [Polygon(np.zeros((5, 2)), color=run.color) for run in runs]
     for outline in hulls:
         axes.add_patch(outline)
-    every = [run.recording[name] for run in runs for name in ("x", "y", "x_d", "y_d")]
-    north, east = np.concatenate(every[0::2]), np.concatenate(every[1::2])
-    axes.set_xlim(east.min() - 3, east.max() + 3)
-    axes.set_ylim(north.min() - 3, north.max() + 3)
+    east, north = bounds(runs)
+    axes.set_xlim(*east)
+    axes.set_ylim(*north)
     axes.set_aspect("equal", adjustable="box")
     axes.set_xlabel("$y$ [m], east")
     axes.set_ylabel("$x$ [m], north")

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from podusv_cli.figures.style import Shown, axis_label, draw_signal, new_figure
+from podusv_cli.figures.style import Shown, axis_label, draw_signal, frame_finished, new_figure
 
 EARLY = 0.005  # of the run: where the peaks are
 TALL = 20.0  # a peak this many times the settled inputs gets a logarithmic axis
@@ -32,6 +32,7 @@ def _panel(
             )
         draw_signal(axes, shown, applied, between=span)
     axes.set_xlim(*span)
+    frame_finished(axes, runs)
 
 
 def _compress(early: Axes, settled: Axes) -> None:

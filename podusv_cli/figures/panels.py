@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection, Sequence
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from podusv_cli.figures.style import Shown, axis_label, draw_signal, new_figure
+from podusv_cli.figures.style import Shown, axis_label, draw_signal, frame_finished, new_figure
 
 PANEL_HEIGHT = 1.35  # inches
 
@@ -27,6 +27,7 @@ def signals_over_time(*names: str, logarithmic: Collection[str] = ()) -> Family:
             _panel(axes, runs, name)
             if name in logarithmic:
                 axes.set_yscale("log")
+            frame_finished(axes, runs)
         _finish(figure, panels.tolist(), len(shown), columns)
         return figure
 

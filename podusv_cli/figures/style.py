@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import pairwise
@@ -83,6 +83,11 @@ class Shown:
         """Keyword arguments of `Axes.plot`."""
         return {"color": self.color, "linestyle": self.linestyle, "label": self.label}
 
+    @property
+    def whole(self) -> bool:
+        """Whether the run reached its end."""
+        return self.recording.status == "finished"
+
     def has(self, name: str) -> bool:
         """Whether the run has the signal, logged or derivable."""
         return all(part in self.recording for part in DERIVED.get(name, Derived((name,))).needs)
@@ -142,6 +147,23 @@ def draw_signal(
         inside = (t >= between[0]) & (t <= between[1])
         t, y = t[inside], y[inside]
     axes.plot(*thinned(t, y), **{**shown.look, **look})
+
+
+def frame_finished(axes: Axes, runs: Sequence[Shown]) -> None:
+    """Where only some runs finished, fit the vertical axis to those.
+
+    A run that diverges leaves every scale; drawn to fit, it would hide all others.
+    """
+    labels = {run.label for run in runs if run.whole}
+    values = [np.asarray(line.get_ydata()) for line in axes.lines if line.get_label() in labels]
+    if not values or len(labels) == len(runs):
+        return
+    low, high = float(np.min(np.concatenate(values))), float(np.max(np.concatenate(values)))
+    if axes.get_yscale() == "log":
+        axes.set_ylim(low / 1.5, high * 1.5)
+    else:
+        margin = 0.05 * (high - low) or 1.0
+        axes.set_ylim(low - margin, high + margin)
 
 
 def image(figure: Figure, form: str) -> bytes:
