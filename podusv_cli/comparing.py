@@ -18,7 +18,8 @@ from podusv_cli.config.loading import load_text
 from podusv_cli.config.scenario import Claim, Scenario
 from podusv_cli.logbook.folder import Run, RunWriter, open_run
 from podusv_cli.metrics.cost import law_costs
-from podusv_cli.parallel import Outcome, run_all
+from podusv_cli.parallel import INTERRUPTED, Outcome, run_all
+from podusv_cli.recording import Status
 from podusv_cli.running import Finished, Task, execute, warm_up
 
 
@@ -42,6 +43,12 @@ class Result:
     table: pd.DataFrame
     verdicts: Sequence[claims.Verdict]
     timings: Mapping[str, Mapping[str, float]]
+
+    @property
+    def status(self) -> Status:
+        """Interrupted when a run was, else finished, whatever became of the runs."""
+        cut = any(entry.recording.status == "interrupted" for entry in self.entries)
+        return "interrupted" if cut or INTERRUPTED in self.endings.values() else "finished"
 
 
 def from_folder(path: Path) -> list[Part]:

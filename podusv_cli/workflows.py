@@ -96,10 +96,10 @@ def compare(
         result = comparing.collect(parts, outcomes, stated)
         origin = provenance.collect(argv, started, datetime.now(UTC))
         comparing.write(writer, result)
-        if request.figures and result.entries:
+        if request.figures and result.entries and result.status == "finished":
             comparing.draw_all(writer, result, title, origin)
         writer.add_json("provenance.json", origin)
-        final = writer.finish("finished")
+        final = writer.finish(result.status)
     return Compared(final, result)
 
 

@@ -71,6 +71,20 @@ def test_a_killed_worker_is_replaced_once(tmp_path):
     assert "2 times" in outcomes[2].failure
 
 
+def test_interrupted_jobs_bring_home_what_they_have():
+    def interrupt(position, done):
+        raise KeyboardInterrupt
+
+    def salvage(progress):
+        try:
+            progress(0.1)
+            time.sleep(60)
+        except KeyboardInterrupt:
+            return "half of it"
+
+    assert run_all([salvage], interrupt, workers=1)[0].result == "half of it"
+
+
 def test_an_interrupted_caller_leaves_no_process(tmp_path):
     started = []
 
@@ -83,9 +97,9 @@ def test_an_interrupted_caller_leaves_no_process(tmp_path):
         time.sleep(60)
 
     began = time.monotonic()
-    with pytest.raises(KeyboardInterrupt):
-        run_all([linger, linger], interrupt, workers=2)
+    outcomes = run_all([linger, linger, linger], interrupt, workers=2)
     assert time.monotonic() - began < 5
+    assert [outcome.failure for outcome in outcomes] == ["interrupted"] * 3
     started = [int(path.name) for path in tmp_path.iterdir()]
     assert started
     for process in started:

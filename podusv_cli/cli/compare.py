@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from podusv_cli.cli.guard import INTERRUPTED
 from podusv_cli.cli.options import AsJson, Assignments, Figures, Force, Out, Quiet, Verbose
 
 if TYPE_CHECKING:
@@ -47,6 +48,8 @@ def compare(
         typer.echo(done.folder)
     else:
         _report(done, verbose)
+    if done.result.status == "interrupted":
+        raise typer.Exit(INTERRUPTED)
     raise typer.Exit(SOME_FAILED if any(done.result.endings.values()) else 0)
 
 

@@ -29,6 +29,7 @@ from numba.extending import intrinsic
 from podusv_cli import kernels
 from podusv_cli.engine import signatures
 from podusv_cli.engine.closed_loop import Plan, Wires, advance, evaluate_all
+from podusv_cli.interrupts import interrupts_held
 
 config: Any = numba_config  # its settings are made at run time
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": False}
@@ -149,7 +150,8 @@ def _labelled(function: Any, mark: str) -> Any:
 
 def _stored(signature: Any, function: Any) -> Any:
     folder = cache_folder()
-    with _caching_in(folder):
+    # An interrupt inside the compiler would be swallowed there, so it waits for a second or two.
+    with _caching_in(folder), interrupts_held():
         return njit(signature, cache=folder is not None, **OPTIONS)(function)
 
 
