@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 Vector = npt.NDArray[np.float64]
+LANES = 8  # numbers in the widest vector register; loops over whole registers are fastest
 Function = TypeVar("Function", bound=Callable[..., object])
 
 
@@ -42,6 +43,12 @@ def tail(vector: Vector, start: int) -> Vector:
 def address(vector: Vector) -> Vector:
     """`vector` as kernels take it: itself here, a bare pointer in compiled code."""
     return vector
+
+
+@kernel
+def scratch(count: int) -> Vector:
+    """Room for `count` numbers, a constant, while the kernel runs; on the stack where compiled."""
+    return np.empty(count)
 
 
 def with_globals(function: Any, name: str, **replaced: Any) -> Any:
@@ -70,6 +77,11 @@ def constants_type(names: tuple[str, ...]) -> type[Any]:
 def bundle(constants: Mapping[str, float]) -> Any:
     """Constants as kernels take them: `k.m11` instead of `constants["m11"]`."""
     return constants_type(tuple(constants))(**constants)
+
+
+def whole_lanes(count: int) -> int:
+    """`count` rounded up to whole vector registers."""
+    return -(-count // LANES) * LANES
 
 
 def unpacker(names: tuple[str, ...]) -> Callable[[Vector], Any]:

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from podusv_cli.elementary import cos_sin
 from podusv_cli.kernels import Vector, kernel
 
 
@@ -20,8 +21,7 @@ def wrap(angle: float) -> float:
 @kernel
 def earth_velocity(x: Vector, rate: Vector) -> None:
     """Rates of (x, y, psi) from the state (x, y, psi, u, v, r); paper (3)."""
-    cos_psi = math.cos(x[2])
-    sin_psi = math.sin(x[2])
+    cos_psi, sin_psi = cos_sin(x[2])
     rate[0] = x[3] * cos_psi - x[4] * sin_psi
     rate[1] = x[3] * sin_psi + x[4] * cos_psi
     rate[2] = x[5]

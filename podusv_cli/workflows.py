@@ -6,9 +6,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from podusv_cli import comparing
 from podusv_cli.comparison.claims import misfits
 from podusv_cli.comparison.entries import Entry
 from podusv_cli.config.loading import load, resolved_yaml
@@ -17,6 +16,9 @@ from podusv_cli.config.words import unknown
 from podusv_cli.errors import UsageError
 from podusv_cli.logbook import atomic, folder, provenance
 from podusv_cli.running import Finished, Progress, Stopwatch, Task, execute
+
+if TYPE_CHECKING:
+    from podusv_cli import comparing
 
 RESULTS = Path("results")
 
@@ -53,6 +55,8 @@ class Compared:
 
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints of a comparison."""
+        from podusv_cli import comparing
+
         result = self.result
         return {
             "format": 1,
@@ -85,6 +89,8 @@ def compare(
     Each item is a scenario (all its `controllers`, or its one controller), a run folder or the
     folder of a comparison. Claims are those of the scenarios. Raises ScenarioError, StorageError.
     """
+    from podusv_cli import comparing  # pandas is slow to import
+
     started, argv = datetime.now(UTC), list(request.argv)
     parts, stated, title = _parts(items, request)
     text = "".join(f"{part.label}\n{resolved_yaml(part.scenario)}" for part in parts)
@@ -107,6 +113,8 @@ def _parts(
     items: Sequence[Path], request: Request
 ) -> tuple[list[comparing.Part], dict[str, Claim], str]:
     """What is to be compared, the claims about it, and a name for it all."""
+    from podusv_cli import comparing
+
     parts: list[comparing.Part] = []
     stated: dict[str, Claim] = {}
     names = []
@@ -142,7 +150,9 @@ def plot(runs: Sequence[Path], drawing: Drawing) -> list[Path]:
 
     Raises UsageError for a figure or format that there is not, and StorageError.
     """
-    from podusv_cli.figures.animation import animate  # matplotlib is slow to import
+    # pandas and matplotlib are slow to import
+    from podusv_cli import comparing
+    from podusv_cli.figures.animation import animate
     from podusv_cli.figures.drawing import FIGURES, draw_in_parallel, dressed
     from podusv_cli.figures.style import FORMATS
 

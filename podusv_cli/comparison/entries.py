@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from podusv_cli.config.scenario import Scenario
-from podusv_cli.figures.style import DERIVED
+from podusv_cli.derived import DERIVED
 from podusv_cli.kernels import Vector
 from podusv_cli.logbook.folder import Run
 from podusv_cli.recording import Recording

@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import model_validator
 
-from podusv_cli.kernels import Vector, kernel, tail
+from podusv_cli.elementary import exponential
+from podusv_cli.kernels import Vector, kernel, tail, whole_lanes
 from podusv_cli.registry import Component, value
 
 MOST_NODES = 10_000
@@ -85,67 +86,66 @@ class Network(Component):
             return np.asarray(self.widths, dtype=float)
         return np.array([self.spread * (axis[1] - axis[0]) for axis in self.axes()])
 
+    @property
+    def factors(self) -> tuple[int, int]:
+        """How many factors every node is a product of two of: along u, and in the plane (v, r).
+
+        A list is a plane whose factors depend on u as well, and a single factor 1.
+        """
+        n_u, n_v, n_r = self.nodes
+        return (1, len(self.centers)) if self.centers else (n_u, n_v * n_r)
+
+    @property
+    def bells(self) -> int:
+        """How many Gaussians are evaluated: all factors, filled up to whole vector registers."""
+        return whole_lanes(sum(self.factors))
+
     def constants(self) -> dict[str, float]:
-        """Node counts (grid counts are 0 for listed centres) and exponents 1/(2 width^2)."""
-        n_u, n_v, n_r = (0, 0, 0) if self.centers else self.nodes
-        e_u, e_v, e_r = 1.0 / (2.0 * self.width_array() ** 2)
-        counts = {
-            "count": float(self.count),
-            "n_u": float(n_u),
-            "n_v": float(n_v),
-            "n_r": float(n_r),
+        """Numbers of nodes, Gaussians and factors, and the initial weight."""
+        along, plane = self.factors
+        counts = {"count": self.count, "bells": self.bells, "along": along, "plane": plane}
+        return {name: float(n) for name, n in counts.items()} | {
+            "initial_weight": self.initial_weight
         }
-        exponents = {"e_u": float(e_u), "e_v": float(e_v), "e_r": float(e_r)}
-        return counts | exponents | {"initial_weight": self.initial_weight}
 
     def table(self) -> Vector:
-        """Coordinates of the grid's axes one after another, or the listed centres row by row."""
-        if self.centers:
-            return self.center_array().ravel()
-        return np.concatenate(self.axes())
+        """Centre, then exponents 1/(2 width^2), along u, v, r of every Gaussian: six rows.
+
+        Those in the plane come first. One that does not depend on a velocity has no exponent there.
+        """
+        along, plane = self.factors
+        centers, exponents = rows = np.zeros((2, 3, self.bells))
+        centers[:, :plane] = self.center_array()[:plane].T
+        exponents[:, :plane] = 1.0 / (2.0 * self.width_array()[:, None] ** 2)
+        if not self.centers:
+            line = slice(plane, plane + along)
+            centers[0, line], exponents[0, line] = self.axes()[0], exponents[0, 0]
+            exponents[0, :plane] = 0.0
+        return rows.ravel()
 
 
 @kernel
-def _bells(at: float, exponent: float, count: int, centers: Vector, out: Vector) -> None:
+def _evaluate(x: Vector, count: int, table: Vector, out: Vector) -> None:
+    u, v, r = x[3], x[4], x[5]
+    c_u, c_v, c_r = table, tail(table, count), tail(table, 2 * count)
+    e_u, e_v, e_r = tail(table, 3 * count), tail(table, 4 * count), tail(table, 5 * count)
     for i in range(count):
-        out[i] = math.exp(-exponent * (at - centers[i]) * (at - centers[i]))
-
-
-@kernel
-def _on_grid(
-    u: float, v: float, r: float, k: Any, table: Vector, phi: Vector, work: Vector
-) -> None:
-    # The Gaussian of a grid node is the product of three one-dimensional ones: n_u + n_v + n_r
-    # exponentials instead of their product.
-    n_u, n_v, n_r = int(k.network_n_u), int(k.network_n_v), int(k.network_n_r)
-    _bells(u, k.network_e_u, n_u, table, work)
-    _bells(v, k.network_e_v, n_v, tail(table, n_u), tail(work, n_u))
-    _bells(r, k.network_e_r, n_r, tail(table, n_u + n_v), tail(work, n_u + n_v))
-    node = 0
-    for i in range(n_u):
-        for j in range(n_u, n_u + n_v):
-            g = work[i] * work[j]
-            for m in range(n_u + n_v, n_u + n_v + n_r):
-                phi[node] = g * work[m]
-                node += 1
-
-
-@kernel
-def _on_list(u: float, v: float, r: float, k: Any, table: Vector, phi: Vector) -> None:
-    for i in range(int(k.network_count)):
-        du, dv, dr = u - table[3 * i], v - table[3 * i + 1], r - table[3 * i + 2]
-        phi[i] = math.exp(
-            -k.network_e_u * du * du - k.network_e_v * dv * dv - k.network_e_r * dr * dr
-        )
+        du, dv, dr = u - c_u[i], v - c_v[i], r - c_r[i]
+        out[i] = exponential(-e_u[i] * du * du - e_v[i] * dv * dv - e_r[i] * dr * dr)
 
 
 @kernel
 def activate(x: Vector, k: Any, table: Vector, phi: Vector, work: Vector) -> None:
-    """Node outputs (14) at Z = (u, v, r) into `phi`; `work` holds the axes' exponentials."""
-    if k.network_n_u > 0.0:
-        _on_grid(x[3], x[4], x[5], k, table, phi, work)
-    else:
-        _on_list(x[3], x[4], x[5], k, table, phi)
+    """Node outputs (14) at Z = (u, v, r) into `phi`; `work` holds the factors.
+
+    On a grid a node's Gaussian is the product of one of u and one of (v, r): so many exponentials
+    less.
+    """
+    along, plane = int(k.network_along), int(k.network_plane)
+    _evaluate(x, int(k.network_bells), table, work)
+    for i in range(along):
+        for j in range(plane):
+            phi[i * plane + j] = work[plane + i] * work[j]
 
 
 @kernel

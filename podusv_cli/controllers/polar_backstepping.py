@@ -6,7 +6,6 @@ model, by a first-order filter (DSC), or in full.
 
 from __future__ import annotations
 
-import math
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -66,7 +65,7 @@ def polar_backstepping(
     u_e = x[3] - beta_u
     tau[0] = (
         -k.k_ue * u_e - k.m11 * f_hat_u - memory[B_HAT_U] * lemma(u_e, k)
-        + k.m11 * beta_u_dot + s * e.z_e * math.cos(e.psi_e)
+        + k.m11 * beta_u_dot + s * e.z_e * e.cos_e
     )  # fmt: skip
     beta_r, beta_r_dot = yaw(e, x, target, tail(memory, filtered), tail(rate, filtered), k, tau[0])
     r_e = x[5] - beta_r
@@ -123,8 +122,8 @@ class PolarBackstepping(TrackingController):
         return HELD + bounds + (("W_hat_u", count), ("W_hat_r", count))
 
     def workspace(self) -> int:
-        """The nodes' outputs and the exponentials of the grid's axes."""
-        return self.network.count + sum(self.network.nodes)
+        """The nodes' outputs and their factors."""
+        return self.network.count + self.network.bells
 
     def table(self) -> Vector:
         """The network's centres."""

@@ -11,6 +11,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from podusv_cli.controllers.base import Controller
+from podusv_cli.elementary import cos_sin
 from podusv_cli.kernels import Vector, kernel
 from podusv_cli.kinematics import wrap
 from podusv_cli.registry import value
@@ -30,48 +31,44 @@ class Tracking(NamedTuple):
     z_e: float  # distance to the target less the standoff; negative while folded
     distance: float  # (18)
     psi_d: float  # direction of the target (19), before folding
+    cos_d: float
+    sin_d: float
     psi_e: float  # heading error, after folding
+    cos_e: float
+    sin_e: float
     half_turn: float  # what folding added to psi_e: -pi, 0 or pi
+    side: float  # -1 where folding turned the line of sight as well, else 1
     w: float  # rate of psi_d as the law uses it
+    exact_w: float  # rate of psi_d from the velocities; 0 while psi_d is held
     P: float  # target's velocity along psi_d, after folding
     Q: float  # target's velocity across psi_d, after folding
     alpha_u: float  # (21)
     alpha_r: float  # (30)
 
 
-@kernel
-def bearing(x: Vector, memory: Vector, target: Vector, k: Any) -> tuple[float, float, bool]:
-    """Distance [m] and direction [rad] of the target, and whether the direction is held.
+class Bearing(NamedTuple):
+    """Where the target lies: distance [m], direction [rad], and whether the direction is held."""
 
-    (18), (19); the direction is held where the distance is not above `hold_below`, which with 0 is
-    the paper's rule for z_e = 0.
+    distance: float
+    psi_d: float
+    cos_d: float
+    sin_d: float
+    held: bool
+
+
+@kernel
+def bearing(x: Vector, memory: Vector, target: Vector, k: Any) -> Bearing:
+    """(18), (19); the direction is held where the distance is not above `hold_below`.
+
+    With `hold_below` 0 this is the paper's rule for z_e = 0.
     """
     x_e = target[0] - x[0]
     y_e = target[1] - x[1]
     distance = math.sqrt(x_e * x_e + y_e * y_e)
     if distance <= k.hold_below:
-        return distance, memory[PSI_D_HELD], True
-    return distance, math.atan2(y_e, x_e), False
-
-
-@kernel
-def exact_rate(distance: float, psi_d: float, x: Vector, target: Vector) -> float:
-    """Rate of the target's direction [rad/s] from the velocities across the line of sight."""
-    psi_e = psi_d - x[2]
-    Q = -target[2] * math.sin(psi_d) + target[3] * math.cos(psi_d)
-    return float((Q + x[3] * math.sin(psi_e) - x[4] * math.cos(psi_e)) / distance)
-
-
-@kernel
-def bearing_rate(
-    distance: float, psi_d: float, held: bool, x: Vector, memory: Vector, target: Vector, k: Any
-) -> float:
-    """Rate of psi_d [rad/s]: zero while held, else the difference of Remark 5 or the exact rate."""
-    if held:
-        return 0.0
-    if k.rate == DIFFERENCE:
-        return float(memory[PSI_D_RATE_HELD])
-    return exact_rate(distance, psi_d, x, target)
+        psi_d = memory[PSI_D_HELD]
+        return Bearing(distance, psi_d, math.cos(psi_d), math.sin(psi_d), True)
+    return Bearing(distance, math.atan2(y_e, x_e), x_e / distance, y_e / distance, False)
 
 
 @kernel
@@ -85,26 +82,35 @@ def fold(psi_e: float, k: Any) -> float:
 @kernel
 def track(x: Vector, memory: Vector, target: Vector, k: Any) -> Tracking:
     """Errors (18), (19) and virtual controls (21), (30) in the reading that `k` asks for."""
-    distance, psi_d, held = bearing(x, memory, target, k)
-    w = bearing_rate(distance, psi_d, held, x, memory, target, k)
+    u, v = x[3], x[4]
+    distance, psi_d, cos_d, sin_d, held = bearing(x, memory, target, k)
+    cos_psi, sin_psi = cos_sin(x[2])
     psi_e = wrap(psi_d - x[2])
-    half_turn = fold(psi_e, k)
-    psi_e += half_turn
+    cos_e, sin_e = cos_d * cos_psi + sin_d * sin_psi, sin_d * cos_psi - cos_d * sin_psi
+    P, Q = target[2] * cos_d + target[3] * sin_d, target[3] * cos_d - target[2] * sin_d
+    # The rate of psi_d is zero while held, else Remark 5's difference or the exact rate.
+    exact_w = 0.0 if held else (Q + u * sin_e - v * cos_e) / distance
+    w = memory[PSI_D_RATE_HELD] if k.rate == DIFFERENCE and not held else exact_w
+
     # Folding jointly turns the line of sight round with the error: P, Q and the distance change
     # sign and the vessel backs towards the target. As printed only psi_e is folded.
-    side = -1.0 if k.fold == JOINT and half_turn != 0.0 else 1.0
-    z_e = side * (distance - k.standoff)
-    P = side * (target[2] * math.cos(psi_d) + target[3] * math.sin(psi_d))
-    Q = side * (-target[2] * math.sin(psi_d) + target[3] * math.cos(psi_d))
-    alpha_u = (k.k_ze * z_e + P - x[4] * math.sin(psi_e)) / math.cos(psi_e)
+    half_turn = fold(psi_e, k)
+    turn = 1.0 if half_turn == 0.0 else -1.0
+    side = turn if k.fold == JOINT else 1.0
+    psi_e, cos_e, sin_e = psi_e + half_turn, turn * cos_e, turn * sin_e
+    z_e, P, Q = side * (distance - k.standoff), side * P, side * Q
+    alpha_u = (k.k_ze * z_e + P - v * sin_e) / cos_e
     alpha_r = w + k.k_psie * psi_e
-    return Tracking(z_e, distance, psi_d, psi_e, half_turn, w, P, Q, alpha_u, alpha_r)
+    return Tracking(
+        z_e, distance, psi_d, cos_d, sin_d, psi_e, cos_e, sin_e, half_turn, side, w, exact_w,
+        P, Q, alpha_u, alpha_r,
+    )  # fmt: skip
 
 
 @kernel
 def hold(t: float, x: Vector, memory: Vector, target: Vector, k: Any) -> None:
     """Remember psi_d and form its wrapped backward difference (Remark 5), once a sample."""
-    _, psi_d, held = bearing(x, memory, target, k)
+    _, psi_d, _, _, held = bearing(x, memory, target, k)
     before = memory[PSI_D_HELD]
     if t == 0.0:
         before = 0.0 if k.first_difference == FROM_ZERO else psi_d

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, Literal
 
+import numpy as np
+
 from podusv_cli.disturbances.base import Disturbance
-from podusv_cli.kernels import Vector, kernel
+from podusv_cli.elementary import cos_sin
+from podusv_cli.kernels import LANES, Vector, kernel, scratch, whole_lanes
 from podusv_cli.registry import Component, value
 
 
@@ -35,13 +37,27 @@ class HarmonicDisturbance(Disturbance):
         Harmonic(mean=0.5, sin=0.1, sin_rate=0.1, cos=0.1, cos_rate=0.2), "N m", "yaw moment"
     )
 
+    def constants(self) -> dict[str, float]:
+        """The fields' numbers, and the length of the table's rows."""
+        return super().constants() | {"waves": float(whole_lanes(6))}
+
+    def table(self) -> Vector:
+        """Rates of the sines and the cosines, their cosines, their sines: three rows."""
+        axes = (self.b_u, self.b_v, self.b_r)
+        rates, cosines, sines = rows = np.zeros((3, whole_lanes(6)))
+        rates[:6] = [axis.sin_rate for axis in axes] + [axis.cos_rate for axis in axes]
+        cosines[3:6] = [axis.cos for axis in axes]
+        sines[:3] = [axis.sin for axis in axes]
+        return rows.ravel()
+
     @staticmethod
     @kernel
     def evaluate(t: float, x: Vector, k: Any, table: Vector, b: Vector) -> None:
         """Equation (52), scaled."""
-        surge = k.b_u_sin * math.sin(k.b_u_sin_rate * t) + k.b_u_cos * math.cos(k.b_u_cos_rate * t)
-        sway = k.b_v_sin * math.sin(k.b_v_sin_rate * t) + k.b_v_cos * math.cos(k.b_v_cos_rate * t)
-        yaw = k.b_r_sin * math.sin(k.b_r_sin_rate * t) + k.b_r_cos * math.cos(k.b_r_cos_rate * t)
-        b[0] = k.scale * (k.b_u_mean + surge)
-        b[1] = k.scale * (k.b_v_mean + sway)
-        b[2] = k.scale * (k.b_r_mean + yaw)
+        waves, count = scratch(LANES), int(k.waves)
+        for i in range(count):
+            cosine, sine = cos_sin(table[i] * t)
+            waves[i] = table[count + i] * cosine + table[2 * count + i] * sine
+        b[0] = k.scale * (k.b_u_mean + waves[0] + waves[3])
+        b[1] = k.scale * (k.b_v_mean + waves[1] + waves[4])
+        b[2] = k.scale * (k.b_r_mean + waves[2] + waves[5])

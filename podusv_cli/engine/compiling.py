@@ -23,6 +23,7 @@ from types import CodeType
 from typing import Any
 
 from numba import njit, types
+from numba.core import cgutils
 from numba.core import config as numba_config
 from numba.extending import intrinsic
 
@@ -32,7 +33,8 @@ from podusv_cli.engine.closed_loop import Plan, Wires, advance, evaluate_all
 from podusv_cli.interrupts import interrupts_held
 
 config: Any = numba_config  # its settings are made at run time
-OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": False}
+# Kernels are merged into their caller: to hand on a law's constants costs as much as the law.
+OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": False, "forceinline": True}
 OWN = re.compile(r"[0-9a-f]{16}")
 KEPT = 8  # caches of this many states of the source stay on disk
 
@@ -75,6 +77,15 @@ def _address(typing: Any, array: Any) -> Any:
     return VECTOR(array), code
 
 
+@intrinsic(prefer_literal=True)
+def _scratch(typing: Any, count: Any) -> Any:
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        number = context.get_value_type(NUMBER)
+        return cgutils.alloca_once(builder, number, count.literal_value)  # type: ignore[no-untyped-call]
+
+    return VECTOR(count), code
+
+
 def ingredients(function: Any) -> Iterator[str]:
     """Everything that the machine code of a kernel depends on, the kernels it calls included."""
     code, seen = function.__code__, function.__globals__
@@ -99,13 +110,18 @@ def _named(function: Any) -> set[str]:
     return {i.argval for i in dis.get_instructions(function) if i.opname == "LOAD_GLOBAL"}
 
 
+PRIMITIVES = {
+    kernels.tail: _tail,
+    kernels.address: _address,
+    kernels.scratch: _scratch,
+}
+
+
 @cache
 def machine(function: Any) -> Any:
     """The kernel and all kernels it names, ready to be compiled into their caller."""
-    if function is kernels.tail:
-        return _tail
-    if function is kernels.address:
-        return _address
+    if function in PRIMITIVES:
+        return PRIMITIVES[function]
     seen = function.__globals__
     inner = {
         name: machine(seen[name]) for name in _named(function) if kernels.is_kernel(seen.get(name))

@@ -178,7 +178,7 @@ def _in_blocks(
             done, took = goal, time.perf_counter() - began
             if progress:
                 progress(done / end)
-            size = max(1, int(size * min(4.0, 0.7 * LONGEST_BLOCK / max(took, 1e-9))))
+            size = max(1, int(size * min(100.0, 0.7 * LONGEST_BLOCK / max(took, 1e-9))))
     except KeyboardInterrupt:
         return done, "interrupted"
     return done, "finished"
@@ -198,14 +198,15 @@ def _record(
     table = wires.log.reshape(grid.rows, -1)[:rows]
     labels = names(loop)
     vectors = {name for name in labels if name in SIGNALS and SIGNALS[name].axes}
-    signals: dict[str, Vector] = {}
-    for name in dict.fromkeys(labels):
-        columns = [i for i, label in enumerate(labels) if label == name]
-        part = table[:, columns[0] : columns[-1] + 1]
-        signals[name] = part if name in vectors else part[:, 0]
-    for hidden in TARGET[2:]:
-        del signals[hidden]
-    if "z_e" in signals:  # in sampled control the law's own goes back to its last sample
+    columns: dict[str, list[int]] = {}
+    for column, name in enumerate(labels):
+        columns.setdefault(name, []).append(column)
+    signals = {
+        name: table[:, at[0] : at[-1] + 1] if name in vectors else table[:, at[0]]
+        for name, at in columns.items()
+        if name not in TARGET[2:]
+    }
+    if grid.hold_every and "z_e" in signals:  # the law's own goes back to its last sample
         x_e, y_e = (signals[f"{axis}_d"] - signals[axis] for axis in "xy")
         signals["z_e"] = np.sqrt(x_e * x_e + y_e * y_e)
     message = ""

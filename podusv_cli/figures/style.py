@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import pairwise
@@ -16,6 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from podusv_cli.derived import DERIVED, Derived
 from podusv_cli.kernels import Vector
 from podusv_cli.recording import Recording
 from podusv_cli.signals import SIGNALS
@@ -37,29 +38,6 @@ NO_STAMP: dict[str, dict[str, Any]] = {
     "png": {"Software": None},
     "pdf": {"CreationDate": None, "Producer": None, "Creator": None},
     "svg": {"Date": None, "Creator": None},
-}
-
-
-@dataclass(frozen=True)
-class Derived:
-    """A signal computed from logged ones."""
-
-    needs: tuple[str, ...]
-    compute: Callable[[Recording], Vector] = lambda log: log["time"]
-
-
-def _activation(log: Recording) -> Vector:
-    nu = np.column_stack([log["u"], log["v"], log["r"]])
-    scaled = (nu[:, None, :] - log["rbf_center"]) / log["rbf_width"]
-    return np.asarray(np.exp(-0.5 * np.sum(scaled**2, axis=2)).max(axis=1))
-
-
-DERIVED: dict[str, Derived] = {
-    "x_e": Derived(("x_d", "x"), lambda log: log["x_d"] - log["x"]),
-    "y_e": Derived(("y_d", "y"), lambda log: log["y_d"] - log["y"]),
-    "W_norm_u": Derived(("W_hat_u",), lambda log: np.linalg.norm(log["W_hat_u"], axis=1)),
-    "W_norm_r": Derived(("W_hat_r",), lambda log: np.linalg.norm(log["W_hat_r"], axis=1)),
-    "activation": Derived(("rbf_center", "rbf_width", "u"), _activation),
 }
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, Literal
 
+from podusv_cli.elementary import cos_sin
 from podusv_cli.kernels import Vector, kernel
 from podusv_cli.paths.base import Path
 from podusv_cli.registry import value
@@ -13,8 +13,7 @@ from podusv_cli.registry import value
 @kernel
 def on_circle(radius: float, angle: float, rate: float, target: Vector) -> None:
     """Target at `angle` [rad] of a circle about the origin, turning at constant `rate` [rad/s]."""
-    cos_angle = math.cos(angle)
-    sin_angle = math.sin(angle)
+    cos_angle, sin_angle = cos_sin(angle)
     target[0] = radius * cos_angle
     target[1] = radius * sin_angle
     target[2] = -radius * rate * sin_angle

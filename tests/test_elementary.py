@@ -1,0 +1,63 @@
+"""Exponential, cosine and sine: against the library's, and the same bits compiled or not."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from podusv_cli.elementary import cos_sin, exponential
+from podusv_cli.engine import compiling
+from podusv_cli.kernels import Vector
+
+EPSILON = np.finfo(float).eps
+
+
+def compiled(function: Any, numbers: Vector) -> Vector:
+    code = compiling.machine(function)
+    return np.array([code(x) for x in numbers])
+
+
+@given(x=st.floats(-708, 0))
+@example(x=-0.5 * math.log(2))  # where the nearest power of two changes
+@example(x=0.0)
+@example(x=-708.0)
+def test_the_exponential_is_right_to_the_last_place(x: float) -> None:
+    assert exponential(x) == pytest.approx(math.exp(x), rel=EPSILON, abs=0)
+
+
+def test_the_exponential_ends_in_zero_and_passes_on_what_is_no_number() -> None:
+    assert exponential(0.0) == 1.0
+    assert exponential(-709.0) == exponential(-math.inf) == 0.0
+    assert math.isnan(exponential(math.nan))
+
+
+@given(angle=st.floats(-1e6, 1e6))
+@example(angle=math.pi / 4)  # where the nearest quarter turn changes
+@example(angle=-3 * math.pi / 4)
+@example(angle=0.5 * math.pi)
+@example(angle=1e6)
+def test_cosine_and_sine_are_right_to_the_last_place(angle: float) -> None:
+    assert cos_sin(angle) == pytest.approx((math.cos(angle), math.sin(angle)), abs=EPSILON)
+
+
+@given(angle=st.floats(-1e15, 1e15))
+def test_far_out_they_are_those_of_a_neighbouring_angle(angle: float) -> None:
+    near = 4 * math.ulp(angle) + EPSILON
+    assert cos_sin(angle) == pytest.approx((math.cos(angle), math.sin(angle)), abs=near)
+
+
+def test_no_angle_has_no_cosine() -> None:
+    for angle in (math.nan, math.inf, -math.inf):
+        assert np.isnan(cos_sin(angle)).all()
+
+
+@pytest.mark.parametrize("function", [exponential, cos_sin])
+def test_machine_code_gives_the_same_bits(function: Any) -> None:
+    numbers = -np.random.default_rng(3).exponential(20.0, 2000)
+    plain = np.array([function(float(x)) for x in numbers])
+    np.testing.assert_array_equal(compiled(function, numbers), plain)
