@@ -8,7 +8,7 @@ PODUSV := $(BIN)/podusv
 COMPARISONS := printed_compare figures_compare figures_compare_standoff corrected_compare
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce test test-all lint types contracts clean
+.PHONY: help reproduce test test-all bench lint types contracts clean
 
 help: ## what can be made
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -28,6 +28,10 @@ test: lint types contracts ## lint, types, import contracts, all tests but the s
 
 test-all: lint types contracts ## as test, with the slow tests
 	@$(BIN)/pytest -m "not benchmark"
+
+bench: $(VENV)/dev.done ## speed beside hand-written C (needs a C compiler), into benchmarks/results.md
+	@$(BIN)/python -m benchmarks.bench
+	@$(BIN)/pytest -m benchmark
 
 lint: $(VENV)/dev.done
 	@$(BIN)/ruff check .

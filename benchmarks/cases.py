@@ -1,0 +1,83 @@
+"""What is measured: the closed loop of configs/paper/corrected.yaml with every law and network."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from podusv_cli.config.loading import load
+from podusv_cli.config.scenario import Scenario
+from podusv_cli.controllers.base import Controller
+from podusv_cli.controllers.network import Network
+from podusv_cli.engine.grid import TimeGrid
+from podusv_cli.engine.simulate import ClosedLoop, Observer
+from podusv_cli.metrics.watching import observer
+from podusv_cli.registry import catalogue
+
+ROOT = Path(__file__).resolve().parent.parent
+SCENARIO = ROOT / "configs" / "paper" / "corrected.yaml"
+
+LAWS = ("adaptive_neural", "dsc", "backstepping", "pid")
+
+# The grid of the scenario has 27 nodes; an axis with one node needs widths.
+NETWORKS = {
+    "9 grid": Network(nodes=(1, 3, 3), widths=(2.0, 0.7, 0.7)),
+    "27 grid": Network(),
+    "49 grid": Network(nodes=(7, 7, 1), widths=(0.5, 0.3, 1.0)),
+    "125 grid": Network(nodes=(5, 5, 5)),
+    "27 listed": Network(
+        centers=tuple(map(tuple, Network().center_array().tolist())),
+        widths=tuple(Network().width_array().tolist()),
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Case:
+    """A law and a network (a key of NETWORKS, or none for a law without one)."""
+
+    law: str
+    network: str = ""
+
+    @property
+    def label(self) -> str:
+        """Law and network in words."""
+        return f"{self.law}, {self.network}" if self.network else self.law
+
+    def loop(self) -> ClosedLoop:
+        """The closed loop with this law."""
+        return replace(_scenario().closed_loop(), controller=self.controller())
+
+    def controller(self) -> Controller:
+        """The law with those of the scenario's values that it shares."""
+        kind = catalogue("podusv_cli.controllers", Controller)[self.law]
+        given = _scenario().controller.model_dump(exclude={"kind"})
+        fields: dict[str, Any] = {name: given[name] for name in kind.model_fields.keys() & given}
+        if self.network:
+            fields["network"] = NETWORKS[self.network]
+        return kind(**fields)
+
+
+@cache
+def _scenario() -> Scenario:
+    return load(SCENARIO).scenario
+
+
+def grid(steps: int | None = None, log_every: int = 1) -> TimeGrid:
+    """The scenario's time grid, or another number of its steps."""
+    whole = _scenario().time_grid()
+    return TimeGrid(whole.step, whole.steps if steps is None else steps, log_every)
+
+
+def metrics_observer(loop: ClosedLoop, over: TimeGrid) -> Observer:
+    """The observer of `podusv run`, which gathers all metrics."""
+    settings = _scenario().metrics
+    return observer(
+        loop, over,
+        steady_fraction=settings.steady_fraction, settling_radius=settings.settling_radius,
+    )  # fmt: skip
+
+
+CASES = [Case(law, net) for law in LAWS[:-1] for net in NETWORKS] + [Case("pid")]

@@ -1,0 +1,87 @@
+"""The engine beside C, how its cost grows, and what one evaluation of a law costs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from benchmarks.c_program import agreement, timer
+from benchmarks.cases import CASES, LAWS, Case, grid, metrics_observer
+from benchmarks.timing import Timer, in_turns, quartiles, ratio, timed
+from podusv_cli.controllers.base import Controller
+from podusv_cli.controllers.network import Network
+from podusv_cli.engine.grid import TimeGrid
+from podusv_cli.engine.replay import replayer
+from podusv_cli.engine.simulate import ClosedLoop, simulate
+
+ROUNDS = 7
+STEPS = (1_000, 3_100, 10_000, 31_000, 100_000)
+NODES = (2, 3, 5, 7)  # along every axis
+LOG_EVERY = (1, 10, 100)
+USUAL = Case("adaptive_neural", "27 grid")
+
+
+def engine_timers(case: Case) -> dict[str, Timer]:
+    """Timers of one whole `simulate`, every step logged, without and with the metrics."""
+    loop, over = case.loop(), grid()
+    watching = metrics_observer(loop, over)
+    return {
+        "podusv": timed(partial(simulate, loop, over)),
+        "podusv with metrics": timed(partial(simulate, loop, over, observer=watching)),
+    }
+
+
+def beside_c(programs: Mapping[str, Path], case: Case, rounds: int = ROUNDS) -> dict[str, Any]:
+    """Times [s] and ratios of podusv and the C programs, as quartiles, taken in turns."""
+    timers = engine_timers(case) | {name: timer(path, case) for name, path in programs.items()}
+    times = in_turns(timers, rounds)
+    ratios = {
+        f"{ours} / C -{name}": ratio(times, ours, name)
+        for ours in ("podusv", "podusv with metrics")
+        for name in programs
+    }
+    seconds = {name: quartiles(values) for name, values in times.items()}
+    return {"seconds": seconds, "ratios": ratios}
+
+
+def all_beside_c(
+    programs: Mapping[str, Path], cases: Sequence[Case] = CASES
+) -> Iterator[tuple[str, dict[str, Any]]]:
+    """`beside_c` case by case, each after its results were found to agree."""
+    for case in cases:
+        apart = agreement(programs, case)
+        yield case.label, {"apart": max(apart.values())} | beside_c(programs, case)
+
+
+def growth(rounds: int = ROUNDS) -> dict[str, dict[str, list[float]]]:
+    """Time of one step [s] against the numbers of steps and of nodes and the density of the log."""
+    usual, sparse = USUAL.loop(), grid(log_every=10)
+    loops = {f"{n**3}": replace(usual, controller=_with_nodes(n)) for n in NODES}
+    series = {
+        "steps": {str(n): (usual, grid(n, log_every=10)) for n in STEPS},
+        "nodes": {nodes: (loop, sparse) for nodes, loop in loops.items()},
+        "log_every": {str(n): (usual, grid(log_every=n)) for n in LOG_EVERY},
+    }
+    return {name: _a_step(runs, rounds) for name, runs in series.items()}
+
+
+def _with_nodes(n: int) -> Controller:
+    return USUAL.controller().model_copy(update={"network": Network(nodes=(n, n, n))})
+
+
+def _a_step(runs: dict[str, tuple[ClosedLoop, TimeGrid]], rounds: int) -> dict[str, list[float]]:
+    timers = {label: timed(partial(simulate, *run)) for label, run in runs.items()}
+    times = in_turns(timers, rounds)
+    return {label: quartiles(times[label] / over.steps) for label, (_, over) in runs.items()}
+
+
+def law_costs(rounds: int = 15) -> dict[str, list[float]]:
+    """Time of one evaluation of every law [s], over states of its own run."""
+    cases = [Case(law, "" if law == "pid" else "27 grid") for law in LAWS]
+    runs = {case.label: (case.loop(), simulate(case.loop(), grid())) for case in cases}
+    replays = {label: replayer(loop, recording) for label, (loop, recording) in runs.items()}
+    times = in_turns(replays, rounds)
+    return {label: quartiles(1e-9 * values) for label, values in times.items()}

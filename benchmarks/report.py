@@ -1,0 +1,133 @@
+"""From measurements to Markdown."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+Quartiles = Sequence[float]
+Results = Mapping[str, Any]
+
+HEADING = """\
+# How fast podusv is
+
+Made by `make bench`. One run is the closed loop of `configs/paper/corrected.yaml`: 31 000 steps of
+RK4, every step logged. Times are medians with quartiles in brackets; what is compared is timed in
+turns, and ratios are medians of the ratios of one turn each. Below 1 podusv is the faster one.
+"""
+
+BESIDE_C = """\
+`benchmarks/closed_loop.c` is the same loop by hand: the scenario's numbers are constants in it, its
+log is there before the clock starts. podusv is timed from values to `Recording`; "with metrics"
+adds the 14 metrics of `podusv run`, where the C program integrates the distance only. All numbers
+of the last state and the integral of the distance agree to the relative difference in the last
+column.
+"""
+
+
+def spread(values: Quartiles, scale: float = 1.0) -> str:
+    """Median and quartiles; a number alone where it was measured once."""
+    low, middle, high = (_rounded(scale * value) for value in values)
+    return f"{middle} [{low}, {high}]" if values[0] < values[2] else middle
+
+
+def _rounded(value: float, digits: int = 3) -> str:
+    decimals = max(0, digits - 1 - math.floor(math.log10(value)))
+    return f"{value:.{decimals}f}"
+
+
+def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A Markdown table."""
+    lines = [header, ["---"] * len(header), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
+
+
+def markdown(results: Results) -> str:
+    """The whole report."""
+    sections = [
+        HEADING,
+        table(["machine", ""], results["machine"].items()),
+        "## The engine beside C\n",
+        BESIDE_C,
+        _ratios(results["beside_c"]),
+        _seconds(results["beside_c"]),
+        "## How the cost of a step grows\n",
+        *_growth(results["growth"]),
+        "## One evaluation of a law\n",
+        table(["law", "ns"], ([law, spread(q, 1e9)] for law, q in results["law"].items())),
+        "## Without compiled code\n",
+        _plain(results["plain_engine"]),
+        _alternatives(results["alternatives"]),
+        "## Whole commands\n",
+        *_commands(results["commands"]),
+    ]
+    return "\n".join(sections)
+
+
+def _ratios(beside_c: Results) -> str:
+    names = list(next(iter(beside_c.values()))["ratios"])
+    rows = (
+        [case, *(spread(found["ratios"][name]) for name in names), f"{found['apart']:.1g}"]
+        for case, found in beside_c.items()
+    )
+    return table(["law, network", *names, "apart"], rows)
+
+
+def _seconds(beside_c: Results) -> str:
+    names = list(next(iter(beside_c.values()))["seconds"])
+    rows = (
+        [case, *(spread(found["seconds"][name], 1e3) for name in names)]
+        for case, found in beside_c.items()
+    )
+    return table(["ms a run", *(f"C -{n}" if n.startswith("O") else n for n in names)], rows)
+
+
+def _growth(growth: Results) -> list[str]:
+    headers = {
+        "steps": "steps, every 10th logged",
+        "nodes": "nodes, every 10th step logged",
+        "log_every": "27 nodes, every n-th step logged",
+    }
+    return [
+        table(
+            [headers[name], "ns a step"],
+            ([str(number), spread(values, 1e9)] for number, values in series.items()),
+        )
+        for name, series in growth.items()
+    ]
+
+
+def _plain(plain_engine: Results) -> str:
+    rows = ([law, spread(values, 1e6)] for law, values in plain_engine.items())
+    return table(["podusv with `simulation.compiled: false`", "us a step"], rows)
+
+
+def _alternatives(found: Results) -> str:
+    labels = {
+        "podusv": "podusv",
+        "numpy": "classes, numpy, a loop with RK4",
+        "solve_ivp": f"the same classes, scipy's solve_ivp, RK45 with rtol {found['rtol']:.1g}",
+    }
+    text = (
+        f"The first {found['span_s']:g} s with adaptive_neural and 27 nodes. RK4 with the usual "
+        f"step is off by {found['rk4_error']:.1g} (m, rad, m/s, rad/s) at the end; RK45 has the "
+        "largest tolerance with which it is no further off.\n"
+    )
+    rows = ([labels[n], spread(q, 1e3)] for n, q in found["per_simulated_s"].items())
+    return text + "\n" + table(["", "ms a simulated second"], rows)
+
+
+def _commands(commands: Results) -> list[str]:
+    rows = (
+        [name, spread(found["seconds"]), f"{found['megabytes'][1]:.0f}"]
+        for name, found in commands.items()
+    )
+    runs = {name: found["parts"] for name, found in commands.items() if found["parts"]}
+    parts = list(next(iter(runs.values())))
+    where = ([name, *(f"{spent[part]:.3f}" for part in parts)] for name, spent in runs.items())
+    return [
+        table(["command", "s", "peak memory, MB"], rows),
+        "Where the time of a run goes, in s; the rest is Python and its libraries starting.\n",
+        table(["", *parts], where),
+    ]
