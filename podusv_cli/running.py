@@ -155,8 +155,6 @@ def _write(
 def _draw(writer: folder.RunWriter, scenario: Scenario, recording: Recording) -> None:
     from podusv_cli.figures.drawing import FIRST, draw, dressed  # matplotlib is slow to import
 
-    if len(recording["time"]) < 2:
-        return
     for name, content in draw(
         dressed([(recording.controller, recording, scenario)]), FIRST, ("png",)
     ):

@@ -94,6 +94,20 @@ def test_one_diverging_run_hides_no_other(config, tmp_path):
     assert not result.table.loc["iae", ["fast", "slow"]].isna().any()
 
 
+def test_runs_that_all_diverge_are_still_reported(config, tmp_path):
+    request = workflows.Request(("start.u=1e300",), tmp_path / "x")
+    done = workflows.compare([config], request)
+    assert all(ending.startswith("diverged at t = 0 s") for ending in done.result.endings.values())
+    assert {verdict.answer for verdict in done.result.verdicts} == {"cannot tell"}
+    assert (done.folder / "report.html").is_file()
+
+
+def test_a_run_cannot_take_the_place_of_the_figures(config, tmp_path):
+    request = quick("controllers.figures.kind=pid", out=tmp_path / "x")
+    with pytest.raises(ScenarioError, match="is where figures go"):
+        workflows.compare([config], request)
+
+
 def test_finished_runs_and_scenarios_mix(config, done, tmp_path):
     items = [done.folder / "slow", config]
     result = workflows.compare(items, quick(out=tmp_path / "mix")).result

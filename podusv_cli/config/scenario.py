@@ -182,6 +182,11 @@ class Scenario(Component):
         for label in self.controllers:
             if not LABEL.fullmatch(label):
                 yield f"controllers.{label}", LABEL_IN_WORDS
+            if label == "figures":
+                yield (
+                    f"controllers.{label}",
+                    "is where figures go; take another name",
+                )
 
     def _size(self) -> Misfits:
         columns = 40 + max(sum(n for _, n in law.slots()) for law in self._laws().values())

@@ -27,16 +27,17 @@ def _rows(loop: ClosedLoop, recording: Recording, most: int) -> Vector:
 
 
 def replayer(
-    loop: ClosedLoop, recording: Recording, *, most: int = 1000, rounds: int = 4
+    loop: ClosedLoop, recording: Recording, *, most: int = 1000, evaluations: int = 4000
 ) -> Callable[[], float]:
     """A function that times one evaluation of the law [ns], as the mean of one replay.
 
-    A replay goes `rounds` times over at most `most` logged rows, in machine code.
+    A replay goes over at most `most` logged rows until it has `evaluations`, in machine code.
     """
     from podusv_cli.engine import compiling  # numba is slow to import and not always wanted
 
     rows = _rows(loop, recording, most)
     count, width = rows.shape
+    rounds = -(-evaluations // count)
     room = max(width, len(loop.controller.signals)) * 2 + loop.controller.workspace()
     informed = loop.controller.informed(loop.nominal)
     p = np.array(list(informed.values()))

@@ -63,7 +63,7 @@ FIRST = ("trajectory", "errors", "controls", "adaptation")  # what `run` draws
 
 
 def dressed(runs: Sequence[tuple[str, Recording, Scenario]]) -> list[Shown]:
-    """Labelled recordings with their looks, in order."""
+    """Labelled recordings with their looks, in order; without those too short to draw."""
     return [
         Shown(
             label, recording, *LOOKS[i % len(LOOKS)],
@@ -71,6 +71,7 @@ def dressed(runs: Sequence[tuple[str, Recording, Scenario]]) -> list[Shown]:
             steady_from=(1.0 - scenario.metrics.steady_fraction) * scenario.simulation.duration,
         )
         for i, (label, recording, scenario) in enumerate(runs)
+        if len(recording["time"]) > 1
     ]  # fmt: skip
 
 
