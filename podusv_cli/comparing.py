@@ -54,8 +54,16 @@ class Result:
 def from_folder(path: Path) -> list[Part]:
     """The finished runs of a folder: one run, or all those of a comparison."""
     children = path.iterdir() if path.is_dir() else ()
-    inner = sorted(child for child in children if (child / "log.h5").is_file())
+    inner = sorted((c for c in children if (c / "log.h5").is_file()), key=_place(path))
     return [_from_run(child) for child in (inner or [path])]
+
+
+def _place(comparison: Path) -> Callable[[Path], tuple[int, str]]:
+    """Where a run stands in a comparison: as in its table, else by name."""
+    table_file = comparison / "comparison.csv"
+    head = table_file.read_text().partition("\n")[0] if table_file.is_file() else ""
+    order = {label: place for place, label in enumerate(head.split(","))}
+    return lambda run: (order.get(run.name, len(order)), run.name)
 
 
 def _from_run(path: Path) -> Part:
@@ -85,7 +93,14 @@ def make_runs(
     for part in wanted:
         warm_up(part.scenario)
     tasks = [
-        Task(part.scenario, part.text, folder / part.label, figures=figures, argv=argv)
+        Task(
+            part.scenario,
+            part.text,
+            folder / part.label,
+            figures=("controls",) if figures else (),
+            argv=argv,
+            label=part.label,
+        )
         for part in wanted
     ]
 

@@ -47,14 +47,15 @@ class Stopwatch:
 
 @dataclass(frozen=True)
 class Task:
-    """A scenario, its file's text, where its run folder goes, and how it is drawn."""
+    """A scenario, its file's text, where its run folder goes, how it is called and drawn."""
 
     scenario: Scenario
     text: str
     target: Path
     force: bool = False
-    figures: bool = True
+    figures: Sequence[str] = ()
     argv: Sequence[str] = ()
+    label: str = ""  # in figures; the law's kind by default
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,7 @@ class Finished:
     message: str
     metrics: dict[str, float]
     timing: dict[str, float]
+    others: tuple[str, ...] = ()  # runs of a comparison that the scenario also has
 
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints of a run."""
@@ -95,7 +97,7 @@ def execute(
             _write(writer, task, recording, metrics)
         with watch.part("figures"):
             if task.figures:
-                _draw(writer, task.scenario, recording)
+                _draw(writer, task, recording)
         with watch.part("write"):
             origin = provenance.collect(list(task.argv), started, datetime.now(UTC))
             writer.add_json("provenance.json", origin)
@@ -152,10 +154,9 @@ def _write(
     writer.add("metrics.csv", "\n".join(["metric,value,unit", *rows, ""]).encode())
 
 
-def _draw(writer: folder.RunWriter, scenario: Scenario, recording: Recording) -> None:
-    from podusv_cli.figures.drawing import FIRST, draw, dressed  # matplotlib is slow to import
+def _draw(writer: folder.RunWriter, task: Task, recording: Recording) -> None:
+    from podusv_cli.figures.drawing import draw, dressed  # matplotlib is slow to import
 
-    for name, content in draw(
-        dressed([(recording.controller, recording, scenario)]), FIRST, ("png",)
-    ):
+    shown = dressed([(task.label or recording.controller, recording, task.scenario)])
+    for name, content in draw(shown, task.figures, ("png",)):
         writer.add(f"figures/{name}", content)

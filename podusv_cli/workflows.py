@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from podusv_cli import comparing
 
 RESULTS = Path("results")
+DRAWN = ("trajectory", "errors", "controls", "adaptation")  # by `run`
 
 
 @dataclass(frozen=True)
@@ -42,8 +43,9 @@ def run(config: Path, request: Request, progress: Progress | None = None) -> Fin
         scenario = loaded.scenario.alone()
         resolved = resolved_yaml(scenario)
     target = request.out or folder.default_folder(RESULTS, scenario.name, resolved)
-    task = Task(loaded.scenario, loaded.text, target, request.force, request.figures, request.argv)
-    return execute(task, progress, watch)
+    figures = DRAWN if request.figures else ()
+    task = Task(loaded.scenario, loaded.text, target, request.force, figures, request.argv)
+    return replace(execute(task, progress, watch), others=tuple(loaded.scenario.controllers))
 
 
 @dataclass(frozen=True)

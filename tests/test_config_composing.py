@@ -98,9 +98,31 @@ def test_a_circle_is_told_at_the_key_that_closes_it() -> None:
     ]
 
 
-def test_extends_takes_one_file_name() -> None:
-    write("a.yaml", "extends: [b.yaml, c.yaml]\n")
-    assert findings("a.yaml") == ["a.yaml:1:10: extends: must be a file name, found a list of 2"]
+def test_of_several_bases_the_later_goes_over_the_earlier() -> None:
+    write("first.yaml", SOUND + "description: first\nname: first\n")
+    write("second.yaml", "description: second\nstart: {x: 7.0}\n")
+    write("a.yaml", "extends: [first.yaml, second.yaml]\nstart: {y: 8.0}\n")
+    scenario = load("a.yaml").scenario
+    assert (scenario.name, scenario.description) == ("first", "second")
+    assert (scenario.start.x, scenario.start.y) == (7.0, 8.0)
+
+
+def test_each_of_several_bases_is_a_file_name() -> None:
+    write("a.yaml", "extends: [none.yaml, 3]\n")
+    assert findings("a.yaml") == [
+        "a.yaml:1:11: extends: 'none.yaml' cannot be read: no such file or directory",
+        "a.yaml:1:22: extends: must be a file name, found 3",
+    ]
+
+
+def test_null_takes_out_an_inherited_run_or_claim() -> None:
+    runs = "controllers: {a: {kind: pid}, b: {kind: dsc}}\n"
+    claims = "claims: {c: {says: x, source: y, expect: a.iae < b.iae}}\n"
+    write("base.yaml", SOUND + runs + claims)
+    write("a.yaml", "extends: base.yaml\ncontrollers: {b: null}\nclaims: {c: null}\n")
+    scenario = load("a.yaml").scenario
+    assert list(scenario.controllers) == ["a"]
+    assert not scenario.claims
 
 
 def test_an_override_wins_and_is_told_as_origin() -> None:

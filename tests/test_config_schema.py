@@ -92,7 +92,8 @@ def test_no_key_is_required_and_no_unknown_one_allowed() -> None:
 
 
 def test_a_file_can_extend_another() -> None:
-    assert SCHEMA["properties"]["extends"]["type"] == "string"
+    one, several = SCHEMA["properties"]["extends"]["anyOf"]
+    assert (one["type"], several["type"], several["items"]["type"]) == ("string", "array", "string")
     assert set(SCHEMA["properties"]) == {"extends", *Scenario.model_fields}
 
 

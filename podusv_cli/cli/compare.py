@@ -48,29 +48,34 @@ def compare(
         typer.echo(done.folder)
     else:
         _report(done, verbose)
+    _warn(done)
     if done.result.status == "interrupted":
         raise typer.Exit(INTERRUPTED)
     raise typer.Exit(SOME_FAILED if any(done.result.endings.values()) else 0)
 
 
 def _report(done: Compared, verbose: bool) -> None:
-    from podusv_cli.cli.layout import echo_table
-    from podusv_cli.comparison.table import cells
+    from podusv_cli.cli.layout import echo_entry, echo_table
+    from podusv_cli.comparison.table import NOTE, cells
 
     result = done.result
-    for key, values in result.differences.items():
-        shown = ", ".join(f"{label} {value}" for label, value in values.items())
-        typer.echo(f"the runs differ in {key}: {shown}", err=True)
     echo_table(["metric", "unit", *map(str, result.table.columns)], cells(result.table))
-    if result.verdicts:
-        typer.echo()
-        rows = [[v.name, v.answer, v.claim.says, v.shown()] for v in result.verdicts]
-        echo_table(["", "verdict", "claim", "numbers"], rows)
-    for label, ending in result.endings.items():
-        if ending:
-            typer.echo(f"{label}: {ending}", err=True)
+    typer.echo(NOTE)
+    for v in result.verdicts:
+        echo_entry(v.name, v.claim.says, v.shown(), facts=v.answer)
     if verbose:
         for label, timing in result.timings.items():
             shown = ", ".join(f"{name} {seconds:.3f}" for name, seconds in timing.items())
             typer.echo(f"{label}: {shown}")
     typer.echo(f"compared {len(result.entries)} runs: {done.folder}")
+
+
+def _warn(done: Compared) -> None:
+    if done.result.differences:
+        typer.echo("warning: the runs differ in more than the controller:", err=True)
+    for key, values in done.result.differences.items():
+        shown = ", ".join(f"{label} {value}" for label, value in values.items())
+        typer.echo(f"  {key}: {shown}", err=True)
+    for label, ending in done.result.endings.items():
+        if ending:
+            typer.echo(f"{label}: {ending}", err=True)

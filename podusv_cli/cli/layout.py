@@ -9,7 +9,6 @@ import textwrap
 import typer
 
 WIDEST = 100
-ENDLESS = 100_000
 
 
 def echo_entry(name: str, *lines: str, facts: str = "") -> None:
@@ -28,15 +27,13 @@ def echo_entry(name: str, *lines: str, facts: str = "") -> None:
 
 
 def echo_table(head: list[str], rows: list[list[str]]) -> None:
-    """A table: bold head, columns as wide as needed; cells wrap where the terminal is narrow."""
-    from rich.console import Console
-    from rich.markup import escape
-    from rich.table import Table
-
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for title in head:
-        table.add_column(title, overflow="fold")
-    for row in rows:
-        table.add_row(*map(escape, row))
-    # A pipe has no width: nothing is wrapped there, so that every line is a row.
-    Console(width=None if sys.stdout.isatty() else ENDLESS, highlight=False).print(table)
+    """A table in columns; where the terminal is too narrow for it, a block for each row."""
+    widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
+    if sys.stdout.isatty() and sum(widths) + 2 * len(widths) > shutil.get_terminal_size().columns:
+        for row in rows:
+            cells = [f"{title} {cell}" for title, cell in zip(head[2:], row[2:], strict=True)]
+            echo_entry(row[0], ", ".join(cells), facts=f"[{row[1]}]")
+        return
+    for row in (head, *rows):
+        padded = (cell.ljust(width) for cell, width in zip(row, widths, strict=True))
+        typer.echo("  ".join(padded).rstrip())

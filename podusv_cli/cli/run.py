@@ -52,6 +52,9 @@ def run(
         _report(done, verbose)
     if done.message:
         typer.echo(f"{config}: {done.message}", err=True)
+    if done.others:
+        names = ", ".join(done.others)
+        typer.echo(f"{config}: ran `controller` only; `podusv compare` runs {names}", err=True)
     raise typer.Exit(EXIT_CODES[done.status])
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+PROSE = (".source", ".validity")
 IGNORED = ("name", "description", "controller", "controllers", "claims", "log")
 
 
@@ -27,6 +28,7 @@ def differences(scenarios: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[st
         for label, tree in scenarios.items()
     }
     keys = dict.fromkeys(key for values in flattened.values() for key in values)
+    keys = {key: None for key in keys if not key.endswith(PROSE)}
     found = {key: {label: v.get(key) for label, v in flattened.items()} for key in keys}
     return {
         key: values for key, values in found.items() if len({repr(v) for v in values.values()}) > 1

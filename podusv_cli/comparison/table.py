@@ -9,7 +9,11 @@ import pandas as pd
 
 from podusv_cli.metrics.table import METRICS
 
-RUN, METRIC = "run", "metric"
+METRIC = "metric"
+NOTE = (
+    "* smallest of its row; in brackets the ratio to the first run; - not defined, or the run did "
+    "not finish"
+)
 
 
 def table(metrics: Mapping[str, Mapping[str, float]]) -> pd.DataFrame:
@@ -57,7 +61,7 @@ def as_markdown(frame: pd.DataFrame) -> str:
     """The table for people, in Markdown."""
     head = ["metric", "unit", *map(str, frame.columns)]
     lines = [head, ["---", "---", *["---:"] * len(frame.columns)], *cells(frame)]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines) + f"\n\n{NOTE}\n"
 
 
 def as_latex(frame: pd.DataFrame) -> str:

@@ -19,7 +19,7 @@ def composed(text: str, source: str, overrides: Sequence[str], faults: list[Faul
 
     None where the text cannot be read to its end. File names in `extends` are relative to `source`.
     """
-    layers = _layers(text, source, faults)
+    layers = _layers(text, (source,), faults)
     settings = [_setting(override, faults) for override in overrides]
     if not layers:
         return None
@@ -29,25 +29,24 @@ def composed(text: str, source: str, overrides: Sequence[str], faults: list[Faul
     return replace(reduce(merge, [*reversed(layers), top]), mark=Mark(source))
 
 
-def _layers(text: str, source: str, faults: list[Fault]) -> list[Node]:
-    """The file's own tree and those that it extends, nearest first, without `extends`.
+def _layers(text: str, sources: tuple[str, ...], faults: list[Fault]) -> list[Node]:
+    """The tree of the last of `sources`, then those that it extends, nearest first.
 
-    The last one is marked faulty where what it extends cannot be had.
+    None of them has the key `extends`; the last one is marked faulty where what it extends cannot
+    be had. Of several bases the later one goes over the earlier.
     """
-    layers: list[Node] = []
-    sources = [source]
-    while node := _mapping(text, sources[-1], faults):
-        above = node.mapping.get("extends")
-        own = {key: entry for key, entry in node.mapping.items() if key != "extends"}
-        layers.append(replace(node, content=own))
-        if above is None:
-            return layers
-        base = _base(above, sources, faults)
-        if base is None:
-            break
-        sources.append(base[0])
-        text = base[1]
-    return [*layers[:-1], replace(layers[-1], faulty=True)] if layers else []
+    node = _mapping(text, sources[-1], faults)
+    if not node:
+        return []
+    own = {key: entry for key, entry in node.mapping.items() if key != "extends"}
+    layers = [replace(node, content=own)]
+    above = node.mapping.get("extends")
+    named = () if above is None else above.content if isinstance(above.content, tuple) else (above,)
+    for name in reversed(named):
+        base = _base(name, sources, faults)
+        below = _layers(base[1], (*sources, base[0]), faults) if base else []
+        layers = [*layers, *below] if below else [replace(layers[0], faulty=True), *layers[1:]]
+    return layers
 
 
 def _mapping(text: str, source: str, faults: list[Fault]) -> Node | None:
@@ -61,7 +60,7 @@ def _mapping(text: str, source: str, faults: list[Fault]) -> Node | None:
     return node
 
 
-def _base(above: Node, sources: list[str], faults: list[Fault]) -> tuple[str, str] | None:
+def _base(above: Node, sources: tuple[str, ...], faults: list[Fault]) -> tuple[str, str] | None:
     """Name and text of the file that `extends` names, or None and a fault."""
     if not isinstance(above.content, str):
         if not above.faulty:

@@ -45,7 +45,9 @@ class Row:
     kinds: tuple[str, ...] = ()
 
 
-EXTENDS = Row("extends", "scenario that this one changes, a file name relative to it", "text")
+EXTENDS = Row(
+    "extends", "scenario that this one changes, a file name relative to it, or a list", "text"
+)
 
 
 def explain(key: str | None = None) -> list[Row]:

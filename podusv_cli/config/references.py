@@ -45,8 +45,18 @@ def vessel_text(name: str, key: str) -> str:
 
 def complete(root: Node, faults: list[Fault]) -> Node:
     """The tree with everything filled in that it takes from elsewhere."""
-    for fill in (_name, _vessel, _nominal, _points, _controllers):
+    for fill in (_without_removed, _name, _vessel, _nominal, _points, _controllers):
         root = fill(root, faults)
+    return root
+
+
+def _without_removed(root: Node, faults: list[Fault]) -> Node:
+    """Entries of `controllers` and `claims` that are null are taken out of what is extended."""
+    for section in ("controllers", "claims"):
+        given = root.mapping.get(section)
+        if given and given.mapping:
+            kept = {k: e for k, e in given.mapping.items() if e.content is not None or e.faulty}
+            root = root.with_entry(section, replace(given, content=kept))
     return root
 
 

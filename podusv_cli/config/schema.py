@@ -29,7 +29,8 @@ def json_schema() -> dict[str, Any]:
             part.pop("default", None)
     definitions["Vessel"]["properties"]["preset"]["enum"] = list(vessel_names())
     scenario = _converted(made)
-    extends = {"type": "string", "description": EXTENDS.meaning}
+    names = {"type": "array", "items": {"type": "string"}}
+    extends = {"anyOf": [{"type": "string"}, names], "description": EXTENDS.meaning}
     scenario["properties"] = {"extends": extends} | scenario["properties"]
     return (
         {"$schema": DIALECT, "title": "podusv scenario"} | scenario | {"definitions": definitions}

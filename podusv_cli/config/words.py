@@ -54,7 +54,7 @@ NUMBER_HINTS = (
     (r"[-+]?\d[\d_]*(\.\d*)?", "leave out the underscores"),
     (r"0[xob][\da-fA-F]+", "write it in decimal"),
     (r"[-+]?\.?(nan|inf|infinity)", "numbers must be finite"),
-    (r"[-+]?\d\S*\s*[a-zA-Z°%][\w/^°%]*", "leave out the unit"),
+    (r"[-+]?\d\S*\s*[a-zA-Z°%][\w/^°%]*", "convert it to that unit and leave the unit out"),
 )
 TRUTH_HINTS = (
     (r"yes|on|y|true|1", "write true"),

@@ -59,7 +59,6 @@ FIGURES: dict[str, Sheet] = {
         "disturbance, and when the actuator limits the law", "b_u", "b_v", "b_r", "saturated"
     ),
 }  # fmt: skip
-FIRST = ("trajectory", "errors", "controls", "adaptation")  # what `run` draws
 
 
 def dressed(runs: Sequence[tuple[str, Recording, Scenario]]) -> list[Shown]:
