@@ -44,7 +44,7 @@ def run(config: Path, request: Request, progress: Progress | None = None) -> Fin
         resolved = resolved_yaml(scenario)
     target = request.out or folder.default_folder(RESULTS, scenario.name, resolved)
     figures = DRAWN if request.figures else ()
-    task = Task(loaded.scenario, loaded.text, target, request.force, figures, request.argv)
+    task = Task(scenario, loaded.text, target, request.force, figures, request.argv)
     return replace(execute(task, progress, watch), others=tuple(loaded.scenario.controllers))
 
 

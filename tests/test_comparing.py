@@ -9,9 +9,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from podusv_cli import workflows
+from podusv_cli import comparing, workflows
 from podusv_cli.comparison import table
 from podusv_cli.comparison.differences import differences
+from podusv_cli.config.loading import load
 from podusv_cli.errors import ScenarioError, StorageError, UsageError
 
 SCENARIO = """
@@ -54,6 +55,20 @@ def test_every_controller_is_run_from_the_shared_keys(done):
     laws = {entry.label: entry.scenario.controller for entry in done.result.entries}
     assert list(laws) == ["fast", "slow", "pid"]
     assert (laws["fast"].k_ze, laws["slow"].k_ze, laws["pid"].k_ze) == (0.2, 0.02, 0.2)
+
+
+def test_run_takes_the_one_controller_and_says_what_it_left(config, tmp_path):
+    done = workflows.run(config, quick("simulation.duration=1", out=tmp_path / "x"))
+    assert done.controller == "adaptive_neural"
+    assert done.others == ("fast", "slow", "pid")
+    alone = load(done.folder / "resolved.yaml").scenario
+    assert not alone.controllers
+    assert not alone.claims
+
+
+def test_runs_of_a_comparison_keep_their_order(done):
+    parts = comparing.from_folder(done.folder)
+    assert [part.label for part in parts] == ["fast", "slow", "pid"]
 
 
 def test_planted_claims_get_their_verdicts_with_numbers(done):
