@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-
 
 from benchmarks.alternatives import python_alternatives
 from benchmarks.c_program import TOLERANCE, agreement, build
