@@ -1,15 +1,25 @@
 """The committed results of the paper, made anew: no number may move unnoticed."""
 
 import json
+import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import pandas as pd
 import pytest
 
 from podusv_cli import workflows
+from podusv_cli.comparison.claims import judge
+from podusv_cli.comparison.entries import Entry
+from podusv_cli.config.loading import load
+from podusv_cli.engine.simulate import simulate
+from podusv_cli.metrics.watching import observer, summarise
 
 ROOT = Path(__file__).parent.parent
 NAMES = ("printed_compare", "figures_compare", "figures_compare_standoff", "corrected_compare")
+LETTERS = dict(zip("PFSC", NAMES, strict=True))  # as results/README.md calls them
+SIGNS = {"reproduced": "+", "not reproduced": "-", "cannot tell": "?"}
+README = (ROOT / "results/README.md").read_text()
 TIMED = ["law_ns", "law_ns_low", "law_ns_high"]
 # Sits on the singularity and chatters; the last bit of the start decides its settled numbers.
 CHAOTIC = {"figures_compare": "dsc"}
@@ -45,3 +55,78 @@ def test_the_committed_verdicts_are_what_comes_out(made):
     )
     del committed["C14"], new["C14"]  # a time, measured here and now
     assert new == committed
+
+
+def committed(letter):
+    """Claim and sign, as committed; C14 is a time, measured anew by whoever asks."""
+    path = ROOT / "results/paper" / LETTERS[letter] / "claims.json"
+    claims = json.loads(path.read_text())["claims"]
+    return {c["claim"]: SIGNS[c["verdict"]] for c in claims if c["claim"] != "C14"}
+
+
+def rerun(scenario):
+    """A run without a folder, as a comparison sees it; nothing is timed."""
+    loop, grid, settings = scenario.closed_loop(), scenario.time_grid(), scenario.metrics
+    seeing = observer(
+        loop, grid, steady_fraction=settings.steady_fraction,
+        settling_radius=settings.settling_radius,
+    )  # fmt: skip
+    recording = simulate(loop, grid, observer=seeing)
+    run = SimpleNamespace(recording=recording, metrics=summarise(recording.seen, grid.step))
+    return Entry("", run, scenario)
+
+
+def signs(letter, sets, laws=("proposed", "li", "pid")):
+    """Claim and sign of a comparison with some keys set anew."""
+    scenario = load(ROOT / f"configs/paper/{LETTERS[letter]}.yaml", sets).scenario
+    entries = {name: rerun(scenario.singles()[name]) for name in laws}
+    told = {
+        name: claim
+        for name, claim in scenario.claims.items()
+        if name != "C14"
+        and not any(f"{law}." in claim.expect for law in ("li", "pid") if law not in laws)
+    }
+    return {v.name: SIGNS[v.answer] for v in judge(told, entries)}
+
+
+def sensitivity():
+    """(letter, keys, claim and sign that change) of every line of the README's second table."""
+    table = README.partition("## What the verdicts hang on")[2].partition("\n## ")[0]
+    for line in table.splitlines():
+        if line.startswith("| `"):
+            _, sets, changes, _ = line.split("|")
+            for part in changes.split(";"):
+                letters, _, told = part.partition(":")
+                for letter in re.findall("[PFSC]", letters):
+                    flips = dict(re.findall(r"(C\d+b?) ([-+?])", told))
+                    assert flips or told.strip() == "none"
+                    yield letter, tuple(re.findall("`(.*?)`", sets)), flips
+
+
+@pytest.mark.parametrize(("letter", "sets", "flips"), list(sensitivity()))
+def test_the_verdicts_hang_on_what_the_readme_says(letter, sets, flips):
+    before = committed(letter)
+    assert {k: v for k, v in signs(letter, sets).items() if v != before[k]} == flips
+
+
+def test_the_readme_tells_the_committed_verdicts():
+    rows = re.findall(r"^\| (C\d+b?) \|[^|]*\| (.) \| (.) \| (.) \| (.) \|", README, re.MULTILINE)
+    for position, letter in enumerate("PFSC"):
+        told = {name: marks[position] for name, *marks in rows if name != "C14"}
+        assert told == committed(letter)
+
+
+@pytest.mark.parametrize(
+    ("letter", "keys", "claim"),
+    [
+        ("S", ("controller.sigma_br=0",), "C11b"),  # no leakage: the bound only grows
+        ("P", ("controller.sigma_u=0",), "C11b"),  # nor do the weights come back
+        ("C", ("disturbance.scale=6",), "C11"),  # more than 8 N can hold
+        ("P", ("controller.first_difference=from_zero",), "C11"),  # diverges
+        # creeps to a right angle and diverges, as figures_compare_standoff.yaml says
+        ("S", ("controller.network.spread=0.4", "simulation.duration=1240"), "C11"),
+    ],
+)
+def test_a_law_that_is_not_bounded_is_told(letter, keys, claim):
+    assert committed(letter)[claim] == "+"
+    assert signs(letter, keys, laws=("proposed",))[claim] == "-"
