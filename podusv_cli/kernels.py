@@ -40,12 +40,6 @@ def tail(vector: Vector, start: int) -> Vector:
 
 
 @kernel
-def address(vector: Vector) -> Vector:
-    """`vector` as kernels take it: itself here, a bare pointer in compiled code."""
-    return vector
-
-
-@kernel
 def scratch(count: int) -> Vector:
     """Room for `count` numbers, a constant, while the kernel runs; on the stack where compiled."""
     return np.empty(count)

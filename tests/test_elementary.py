@@ -9,16 +9,18 @@ import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
+from numba import njit
 
 from podusv_cli.elementary import cos_sin, exponential
-from podusv_cli.engine import compiling
+from podusv_cli.engine import translating
 from podusv_cli.kernels import Vector
 
 EPSILON = np.finfo(float).eps
 
 
 def compiled(function: Any, numbers: Vector) -> Vector:
-    code = compiling.machine(function)
+    inner = translating.machine(function)
+    code = njit(lambda x: inner(x))
     return np.array([code(x) for x in numbers])
 
 

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from podusv_cli.kernels import Vector, address, kernel, tail, unpacker
+from podusv_cli.kernels import Vector, kernel, tail, unpacker
 from podusv_cli.vessels.plant import plant
 from podusv_cli.vessels.vessel import COEFFICIENTS
 
@@ -62,18 +62,8 @@ HELD_X, HELD_TARGET, HELD_DEMAND, HELD_SIGNALS = 1, 7, 13, 15
 
 # Vector to named coefficients of the vessel; the plant is the one part that never varies.
 coefficients = unpacker(COEFFICIENTS)
-
-
-@kernel
-def pointers(c: Wires) -> Wires:
-    """The same vectors as kernels take them; handing on whole arrays costs more than a law."""
-    return Wires(
-        address(c.path), address(c.path_table), address(c.disturbance),
-        address(c.disturbance_table), address(c.law), address(c.law_table), address(c.actuator),
-        address(c.actuator_table), address(c.vessel), address(c.observer), address(c.s),
-        address(c.row), address(c.stages), address(c.held), address(c.work), address(c.seen),
-        address(c.log),
-    )  # fmt: skip
+# Machine code gets both as bare numbers, one by the other.
+named_wires, named_plan = unpacker(Wires._fields), unpacker(Plan._fields)
 
 
 @kernel
@@ -195,10 +185,10 @@ def instant(
 @kernel
 def advance(
     path: Function, disturbance: Function, law: Function, sample: Function, actuator: Function,
-    observe: Function, first: int, last: int, h: float, wires: Wires, n: Plan,
+    observe: Function, first: int, last: int, h: float, wires: Any, plan: Any,
 ) -> int:  # fmt: skip
     """March over the instants first .. last - 1; gives the first that is not finite, or `last`."""
-    c = pointers(wires)
+    c, n = named_wires(wires), named_plan(plan)
     for k in range(first, last):
         if not instant(k, h, path, disturbance, law, sample, actuator, observe, c, n):
             return k
@@ -237,8 +227,8 @@ def evaluate_all(
     """
     for _ in range(rounds):
         for i in range(count):
-            row, rate = tail(address(rows), i * width), address(out)
+            row = tail(rows, i * width)
             law(
-                row[0], tail(row, 7), tail(row, 13), tail(row, 1), address(p), address(table),
-                address(tau), rate, tail(rate, width), tail(rate, 2 * width),
+                row[0], tail(row, 7), tail(row, 13), tail(row, 1), p, table,
+                tau, out, tail(out, width), tail(out, 2 * width),
             )  # fmt: skip

@@ -33,7 +33,7 @@ def replayer(
 
     A replay goes over at most `most` logged rows until it has `evaluations`, in machine code.
     """
-    from podusv_cli.engine import compiling  # numba is slow to import and not always wanted
+    from podusv_cli.engine import compiling  # a loop in plain Python needs no compiler
 
     rows = _rows(loop, recording, most)
     count, width = rows.shape
@@ -42,12 +42,13 @@ def replayer(
     informed = loop.controller.informed(loop.nominal)
     p = np.array(list(informed.values()))
     buffers = (rows.ravel(), p, loop.controller.table(), np.zeros(2), np.zeros(room))
+    vectors = [signatures.pointer(buffer) for buffer in buffers]
     replay: Callable[..., None] = compiling.replay()
     law = compiling.entry(signatures.law_entry, loop.controller.law, tuple(informed))
 
     def timed() -> float:
         began = time.perf_counter_ns()
-        replay(law, rounds, count, width, *buffers)
+        replay(law, rounds, count, width, *vectors)
         return float((time.perf_counter_ns() - began) / (rounds * count))
 
     return timed

@@ -2,13 +2,18 @@
 
 A component's kernel takes its constants as a named tuple `k`; the loop hands over a bare vector
 `p`. Each function here is the door between the two. `kernel` and `named` stand for the component's
-kernel and for the unpacking of its constants; `bind` puts them in, here as Python, in
-`compiling` as machine code.
+kernel and for the unpacking of its constants; `bind` puts them in.
+
+As machine code all of them follow C's calling convention, whose types are given here by ctypes.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from ctypes import CFUNCTYPE, POINTER, c_double, c_int64
 from typing import Any
+
+import numpy as np
 
 from podusv_cli.kernels import Vector, unpacker, with_globals
 
@@ -64,5 +69,40 @@ def observer_entry(
 
 
 def bind(entry: Any, inner: Any, names: tuple[str, ...]) -> Any:
-    """`entry` around the kernel `inner` whose constants have these names, as plain Python."""
+    """`entry` around the kernel `inner` whose constants have these names."""
     return with_globals(entry, entry.__name__, kernel=inner, named=unpacker(names))
+
+
+NUMBER, WHOLE = c_double, c_int64
+VECTOR = POINTER(NUMBER)
+PROTOTYPES: dict[Any, Any] = {
+    path_entry: CFUNCTYPE(None, NUMBER, *[VECTOR] * 3),
+    disturbance_entry: CFUNCTYPE(None, NUMBER, *[VECTOR] * 4),
+    law_entry: CFUNCTYPE(None, NUMBER, *[VECTOR] * 9),
+    sample_entry: CFUNCTYPE(None, NUMBER, *[VECTOR] * 5),
+    actuator_entry: CFUNCTYPE(None, NUMBER, *[VECTOR] * 8),
+    observer_entry: CFUNCTYPE(None, NUMBER, NUMBER, *[VECTOR] * 4),
+}
+LOOP = (
+    path_entry, disturbance_entry, law_entry, sample_entry, actuator_entry, observer_entry,
+)  # fmt: skip
+_PARTS = [PROTOTYPES[door] for door in LOOP]
+ADVANCE = CFUNCTYPE(WHOLE, *_PARTS, WHOLE, WHOLE, NUMBER, POINTER(VECTOR), POINTER(WHOLE))
+EVALUATE_ALL = CFUNCTYPE(None, PROTOTYPES[law_entry], WHOLE, WHOLE, WHOLE, *[VECTOR] * 5)
+
+
+def pointer(vector: Vector) -> Any:
+    """Where the numbers of a vector begin. TypeError unless they are float64, one by the other."""
+    if vector.dtype != np.float64 or not vector.flags.c_contiguous:
+        raise TypeError(f"machine code takes contiguous float64, not {vector.dtype}")
+    return vector.ctypes.data_as(VECTOR)
+
+
+def pointers(vectors: Sequence[Vector]) -> Any:
+    """Where each of these vectors begins; they have to outlive its use."""
+    return (VECTOR * len(vectors))(*map(pointer, vectors))
+
+
+def whole_numbers(numbers: Sequence[int]) -> Any:
+    """These numbers, one by the other."""
+    return (WHOLE * len(numbers))(*numbers)

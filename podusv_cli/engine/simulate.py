@@ -136,11 +136,16 @@ def marcher(loop: ClosedLoop, observer: Observer, compiled: bool) -> Callable[..
     if not compiled:
         doors = [signatures.bind(*part) for part in entries(loop, observer)]
         return lambda *rest: closed_loop.advance_plainly(*doors, *rest)
-    from podusv_cli.engine import compiling  # numba is slow to import and not always wanted
+    from podusv_cli.engine import compiling  # a loop in plain Python needs no compiler
 
     doors = [compiling.entry(*part) for part in entries(loop, observer)]
     march = compiling.march()
-    return lambda *rest: int(march(*doors, *rest))
+
+    def compiled_march(first: int, last: int, h: float, wires: Wires, plan: Plan) -> int:
+        vectors, sizes = signatures.pointers(wires), signatures.whole_numbers(plan)
+        return int(march(*doors, first, last, h, vectors, sizes))
+
+    return compiled_march
 
 
 def _wire(loop: ClosedLoop, grid: TimeGrid, plan: Plan, observer: Observer) -> Wires:

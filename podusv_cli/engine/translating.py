@@ -1,0 +1,92 @@
+"""Kernels to object code by numba, once for each; later processes find it on disk."""
+
+from __future__ import annotations
+
+import ctypes
+from functools import cache
+from typing import Any
+
+import llvmlite.binding as llvm
+from numba import cfunc, njit, types
+from numba.core import cgutils
+from numba.core.typing.ctypes_utils import from_ctypes
+from numba.extending import intrinsic
+
+from podusv_cli import kernels
+from podusv_cli.engine.machine_code import Code, named_globals, target
+
+# Kernels are merged into their caller: to hand on a law's constants costs as much as the law.
+OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": False, "forceinline": True}
+INNER = OPTIONS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # nobody else calls them
+NUMBER = types.float64
+VECTOR: Any = types.CPointer(NUMBER)  # type: ignore[no-untyped-call]
+
+
+@intrinsic
+def _tail(typing: Any, vector: Any, start: Any) -> Any:
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.gep(arguments[0], [arguments[1]])
+
+    return vector(vector, types.int64), code
+
+
+@intrinsic(prefer_literal=True)
+def _scratch(typing: Any, count: Any) -> Any:
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        number = context.get_value_type(NUMBER)
+        return cgutils.alloca_once(builder, number, count.literal_value)  # type: ignore[no-untyped-call]
+
+    return VECTOR(count), code
+
+
+PRIMITIVES = {kernels.tail: _tail, kernels.scratch: _scratch}
+
+
+def translate(function: Any, prototype: Any) -> Code:
+    """Object code of a kernel and all kernels it calls, as a function of C's calling convention.
+
+    Raises TypeError for a kernel that needs more than arithmetic and the mathematical library.
+    """
+    compiled = cfunc(_signature(prototype), **OPTIONS)(_with_machine_code(function))
+    module = llvm.parse_assembly(compiled.inspect_llvm())
+    _check_calls(module, function.__qualname__)
+    return Code(compiled.native_name, target().emit_object(module))
+
+
+@cache
+def machine(function: Any) -> Any:
+    """The kernel and all kernels it names, ready to be compiled into their caller."""
+    if function in PRIMITIVES:
+        return PRIMITIVES[function]
+    return njit(**INNER)(_with_machine_code(function))
+
+
+def _with_machine_code(function: Any) -> Any:
+    seen = function.__globals__
+    called = {name for name in named_globals(function) if kernels.is_kernel(seen.get(name))}
+    inner = {name: machine(seen[name]) for name in called}
+    return kernels.with_globals(function, function.__qualname__, **inner)
+
+
+def _signature(prototype: Any) -> Any:
+    arguments = [_type(kind) for kind in prototype._argtypes_]
+    return _type(prototype._restype_)(*arguments)
+
+
+def _type(kind: Any) -> Any:
+    if kind and issubclass(kind, ctypes._CFuncPtr):  # type: ignore[attr-defined]
+        # The way from a Python object to its address is asked for, although none comes in here.
+        return types.ExternalFunctionPointer(_signature(kind), ctypes.addressof)
+    return from_ctypes(kind)  # type: ignore[no-untyped-call]
+
+
+def _check_calls(module: Any, name: str) -> None:
+    # A function that the loader does not find ends the process without a word.
+    process = ctypes.CDLL(None)
+    declared = [f.name for f in module.functions if f.is_declaration]
+    for wanted in declared:
+        if not wanted.startswith("llvm.") and not hasattr(process, wanted):
+            raise TypeError(
+                f"kernel {name} needs {wanted}: kernels allocate nothing, raise nothing and call "
+                "arithmetic, the mathematical library and other kernels only"
+            )
