@@ -30,6 +30,6 @@ def axes(name: str) -> tuple[str, ...]:
 
 
 def chunk(shape: tuple[int, ...]) -> tuple[int, ...]:
-    """Rows that are compressed together, with everything in them."""
-    rows = max(1, CHUNK_BYTES // (8 * math.prod(shape[1:])))
-    return (min(shape[0], rows), *shape[1:])
+    """Rows that are compressed together, with everything in them; the last chunk is nearly full."""
+    most = max(1, CHUNK_BYTES // (8 * math.prod(shape[1:])))
+    return (-(-shape[0] // -(-shape[0] // most)), *shape[1:])
