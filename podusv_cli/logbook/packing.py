@@ -28,7 +28,7 @@ def packed(numbers: Vector) -> bytes:
     little = np.ascontiguousarray(numbers, dtype="<f8")
     planes = np.ascontiguousarray(little.reshape(-1).view(np.uint8).reshape(-1, 8).T)
     parts = [_deflated(memoryview(plane), last=i == 7) for i, plane in enumerate(planes)]
-    content = b"".join([HEAD, *parts, zlib.adler32(memoryview(planes)).to_bytes(4, "big")])
+    content = b"".join([HEAD, *parts, zlib.adler32(planes.data).to_bytes(4, "big")])
     return content + fletcher32(content).to_bytes(4, "little")
 
 
