@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import shutil
 import subprocess
@@ -193,6 +194,52 @@ def test_machine_code_is_what_the_kernel_computes() -> None:
 def ready(x: float) -> float:
     """A number that is not there before it is asked for."""
     return x + FORCE
+
+
+@kernel
+def doubled(x: float) -> float:
+    """Twice x."""
+    return 2.0 * x
+
+
+@kernel
+def halved(x: float) -> float:
+    """Half of x."""
+    return 0.5 * x
+
+
+@kernel
+def one_after_the_other(x: float) -> float:
+    """Stand-ins that `specialise` replaces."""
+    return doubled(x) + halved(x) + ready(x)
+
+
+SHIFT = np.array([1.0, 2.0])
+
+
+@kernel
+def shifted(x: float) -> float:
+    """A number out of a table."""
+    return x + float(SHIFT[1])
+
+
+def test_what_a_name_stands_for_is_in_the_fingerprint() -> None:
+    """The same code, with other kernels, functions or tables behind its names."""
+    variants = [
+        one_after_the_other,
+        specialise(one_after_the_other, "one_after_the_other", ready=doubled),
+        specialise(one_after_the_other, "one_after_the_other", ready=halved),
+        specialise(one_after_the_other, "one_after_the_other", ready=math.sin),
+        specialise(one_after_the_other, "one_after_the_other", ready=math.cos),
+        shifted,
+        specialise(shifted, "shifted", SHIFT=np.array([1.0, 3.0])),
+        specialise(ready, "ready", FORCE=1.0),
+        specialise(ready, "ready", FORCE=2.0),
+    ]
+    marks = [machine_code.fingerprint(variant) for variant in variants]
+    assert len(set(marks)) == len(variants)
+    again = specialise(one_after_the_other, "one_after_the_other", ready=halved)
+    assert machine_code.fingerprint(again) == marks[2]
 
 
 def pieces(folder: Path) -> dict[str, bytes]:

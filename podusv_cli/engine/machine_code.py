@@ -10,7 +10,6 @@ that imported the source before it was edited do not get into each other's way.
 
 from __future__ import annotations
 
-import dis
 import hashlib
 import os
 import re
@@ -25,6 +24,7 @@ from types import CodeType
 from typing import Any, NamedTuple
 
 import llvmlite.binding as llvm
+import numpy as np
 
 from podusv_cli import kernels
 
@@ -98,10 +98,9 @@ def _digest(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()[:16]
 
 
-def fingerprint(*functions: Any) -> str:
-    """A short digest of what the machine code of these kernels depends on."""
-    parts = [part for function in functions for part in ingredients(function)]
-    return _digest("\n".join([*parts, *_circumstances()]).encode())
+def fingerprint(function: Any) -> str:
+    """A short digest of what the machine code of a kernel depends on."""
+    return _digest("\n".join([*ingredients(function, {}), *_circumstances()]).encode())
 
 
 @cache
@@ -112,23 +111,36 @@ def _circumstances() -> tuple[str, ...]:
     return (*settings, *versions, *cpu, llvm.get_host_cpu_features().flatten())
 
 
-def ingredients(function: Any) -> Iterator[str]:
-    """Everything that the machine code of a kernel depends on, the kernels it calls included."""
-    code, seen = function.__code__, function.__globals__
+def ingredients(function: Any, told: dict[Any, int]) -> Iterator[str]:
+    """Everything that the machine code of a kernel depends on, the kernels it calls included.
+
+    `told` counts the kernels that have been told already.
+    """
+    told[function] = len(told)
+    code, outside = function.__code__, function.__globals__
     yield code.co_code.hex()
     yield repr([c for c in code.co_consts if not isinstance(c, CodeType)])
     yield repr((code.co_names, code.co_varnames))
-    for name in sorted(named_globals(function) & seen.keys()):
-        thing = seen[name]
-        if kernels.is_kernel(thing):
-            yield from ingredients(thing)
+    # Names of attributes are among these names, too. That one of them may add to the digest what
+    # the kernel does not use does no harm.
+    for name in code.co_names:
+        thing = outside.get(name)
+        if not kernels.is_kernel(thing):
+            yield _described(thing)
+        elif thing in told:
+            yield str(told[thing])
         else:
-            yield repr(getattr(thing, "_fields", thing if isinstance(thing, NUMBERS) else name))
+            yield from ingredients(thing, told)
 
 
-def named_globals(function: Any) -> set[str]:
-    """Names that a function looks up outside itself."""
-    return {i.argval for i in dis.get_instructions(function) if i.opname == "LOAD_GLOBAL"}
+def _described(thing: Any) -> str:
+    """A number by its value, a named tuple by its fields, anything else by what it is called."""
+    if thing is None or isinstance(thing, NUMBERS):
+        return repr(thing)
+    if isinstance(thing, np.ndarray):
+        return f"{thing.dtype}{thing.shape}{thing.tobytes().hex()}"
+    called = getattr(thing, "__qualname__", getattr(thing, "__name__", ""))
+    return repr((getattr(thing, "__module__", ""), called, getattr(thing, "_fields", ())))
 
 
 @cache

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import dis
 from functools import cache
 from typing import Any
 
@@ -13,7 +14,7 @@ from numba.core.typing.ctypes_utils import from_ctypes
 from numba.extending import intrinsic
 
 from podusv_cli import kernels
-from podusv_cli.engine.machine_code import Code, named_globals, target
+from podusv_cli.engine.machine_code import Code, target
 
 # Kernels are merged into their caller: to hand on a law's constants costs as much as the law.
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": False, "forceinline": True}
@@ -63,7 +64,8 @@ def machine(function: Any) -> Any:
 
 def _with_machine_code(function: Any) -> Any:
     seen = function.__globals__
-    called = {name for name in named_globals(function) if kernels.is_kernel(seen.get(name))}
+    named = {i.argval for i in dis.get_instructions(function) if i.opname == "LOAD_GLOBAL"}
+    called = {name for name in named if kernels.is_kernel(seen.get(name))}
     inner = {name: machine(seen[name]) for name in called}
     return kernels.with_globals(function, function.__qualname__, **inner)
 
