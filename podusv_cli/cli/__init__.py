@@ -5,6 +5,7 @@ Commands import what they need when they run, so that help and mistyped options 
 
 from __future__ import annotations
 
+import gc
 import sys
 from importlib import import_module
 from typing import Annotated
@@ -16,6 +17,8 @@ from podusv_cli.cli.guard import flushed, guarded
 
 # NAME is the function NAME of cli/NAME.py
 COMMANDS = ("run", "compare", "plot", "validate", "explain", "list", "schema")
+
+OBJECTS_BETWEEN_COLLECTIONS = 100_000
 
 app = typer.Typer(
     name="podusv",
@@ -48,6 +51,8 @@ def options(
 
 def main() -> None:
     """Run the command line and leave with its exit code."""
+    # What imports make stays; to look through all of it time and again costs a tenth of a run.
+    gc.set_threshold(OBJECTS_BETWEEN_COLLECTIONS)
     for stream in (sys.stdout, sys.stderr):
         # A file name or text that the terminal's encoding lacks must not end in a traceback.
         getattr(stream, "reconfigure", lambda errors: None)(errors="backslashreplace")
