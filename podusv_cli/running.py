@@ -155,8 +155,8 @@ def _write(
 
 
 def _draw(writer: folder.RunWriter, task: Task, recording: Recording) -> None:
-    from podusv_cli.figures.drawing import draw, dressed  # matplotlib is slow to import
+    from podusv_cli.figures.drawing import draw_in_parallel, dressed  # matplotlib is slow to import
 
     shown = dressed([(task.label or recording.controller, recording, task.scenario)])
-    for name, content in draw(shown, task.figures, ("png",)):
+    for name, content in draw_in_parallel(shown, task.figures, ("png",)):
         writer.add(f"figures/{name}", content)

@@ -31,7 +31,11 @@ from podusv_cli import kernels
 OWN = re.compile(r"[0-9a-f]{16}")
 KEPT = 8  # caches of this many states of the source stay on disk
 NUMBERS = (bool, int, float, str, tuple)
-APART = ("cli", "comparison", "config", "figures", "logbook")  # rooms that hold no kernel
+# Rooms and files that hold no kernel: what is edited there leaves machine code as it is.
+APART = (
+    "cli", "comparison", "config", "figures", "logbook",
+    "comparing.py", "running.py", "workflows.py",
+)  # fmt: skip
 
 
 class Code(NamedTuple):

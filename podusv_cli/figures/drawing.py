@@ -11,7 +11,7 @@ from podusv_cli.figures.controls import controls
 from podusv_cli.figures.panels import Family, signals_over_time
 from podusv_cli.figures.style import LOOKS, Shown, house_style, image
 from podusv_cli.figures.trajectory import trajectory
-from podusv_cli.parallel import run_all
+from podusv_cli.parallel import INTERRUPTED, run_all
 from podusv_cli.recording import Recording
 
 
@@ -95,6 +95,8 @@ def draw_in_parallel(
 
     names = tuple(names)
     for name, outcome in zip(names, run_all([partial(job, name) for name in names]), strict=True):
+        if outcome.failure == INTERRUPTED:
+            raise KeyboardInterrupt
         if outcome.failure:
             raise RuntimeError(f"drawing {name} failed: {outcome.failure}")
         yield from outcome.result

@@ -15,6 +15,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import ScalarFormatter
 
 from podusv_cli.derived import DERIVED, Derived
 from podusv_cli.kernels import Vector
@@ -146,6 +147,25 @@ def frame_finished(axes: Axes, runs: Sequence[Shown]) -> None:
 
 def image(figure: Figure, form: str) -> bytes:
     """The figure as a file's content: png, pdf or svg, the same bytes for the same figure."""
+    _settle(figure)
     buffer = io.BytesIO()
     figure.savefig(buffer, format=form, metadata=NO_STAMP[form])
     return buffer.getvalue()
+
+
+class _PlainTicks(ScalarFormatter):
+    """Numbers at ticks as plain text; set as formulas, they take a quarter of the drawing time."""
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        return super().__call__(x, pos).removeprefix(r"$\mathdefault{").removesuffix("}$")
+
+
+def _settle(figure: Figure) -> None:
+    """Lay the figure out once and for all; saving alone would go through all its text twice."""
+    for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
+        if type(axis.get_major_formatter()) is ScalarFormatter:
+            axis.set_major_formatter(_PlainTicks())
+    layout = figure.get_layout_engine()
+    if layout:
+        layout.execute(figure)
+    figure.set_layout_engine("none")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-import secrets
+import io
 from collections.abc import Mapping
 
 import h5py
@@ -43,18 +43,16 @@ def encode(
     }
     if recording.message:
         facts["message"] = recording.message
-    # HDF5 tells open files apart by name; the name is nowhere in the file.
-    name = f"podusv-{secrets.token_hex(8)}"
+    # Nothing but the growing file itself is kept in memory beside the recording.
+    content = io.BytesIO()
     with h5py.File(
-        name, "w", driver="core", backing_store=False, libver=_FORMAT,
-        track_order=True, track_times=False,
+        content, "w", libver=_FORMAT, track_order=True, track_times=False
     ) as file:  # fmt: skip
         file.attrs.create("podusv_format", np.int32(layout.FORMAT))
         _describe(file, facts)
         _write_signals(file, recording)
         _write_provenance(file, resolved_yaml)
-        file.flush()
-        return bytes(file.id.get_file_image())
+    return content.getvalue()
 
 
 def _text(words: str) -> np.ndarray[tuple[()], np.dtype[np.bytes_]]:
