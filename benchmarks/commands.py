@@ -31,27 +31,32 @@ import os, resource, sys, time
 began = time.perf_counter()
 code = os.spawnv(os.P_WAIT, sys.argv[1], sys.argv[1:])
 took = time.perf_counter() - began
-print(code, took, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss, file=sys.stderr)
+used = resource.getrusage(resource.RUSAGE_CHILDREN)
+print(code, took, used.ru_utime + used.ru_stime, used.ru_maxrss, file=sys.stderr)
 """
 
 
 def spent(arguments: Sequence[str], folder: Path) -> dict[str, Any]:
-    """Seconds, peak memory in MB and the output of podusv, run in a folder with its cache there.
+    """Seconds, those that processors were busy, peak memory in MiB and output of podusv.
 
-    Raises RuntimeError where the command fails.
+    It runs in `folder` with its cache there. Raises RuntimeError where the command fails.
     """
     paths = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
     command = [sys.executable, "-S", "-c", MEASURE, sys.executable, "-m", "podusv_cli", *arguments]
+    environment = os.environ | {"PODUSV_CACHE": str(folder / "cache"), "PYTHONPATH": paths}
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)  # an installed podusv has its byte code
     done = subprocess.run(
-        command, check=True, capture_output=True, text=True, cwd=folder,
-        env=os.environ | {"PODUSV_CACHE": str(folder / "cache"), "PYTHONPATH": paths},
-    )  # fmt: skip
-    code, seconds, peak = done.stderr.splitlines()[-1].split()
+        command, check=True, capture_output=True, text=True, cwd=folder, env=environment
+    )
+    code, seconds, busy, peak = done.stderr.splitlines()[-1].split()
     if code != "0":
         raise RuntimeError(f"podusv {' '.join(arguments)} failed: {done.stderr}")
     unit = 1 if sys.platform == "darwin" else 1024  # of ru_maxrss in bytes
     megabytes = int(peak) * unit / 2**20
-    return {"seconds": float(seconds), "megabytes": megabytes, "output": done.stdout}
+    return {
+        "seconds": float(seconds), "busy": float(busy), "megabytes": megabytes,
+        "output": done.stdout,
+    }  # fmt: skip
 
 
 def commands() -> dict[str, dict[str, Any]]:
@@ -79,6 +84,7 @@ def _summary(arguments: Sequence[str], several: list[dict[str, Any]]) -> dict[st
     parts = json.loads(several[-1]["output"])["timing"] if arguments[0] == "run" else {}
     return {
         "seconds": quartiles(np.array([one["seconds"] for one in several])),
+        "busy": quartiles(np.array([one["busy"] for one in several])),
         "megabytes": quartiles(np.array([one["megabytes"] for one in several])),
         "parts": parts,
     }

@@ -120,14 +120,14 @@ def _alternatives(found: Results) -> str:
 
 def _commands(commands: Results) -> list[str]:
     rows = (
-        [name, spread(found["seconds"]), f"{found['megabytes'][1]:.0f}"]
+        [name, *(spread(found[key]) for key in ("seconds", "busy")), f"{found['megabytes'][1]:.0f}"]
         for name, found in commands.items()
     )
     runs = {name: found["parts"] for name, found in commands.items() if found["parts"]}
     parts = list(next(iter(runs.values())))
     where = ([name, *(f"{spent[part]:.3f}" for part in parts)] for name, spent in runs.items())
     return [
-        table(["command", "s", "peak memory, MB"], rows),
+        table(["command", "s", "s of processors", "peak memory, MiB"], rows),
         "Where the time of a run goes, in s; the rest is Python and its libraries starting.\n",
         table(["", *parts], where),
     ]
