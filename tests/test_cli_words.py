@@ -23,7 +23,9 @@ from podusv_cli.config.scenario import Scenario
 from podusv_cli.config.schema import schema_text
 from podusv_cli.errors import Finding, ScenarioError, StorageError
 
-HEAVY = {"numpy", "scipy", "numba", "pandas", "matplotlib", "h5py", "pydantic", "yaml"}
+HEAVY = {
+    "numpy", "scipy", "numba", "llvmlite", "pandas", "matplotlib", "h5py", "pydantic", "yaml",
+}  # fmt: skip
 ROOT = Path(podusv_cli.__file__).parents[1]
 
 

@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from podusv_cli.errors import StorageError
-from podusv_cli.parallel import run_all
+from podusv_cli.figures import drawing
+from podusv_cli.parallel import INTERRUPTED, Outcome, run_all
 
 
 def square(number, progress):
@@ -105,3 +106,11 @@ def test_an_interrupted_caller_leaves_no_process(tmp_path):
     for process in started:
         with pytest.raises(ProcessLookupError):
             os.kill(process, 0)
+
+
+def test_an_interrupt_while_figures_are_drawn_is_one_and_no_bug(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(drawing, "run_all", lambda jobs: [Outcome(failure=INTERRUPTED)])
+    with pytest.raises(KeyboardInterrupt):
+        list(drawing.draw_in_parallel([], ["errors"], ["png"]))
