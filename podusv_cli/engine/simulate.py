@@ -109,10 +109,10 @@ def simulate(
     """
     observer = observer or Observer()
     plan = loop.layout(grid)
-    wires = _wire(loop, grid, plan, observer)
+    wires = wire(loop, grid, plan, observer)
     march = marcher(loop, observer, compiled)
     with np.errstate(all="ignore"):
-        reached, status = _in_blocks(
+        reached, status = in_blocks(
             lambda a, b: march(a, b, grid.step, wires, plan), plan, progress
         )
     return _record(loop, grid, plan, wires, reached, status)
@@ -148,7 +148,9 @@ def marcher(loop: ClosedLoop, observer: Observer, compiled: bool) -> Callable[..
     return compiled_march
 
 
-def _wire(loop: ClosedLoop, grid: TimeGrid, plan: Plan, observer: Observer) -> Wires:
+def wire(loop: ClosedLoop, grid: TimeGrid, plan: Plan, observer: Observer) -> Wires:
+    """The loop's vectors, ready for the march to begin."""
+
     def numbers(constants: dict[str, float]) -> Vector:
         return np.array(list(constants.values()) or [0.0])
 
@@ -168,7 +170,7 @@ def _wire(loop: ClosedLoop, grid: TimeGrid, plan: Plan, observer: Observer) -> W
     )  # fmt: skip
 
 
-def _in_blocks(
+def in_blocks(
     march: Callable[[int, int], int], plan: Plan, progress: Callable[[float], None] | None
 ) -> tuple[int, Status]:
     """March until the end or trouble; how many instants are good, and the status."""

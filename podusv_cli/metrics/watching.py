@@ -8,6 +8,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import ClosedLoop, Observer
 from podusv_cli.kernels import Vector, kernel
@@ -103,3 +105,13 @@ def summarise(seen: Vector, step: float) -> dict[str, float]:
         "tv_tau_r": float(seen[TV_R]),
         "saturated_fraction": float(seen[SATURATED] / total) if total else math.nan,
     }
+
+
+def summarise_many(seen: Vector, step: float) -> dict[str, Vector]:
+    """Metrics by name, one number a run, from rows of what was gathered (`Batch.seen`).
+
+    NaN where a run ended before a metric is defined, and throughout for one that never began.
+    """
+    each = [summarise(row, step) for row in seen]
+    names = summarise(np.full(SIZE, np.nan), step)
+    return {name: np.array([metrics[name] for metrics in each]) for name in names}
