@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 from podusv_cli.kernels import Vector
 from podusv_cli.registry import Component
@@ -12,8 +12,11 @@ class Disturbance(Component):
     """A load on the hull in the body frame.
 
     `evaluate(t, x, k, table, b)` is a kernel that writes (b_u [N], b_v [N], b_r [N m]) at time
-    t [s] and state x = (x, y, psi, u, v, r) into `b`.
+    t [s] and state x = (x, y, psi, u, v, r) into `b`. One that does not look at x says so with
+    `of_time`, and is not asked twice for the same t.
     """
+
+    of_time: ClassVar[bool] = False
 
     @staticmethod
     def evaluate(t: float, x: Vector, k: Any, table: Vector, b: Vector) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from podusv_cli.disturbances.base import Disturbance
 from podusv_cli.kernels import Vector, kernel
@@ -11,6 +11,7 @@ from podusv_cli.kernels import Vector, kernel
 class Calm(Disturbance):
     """No load at all."""
 
+    of_time: ClassVar[bool] = True
     kind: Literal["none"] = "none"
 
     @staticmethod

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -25,6 +25,7 @@ class Harmonic(Component):
 class HarmonicDisturbance(Disturbance):
     """Loads of (52); the defaults are its numbers."""
 
+    of_time: ClassVar[bool] = True
     kind: Literal["harmonic"] = "harmonic"
     scale: float = value(1.0, "", "factor on all three axes", ge=0)
     b_u: Harmonic = value(

@@ -33,6 +33,7 @@ class Plan(NamedTuple):
     log_every: int
     hold_every: int  # 0: the law acts continuously
     sample_every: int  # 0: the law takes no samples
+    load_of_time: int  # 1: the disturbance depends on time alone
 
 
 class Wires(NamedTuple):
@@ -70,14 +71,20 @@ named_wires, named_plan = unpacker(Wires._fields), unpacker(Plan._fields)
 def rates(
     t: float, s: Vector, ds: Vector,
     path: Function, disturbance: Function, law: Function, actuator: Function, c: Wires, n: Plan,
+    seen: bool,
 ) -> None:  # fmt: skip
-    """Right-hand side of the closed loop at time t; leaves all signals in the row."""
+    """Right-hand side of the closed loop at time t; leaves all signals in the row.
+
+    `seen`: the evaluation before was at this very t, so what depends on time alone is in the row.
+    """
     row = c.row
     demand, tau, b = tail(row, n.demand), tail(row, n.tau), tail(row, n.b)
     memory, memory_rate = tail(s, n.memory), tail(ds, n.memory)
     p, table, work = c.law, c.law_table, c.work
-    path(t, c.path, c.path_table, row)
-    disturbance(t, s, c.disturbance, c.disturbance_table, b)
+    if not seen:
+        path(t, c.path, c.path_table, row)
+    if not (seen and n.load_of_time == 1):
+        disturbance(t, s, c.disturbance, c.disturbance_table, b)
     if n.hold_every > 0:
         held = c.held
         law(
@@ -133,11 +140,11 @@ def step(
     k2, k3, k4 = tail(k1, count), tail(k1, 2 * count), tail(k1, 3 * count)
     y = tail(k1, 4 * count)
     shifted(count, s, 0.5 * h, k1, y)
-    rates(t + 0.5 * h, y, k2, path, disturbance, law, actuator, c, n)
+    rates(t + 0.5 * h, y, k2, path, disturbance, law, actuator, c, n, False)
     shifted(count, s, 0.5 * h, k2, y)
-    rates(t + 0.5 * h, y, k3, path, disturbance, law, actuator, c, n)
+    rates(t + 0.5 * h, y, k3, path, disturbance, law, actuator, c, n, True)
     shifted(count, s, h, k3, y)
-    rates(t + h, y, k4, path, disturbance, law, actuator, c, n)
+    rates(t + h, y, k4, path, disturbance, law, actuator, c, n, False)
     for i in range(count):
         s[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
 
@@ -165,14 +172,15 @@ def write_row(k: int, t: float, c: Wires, n: Plan) -> None:
 
 @kernel
 def instant(
-    k: int, h: float, path: Function, disturbance: Function, law: Function, sample: Function,
-    actuator: Function, observe: Function, c: Wires, n: Plan,
+    k: int, first: int, h: float, path: Function, disturbance: Function, law: Function,
+    sample: Function, actuator: Function, observe: Function, c: Wires, n: Plan,
 ) -> bool:  # fmt: skip
     """Sample, evaluate, observe and log instant k; whether all its numbers are finite."""
     t = k * h
+    seen = k > first and t == (k - 1) * h + h  # where the last stage of the step before was
     if n.sample_every > 0 or n.hold_every > 0:
         sample_and_hold(k, t, path, law, sample, c, n)
-    rates(t, c.s, c.stages, path, disturbance, law, actuator, c, n)
+    rates(t, c.s, c.stages, path, disturbance, law, actuator, c, n, seen)
     if not (finite(n.states, c.s) and finite(n.columns, c.row)):
         return False
     weight = 0.5 * h if k == 0 or k == n.steps else h
@@ -190,7 +198,7 @@ def advance(
     """March over the instants first .. last - 1; gives the first that is not finite, or `last`."""
     c, n = named_wires(wires), named_plan(plan)
     for k in range(first, last):
-        if not instant(k, h, path, disturbance, law, sample, actuator, observe, c, n):
+        if not instant(k, first, h, path, disturbance, law, sample, actuator, observe, c, n):
             return k
         if k < n.steps:
             step(k * h, h, path, disturbance, law, actuator, c, n)
@@ -204,7 +212,7 @@ def advance_plainly(
     """`advance` as plain Python, whose `math` raises where machine code gives no number."""
     for k in range(first, last):
         try:
-            if not instant(k, h, path, disturbance, law, sample, actuator, observe, c, n):
+            if not instant(k, first, h, path, disturbance, law, sample, actuator, observe, c, n):
                 return k
         except (ArithmeticError, ValueError):
             return k

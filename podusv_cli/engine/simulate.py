@@ -76,6 +76,7 @@ class ClosedLoop:
             signals=signals, demand=demand, tau=tau, b=b, flags=flags, columns=columns,
             steps=grid.steps, log_every=grid.log_every, hold_every=grid.hold_every,
             sample_every=_sample_steps(law.sample_period(), grid),
+            load_of_time=int(self.disturbance.of_time),
         )  # fmt: skip
 
 
