@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+import time
 from dataclasses import replace
 from typing import Any, Literal
 
@@ -98,6 +99,20 @@ def test_a_run_that_diverges_stops_no_other() -> None:
     np.testing.assert_array_equal(np.isfinite(batch.state).all(axis=1), batch.reached == 2001)
     for loop, row in zip(loops, batch.seen, strict=True):
         np.testing.assert_array_equal(row, simulate(loop, GRID, observer=watching).seen)
+
+
+def test_other_threads_go_on_while_one_marches() -> None:
+    runs = threading.Thread(
+        target=simulate_many, args=([corrected(controller=Pid())], TimeGrid(0.01, 1_000_000))
+    )
+    simulate_many([corrected(controller=Pid())], GRID)  # compiled by now
+    runs.start()
+    naps = 0
+    while runs.is_alive():
+        time.sleep(0.001)
+        naps += 1
+    # Hundreds; about two for each of some ten blocks where a march keeps the lock.
+    assert naps > 60
 
 
 def test_progress_comes_to_one() -> None:

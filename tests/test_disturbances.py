@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
-from conftest import load_at
+from conftest import example, kinds, load_at
 
 from podusv_cli.disturbances.calm import Calm
 from podusv_cli.disturbances.harmonic import Harmonic, HarmonicDisturbance
@@ -49,3 +50,11 @@ def test_the_load_is_bounded_as_assumption_1_wants() -> None:
     assert np.all(np.abs(loads).max(axis=0) <= [0.9, 0.8, 0.7])
     # A nonzero mean, as the paper says: about 0.5 on every axis.
     np.testing.assert_allclose(loads.mean(axis=0), 0.5, atol=0.02)
+
+
+@pytest.mark.parametrize("kind", [k for k in kinds("disturbances").values() if k.of_time])
+def test_what_claims_to_depend_on_time_alone_does(kind: Any) -> None:
+    sea, random = example(kind), np.random.default_rng(1)
+    for t in random.uniform(0, 300, 20):
+        loads = [load_at(sea, t, random.normal(0, 5, 6)) for _ in range(3)]
+        np.testing.assert_array_equal(loads, [loads[0]] * 3)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from typing import Any, Literal
+from dataclasses import replace
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 import pytest
@@ -31,6 +32,7 @@ from podusv_cli.actuators.saturated import Saturated
 from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
 from podusv_cli.controllers.backstepping import Backstepping
 from podusv_cli.controllers.pid import Pid
+from podusv_cli.disturbances.calm import Calm
 from podusv_cli.disturbances.harmonic import HarmonicDisturbance
 from podusv_cli.engine.grid import TimeGrid, whole_steps
 from podusv_cli.engine.simulate import STATE, ClosedLoop, Observer, simulate
@@ -96,6 +98,39 @@ def test_a_slow_display_does_not_slow_the_march() -> None:
             raise KeyboardInterrupt
 
     assert run(corrected(), 310.0, progress=display).status == "finished"
+
+
+class Current(Calm):
+    """A disturbance for tests: one that looks at the state."""
+
+    kind: Literal["current"] = "current"
+    of_time: ClassVar[bool] = False
+
+    @staticmethod
+    @kernel
+    def evaluate(t: float, x: Vector, k: Any, table: Vector, b: Vector) -> None:
+        """Against the velocities."""
+        b[0], b[1], b[2] = -20.0 * x[3], 0.0, 0.0
+
+
+class Asked(HarmonicDisturbance):
+    """(52), evaluated at every stage."""
+
+    of_time: ClassVar[bool] = False
+
+
+def test_a_load_that_depends_on_the_state_is_evaluated_at_every_stage() -> None:
+    """The order of the method, which it loses where a stage takes over the load of another."""
+    loop = adrift(disturbance=Current(), controller=Constant(surge=9.0))
+    fine, half, whole = (run(loop, 32.0, h)["x"][-1] for h in (0.05, 0.8, 1.6))
+    assert abs(whole - fine) > 12 * abs(half - fine) > 0
+
+
+@pytest.mark.parametrize("hold_every", [0, 5])
+def test_not_evaluating_a_load_twice_changes_no_bit(hold_every: int) -> None:
+    loop = corrected(disturbance=HarmonicDisturbance())
+    asked = run(replace(loop, disturbance=Asked()), 20.0, hold_every=hold_every)
+    assert same(asked, run(loop, 20.0, hold_every=hold_every))
 
 
 def test_time_is_a_whole_number_of_steps() -> None:
