@@ -11,9 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.alternatives import plain_engine, python_alternatives
+from benchmarks.batch import batch_costs
 from benchmarks.c_program import build
 from benchmarks.commands import commands
-from benchmarks.engine import all_beside_c, growth, law_costs
+from benchmarks.engine import all_beside_c, growth, law_costs, log_megabytes
 from benchmarks.report import markdown
 from benchmarks.timing import machine
 
@@ -35,6 +36,8 @@ PARTS: dict[str, Callable[[], Any]] = {
     "machine": machine,
     "beside_c": beside_c,
     "growth": growth,
+    "batch": batch_costs,
+    "log_megabytes": log_megabytes,
     "law": law_costs,
     "plain_engine": plain_engine,
     "alternatives": python_alternatives,

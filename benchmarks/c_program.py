@@ -23,7 +23,7 @@ TOLERANCE = 1e-9  # relative, for every number of the last state and for iae
 
 @dataclass(frozen=True)
 class Outcome:
-    """The integral of the distance [m s], the last state, and the median time of the loop [s]."""
+    """The integral of the distance [m s], the last state, and the median CPU time of the loop [s]."""
 
     iae: float
     state: Vector
@@ -92,5 +92,5 @@ def agreement(programs: Mapping[str, Path], case: Case) -> dict[str, float]:
 
 
 def timer(program: Path, case: Case, *, repeats: int = 3) -> Callable[[], float]:
-    """A function that gives the median time of the loop over a few repeats [s]."""
+    """A function that gives the median time of the loop over a few repeats [CPU s]."""
     return lambda: run(program, case, repeats=repeats).seconds

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from time import thread_time
 from typing import Any
 
 from benchmarks.c_program import agreement, timer
@@ -15,7 +16,7 @@ from podusv_cli.controllers.base import Controller
 from podusv_cli.controllers.network import Network
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.replay import replayer
-from podusv_cli.engine.simulate import ClosedLoop, simulate
+from podusv_cli.engine.simulate import ClosedLoop, names, simulate
 
 ROUNDS = 7
 STEPS = (1_000, 3_100, 10_000, 31_000, 100_000)
@@ -25,17 +26,19 @@ USUAL = Case("adaptive_neural", "27 grid")
 
 
 def engine_timers(case: Case) -> dict[str, Timer]:
-    """Timers of one whole `simulate`, every step logged, without and with the metrics."""
+    """Timers of one whole `simulate`, every step logged, without and with the metrics [CPU s]."""
     loop, over = case.loop(), grid()
     watching = metrics_observer(loop, over)
     return {
-        "podusv": timed(partial(simulate, loop, over)),
-        "podusv with metrics": timed(partial(simulate, loop, over, observer=watching)),
+        "podusv": timed(partial(simulate, loop, over), clock=thread_time),
+        "podusv with metrics": timed(
+            partial(simulate, loop, over, observer=watching), clock=thread_time
+        ),
     }
 
 
 def beside_c(programs: Mapping[str, Path], case: Case, rounds: int = ROUNDS) -> dict[str, Any]:
-    """Times [s] and ratios of podusv and the C programs, as quartiles, taken in turns."""
+    """CPU times [s] and ratios of podusv and the C programs, as quartiles, taken in turns."""
     timers = engine_timers(case) | {name: timer(path, case) for name, path in programs.items()}
     times = in_turns(timers, rounds)
     ratios = {
@@ -57,7 +60,7 @@ def all_beside_c(
 
 
 def growth(rounds: int = ROUNDS) -> dict[str, dict[str, list[float]]]:
-    """Time of one step [s] against the numbers of steps and of nodes and the density of the log."""
+    """CPU time of one step [s] against numbers of steps and nodes and density of the log."""
     usual, sparse = USUAL.loop(), grid(log_every=10)
     loops = {f"{n**3}": replace(usual, controller=_with_nodes(n)) for n in NODES}
     series = {
@@ -73,9 +76,17 @@ def _with_nodes(n: int) -> Controller:
 
 
 def _a_step(runs: dict[str, tuple[ClosedLoop, TimeGrid]], rounds: int) -> dict[str, list[float]]:
-    timers = {label: timed(partial(simulate, *run)) for label, run in runs.items()}
+    timers = {
+        label: timed(partial(simulate, *run), clock=thread_time) for label, run in runs.items()
+    }
     times = in_turns(timers, rounds)
     return {label: quartiles(times[label] / over.steps) for label, (_, over) in runs.items()}
+
+
+def log_megabytes(case: Case = USUAL) -> float:
+    """Size of the log of a whole run, in memory."""
+    loop, over = case.loop(), grid()
+    return over.rows * len(names(loop)) * 8 / 2**20
 
 
 def law_costs(rounds: int = 15) -> dict[str, list[float]]:

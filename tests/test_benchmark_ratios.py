@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from benchmarks.alternatives import python_alternatives
+from benchmarks.batch import batch_costs
 from benchmarks.c_program import TOLERANCE, agreement, build
 from benchmarks.cases import CASES, Case
 from benchmarks.engine import beside_c, growth
@@ -56,6 +57,13 @@ def test_a_run_of_the_usual_size(level: Any, law: str) -> None:
 def test_the_cost_of_a_step_does_not_depend_on_how_many_there_are() -> None:
     seconds = {int(n): low for n, (low, _, _) in growth()["steps"].items()}
     assert seconds[100_000] <= 1.1 * seconds[10_000]
+
+
+def test_many_runs_cost_what_their_steps_cost() -> None:
+    whole = batch_costs()["31000"]
+    assert whole["processor cost"][1] <= 1.05
+    # Other programs take cores away; they do not give any.
+    assert whole["cost"][0] <= 1.05
 
 
 def test_python_alternatives_are_slower_at_the_same_accuracy() -> None:

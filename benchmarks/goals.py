@@ -1,0 +1,80 @@
+"""What podusv is meant to reach, and whether it does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from benchmarks.cases import CASES, LAWS, Case
+
+Results = Mapping[str, Any]
+USUAL = [Case(law, "" if law == "pid" else "27 grid").label for law in LAWS]
+LISTED = [case.label for case in CASES if "listed" in case.network]
+RUN = "podusv run --no-figures"
+
+
+@dataclass(frozen=True)
+class Goal:
+    """A number that is to stay at or below a limit; `measured` finds it in the results."""
+
+    says: str
+    most: float
+    measured: Callable[[Results], float]
+    unit: str = ""
+
+
+def _worst(labels: list[str], ratio: str) -> Callable[[Results], float]:
+    return lambda found: max(
+        float(found["beside_c"][label]["ratios"][ratio][1]) for label in labels
+    )
+
+
+def _steps(found: Results) -> float:
+    cost = found["growth"]["steps"]
+    return float(cost["100000"][1] / cost["10000"][1])
+
+
+def _nodes(found: Results) -> float:
+    cost = {int(nodes): values[1] for nodes, values in found["growth"]["nodes"].items()}
+    few, some, many = sorted(cost)[-3:]
+    slopes = (cost[b] - cost[a] for a, b in ((few, some), (some, many)))
+    first, last = (
+        slope / count for slope, count in zip(slopes, (some - few, many - some), strict=True)
+    )
+    return float(last / first)
+
+
+def _seconds(command: str) -> Callable[[Results], float]:
+    return lambda found: float(found["commands"][command]["seconds"][1])
+
+
+def _memory(found: Results) -> float:
+    peak = max(found["commands"][command]["megabytes"][1] for command in (RUN, "podusv run"))
+    return float(peak - found["log_megabytes"])
+
+
+GOALS = (
+    Goal("a run of any law, 27 nodes, beside C -O3", 0.8, _worst(USUAL, "podusv / C -O3")),
+    Goal("the same beside C -Ofast", 1.0, _worst(USUAL, "podusv / C -Ofast")),
+    Goal("27 nodes that lie on no grid, beside C -O3", 1.05, _worst(LISTED, "podusv / C -O3")),
+    Goal("a step of 100 000 beside one of 10 000", 1.05, _steps),
+    Goal("a node of 343 beside one of 125", 1.1, _nodes),
+    Goal(
+        "N runs at once beside N / cores single ones", 1.05,
+        lambda found: float(found["batch"]["31000"]["cost"][1]),
+    ),
+    Goal("peak memory of a run less its log", 150.0, _memory, "MB"),
+    Goal("`podusv run` without figures", 0.7, _seconds(RUN), "s"),
+    Goal("`podusv run` with figures", 1.8, _seconds("podusv run"), "s"),
+    Goal("the very first run", 10.0, _seconds(f"{RUN}, for the first time"), "s"),
+    Goal("`podusv --help`", 0.15, _seconds("podusv --help"), "s"),
+)  # fmt: skip
+
+
+def goal_rows(found: Results) -> Iterator[list[str]]:
+    """Goal, limit, what was measured, and whether that is within the limit."""
+    for goal in GOALS:
+        value = goal.measured(found)
+        limit, got = (f"{number:.3g} {goal.unit}".strip() for number in (goal.most, value))
+        yield [goal.says, limit, got, "yes" if value <= goal.most else "**no**"]
