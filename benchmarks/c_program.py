@@ -23,7 +23,7 @@ TOLERANCE = 1e-9  # relative, for every number of the last state and for iae
 
 @dataclass(frozen=True)
 class Outcome:
-    """The integral of the distance [m s], the last state, and the median CPU time of the loop [s]."""
+    """Integral of the distance [m s], the last state, and the median CPU time of the loop [s]."""
 
     iae: float
     state: Vector
