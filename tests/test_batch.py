@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import re
 import threading
 import time
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -26,6 +28,7 @@ from podusv_cli.metrics.watching import observer, summarise, summarise_many
 from podusv_cli.paths.waypoints import Waypoints
 from podusv_cli.registry import value
 
+ROOT = Path(__file__).resolve().parent.parent
 GRID = TimeGrid(0.01, 2000)
 SETTINGS = {"steady_fraction": 0.5, "settling_radius": 12.0}
 COUNT = 7
@@ -175,6 +178,18 @@ def test_a_fault_in_one_run_is_raised() -> None:
 
     with pytest.raises(ZeroDivisionError):
         simulate_many([adrift(controller=Faulty())] * 3, GRID)
+
+
+def test_the_documented_monte_carlo_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    text = (ROOT / "docs" / "performance.md").read_text()
+    (code,) = re.findall(r"```python\n(.*?simulate_many.*?)```", text, re.DOTALL)
+    few = code.replace("(1000, 6)", "(4, 6)").replace('"configs/', f'"{ROOT}/configs/')
+    assert few.count("(4, 6)") == few.count(f"{ROOT}/configs/paper") == 1
+    exec(few, {})  # noqa: S102
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "4 of 4 finished"
+    low, middle, high = map(float, lines[1].removeprefix("iae [").rstrip("]").split())
+    assert 375 < low < middle < high < 395  # as the text says of a thousand
 
 
 def test_variants_change_what_they_name_and_nothing_else() -> None:
