@@ -71,19 +71,19 @@ named_wires, named_plan = unpacker(Wires._fields), unpacker(Plan._fields)
 def rates(
     t: float, s: Vector, ds: Vector,
     path: Function, disturbance: Function, law: Function, actuator: Function, c: Wires, n: Plan,
-    seen: bool,
+    again: bool,
 ) -> None:  # fmt: skip
     """Right-hand side of the closed loop at time t; leaves all signals in the row.
 
-    `seen`: the evaluation before was at this very t, so what depends on time alone is in the row.
+    `again`: the evaluation before was at this very t, so what depends on time alone is in the row.
     """
     row = c.row
     demand, tau, b = tail(row, n.demand), tail(row, n.tau), tail(row, n.b)
     memory, memory_rate = tail(s, n.memory), tail(ds, n.memory)
     p, table, work = c.law, c.law_table, c.work
-    if not seen:
+    if not again:
         path(t, c.path, c.path_table, row)
-    if not (seen and n.load_of_time == 1):
+    if not (again and n.load_of_time == 1):
         disturbance(t, s, c.disturbance, c.disturbance_table, b)
     if n.hold_every > 0:
         held = c.held
@@ -177,10 +177,10 @@ def instant(
 ) -> bool:  # fmt: skip
     """Sample, evaluate, observe and log instant k; whether all its numbers are finite."""
     t = k * h
-    seen = k > first and t == (k - 1) * h + h  # where the last stage of the step before was
+    again = k > first and t == (k - 1) * h + h  # where the last stage of the step before was
     if n.sample_every > 0 or n.hold_every > 0:
         sample_and_hold(k, t, path, law, sample, c, n)
-    rates(t, c.s, c.stages, path, disturbance, law, actuator, c, n, seen)
+    rates(t, c.s, c.stages, path, disturbance, law, actuator, c, n, again)
     if not (finite(n.states, c.s) and finite(n.columns, c.row)):
         return False
     weight = 0.5 * h if k == 0 or k == n.steps else h
