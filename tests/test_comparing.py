@@ -14,6 +14,8 @@ from podusv_cli.comparison import table
 from podusv_cli.comparison.differences import differences
 from podusv_cli.config.loading import load
 from podusv_cli.errors import ScenarioError, StorageError, UsageError
+from podusv_cli.figures.drawing import FIGURES, dressed
+from podusv_cli.figures.style import FORMATS
 
 SCENARIO = """
 vessel: {preset: paper_nonlinear}
@@ -244,8 +246,9 @@ def test_ratios_to_a_first_run_that_is_zero_are_left_out():
     assert table.cells(frame)[0][2:] == ["0*", "2"]
 
 
-def test_figures_exist_for_all_paths_named(done):
-    stems = {path.stem for path in (Path(done.folder) / "figures").iterdir()}
-    assert stems == {
-        "trajectory", "errors", "controls", "filters", "adaptation", "velocities", "loads",
-    }  # fmt: skip
+def test_every_figure_that_fits_is_there_in_every_format(done):
+    shown = dressed([(e.label, e.recording, e.scenario) for e in done.result.entries])
+    fitting = [name for name, sheet in FIGURES.items() if sheet.fits(shown)]
+    found = {path.name for path in (Path(done.folder) / "figures").iterdir()}
+    assert found == {f"{name}.{form}" for name in fitting for form in FORMATS}
+    assert {"trajectory", "errors", "controls", "filters", "velocities"} <= set(fitting)

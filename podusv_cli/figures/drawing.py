@@ -64,14 +64,10 @@ FIGURES: dict[str, Sheet] = {
 def dressed(runs: Sequence[tuple[str, Recording, Scenario]]) -> list[Shown]:
     """Labelled recordings with their looks, in order; without those too short to draw."""
     return [
-        Shown(
-            label, recording, *LOOKS[i % len(LOOKS)],
-            length=scenario.vessel.length, beam=scenario.vessel.beam,
-            steady_from=(1.0 - scenario.metrics.steady_fraction) * scenario.simulation.duration,
-        )
+        Shown(label, recording, scenario, *LOOKS[i % len(LOOKS)])
         for i, (label, recording, scenario) in enumerate(runs)
         if len(recording["time"]) > 1
-    ]  # fmt: skip
+    ]
 
 
 def draw(

@@ -17,6 +17,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import ScalarFormatter
 
+from podusv_cli.config.scenario import Scenario
 from podusv_cli.derived import DERIVED, Derived
 from podusv_cli.kernels import Vector
 from podusv_cli.recording import Recording
@@ -44,18 +45,29 @@ NO_STAMP: dict[str, dict[str, Any]] = {
 
 @dataclass(frozen=True)
 class Shown:
-    """A recording with the name, colour and line style under which every figure shows it.
-
-    `length` and `beam` [m] are the vessel's, `limits` the actuator's (surge [N], yaw [N m]).
-    """
+    """A run with the name, colour and line style under which every figure shows it."""
 
     label: str
     recording: Recording
+    scenario: Scenario
     color: str
     linestyle: Any
-    length: float
-    beam: float
-    steady_from: float
+
+    @property
+    def length(self) -> float:
+        """Of the vessel [m]."""
+        return self.scenario.vessel.length
+
+    @property
+    def beam(self) -> float:
+        """Of the vessel [m]."""
+        return self.scenario.vessel.beam
+
+    @property
+    def steady_from(self) -> float:
+        """Start of the part that counts as settled [s]."""
+        fraction = self.scenario.metrics.steady_fraction
+        return (1.0 - fraction) * self.scenario.simulation.duration
 
     @property
     def look(self) -> dict[str, Any]:
