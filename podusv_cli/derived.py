@@ -28,6 +28,8 @@ def _activation(log: Recording) -> Vector:
 DERIVED: dict[str, Derived] = {
     "x_e": Derived(("x_d", "x"), lambda log: log["x_d"] - log["x"]),
     "y_e": Derived(("y_d", "y"), lambda log: log["y_d"] - log["y"]),
+    "y_u": Derived(("beta_u", "alpha_u"), lambda log: log["beta_u"] - log["alpha_u"]),
+    "y_r": Derived(("beta_r", "alpha_r"), lambda log: log["beta_r"] - log["alpha_r"]),
     "W_norm_u": Derived(("W_hat_u",), lambda log: np.linalg.norm(log["W_hat_u"], axis=1)),
     "W_norm_r": Derived(("W_hat_r",), lambda log: np.linalg.norm(log["W_hat_r"], axis=1)),
     "activation": Derived(("rbf_center", "rbf_width", "u"), _activation),

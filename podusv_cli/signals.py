@@ -38,6 +38,8 @@ _ROWS = (
     Signal("alpha_r", r"\alpha_r", "rad/s", "virtual yaw rate (30)"),
     Signal("beta_u", r"\beta_u", "m/s", "filtered virtual surge velocity (22)"),
     Signal("beta_r", r"\beta_r", "rad/s", "filtered virtual yaw rate (31)"),
+    Signal("y_u", "y_u", "m/s", "error of the surge filter, beta_u - alpha_u; derived, not logged"),
+    Signal("y_r", "y_r", "rad/s", "error of the yaw filter, beta_r - alpha_r; derived, not logged"),
     Signal("u_e", "u_e", "m/s", "surge velocity error (23)"),
     Signal("r_e", "r_e", "rad/s", "yaw rate error (32)"),
     Signal("tau_u_cmd", r"\tau_{u,\mathrm{cmd}}", "N", "surge force that the law asked for"),

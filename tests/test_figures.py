@@ -1,129 +1,191 @@
-"""Figures by their data: lines, labels, limits; never by pixels."""
+"""Figures by their data: which line shows which numbers, under which label, on which scale."""
+
+import io
 
 import numpy as np
 import pytest
-from conftest import corrected, run
+from drawn_samples import CENTER, WIDTH, drawn, line, panels, recording, shown
+from PIL import Image
 
-from podusv_cli.actuators.saturated import Saturated
-from podusv_cli.config.loading import load_text
-from podusv_cli.controllers.pid import Pid
-from podusv_cli.figures.drawing import FIGURES, draw, dressed
-from podusv_cli.figures.style import LOOKS, WIDTHS, axis_label, house_style, thinned
-from podusv_cli.figures.trajectory import hull
+from podusv_cli.figures.curves import thinned
+from podusv_cli.figures.drawing import FIGURES, draw
+from podusv_cli.figures.style import LOOKS, WIDTHS, axis_label, look
 from podusv_cli.signals import SIGNALS
-
-TEXT = """
-vessel: {preset: paper_nonlinear}
-path: {kind: line_circle}
-disturbance: {kind: harmonic}
-actuator: {kind: saturated}
-controller: {kind: pid}
-simulation: {duration: 40.0}
-"""
 
 
 @pytest.fixture(scope="module")
-def shown():
-    scenario = load_text(TEXT, "drawn.yaml").scenario
-    laws = {"adaptive": corrected(actuator=Saturated()), "pid": corrected(controller=Pid())}
-    return dressed([(label, run(loop, 40.0), scenario) for label, loop in laws.items()])
+def two():
+    return shown(("a", recording()), ("b", recording(shift=0.7)))
 
 
-def drawn(name, shown, columns=2):
-    with house_style():
-        return FIGURES[name].family(shown, columns)
+def activation(log):
+    nu = np.column_stack([log["u"], log["v"], log["r"]])
+    outputs = [np.exp(-0.5 * (((nu - c) / WIDTH) ** 2).sum(axis=1)) for c in CENTER]
+    return np.maximum(*outputs)
 
 
-def test_errors_show_the_logged_numbers(shown):
-    axes = {a.get_ylabel(): a for a in drawn("errors", shown).axes}
-    assert list(axes) == [axis_label(name) for name in ("x_e", "y_e", "z_e", "psi_e")]
-    assert axes[axis_label("z_e")].get_yscale() == "log"
-    line = axes[axis_label("x_e")].lines[0]
-    log = shown[0].recording
-    assert np.isin(line.get_ydata(), log["x_d"] - log["x"]).all()
-    assert line.get_ydata().max() == (log["x_d"] - log["x"]).max()
+# By hand: label of the axis, and the numbers that belong there.
+GRIDS = {
+    "errors": {
+        "$x_e$ [m]": lambda log: log["x_d"] - log["x"],
+        "$y_e$ [m]": lambda log: log["y_d"] - log["y"],
+        "$z_e$ [m]": lambda log: log["z_e"],
+        r"$\psi_e$ [rad]": lambda log: log["psi_e"],
+    },
+    "velocities": {
+        "$u$ [m/s]": lambda log: log["u"],
+        "$v$ [m/s]": lambda log: log["v"],
+        "$r$ [rad/s]": lambda log: log["r"],
+        r"$\psi$ [rad]": lambda log: log["psi"],
+    },
+    "adaptation": {
+        r"$|\hat W_u|$ [m/s$^2$]": lambda log: np.hypot(*log["W_hat_u"].T),
+        r"$|\hat W_r|$ [rad/s$^2$]": lambda log: np.hypot(*log["W_hat_r"].T),
+        r"$\hat b_u$ [N]": lambda log: log["b_hat_u"],
+        r"$\hat b_r$ [N m]": lambda log: log["b_hat_r"],
+        r"$\hat f_u$ [m/s$^2$]": lambda log: log["f_hat_u"],
+        r"$\hat f_r$ [rad/s$^2$]": lambda log: log["f_hat_r"],
+        r"$\max\Phi$ [1]": activation,
+    },
+}
 
 
-def test_every_run_has_its_own_look(shown):
-    lines = drawn("errors", shown).axes[0].lines
-    assert [line.get_label() for line in lines] == ["adaptive", "pid"]
-    assert len({(line.get_color(), line.get_linestyle()) for line in lines}) == 2
+@pytest.mark.parametrize("name", GRIDS)
+def test_every_panel_shows_its_signal_of_every_run(two, name):
+    found = panels(drawn(name, two))
+    assert list(found) == list(GRIDS[name])
+    for label, expected in GRIDS[name].items():
+        assert [curve.get_label() for curve in found[label].lines] == ["a", "b"]
+        for run, curve in zip(two, found[label].lines, strict=True):
+            assert np.array_equal(curve.get_xdata(), run.recording["time"])
+            assert curve.get_ydata() == pytest.approx(expected(run.recording), abs=1e-12)
 
 
-def test_looks_differ_in_colour_and_in_line_style():
+@pytest.mark.parametrize("name", [*GRIDS, "filters", "loads"])
+def test_time_stands_below_the_last_row_alone(two, name):
+    figure = drawn(name, two)
+    lowest = min(axes.get_position().y0 for axes in figure.axes)
+    for axes in figure.axes:
+        last = axes.get_position().y0 == pytest.approx(lowest)
+        assert axes.get_xlabel() == ("time [s]" if last else "")
+
+
+def test_only_the_distance_is_on_a_logarithmic_axis(two):
+    scales = {label: axes.get_yscale() for label, axes in panels(drawn("errors", two)).items()}
+    assert scales.pop("$z_e$ [m]") == "log"
+    assert set(scales.values()) == {"linear"}
+
+
+def test_what_no_run_logged_has_no_panel_and_a_run_without_it_no_line():
+    lacking = recording(without=("b_hat_u", "b_hat_r"))
+    runs = shown(("a", lacking), ("b", recording(without=("b_hat_u",))))
+    found = panels(drawn("adaptation", runs))
+    assert r"$\hat b_u$ [N]" not in found
+    assert [curve.get_label() for curve in found[r"$\hat b_r$ [N m]"].lines] == ["b"]
+
+
+def test_a_panel_alone_in_its_row_fills_it(two):
+    figure = drawn("adaptation", two)
+    figure.canvas.draw()
+    left, right, last = (axes.get_position() for axes in figure.axes[-3:])
+    assert (last.x0, last.x1) == pytest.approx((left.x0, right.x1), abs=0.01)
+
+
+@pytest.mark.parametrize(("columns", "count"), [(2, 2), (1, 1)])
+def test_panels_stand_in_as_many_columns_as_the_page_has(two, columns, count):
+    figure = drawn("errors", two, columns)
+    assert len({round(axes.get_position().x0, 3) for axes in figure.axes}) == count
+
+
+def test_every_run_has_its_own_look_and_its_name_in_the_legend(two):
+    figure = drawn("errors", two)
+    for axes in figure.axes:
+        looks = [(curve.get_color(), curve.get_linestyle()) for curve in axes.lines]
+        assert looks == [("#0072B2", "-"), ("#D55E00", "--")]
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["a", "b"]
+    colors = [handle.get_color() for handle in legend.get_lines()]
+    assert colors == ["#0072B2", "#D55E00"]
+
+
+def test_looks_differ_in_colour_and_in_line_style_and_are_not_used_twice():
     assert len({color for color, _ in LOOKS}) == len(LOOKS)
     assert len({str(style) for _, style in LOOKS}) == len(LOOKS)
+    assert [look(i) for i in range(len(LOOKS))] == list(LOOKS)
+    assert len({str(look(i)) for i in range(36)}) == 36
 
 
-def test_controls_show_the_peak_and_the_settled_part(shown):
-    early, settled = drawn("controls", shown).axes[:2]
-    assert early.get_xlim() == pytest.approx((0.0, 0.005 * 40))
-    assert settled.get_xlim() == pytest.approx((32.0, 40.0))
-    applied = next(line for line in settled.lines if line.get_label() == "adaptive")
-    assert np.abs(applied.get_ydata()).max() <= 8.0
+def test_a_long_log_is_thinned_with_every_extreme_kept():
+    spike = {"u": lambda t: np.where(t == t[7771], 9.0, np.where(t == t[20_001], -8.0, 0.1 * t))}
+    runs = shown(("a", recording(period=0.004, **spike)))
+    curve = line(panels(drawn("velocities", runs))["$u$ [m/s]"], "a")
+    log = runs[0].recording
+    assert len(curve.get_xdata()) < 3100 < len(log["time"])
+    rows = np.searchsorted(log["time"], curve.get_xdata())
+    assert np.array_equal(log["u"][rows], curve.get_ydata())
+    assert (curve.get_ydata().max(), curve.get_ydata().min()) == (log["u"].max(), -8.0)
+    assert curve.get_xdata()[-1] == log["time"][-1]
 
 
-def test_controls_draw_what_was_asked_only_where_it_was_not_given(shown):
-    labels = {line.get_label() for line in drawn("controls", shown).axes[0].lines}
-    assert labels == {"adaptive", "adaptive, asked", "pid"}
-
-
-def test_a_map_has_equal_scales_and_the_target(shown):
-    whole = drawn("trajectory", shown).axes[0]
-    assert whole.get_aspect() == 1.0
-    target = next(line for line in whole.lines if line.get_label() == "target")
-    log = shown[0].recording
-    assert target.get_xdata()[-1] == log["y_d"][-1]
-    assert target.get_ydata()[-1] == log["x_d"][-1]
-    hulls = [patch.get_xy() for patch in whole.patches]
-    assert len(hulls) == 2 * 9
-
-
-def test_a_hull_points_where_the_vessel_heads():
-    north = hull(0.0, 0.0, 0.0, length=2.0, beam=0.5)
-    assert north[0] == pytest.approx([0.0, 1.0])  # the bow: east 0, north 1
-    east = hull(3.0, 4.0, np.pi / 2, length=2.0, beam=0.5)
-    assert east[0] == pytest.approx([5.0, 3.0])
-
-
-def test_a_law_without_memory_has_no_adaptation_to_show(shown):
-    assert FIGURES["adaptation"].fits(shown)
-    assert not FIGURES["adaptation"].fits(shown[1:])
-    assert not list(draw(shown[1:], ["adaptation"], ("png",)))
-
-
-@pytest.mark.parametrize("columns", [1, 2])
-@pytest.mark.parametrize("name", FIGURES)
-def test_every_figure_fits_its_page(shown, name, columns):
-    figure = drawn(name, shown, columns)
-    assert figure.get_size_inches()[0] == WIDTHS[columns]
-    used = [axes for axes in figure.axes if axes.axison]
-    assert all("[" in axes.get_ylabel() for axes in used if axes.get_ylabel())
-
-
-@pytest.mark.parametrize("form", ["png", "pdf", "svg"])
-def test_the_same_runs_give_the_same_bytes(shown, form):
-    first, second = (dict(draw(shown, ["errors"], (form,))) for _ in range(2))
-    assert first == second
-
-
-def test_thinning_keeps_every_extreme():
+def test_thinning_keeps_the_extremes_of_every_bin_in_order():
     t = np.linspace(0, 1, 100_000)
     y = np.sin(50 * t)
     y[[777, 54_321]] = 9.0, -9.0
     few, kept = thinned(t, y)
-    assert len(few) < 3000
+    assert len(few) <= 1500 + 2
     assert np.all(np.diff(few) > 0)
     assert (kept.max(), kept.min()) == (9.0, -9.0)
+    smooth = np.sin(50 * t)
+    assert np.interp(t, *thinned(t, smooth)) == pytest.approx(smooth, abs=0.1)
+    assert all(
+        np.array_equal(*pair)
+        for pair in zip(thinned(t[:1500], y[:1500]), (t[:1500], y[:1500]), strict=True)
+    )
 
 
 def test_every_signal_has_a_label_with_its_unit():
-    assert all(f"[{signal.unit}]" in axis_label(name) for name, signal in SIGNALS.items())
+    for name, signal in SIGNALS.items():
+        symbol, unit = axis_label(name).removesuffix("]").split(" [")
+        assert symbol == f"${signal.symbol}$"
+        assert unit.replace("$", "").replace("^", "") == signal.unit
+    assert axis_label("f_hat_u") == r"$\hat f_u$ [m/s$^2$]"
 
 
-def test_the_style_stays_inside(shown):
+@pytest.mark.parametrize("columns", [1, 2])
+@pytest.mark.parametrize("name", FIGURES)
+def test_every_figure_is_as_wide_as_its_page_and_names_its_axes(two, name, columns):
+    if not FIGURES[name].fits(two):
+        pytest.skip("the sample logs lack what this figure shows")
+    figure = drawn(name, two, columns)
+    assert figure.get_size_inches()[0] == {1: 3.46, 2: 7.09}[columns] == WIDTHS[columns]
+    assert all("[" in axes.get_ylabel() for axes in figure.axes if axes.get_ylabel())
+    assert any(axes.get_xlabel() for axes in figure.axes)
+
+
+def test_a_figure_whose_signals_no_run_has_is_not_drawn():
+    runs = shown(("a", recording(without=FIGURES["filters"].signals)))
+    assert not FIGURES["filters"].fits(runs)
+    names = [name for name, _ in draw(runs, ["filters", "velocities"], ("png",))]
+    assert names == ["velocities.png"]
+
+
+@pytest.mark.parametrize("form", ["png", "pdf", "svg"])
+def test_the_same_runs_give_the_same_bytes_without_a_date(two, form):
+    first, second = (dict(draw(two, ["errors"], (form,)))[f"errors.{form}"] for _ in range(2))
+    assert first == second
+    assert not any(word in first for word in (b"CreationDate", b"dc:date", b"Software"))
+    assert first.startswith({"png": b"\x89PNG", "pdf": b"%PDF", "svg": b"<?xml"}[form])
+
+
+def test_columns_reach_the_drawing(two):
+    (_, content), *_ = draw(two, ["errors"], ("png",), columns=1)
+    with Image.open(io.BytesIO(content)) as picture:
+        assert picture.width == round(3.46 * 200)
+
+
+def test_the_style_stays_inside(two):
     import matplotlib as mpl
 
     before = mpl.rcParams["font.size"]
-    drawn("errors", shown)
+    drawn("errors", two)
     assert mpl.rcParams["font.size"] == before

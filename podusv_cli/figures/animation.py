@@ -6,30 +6,33 @@ import io
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from PIL import Image
 
-from podusv_cli.figures.style import TARGET_LOOK, Shown, house_style
-from podusv_cli.figures.trajectory import bounds, enlargement, hull
+from podusv_cli.figures.style import Shown, house_style
+from podusv_cli.figures.trajectory import bounds, enlargement, hull_of, map_axes, targets
 
+FILE = "animation.gif"
 FRAMES = 120
 FRAME_MS = 80
 SIZE = 4.0  # inches
 DPI = 110
+STRIDE = 10  # rows between points of a track
+PALE = 0.25
 
 
 def animate(runs: Sequence[Shown]) -> bytes:
-    """A GIF: tracks grow, hulls (enlarged) and target move; same runs, same bytes."""
+    """A GIF: tracks grow, hulls (enlarged) and targets move; same runs, same bytes."""
     with house_style():
         figure = Figure(figsize=(SIZE, SIZE), dpi=DPI, layout="constrained")
         canvas = FigureCanvasAgg(figure)
-        move = _stage(figure, runs)
-        longest = max(float(run.recording["time"][-1]) for run in runs)
+        move = stage(figure.add_subplot(), runs)
         frames = []
-        for t in np.linspace(0.0, longest, FRAMES):
-            move(float(t))
+        for t in frame_times(runs):
+            move(t)
             canvas.draw()  # type: ignore[no-untyped-call]
             pixels = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
             picture = Image.fromarray(pixels).convert("RGB")
@@ -41,34 +44,40 @@ def animate(runs: Sequence[Shown]) -> bytes:
     return buffer.getvalue()
 
 
-def _stage(figure: Figure, runs: Sequence[Shown]) -> Callable[[float], None]:
-    """Draw what stands still; the function moves the rest to a time [s]."""
-    axes = figure.add_subplot()
-    first = runs[0].recording
-    axes.plot(first["y_d"], first["x_d"], **TARGET_LOOK, label="target")
-    (target,) = axes.plot([], [], "o", color=TARGET_LOOK["color"], markersize=4)
+def frame_times(runs: Sequence[Shown]) -> list[float]:
+    """The instants [s] that are shown, from the start to the end of the longest run."""
+    return [float(t) for t in np.linspace(0.0, max(run.end for run in runs), FRAMES)]
+
+
+def stage(axes: Axes, runs: Sequence[Shown]) -> Callable[[float], None]:
+    """Draw what stands still; the function moves the rest to a time [s].
+
+    A run that has ended stays where it is, its hull pale.
+    """
+    chased = [
+        (target.recording, axes.plot([], [], "o", color=target.look["color"], markersize=4)[0])
+        for target in targets(runs)
+    ]
+    for target in targets(runs):
+        axes.plot(target.recording["y_d"], target.recording["x_d"], **target.look)
     scale = enlargement(runs)
     tracks = [axes.plot([], [], **run.look)[0] for run in runs]
     hulls = [Polygon(np.zeros((5, 2)), color=run.color) for run in runs]
     for outline in hulls:
         axes.add_patch(outline)
-    east, north = bounds(runs)
-    axes.set_xlim(*east)
-    axes.set_ylim(*north)
-    axes.set_aspect("equal", adjustable="box")
-    axes.set_xlabel("$y$ [m], east")
-    axes.set_ylabel("$x$ [m], north")
+    map_axes(axes, *bounds(runs))
     axes.legend(loc="best")
 
     def move(t: float) -> None:
-        axes.set_title(f"t = {t:5.1f} s")
+        axes.set_title(f"t = {t:5.1f} s, hulls {scale:.0f} times as large")
         for run, track, outline in zip(runs, tracks, hulls, strict=True):
-            log = run.recording
+            log, row = run.recording, run.row(t)
+            rows = np.append(np.arange(0, row, STRIDE), row)
+            track.set_data(log["y"][rows], log["x"][rows])
+            outline.set_xy(hull_of(run, t, scale))
+            outline.set_alpha(1.0 if t <= run.end else PALE)
+        for log, dot in chased:
             row = min(int(np.searchsorted(log["time"], t)), len(log["time"]) - 1)
-            track.set_data(log["y"][: row + 1 : 10], log["x"][: row + 1 : 10])
-            x, y, psi = (float(log[name][row]) for name in ("x", "y", "psi"))
-            outline.set_xy(hull(x, y, psi, length=scale * run.length, beam=scale * run.beam))
-        row = min(int(np.searchsorted(first["time"], t)), len(first["time"]) - 1)
-        target.set_data([first["y_d"][row]], [first["x_d"][row]])
+            dot.set_data([log["y_d"][row]], [log["x_d"][row]])
 
     return move

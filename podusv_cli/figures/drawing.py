@@ -8,8 +8,10 @@ from functools import partial
 
 from podusv_cli.config.scenario import Scenario
 from podusv_cli.figures.controls import controls
+from podusv_cli.figures.filters import filters
+from podusv_cli.figures.loads import loads
 from podusv_cli.figures.panels import Family, signals_over_time
-from podusv_cli.figures.style import LOOKS, Shown, house_style, image
+from podusv_cli.figures.style import Shown, house_style, image, look
 from podusv_cli.figures.trajectory import trajectory
 from podusv_cli.parallel import INTERRUPTED, run_all
 from podusv_cli.recording import Recording
@@ -28,35 +30,46 @@ class Sheet:
         return any(run.has(name) for run in runs for name in self.signals)
 
 
-def _grid(caption: str, *signals: str, logarithmic: tuple[str, ...] = ()) -> Sheet:
-    return Sheet(caption, signals, signals_over_time(*signals, logarithmic=logarithmic))
+def _grid(
+    caption: str, *signals: str, logarithmic: tuple[str, ...] = (), compressed: bool = False
+) -> Sheet:
+    family = signals_over_time(*signals, logarithmic=logarithmic, compressed=compressed)
+    return Sheet(caption, signals, family)
 
 
+PEAKS = "; where peaks dwarf the settled values the axis is logarithmic beyond these"
 FIGURES: dict[str, Sheet] = {
     "trajectory": Sheet(
-        "tracks and target on a map; right, the end of the run close up", ("x", "y"), trajectory
+        "tracks and target on a map; aside, the end of the run close up, framed on the map",
+        ("x", "y"),
+        trajectory,
     ),
     "errors": _grid(
         "tracking errors (18) over time, the distance on a logarithmic axis",
         "x_e", "y_e", "z_e", "psi_e", logarithmic=("z_e",),
     ),
     "controls": Sheet(
-        "surge force and yaw moment on the hull, thin what the law asked for; left the first "
-        "moments, right the settled part",
+        "surge force and yaw moment on the hull, thin what the law asked for: the first moments, "
+        "the whole run, the settled part" + PEAKS,
         ("tau_u", "tau_r"),
         controls,
     ),
-    "filters": _grid(
-        "virtual controls (21), (30) and what the filter makes of them (22), (31)",
-        "alpha_u", "beta_u", "alpha_r", "beta_r",
+    "filters": Sheet(
+        "virtual controls (21), (30), thin, with what the filter makes of them (22), (31), and the "
+        "filter's error y = beta - alpha" + PEAKS,
+        ("alpha_u", "alpha_r"),
+        filters,
     ),
     "adaptation": _grid(
-        "norms of the network weights, estimated bounds, network outputs, largest node output",
+        "norms of the network weights, estimated bounds, network outputs, largest node output"
+        + PEAKS,
         "W_norm_u", "W_norm_r", "b_hat_u", "b_hat_r", "f_hat_u", "f_hat_r", "activation",
+        compressed=True,
     ),
-    "velocities": _grid("velocities and heading", "u", "v", "r", "psi"),
-    "loads": _grid(
-        "disturbance, and when the actuator limits the law", "b_u", "b_v", "b_r", "saturated"
+    "velocities": _grid("velocities and heading" + PEAKS, "u", "v", "r", "psi", compressed=True),
+    "loads": Sheet(
+        "disturbance, and when the actuator limits the law", ("b_u", "b_v", "b_r", "saturated"),
+        loads,
     ),
 }  # fmt: skip
 
@@ -64,7 +77,7 @@ FIGURES: dict[str, Sheet] = {
 def dressed(runs: Sequence[tuple[str, Recording, Scenario]]) -> list[Shown]:
     """Labelled recordings with their looks, in order; without those too short to draw."""
     return [
-        Shown(label, recording, scenario, *LOOKS[i % len(LOOKS)])
+        Shown(label, recording, scenario, *look(i))
         for i, (label, recording, scenario) in enumerate(runs)
         if len(recording["time"]) > 1
     ]

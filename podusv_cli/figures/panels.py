@@ -8,43 +8,52 @@ from collections.abc import Callable, Collection, Sequence
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from podusv_cli.figures.style import Shown, axis_label, draw_signal, frame_finished, new_figure
+from podusv_cli.figures.curves import compress, draw_signal
+from podusv_cli.figures.style import Shown, axis_label, legend, new_figure
 
 PANEL_HEIGHT = 1.35  # inches
+TIME = "time [s]"
 
 Family = Callable[[Sequence[Shown], int], Figure]
 
 
-def signals_over_time(*names: str, logarithmic: Collection[str] = ()) -> Family:
-    """A family that shows these signals, one a panel, all runs in each."""
+def signals_over_time(
+    *names: str, logarithmic: Collection[str] = (), compressed: bool = False
+) -> Family:
+    """A family that shows these signals, one a panel, all runs in each.
+
+    With `compressed`, an axis with tall peaks is logarithmic beyond the settled values.
+    """
 
     def family(runs: Sequence[Shown], columns: int) -> Figure:
         shown = [name for name in names if any(run.has(name) for run in runs)]
-        rows = math.ceil(len(shown) / columns)
-        figure = new_figure(columns, 0.7 + PANEL_HEIGHT * rows)
-        panels = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
-        for axes, name in zip(panels, shown, strict=False):
-            _panel(axes, runs, name)
+        figure, panels = grid(len(shown), columns)
+        for axes, name in zip(panels, shown, strict=True):
+            draw_signal(axes, runs, name)
+            axes.set_ylabel(axis_label(name))
             if name in logarithmic:
                 axes.set_yscale("log")
-            frame_finished(axes, runs)
-        _finish(figure, panels.tolist(), len(shown), columns)
+                axes.autoscale_view()  # margins in the new scale
+            if compressed:
+                compress(axes, runs, name)
+        legend(figure, columns)
         return figure
 
     return family
 
 
-def _panel(axes: Axes, runs: Sequence[Shown], name: str) -> None:
-    for run in runs:
-        draw_signal(axes, run, name)
-    axes.set_ylabel(axis_label(name))
-
-
-def _finish(figure: Figure, panels: list[Axes], used: int, columns: int) -> None:
-    for spare in panels[used:]:
-        spare.set_axis_off()
-    for axes in panels[max(0, used - columns) : used]:
-        axes.set_xlabel("time [s]")
-        axes.tick_params(labelbottom=True)
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
+def grid(count: int, columns: int) -> tuple[Figure, list[Axes]]:
+    """A figure with panels over one time, row by row; one alone in the last row fills it."""
+    rows = math.ceil(count / columns)
+    figure = new_figure(columns, 0.7 + PANEL_HEIGHT * rows)
+    cells = figure.add_gridspec(rows, columns)
+    alone = count % columns == 1 < columns
+    panels: list[Axes] = []
+    for place in range(count):
+        row, column = divmod(place, columns)
+        cell = cells[row, :] if alone and place == count - 1 else cells[row, column]
+        axes = figure.add_subplot(cell, sharex=panels[0] if panels else None)
+        axes.tick_params(labelbottom=row == rows - 1 or (alone and row == rows - 2))
+        axes.set_xlabel(TIME if row == rows - 1 else "")
+        panels.append(axes)
+    return figure, panels

@@ -1,20 +1,20 @@
-"""The look that all figures share: sizes, colours, line styles, labels, thinning, saving."""
+"""The look that all figures share: sizes, colours, line styles, labels, legend, saving."""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.ticker import ScalarFormatter
 
 from podusv_cli.config.scenario import Scenario
@@ -43,7 +43,7 @@ NO_STAMP: dict[str, dict[str, Any]] = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Shown:
     """A run with the name, colour and line style under which every figure shows it."""
 
@@ -62,6 +62,11 @@ class Shown:
     def beam(self) -> float:
         """Of the vessel [m]."""
         return self.scenario.vessel.beam
+
+    @property
+    def end(self) -> float:
+        """Time of the last row [s]."""
+        return float(self.recording["time"][-1])
 
     @property
     def steady_from(self) -> float:
@@ -89,6 +94,26 @@ class Shown:
             return self.recording[name]
         return DERIVED[name].compute(self.recording)
 
+    def during(self, name: str, span: tuple[float, float] | None) -> tuple[Vector, Vector]:
+        """Time and a signal, all of it or that of a part [s]."""
+        t, y = self.recording["time"], self.signal(name)
+        inside = (t >= span[0]) & (t <= span[1]) if span else slice(None)
+        return t[inside], y[inside]
+
+    def row(self, t: float) -> int:
+        """The first row that is not before a time [s], else the last row."""
+        return min(int(np.searchsorted(self.recording["time"], t)), len(self.recording["time"]) - 1)
+
+    def at(self, t: float, name: str) -> float:
+        """A signal in the row of a time [s]."""
+        return float(self.signal(name)[self.row(t)])
+
+
+def look(place: int) -> tuple[str, Any]:
+    """Colour and line style of the run in this place: a new pair for each of the first 36."""
+    count = len(LOOKS)
+    return LOOKS[place % count][0], LOOKS[(place + place // count) % count][1]
+
 
 @contextmanager
 def house_style() -> Iterator[None]:
@@ -112,49 +137,24 @@ def new_figure(columns: int, height: float) -> Figure:
 def axis_label(name: str) -> str:
     """Symbol and unit of a signal as an axis shows them."""
     signal = SIGNALS[name]
-    return f"${signal.symbol}$ [{signal.unit}]"
+    return f"${signal.symbol}$ [{unit(name)}]"
 
 
-def thinned(t: Vector, y: Vector, points: int = 1500) -> tuple[Vector, Vector]:
-    """At most about `points` samples that keep every extreme: the least and largest of each bin."""
-    if len(t) <= points:
-        return t, y
-    edges = np.linspace(0, len(t), points // 2 + 1).astype(int)
-    kept = {0, len(t) - 1}
-    for low, high in pairwise(edges):
-        kept |= {low + int(np.argmin(y[low:high])), low + int(np.argmax(y[low:high]))}
-    chosen = np.array(sorted(kept))
-    return t[chosen], y[chosen]
+def unit(name: str) -> str:
+    """Unit of a signal with its powers raised."""
+    return re.sub(r"(?<=[a-z])(\d)", r"$^\1$", SIGNALS[name].unit)
 
 
-def draw_signal(
-    axes: Axes, shown: Shown, name: str, *, between: tuple[float, float] | None = None, **look: Any
-) -> None:
-    """Plot a signal over time, or over a part of it [s]; does nothing where it was not logged."""
-    if not shown.has(name):
-        return
-    t, y = shown.recording["time"], shown.signal(name)
-    if between:
-        inside = (t >= between[0]) & (t <= between[1])
-        t, y = t[inside], y[inside]
-    axes.plot(*thinned(t, y), **{**shown.look, **look})
-
-
-def frame_finished(axes: Axes, runs: Sequence[Shown]) -> None:
-    """Where only some runs finished, fit the vertical axis to those.
-
-    A run that diverges leaves every scale; drawn to fit, it would hide all others.
-    """
-    labels = {run.label for run in runs if run.whole}
-    values = [np.asarray(line.get_ydata()) for line in axes.lines if line.get_label() in labels]
-    if not values or len(labels) == len(runs):
-        return
-    low, high = float(np.min(np.concatenate(values))), float(np.max(np.concatenate(values)))
-    if axes.get_yscale() == "log":
-        axes.set_ylim(low / 1.5, high * 1.5)
-    else:
-        margin = 0.05 * (high - low) or 1.0
-        axes.set_ylim(low - margin, high + margin)
+def legend(figure: Figure, columns: int, thin: str = "") -> None:
+    """Every name in any panel once, above all panels; `thin` says what the thin curves are."""
+    found = {
+        label: handle
+        for axes in figure.axes
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
+    }
+    if thin:
+        found[thin] = Line2D([], [], color="#444444", linewidth=0.5)
+    figure.legend(list(found.values()), list(found), loc="outside upper center", ncols=3 * columns)
 
 
 def image(figure: Figure, form: str) -> bytes:

@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Polygon
+from matplotlib.patches import Polygon, Rectangle
 
-from podusv_cli.figures.style import TARGET_LOOK, Shown, new_figure
+from podusv_cli.figures.curves import Span, scaling
+from podusv_cli.figures.style import TARGET_LOOK, Shown, legend, new_figure
 from podusv_cli.kernels import Vector
+from podusv_cli.recording import Recording
 
 HULL = np.array([(0.5, 0.0), (0.25, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.25, -0.5)])
 SILHOUETTES = 9
 LAST_PART = 0.05  # of the run, in the close-up
+NEAREST, FARTHEST = 2.0, 20.0  # lengths from the middle of the close-up to its edges
+POINTS = 3000  # of a track, at most about
+MARK: dict[str, Any] = {"color": "#444444", "linestyle": "none"}
 
 
 def hull(x: float, y: float, psi: float, *, length: float, beam: float) -> Vector:
@@ -26,18 +32,51 @@ def hull(x: float, y: float, psi: float, *, length: float, beam: float) -> Vecto
     return np.column_stack([east, north])
 
 
+@dataclass(frozen=True)
+class Target:
+    """A target that runs follow: its name in the legend, its look, a log that holds its track."""
+
+    look: dict[str, Any]
+    recording: Recording
+
+
+def targets(runs: Sequence[Shown]) -> list[Target]:
+    """Every target that differs from the others, as long as any of its runs lasts."""
+    groups: list[list[Shown]] = []
+    for run in runs:
+        group = next((g for g in groups if g[0].scenario.path == run.scenario.path), None)
+        if group is None:
+            groups.append([run])
+        else:
+            group.append(run)
+    return [_target(group, only=len(groups) == 1) for group in groups]
+
+
+def _target(group: Sequence[Shown], *, only: bool) -> Target:
+    longest = max(group, key=lambda run: run.end).recording
+    if only:
+        return Target({**TARGET_LOOK, "label": "target"}, longest)
+    label = f"target of {', '.join(run.label for run in group)}"
+    return Target({**TARGET_LOOK, "color": group[0].color, "label": label}, longest)
+
+
 def enlargement(runs: Sequence[Shown]) -> float:
     """How many times larger than life hulls must be drawn to be seen on a map of the whole run."""
-    target = runs[0].recording
-    spread = float(np.ptp(target["x_d"]) + np.ptp(target["y_d"]))
-    return max(1.0, round(0.05 * spread / runs[0].length))
+    tracks = [target.recording for target in targets(runs)]
+    spread = max(float(np.ptp(log["x_d"]) + np.ptp(log["y_d"])) for log in tracks)
+    return max(1.0, round(0.05 * spread / max(run.length for run in runs)))
 
 
-def bounds(runs: Sequence[Shown]) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Limits east and north [m] of a map of the target and of the runs that finished, if any."""
-    kept = [run.recording for run in runs if run.whole] or [runs[0].recording]
-    east = np.concatenate([log[name] for log in kept for name in ("y", "y_d")])
-    north = np.concatenate([log[name] for log in kept for name in ("x", "x_d")])
+def bounds(runs: Sequence[Shown]) -> tuple[Span, Span]:
+    """Limits east and north [m] of a map of the targets and of the runs that finished, if any.
+
+    Where none finished, targets alone.
+    """
+    logs = [target.recording for target in targets(runs)]
+    pairs = [(log["y_d"], log["x_d"]) for log in logs]
+    pairs += [(run.recording["y"], run.recording["x"]) for run in runs if run.whole]
+    pairs += [(run.recording["y"][:1], run.recording["x"][:1]) for run in runs]
+    east, north = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
     margin = 0.06 * max(float(np.ptp(east)), float(np.ptp(north)), 1.0)
     return (
         (float(east.min()) - margin, float(east.max()) + margin),
@@ -45,67 +84,82 @@ def bounds(runs: Sequence[Shown]) -> tuple[tuple[float, float], tuple[float, flo
     )
 
 
-def _draw_tracks(axes: Axes, runs: Sequence[Shown], since: float) -> None:
-    """The target's and the runs' tracks from a time [s] on, on scales that are equal."""
-    for log, x, y, look in (
-        (runs[0].recording, "x_d", "y_d", {**TARGET_LOOK, "label": "target"}),
-        *((run.recording, "x", "y", run.look) for run in runs),
-    ):
-        first = int(np.searchsorted(log["time"], since))
-        # Thin in steps, not by extremes: a track may run in any direction.
-        stride = max(1, (len(log["time"]) - first) // 3000)
-        axes.plot(log[y][first::stride], log[x][first::stride], **look)
+def map_axes(axes: Axes, east: Span, north: Span) -> None:
+    """Make the axes a map with these limits [m] and equal scales."""
+    axes.set_xlim(*east)
+    axes.set_ylim(*north)
+    axes.set_aspect("equal", adjustable="box")
     axes.set_xlabel("$y$ [m], east")
     axes.set_ylabel("$x$ [m], north")
 
 
-def _draw_hull(axes: Axes, shown: Shown, row: int, scale: float, **look: Any) -> None:
-    x, y, psi = (float(shown.recording[name][row]) for name in ("x", "y", "psi"))
-    outline = hull(x, y, psi, length=scale * shown.length, beam=scale * shown.beam)
-    axes.add_patch(Polygon(outline, closed=True, edgecolor=shown.color, **look))
+def hull_of(run: Shown, t: float, scale: float) -> Vector:
+    """Outline of a run's vessel at a time [s], drawn `scale` times as large."""
+    x, y, psi = (run.at(t, name) for name in ("x", "y", "psi"))
+    return hull(x, y, psi, length=scale * run.length, beam=scale * run.beam)
 
 
 def trajectory(runs: Sequence[Shown], columns: int) -> Figure:
     """Tracks and target on a map, hulls enlarged to show the heading; the end of the run aside."""
-    figure = new_figure(columns, 3.7 if columns == 2 else 6.0)
-    shape = (1, 2) if columns == 2 else (2, 1)
-    whole, end = figure.subplots(*shape)
+    east, north = bounds(runs)
+    wide = columns == 2
+    shape = float(np.clip(np.ptp(east) / np.ptp(north), 0.6, 1.6))
+    figure = new_figure(columns, 3.7 if wide else 6.0)
+    ratios = {"width_ratios": (shape, 1.0)} if wide else {"height_ratios": (1.0, shape)}
+    rows = 1 if wide else 2
+    whole, end = figure.subplots(rows, 3 - rows, squeeze=False, gridspec_kw=ratios).ravel()
     _whole(whole, runs)
-    _end(end, runs)
-    handles, labels = whole.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=3 * columns)
+    map_axes(whole, east, north)
+    box = _end(end, runs)
+    whole.add_patch(Rectangle(*box, fill=False, edgecolor="#444444", linewidth=0.5))
+    legend(figure, columns)
     return figure
 
 
 def _whole(axes: Axes, runs: Sequence[Shown]) -> None:
-    _draw_tracks(axes, runs, 0.0)
+    _draw_tracks(axes, runs, runs, (0.0, max(run.end for run in runs)))
     scale = enlargement(runs)
+    times = np.linspace(0.0, max(run.end for run in runs), SILHOUETTES)
     for run in runs:
-        rows = np.linspace(0, len(run.recording["time"]) - 1, SILHOUETTES).astype(int)
-        for row in rows:
-            _draw_hull(axes, run, row, scale, facecolor="none", linewidth=0.6)
-    first = runs[0].recording
-    axes.plot(first["y"][0], first["x"][0], "o", color="#444444", markersize=3.5, label="start")
-    east, north = bounds(runs)
-    axes.set_xlim(*east)
-    axes.set_ylim(*north)
-    axes.set_aspect("equal", adjustable="box")
-    axes.set_title(f"whole run, hulls drawn {scale:.0f} times as large")
+        for t in times[times <= run.end]:
+            outline = hull_of(run, float(t), scale)
+            axes.add_patch(Polygon(outline, fill=False, edgecolor=run.color, linewidth=0.6))
+    starts = {(run.recording["y"][0], run.recording["x"][0]) for run in runs}
+    axes.plot(*zip(*sorted(starts), strict=True), **MARK, marker="o", markersize=3.5, label="start")
+    axes.set_title(f"hulls every {times[1]:.3g} s, {scale:.0f} times as large")
 
 
-def _end(axes: Axes, runs: Sequence[Shown]) -> None:
-    """The last part of the runs that finished, around the target's last position, to scale."""
-    kept = [run for run in runs if run.whole] or list(runs)
-    target = kept[0].recording
-    last = float(target["time"][-1])
-    _draw_tracks(axes, kept, (1.0 - LAST_PART) * last)
+def _end(axes: Axes, runs: Sequence[Shown]) -> tuple[tuple[float, float], float, float]:
+    """The last part of the runs that finished, to scale; corner, width and height of what is seen.
+
+    The last part that all of them have: hulls are shown at one and the same time.
+    """
+    kept = scaling(runs)
+    last = min(run.end for run in kept)
+    _draw_tracks(axes, runs, kept, ((1.0 - LAST_PART) * last, last))
     for run in kept:
-        _draw_hull(axes, run, -1, 1.0, facecolor=run.color, alpha=0.3)
-    east, north = float(target["y_d"][-1]), float(target["x_d"][-1])
-    axes.plot(east, north, "+", color="#444444", markersize=7)
-    away = [np.hypot(run.recording["x"][-1] - north, run.recording["y"][-1] - east) for run in kept]
-    reach = min(max(3.0 * kept[0].length, 1.3 * float(max(away))), 20.0 * kept[0].length)
-    axes.set_xlim(east - reach, east + reach)
-    axes.set_ylim(north - reach, north + reach)
-    axes.set_aspect("equal", adjustable="box")
+        axes.add_patch(Polygon(hull_of(run, last, 1.0), color=run.color, alpha=0.3))
+    ahead, here = (
+        [(run.at(last, y), run.at(last, x)) for run in kept]
+        for y, x in (("y_d", "x_d"), ("y", "x"))
+    )
+    axes.plot(*zip(*ahead, strict=True), **MARK, marker="+", markersize=7)
+    east, north = ahead[0]
+    away = max(float(np.hypot(y - east, x - north)) for y, x in (*here, *ahead))
+    length = max(run.length for run in kept)
+    reach = min(max(NEAREST * length, 1.3 * away), FARTHEST * length)
+    map_axes(axes, (east - reach, east + reach), (north - reach, north + reach))
     axes.set_title(f"last {LAST_PART * last:.3g} s, hulls to scale at t = {last:g} s, target +")
+    return (east - reach, north - reach), 2.0 * reach, 2.0 * reach
+
+
+def _draw_tracks(axes: Axes, runs: Sequence[Shown], kept: Sequence[Shown], span: Span) -> None:
+    """The targets' tracks and those of the runs that are kept, during a time [s]."""
+    tracks = [(target.recording, "x_d", "y_d", target.look) for target in targets(runs)]
+    tracks += [(run.recording, "x", "y", run.look) for run in kept]
+    for log, x, y, look in tracks:
+        first, last = (int(row) for row in np.searchsorted(log["time"], span))
+        # Thin in steps, not by extremes: a track may run in any direction.
+        stride = max(1, (last + 1 - first) // POINTS)
+        rows = slice(first, last + 1, stride)
+        axes.plot(log[y][rows], log[x][rows], **look)

@@ -1,0 +1,92 @@
+"""Curves over time: which runs set a panel's scale, and how peaks leave the rest readable."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from podusv_cli.figures.style import Shown
+from podusv_cli.kernels import Vector
+
+THIN: dict[str, Any] = {"linewidth": 0.5, "alpha": 0.6}
+TALL = 20.0  # a peak this many times the usual values gets a logarithmic axis
+DECADES = 4  # at most, on the logarithmic axis of runs that finished
+
+Span = tuple[float, float]
+
+
+def thinned(t: Vector, y: Vector, points: int = 1500) -> tuple[Vector, Vector]:
+    """At most about `points` samples that keep every extreme: the least and largest of each bin."""
+    if len(t) <= points:
+        return t, y
+    edges = np.linspace(0, len(t), points // 2 + 1).astype(int)
+    kept = {0, len(t) - 1}
+    for low, high in pairwise(edges):
+        kept |= {low + int(np.argmin(y[low:high])), low + int(np.argmax(y[low:high]))}
+    chosen = np.array(sorted(kept))
+    return t[chosen], y[chosen]
+
+
+def scaling(runs: Sequence[Shown], span: Span | None = None) -> list[Shown]:
+    """The runs that the scale has to fit: those that finished, or go on after the span [s].
+
+    A run that diverges leaves every scale; drawn to fit, it would hide all others. Where there is
+    no other run, it sets the scale.
+    """
+    kept = [run for run in runs if run.whole or (span is not None and run.end > span[1])]
+    return kept or list(runs)
+
+
+def draw_signal(
+    axes: Axes, runs: Sequence[Shown], name: str, *, span: Span | None = None, beside: str = ""
+) -> None:
+    """Plot a signal of all runs that have it over time, or over a part of it [s].
+
+    `beside` another signal it is drawn thin, not in the legend, and only where the two differ.
+    """
+    having = [run for run in runs if run.has(name)]
+    fitted = scaling(having, span)
+    for run in having:
+        look = {**run.look, **THIN, "label": f"_{run.label}, {name}"} if beside else run.look
+        if not beside or differ(run, name, beside):
+            draw_curve(axes, run.during(name, span), fitted=run in fitted, **look)
+
+
+def differ(run: Shown, name: str, other: str) -> bool:
+    """Whether the run has both signals, and they are not the same."""
+    both = run.has(name) and run.has(other)
+    return both and not np.array_equal(run.signal(name), run.signal(other))
+
+
+def draw_curve(axes: Axes, curve: tuple[Vector, Vector], *, fitted: bool, **look: Any) -> None:
+    """Plot a curve over time, thinned; the vertical scale fits it only where it is `fitted`."""
+    t, y = thinned(*curve)
+    if fitted:
+        axes.plot(t, y, **look)
+    elif len(t):
+        axes.add_artist(Line2D(t, y, **look))
+        axes.update_datalim(np.column_stack([t, np.zeros(len(t))]), updatey=False)
+
+
+def compress(axes: Axes, runs: Sequence[Shown], name: str) -> None:
+    """Make the axis logarithmic beyond a signal's usual values where its peaks dwarf them."""
+    kept = scaling([run for run in runs if run.has(name)])
+    peak = max(abs(limit) for limit in axes.dataLim.intervaly)
+    usual = max(_usual(run, name) for run in kept)
+    if any(run.whole for run in kept):
+        usual = max(usual, peak * 10.0**-DECADES)
+    if peak > TALL * usual > 0.0:
+        axes.set_yscale("symlog", linthresh=10.0 ** np.ceil(np.log10(usual)))
+        axes.autoscale_view()  # margins in the new scale
+
+
+def _usual(run: Shown, name: str) -> float:
+    """The largest settled value; of a run that did not get there, the median."""
+    sizes = np.abs(run.signal(name))
+    settled = sizes[run.recording["time"] >= run.steady_from]
+    return float(settled.max() if run.whole and len(settled) else np.median(sizes))

@@ -1,0 +1,38 @@
+"""Virtual controls against what the filter makes of them, and the filter's error."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from matplotlib.figure import Figure
+
+from podusv_cli.figures.curves import compress, draw_curve, draw_signal, scaling
+from podusv_cli.figures.panels import grid
+from podusv_cli.figures.style import Shown, axis_label, legend, unit
+from podusv_cli.signals import SIGNALS
+
+PAIRS = (("alpha_u", "beta_u"), ("alpha_r", "beta_r"))
+ERRORS = ("y_u", "y_r")
+
+
+def filters(runs: Sequence[Shown], columns: int) -> Figure:
+    """Virtual control thin behind the filter's output; below or beside, what lies between them.
+
+    A law without a filter uses its virtual control as it is; that is drawn like an output.
+    """
+    filtered = any(run.has(name) for run in runs for name in ERRORS)
+    figure, panels = grid(len(PAIRS) * (2 if filtered else 1), columns)
+    for axes, (alpha, beta) in zip(panels, PAIRS, strict=False):
+        draw_signal(axes, runs, alpha, beside=beta)
+        for run in (run for run in runs if run.has(alpha)):
+            used = run.during(beta if run.has(beta) else alpha, None)
+            draw_curve(axes, used, fitted=run in scaling(runs), **run.look)
+        symbols = [SIGNALS[name].symbol for name in ((alpha, beta) if filtered else (alpha,))]
+        axes.set_ylabel(f"${', '.join(symbols)}$ [{unit(alpha)}]")
+        compress(axes, runs, alpha)
+    for axes, error in zip(panels[len(PAIRS) :], ERRORS, strict=False):
+        draw_signal(axes, runs, error)
+        axes.set_ylabel(axis_label(error))
+        compress(axes, runs, error)
+    legend(figure, columns, "virtual control before the filter" if filtered else "")
+    return figure

@@ -1,0 +1,74 @@
+"""Runs made by hand, every signal a curve of its own, for tests of what figures show."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from podusv_cli.config.loading import load_text
+from podusv_cli.figures.drawing import FIGURES, dressed
+from podusv_cli.figures.style import house_style
+from podusv_cli.recording import Recording
+
+TEXT = """
+name: {name}
+vessel: {{preset: paper_nonlinear}}
+path: {{kind: line_circle, rate: {rate}}}
+disturbance: {{kind: harmonic}}
+actuator: {{kind: saturated}}
+controller: {{kind: pid}}
+metrics: {{steady_fraction: 0.25}}
+simulation: {{duration: {duration}}}
+"""
+PLAIN = (
+    "u", "v", "r", "psi_e", "tau_u", "tau_r", "tau_u_cmd", "tau_r_cmd", "b_u", "b_v", "b_r",
+    "alpha_u", "alpha_r", "beta_u", "beta_r", "b_hat_u", "b_hat_r", "f_hat_u", "f_hat_r",
+)  # fmt: skip
+CENTER = np.array([[0.0, 0.0, 0.0], [1.0, 0.5, -0.5]])
+WIDTH = np.array([0.5, 1.0, 2.0])
+
+
+def scenario(name="drawn", rate=0.03, duration=100.0):
+    text = TEXT.format(name=name, rate=rate, duration=duration)
+    return load_text(text, "drawn.yaml").scenario
+
+
+def recording(end=100.0, period=0.1, status="finished", shift=0.0, without=(), **given):
+    """A log up to `end` [s]; signals not given are sines, no two alike and none beyond 2."""
+    t = np.arange(round(end / period) + 1) * period
+    signals = {name: np.sin(0.1 * t + i + shift) + 0.03 * i for i, name in enumerate(PLAIN)}
+    signals |= {"x": 0.45 * t - 5.0 + shift, "y": np.sin(0.05 * t) - shift, "psi": 0.02 * t + shift}
+    signals |= {"x_d": 0.5 * t, "y_d": 2.0 * np.sin(0.03 * t), "z_e": 1.5 + 0.5 * np.cos(t)}
+    signals["saturated"] = ((t >= 2.0) & (t < 5.0)) | ((t >= 30.0) & (t < 30.5))
+    signals["W_hat_u"] = np.column_stack([np.sin(t + shift), np.cos(2.0 * t)])
+    signals["W_hat_r"] = np.column_stack([np.sin(3.0 * t), 2.0 * np.cos(t + shift)])
+    signals |= {name: values(t) if callable(values) else values for name, values in given.items()}
+    kept = {n: np.asarray(s, dtype=float) for n, s in signals.items() if n not in without}
+    fixed = {"rbf_center": CENTER, "rbf_width": WIDTH}
+    return Recording(status, "pid", {"time": t} | kept, fixed)
+
+
+def shown(*runs):
+    """Recordings by label (with a scenario of their own, or the usual one) as figures take them."""
+    usual = scenario()
+    triples = [(run[0], run[1], run[2] if len(run) > 2 else usual) for run in runs]
+    return dressed(triples)
+
+
+def drawn(name, runs, columns=2):
+    with house_style():
+        return FIGURES[name].family(runs, columns)
+
+
+def line(axes, label):
+    """The one line of this label."""
+    (found,) = (line for line in axes.lines if line.get_label() == label)
+    return found
+
+
+def panels(figure):
+    """A figure's panels by the label of their vertical axis."""
+    return {axes.get_ylabel(): axes for axes in figure.axes}
+
+
+def changed(run, **signals):
+    return replace(run, signals={**run.signals, **signals})

@@ -1,0 +1,231 @@
+"""Scales of figures: runs that diverge, peaks beside small values; controls, filters, loads."""
+
+import numpy as np
+import pytest
+from drawn_samples import changed, drawn, line, panels, recording, scenario, shown
+
+
+def inside(limits, values):
+    return limits[0] <= np.min(values) and np.max(values) <= limits[1]
+
+
+def blown_up(end=50.0, **given):
+    """A run that leaves all bounds in its last 10 s."""
+    growth = {"u": lambda t: np.exp(np.maximum(0.0, t - end + 10.0))}
+    return recording(end=end, status="diverged", **growth | given)
+
+
+@pytest.mark.parametrize("place", [0, 1])
+def test_a_run_that_diverges_is_drawn_but_does_not_set_the_scale(place):
+    pair = [("good", recording()), ("bad", blown_up())]
+    runs = shown(*(pair if place else reversed(pair)))
+    axes = panels(drawn("velocities", runs))["$u$ [m/s]"]
+    good, bad = (line(axes, label).get_ydata() for label in ("good", "bad"))
+    assert inside(axes.get_ylim(), good)
+    assert axes.get_ylim()[1] < 2.0 * good.max()
+    assert bad.max() == pytest.approx(np.exp(10.0))
+    assert axes.get_yscale() == "linear"
+
+
+def test_runs_that_all_diverge_set_the_scale_themselves():
+    axes = panels(drawn("velocities", shown(("bad", blown_up()))))["$u$ [m/s]"]
+    assert inside(axes.get_ylim(), line(axes, "bad").get_ydata())
+
+
+def test_the_time_axis_reaches_to_the_end_of_the_longest_run_finished_or_not():
+    runs = shown(("good", recording(end=20.0)), ("bad", blown_up(end=50.0)))
+    axes = panels(drawn("velocities", runs))["$u$ [m/s]"]
+    assert axes.get_xlim()[1] >= 50.0
+
+
+def test_an_axis_with_a_tall_peak_is_logarithmic_beyond_the_settled_values():
+    peak = {"r": lambda t: np.where(t < 1.0, 60.0, 0.04)}
+    axes = panels(drawn("velocities", shown(("a", recording(**peak)))))["$r$ [rad/s]"]
+    assert axes.get_yscale() == "symlog"
+    assert axes.yaxis.get_transform().linthresh == pytest.approx(0.1)
+    assert inside(axes.get_ylim(), [0.04, 60.0])
+    assert axes.get_ylim()[0] > -0.1
+
+
+@pytest.mark.parametrize(("peak", "scale"), [(19.0, "linear"), (21.0, "symlog")])
+def test_a_peak_is_tall_from_twenty_times_the_settled_values_on(peak, scale):
+    given = {"r": lambda t: np.where(t < 1.0, -peak, 1.0)}
+    axes = panels(drawn("velocities", shown(("a", recording(**given)))))["$r$ [rad/s]"]
+    assert axes.get_yscale() == scale
+
+
+def test_a_logarithmic_axis_spans_four_decades_where_nothing_remains():
+    given = {"b_hat_u": lambda t: np.where(t < 1.0, 900.0, 1e-12)}
+    runs = shown(("a", recording(**given)))
+    axes = panels(drawn("adaptation", runs))[r"$\hat b_u$ [N]"]
+    assert axes.yaxis.get_transform().linthresh == pytest.approx(0.1)
+
+
+def controls(*runs, columns=2):
+    found = drawn("controls", shown(*runs), columns).axes
+    return dict(zip(("early", "whole", "settled"), found, strict=False)), found
+
+
+def test_controls_show_the_peak_the_whole_run_and_the_settled_part():
+    log = recording(period=0.01)
+    _, found = controls(("a", log))
+    limits = [(0.0, 0.5), (0.0, 100.0), (75.0, 100.0)] * 2
+    for axes, span, name in zip(found, limits, ["tau_u"] * 3 + ["tau_r"] * 3, strict=True):
+        assert axes.get_xlim() == pytest.approx(span)
+        curve = line(axes, "a")
+        rows = np.searchsorted(log["time"], curve.get_xdata())
+        assert np.array_equal(curve.get_ydata(), log[name][rows])
+        assert curve.get_xdata()[[0, -1]] == pytest.approx(span)
+    assert [axes.get_title() for axes in found] == ["early", "whole run", "settled", "", "", ""]
+    assert found[0].get_ylabel() == r"$\tau_u$ [N]"
+    assert found[3].get_ylabel() == r"$\tau_r$ [N m]"
+    assert [axes.get_xlabel() for axes in found] == [""] * 3 + ["time [s]"] * 3
+
+
+def test_controls_in_one_column_name_the_load_above_each_panel():
+    log = recording()
+    _, found = controls(("a", log), columns=1)
+    titles = [axes.get_title() for axes in found]
+    assert titles[:2] == [r"$\tau_u$ [N], early", r"$\tau_r$ [N m], early"]
+    assert titles[4:] == [r"$\tau_u$ [N], settled", r"$\tau_r$ [N m], settled"]
+    assert found[3].get_xlim() == pytest.approx((0.0, 100.0))
+    assert np.isin(line(found[3], "a").get_ydata(), log["tau_r"]).all()
+
+
+def test_the_early_part_of_a_coarse_log_has_rows_enough_to_see():
+    by, _ = controls(("a", recording(period=0.5)))
+    assert by["early"].get_xlim() == pytest.approx((0.0, 10.0))
+
+
+def test_controls_draw_what_was_asked_only_where_it_was_not_given():
+    log = recording()
+    given = changed(log, tau_u_cmd=log["tau_u"], tau_r_cmd=log["tau_r"])
+    half = changed(log, tau_r_cmd=log["tau_r"])
+    runs = shown(("limited", log), ("free", given), ("half", half))
+    figure = drawn("controls", runs)
+    asked = [
+        [curve.get_label() for curve in axes.lines if curve.get_label().startswith("_")]
+        for axes in figure.axes
+    ]
+    assert (
+        asked == [["_limited, tau_u_cmd", "_half, tau_u_cmd"]] * 3 + [["_limited, tau_r_cmd"]] * 3
+    )
+    thin = line(figure.axes[1], "_limited, tau_u_cmd")
+    assert np.array_equal(thin.get_ydata(), log["tau_u_cmd"])
+    assert np.array_equal(thin.get_xdata(), log["time"])
+    assert thin.get_linewidth() < line(figure.axes[1], "limited").get_linewidth()
+    words = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert words == ["limited", "free", "half", "asked for by the law"]
+
+
+def test_no_word_of_what_was_asked_where_the_law_got_it():
+    log = recording()
+    runs = shown(("a", changed(log, tau_u_cmd=log["tau_u"], tau_r_cmd=log["tau_r"])))
+    words = [text.get_text() for text in drawn("controls", runs).legends[0].get_texts()]
+    assert words == ["a"]
+
+
+def test_the_early_peak_of_a_run_that_diverges_later_is_not_cut():
+    late = recording(end=60.0, status="diverged", tau_u=lambda t: np.where(t < 30.0, 500.0, 1e9))
+    by, _ = controls(("good", recording()), ("bad", late))
+    assert inside(by["early"].get_ylim(), [500.0])
+    assert by["early"].get_ylim()[1] < 1e4
+    assert by["whole"].get_ylim()[1] < 1e3
+
+
+def test_what_a_diverging_run_asks_for_does_not_set_the_scale():
+    log = recording()
+    free = changed(log, tau_u_cmd=log["tau_u"])
+    wild = recording(end=60.0, status="diverged", tau_u_cmd=lambda t: np.where(t < 50.0, 0.0, 1e9))
+    by, _ = controls(("good", free), ("bad", wild))
+    assert by["whole"].get_ylim()[1] < 1e3
+
+
+def test_filters_show_virtual_control_and_output_together_and_their_difference():
+    log, plain = recording(), recording(shift=0.4, without=("beta_u", "beta_r"))
+    figure = drawn("filters", shown(("filtered", log), ("plain", plain)))
+    found = panels(figure)
+    assert list(found) == [
+        r"$\alpha_u, \beta_u$ [m/s]",
+        r"$\alpha_r, \beta_r$ [rad/s]",
+        "$y_u$ [m/s]",
+        "$y_r$ [rad/s]",
+    ]
+    for axes, part in zip(figure.axes[:2], "ur", strict=True):
+        assert np.array_equal(line(axes, "filtered").get_ydata(), log[f"beta_{part}"])
+        assert np.array_equal(line(axes, "plain").get_ydata(), plain[f"alpha_{part}"])
+        thin = line(axes, f"_filtered, alpha_{part}")
+        assert np.array_equal(thin.get_ydata(), log[f"alpha_{part}"])
+        assert thin.get_linewidth() < line(axes, "filtered").get_linewidth()
+        assert len(axes.lines) == 3
+    for axes, part in zip(figure.axes[2:], "ur", strict=True):
+        (curve,) = axes.lines
+        assert np.array_equal(curve.get_ydata(), log[f"beta_{part}"] - log[f"alpha_{part}"])
+    words = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert words == ["filtered", "plain", "virtual control before the filter"]
+
+
+def test_without_a_filter_there_are_only_virtual_controls():
+    log = recording(without=("beta_u", "beta_r"))
+    figure = drawn("filters", shown(("plain", log)))
+    assert list(panels(figure)) == [r"$\alpha_u$ [m/s]", r"$\alpha_r$ [rad/s]"]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["plain"]
+
+
+def test_an_unfiltered_run_that_diverges_does_not_set_the_scale_of_filters():
+    wild = recording(
+        end=60.0, status="diverged", without=("beta_u",),
+        alpha_u=lambda t: np.where(t < 50.0, 0.0, 1e9),
+    )  # fmt: skip
+    axes = drawn("filters", shown(("good", recording()), ("bad", wild))).axes[0]
+    assert axes.get_ylim()[1] < 1e3
+
+
+def test_a_disturbance_that_all_runs_share_is_drawn_once():
+    figure = drawn("loads", shown(("a", recording(end=60.0)), ("b", recording(shift=0.0))))
+    for axes, name in zip(figure.axes, ("b_u", "b_v", "b_r"), strict=False):
+        (curve,) = axes.lines
+        assert curve.get_label() == "all runs"
+        assert np.array_equal(curve.get_ydata(), recording()[name])
+    assert [a.get_ylabel() for a in figure.axes] == ["$b_u$ [N]", "$b_v$ [N]", "$b_r$ [N m]", ""]
+
+
+def test_disturbances_that_differ_are_drawn_for_each_run():
+    logs = {"a": recording(), "b": recording(shift=0.01)}
+    axes = drawn("loads", shown(*logs.items())).axes[1]
+    for label, log in logs.items():
+        assert np.array_equal(line(axes, label).get_ydata(), log["b_v"])
+    (alone,) = drawn("loads", shown(("a", logs["a"]))).axes[1].lines
+    assert alone.get_label() == "a"
+
+
+def test_limits_are_marked_while_they_act_in_a_line_for_each_run():
+    never = changed(recording(), saturated=np.zeros(1001))
+    runs = shown(
+        ("often", recording()), ("never", never), ("none", recording(without=("saturated",)))
+    )
+    axes = drawn("loads", runs).axes[-1]
+    assert [tick.get_text() for tick in axes.get_yticklabels()] == ["often", "never"]
+    assert axes.get_title() == "limited by the actuator"
+    often, never = axes.collections
+    boxes = [path.get_extents() for path in often.get_paths()]
+    assert [(box.x0, box.x1) for box in boxes] == [
+        pytest.approx((2.0, 5.0)),
+        pytest.approx((30.0, 30.5)),
+    ]
+    assert {(box.y0 + box.y1) / 2 for box in boxes} == {0.0}
+    assert len(never.get_paths()) == 0
+    assert axes.get_ylim()[0] > 1.3
+    assert axes.get_ylim()[1] < -0.3
+
+
+def test_limits_that_act_to_the_end_are_marked_to_the_end():
+    to_end = changed(recording(), saturated=np.arange(1001) >= 900)
+    (bars,) = drawn("loads", shown(("a", to_end))).axes[-1].collections
+    (box,) = (path.get_extents() for path in bars.get_paths())
+    assert (box.x0, box.x1) == pytest.approx((90.0, 100.0))
+
+
+def test_settled_starts_where_the_scenario_says():
+    (run,) = shown(("a", recording(), scenario(duration=200.0)))
+    assert run.steady_from == pytest.approx(150.0)
