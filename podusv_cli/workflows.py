@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from podusv_cli.comparison.claims import misfits
+from podusv_cli.comparison.differences import differences
 from podusv_cli.comparison.entries import Entry
 from podusv_cli.config.loading import load, resolved_yaml
 from podusv_cli.config.scenario import Claim
 from podusv_cli.config.words import unknown
 from podusv_cli.errors import UsageError
-from podusv_cli.logbook import atomic, folder, provenance
+from podusv_cli.logbook import folder, provenance
 from podusv_cli.running import Finished, Progress, Stopwatch, Task, execute
 
 if TYPE_CHECKING:
@@ -147,29 +148,42 @@ class Drawing:
     out: Path
 
 
-def plot(runs: Sequence[Path], drawing: Drawing) -> list[Path]:
-    """Draw finished runs, overlaid; the files that were written.
+@dataclass(frozen=True)
+class Drawn:
+    """What was drawn, and what is to be said about it."""
 
-    Raises UsageError for a figure or format that there is not, and StorageError.
+    files: Sequence[Path]
+    replaced: Sequence[Path]  # of `files`, those that were there with another content
+    empty: Mapping[str, str]  # runs that ended before there was anything to draw, and how
+    differences: Mapping[str, Mapping[str, Any]]  # in more than the controller
+
+
+def plot(runs: Sequence[Path], drawing: Drawing) -> Drawn:
+    """Draw finished runs, overlaid; files of the same names in the folder are replaced.
+
+    Raises UsageError for a figure or format that there is not, or that the runs have no signals
+    for, and for a file that belongs to a finished folder; StorageError.
     """
     # pandas and matplotlib are slow to import
-    from podusv_cli import comparing
-    from podusv_cli.figures.animation import animate
+    from podusv_cli import comparing, plotting
+    from podusv_cli.figures.animation import FILE, animate
     from podusv_cli.figures.drawing import FIGURES, draw_in_parallel, dressed
     from podusv_cli.figures.style import FORMATS
 
     _all_known("figure", drawing.figures, FIGURES)
     _all_known("format", drawing.formats, FORMATS)
-    parts = comparing.distinct(part for path in runs for part in comparing.from_folder(path))
+    parts = plotting.named(part for path in runs for part in comparing.from_folder(path))
     shown = dressed([(p.label, p.run.recording, p.scenario) for p in parts if p.run])
-    names = drawing.figures or tuple(FIGURES)
-    drawn = list(draw_in_parallel(shown, names, drawing.formats, drawing.columns))
+    empty = plotting.empty(parts, shown)
+    names = plotting.chosen(drawing.figures, shown)
+    planned = [f"{name}.{form}" for name in names for form in drawing.formats]
+    plotting.spared(drawing.out, [*planned, FILE] if drawing.animate else planned)
+    drawn = dict(draw_in_parallel(shown, names, drawing.formats, drawing.columns))
     if drawing.animate:
-        drawn.append(("animation.gif", animate(shown)))
-    atomic.make_folder(drawing.out)
-    for name, content in drawn:
-        atomic.write_bytes(drawing.out / name, content)
-    return [drawing.out / name for name, _ in drawn]
+        drawn[FILE] = animate(shown)
+    replaced = plotting.put(drawing.out, drawn)
+    differing = differences({part.label: part.scenario.model_dump() for part in parts})
+    return Drawn([drawing.out / name for name in drawn], replaced, empty, differing)
 
 
 def _all_known(what: str, names: Sequence[str], known: Iterable[str]) -> None:

@@ -13,7 +13,7 @@ from podusv_cli import comparing, workflows
 from podusv_cli.comparison import table
 from podusv_cli.comparison.differences import differences
 from podusv_cli.config.loading import load
-from podusv_cli.errors import ScenarioError, StorageError, UsageError
+from podusv_cli.errors import ScenarioError, StorageError
 from podusv_cli.figures.drawing import FIGURES, dressed
 from podusv_cli.figures.style import FORMATS
 
@@ -211,33 +211,6 @@ def test_the_report_escapes_what_it_is_given(config, tmp_path):
     request = workflows.Request(("description='<b>&'", "simulation.duration=1"), tmp_path / "x")
     page = (workflows.compare([config], request).folder / "report.html").read_text()
     assert "&lt;b&gt;&amp;" in page
-
-
-def test_plot_draws_finished_runs_again(done, tmp_path):
-    runs = [done.folder / "fast", done.folder / "pid"]
-    drawing = workflows.Drawing(("errors",), ("png", "svg"), 1, False, tmp_path / "drawn")
-    first = {path.name: path.read_bytes() for path in workflows.plot(runs, drawing)}
-    assert set(first) == {"errors.png", "errors.svg"}
-    again = {path.name: path.read_bytes() for path in workflows.plot(runs, drawing)}
-    assert first == again
-
-
-def test_plot_refuses_what_there_is_not(done, tmp_path):
-    drawing = workflows.Drawing(("trajectry",), ("png",), 1, False, tmp_path)
-    with pytest.raises(UsageError, match="did you mean 'trajectory'"):
-        workflows.plot([done.folder / "fast"], drawing)
-
-
-def test_the_animation_moves(done, tmp_path):
-    from PIL import Image
-
-    drawing = workflows.Drawing(("errors",), ("png",), 1, True, tmp_path)
-    path = next(p for p in workflows.plot([done.folder / "fast"], drawing) if p.suffix == ".gif")
-    with Image.open(path) as film:
-        assert film.n_frames > 50
-        first = np.asarray(film.convert("L")).astype(int)
-        film.seek(film.n_frames - 1)
-        assert np.abs(np.asarray(film.convert("L")) - first).max() > 50
 
 
 def test_ratios_to_a_first_run_that_is_zero_are_left_out():

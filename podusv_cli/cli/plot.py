@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from podusv_cli.workflows import Drawn
 
 
 def plot(
@@ -18,12 +21,31 @@ def plot(
     ] = "png",
     columns: Annotated[int, typer.Option(min=1, max=2, help="Width in columns of a page.")] = 2,
     animate: Annotated[bool, typer.Option("--animate", help="A GIF of the chase as well.")] = False,
-    out: Annotated[Path, typer.Option(help="Folder for the figures.")] = Path("figures"),
+    out: Annotated[
+        Path, typer.Option(help="Folder for the figures; replaces those of the same name there.")
+    ] = Path("figures"),
 ) -> None:
-    """Draw finished runs, several in one figure; needs their folders and nothing else."""
+    """Draw finished runs, several in one figure; needs their folders and nothing else.
+
+    Prints every file that it wrote. Files that belong to a finished run are never replaced.
+    """
     from podusv_cli import workflows  # heavy imports only when they are needed
 
     formats = tuple(name.strip() for name in form.split(","))
     drawing = workflows.Drawing(tuple(figure or ()), formats, columns, animate, out)
-    for path in workflows.plot([Path(run) for run in runs], drawing):
+    drawn = workflows.plot([Path(run) for run in runs], drawing)
+    for path in drawn.files:
         typer.echo(path)
+    _warn(drawn)
+
+
+def _warn(drawn: Drawn) -> None:
+    for path in drawn.replaced:
+        typer.echo(f"replaced what was in {path}", err=True)
+    for label, ending in drawn.empty.items():
+        typer.echo(f"{label}: nothing to draw: {ending}", err=True)
+    if drawn.differences:
+        typer.echo("warning: the runs differ in more than the controller:", err=True)
+    for key, values in drawn.differences.items():
+        shown = ", ".join(f"{label} {value}" for label, value in values.items())
+        typer.echo(f"  {key}: {shown}", err=True)

@@ -1,0 +1,207 @@
+"""`podusv plot`: what it draws, what it refuses, what it says."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+from drawn_samples import recording, scenario
+
+from podusv_cli import __version__, workflows
+from podusv_cli.config.loading import resolved_yaml
+from podusv_cli.errors import StorageError, UsageError
+from podusv_cli.figures import animation
+from podusv_cli.figures.drawing import FIGURES
+from podusv_cli.logbook import folder, hdf5
+from podusv_cli.recording import Recording
+
+LAWLESS = ("W_hat_u", "W_hat_r", "b_hat_u", "b_hat_r", "f_hat_u", "f_hat_r", "rbf_center")
+
+
+def keep(target, log, plan=None):
+    """A finished run folder that holds a log made by hand."""
+    plan = plan or scenario()
+    text = resolved_yaml(plan)
+    encoded = hdf5.encode(log, resolved_yaml=text, title="", source="", version=__version__)
+    with folder.RunWriter(target) as writer:
+        writer.add("log.h5", encoded)
+        writer.add("resolved.yaml", text.encode())
+        writer.add("figures/errors.png", b"as it was")
+        writer.add_json("metrics.json", {"metrics": {}})
+        writer.add_json("provenance.json", {})
+        return writer.finish(log.status)
+
+
+def pid(**options):
+    log = recording(without=LAWLESS, **options)
+    return Recording(log.status, "pid", log.signals, {}, message=log.message)
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
+    return tmp_path_factory.mktemp("runs")
+
+
+@pytest.fixture(scope="module")
+def one(place):
+    return keep(place / "first" / "pid", pid(), scenario("first"))
+
+
+@pytest.fixture(scope="module")
+def other(place):
+    return keep(place / "second" / "pid", pid(shift=0.3), scenario("second"))
+
+
+@pytest.fixture(scope="module")
+def stillborn(place):
+    whole = pid()
+    signals = {name: values[:0] for name, values in whole.signals.items()}
+    message = "diverged at t = 0 s: tau_u_cmd is not finite"
+    return keep(place / "stillborn", Recording("diverged", "pid", signals, {}, message=message))
+
+
+def plot(*runs, out, figures=("velocities",), formats=("svg",), animate=False):
+    return workflows.plot(runs, workflows.Drawing(figures, formats, 1, animate, out))
+
+
+def words(path):
+    """What an SVG says, as its comments keep it."""
+    return [part.partition(" -->")[0] for part in path.read_text().split("<!-- ")[1:]]
+
+
+def test_finished_runs_are_drawn_again_in_every_format(one, other, tmp_path):
+    drawn = plot(one, other, out=tmp_path / "new", formats=("png", "pdf"))
+    assert drawn.files == [tmp_path / "new" / f"velocities.{form}" for form in ("png", "pdf")]
+    assert all(path.read_bytes() for path in drawn.files)
+    assert not drawn.replaced
+
+
+def test_without_a_name_all_figures_are_drawn_that_the_runs_have_signals_for(one, tmp_path):
+    drawn = plot(one, out=tmp_path, figures=())
+    assert {path.stem for path in drawn.files} >= {"trajectory", "errors", "controls", "loads"}
+    assert "adaptation" not in {path.stem for path in drawn.files}
+
+
+def test_a_figure_that_the_runs_have_no_signals_for_is_refused_with_what_there_is(one, tmp_path):
+    with pytest.raises(UsageError) as caught:
+        plot(one, out=tmp_path / "x", figures=("errors", "adaptation"))
+    text = str(caught.value)
+    for word in ("'adaptation'", *FIGURES["adaptation"].signals, "pid", "trajectory, errors"):
+        assert word in text
+    assert not (tmp_path / "x").exists()
+
+
+@pytest.mark.parametrize(("figures", "formats"), [(("trajectry",), ("png",)), ((), ("pgn",))])
+def test_what_there_is_not_is_refused_with_the_likely_name(one, tmp_path, figures, formats):
+    with pytest.raises(UsageError, match=r"did you mean '(trajectory|png)'"):
+        plot(one, out=tmp_path, figures=figures, formats=formats)
+
+
+@pytest.mark.parametrize("animate", [True, False])
+@pytest.mark.parametrize("figures", [("errors",), ()])
+def test_a_run_that_ended_at_once_is_refused_in_a_sentence(stillborn, tmp_path, figures, animate):
+    with pytest.raises(UsageError, match="nothing to draw: stillborn: diverged at t = 0 s"):
+        plot(stillborn, out=tmp_path, figures=figures, animate=animate)
+
+
+def test_beside_others_it_is_left_out_and_named(one, stillborn, tmp_path):
+    drawn = plot(one, stillborn, out=tmp_path)
+    assert drawn.empty == {"stillborn": "diverged at t = 0 s: tau_u_cmd is not finite"}
+    assert "stillborn" not in words(drawn.files[0])
+
+
+def test_runs_of_one_name_are_told_apart_by_their_scenario(one, other, tmp_path):
+    (path,) = plot(one, other, out=tmp_path).files
+    assert {"pid (first)", "pid (second)"} < set(words(path))
+
+
+def test_runs_of_one_name_and_scenario_are_told_apart_by_their_folders(place, one, tmp_path):
+    twin = keep(place / "third" / "pid", pid(shift=0.1), scenario("first"))
+    (path,) = plot(one, twin, out=tmp_path).files
+    assert {"first/pid", "third/pid"} < set(words(path))
+
+
+def test_a_folder_that_nobody_named_goes_by_its_scenario(place, one, tmp_path):
+    stamped = keep(place / "20260102T030405Z-0123abcd", pid(), scenario("mine"))
+    (path,) = plot(one, stamped, out=tmp_path).files
+    assert {"pid", "mine"} < set(words(path))
+
+
+def test_a_run_given_twice_is_drawn_once(one, tmp_path):
+    (path,) = plot(one, one, out=tmp_path).files
+    assert words(path).count("pid") == 1
+
+
+def test_a_new_drawing_replaces_an_old_one_and_says_so(one, other, tmp_path):
+    (path,) = plot(one, out=tmp_path).files
+    before = path.read_bytes()
+    assert not plot(one, out=tmp_path).replaced  # the same bytes
+    assert path.read_bytes() == before
+    assert plot(other, out=tmp_path).replaced == [path]
+    assert path.read_bytes() != before
+
+
+def test_files_of_a_finished_run_are_never_replaced(one, tmp_path):
+    with pytest.raises(UsageError, match=r"figures/errors\.png belongs to the finished folder"):
+        plot(one, out=one / "figures", figures=("velocities", "errors"), formats=("png",))
+    assert (one / "figures" / "errors.png").read_bytes() == b"as it was"
+    assert not (one / "figures" / "velocities.png").exists()
+    link = tmp_path / "link"
+    link.symlink_to(one / "figures")
+    with pytest.raises(UsageError, match="belongs to the finished folder"):
+        plot(one, out=link, figures=("errors",), formats=("png",))
+
+
+def test_files_that_a_finished_run_does_not_know_may_stand_in_its_folder(place, tmp_path):
+    run = keep(place / "fourth", pid())
+    plot(run, out=run / "figures", figures=("velocities",))
+    assert folder.open_run(run).status == "finished"
+
+
+def test_differences_beyond_the_controller_are_told(one, place, tmp_path):
+    longer = keep(place / "longer", pid(), scenario(duration=200.0))
+    drawn = plot(one, longer, out=tmp_path)
+    assert drawn.differences == {"simulation.duration": {"pid": 100.0, "longer": 200.0}}
+
+
+def test_runs_that_differ_in_nothing_else_raise_no_word(one, other, tmp_path):
+    assert not plot(one, other, out=tmp_path).differences
+
+
+def test_the_film_is_a_file_beside_the_figures(one, tmp_path, monkeypatch):
+    monkeypatch.setattr(animation, "FRAMES", 3)
+    drawn = plot(one, out=tmp_path, animate=True)
+    assert [path.name for path in drawn.files] == ["velocities.svg", "animation.gif"]
+    assert drawn.files[1].read_bytes().startswith(b"GIF89a")
+
+
+def test_a_folder_that_is_no_run_is_refused(tmp_path):
+    with pytest.raises(StorageError, match=r"manifest\.json"):
+        plot(tmp_path, out=tmp_path / "x")
+
+
+def command(*arguments, cwd):
+    call = [sys.executable, "-m", "podusv_cli", "plot", *map(str, arguments)]
+    return subprocess.run(call, cwd=cwd, capture_output=True, text=True, env=os.environ)
+
+
+def test_the_command_prints_files_and_warns_beside_them(one, place, stillborn, tmp_path):
+    brief = keep(place / "brief", pid(end=40.0), scenario(duration=40.0))
+    (tmp_path / "figures").mkdir()
+    (tmp_path / "figures" / "errors.png").write_text("a picture of my own")
+    done = command(one, brief, stillborn, "--figure", "errors", cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (0, "figures/errors.png\n")
+    for word in (
+        "replaced what was in figures/errors.png",
+        "stillborn: nothing to draw: diverged at t = 0 s",
+        "warning: the runs differ in more than the controller:",
+        "simulation.duration: pid 100.0, brief 40.0",
+    ):
+        assert word in done.stderr
+
+
+def test_the_command_refuses_with_exit_code_2(one, tmp_path):
+    done = command(one, "--figure", "adaptation", cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "Traceback" not in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
