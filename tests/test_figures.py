@@ -73,6 +73,8 @@ def test_time_stands_below_the_last_row_alone(two, name):
 def test_only_the_distance_is_on_a_logarithmic_axis(two):
     scales = {label: axes.get_yscale() for label, axes in panels(drawn("errors", two)).items()}
     assert scales.pop("$z_e$ [m]") == "log"
+    distance = panels(drawn("errors", two))["$z_e$ [m]"]
+    assert distance.get_ylim() == pytest.approx((1.0 / 2.0**0.05, 2.0 * 2.0**0.05), rel=1e-3)
     assert set(scales.values()) == {"linear"}
 
 

@@ -191,16 +191,18 @@ def different_targets():
 
 def test_every_differing_target_is_drawn_and_named():
     runs = different_targets()
-    for axes in drawn("trajectory", runs).axes:
-        labels = [text.get_label() for text in axes.lines if "target" in text.get_label()]
-        assert labels == ["target of a, c", "target of b, d"]
-    whole = drawn("trajectory", runs).axes[0]
+    whole, end = drawn("trajectory", runs).axes
+    labels = [curve.get_label() for curve in whole.lines if "target" in curve.get_label()]
+    assert labels == ["target of a, c", "target of b, d"]
     second = line(whole, "target of b, d")
     assert np.array_equal(second.get_ydata(), runs[1].recording["x_d"])
     assert np.array_equal(second.get_xdata(), runs[1].recording["y_d"])
-    assert second.get_color() == runs[1].color
+    assert second.get_color() == line(whole, "target of a, c").get_color() == "#444444"
+    assert second.get_linestyle() != line(whole, "target of a, c").get_linestyle()
     assert whole.get_xlim()[1] > 30.0
     assert whole.get_ylim()[0] < -50.0
+    assert [curve.get_label() for curve in end.lines[:-1]] == ["target of a, c", "a", "c"]
+    assert end.get_title() == "last 5 s, hulls to scale at t = 100 s, target of a, c +"
 
 
 def test_one_target_is_drawn_as_long_as_any_run_lasts():
@@ -262,8 +264,7 @@ def test_an_animation_is_a_map_with_every_target():
     assert (axes.get_xlim(), axes.get_ylim()) == tuple(map(pytest.approx, bounds(runs)))
     assert axes.get_aspect() == 1.0
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("$y$ [m], east", "$x$ [m], north")
-    names = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert set("abcd") < set(names)
+    assert set("abcd") < set(axes.get_legend_handles_labels()[1])
 
 
 def test_a_run_that_has_ended_stays_pale_where_it_was():

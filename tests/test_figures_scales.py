@@ -24,6 +24,9 @@ def test_a_run_that_diverges_is_drawn_but_does_not_set_the_scale(place):
     assert inside(axes.get_ylim(), good)
     assert axes.get_ylim()[1] < 2.0 * good.max()
     assert bad.max() == pytest.approx(np.exp(10.0))
+    far = axes.get_ylim()[0] - 5.0
+    shifted = [(name, changed(log, u=log["u"] - far)) for name, log in pair]
+    assert panels(drawn("velocities", shown(*shifted)))["$u$ [m/s]"].get_ylim()[0] > 4.0
     assert axes.get_yscale() == "linear"
 
 

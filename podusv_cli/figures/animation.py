@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from PIL import Image
 
-from podusv_cli.figures.style import Shown, house_style
+from podusv_cli.figures.style import Shown, house_style, legend
 from podusv_cli.figures.trajectory import bounds, enlargement, hull_of, map_axes, targets
 
 FILE = "animation.gif"
@@ -30,6 +30,7 @@ def animate(runs: Sequence[Shown]) -> bytes:
         figure = Figure(figsize=(SIZE, SIZE), dpi=DPI, layout="constrained")
         canvas = FigureCanvasAgg(figure)
         move = stage(figure.add_subplot(), runs)
+        legend(figure, 1)
         frames = []
         for t in frame_times(runs):
             move(t)
@@ -66,7 +67,6 @@ def stage(axes: Axes, runs: Sequence[Shown]) -> Callable[[float], None]:
     for outline in hulls:
         axes.add_patch(outline)
     map_axes(axes, *bounds(runs))
-    axes.legend(loc="best")
 
     def move(t: float) -> None:
         axes.set_title(f"t = {t:5.1f} s, hulls {scale:.0f} times as large")

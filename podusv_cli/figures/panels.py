@@ -33,7 +33,6 @@ def signals_over_time(
             axes.set_ylabel(axis_label(name))
             if name in logarithmic:
                 axes.set_yscale("log")
-                axes.autoscale_view()  # margins in the new scale
             if compressed:
                 compress(axes, runs, name)
         legend(figure, columns)

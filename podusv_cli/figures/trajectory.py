@@ -34,8 +34,9 @@ def hull(x: float, y: float, psi: float, *, length: float, beam: float) -> Vecto
 
 @dataclass(frozen=True)
 class Target:
-    """A target that runs follow: its name in the legend, its look, a log that holds its track."""
+    """A target, the runs that follow it, how it is drawn, and a log that holds its whole track."""
 
+    runs: Sequence[Shown]
     look: dict[str, Any]
     recording: Recording
 
@@ -55,9 +56,10 @@ def targets(runs: Sequence[Shown]) -> list[Target]:
 def _target(group: Sequence[Shown], *, only: bool) -> Target:
     longest = max(group, key=lambda run: run.end).recording
     if only:
-        return Target({**TARGET_LOOK, "label": "target"}, longest)
+        return Target(group, {**TARGET_LOOK, "label": "target"}, longest)
     label = f"target of {', '.join(run.label for run in group)}"
-    return Target({**TARGET_LOOK, "color": group[0].color, "label": label}, longest)
+    look = {**TARGET_LOOK, "linestyle": group[0].linestyle, "label": label}
+    return Target(group, look, longest)
 
 
 def enlargement(runs: Sequence[Shown]) -> float:
@@ -117,7 +119,7 @@ def trajectory(runs: Sequence[Shown], columns: int) -> Figure:
 
 
 def _whole(axes: Axes, runs: Sequence[Shown]) -> None:
-    _draw_tracks(axes, runs, runs, (0.0, max(run.end for run in runs)))
+    _draw_tracks(axes, targets(runs), runs, (0.0, max(run.end for run in runs)))
     scale = enlargement(runs)
     times = np.linspace(0.0, max(run.end for run in runs), SILHOUETTES)
     for run in runs:
@@ -132,31 +134,31 @@ def _whole(axes: Axes, runs: Sequence[Shown]) -> None:
 def _end(axes: Axes, runs: Sequence[Shown]) -> tuple[tuple[float, float], float, float]:
     """The last part of the runs that finished, to scale; corner, width and height of what is seen.
 
-    The last part that all of them have: hulls are shown at one and the same time.
+    The last part that all of them have: hulls are shown at one and the same time. Of several
+    targets, the first with its runs.
     """
-    kept = scaling(runs)
+    finished = scaling(runs)
+    target = next(target for target in targets(runs) if finished[0] in target.runs)
+    kept = [run for run in finished if run in target.runs]
     last = min(run.end for run in kept)
-    _draw_tracks(axes, runs, kept, ((1.0 - LAST_PART) * last, last))
+    _draw_tracks(axes, [target], kept, ((1.0 - LAST_PART) * last, last))
     for run in kept:
         axes.add_patch(Polygon(hull_of(run, last, 1.0), color=run.color, alpha=0.3))
-    ahead, here = (
-        [(run.at(last, y), run.at(last, x)) for run in kept]
-        for y, x in (("y_d", "x_d"), ("y", "x"))
-    )
-    axes.plot(*zip(*ahead, strict=True), **MARK, marker="+", markersize=7)
-    east, north = ahead[0]
-    away = max(float(np.hypot(y - east, x - north)) for y, x in (*here, *ahead))
+    east, north = (kept[0].at(last, name) for name in ("y_d", "x_d"))
+    axes.plot([east], [north], **MARK, marker="+", markersize=7)
+    away = max(np.hypot(run.at(last, "y") - east, run.at(last, "x") - north) for run in kept)
     length = max(run.length for run in kept)
     reach = min(max(NEAREST * length, 1.3 * away), FARTHEST * length)
     map_axes(axes, (east - reach, east + reach), (north - reach, north + reach))
-    axes.set_title(f"last {LAST_PART * last:.3g} s, hulls to scale at t = {last:g} s, target +")
+    part, name = f"last {LAST_PART * last:.3g} s", target.look["label"]
+    axes.set_title(f"{part}, hulls to scale at t = {last:g} s, {name} +")
     return (east - reach, north - reach), 2.0 * reach, 2.0 * reach
 
 
-def _draw_tracks(axes: Axes, runs: Sequence[Shown], kept: Sequence[Shown], span: Span) -> None:
-    """The targets' tracks and those of the runs that are kept, during a time [s]."""
-    tracks = [(target.recording, "x_d", "y_d", target.look) for target in targets(runs)]
-    tracks += [(run.recording, "x", "y", run.look) for run in kept]
+def _draw_tracks(axes: Axes, ahead: Sequence[Target], runs: Sequence[Shown], span: Span) -> None:
+    """Tracks of targets and runs during a time [s]."""
+    tracks = [(target.recording, "x_d", "y_d", target.look) for target in ahead]
+    tracks += [(run.recording, "x", "y", run.look) for run in runs]
     for log, x, y, look in tracks:
         first, last = (int(row) for row in np.searchsorted(log["time"], span))
         # Thin in steps, not by extremes: a track may run in any direction.
