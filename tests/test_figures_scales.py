@@ -85,6 +85,14 @@ def test_controls_show_the_peak_the_whole_run_and_the_settled_part():
     assert [axes.get_xlabel() for axes in found] == [""] * 3 + ["time [s]"] * 3
 
 
+def test_controls_are_logarithmic_where_the_peak_is_and_linear_where_it_is_over():
+    by, _ = controls(("a", recording(tau_u=lambda t: np.where(t < 1.0, 500.0, 0.5 * np.sin(t)))))
+    scales = {part: axes.get_yscale() for part, axes in by.items()}
+    assert scales == {"early": "symlog", "whole": "symlog", "settled": "linear"}
+    assert by["early"].yaxis.get_transform().linthresh == pytest.approx(1.0)
+    assert inside(by["early"].get_ylim(), [500.0])
+
+
 def test_controls_in_one_column_name_the_load_above_each_panel():
     log = recording()
     _, found = controls(("a", log), columns=1)
