@@ -176,6 +176,14 @@ def test_filters_show_virtual_control_and_output_together_and_their_difference()
     assert words == ["filtered", "plain", "virtual control before the filter"]
 
 
+def test_filters_with_a_tall_peak_are_logarithmic_beyond_the_settled_values():
+    peak = {"alpha_r": lambda t: np.where(t < 1.0, 90.0, 0.05), "beta_r": lambda t: 0.0 * t}
+    _, yaw, _, error = drawn("filters", shown(("a", recording(**peak)))).axes
+    for axes in (yaw, error):
+        assert axes.get_yscale() == "symlog"
+        assert axes.yaxis.get_transform().linthresh == pytest.approx(0.1)
+
+
 def test_without_a_filter_there_are_only_virtual_controls():
     log = recording(without=("beta_u", "beta_r"))
     figure = drawn("filters", shown(("plain", log)))
