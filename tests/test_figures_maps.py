@@ -93,7 +93,7 @@ def test_a_hull_has_its_bow_ahead_and_its_beam_across():
     assert east[0] == pytest.approx([5.0, 3.0])
     starboard = hull(0.0, 0.0, 0.0, length=2.0, beam=0.5)[1]
     assert starboard[0] > 0.0
-    assert east[1][1] < 4.0  # heading east, starboard is south
+    assert east[1][1] < 3.0  # heading east, starboard is south
 
 
 def test_silhouettes_of_a_short_run_stand_at_the_same_instants():
