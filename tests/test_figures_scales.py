@@ -91,6 +91,7 @@ def test_controls_are_logarithmic_where_the_peak_is_and_linear_where_it_is_over(
     assert scales == {"early": "symlog", "whole": "symlog", "settled": "linear"}
     assert by["early"].yaxis.get_transform().linthresh == pytest.approx(1.0)
     assert inside(by["early"].get_ylim(), [500.0])
+    assert by["whole"].get_ylim()[1] > 700.0  # a margin that can be seen on this axis
 
 
 def test_controls_in_one_column_name_the_load_above_each_panel():

@@ -82,6 +82,7 @@ def compress(axes: Axes, runs: Sequence[Shown], name: str) -> None:
         usual = max(usual, peak * 10.0**-DECADES)
     if peak > TALL * usual > 0.0:
         axes.set_yscale("symlog", linthresh=10.0 ** np.ceil(np.log10(usual)))
+        axes.autoscale_view(scalex=False)  # margins in the new scale
 
 
 def _usual(run: Shown, name: str) -> float:
