@@ -16,6 +16,7 @@ from podusv_cli.comparison.differences import differences
 from podusv_cli.comparison.entries import Absent, Entry
 from podusv_cli.config.loading import load_text
 from podusv_cli.config.scenario import Claim, Scenario
+from podusv_cli.findings.finding import Finding
 from podusv_cli.logbook.folder import Run, RunWriter, open_run
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.parallel import INTERRUPTED, Outcome, run_all
@@ -31,6 +32,7 @@ class Part:
     scenario: Scenario
     text: str = ""
     run: Run | None = None
+    noticed: Sequence[Finding] = ()  # before the run
 
 
 @dataclass(frozen=True)
@@ -43,6 +45,7 @@ class Result:
     table: pd.DataFrame
     verdicts: Sequence[claims.Verdict]
     timings: Mapping[str, Mapping[str, float]]
+    warnings: Mapping[str, Sequence[Finding]]  # of the runs that were made
 
     @property
     def status(self) -> Status:
@@ -80,7 +83,7 @@ def distinct(parts: Iterable[Part]) -> list[Part]:
         while label in found:
             count += 1
             label = f"{part.label}_{count}"
-        found[label] = Part(label, part.scenario, part.text, part.run)
+        found[label] = replace(part, label=label)
     return list(found.values())
 
 
@@ -100,6 +103,7 @@ def make_runs(
             figures=("controls",) if figures else (),
             argv=argv,
             label=part.label,
+            noticed=part.noticed,
         )
         for part in wanted
     ]
@@ -117,7 +121,7 @@ def collect(
 ) -> Result:
     """Open the runs that were made, and compare."""
     entries: list[Entry] = []
-    endings, timings = {}, {}
+    endings, timings, warnings = {}, {}, {}
     for part in parts:
         outcome = outcomes.get(part.label, Outcome())
         done: Finished | None = outcome.result
@@ -126,13 +130,13 @@ def collect(
         if run:
             entries.append(Entry(part.label, run, part.scenario))
         if done:
-            timings[part.label] = done.timing
+            timings[part.label], warnings[part.label] = done.timing, done.warnings
     entries = _timed(entries)
     sources = {part.label: Absent() for part in parts} | {e.label: e for e in entries}
     differing = differences({part.label: part.scenario.model_dump() for part in parts})
     measured = {entry.label: {n: entry.metric(n) for n in entry.run.metrics} for entry in entries}
     verdicts = claims.judge(stated, sources)
-    return Result(entries, endings, differing, table.table(measured), verdicts, timings)
+    return Result(entries, endings, differing, table.table(measured), verdicts, timings, warnings)
 
 
 def _timed(entries: Sequence[Entry]) -> list[Entry]:

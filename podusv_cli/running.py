@@ -14,6 +14,8 @@ from podusv_cli import __version__
 from podusv_cli.config.loading import resolved_yaml
 from podusv_cli.config.scenario import Scenario
 from podusv_cli.engine.simulate import Observer, marcher, simulate
+from podusv_cli.findings.after import aftermath
+from podusv_cli.findings.finding import Finding, heard
 from podusv_cli.logbook import folder, hdf5, provenance
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.table import METRICS
@@ -47,7 +49,10 @@ class Stopwatch:
 
 @dataclass(frozen=True)
 class Task:
-    """A scenario, its file's text, where its run folder goes, how it is called and drawn."""
+    """A scenario, its file's text, where its run folder goes, how it is called and drawn.
+
+    `noticed` is what was found before the run.
+    """
 
     scenario: Scenario
     text: str
@@ -56,6 +61,7 @@ class Task:
     figures: Sequence[str] = ()
     argv: Sequence[str] = ()
     label: str = ""  # in figures; the law's kind by default
+    noticed: Sequence[Finding] = ()
 
 
 @dataclass(frozen=True)
@@ -69,6 +75,7 @@ class Finished:
     metrics: dict[str, float]
     timing: dict[str, float]
     others: tuple[str, ...] = ()  # runs of a comparison that the scenario also has
+    warnings: tuple[Finding, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints of a run."""
@@ -79,6 +86,7 @@ class Finished:
             "controller": self.controller,
             "metrics": self.metrics,
             "timing": self.timing,
+            "warnings": [finding.as_json() for finding in self.warnings],
         }
 
 
@@ -93,8 +101,11 @@ def execute(
     started, watch = datetime.now(UTC), watch or Stopwatch()
     with folder.RunWriter(task.target, force=task.force) as writer:
         recording, metrics = measured(task.scenario, watch, progress)
+        with watch.part("metrics"):
+            seen_after = heard(aftermath(task.scenario, recording), task.scenario)
+        warnings = (*task.noticed, *seen_after)
         with watch.part("write"):
-            _write(writer, task, recording, metrics)
+            _write(writer, task, recording, metrics, warnings)
         with watch.part("figures"):
             if task.figures:
                 _draw(writer, task, recording)
@@ -103,8 +114,9 @@ def execute(
             writer.add_json("provenance.json", origin)
             final = writer.finish(recording.status)
     return Finished(
-        final, recording.controller, recording.status, recording.message, metrics, watch.total()
-    )
+        final, recording.controller, recording.status, recording.message, metrics, watch.total(),
+        warnings=warnings,
+    )  # fmt: skip
 
 
 def warm_up(scenario: Scenario) -> None:
@@ -138,8 +150,9 @@ def measured(
 
 
 def _write(
-    writer: folder.RunWriter, task: Task, recording: Recording, metrics: dict[str, float]
-) -> None:
+    writer: folder.RunWriter, task: Task, recording: Recording, metrics: dict[str, float],
+    warnings: Sequence[Finding],
+) -> None:  # fmt: skip
     scenario, resolved = task.scenario, resolved_yaml(task.scenario)
     log = hdf5.encode(
         recording, resolved_yaml=resolved, title=scenario.description or scenario.name,
@@ -149,7 +162,8 @@ def _write(
     writer.add("resolved.yaml", resolved.encode())
     writer.add("log.h5", log)
     status = {"status": recording.status, "controller": recording.controller}
-    writer.add_json("metrics.json", {**status, "metrics": metrics})
+    told = [finding.as_json() for finding in warnings]
+    writer.add_json("metrics.json", {**status, "metrics": metrics, "warnings": told})
     rows = [f"{name},{metrics[name]!r},{METRICS[name].unit}" for name in METRICS if name in metrics]
     writer.add("metrics.csv", "\n".join(["metric,value,unit", *rows, ""]).encode())
 

@@ -15,6 +15,8 @@ from podusv_cli.config.loading import load, resolved_yaml
 from podusv_cli.config.scenario import Claim
 from podusv_cli.config.words import unknown
 from podusv_cli.errors import UsageError
+from podusv_cli.findings.finding import Finding, heard
+from podusv_cli.findings.preflight import preflight, together
 from podusv_cli.logbook import folder, provenance
 from podusv_cli.running import Finished, Progress, Stopwatch, Task, execute
 
@@ -34,6 +36,7 @@ class Request:
     force: bool = False
     figures: bool = True
     argv: Sequence[str] = ()
+    warn: Callable[[Finding], None] = lambda finding: None  # before anything is simulated
 
 
 def run(config: Path, request: Request, progress: Progress | None = None) -> Finished:
@@ -44,8 +47,14 @@ def run(config: Path, request: Request, progress: Progress | None = None) -> Fin
         scenario = loaded.scenario.alone()
         resolved = resolved_yaml(scenario)
     target = request.out or folder.default_folder(RESULTS, scenario.name, resolved)
+    with watch.part("preflight"):
+        noticed = heard(preflight(scenario), scenario)
+    for finding in noticed:
+        request.warn(finding)
     figures = DRAWN if request.figures else ()
-    task = Task(scenario, loaded.text, target, request.force, figures, request.argv)
+    task = Task(
+        scenario, loaded.text, target, request.force, figures, request.argv, noticed=noticed
+    )
     return replace(execute(task, progress, watch), others=tuple(loaded.scenario.controllers))
 
 
@@ -71,6 +80,10 @@ class Compared:
             "claims": [verdict.as_json() for verdict in result.verdicts],
         }
 
+    def warnings(self) -> list[Finding]:
+        """What was noticed about the runs that were made."""
+        return together(self.result.warnings)
+
     def _run_as_json(self, entry: Entry) -> dict[str, Any]:
         """A run as `podusv run --json` prints it; timing only where it was run now."""
         here = entry.label in self.result.timings
@@ -81,6 +94,7 @@ class Compared:
             "controller": entry.recording.controller,
             "metrics": dict(entry.run.metrics),
             "timing": dict(self.result.timings.get(entry.label, {})),
+            "warnings": [f.as_json() for f in self.result.warnings.get(entry.label, ())],
         }
 
 
@@ -96,6 +110,8 @@ def compare(
 
     started, argv = datetime.now(UTC), list(request.argv)
     parts, stated, title = _parts(items, request)
+    for finding in together({part.label: part.noticed for part in parts}):
+        request.warn(finding)
     text = "".join(f"{part.label}\n{resolved_yaml(part.scenario)}" for part in parts)
     target = request.out or folder.default_folder(RESULTS, title, text)
     with folder.RunWriter(target, force=request.force) as writer:
@@ -130,7 +146,8 @@ def _parts(
         alone = len(items) == 1 or bool(loaded.scenario.controllers)
         for label, scenario in loaded.scenario.singles().items():
             name = label if alone else scenario.name
-            parts.append(comparing.Part(name, scenario, loaded.text))
+            noticed = heard(preflight(scenario), scenario)
+            parts.append(comparing.Part(name, scenario, loaded.text, noticed=noticed))
         stated |= loaded.scenario.claims
         names.append(loaded.scenario.name)
     title = "-".join(dict.fromkeys(names))[:80]

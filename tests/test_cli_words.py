@@ -77,7 +77,8 @@ def podusv_process(*words: str, stdout: int = subprocess.PIPE) -> subprocess.Com
 
 
 def test_a_sound_scenario_is_one_line(podusv: Callable[..., Said]) -> None:
-    assert podusv("validate", "a.yaml") == (0, "a.yaml: ok (a, pid, 31000 steps)\n", "")
+    said = podusv("validate", "a.yaml", "--set", "controller.k_ze=0.03")
+    assert said == (0, "a.yaml: ok (a, pid, 31000 steps)\n", "")
 
 
 def test_every_fault_is_a_line_on_stderr(podusv: Callable[..., Said]) -> None:
@@ -99,7 +100,8 @@ def test_a_missing_file_is_a_line_on_stderr(podusv: Callable[..., Said]) -> None
 def test_the_laws_to_compare_are_named_and_claims_are_checked(podusv: Callable[..., Said]) -> None:
     several = SOUND + "controllers: {slow: {k_ze: 0.01}, fast: {k_ze: 1}}\nclaims:\n"
     write("b.yaml", several + "  C1: {says: s, source: p, expect: slow.iae > fast.iae}\n")
-    assert podusv("validate", "b.yaml").out == "b.yaml: ok (b, slow, fast, 31000 steps)\n"
+    ok, *_ = podusv("validate", "b.yaml").out.splitlines()
+    assert ok == "b.yaml: ok (b, slow, fast, 31000 steps)"
     write("c.yaml", several + "  C1: {says: s, source: p, expect: lame.iae > fast.iae}\n")
     said = podusv("validate", "c.yaml")
     assert said.code == 2
@@ -115,7 +117,8 @@ def test_verbose_shows_every_value_and_where_it_comes_from(podusv: Callable[...,
     assert "start.y: 0.0  # default" in lines
     assert "path.kind: line  # a.yaml:2:14" in lines
     assert "vessel.m: 23.8  # vessel file paper.yaml" in lines
-    assert all("  # " in line for line in lines[1:])
+    head = next(i for i, line in enumerate(lines) if line.startswith("underactuated: "))
+    assert all("  # " in line for line in lines[head + 1 :])
 
 
 # --- explain, list, schema
@@ -279,7 +282,7 @@ def test_a_name_that_is_no_text_is_shown_escaped(tmp_path: Path) -> None:
         file.write(SOUND + "name: a\n")
     process = podusv_process("validate", os.fsdecode(path))
     assert (process.returncode, process.stderr) == (0, "")
-    assert process.stdout.endswith("/\\udcff.yaml: ok (a, pid, 31000 steps)\n")
+    assert "/\\udcff.yaml: ok (a, pid, 31000 steps)\n" in process.stdout
 
 
 LOADED = """

@@ -37,9 +37,11 @@ def compare(
     when a run failed or diverged; the others are compared all the same.
     """
     from podusv_cli import workflows  # heavy imports only when they are needed
+    from podusv_cli.cli.layout import Warned
     from podusv_cli.cli.progress import progress_bars
 
-    request = workflows.Request(tuple(assign or ()), out, force, figures, tuple(sys.argv))
+    warned = Warned(quiet)
+    request = workflows.Request(tuple(assign or ()), out, force, figures, tuple(sys.argv), warned)
     with progress_bars(wanted=not (quiet or as_json)) as progress:
         done = workflows.compare([Path(item) for item in items], request, progress)
     if as_json:
@@ -48,6 +50,8 @@ def compare(
         typer.echo(done.folder)
     else:
         _report(done, verbose)
+    for finding in done.warnings():
+        warned(finding)
     _warn(done)
     if done.result.status == "interrupted":
         raise typer.Exit(INTERRUPTED)

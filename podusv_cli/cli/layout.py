@@ -37,3 +37,19 @@ def echo_table(head: list[str], rows: list[list[str]]) -> None:
     for row in (head, *rows):
         padded = (cell.ljust(width) for cell, width in zip(row, widths, strict=True))
         typer.echo("  ".join(padded).rstrip())
+
+
+class Warned:
+    """Shows warnings on stderr, each once; none where `quiet`."""
+
+    def __init__(self, quiet: bool = False) -> None:
+        """Nothing has been shown yet."""
+        self._quiet = quiet
+        self._shown: set[str] = set()
+
+    def __call__(self, finding: object) -> None:
+        """Show one."""
+        line = str(finding)
+        if line not in self._shown and not self._quiet:
+            typer.echo(line, err=True)
+        self._shown.add(line)

@@ -39,9 +39,11 @@ def run(
 ) -> None:
     """Simulate a scenario and write a run folder: log, metrics, figures."""
     from podusv_cli import workflows  # heavy imports only when they are needed
+    from podusv_cli.cli.layout import Warned
     from podusv_cli.cli.progress import progress_bar
 
-    request = workflows.Request(tuple(assign or ()), out, force, figures, tuple(sys.argv))
+    warned = Warned(quiet)
+    request = workflows.Request(tuple(assign or ()), out, force, figures, tuple(sys.argv), warned)
     with progress_bar(str(config), wanted=not (quiet or as_json)) as progress:
         done = workflows.run(Path(config), request, progress)
     if as_json:
@@ -50,6 +52,8 @@ def run(
         typer.echo(done.folder)
     else:
         _report(done, verbose)
+    for finding in done.warnings:
+        warned(finding)
     if done.message:
         typer.echo(f"{config}: {done.message}", err=True)
     if done.others:

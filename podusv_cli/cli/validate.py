@@ -1,33 +1,51 @@
-"""`podusv validate`: is a scenario sound, and where does every value come from."""
+"""`podusv validate`: is a scenario sound, what to expect of it, where every value comes from."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from podusv_cli.cli.options import Assignments, Config
+
+if TYPE_CHECKING:
+    from podusv_cli.config.loading import Loaded
 
 
 def validate(
     config: Config,
     assign: Assignments = None,
     verbose: Annotated[
-        bool, typer.Option("--verbose", "-v", help="Show every value and where it comes from.")
+        bool,
+        typer.Option(
+            "--verbose", "-v", help="Show the rank argument, every value and where it comes from."
+        ),
     ] = False,
 ) -> None:
-    """Check a scenario and show every fault at once.
+    """Check a scenario: every fault at once, or what to know before it runs.
 
-    Exit code 0, or 2 with a line for each fault.
+    Exit code 0, with a line for each finding; or 2 with a line for each fault.
     """
     from podusv_cli.comparison.claims import misfits
-    from podusv_cli.config.loading import load, values
-    from podusv_cli.config.words import as_written
+    from podusv_cli.config.loading import load
+    from podusv_cli.findings.finding import heard
+    from podusv_cli.findings.preflight import preflight
 
     loaded = load(config, assign or (), checks=(misfits,))
     scenario = loaded.scenario
     laws, steps = ", ".join(scenario.labels()), scenario.time_grid().steps
     typer.echo(f"{config}: ok ({scenario.name}, {laws}, {steps} steps)")
+    for finding in heard(preflight(scenario), scenario):
+        typer.echo(str(finding))
     if verbose:
-        for key, content in values(scenario).items():
-            typer.echo(f"{key}: {as_written(content)}  # {loaded.origins[key]}")
+        _explain(loaded)
+
+
+def _explain(loaded: Loaded) -> None:
+    from podusv_cli.config.loading import values
+    from podusv_cli.config.words import as_written
+    from podusv_cli.findings.underactuation import argument
+
+    typer.echo(argument(loaded.scenario))
+    for key, content in values(loaded.scenario).items():
+        typer.echo(f"{key}: {as_written(content)}  # {loaded.origins[key]}")

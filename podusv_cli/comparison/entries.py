@@ -11,23 +11,14 @@ import numpy as np
 
 from podusv_cli.config.scenario import Scenario
 from podusv_cli.derived import DERIVED
+from podusv_cli.findings.underactuation import input_rank
 from podusv_cli.kernels import Vector
 from podusv_cli.logbook.folder import Run
 from podusv_cli.recording import Recording
 
-
-def input_rank(scenario: Scenario) -> int:
-    """Rank of the map from what the actuator can do to loads (tau_u, tau_v, tau_r), at rest.
-
-    By central differences of the actuator's kernel about zero demand; below 3 the vessel is
-    underactuated, which is the paper's title claim for Y_p = 0.
-    """
-    return int(np.linalg.matrix_rank(scenario.actuator.input_matrix()))
-
-
 CHECKS: dict[str, Callable[[Entry], bool]] = {
     "finished": lambda entry: entry.recording.status == "finished",
-    "underactuated": lambda entry: input_rank(entry.scenario) < 3,
+    "underactuated": lambda entry: input_rank(entry.scenario.actuator) < 3,
 }
 
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from podusv_cli.actuators.base import Actuator
+from podusv_cli.codes import CODES
 from podusv_cli.controllers.base import Controller
 from podusv_cli.disturbances.base import Disturbance
 from podusv_cli.engine.grid import TimeGrid, whole_steps
@@ -20,11 +21,13 @@ if TYPE_CHECKING:
     AnyController = Controller
     AnyDisturbance = Disturbance
     AnyPath = Path
+    AnyCode = str
 else:
     AnyActuator = any_of("podusv_cli.actuators", Actuator)
     AnyController = any_of("podusv_cli.controllers", Controller)
     AnyDisturbance = any_of("podusv_cli.disturbances", Disturbance)
     AnyPath = any_of("podusv_cli.paths", Path)
+    AnyCode = Literal.__getitem__(tuple(CODES))
 
 
 Misfits = Iterator[tuple[str, str]]  # keys, and what is wrong with them
@@ -116,6 +119,9 @@ class Scenario(Component):
     control: Control = value(Control(), "", "sampling of the law")
     log: Log = value(Log(), "", "logging")
     metrics: MetricSettings = value(MetricSettings(), "", "windows and thresholds of the metrics")
+    silence: tuple[AnyCode, ...] = value(
+        (), "", "codes of findings that are not to be shown; see docs/findings.md", strict=False
+    )
 
     def labels(self) -> tuple[str, ...]:
         """The names of the runs that a comparison of this scenario has."""

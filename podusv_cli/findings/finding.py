@@ -1,0 +1,70 @@
+"""A finding, and the scenario as the checks see it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from podusv_cli.codes import CODES
+from podusv_cli.config.scenario import Scenario
+from podusv_cli.findings.reference import Reference, reference
+from podusv_cli.kernels import bundle
+from podusv_cli.paths.base import TARGET
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something that a user should know: a code of `codes.CODES`, a scenario key, a sentence."""
+
+    code: str
+    where: str
+    text: str
+
+    def __str__(self) -> str:
+        """One line, as a command shows it."""
+        return f"warning[{self.code}]: {self.where}: {self.text}"
+
+    def as_json(self) -> dict[str, str]:
+        """What `--json` prints and metrics.json holds."""
+        return {"code": self.code, "where": self.where, "text": self.text}
+
+
+def found(code: str, text: str, where: str = "") -> Finding:
+    """A finding at its code's key, or at a key below or beside it."""
+    return Finding(code, where or CODES[code].key, text)
+
+
+def heard(findings: Iterable[Finding], scenario: Scenario) -> list[Finding]:
+    """The findings that the scenario does not silence."""
+    return [finding for finding in findings if finding.code not in scenario.silence]
+
+
+@dataclass(frozen=True)
+class Case:
+    """A scenario of one law, with what several checks need of it, computed once."""
+
+    scenario: Scenario
+
+    @cached_property
+    def reference(self) -> Reference:
+        """What following the target means for this vessel."""
+        return reference(self.scenario)
+
+    @cached_property
+    def first(self) -> dict[str, float]:
+        """The law's signals at t = 0."""
+        loop = self.scenario.closed_loop()
+        law, memory = loop.controller, loop.first_memory()
+        x, target = np.array(loop.start), np.zeros(len(TARGET))
+        loop.path.evaluate(0.0, bundle(loop.path.constants()), loop.path.table(), target)
+        k, table = bundle(law.informed(loop.nominal)), law.table()
+        signals, rate = np.zeros(len(law.signals)), np.zeros(len(memory))
+        if law.sample_period() > 0:
+            law.sample(0.0, x, memory, target, k, table)
+        with np.errstate(all="ignore"):
+            work = np.zeros(law.workspace())
+            law.law(0.0, x, memory, target, k, table, np.zeros(2), rate, signals, work)
+        return dict(zip(law.signals, signals.tolist(), strict=True))

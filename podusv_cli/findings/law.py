@@ -1,0 +1,198 @@
+"""Findings about the law: signs, folding, the network, and how fast its loops are."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from podusv_cli.controllers.network import Network
+from podusv_cli.controllers.pid import Pid
+from podusv_cli.controllers.polar_backstepping import PolarBackstepping
+from podusv_cli.controllers.tracking import TrackingController
+from podusv_cli.findings.finding import Case, Finding, found
+from podusv_cli.findings.stability import (
+    EULER_REACH,
+    RK4_REACH,
+    Loop,
+    loops,
+    rk4_growth,
+    sampled_growth,
+)
+from podusv_cli.kernels import Vector
+
+FAR = 2.0  # widths; a node further away answers with less than exp(-2)
+KICK = 1.0  # rad/s; beyond what a hull turns at
+UNSTABLE = 1.0 + 1e-6
+
+
+def coupling_saddle(case: Case) -> Iterator[Finding]:
+    """With the printed sign, z_e' = -k_ze z_e - u_e and m11 u_e' = -k_ue u_e - z_e; yaw alike.
+
+    The determinant (k_ze k_ue - 1)/m11 is negative where k_ze k_ue < 1: a saddle.
+    """
+    law, vessel = case.scenario.controller, case.scenario.vessel
+    if not isinstance(law, PolarBackstepping) or law.coupling != "printed":
+        return
+    pairs = (
+        ("k_ze", "k_ue", law.k_ze, law.k_ue, vessel.m11),
+        ("k_psie", "k_re", law.k_psie, law.k_re, vessel.m33),
+    )
+    for outer, inner, k, k_e, inertia in pairs:
+        if k * k_e < 1.0:
+            matrix = np.array([[-k, -1.0], [-1.0 / inertia, -k_e / inertia]])
+            growth = float(np.linalg.eigvals(matrix).real.max())
+            yield found(
+                "coupling-saddle",
+                f"the printed sign with {outer} {inner} = {k * k_e:.2g} < 1 makes a saddle that "
+                f"grows at {growth:.2g} 1/s unless the network's adaptation hides it; take "
+                "coupling: corrected, or larger gains",
+            )
+
+
+def start_astern(case: Case) -> Iterator[Finding]:
+    """The target lies abaft the beam at t = 0 and the law does not fold line of sight and error."""
+    law, start = case.scenario.controller, case.scenario.start
+    if not isinstance(law, TrackingController) or law.fold == "joint":
+        return
+    psi_e = math.remainder(case.first["psi_d"] - start.psi, 2.0 * math.pi)
+    if abs(psi_e) >= 0.5 * math.pi:
+        yield found(
+            "start-astern",
+            f"the target lies {math.degrees(psi_e):.0f} degrees off the bow at the start, beyond "
+            f"the right angle within which fold: {law.fold} steers towards it; turn start.psi, or "
+            "take fold: joint",
+        )
+
+
+def start_kick(case: Case) -> Iterator[Finding]:
+    """Remark 5's difference, started from psi_d = 0, is a kick of psi_d(0)/Delta t for a sample."""
+    law = case.scenario.controller
+    if not isinstance(law, TrackingController) or law.rate != "difference":
+        return
+    kick = math.remainder(case.first["psi_d"], 2.0 * math.pi) / law.difference_step
+    if law.first_difference == "from_zero" and abs(kick) > KICK:
+        yield found(
+            "start-kick",
+            f"the first difference of psi_d starts from zero and turns the virtual yaw rate by "
+            f"{kick:.3g} rad/s for {law.difference_step:g} s; take first_difference: from_start",
+        )
+
+
+def network_range(case: Case) -> Iterator[Finding]:
+    """No node of the network within two widths of the velocities that keep up with the target."""
+    law = case.scenario.controller
+    if not isinstance(law, PolarBackstepping):
+        return
+    nu = case.reference.nu[np.isfinite(case.reference.nu).all(axis=1)]
+    if not len(nu):
+        return
+    distance = nearest(law.network, nu)
+    worst = int(distance.argmax())
+    if distance[worst] > FAR:
+        u, v, r = nu[worst]
+        yield found(
+            "network-range",
+            f"keeping up means u = {u:.2g} m/s, v = {v:.2g} m/s, r = {r:.2g} rad/s, and the "
+            f"nearest node is {distance[worst]:.2g} widths away: the network is blind there; "
+            "move low and high, or widen spread",
+        )
+
+
+def nearest(network: Network, nu: Vector) -> Vector:
+    """Distance from velocities (n, 3) to the nearest node, in widths."""
+    widths = network.width_array()
+    if network.centers:
+        gaps = [((row - network.center_array()) / widths) ** 2 for row in nu]
+        return np.sqrt([gap.sum(axis=1).min() for gap in gaps])
+    axes = zip(nu.T, network.axes(), widths, strict=True)
+    gaps = [(((v[:, None] - axis) / width) ** 2).min(axis=1) for v, axis, width in axes]
+    return np.asarray(np.sqrt(np.sum(gaps, axis=0)))
+
+
+def stiff_adaptation(case: Case) -> Iterator[Finding]:
+    """The network's adaptation turns faster than RK4 follows at this step."""
+    if isinstance(case.scenario.controller, PolarBackstepping):
+        yield from _too_fast(case, "stiff-adaptation", "adaptation")
+
+
+def stiff_derivative(case: Case) -> Iterator[Finding]:
+    """PID's proportional and derivative action is faster than RK4 follows at this step."""
+    if isinstance(case.scenario.controller, Pid):
+        yield from _too_fast(case, "stiff-derivative", "PID loop")
+
+
+def _too_fast(case: Case, code: str, what: str) -> Iterator[Finding]:
+    grid = case.scenario.time_grid()
+    for loop in () if grid.hold_every else loops(case.scenario.controller, case):
+        if rk4_growth(loop, grid.step) > UNSTABLE:
+            yield found(
+                code,
+                f"the {loop.axis} {what} turns at {loop.fastest:.3g} 1/s, too fast for RK4 with "
+                f"{grid.step:g} s; take a step below {_largest(loop):.2g} s, or a smaller "
+                f"{loop.key}",
+            )
+
+
+def _largest(loop: Loop) -> float:
+    """The largest step [s] up to which RK4 is stable, by bisection."""
+    low, high = 0.0, 4.0 / loop.fastest
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        stable = rk4_growth(loop, middle) <= UNSTABLE
+        low, high = (middle, high) if stable else (low, middle)
+    return low
+
+
+def sampled_adaptation(case: Case) -> Iterator[Finding]:
+    """The network's adaptation is unstable when the law acts once a period."""
+    if isinstance(case.scenario.controller, PolarBackstepping):
+        yield from _sampled_too_fast(case, "sampled-adaptation", "adaptation")
+
+
+def sampled_derivative(case: Case) -> Iterator[Finding]:
+    """PID is unstable when it acts once a period."""
+    if isinstance(case.scenario.controller, Pid):
+        yield from _sampled_too_fast(case, "sampled-derivative", "PID loop")
+
+
+def _sampled_too_fast(case: Case, code: str, what: str) -> Iterator[Finding]:
+    grid = case.scenario.time_grid()
+    for loop in loops(case.scenario.controller, case) if grid.hold_every else ():
+        growth = sampled_growth(loop, grid.step, grid.hold_every)
+        if growth > UNSTABLE:
+            yield found(
+                code,
+                f"the {loop.axis} {what}, held for {case.scenario.control.period:g} s, grows "
+                f"{growth:.3g} times a period; take a shorter period, or a smaller {loop.key}",
+            )
+
+
+def stiff_start(case: Case) -> Iterator[Finding]:
+    """The velocity error at the start drives the bound so high that its loop outruns the step.
+
+    Without leakage b_hat rises to sqrt(gamma m) |e(0)| while e decays, and then e' = -e b_hat/
+    (4 partial m). Where an actuator cuts the demand off, that loop is open and nothing is said.
+    """
+    law, scenario = case.scenario.controller, case.scenario
+    if not isinstance(law, PolarBackstepping) or "saturated" in scenario.actuator.signals:
+        return
+    step, period = scenario.simulation.step, scenario.control.period
+    allowed = EULER_REACH / period if period else RK4_REACH / step
+    axes = (
+        ("surge", "u_e", law.gamma_u, law.b_hat_u0, scenario.vessel.m11),
+        ("yaw", "r_e", law.gamma_r, law.b_hat_r0, scenario.vessel.m33),
+    )
+    for axis, name, gamma, b_hat, inertia in axes:
+        error = abs(case.first[name])
+        rate = (b_hat + math.sqrt(gamma * inertia) * error) / (4.0 * law.partial * inertia)
+        if rate > allowed:
+            yield found(
+                "stiff-start",
+                f"{name} = {error:.3g} at the start drives the estimated bound to where the {axis} "
+                f"loop turns at {rate:.3g} 1/s, above the {allowed:.3g} 1/s that "
+                f"{period or step:g} s can follow; take a shorter step, a smaller gamma, or a "
+                "start nearer to what the law wants",
+                "control.period" if period else "",
+            )

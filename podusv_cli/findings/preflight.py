@@ -1,0 +1,57 @@
+"""All findings about a scenario that can be told before it runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+
+from podusv_cli.config.scenario import Scenario
+from podusv_cli.findings import law, task
+from podusv_cli.findings.finding import Case, Finding
+
+Check = Callable[[Case], Iterator[Finding]]
+
+# One function a code, in the order in which findings are shown.
+CHECKS: dict[str, Check] = {
+    "path-jump": task.path_jump,
+    "path-corner": task.path_corner,
+    "path-bend": task.path_bend,
+    "sway-drift": task.sway_drift,
+    "sway-unstable": task.sway_unstable,
+    "thrust-short": task.thrust_short,
+    "coupling-saddle": law.coupling_saddle,
+    "start-astern": law.start_astern,
+    "start-kick": law.start_kick,
+    "network-range": law.network_range,
+    "stiff-adaptation": law.stiff_adaptation,
+    "stiff-start": law.stiff_start,
+    "stiff-derivative": law.stiff_derivative,
+    "sampled-adaptation": law.sampled_adaptation,
+    "sampled-derivative": law.sampled_derivative,
+}
+
+
+def preflight(scenario: Scenario) -> list[Finding]:
+    """What is worth knowing about a scenario before it runs, silenced findings included.
+
+    With `controllers` it is asked of each law; what they share is told once.
+    """
+    if scenario.controllers:
+        return together({name: preflight(one) for name, one in scenario.singles().items()})
+    case = Case(scenario)
+    return [finding for check in CHECKS.values() for finding in check(case)]
+
+
+def together(findings: Mapping[str, Sequence[Finding]]) -> list[Finding]:
+    """Findings about several runs, by label, with those that are the same told once."""
+    alike: dict[Finding, list[str]] = {}
+    for label, several in findings.items():
+        for finding in several:
+            alike.setdefault(finding, []).append(label)
+    return [replace(f, where=_in_its_place(f.where, labels)) for f, labels in alike.items()]
+
+
+def _in_its_place(where: str, labels: Sequence[str]) -> str:
+    """A key of `controller` as the key below `controllers` of the laws that share it."""
+    section, dot, rest = where.partition(".")
+    return f"controllers.{'|'.join(labels)}{dot}{rest}" if section == "controller" else where

@@ -1,0 +1,132 @@
+"""What it takes to follow the target: speeds, sway and forces along the path.
+
+A steady hull keeps up with the target at the target's speed over ground U. Its sway v is where
+sway force and mean load balance: Y(u, v, r) + b_v + tau_v = 0 with u^2 + v^2 = U^2, r the rate at
+which the target's course turns, tau_v what the actuator puts on sway along with the yaw moment.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from podusv_cli.config.scenario import Scenario
+from podusv_cli.kernels import Vector, bundle
+from podusv_cli.paths.base import TARGET
+from podusv_cli.vessels.plant import surge_force, sway_force, yaw_moment
+
+SAMPLES = 60
+FASTEST = 100.0  # m/s; no sway beyond is looked for
+STANDING = 1e-6  # m/s; a slower target has no course
+
+
+@dataclass(frozen=True)
+class Reference:
+    """At sampled times of a run: what the target does and what the hull has to do.
+
+    `nu` (n, 3) is the steady velocity that keeps up, with NaN for surge and sway where no heading
+    does; `load` (n, 3) the disturbance; `demand` (n, 2) the surge force [N] and yaw moment [N m]
+    that keep this velocity.
+    """
+
+    time: Vector
+    speed: Vector
+    nu: Vector
+    load: Vector
+    demand: Vector
+
+    @property
+    def steady_sway(self) -> float:
+        """Median sway velocity that keeps up [m/s]; 0 where nothing does."""
+        known = self.nu[:, 1][np.isfinite(self.nu[:, 1])]
+        return float(np.median(known)) if len(known) else 0.0
+
+
+def reference(scenario: Scenario) -> Reference:
+    """Sample a scenario's target and loads, and balance the hull at each sample."""
+    time = np.linspace(0.0, scenario.simulation.duration, SAMPLES)
+    target = _targets(scenario, time)
+    speed, turn, along = _motion(target)
+    load = _loads(scenario, time, target, turn)
+    balance = _balance(scenario, float(load[:, 1].mean()))
+    nu = np.array([(*balance(U, r), r) for U, r in zip(speed.tolist(), turn.tolist(), strict=True)])
+    held = np.where(np.isnan(nu), np.column_stack([speed, 0.0 * speed, turn]), nu)
+    k = bundle(scenario.vessel.constants())
+    demand = np.array(
+        [(-surge_force(u, v, r, k), -yaw_moment(u, v, r, k)) for u, v, r in held.tolist()]
+    )
+    demand[:, 0] += scenario.vessel.m11 * along
+    return Reference(time, speed, nu, load, demand - load[:, [0, 2]])
+
+
+def _targets(scenario: Scenario, time: Vector) -> Vector:
+    path, target = scenario.path, np.zeros((len(time), len(TARGET)))
+    k, table = bundle(path.constants()), path.table()
+    for t, row in zip(time.tolist(), target, strict=True):
+        path.evaluate(t, k, table, row)
+    return target
+
+
+def _motion(target: Vector) -> tuple[Vector, Vector, Vector]:
+    """Speed, rate of the course and tangential acceleration of the target."""
+    _, _, x_dot, y_dot, x_ddot, y_ddot = target.T
+    speed = np.hypot(x_dot, y_dot)
+    moving = np.where(speed > STANDING, speed, np.inf)
+    turn = np.round((x_dot * y_ddot - y_dot * x_ddot) / moving**2, 9)
+    return np.round(speed, 9), turn, (x_dot * x_ddot + y_dot * y_ddot) / moving
+
+
+def _loads(scenario: Scenario, time: Vector, target: Vector, turn: Vector) -> Vector:
+    """The disturbance on a hull that rides on the target."""
+    sea, load = scenario.disturbance, np.zeros((len(time), 3))
+    k, table = bundle(sea.constants()), sea.table()
+    course = np.arctan2(target[:, 3], target[:, 2])
+    speed = np.hypot(target[:, 2], target[:, 3])
+    states = np.column_stack([target[:, :2], course, speed, 0.0 * speed, turn])
+    for t, x, row in zip(time.tolist(), states, load, strict=True):
+        sea.evaluate(t, x, k, table, row)
+    return load
+
+
+def _balance(scenario: Scenario, b_v: float) -> Callable[[float, float], tuple[float, float]]:
+    """From speed U and turn rate r to the surge and sway that keep up; NaN where none do."""
+    k, share = bundle(scenario.vessel.constants()), sway_share(scenario)
+
+    @cache  # a line and a circle have one speed and one turn rate each
+    def steady(U: float, r: float) -> tuple[float, float]:
+        def excess(v: float) -> float:
+            u = math.sqrt(max(U * U - v * v, 0.0))
+            return sway_force(u, v, r, k) + b_v - share * yaw_moment(u, v, r, k)
+
+        v = root(excess, -U, U)
+        return math.sqrt(max(U * U - v * v, 0.0)), v
+
+    return steady
+
+
+def sway_share(scenario: Scenario) -> float:
+    """Sway force that comes with a yaw moment of 1 N m from the actuator, at small demands."""
+    matrix: Any = scenario.actuator.input_matrix()
+    return float(matrix[1, 1] / matrix[2, 1]) if matrix[2, 1] else 0.0
+
+
+def root(function: Callable[[float], float], low: float, high: float) -> float:
+    """Where a function that falls from `low` to `high` passes zero; NaN where it does not."""
+    if not function(low) >= 0.0 >= function(high):
+        return math.nan
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if function(middle) >= 0.0 else (low, middle)
+    return 0.5 * (low + high)
+
+
+def drift(scenario: Scenario, b_v: float) -> float:
+    """Sway velocity [m/s] at which damping alone holds the load b_v [N]; infinite without any."""
+    k = bundle(scenario.vessel.constants())
+    v = root(lambda v: sway_force(0.0, v, 0.0, k) + b_v, -FASTEST, FASTEST)
+    return math.copysign(math.inf, b_v) if math.isnan(v) else v

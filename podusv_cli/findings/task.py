@@ -1,0 +1,157 @@
+"""Findings about the task: the path, and whether this hull with this actuator can follow it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from podusv_cli.actuators.base import Actuator
+from podusv_cli.controllers.tracking import TrackingController
+from podusv_cli.findings.finding import Case, Finding, found
+from podusv_cli.findings.reference import FASTEST, drift
+from podusv_cli.kernels import Vector, bundle
+from podusv_cli.paths.base import TARGET
+from podusv_cli.vessels.plant import sway_force
+
+BESIDE = 1e-9  # s; how far from a break the target is looked at on both sides
+DELIVERED = 0.999  # of what is needed counts as all of it
+SETTLING = 60.0  # s that an actuator gets to build up its force
+BREAKS = {  # what jumps: code, offset in TARGET, unit
+    "position": ("path-jump", 0, "m"),
+    "velocity": ("path-corner", 2, "m/s"),
+    "acceleration": ("path-bend", 4, "m/s2"),
+}
+CONSEQUENCES: dict[str, Callable[[float, Case], str]] = {
+    "position": lambda size, case: (
+        "the errors jump with it, and Assumption 3 (a smooth path) does not hold"
+    ),
+    "velocity": lambda size, case: (
+        "the virtual controls jump with it, and Assumption 3 (bounded acceleration) does not hold"
+    ),
+    "acceleration": lambda size, case: (
+        "position and velocity go on smoothly and Assumption 3 holds; a law that uses the "
+        f"acceleration (backstepping) may step by up to {size * case.scenario.nominal.m11:.2g} N"
+    ),
+}
+
+
+def path_breaks(case: Case, what: str) -> Iterator[Finding]:
+    """Where the target's position, velocity or acceleration jumps within the run."""
+    code, offset, unit = BREAKS[what]
+    for at in case.scenario.path.breaks():
+        if at.what == what and at.time < case.scenario.simulation.duration:
+            size = float(np.hypot(*_jump(case, at.time)[offset : offset + 2]))
+            meaning = CONSEQUENCES[what](size, case)
+            yield found(
+                code, f"the target's {what} jumps by {size:.3g} {unit} at {at.time:g} s; {meaning}"
+            )
+
+
+def _jump(case: Case, time: float) -> Vector:
+    path, sides = case.scenario.path, np.zeros((2, len(TARGET)))
+    k, table = bundle(path.constants()), path.table()
+    for side, target in zip((-BESIDE, BESIDE), sides, strict=True):
+        path.evaluate(time + side * max(time, 1.0), k, table, target)
+    return np.asarray(sides[1] - sides[0])
+
+
+def path_jump(case: Case) -> Iterator[Finding]:
+    """A jump in position."""
+    return path_breaks(case, "position")
+
+
+def path_corner(case: Case) -> Iterator[Finding]:
+    """A jump in velocity."""
+    return path_breaks(case, "velocity")
+
+
+def path_bend(case: Case) -> Iterator[Finding]:
+    """A jump in acceleration."""
+    return path_breaks(case, "acceleration")
+
+
+def sway_drift(case: Case) -> Iterator[Finding]:
+    """The mean sway load pushes the hull sideways faster than the target moves."""
+    seen = case.reference
+    lost = np.isnan(seen.nu[:, 1])
+    if lost.any():
+        load = float(seen.load[:, 1].mean())
+        speed = abs(drift(case.scenario, load))
+        shown = f"at {speed:.2g} m/s" if np.isfinite(speed) else "without limit"
+        fastest = float(seen.speed[lost].max())
+        yield found(
+            "sway-drift",
+            f"the mean sway load of {load:.2g} N pushes the hull sideways {shown}, and during "
+            f"{lost.mean():.0%} of the run (target at up to {fastest:.2g} m/s) no heading makes up "
+            "for that: it cannot be followed; check the sway damping, the load and the speed",
+        )
+
+
+def sway_unstable(case: Case) -> Iterator[Finding]:
+    """A hull that points at the target slides away sideways.
+
+    v' = ((m11 k_ze - d) v)/m22 on the way to the target, with d the sway damping at the steady
+    sway; nonlinear damping stops the growth where it catches up.
+    """
+    law, vessel = case.scenario.controller, case.scenario.vessel
+    if not isinstance(law, TrackingController):
+        return
+    damping, limit = _damping(case, vessel.m11 * law.k_ze)
+    speed = float(np.median(case.reference.speed))
+    if vessel.m11 * law.k_ze > damping and limit > speed:
+        reach = f"up to {limit:.2g} m/s" if limit < FASTEST else "without limit"
+        yield found(
+            "sway-unstable",
+            f"m11 k_ze = {vessel.m11 * law.k_ze:.3g} kg/s exceeds the sway damping "
+            f"{damping:.3g} kg/s: a hull that points at the target slides sideways, growing "
+            f"{reach}, against the target's {speed:.2g} m/s; take k_ze below "
+            f"{damping / vessel.m11:.2g} 1/s, or a hull with more sway damping",
+        )
+
+
+def _damping(case: Case, drive: float) -> tuple[float, float]:
+    """Sway damping [kg/s] at the steady sway, and where growing at `drive` [kg/s] it stops."""
+    k, sway = bundle(case.scenario.vessel.constants()), case.reference.steady_sway
+    u = float(np.median(case.reference.speed))
+    at_rest, small = sway_force(u, sway, 0.0, k), 1e-4
+    damping = (sway_force(u, sway - small, 0.0, k) - sway_force(u, sway + small, 0.0, k)) / (
+        2 * small
+    )
+    growths = np.geomspace(1e-3, FASTEST, 200)
+    side = 1.0 if sway >= 0.0 else -1.0
+    held = [
+        side * (at_rest - sway_force(u, sway + side * growth, 0.0, k)) > drive * growth
+        for growth in growths.tolist()
+    ]
+    return damping, float(growths[held.index(True)]) if any(held) else FASTEST
+
+
+def thrust_short(case: Case) -> Iterator[Finding]:
+    """Keeping up takes more surge force or yaw moment than the actuator delivers."""
+    seen = case.reference
+    worst = np.abs(seen.demand).argmax(axis=0)
+    actuator = case.scenario.actuator
+    for axis, (what, unit) in enumerate((("surge force", "N"), ("yaw moment", "N m"))):
+        demand = seen.demand[worst[axis]]
+        x = np.concatenate([np.zeros(3), np.nan_to_num(seen.nu[worst[axis]])])
+        needed, got = float(demand[axis]), float(delivered(actuator, x, demand)[2 * axis])
+        if got * np.sign(needed) < DELIVERED * abs(needed):
+            mean = float(seen.demand[:, axis].mean())
+            yield found(
+                "thrust-short",
+                f"keeping up takes a {what} of {needed:.3g} {unit} at "
+                f"t = {seen.time[worst[axis]]:.0f} s ({mean:.3g} on average) and the actuator "
+                f"gives {got:.3g} {unit}; raise its limit or slow the target down",
+            )
+
+
+def delivered(actuator: Actuator, x: Vector, demand: Vector) -> Vector:
+    """Loads (tau_u, tau_v, tau_r) under a steady demand, once the actuator has built them up."""
+    k, table, state = bundle(actuator.constants()), actuator.table(), actuator.rest()
+    tau, rate, signals = np.zeros(3), np.zeros(len(state)), np.zeros(len(actuator.signals))
+    step = 0.05
+    for i in range(round(SETTLING / step) if len(state) else 1):
+        actuator.drive(i * step, x, state, demand, k, table, tau, rate, signals)
+        state = state + step * rate
+    return tau
