@@ -17,11 +17,12 @@ from podusv_cli.config.words import unknown
 from podusv_cli.errors import UsageError
 from podusv_cli.findings.finding import Finding, heard
 from podusv_cli.findings.preflight import preflight, together
-from podusv_cli.logbook import folder, provenance
+from podusv_cli.logbook import atomic, folder, jsonfile, provenance
 from podusv_cli.running import Finished, Progress, Stopwatch, Task, execute
 
 if TYPE_CHECKING:
     from podusv_cli import comparing
+    from podusv_cli.verification.verify import Verified
 
 RESULTS = Path("results")
 DRAWN = ("trajectory", "errors", "controls", "adaptation")  # by `run`
@@ -152,6 +153,22 @@ def _parts(
         names.append(loaded.scenario.name)
     title = "-".join(dict.fromkeys(names))[:80]
     return comparing.distinct(parts), stated, title
+
+
+def verify(
+    config: Path, overrides: Sequence[str], tolerance: float, out: Path | None = None,
+    progress: Callable[[str, float], None] | None = None,
+) -> Verified:  # fmt: skip
+    """Verify a scenario's numbers; written to the file `out`, if there is one, as JSON.
+
+    Raises ScenarioError and StorageError.
+    """
+    from podusv_cli.verification import verify as verification  # not needed by a run
+
+    done = verification.verify(load(config, overrides).scenario, tolerance, progress)
+    if out:
+        atomic.write_bytes(out, jsonfile.encode(done.as_json()))
+    return done
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,105 @@
+"""`podusv verify`: can the numbers of a scenario be trusted."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from podusv_cli.cli.options import AsJson, Assignments, Config, Quiet
+
+if TYPE_CHECKING:
+    from podusv_cli.verification.convergence import Estimate
+    from podusv_cli.verification.ranking import Ranking
+    from podusv_cli.verification.verify import Checked, Verified
+
+NOT_CONVERGED = 3
+
+
+def verify(
+    config: Config,
+    assign: Assignments = None,
+    tolerance: Annotated[
+        float, typer.Option(min=0.0, help="Relative error up to which a number is converged.")
+    ] = 0.01,
+    out: Annotated[
+        Path | None, typer.Option(help="File to write the JSON object to as well.")
+    ] = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """Repeat a scenario at half and at a quarter of its step, and by another integrator.
+
+    Shows order and error of every metric, and in a comparison whether the ranking is the same.
+    Exit code 3 when something is not converged.
+    """
+    from podusv_cli import workflows  # heavy imports only when they are needed
+    from podusv_cli.cli.progress import progress_bars
+    from podusv_cli.logbook.jsonfile import encode
+
+    with progress_bars(wanted=not (quiet or as_json)) as progress:
+        done = workflows.verify(Path(config), assign or (), tolerance, out, progress)
+    if as_json:
+        typer.echo(encode(done.as_json()), nl=False)
+    elif not quiet:
+        _report(done)
+    raise typer.Exit(NOT_CONVERGED if done.doubts else 0)
+
+
+def _report(done: Verified) -> None:
+    for label, run in done.runs.items():
+        _show_run(label, run, done.tolerance)
+    if done.rankings:
+        _show_rankings(done.rankings)
+    doubts = [f"{label}: {', '.join(names)}" for label, names in done.doubts.items()]
+    heading = "not converged" if doubts else "converged"
+    typer.echo("\n".join([f"{heading} within {done.tolerance:.3g} relative", *doubts]))
+
+
+def _show_run(label: str, run: Checked, tolerance: float) -> None:
+    from podusv_cli.cli.layout import echo_table
+    from podusv_cli.metrics.table import METRICS
+
+    units = {name: metric.unit for name, metric in METRICS.items()}
+    steps = [f"{level.step:.6g} s" for level in run.levels]
+    rows = [
+        [name, units.get(name, "m"), *_cells(e, tolerance)] for name, e in run.estimates.items()
+    ]
+    echo_table([label, "unit", *steps, "order", "error", ""], rows)
+    for level in run.levels:
+        if level.message:
+            typer.echo(f"at {level.step:.6g} s: {level.message}")
+    typer.echo(f"{_independent(run)}\n")
+
+
+def _cells(e: Estimate, tolerance: float) -> list[str]:
+    values = ["-" if math.isnan(value) else f"{value:.6g}" for value in e.values]
+    order = "-" if math.isnan(e.order) else f"{e.order:.1f}"
+    error = "-" if math.isinf(e.relative) else f"{e.relative:.1e}"
+    return [*values, order, error, "" if e.converged(tolerance) else "not converged"]
+
+
+def _independent(run: Checked) -> str:
+    reason = run.left_out or (run.independent.left_out if run.independent else "")
+    if reason or run.independent is None:
+        return f"DOP853 left out: {reason}"
+    gaps = ", ".join(f"{name} {gap:.1e}" for name, gap in run.distances().items())
+    return f"relative difference to DOP853: {gaps} ({run.independent.evaluations} evaluations)"
+
+
+def _show_rankings(rankings: dict[str, Ranking]) -> None:
+    from podusv_cli.cli.layout import echo_entry
+
+    typer.echo("ranking, smallest first:")
+    for name, rank in rankings.items():
+        if not rank.same:
+            verdict = "changes with the step: " + "; ".join(", ".join(o) for o in rank.orders)
+        elif rank.close:
+            pairs = "; ".join(" and ".join(pair) for pair in rank.close)
+            verdict = f"{', '.join(rank.orders[0])}; closer than their errors: {pairs}"
+        else:
+            verdict = f"{', '.join(rank.orders[0])}; the same at all steps, beyond the errors"
+        echo_entry(f"  {name}", verdict)
+    typer.echo("")

@@ -1,0 +1,47 @@
+"""The closed loop as s' = f(t, s), for integrators other than the engine's own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from podusv_cli.engine.grid import TimeGrid
+from podusv_cli.engine.simulate import ClosedLoop, Observer, entries, marcher, wire
+from podusv_cli.kernels import Vector
+
+Slope = Callable[[float, Vector], Vector]
+
+
+def continuous(loop: ClosedLoop, *, compiled: bool = True) -> tuple[Slope, Vector]:
+    """f(t, s) and s(0); s is the vessel's state, the actuator's, the law's memory.
+
+    f raises ArithmeticError where a number is not finite. Raises ValueError for a law that takes
+    samples, which is no ordinary differential equation.
+    """
+    if loop.controller.sample_period() > 0:
+        raise ValueError("a law that takes samples has no continuous right-hand side")
+    grid = TimeGrid(1.0, 1, log_every=2)
+    plan = loop.layout(grid)
+    wires = wire(loop, grid, plan, Observer())
+    march = _march(loop) if compiled else marcher(loop, Observer(), compiled)
+
+    def slope(t: float, s: Vector) -> Vector:
+        # The march over instant 1 of a grid with step t and no step after it: rates, no more.
+        wires.s[:] = s
+        with np.errstate(all="ignore"):
+            if march(1, 2, t, wires, plan) != 2:
+                raise ArithmeticError(f"not finite at t = {t:.6g} s")
+        return wires.stages[: plan.states].copy()
+
+    return slope, wires.s.copy()
+
+
+def _march(loop: ClosedLoop) -> Callable[..., int]:
+    """The compiled march, for being called once for every evaluation."""
+    from podusv_cli.engine import compiling  # numba is slow to import and not always wanted
+
+    parts = entries(loop, Observer())
+    doors = [compiling.Pinned(part[0], compiling.entry(*part)) for part in parts]
+    march = compiling.march()
+    return lambda *rest: int(march(*doors, *rest))

@@ -1,0 +1,51 @@
+"""Does a comparison rank its runs the same at every step, and by more than the errors?"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+from podusv_cli.verification.convergence import Estimate
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """Labels from the smallest number on, at each of the three steps.
+
+    `close` are neighbours that lie closer together than their errors.
+    """
+
+    orders: tuple[tuple[str, ...], ...]
+    close: tuple[tuple[str, str], ...]
+
+    @property
+    def same(self) -> bool:
+        """Whether the order is the same at all steps."""
+        return len(set(self.orders)) == 1
+
+    @property
+    def converged(self) -> bool:
+        """Whether the order can be relied on."""
+        return self.same and not self.close
+
+
+def ranking(estimates: Mapping[str, Estimate]) -> Ranking | None:
+    """Of one metric, by run; None where fewer than two runs have it at all."""
+    known = {label: e for label, e in estimates.items() if not e.undefined}
+    if len(known) < 2:
+        return None
+    orders = tuple(_order({label: e.values[i] for label, e in known.items()}) for i in range(3))
+    close = tuple((a, b) for a, b in pairwise(orders[0]) if _too_close(known[a], known[b]))
+    return Ranking(orders, close)
+
+
+def _order(values: Mapping[str, float]) -> tuple[str, ...]:
+    """Smallest first, those without a number last; equal ones as they come."""
+    return tuple(sorted(values, key=lambda label: (math.isnan(values[label]), values[label])))
+
+
+def _too_close(a: Estimate, b: Estimate) -> bool:
+    gap, errors = abs(a.values[0] - b.values[0]), a.error + b.error
+    return errors > 0.0 and not gap > errors
