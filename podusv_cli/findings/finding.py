@@ -11,7 +11,7 @@ import numpy as np
 from podusv_cli.codes import CODES
 from podusv_cli.config.scenario import Scenario
 from podusv_cli.findings.reference import Reference, reference
-from podusv_cli.kernels import bundle
+from podusv_cli.kernels import Vector, bundle
 from podusv_cli.paths.base import TARGET
 
 
@@ -52,6 +52,12 @@ class Case:
     def reference(self) -> Reference:
         """What following the target means for this vessel."""
         return reference(self.scenario)
+
+    @property
+    def first_velocity(self) -> Vector:
+        """(u, v, r) at t = 0."""
+        start = self.scenario.start
+        return np.array([start.u, start.v, start.r])
 
     @cached_property
     def first(self) -> dict[str, float]:

@@ -13,9 +13,9 @@ from podusv_cli.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.controllers.tracking import TrackingController
 from podusv_cli.findings.finding import Case, Finding, found
 from podusv_cli.findings.stability import (
-    EULER_REACH,
-    RK4_REACH,
+    Bound,
     Loop,
+    bursts,
     loops,
     rk4_growth,
     sampled_growth,
@@ -124,15 +124,18 @@ def stiff_derivative(case: Case) -> Iterator[Finding]:
 
 
 def _too_fast(case: Case, code: str, what: str) -> Iterator[Finding]:
-    grid = case.scenario.time_grid()
-    for loop in () if grid.hold_every else loops(case.scenario.controller, case):
-        if rk4_growth(loop, grid.step) > UNSTABLE:
-            yield found(
-                code,
-                f"the {loop.axis} {what} turns at {loop.fastest:.3g} 1/s, too fast for RK4 with "
-                f"{grid.step:g} s; take a step below {_largest(loop):.2g} s, or a smaller "
-                f"{loop.key}",
-            )
+    grid, law = case.scenario.time_grid(), case.scenario.controller
+    told: set[str] = set()
+    for nu in () if grid.hold_every else (case.first_velocity, case.reference.working):
+        for loop in loops(law, case.scenario, nu):
+            if loop.axis not in told and rk4_growth(loop, grid.step) > UNSTABLE:
+                told.add(loop.axis)
+                yield found(
+                    code,
+                    f"the {loop.axis} {what} turns at {loop.fastest:.3g} 1/s, too fast for RK4 "
+                    f"with {grid.step:g} s; take a step below {_largest(loop):.2g} s, or a smaller "
+                    f"{loop.key}",
+                )
 
 
 def _largest(loop: Loop) -> float:
@@ -158,8 +161,10 @@ def sampled_derivative(case: Case) -> Iterator[Finding]:
 
 
 def _sampled_too_fast(case: Case, code: str, what: str) -> Iterator[Finding]:
-    grid = case.scenario.time_grid()
-    for loop in loops(case.scenario.controller, case) if grid.hold_every else ():
+    grid, law = case.scenario.time_grid(), case.scenario.controller
+    if not grid.hold_every:
+        return
+    for loop in loops(law, case.scenario, case.reference.working):
         growth = sampled_growth(loop, grid.step, grid.hold_every)
         if growth > UNSTABLE:
             yield found(
@@ -176,23 +181,22 @@ def stiff_start(case: Case) -> Iterator[Finding]:
     (4 partial m). Where an actuator cuts the demand off, that loop is open and nothing is said.
     """
     law, scenario = case.scenario.controller, case.scenario
-    if not isinstance(law, PolarBackstepping) or "saturated" in scenario.actuator.signals:
+    limited = "saturated" in scenario.actuator.signals
+    if not isinstance(law, PolarBackstepping) or limited or scenario.control.period:
         return
-    step, period = scenario.simulation.step, scenario.control.period
-    allowed = EULER_REACH / period if period else RK4_REACH / step
-    axes = (
-        ("surge", "u_e", law.gamma_u, law.b_hat_u0, scenario.vessel.m11),
-        ("yaw", "r_e", law.gamma_r, law.b_hat_r0, scenario.vessel.m33),
-    )
-    for axis, name, gamma, b_hat, inertia in axes:
-        error = abs(case.first[name])
-        rate = (b_hat + math.sqrt(gamma * inertia) * error) / (4.0 * law.partial * inertia)
-        if rate > allowed:
+    u, r, partial, step = "u_e", "r_e", law.partial, scenario.simulation.step
+    m11, m33 = scenario.vessel.m11, scenario.vessel.m33
+    bounds = {
+        u: Bound("gamma_u", law.gamma_u, law.sigma_bu, law.b_hat_u0, partial, m11),
+        r: Bound("gamma_r", law.gamma_r, law.sigma_br, law.b_hat_r0, partial, m33),
+    }
+    both = zip(bounds.items(), loops(law, scenario, case.first_velocity), strict=True)
+    for (name, bound), loop in both:
+        error = case.first[name]
+        if bursts(loop, bound, error, step) and not rk4_growth(loop, step) > UNSTABLE:
             yield found(
                 "stiff-start",
-                f"{name} = {error:.3g} at the start drives the estimated bound to where the {axis} "
-                f"loop turns at {rate:.3g} 1/s, above the {allowed:.3g} 1/s that "
-                f"{period or step:g} s can follow; take a shorter step, a smaller gamma, or a "
-                "start nearer to what the law wants",
-                "control.period" if period else "",
+                f"{name} = {error:.3g} at the start drives the estimated bound so high that the "
+                f"{loop.axis} loop outruns RK4 with {step:g} s and the error grows instead; take "
+                f"a shorter step, a smaller {bound.key}, or a start nearer to what the law wants",
             )

@@ -41,6 +41,13 @@ class Reference:
     demand: Vector
 
     @property
+    def working(self) -> Vector:
+        """Median velocity (u, v, r) that keeps up; the target's speed straight on where none is."""
+        known = self.nu[np.isfinite(self.nu).all(axis=1)]
+        straight = np.array([float(np.median(self.speed)), 0.0, 0.0])
+        return np.median(known, axis=0) if len(known) else straight
+
+    @property
     def steady_sway(self) -> float:
         """Median sway velocity that keeps up [m/s]; 0 where nothing does."""
         known = self.nu[:, 1][np.isfinite(self.nu[:, 1])]

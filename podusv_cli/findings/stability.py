@@ -15,15 +15,16 @@ from functools import singledispatch
 
 import numpy as np
 
+from podusv_cli.config.scenario import Scenario
 from podusv_cli.controllers.base import Controller
 from podusv_cli.controllers.network import activation
 from podusv_cli.controllers.pid import Pid
 from podusv_cli.controllers.polar_backstepping import PolarBackstepping
-from podusv_cli.findings.finding import Case
-from podusv_cli.kernels import Vector
+from podusv_cli.kernels import Vector, bundle
+from podusv_cli.vessels.plant import surge_force, yaw_moment
 
-RK4_REACH = 2.785  # |h lambda| on the negative real axis up to which RK4 is stable
-EULER_REACH = 2.0
+BURST = 20  # steps within which a start that is too stiff shows
+MUCH = 2.0  # times the error at the start
 
 
 @dataclass(frozen=True)
@@ -86,53 +87,103 @@ def _radius(matrix: Vector) -> float:
     return float(np.abs(np.linalg.eigvals(matrix)).max())
 
 
+@dataclass(frozen=True)
+class Axis:
+    """One axis of the hull: true inertia, what the law takes it for, damping at a velocity."""
+
+    name: str
+    inertia: float
+    told: float
+    damping: float  # d [1/s]
+
+
+def axes(scenario: Scenario, nu: Vector) -> tuple[Axis, Axis]:
+    """Surge and yaw at the velocity nu = (u, v, r)."""
+    k, (u, v, r), small = bundle(scenario.vessel.constants()), nu.tolist(), 1e-4
+    surge = surge_force(u - small, v, r, k) - surge_force(u + small, v, r, k)
+    yaw = yaw_moment(u, v, r - small, k) - yaw_moment(u, v, r + small, k)
+    vessel, told = scenario.vessel, scenario.nominal
+    return (
+        Axis("surge", vessel.m11, told.m11, surge / (2 * small * vessel.m11)),
+        Axis("yaw", vessel.m33, told.m33, yaw / (2 * small * vessel.m33)),
+    )
+
+
 @singledispatch
-def loops(law: Controller, case: Case) -> list[Loop]:
-    """The velocity loops of a law; none where nothing is known about it."""
+def loops(law: Controller, scenario: Scenario, nu: Vector) -> list[Loop]:
+    """The velocity loops of a law at a velocity; none where nothing is known about it."""
     return []
 
 
 @loops.register
-def _(law: PolarBackstepping, case: Case) -> list[Loop]:
+def _(law: PolarBackstepping, scenario: Scenario, nu: Vector) -> list[Loop]:
     # (26), (27) with a = W . Phi at frozen Phi: a' = Gamma (m |Phi|^2 e - sigma a).
-    vessel, told, power = case.scenario.vessel, case.scenario.nominal, network_power(law, case)
-    k_u = law.k_ue + law.b_hat_u0 / (4.0 * law.partial)
-    k_r = law.k_re + law.b_hat_r0 / (4.0 * law.partial)
-    rows = (
-        ("surge", "Gamma_u", vessel.m11, told.m11, -vessel.X_u, k_u, law.Gamma_u, law.sigma_u),
-        ("yaw", "Gamma_r", vessel.m33, told.m33, -vessel.N_r, k_r, law.Gamma_r, law.sigma_r),
+    power = float((activation(law.network, nu[None]) ** 2).sum())
+    gains = (
+        ("Gamma_u", law.k_ue, law.b_hat_u0, law.Gamma_u, law.sigma_u),
+        ("Gamma_r", law.k_re, law.b_hat_r0, law.Gamma_r, law.sigma_r),
     )
     return [
         Loop(
-            axis, key, drag / inertia, np.array([-k, -told_inertia]) / inertia,
-            np.array([[Gamma * told_inertia * power, -Gamma * sigma]]),
+            axis.name, key, axis.damping,
+            np.array([-k - b_hat / (4.0 * law.partial), -axis.told]) / axis.inertia,
+            np.array([[Gamma * axis.told * power, -Gamma * sigma]]),
         )
-        for axis, key, inertia, told_inertia, drag, k, Gamma, sigma in rows
+        for axis, (key, k, b_hat, Gamma, sigma) in zip(axes(scenario, nu), gains, strict=True)
     ]  # fmt: skip
-
-
-def network_power(law: PolarBackstepping, case: Case) -> float:
-    """Largest |Phi|^2 at the start's velocity and at those that keep up with the target."""
-    start = case.scenario.start
-    nu = case.reference.nu
-    visited = np.vstack([nu[np.isfinite(nu).all(axis=1)], [(start.u, start.v, start.r)]])
-    return float((activation(law.network, visited) ** 2).sum(axis=1).max())
 
 
 @loops.register
-def _(law: Pid, case: Case) -> list[Loop]:
+def _(law: Pid, scenario: Scenario, nu: Vector) -> list[Loop]:
     # With e = -u_p: m e' = -K_P e + K_I i + K_D l', i' = -e, l' = (-e - l)/T_d.
-    vessel = case.scenario.vessel
-    rows = (
-        ("surge", "K_Du", vessel.m11, -vessel.X_u, law.K_Pu, law.K_Iu, law.K_Du),
-        ("yaw", "K_Dr", vessel.m33, -vessel.N_r, law.K_Pr, law.K_Ir, law.K_Dr),
-    )
     lag = 1.0 / law.T_d
+    gains = (
+        ("K_Du", law.K_Pu, law.K_Iu, law.K_Du),
+        ("K_Dr", law.K_Pr, law.K_Ir, law.K_Dr),
+    )
     return [
         Loop(
-            axis, key, drag / inertia,
-            np.array([-K_P - K_D * lag, K_I, -K_D * lag]) / inertia,
+            axis.name, key, axis.damping,
+            np.array([-K_P - K_D * lag, K_I, -K_D * lag]) / axis.inertia,
             np.array([[-1.0, 0.0, 0.0], [-lag, 0.0, -lag]]),
         )
-        for axis, key, inertia, drag, K_P, K_I, K_D in rows
+        for axis, (key, K_P, K_I, K_D) in zip(axes(scenario, nu), gains, strict=True)
     ]  # fmt: skip
+
+
+def bursts(loop: Loop, bound: Bound, error: float, step: float) -> bool:
+    """Whether RK4 with this step lets a velocity error grow that the bound's adaptation quells.
+
+    The loop with e' = ... - b_hat phi(e)/m and (28), marched from e(0) = error.
+    """
+    matrix, count = loop.matrix, len(loop.memory) + 1
+
+    def rates(s: Vector) -> Vector:
+        phi = s[0] / (4.0 * bound.partial)
+        linear = matrix @ s[:count]
+        linear[0] -= (s[-1] - bound.initial) * phi / bound.inertia
+        rising = bound.gamma * (s[0] * phi - bound.sigma * (s[-1] - bound.initial))
+        return np.append(linear, rising)
+
+    s = np.zeros(count + 1)
+    s[0], s[-1] = error, bound.initial
+    for _ in range(BURST):
+        k1 = rates(s)
+        k2 = rates(s + 0.5 * step * k1)
+        k3 = rates(s + 0.5 * step * k2)
+        s = s + step / 6.0 * (k1 + 2.0 * (k2 + k3) + rates(s + step * k3))
+        if not abs(s[0]) <= MUCH * abs(error):
+            return True
+    return False
+
+
+@dataclass(frozen=True)
+class Bound:
+    """The adaptation (28) of an axis: gains, b_hat at the start, and the true inertia."""
+
+    key: str
+    gamma: float
+    sigma: float
+    initial: float
+    partial: float
+    inertia: float

@@ -14,6 +14,7 @@ from podusv_cli.kernels import Vector, bundle
 from podusv_cli.paths.base import TARGET
 from podusv_cli.vessels.plant import sway_force
 
+RUNAWAY = 4.0  # target speeds; sway that damping stops below did no harm in any run
 BESIDE = 1e-9  # s; how far from a break the target is looked at on both sides
 DELIVERED = 0.999  # of what is needed counts as all of it
 SETTLING = 60.0  # s that an actuator gets to build up its force
@@ -31,7 +32,9 @@ CONSEQUENCES: dict[str, Callable[[float, Case], str]] = {
     ),
     "acceleration": lambda size, case: (
         "position and velocity go on smoothly and Assumption 3 holds; a law that uses the "
-        f"acceleration (backstepping) may step by up to {size * case.scenario.nominal.m11:.2g} N"
+        "acceleration (backstepping) steps with it, by up to "
+        f"{size * case.scenario.nominal.m11:.2g} N and "
+        f"{size * case.scenario.nominal.m33:.2g}/z_e N m"
     ),
 }
 
@@ -99,12 +102,12 @@ def sway_unstable(case: Case) -> Iterator[Finding]:
         return
     damping, limit = _damping(case, vessel.m11 * law.k_ze)
     speed = float(np.median(case.reference.speed))
-    if vessel.m11 * law.k_ze > damping and limit > speed:
+    if vessel.m11 * law.k_ze > damping and limit > RUNAWAY * speed:
         reach = f"up to {limit:.2g} m/s" if limit < FASTEST else "without limit"
         yield found(
             "sway-unstable",
             f"m11 k_ze = {vessel.m11 * law.k_ze:.3g} kg/s exceeds the sway damping "
-            f"{damping:.3g} kg/s: a hull that points at the target slides sideways, growing "
+            f"{damping:.3g} kg/s: a hull that points at the target can slide sideways, growing "
             f"{reach}, against the target's {speed:.2g} m/s; take k_ze below "
             f"{damping / vessel.m11:.2g} 1/s, or a hull with more sway damping",
         )

@@ -1,0 +1,57 @@
+"""Scenarios from overrides of the corrected one, their findings, and their runs."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from conftest import PACKAGE
+
+from podusv_cli.config.loading import load
+from podusv_cli.config.scenario import Scenario
+from podusv_cli.findings.finding import Finding
+from podusv_cli.findings.preflight import preflight
+from podusv_cli.kernels import Vector
+from podusv_cli.recording import Recording
+from podusv_cli.running import Stopwatch, measured
+
+CONFIGS = PACKAGE.parent / "configs" / "paper"
+PLAIN = ("path={kind: line}", "actuator={kind: ideal}", "simulation.duration=20")
+# No adaptation, calm water: the bare linear loops.
+BARE = (
+    "controller.Gamma_u=0", "controller.Gamma_r=0", "controller.gamma_u=0", "controller.gamma_r=0",
+    "disturbance={kind: none}",
+)  # fmt: skip
+
+
+def scene(*overrides: str) -> Scenario:
+    """The corrected scenario on a line, without limits, for 20 s, with these overrides."""
+    return load(CONFIGS / "corrected.yaml", (*PLAIN, *overrides)).scenario
+
+
+def codes(*overrides: str) -> set[str]:
+    """Codes of the findings about that scenario."""
+    return {finding.code for finding in preflight(scene(*overrides))}
+
+
+def finding(code: str, *overrides: str) -> Finding:
+    """The first finding of that code."""
+    return next(f for f in preflight(scene(*overrides)) if f.code == code)
+
+
+@cache
+def simulated(*overrides: str) -> tuple[Recording, dict[str, float]]:
+    """The run of that scenario, and its metrics."""
+    return measured(scene(*overrides).alone(), Stopwatch())
+
+
+def log(*overrides: str) -> Recording:
+    """The run of that scenario."""
+    return simulated(*overrides)[0]
+
+
+def late(signal: str, *overrides: str) -> Vector:
+    """A signal over the last third of the run; raises where the run did not finish."""
+    out = log(*overrides)
+    assert out.status == "finished", out.message
+    return np.asarray(out[signal][2 * len(out["time"]) // 3 :])

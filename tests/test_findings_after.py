@@ -1,0 +1,236 @@
+"""Warnings after a run, with times; where warnings go; how they are silenced; underactuation."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import PACKAGE, VESSELS, example, kinds
+from findings_samples import CONFIGS, PLAIN, log, scene
+from test_cli_words import Said, podusv
+
+from podusv_cli.codes import CODES
+from podusv_cli.config.loading import load
+from podusv_cli.config.scenario import Scenario
+from podusv_cli.findings.after import LOOKS, aftermath
+from podusv_cli.findings.preflight import CHECKS, preflight
+from podusv_cli.findings.underactuation import argument, input_rank
+from podusv_cli.recording import Recording
+
+__all__ = ["podusv"]  # a fixture that is used here too
+
+
+def told(code: str, *overrides: str) -> list[str]:
+    """Texts of that code about the run of a scenario."""
+    found = aftermath(scene(*overrides).alone(), log(*overrides))
+    return [finding.text for finding in found if finding.code == code]
+
+
+def changed(out: Recording, **signals: Any) -> Recording:
+    return replace(out, signals={**out.signals, **signals})
+
+
+# --- the table
+
+
+def test_every_code_has_one_check_and_every_check_a_code() -> None:
+    assert [c.name for c in CODES.values() if c.when == "before"] == list(CHECKS)
+    assert [c.name for c in CODES.values() if c.when == "after"] == list(LOOKS)
+
+
+def test_every_code_points_to_a_key_of_a_scenario() -> None:
+    for code in CODES.values():
+        assert code.key.split(".")[0] in Scenario.model_fields
+
+
+def test_every_code_is_documented_with_its_meaning() -> None:
+    text = (PACKAGE.parent / "docs" / "findings.md").read_text()
+    for code in CODES.values():
+        assert f"| `{code.name}` | `{code.key}` | {code.meaning}" in text
+
+
+# --- each look, on a run where it is so and on one where it is not
+
+
+def test_a_run_that_touches_the_singularity_is_told_with_the_time() -> None:
+    touching = ("controller={kind: pid, standoff: 0.0}", "simulation.duration=60")
+    (text,) = told("near-target", *touching)
+    out = log(*touching)
+    first = out["time"][np.argmax(out["z_e"] < 0.05 * 1.255)]
+    assert f"{first:.6g} s" in text
+    assert "take a standoff" in text
+    assert told("near-target", "controller={kind: pid}", "simulation.duration=60") == []
+    held = scene(*touching, "controller.hold_below=0.1").alone()
+    assert "near-target" not in {f.code for f in aftermath(held, out)}
+
+
+def test_a_heading_across_the_line_of_sight_is_told_with_the_time() -> None:
+    quiet = log()
+    assert told("crosswise") == []
+    psi_e = np.array(quiet["psi_e"])
+    psi_e[700:703] = math.pi / 2 - 0.01
+    across = aftermath(scene(), changed(quiet, psi_e=psi_e))
+    assert [f.text for f in across if f.code == "crosswise"] == [
+        "|cos psi_e| falls below 0.05 from 7 s to 7.02 s; the virtual surge velocity (21) divides "
+        "by it"
+    ]
+
+
+def test_velocities_outside_the_network_are_told_and_the_activation_is_low_there() -> None:
+    far = ("controller.network.low=[3, 2, 2]", "controller.network.high=[6, 4, 4]")
+    (text,) = told("off-network", *far)
+    assert text.startswith("no node within 2 widths of (u, v, r) from 0 s to 20 s")
+    assert told("off-network") == []
+
+
+def test_listed_centres_are_looked_at_like_a_grid() -> None:
+    grid = scene().controller
+    listed = "[" + ", ".join(str(list(map(float, c))) for c in grid.network.center_array()) + "]"
+    widths = list(map(float, grid.network.width_array()))
+    same = (f"controller.network.centers={listed}", f"controller.network.widths={widths}")
+    assert told("off-network", *same) == []
+    shifted = listed.replace("-1.0, -1.0, -1.0", "9.0, 9.0, 9.0")
+    assert told("off-network", f"controller.network.centers={shifted}", same[1]) == []
+
+
+def test_a_bound_without_leakage_still_grows_at_the_end() -> None:
+    wind_up = ("controller.sigma_bu=0", "controller.gamma_u=0.05", "controller.k_ue=0.1")
+    assert told("bound-growing", *wind_up)[0].startswith("b_hat_u still grows at the end")
+    assert told("bound-growing", "simulation.duration=60") == []
+
+
+def test_long_saturation_is_told_with_its_times() -> None:
+    tight = "actuator={kind: saturated, surge_limit: 2.0}"
+    (text,) = told("saturated", tight)
+    limited = log(tight)["saturated"] > 0.5
+    assert f"{limited.mean():.1%} of the run" in text
+    assert told("saturated", "actuator={kind: saturated, surge_limit: 1e6, yaw_limit: 1e6}") == []
+
+
+def test_nothing_is_told_about_a_run_without_rows() -> None:
+    empty = {name: values[:0] for name, values in log().signals.items()}
+    assert aftermath(scene(), Recording("interrupted", "adaptive_neural", empty)) == []
+
+
+# --- no false alarms
+
+
+def test_the_shipped_corrected_scenario_has_only_the_findings_that_are_true_of_it() -> None:
+    found = preflight(load(CONFIGS / "corrected.yaml").scenario)
+    assert [f.code for f in found] == ["path-bend"]
+
+
+def test_the_printed_scenario_is_told_why_it_cannot_track() -> None:
+    found = {f.code: f.text for f in preflight(load(CONFIGS / "printed.yaml").scenario)}
+    assert set(found) == {
+        "path-jump", "sway-drift", "sway-unstable", "coupling-saddle"
+    }  # fmt: skip
+    assert "0.56 m/s" in found["sway-drift"]
+    assert "2.58 kg/s exceeds the sway damping 0.89 kg/s" in found["sway-unstable"]
+
+
+def test_what_laws_share_is_told_once_and_names_them() -> None:
+    found = preflight(load(CONFIGS / "figures_compare.yaml").scenario)
+    assert len(found) == len(set(found))
+    kicks = [f.where for f in found if f.code == "start-kick"]
+    assert kicks == ["controllers.proposed|dsc.first_difference"]
+
+
+# --- where warnings go
+
+SHORT = ("--set", "simulation.duration=1", "--set", "actuator={kind: ideal}", "--no-figures")
+
+
+def scenario_file(name: str) -> str:
+    return str(CONFIGS / name)
+
+
+def test_warnings_come_on_stderr_in_json_and_in_the_run_folder(podusv: Any) -> None:
+    bad = ("run", scenario_file("corrected.yaml"), "--set", "vessel.preset=paper", *SHORT)
+    said: Said = podusv(*bad, "--out", "out", "--json")
+    assert said.code == 0
+    lines = said.err.splitlines()
+    assert {line.partition(":")[0] for line in lines} == {
+        "warning[sway-drift]", "warning[sway-unstable]"
+    }  # fmt: skip
+    printed = json.loads(said.out)["warnings"]
+    assert [f"warning[{w['code']}]: {w['where']}: {w['text']}" for w in printed] == lines
+    assert json.loads(Path("out/metrics.json").read_text())["warnings"] == printed
+    assert podusv(*bad, "--out", "quiet", "-q").err == ""
+
+
+def test_what_is_silenced_is_not_shown(podusv: Any) -> None:
+    bad = ("--set", "vessel.preset=paper", "--set", "silence=[sway-drift, sway-unstable]")
+    assert podusv("run", scenario_file("corrected.yaml"), *bad, *SHORT, "--out", "o").err == ""
+    said = podusv("validate", scenario_file("corrected.yaml"), *bad)
+    assert "sway" not in said.out
+    assert "path-bend" in said.out
+
+
+def test_an_unknown_code_is_refused_with_a_suggestion(podusv: Any) -> None:
+    said = podusv("validate", "a.yaml", "--set", "silence=[path-jumps]")
+    assert said.code == 2
+    assert "did you mean 'path-jump'?" in said.err
+
+
+def test_a_comparison_warns_once_for_all_laws_it_holds_for(podusv: Any) -> None:
+    said = podusv(
+        "compare", scenario_file("printed_compare.yaml"), "--set", "simulation.duration=0.5",
+        "--no-figures", "--json", "--out", "c",
+    )  # fmt: skip
+    assert said.err.count("warning[sway-unstable]: controllers.proposed|dsc|li|pid.k_ze") == 1
+    runs = {Path(run["run"]).name: run["warnings"] for run in json.loads(said.out)["runs"]}
+    assert "sway-drift" in {w["code"] for w in runs["li"]}
+
+
+def test_silencing_is_no_difference_between_runs_and_survives_resolving(podusv: Any) -> None:
+    loud = (*PLAIN, "silence=[path-jump, saturated]")
+    assert load(CONFIGS / "corrected.yaml", loud).scenario.silence == ("path-jump", "saturated")
+    podusv("run", scenario_file("corrected.yaml"), *SHORT, "--out", "a")
+    podusv(
+        "run", scenario_file("corrected.yaml"), *SHORT, "--set", "silence=[saturated]", "--out", "b"
+    )
+    assert "silence:\n" not in Path("a/resolved.yaml").read_text()
+    assert 'silence: ["saturated"]' in Path("b/resolved.yaml").read_text().replace(
+        "[saturated]", '["saturated"]'
+    )
+    assert "silence" not in podusv("compare", "a", "b", "--no-figures", "--out", "ab").err
+
+
+# --- underactuation
+
+ACTUATORS = {name: example(kind) for name, kind in kinds("actuators").items()}
+
+
+@pytest.mark.parametrize("actuator", ACTUATORS)
+@pytest.mark.parametrize("hull", VESSELS)
+def test_every_hull_with_every_actuator_is_underactuated(hull: str, actuator: str) -> None:
+    vessel, drive = VESSELS[hull], ACTUATORS[actuator]
+    inertia = np.array(
+        [[vessel.m11, 0, 0], [0, vessel.m22, vessel.m23], [0, vessel.m32, vessel.m33]]
+    )
+    accelerations = np.linalg.solve(inertia, drive.input_matrix())
+    assert np.linalg.matrix_rank(accelerations) == input_rank(drive) == 2 < 3
+    text = argument(scene().model_copy(update={"vessel": vessel, "actuator": drive}))
+    assert text.startswith("underactuated: ")
+    assert f"{actuator} on {hull} is " in text
+    assert "rank 2 of 3" in text
+
+
+def test_the_rank_tells_an_actuator_with_a_third_input_apart(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    drive = ACTUATORS["ideal"]
+    monkeypatch.setattr(type(drive), "input_matrix", lambda self: np.eye(3))
+    assert input_rank(drive) == 3
+    assert argument(scene()).startswith("fully actuated: ")
+
+
+def test_validate_shows_the_argument(podusv: Any) -> None:
+    said = podusv("validate", "-v", scenario_file("corrected.yaml"))
+    assert "[[1, 0], [0, 0], [0, 1]], rank 2 of 3; its sway row is zero (Y_p = 0)" in said.out

@@ -1,0 +1,147 @@
+"""Findings about path, hull and actuator: told where they hold, borne out by simulation."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from conftest import VESSELS
+from findings_samples import codes, finding, late, log, scene
+
+from podusv_cli.findings.finding import Case
+from podusv_cli.findings.reference import drift, reference
+from podusv_cli.findings.task import delivered
+from podusv_cli.kernels import bundle
+from podusv_cli.vessels.plant import plant
+
+LONG = "simulation.duration=300"
+SWITCH = 15.0
+ON_TARGET = "start={x: -0.8, y: 0.0, u: 0.5}"
+
+
+def turning(reading: str, amplitude: float = 0.5) -> str:
+    return (
+        f"path={{kind: line_circle, reading: {reading}, switch: {SWITCH}, amplitude: {amplitude}}}"
+    )
+
+
+def jump(signal: str, *overrides: str) -> float:
+    """By how much a signal changes over the two steps around the path's switch."""
+    out = log(*overrides)
+    at = int(np.searchsorted(out["time"], SWITCH - 1e-9))
+    return float(np.abs(np.diff(out[signal][at - 1 : at + 2])).max())
+
+
+def test_a_jump_of_the_path_is_told_and_the_distance_jumps() -> None:
+    there, not_there = turning("literal"), turning("velocity")
+    assert "path-jump" in codes(there, ON_TARGET)
+    assert "0.5 m at 15 s" in finding("path-jump", there).text
+    assert jump("z_e", there, ON_TARGET) > 0.2
+    assert "path-jump" not in codes(not_there, ON_TARGET)
+    assert jump("z_e", not_there, ON_TARGET) < 0.01
+
+
+def test_a_corner_of_the_path_is_told_and_the_virtual_speed_jumps() -> None:
+    there, not_there = turning("velocity", 0.4), turning("velocity")
+    assert codes(there) & {"path-jump", "path-corner", "path-bend"} == {"path-corner"}
+    assert "0.1 m/s at 15 s" in finding("path-corner", there).text
+    assert jump("alpha_u", there, ON_TARGET) == pytest.approx(0.1, abs=0.01)
+    assert "path-corner" not in codes(not_there)
+    assert jump("alpha_u", not_there, ON_TARGET) < 0.01
+
+
+def test_a_bend_of_the_path_is_told_and_only_a_law_with_accelerations_steps() -> None:
+    path, law = turning("velocity"), "controller={kind: backstepping}"
+    assert codes(path) & {"path-jump", "path-corner", "path-bend"} == {"path-bend"}
+    assert "0.015 m/s2 at 15 s" in finding("path-bend", path).text
+    out = log(path, law, ON_TARGET)
+    z_e = float(np.interp(SWITCH, out["time"], out["z_e"]))
+    assert jump("tau_r_cmd", path, law, ON_TARGET) == pytest.approx(2.76 * 0.015 / z_e, rel=0.2)
+    assert jump("tau_r_cmd", path, ON_TARGET) < 0.1 * 2.76 * 0.015 / z_e
+    assert jump("tau_r_cmd", "path={kind: line}", law, ON_TARGET) < 0.1 * 2.76 * 0.015 / z_e
+
+
+def test_what_comes_after_the_run_is_not_told() -> None:
+    assert "path-jump" not in codes(turning("literal"), "simulation.duration=10")
+
+
+DRIFTS = ("vessel={preset: paper}", "controller.k_ze=0.03", LONG)
+
+
+def test_a_load_that_drifts_the_hull_faster_than_the_target_is_told_and_nothing_holds() -> None:
+    assert "sway-drift" in codes(*DRIFTS)
+    assert "0.57 m/s" in finding("sway-drift", *DRIFTS).text
+    assert late("z_e", *DRIFTS).min() > 2.0
+    half = (*DRIFTS, "disturbance.scale=0.5")
+    assert "sway-drift" not in codes(*half)
+    assert np.abs(late("z_e", *half) - 0.5).max() < 0.1
+
+
+def test_the_steady_hull_of_the_reference_is_at_rest_in_the_plant() -> None:
+    """The plant's rates vanish at the balance that the findings rest on, for every vessel."""
+    for name, hull in VESSELS.items():
+        calm = scene(f"vessel={{preset: {name}}}", "disturbance.scale=0.4", "path={kind: circle}")
+        seen = reference(calm)
+        mean = seen.load[:, 1].mean()
+        for i in (0, 30):
+            x, rate = np.concatenate([np.zeros(3), seen.nu[i]]), np.zeros(6)
+            tau = np.array([seen.demand[i, 0], 0.0, seen.demand[i, 1]])
+            b = np.array([seen.load[i, 0], mean, seen.load[i, 2]])
+            plant(x, tau, b, bundle(hull.constants()), rate)
+            assert np.abs(rate[3:]).max() < 1e-6, name
+            assert math.hypot(*seen.nu[i, :2]) == pytest.approx(0.5)
+
+
+def test_the_drift_is_where_damping_holds_the_load() -> None:
+    assert drift(scene("vessel={preset: paper}"), 0.5) == pytest.approx(0.5 / 0.8896)
+    v = drift(scene(), 0.5)
+    assert 0.8896 * v + 36.47287 * v * v == pytest.approx(0.5)
+
+
+SLIDES = ("vessel={preset: paper}", "disturbance.scale=0.05", LONG)
+
+
+def test_a_hull_too_slippery_to_point_at_the_target_is_told_and_slides_away() -> None:
+    assert "sway-unstable" in codes(*SLIDES)
+    assert late("z_e", *SLIDES).min() > 2.0
+    assert np.abs(late("v", *SLIDES)).max() > 2.0
+    gentle = (*SLIDES, "controller.k_ze=0.03")  # below d22/m11 = 0.0345
+    assert "sway-unstable" not in codes(*gentle)
+    assert np.abs(late("z_e", *gentle) - 0.5).max() < 0.1
+
+
+@pytest.mark.parametrize("k_ze", [0.1, 0.5])
+def test_sway_that_nonlinear_damping_stops_is_no_finding_and_does_no_harm(k_ze: float) -> None:
+    calm = (f"controller.k_ze={k_ze}", "disturbance={kind: none}", LONG)
+    assert 25.8 * k_ze > 0.8896
+    assert "sway-unstable" not in codes(*calm)
+    assert np.abs(late("z_e", *calm) - 0.5).max() < 0.01
+
+
+def limits(surge: float, yaw: float) -> str:
+    return f"actuator={{kind: saturated, surge_limit: {surge}, yaw_limit: {yaw}}}"
+
+
+@pytest.mark.parametrize(
+    ("short", "enough"), [((0.5, 2.5), (4.0, 2.5)), ((8.0, 0.1), (8.0, 2.5))], ids=["surge", "yaw"]
+)
+def test_an_actuator_too_weak_is_told_and_falls_behind(
+    short: tuple[float, float], enough: tuple[float, float]
+) -> None:
+    assert "thrust-short" in codes(limits(*short), ON_TARGET, LONG)
+    assert late("z_e", limits(*short), ON_TARGET, LONG).max() > 3.0
+    assert "thrust-short" not in codes(limits(*enough), ON_TARGET, LONG)
+    assert np.abs(late("z_e", limits(*enough), ON_TARGET, LONG) - 0.5).max() < 0.1
+
+
+def test_the_thrust_needed_is_what_the_law_ends_up_asking_for() -> None:
+    needed = Case(scene(LONG)).reference.demand[:, 0]
+    asked = late("tau_u_cmd", LONG)
+    assert needed.max() == pytest.approx(asked.max(), rel=0.1)
+    assert needed.min() == pytest.approx(asked.min(), abs=0.15)
+
+
+def test_an_actuator_without_states_delivers_what_it_is_asked_for_within_limits() -> None:
+    actuator = scene(limits(3.0, 1.0)).actuator
+    assert delivered(actuator, np.zeros(6), np.array([9.0, -0.5])).tolist() == [3.0, 0.0, -0.5]
