@@ -70,7 +70,7 @@ def _estimate(
 ) -> Estimate:
     if not math.isfinite(coarse + fine):
         return Estimate(values, math.nan, math.inf, scale)
-    negligible = ROUNDING * scale
+    negligible = ROUNDING * max(scale, coarse, fine)
     if max(coarse, fine) <= negligible:
         return Estimate(values, math.nan, max(coarse, fine), scale)
     order = math.log2(max(coarse, negligible) / max(fine, negligible))

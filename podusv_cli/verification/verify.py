@@ -41,11 +41,12 @@ class Checked:
         }
 
     def doubtful(self, tolerance: float) -> list[str]:
-        """Names of numbers that are not converged, `status` where a run did not finish."""
+        """Names of numbers that are not converged; `status` alone where a run did not finish."""
+        if any(level.status != "finished" for level in self.levels):
+            return ["status"]
         names = [n for n, e in self.estimates.items() if not e.converged(tolerance)]
         apart = [f"{n} (DOP853)" for n, gap in self.distances().items() if not gap <= tolerance]
-        ended = any(level.status != "finished" for level in self.levels)
-        return ["status"] * ended + names + apart
+        return names + apart
 
     def as_json(self, tolerance: float) -> dict[str, Any]:
         """Plain data; NaN or infinity where there is no number."""
