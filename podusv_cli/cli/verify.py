@@ -67,7 +67,8 @@ def _show_run(label: str, run: Checked, tolerance: float) -> None:
     rows = [
         [name, units.get(name, "m"), *_cells(e, tolerance)] for name, e in run.estimates.items()
     ]
-    echo_table([label, "unit", *steps, "order", "error", ""], rows)
+    typer.echo(f"{label}:")
+    echo_table(["number", "unit", *steps, "order", "error", "verdict"], rows)
     for level in run.levels:
         if level.message:
             typer.echo(f"at {level.step:.6g} s: {level.message}")
@@ -78,7 +79,7 @@ def _cells(e: Estimate, tolerance: float) -> list[str]:
     values = ["-" if math.isnan(value) else f"{value:.6g}" for value in e.values]
     order = "-" if math.isnan(e.order) else f"{e.order:.1f}"
     error = "-" if math.isinf(e.relative) else f"{e.relative:.1e}"
-    return [*values, order, error, "" if e.converged(tolerance) else "not converged"]
+    return [*values, order, error, "converged" if e.converged(tolerance) else "not converged"]
 
 
 def _independent(run: Checked) -> str:

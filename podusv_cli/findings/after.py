@@ -113,7 +113,8 @@ def aftermath(scenario: Scenario, log: Recording) -> list[Finding]:
     """What is worth knowing about a run of this scenario, silenced findings included."""
     if not len(log["time"]):
         return []
-    return [finding for look in LOOKS.values() for finding in look(scenario, log)]
+    with np.errstate(all="ignore"):
+        return [finding for look in LOOKS.values() for finding in look(scenario, log)]
 
 
 def _when(log: Recording, mask: Mask) -> str:

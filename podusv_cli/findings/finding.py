@@ -61,16 +61,18 @@ class Case:
 
     @cached_property
     def first(self) -> dict[str, float]:
-        """The law's signals at t = 0."""
+        """The law's signals at t = 0; NaN where it has no numbers, as right on the target."""
         loop = self.scenario.closed_loop()
         law, memory = loop.controller, loop.first_memory()
         x, target = np.array(loop.start), np.zeros(len(TARGET))
         loop.path.evaluate(0.0, bundle(loop.path.constants()), loop.path.table(), target)
         k, table = bundle(law.informed(loop.nominal)), law.table()
         signals, rate = np.zeros(len(law.signals)), np.zeros(len(memory))
-        if law.sample_period() > 0:
-            law.sample(0.0, x, memory, target, k, table)
-        with np.errstate(all="ignore"):
-            work = np.zeros(law.workspace())
+        work = np.zeros(law.workspace())
+        try:
+            if law.sample_period() > 0:
+                law.sample(0.0, x, memory, target, k, table)
             law.law(0.0, x, memory, target, k, table, np.zeros(2), rate, signals, work)
+        except (ArithmeticError, ValueError):  # plain Python's; machine code gives no number
+            signals[:] = np.nan
         return dict(zip(law.signals, signals.tolist(), strict=True))

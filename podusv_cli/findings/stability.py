@@ -55,7 +55,7 @@ def rk4_growth(loop: Loop, step: float) -> float:
 
     Above 1 the integrator is unstable though the loop is not.
     """
-    if np.linalg.eigvals(loop.matrix).real.max() > 0.0:
+    if not np.isfinite(loop.matrix).all() or np.linalg.eigvals(loop.matrix).real.max() > 0.0:
         return 1.0
     return _radius(_rk4(loop.matrix, step))
 
@@ -84,6 +84,8 @@ def _rk4(matrix: Vector, step: float) -> Vector:
 
 
 def _radius(matrix: Vector) -> float:
+    if not np.isfinite(matrix).all():
+        return np.inf
     return float(np.abs(np.linalg.eigvals(matrix)).max())
 
 

@@ -20,6 +20,7 @@ from podusv_cli.paths.base import TARGET
 from podusv_cli.verification.refining import Level, Progress
 
 TOLERANCE = 1e-10  # relative and absolute, of every state
+UPDATES = 100  # of the progress, for a display is slower than a step
 MOST_EVALUATIONS = 500_000
 
 
@@ -60,7 +61,7 @@ def integrate(scenario: Scenario, progress: Progress | None = None) -> Independe
     from scipy.integrate import DOP853  # slow to import
 
     slope, start = continuous(scenario.closed_loop(), compiled=scenario.simulation.compiled)
-    f, s, evaluations = _with_iae(scenario, slope), np.append(start, 0.0), 0
+    f, s, evaluations, shown = _with_iae(scenario, slope), np.append(start, 0.0), 0, 0.0
     duration = scenario.time_grid().steps * scenario.simulation.step
     for begin, end in _pieces(scenario, duration):
         solver = DOP853(f, begin, s, end, rtol=TOLERANCE, atol=TOLERANCE)
@@ -70,8 +71,9 @@ def integrate(scenario: Scenario, progress: Progress | None = None) -> Independe
                 why = trouble or f"gave up after {MOST_EVALUATIONS} evaluations"
                 text = f"{why} at t = {solver.t:.6g} s"
                 return Independent(np.full(2, np.nan), math.nan, evaluations + solver.nfev, text)
-            if progress:
+            if progress and solver.t > shown:
                 progress(solver.t / duration)
+                shown = solver.t + duration / UPDATES
         s, evaluations = solver.y, evaluations + solver.nfev
     return Independent(s[:2], float(s[-1]), evaluations)
 
