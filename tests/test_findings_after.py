@@ -141,6 +141,15 @@ def test_what_laws_share_is_told_once_and_names_them() -> None:
     assert kicks == ["controllers.proposed|dsc.first_difference"]
 
 
+@pytest.mark.parametrize(
+    "override",
+    ["start={x: 0, y: 0}", "start.u=1e300", "vessel.Y_v=0", "path.speed=0", "control.period=1"],
+)
+def test_whatever_the_scenario_there_is_an_answer(override: str) -> None:
+    for law in ("adaptive_neural", "pid"):
+        preflight(scene(f"controller.kind={law}", override))
+
+
 # --- where warnings go
 
 SHORT = ("--set", "simulation.duration=1", "--set", "actuator={kind: ideal}", "--no-figures")

@@ -7,7 +7,7 @@ import pytest
 from findings_samples import BARE, codes, finding, late, log, scene, simulated
 
 from podusv_cli.engine.continuous import continuous
-from podusv_cli.findings.stability import loops
+from podusv_cli.findings.stability import Loop, loops, rk4_growth, sampled_growth
 
 LONG = "simulation.duration=120"
 PRINTED = "controller.coupling=printed"
@@ -119,3 +119,23 @@ def test_the_linearised_loops_are_those_of_the_whole_closed_loop(law: tuple[str,
         # A loop's fast mode: within 10 % of one of the whole system's.
         fastest = max(np.linalg.eigvals(loop.matrix), key=abs)
         assert min(abs(whole - fastest)) < 0.1 * abs(fastest), loop.axis
+
+
+def bare_loop(feedback: list[float], memory: list[list[float]]) -> Loop:
+    return Loop("surge", "k", 0.0, np.array(feedback), np.array(memory).reshape(-1, len(feedback)))
+
+
+def test_rk4_is_stable_up_to_its_textbook_limits() -> None:
+    decay, swing = bare_loop([-1.0], []), bare_loop([0.0, -1.0], [[1.0, 0.0]])
+    assert rk4_growth(decay, 2.785) < 1.0 < rk4_growth(decay, 2.786)
+    assert rk4_growth(swing, 2.828) < 1.0 < rk4_growth(swing, 2.829)
+    assert rk4_growth(bare_loop([1.0], []), 10.0) == 1.0  # grows by itself, whatever the step
+
+
+@pytest.mark.parametrize("count", [1, 4])
+def test_a_held_feedback_is_an_euler_step_of_the_period(count: int) -> None:
+    assert sampled_growth(bare_loop([-1.0], []), 1.9 / count, count) == pytest.approx(0.9)
+    assert sampled_growth(bare_loop([-1.0], []), 2.1 / count, count) == pytest.approx(1.1)
+    # e' = -a, a' = e, both held: one step of Euler, which spirals out by sqrt(1 + T^2).
+    swing = bare_loop([0.0, -1.0], [[1.0, 0.0]])
+    assert sampled_growth(swing, 0.5 / count, count) == pytest.approx(np.hypot(1.0, 0.5))

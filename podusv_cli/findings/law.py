@@ -193,11 +193,8 @@ def stiff_start(case: Case) -> Iterator[Finding]:
     both = zip(bounds.items(), loops(law, scenario, case.first_velocity), strict=True)
     for (name, bound), loop in both:
         error = case.first[name]
-        if (
-            math.isfinite(error)
-            and bursts(loop, bound, error, step)
-            and not rk4_growth(loop, step) > UNSTABLE
-        ):
+        told_already = rk4_growth(loop, step) > UNSTABLE
+        if math.isfinite(error) and not told_already and bursts(loop, bound, error, step):
             yield found(
                 "stiff-start",
                 f"{name} = {error:.3g} at the start drives the estimated bound so high that the "
