@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.simulate import ClosedLoop, Observer, entries, marcher, wire
+from podusv_cli.engine.simulate import ClosedLoop, Observer, marcher, wire
 from podusv_cli.kernels import Vector
 
 Slope = Callable[[float, Vector], Vector]
@@ -24,7 +24,7 @@ def continuous(loop: ClosedLoop, *, compiled: bool = True) -> tuple[Slope, Vecto
     grid = TimeGrid(1.0, 1, log_every=2)
     plan = loop.layout(grid)
     wires = wire(loop, grid, plan, Observer())
-    march = _march(loop) if compiled else marcher(loop, Observer(), compiled)
+    march = marcher(loop, Observer(), compiled)
 
     def slope(t: float, s: Vector) -> Vector:
         # The march over instant 1 of a grid with step t and no step after it: rates, no more.
@@ -35,13 +35,3 @@ def continuous(loop: ClosedLoop, *, compiled: bool = True) -> tuple[Slope, Vecto
         return wires.stages[: plan.states].copy()
 
     return slope, wires.s.copy()
-
-
-def _march(loop: ClosedLoop) -> Callable[..., int]:
-    """The compiled march, for being called once for every evaluation."""
-    from podusv_cli.engine import compiling  # numba is slow to import and not always wanted
-
-    parts = entries(loop, Observer())
-    doors = [compiling.Pinned(part[0], compiling.entry(*part)) for part in parts]
-    march = compiling.march()
-    return lambda *rest: int(march(*doors, *rest))
