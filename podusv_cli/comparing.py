@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -14,14 +15,22 @@ import pandas as pd
 from podusv_cli.comparison import claims, report, table
 from podusv_cli.comparison.differences import differences
 from podusv_cli.comparison.entries import Absent, Entry
+from podusv_cli.comparison.expressions import Source
 from podusv_cli.config.loading import load_text
-from podusv_cli.config.scenario import Claim, Scenario
+from podusv_cli.config.scenario import Scenario
 from podusv_cli.findings.finding import Finding
+from podusv_cli.interrupts import Extras, interrupts_heard
 from podusv_cli.logbook.folder import Run, RunWriter, open_run
 from podusv_cli.metrics.cost import law_costs
-from podusv_cli.parallel import INTERRUPTED, Outcome, run_all
-from podusv_cli.recording import Status
+from podusv_cli.parallel import Outcome, run_all
 from podusv_cli.running import Finished, Task, execute, warm_up
+
+# What a comparison has of its own: in its folder, or as a column of its table.
+RESERVED = (
+    "comparison.csv", "comparison.md", "comparison.tex", "claims.json", "claims.md", "figures",
+    "manifest.json", "metric", "provenance.json", "report.html", "unit",
+)  # fmt: skip
+UNMEASURED = dict.fromkeys(("law_ns", "law_ns_low", "law_ns_high"), math.nan)
 
 
 @dataclass(frozen=True)
@@ -37,8 +46,12 @@ class Part:
 
 @dataclass(frozen=True)
 class Result:
-    """What a comparison found. `endings` says for each run why it did not finish, "" if it did."""
+    """What a comparison of these parts found; `entries` are those that left a run.
 
+    `endings` says for each part why it did not finish, "" if it did.
+    """
+
+    parts: Sequence[Part]
     entries: Sequence[Entry]
     endings: Mapping[str, str]
     differences: Mapping[str, Mapping[str, Any]]
@@ -46,12 +59,6 @@ class Result:
     verdicts: Sequence[claims.Verdict]
     timings: Mapping[str, Mapping[str, float]]
     warnings: Mapping[str, Sequence[Finding]]  # of the runs that were made
-
-    @property
-    def status(self) -> Status:
-        """Interrupted when a run was, else finished, whatever became of the runs."""
-        cut = any(entry.recording.status == "interrupted" for entry in self.entries)
-        return "interrupted" if cut or INTERRUPTED in self.endings.values() else "finished"
 
 
 def from_folder(path: Path) -> list[Part]:
@@ -64,8 +71,8 @@ def from_folder(path: Path) -> list[Part]:
 def _place(comparison: Path) -> Callable[[Path], tuple[int, str]]:
     """Where a run stands in a comparison: as in its table, else by name."""
     table_file = comparison / "comparison.csv"
-    head = table_file.read_text().partition("\n")[0] if table_file.is_file() else ""
-    order = {label: place for place, label in enumerate(head.split(","))}
+    head = table_file.read_text().splitlines()[:1] if table_file.is_file() else []
+    order = {label: place for row in csv.reader(head) for place, label in enumerate(row)}
     return lambda run: (order.get(run.name, len(order)), run.name)
 
 
@@ -76,15 +83,23 @@ def _from_run(path: Path) -> Part:
 
 
 def distinct(parts: Iterable[Part]) -> list[Part]:
-    """The parts with labels that tell them apart."""
-    found: dict[str, Part] = {}
-    for part in parts:
-        label, count = part.label, 1
-        while label in found:
+    """The parts, in order, with labels that tell them apart."""
+    parts = list(parts)
+    labels = told_apart([part.label for part in parts], taken=RESERVED)
+    return [replace(part, label=label) for part, label in zip(parts, labels, strict=True)]
+
+
+def told_apart(names: Iterable[str], taken: Iterable[str] = ()) -> list[str]:
+    """The names, with a number after those that are taken or came before."""
+    found, taken = list[str](), set(taken)
+    for name in names:
+        label, count = name, 1
+        while label in taken:
             count += 1
-            label = f"{part.label}_{count}"
-        found[label] = replace(part, label=label)
-    return list(found.values())
+            label = f"{name}_{count}"
+        taken.add(label)
+        found.append(label)
+    return found
 
 
 def make_runs(
@@ -93,8 +108,9 @@ def make_runs(
 ) -> dict[str, Outcome]:  # fmt: skip
     """Execute the parts that are scenarios, in parallel, each into its own folder in `folder`."""
     wanted = [part for part in parts if part.run is None]
-    for part in wanted:
-        warm_up(part.scenario)
+    with interrupts_heard():
+        for part in wanted:
+            warm_up(part.scenario)
     tasks = [
         Task(
             part.scenario,
@@ -117,9 +133,10 @@ def make_runs(
 
 
 def collect(
-    parts: Sequence[Part], outcomes: Mapping[str, Outcome], stated: Mapping[str, Claim]
-) -> Result:
-    """Open the runs that were made, and compare."""
+    parts: Sequence[Part], outcomes: Mapping[str, Outcome],
+    stated: Sequence[claims.Stated], extras: Extras,
+) -> Result:  # fmt: skip
+    """Open the runs that were made, and compare; the laws' cost is one of the `extras`."""
     entries: list[Entry] = []
     endings, timings, warnings = {}, {}, {}
     for part in parts:
@@ -131,23 +148,31 @@ def collect(
             entries.append(Entry(part.label, run, part.scenario))
         if done:
             timings[part.label], warnings[part.label] = done.timing, done.warnings
-    entries = _timed(entries)
-    sources = {part.label: Absent() for part in parts} | {e.label: e for e in entries}
+    entries = _with_costs(entries, extras)
+    sources: dict[str, Source] = {e.label: e for e in entries}
+    for part in parts:
+        sources.setdefault(part.label, Absent(part.scenario, endings[part.label]))
     differing = differences({part.label: part.scenario.model_dump() for part in parts})
-    measured = {entry.label: {n: entry.metric(n) for n in entry.run.metrics} for entry in entries}
+    measured: dict[str, dict[str, float]] = {part.label: {} for part in parts}
+    for entry in entries:
+        names = dict.fromkeys([*entry.run.metrics, *entry.cost])
+        measured[entry.label] = {name: entry.metric(name) for name in names}
     verdicts = claims.judge(stated, sources)
-    return Result(entries, endings, differing, table.table(measured), verdicts, timings, warnings)
+    compared = table.table(measured)
+    return Result(parts, entries, endings, differing, compared, verdicts, timings, warnings)
 
 
-def _timed(entries: Sequence[Entry]) -> list[Entry]:
+def _with_costs(entries: list[Entry], extras: Extras) -> list[Entry]:
     """The entries with the laws' cost measured here and now, side by side.
 
-    What a run measured for itself stems from another moment, perhaps another machine.
+    What a run measured for itself stems from another moment, perhaps another machine: without
+    these costs there are none.
     """
     timed = [e for e in entries if e.scenario.simulation.compiled and len(e.recording["time"])]
-    costs = law_costs([(e.scenario.closed_loop(), e.recording) for e in timed])
+    loops = [(entry.scenario.closed_loop(), entry.recording) for entry in timed]
+    costs = extras.attempt(lambda: law_costs(loops)) or [UNMEASURED] * len(timed)
     by_label = {entry.label: cost for entry, cost in zip(timed, costs, strict=True)}
-    return [replace(entry, cost=by_label.get(entry.label, {})) for entry in entries]
+    return [replace(entry, cost=by_label.get(entry.label, UNMEASURED)) for entry in entries]
 
 
 def numbers(frame: pd.DataFrame) -> dict[str, dict[str, float | None]]:
@@ -162,7 +187,7 @@ def write(writer: RunWriter, result: Result) -> None:
     """Table and verdicts, in every form, into the comparison's folder."""
     forms = {
         "comparison.csv": table.as_csv(result.table),
-        "comparison.md": table.as_markdown(result.table),
+        "comparison.md": table.as_markdown(result.table, result.endings),
         "comparison.tex": table.as_latex(result.table),
     }
     for name, text in forms.items():
@@ -173,26 +198,34 @@ def write(writer: RunWriter, result: Result) -> None:
         writer.add_json("claims.json", {"format": 1, "claims": verdicts})
 
 
-def draw_all(writer: RunWriter, result: Result, title: str, provenance: Mapping[str, Any]) -> None:
-    """Shared figures in every format, and the report."""
+def drawn(result: Result, progress: Callable[[str, float], None] | None = None) -> dict[str, bytes]:
+    """Shared figures in every format, by file name."""
     # matplotlib is slow to import
     from podusv_cli.figures.drawing import FIGURES, draw_in_parallel, dressed
     from podusv_cli.figures.style import FORMATS
 
+    tell = progress and partial(progress, "drawing figures")
+    if tell:
+        tell(0.0)
     shown = dressed([(e.label, e.recording, e.scenario) for e in result.entries])
-    drawn = dict(draw_in_parallel(shown, FIGURES, FORMATS))
-    for name, content in drawn.items():
-        writer.add(f"figures/{name}", content)
+    return dict(draw_in_parallel(shown, FIGURES, FORMATS, progress=tell))
+
+
+def as_report(
+    result: Result, title: str, figures: Mapping[str, bytes], provenance: Mapping[str, Any]
+) -> str:
+    """The report; `figures` as `drawn` gives them."""
+    from podusv_cli.figures.drawing import FIGURES  # matplotlib is slow to import
+
     pictures = [
-        (name, sheet.caption, drawn[f"{name}.svg"])
+        (name, sheet.caption, figures[f"{name}.svg"])
         for name, sheet in FIGURES.items()
-        if f"{name}.svg" in drawn
+        if f"{name}.svg" in figures
     ]
-    first = result.entries[0].scenario
     story = report.Story(
-        title=title, scenario=first,
-        controllers={e.label: e.scenario.controller for e in result.entries},
+        title=title, scenario=result.parts[0].scenario,
+        controllers={part.label: part.scenario.controller for part in result.parts},
         endings=result.endings, differences=result.differences, table=result.table,
         verdicts=result.verdicts, figures=pictures, provenance=provenance,
     )  # fmt: skip
-    writer.add("report.html", report.page(story).encode())
+    return report.page(story)

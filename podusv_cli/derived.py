@@ -16,7 +16,7 @@ class Derived:
     """A signal computed from logged ones."""
 
     needs: tuple[str, ...]
-    compute: Callable[[Recording], Vector] = lambda log: log["time"]
+    compute: Callable[[Recording], Vector]
 
 
 def _activation(log: Recording) -> Vector:
@@ -32,5 +32,5 @@ DERIVED: dict[str, Derived] = {
     "y_r": Derived(("beta_r", "alpha_r"), lambda log: log["beta_r"] - log["alpha_r"]),
     "W_norm_u": Derived(("W_hat_u",), lambda log: np.linalg.norm(log["W_hat_u"], axis=1)),
     "W_norm_r": Derived(("W_hat_r",), lambda log: np.linalg.norm(log["W_hat_r"], axis=1)),
-    "activation": Derived(("rbf_center", "rbf_width", "u"), _activation),
+    "activation": Derived(("rbf_center", "rbf_width", "u", "v", "r"), _activation),
 }

@@ -1,24 +1,117 @@
-"""Stretches of work that an interrupt (Ctrl-C) must not cut in two."""
+"""Ctrl-C (SIGINT) and SIGTERM: heard where work can be cut short, held where it cannot."""
 
 from __future__ import annotations
 
 import signal
-from collections.abc import Iterator
+import threading
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from types import FrameType
+from typing import TypeVar
+
+Result = TypeVar("Result")
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+# s; a terminal interrupts a command and its workers, the command its workers again, and people
+# press twice: what follows this closely on an interrupt is the same interrupt.
+ECHO = 5.0
+
+
+class Interrupts:
+    """A handler of signals: raises KeyboardInterrupt, at once or when the signals are heard again.
+
+    `number` is the signal that came first, 0 as long as there was none.
+    """
+
+    def __init__(self) -> None:
+        """Nothing came yet, and nothing is held."""
+        self.number = 0
+        self.held = False
+        self._waiting = False
+        self._last = -ECHO
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        """Take in a signal."""
+        if time.monotonic() - self._last < ECHO:
+            return
+        self._last, self.number = time.monotonic(), self.number or number
+        self._waiting = True
+        self.deliver()
+
+    def deliver(self) -> None:
+        """Raise KeyboardInterrupt where a signal waits and is not held."""
+        if self._waiting and not self.held:
+            self._waiting = False
+            raise KeyboardInterrupt
+
+
+@contextmanager
+def interrupts_caught() -> Iterator[Interrupts]:
+    """Both signals go to one `Interrupts`: to the one that is there, or else to a new one."""
+    handlers = (signal.getsignal(number) for number in SIGNALS)
+    there = next((handler for handler in handlers if isinstance(handler, Interrupts)), None)
+    here = there or Interrupts()
+    before = {} if there else _install(here)
+    try:
+        yield here
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _install(here: Interrupts) -> dict[signal.Signals, signal.Handlers]:
+    """Put the handler in place; what was there. Only a main thread can, only it is interrupted."""
+    if threading.current_thread() is not threading.main_thread():
+        return {}
+    before = {number: signal.getsignal(number) or signal.SIG_DFL for number in SIGNALS}
+    wanted = {n: old for n, old in before.items() if old is not signal.SIG_IGN}  # as under nohup
+    for number in wanted:
+        signal.signal(number, here)
+    return wanted  # type: ignore[return-value]  # any callable that was a handler
 
 
 @contextmanager
 def interrupts_held() -> Iterator[None]:
-    """Interrupts wait until the block is over."""
-    hold_interrupts(True)
-    try:
+    """Interrupts wait until the block is over, or for `interrupts_heard` in it."""
+    with _holding(True):
         yield
-    finally:
-        hold_interrupts(False)
 
 
-def hold_interrupts(held: bool) -> None:
-    """Let interrupts wait, or let them through; a forked process inherits which."""
-    if hasattr(signal, "pthread_sigmask"):  # not on every system
-        how = signal.SIG_BLOCK if held else signal.SIG_UNBLOCK
-        signal.pthread_sigmask(how, {signal.SIGINT})
+@contextmanager
+def interrupts_heard() -> Iterator[None]:
+    """Interrupts, also those that wait, raise KeyboardInterrupt in the block."""
+    with _holding(False):
+        yield
+
+
+@contextmanager
+def _holding(held: bool) -> Iterator[None]:
+    with interrupts_caught() as here:
+        before, here.held = here.held, held
+        try:
+            here.deliver()
+            yield
+        finally:
+            here.held = before
+            here.deliver()
+
+
+class Extras:
+    """Work that is worth having but not worth waiting for: after an interrupt it is left out.
+
+    For use while interrupts are held.
+    """
+
+    def __init__(self, interrupted: bool = False) -> None:
+        """`interrupted`: leave out everything from the start."""
+        self.interrupted = interrupted
+
+    def attempt(self, work: Callable[[], Result]) -> Result | None:
+        """What the work returns, or None where an interrupt came before its end."""
+        if not self.interrupted:
+            try:
+                with interrupts_heard():
+                    return work()
+            except KeyboardInterrupt:
+                self.interrupted = True
+        return None

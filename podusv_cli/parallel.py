@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import signal
 import time
 import traceback
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any
 
 from podusv_cli.errors import PodusvError
-from podusv_cli.interrupts import hold_interrupts, interrupts_held
+from podusv_cli.interrupts import interrupts_heard, interrupts_held
 
 Progress = Callable[[float], None]
 Job = Callable[[Progress], Any]
@@ -27,10 +26,14 @@ TRIES = 2  # a worker that was killed is replaced once
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a job: its result, or in `failure` the reason why there is none."""
+    """What became of a job: its result, or in `failure` the reason why there is none.
+
+    `cut`: it was not over when an interrupt came.
+    """
 
     result: Any = None
     failure: str = ""
+    cut: bool = False
 
 
 @dataclass
@@ -68,18 +71,21 @@ def run_all(
 
     `progress` is called with a job's position and the fraction that it reports. A job's PodusvError
     becomes its failure; any other exception too, with its traceback. An interrupt is passed on to
-    the jobs, which have a moment to bring home what they have; a second one ends everything.
+    the jobs, which begin with interrupts held: those that hear them have a moment to bring home
+    what they have, the others are ended.
     """
     shift = _Shift(jobs, deque(range(len(jobs))))
-    with _cleared(shift):
+    with interrupts_held(), _cleared(shift):
         try:
             while shift.waiting or shift.busy:
                 while shift.waiting and len(shift.busy) < (workers or workers_here()):
                     shift.busy.append(_started(shift, shift.waiting.popleft()))
-                _listen_to_all(shift, progress)
+                with interrupts_heard():
+                    ready = wait([worker.channel for worker in shift.busy])
+                _listen_to_all(shift, ready, progress)
         except KeyboardInterrupt:
             _call_home(shift)
-    missing = Outcome(failure=INTERRUPTED)
+    missing = Outcome(failure=INTERRUPTED, cut=True)
     return [shift.outcomes.get(position, missing) for position in range(len(jobs))]
 
 
@@ -87,18 +93,19 @@ def _call_home(shift: _Shift) -> None:
     """Interrupt all workers and wait a moment for what they have."""
     shift.tries = dict.fromkeys(range(len(shift.jobs)), TRIES)
     for worker in shift.busy:
-        with suppress(OSError):
-            os.kill(worker.process.pid or 0, signal.SIGINT)
-    end = time.monotonic() + GRACE
+        worker.process.terminate()
+    over, end = set(shift.outcomes), time.monotonic() + GRACE
     while shift.busy and time.monotonic() < end:
-        _listen_to_all(shift, None, timeout=max(0.0, end - time.monotonic()))
+        left = max(0.0, end - time.monotonic())
+        _listen_to_all(shift, wait([worker.channel for worker in shift.busy], left), None)
+    for position in shift.outcomes.keys() - over:
+        shift.outcomes[position] = replace(shift.outcomes[position], cut=True)
 
 
 def _listen_to_all(
-    shift: _Shift, progress: Callable[[int, float], None] | None, timeout: float | None = None
+    shift: _Shift, ready: Sequence[object], progress: Callable[[int, float], None] | None
 ) -> None:
-    for channel in wait([worker.channel for worker in shift.busy], timeout):
-        worker = next(worker for worker in shift.busy if worker.channel is channel)
+    for worker in [worker for worker in shift.busy if worker.channel in ready]:
         _listen(shift, worker, progress)
 
 
@@ -109,24 +116,29 @@ def _started(shift: _Shift, position: int) -> _Worker:
     context: Any = multiprocessing.get_context("fork" if forks else "spawn")
     ours, theirs = context.Pipe(duplex=False)
     process = context.Process(target=_work, args=(shift.jobs[position], theirs))
-    with interrupts_held():  # until the worker can deal with them
-        process.start()
+    process.start()
     theirs.close()
     shift.tries[position] = shift.tries.get(position, 0) + 1
     return _Worker(position, process, ours)
 
 
 def _work(job: Job, channel: Connection) -> None:
+    # Where nobody listens any more there is nobody to tell.
+    with interrupts_held(), suppress(BrokenPipeError):
+        channel.send(_outcome(job, channel.send))
+
+
+def _outcome(job: Job, progress: Progress) -> Outcome:
     try:
-        hold_interrupts(False)
-        outcome = Outcome(job(channel.send))
+        return Outcome(job(progress))
+    except BrokenPipeError:
+        raise
     except PodusvError as error:
-        outcome = Outcome(failure=str(error))
+        return Outcome(failure=str(error))
     except KeyboardInterrupt:
-        outcome = Outcome(failure=INTERRUPTED)
+        return Outcome(failure=INTERRUPTED)
     except Exception:
-        outcome = Outcome(failure=traceback.format_exc())
-    channel.send(outcome)
+        return Outcome(failure=traceback.format_exc())
 
 
 def _listen(shift: _Shift, worker: _Worker, progress: Callable[[int, float], None] | None) -> None:
@@ -163,6 +175,6 @@ def _cleared(shift: _Shift) -> Iterator[None]:
         yield
     finally:
         for worker in shift.busy:
-            worker.process.terminate()
+            worker.process.kill()
             worker.process.join()
             worker.channel.close()

@@ -16,6 +16,7 @@ from podusv_cli.config.scenario import Scenario
 from podusv_cli.engine.simulate import Observer, marcher, simulate
 from podusv_cli.findings.after import aftermath
 from podusv_cli.findings.finding import Finding, heard
+from podusv_cli.interrupts import Extras, interrupts_heard, interrupts_held
 from podusv_cli.logbook import folder, hdf5, provenance
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.table import METRICS
@@ -23,6 +24,9 @@ from podusv_cli.metrics.watching import observer, summarise
 from podusv_cli.recording import Recording, Status
 
 Progress = Callable[[float], None]
+UNDRAWN = (
+    "interrupted after the simulation; the log is whole, figures or the law's cost are missing"
+)
 
 
 @dataclass
@@ -95,28 +99,31 @@ def execute(
 ) -> Finished:
     """Simulate, measure, write, draw; `target` is there only when all of it is.
 
-    A run that diverges or is interrupted is written like any other; its status tells. Raises
-    StorageError.
+    A run that diverges or is interrupted is written like any other; its status tells. An interrupt
+    after the simulation costs the figures or the law's cost, nothing else. Raises StorageError.
     """
     started, watch = datetime.now(UTC), watch or Stopwatch()
-    with folder.RunWriter(task.target, force=task.force) as writer:
+    with interrupts_held(), folder.RunWriter(task.target, force=task.force) as writer:
         recording, metrics = measured(task.scenario, watch, progress)
+        extras = Extras(recording.status == "interrupted")
         with watch.part("metrics"):
+            metrics |= extras.attempt(lambda: _cost(task.scenario, recording)) or {}
             seen_after = heard(aftermath(task.scenario, recording), task.scenario)
         warnings = (*task.noticed, *seen_after)
         with watch.part("write"):
             _write(writer, task, recording, metrics, warnings)
         with watch.part("figures"):
-            if task.figures:
-                _draw(writer, task, recording)
+            for name, content in extras.attempt(lambda: _drawn(task, recording)) or ():
+                writer.add(f"figures/{name}", content)
+        status = "interrupted" if extras.interrupted else recording.status
         with watch.part("write"):
             origin = provenance.collect(list(task.argv), started, datetime.now(UTC))
             writer.add_json("provenance.json", origin)
-            final = writer.finish(recording.status)
+            final = writer.finish(status)
+    message = recording.message or ("" if status == "finished" else UNDRAWN)
     return Finished(
-        final, recording.controller, recording.status, recording.message, metrics, watch.total(),
-        warnings=warnings,
-    )  # fmt: skip
+        final, recording.controller, status, message, metrics, watch.total(), warnings=warnings
+    )
 
 
 def warm_up(scenario: Scenario) -> None:
@@ -138,15 +145,18 @@ def measured(
     """Simulate a scenario and sum it up in metrics."""
     loop, grid, seeing = scenario.closed_loop(), scenario.time_grid(), _observer(scenario)
     compiled = scenario.simulation.compiled
-    with watch.part("compile"):
+    with watch.part("compile"), interrupts_heard():
         marcher(loop, seeing, compiled)
     with watch.part("engine"):
         recording = simulate(loop, grid, observer=seeing, compiled=compiled, progress=progress)
     with watch.part("metrics"):
         metrics = summarise(recording.seen, grid.step) if recording.seen is not None else {}
-        timed = compiled and len(recording["time"])
-        cost = law_costs([(loop, recording)])[0] if timed else {}
-    return recording, metrics | cost
+    return recording, metrics
+
+
+def _cost(scenario: Scenario, recording: Recording) -> dict[str, float]:
+    timed = scenario.simulation.compiled and len(recording["time"])
+    return law_costs([(scenario.closed_loop(), recording)])[0] if timed else {}
 
 
 def _write(
@@ -168,9 +178,10 @@ def _write(
     writer.add("metrics.csv", "\n".join(["metric,value,unit", *rows, ""]).encode())
 
 
-def _draw(writer: folder.RunWriter, task: Task, recording: Recording) -> None:
+def _drawn(task: Task, recording: Recording) -> list[tuple[str, bytes]]:
+    if not task.figures:
+        return []
     from podusv_cli.figures.drawing import draw_in_parallel, dressed  # matplotlib is slow to import
 
     shown = dressed([(task.label or recording.controller, recording, task.scenario)])
-    for name, content in draw_in_parallel(shown, task.figures, ("png",)):
-        writer.add(f"figures/{name}", content)
+    return list(draw_in_parallel(shown, task.figures, ("png",)))

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from podusv_cli.comparison.claims import misfits
+from podusv_cli.comparison.claims import Stated, misfits
 from podusv_cli.comparison.differences import differences
 from podusv_cli.comparison.entries import Entry
 from podusv_cli.config.loading import load, resolved_yaml
@@ -17,7 +18,9 @@ from podusv_cli.config.words import unknown
 from podusv_cli.errors import UsageError
 from podusv_cli.findings.finding import Finding, heard
 from podusv_cli.findings.preflight import preflight, together
+from podusv_cli.interrupts import Extras, interrupts_held
 from podusv_cli.logbook import atomic, folder, jsonfile, provenance
+from podusv_cli.recording import Status
 from podusv_cli.running import Finished, Progress, Stopwatch, Task, execute
 
 if TYPE_CHECKING:
@@ -65,6 +68,7 @@ class Compared:
 
     folder: Path
     result: comparing.Result
+    status: Status  # interrupted where a run or the figures were, else finished
 
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints of a comparison."""
@@ -73,6 +77,7 @@ class Compared:
         result = self.result
         return {
             "format": 1,
+            "status": self.status,
             "folder": str(self.folder),
             "runs": [self._run_as_json(entry) for entry in result.entries],
             "comparison": comparing.numbers(result.table),
@@ -105,54 +110,119 @@ def compare(
     """Run what has to be run, and compare it with what is there.
 
     Each item is a scenario (all its `controllers`, or its one controller), a run folder or the
-    folder of a comparison. Claims are those of the scenarios. Raises ScenarioError, StorageError.
+    folder of a comparison. Claims are those of the scenarios. After an interrupt what the runs have
+    is compared, without figures; KeyboardInterrupt where they have nothing. Raises UsageError,
+    ScenarioError, StorageError.
     """
     from podusv_cli import comparing  # pandas is slow to import
 
     started, argv = datetime.now(UTC), list(request.argv)
-    parts, stated, title = _parts(items, request)
+    gathered = _gathered(items, request)
+    parts, title = gathered.parts, gathered.title
     for finding in together({part.label: part.noticed for part in parts}):
         request.warn(finding)
     text = "".join(f"{part.label}\n{resolved_yaml(part.scenario)}" for part in parts)
     target = request.out or folder.default_folder(RESULTS, title, text)
-    with folder.RunWriter(target, force=request.force) as writer:
+    _keep_apart(items, target)
+    with interrupts_held(), folder.RunWriter(target, force=request.force) as writer:
         outcomes = comparing.make_runs(
             parts, writer.folder, figures=request.figures, argv=argv, progress=progress
         )
-        result = comparing.collect(parts, outcomes, stated)
+        extras = Extras(interrupted=any(outcome.cut for outcome in outcomes.values()))
+        result = comparing.collect(parts, outcomes, gathered.stated, extras)
+        if extras.interrupted and not result.entries:
+            raise KeyboardInterrupt
         origin = provenance.collect(argv, started, datetime.now(UTC))
         comparing.write(writer, result)
-        if request.figures and result.entries and result.status == "finished":
-            comparing.draw_all(writer, result, title, origin)
+        if request.figures:
+            figures = extras.attempt(lambda: comparing.drawn(result, progress)) or {}
+            for name, content in figures.items():
+                writer.add(f"figures/{name}", content)
+            page = comparing.as_report(result, title, figures, origin)
+            writer.add("report.html", page.encode())
         writer.add_json("provenance.json", origin)
-        final = writer.finish(result.status)
-    return Compared(final, result)
+        status: Status = "interrupted" if extras.interrupted else "finished"
+        return Compared(writer.finish(status), result, status)
 
 
-def _parts(
-    items: Sequence[Path], request: Request
-) -> tuple[list[comparing.Part], dict[str, Claim], str]:
+def _keep_apart(items: Sequence[Path], target: Path) -> None:
+    """UsageError where writing the comparison would touch what is compared."""
+    there = target.resolve()
+    for item in items:
+        here = item.resolve()
+        within = there.is_relative_to(here) and (here / "manifest.json").exists()
+        if here.is_relative_to(there) or within:
+            raise UsageError(
+                f"--out {target}: {item} is to be compared and would be overwritten or written "
+                "into; name another folder"
+            )
+
+
+@dataclass(frozen=True)
+class _Gathered:
     """What is to be compared, the claims about it, and a name for it all."""
+
+    parts: Sequence[comparing.Part]
+    stated: Sequence[Stated]
+    title: str
+
+
+def _gathered(items: Sequence[Path], request: Request) -> _Gathered:
     from podusv_cli import comparing
 
-    parts: list[comparing.Part] = []
-    stated: dict[str, Claim] = {}
-    names = []
-    for item in items:
-        if item.is_dir():
-            parts += comparing.from_folder(item)
-            names.append(item.name)
-            continue
-        loaded = load(item, request.overrides, checks=(misfits,))
-        alone = len(items) == 1 or bool(loaded.scenario.controllers)
-        for label, scenario in loaded.scenario.singles().items():
-            name = label if alone else scenario.name
-            noticed = heard(preflight(scenario), scenario)
-            parts.append(comparing.Part(name, scenario, loaded.text, noticed=noticed))
-        stated |= loaded.scenario.claims
-        names.append(loaded.scenario.name)
-    title = "-".join(dict.fromkeys(names))[:80]
-    return comparing.distinct(parts), stated, title
+    if request.overrides and all(item.is_dir() for item in items):
+        given = ", ".join(request.overrides)
+        raise UsageError(
+            f"--set {given}: finished runs are as they are; --set changes scenarios, and none is "
+            "given"
+        )
+    found = [_opened(item, request, alone=len(items) == 1) for item in items]
+    parts = comparing.distinct(part for some in found for part in some.parts)
+    labels = iter(part.label for part in parts)
+    called = [dict(zip(some.names, labels, strict=False)) for some in found]
+    title = "-".join(dict.fromkeys(some.name for some in found))[:80]
+    return _Gathered(parts, _stated(found, called), title)
+
+
+@dataclass(frozen=True)
+class _Item:
+    """What one argument stands for; `names` are what its own claims call the `parts`."""
+
+    name: str
+    parts: Sequence[comparing.Part]
+    names: Sequence[str] = ()
+    claims: Mapping[str, Claim] = field(default_factory=dict)
+
+
+def _opened(path: Path, request: Request, *, alone: bool) -> _Item:
+    from podusv_cli import comparing
+
+    if path.is_dir():
+        parts = comparing.from_folder(path)
+        return _Item(path.resolve().name, parts, [part.label for part in parts])
+    loaded = load(path, request.overrides, checks=(misfits,))
+    scenario, singles = loaded.scenario, loaded.scenario.singles()
+    by_law = alone or scenario.controllers
+    labels = list(singles) if by_law else [scenario.name]
+    parts = [
+        comparing.Part(label, single, loaded.text, noticed=heard(preflight(single), single))
+        for label, single in zip(labels, singles.values(), strict=True)
+    ]
+    return _Item(scenario.name, parts, list(singles), scenario.claims)
+
+
+def _stated(found: Sequence[_Item], called: Sequence[Mapping[str, str]]) -> list[Stated]:
+    """All claims; those of the same name bear their scenario's too."""
+    from podusv_cli import comparing
+
+    counts = Counter(name for item in found for name in item.claims)
+    stated = [
+        Stated(f"{item.name}.{name}" if counts[name] > 1 else name, claim, labels)
+        for item, labels in zip(found, called, strict=True)
+        for name, claim in item.claims.items()
+    ]
+    names = comparing.told_apart(said.name for said in stated)
+    return [replace(said, name=name) for said, name in zip(stated, names, strict=True)]
 
 
 def verify(

@@ -10,6 +10,7 @@ import pytest
 
 from podusv_cli.errors import StorageError
 from podusv_cli.figures import drawing
+from podusv_cli.interrupts import interrupts_heard
 from podusv_cli.parallel import INTERRUPTED, Outcome, run_all
 
 
@@ -79,11 +80,13 @@ def test_interrupted_jobs_bring_home_what_they_have():
     def salvage(progress):
         try:
             progress(0.1)
-            time.sleep(60)
+            with interrupts_heard():
+                time.sleep(60)
         except KeyboardInterrupt:
             return "half of it"
 
-    assert run_all([salvage], interrupt, workers=1)[0].result == "half of it"
+    outcome = run_all([salvage], interrupt, workers=1)[0]
+    assert (outcome.result, outcome.cut) == ("half of it", True)
 
 
 def test_an_interrupted_caller_leaves_no_process(tmp_path):
@@ -111,6 +114,8 @@ def test_an_interrupted_caller_leaves_no_process(tmp_path):
 def test_an_interrupt_while_figures_are_drawn_is_one_and_no_bug(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(drawing, "run_all", lambda jobs: [Outcome(failure=INTERRUPTED)])
+    monkeypatch.setattr(
+        drawing, "run_all", lambda jobs, *rest: [Outcome(failure=INTERRUPTED, cut=True)] * 2
+    )
     with pytest.raises(KeyboardInterrupt):
-        list(drawing.draw_in_parallel([], ["errors"], ["png"]))
+        list(drawing.draw_in_parallel([], ["errors", "loads"], ["png"]))

@@ -53,7 +53,7 @@ def compare(
     for finding in done.warnings():
         warned(finding)
     _warn(done)
-    if done.result.status == "interrupted":
+    if done.status == "interrupted":
         raise typer.Exit(INTERRUPTED)
     raise typer.Exit(SOME_FAILED if any(done.result.endings.values()) else 0)
 

@@ -12,8 +12,10 @@ from typing import ParamSpec
 import typer
 
 from podusv_cli.errors import PodusvError, StorageError
+from podusv_cli.interrupts import interrupts_caught
 
 Given = ParamSpec("Given")
+SIGNALLED = 128  # and the signal's number: 130 for SIGINT, 143 for SIGTERM
 INTERRUPTED = 130
 PIPE_CLOSED = 141  # what a shell reports for a program that SIGPIPE ended
 BUG = 1
@@ -25,14 +27,25 @@ def guarded(command: Callable[Given, None]) -> Callable[Given, None]:
 
     @wraps(command)
     def run(*args: Given.args, **kwargs: Given.kwargs) -> None:
-        try:
-            command(*args, **kwargs)
-        except (typer.Exit, typer.Abort, typer.BadParameter):
-            raise
-        except (Exception, KeyboardInterrupt) as error:
-            raise typer.Exit(_exit_code(error)) from error
+        with interrupts_caught() as interrupts:
+            code = _code_of(lambda: command(*args, **kwargs))
+            # What was interrupted says so in one way; which signal it was, the shell wants to know.
+            signalled = code == INTERRUPTED and interrupts.number
+            raise typer.Exit(SIGNALLED + interrupts.number if signalled else code)
 
     return run
+
+
+def _code_of(command: Callable[[], None]) -> int:
+    try:
+        command()
+    except (typer.Abort, typer.BadParameter):
+        raise
+    except typer.Exit as end:
+        return end.exit_code
+    except (Exception, KeyboardInterrupt) as error:
+        return _exit_code(error)
+    return 0
 
 
 def _exit_code(error: BaseException) -> int:

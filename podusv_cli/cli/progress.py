@@ -26,7 +26,8 @@ def progress_bars(*, wanted: bool) -> Iterator[Callable[[str, float], None] | No
     began = time.monotonic()
     # Drawn from here only: a thread that draws would not survive the forks of a comparison.
     bars = Progress(
-        TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn(),
+        TextColumn("{task.description}"), BarColumn(),
+        TimeRemainingColumn(elapsed_when_finished=True),
         console=Console(stderr=True), transient=True, auto_refresh=False,
     )  # fmt: skip
     tasks: dict[str, TaskID] = {}

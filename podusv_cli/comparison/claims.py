@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from podusv_cli.comparison.expressions import Sources
-from podusv_cli.comparison.parsing import ExpressionError, parse
+from podusv_cli.comparison.expressions import Evidence, Sources
+from podusv_cli.comparison.parsing import ExpressionError, parse, renamed
 from podusv_cli.config.scenario import Claim, Scenario
 
 Answer = Literal["reproduced", "not reproduced", "cannot tell"]
@@ -20,17 +20,38 @@ ANSWERS: dict[bool | None, Answer] = {
 
 
 @dataclass(frozen=True)
+class Stated:
+    """A claim of one scenario: `called` has the labels of its runs in the comparison by the names
+    that the scenario has for them.
+    """
+
+    name: str
+    claim: Claim
+    called: Mapping[str, str]
+
+
+@dataclass(frozen=True)
 class Verdict:
-    """What the runs say of a claim; `numbers` holds every quantity that was compared."""
+    """What the runs say of a claim.
+
+    `numbers` holds every quantity that was compared, NaN where there is none; `reason` says why
+    nothing can be told, "" where something can.
+    """
 
     name: str
     claim: Claim
     answer: Answer
     numbers: dict[str, float]
+    reason: str = ""
 
     def shown(self) -> str:
-        """The numbers in a line."""
-        return ", ".join(f"{text} = {number:.4g}" for text, number in self.numbers.items())
+        """The numbers in a line, and what is missing."""
+        numbers = (
+            f"{text} = {number:.4g}"
+            for text, number in self.numbers.items()
+            if not math.isnan(number)
+        )
+        return "; ".join(part for part in (", ".join(numbers), self.reason) if part)
 
     def as_json(self) -> dict[str, object]:
         """The verdict as plain data, undefined numbers as None."""
@@ -40,6 +61,7 @@ class Verdict:
             **self.claim.model_dump(),
             "verdict": self.answer,
             "numbers": numbers,
+            "reason": self.reason,
         }
 
 
@@ -54,23 +76,31 @@ def misfits(scenario: Scenario) -> list[tuple[str, str]]:
     return found
 
 
-def judge(claims: Mapping[str, Claim], runs: Sources) -> list[Verdict]:
-    """A verdict on every claim."""
-    verdicts = []
-    for name, claim in claims.items():
-        numbers: dict[str, float] = {}
-        holds = parse(claim.expect, runs).holds(runs, claim.tolerance, numbers)
-        verdicts.append(Verdict(name, claim, ANSWERS[holds], numbers))
-    return verdicts
+def judge(stated: Sequence[Stated], runs: Sources) -> list[Verdict]:
+    """A verdict on every claim; in it, the claim is put with the runs' labels."""
+    return [_verdict(said, runs) for said in stated]
+
+
+def _verdict(said: Stated, runs: Sources) -> Verdict:
+    claim, found = said.claim, Evidence()
+    holds = parse(claim.expect, runs, said.called).holds(runs, claim.tolerance, found)
+    reason = "; ".join(dict.fromkeys(found.doubts)) if holds is None else ""
+    put = claim.model_copy(update={"expect": renamed(claim.expect, said.called)})
+    return Verdict(said.name, put, ANSWERS[holds], found.numbers, reason)
 
 
 def as_markdown(verdicts: Sequence[Verdict]) -> str:
     """The verdicts as a table, choices and remarks below it."""
     rows = [
-        f"| {v.name} | {v.claim.says} ({v.claim.source}) | **{v.answer}** | "
-        f"`{v.claim.expect}`, tolerance {v.claim.tolerance:g} | {v.shown()} |"
+        f"| {v.name} | {_cell(v.claim.says)} ({_cell(v.claim.source)}) | **{v.answer}** | "
+        f"`{_cell(v.claim.expect)}`, tolerance {v.claim.tolerance:g} | {_cell(v.shown())} |"
         for v in verdicts
     ]
     remarks = [f"- {v.name}: {v.claim.remark}" for v in verdicts if v.claim.remark]
     head = ["| | claim | verdict | put as | numbers |", "|---|---|---|---|---|"]
     return "\n".join([*head, *rows, *(["", *remarks] if remarks else []), ""])
+
+
+def _cell(text: str) -> str:
+    """Text in one line that ends no cell of a table."""
+    return " ".join(text.split()).replace("|", "\\|")

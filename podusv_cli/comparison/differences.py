@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 PROSE = (".source", ".validity")
-IGNORED = ("name", "description", "controller", "controllers", "claims", "log", "silence")
+IGNORED = ("name", "description", "controller", "controllers", "claims", "silence")
 
 
 def flat(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:

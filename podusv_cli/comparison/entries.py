@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
+from podusv_cli.comparison.checks import CHECKS
 from podusv_cli.config.scenario import Scenario
 from podusv_cli.derived import DERIVED
-from podusv_cli.findings.underactuation import input_rank
 from podusv_cli.kernels import Vector
 from podusv_cli.logbook.folder import Run
 from podusv_cli.recording import Recording
-
-CHECKS: dict[str, Callable[[Entry], bool]] = {
-    "finished": lambda entry: entry.recording.status == "finished",
-    "underactuated": lambda entry: input_rank(entry.scenario.actuator) < 3,
-}
 
 
 @dataclass(frozen=True)
@@ -39,6 +34,18 @@ class Entry:
         """The log."""
         return self.run.recording
 
+    @property
+    def until(self) -> float:
+        """Where the run ends, else the last instant that was logged [s]."""
+        if self.recording.status == "finished":
+            return self.scenario.simulation.duration
+        return float(self.recording["time"][-1]) if len(self.recording["time"]) else 0.0
+
+    @property
+    def ending(self) -> str:
+        """The first words of what the run says about its end, empty where it finished."""
+        return self.recording.message.partition(":")[0]
+
     def metric(self, name: str) -> float:
         """A metric; NaN where it is undefined, and for any run that did not reach its end."""
         number = self.cost.get(name, self.run.metrics.get(name))
@@ -52,13 +59,23 @@ class Entry:
             return DERIVED[name].compute(self.recording) if has else np.empty(0)
         return self.recording[name] if name in self.recording else np.empty(0)
 
-    def check(self, name: str) -> bool:
+    def check(self, name: str) -> bool | None:
         """Whether a named property holds."""
-        return CHECKS[name](self)
+        return CHECKS[name](self.scenario, self.recording.status)
 
 
+@dataclass(frozen=True)
 class Absent:
-    """A run that failed before it left anything: nothing can be told of it."""
+    """A run that failed before it left anything; `failure` says how."""
+
+    scenario: Scenario
+    failure: str
+    until = 0.0
+
+    @property
+    def ending(self) -> str:
+        """The last line of the failure: of a traceback, what went wrong."""
+        return f"has no log: {self.failure.strip().splitlines()[-1]}"
 
     def metric(self, name: str) -> float:
         """NaN."""
@@ -68,6 +85,6 @@ class Absent:
         """Empty."""
         return np.empty(0)
 
-    def check(self, name: str) -> bool:
-        """It did not finish, and has no other property."""
-        return False
+    def check(self, name: str) -> bool | None:
+        """Whether a property holds that the scenario alone decides."""
+        return CHECKS[name](self.scenario, None)

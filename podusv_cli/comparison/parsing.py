@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import ast
 import operator
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from functools import singledispatchmethod
 
 import numpy as np
 
+from podusv_cli.comparison.checks import CHECKS
 from podusv_cli.comparison.expressions import (
-    CHECKS,
     MAPPERS,
     REDUCERS,
     Applied,
@@ -27,10 +27,16 @@ from podusv_cli.comparison.expressions import (
     Term,
 )
 from podusv_cli.config.words import unknown
+from podusv_cli.derived import DERIVED
+from podusv_cli.logbook.layout import FIXED_AXES
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.signals import SIGNALS
 
 LONGEST = 500  # characters of an expression
+LARGEST = 1e300  # of numbers written down
+DEEPEST = 60  # brackets, signs and operations in one another
+# signals with a value for every node, and those that sum them up
+NORMS = {derived.needs[0]: name for name, derived in DERIVED.items() if len(derived.needs) == 1}
 SIGNS: dict[type[ast.cmpop], str] = {
     ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==",
 }  # fmt: skip
@@ -43,15 +49,49 @@ class ExpressionError(ValueError):
     """An expression that means nothing; the text says what would."""
 
 
-def parse(text: str, runs: Collection[str]) -> Condition:
-    """The condition that `text` puts about these runs; raises ExpressionError."""
+def parse(text: str, runs: Collection[str], called: Mapping[str, str] | None = None) -> Condition:
+    """The condition that `text` puts about these runs.
+
+    `called` has the runs' labels by the names that the text has for them, where these differ.
+    Raises ExpressionError.
+    """
+    return _Reader(runs).condition(_tree(text, called or {}))
+
+
+def renamed(text: str, called: Mapping[str, str]) -> str:
+    """The same expression with the runs' labels; `called` as for `parse`."""
+    return (
+        text if all(name == label for name, label in called.items()) else _text(_tree(text, called))
+    )
+
+
+def _tree(text: str, called: Mapping[str, str]) -> ast.expr:
     if len(text) > LONGEST:
         raise ExpressionError(f"is longer than {LONGEST} characters")
     try:
         tree = ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         raise ExpressionError(f"cannot read {text!r}; example: a.iae < b.iae") from error
-    return _Reader(runs).condition(tree)
+    if _deeper_than(DEEPEST, tree):
+        raise ExpressionError(f"is nested more than {DEEPEST} deep")
+    for node in ast.walk(tree):
+        for name in _runs_in(node):
+            name.id = called.get(name.id, name.id)
+    return tree
+
+
+def _deeper_than(limit: int, tree: ast.AST) -> bool:
+    level = [tree]
+    for _ in range(limit):
+        level = [child for node in level for child in ast.iter_child_nodes(node)]
+    return bool(level)
+
+
+def _runs_in(node: ast.AST) -> list[ast.Name]:
+    """Names right below this node that stand for runs."""
+    beside = [node.value] if isinstance(node, ast.Attribute) else []
+    beside += node.args if isinstance(node, ast.Call) else []
+    return [part for part in beside if isinstance(part, ast.Name)]
 
 
 def _known(name: str, names: Collection[str], what: str) -> str:
@@ -121,6 +161,8 @@ class _Reader:
     def _(self, node: ast.Constant) -> Term:
         if isinstance(node.value, bool) or not isinstance(node.value, (int, float)):
             raise ExpressionError(f"{_text(node)!r} is no number")
+        if abs(node.value) > LARGEST:
+            raise ExpressionError(f"a number is too large, the largest is {LARGEST:g}")
         return Number(float(node.value))
 
     @term.register
@@ -130,7 +172,7 @@ class _Reader:
         run = _known(node.value.id, self.runs, "run")
         if node.attr in METRICS:
             return MetricOf(run, node.attr)
-        return SignalOf(run, _known(node.attr, [*SIGNALS, *METRICS], "signal or metric"))
+        return SignalOf(run, self._over_time(node.attr))
 
     @term.register
     def _(self, node: ast.UnaryOp) -> Term:
@@ -157,6 +199,14 @@ class _Reader:
             return Applied(operation, parts)
         return Rate(self._curve(node.args[0]))
 
+    def _over_time(self, name: str) -> str:
+        """The name of a signal with one value at each time."""
+        if name in NORMS:
+            raise ExpressionError(f"{name!r} has a value for every node; take {NORMS[name]}")
+        if name in FIXED_AXES:
+            raise ExpressionError(f"{name!r} does not run over time")
+        return _known(name, [*SIGNALS, *METRICS], "signal or metric")
+
     def _curve(self, node: ast.AST) -> Term:
         term = self.term(node)
         if not term.curve:
@@ -175,7 +225,8 @@ class _Reader:
         times = [end.number for end in ends if isinstance(end, Number)]
         if times and not 0 <= times[0] < times[1]:
             raise ExpressionError(f"{_text(node)!r}: the first time must lie before the second")
-        return Reduced(REDUCERS[name], part, (times[0], times[1]) if times else None)
+        window = (times[0], times[1]) if times else None
+        return Reduced(REDUCERS[name], part, window, _text(node))
 
 
 def _function(node: ast.Call) -> str:

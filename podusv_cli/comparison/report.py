@@ -5,9 +5,11 @@ from __future__ import annotations
 import base64
 import html
 import inspect
+import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import count
 from typing import Any
 
 import pandas as pd
@@ -64,7 +66,7 @@ def page(story: Story) -> str:
             "<h2>Comparison</h2>",
             _numbers(story.table),
             _claims(story.verdicts),
-            "<h2>Figures</h2>",
+            "<h2>Figures</h2>" if story.figures else "",
             *(_figure(*figure) for figure in story.figures),
             "<h2>Scenario</h2>",
             _scenario(story),
@@ -79,17 +81,22 @@ def page(story: Story) -> str:
     return f"<!doctype html>\n{whole}\n"
 
 
-def _table(head: Iterable[str], rows: Iterable[Iterable[str]], numeric_from: int = 99) -> str:
-    kinds = (" class=number" if i >= numeric_from else "" for i in range(99))
-    top = "".join(
-        f"<th{kind}>{html.escape(cell)}</th>" for kind, cell in zip(kinds, head, strict=False)
+def _table(
+    head: Iterable[str], rows: Iterable[Iterable[str]], *, numeric_from: float = math.inf
+) -> str:
+    """Rows of markup under a head of text; from column `numeric_from` on they are numbers."""
+
+    def line(tag: str, row: Iterable[str]) -> str:
+        kinds = (" class=number" if i >= numeric_from else "" for i in count())
+        cells_ = (f"<{tag}{kind}>{cell}</{tag}>" for kind, cell in zip(kinds, row, strict=False))
+        return f"<tr>{''.join(cells_)}</tr>"
+
+    top = line("th", map(html.escape, head))
+    return (
+        f"<div class=wide><table>{top}"
+        + "\n".join(line("td", row) for row in rows)
+        + "</table></div>"
     )
-    lines = []
-    for row in rows:
-        tags = ("<td class=number>" if i >= numeric_from else "<td>" for i in range(99))
-        cells_ = (f"{tag}{cell}</td>" for tag, cell in zip(tags, row, strict=False))
-        lines.append("<tr>" + "".join(cells_) + "</tr>")
-    return f"<div class=wide><table><tr>{top}</tr>" + "\n".join(lines) + "</table></div>"
 
 
 def _rows(head: tuple[str, str], pairs: Iterable[tuple[str, Any]]) -> str:
@@ -148,7 +155,7 @@ def _claims(verdicts: Sequence[Verdict]) -> str:
         says = f"{html.escape(v.claim.says)} <small>({html.escape(v.claim.source)})</small>{remark}"
         mark = f"<b class='{v.answer.split()[0]}'>{v.answer}</b>"
         put = f"<code>{html.escape(v.claim.expect)}</code>, tolerance {v.claim.tolerance:g}"
-        rows.append([v.name, says, mark, f"{put}<br>{html.escape(v.shown())}"])
+        rows.append([html.escape(v.name), says, mark, f"{put}<br>{html.escape(v.shown())}"])
     return "<h2>Claims</h2>" + _table(("", "claim", "verdict", "put as, and the numbers"), rows)
 
 

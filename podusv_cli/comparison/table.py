@@ -14,6 +14,11 @@ NOTE = (
     "* smallest of its row; in brackets the ratio to the first run; - not defined, or the run did "
     "not finish"
 )
+# run labels may be folder names, with anything in them
+LATEX = str.maketrans(
+    {sign: rf"\{sign}" for sign in "_%&#${}"}
+    | {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
+)
 
 
 def table(metrics: Mapping[str, Mapping[str, float]]) -> pd.DataFrame:
@@ -57,24 +62,33 @@ def _cell(number: float, first: float, best: float, position: int) -> str:
     return f"{number:.5g}{mark}{ratio}"
 
 
-def as_markdown(frame: pd.DataFrame) -> str:
-    """The table for people, in Markdown."""
+def as_markdown(frame: pd.DataFrame, endings: Mapping[str, str]) -> str:
+    """The table for people, in Markdown, and below it how runs ended that did not finish."""
+    told = [f"- {label}: {ending}" for label, ending in endings.items() if ending]
     head = ["metric", "unit", *map(str, frame.columns)]
     lines = [head, ["---", "---", *["---:"] * len(frame.columns)], *cells(frame)]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines) + f"\n\n{NOTE}\n"
+    return (
+        "\n".join("| " + " | ".join(line) + " |" for line in lines)
+        + f"\n\n{NOTE}\n"
+        + ("\n".join(["", *told, ""]) if told else "")
+    )
 
 
 def as_latex(frame: pd.DataFrame) -> str:
     """The table for a paper, with booktabs; the best in bold face."""
     head = ["metric", "unit", *map(str, frame.columns)]
-    body = [[_latex(cell) for cell in row] for row in [head, *cells(frame)]]
+    body = [[_escaped(cell) for cell in head]]
+    body += [[_marked(cell) for cell in row] for row in cells(frame)]
     lines = [" & ".join(row) + r" \\" for row in body]
     columns = "ll" + "r" * len(frame.columns)
     opening = [rf"\begin{{tabular}}{{{columns}}}", r"\toprule", lines[0], r"\midrule"]
     return "\n".join([*opening, *lines[1:], r"\bottomrule", r"\end{tabular}", ""])
 
 
-def _latex(cell: str) -> str:
-    escaped = cell.replace("_", r"\_").replace("%", r"\%").replace("&", r"\&").replace("#", r"\#")
-    number, marked, ratio = escaped.partition("*")
-    return rf"\textbf{{{number}}}{ratio}" if marked else escaped
+def _marked(cell: str) -> str:
+    number, marked, ratio = _escaped(cell).partition("*")
+    return rf"\textbf{{{number}}}{ratio}" if marked else number
+
+
+def _escaped(text: str) -> str:
+    return text.translate(LATEX)

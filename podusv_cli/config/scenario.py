@@ -34,6 +34,10 @@ Misfits = Iterator[tuple[str, str]]  # keys, and what is wrong with them
 MOST_GIGABYTES = 4.0  # of a log, which is held in memory
 LABEL = re.compile(r"[a-z][a-z0-9_]{0,29}")  # usable as a name in claims and as a folder
 LABEL_IN_WORDS = "a name here is at most 30 of a-z, 0-9 and _, starting with a letter"
+CLAIM = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,29}")
+CLAIM_IN_WORDS = (
+    "a claim's name is at most 30 of letters, digits, '_' and '-', starting with a letter"
+)
 
 
 class Start(Component):
@@ -154,6 +158,10 @@ class Scenario(Component):
         steps = whole_steps(self.simulation.duration, step) or 0
         return TimeGrid(step, steps, self.log.every, whole_steps(self.control.period, step) or 0)
 
+    def steady_from(self) -> float:
+        """When the part of the run begins that counts as settled [s]."""
+        return self.time_grid().last_part(self.metrics.steady_fraction)
+
     def misfits(self) -> list[tuple[str, str]]:
         """Key and sentence for every pair of values that cannot go together."""
         return [*self._times(), *self._samples(), *self._names(), *self._size()]
@@ -193,6 +201,9 @@ class Scenario(Component):
                     f"controllers.{label}",
                     "is where figures go; take another name",
                 )
+        for name in self.claims:
+            if not CLAIM.fullmatch(name):
+                yield f"claims.{name}", CLAIM_IN_WORDS
 
     def _size(self) -> Misfits:
         columns = 40 + max(sum(n for _, n in law.slots()) for law in self._laws().values())

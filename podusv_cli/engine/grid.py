@@ -24,6 +24,10 @@ class TimeGrid:
     log_every: int = 1
     hold_every: int = 0
 
+    def last_part(self, fraction: float) -> float:
+        """When the last part of the run begins that is this fraction of it [s]."""
+        return (1.0 - fraction) * self.steps * self.step
+
     @property
     def rows(self) -> int:
         """How many instants are logged: every `log_every`-th from the start."""

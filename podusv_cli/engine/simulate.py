@@ -15,6 +15,7 @@ from podusv_cli.disturbances.base import Disturbance
 from podusv_cli.engine import closed_loop, signatures
 from podusv_cli.engine.closed_loop import Plan, Wires
 from podusv_cli.engine.grid import TimeGrid, whole_steps
+from podusv_cli.interrupts import interrupts_heard, interrupts_held
 from podusv_cli.kernels import Vector, bundle, kernel
 from podusv_cli.paths.base import TARGET, Path
 from podusv_cli.recording import Recording, Status
@@ -105,18 +106,18 @@ def simulate(
 ) -> Recording:
     """Integrate the closed loop over the grid.
 
-    `progress` is called between blocks with the fraction done. KeyboardInterrupt ends the march
-    and keeps what was logged; `compiled=False` runs the same kernels as plain Python.
+    `progress` is called between blocks with the fraction done. An interrupt ends the march and
+    keeps what was logged; `compiled=False` runs the same kernels as plain Python.
     """
     observer = observer or Observer()
     plan = loop.layout(grid)
     wires = wire(loop, grid, plan, observer)
     march = marcher(loop, observer, compiled)
-    with np.errstate(all="ignore"):
+    with np.errstate(all="ignore"), interrupts_held():
         reached, status = in_blocks(
             lambda a, b: march(a, b, grid.step, wires, plan), plan, progress
         )
-    return _record(loop, grid, plan, wires, reached, status)
+        return _record(loop, grid, plan, wires, reached, status)
 
 
 def entries(loop: ClosedLoop, observer: Observer) -> Iterator[tuple[Any, Any, tuple[str, ...]]]:
@@ -177,16 +178,17 @@ def in_blocks(
     """March until the end or trouble; how many instants are good, and the status."""
     end, size, done = plan.steps + 1, FIRST_BLOCK, 0
     try:
-        while done < end:
-            began = time.perf_counter()
-            goal = min(done + size, end)
-            reached = march(done, goal)
-            if reached < goal:
-                return reached, "diverged"
-            done, took = goal, time.perf_counter() - began
-            if progress:
-                progress(done / end)
-            size = max(1, int(size * min(100.0, 0.7 * LONGEST_BLOCK / max(took, 1e-9))))
+        with interrupts_heard():
+            while done < end:
+                began = time.perf_counter()
+                goal = min(done + size, end)
+                reached = march(done, goal)
+                if reached < goal:
+                    return reached, "diverged"
+                done, took = goal, time.perf_counter() - began
+                if progress:
+                    progress(done / end)
+                size = max(1, int(size * min(100.0, 0.7 * LONGEST_BLOCK / max(took, 1e-9))))
     except KeyboardInterrupt:
         return done, "interrupted"
     return done, "finished"

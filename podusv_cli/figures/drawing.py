@@ -13,7 +13,8 @@ from podusv_cli.figures.loads import loads
 from podusv_cli.figures.panels import Family, signals_over_time
 from podusv_cli.figures.style import Shown, house_style, image, look
 from podusv_cli.figures.trajectory import trajectory
-from podusv_cli.parallel import INTERRUPTED, run_all
+from podusv_cli.interrupts import interrupts_heard
+from podusv_cli.parallel import run_all
 from podusv_cli.recording import Recording
 
 
@@ -95,17 +96,35 @@ def draw(
 
 
 def draw_in_parallel(
-    runs: Sequence[Shown], names: Iterable[str], formats: Sequence[str], columns: int = 2
-) -> Iterator[tuple[str, bytes]]:
-    """The same as `draw`, each figure in a process of its own; raises RuntimeError if one fails."""
+    runs: Sequence[Shown], names: Iterable[str], formats: Sequence[str], columns: int = 2,
+    progress: Callable[[float], None] | None = None,
+) -> Iterator[tuple[str, bytes]]:  # fmt: skip
+    """The same as `draw`, each of several figures in a process of its own.
 
-    def job(name: str, progress: Callable[[float], None]) -> list[tuple[str, bytes]]:
-        return list(draw(runs, [name], formats, columns))
+    `progress` is called with the fraction of figures drawn. Raises RuntimeError if one fails, and
+    KeyboardInterrupt where they were interrupted.
+    """
 
-    names = tuple(names)
-    for name, outcome in zip(names, run_all([partial(job, name) for name in names]), strict=True):
-        if outcome.failure == INTERRUPTED:
-            raise KeyboardInterrupt
+    def job(name: str, tell: Callable[[float], None]) -> list[tuple[str, bytes]]:
+        with interrupts_heard():
+            drawn = list(draw(runs, [name], formats, columns))
+        tell(1.0)
+        return drawn
+
+    names, done = tuple(names), set[int]()
+    if len(names) == 1:
+        yield from draw(runs, names, formats, columns)
+        return
+
+    def tell(position: int, _: float) -> None:
+        done.add(position)
+        if progress:
+            progress(len(done) / len(names))
+
+    outcomes = run_all([partial(job, name) for name in names], tell)
+    if any(outcome.cut for outcome in outcomes):
+        raise KeyboardInterrupt
+    for name, outcome in zip(names, outcomes, strict=True):
         if outcome.failure:
             raise RuntimeError(f"drawing {name} failed: {outcome.failure}")
         yield from outcome.result

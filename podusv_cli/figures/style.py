@@ -18,7 +18,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import ScalarFormatter
 
 from podusv_cli.config.scenario import Scenario
-from podusv_cli.derived import DERIVED, Derived
+from podusv_cli.derived import DERIVED
 from podusv_cli.kernels import Vector
 from podusv_cli.recording import Recording
 from podusv_cli.signals import SIGNALS
@@ -86,7 +86,8 @@ class Shown:
 
     def has(self, name: str) -> bool:
         """Whether the run has the signal, logged or derivable."""
-        return all(part in self.recording for part in DERIVED.get(name, Derived((name,))).needs)
+        needs = DERIVED[name].needs if name in DERIVED else (name,)
+        return all(part in self.recording for part in needs)
 
     def signal(self, name: str) -> Vector:
         """A logged or derived signal."""

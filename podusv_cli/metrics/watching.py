@@ -76,7 +76,7 @@ def observer(
     plan = loop.layout(grid)
     flags = loop.actuator.signals
     constants = {
-        "steady_from": (1.0 - steady_fraction) * grid.steps * grid.step,
+        "steady_from": grid.last_part(steady_fraction),
         "settling_radius": settling_radius,
         "demand": float(plan.demand),
         "tau": float(plan.tau),

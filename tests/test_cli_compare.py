@@ -1,0 +1,432 @@
+"""`podusv compare` on the command line: exit codes, what is told where, what is refused."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+import podusv_cli
+from podusv_cli import cli, comparing, running
+from podusv_cli.logbook import manifest
+from podusv_cli.logbook.folder import open_run
+from podusv_cli.parallel import INTERRUPTED, Outcome
+
+ROOT = Path(podusv_cli.__file__).parents[1]
+BASE = """
+vessel: {preset: paper_nonlinear}
+path: {kind: line}
+disturbance: {kind: none}
+actuator: {kind: saturated}
+start: {x: -5.0, y: -2.0, u: 0.3}
+simulation: {duration: 1.0}
+controller: {kind: pid, K_Pu: 100.0}
+"""
+TWO = BASE + "controllers: {stiff: {K_Pu: 200.0}, soft: {K_Pu: 5.0}}\n"
+
+
+class Said(NamedTuple):
+    """What a command left behind."""
+
+    code: object
+    out: str
+    err: str
+
+
+Podusv = Callable[..., Said]
+
+
+@pytest.fixture
+def podusv(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Podusv:
+    """`podusv compare` without figures, in a folder of its own."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "100")
+
+    def run(*words: str) -> Said:
+        monkeypatch.setattr(sys, "argv", ["podusv", "compare", "--no-figures", *words])
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        return Said(ended.value.code, *capsys.readouterr())
+
+    return run
+
+
+def claim(name: str, expect: str) -> str:
+    """A scenario's section with one claim."""
+    return f"claims:\n  {name}: {{says: s, source: p, expect: {expect!r}}}\n"
+
+
+def write(name: str, text: str) -> str:
+    """A scenario file; its name."""
+    Path(name).write_text(text)
+    return name
+
+
+def claims_of(said: Said) -> dict[str, dict]:
+    """Claims by name, of what `--json` printed."""
+    return {verdict["claim"]: verdict for verdict in json.loads(said.out)["claims"]}
+
+
+# --- what is told
+
+
+def test_a_diverging_run_is_exit_code_3_and_hides_no_other(podusv: Podusv) -> None:
+    config = write("two.yaml", TWO)
+    said = podusv(config, "--out", "x", "--set", "controllers.soft.T_d=1e-5")
+    assert said.code == 3
+    assert "soft: diverged at t = " in said.err
+    row = next(line for line in said.out.splitlines() if line.startswith("iae ")).split()
+    assert float(row[3].rstrip("*")) > 0
+    assert row[4] == "-"
+    assert "soft: diverged at t = " in Path("x/comparison.md").read_text()
+    assert manifest.check(Path("x")).status == "finished"
+
+
+def test_runs_that_differ_in_more_are_warned_of_by_key(podusv: Podusv) -> None:
+    write("a.yaml", BASE)
+    write("b.yaml", BASE.replace("y: -2.0", "y: -3.0"))
+    said = podusv("a.yaml", "b.yaml", "--out", "x")
+    assert said.code == 0
+    assert said.err == (
+        "warning: the runs differ in more than the controller:\n  start.y: a -2.0, b -3.0\n"
+    )
+    assert podusv(write("two.yaml", TWO), "--out", "y").err == ""
+
+
+def test_json_has_the_documented_shape(podusv: Podusv) -> None:
+    config = write("two.yaml", TWO + claim("C1", "stiff.iae <= soft.iae"))
+    said = podusv(config, "--out", "x", "--json")
+    found = json.loads(said.out)
+    assert list(found) == [
+        "format", "status", "folder", "runs", "comparison", "failed", "differences", "claims",
+    ]  # fmt: skip
+    assert (found["format"], found["status"], found["folder"]) == (1, "finished", "x")
+    for run, label in zip(found["runs"], ("stiff", "soft"), strict=True):
+        assert list(run) == ["format", "status", "run", "controller", "metrics", "timing"]
+        assert (run["status"], run["run"], run["controller"]) == ("finished", f"x/{label}", "pid")
+        parts = {"compile_s", "engine_s", "write_s", "figures_s", "total_s"}
+        assert parts <= set(run["timing"])
+        iae = found["comparison"]["iae"][label]
+        assert iae == run["metrics"]["iae"] > 0
+    assert found["claims"][0]["verdict"] == "reproduced"
+
+
+def test_quiet_is_the_folder_alone(podusv: Podusv) -> None:
+    assert podusv(write("two.yaml", TWO), "--out", "x", "-q") == (0, "x\n", "")
+
+
+def test_finished_folders_and_a_scenario_mix(podusv: Podusv) -> None:
+    podusv(write("two.yaml", TWO), "--out", "x")
+    said = podusv("x", "x/soft", write("one.yaml", BASE), "--out", "y", "--json")
+    found = json.loads(said.out)
+    assert said.code == 0
+    where = [run["run"] for run in found["runs"]]
+    assert where == ["x/stiff", "x/soft", "x/soft", "y/one"]
+    assert list(found["comparison"]["iae"]) == ["stiff", "soft", "soft_2", "one"]
+
+
+@pytest.mark.parametrize("name", ["nope.yaml", "nope"])
+def test_an_unknown_file_is_a_line(podusv: Podusv, name: str) -> None:
+    said = podusv(name, "--out", "x")
+    assert said == (2, "", f"{name}: cannot be read: no such file or directory\n")
+    assert not Path("x").exists()
+
+
+def test_a_scenario_may_be_called_like_a_file_of_the_comparison(podusv: Podusv) -> None:
+    write("figures.yaml", BASE)
+    write("unit.yaml", BASE)
+    said = podusv("figures.yaml", "unit.yaml", "--out", "x", "--json")
+    assert said.code == 0
+    assert [run["run"] for run in json.loads(said.out)["runs"]] == ["x/figures_2", "x/unit_2"]
+
+
+# --- claims of several scenarios
+
+
+def test_claims_speak_of_their_own_scenarios_runs(podusv: Podusv) -> None:
+    """The second scenario's `stiff` and `soft` are swapped, and run under other names."""
+    swapped = BASE + "controllers: {soft: {K_Pu: 200.0}, stiff: {K_Pu: 5.0}}\n"
+    write("a.yaml", TWO + claim("C1", "stiff.peak_tau_u > soft.peak_tau_u"))
+    expect = "stiff.peak_tau_u > soft.peak_tau_u and finished(stiff)"
+    write("b.yaml", swapped + claim("C2", expect))
+    found = claims_of(podusv("a.yaml", "b.yaml", "--out", "x", "--json"))
+    assert found["C1"]["verdict"] == "reproduced"
+    assert found["C2"]["verdict"] == "not reproduced"
+    assert list(found["C2"]["numbers"]) == [
+        "stiff_2.peak_tau_u", "soft_2.peak_tau_u", "finished(stiff_2)",
+    ]  # fmt: skip
+    assert found["C2"]["expect"].startswith("stiff_2.peak_tau_u > soft_2.peak_tau_u")
+
+
+def test_claims_reach_runs_that_are_named_after_their_scenario(podusv: Podusv) -> None:
+    write("my-a.yaml", BASE + claim("C1", "pid.peak_tau_u > 1 and max(pid.u, 0, 1) > 0"))
+    write("my-b.yaml", BASE)
+    found = claims_of(podusv("my-a.yaml", "my-b.yaml", "--out", "x", "--json"))
+    assert found["C1"]["verdict"] == "reproduced"
+    assert list(found["C1"]["numbers"]) == ["my-a.peak_tau_u", "max(my-a.u, 0, 1)"]
+
+
+def test_claims_are_not_about_finished_runs_of_the_same_name(podusv: Podusv) -> None:
+    config = write("two.yaml", TWO + claim("C1", "soft.peak_tau_u < 100"))
+    podusv(config, "--out", "old", "--set", "controllers.soft.K_Pu=900")
+    found = claims_of(podusv("old/soft", config, "--out", "x", "--json"))
+    assert found["C1"]["verdict"] == "reproduced"
+    assert list(found["C1"]["numbers"]) == ["soft_2.peak_tau_u"]
+
+
+def test_claims_of_the_same_name_keep_apart(podusv: Podusv) -> None:
+    write("a.yaml", TWO + claim("C1", "finished(soft)"))
+    write("b.yaml", TWO + claim("C1", "not finished(soft)"))
+    found = claims_of(podusv("a.yaml", "b.yaml", "a.yaml", "--out", "x", "--json"))
+    assert {name: verdict["verdict"] for name, verdict in found.items()} == {
+        "a.C1": "reproduced", "b.C1": "not reproduced", "a.C1_2": "reproduced",
+    }  # fmt: skip
+
+
+def test_cannot_tell_says_why(podusv: Podusv) -> None:
+    config = write("two.yaml", TWO + claim("C1", "soft.iae < stiff.iae"))
+    said = podusv(config, "--out", "x", "--set", "controllers.soft.T_d=1e-5")
+    assert "C1  cannot tell" in said.out
+    for text in (said.out, Path("x/claims.md").read_text()):
+        assert "soft.iae: soft diverged at t = " in " ".join(text.split())
+    stored = json.loads(Path("x/claims.json").read_text())["claims"][0]
+    assert stored["reason"].startswith("soft.iae: soft diverged at t = ")
+
+
+# --- what is refused
+
+
+@pytest.mark.parametrize("out", ["x", "x/", "./x/../x", "x/soft", "x/new", "."])
+@pytest.mark.parametrize("force", [[], ["--force"]])
+def test_what_is_compared_is_not_overwritten(podusv: Podusv, out: str, force: list[str]) -> None:
+    podusv(write("two.yaml", TWO), "--out", "x")
+    before = manifest.check(Path("x"))
+    said = podusv("x", "--out", out, *force)
+    assert said.code == 2
+    assert said.out == ""
+    assert said.err.count("\n") == 1
+    assert said.err.startswith(f"--out {Path(out)}: x is to be compared")
+    assert manifest.check(Path("x")) == before
+    assert not Path("x/new").exists()
+
+
+def test_a_scenario_inside_what_would_be_replaced_is_refused(podusv: Podusv) -> None:
+    podusv(write("two.yaml", TWO), "--out", "x")
+    said = podusv("x/soft/scenario.yaml", "--out", "x", "--force")
+    assert said.code == 2
+    assert Path("x/soft/scenario.yaml").is_file()
+
+
+def test_a_link_is_no_way_around(podusv: Podusv) -> None:
+    podusv(write("two.yaml", TWO), "--out", "x")
+    Path("link").symlink_to("x")
+    assert podusv("link/soft", "--out", "x", "--force").code == 2
+    assert Path("x/soft/log.h5").is_file()
+
+
+def test_set_without_a_scenario_is_refused(podusv: Podusv) -> None:
+    podusv(write("two.yaml", TWO), "--out", "x")
+    said = podusv("x/soft", "x/stiff", "--set", "start.x=1", "--out", "y")
+    assert said.code == 2
+    assert said.err == (
+        "--set start.x=1: finished runs are as they are; --set changes scenarios, and none is "
+        "given\n"
+    )
+    assert not Path("y").exists()
+
+
+@pytest.mark.parametrize(
+    ("expect", "says"),
+    [
+        ("max(stiff.W_hat_u) < 1", "W_norm_u"),
+        ("max(stiff.rbf_center) < 1", "does not run over time"),
+        ("-" * 300 + "1 < stiff.iae", "nested"),
+        ("1" + "0" * 400 + " < stiff.iae", "too large"),
+        ("1e999 < stiff.iae", "too large"),
+        ("not " * 100 + "finished(stiff)", "nested"),
+    ],
+)
+def test_a_claim_without_meaning_is_a_scenario_error(
+    podusv: Podusv, expect: str, says: str
+) -> None:
+    config = write("two.yaml", TWO + claim("C1", expect))
+    said = podusv(config, "--out", "x")
+    line = len(TWO.splitlines()) + 2
+    assert said.code == 2
+    assert said.err.startswith(f"two.yaml:{line}:")
+    assert "claims.C1.expect: " in said.err
+    assert says in said.err
+
+
+@pytest.mark.parametrize("name", ["<b>", "a|b", "a b", "", "9" * 31])
+def test_claims_have_plain_names(podusv: Podusv, name: str) -> None:
+    config = write("two.yaml", TWO + claim(f"{name!r}", "finished(soft)"))
+    said = podusv(config, "--out", "x")
+    assert said.code == 2
+    assert "a claim's name is at most 30 of" in said.err
+
+
+# --- interrupts
+
+
+def test_nothing_finished_leaves_nothing(podusv: Podusv, monkeypatch: pytest.MonkeyPatch) -> None:
+    lost = Outcome(failure=INTERRUPTED, cut=True)
+    monkeypatch.setattr(comparing, "run_all", lambda jobs, *rest: [lost] * len(jobs))
+    assert podusv(write("two.yaml", TWO), "--out", "x") == (130, "", "")
+    assert [path.name for path in Path().iterdir()] == ["two.yaml"]
+
+
+def test_runs_that_all_die_are_reported(podusv: Podusv, monkeypatch: pytest.MonkeyPatch) -> None:
+    lost = Outcome(failure="its process ended with exit code -9, 2 times")
+    monkeypatch.setattr(comparing, "run_all", lambda jobs, *rest: [lost] * len(jobs))
+    config = write("two.yaml", TWO + claim("C1", "soft.iae < stiff.iae"))
+    said = podusv(config, "--out", "x")
+    assert said.code == 3
+    assert said.err.splitlines() == [
+        "stiff: its process ended with exit code -9, 2 times",
+        "soft: its process ended with exit code -9, 2 times",
+    ]
+    assert "soft.iae: soft has no log: its process ended with exit code -9" in said.out
+    assert Path("x/comparison.csv").read_text().startswith("metric,unit,stiff,soft")
+
+
+LONG = BASE.replace("duration: 1.0", "duration: 2e5, step: 1e-3") + "log: {every: 1000}\n"
+
+
+@contextmanager
+def under_way(*words: str) -> Iterator[subprocess.Popen[str]]:
+    """`podusv` in a session of its own; nothing of it is left behind."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "podusv_cli", *words],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    try:
+        yield process
+    finally:
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.communicate()
+
+
+def wait_for(pattern: str) -> None:
+    """Wait until a file of this name is there."""
+    end = time.monotonic() + 60
+    while not list(Path().glob(pattern)):
+        assert time.monotonic() < end, f"there is no {pattern}"
+        time.sleep(0.01)
+
+
+def send(process: subprocess.Popen[str], number: signal.Signals, times: int) -> None:
+    """As a terminal does it: SIGINT to all processes; SIGTERM to the first alone."""
+    for _ in range(times):
+        if number == signal.SIGINT:
+            os.killpg(process.pid, number)
+        else:
+            process.send_signal(number)
+        time.sleep(0.2)
+
+
+SIGNALS = [(signal.SIGINT, 130), (signal.SIGTERM, 143)]
+
+
+@pytest.mark.parametrize(("number", "code"), SIGNALS)
+@pytest.mark.parametrize("times", [1, 3])
+def test_an_interrupted_comparison_keeps_what_it_has(
+    podusv: Podusv, number: signal.Signals, code: int, times: int
+) -> None:
+    write("short.yaml", BASE)
+    write("long.yaml", LONG)
+    with under_way("compare", "short.yaml", "long.yaml", "--out", "x") as process:
+        wait_for(".x.podusv-*.part/new/short/manifest.json")
+        send(process, number, times)
+        out, err = process.communicate(timeout=30)
+        assert process.returncode == code, err
+        with pytest.raises(ProcessLookupError):
+            os.killpg(process.pid, 0)
+    assert "long: interrupted after t = " in err
+    assert "Traceback" not in err
+    assert "compared 2 runs: x" in out
+    assert manifest.check(Path("x")).status == "interrupted"
+    assert manifest.check(Path("x/short")).status == "finished"
+    assert manifest.check(Path("x/long")).status == "interrupted"
+    assert not list(Path().glob(".x*"))
+
+
+@pytest.mark.parametrize(("number", "code"), SIGNALS)
+def test_an_interrupt_while_drawing_costs_the_figures_only(
+    podusv: Podusv, number: signal.Signals, code: int
+) -> None:
+    config = write("two.yaml", TWO)
+    with under_way("compare", config, "--out", "x") as process:
+        wait_for(".x.podusv-*.part/new/comparison.csv")
+        send(process, number, 1)
+        out, err = process.communicate(timeout=30)
+        assert process.returncode == code, err
+        with pytest.raises(ProcessLookupError):
+            os.killpg(process.pid, 0)
+    assert "compared 2 runs: x" in out
+    assert "Traceback" not in err
+    assert manifest.check(Path("x")).status == "interrupted"
+    assert manifest.check(Path("x/soft")).status == "finished"
+    assert Path("x/report.html").is_file()
+    assert not Path("x/figures").exists()
+
+
+def soon(number: signal.Signals, work: Callable[..., object]) -> Callable[..., object]:
+    """The work, with a signal to this process twice after it has begun."""
+
+    def begun(*args: object, **options: object) -> object:
+        for delay in (0.1, 0.2):
+            threading.Timer(delay, os.kill, (os.getpid(), number)).start()
+        return work(*args, **options)
+
+    return begun
+
+
+def run_until_stopped(capsys: pytest.CaptureFixture[str], *words: str) -> Said:
+    """`podusv run` in this process."""
+    with pytest.raises(SystemExit) as ended, pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", ["podusv", "run", *words])
+        cli.main()
+    return Said(ended.value.code, *capsys.readouterr())
+
+
+@pytest.mark.parametrize(("number", "code"), SIGNALS)
+def test_an_interrupted_run_is_kept(
+    podusv: Podusv, number: signal.Signals, code: int,
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    monkeypatch.setattr(running, "simulate", soon(number, running.simulate))
+    said = run_until_stopped(capsys, write("long.yaml", LONG), "--out", "x")
+    assert said.code == code
+    assert said.err.startswith("long.yaml: interrupted after t = ")
+    assert manifest.check(Path("x")).status == "interrupted"
+    assert 0 < open_run(Path("x")).recording["time"][-1] < 2e5
+
+
+@pytest.mark.parametrize(("number", "code"), SIGNALS)
+@pytest.mark.parametrize("stage", ["_drawn", "_cost"])
+def test_a_run_that_is_interrupted_after_its_simulation_is_whole(
+    podusv: Podusv, number: signal.Signals, code: int, stage: str,
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    monkeypatch.setattr(running, stage, soon(number, lambda *given: time.sleep(60)))
+    said = run_until_stopped(capsys, write("short.yaml", BASE), "--out", "x")
+    assert said.code == code
+    assert said.err.startswith("short.yaml: interrupted after the simulation; the log is whole")
+    assert manifest.check(Path("x")).status == "interrupted"
+    assert open_run(Path("x")).recording.status == "finished"
+    assert not Path("x/figures").exists()
