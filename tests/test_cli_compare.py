@@ -386,11 +386,10 @@ def test_an_interrupt_while_drawing_costs_the_figures_only(
 
 
 def soon(number: signal.Signals, work: Callable[..., object]) -> Callable[..., object]:
-    """The work, with a signal to this process twice after it has begun."""
+    """The work, with a signal to this process after it has begun."""
 
     def begun(*args: object, **options: object) -> object:
-        for delay in (0.1, 0.2):
-            threading.Timer(delay, os.kill, (os.getpid(), number)).start()
+        threading.Timer(0.1, os.kill, (os.getpid(), number)).start()
         return work(*args, **options)
 
     return begun
@@ -398,9 +397,10 @@ def soon(number: signal.Signals, work: Callable[..., object]) -> Callable[..., o
 
 def run_until_stopped(capsys: pytest.CaptureFixture[str], *words: str) -> Said:
     """`podusv run` in this process."""
-    with pytest.raises(SystemExit) as ended, pytest.MonkeyPatch.context() as patch:
+    with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys, "argv", ["podusv", "run", *words])
-        cli.main()
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
     return Said(ended.value.code, *capsys.readouterr())
 
 

@@ -5,32 +5,49 @@ import math
 import numpy as np
 import pytest
 
-from podusv_cli.comparison.parsing import ExpressionError, parse
+from podusv_cli.comparison.conditions import Evidence
+from podusv_cli.comparison.parsing import ExpressionError, parse, renamed
 
 
 class Planted:
     """A run with known numbers: z_e falls linearly from 10 m to 0 over 10 s."""
 
-    def __init__(self, scale: float = 1.0, finished: bool = True) -> None:
-        self.scale, self.is_finished = scale, finished
+    def __init__(self, scale: float = 1.0, until: float = 10.0, every: int = 1) -> None:
+        self.scale, self.until, self.every = scale, until, every
+        self.ending = "" if until == 10.0 else f"diverged at t = {until:g} s"
 
     def metric(self, name: str) -> float:
-        return {"iae": 50.0, "peak_tau_u": 300.0}.get(name, math.nan) * self.scale
+        scale = math.nan if self.ending else self.scale
+        return {"iae": 50.0, "peak_tau_u": 300.0}.get(name, math.nan) * scale
 
     def signal(self, name: str) -> np.ndarray:
         t = np.linspace(0.0, 10.0, 101)
-        return {"time": t, "z_e": self.scale * (10.0 - t), "x_d": 0.5 * t}.get(name, np.empty(0))
+        t = t[t <= self.until + 1e-9][:: self.every]
+        known = {"time": t, "z_e": self.scale * (10.0 - t), "x_d": 0.5 * t, "tau_u": 0 * t + 2.0}
+        return known.get(name, np.empty(0))
 
-    def check(self, name: str) -> bool:
-        return self.is_finished
+    def check(self, name: str) -> bool | None:
+        return None if self is RUNS["cut"] else not self.ending
 
 
-RUNS = {"a": Planted(), "b": Planted(2.0), "c": Planted(1.01), "lost": Planted(math.nan, False)}
+RUNS = {
+    "a": Planted(),
+    "b": Planted(2.0),
+    "c": Planted(1.01),
+    "lost": Planted(until=8.1),
+    "cut": Planted(until=3.0),
+    "thin": Planted(every=30),  # logged up to 9 s
+}
+
+
+def judged(text: str, tolerance: float = 0.05) -> tuple[bool | None, Evidence]:
+    found = Evidence()
+    return parse(text, RUNS).holds(RUNS, tolerance, found), found
 
 
 def verdict(text: str, tolerance: float = 0.05):
-    numbers: dict[str, float] = {}
-    return parse(text, RUNS).holds(RUNS, tolerance, numbers), numbers
+    answer, found = judged(text, tolerance)
+    return answer, found.numbers
 
 
 @pytest.mark.parametrize(
@@ -57,16 +74,92 @@ def test_planted_claims_of_every_kind(kind, true, false):
 
 
 @pytest.mark.parametrize(
-    "text",
+    ("text", "why"),
     [
-        "a.iae < c.iae",  # closer than the tolerance
-        "lost.iae < a.iae",
-        "max(a.z_e, 5, 20) < 100",  # the run ends before the window does
-        "a.rmse < 1",  # this run has no such metric
+        ("a.iae < c.iae", "a.iae and c.iae differ by no more than the tolerance of 0.05"),
+        ("lost.iae < a.iae", "lost.iae: lost diverged at t = 8.1 s"),
+        ("max(a.z_e, 5, 20) < 100", "max(a.z_e, 5, 20): a ends at 10 s"),
+        ("a.rmse < 1", "a.rmse: this run has none (root of the mean of z_e^2)"),
+        ("max(a.psi_e) < 1", "a.psi_e: a does not log it"),
+        ("finished(cut)", "finished(cut): cut diverged at t = 3 s"),
+        ("max(lost.z_e) < 100", "max(lost.z_e): lost diverged at t = 8.1 s"),
+        ("max(lost.z_e, 0, 8.2) < 100", "max(lost.z_e, 0, 8.2): lost diverged at t = 8.1 s"),
+        ("max(a.z_e - lost.z_e, 0, 9) < 1", "max(a.z_e - lost.z_e, 0, 9): lost diverged"),
+        ("max(thin.z_e, 4, 5) < 1", "max(thin.z_e, 4, 5): nothing is logged in this window"),
+        ("integral(thin.z_e, 5, 7) < 1", "integral(thin.z_e, 5, 7) is no finite number"),
+        ("variation(thin.z_e, 5, 7) < 1", "variation(thin.z_e, 5, 7) is no finite number"),
+        ("a.iae / (a.iae - a.iae) < 1", "a.iae / (a.iae - a.iae) is no finite number"),
+        ("max(1 / (a.z_e - a.z_e)) < 1", "is no finite number"),
     ],
 )
-def test_what_cannot_be_told(text):
-    assert verdict(text)[0] is None
+def test_what_cannot_be_told_and_why(text, why):
+    answer, found = judged(text)
+    assert answer is None
+    assert len(found.doubts) == 1
+    assert why in found.doubts[0]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "max(lost.z_e, 0, 2) == 10",
+        "min(lost.z_e, 0, 8.1) == 1.9",  # up to its last instant
+        "max(rate(lost.x_d), 1, 2) == 0.5",
+        "mean(abs(a.z_e - lost.z_e), 0, 8) == 0",
+        "final(thin.z_e) == 1",  # logged up to 9 s, simulated up to 10 s
+        "final(thin.z_e, 0, 10) == 1",
+    ],
+)
+def test_windows_that_a_run_covers_are_judged_whatever_became_of_it(text):
+    assert judged(text, tolerance=1e-9) == (True, judged(text)[1])
+    assert not judged(text)[1].doubts
+
+
+def test_both_ends_of_a_window_belong_to_it():
+    _, numbers = verdict("max(a.z_e, 2, 4) + 1000 * min(a.z_e, 2, 4) < 1")
+    assert list(numbers.values()) == pytest.approx([8.0 + 6000.0])
+
+
+@pytest.mark.parametrize(
+    ("sign", "answers"),
+    [
+        # left side 94, 95, 99, 100, 101, 105, 106 against 100 with a tolerance of 5 %
+        ("<", [True, None, None, None, None, None, False]),
+        (">", [False, None, None, None, None, None, True]),
+        ("<=", [True, True, True, True, True, True, False]),
+        (">=", [False, True, True, True, True, True, True]),
+        ("==", [False, True, True, True, True, True, False]),
+    ],
+)
+def test_every_sign_at_its_limits(sign, answers):
+    lefts = (94, 95, 99, 100, 101, 105, 106)
+    assert [verdict(f"{left} {sign} 2 * a.iae")[0] for left in lefts] == answers
+
+
+@pytest.mark.parametrize(("sign", "answer"), [("<", False), (">", False), ("<=", True),
+                                              (">=", True), ("==", True)])  # fmt: skip
+def test_equal_numbers_without_tolerance(sign, answer):
+    assert verdict(f"a.iae {sign} 50", tolerance=0.0)[0] is answer
+
+
+def test_the_tolerance_of_an_order_is_of_the_larger_number():
+    assert verdict("95.1 < 2 * a.iae")[0] is None
+    assert verdict("-100 < -95.1 * a.iae / a.iae")[0] is None
+    assert verdict("-106 < -2 * a.iae")[0] is True
+
+
+def test_an_integral_knows_its_time():
+    assert verdict("integral(thin.tau_u) == 18", tolerance=1e-9)[0] is True
+    assert verdict("mean(thin.tau_u, 5, 7) == 2", tolerance=1e-9)[0] is True
+
+
+def test_names_of_a_scenario_stand_for_other_runs():
+    text, called = "a.iae < b.iae and max(a.z_e, 0, 1) > 1 and finished(a)", {"a": "b", "b": "a"}
+    found = Evidence()
+    assert parse(text, RUNS, called).holds(RUNS, 0.0, found) is False
+    assert list(found.numbers) == ["b.iae", "a.iae", "max(b.z_e, 0, 1)", "finished(b)"]
+    assert renamed(text, called) == "b.iae < a.iae and max(b.z_e, 0, 1) > 1 and finished(b)"
+    assert renamed(text, {"a": "a"}) == text
 
 
 def test_a_false_part_decides_even_beside_an_unknown_one():
@@ -90,7 +183,7 @@ def test_the_numbers_are_shown_by_their_text():
         ("a.iae", "is no condition"),
         ("a.z_e < 3", "runs over time: sum it up with one of"),
         ("a.ia < 3", "unknown signal or metric 'ia'; did you mean 'iae'?"),
-        ("d.iae < 3", "unknown run 'd' (allowed: a, b, c, lost)"),
+        ("d.iae < 3", "unknown run 'd' (allowed: a, b, c, cut, lost, thin)"),
         ("maximum(a.z_e) < 3", "unknown function 'maximum'"),
         ("max(a.iae) < 3", "is a number, a signal is wanted"),
         ("max(a.z_e, 5) < 3", "takes a signal, or a signal and two times"),
@@ -109,6 +202,15 @@ def test_the_numbers_are_shown_by_their_text():
         ("a.iae <", "cannot read"),
         ("", "cannot read"),
         ("(" * 300 + ")" * 300, "is longer than 500 characters"),
+        ("-" * 100 + "1 < a.iae", "is nested more than 60 deep"),
+        ("1e400 < a.iae", "a number is too large"),
+        ("9" * 400 + " < a.iae", "a number is too large"),
+        ("max(a.W_hat_u) < 1", "'W_hat_u' has a value for every node; take W_norm_u"),
+        ("max(a.W_hat_r) < 1", "'W_hat_r' has a value for every node; take W_norm_r"),
+        ("max(a.rbf_center) < 1", "'rbf_center' does not run over time"),
+        ("max(a.rbf_width) < 1", "'rbf_width' does not run over time"),
+        ("(lambda: 1) < a.iae", "has no meaning here"),
+        ("max(a.z_e, 2, 2) < 3", "the first time must lie before the second"),
     ],
 )
 def test_what_means_nothing_gets_a_sentence(text, says):

@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from podusv_cli.comparison.expressions import Evidence, Sources
+from podusv_cli.comparison.conditions import Evidence
+from podusv_cli.comparison.expressions import Sources
 from podusv_cli.comparison.parsing import ExpressionError, parse, renamed
 from podusv_cli.config.scenario import Claim, Scenario
 

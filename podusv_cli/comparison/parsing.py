@@ -10,22 +10,18 @@ from functools import singledispatchmethod
 import numpy as np
 
 from podusv_cli.comparison.checks import CHECKS
+from podusv_cli.comparison.conditions import Checked, Compared, Condition, Denied, Joined
 from podusv_cli.comparison.expressions import (
     MAPPERS,
     REDUCERS,
     Applied,
-    Checked,
-    Compared,
-    Condition,
-    Denied,
-    Joined,
     MetricOf,
     Number,
     Rate,
     Reduced,
     SignalOf,
     Term,
-)
+)  # fmt: skip
 from podusv_cli.config.words import unknown
 from podusv_cli.derived import DERIVED
 from podusv_cli.logbook.layout import FIXED_AXES

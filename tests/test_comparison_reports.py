@@ -1,0 +1,306 @@
+"""Table, differences, verdicts and report as texts, from numbers planted by hand."""
+
+import math
+import re
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from podusv_cli import comparing
+from podusv_cli.cli.progress import progress_bars
+from podusv_cli.comparison import claims, report, table
+from podusv_cli.comparison.checks import CHECKS
+from podusv_cli.comparison.claims import Stated
+from podusv_cli.comparison.differences import differences
+from podusv_cli.comparison.entries import Absent, Entry
+from podusv_cli.config.loading import load_text
+from podusv_cli.config.scenario import Claim
+from podusv_cli.metrics import cost
+from podusv_cli.recording import Recording
+
+SCENARIO = """
+name: planted
+description: What the <test> is for.
+vessel: {preset: paper_nonlinear}
+path: {kind: line}
+disturbance: {kind: harmonic}
+actuator: {kind: saturated}
+simulation: {duration: 4.0}
+controller: {kind: pid}
+"""
+# A key of every section that a run has besides its law, and another value.
+OTHERWISE = {
+    "vessel.m": "24.5", "nominal.m": "24.5", "start.x": "1.5", "path.speed": "0.25",
+    "disturbance.b_u.mean": "0.75", "actuator.surge_limit": "4.0", "simulation.step": "0.02",
+    "simulation.duration": "5.0", "control.period": "0.1", "log.every": "2",
+    "metrics.settling_radius": "3.0",
+}  # fmt: skip
+FRAME = table.table(
+    {
+        "a": {"iae": 4.0, "law_ns": 10.0, "energy": 0.0},
+        "b": {"iae": 2.0, "law_ns": math.nan, "energy": 3.0},
+        "c": {"iae": 8.0, "law_ns": 5.0, "energy": 1.0},
+        "lost": {},
+    }
+)
+
+
+def scenario(*overrides):
+    return load_text(SCENARIO, "a.yaml", overrides).scenario
+
+
+class Folder:
+    """What an entry needs of a run folder."""
+
+    def __init__(self, metrics, status="finished", message=""):
+        self.metrics = metrics
+        t = np.linspace(0.0, 3.0, 4)
+        signals = {"time": t, "x": 2 * t, "x_d": 3 * t, "u": t}
+        self.recording = Recording(status, "pid", signals, message=message)
+
+
+# --- table
+
+
+def test_cells_have_number_mark_and_ratio():
+    assert table.cells(FRAME) == [
+        ["iae", "m s", "4", "2* (0.5)", "8 (2)", "-"],
+        ["energy", "J", "0*", "3", "1", "-"],
+        ["law_ns", "ns", "10", "-", "5* (0.5)", "-"],
+    ]
+
+
+def test_csv_has_units_first_and_ratios_last():
+    full = table.with_ratios(FRAME)
+    assert list(full) == ["unit", "a", "b", "c", "lost", "b/a", "c/a", "lost/a"]
+    assert full.loc["iae", ["b/a", "c/a"]].tolist() == [0.5, 2.0]
+    assert full.loc["energy", ["b/a", "lost/a"]].isna().all()
+    assert table.as_csv(FRAME).splitlines()[1] == "iae,m s,4.0,2.0,8.0,,0.5,2.0,"
+
+
+def test_a_table_without_numbers_is_a_table():
+    frame = table.table({"a": {}, "b": {}})
+    assert table.as_csv(frame) == "metric,unit,a,b,b/a\n"
+    assert table.cells(frame) == []
+    assert r"\begin{tabular}{llrr}" in table.as_latex(frame)
+
+
+def test_markdown_tells_how_runs_ended():
+    text = table.as_markdown(FRAME, {"a": "", "lost": "killed"})
+    lines = text.splitlines()
+    assert lines[0] == "| metric | unit | a | b | c | lost |"
+    assert lines[1] == "| --- | --- | ---: | ---: | ---: | ---: |"
+    assert lines[2] == "| iae | m s | 4 | 2* (0.5) | 8 (2) | - |"
+    assert lines[-2:] == ["", "- lost: killed"]
+    assert table.as_markdown(FRAME, {"a": ""}).endswith(table.NOTE + "\n")
+
+
+def test_latex_escapes_and_marks():
+    frame = table.table({"a_b&~^\\{}": {"iae": 1.0}, "#$%": {"iae": 2.0}})
+    lines = table.as_latex(frame).splitlines()
+    head = r"a\_b\&\textasciitilde{}\textasciicircum{}\textbackslash{}\{\} & \#\$\% \\"
+    assert lines[2].endswith(head)
+    assert lines[4] == r"iae & m s & \textbf{1} & 2 (2) \\"
+
+
+# --- differences
+
+
+@pytest.mark.parametrize("key", OTHERWISE)
+def test_a_difference_in_any_section_is_found(key):
+    other = scenario(f"{key}={OTHERWISE[key]}")
+    found = differences({"a": scenario().model_dump(), "b": other.model_dump()})
+    also = {"vessel.m": ["nominal.m"]}.get(key, [])  # the law is told about the vessel as it is
+    assert list(found) == [key, *also]
+    assert found[key]["b"] == float(OTHERWISE[key]) != found[key]["a"]
+
+
+def test_every_section_of_a_scenario_is_looked_at():
+    sections = {key.partition(".")[0] for key in OTHERWISE}
+    rest = {"name", "description", "controller", "controllers", "claims"}
+    assert sections | rest == set(type(scenario()).model_fields)
+
+
+@pytest.mark.parametrize("key", ["name=b", "description=b", "controller.K_Pu=3"])
+def test_names_and_laws_are_no_difference(key):
+    assert not differences({"a": scenario().model_dump(), "b": scenario(key).model_dump()})
+
+
+def test_a_key_that_a_run_lacks_is_a_difference():
+    other = scenario("disturbance.kind=none").model_dump()
+    found = differences({"a": scenario().model_dump(), "b": other})
+    assert found["disturbance.kind"] == {"a": "harmonic", "b": "none"}
+    assert found["disturbance.b_u.mean"]["b"] is None
+
+
+# --- entries
+
+
+def test_an_entry_answers_for_its_run():
+    entry = Entry("a", Folder({"iae": 3.0, "rmse": None, "law_ns": 7.0}), scenario(), {"law_ns": 9})
+    assert (entry.metric("iae"), entry.metric("law_ns")) == (3.0, 9.0)
+    assert math.isnan(entry.metric("rmse"))
+    assert math.isnan(entry.metric("ise"))
+    assert entry.signal("x_e").tolist() == [0, 1, 2, 3]
+    assert len(entry.signal("y_e")) == len(entry.signal("W_norm_u")) == len(entry.signal("v")) == 0
+    assert (entry.until, entry.ending) == (4.0, "")
+    assert entry.check("finished") is True
+
+
+def test_an_entry_that_diverged_has_no_metrics_and_ends_early():
+    run = Folder({"iae": 3.0}, "diverged", "diverged at t = 3.5 s: u is not finite; last ...")
+    entry = Entry("a", run, scenario(), {"law_ns": 9.0})
+    assert math.isnan(entry.metric("iae"))
+    assert math.isnan(entry.metric("law_ns"))
+    assert (entry.until, entry.ending) == (3.0, "diverged at t = 3.5 s")
+    assert entry.check("finished") is False
+    assert entry.check("underactuated") is True
+
+
+def test_an_absent_run_has_nothing_but_its_scenario():
+    absent = Absent(scenario(), "Traceback\n  File\nZeroDivisionError: oops\n")
+    assert absent.ending == "has no log: ZeroDivisionError: oops"
+    assert math.isnan(absent.metric("iae"))
+    assert (len(absent.signal("x")), absent.until) == (0, 0.0)
+    assert absent.check("finished") is None
+    assert absent.check("underactuated") is True
+
+
+def test_whether_an_interrupted_run_would_have_finished_cannot_be_told():
+    assert CHECKS["finished"](scenario(), "interrupted") is None
+
+
+# --- verdicts
+
+
+def verdicts():
+    runs = {
+        "a": Entry("a", Folder({"iae": 3.0}), scenario()),
+        "lost": Absent(scenario(), "killed"),
+    }
+    texts = {
+        "C1": "x.iae == 3", "C2": "x.iae > 4", "C3": "lost.iae < x.iae", "C4": "1 / 3 < 0 * x.iae",
+    }  # fmt: skip
+    stated = [
+        Stated(
+            name,
+            Claim(says="a | <b>", source="here", expect=text, remark="Not <stated>."),
+            {"x": "a", "lost": "lost"},
+        )
+        for name, text in texts.items()
+    ]
+    return claims.judge(stated, runs)
+
+
+def test_verdicts_have_numbers_reasons_and_the_labels_of_the_comparison():
+    found = {verdict.name: verdict.as_json() for verdict in verdicts()}
+    assert [v["verdict"] for v in found.values()] == [
+        "reproduced", "not reproduced", "cannot tell", "not reproduced",
+    ]  # fmt: skip
+    assert found["C1"]["expect"] == "a.iae == 3"
+    assert found["C1"]["numbers"] == {"a.iae": 3.0}
+    assert found["C1"]["reason"] == ""
+    assert found["C3"]["numbers"] == {"lost.iae": None, "a.iae": 3.0}
+    assert found["C3"]["reason"] == "lost.iae: lost has no log: killed"
+    assert verdicts()[2].shown() == "a.iae = 3; lost.iae: lost has no log: killed"
+
+
+def test_claims_in_markdown_stay_in_their_cells():
+    lines = claims.as_markdown(verdicts()).splitlines()
+    assert lines[2] == (
+        r"| C1 | a \| <b> (here) | **reproduced** | `a.iae == 3`, tolerance 0.05 | a.iae = 3 |"
+    )
+    assert lines[-1] == "- C4: Not <stated>."
+
+
+# --- report
+
+
+def page(**parts):
+    story = {
+        "title": "planted", "scenario": scenario(),
+        "controllers": {"a": scenario().controller}, "endings": {"a": "", "lost": "killed <9>"},
+        "differences": {"start.x": {"a": 1.0, "lost": [1.0, 2.5]}}, "table": FRAME,
+        "verdicts": verdicts(), "figures": [("errors", "x_e & y_e", b"<svg/>")],
+        "provenance": {"git": {"commit": "abc"}},
+    }  # fmt: skip
+    return report.page(report.Story(**story | parts))
+
+
+def test_the_report_tells_how_runs_ended_and_differ():
+    text = page()
+    assert "Not all runs finished:<ul><li><b>lost</b>: killed &lt;9&gt;</li></ul>" in text
+    assert "<tr><th>key</th><th>a</th><th>lost</th></tr>" in text
+    assert "<tr><td>start.x</td><td>1</td><td>1 2.5</td></tr>" in text
+    assert "Not all runs finished" not in page(endings={"a": ""})
+    assert "differ in more" not in page(differences={})
+
+
+def test_the_report_has_the_table_with_numbers_to_the_right():
+    number = "<td class=number>".replace('"', "")
+    assert (
+        f"<tr><td>iae</td><td>m s</td>{number}4</td>{number}<b>2 (0.5)</b></td>{number}8 (2)</td>"
+        f"{number}-</td></tr>"
+    ) in page()
+    assert "<th>unit</th><th class=number>a</th>" in page()
+
+
+def test_the_report_has_every_verdict_escaped():
+    text = page()
+    assert "<b class='reproduced'>reproduced</b>" in text
+    assert "<b class='not'>not reproduced</b>" in text
+    assert "<b class='cannot'>cannot tell</b>" in text
+    assert "a | &lt;b&gt; <small>(here)</small><br><small>Not &lt;stated&gt;.</small>" in text
+    assert "<code>lost.iae &lt; a.iae</code>, tolerance 0.05" in text
+    assert "lost.iae: lost has no log: killed" in text
+    assert "<b>" not in re.sub(r"</?b>", "", text)
+    assert "Claims" not in page(verdicts=[])
+
+
+def test_the_report_has_scenario_figures_and_provenance():
+    text = page()
+    assert "<p>What the &lt;test&gt; is for.</p>" in text
+    assert "<figcaption>errors: x_e &amp; y_e</figcaption>" in text
+    assert "<td>git.commit</td><td>abc</td>" in text
+    assert "<b>controller a</b>" in text
+    assert "surge_limit 8" in text
+    assert "Figures" not in page(figures=[])
+
+
+# --- costs, names, progress
+
+
+def test_costs_are_median_and_quartiles(monkeypatch):
+    clock = iter(range(1, 51))
+    monkeypatch.setattr(cost, "replayer", lambda loop, recording: lambda: float(next(clock)))
+    first, second = cost.law_costs([(None, None), (None, None)])  # 1, 3 .. 49 and 2, 4 .. 50
+    assert first == {"law_ns": 25.0, "law_ns_low": 13.0, "law_ns_high": 37.0}
+    assert second == {"law_ns": 26.0, "law_ns_low": 14.0, "law_ns_high": 38.0}
+
+
+def test_names_are_told_apart():
+    assert comparing.told_apart(["a", "a", "a_2", "b", "a"]) == ["a", "a_2", "a_2_2", "b", "a_3"]
+    assert comparing.told_apart(["figures", "unit"], comparing.RESERVED) == ["figures_2", "unit_2"]
+
+
+def test_drawing_is_progress_too(monkeypatch):
+    seen = []
+    t = np.linspace(0, 1, 5)
+    signals = dict.fromkeys(("time", "x", "y", "x_d", "y_d", "psi", "u", "v", "r"), t)
+    run = Folder({})
+    run.recording = Recording("finished", "pid", signals)
+    entry = Entry("a", run, scenario())
+    result = comparing.Result([], [entry], {}, {}, pd.DataFrame(), [], {})
+    monkeypatch.setattr("podusv_cli.figures.style.FORMATS", {"png": None})
+    drawn = comparing.drawn(result, lambda name, fraction: seen.append((name, fraction)))
+    assert "velocities.png" in drawn
+    assert {name for name, _ in seen} == {"drawing figures"}
+    fractions = [fraction for _, fraction in seen]
+    assert fractions == sorted(fractions)
+    assert (fractions[0], fractions[-1]) == (0.0, 1.0)
+
+
+def test_there_is_no_bar_without_a_terminal():
+    with progress_bars(wanted=True) as advance:
+        assert advance is None
