@@ -215,13 +215,15 @@ def as_report(
     result: Result, title: str, figures: Mapping[str, bytes], provenance: Mapping[str, Any]
 ) -> str:
     """The report; `figures` as `drawn` gives them."""
-    from podusv_cli.figures.drawing import FIGURES  # matplotlib is slow to import
+    pictures: list[tuple[str, str, bytes]] = []
+    if figures:
+        from podusv_cli.figures.drawing import FIGURES  # matplotlib is slow to import
 
-    pictures = [
-        (name, sheet.caption, figures[f"{name}.svg"])
-        for name, sheet in FIGURES.items()
-        if f"{name}.svg" in figures
-    ]
+        pictures = [
+            (name, sheet.caption, figures[f"{name}.svg"])
+            for name, sheet in FIGURES.items()
+            if f"{name}.svg" in figures
+        ]
     story = report.Story(
         title=title, scenario=result.parts[0].scenario,
         controllers={part.label: part.scenario.controller for part in result.parts},

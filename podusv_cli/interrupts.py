@@ -108,10 +108,16 @@ class Extras:
 
     def attempt(self, work: Callable[[], Result]) -> Result | None:
         """What the work returns, or None where an interrupt came before its end."""
-        if not self.interrupted:
+        if self.interrupted:
+            return None
+        with interrupts_caught() as here:
             try:
                 with interrupts_heard():
                     return work()
             except KeyboardInterrupt:
-                self.interrupted = True
+                pass
+            except Exception:
+                if not here.number:  # machine code may turn an interrupt into another exception
+                    raise
+        self.interrupted = True
         return None

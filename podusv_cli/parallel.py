@@ -15,7 +15,7 @@ from multiprocessing.process import BaseProcess
 from typing import Any
 
 from podusv_cli.errors import PodusvError
-from podusv_cli.interrupts import interrupts_heard, interrupts_held
+from podusv_cli.interrupts import Interrupts, interrupts_caught, interrupts_heard, interrupts_held
 
 Progress = Callable[[float], None]
 Job = Callable[[Progress], Any]
@@ -124,11 +124,11 @@ def _started(shift: _Shift, position: int) -> _Worker:
 
 def _work(job: Job, channel: Connection) -> None:
     # Where nobody listens any more there is nobody to tell.
-    with interrupts_held(), suppress(BrokenPipeError):
-        channel.send(_outcome(job, channel.send))
+    with interrupts_caught() as interrupts, interrupts_held(), suppress(BrokenPipeError):
+        channel.send(_outcome(job, channel.send, interrupts))
 
 
-def _outcome(job: Job, progress: Progress) -> Outcome:
+def _outcome(job: Job, progress: Progress, interrupts: Interrupts) -> Outcome:
     try:
         return Outcome(job(progress))
     except BrokenPipeError:
@@ -137,8 +137,8 @@ def _outcome(job: Job, progress: Progress) -> Outcome:
         return Outcome(failure=str(error))
     except KeyboardInterrupt:
         return Outcome(failure=INTERRUPTED)
-    except Exception:
-        return Outcome(failure=traceback.format_exc())
+    except Exception:  # machine code may turn an interrupt into another exception
+        return Outcome(failure=INTERRUPTED if interrupts.number else traceback.format_exc())
 
 
 def _listen(shift: _Shift, worker: _Worker, progress: Callable[[int, float], None] | None) -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from podusv_cli.errors import StorageError
 from podusv_cli.figures import drawing
-from podusv_cli.interrupts import interrupts_heard
+from podusv_cli.interrupts import Extras, Interrupts, interrupts_heard, interrupts_held
 from podusv_cli.parallel import INTERRUPTED, Outcome, run_all
 
 
@@ -119,3 +119,35 @@ def test_an_interrupt_while_figures_are_drawn_is_one_and_no_bug(
     )
     with pytest.raises(KeyboardInterrupt):
         list(drawing.draw_in_parallel([], ["errors", "loads"], ["png"]))
+
+
+def test_an_interrupt_that_became_another_exception_is_one(tmp_path):
+    def confused(progress=None):
+        try:
+            os.kill(os.getpid(), signal.SIGTERM)
+            time.sleep(60)
+        except KeyboardInterrupt as error:
+            raise SystemError("returned a result with an exception set") from error
+
+    with interrupts_held():
+        extras = Extras()
+        assert extras.attempt(confused) is None
+    assert extras.interrupted
+    assert extras.attempt(lambda: 1) is None
+
+
+def test_other_exceptions_of_extras_are_raised():
+    with interrupts_held(), pytest.raises(ZeroDivisionError):
+        Extras().attempt(lambda: 1 / 0)
+
+
+def test_held_interrupts_come_when_they_are_heard():
+    with interrupts_held():
+        os.kill(os.getpid(), signal.SIGTERM)
+        os.kill(os.getpid(), signal.SIGINT)  # an echo of the first
+        time.sleep(0.01)
+        with pytest.raises(KeyboardInterrupt), interrupts_heard():
+            time.sleep(60)
+        with interrupts_heard():
+            time.sleep(0.01)
+    assert not isinstance(signal.getsignal(signal.SIGTERM), Interrupts)

@@ -12,7 +12,7 @@ from typing import ParamSpec
 import typer
 
 from podusv_cli.errors import PodusvError, StorageError
-from podusv_cli.interrupts import interrupts_caught
+from podusv_cli.interrupts import Interrupts, interrupts_caught
 
 Given = ParamSpec("Given")
 SIGNALLED = 128  # and the signal's number: 130 for SIGINT, 143 for SIGTERM
@@ -28,7 +28,7 @@ def guarded(command: Callable[Given, None]) -> Callable[Given, None]:
     @wraps(command)
     def run(*args: Given.args, **kwargs: Given.kwargs) -> None:
         with interrupts_caught() as interrupts:
-            code = _code_of(lambda: command(*args, **kwargs))
+            code = _code_of(lambda: command(*args, **kwargs), interrupts)
             # What was interrupted says so in one way; which signal it was, the shell wants to know.
             signalled = code == INTERRUPTED and interrupts.number
             raise typer.Exit(SIGNALLED + interrupts.number if signalled else code)
@@ -36,7 +36,7 @@ def guarded(command: Callable[Given, None]) -> Callable[Given, None]:
     return run
 
 
-def _code_of(command: Callable[[], None]) -> int:
+def _code_of(command: Callable[[], None], interrupts: Interrupts) -> int:
     try:
         command()
     except (typer.Abort, typer.BadParameter):
@@ -44,6 +44,9 @@ def _code_of(command: Callable[[], None]) -> int:
     except typer.Exit as end:
         return end.exit_code
     except (Exception, KeyboardInterrupt) as error:
+        foreseen = isinstance(error, (PodusvError, OSError))
+        if interrupts.number and not foreseen:  # which machine code may have turned into anything
+            return INTERRUPTED
         return _exit_code(error)
     return 0
 

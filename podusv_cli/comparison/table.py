@@ -64,7 +64,8 @@ def _cell(number: float, first: float, best: float, position: int) -> str:
 
 def as_markdown(frame: pd.DataFrame, endings: Mapping[str, str]) -> str:
     """The table for people, in Markdown, and below it how runs ended that did not finish."""
-    told = [f"- {label}: {ending}" for label, ending in endings.items() if ending]
+    last = {label: ending.strip().splitlines()[-1:] for label, ending in endings.items()}
+    told = [f"- {label}: {line}" for label, lines in last.items() for line in lines]
     head = ["metric", "unit", *map(str, frame.columns)]
     lines = [head, ["---", "---", *["---:"] * len(frame.columns)], *cells(frame)]
     return (
