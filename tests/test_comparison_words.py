@@ -82,6 +82,7 @@ def test_planted_claims_of_every_kind(kind, true, false):
         ("a.rmse < 1", "a.rmse: this run has none (root of the mean of z_e^2)"),
         ("max(a.psi_e) < 1", "a.psi_e: a does not log it"),
         ("finished(cut)", "finished(cut): cut diverged at t = 3 s"),
+        ("not finished(cut)", "finished(cut): cut diverged at t = 3 s"),
         ("max(lost.z_e) < 100", "max(lost.z_e): lost diverged at t = 8.1 s"),
         ("max(lost.z_e, 0, 8.2) < 100", "max(lost.z_e, 0, 8.2): lost diverged at t = 8.1 s"),
         ("max(a.z_e - lost.z_e, 0, 9) < 1", "max(a.z_e - lost.z_e, 0, 9): lost diverged"),
