@@ -71,8 +71,7 @@ class Shown:
     @property
     def steady_from(self) -> float:
         """Start of the part that counts as settled [s]."""
-        fraction = self.scenario.metrics.steady_fraction
-        return (1.0 - fraction) * self.scenario.simulation.duration
+        return self.scenario.steady_from()
 
     @property
     def look(self) -> dict[str, Any]:
