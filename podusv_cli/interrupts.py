@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import signal
 import threading
 import time
@@ -20,19 +21,21 @@ ECHO = 5.0
 class Interrupts:
     """A handler of signals: raises KeyboardInterrupt, at once or when the signals are heard again.
 
-    `number` is the signal that came first, 0 as long as there was none.
+    `number` is the signal that came first, 0 as long as there was none. Once `ending` is set the
+    process is about to end, and signals, then and during its shutdown, change nothing any more.
     """
 
     def __init__(self) -> None:
         """Nothing came yet, and nothing is held."""
         self.number = 0
         self.held = False
+        self.ending = False
         self._waiting = False
         self._last = -ECHO
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
         """Take in a signal."""
-        if time.monotonic() - self._last < ECHO:
+        if self.ending or time.monotonic() - self._last < ECHO:
             return
         self._last, self.number = time.monotonic(), self.number or number
         self._waiting = True
@@ -49,14 +52,23 @@ class Interrupts:
 def interrupts_caught() -> Iterator[Interrupts]:
     """Both signals go to one `Interrupts`: to the one that is there, or else to a new one."""
     handlers = (signal.getsignal(number) for number in SIGNALS)
-    there = next((handler for handler in handlers if isinstance(handler, Interrupts)), None)
+    caught = (handler for handler in handlers if isinstance(handler, Interrupts))
+    there = next((handler for handler in caught if not handler.ending), None)
     here = there or Interrupts()
     before = {} if there else _install(here)
     try:
         yield here
     finally:
+        if before and here.ending:
+            atexit.register(_ignore)
         for number, handler in before.items():
-            signal.signal(number, handler)
+            signal.signal(number, here if here.ending else handler)
+
+
+def _ignore() -> None:
+    """Python puts back the system's handlers, which end the process, after its exit functions."""
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
 
 
 def _install(here: Interrupts) -> dict[signal.Signals, signal.Handlers]:

@@ -31,6 +31,7 @@ actuator: {kind: saturated}
 start: {x: -5.0, y: -2.0, u: 0.3}
 simulation: {duration: 1.0}
 controller: {kind: pid, K_Pu: 100.0}
+silence: [saturated] # the gains are large on purpose
 """
 TWO = BASE + "controllers: {stiff: {K_Pu: 200.0}, soft: {K_Pu: 5.0}}\n"
 
@@ -114,7 +115,8 @@ def test_json_has_the_documented_shape(podusv: Podusv) -> None:
     ]  # fmt: skip
     assert (found["format"], found["status"], found["folder"]) == (1, "finished", "x")
     for run, label in zip(found["runs"], ("stiff", "soft"), strict=True):
-        assert list(run) == ["format", "status", "run", "controller", "metrics", "timing"]
+        keys = ["format", "status", "run", "controller", "metrics", "timing", "warnings"]
+        assert list(run) == keys
         assert (run["status"], run["run"], run["controller"]) == ("finished", f"x/{label}", "pid")
         parts = {"compile_s", "engine_s", "write_s", "figures_s", "total_s"}
         assert parts <= set(run["timing"])

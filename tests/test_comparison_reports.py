@@ -118,7 +118,7 @@ def test_a_difference_in_any_section_is_found(key):
 
 def test_every_section_of_a_scenario_is_looked_at():
     sections = {key.partition(".")[0] for key in OTHERWISE}
-    rest = {"name", "description", "controller", "controllers", "claims"}
+    rest = {"name", "description", "controller", "controllers", "claims", "silence"}
     assert sections | rest == set(type(scenario()).model_fields)
 
 
@@ -291,7 +291,7 @@ def test_drawing_is_progress_too(monkeypatch):
     run = Folder({})
     run.recording = Recording("finished", "pid", signals)
     entry = Entry("a", run, scenario())
-    result = comparing.Result([], [entry], {}, {}, pd.DataFrame(), [], {})
+    result = comparing.Result([], [entry], {}, {}, pd.DataFrame(), [], {}, {})
     monkeypatch.setattr("podusv_cli.figures.style.FORMATS", {"png": None})
     drawn = comparing.drawn(result, lambda name, fraction: seen.append((name, fraction)))
     assert "velocities.png" in drawn

@@ -29,6 +29,7 @@ def guarded(command: Callable[Given, None]) -> Callable[Given, None]:
     def run(*args: Given.args, **kwargs: Given.kwargs) -> None:
         with interrupts_caught() as interrupts:
             code = _code_of(lambda: command(*args, **kwargs), interrupts)
+            interrupts.ending = interrupts.number > 0
             # What was interrupted says so in one way; which signal it was, the shell wants to know.
             signalled = code == INTERRUPTED and interrupts.number
             raise typer.Exit(SIGNALLED + interrupts.number if signalled else code)
