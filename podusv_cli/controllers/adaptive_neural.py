@@ -56,3 +56,7 @@ class AdaptiveNeural(FilteredBackstepping):
     law: ClassVar[Callable[..., None]] = staticmethod(
         specialise(polar_backstepping, "adaptive_neural", surge=surge_shunting, yaw=yaw_shunting)
     )
+
+    def filter_decay(self, alpha_u: Any, alpha_r: Any) -> tuple[Any, Any]:
+        """A + |alpha|, see (41) and (45)."""
+        return self.A_u + abs(alpha_u), self.A_r + abs(alpha_r)

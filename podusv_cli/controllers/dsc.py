@@ -38,3 +38,7 @@ class DynamicSurface(FilteredBackstepping):
     law: ClassVar[Callable[..., None]] = staticmethod(
         specialise(polar_backstepping, "dsc", surge=surge_lag, yaw=yaw_lag)
     )
+
+    def filter_decay(self, alpha_u: Any, alpha_r: Any) -> tuple[Any, Any]:
+        """1/T, whatever the virtual control."""
+        return alpha_u * 0.0 + 1.0 / self.T_u, alpha_r * 0.0 + 1.0 / self.T_r

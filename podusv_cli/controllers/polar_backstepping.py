@@ -121,6 +121,13 @@ class PolarBackstepping(TrackingController):
         bounds = (("b_hat_u", 1), ("b_hat_r", 1))
         return HELD + bounds + (("W_hat_u", count), ("W_hat_r", count))
 
+    def filter_decay(self, alpha_u: Any, alpha_r: Any) -> tuple[Any, Any]:
+        """Rates A_u, A_r [1/s] of (41), (45) at which the filters forget; infinite without any.
+
+        Numbers or arrays, like the virtual controls. Never below their values at 0.
+        """
+        return alpha_u * 0.0 + np.inf, alpha_r * 0.0 + np.inf
+
     def workspace(self) -> int:
         """The nodes' outputs and their factors."""
         return self.network.count + self.network.bells

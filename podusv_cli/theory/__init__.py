@@ -1,0 +1,1 @@
+"""What the paper's stability proof promises, and whether a run keeps it."""

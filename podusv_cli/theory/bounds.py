@@ -1,0 +1,231 @@
+"""The ultimate bound of the paper's section 5, (46)-(49), as printed and as it has to read.
+
+V' <= -2 lambda V + Delta, so that V ends below Delta / (2 lambda); docs/theory.md derives both.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from podusv_cli.controllers.polar_backstepping import PolarBackstepping
+from podusv_cli.kernels import Vector
+from podusv_cli.vessels.vessel import Vessel
+
+TRIES = 400  # values of lambda among which the one with the lowest bound is taken
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A quantity of the surge and of the yaw part."""
+
+    u: float
+    r: float
+
+
+@dataclass(frozen=True)
+class Observed:
+    """Largest values, over a part of a run, of what a scenario alone does not tell."""
+
+    b: Pair  # |b_u| [N], |b_r| [N m]: what the disturbance can reach
+    W: Pair  # |W* - W(0)| [m/s2], [rad/s2]
+    alpha_dot: Pair  # the paper's X_1 [m/s2] and X_2 [rad/s2]: |alpha'|
+    drift: Pair  # |alpha' + (A + |alpha| - B) alpha|, what really drives the filter errors
+    epsilon: Pair  # |epsilon| [m/s2], [rad/s2]: what the ideal weights leave of f
+    rest: Pair  # [N], [N m]: all that acts on u_e, r_e and is in no other term
+
+
+@dataclass(frozen=True)
+class Condition:
+    """A gain and what it has to exceed; NaN where that form does not ask for it."""
+
+    name: str
+    value: float
+    limit: float
+    printed_limit: float
+    why: str
+
+    @property
+    def holds(self) -> bool:
+        """Whether the gain exceeds its limit; true where there is none."""
+        return not self.value <= self.limit
+
+    @property
+    def holds_printed(self) -> bool:
+        """The same with the limit that the paper prints."""
+        return not self.value <= self.printed_limit
+
+
+@dataclass(frozen=True)
+class Bound:
+    """lambda [1/s], Delta, and V's bound Delta / (2 lambda): NaN where nothing was observed.
+
+    `candidates` are what lambda is the least of [1/s], by the error that each belongs to, and
+    `terms` what Delta is the sum of. The bound is infinite where lambda is not positive.
+    """
+
+    lambda_: float
+    Delta: float
+    value: float
+    candidates: dict[str, float]
+    terms: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class UltimateBound:
+    """The bound in both forms, and the conditions on the gains in both."""
+
+    corrected: Bound
+    printed: Bound
+    conditions: tuple[Condition, ...]
+
+    @property
+    def holds(self) -> bool:
+        """Whether all conditions of the corrected form hold."""
+        return all(condition.holds for condition in self.conditions)
+
+
+@dataclass(frozen=True)
+class _Axis:
+    """Gains of one axis: surge (z_e, u_e, y_u, ...) or yaw (psi_e, r_e, y_r, ...)."""
+
+    k: float
+    gain: float  # k_ue - 1/2 or k_re - 1/2
+    mass: float
+    A: float
+    cross: float  # 0, or 1 where the printed sign doubles the cross term
+
+    def slowest(self) -> float:
+        """Largest lambda with which -k e^2 - gain w^2 - A y^2 + |e y| + 2 cross |e w| decays."""
+        form = np.array([[self.k, self.cross, 0.5], [self.cross, self.gain, 0.0], [0.5, 0.0, 0.0]])
+        form[2, 2] = self.A if math.isfinite(self.A) else 0.0
+        size = 3 if math.isfinite(self.A) else 2  # without a filter there is no y
+        scale = np.sqrt([1.0, self.mass, 1.0])
+        return float(np.linalg.eigvalsh((form / np.outer(scale, scale))[:size, :size])[0])
+
+    def limit(self) -> float:
+        """What k has to exceed for that lambda to be positive."""
+        from_cross = self.cross**2 / self.gain if self.gain > 0 else math.inf * self.cross
+        return 1.0 / (4.0 * self.A) + (from_cross if self.cross else 0.0)
+
+    def room(self, rate: Vector) -> Vector:
+        """sigma_y, the part of 2 A that a decay at `rate` leaves for the drift of the filter."""
+        if math.isinf(self.A):
+            return np.full_like(rate, math.inf)
+        spare = self.k - rate - self.cross**2 / (self.gain - rate * self.mass)
+        return np.asarray(2.0 * (self.A - rate - 1.0 / (4.0 * spare)))
+
+
+def ultimate_bound(
+    law: PolarBackstepping, vessel: Vessel, observed: Observed | None = None
+) -> UltimateBound:
+    """lambda, Delta and the bound of (47)-(49) in both forms; `vessel` gives m11 and m33.
+
+    Without `observed` only lambda and the conditions are known; lambda is then the largest that
+    any choice of sigma_yu, sigma_yr in (47) allows.
+    """
+    cross = 0.0 if law.coupling == "corrected" else 1.0
+    A = law.filter_decay(0.0, 0.0)
+    axes = (
+        _Axis(law.k_ze, law.k_ue - 0.5, vessel.m11, A[0], cross),
+        _Axis(law.k_psie, law.k_re - 0.5, vessel.m33, A[1], cross),
+    )
+    return UltimateBound(
+        _corrected(law, axes, observed), _printed(law, axes, observed), _conditions(law, axes)
+    )
+
+
+Axes = tuple[_Axis, _Axis]
+
+
+def _corrected(law: PolarBackstepping, axes: Axes, observed: Observed | None) -> Bound:
+    surge, yaw = axes
+    candidates = {
+        "z_e, y_u": surge.slowest(),
+        "psi_e, y_r": yaw.slowest(),
+        "u_e": surge.gain / surge.mass,
+        "r_e": yaw.gain / yaw.mass,
+        "W_u": law.Gamma_u * law.sigma_u / 2.0,
+        "W_r": law.Gamma_r * law.sigma_r / 2.0,
+        "b_u": law.gamma_u * law.sigma_bu / 2.0,
+        "b_r": law.gamma_r * law.sigma_br / 2.0,
+    }
+    if observed is None:
+        return _unobserved(candidates)
+    terms = _fixed_terms(law, observed) | {
+        "rest_u": observed.rest.u**2 / 2.0,
+        "rest_r": observed.rest.r**2 / 2.0,
+    }
+    rates = np.arange(1, TRIES) / TRIES * min(candidates.values())
+    rooms = (surge.room(rates), yaw.room(rates))
+    return _best(candidates, terms, rates, rooms, observed.drift)
+
+
+def _printed(law: PolarBackstepping, axes: Axes, observed: Observed | None) -> Bound:
+    surge, yaw = axes
+    candidates = {
+        "z_e": surge.k, "psi_e": yaw.k, "u_e": surge.gain, "r_e": yaw.gain,
+        "W_u": law.sigma_u / 2.0, "W_r": law.sigma_r / 2.0,
+        "b_u": law.sigma_bu / 2.0, "b_r": law.sigma_br / 2.0,
+        "y_u": surge.A, "y_r": yaw.A,
+    }  # fmt: skip
+    if observed is None:
+        return _unobserved(candidates)
+    terms = _fixed_terms(law, observed) | {
+        "epsilon_u": observed.epsilon.u**2 / 2.0,
+        "epsilon_r": observed.epsilon.r**2 / 2.0,
+    }
+    rates = np.arange(1, TRIES) / TRIES * min(candidates.values())
+    rooms = (2.0 * (surge.A - rates), 2.0 * (yaw.A - rates))
+    return _best(candidates, terms, rates, rooms, observed.alpha_dot)
+
+
+def _unobserved(candidates: dict[str, float]) -> Bound:
+    return Bound(min(candidates.values()), math.nan, math.nan, candidates)
+
+
+def _fixed_terms(law: PolarBackstepping, observed: Observed) -> dict[str, float]:
+    """The terms of Delta that are the same in both forms and for every lambda."""
+    return {
+        "W_u": law.sigma_u * observed.W.u**2 / 2.0,
+        "W_r": law.sigma_r * observed.W.r**2 / 2.0,
+        "b_u": law.sigma_bu * (observed.b.u - law.b_hat_u0) ** 2 / 2.0,
+        "b_r": law.sigma_br * (observed.b.r - law.b_hat_r0) ** 2 / 2.0,
+        "lemma": law.partial * (observed.b.u + observed.b.r),
+    }
+
+
+def _best(
+    candidates: dict[str, float], terms: dict[str, float], rates: Vector,
+    rooms: tuple[Vector, Vector], drift: Pair,
+) -> Bound:  # fmt: skip
+    """The lambda, and with it sigma_yu and sigma_yr of (47), that give the lowest bound."""
+    largest = min(candidates.values())
+    if largest <= 0.0:
+        return Bound(largest, math.nan, math.inf, candidates, terms)
+    y_u, y_r = drift.u**2 / (2.0 * rooms[0]), drift.r**2 / (2.0 * rooms[1])
+    Delta = sum(terms.values()) + y_u + y_r
+    best = int(np.argmin(Delta / rates))
+    terms = terms | {"y_u": float(y_u[best]), "y_r": float(y_r[best])}
+    rate, total = float(rates[best]), float(Delta[best])
+    return Bound(rate, total, total / (2.0 * rate), candidates, terms)
+
+
+def _conditions(law: PolarBackstepping, axes: Axes) -> tuple[Condition, ...]:
+    surge, yaw = axes
+    why = "or -z_e y_u cos psi_e and -psi_e y_r, which the paper's V' leaves out, can outweigh it"
+    if surge.cross:
+        why += ", and the cross terms that the printed sign doubles"
+    half = "half of it goes to the network's error (47)"
+    leak = "without it nothing pulls the estimate back (48)"
+    pulled = ("Gamma_u", "sigma_u", "Gamma_r", "sigma_r", "gamma_u", "sigma_bu", "gamma_r",
+              "sigma_br")  # fmt: skip
+    return (
+        Condition("k_ze", law.k_ze, surge.limit(), 0.0, why),
+        Condition("k_psie", law.k_psie, yaw.limit(), 0.0, why),
+        Condition("k_ue", law.k_ue, 0.5, 0.5, half),
+        Condition("k_re", law.k_re, 0.5, 0.5, half),
+        *(Condition(name, getattr(law, name), 0.0, 0.0, leak) for name in pulled),
+    )
