@@ -19,10 +19,23 @@ class Derived:
     compute: Callable[[Recording], Vector]
 
 
+def _node_distance(log: Recording) -> Vector:
+    nearest = np.full(len(log["time"]), np.inf)
+    for center in log["rbf_center"]:
+        parts = (
+            (log[name] - c) / w for name, c, w in zip("uvr", center, log["rbf_width"], strict=True)
+        )
+        nearest = np.minimum(nearest, sum(part**2 for part in parts))
+    return np.asarray(np.sqrt(nearest))
+
+
 def _activation(log: Recording) -> Vector:
-    nu = np.column_stack([log["u"], log["v"], log["r"]])
-    scaled = (nu[:, None, :] - log["rbf_center"]) / log["rbf_width"]
-    return np.asarray(np.exp(-0.5 * np.sum(scaled**2, axis=2)).max(axis=1))
+    return np.asarray(np.exp(-0.5 * _node_distance(log) ** 2))
+
+
+def _v_dot_bound(log: Recording) -> Vector:
+    part = np.searchsorted(log["window_start"], log["time"], side="right") - 1
+    return np.asarray(-2.0 * log["V_lambda"][part] * log["V"] + log["V_Delta"][part])
 
 
 DERIVED: dict[str, Derived] = {
@@ -32,5 +45,7 @@ DERIVED: dict[str, Derived] = {
     "y_r": Derived(("beta_r", "alpha_r"), lambda log: log["beta_r"] - log["alpha_r"]),
     "W_norm_u": Derived(("W_hat_u",), lambda log: np.linalg.norm(log["W_hat_u"], axis=1)),
     "W_norm_r": Derived(("W_hat_r",), lambda log: np.linalg.norm(log["W_hat_r"], axis=1)),
+    "V_dot_bound": Derived(("V_dot", "V_Delta"), _v_dot_bound),
+    "node_distance": Derived(("rbf_center", "rbf_width", "u", "v", "r"), _node_distance),
     "activation": Derived(("rbf_center", "rbf_width", "u", "v", "r"), _activation),
 }

@@ -22,6 +22,8 @@ from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.metrics.watching import observer, summarise
 from podusv_cli.recording import Recording, Status
+from podusv_cli.theory import monitor
+from podusv_cli.theory.report import as_json as theory_report
 
 Progress = Callable[[float], None]
 UNDRAWN = (
@@ -110,8 +112,12 @@ def execute(
             metrics |= extras.attempt(lambda: _cost(task.scenario, recording)) or {}
             seen_after = heard(aftermath(task.scenario, recording), task.scenario)
         warnings = (*task.noticed, *seen_after)
+        with watch.part("theory"):
+            recording, theory = monitored(task.scenario, recording)
         with watch.part("write"):
             _write(writer, task, recording, metrics, warnings)
+            if theory:
+                writer.add_json("theory.json", theory)
         with watch.part("figures"):
             for name, content in extras.attempt(lambda: _drawn(task, recording)) or ():
                 writer.add(f"figures/{name}", content)
@@ -128,7 +134,10 @@ def execute(
 
 def warm_up(scenario: Scenario) -> None:
     """Have all code of this scenario's loop compiled and loaded."""
-    marcher(scenario.closed_loop(), _observer(scenario), scenario.simulation.compiled)
+    loop, compiled = scenario.closed_loop(), scenario.simulation.compiled
+    marcher(loop, _observer(scenario), compiled)
+    if scenario.log.monitor:
+        monitor.prepare(loop, scenario.time_grid(), compiled)
 
 
 def _observer(scenario: Scenario) -> Observer:
@@ -146,7 +155,7 @@ def measured(
     loop, grid, seeing = scenario.closed_loop(), scenario.time_grid(), _observer(scenario)
     compiled = scenario.simulation.compiled
     with watch.part("compile"), interrupts_heard():
-        marcher(loop, seeing, compiled)
+        warm_up(scenario)
     with watch.part("engine"):
         recording = simulate(loop, grid, observer=seeing, compiled=compiled, progress=progress)
     with watch.part("metrics"):
@@ -157,6 +166,16 @@ def measured(
 def _cost(scenario: Scenario, recording: Recording) -> dict[str, float]:
     timed = scenario.simulation.compiled and len(recording["time"])
     return law_costs([(scenario.closed_loop(), recording)])[0] if timed else {}
+
+
+def monitored(scenario: Scenario, recording: Recording) -> tuple[Recording, dict[str, Any]]:
+    """The recording with what the stability monitor adds, and its findings; none without V."""
+    loop, grid = scenario.closed_loop(), scenario.time_grid()
+    found = scenario.log.monitor and monitor.monitored(
+        loop, grid, recording,
+        steady_fraction=scenario.metrics.steady_fraction, compiled=scenario.simulation.compiled,
+    )  # fmt: skip
+    return (found.recording, theory_report(loop, grid, found)) if found else (recording, {})
 
 
 def _write(

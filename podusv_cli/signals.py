@@ -19,6 +19,7 @@ class Signal:
     axes: tuple[str, ...] = ()
 
 
+# fmt: off
 _ROWS = (
     Signal("time", "t", "s", "time since the start of the run"),
     Signal("x", "x", "m", "vessel position, north"),
@@ -63,6 +64,10 @@ _ROWS = (
     Signal(
         "activation", r"\max\Phi", "1", "largest output of a network node (14); derived, not logged"
     ),
+    Signal(
+        "node_distance", "d", "1",
+        "distance of (u, v, r) to the nearest network centre, in widths; derived, not logged",
+    ),
     Signal("f_hat_u", r"\hat f_u", "m/s2", "network's estimate of f_u (25)"),
     Signal("f_hat_r", r"\hat f_r", "rad/s2", "network's estimate of f_r (34)"),
     Signal("psi_d_held", r"\psi_d^-", "rad", "target direction at the law's last sample"),
@@ -72,8 +77,34 @@ _ROWS = (
     Signal("lag_u", "u_{p,f}", "m/s", "lagged surge velocity error (PID derivative)"),
     Signal("lag_r", "r_{p,f}", "rad/s", "lagged yaw rate error (PID derivative)"),
     Signal("saturated", "sat", "1", "1 while the actuator limits what the law asked for"),
+    Signal("y_u", "y_u", "m/s", "filter error beta_u - alpha_u (38); derived, not logged"),
+    Signal("y_r", "y_r", "rad/s", "filter error beta_r - alpha_r (42); derived, not logged"),
+    Signal("V", "V", "1", "Lyapunov function (46), the sum of its ten terms"),
+    Signal("V_dot", r"\dot V", "1/s", "rate of V along the closed loop, by the chain rule"),
+    Signal("V_z_e", "V_{z_e}", "m2", "z_e^2/2, term of V; z_e less the standoff"),
+    Signal("V_psi_e", r"V_{\psi_e}", "rad2", "psi_e^2/2, term of V"),
+    Signal("V_u_e", "V_{u_e}", "J", "m11 u_e^2/2, term of V"),
+    Signal("V_r_e", "V_{r_e}", "J", "m33 r_e^2/2, term of V"),
+    Signal("V_y_u", "V_{y_u}", "m2/s2", "y_u^2/2, term of V"),
+    Signal("V_y_r", "V_{y_r}", "rad2/s2", "y_r^2/2, term of V"),
+    Signal("V_W_u", "V_{W_u}", "J", "|W_hat_u - W_star_u|^2/(2 Gamma_u), term of V"),
+    Signal("V_W_r", "V_{W_r}", "J", "|W_hat_r - W_star_r|^2/(2 Gamma_r), term of V"),
+    Signal("V_b_u", "V_{b_u}", "J", "(b_hat_u - b_u max)^2/(2 gamma_u), term of V"),
+    Signal("V_b_r", "V_{b_r}", "J", "(b_hat_r - b_r max)^2/(2 gamma_r), term of V"),
+    Signal(
+        "V_dot_bound", r"-2\lambda V+\Delta", "1/s",
+        "what V_dot should stay below (49), corrected; derived, not logged",
+    ),
+    Signal("W_star_u", "W_u^*", "m/s2", "ideal weights of the surge network, fitted to the run"),
+    Signal("W_star_r", "W_r^*", "rad/s2", "ideal weights of the yaw network, fitted to the run"),
+    Signal("window_start", "t_0", "s", "start of the part of the run whose extremes enter V_Delta"),
+    Signal("V_lambda", r"\lambda", "1/s", "rate lambda of (49), corrected"),
+    Signal("V_Delta", r"\Delta", "1/s", "Delta of (49), corrected, from extremes of that part"),
+    Signal("V_bound", r"\Delta/2\lambda", "1", "ultimate bound of V, corrected"),
+    Signal("v_bound", r"|v|_{\max}", "m/s", "bound of the sway speed (51), with all damping"),
     Signal("rbf_center", "c", "1", "network centres in (u, v, r) [m/s, m/s, rad/s]"),
     Signal("rbf_width", r"\sigma", "1", "Gaussian widths in (u, v, r) [m/s, m/s, rad/s]"),
 )
+# fmt: on
 
 SIGNALS: dict[str, Signal] = {row.name: row for row in _ROWS}

@@ -72,6 +72,11 @@ class Log(Component):
     """What is written to log.h5."""
 
     every: int = value(1, "steps", "every n-th step is logged; metrics always see every step", ge=1)
+    monitor: bool = value(
+        True,
+        "",
+        "whether the Lyapunov function of the adaptive laws, its rate and its bounds are logged",
+    )
 
 
 class MetricSettings(Component):

@@ -22,3 +22,7 @@ class Disturbance(Component):
     def evaluate(t: float, x: Vector, k: Any, table: Vector, b: Vector) -> None:
         """Write the load; every disturbance has its own."""
         raise NotImplementedError
+
+    def bounds(self) -> tuple[float, float, float] | None:
+        """Largest |b_u| [N], |b_v| [N], |b_r| [N m] at any time and state; None where unknown."""
+        return None

@@ -19,3 +19,7 @@ class Calm(Disturbance):
     def evaluate(t: float, x: Vector, k: Any, table: Vector, b: Vector) -> None:
         """Zero."""
         b[0] = b[1] = b[2] = 0.0
+
+    def bounds(self) -> tuple[float, float, float]:
+        """Zero."""
+        return 0.0, 0.0, 0.0

@@ -51,6 +51,14 @@ class HarmonicDisturbance(Disturbance):
         sines[:3] = [axis.sin for axis in axes]
         return rows.ravel()
 
+    def bounds(self) -> tuple[float, float, float]:
+        """The sum of all amplitudes, axis by axis."""
+        u, v, r = (
+            self.scale * (abs(axis.mean) + abs(axis.sin) + abs(axis.cos))
+            for axis in (self.b_u, self.b_v, self.b_r)
+        )
+        return u, v, r
+
     @staticmethod
     @kernel
     def evaluate(t: float, x: Vector, k: Any, table: Vector, b: Vector) -> None:

@@ -240,3 +240,18 @@ def evaluate_all(
                 row[0], tail(row, 7), tail(row, 13), tail(row, 1), p, table,
                 tau, out, tail(out, width), tail(out, 2 * width),
             )  # fmt: skip
+
+
+@kernel
+def rates_along(
+    path: Function, disturbance: Function, law: Function, actuator: Function,
+    count: int, logged: Vector, out: Vector, wires: Any, plan: Any,
+) -> None:  # fmt: skip
+    """For each of `count` logged rows of t, s: the rates of s, then the row, into `out`."""
+    c, n = named_wires(wires), named_plan(plan)
+    for i in range(count):
+        here = tail(logged, i * (1 + n.states))
+        there = tail(out, i * (n.states + n.columns))
+        rates(here[0], tail(here, 1), there, path, disturbance, law, actuator, c, n, False)
+        for j in range(n.columns):
+            there[n.states + j] = c.row[j]

@@ -10,7 +10,7 @@ from functools import cache
 from typing import Any
 
 from podusv_cli.engine import machine_code, signatures
-from podusv_cli.engine.closed_loop import advance, evaluate_all
+from podusv_cli.engine.closed_loop import advance, evaluate_all, rates_along
 from podusv_cli.interrupts import interrupts_held
 
 
@@ -32,6 +32,12 @@ def march() -> Any:
 def replay() -> Any:
     """Machine code of `closed_loop.evaluate_all`."""
     return compiled(evaluate_all, signatures.EVALUATE_ALL)
+
+
+@cache
+def rates_replay() -> Any:
+    """Machine code of `closed_loop.rates_along`."""
+    return compiled(rates_along, signatures.RATES_ALONG)
 
 
 def compiled(function: Any, prototype: Any, label: str = "") -> Any:

@@ -1,14 +1,17 @@
-"""Evaluate a law again and again over logged states, to see what one evaluation costs."""
+"""Logged states gone through again: the rates there, and what one evaluation of a law costs."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
-from podusv_cli.engine import signatures
-from podusv_cli.engine.simulate import STATE, ClosedLoop
+from podusv_cli.engine import closed_loop, signatures
+from podusv_cli.engine.closed_loop import Plan, Wires
+from podusv_cli.engine.grid import TimeGrid
+from podusv_cli.engine.simulate import STATE, ClosedLoop, Observer, by_name, entries, names, wire
 from podusv_cli.kernels import Vector, bundle
 from podusv_cli.paths.base import TARGET
 from podusv_cli.recording import Recording
@@ -52,3 +55,59 @@ def replayer(
         return float((time.perf_counter_ns() - began) / (rounds * count))
 
     return timed
+
+
+@dataclass(frozen=True)
+class Replayed:
+    """The right-hand side at logged states: rates by the state's names, and all signals.
+
+    `signals` holds the target's velocity and acceleration as well, and those of the law at the
+    logged state, even where control is sampled.
+    """
+
+    rates: dict[str, Vector]
+    signals: dict[str, Vector]
+
+
+def rates_replay(
+    loop: ClosedLoop, grid: TimeGrid, *, compiled: bool = True
+) -> Callable[[Recording], Replayed]:
+    """A function that gives the loop's right-hand side at every row of a recording of it.
+
+    Control is taken as continuous, also where the run's was sampled.
+    """
+    plan = loop.layout(grid)._replace(hold_every=0)
+    labels, split = names(loop), 1 + plan.states
+    state = list(dict.fromkeys(labels[:split]))
+    wires = wire(loop, TimeGrid(grid.step, 0), plan, Observer())
+    run = _rates_runner(loop, compiled)
+
+    def replayed(recording: Recording) -> Replayed:
+        logged = np.column_stack([recording[name] for name in state])
+        out = np.empty((len(logged), plan.states + plan.columns))
+        run(len(logged), logged.ravel(), out.reshape(-1), wires, plan)
+        return Replayed(
+            by_name(labels[1:split], out[:, : plan.states]),
+            by_name(labels[split:], out[:, plan.states :]),
+        )
+
+    return replayed
+
+
+def _rates_runner(loop: ClosedLoop, compiled: bool) -> Callable[..., None]:
+    """`closed_loop.rates_along` of this loop less its functions."""
+    parts = list(entries(loop, Observer()))
+    chosen = [part for part in parts if part[0] in signatures.RIGHT_HAND_SIDE]
+    if not compiled:
+        doors = [signatures.bind(*part) for part in chosen]
+        return lambda *rest: closed_loop.rates_along(*doors, *rest)
+    from podusv_cli.engine import compiling  # a loop in plain Python needs no compiler
+
+    doors = [compiling.entry(*part) for part in chosen]
+    run = compiling.rates_replay()
+
+    def compiled_run(count: int, logged: Vector, out: Vector, wires: Wires, plan: Plan) -> None:
+        vectors, sizes = signatures.pointers(wires), signatures.whole_numbers(plan)
+        run(*doors, count, signatures.pointer(logged), signatures.pointer(out), vectors, sizes)
+
+    return compiled_run

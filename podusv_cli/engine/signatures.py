@@ -86,8 +86,13 @@ PROTOTYPES: dict[Any, Any] = {
 LOOP = (
     path_entry, disturbance_entry, law_entry, sample_entry, actuator_entry, observer_entry,
 )  # fmt: skip
+RIGHT_HAND_SIDE = (path_entry, disturbance_entry, law_entry, actuator_entry)
 _PARTS = [PROTOTYPES[door] for door in LOOP]
 ADVANCE = CFUNCTYPE(WHOLE, *_PARTS, WHOLE, WHOLE, NUMBER, POINTER(VECTOR), POINTER(WHOLE))
+RATES_ALONG = CFUNCTYPE(
+    None, *[PROTOTYPES[door] for door in RIGHT_HAND_SIDE],
+    WHOLE, VECTOR, VECTOR, POINTER(VECTOR), POINTER(WHOLE),
+)  # fmt: skip
 EVALUATE_ALL = CFUNCTYPE(None, PROTOTYPES[law_entry], WHOLE, WHOLE, WHOLE, *[VECTOR] * 5)
 
 

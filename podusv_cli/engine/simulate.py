@@ -201,21 +201,26 @@ def names(loop: ClosedLoop) -> list[str]:
     return ["time", *STATE, *loop.actuator.states, *slots, *signals]
 
 
+def by_name(labels: list[str], table: Vector) -> dict[str, Vector]:
+    """A table's columns by name; those of a vector together, shape (rows, size)."""
+    vectors = {name for name in labels if name in SIGNALS and SIGNALS[name].axes}
+    columns: dict[str, list[int]] = {}
+    for column, name in enumerate(labels):
+        columns.setdefault(name, []).append(column)
+    return {
+        name: table[:, at[0] : at[-1] + 1] if name in vectors else table[:, at[0]]
+        for name, at in columns.items()
+    }
+
+
 def _record(
     loop: ClosedLoop, grid: TimeGrid, plan: Plan, wires: Wires, reached: int, status: Status
 ) -> Recording:
     rows = (reached + grid.log_every - 1) // grid.log_every
     table = wires.log.reshape(grid.rows, -1)[:rows]
     labels = names(loop)
-    vectors = {name for name in labels if name in SIGNALS and SIGNALS[name].axes}
-    columns: dict[str, list[int]] = {}
-    for column, name in enumerate(labels):
-        columns.setdefault(name, []).append(column)
-    signals = {
-        name: table[:, at[0] : at[-1] + 1] if name in vectors else table[:, at[0]]
-        for name, at in columns.items()
-        if name not in TARGET[2:]
-    }
+    named = by_name(labels, table)
+    signals = {name: column for name, column in named.items() if name not in TARGET[2:]}
     if grid.hold_every and "z_e" in signals:  # the law's own goes back to its last sample
         x_e, y_e = (signals[f"{axis}_d"] - signals[axis] for axis in "xy")
         signals["z_e"] = np.sqrt(x_e * x_e + y_e * y_e)

@@ -15,12 +15,20 @@ CHUNK_BYTES = 2**20  # HDF5's default chunk cache
 AXES = {
     "node": "network node",
     "input": "network input: u, v, r",
+    "window": "part of the run: the whole, its settled end",
 }
 
 # Arrays that do not run over time, and their axes.
 FIXED_AXES = {
     "rbf_center": ("node", "input"),
     "rbf_width": ("input",),
+    "W_star_u": ("node",),
+    "W_star_r": ("node",),
+    "window_start": ("window",),
+    "V_lambda": ("window",),
+    "V_Delta": ("window",),
+    "V_bound": ("window",),
+    "v_bound": ("window",),
 }
 
 

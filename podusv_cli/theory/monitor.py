@@ -1,0 +1,209 @@
+"""The stability monitor: V, its terms and rate along a run, and the bound they should keep."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from podusv_cli.controllers.polar_backstepping import PolarBackstepping
+from podusv_cli.engine.grid import TimeGrid
+from podusv_cli.engine.replay import Replayed, rates_replay
+from podusv_cli.engine.simulate import ClosedLoop
+from podusv_cli.kernels import Vector
+from podusv_cli.recording import Recording
+from podusv_cli.theory.bounds import Observed, Pair, UltimateBound, ultimate_bound
+from podusv_cli.theory.ideal import (
+    Ideal,
+    ideal_weights,
+    network_output,
+    node_outputs,
+    rows_to_fit,
+    unloaded_accelerations,
+)
+from podusv_cli.theory.lyapunov import estimates, lyapunov, remainders
+from podusv_cli.theory.rates import error_rates
+from podusv_cli.theory.sway import SwayBound, sway_bound, sway_push
+
+WINDOWS = ("whole", "settled")
+BLOCK = 4096  # rows that are worked on together, so that they stay in the cache
+TERMS = (
+    "V_z_e", "V_psi_e", "V_u_e", "V_r_e", "V_y_u", "V_y_r", "V_W_u", "V_W_r", "V_b_u", "V_b_r",
+)  # fmt: skip
+
+Traces = dict[str, Vector]
+
+
+@dataclass(frozen=True)
+class Window:
+    """A part of a run: where it begins [s], what was observed in it, and the bounds there.
+
+    `kept` is the fraction of its rows with V' <= -2 lambda V + Delta. With sampled control, and
+    where the run ended before the window, nothing is observed.
+    """
+
+    since: float
+    observed: Observed | None
+    bound: UltimateBound
+    sway: SwayBound
+    largest_V: float
+    largest_v: float
+    kept: float
+
+
+@dataclass(frozen=True)
+class Monitored:
+    """A recording with the monitor's signals, and what they amount to in each window.
+
+    `traces` has what the signals do not: rates of the virtual controls, what disturbs the errors.
+    """
+
+    recording: Recording
+    windows: dict[str, Window]
+    traces: Traces
+
+
+def watches(loop: ClosedLoop) -> bool:
+    """Whether the loop's law has a Lyapunov function to monitor."""
+    return isinstance(loop.controller, PolarBackstepping)
+
+
+def prepare(loop: ClosedLoop, grid: TimeGrid, compiled: bool) -> None:
+    """Have what the monitor needs compiled and loaded."""
+    if watches(loop):
+        rates_replay(loop, grid, compiled=compiled)
+
+
+def monitored(
+    loop: ClosedLoop, grid: TimeGrid, recording: Recording,
+    *, steady_fraction: float = 0.2, compiled: bool = True,
+) -> Monitored | None:  # fmt: skip
+    """Add V, its terms, V' and its bounds to a fresh recording; None for a law without V.
+
+    V takes the true bound of the disturbance, and weights fitted to this run (`theory.ideal`).
+    With sampled control V' and the bound of V are left out: the law acts on old measurements.
+    """
+    law, count = loop.controller, len(recording["time"])
+    if not isinstance(law, PolarBackstepping) or not count:
+        return None
+    with np.errstate(all="ignore"):  # a run that diverges leaves all numbers
+        replayed = rates_replay(loop, grid, compiled=compiled)
+        chosen = part_of(recording, rows_to_fit(count, law.network.count))
+        ideal = ideal_weights(loop, law, chosen, replayed(chosen))
+        b = _disturbance_bound(loop, recording)
+        blocks = []
+        for first in range(0, count, BLOCK):
+            log = part_of(recording, slice(first, first + BLOCK))
+            blocks.append(_traces(loop, law, log, replayed(log), (ideal, b)))
+        traces = {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
+        observed = _Observer(loop, law, recording, traces, ideal, b, grid.hold_every == 0)
+        starts = (0.0, (1.0 - steady_fraction) * grid.steps * grid.step)
+        windows = dict(zip(WINDOWS, map(observed.window, starts), strict=True))
+    return Monitored(_extended(recording, traces, windows, ideal, grid), windows, traces)
+
+
+def part_of(recording: Recording, rows: slice | Vector) -> Recording:
+    """Some rows of a recording."""
+    return replace(recording, signals={n: a[rows] for n, a in recording.signals.items()})
+
+
+def _disturbance_bound(loop: ClosedLoop, log: Recording) -> Pair:
+    """Largest |b_u|, |b_r|: what the disturbance can reach, or where it cannot tell, did reach."""
+    known = loop.disturbance.bounds()
+    if known is not None:
+        return Pair(known[0], known[2])
+    return Pair(_largest(log["b_u"]), _largest(log["b_r"]))
+
+
+def _largest(values: Vector) -> float:
+    return float(np.max(np.abs(values))) if len(values) else np.nan
+
+
+def _traces(
+    loop: ClosedLoop, law: PolarBackstepping, log: Recording, now: Replayed,
+    unknown: tuple[Ideal, Pair],
+) -> Traces:  # fmt: skip
+    ideal, b = unknown
+    e = error_rates(log, now, law)
+    phi = node_outputs(law.network, log)
+    fit_u, fit_r = network_output(phi, ideal.W_u), network_output(phi, ideal.W_r)
+    f_u, f_r = unloaded_accelerations(loop, now)
+    rest_u, rest_r = remainders(loop, law, log, now, e)
+    A_u, A_r = law.filter_decay(now.signals["alpha_u"], now.signals["alpha_r"])
+    push, printed_push = sway_push(loop.vessel, log, now)
+    return lyapunov(loop, law, e, estimates(log, now, ideal, b)) | {
+        "alpha_u_dot": e.alpha_u_dot,
+        "alpha_r_dot": e.alpha_r_dot,
+        "drift_u": np.where(np.isinf(A_u), 0.0, e.y_u_dot + A_u * e.y_u),
+        "drift_r": np.where(np.isinf(A_r), 0.0, e.y_r_dot + A_r * e.y_r),
+        "epsilon_u": f_u - fit_u,
+        "epsilon_r": f_r - fit_r,
+        "rest_u": rest_u - loop.nominal.m11 * fit_u,
+        "rest_r": rest_r - loop.nominal.m33 * fit_r,
+        "push": push,
+        "printed_push": printed_push,
+        "turn": e.turn,
+    }
+
+
+@dataclass(frozen=True)
+class _Observer:
+    """Takes the largest values of a part of a run, and makes bounds of them."""
+
+    loop: ClosedLoop
+    law: PolarBackstepping
+    log: Recording
+    traces: Traces
+    ideal: Ideal
+    b: Pair
+    continuous: bool
+
+    def window(self, since: float) -> Window:
+        """The part of the run from a time [s] on."""
+        rows = slice(int(np.searchsorted(self.log["time"], since - 1e-9)), None)
+        V, rate = self.traces["V"][rows], self.traces["V_dot"][rows]
+        observed = self._observed(rows) if self.continuous and len(V) else None
+        bound = ultimate_bound(self.law, self.loop.vessel, observed)
+        limit = -2.0 * bound.corrected.lambda_ * V + bound.corrected.Delta
+        kept = float(np.mean(rate <= limit)) if observed else np.nan
+        pushes = [_largest(self.traces[name][rows]) for name in ("push", "printed_push")]
+        sway = sway_bound(self.loop.vessel, *pushes)
+        largest_v = _largest(self.log["v"][rows])
+        return Window(since, observed, bound, sway, _largest(V), largest_v, kept)
+
+    def _observed(self, rows: slice) -> Observed:
+        start, ideal = self.law.network.initial_weight, self.ideal
+        W = (float(np.linalg.norm(weights - start)) for weights in (ideal.W_u, ideal.W_r))
+        return Observed(
+            b=self.b,
+            W=Pair(*W),
+            alpha_dot=self._both(rows, "alpha_u_dot", "alpha_r_dot"),
+            drift=self._both(rows, "drift_u", "drift_r"),
+            epsilon=self._both(rows, "epsilon_u", "epsilon_r"),
+            rest=self._both(rows, "rest_u", "rest_r"),
+        )
+
+    def _both(self, rows: slice, u: str, r: str) -> Pair:
+        return Pair(_largest(self.traces[u][rows]), _largest(self.traces[r][rows]))
+
+
+def _extended(
+    recording: Recording, traces: Traces, windows: dict[str, Window], ideal: Ideal, grid: TimeGrid
+) -> Recording:
+    """The recording with what the monitor logs."""
+    parts = windows.values()
+    numbers = {
+        "window_start": [part.since for part in parts],
+        "V_lambda": [part.bound.corrected.lambda_ for part in parts],
+        "V_Delta": [part.bound.corrected.Delta for part in parts],
+        "V_bound": [part.bound.corrected.value for part in parts],
+        "v_bound": [part.sway.value for part in parts],
+    }
+    fixed = {"W_star_u": ideal.W_u, "W_star_r": ideal.W_r}
+    fixed |= {name: np.array(values) for name, values in numbers.items()}
+    names = ("V", "V_dot", *TERMS) if grid.hold_every == 0 else ("V", *TERMS)
+    return replace(
+        recording,
+        signals={**recording.signals, **{name: traces[name] for name in names}},
+        fixed={**recording.fixed, **fixed},
+    )
