@@ -38,8 +38,8 @@ Traces = dict[str, Vector]
 class Window:
     """A part of a run: where it begins [s], what was observed in it, and the bounds there.
 
-    `kept` is the fraction of its rows with V' <= -2 lambda V + Delta. With sampled control, and
-    where the run ended before the window, nothing is observed.
+    `kept` is the fraction of its rows with V' <= -2 lambda V + Delta, NaN without a bound. With
+    sampled control, and where the run ended before the window, nothing is observed.
     """
 
     since: float
@@ -165,7 +165,7 @@ class _Observer:
         observed = self._observed(rows) if self.continuous and len(V) else None
         bound = ultimate_bound(self.law, self.loop.vessel, observed)
         limit = -2.0 * bound.corrected.lambda_ * V + bound.corrected.Delta
-        kept = float(np.mean(rate <= limit)) if observed else np.nan
+        kept = float(np.mean(rate <= limit)) if np.isfinite(bound.corrected.Delta) else np.nan
         pushes = [_largest(self.traces[name][rows]) for name in ("push", "printed_push")]
         sway = sway_bound(self.loop.vessel, *pushes)
         largest_v = _largest(self.log["v"][rows])

@@ -1,0 +1,156 @@
+"""lambda, Delta and the conditions on the gains, against a search over what they promise."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import NONLINEAR, PAPER, load_at
+
+from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
+from podusv_cli.controllers.backstepping import Backstepping
+from podusv_cli.controllers.dsc import DynamicSurface
+from podusv_cli.controllers.polar_backstepping import PolarBackstepping
+from podusv_cli.disturbances.harmonic import HarmonicDisturbance
+from podusv_cli.theory.bounds import Observed, Pair, UltimateBound, ultimate_bound
+from podusv_cli.theory.sway import sway_bound
+
+SEEN = Observed(
+    b=Pair(0.9, 0.7), W=Pair(0.7, 0.4), alpha_dot=Pair(0.2, 0.03), drift=Pair(0.3, 0.05),
+    epsilon=Pair(0.1, 0.2), rest=Pair(2.6, 0.6),
+)  # fmt: skip
+
+
+def bound(observed: Observed | None = SEEN, **gains: Any) -> UltimateBound:
+    return ultimate_bound(AdaptiveNeural(**gains), NONLINEAR, observed)
+
+
+def lowest_by_search(law: PolarBackstepping, seen: Observed, coupled: bool) -> float:
+    """Delta / (2 lambda) over a grid of sigma_yu and sigma_yr, lambda from eigenvalues."""
+    m11, m33 = NONLINEAR.m11, NONLINEAR.m33
+    A_u, A_r = law.filter_decay(0.0, 0.0)
+    best = math.inf
+    half = 0.5 if coupled else 0.0
+    others = [
+        (law.k_ue - 0.5) / m11, (law.k_re - 0.5) / m33, law.Gamma_u * law.sigma_u / 2,
+        law.Gamma_r * law.sigma_r / 2, law.gamma_u * law.sigma_bu / 2,
+        law.gamma_r * law.sigma_br / 2,
+    ]  # fmt: skip
+    fixed = (
+        law.sigma_u * seen.W.u**2 / 2 + law.sigma_r * seen.W.r**2 / 2
+        + law.sigma_bu * seen.b.u**2 / 2 + law.sigma_br * seen.b.r**2 / 2
+        + law.partial * (seen.b.u + seen.b.r) + seen.rest.u**2 / 2 + seen.rest.r**2 / 2
+    )  # fmt: skip
+    for s_u in np.geomspace(1e-3, 2 * A_u, 150):
+        slow_u = np.linalg.eigvalsh([[law.k_ze, half], [half, A_u - s_u / 2]])[0]
+        for s_r in np.geomspace(1e-3, 2 * A_r, 150):
+            slow_r = np.linalg.eigvalsh([[law.k_psie, half], [half, A_r - s_r / 2]])[0]
+            rate = min(slow_u, slow_r, *others)
+            if rate > 0:
+                drift = seen.drift.u**2 / (2 * s_u) + seen.drift.r**2 / (2 * s_r)
+                best = min(best, (fixed + drift) / (2 * rate))
+    return best
+
+
+@pytest.mark.parametrize("gains", [{}, {"k_ze": 2.0, "k_psie": 1.0}, {"A_u": 3.0, "k_ze": 0.12}])
+def test_the_bound_is_the_lowest_that_the_free_constants_of_47_allow(gains: dict[str, Any]) -> None:
+    law = AdaptiveNeural(**gains)
+    searched = lowest_by_search(law, SEEN, coupled=True)
+    found = ultimate_bound(law, NONLINEAR, SEEN).corrected
+    assert found.value == pytest.approx(searched, rel=0.01)
+    assert found.Delta == pytest.approx(sum(found.terms.values()))
+    assert found.value == found.Delta / (2.0 * found.lambda_)
+
+
+@pytest.mark.parametrize("coupling", ["corrected", "printed"])
+@pytest.mark.parametrize("k", [0.02, 0.049, 0.051, 0.1, 0.4, 2.0])
+def test_lambda_is_what_the_worst_direction_leaves(coupling: Any, k: float) -> None:
+    law = AdaptiveNeural(k_ze=k, k_psie=5.0, coupling=coupling)
+    found = ultimate_bound(law, PAPER).corrected.candidates["z_e, y_u"]
+    doubled = 2.0 if coupling == "printed" else 0.0
+    z, u, y = np.random.default_rng(0).normal(size=(3, 400_000)) * [[1.0], [0.3], [0.3]]
+    form = k * z**2 + 3.5 * u**2 + 5.0 * y**2 - np.abs(z * y) - doubled * np.abs(z * u)
+    least = np.min(form / (z**2 + PAPER.m11 * u**2 + y**2))
+    assert least >= found - 1e-12
+    assert least == pytest.approx(found, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("law", "limit"),
+    [
+        (AdaptiveNeural(A_u=5.0), 0.05),
+        (DynamicSurface(T_u=0.2), 0.05),
+        (DynamicSurface(T_u=2.0), 0.5),
+        (Backstepping(), 0.0),
+        (AdaptiveNeural(coupling="printed"), 0.05 + 1.0 / 3.5),
+    ],
+)
+def test_limit_of_k_ze_is_where_lambda_changes_sign(law: PolarBackstepping, limit: float) -> None:
+    condition = ultimate_bound(law, PAPER).conditions[0]
+    assert condition.name == "k_ze"
+    assert condition.limit == pytest.approx(limit)
+    for k, sign in ((limit * 0.99, -1.0), (limit * 1.01 + 1e-6, 1.0)):
+        there = ultimate_bound(law.model_copy(update={"k_ze": k}), PAPER)
+        assert there.conditions[0].holds is (sign > 0)
+        if k > 0.0:
+            assert math.copysign(1.0, there.corrected.candidates["z_e, y_u"]) == sign
+
+
+def test_gains_as_printed_fail_where_the_paper_sees_no_failure() -> None:
+    printed = bound(k_psie=0.01)
+    failing = [c.name for c in printed.conditions if not c.holds]
+    assert failing == ["k_psie"]
+    assert all(c.holds_printed for c in printed.conditions)
+    assert printed.corrected.value == math.inf
+    assert printed.printed.value < math.inf
+
+
+@pytest.mark.parametrize("name", ["sigma_u", "gamma_r", "Gamma_u", "sigma_br"])
+def test_without_leakage_there_is_no_bound(name: str) -> None:
+    without = bound(**{name: 0.0})
+    assert [c.name for c in without.conditions if not c.holds] == [name]
+    assert without.corrected.value == math.inf
+    assert without.printed.value == math.inf or "amma" in name  # gains that the paper dropped
+
+
+def test_before_a_run_only_lambda_and_the_conditions_are_known() -> None:
+    before = bound(None)
+    assert before.holds
+    assert before.corrected.lambda_ > bound().corrected.lambda_
+    assert math.isnan(before.corrected.value)
+
+
+def test_the_printed_lambda_leaves_out_masses_and_gains() -> None:
+    candidates = bound().printed.candidates
+    assert candidates["u_e"] == 3.5
+    assert candidates["W_u"] == 0.05
+    assert min(candidates, key=lambda name: candidates[name]) == "b_u"
+
+
+def test_bound_cannot_be_made_arbitrarily_small() -> None:
+    # Gains a thousand times as large: what leakage and the lemma's constant leave stays.
+    large = bound(k_ze=100.0, k_psie=100.0, k_ue=4e3, k_re=4e4, A_u=5e3, A_r=5e3)
+    assert large.corrected.Delta > 0.9 * sum(
+        large.corrected.terms[name] for name in ("W_u", "W_r", "b_u", "b_r", "lemma")
+    )
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_disturbance_exceeds_its_bound(seed: int) -> None:
+    sea, random = HarmonicDisturbance(scale=1.7), np.random.default_rng(seed)
+    loads = np.array([load_at(sea, t) for t in random.uniform(0, 2000, 3000)])
+    largest = np.abs(loads).max(axis=0)
+    assert np.all(largest <= sea.bounds())
+    # Reached where the two rates have no common period; b_v and b_r stop short of it.
+    assert largest[0] > 0.98 * sea.bounds()[0]
+
+
+def test_sway_bound_is_where_damping_meets_the_push() -> None:
+    for vessel in (PAPER, NONLINEAR):
+        v = sway_bound(vessel, 1.3, 1.3).value
+        assert -(vessel.Y_v + vessel.Y_vv * v) * v == pytest.approx(1.3)
+    assert sway_bound(NONLINEAR, 1.3, 1.3).printed == pytest.approx(1.3 / 0.88965, rel=1e-3)
+    bare = PAPER.model_copy(update={"Y_v": 0.0})
+    assert sway_bound(bare, 1.3, 1.3).value == math.inf
