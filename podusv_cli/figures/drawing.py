@@ -11,8 +11,10 @@ from podusv_cli.figures.controls import controls
 from podusv_cli.figures.filters import filters
 from podusv_cli.figures.loads import loads
 from podusv_cli.figures.panels import Family, signals_over_time
+from podusv_cli.figures.stability import stability
 from podusv_cli.figures.style import Shown, house_style, image, look
 from podusv_cli.figures.trajectory import trajectory
+from podusv_cli.figures.validity import validity
 from podusv_cli.interrupts import interrupts_heard
 from podusv_cli.parallel import run_all
 from podusv_cli.recording import Recording
@@ -71,6 +73,18 @@ FIGURES: dict[str, Sheet] = {
     "loads": Sheet(
         "disturbance, and when the actuator limits the law", ("b_u", "b_v", "b_r", "saturated"),
         loads,
+    ),
+    "stability": Sheet(
+        "Lyapunov function (46) with its ultimate bound, its rate with what it should stay below "
+        "(49), and its terms, stacked, as parts of it",
+        ("V",),
+        stability,
+    ),
+    "validity": Sheet(
+        "distance to the nearest network centre in widths, largest node output, filter errors, "
+        "and the sway speed with its bound (51)",
+        ("V",),
+        validity,
     ),
 }  # fmt: skip
 
