@@ -77,8 +77,6 @@ _ROWS = (
     Signal("lag_u", "u_{p,f}", "m/s", "lagged surge velocity error (PID derivative)"),
     Signal("lag_r", "r_{p,f}", "rad/s", "lagged yaw rate error (PID derivative)"),
     Signal("saturated", "sat", "1", "1 while the actuator limits what the law asked for"),
-    Signal("y_u", "y_u", "m/s", "filter error beta_u - alpha_u (38); derived, not logged"),
-    Signal("y_r", "y_r", "rad/s", "filter error beta_r - alpha_r (42); derived, not logged"),
     Signal("V", "V", "1", "Lyapunov function (46), the sum of its ten terms"),
     Signal("V_dot", r"\dot V", "1/s", "rate of V along the closed loop, by the chain rule"),
     Signal("V_z_e", "V_{z_e}", "m2", "z_e^2/2, term of V; z_e less the standoff"),

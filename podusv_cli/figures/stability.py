@@ -8,10 +8,13 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import SymmetricalLogLocator
 
-from podusv_cli.figures.style import Shown, axis_label, new_figure, thinned
+from podusv_cli.figures.curves import thinned
+from podusv_cli.figures.panels import TIME
+from podusv_cli.figures.style import Shown, axis_label, legend, new_figure
 from podusv_cli.kernels import Vector
 from podusv_cli.signals import SIGNALS
 from podusv_cli.theory.monitor import TERMS
@@ -32,15 +35,15 @@ def stability(runs: Sequence[Shown], columns: int) -> Figure:
     over_time = figure.subplots(2 + len(runs), 1, sharex=True)
     _value(over_time[0], runs)
     _rate(over_time[1], runs)
-    for axes, run in zip(over_time[2:], runs, strict=True):
-        _shares(axes, run)
-    over_time[-1].set_xlabel("time [s]")
-    over_time[-1].set_xlim(0.0, max(float(run.recording["time"][-1]) for run in runs))
-    layers, names = over_time[-1].get_legend_handles_labels()
-    over_time[-1].legend(layers, names, loc="upper center", bbox_to_anchor=(0.5, -0.35), ncols=10,
-                         fontsize="small", handlelength=0.8, columnspacing=0.8)  # fmt: skip
-    handles, labels = over_time[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=2 * columns)
+    layers = [_shares(axes, run) for axes, run in zip(over_time[2:], runs, strict=True)]
+    over_time[-1].set_xlabel(TIME)
+    over_time[-1].set_xlim(0.0, max(run.end for run in runs))
+    names = [f"${SIGNALS[name].symbol}$" for name in TERMS]
+    over_time[-1].legend(
+        layers[-1], names, loc="upper center", bbox_to_anchor=(0.5, -0.35), ncols=5 * columns,
+        fontsize="small", handlelength=0.8, columnspacing=0.8,
+    )  # fmt: skip
+    legend(figure, columns)
     return figure
 
 
@@ -97,16 +100,16 @@ def _settled_rate(run: Shown) -> float:
     return float(np.max(np.abs(run.signal("V_dot")[settled]), initial=0.0))
 
 
-def _shares(axes: Axes, run: Shown) -> None:
-    """V's terms, stacked, each as its part of V."""
+def _shares(axes: Axes, run: Shown) -> list[PolyCollection]:
+    """V's terms, stacked, each as its part of V; the layers."""
     time = run.recording["time"]
     terms = np.stack([_means(run.signal(name)) for name in TERMS])
     total = terms.sum(axis=0)
     parts = np.divide(terms, total, out=np.zeros_like(terms), where=total > 0.0)
-    names = [f"${SIGNALS[name].symbol}$" for name in TERMS]
-    axes.stackplot(_means(time), parts, labels=names, colors=LAYERS, linewidth=0.0)
+    layers = axes.stackplot(_means(time), parts, colors=LAYERS, linewidth=0.0)
     axes.set_ylim(0.0, 1.0)
-    axes.set_ylabel(f"parts of $V$\n{run.label}")
+    axes.set_ylabel(f"parts of $V$ [1]\n{run.label}")
+    return layers
 
 
 def _means(values: Vector) -> Vector:

@@ -8,7 +8,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from podusv_cli.figures.style import Shown, axis_label, draw_signal, new_figure
+from podusv_cli.figures.curves import draw_signal
+from podusv_cli.figures.panels import TIME
+from podusv_cli.figures.style import Shown, axis_label, legend, new_figure
 
 REACH = 2.0  # widths; farther from every node a network says next to nothing
 LABELS = {"node_distance": "nearest node [widths]"}
@@ -18,29 +20,27 @@ PANELS = ("node_distance", "activation", "y_u", "y_r")
 def validity(runs: Sequence[Shown], columns: int) -> Figure:
     """Distance to the nearest node, largest node output, filter errors, sway with its bound."""
     runs = [run for run in runs if run.has("V")]
-    figure = new_figure(columns, 5.2)
-    cells = figure.add_gridspec(3, 2)
+    rows = len(PANELS) // columns
+    figure = new_figure(columns, 0.7 + 1.5 * (rows + 1))
+    cells = figure.add_gridspec(rows + 1, columns)
     for place, name in enumerate(PANELS):
-        axes = figure.add_subplot(cells[divmod(place, 2)])
-        for run in runs:
-            draw_signal(axes, run, name)
+        axes = figure.add_subplot(cells[divmod(place, columns)])
+        draw_signal(axes, runs, name)
         axes.set_ylabel(LABELS.get(name) or axis_label(name))
         if name == "node_distance":
             axes.axhline(REACH, color="#444444", linewidth=0.6)
-    _sway(figure.add_subplot(cells[2, :]), runs)
-    end = max(float(run.recording["time"][-1]) for run in runs)
+    _sway(figure.add_subplot(cells[rows, :]), runs)
+    end = max(run.end for run in runs)
     for axes in figure.axes:
         axes.set_xlim(0.0, end)
-    handles, labels = figure.axes[-1].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=2 * columns)
+    legend(figure, columns)
     return figure
 
 
 def _sway(axes: Axes, runs: Sequence[Shown]) -> None:
+    draw_signal(axes, runs, "v")
     for run in runs:
-        time = run.recording["time"]
-        draw_signal(axes, run, "v")
-        end = float(time[-1])
+        end = run.end
         for start, bound in zip(
             run.recording["window_start"], run.recording["v_bound"], strict=True
         ):
@@ -50,4 +50,4 @@ def _sway(axes: Axes, runs: Sequence[Shown]) -> None:
                               linewidth=0.8, linestyle=(0, (4, 2)))  # fmt: skip
     axes.plot([], [], color="#444444", linewidth=0.8, linestyle=(0, (4, 2)), label="bound of $|v|$")
     axes.set_ylabel(axis_label("v"))
-    axes.set_xlabel("time [s]")
+    axes.set_xlabel(TIME)
