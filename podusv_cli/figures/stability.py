@@ -60,10 +60,10 @@ def _value(axes: Axes, runs: Sequence[Shown]) -> None:
                 axes.plot([start, end], [bound, bound], color=run.color, **BOUND)
             else:
                 size = f"{bound:.2g}, not drawn" if math.isfinite(bound) else "none"
-                told.append(f"{run.label} from {start:g} s: {size}")
-    axes.plot([], [], color="#444444", label="bound", **BOUND)
+                told.append(f"bound of {run.label} from {start:g} s on: {size}")
+    axes.plot([], [], color="#444444", label=r"bound $\Delta/2\lambda$", **BOUND)
     if told:
-        axes.set_title(r"bound $\Delta/2\lambda$ of " + "; ".join(told), fontsize="x-small")
+        axes.set_title("\n".join(told), fontsize="x-small", loc="left")
 
 
 def _bounds(run: Shown) -> Iterator[tuple[float, float, float]]:
