@@ -16,7 +16,9 @@ from podusv_cli import __version__
 from podusv_cli.cli.guard import flushed, guarded
 
 # NAME is the function NAME of cli/NAME.py
-COMMANDS = ("run", "compare", "plot", "validate", "verify", "explain", "list", "schema")
+COMMANDS = (
+    "run", "compare", "rerun", "diff", "plot", "validate", "verify", "explain", "list", "schema",
+)  # fmt: skip
 
 OBJECTS_BETWEEN_COLLECTIONS = 100_000
 

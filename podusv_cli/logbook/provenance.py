@@ -6,6 +6,7 @@ import os
 import platform
 import subprocess
 from collections.abc import Sequence
+from contextlib import suppress
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -21,7 +22,8 @@ def collect(argv: Sequence[str], started: datetime, finished: datetime) -> dict[
     """Facts about a run for provenance.json; times are aware datetimes.
 
     `git` is None where podusv does not run from a git checkout or git is missing; a version is
-    None where a package is not installed.
+    None where a package is not installed. Processor and C library are told because the library's
+    sine, cosine and arctangent may depend on both in the last bit.
     """
     return {
         "podusv": podusv_cli.__version__,
@@ -31,6 +33,8 @@ def collect(argv: Sequence[str], started: datetime, finished: datetime) -> dict[
             "system": platform.system(),
             "release": platform.release(),
             "machine": platform.machine(),
+            "processor": _processor(),
+            "libc": " ".join(platform.libc_ver()).strip() or None,
         },
         "git": source_tree(Path(podusv_cli.__file__).parent),
         "argv": list(argv),
@@ -64,6 +68,16 @@ def _git(folder: Path, *words: str) -> str | None:
     except (OSError, subprocess.SubprocessError):
         return None
     return done.stdout.strip()
+
+
+def _processor() -> str | None:
+    """The processor's model, None where nobody tells."""
+    with suppress(OSError), open("/proc/cpuinfo", encoding="utf-8", errors="replace") as file:
+        for line in file:
+            key, _, model = line.partition(":")
+            if key.strip() == "model name":
+                return model.strip()
+    return platform.processor() or None
 
 
 def _version(package: str) -> str | None:

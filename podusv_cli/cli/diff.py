@@ -1,0 +1,105 @@
+"""`podusv diff`: two finished runs held against each other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from podusv_cli.cli.options import AsJson
+from podusv_cli.cli.parting import DIFFERENT
+
+if TYPE_CHECKING:
+    from podusv_cli.repetition.causes import Change
+    from podusv_cli.repetition.difference import Difference
+    from podusv_cli.repetition.logs import Logs
+
+
+def diff(
+    one: Annotated[str, typer.Argument(metavar="RUN", help="A run folder, or a comparison's.")],
+    other: Annotated[str, typer.Argument(metavar="RUN", help="What to hold against it.")],
+    as_json: AsJson = False,
+) -> None:
+    """Tell what two runs differ in: scenario, versions, metrics, signals.
+
+    Exit code 0 when scenario, signals and metrics are the same to the last bit, 3 when not;
+    versions and the measured time of a law do not count. Of two comparisons, runs of the same name
+    are held against each other.
+    """
+    from podusv_cli import repeating  # heavy imports only when they are needed
+    from podusv_cli.logbook import jsonfile
+
+    found = repeating.diff(Path(one), Path(other))
+    if as_json:
+        typer.echo(jsonfile.encode(found.as_json()).decode(), nl=False)
+    else:
+        for label, (_, _, difference) in found.pairs.items():
+            _report(label, difference)
+        for path, names in ((one, found.only_one), (other, found.only_other)):
+            if names:
+                typer.echo(f"only in {path}: {', '.join(names)}")
+    raise typer.Exit(0 if found.nothing else DIFFERENT)
+
+
+def _report(label: str, found: Difference) -> None:
+    from podusv_cli.cli.layout import echo_entry
+
+    if label:
+        echo_entry(label)
+    if found.nothing:
+        log = "log.h5 byte for byte" if found.same_bytes else "every number of log.h5"
+        typer.echo(f"identical: scenario, metrics, {log}")
+    _show_changes("scenario", found.scenario)
+    _show_changes("versions", found.versions)
+    _show_metrics(found)
+    _show_log(found.log)
+
+
+def _show_changes(what: str, changes: Mapping[str, Change]) -> None:
+    from podusv_cli.cli.layout import echo_entry
+    from podusv_cli.cli.parting import change_in_words
+
+    if changes:
+        echo_entry(what, *(change_in_words(key, change) for key, change in changes.items()))
+
+
+def _show_metrics(found: Difference) -> None:
+    from podusv_cli.cli.layout import echo_table
+    from podusv_cli.metrics.table import METRICS
+    from podusv_cli.repetition.difference import relative
+
+    rows = [
+        [name, METRICS[name].unit, _number(a), _number(b), _signed(relative(a, b))]
+        for name, (a, b) in found.metrics.items()
+        if a != b
+    ]
+    if rows:
+        echo_table(["metric", "unit", "first", "second", "relative"], rows)
+
+
+def _show_log(log: Logs) -> None:
+    from podusv_cli.cli.layout import echo_entry, echo_table
+    from podusv_cli.cli.parting import log_in_words, unit
+
+    rows = [
+        [d.signal, unit(d), _number(d.gap), _number(d.of_peak), _time(d.time)] for d in log.largest
+    ]
+    if rows:
+        echo_table(["signal", "unit", "largest difference", "of its peak", "at t [s]"], rows)
+    lines = list(log_in_words(log))
+    if lines:
+        echo_entry("log", *lines)
+
+
+def _number(number: float | None) -> str:
+    return "-" if number is None else f"{number:.6g}"
+
+
+def _signed(number: float | None) -> str:
+    return "-" if number is None else f"{number:+.2g}"
+
+
+def _time(time: float | None) -> str:
+    return "-" if time is None else f"{time:.6g}"

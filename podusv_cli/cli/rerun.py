@@ -1,0 +1,100 @@
+"""`podusv rerun`: make a finished run once more and see whether the same comes out."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from podusv_cli.cli.guard import INTERRUPTED
+from podusv_cli.cli.options import AsJson, Force
+from podusv_cli.cli.parting import DIFFERENT
+
+if TYPE_CHECKING:
+    from podusv_cli.repeating import Repeated, Repetition
+
+DIVERGED = 4
+
+
+def rerun(
+    run: Annotated[str, typer.Argument(metavar="RUN", help="A run folder, or a comparison's.")],
+    out: Annotated[
+        Path | None, typer.Option(help="Folder to keep the repeated run in.", show_default="none")
+    ] = None,
+    force: Force = False,
+    as_json: AsJson = False,
+) -> None:
+    """Repeat a finished run from its folder and tell whether the log is the same.
+
+    Exit code 0 when every number of the log is the same to the last bit, 3 when not, 4 when the
+    run diverges and had not. Nothing is left behind without `--out`.
+    """
+    from podusv_cli import repeating  # heavy imports only when they are needed
+    from podusv_cli.cli.progress import progress_bars
+
+    request = repeating.Request(out, force, tuple(sys.argv))
+    with progress_bars(wanted=not as_json) as progress:
+        done = repeating.rerun(Path(run), request, progress)
+    if as_json:
+        _print_json(done, out)
+    else:
+        _report(done)
+        if out:
+            typer.echo(f"repeated: {out}")
+    for label, failure in done.failures.items():
+        typer.echo(f"{label}: {failure}", err=True)
+    raise typer.Exit(_exit_code(done))
+
+
+def _exit_code(done: Repetition) -> int:
+    if done.interrupted:
+        return INTERRUPTED
+    if done.diverges:
+        return DIVERGED
+    return 0 if done.identical else DIFFERENT
+
+
+def _print_json(done: Repetition, folder: Path | None) -> None:
+    from podusv_cli.logbook import jsonfile
+
+    runs = [{"label": label, **run.as_json()} for label, run in done.runs.items()]
+    content = {
+        "format": 1, "identical": done.identical, "folder": folder and str(folder),
+        "runs": runs, "failed": done.failures,
+    }  # fmt: skip
+    typer.echo(jsonfile.encode(content).decode(), nl=False)
+
+
+def _report(done: Repetition) -> None:
+    from podusv_cli.cli.layout import echo_entry
+
+    for label, run in done.runs.items():
+        echo_entry(label, *_lines(run), facts=_verdict(run))
+
+
+def _verdict(run: Repeated) -> str:
+    if run.found.same_bytes:
+        return f"identical: {run.found.sizes[0]} bytes, sha256 {run.found.digests[0]}"
+    if run.identical:
+        return "identical in every number; the file log.h5 is packed or described otherwise"
+    return "interrupted" if run.status == "interrupted" else "not identical"
+
+
+def _lines(run: Repeated) -> Iterator[str]:
+    from podusv_cli.cli.parting import changes_in_words, deviation_in_words, log_in_words
+
+    found = run.found
+    yield from log_in_words(found.log)
+    if found.log.largest:
+        widest = max(found.log.largest, key=lambda deviation: deviation.of_peak)
+        share = f"{widest.of_peak:.2g} of its peak"
+        yield f"largest difference, {share}: {deviation_in_words(widest)}"
+    if found.scenario:
+        yield f"changed in the scenario: {changes_in_words(found.scenario)}"
+    if found.versions:
+        yield f"changed in versions: {changes_in_words(found.versions)}"
+    if not (run.identical or found.scenario or found.versions):
+        yield "nothing that provenance.json and the scenario tell has changed"

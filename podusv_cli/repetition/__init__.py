@@ -1,0 +1,1 @@
+"""What two recordings of the same, or nearly the same, run differ in, and why they may."""
