@@ -1,0 +1,104 @@
+"""A finished run made in a second without a compiler, and copies of it with a planted change."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from config_samples import SOUND
+from logbook_samples import files
+
+import podusv_cli
+from podusv_cli import cli, workflows
+from podusv_cli.logbook import hdf5, jsonfile, reading
+from podusv_cli.logbook.folder import RunWriter
+from podusv_cli.recording import Recording
+
+SCENARIO = SOUND + "name: sample\nsimulation: {step: 0.05, duration: 2.0, compiled: false}\n"
+
+
+class Said(NamedTuple):
+    """What a command left behind."""
+
+    code: object
+    out: str
+    err: str
+
+
+Command = Callable[..., Said]
+
+
+def commanded(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Command:
+    """The command line on a terminal of 100 columns."""
+    monkeypatch.setenv("COLUMNS", "100")
+
+    def run(*words: Any) -> Said:
+        monkeypatch.setattr(sys, "argv", ["podusv", *map(str, words)])
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        return Said(ended.value.code, *capsys.readouterr())
+
+    return run
+
+
+def made(folder: Path, *overrides: str, text: str = SCENARIO) -> Path:
+    """The run folder of this scenario."""
+    config = folder.with_suffix(".yaml")
+    config.write_text(text)
+    return workflows.run(config, workflows.Request(overrides, folder, figures=False)).folder
+
+
+def copied(folder: Path, target: Path, **changes: Callable[[bytes], bytes]) -> Path:
+    """A finished copy, manifest included, with changed files: `log_h5` changes log.h5."""
+    with RunWriter(target) as writer:
+        for name, content in files(folder).items():
+            if name != "manifest.json":
+                change = changes.pop(name.replace(".", "_"), lambda content: content)
+                writer.add(name, change(content))
+        assert not changes
+        return writer.finish("finished")
+
+
+def relogged(folder: Path, change: Callable[[dict[str, Any]], None]) -> Callable[[bytes], bytes]:
+    """A change of log.h5: `change` works on its signals by name."""
+    recorded: Recording = reading.read_log(folder / "log.h5")
+    signals = {name: np.array(array) for name, array in recorded.signals.items()}
+    change(signals)
+    texts = {
+        "resolved_yaml": reading.resolved_yaml(folder / "log.h5"), "title": "t", "source": "s",
+        "version": podusv_cli.__version__,
+    }  # fmt: skip
+    return lambda _: hdf5.encode(replace(recorded, signals=signals), **texts)
+
+
+def flip(array: Any, row: int) -> None:
+    """Turn the last bit of a number."""
+    array.view(np.int64)[row] ^= 1
+
+
+def told_otherwise(**facts: Any) -> Callable[[bytes], bytes]:
+    """A change of a JSON file: these packages' versions."""
+
+    def change(content: bytes) -> bytes:
+        told = json.loads(content)
+        told["packages"] |= facts
+        return jsonfile.encode(told)
+
+    return change
+
+
+def replaced(old: str, new: str) -> Callable[[bytes], bytes]:
+    """A change of a text file."""
+
+    def change(content: bytes) -> bytes:
+        text = content.decode()
+        assert old in text
+        return text.replace(old, new).encode()
+
+    return change

@@ -1,0 +1,272 @@
+"""`podusv diff`: what two runs differ in, to the last bit and in words."""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from logbook_samples import recording
+from repetition_samples import (
+    Command,
+    commanded,
+    copied,
+    flip,
+    made,
+    relogged,
+    replaced,
+    told_otherwise,
+)  # fmt: skip
+
+from podusv_cli.errors import StorageError
+from podusv_cli.recording import Recording
+from podusv_cli.repetition.causes import scenario_changes, version_changes
+from podusv_cli.repetition.logs import compare
+from podusv_cli.repetition.numbers import Deviation, differing
+
+FINITE = st.floats(allow_nan=False, allow_infinity=False)
+
+
+def deviation(one: float, other: float) -> Deviation:
+    return Deviation("x", 0.0, one, other, 1.0)
+
+
+# --- numbers
+
+
+@given(FINITE, st.integers(1, 5))
+def test_units_in_the_last_place_are_counted_also_across_zero(start: float, count: int) -> None:
+    number = start
+    for _ in range(count):
+        number = math.nextafter(number, math.inf)
+    if math.isfinite(number):
+        assert deviation(start, number).ulps == deviation(number, start).ulps == count
+
+
+def test_zeros_of_either_sign_are_no_distance_apart_but_differ() -> None:
+    assert deviation(0.0, -0.0).ulps == 0
+    assert differing(np.array([0.0]), np.array([-0.0]))[0]
+
+
+def test_what_is_not_finite_is_infinitely_far_from_what_is() -> None:
+    assert deviation(math.nan, 1.0).ulps is None
+    for bad in (math.nan, math.inf):
+        assert deviation(bad, 1.0).gap == deviation(1.0, bad).relative == math.inf
+    payload = struct.unpack("<d", struct.pack("<Q", 0xFFF8_0000_0000_0001))[0]
+    assert not differing(np.array([math.nan]), np.array([payload]))[0]
+
+
+# --- logs
+
+
+def changed(**signals: Any) -> Recording:
+    """The small recording with some of its signals replaced."""
+    base = recording()
+    return replace(base, signals=base.signals | signals)
+
+
+def bumped(name: str, place: Any, by: float) -> Any:
+    array = np.array(recording()[name])
+    array[place] += by
+    return array
+
+
+def test_a_recording_is_the_same_as_itself() -> None:
+    assert compare(recording(), recording()).same
+
+
+@given(st.sampled_from(["x", "z_e", "tau_u_cmd"]), st.integers(0, 49), st.integers(0, 62))
+def test_any_flipped_bit_of_any_signal_is_found(name: str, row: int, bit: int) -> None:
+    array = np.array(recording()[name])
+    array.view(np.int64)[row] ^= 1 << bit
+    found = compare(recording(), changed(**{name: array}))
+    assert not found.same
+    assert found.first is not None
+    assert (found.first.signal, found.first.time) == (name, recording()["time"][row])
+
+
+def test_the_first_difference_is_the_earliest_and_the_largest_the_widest() -> None:
+    other = changed(
+        x=bumped("x", 30, 5.0), W_hat_u=bumped("W_hat_u", (12, 3), 1e-9),
+        z_e=bumped("z_e", [20, 40], [1.0, -2.0]),
+    )  # fmt: skip
+    found = compare(recording(), other)
+    assert found.first
+    assert (found.first.signal, found.first.time) == ("W_hat_u[3]", 0.12)
+    assert found.first.one == recording()["W_hat_u"][12, 3]
+    largest = {d.signal: (d.time, d.gap) for d in found.largest}
+    assert largest == {
+        "x": (0.30, pytest.approx(5.0)),
+        "W_hat_u[3]": (0.12, pytest.approx(1e-9)),
+        "z_e": (0.40, pytest.approx(2.0)),
+    }
+
+
+def test_what_does_not_run_over_time_comes_first() -> None:
+    base = recording()
+    centres = np.array(base["rbf_center"])
+    centres[2, 1] += 1.0
+    other = replace(changed(x=bumped("x", 0, 1.0)), fixed={**base.fixed, "rbf_center": centres})
+    first = compare(base, other).first
+    assert first
+    assert (first.signal, first.time) == ("rbf_center[2,1]", None)
+
+
+def test_logs_of_other_steps_are_compared_at_the_times_of_both() -> None:
+    base = recording()
+    thin = replace(base, signals={name: array[::2] for name, array in base.signals.items()})
+    found = compare(base, thin)
+    assert found.rows == (50, 25, 25)
+    assert not found.largest
+    assert not found.same
+    shorter = replace(base, signals={name: array[:7] for name, array in base.signals.items()})
+    assert compare(shorter, base).rows == (7, 50, 7)
+
+
+def test_one_wrong_time_does_not_set_the_rows_adrift() -> None:
+    found = compare(recording(), changed(time=bumped("time", 9, 1e-6)))
+    assert found.rows == (50, 50, 50)
+    assert [d.signal for d in found.largest] == ["time"]
+
+
+def test_signals_of_another_size_or_of_one_log_alone_are_named() -> None:
+    base = recording()
+    other = replace(
+        base, signals={k: v for k, v in changed(u=base["x"]).signals.items() if k != "z_e"}
+    )
+    found = compare(base, other)
+    assert (found.only_one, found.only_other) == (("z_e",), ("u",))
+    assert compare(base, recording(nodes=4)).reshaped == ("W_hat_u", "rbf_center")
+    assert not found.same
+
+
+def test_how_a_run_ended_counts() -> None:
+    found = compare(recording(), recording(status="diverged", message="at t = 1"))
+    assert found.endings == {"status": ("finished", "diverged"), "message": ("", "at t = 1")}
+    assert not found.same
+
+
+# --- causes
+
+
+def test_every_key_of_the_scenario_counts() -> None:
+    one = "name: a\ncontroller: {kind: pid, K_Pu: 1.0}\nvessel: {m: 2.0, source: tank}\n"
+    other = "name: b\ncontroller: {kind: pid, K_Pu: 2.0}\nvessel: {m: 2.0}\nlog: {every: 1}\n"
+    assert scenario_changes(one, other) == {
+        "name": ("a", "b"), "controller.K_Pu": (1.0, 2.0), "vessel.source": ("tank", None),
+        "log.every": (None, 1),
+    }  # fmt: skip
+
+
+def test_versions_count_and_moments_do_not() -> None:
+    one = {"podusv": "1", "packages": {"numba": "1"}, "argv": ["a"], "started": "x", "git": None}
+    other = {"podusv": "1", "packages": {"numba": "2"}, "argv": [], "started": "y", "git": {"c": 1}}
+    assert version_changes(one, other) == {"packages.numba": ("1", "2")}
+
+
+def test_a_log_without_a_readable_scenario_is_damaged() -> None:
+    for text in ("a: [1", "- 1\n"):
+        with pytest.raises(StorageError, match="the scenario in a log is damaged"):
+            scenario_changes("a: 1\n", text)
+
+
+# --- the command
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return made(tmp_path_factory.mktemp("diff") / "first")
+
+
+@pytest.fixture
+def podusv(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Command:
+    return commanded(monkeypatch, capsys)
+
+
+def test_a_copy_is_identical(run: Path, tmp_path: Path, podusv: Command) -> None:
+    said = podusv("diff", run, copied(run, tmp_path / "copy"))
+    assert said == (0, "identical: scenario, metrics, log.h5 byte for byte\n", "")
+
+
+def test_another_version_is_told_and_changes_nothing(
+    run: Path, tmp_path: Path, podusv: Command
+) -> None:
+    other = copied(run, tmp_path / "copy", provenance_json=told_otherwise(numpy="1.0.0"))
+    said = podusv("diff", run, other)
+    assert said.code == 0
+    now = json.loads((run / "provenance.json").read_text())["packages"]["numpy"]
+    assert f"    packages.numpy {now} -> 1.0.0\n" in said.out.replace('"', "")
+
+
+def test_one_flipped_bit_is_named(run: Path, tmp_path: Path, podusv: Command) -> None:
+    change = relogged(run, lambda signals: flip(signals["r"], 17))
+    said = podusv("diff", run, copied(run, tmp_path / "copy", log_h5=change))
+    assert said.code == 3
+    assert "first difference: r at t = 0.8500000000000001 s: " in said.out
+    assert "1 ulp" in said.out
+    assert "1 of " in said.out
+    assert "metric" not in said.out
+
+
+def test_another_gain_moves_metrics_and_signals(run: Path, tmp_path: Path, podusv: Command) -> None:
+    other = made(tmp_path / "other", "controller.K_Pu=900")
+    said = podusv("diff", run, other)
+    assert said.code == 3
+    assert "    controller.K_Pu 1100.0 -> 900.0\n" in said.out
+    told = json.loads(podusv("diff", run, other, "--json").out)
+    assert told["identical"] is False
+    (pair,) = told["pairs"]
+    numbers = [json.loads((f / "metrics.json").read_text())["metrics"]["iae"] for f in (run, other)]
+    assert pair["metrics"]["iae"]["values"] == numbers
+    change = numbers[1] / numbers[0] - 1
+    assert pair["metrics"]["iae"]["relative"] == pytest.approx(change)
+    assert pair["scenario"] == {"controller.K_Pu": [1100.0, 900.0]}
+
+
+def test_comparisons_are_held_together_run_by_run(
+    run: Path, tmp_path: Path, podusv: Command
+) -> None:
+    for name, labels in (("one", ("a", "b")), ("two", ("b", "c"))):
+        for label in labels:
+            copied(run, tmp_path / name / label)
+        (tmp_path / name / "manifest.json").write_text("{}")
+    said = podusv("diff", tmp_path / "one", tmp_path / "two")
+    assert said.code == 3
+    assert said.out == (
+        "b\nidentical: scenario, metrics, log.h5 byte for byte\n"
+        f"only in {tmp_path / 'one'}: a\nonly in {tmp_path / 'two'}: c\n"
+    )
+
+
+def test_no_run_folder_and_a_damaged_one(run: Path, tmp_path: Path, podusv: Command) -> None:
+    said = podusv("diff", run, tmp_path)
+    assert said == (2, "", f"{tmp_path} is no run folder: it has no manifest.json\n")
+    broken = copied(run, tmp_path / "broken")
+    (broken / "log.h5").write_bytes(b"")
+    said = podusv("diff", broken, run)
+    assert said == (5, "", f"{broken} is not a finished folder: log.h5 was altered\n")
+
+
+def test_narrow_terminals_get_narrow_lines(
+    run: Path, tmp_path: Path, podusv: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    other = made(tmp_path / "other", "controller.K_Pu=900")
+    monkeypatch.setenv("COLUMNS", "40")
+    monkeypatch.setattr("podusv_cli.cli.layout.sys.stdout.isatty", lambda: True, raising=False)
+    said = podusv("diff", run, other)
+    assert said.code == 3
+    assert max(map(len, said.out.splitlines())) <= 40
+
+
+def test_the_scenario_that_counts_is_the_one_in_the_log(
+    run: Path, tmp_path: Path, podusv: Command
+) -> None:
+    other = copied(run, tmp_path / "copy", resolved_yaml=replaced("K_Pu: 1100.0", "K_Pu: 1.0"))
+    assert podusv("diff", run, other).code == 0

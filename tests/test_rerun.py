@@ -1,0 +1,229 @@
+"""`podusv rerun`: the same comes out, or podusv says what parted and what had changed."""
+
+from __future__ import annotations
+
+import json
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+from logbook_samples import ENVIRONMENT, beside, files
+from repetition_samples import (
+    SCENARIO,
+    Command,
+    commanded,
+    copied,
+    flip,
+    made,
+    relogged,
+    replaced,
+    told_otherwise,
+)  # fmt: skip
+
+from podusv_cli import repeating, workflows
+from podusv_cli.logbook import manifest
+from podusv_cli.logbook.folder import open_run
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return made(tmp_path_factory.mktemp("rerun") / "first")
+
+
+@pytest.fixture
+def podusv(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Command:
+    room = tmp_path / "passing"
+    room.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(room))
+    return commanded(monkeypatch, capsys)
+
+
+def shown(said: Any) -> str:
+    """The output on one line."""
+    return " ".join(said.out.split())
+
+
+def test_an_untouched_run_comes_out_the_same_and_leaves_nothing(
+    run: Path, tmp_path: Path, podusv: Command
+) -> None:
+    before = files(run.parent)
+    said = podusv("rerun", run)
+    assert said.code == 0
+    digest = manifest.read(run).files["log.h5"].sha256
+    size = (run / "log.h5").stat().st_size
+    assert shown(said) == f"first identical: {size} bytes, sha256 {digest}"
+    assert files(run.parent) == before
+    assert not list((tmp_path / "passing").iterdir())
+
+
+def test_a_changed_gain_is_found_and_named(run: Path, tmp_path: Path, podusv: Command) -> None:
+    change = replaced("K_Pu: 1100.0", "K_Pu: 1200.0")
+    said = podusv("rerun", copied(run, tmp_path / "copy", resolved_yaml=change))
+    assert said.code == 3
+    assert "copy not identical" in shown(said)
+    assert "changed in the scenario: controller.K_Pu 1100.0 -> 1200.0" in shown(said)
+    # Surge acceleration at the start differs, so the law's output is the first to differ.
+    assert "first difference: tau_u_cmd at t = 0.0 s: " in shown(said)
+
+
+def test_a_changed_version_is_named_though_nothing_moved(
+    run: Path, tmp_path: Path, podusv: Command
+) -> None:
+    other = copied(run, tmp_path / "copy", provenance_json=told_otherwise(numba="0.1.0"))
+    said = podusv("rerun", other)
+    assert said.code == 0
+    now = json.loads((run / "provenance.json").read_text())["packages"]["numba"]
+    told = f"changed in versions: packages.numba 0.1.0 -> {now}"
+    assert told in shown(said).replace('"', "")
+
+
+def test_one_flipped_bit_is_found_with_time_values_and_size(
+    run: Path, tmp_path: Path, podusv: Command
+) -> None:
+    change = relogged(run, lambda signals: flip(signals["psi"], 31))
+    other = copied(run, tmp_path / "copy", log_h5=change)
+    said = podusv("rerun", other)
+    assert said.code == 3
+    was, now = (open_run(f).recording["psi"][31] for f in (other, run))
+    assert f"psi at t = 1.55 s: {float(was)!r} -> {float(now)!r} rad (1 ulp" in shown(said)
+    assert "nothing that provenance.json and the scenario tell has changed" in shown(said)
+
+
+def test_the_same_numbers_in_another_file_are_identical(
+    run: Path, tmp_path: Path, podusv: Command
+) -> None:
+    other = copied(run, tmp_path / "copy", log_h5=relogged(run, lambda signals: None))
+    said = podusv("rerun", other)
+    assert said.code == 0
+    assert "identical in every number" in shown(said)
+
+
+def test_signals_that_only_one_podusv_logs_are_named(
+    run: Path, tmp_path: Path, podusv: Command
+) -> None:
+    change = relogged(run, lambda signals: signals.pop("psi_e"))
+    said = podusv("rerun", copied(run, tmp_path / "copy", log_h5=change))
+    assert said.code == 3
+    assert "in the second alone: psi_e" in shown(said)
+    assert "first difference" not in said.out
+
+
+def test_out_keeps_the_repeated_run(run: Path, tmp_path: Path, podusv: Command) -> None:
+    said = podusv("rerun", run, "--out", tmp_path / "kept", "--json")
+    assert said.code == 0
+    told = json.loads(said.out)
+    assert (told["identical"], told["folder"]) == (True, str(tmp_path / "kept"))
+    assert (tmp_path / "kept/log.h5").read_bytes() == (run / "log.h5").read_bytes()
+    assert open_run(tmp_path / "kept").status == "finished"
+    assert beside(tmp_path / "kept") == {"passing"}
+    again = podusv("rerun", run, "--out", tmp_path / "kept")
+    assert again == (5, "", f"{tmp_path / 'kept'} exists already; --force replaces it\n")
+
+
+def test_a_run_that_diverges_and_had_not_has_a_code_of_its_own(
+    run: Path, tmp_path: Path, podusv: Command
+) -> None:
+    change = replaced("K_Pu: 1100.0", "K_Pu: 1.0e+300")
+    said = podusv("rerun", copied(run, tmp_path / "copy", resolved_yaml=change))
+    assert said.code == 4
+    assert "status: finished -> diverged" in shown(said)
+
+
+def test_a_run_that_diverges_as_it_did_is_identical(tmp_path: Path, podusv: Command) -> None:
+    run = made(tmp_path / "wild", "controller.K_Pu=1e300")
+    assert open_run(run).status == "diverged"
+    assert podusv("rerun", run).code == 0
+
+
+def test_an_interrupted_run_is_refused(run: Path, tmp_path: Path, podusv: Command) -> None:
+    other = copied(run, tmp_path / "copy")
+    stated = (other / "manifest.json").read_text()
+    (other / "manifest.json").write_text(stated.replace('"finished"', '"interrupted"'))
+    said = podusv("rerun", other)
+    assert said.code == 2
+    assert said.err == f"{other} was interrupted; there is no whole run to repeat\n"
+
+
+def test_ctrl_c_ends_it_and_leaves_nothing(run: Path, tmp_path: Path) -> None:
+    change = replaced("duration: 2.0", "duration: 20000.0")
+    other = copied(run, tmp_path / "copy", resolved_yaml=change)
+    room = tmp_path / "passing"
+    room.mkdir()
+    process = subprocess.Popen(
+        [sys.executable, "-m", "podusv_cli", "rerun", str(other)],
+        env={**ENVIRONMENT, "TMPDIR": str(room)}, stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    try:
+        while not any(room.glob("podusv-*/.again.*")) and process.poll() is None:
+            time.sleep(0.05)
+        time.sleep(0.5)
+        process.send_signal(signal.SIGINT)
+        out, _ = process.communicate(timeout=60)
+    finally:
+        process.kill()
+    assert process.returncode == 130
+    assert out.startswith("copy  interrupted\n")
+    assert not list(room.iterdir())
+
+
+def test_what_is_no_run_folder(run: Path, tmp_path: Path, podusv: Command) -> None:
+    for path in (tmp_path, tmp_path / "nowhere", run / "log.h5"):
+        said = podusv("rerun", path)
+        assert said == (2, "", f"{path} is no run folder: it has no manifest.json\n")
+    broken = copied(run, tmp_path / "broken")
+    (broken / "resolved.yaml").write_text("name: x\n")
+    assert podusv("rerun", broken).code == 5
+
+
+def test_a_key_that_this_podusv_does_not_know(run: Path, tmp_path: Path, podusv: Command) -> None:
+    change = replaced("K_Pu:", "K_Qu:")
+    other = copied(run, tmp_path / "copy", resolved_yaml=change)
+    said = podusv("rerun", other)
+    assert said.code == 2
+    assert re.search(r"resolved\.yaml:\d+:\d+: controller\.K_Qu: unknown key", said.err)
+
+
+@pytest.fixture
+def compared(tmp_path: Path) -> Path:
+    config = tmp_path / "two.yaml"
+    config.write_text(SCENARIO + "controllers: {soft: {K_Pu: 500.0}, hard: {K_Pu: 1500.0}}\n")
+    request = workflows.Request(out=tmp_path / "two", figures=False)
+    return workflows.compare([config], request).folder
+
+
+def test_every_run_of_a_comparison_is_repeated(
+    compared: Path, tmp_path: Path, podusv: Command
+) -> None:
+    said = podusv("rerun", compared, "--out", tmp_path / "kept")
+    assert said.code == 0
+    assert re.findall(r"^(\w+)  identical", said.out, re.MULTILINE) == ["soft", "hard"]
+    for label in ("soft", "hard"):
+        logs = [folder / label / "log.h5" for folder in (compared, tmp_path / "kept")]
+        assert logs[0].read_bytes() == logs[1].read_bytes()
+    manifest.check(tmp_path / "kept")
+
+
+def test_a_run_that_cannot_be_repeated_takes_no_other_with_it(
+    compared: Path, podusv: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real = repeating.execute
+
+    def execute(task: Any, progress: Any = None) -> Any:
+        if task.scenario.controller.K_Pu == 500.0:
+            raise RuntimeError("planted")
+        return real(task, progress)
+
+    monkeypatch.setattr(repeating, "execute", execute)
+    said = podusv("rerun", compared)
+    assert said.code == 3
+    assert said.out.startswith("hard  identical")
+    assert said.err.startswith("soft: ")
+    assert "planted" in said.err
