@@ -20,7 +20,7 @@ from podusv_cli.logbook import hdf5, jsonfile, reading
 from podusv_cli.logbook.folder import RunWriter
 from podusv_cli.recording import Recording
 
-SCENARIO = SOUND + "name: sample\nsimulation: {step: 0.05, duration: 2.0, compiled: false}\n"
+SCENARIO = SOUND + "name: sample\nsimulation: {step: 0.01, duration: 0.5, compiled: false}\n"
 
 
 class Said(NamedTuple):
