@@ -33,8 +33,8 @@ KEPT = 8  # caches of this many states of the source stay on disk
 NUMBERS = (bool, int, float, str, tuple)
 # Rooms and files that hold no kernel: what is edited there leaves machine code as it is.
 APART = (
-    "cli", "comparison", "config", "figures", "findings", "logbook", "verification",
-    "comparing.py", "running.py", "workflows.py",
+    "cli", "comparison", "config", "figures", "findings", "logbook", "repetition", "verification",
+    "comparing.py", "repeating.py", "running.py", "workflows.py",
 )  # fmt: skip
 
 
