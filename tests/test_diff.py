@@ -26,6 +26,7 @@ from repetition_samples import (
 )  # fmt: skip
 
 from podusv_cli.errors import StorageError
+from podusv_cli.logbook import jsonfile
 from podusv_cli.recording import Recording
 from podusv_cli.repetition.causes import scenario_changes, version_changes
 from podusv_cli.repetition.logs import compare
@@ -203,6 +204,21 @@ def test_another_version_is_told_and_changes_nothing(
     assert said.code == 0
     now = json.loads((run / "provenance.json").read_text())["packages"]["numpy"]
     assert f"    packages.numpy {now} -> 1.0.0\n" in said.out.replace('"', "")
+
+
+@pytest.mark.parametrize(("name", "code"), [("law_ns", 0), ("iae", 3)])
+def test_metrics_count_but_for_what_a_clock_measured(
+    name: str, code: int, run: Path, tmp_path: Path, podusv: Command
+) -> None:
+    def change(content: bytes) -> bytes:
+        told = json.loads(content)
+        told["metrics"][name] = 12.5
+        return jsonfile.encode(told)
+
+    said = podusv("diff", run, copied(run, tmp_path / "copy", metrics_json=change))
+    assert said.code == code
+    assert f"\n{name} " in said.out
+    assert ("identical" in said.out) == (code == 0)
 
 
 def test_one_flipped_bit_is_named(run: Path, tmp_path: Path, podusv: Command) -> None:
