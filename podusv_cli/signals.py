@@ -100,6 +100,17 @@ _ROWS = (
     Signal("V_Delta", r"\Delta", "1/s", "Delta of (49), corrected, from extremes of that part"),
     Signal("V_bound", r"\Delta/2\lambda", "1", "ultimate bound of V, corrected"),
     Signal("v_bound", r"|v|_{\max}", "m/s", "bound of the sway speed (51), with all damping"),
+    Signal("n", "n", "1/s", "propeller speed", ("pod",)),
+    Signal("delta", r"\delta", "rad", "propulsion angle", ("pod",)),
+    Signal("n_cmd", r"n_\mathrm{cmd}", "1/s", "propeller speed that was asked for", ("pod",)),
+    Signal(
+        "delta_cmd", r"\delta_\mathrm{cmd}", "rad", "propulsion angle that was asked for", ("pod",)
+    ),
+    Signal("thrust", "T", "N", "thrust of the propeller (8)", ("pod",)),
+    Signal("power", "P", "W", "power that the propeller takes", ("pod",)),
+    Signal("speed_limited", "n lim", "1", "1 while a propeller is asked for its largest speed"),
+    Signal("angle_limited", r"\delta lim", "1", "1 while a pod is asked for its largest angle"),
+    Signal("rate_limited", "rate lim", "1", "1 while a speed or an angle changes at its limit"),
     Signal("rbf_center", "c", "1", "network centres in (u, v, r) [m/s, m/s, rad/s]"),
     Signal("rbf_width", r"\sigma", "1", "Gaussian widths in (u, v, r) [m/s, m/s, rad/s]"),
 )

@@ -36,9 +36,15 @@ PACKAGE = File(podusv_cli.__file__).parent
 ROOMS: dict[str, Any] = {
     "paths": Path, "disturbances": Disturbance, "actuators": Actuator, "controllers": Controller,
 }  # fmt: skip
+# CyberShip II's two propellers as one that turns, on the centre line.
+POD: dict[str, float] = {
+    "x": -0.499, "T_nn": 7.30068e-3, "T_nn_astern": 1.020512e-2, "n_max": 33.0,
+    "n_max_astern": 33.0, "n_rate": 60.0, "n_lag": 0.2, "angle_rate": 1.0, "angle_lag": 0.2,
+}  # fmt: skip
 # What a component needs that has no default; a new kind without an entry fails its contract test.
 REQUIRED: dict[str, dict[str, Any]] = {
     "waypoints": {"points": ((0.0, 0.0), (10.0, 1.0), (18.0, 6.0), (20.0, 15.0))},
+    "pod": {"pods": (POD,)},
 }
 # Slow enough an adaptation for a law that is evaluated only now and then.
 GENTLE = AdaptiveNeural(Gamma_u=1.0, Gamma_r=1.0, gamma_u=10.0, gamma_r=10.0)

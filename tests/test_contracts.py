@@ -30,6 +30,8 @@ KERNELS = {
     "controllers": "law",
 }
 
+POD_VECTORS = ("n", "delta", "n_cmd", "delta_cmd", "thrust", "power")
+
 
 def parts(kind: type[BaseModel]) -> Iterator[type[BaseModel]]:
     """A component's class and those of the components in its fields."""
@@ -212,12 +214,14 @@ def test_a_law_s_memory_has_the_declared_size_and_is_made_anew(kind: type[Contro
 @every_kind
 def test_every_logged_column_has_one_meaning(room: str, kind: type[Component]) -> None:
     loop = corrected(**{room[:-1]: example(kind)})
-    wide = {name: size for name, size in loop.controller.slots() if size > 1}
+    own = Counter([*loop.actuator.states, *loop.actuator.signals])
+    wide = dict(loop.controller.slots()) | own
     for name, count in Counter(names(loop)).items():
         assert count == wide.get(name, 1), f"{name} is logged twice"
         if name not in ("x_d_dot", "y_d_dot", "x_d_ddot", "y_d_ddot"):
             assert name in SIGNALS, f"{name} is in no table of signals"
-            assert bool(SIGNALS[name].axes) == name.startswith("W_hat")
+            vector = name.startswith("W_hat") or name in POD_VECTORS
+            assert bool(SIGNALS[name].axes) == vector
     assert all(name in SIGNALS for name in loop.controller.fixed_signals())
 
 

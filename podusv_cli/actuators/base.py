@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -17,10 +17,19 @@ class Actuator(Component):
     x, the actuator's own `state` and the `demand` (tau_u [N], tau_r [N m]) it writes the loads
     (tau_u, tau_v, tau_r) into `tau`, the rate of its state into `rate`, and one number for each
     name in `signals`. Limits act here, inside the right-hand side.
+
+    `states` and `signals` name every number; the numbers of one vector bear the same name.
     """
 
-    states: ClassVar[tuple[str, ...]] = ()
-    signals: ClassVar[tuple[str, ...]] = ()
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the actuator's own states."""
+        return ()
+
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """Names of what `drive` writes into `signals`."""
+        return ()
 
     @staticmethod
     def drive(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 from podusv_cli.actuators.base import Actuator
 from podusv_cli.kernels import Vector, kernel
@@ -13,9 +13,13 @@ class Saturated(Actuator):
     """Surge force and yaw moment cut off at limits that are the same ahead and astern."""
 
     kind: Literal["saturated"] = "saturated"
-    signals: ClassVar[tuple[str, ...]] = ("saturated",)
     surge_limit: float = value(8.0, "N", "largest surge force, ahead and astern", gt=0)
     yaw_limit: float = value(2.5, "N m", "largest yaw moment, both ways", gt=0)
+
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """The flag."""
+        return ("saturated",)
 
     @staticmethod
     @kernel

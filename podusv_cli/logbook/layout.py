@@ -16,6 +16,7 @@ AXES = {
     "node": "network node",
     "input": "network input: u, v, r",
     "window": "part of the run: the whole, its settled end",
+    "pod": "pod, in the scenario's order",
 }
 
 # Arrays that do not run over time, and their axes.

@@ -1,0 +1,57 @@
+"""A propeller's thrust (8) and its inverse, as kernels."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from podusv_cli.kernels import Vector, kernel
+
+PHYSICAL = 0.0
+
+# A pod's numbers in the actuator's table, by position.
+(
+    X, Y, T_AHEAD, T_ASTERN, T_NV, N_AHEAD, N_ASTERN, ANGLE, N_RATE, DELTA_RATE, N_LAG, DELTA_LAG,
+    POWER, WIDTH,
+) = range(14)  # fmt: skip
+
+
+@kernel
+def speed_gain(x: Vector, pod: Vector, delta: float, k: Any) -> float:
+    """What |n| is multiplied with in the thrust, N s: T_nV times a speed, with its sign.
+
+    The physical form loses thrust with the advance speed V_a, the water's speed along the
+    propeller's axis at the pod; the printed (8) gains with the vessel's speed V, both ways alike.
+    """
+    if k.thrust_form == PHYSICAL:
+        ahead, aside = x[3] - pod[Y] * x[5], x[4] + pod[X] * x[5]
+        return float(-pod[T_NV] * (ahead * math.cos(delta) + aside * math.sin(delta)))
+    return float(pod[T_NV] * math.sqrt(x[3] * x[3] + x[4] * x[4]))
+
+
+@kernel
+def thrust(n: float, gain: float, pod: Vector, k: Any) -> float:
+    """Thrust [N] at the propeller speed n: T_nn |n| n + gain |n|, or as printed + gain n."""
+    T_nn = pod[T_AHEAD] if n >= 0.0 else pod[T_ASTERN]
+    return float(T_nn * abs(n) * n + gain * (abs(n) if k.thrust_form == PHYSICAL else n))
+
+
+@kernel
+def speed_for(T: float, gain: float, pod: Vector, k: Any) -> float:
+    """A propeller speed n with thrust(n) = T [N]: never astern for T >= 0, never ahead for T < 0.
+
+    In the water's flow a propeller that turns slowly brakes, so n jumps where T changes sign.
+    """
+    if T >= 0.0:
+        return float(_positive_root(pod[T_AHEAD], gain, T))
+    along = -gain if k.thrust_form == PHYSICAL else gain
+    return float(-_positive_root(pod[T_ASTERN], along, -T))
+
+
+@kernel
+def _positive_root(a: float, b: float, c: float) -> float:
+    """The larger n of a n^2 + b n = c >= 0, without cancellation."""
+    root = math.sqrt(b * b + 4.0 * a * c)
+    if b <= 0.0:
+        return (root - b) / (2.0 * a)
+    return 2.0 * c / (root + b)
