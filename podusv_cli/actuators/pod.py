@@ -8,8 +8,9 @@ from typing import Any, Literal, Self
 import numpy as np
 from pydantic import model_validator
 
+from podusv_cli.actuators.allocation import allocate, speeds
 from podusv_cli.actuators.base import Actuator
-from podusv_cli.actuators.one_pod import one_pod, within
+from podusv_cli.actuators.one_pod import within
 from podusv_cli.actuators.propeller import (
     ANGLE,
     DELTA_LAG,
@@ -22,15 +23,16 @@ from podusv_cli.actuators.propeller import (
     WIDTH,
     X,
     Y,
-    speed_for,
     speed_gain,
     thrust,
 )
+from podusv_cli.actuators.several_pods import MOST_PODS
 from podusv_cli.kernels import Vector, kernel, scratch, tail
 from podusv_cli.registry import Component, value
 
-MOST_PODS = 4
-AT_LIMIT = 1e-9  # relative
+SATURATED, SPEED_LIMITED, ANGLE_LIMITED, RATE_LIMITED, FLAGS = range(5)
+NEARLY = 1.0 - 1e-9
+SMALL = 1e-3  # of what the pods can do, for finite differences
 
 
 class Pod(Component):
@@ -65,13 +67,13 @@ class Pod(Component):
 
 
 @kernel
-def act(x: Vector, state: Vector, k: Any, table: Vector, tau: Vector, thrusts: Vector) -> None:
+def act(state: Vector, gains: Vector, k: Any, table: Vector, tau: Vector, thrusts: Vector) -> None:
     """Loads (9) of all pods as they stand, and the thrust of each."""
     count = int(k.count)
     tau[0] = tau[1] = tau[2] = 0.0
     for i in range(count):
-        pod, n, delta = tail(table, i * WIDTH), state[i], state[count + i]
-        T = thrust(n, speed_gain(x, pod, delta, k), pod, k)
+        pod, delta = tail(table, i * WIDTH), state[count + i]
+        T = thrust(state[i], gains[i], pod, k)
         along, across = T * math.cos(delta), T * math.sin(delta)
         thrusts[i] = T
         tau[0] += along
@@ -80,9 +82,9 @@ def act(x: Vector, state: Vector, k: Any, table: Vector, tau: Vector, thrusts: V
 
 
 @kernel
-def follow(state: Vector, command: Vector, k: Any, table: Vector, rate: Vector) -> float:
-    """Rates of speeds and angles: first-order lags within limits; 1 while any is at its limit."""
-    count, limited = int(k.count), 0.0
+def follow(state: Vector, command: Vector, k: Any, table: Vector, rate: Vector) -> bool:
+    """Rates of speeds and angles: first-order lags within limits; whether any is at its limit."""
+    count, limited = int(k.count), False
     for i in range(count):
         pod = tail(table, i * WIDTH)
         wanted = (command[i] - state[i]) / pod[N_LAG]
@@ -90,26 +92,21 @@ def follow(state: Vector, command: Vector, k: Any, table: Vector, rate: Vector) 
         turn = (command[count + i] - state[count + i]) / pod[DELTA_LAG]
         rate[count + i] = within(turn, -pod[DELTA_RATE], pod[DELTA_RATE])
         if rate[i] != wanted or rate[count + i] != turn:
-            limited = 1.0
+            limited = True
     return limited
 
 
 @kernel
-def allocate(x: Vector, state: Vector, demand: Vector, k: Any, table: Vector, out: Vector) -> None:
-    """Propeller speeds and angles for the demand into `out`, as the states are ordered."""
-    pod = table
-    gain = speed_gain(x, pod, state[1], k)
-    most_ahead = max(0.0, thrust(pod[N_AHEAD], gain, pod, k))
-    most_astern = max(0.0, -thrust(-pod[N_ASTERN], gain, pod, k))
-    T = scratch(2)
-    one_pod(
-        demand[0], demand[1] / pod[X], -pod[ANGLE], pod[ANGLE], most_astern, most_ahead,
-        k.priority, T,
-    )  # fmt: skip
-    # What is no number must not get lost between limits.
-    lost = 0.0 * (demand[0] + demand[1])
-    out[0] = within(speed_for(T[0], gain, pod, k), -pod[N_ASTERN], pod[N_AHEAD]) + lost
-    out[1] = T[1] + lost
+def at_limits(command: Vector, k: Any, table: Vector, flags: Vector) -> None:
+    """Whether any speed, any angle is commanded to its limit."""
+    count = int(k.count)
+    flags[SPEED_LIMITED] = flags[ANGLE_LIMITED] = 0.0
+    for i in range(count):
+        pod, n, delta = tail(table, i * WIDTH), command[i], abs(command[count + i])
+        if n >= pod[N_AHEAD] * NEARLY or n <= -pod[N_ASTERN] * NEARLY:
+            flags[SPEED_LIMITED] = 1.0
+        if pod[ANGLE] > 0.0 and delta >= pod[ANGLE] * NEARLY:
+            flags[ANGLE_LIMITED] = 1.0
 
 
 class Pods(Actuator):
@@ -127,15 +124,33 @@ class Pods(Actuator):
         "physical", "", "T_nV takes thrust away with the advance speed, or adds as printed in (8)"
     )
     neglect_sway_force: bool = value(False, "", "leave out the sway force, the paper's Y_p = 0")
+    sway_weight: float = value(
+        0.0, "", "several pods: what sway force counts in the squares beside 1 for surge", ge=0
+    )
+    horizon: float = value(
+        0.0, "s", "0: angles and speeds anywhere within their limits are asked for; else those "
+        "that their rates allow within this time", ge=0,
+    )  # fmt: skip
 
     @model_validator(mode="after")
     def _steerable(self) -> Self:
-        if len(self.pods) != 1 or self.pods[0].y != 0.0:
-            raise ValueError(f"must be one pod on the centre line, got {len(self.pods)} pods")
-        if self.pods[0].x == 0.0 or self.pods[0].angle_limit == 0.0:
+        if not 1 <= len(self.pods) <= MOST_PODS:
+            raise ValueError(f"has {len(self.pods)} pods; 1 to {MOST_PODS} are possible")
+        if not any((pod.angle_limit > 0 and pod.x != 0) or pod.y != 0 for pod in self.pods):
             raise ValueError(
-                "has no authority over yaw: the pod needs a lever arm x and an angle_limit, both "
-                "other than 0"
+                "has no authority over yaw: a pod that turns needs a lever arm x other than 0, "
+                "one that does not (angle_limit 0) a lever arm y"
+            )
+        if len(self.pods) == 1 and not (self.pods[0].angle_limit > 0 and self.pods[0].x != 0):
+            raise ValueError(
+                "has one pod, which cannot make surge force and yaw moment apart from each other; "
+                "it needs a lever arm x and an angle_limit, both other than 0"
+            )
+        fixed = [pod for pod in self.pods if pod.angle_limit == 0]
+        if len(fixed) == len(self.pods) and len({pod.y for pod in fixed}) == 1:
+            raise ValueError(
+                "has only fixed propellers side by side at the same y, which cannot make surge "
+                "force and yaw moment apart from each other; place them at different y"
             )
         return self
 
@@ -157,12 +172,15 @@ class Pods(Actuator):
     def constants(self) -> dict[str, float]:
         """The options, and how many pods there are."""
         known = all(pod.power_nnn is not None for pod in self.pods)
-        counts = {"count": float(len(self.pods)), "power_known": float(known)}
-        return super().constants() | counts
+        return super().constants() | {
+            "count": float(len(self.pods)),
+            "power_known": float(known),
+            "closed_form": float(len(self.pods) == 1 and self.pods[0].y == 0.0),
+        }
 
     def table(self) -> Vector:
         """The pods' numbers, row after row."""
-        return np.array([number for pod in self.pods for number in [*pod.numbers()]])
+        return np.array([number for pod in self.pods for number in pod.numbers()])
 
     @staticmethod
     @kernel
@@ -172,35 +190,22 @@ class Pods(Actuator):
     ) -> None:  # fmt: skip
         """Loads from the pods' states; rates towards what the demand asks for."""
         count = int(k.count)
-        command, thrusts = tail(signals, 4), tail(signals, 4 + 2 * count)
-        act(x, state, k, table, tau, thrusts)
-        allocate(x, state, demand, k, table, command)
-        signals[3] = follow(state, command, k, table, rate)
-        limits(x, state, demand, command, k, table, signals)
+        command, thrusts = tail(signals, FLAGS), tail(signals, FLAGS + 2 * count)
+        gains, T = scratch(MOST_PODS), scratch(MOST_PODS)
+        for i in range(count):
+            gains[i] = speed_gain(x, tail(table, i * WIDTH), state[count + i], k)
+        act(state, gains, k, table, tau, thrusts)
+        met = allocate(state, demand, gains, k, table, T, tail(command, count))
+        speeds(count, T, gains, k, table, command)
+        # What is no number must not get lost between limits.
+        lost = 0.0 * (demand[0] + demand[1])
+        for i in range(2 * count):
+            command[i] += lost
+        signals[SATURATED] = 0.0 if met else 1.0
+        signals[RATE_LIMITED] = 1.0 if follow(state, command, k, table, rate) else 0.0
+        at_limits(command, k, table, signals)
         if k.power_known > 0.0:
             power = tail(thrusts, count)
             for i in range(count):
                 n = abs(state[i])
                 power[i] = table[i * WIDTH + POWER] * n * n * n
-
-
-@kernel
-def limits(
-    x: Vector, state: Vector, demand: Vector, command: Vector, k: Any, table: Vector, flags: Vector
-) -> None:
-    """Flags: the command does not make the demand; a speed, an angle is commanded to its limit."""
-    count = int(k.count)
-    made, thrusts = scratch(3), scratch(MOST_PODS)
-    act(x, command, k, table, made, thrusts)
-    flags[1] = flags[2] = 0.0
-    for i in range(count):
-        pod, n, delta = tail(table, i * WIDTH), command[i], abs(command[count + i])
-        if n >= pod[N_AHEAD] * (1.0 - AT_LIMIT) or -n >= pod[N_ASTERN] * (1.0 - AT_LIMIT):
-            flags[1] = 1.0
-        if pod[ANGLE] > 0.0 and delta >= pod[ANGLE] * (1.0 - AT_LIMIT):
-            flags[2] = 1.0
-    apart_u, apart_r = abs(made[0] - demand[0]), abs(made[2] - demand[1])
-    met = apart_u <= AT_LIMIT * (1.0 + abs(demand[0])) and apart_r <= AT_LIMIT * (
-        1.0 + abs(demand[1])
-    )
-    flags[0] = 0.0 if met else 1.0
