@@ -76,6 +76,8 @@ _ROWS = (
     Signal("integral_r", r"\int r_p", "rad", "integral of the yaw rate error (PID)"),
     Signal("lag_u", "u_{p,f}", "m/s", "lagged surge velocity error (PID derivative)"),
     Signal("lag_r", "r_{p,f}", "rad/s", "lagged yaw rate error (PID derivative)"),
+    Signal("xi_u", r"\xi_u", "m/s", "shortfall of surge force as a velocity (anti-windup)"),
+    Signal("xi_r", r"\xi_r", "rad/s", "shortfall of yaw moment as a yaw rate (anti-windup)"),
     Signal("saturated", "sat", "1", "1 while the actuator limits what the law asked for"),
     Signal("V", "V", "1", "Lyapunov function (46), the sum of its ten terms"),
     Signal("V_dot", r"\dot V", "1/s", "rate of V along the closed loop, by the chain rule"),

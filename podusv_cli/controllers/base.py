@@ -22,6 +22,10 @@ class Controller(Component):
 
     `sample(t, x, memory, target, k, table)` is a kernel that may change `memory`; it is called at
     every multiple of `sample_period()`, before anything else sees that instant.
+
+    `settle(t, memory, demand, tau, k, table, rate)` is a kernel that may change the `rate` that
+    `law` wrote, once the actuator has made loads `tau` of the `demand`; it is called where
+    `settles()`.
     """
 
     signals: ClassVar[tuple[str, ...]] = ()
@@ -43,6 +47,17 @@ class Controller(Component):
     def sample(t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector) -> None:
         """Change the memory at a sampling instant."""
         raise NotImplementedError
+
+    @staticmethod
+    def settle(
+        t: float, memory: Vector, demand: Vector, tau: Vector, k: Any, table: Vector, rate: Vector
+    ) -> None:
+        """Change the memory's rate in the light of the loads (tau_u, tau_v, tau_r) that act."""
+        raise NotImplementedError
+
+    def settles(self) -> bool:
+        """Whether the law has to know the loads that act."""
+        return False
 
     def sample_period(self) -> float:
         """Seconds between two calls of `sample`; 0 where the law needs none."""

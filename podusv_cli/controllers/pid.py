@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
+from pydantic import model_validator
 
 from podusv_cli.controllers.base import Slots
 from podusv_cli.controllers.tracking import HELD, TrackingController, track
@@ -38,6 +39,15 @@ class Pid(TrackingController):
         "error", "", "lagged error at the start: 0 (a kick at once), or the error (none)"
     )
 
+    @model_validator(mode="after")
+    def _tracks(self) -> Self:
+        if self.settles() and min(self.K_Pu, self.K_Pr) <= 0:
+            raise ValueError(
+                "anti_windup: auxiliary feeds the shortfall back over K_Pu and K_Pr, which have to "
+                "be above 0"
+            )
+        return self
+
     def slots(self) -> Slots:
         """Held direction, integrals and lagged errors."""
         names = ("integral_u", "integral_r", "lag_u", "lag_r")
@@ -52,6 +62,15 @@ class Pid(TrackingController):
             e = track(x, seen, target, k)
             memory[[LAG_U, LAG_R]] = e.alpha_u - x[3], e.alpha_r - x[5]
         return memory
+
+    @staticmethod
+    @kernel
+    def settle(
+        t: float, memory: Vector, demand: Vector, tau: Vector, k: Any, table: Vector, rate: Vector
+    ) -> None:
+        """Back-calculation with the tracking time K_P/K_I (Astrom and Hagglund; Hanus)."""
+        rate[INTEGRAL_U] += (tau[0] - demand[0]) / k.K_Pu
+        rate[INTEGRAL_R] += (tau[2] - demand[1]) / k.K_Pr
 
     @staticmethod
     @kernel

@@ -44,6 +44,20 @@ def lemma(error: float, k: Any) -> float:
 
 
 @kernel
+def compensation(memory: Vector, k: Any, rate: Vector) -> tuple[float, float]:
+    """(xi_u, xi_r), what the loads fell short as a velocity; 0 without anti-windup.
+
+    m11 xi_u' = -k_ue xi_u + (tau_u on the hull - tau_u asked for), of which `settle` adds the last.
+    """
+    at = int(k.auxiliary)
+    if at <= 0:
+        return 0.0, 0.0
+    rate[at] = -k.k_ue / k.m11 * memory[at]
+    rate[at + 1] = -k.k_re / k.m33 * memory[at + 1]
+    return memory[at], memory[at + 1]
+
+
+@kernel
 def polar_backstepping(
     t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
     tau: Vector, rate: Vector, signals: Vector, work: Vector,
@@ -51,6 +65,8 @@ def polar_backstepping(
     """Demand (26), (35) and memory rates (27), (28), (36), (37), see `controllers.base`.
 
     The sign s of the coupling is -1 as printed, +1 where the cross terms are to cancel in V'.
+    With anti-windup bounds and networks learn from the errors u_c = u_e - xi_u, r_c = r_e - xi_r,
+    which obey the same equations as u_e and r_e would without limits (Farrell et al. 2009).
     """
     count = int(k.network_count)
     W_hat_u, W_hat_r = tail(memory, WEIGHTS), tail(memory, WEIGHTS + count)
@@ -62,24 +78,27 @@ def polar_backstepping(
     s = 2.0 * k.coupling - 1.0
 
     beta_u, beta_u_dot = surge(e, x, target, tail(memory, filtered), tail(rate, filtered), k)
+    xi_u, xi_r = compensation(memory, k, rate)
     u_e = x[3] - beta_u
+    u_c = u_e - xi_u
     tau[0] = (
-        -k.k_ue * u_e - k.m11 * f_hat_u - memory[B_HAT_U] * lemma(u_e, k)
+        -k.k_ue * u_e - k.m11 * f_hat_u - memory[B_HAT_U] * lemma(u_c, k)
         + k.m11 * beta_u_dot + s * e.z_e * e.cos_e
     )  # fmt: skip
     beta_r, beta_r_dot = yaw(e, x, target, tail(memory, filtered), tail(rate, filtered), k, tau[0])
     r_e = x[5] - beta_r
+    r_c = r_e - xi_r
     tau[1] = (
-        -k.k_re * r_e - k.m33 * f_hat_r - memory[B_HAT_R] * lemma(r_e, k)
+        -k.k_re * r_e - k.m33 * f_hat_r - memory[B_HAT_R] * lemma(r_c, k)
         + k.m33 * beta_r_dot + s * e.psi_e
     )  # fmt: skip
 
     rate[0] = rate[1] = 0.0
-    rate[B_HAT_U] = k.gamma_u * (u_e * lemma(u_e, k) - k.sigma_bu * (memory[B_HAT_U] - k.b_hat_u0))
-    rate[B_HAT_R] = k.gamma_r * (r_e * lemma(r_e, k) - k.sigma_br * (memory[B_HAT_R] - k.b_hat_r0))
+    rate[B_HAT_U] = k.gamma_u * (u_c * lemma(u_c, k) - k.sigma_bu * (memory[B_HAT_U] - k.b_hat_u0))
+    rate[B_HAT_R] = k.gamma_r * (r_c * lemma(r_c, k) - k.sigma_br * (memory[B_HAT_R] - k.b_hat_r0))
     W_0 = k.network_initial_weight
-    adapt(count, W_hat_u, phi, u_e * k.m11, k.Gamma_u, k.sigma_u, W_0, tail(rate, WEIGHTS))
-    adapt(count, W_hat_r, phi, r_e * k.m33, k.Gamma_r, k.sigma_r, W_0, tail(rate, WEIGHTS + count))
+    adapt(count, W_hat_u, phi, u_c * k.m11, k.Gamma_u, k.sigma_u, W_0, tail(rate, WEIGHTS))
+    adapt(count, W_hat_r, phi, r_c * k.m33, k.Gamma_r, k.sigma_r, W_0, tail(rate, WEIGHTS + count))
 
     signals[0], signals[1], signals[2] = e.distance, e.psi_d, e.psi_e
     signals[3], signals[4] = e.alpha_u, e.alpha_r
@@ -116,10 +135,30 @@ class PolarBackstepping(TrackingController):
     network: Network = value(Network(), "", "nodes and widths of the two networks")
 
     def slots(self) -> Slots:
-        """Held direction, bounds and weights."""
+        """Held direction, bounds, weights, the filter's output, and what anti-windup needs."""
         count = self.network.count
-        bounds = (("b_hat_u", 1), ("b_hat_r", 1))
-        return HELD + bounds + (("W_hat_u", count), ("W_hat_r", count))
+        learnt = (("b_hat_u", 1), ("b_hat_r", 1), ("W_hat_u", count), ("W_hat_r", count))
+        auxiliary = (("xi_u", 1), ("xi_r", 1)) if self.settles() else ()
+        return HELD + learnt + self.filtered() + auxiliary
+
+    def filtered(self) -> Slots:
+        """The filter's output, where there is a filter."""
+        return ()
+
+    def constants(self) -> dict[str, float]:
+        """The fields' numbers, and where xi_u and xi_r are in the memory (0 for nowhere)."""
+        end = sum(size for _, size in self.slots())
+        return super().constants() | {"auxiliary": float(end - 2 if self.settles() else 0)}
+
+    @staticmethod
+    @kernel
+    def settle(
+        t: float, memory: Vector, demand: Vector, tau: Vector, k: Any, table: Vector, rate: Vector
+    ) -> None:
+        """Add what the loads fall short of the demand."""
+        at = int(k.auxiliary)
+        rate[at] += (tau[0] - demand[0]) / k.m11
+        rate[at + 1] += (tau[2] - demand[1]) / k.m33
 
     def filter_decay(self, alpha_u: Any, alpha_r: Any) -> tuple[Any, Any]:
         """Rates A_u, A_r [1/s] of (41), (45) at which the filters forget; infinite without any.
@@ -156,9 +195,9 @@ class FilteredBackstepping(PolarBackstepping):
         "alpha", "", "filter output at the start: 0, or the virtual control"
     )
 
-    def slots(self) -> Slots:
-        """The filter's output comes last."""
-        return (*super().slots(), ("beta_u", 1), ("beta_r", 1))
+    def filtered(self) -> Slots:
+        """(beta_u, beta_r)."""
+        return (("beta_u", 1), ("beta_r", 1))
 
     def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
         """The filter at zero or settled on the virtual control."""
@@ -167,5 +206,6 @@ class FilteredBackstepping(PolarBackstepping):
             k, seen = bundle(self.informed(nominal)), np.array(memory)
             self.sample(0.0, x, seen, target, k, self.table())
             e = track(x, seen, target, k)
-            memory[-2:] = e.alpha_u, e.alpha_r
+            at = WEIGHTS + 2 * self.network.count
+            memory[at : at + 2] = e.alpha_u, e.alpha_r
         return memory

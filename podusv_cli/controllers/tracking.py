@@ -148,6 +148,15 @@ class TrackingController(Controller):
         "from_start", "", "direction before the first sample: 0, or the same as at the start"
     )
 
+    anti_windup: Literal["none", "auxiliary"] = value(
+        "none", "", "what the law's memory does while the actuator falls short of the demand: "
+        "nothing as printed, or the shortfall is taken out of what it learns from",
+    )  # fmt: skip
+
+    def settles(self) -> bool:
+        """With anti-windup only."""
+        return self.anti_windup == "auxiliary"
+
     def sample_period(self) -> float:
         """The difference's step where a difference or a held direction is used."""
         needed = self.rate == "difference" or self.hold_below > 0

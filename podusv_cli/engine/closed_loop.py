@@ -34,6 +34,7 @@ class Plan(NamedTuple):
     hold_every: int  # 0: the law acts continuously
     sample_every: int  # 0: the law takes no samples
     load_of_time: int  # 1: the disturbance depends on time alone
+    settles: int  # 1: the law is told which loads really act
 
 
 class Wires(NamedTuple):
@@ -70,8 +71,8 @@ named_wires, named_plan = unpacker(Wires._fields), unpacker(Plan._fields)
 @kernel
 def rates(
     t: float, s: Vector, ds: Vector,
-    path: Function, disturbance: Function, law: Function, actuator: Function, c: Wires, n: Plan,
-    again: bool,
+    path: Function, disturbance: Function, law: Function, actuator: Function, settle: Function,
+    c: Wires, n: Plan, again: bool,
 ) -> None:  # fmt: skip
     """Right-hand side of the closed loop at time t; leaves all signals in the row.
 
@@ -97,6 +98,8 @@ def rates(
         t, s, tail(s, 6), demand, c.actuator, c.actuator_table,
         tau, tail(ds, 6), tail(row, n.flags),
     )  # fmt: skip
+    if n.settles > 0:
+        settle(t, memory, demand, tau, p, table, memory_rate)
     plant(s, tau, b, coefficients(c.vessel), ds)
 
 
@@ -132,7 +135,8 @@ def shifted(count: int, s: Vector, h: float, ds: Vector, out: Vector) -> None:
 @kernel
 def step(
     t: float, h: float,
-    path: Function, disturbance: Function, law: Function, actuator: Function, c: Wires, n: Plan,
+    path: Function, disturbance: Function, law: Function, actuator: Function, settle: Function,
+    c: Wires, n: Plan,
 ) -> None:  # fmt: skip
     """Classical RK4 from t to t + h; the first stage has been evaluated already."""
     s, count = c.s, n.states
@@ -140,11 +144,11 @@ def step(
     k2, k3, k4 = tail(k1, count), tail(k1, 2 * count), tail(k1, 3 * count)
     y = tail(k1, 4 * count)
     shifted(count, s, 0.5 * h, k1, y)
-    rates(t + 0.5 * h, y, k2, path, disturbance, law, actuator, c, n, False)
+    rates(t + 0.5 * h, y, k2, path, disturbance, law, actuator, settle, c, n, False)
     shifted(count, s, 0.5 * h, k2, y)
-    rates(t + 0.5 * h, y, k3, path, disturbance, law, actuator, c, n, True)
+    rates(t + 0.5 * h, y, k3, path, disturbance, law, actuator, settle, c, n, True)
     shifted(count, s, h, k3, y)
-    rates(t + h, y, k4, path, disturbance, law, actuator, c, n, False)
+    rates(t + h, y, k4, path, disturbance, law, actuator, settle, c, n, False)
     for i in range(count):
         s[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
 
@@ -173,14 +177,14 @@ def write_row(k: int, t: float, c: Wires, n: Plan) -> None:
 @kernel
 def instant(
     k: int, first: int, h: float, path: Function, disturbance: Function, law: Function,
-    sample: Function, actuator: Function, observe: Function, c: Wires, n: Plan,
+    sample: Function, actuator: Function, settle: Function, observe: Function, c: Wires, n: Plan,
 ) -> bool:  # fmt: skip
     """Sample, evaluate, observe and log instant k; whether all its numbers are finite."""
     t = k * h
     again = k > first and t == (k - 1) * h + h  # where the last stage of the step before was
     if n.sample_every > 0 or n.hold_every > 0:
         sample_and_hold(k, t, path, law, sample, c, n)
-    rates(t, c.s, c.stages, path, disturbance, law, actuator, c, n, again)
+    rates(t, c.s, c.stages, path, disturbance, law, actuator, settle, c, n, again)
     if not (finite(n.states, c.s) and finite(n.columns, c.row)):
         return False
     weight = 0.5 * h if k == 0 or k == n.steps else h
@@ -193,32 +197,36 @@ def instant(
 @kernel
 def advance(
     path: Function, disturbance: Function, law: Function, sample: Function, actuator: Function,
-    observe: Function, first: int, last: int, h: float, wires: Any, plan: Any,
+    settle: Function, observe: Function, first: int, last: int, h: float, wires: Any, plan: Any,
 ) -> int:  # fmt: skip
     """March over the instants first .. last - 1; gives the first that is not finite, or `last`."""
     c, n = named_wires(wires), named_plan(plan)
     for k in range(first, last):
-        if not instant(k, first, h, path, disturbance, law, sample, actuator, observe, c, n):
+        if not instant(
+            k, first, h, path, disturbance, law, sample, actuator, settle, observe, c, n
+        ):
             return k
         if k < n.steps:
-            step(k * h, h, path, disturbance, law, actuator, c, n)
+            step(k * h, h, path, disturbance, law, actuator, settle, c, n)
     return last
 
 
 def advance_plainly(
     path: Function, disturbance: Function, law: Function, sample: Function, actuator: Function,
-    observe: Function, first: int, last: int, h: float, c: Wires, n: Plan,
+    settle: Function, observe: Function, first: int, last: int, h: float, c: Wires, n: Plan,
 ) -> int:  # fmt: skip
     """`advance` as plain Python, whose `math` raises where machine code gives no number."""
     for k in range(first, last):
         try:
-            if not instant(k, first, h, path, disturbance, law, sample, actuator, observe, c, n):
+            if not instant(
+                k, first, h, path, disturbance, law, sample, actuator, settle, observe, c, n
+            ):
                 return k
         except (ArithmeticError, ValueError):
             return k
         try:
             if k < n.steps:
-                step(k * h, h, path, disturbance, law, actuator, c, n)
+                step(k * h, h, path, disturbance, law, actuator, settle, c, n)
         except (ArithmeticError, ValueError):
             c.s[:] = math.nan
     return last

@@ -61,6 +61,13 @@ def actuator_entry(
     kernel(t, x, state, demand, named(p), table, tau, rate, signals)
 
 
+def settle_entry(
+    t: float, memory: Vector, demand: Vector, tau: Vector, p: Vector, table: Vector, rate: Vector
+) -> None:
+    """The door of a law that learns which loads really act."""
+    kernel(t, memory, demand, tau, named(p), table, rate)
+
+
 def observer_entry(
     t: float, weight: float, s: Vector, row: Vector, p: Vector, seen: Vector
 ) -> None:
@@ -81,10 +88,12 @@ PROTOTYPES: dict[Any, Any] = {
     law_entry: CFUNCTYPE(None, NUMBER, *[VECTOR] * 9),
     sample_entry: CFUNCTYPE(None, NUMBER, *[VECTOR] * 5),
     actuator_entry: CFUNCTYPE(None, NUMBER, *[VECTOR] * 8),
+    settle_entry: CFUNCTYPE(None, NUMBER, *[VECTOR] * 6),
     observer_entry: CFUNCTYPE(None, NUMBER, NUMBER, *[VECTOR] * 4),
 }
 LOOP = (
-    path_entry, disturbance_entry, law_entry, sample_entry, actuator_entry, observer_entry,
+    path_entry, disturbance_entry, law_entry, sample_entry, actuator_entry, settle_entry,
+    observer_entry,
 )  # fmt: skip
 RIGHT_HAND_SIDE = (path_entry, disturbance_entry, law_entry, actuator_entry)
 _PARTS = [PROTOTYPES[door] for door in LOOP]

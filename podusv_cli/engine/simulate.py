@@ -39,6 +39,13 @@ def _no_sample(t: float, x: Vector, memory: Vector, target: Vector, k: Any, tabl
     pass
 
 
+@kernel
+def _settle_nothing(
+    t: float, memory: Vector, demand: Vector, tau: Vector, k: Any, table: Vector, rate: Vector
+) -> None:
+    pass
+
+
 @dataclass(frozen=True)
 class Observer:
     """A kernel `watch(t, weight, s, row, k, seen)` that sees every instant, and its constants."""
@@ -77,7 +84,7 @@ class ClosedLoop:
             signals=signals, demand=demand, tau=tau, b=b, flags=flags, columns=columns,
             steps=grid.steps, log_every=grid.log_every, hold_every=grid.hold_every,
             sample_every=_sample_steps(law.sample_period(), grid),
-            load_of_time=int(self.disturbance.of_time),
+            load_of_time=int(self.disturbance.of_time), settles=int(law.settles()),
         )  # fmt: skip
 
 
@@ -125,11 +132,13 @@ def entries(loop: ClosedLoop, observer: Observer) -> Iterator[tuple[Any, Any, tu
     law, path, disturbance, actuator = loop.controller, loop.path, loop.disturbance, loop.actuator
     informed = tuple(law.informed(loop.nominal))
     sample = law.sample if law.sample_period() > 0 else _no_sample
+    settle = law.settle if law.settles() else _settle_nothing
     yield signatures.path_entry, path.evaluate, tuple(path.constants())
     yield signatures.disturbance_entry, disturbance.evaluate, tuple(disturbance.constants())
     yield signatures.law_entry, law.law, informed
     yield signatures.sample_entry, sample, informed
     yield signatures.actuator_entry, actuator.drive, tuple(actuator.constants())
+    yield signatures.settle_entry, settle, informed
     yield signatures.observer_entry, observer.watch, tuple(observer.constants)
 
 
