@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from conftest import SMOOTH_START, corrected
+from conftest import SMOOTH_START, corrected, example
 
+from podusv_cli.actuators.pod import Pods
 from podusv_cli.actuators.saturated import Saturated
 from podusv_cli.controllers.backstepping import Backstepping
 from podusv_cli.controllers.pid import Pid
@@ -78,7 +79,9 @@ def test_settled_from_the_start_is_zero():
 def test_every_metric_is_computed_and_documented(limited):
     log, got = limited
     (cost,) = law_costs([(corrected(), log)])
-    assert set(METRICS) <= set(got | cost)
+    _, of_pods = gathered(corrected(actuator=example(Pods)), steps=10)
+    assert set(METRICS) == set(got | cost | of_pods)
+    assert set(of_pods) > set(got)
     assert all(metric.unit and metric.meaning for metric in METRICS.values())
 
 

@@ -27,7 +27,7 @@ from podusv_cli.actuators.propeller import (
     thrust,
 )
 from podusv_cli.actuators.several_pods import MOST_PODS
-from podusv_cli.kernels import Vector, kernel, scratch, tail
+from podusv_cli.kernels import Vector, bundle, kernel, scratch, tail
 from podusv_cli.registry import Component, value
 
 SATURATED, SPEED_LIMITED, ANGLE_LIMITED, RATE_LIMITED, FLAGS = range(5)
@@ -116,7 +116,10 @@ class Pods(Actuator):
     """
 
     kind: Literal["pod"] = "pod"
-    pods: tuple[Pod, ...] = value(..., "", "the pods", strict=False)
+    preset: str = value("", "", "name of the file that brings the pods along; none where empty")
+    source: str = value("", "", "where the pods' numbers come from")
+    validity: str = value("", "", "what they hold for")
+    pods: tuple[Pod, ...] = value(..., "", "every pod; in place of the preset's", strict=False)
     priority: Literal["yaw", "surge"] = value(
         "yaw", "", "what is met first when surge force and yaw moment cannot both be had"
     )
@@ -181,6 +184,28 @@ class Pods(Actuator):
     def table(self) -> Vector:
         """The pods' numbers, row after row."""
         return np.array([number for pod in self.pods for number in pod.numbers()])
+
+    def settled(self, tau_u: float, tau_r: float) -> Vector:
+        """Loads (tau_u, tau_v, tau_r) at rest once the pods have followed a constant demand."""
+        k, table, count = bundle(self.constants()), self.table(), len(self.states)
+        demand, tau, rate = np.array([tau_u, tau_r]), np.zeros(3), np.zeros(count)
+        signals, state = np.zeros(len(self.signals)), self.rest()
+        for _ in range(2):
+            self.drive(0.0, np.zeros(6), state, demand, k, table, tau, rate, signals)
+            state = signals[FLAGS : FLAGS + count].copy()
+        return tau
+
+    def input_matrix(self) -> Vector:
+        """As for every actuator, but for loads that have settled, about a third of full thrust.
+
+        At rest with no demand an angle has no effect yet, and loads follow the demand with a lag.
+        """
+        force = sum(pod.T_nn * pod.n_max**2 for pod in self.pods) / 3.0
+        columns = [
+            (self.settled(force + du, dr) - self.settled(force - du, -dr)) / (2.0 * SMALL * force)
+            for du, dr in ((SMALL * force, 0.0), (0.0, SMALL * force))
+        ]
+        return np.array(columns).T
 
     @staticmethod
     @kernel

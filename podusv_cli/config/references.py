@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import cache
 from importlib.resources import files
+from importlib.resources.abc import Traversable
 from pathlib import Path
 
 from podusv_cli.config.annotations import sections
@@ -21,14 +22,24 @@ from podusv_cli.registry import Component
 MAX_POINTS = MAX_NODES // 4  # a point is three values, and the resolved scenario has to be readable
 MOST_FAULTS = 10  # in one file of points
 HEADER = re.compile(r'\s*"?(?!nan|inf)[a-z]', re.IGNORECASE)
-VESSELS = files("podusv_cli.vessels")
+VESSELS, ACTUATORS = files("podusv_cli.vessels"), files("podusv_cli.actuators")
+
+
+def _names_in(folder: Traversable) -> tuple[str, ...]:
+    names = (Path(entry.name) for entry in folder.iterdir())
+    return tuple(sorted(name.stem for name in names if name.suffix == ".yaml"))
 
 
 @cache
 def vessel_names() -> tuple[str, ...]:
     """Names of the vessels that podusv brings along, sorted."""
-    names = (Path(entry.name) for entry in VESSELS.iterdir())
-    return tuple(sorted(name.stem for name in names if name.suffix == ".yaml"))
+    return _names_in(VESSELS)
+
+
+@cache
+def pod_names() -> tuple[str, ...]:
+    """Names of the sets of pods that podusv brings along, sorted."""
+    return _names_in(ACTUATORS)
 
 
 def vessel_file(name: str, faults: list[Fault]) -> Node | None:
@@ -45,7 +56,7 @@ def vessel_text(name: str, key: str) -> str:
 
 def complete(root: Node, faults: list[Fault]) -> Node:
     """The tree with everything filled in that it takes from elsewhere."""
-    for fill in (_without_removed, _name, _vessel, _nominal, _points, _controllers):
+    for fill in (_without_removed, _name, _vessel, _nominal, _pods, _points, _controllers):
         root = fill(root, faults)
     return root
 
@@ -114,6 +125,26 @@ def _from_preset(given: Node, key: str, faults: list[Fault]) -> Node:
         faults.append(Fault(preset.mark, f"{key}.preset", text))
         given = given.with_entry("preset", replace(preset, content=None, faulty=True))
     return replace(given, faulty=True)
+
+
+def _pods(root: Node, faults: list[Fault]) -> Node:
+    """The pods of `actuator.preset`, where there is one, below what is given."""
+    given = root.mapping.get("actuator")
+    preset = given.mapping.get("preset") if given else None
+    if not given or not preset or given.get("kind") != "pod" or preset.content == "":
+        return root
+    if preset.content not in pod_names():
+        if preset.faulty:
+            return root
+        what = f"set of pods {found(preset.content, preset.text)}"
+        faults.append(
+            Fault(preset.mark, "actuator.preset", unknown(what, str(preset.content), pod_names()))
+        )
+        wrong = given.with_entry("preset", replace(preset, content=None, faulty=True))
+        return root.with_entry("actuator", replace(wrong, faulty=True))
+    text = ACTUATORS.joinpath(f"{preset.content}.yaml").read_text("utf-8")
+    base = read(text, f"pod file {preset.content}.yaml", faults, placed=False)
+    return root.with_entry("actuator", merge(base, given)) if base else root
 
 
 def _points(root: Node, faults: list[Fault]) -> Node:

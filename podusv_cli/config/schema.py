@@ -7,7 +7,7 @@ from typing import Any
 
 from podusv_cli.config.explain import EXTENDS
 from podusv_cli.config.fields import keys
-from podusv_cli.config.references import vessel_names
+from podusv_cli.config.references import pod_names, vessel_names
 from podusv_cli.config.scenario import Scenario
 from podusv_cli.registry import Component
 
@@ -28,6 +28,7 @@ def json_schema() -> dict[str, Any]:
         for part in definitions[name]["properties"].values():
             part.pop("default", None)
     definitions["Vessel"]["properties"]["preset"]["enum"] = list(vessel_names())
+    definitions["Pods"]["properties"]["preset"]["enum"] = ["", *pod_names()]
     scenario = _converted(made)
     names = {"type": "array", "items": {"type": "string"}}
     extends = {"anyOf": [{"type": "string"}, names], "description": EXTENDS.meaning}

@@ -12,13 +12,16 @@ import numpy as np
 
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import ClosedLoop, Observer
-from podusv_cli.kernels import Vector, kernel
+from podusv_cli.kernels import Vector, kernel, tail
 
 # What is gathered, by position.
 (
     TIME, ABSOLUTE, SQUARE, TIMED, STEADY, STEADY_TIME, OUTSIDE, PEAK_U, PEAK_R, EFFORT_U, EFFORT_R,
     ENERGY, TV_U, TV_R, LAST_U, LAST_R, SATURATED, NOW, SIZE,
 ) = range(19)  # fmt: skip
+# Behind these, for pods: energy, way of the angles, time at each limit, every pod's last angle.
+ENERGY_POD, TRAVEL, SPEED, ANGLE, RATE, LAST_DELTA = range(SIZE, SIZE + 6)
+LIMITS = ("speed_limited", "angle_limited", "rate_limited")
 
 
 @kernel
@@ -69,26 +72,50 @@ def watch(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector)
     _demand(t, row[int(k.demand)], row[int(k.demand) + 1], k, seen)
 
 
+@kernel
+def watch_pods(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
+    """`watch`, and what pods take and do; the vessel's state is followed by speeds and angles."""
+    watch(t, weight, s, row, k, seen)
+    count, flags = int(k.pods), tail(row, int(k.limits))
+    for i in range(3):
+        seen[SPEED + i] += weight * flags[i]
+    for i in range(count):
+        delta = s[6 + count + i]
+        if t > 0.0:
+            seen[TRAVEL] += abs(delta - seen[LAST_DELTA + i])
+        seen[LAST_DELTA + i] = delta
+        seen[ENERGY_POD] += weight * row[int(k.power) + i] if k.power >= 0.0 else math.nan
+
+
 def observer(
     loop: ClosedLoop, grid: TimeGrid, *, steady_fraction: float, settling_radius: float
 ) -> Observer:
     """An observer for `engine.simulate` that gathers what `summarise` needs."""
     plan = loop.layout(grid)
-    flags = loop.actuator.signals
+    columns = {name: plan.flags + i for i, name in reversed([*enumerate(loop.actuator.signals)])}
     constants = {
         "steady_from": grid.last_part(steady_fraction),
         "settling_radius": settling_radius,
         "demand": float(plan.demand),
         "tau": float(plan.tau),
-        "saturated": float(plan.flags + flags.index("saturated")) if "saturated" in flags else -1.0,
+        "saturated": float(columns.get("saturated", -1)),
     }
-    return Observer(watch, constants, SIZE)
+    pods = loop.actuator.states.count("delta")
+    if not pods:
+        return Observer(watch, constants, SIZE)
+    constants |= {
+        "pods": float(pods),
+        "limits": float(columns[LIMITS[0]]),
+        "power": float(columns.get("power", -1)),
+    }
+    return Observer(watch_pods, constants, LAST_DELTA + pods)
 
 
 def summarise(seen: Vector, step: float) -> dict[str, float]:
     """Metrics by name from what was gathered; NaN where a run ended before one is defined."""
     total = float(seen[TIME])
     inside_from = float(seen[OUTSIDE]) + step if seen[OUTSIDE] >= 0.0 else 0.0
+    pods = {} if len(seen) == SIZE else _of_pods(seen, total)
     return {
         "iae": float(seen[ABSOLUTE]),
         "ise": float(seen[SQUARE]),
@@ -104,7 +131,15 @@ def summarise(seen: Vector, step: float) -> dict[str, float]:
         "tv_tau_u": float(seen[TV_U]),
         "tv_tau_r": float(seen[TV_R]),
         "saturated_fraction": float(seen[SATURATED] / total) if total else math.nan,
-    }
+    } | pods
+
+
+def _of_pods(seen: Vector, total: float) -> dict[str, float]:
+    parts = [float(seen[i] / total) if total else math.nan for i in (SPEED, ANGLE, RATE)]
+    names = ("at_speed_limit", "at_angle_limit", "at_rate_limit")
+    return dict(zip(names, parts, strict=True)) | {
+        "energy_pod": float(seen[ENERGY_POD]), "angle_travel": float(seen[TRAVEL]),
+    }  # fmt: skip
 
 
 def summarise_many(seen: Vector, step: float) -> dict[str, Vector]:
@@ -113,5 +148,5 @@ def summarise_many(seen: Vector, step: float) -> dict[str, Vector]:
     NaN where a run ended before a metric is defined, and throughout for one that never began.
     """
     each = [summarise(row, step) for row in seen]
-    names = summarise(np.full(SIZE, np.nan), step)
+    names = summarise(np.full(seen.shape[1], np.nan), step)
     return {name: np.array([metrics[name] for metrics in each]) for name in names}

@@ -1,0 +1,264 @@
+"""Pods as mechanics: thrust and its inverse, lags and rates, equilibria, symmetry, bad input."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import NONLINEAR, POD, SMOOTH_START, Constant, adrift, corrected, example, run, vessel
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+from test_actuators import drive
+from test_closed_loop import order
+from test_metrics import gathered
+
+from podusv_cli.actuators.pod import Pod, Pods
+from podusv_cli.actuators.propeller import speed_for, speed_gain, thrust
+from podusv_cli.controllers.pid import Pid
+from podusv_cli.kernels import Vector, bundle
+from podusv_cli.paths.line import Line
+
+DRAG = 0.72 * 0.5 + 1.32742 * 0.25 + 5.86643 * 0.125  # the paper's vessel at 0.5 m/s [N]
+
+
+def pods(*several: dict[str, float], **options: Any) -> Pods:
+    """Pods like `POD`, each with these fields changed; one on the centre line by default."""
+    return Pods(pods=tuple(Pod(**POD | own) for own in several or ({},)), **options)
+
+
+TWIN = ({"y": -0.078, "T_nn": 3.65e-3}, {"y": 0.078, "T_nn": 3.65e-3})
+
+
+def state_of(actuator: Pods, n: float, delta: float) -> Vector:
+    count = len(actuator.pods)
+    return np.array([n] * count + [delta] * count)
+
+
+def loads(actuator: Pods, state: Vector, x: Vector, demand: tuple[float, float] = (0, 0)) -> Any:
+    """(tau, rate, signals by name) of a state of pods and vessel."""
+    tau, rate = np.full(3, np.nan), np.full(len(state), np.nan)
+    signals = np.full(len(actuator.signals), np.nan)
+    k, table = bundle(actuator.constants()), actuator.table()
+    actuator.drive(0.0, x, state, np.array(demand, float), k, table, tau, rate, signals)
+    assert np.isfinite(np.concatenate([tau, rate, signals])).all()
+    return tau, rate, dict(zip(actuator.signals, signals, strict=True))
+
+
+@given(
+    T=st.floats(-8, 8), u=st.floats(-1, 1), v=st.floats(-1, 1), T_nV=st.floats(0, 0.5),
+    form=st.sampled_from(["physical", "printed"]),
+)  # fmt: skip
+def test_the_inverse_gives_the_thrust_back(
+    T: float, u: float, v: float, T_nV: float, form: Any
+) -> None:
+    one = pods({"T_nV": T_nV}, thrust_form=form)
+    k, table, x = bundle(one.constants()), one.table(), np.array([0, 0, 0, u, v, 0.1])
+    gain = speed_gain(x, table, 0.3, k)
+    n = speed_for(T, gain, table, k)
+    assert thrust(n, gain, table, k) == pytest.approx(T, abs=1e-12, rel=1e-9)
+    assert n * T >= 0.0
+
+
+def test_physical_thrust_falls_with_speed_and_the_printed_one_rises() -> None:
+    ahead = np.array([0, 0, 0, 0.5, 0, 0])
+    for form, sign in (("physical", -1), ("printed", 1)):
+        one = pods({"T_nV": 2e-3}, thrust_form=form)
+        tau, _, _ = loads(one, state_of(one, 20.0, 0.0), ahead)
+        assert tau[0] == pytest.approx(POD["T_nn"] * 400 + sign * 2e-3 * 20 * 0.5)
+
+
+def test_the_advance_speed_is_that_of_the_water_along_the_pod() -> None:
+    one = pods({"T_nV": 2e-3, "y": 0.1})
+    x, delta = np.array([0, 0, 0, 0.5, 0.2, 0.3]), 0.4
+    velocity = [0.5 - 0.1 * 0.3, 0.2 - 0.499 * 0.3]  # nu + r x (x_p, y_p)
+    V_a = velocity @ np.array([math.cos(delta), math.sin(delta)])
+    assert speed_gain(x, one.table(), delta, bundle(one.constants())) == pytest.approx(-2e-3 * V_a)
+
+
+def test_at_rest_nothing_is_undefined() -> None:
+    one = pods({"T_nV": 2e-3})
+    tau, rate, signals = loads(one, np.zeros(2), np.zeros(6))
+    assert not tau.any()
+    assert not rate.any()
+    assert signals["saturated"] == 0.0
+
+
+@given(n=st.floats(-33, 33), delta=st.floats(-0.6, 0.6))
+def test_loads_are_those_of_the_force_at_its_place(n: float, delta: float) -> None:
+    for kept in (True, False):
+        pair = pods(*TWIN, neglect_sway_force=not kept)
+        tau, _, signals = loads(pair, state_of(pair, n, delta), np.zeros(6))
+        T = (3.65e-3 if n > 0 else POD["T_nn_astern"]) * n * abs(n)
+        assert signals["thrust"] == pytest.approx(T)
+        # Both alike: as one of twice the thrust on the centre line (9).
+        expected = [math.cos(delta), kept * math.sin(delta), -0.499 * math.sin(delta)]
+        np.testing.assert_allclose(tau, 2 * T * np.array(expected), atol=1e-12)
+
+
+def test_bollard_pull_of_cybership_ii() -> None:
+    """facts: 4.0 N ahead and 5.7 N astern each, about."""
+    one = pods({"T_nn": 3.65034e-3, "T_nn_astern": 5.10256e-3})
+    ahead, astern = (loads(one, state_of(one, n, 0.0), np.zeros(6))[0][0] for n in (33, -33))
+    assert ahead == pytest.approx(3.975, abs=1e-3)
+    assert astern == pytest.approx(-5.557, abs=1e-3)
+
+
+def step_response(lag: float, rate: float, goal: float, t: Vector) -> Vector:
+    """A lag of which the rate is limited: a ramp until the lag is slower than it, then e^-t."""
+    left = min(goal, rate * lag)  # of the way when the ramp ends
+    ramp = (goal - left) / rate
+    return np.where(t < ramp, rate * t, goal - left * np.exp(-(t - ramp) / lag))
+
+
+@pytest.mark.parametrize("rate", [60.0, 1e9])
+def test_speed_and_angle_follow_their_lags_and_rates_exactly(rate: float) -> None:
+    T, angle = 4.0, 0.5
+    law = Constant(surge=T * math.cos(angle), yaw=-0.499 * T * math.sin(angle))
+    one = pods({"n_rate": rate, "n_lag": 0.25, "angle_rate": rate / 60, "angle_lag": 0.125})
+    out = run(adrift(actuator=one, controller=law), 2.0, 0.0005)
+    n = math.sqrt(T / POD["T_nn"])
+    # The corner where the ramp ends lies between two steps.
+    np.testing.assert_allclose(
+        out["n"][:, 0], step_response(0.25, rate, n, out["time"]), atol=2e-5 * n
+    )
+    np.testing.assert_allclose(
+        out["delta"][:, 0], step_response(0.125, rate / 60, angle, out["time"]), atol=2e-5
+    )
+    assert out["rate_limited"][0] == (1.0 if rate < 1e9 else 0.0)
+    assert out["rate_limited"][-1] == 0.0
+
+
+def test_a_steady_run_ahead_is_where_thrust_is_drag() -> None:
+    law = Constant(surge=DRAG)
+    out = run(adrift(actuator=pods(*TWIN), controller=law, start=(0, 0, 0, 0.4, 0, 0)), 200.0)
+    assert out["u"][-1] == pytest.approx(0.5, abs=1e-6)
+    n = math.sqrt(DRAG / 2 / 3.65e-3)
+    np.testing.assert_allclose(out["n"][-1], n, rtol=1e-6)
+
+
+def test_a_steady_turn_solves_the_equations_of_motion() -> None:
+    law, hull = Constant(surge=2.0, yaw=0.4), vessel("cybership2")
+    out = run(adrift(actuator=pods(), controller=law, vessel=hull), 400.0, 0.02)
+    k = hull.constants()
+    u, v, r = (float(out[name][-1]) for name in "uvr")
+    Y = 0.4 / -0.499  # the sway force that comes with the moment
+    damping = np.array([
+        (k["X_u"] + k["X_uu"] * abs(u) + k["X_uuu"] * u * u) * u,
+        (k["Y_v"] + k["Y_vv"] * abs(v) + k["Y_rv"] * abs(r)) * v
+        + (k["Y_r"] + k["Y_vr"] * abs(v) + k["Y_rr"] * abs(r)) * r,
+        (k["N_v"] + k["N_vv"] * abs(v) + k["N_rv"] * abs(r)) * v
+        + (k["N_r"] + k["N_vr"] * abs(v) + k["N_rr"] * abs(r)) * r,
+    ])  # fmt: skip
+    m22v = k["m22"] * v + k["m23"] * r
+    coriolis = np.array([-m22v * r, k["m11"] * u * r, m22v * u - k["m11"] * u * v])
+    np.testing.assert_allclose(np.array([2.0, Y, 0.4]) + damping - coriolis, 0.0, atol=1e-7)
+    assert abs(r) > 0.05
+
+
+def test_port_is_starboard_in_the_mirror() -> None:
+    """Everything to starboard changes sign: y, psi, v, r, yaw moment, sway force, angles."""
+    both = []
+    for side in (1.0, -1.0):
+        law = Constant(surge=1.5, yaw=side * 1.9)
+        start = (0.0, side * 2.0, side * 0.3, 0.4, side * 0.1, side * 0.2)
+        both.append(run(adrift(actuator=pods(*TWIN), controller=law, start=start), 20.0))
+    one, other = both
+    for name in ("x", "u", "tau_u"):
+        np.testing.assert_allclose(one[name], other[name], atol=1e-6)
+    for name in ("y", "psi", "v", "r", "tau_v", "tau_r"):
+        np.testing.assert_allclose(one[name], -other[name], atol=1e-6)
+    np.testing.assert_allclose(one["n"], other["n"][:, ::-1], atol=1e-5)
+    np.testing.assert_allclose(one["delta"], -other["delta"][:, ::-1], atol=1e-6)
+
+
+def test_away_from_limits_the_loop_is_of_fourth_order() -> None:
+    fast = pods({"n_rate": 1e6, "angle_rate": 1e6, "n_max": 1e3, "angle_limit": 1.5})
+    law = Pid(K_Pu=20.0, K_Iu=1.0, K_Du=0.0, K_Pr=2.0, K_Ir=0.1, K_Dr=0.0, anti_windup="auxiliary")
+    loop = corrected(actuator=fast, controller=law, path=Line(), start=SMOOTH_START)
+    ends = []
+    for step in (0.004, 0.002, 0.001, 0.0005):
+        out = run(loop, 1.0, step)
+        assert not out["angle_limited"].any()
+        assert not out["speed_limited"].any()
+        ends.append(np.concatenate([np.ravel(out[name][-1]) for name in ("x", "psi", "r", "n")]))
+    assert order(ends) == pytest.approx(4.0, abs=0.2)
+
+
+def test_machine_code_does_what_python_does() -> None:
+    loop = corrected(actuator=pods(*TWIN, horizon=0.5), start=SMOOTH_START)
+    one, other = (run(loop, 0.3, compiled=compiled) for compiled in (True, False))
+    for name in one.signals:
+        np.testing.assert_allclose(one[name], other[name], rtol=1e-7, atol=1e-9, err_msg=name)
+
+
+def test_a_demand_out_of_reach_is_an_event_and_no_accident() -> None:
+    for actuator in (pods(), pods(*TWIN)):
+        loop = adrift(actuator=actuator, controller=Constant(surge=1e9, yaw=-1e12))
+        log, got = gathered(loop, steps=500)
+        assert log.status == "finished"
+        assert log["saturated"].all()
+        assert got["saturated_fraction"] == 1.0
+        assert 0.0 < got["at_speed_limit"] <= 1.0
+        assert got["at_angle_limit"] == 1.0
+        assert np.abs(log["delta"]).max() <= math.radians(35.0)
+        assert np.abs(log["n"]).max() <= 33.0
+
+
+def test_energy_and_travel_are_those_of_the_log() -> None:
+    actuator = pods(*({**one, "power_nnn": 2e-4} for one in TWIN))
+    log, got = gathered(corrected(actuator=actuator), steps=2000)
+    power = 2e-4 * np.abs(log["n"]) ** 3
+    np.testing.assert_allclose(log["power"], power)
+    assert got["energy_pod"] == pytest.approx(np.trapezoid(power.sum(axis=1), log["time"]))
+    assert got["angle_travel"] == pytest.approx(np.abs(np.diff(log["delta"], axis=0)).sum())
+    assert got["angle_travel"] > 1.0
+    for metric, flag in (("at_rate_limit", "rate_limited"), ("at_angle_limit", "angle_limited")):
+        assert got[metric] == pytest.approx(np.trapezoid(log[flag], log["time"]) / log["time"][-1])
+
+
+def test_without_a_power_law_there_is_no_energy() -> None:
+    log, got = gathered(corrected(actuator=pods()), steps=10)
+    assert "power" not in log
+    assert math.isnan(got["energy_pod"])
+
+
+def test_pods_start_at_rest() -> None:
+    assert not example(Pods).rest().any()
+    np.testing.assert_array_equal(drive(example(Pods), 3.0, 0.1)[0], 0.0)
+
+
+def test_two_inputs_for_three_axes() -> None:
+    matrix = pods().input_matrix()
+    assert np.linalg.matrix_rank(matrix) == 2
+    np.testing.assert_allclose(matrix, [[1, 0], [0, -1 / 0.499], [0, 1]], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("several", "words"),
+    [
+        ([{"x": 0.0}], "no authority over yaw"),
+        ([{"x": 0.0}, {"x": 0.0}], "no authority over yaw"),
+        ([{"angle_limit": 0.0}], "no authority over yaw"),
+        ([{"angle_limit": 0.0, "y": 0.3}], "apart from each other"),
+        ([{"angle_limit": 0.0, "y": 0.3}, {"angle_limit": 0.0, "y": 0.3}], "at different y"),
+        ([{}] * 5, "has 5 pods; 1 to 4"),
+        ([{"n_max": -1.0}], "n_max"),
+        ([{"T_nn": -1e-3}], "T_nn"),
+        ([{"T_nV": -1e-3}], "T_nV"),
+        ([{"angle_limit": 2.0}], "angle_limit"),
+        ([{"angle_rate": 0.0}], "angle_rate"),
+        ([{"n_lag": 0.0}], "n_lag"),
+        ([], "has 0 pods"),
+    ],
+)
+def test_pods_that_cannot_be_are_refused(several: list[dict[str, float]], words: str) -> None:
+    with pytest.raises(ValidationError, match=words):
+        Pods(pods=tuple({**POD, **own} for own in several))
+
+
+def test_the_paper_s_vessel_has_the_drag_of_the_hand_calculation() -> None:
+    k = NONLINEAR.constants()
+    assert -(k["X_u"] + k["X_uu"] * 0.5 + k["X_uuu"] * 0.25) * 0.5 == pytest.approx(DRAG)
