@@ -5,10 +5,11 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt
 PODUSV := $(BIN)/podusv
+PODS := kept dropped ideal no_anti_windup single
 COMPARISONS := printed_compare figures_compare figures_compare_standoff corrected_compare
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce test test-all bench lint types contracts clean
+.PHONY: help reproduce pod test test-all bench lint types contracts clean
 
 help: ## what can be made
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -24,6 +25,12 @@ reproduce: $(VENV)/run.done ## the paper, claim by claim, into results/paper/
 	    code=$$?; test $$code -eq 0 -o $$code -eq 3 || exit $$code; \
 	done
 	@echo "what was found: results/README.md; every table, claim and figure: results/paper/*/report.html"
+
+pod: $(VENV)/run.done ## the laws behind a pod, into results/pod/
+	@for name in $(PODS); do \
+	    $(PODUSV) compare configs/pod/$$name.yaml --out results/pod/$$name --force -q || exit $$?; \
+	done
+	@echo "what was found: results/pod.md; every table and figure: results/pod/*/report.html"
 
 test: lint types contracts ## lint, types, import contracts, all tests but the slow ones
 	@$(BIN)/pytest

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from conftest import VESSELS
+
 from podusv_cli.config.loading import Loaded, load, load_text
 from podusv_cli.errors import ScenarioError
 
+VESSEL_NAMES = ", ".join(VESSELS)
 SOUND = """\
 vessel: {preset: paper}
 path: {kind: line}

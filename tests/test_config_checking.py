@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from config_samples import SOUND, told
+from config_samples import SOUND, VESSEL_NAMES, told
 
 from podusv_cli.config.scenario import Scenario
 from podusv_cli.vessels.vessel import Vessel
@@ -124,17 +124,17 @@ def test_a_wrong_section_is_one_sentence_at_its_place(text: str, says: str) -> N
             "{preset: paper}",
             "{preset: papr}",
             "1:18: vessel.preset: unknown vessel 'papr'; did you mean 'paper'? "
-            "(allowed: cybership2, paper, paper_nonlinear)",
+            "(allowed: " + VESSEL_NAMES + ")",
         ),
         (
             "{preset: paper}",
             "{preset: 3}",
-            "1:18: vessel.preset: unknown vessel 3 (allowed: cybership2, paper, paper_nonlinear)",
+            "1:18: vessel.preset: unknown vessel 3 (allowed: " + VESSEL_NAMES + ")",
         ),
         (
             "{preset: paper}",
             "{m: 3}",
-            "1:9: vessel.preset: missing (allowed: cybership2, paper, paper_nonlinear)",
+            "1:9: vessel.preset: missing (allowed: " + VESSEL_NAMES + ")",
         ),
         (
             "{preset: paper}",
@@ -241,11 +241,11 @@ def test_a_key_of_a_kind_is_told_without_the_kind(text: str, says: list[str]) ->
 
 def test_what_is_missing_is_told_at_the_file() -> None:
     assert told("description: nothing else\n") == [
-        "a.yaml: vessel.preset: missing (allowed: cybership2, paper, paper_nonlinear)",
+        "a.yaml: vessel.preset: missing (allowed: " + VESSEL_NAMES + ")",
         "a.yaml: path: missing; must be a mapping of keys with kind circle, line, line_circle or "
         "waypoints",
         "a.yaml: disturbance: missing; must be a mapping of keys with kind harmonic or none",
-        "a.yaml: actuator: missing; must be a mapping of keys with kind ideal or saturated",
+        "a.yaml: actuator: missing; must be a mapping of keys with kind ideal, pod or saturated",
         "a.yaml: controller: missing; must be a mapping of keys with kind adaptive_neural, "
         "backstepping, dsc or pid",
     ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from config_samples import SOUND, findings, loaded, told, write
+from config_samples import SOUND, VESSEL_NAMES, findings, loaded, told, write
 
 from podusv_cli.config.loading import load
 
@@ -180,7 +180,7 @@ def test_the_last_of_two_equal_keys_wins() -> None:
         (
             "vessel.preset=cybership",
             "vessel.preset: unknown vessel 'cybership'; did you mean 'cybership2'? "
-            "(allowed: cybership2, paper, paper_nonlinear)",
+            "(allowed: " + VESSEL_NAMES + ")",
         ),
         (
             "simulation.duration=1e-9",

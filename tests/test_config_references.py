@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from config_samples import SOUND, findings, loaded, told, write
+from config_samples import SOUND, VESSEL_NAMES, findings, loaded, told, write
 
+from podusv_cli.actuators.pod import Pods
 from podusv_cli.config.loading import load, load_text
-from podusv_cli.config.references import MAX_POINTS, vessel_file, vessel_names
+from podusv_cli.config.references import MAX_POINTS, pod_names, vessel_file, vessel_names
 from podusv_cli.config.tree import plain
 from podusv_cli.errors import ScenarioError
 from podusv_cli.vessels.vessel import Vessel
@@ -59,8 +60,7 @@ def test_a_nominal_vessel_with_preset_starts_from_it() -> None:
 def test_a_wrong_nominal_value_is_told_at_its_place() -> None:
     assert told(SOUND + "nominal: {X_u: 1, preset: x}\n") == [
         "a.yaml:6:16: nominal.X_u: must be a number not above 0 [kg/s], found 1",
-        "a.yaml:6:27: nominal.preset: unknown vessel 'x' "
-        "(allowed: cybership2, paper, paper_nonlinear)",
+        "a.yaml:6:27: nominal.preset: unknown vessel 'x' (allowed: " + VESSEL_NAMES + ")",
     ]
 
 
@@ -162,3 +162,40 @@ def test_a_route_stays_short_enough_to_be_written_out() -> None:
     write("route.csv", "".join(f"{i},0\n" for i in range(MAX_POINTS + 1)))
     write("a.yaml", with_route())
     assert findings("a.yaml") == [f"route.csv: more than {MAX_POINTS:,} points"]
+
+
+POD_SOUND = SOUND.replace("{kind: ideal}", "{kind: pod, preset: otter}")
+
+
+def test_pods_come_from_their_file_and_what_is_given_goes_over_it() -> None:
+    actuator = loaded(POD_SOUND, ["actuator.priority=surge"]).scenario.actuator
+    assert isinstance(actuator, Pods)
+    assert [pod.y for pod in actuator.pods] == [-0.395, 0.395]
+    assert "otter.m" in actuator.source
+    own = "[{x: -1, T_nn: 1, T_nn_astern: 1, n_max: 1, n_max_astern: 1, n_rate: 1, n_lag: 1, "
+    own += "angle_rate: 1, angle_lag: 1}]"
+    (pod,) = loaded(POD_SOUND, [f"actuator.pods={own}"]).scenario.actuator.pods
+    assert pod.x == -1.0
+
+
+def test_every_set_of_pods_that_podusv_brings_is_sound_and_says_where_it_comes_from() -> None:
+    for name in pod_names():
+        actuator = loaded(POD_SOUND.replace("otter", name)).scenario.actuator
+        assert isinstance(actuator, Pods)
+        assert actuator.source
+        assert actuator.validity
+
+
+def test_what_is_wrong_with_pods_is_one_sentence_at_its_place() -> None:
+    assert told(POD_SOUND.replace("otter", "oter")) == [
+        "a.yaml:4:30: actuator.preset: unknown set of pods 'oter'; did you mean 'otter'? "
+        f"(allowed: {', '.join(pod_names())})"
+    ]
+    one = "{x: 0, T_nn: 1, T_nn_astern: 1, n_max: 1, n_max_astern: 1, n_rate: 1, n_lag: 1, "
+    one += "angle_rate: 1, angle_lag: 1}"
+    (said,) = told(SOUND, [f"actuator={{kind: pod, pods: [{one}]}}"])
+    assert "actuator: has no authority over yaw" in said
+    (said,) = told(SOUND, [f"actuator={{kind: pod, pods: [{one.replace('T_nn: 1', 'T_nn: -1')}]}}"])
+    assert "actuator.pods.0.T_nn: must be a number above 0 [N s2], found -1" in said
+    (said,) = told(SOUND, ["actuator={kind: pod}"])
+    assert "actuator.pods: missing; must be a list of" in said

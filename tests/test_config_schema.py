@@ -10,7 +10,7 @@ import pytest
 
 import podusv_cli
 from podusv_cli.config.annotations import sections
-from podusv_cli.config.fields import NAME, Key, keys
+from podusv_cli.config.fields import NAME, NUMBER, Key, keys
 from podusv_cli.config.references import vessel_names
 from podusv_cli.config.scenario import Scenario
 from podusv_cli.config.schema import json_schema, schema_text
@@ -57,6 +57,9 @@ def places(schema: dict[str, Any], path: tuple[str, ...]) -> list[dict[str, Any]
         inside = [target(part) for one in found for part in one.get("anyOf", [one])]
         if step == NAME:
             found = [target(one["additionalProperties"]) for one in inside]
+            continue
+        if step == NUMBER:
+            found = [target(one["items"]) for one in inside if "items" in one]
             continue
         found = [one["properties"][step] for one in inside if step in one.get("properties", {})]
     return found

@@ -9,7 +9,7 @@ from functools import cache
 
 from podusv_cli.config.annotations import choices, joined, sections
 from podusv_cli.config.fields import MISSING, NAME, Key, keys, range_of, type_of
-from podusv_cli.config.references import vessel_names
+from podusv_cli.config.references import pod_names, vessel_names
 from podusv_cli.config.scenario import Scenario
 from podusv_cli.config.words import as_written, did_you_mean
 from podusv_cli.errors import PodusvError
@@ -167,7 +167,7 @@ def _row(entry: Key) -> Row:
 def _choices(entry: Key) -> tuple[str, ...]:
     """The words that a value may be; of a kind, all that its section has."""
     if entry.path[-1] == "preset":
-        return vessel_names()
+        return pod_names() if entry.path[0] == "actuator" else vessel_names()
     if entry.path[-1] == "kind":
         above = (other for other in _keys() if other.path == entry.path[:-1])
         return tuple(kind for other in above for kind in sections(other.field.annotation))

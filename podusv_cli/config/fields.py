@@ -12,7 +12,7 @@ from pydantic_core import PydanticUndefined
 from podusv_cli.config.annotations import inside, noun, sections
 from podusv_cli.registry import Component, unit_of
 
-NAME = "NAME"
+NAME, NUMBER = "NAME", "NUMBER"
 MISSING = PydanticUndefined  # the default of a field that has none
 BOUNDS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 BOUNDS_IN_WORDS = {"gt": "above", "ge": "not below", "lt": "below", "le": "not above"}
@@ -58,7 +58,7 @@ class Key:
     """A key of a scenario: `path` as in files, `route` with the kinds of sections in between.
 
     `kind` is the innermost kind on the way, "" where there is none. In a mapping of names to
-    sections all alike, NAME stands for the names.
+    sections all alike, NAME stands for the names; in a list of them, NUMBER for their places.
     """
 
     path: tuple[str, ...]
@@ -83,7 +83,8 @@ def _branch(key: Key) -> Iterator[Key]:
             default = getattr(key.default, name) if isinstance(key.default, part) else field.default
             inner = Key((*key.path, name), (*route, name), kind or key.kind, field, default)
             yield from _branch(inner)
-    alike = sections(inside(key.field.annotation, NAME)).get("")
-    for name, field in alike.model_fields.items() if alike else ():
-        path = (*key.path, NAME, name)
-        yield from _branch(Key(path, path, "", field, field.default))
+    for sign, step in ((NAME, NAME), (NUMBER, 0)):
+        alike = sections(inside(key.field.annotation, step)).get("")
+        for name, field in alike.model_fields.items() if alike else ():
+            path, route = (*key.path, sign, name), (*key.route, sign, name)
+            yield from _branch(Key(path, route, key.kind, field, field.default))

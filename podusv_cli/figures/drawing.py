@@ -11,6 +11,7 @@ from podusv_cli.figures.controls import controls
 from podusv_cli.figures.filters import filters
 from podusv_cli.figures.loads import loads
 from podusv_cli.figures.panels import Family, signals_over_time
+from podusv_cli.figures.pods import pods
 from podusv_cli.figures.stability import stability
 from podusv_cli.figures.style import Shown, house_style, image, look
 from podusv_cli.figures.trajectory import trajectory
@@ -85,6 +86,10 @@ FIGURES: dict[str, Sheet] = {
         "and the sway speed with its bound (51)",
         ("V",),
         validity,
+    ),
+    "pods": Sheet(
+        "propeller speeds, propulsion angles and power of every pod, thin what was asked for",
+        ("n", "delta", "power"), pods,
     ),
 }  # fmt: skip
 

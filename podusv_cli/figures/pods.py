@@ -1,0 +1,45 @@
+"""Propellers at work: speeds, angles and power, and thin what was asked of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from podusv_cli.figures.style import Shown, axis_label, new_figure, thinned
+
+ROWS = (("n", "n_cmd"), ("delta", "delta_cmd"), ("power", ""))
+PANEL_HEIGHT = 1.5  # inches
+
+
+def pods(runs: Sequence[Shown], columns: int) -> Figure:
+    """A row for each of speed, angle and power, a column for each pod; actual over commanded."""
+    having = [run for run in runs if run.has("n")]
+    count = max(run.recording["n"].shape[1] for run in having)
+    rows = [names for names in ROWS if any(run.has(names[0]) for run in having)]
+    figure = new_figure(columns, 0.7 + PANEL_HEIGHT * len(rows))
+    panels = figure.subplots(len(rows), count, sharex=True, sharey="row", squeeze=False)
+    for line, names in zip(panels, rows, strict=True):
+        line[0].set_ylabel(axis_label(names[0]))
+        for pod, axes in enumerate(line):
+            for run in having:
+                _draw(axes, run, names, pod)
+    for pod, (top, bottom) in enumerate(zip(panels[0], panels[-1], strict=True)):
+        top.set_title(f"pod {pod + 1}")
+        bottom.set_xlabel("time [s]")
+    handles, labels = panels[0][0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=max(1, len(labels)))
+    return figure
+
+
+def _draw(axes: Axes, run: Shown, names: tuple[str, str], pod: int) -> None:
+    actual, asked = names
+    time = run.recording["time"]
+    thin: dict[str, Any] = {"linewidth": 0.4, "alpha": 0.5, "label": "_asked"}
+    for name, look in ((asked, thin), (actual, {})):
+        if name and run.has(name) and pod < run.recording[name].shape[1]:
+            values = np.asarray(run.recording[name][:, pod])
+            axes.plot(*thinned(time, values), **{**run.look, **look})
