@@ -14,7 +14,7 @@ from benchmarks.alternatives import plain_engine, python_alternatives
 from benchmarks.batch import batch_costs
 from benchmarks.c_program import build
 from benchmarks.commands import commands
-from benchmarks.engine import all_beside_c, growth, law_costs, log_megabytes
+from benchmarks.engine import actuators, all_beside_c, growth, law_costs, log_megabytes
 from benchmarks.report import markdown
 from benchmarks.timing import machine
 
@@ -39,6 +39,7 @@ PARTS: dict[str, Callable[[], Any]] = {
     "batch": batch_costs,
     "log_megabytes": log_megabytes,
     "law": law_costs,
+    "actuators": actuators,
     "plain_engine": plain_engine,
     "alternatives": python_alternatives,
     "commands": commands,

@@ -10,8 +10,9 @@ from time import thread_time
 from typing import Any
 
 from benchmarks.c_program import agreement, timer
-from benchmarks.cases import CASES, LAWS, Case, grid, metrics_observer
+from benchmarks.cases import CASES, LAWS, ROOT, Case, grid, metrics_observer
 from benchmarks.timing import Timer, in_turns, quartiles, ratio, timed
+from podusv_cli.config.loading import load
 from podusv_cli.controllers.base import Controller
 from podusv_cli.controllers.network import Network
 from podusv_cli.engine.grid import TimeGrid
@@ -87,6 +88,22 @@ def log_megabytes(case: Case = USUAL) -> float:
     """Size of the log of a whole run, in memory."""
     loop, over = case.loop(), grid()
     return over.rows * len(names(loop)) * 8 / 2**20
+
+
+def actuators(rounds: int = ROUNDS) -> dict[str, list[float]]:
+    """Time of one step [s] with the usual law behind each actuator; pods differ by allocation."""
+    acting = {
+        "ideal": "ideal", "saturated": "corrected", "one pod": "single", "two pods": "kept",
+    }  # fmt: skip
+    loops = {label: _behind(name) for label, name in acting.items()}
+    sparse = grid(log_every=10)
+    return _a_step({label: (loop, sparse) for label, loop in loops.items()}, rounds)
+
+
+def _behind(name: str) -> ClosedLoop:
+    folder = "paper" if name == "corrected" else "pod"
+    scenario = load(ROOT / "configs" / folder / f"{name}.yaml").scenario
+    return replace(USUAL.loop(), actuator=scenario.actuator)
 
 
 def law_costs(rounds: int = 15) -> dict[str, list[float]]:

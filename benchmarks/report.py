@@ -73,6 +73,11 @@ def markdown(results: Results) -> str:
         _batch(results["batch"]),
         "## One evaluation of a law\n",
         table(["law", "ns"], ([law, spread(q, 1e9)] for law, q in results["law"].items())),
+        "## One step behind each actuator\n",
+        table(
+            ["actuator", "us"],
+            ([name, spread(q, 1e6)] for name, q in results["actuators"].items()),
+        ),
         "## Without compiled code\n",
         _plain(results["plain_engine"]),
         _alternatives(results["alternatives"]),
