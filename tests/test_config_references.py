@@ -188,7 +188,7 @@ def test_every_set_of_pods_that_podusv_brings_is_sound_and_says_where_it_comes_f
 
 def test_what_is_wrong_with_pods_is_one_sentence_at_its_place() -> None:
     assert told(POD_SOUND.replace("otter", "oter")) == [
-        "a.yaml:4:30: actuator.preset: unknown set of pods 'oter'; did you mean 'otter'? "
+        "a.yaml:4:31: actuator.preset: unknown set of pods 'oter'; did you mean 'otter'? "
         f"(allowed: {', '.join(pod_names())})"
     ]
     one = "{x: 0, T_nn: 1, T_nn_astern: 1, n_max: 1, n_max_astern: 1, n_rate: 1, n_lag: 1, "
@@ -196,6 +196,6 @@ def test_what_is_wrong_with_pods_is_one_sentence_at_its_place() -> None:
     (said,) = told(SOUND, [f"actuator={{kind: pod, pods: [{one}]}}"])
     assert "actuator: has no authority over yaw" in said
     (said,) = told(SOUND, [f"actuator={{kind: pod, pods: [{one.replace('T_nn: 1', 'T_nn: -1')}]}}"])
-    assert "actuator.pods.0.T_nn: must be a number above 0 [N s2], found -1" in said
+    assert "actuator.pods[0].T_nn: must be a number above 0 [N s2], found -1" in said
     (said,) = told(SOUND, ["actuator={kind: pod}"])
     assert "actuator.pods: missing; must be a list of" in said

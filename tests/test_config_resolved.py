@@ -92,6 +92,8 @@ def possible(data: dict[str, Any]) -> Scenario:
     if data["path"]["kind"] == "waypoints":
         points = ((0.0, 0.0), (1.0, 0.5), *data["path"]["points"])
         data["path"].update(file=None, speed=0.5, points=tuple(dict.fromkeys(points)))
+    if data["actuator"]["kind"] == "pod":
+        data["actuator"].update(preset="otter")
     for law in (data["controller"], *data["controllers"].values()):
         law.update(rate="analytic", hold_below=0.0)
         if "network" in law:
