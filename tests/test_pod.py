@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import NONLINEAR, POD, SMOOTH_START, Constant, adrift, corrected, example, run, vessel
+from drawn_samples import drawn, shown
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
@@ -18,6 +19,7 @@ from test_metrics import gathered
 from podusv_cli.actuators.pod import Pod, Pods
 from podusv_cli.actuators.propeller import speed_for, speed_gain, thrust
 from podusv_cli.controllers.pid import Pid
+from podusv_cli.figures.drawing import FIGURES
 from podusv_cli.kernels import Vector, bundle
 from podusv_cli.paths.line import Line
 
@@ -262,3 +264,14 @@ def test_pods_that_cannot_be_are_refused(several: list[dict[str, float]], words:
 def test_the_paper_s_vessel_has_the_drag_of_the_hand_calculation() -> None:
     k = NONLINEAR.constants()
     assert -(k["X_u"] + k["X_uu"] * 0.5 + k["X_uuu"] * 0.25) * 0.5 == pytest.approx(DRAG)
+
+
+def test_the_figure_shows_what_each_pod_did_over_what_it_was_asked_for() -> None:
+    log = run(corrected(actuator=pods(*TWIN)), 5.0)
+    panels = np.reshape(drawn("pods", shown(("pods", log))).axes, (2, 2))
+    for row, name in zip(panels, ("n", "delta"), strict=True):
+        for pod, axes in enumerate(row):
+            asked, done = (np.asarray(line.get_ydata()) for line in axes.lines)
+            np.testing.assert_array_equal(asked, log[f"{name}_cmd"][:, pod])
+            np.testing.assert_array_equal(done, log[name][:, pod])
+    assert not FIGURES["pods"].fits(shown(("ideal", run(corrected(), 0.1))))

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from podusv_cli.figures.style import Shown, axis_label, new_figure, thinned
+from podusv_cli.figures.curves import THIN, draw_curve, scaling
+from podusv_cli.figures.style import Shown, axis_label, legend, new_figure
 
 ROWS = (("n", "n_cmd"), ("delta", "delta_cmd"), ("power", ""))
 PANEL_HEIGHT = 1.5  # inches
@@ -26,20 +26,18 @@ def pods(runs: Sequence[Shown], columns: int) -> Figure:
         line[0].set_ylabel(axis_label(names[0]))
         for pod, axes in enumerate(line):
             for run in having:
-                _draw(axes, run, names, pod)
+                _draw(axes, run, names, pod, fitted=run in scaling(having))
     for pod, (top, bottom) in enumerate(zip(panels[0], panels[-1], strict=True)):
         top.set_title(f"pod {pod + 1}")
         bottom.set_xlabel("time [s]")
-    handles, labels = panels[0][0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=max(1, len(labels)))
+    legend(figure, columns)
     return figure
 
 
-def _draw(axes: Axes, run: Shown, names: tuple[str, str], pod: int) -> None:
+def _draw(axes: Axes, run: Shown, names: tuple[str, str], pod: int, *, fitted: bool) -> None:
     actual, asked = names
-    time = run.recording["time"]
-    thin: dict[str, Any] = {"linewidth": 0.4, "alpha": 0.5, "label": "_asked"}
+    thin: dict[str, Any] = {**THIN, "label": f"_{run.label}, {asked}"}
     for name, look in ((asked, thin), (actual, {})):
         if name and run.has(name) and pod < run.recording[name].shape[1]:
-            values = np.asarray(run.recording[name][:, pod])
-            axes.plot(*thinned(time, values), **{**run.look, **look})
+            curve = run.recording["time"], run.recording[name][:, pod]
+            draw_curve(axes, curve, fitted=fitted, **{**run.look, **look})
