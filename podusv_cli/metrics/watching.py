@@ -115,7 +115,7 @@ def summarise(seen: Vector, step: float) -> dict[str, float]:
     """Metrics by name from what was gathered; NaN where a run ended before one is defined."""
     total = float(seen[TIME])
     inside_from = float(seen[OUTSIDE]) + step if seen[OUTSIDE] >= 0.0 else 0.0
-    pods = {} if len(seen) == SIZE else _of_pods(seen, total)
+    pods = _of_pods(seen, total) if len(seen) > SIZE else {}
     return {
         "iae": float(seen[ABSOLUTE]),
         "ise": float(seen[SQUARE]),
@@ -148,5 +148,5 @@ def summarise_many(seen: Vector, step: float) -> dict[str, Vector]:
     NaN where a run ended before a metric is defined, and throughout for one that never began.
     """
     each = [summarise(row, step) for row in seen]
-    names = summarise(np.full(seen.shape[1], np.nan), step)
+    names = summarise(np.full(max(SIZE, seen.shape[1]), np.nan), step)
     return {name: np.array([metrics[name] for metrics in each]) for name in names}
