@@ -115,7 +115,7 @@ def summarise(seen: Vector, step: float) -> dict[str, float]:
     """Metrics by name from what was gathered; NaN where a run ended before one is defined."""
     total = float(seen[TIME])
     inside_from = float(seen[OUTSIDE]) + step if seen[OUTSIDE] >= 0.0 else 0.0
-    pods = _of_pods(seen, total) if len(seen) > SIZE else {}
+    pods = _of_pods(seen, total) if len(seen) > LAST_DELTA else {}
     return {
         "iae": float(seen[ABSOLUTE]),
         "ise": float(seen[SQUARE]),
