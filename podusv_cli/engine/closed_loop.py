@@ -252,7 +252,7 @@ def evaluate_all(
 
 @kernel
 def rates_along(
-    path: Function, disturbance: Function, law: Function, actuator: Function,
+    path: Function, disturbance: Function, law: Function, actuator: Function, settle: Function,
     count: int, logged: Vector, out: Vector, wires: Any, plan: Any,
 ) -> None:  # fmt: skip
     """For each of `count` logged rows of t, s: the rates of s, then the row, into `out`."""
@@ -260,6 +260,6 @@ def rates_along(
     for i in range(count):
         here = tail(logged, i * (1 + n.states))
         there = tail(out, i * (n.states + n.columns))
-        rates(here[0], tail(here, 1), there, path, disturbance, law, actuator, c, n, False)
+        rates(here[0], tail(here, 1), there, path, disturbance, law, actuator, settle, c, n, False)
         for j in range(n.columns):
             there[n.states + j] = c.row[j]

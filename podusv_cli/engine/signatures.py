@@ -95,7 +95,7 @@ LOOP = (
     path_entry, disturbance_entry, law_entry, sample_entry, actuator_entry, settle_entry,
     observer_entry,
 )  # fmt: skip
-RIGHT_HAND_SIDE = (path_entry, disturbance_entry, law_entry, actuator_entry)
+RIGHT_HAND_SIDE = (path_entry, disturbance_entry, law_entry, actuator_entry, settle_entry)
 _PARTS = [PROTOTYPES[door] for door in LOOP]
 ADVANCE = CFUNCTYPE(WHOLE, *_PARTS, WHOLE, WHOLE, NUMBER, POINTER(VECTOR), POINTER(WHOLE))
 RATES_ALONG = CFUNCTYPE(

@@ -46,6 +46,7 @@ def _assumptions(loop: ClosedLoop, grid: TimeGrid, found: Monitored) -> Iterator
     yield _says("psi_e is never folded or unfolded on the way", turned == 0, turned)
     yield _says("psi_e is not folded alone, which turns the sign of z_e'", not alone)
     yield _says("distance [m] stays above hold_below", distance > law.hold_below, distance)
+    yield _says("weights and bounds learn from u_e and r_e", not law.settles())
     yield _says("actuator gives what the law asks for [N, N m]", asked == 0.0, asked)
 
 
