@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from podusv_cli import workflows
-from podusv_cli.comparison.claims import judge
+from podusv_cli.comparison.claims import Stated, judge
 from podusv_cli.comparison.entries import Entry
 from podusv_cli.config.loading import load
 from podusv_cli.engine.simulate import simulate
@@ -80,12 +80,13 @@ def signs(letter, sets, laws=("proposed", "li", "pid")):
     """Claim and sign of a comparison with some keys set anew."""
     scenario = load(ROOT / f"configs/paper/{LETTERS[letter]}.yaml", sets).scenario
     entries = {name: rerun(scenario.singles()[name]) for name in laws}
-    told = {
-        name: claim
+    called = {law: law for law in laws}
+    told = [
+        Stated(name, claim, called)
         for name, claim in scenario.claims.items()
         if name != "C14"
         and not any(f"{law}." in claim.expect for law in ("li", "pid") if law not in laws)
-    }
+    ]
     return {v.name: SIGNS[v.answer] for v in judge(told, entries)}
 
 
