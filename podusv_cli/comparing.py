@@ -20,6 +20,7 @@ from podusv_cli.config.loading import load_text
 from podusv_cli.config.scenario import Scenario
 from podusv_cli.findings.finding import Finding
 from podusv_cli.interrupts import Extras, interrupts_heard
+from podusv_cli.logbook import jsonfile
 from podusv_cli.logbook.folder import Run, RunWriter, open_run
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.parallel import Outcome, run_all
@@ -211,6 +212,11 @@ def drawn(result: Result, progress: Callable[[str, float], None] | None = None) 
     return dict(draw_in_parallel(shown, FIGURES, FORMATS, progress=tell))
 
 
+def _theories(result: Result) -> dict[str, dict[str, Any]]:
+    files = {entry.label: entry.run.folder / "theory.json" for entry in result.entries}
+    return {label: jsonfile.read(path) for label, path in files.items() if path.is_file()}
+
+
 def as_report(
     result: Result, title: str, figures: Mapping[str, bytes], provenance: Mapping[str, Any]
 ) -> str:
@@ -228,6 +234,7 @@ def as_report(
         title=title, scenario=result.parts[0].scenario,
         controllers={part.label: part.scenario.controller for part in result.parts},
         endings=result.endings, differences=result.differences, table=result.table,
-        verdicts=result.verdicts, figures=pictures, provenance=provenance,
+        verdicts=result.verdicts, theories=_theories(result), figures=pictures,
+        provenance=provenance,
     )  # fmt: skip
     return report.page(story)

@@ -222,10 +222,29 @@ def page(**parts):
         "title": "planted", "scenario": scenario(),
         "controllers": {"a": scenario().controller}, "endings": {"a": "", "lost": "killed <9>"},
         "differences": {"start.x": {"a": 1.0, "lost": [1.0, 2.5]}}, "table": FRAME,
-        "verdicts": verdicts(), "figures": [("errors", "x_e & y_e", b"<svg/>")],
+        "verdicts": verdicts(), "theories": {}, "figures": [("errors", "x_e & y_e", b"<svg/>")],
         "provenance": {"git": {"commit": "abc"}},
     }  # fmt: skip
     return report.page(report.Story(**story | parts))
+
+
+def theory(bound, holds):
+    """A run's theory.json, as far as the report reads it."""
+    forms = {name: {"lambda": 0.05, "bound": bound} for name in ("corrected", "printed")}
+    return {
+        "conditions": [{"name": "k_ze", "value": 0.1, "limit": 0.05, "holds": holds}],
+        "assumptions": [{"assumption": "gives what is asked", "holds": holds, "found": 3.0}],
+        "windows": {"settled": {**forms, "largest_V": 0.25}},
+    }
+
+
+def test_the_report_has_the_bounds_of_every_run_with_a_theory():
+    text = page(theories={"a": theory(2.5, True), "<b>": theory(None, False)})
+    row = "<td>settled</td><td>0.05</td><td>{0}</td><td>{0}</td><td>0.25</td><td>{1}</td></tr>"
+    assert "<tr><td>a</td>" + row.format("2.5", "nothing") in text
+    missing = "k_ze = 0.1 has to exceed 0.05; gives what is asked (off by 3)"
+    assert "<tr><td>&lt;b&gt;</td>" + row.format("none", missing) in text
+    assert "Stability" not in page(theories={})
 
 
 def test_the_report_tells_how_runs_ended_and_differ():

@@ -18,7 +18,9 @@ def validate(
     verbose: Annotated[
         bool,
         typer.Option(
-            "--verbose", "-v", help="Show the rank argument, every value and where it comes from."
+            "--verbose",
+            "-v",
+            help="Show the rank argument, the proof's gain conditions, every value and its origin.",
         ),
     ] = False,
 ) -> None:
@@ -44,8 +46,11 @@ def validate(
 def _explain(loaded: Loaded) -> None:
     from podusv_cli.config.loading import values
     from podusv_cli.config.words import as_written
+    from podusv_cli.findings.gains import conditions
     from podusv_cli.findings.underactuation import argument
 
     typer.echo(argument(loaded.scenario))
+    for line in conditions(loaded.scenario):
+        typer.echo(line)
     for key, content in values(loaded.scenario).items():
         typer.echo(f"{key}: {as_written(content)}  # {loaded.origins[key]}")

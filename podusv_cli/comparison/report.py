@@ -14,6 +14,7 @@ from typing import Any
 
 import pandas as pd
 
+from podusv_cli.comparison import stability
 from podusv_cli.comparison.claims import Verdict
 from podusv_cli.comparison.differences import flat
 from podusv_cli.comparison.table import cells
@@ -49,6 +50,7 @@ class Story:
     differences: Mapping[str, Mapping[str, Any]]
     table: pd.DataFrame
     verdicts: Sequence[Verdict]
+    theories: Mapping[str, Mapping[str, Any]]  # theory.json of the runs that have one
     figures: Sequence[tuple[str, str, bytes]]  # name, caption, SVG
     provenance: Mapping[str, Any]
 
@@ -66,6 +68,7 @@ def page(story: Story) -> str:
             "<h2>Comparison</h2>",
             _numbers(story.table),
             _claims(story.verdicts),
+            _stability(story.theories),
             "<h2>Figures</h2>" if story.figures else "",
             *(_figure(*figure) for figure in story.figures),
             "<h2>Scenario</h2>",
@@ -157,6 +160,18 @@ def _claims(verdicts: Sequence[Verdict]) -> str:
         put = f"<code>{html.escape(v.claim.expect)}</code>, tolerance {v.claim.tolerance:g}"
         rows.append([html.escape(v.name), says, mark, f"{put}<br>{html.escape(v.shown())}"])
     return "<h2>Claims</h2>" + _table(("", "claim", "verdict", "put as, and the numbers"), rows)
+
+
+def _stability(theories: Mapping[str, Mapping[str, Any]]) -> str:
+    if not theories:
+        return ""
+    note = (
+        "<p><small>V' &le; -2 lambda V + Delta, so V ends below Delta/(2 lambda), the bound; its "
+        "constants are the largest of this very run, so it is no prediction. None: lambda is not "
+        "positive, or control is sampled. Term by term: theory.json.</small></p>"
+    )
+    rows = (map(html.escape, row) for row in stability.rows(theories))
+    return "<h2>Stability (46)-(49)</h2>" + _table(stability.HEAD, rows) + note
 
 
 def _figure(name: str, caption: str, svg: bytes) -> str:
