@@ -71,6 +71,11 @@ def test_cells_have_number_mark_and_ratio():
     ]
 
 
+def test_numbers_that_read_the_same_are_marked_the_same():
+    frame = table.table({"a": {"iae": 0.500653}, "b": {"iae": 0.500649}, "c": {"iae": 0.50066}})
+    assert table.cells(frame) == [["iae", "m s", "0.50065*", "0.50065* (1)", "0.50066 (1)"]]
+
+
 def test_csv_has_units_first_and_ratios_last():
     full = table.with_ratios(FRAME)
     assert list(full) == ["unit", "a", "b", "c", "lost", "b/a", "c/a", "lost/a"]

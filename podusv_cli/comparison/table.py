@@ -57,7 +57,7 @@ def cells(frame: pd.DataFrame) -> list[list[str]]:
 def _cell(number: float, first: float, best: float, position: int) -> str:
     if math.isnan(number):
         return "-"
-    mark = "*" if number == best else ""
+    mark = "*" if f"{number:.5g}" == f"{best:.5g}" else ""  # as readers see them
     ratio = f" ({number / first:.3g})" if position and first and not math.isnan(first) else ""
     return f"{number:.5g}{mark}{ratio}"
 

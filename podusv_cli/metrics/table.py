@@ -34,7 +34,9 @@ _ROWS = (
     Metric("at_rate_limit", "1", "part of the time with a pod changing as fast as it can"),
     Metric("energy_pod", "J", "integral of the propellers' power, where that is known"),
     Metric("angle_travel", "rad", "way that all propulsion angles go, steering wear"),
-    Metric("law_ns", "ns", "median processor time of one evaluation of the law over its logged states"),
+    Metric(
+        "law_ns", "ns", "median processor time of one evaluation of the law over its logged states"
+    ),
     Metric("law_ns_low", "ns", "lower quartile of that time over the replays"),
     Metric("law_ns_high", "ns", "upper quartile of that time over the replays"),
 )
