@@ -234,7 +234,7 @@ def test_the_command_shows_tables_and_rankings_and_leaves_nothing(podusv: Any) -
     assert lines[0] == "quick:"
     assert lines[1].split() == [
         *("number", "unit", "0.0025", "s", "0.00125", "s", "0.000625", "s"),
-        *("order", "error", "verdict"),
+        *("order", "rel.", "error", "verdict"),
     ]  # fmt: skip
     assert "slow:" in lines
     assert "quick, slow; the same at all steps" in said.out

@@ -24,7 +24,8 @@ def validate(
         ),
     ] = False,
 ) -> None:
-    """Check a scenario: every fault at once, or what to know before it runs.
+    """Check a scenario: all faults of keys and values at once, then those of claims; or what to
+    know before it runs.
 
     Exit code 0, with a line for each finding; or 2 with a line for each fault.
     """

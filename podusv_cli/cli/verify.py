@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from podusv_cli.cli.options import AsJson, Assignments, Config, Quiet
+from podusv_cli.cli.options import AsJson, Assignments, Config
 
 if TYPE_CHECKING:
     from podusv_cli.verification.convergence import Estimate
@@ -28,7 +28,9 @@ def verify(
         Path | None, typer.Option(help="File to write the JSON object to as well.")
     ] = None,
     as_json: AsJson = False,
-    quiet: Quiet = False,
+    quiet: Annotated[
+        bool, typer.Option("--quiet", "-q", help="Print nothing; the exit code tells.")
+    ] = False,
 ) -> None:
     """Repeat a scenario at half and at a quarter of its step, and by another integrator.
 
@@ -55,6 +57,7 @@ def _report(done: Verified) -> None:
         _show_rankings(done.rankings)
     doubts = [f"{label}: {', '.join(names)}" for label, names in done.doubts.items()]
     heading = "not converged" if doubts else "converged"
+    typer.echo("end_position: distance from where the run with the smallest step ends")
     typer.echo("\n".join([f"{heading} within {done.tolerance:.3g} relative", *doubts]))
 
 
@@ -68,7 +71,7 @@ def _show_run(label: str, run: Checked, tolerance: float) -> None:
         [name, units.get(name, "m"), *_cells(e, tolerance)] for name, e in run.estimates.items()
     ]
     typer.echo(f"{label}:")
-    echo_table(["number", "unit", *steps, "order", "error", "verdict"], rows)
+    echo_table(["number", "unit", *steps, "order", "rel. error", "verdict"], rows)
     for level in run.levels:
         if level.message:
             typer.echo(f"at {level.step:.6g} s: {level.message}")
