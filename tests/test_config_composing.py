@@ -200,3 +200,31 @@ def test_an_override_is_always_on_one_line() -> None:
     assert told(SOUND, ["start.x=a\nb"]) == [
         r"--set 'start.x=a\nb': start.x: must be a number [m], found 'a\nb'"
     ]
+
+
+PODS = SOUND.replace("{kind: ideal}", "{kind: pod, preset: cybership2_pod}")
+
+
+def test_an_item_of_a_list_can_be_set_by_its_place_also_where_a_preset_brings_the_list() -> None:
+    sets = ("actuator.pods.1.n_lag=0.5", "actuator.pods.0={angle_lag: 0.2, n_lag: 0.3}")
+    one, two = loaded(PODS, sets).scenario.actuator.pods
+    assert (one.n_lag, one.angle_lag, one.T_nn) == (0.3, 0.2, 3.65034e-3)
+    assert (two.n_lag, two.angle_lag, two.y) == (0.5, 0.1, 0.078)
+    assert told(PODS, ["actuator.pods.1.T_nn=-1"]) == [
+        "--set actuator.pods.1.T_nn=-1: actuator.pods[1].T_nn: must be a number above 0 [N s2], "
+        "found -1"
+    ]
+
+
+def test_a_place_that_a_list_does_not_have_is_no_item() -> None:
+    (line,) = told(PODS, ["actuator.pods.2.n_lag=0.5"])
+    assert "actuator.pods: must be a list" in line
+
+
+def test_another_preset_of_pods_keeps_the_kind_and_nothing_else() -> None:
+    text = PODS.replace("kind: pod,", "kind: pod, priority: surge,")
+    write("base.yaml", text)
+    actuator = load("base.yaml", ["actuator.preset=revolt"]).scenario.actuator
+    assert (actuator.kind, actuator.priority, len(actuator.pods)) == ("pod", "yaw", 3)
+    (line,) = told(text, ["actuator.preset=revol"])
+    assert "unknown set of pods 'revol'; did you mean 'revolt'?" in line

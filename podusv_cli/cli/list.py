@@ -8,9 +8,9 @@ from podusv_cli.cli.layout import echo_entry
 
 
 def list() -> None:
-    """List the kinds of components, the vessels and the metrics."""
+    """List the kinds of components, the vessels, the sets of pods and the metrics."""
     from podusv_cli.config.explain import first_sentence, kinds
-    from podusv_cli.config.references import vessel_names, vessel_text
+    from podusv_cli.config.references import pod_names, pod_text, vessel_names, vessel_text
     from podusv_cli.metrics.table import METRICS
 
     for section, summaries in kinds().items():
@@ -20,6 +20,9 @@ def list() -> None:
     typer.echo("vessel:")
     for name in vessel_names():
         echo_entry(f"  {name}", first_sentence(vessel_text(name, "source")))
+    typer.echo("pods (actuator.preset):")
+    for name in pod_names():
+        echo_entry(f"  {name}", first_sentence(pod_text(name, "source")))
     typer.echo("metrics:")
     for name, metric in METRICS.items():
         echo_entry(f"  {name}", metric.meaning, facts=f"[{metric.unit}]")

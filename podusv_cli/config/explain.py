@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 from podusv_cli.config.annotations import choices, joined, sections
-from podusv_cli.config.fields import MISSING, NAME, Key, keys, range_of, type_of
+from podusv_cli.config.fields import MISSING, NAME, NUMBER, Key, keys, range_of, type_of
 from podusv_cli.config.references import pod_names, vessel_names
 from podusv_cli.config.scenario import Scenario
 from podusv_cli.config.words import as_written, did_you_mean
@@ -60,7 +60,8 @@ def explain(key: str | None = None) -> list[Row]:
         return [EXTENDS, *_together(entry for entry in _keys() if len(entry.path) == 1)]
     if key == EXTENDS.key:
         return [EXTENDS]
-    found = _at(tuple(key.split("."))) or [*_signal(key), *_named(key)]
+    place = tuple(NUMBER if step.isdecimal() else step for step in key.split("."))
+    found = _at(place) or [*_signal(key), *_named(key)]
     if not found:
         raise UnknownKeyError(f"{key}: no such key or signal{did_you_mean(key, _names())}")
     return found
@@ -111,7 +112,7 @@ def _at(place: tuple[str, ...]) -> list[Row]:
         return [*_together(entries), *rows.values()]
     if not entries:
         return _of_kind(place)
-    places = (place, (*place, NAME))
+    places = (place, (*place, NAME), (*place, NUMBER))
     inside = [e for e in _keys() if e.path[:-1] in places or e.route[:-1] in places]
     heads = (replace(row, choices=() if inside else row.choices) for row in _together(entries))
     return [*heads, *_together(inside)]

@@ -54,6 +54,18 @@ def vessel_text(name: str, key: str) -> str:
     return str(node.get(key)) if node else ""
 
 
+def pod_file(name: str, faults: list[Fault]) -> Node | None:
+    """A set of pods by its name, one of `pod_names()`."""
+    text = ACTUATORS.joinpath(f"{name}.yaml").read_text("utf-8")
+    return read(text, f"pod file {name}.yaml", faults, placed=False)
+
+
+def pod_text(name: str, key: str) -> str:
+    """A text, such as `source`, from the file of a set of pods."""
+    node = pod_file(name, [])
+    return str(node.get(key)) if node else ""
+
+
 def complete(root: Node, faults: list[Fault]) -> Node:
     """The tree with everything filled in that it takes from elsewhere."""
     for fill in (_without_removed, _name, _vessel, _nominal, _pods, _points, _controllers):
@@ -142,8 +154,7 @@ def _pods(root: Node, faults: list[Fault]) -> Node:
         )
         wrong = given.with_entry("preset", replace(preset, content=None, faulty=True))
         return root.with_entry("actuator", replace(wrong, faulty=True))
-    text = ACTUATORS.joinpath(f"{preset.content}.yaml").read_text("utf-8")
-    base = read(text, f"pod file {preset.content}.yaml", faults, placed=False)
+    base = pod_file(preset.content, faults)
     return root.with_entry("actuator", merge(base, given)) if base else root
 
 

@@ -102,15 +102,32 @@ def plain(node: Node) -> Any:
 
 
 def overlay(base: Node, top: Node, replaces: Callable[[Node, Node], bool]) -> Node:
-    """`top` over `base`, mapping by mapping; lists, scalars and what `replaces` says whole."""
-    if not (isinstance(base.content, dict) and isinstance(top.content, dict)) or replaces(
-        base, top
-    ):
+    """`top` over `base`, mapping by mapping; lists, scalars and what `replaces` says whole.
+
+    Of a list that lies under a mapping of places in it, {"0": ...}, only those items change.
+    """
+    if _names_places(base, top):
+        items = list(base.content)
+        for place, item in top.content.items():
+            items[int(place)] = overlay(items[int(place)], item, replaces)
+        return replace(top, content=tuple(items), faulty=top.faulty or base.faulty)
+    if not (isinstance(base.content, dict) and isinstance(top.content, dict)):
         return top
+    if replaces(base, top):
+        kind = base.content.get("kind")
+        return top.with_entry("kind", kind) if kind and "kind" not in top.content else top
     entries = dict(base.content)
     for key, entry in top.content.items():
         entries[key] = overlay(entries[key], entry, replaces) if key in entries else entry
     return replace(top, content=entries, faulty=top.faulty or base.faulty)
+
+
+def _names_places(base: Node, top: Node) -> bool:
+    """Whether `top` is a mapping of places in the list `base`."""
+    places = top.mapping
+    return bool(places) and all(
+        place.isdecimal() and int(place) < len(_items(base.content)) for place in places
+    )
 
 
 def another_kind(base: Node, top: Node) -> bool:
@@ -120,5 +137,8 @@ def another_kind(base: Node, top: Node) -> bool:
 
 
 def merge(base: Node, top: Node) -> Node:
-    """`top` over `base`; a mapping of another kind or preset replaces the base's whole."""
+    """`top` over `base`; a mapping of another kind or preset replaces the base's whole.
+
+    The kind stays where only the preset is another.
+    """
     return overlay(base, top, another_kind)
