@@ -33,6 +33,7 @@ _ROWS = (
     Code("network-range", "controller.network", "before", "no node near the speeds needed"),
     Code("stiff-adaptation", "simulation.step", "before", "adaptation too fast for RK4's step"),
     Code("stiff-start", "simulation.step", "before", "start error makes the bound too stiff"),
+    Code("stiff-actuator", "simulation.step", "before", "a pod's lag too short for RK4's step"),
     Code("stiff-derivative", "simulation.step", "before", "PID's loop too fast for RK4's step"),
     Code("sampled-adaptation", "control.period", "before", "adaptation too fast for the period"),
     Code("sampled-derivative", "control.period", "before", "PID's loop too fast for the period"),

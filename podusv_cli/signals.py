@@ -103,8 +103,16 @@ _ROWS = (
     Signal("V_bound", r"\Delta/2\lambda", "1", "ultimate bound of V, corrected"),
     Signal("v_bound", r"|v|_{\max}", "m/s", "bound of the sway speed (51), with all damping"),
     Signal("n", "n", "1/s", "propeller speed", ("pod",)),
+    Signal("n_part", "n", "1", "propeller speed, in parts of full speed", ("pod",)),
     Signal("delta", r"\delta", "rad", "propulsion angle", ("pod",)),
     Signal("n_cmd", r"n_\mathrm{cmd}", "1/s", "propeller speed that was asked for", ("pod",)),
+    Signal(
+        "n_part_cmd",
+        r"n_\mathrm{cmd}",
+        "1",
+        "propeller speed that was asked for, in parts of full speed",
+        ("pod",),
+    ),
     Signal(
         "delta_cmd", r"\delta_\mathrm{cmd}", "rad", "propulsion angle that was asked for", ("pod",)
     ),

@@ -11,7 +11,6 @@ from findings_samples import codes, finding, late, log, scene
 
 from podusv_cli.findings.finding import Case
 from podusv_cli.findings.reference import drift, reference
-from podusv_cli.findings.task import delivered
 from podusv_cli.kernels import bundle
 from podusv_cli.vessels.plant import plant
 
@@ -144,4 +143,24 @@ def test_the_thrust_needed_is_what_the_law_ends_up_asking_for() -> None:
 
 def test_an_actuator_without_states_delivers_what_it_is_asked_for_within_limits() -> None:
     actuator = scene(limits(3.0, 1.0)).actuator
-    assert delivered(actuator, np.zeros(6), np.array([9.0, -0.5])).tolist() == [3.0, 0.0, -0.5]
+    assert actuator.settled(np.zeros(6), np.array([9.0, -0.5])).tolist() == [3.0, 0.0, -0.5]
+
+
+def test_a_quick_pod_is_not_taken_for_a_weak_one() -> None:
+    """What a pod delivers in the end does not hang on its lags."""
+    quick = [f"actuator.pods.{i}={{n_lag: 0.004, angle_lag: 0.004}}" for i in (0, 1)]
+    pair = "actuator={kind: pod, preset: cybership2_pod}"
+    assert "thrust-short" not in codes(pair, *quick, LONG)
+    weak = [f"actuator.pods.{i}.n_max=8" for i in (0, 1)]
+    assert "thrust-short" in codes(pair, *weak, LONG)
+
+
+def test_a_lag_too_short_for_the_step_is_told_and_does_not_settle() -> None:
+    """RK4 decays up to step = 2.785 lags: 0.01 s for 3.6 ms."""
+    pair, calm = "actuator={kind: pod, preset: cybership2_pod}", "disturbance={kind: none}"
+    for lag, stiff in ((0.0034, True), (0.0038, False)):
+        sets = [pair, calm, "controller.anti_windup=auxiliary", "simulation.duration=40"]
+        sets += [f"actuator.pods.{i}={{n_lag: {lag}, angle_lag: {lag}}}" for i in (0, 1)]
+        assert ("stiff-actuator" in codes(*sets)) == stiff
+        apart = np.abs(late("n", *sets) - late("n_cmd", *sets))
+        assert (np.median(apart) > 0.1) == stiff, np.median(apart)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -42,6 +43,20 @@ class Actuator(Component):
     def rest(self) -> Vector:
         """The state at the start of a run."""
         return np.zeros(len(self.states))
+
+    def shortest_lag(self) -> float:
+        """The smallest time constant of its states [s]; infinite without states."""
+        return math.inf
+
+    def settled(self, x: Vector, demand: Vector) -> Vector:
+        """Loads (tau_u, tau_v, tau_r) once the actuator has followed a constant demand.
+
+        `x` is the vessel's state, which is held; `demand` is (tau_u [N], tau_r [N m]).
+        """
+        tau, rate, signals = np.zeros(3), np.zeros(0), np.zeros(len(self.signals))
+        k, table = bundle(self.constants()), self.table()
+        self.drive(0.0, x, self.rest(), demand, k, table, tau, rate, signals)
+        return tau
 
     def input_matrix(self) -> Vector:
         """How loads (tau_u, tau_v, tau_r) follow small demands at rest, shape (3, 2).

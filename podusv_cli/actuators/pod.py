@@ -32,11 +32,16 @@ from podusv_cli.registry import Component, value
 
 SATURATED, SPEED_LIMITED, ANGLE_LIMITED, RATE_LIMITED, FLAGS = range(5)
 NEARLY = 1.0 - 1e-9
+ROUNDS = 20  # until speeds and angles agree
 SMALL = 1e-3  # of what the pods can do, for finite differences
 
 
 class Pod(Component):
-    """One propeller and the pod that turns it; `n` counts turns a second."""
+    """One propeller and the pod that turns it.
+
+    `n` counts turns a second, or parts of full speed where the actuator's `counts` says so; units
+    with s for it then go without.
+    """
 
     x: float = value(..., "m", "position ahead of the body origin; negative at the stern")
     y: float = value(0.0, "m", "position to starboard of the body origin")
@@ -119,6 +124,10 @@ class Pods(Actuator):
     preset: str = value("", "", "name of the file that brings the pods along; none where empty")
     source: str = value("", "", "where the pods' numbers come from")
     validity: str = value("", "", "what they hold for")
+    counts: Literal["turns", "parts"] = value(
+        "turns", "", "what n counts: turns a second, logged as n, or parts of full speed, "
+        "logged as n_part; units of the pods' numbers with s for n then go without",
+    )  # fmt: skip
     pods: tuple[Pod, ...] = value(..., "", "every pod; in place of the preset's", strict=False)
     priority: Literal["yaw", "surge"] = value(
         "yaw", "", "what is met first when surge force and yaw moment cannot both be had"
@@ -161,14 +170,19 @@ class Pods(Actuator):
     def states(self) -> tuple[str, ...]:
         """Speed and angle of every pod."""
         count = len(self.pods)
-        return ("n",) * count + ("delta",) * count
+        return (self.speed,) * count + ("delta",) * count
+
+    @property
+    def speed(self) -> str:
+        """The propellers' speed, as the log names it."""
+        return "n" if self.counts == "turns" else "n_part"
 
     @property
     def signals(self) -> tuple[str, ...]:
         """Commands, thrust and, where every pod's is known, power; flags of what is at a limit."""
         count = len(self.pods)
         known = all(pod.power_nnn is not None for pod in self.pods)
-        vectors = ("n_cmd", "delta_cmd", "thrust", *(("power",) if known else ()))
+        vectors = (f"{self.speed}_cmd", "delta_cmd", "thrust", *(("power",) if known else ()))
         flags = ("saturated", "speed_limited", "angle_limited", "rate_limited")
         return (*flags, *(name for name in vectors for _ in range(count)))
 
@@ -185,14 +199,28 @@ class Pods(Actuator):
         """The pods' numbers, row after row."""
         return np.array([number for pod in self.pods for number in pod.numbers()])
 
-    def settled(self, tau_u: float, tau_r: float) -> Vector:
-        """Loads (tau_u, tau_v, tau_r) at rest once the pods have followed a constant demand."""
-        k, table, count = bundle(self.constants()), self.table(), len(self.states)
-        demand, tau, rate = np.array([tau_u, tau_r]), np.zeros(3), np.zeros(count)
-        signals, state = np.zeros(len(self.signals)), self.rest()
-        for _ in range(2):
-            self.drive(0.0, np.zeros(6), state, demand, k, table, tau, rate, signals)
-            state = signals[FLAGS : FLAGS + count].copy()
+    def shortest_lag(self) -> float:
+        """Of speeds and angles."""
+        return min(min(pod.n_lag, pod.angle_lag) for pod in self.pods)
+
+    def settled(self, x: Vector, demand: Vector) -> Vector:
+        """Loads where the pods' state is what is commanded; the advance speed hangs on the angle.
+
+        A horizon only takes longer to get there, so it is left out.
+        """
+        k, table, count = (
+            bundle(self.constants() | {"horizon": 0.0}),
+            self.table(),
+            len(self.states),
+        )
+        tau, rate, state = np.zeros(3), np.zeros(count), self.rest()
+        signals = np.zeros(len(self.signals))
+        for _ in range(ROUNDS):
+            self.drive(0.0, x, state, demand, k, table, tau, rate, signals)
+            command = signals[FLAGS : FLAGS + count]
+            if np.allclose(state, command, rtol=1e-9, atol=0.0):
+                break
+            state = command.copy()
         return tau
 
     def input_matrix(self) -> Vector:
@@ -201,9 +229,10 @@ class Pods(Actuator):
         At rest with no demand an angle has no effect yet, and loads follow the demand with a lag.
         """
         force = sum(pod.T_nn * pod.n_max**2 for pod in self.pods) / 3.0
+        at, still, small = np.array([force, 0.0]), np.zeros(6), SMALL * force
         columns = [
-            (self.settled(force + du, dr) - self.settled(force - du, -dr)) / (2.0 * SMALL * force)
-            for du, dr in ((SMALL * force, 0.0), (0.0, SMALL * force))
+            (self.settled(still, at + change) - self.settled(still, at - change)) / (2.0 * small)
+            for change in small * np.eye(2)
         ]
         return np.array(columns).T
 

@@ -11,14 +11,14 @@ from matplotlib.figure import Figure
 from podusv_cli.figures.curves import THIN, draw_curve, scaling
 from podusv_cli.figures.style import Shown, axis_label, legend, new_figure
 
-ROWS = (("n", "n_cmd"), ("delta", "delta_cmd"), ("power", ""))
+ROWS = (("n", "n_cmd"), ("n_part", "n_part_cmd"), ("delta", "delta_cmd"), ("power", ""))
 PANEL_HEIGHT = 1.5  # inches
 
 
 def pods(runs: Sequence[Shown], columns: int) -> Figure:
     """A row for each of speed, angle and power, a column for each pod; actual over commanded."""
-    having = [run for run in runs if run.has("n")]
-    count = max(run.recording["n"].shape[1] for run in having)
+    having = [run for run in runs if run.has("delta")]
+    count = max(run.recording["delta"].shape[1] for run in having)
     rows = [names for names in ROWS if any(run.has(names[0]) for run in having)]
     figure = new_figure(columns, 0.7 + PANEL_HEIGHT * len(rows))
     panels = figure.subplots(len(rows), count, sharex=True, sharey="row", squeeze=False)

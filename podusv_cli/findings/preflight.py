@@ -27,6 +27,7 @@ CHECKS: dict[str, Check] = {
     "network-range": law.network_range,
     "stiff-adaptation": law.stiff_adaptation,
     "stiff-start": law.stiff_start,
+    "stiff-actuator": task.stiff_actuator,
     "stiff-derivative": law.stiff_derivative,
     "sampled-adaptation": law.sampled_adaptation,
     "sampled-derivative": law.sampled_derivative,

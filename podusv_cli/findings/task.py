@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from podusv_cli.actuators.base import Actuator
 from podusv_cli.controllers.tracking import TrackingController
 from podusv_cli.findings.finding import Case, Finding, found
 from podusv_cli.findings.reference import FASTEST, drift
@@ -16,8 +15,8 @@ from podusv_cli.vessels.plant import sway_force
 
 RUNAWAY = 4.0  # target speeds; sway that damping stops below did no harm in any run
 BESIDE = 1e-9  # s; how far from a break the target is looked at on both sides
+STABLE = 2.785  # step over time constant up to which RK4 decays
 DELIVERED = 0.999  # of what is needed counts as all of it
-SETTLING = 60.0  # s that an actuator gets to build up its force
 BREAKS = {  # what jumps: code, offset in TARGET, unit
     "position": ("path-jump", 0, "m"),
     "velocity": ("path-corner", 2, "m/s"),
@@ -138,7 +137,7 @@ def thrust_short(case: Case) -> Iterator[Finding]:
     for axis, (what, unit) in enumerate((("surge force", "N"), ("yaw moment", "N m"))):
         demand = seen.demand[worst[axis]]
         x = np.concatenate([np.zeros(3), np.nan_to_num(seen.nu[worst[axis]])])
-        needed, got = float(demand[axis]), float(delivered(actuator, x, demand)[2 * axis])
+        needed, got = float(demand[axis]), float(actuator.settled(x, demand)[2 * axis])
         if got * np.sign(needed) < DELIVERED * abs(needed):
             mean = float(seen.demand[:, axis].mean())
             yield found(
@@ -149,12 +148,13 @@ def thrust_short(case: Case) -> Iterator[Finding]:
             )
 
 
-def delivered(actuator: Actuator, x: Vector, demand: Vector) -> Vector:
-    """Loads (tau_u, tau_v, tau_r) under a steady demand, once the actuator has built them up."""
-    k, table, state = bundle(actuator.constants()), actuator.table(), actuator.rest()
-    tau, rate, signals = np.zeros(3), np.zeros(len(state)), np.zeros(len(actuator.signals))
-    step = 0.05
-    for i in range(round(SETTLING / step) if len(state) else 1):
-        actuator.drive(i * step, x, state, demand, k, table, tau, rate, signals)
-        state = state + step * rate
-    return tau
+def stiff_actuator(case: Case) -> Iterator[Finding]:
+    """A lag of the actuator is too short for RK4, whose steps of -x/lag grow beyond 2.78 lags."""
+    lag, step = case.scenario.actuator.shortest_lag(), case.scenario.simulation.step
+    if step > STABLE * lag:
+        yield found(
+            "stiff-actuator",
+            f"the actuator's lag of {lag:g} s is too short for RK4 with {step:g} s: it would "
+            f"not settle on what is commanded; take a step below {STABLE * lag:.2g} s, or a "
+            "longer lag",
+        )
