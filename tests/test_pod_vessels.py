@@ -1,0 +1,50 @@
+"""The vessels that have pods of their own, each along a line: they follow, within their limits."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from podusv_cli.actuators.pod import Pods
+from podusv_cli.config.loading import load
+from podusv_cli.config.references import pod_names, pod_text, vessel_names
+from podusv_cli.engine.simulate import simulate
+from podusv_cli.findings.preflight import preflight
+
+CONFIGS = Path(__file__).parent.parent / "configs/pod/vessels"
+SCENARIOS = sorted(CONFIGS.glob("*.yaml"))
+
+
+def test_every_vessel_with_pods_has_a_scenario() -> None:
+    both = set(pod_names()) & set(vessel_names())
+    assert {path.stem for path in SCENARIOS} == both == {"milliampere", "otter", "revolt", "wamv"}
+
+
+@pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: path.stem)
+def test_it_follows_the_line_and_keeps_its_distance(path: Path) -> None:
+    scenario = load(path).scenario
+    assert not [finding.code for finding in preflight(scenario)]
+    log = simulate(scenario.closed_loop(), scenario.time_grid())
+    assert log.status == "finished"
+    late = log["time"] > 0.8 * log["time"][-1]
+    apart = log["z_e"][late] - scenario.controller.standoff
+    assert np.abs(apart).max() < scenario.vessel.length / 3.0
+    assert np.ptp(apart) < scenario.vessel.length / 20.0
+    assert log["saturated"][late].max() == 0.0
+    assert isinstance(scenario.actuator, Pods)
+    U, k = float(np.hypot(log["u"], log["v"])[-1]), scenario.vessel
+    drag = -(k.X_u + k.X_uu * U + k.X_uuu * U * U) * U
+    across = np.array([pod.angle_limit > 1.5 for pod in scenario.actuator.pods])
+    ahead = float((log["thrust"][-1] * np.cos(log["delta"][-1])).sum())
+    assert ahead == pytest.approx(drag, rel=0.03)
+    assert np.all(log["delta"][:, ~across] == 0.0)
+
+
+@pytest.mark.parametrize("name", sorted({"cybership2_pod", *(path.stem for path in SCENARIOS)}))
+def test_every_set_of_pods_says_where_its_numbers_come_from_and_what_they_hold_for(
+    name: str,
+) -> None:
+    assert len(pod_text(name, "source")) > 60
+    assert len(pod_text(name, "validity")) > 30
