@@ -11,6 +11,7 @@ from conftest import (
     GENTLE,
     NONLINEAR,
     PAPER,
+    POD,
     SMOOTH_START,
     VESSELS,
     corrected,
@@ -19,6 +20,7 @@ from conftest import (
     target_at,
 )
 
+from podusv_cli.actuators.pod import Pod, Pods
 from podusv_cli.actuators.saturated import Saturated
 from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
 from podusv_cli.controllers.backstepping import Backstepping
@@ -71,6 +73,22 @@ def test_rate_integrates_to_the_change_of_V_to_fourth_order(law: PolarBacksteppi
     orders = np.log2(np.array(gaps[:-1]) / gaps[1:])
     print(law.label, gaps, orders)
     assert orders[-1] == pytest.approx(4.0, abs=0.5)
+
+
+@pytest.mark.parametrize("anti_windup", ["none", "auxiliary"])
+@pytest.mark.parametrize("places", [(0.0,), (-0.078, 0.078)], ids=["one pod", "two pods"])
+def test_rate_integrates_to_the_change_of_V_behind_pods_too(
+    anti_windup: Any, places: tuple[float, ...]
+) -> None:
+    """At limits and rates the integrand has corners, hence no order but closeness."""
+    own = {"T_nV": 1e-3, "n_rate": 200.0, "angle_rate": 1.75, "n_lag": 0.1, "angle_lag": 0.1}
+    actuator = Pods(pods=tuple(Pod(**POD | own | {"y": y}) for y in places))
+    law = GENTLE.model_copy(update={"anti_windup": anti_windup})
+    log = watched(smooth(law, vessel=NONLINEAR, actuator=actuator), 20.0, 0.005).recording
+    assert log["saturated"].any()
+    assert log["rate_limited"].any()
+    change, travel = log["V"][-1] - log["V"][0], simpson(np.abs(log["V_dot"]), 0.005)
+    assert change == pytest.approx(simpson(log["V_dot"], 0.005), abs=1e-5 * travel)
 
 
 FOLDS = [
