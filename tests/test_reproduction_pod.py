@@ -1,0 +1,104 @@
+"""The committed results of the pods, made anew: the tables, and what results/pod.md says."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+from test_reproduction import rerun
+
+from podusv_cli import workflows
+from podusv_cli.config.loading import load
+
+ROOT = Path(__file__).parent.parent
+NAMES = ("ideal", "kept", "dropped", "single", "no_anti_windup")
+LAWS = ["proposed", "dsc", "li", "pid"]
+TIMED = ["law_ns", "law_ns_low", "law_ns_high"]
+FOUND = (ROOT / "results/pod.md").read_text()
+
+
+LINES = re.findall(r"^\| `(\w+)` \| (`.*`) \| (\d+) \| (\d+) \|$", FOUND, re.MULTILINE)
+
+
+def committed(name: str, folder: Path = ROOT / "results/pod") -> Any:
+    """A comparison's table, without what is timed."""
+    return pd.read_csv(folder / name / "comparison.csv", index_col=0).drop(index=TIMED)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_committed_table_is_what_comes_out(name: str, tmp_path: Path) -> None:
+    request = workflows.Request(out=tmp_path / name, figures=False)
+    workflows.compare([ROOT / f"configs/pod/{name}.yaml"], request)
+    pd.testing.assert_frame_equal(committed(name, tmp_path), committed(name), rtol=1e-6)
+
+
+def test_the_table_in_words_is_the_committed_one() -> None:
+    rows = re.findall(r"^\| [^|]*\(`(\w+)`\) \|(.*)\|$", FOUND, re.MULTILINE)
+    assert [name for name, _ in rows] == list(NAMES)
+    for name, cells in rows:
+        table = committed(name)
+        for law, cell in zip(LAWS, cells.split("|"), strict=True):
+            iae, z_e = cell.strip(" )").split(" (")
+            assert float(iae) == round(float(table.loc["iae", law]))
+            digits = len(z_e.partition(".")[2])
+            assert float(z_e) == round(float(table.loc["z_e_steady", law]), digits)
+
+
+@pytest.mark.parametrize(
+    ("name", "law", "metric", "unit", "told"),
+    [
+        ("dropped", "proposed", "energy_pod", 1, "({} against "),
+        ("kept", "proposed", "energy_pod", 1, " against {} J)"),
+        ("dropped", "proposed", "angle_travel", 1, "({} against "),
+        ("kept", "proposed", "angle_travel", 1, " against {} rad)"),
+        ("dropped", "proposed", "at_angle_limit", 100, "for {} % of the time"),
+        ("kept", "proposed", "at_angle_limit", 100, "instead of {} %"),
+        ("no_anti_windup", "pid", "energy_pod", 1, "({} against "),
+        ("kept", "pid", "energy_pod", 1, " against {} J)"),
+        ("no_anti_windup", "li", "peak_tau_u", 1e-3, "(up to {} kN)"),
+        ("single", "pid", "saturated_fraction", 100, "({} % of the time out of"),
+    ],
+)
+def test_a_number_in_the_text_is_the_committed_one(
+    name: str, law: str, metric: str, unit: float, told: str
+) -> None:
+    number = float(committed(name).loc[metric, law]) * unit
+    assert told.format(f"{number:.0f}") in " ".join(FOUND.split())
+
+
+def test_which_law_arrives_first_is_as_committed() -> None:
+    settling = committed("kept").loc["settling_time", LAWS].astype(float)
+    assert settling.idxmin() == "pid"
+    assert f"({settling['pid']:.1f} against {settling['proposed']:.1f} s)" in FOUND
+
+
+@pytest.mark.parametrize(("name", "keys", "proposed", "pid"), LINES)
+def test_what_the_findings_hang_on_comes_out(name: str, keys: str, proposed: str, pid: str) -> None:
+    singles = load(
+        ROOT / f"configs/pod/{name}.yaml", re.findall("`(.*?)`", keys)
+    ).scenario.singles()
+    for law, told in (("proposed", proposed), ("pid", pid)):
+        iae = rerun(singles[law]).run.metrics["iae"]
+        assert iae == pytest.approx(int(told), abs=0.6, rel=1e-3)
+
+
+def test_the_lines_that_say_so_are_there() -> None:
+    assert len(LINES) == 13
+
+
+@pytest.mark.parametrize(
+    ("name", "keys", "told"),
+    [
+        ("kept", ("disturbance.b_v.mean=-0.5",), "{} against 861 J"),
+        ("dropped", ("disturbance.b_v.mean=-0.5",), "495 against {} J"),
+        ("kept", tuple(f"actuator.pods.{i}.T_nV=0.075" for i in (0, 1)), "({} against 337 J)"),
+    ],
+)
+def test_what_else_costs_at_the_propeller_comes_out(
+    name: str, keys: tuple[str, ...], told: str
+) -> None:
+    law = load(ROOT / f"configs/pod/{name}.yaml", keys).scenario.singles()["proposed"]
+    assert told.format(round(rerun(law).run.metrics["energy_pod"])) in FOUND
