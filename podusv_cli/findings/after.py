@@ -92,10 +92,16 @@ def saturated(scenario: Scenario, log: Recording) -> Iterator[Finding]:
     limited = log["saturated"] > 0.5
     part = float(limited.mean())
     if part > LONG:
+        learnt = (
+            "anti_windup keeps it out of what the law learns"
+            if scenario.controller.settles()
+            else "what the law adapts and integrates meanwhile is not what it was designed for; "
+            "see anti_windup"
+        )
         yield found(
             "saturated",
             f"the actuator limits the law during {part:.1%} of the run, {_when(log, limited)}; "
-            "what the law adapts and integrates meanwhile is not what it was designed for",
+            f"{learnt}",
         )
 
 
