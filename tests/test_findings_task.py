@@ -164,3 +164,17 @@ def test_a_lag_too_short_for_the_step_is_told_and_does_not_settle() -> None:
         assert ("stiff-actuator" in codes(*sets)) == stiff
         apart = np.abs(late("n", *sets) - late("n_cmd", *sets))
         assert (np.median(apart) > 0.1) == stiff, np.median(apart)
+
+
+def test_a_pod_that_turns_too_little_drives_the_hull_ahead_and_that_is_told() -> None:
+    place = "x: -0.499, T_nn: 7.3e-3, T_nn_astern: 1e-2, n_max: 33, n_max_astern: 33"
+    slow = "n_rate: 200, n_lag: 0.1, angle_rate: 1.75, angle_lag: 0.1"
+
+    def sets(limit: float) -> tuple[str, ...]:
+        one = f"actuator={{kind: pod, pods: [{{{place}, {slow}, angle_limit: {limit}}}]}}"
+        return one, "controller.anti_windup=auxiliary", ON_TARGET, LONG
+
+    assert "thrust-short" in codes(*sets(0.15))
+    assert "thrust-short" not in codes(*sets(1.2))
+    assert late("z_e", *sets(0.15)).min() < 0.3  # of the standoff of 0.5 m
+    assert np.abs(late("z_e", *sets(1.2)) - 0.5).max() < 0.1

@@ -16,6 +16,7 @@ from podusv_cli.vessels.plant import sway_force
 RUNAWAY = 4.0  # target speeds; sway that damping stops below did no harm in any run
 BESIDE = 1e-9  # s; how far from a break the target is looked at on both sides
 STABLE = 2.785  # step over time constant up to which RK4 decays
+AHEAD = 0.5  # of the largest surge force needed
 DELIVERED = 0.999  # of what is needed counts as all of it
 BREAKS = {  # what jumps: code, offset in TARGET, unit
     "position": ("path-jump", 0, "m"),
@@ -146,6 +147,22 @@ def thrust_short(case: Case) -> Iterator[Finding]:
                 f"t = {seen.time[worst[axis]]:.0f} s ({mean:.3g} on average) and the actuator "
                 f"gives {got:.3g} {unit}; raise its limit or slow the target down",
             )
+    yield from _driven_ahead(case, int(worst[1]))
+
+
+def _driven_ahead(case: Case, row: int) -> Iterator[Finding]:
+    """The largest yaw moment comes with more surge force than keeps up."""
+    seen = case.reference
+    x = np.concatenate([np.zeros(3), np.nan_to_num(seen.nu[row])])
+    needed, moment = seen.demand[row].tolist()
+    got = float(case.scenario.actuator.settled(x, seen.demand[row])[0])
+    if got - needed > AHEAD * float(np.abs(seen.demand[:, 0]).max()):
+        yield found(
+            "thrust-short",
+            f"the yaw moment of {moment:.3g} N m at t = {seen.time[row]:.0f} s comes with a surge "
+            f"force of {got:.3g} N where {needed:.3g} N keeps up, and the hull runs ahead; let the "
+            "pods turn further, or take priority: surge",
+        )
 
 
 def stiff_actuator(case: Case) -> Iterator[Finding]:
