@@ -102,3 +102,12 @@ def test_what_else_costs_at_the_propeller_comes_out(
 ) -> None:
     law = load(ROOT / f"configs/pod/{name}.yaml", keys).scenario.singles()["proposed"]
     assert told.format(round(rerun(law).run.metrics["energy_pod"])) in FOUND
+
+
+def test_unequal_thrust_holds_twice_the_disturbance_as_told() -> None:
+    keys = ("disturbance.scale=2",)
+    law = load(ROOT / "configs/pod/kept.yaml", keys).scenario.singles()["proposed"]
+    got = rerun(law).run.metrics
+    assert f"limit for {100 * got['at_angle_limit']:.0f} % of the time" in FOUND
+    assert f"(z_e {got['z_e_steady']:.3f} m, no more propeller energy" in FOUND
+    assert got["energy_pod"] < float(committed("kept").loc["energy_pod", "proposed"])
