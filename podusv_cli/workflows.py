@@ -9,9 +9,6 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from podusv_cli.comparison.claims import Stated, misfits
-from podusv_cli.comparison.differences import differences
-from podusv_cli.comparison.entries import Entry
 from podusv_cli.config.loading import load, resolved_yaml
 from podusv_cli.config.scenario import Claim
 from podusv_cli.config.words import unknown
@@ -25,10 +22,12 @@ from podusv_cli.running import Finished, Progress, Stopwatch, Task, execute
 
 if TYPE_CHECKING:
     from podusv_cli import comparing
+    from podusv_cli.comparison.claims import Stated
+    from podusv_cli.comparison.entries import Entry
     from podusv_cli.verification.verify import Verified
 
 RESULTS = Path("results")
-DRAWN = ("trajectory", "errors", "controls", "adaptation")  # by `run`
+DRAWN = ("controls", "trajectory", "errors")  # by `run`; the longest to draw first
 
 
 @dataclass(frozen=True)
@@ -196,6 +195,7 @@ class _Item:
 
 def _opened(path: Path, request: Request, *, alone: bool) -> _Item:
     from podusv_cli import comparing
+    from podusv_cli.comparison.claims import misfits
 
     if path.is_dir():
         parts = comparing.from_folder(path)
@@ -214,6 +214,7 @@ def _opened(path: Path, request: Request, *, alone: bool) -> _Item:
 def _stated(found: Sequence[_Item], called: Sequence[Mapping[str, str]]) -> list[Stated]:
     """All claims; those of the same name bear their scenario's too."""
     from podusv_cli import comparing
+    from podusv_cli.comparison.claims import Stated
 
     counts = Counter(name for item in found for name in item.claims)
     stated = [
@@ -270,6 +271,7 @@ def plot(runs: Sequence[Path], drawing: Drawing) -> Drawn:
     """
     # pandas and matplotlib are slow to import
     from podusv_cli import comparing, plotting
+    from podusv_cli.comparison.differences import differences
     from podusv_cli.figures.animation import FILE, animate
     from podusv_cli.figures.drawing import FIGURES, draw_in_parallel, dressed
     from podusv_cli.figures.style import FORMATS

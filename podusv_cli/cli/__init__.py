@@ -6,6 +6,7 @@ Commands import what they need when they run, so that help and mistyped options 
 from __future__ import annotations
 
 import gc
+import os
 import sys
 from importlib import import_module
 from typing import Annotated
@@ -55,10 +56,13 @@ def main() -> None:
     """Run the command line and leave with its exit code."""
     # What imports make stays; to look through all of it time and again costs a tenth of a run.
     gc.set_threshold(OBJECTS_BETWEEN_COLLECTIONS)
+    # pydantic would look through every installed package for plugins.
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     for stream in (sys.stdout, sys.stderr):
         # A file name or text that the terminal's encoding lacks must not end in a traceback.
         getattr(stream, "reconfigure", lambda errors: None)(errors="backslashreplace")
     try:
         app()
     except SystemExit as end:
+        gc.freeze()  # or Python looks through everything once more before it ends
         sys.exit(flushed(end.code))

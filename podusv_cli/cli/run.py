@@ -37,7 +37,10 @@ def run(
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Simulate a scenario and write a run folder: log, metrics, figures."""
+    """Simulate a scenario and write a run folder: log, metrics, figures.
+
+    Draws trajectory, errors and controls; `podusv plot RUN` draws all that the run has signals for.
+    """
     from podusv_cli import workflows  # heavy imports only when they are needed
     from podusv_cli.cli.layout import Warned
     from podusv_cli.cli.progress import progress_bar

@@ -161,7 +161,10 @@ def image(figure: Figure, form: str) -> bytes:
     """The figure as a file's content: png, pdf or svg, the same bytes for the same figure."""
     _settle(figure)
     buffer = io.BytesIO()
-    figure.savefig(buffer, format=form, metadata=NO_STAMP[form])
+    if form == "png":  # `savefig` would draw twice
+        FigureCanvasAgg(figure).print_png(buffer, metadata=NO_STAMP[form])  # type: ignore[no-untyped-call]
+    else:
+        figure.savefig(buffer, format=form, metadata=NO_STAMP[form])
     return buffer.getvalue()
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from podusv_cli.kernels import Vector
 from podusv_cli.logbook import layout
-from podusv_cli.logbook.packing import packed
+from podusv_cli.logbook.packing import LEVEL, packed
 from podusv_cli.recording import Recording
 from podusv_cli.signals import SIGNALS
 
@@ -19,7 +19,7 @@ from podusv_cli.signals import SIGNALS
 _FORMAT = ("v108", "v108")
 # The checksum of every chunk (Fletcher) makes damage to the data an error, too. These filters are
 # what readers undo; `packing` does them faster than HDF5.
-_FILTERS = {"compression": "gzip", "compression_opts": 4, "shuffle": True, "fletcher32": True}
+_FILTERS = {"compression": "gzip", "compression_opts": LEVEL, "shuffle": True, "fletcher32": True}
 
 Scales = Mapping[str, h5py.Dataset]
 

@@ -49,11 +49,14 @@ def source_tree(package: Path) -> dict[str, Any] | None:
     # A package installed somewhere below an unrelated checkout is not tracked there.
     if _git(package, "ls-files", "--error-unmatch", "__init__.py") is None:
         return None
-    commit = _git(package, "rev-parse", "HEAD")
-    changes = _git(package, "status", "--porcelain", "--untracked-files=normal", "--", ".")
-    if commit is None or changes is None:
+    told = _git(
+        package, "status", "--porcelain=v2", "--branch", "--untracked-files=normal", "--", "."
+    )
+    lines = (told or "").splitlines()
+    commit = next((line.split()[-1] for line in lines if line.startswith("# branch.oid ")), None)
+    if commit in (None, "(initial)"):
         return None
-    return {"commit": commit, "dirty": bool(changes)}
+    return {"commit": commit, "dirty": any(not line.startswith("#") for line in lines)}
 
 
 def _git(folder: Path, *words: str) -> str | None:
