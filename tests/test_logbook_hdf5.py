@@ -16,6 +16,7 @@ from logbook_samples import ENVIRONMENT, PYTHON, TEXTS, YAML, assert_same, log, 
 from numpy.testing import assert_array_equal
 
 from podusv_cli.logbook import layout, reading
+from podusv_cli.logbook.packing import LEVEL
 from podusv_cli.signals import SIGNALS
 
 DIMENSIONS = {
@@ -125,7 +126,7 @@ def test_every_signal_is_packed_and_has_a_checksum() -> None:
     datasets = objects(log())
     for name in (*recording().signals, *recording().fixed):
         found = datasets[name]
-        assert (found.compression, found.compression_opts) == ("gzip", 4), name
+        assert (found.compression, found.compression_opts) == ("gzip", LEVEL), name
         assert found.shuffle, name
         assert found.fletcher32, name
 
