@@ -1,4 +1,4 @@
-"""Signals that are not logged but follow from logged ones."""
+"""Signals that follow from logged ones, where the log does not have them itself."""
 
 from __future__ import annotations
 
@@ -36,6 +36,18 @@ def _activation(log: Recording) -> Vector:
 def _v_dot_bound(log: Recording) -> Vector:
     part = np.searchsorted(log["window_start"], log["time"], side="right") - 1
     return np.asarray(-2.0 * log["V_lambda"][part] * log["V"] + log["V_Delta"][part])
+
+
+def has(log: Recording, name: str) -> bool:
+    """Whether the log has the signal, or what it takes to compute it."""
+    if name in log:
+        return True
+    return name in DERIVED and all(part in log for part in DERIVED[name].needs)
+
+
+def signal(log: Recording, name: str) -> Vector:
+    """A signal as logged, else computed; KeyError where there is neither."""
+    return log[name] if name in log else DERIVED[name].compute(log)
 
 
 DERIVED: dict[str, Derived] = {

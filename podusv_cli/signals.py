@@ -39,8 +39,8 @@ _ROWS = (
     Signal("alpha_r", r"\alpha_r", "rad/s", "virtual yaw rate (30)"),
     Signal("beta_u", r"\beta_u", "m/s", "filtered virtual surge velocity (22)"),
     Signal("beta_r", r"\beta_r", "rad/s", "filtered virtual yaw rate (31)"),
-    Signal("y_u", "y_u", "m/s", "error of the surge filter, beta_u - alpha_u; derived, not logged"),
-    Signal("y_r", "y_r", "rad/s", "error of the yaw filter, beta_r - alpha_r; derived, not logged"),
+    Signal("y_u", "y_u", "m/s", "error of the surge filter, beta_u - alpha_u"),
+    Signal("y_r", "y_r", "rad/s", "error of the yaw filter, beta_r - alpha_r"),
     Signal("u_e", "u_e", "m/s", "surge velocity error (23)"),
     Signal("r_e", "r_e", "rad/s", "yaw rate error (32)"),
     Signal("tau_u_cmd", r"\tau_{u,\mathrm{cmd}}", "N", "surge force that the law asked for"),
@@ -56,17 +56,17 @@ _ROWS = (
     Signal("W_hat_u", r"\hat W_u", "m/s2", "surge network weights (27)", ("node",)),
     Signal("W_hat_r", r"\hat W_r", "rad/s2", "yaw network weights (36)", ("node",)),
     Signal(
-        "W_norm_u", r"|\hat W_u|", "m/s2", "norm of the surge network weights; derived, not logged"
+        "W_norm_u", r"|\hat W_u|", "m/s2", "norm of the surge network weights"
     ),
     Signal(
-        "W_norm_r", r"|\hat W_r|", "rad/s2", "norm of the yaw network weights; derived, not logged"
+        "W_norm_r", r"|\hat W_r|", "rad/s2", "norm of the yaw network weights"
     ),
     Signal(
-        "activation", r"\max\Phi", "1", "largest output of a network node (14); derived, not logged"
+        "activation", r"\max\Phi", "1", "largest output of a network node (14)"
     ),
     Signal(
         "node_distance", "d", "1",
-        "distance of (u, v, r) to the nearest network centre, in widths; derived, not logged",
+        "distance of (u, v, r) to the nearest network centre, in widths",
     ),
     Signal("f_hat_u", r"\hat f_u", "m/s2", "network's estimate of f_u (25)"),
     Signal("f_hat_r", r"\hat f_r", "rad/s2", "network's estimate of f_r (34)"),

@@ -10,10 +10,13 @@ import numpy as np
 import pytest
 
 from podusv_cli.config.loading import load
+from podusv_cli.controllers.network import Network
+from podusv_cli.derived import DERIVED
 from podusv_cli.figures.drawing import FIGURES, draw, dressed
 from podusv_cli.logbook.reading import read_log
 from podusv_cli.recording import Recording
-from podusv_cli.theory.monitor import TERMS, WINDOWS
+from podusv_cli.theory.ideal import exponents, node_distance
+from podusv_cli.theory.monitor import ERRORS, NETWORKS, TERMS, WINDOWS
 from podusv_cli.workflows import Request, run
 
 CONFIGS = Path(__file__).parents[1] / "configs"
@@ -89,7 +92,8 @@ def test_without_a_monitor_there_is_nothing_of_it(change: str, tmp_path: Path) -
     request = Request(("simulation.duration=2", change), tmp_path / "run", figures=False)
     done = run(CONFIGS / "theory/base.yaml", request).folder
     assert not (done / "theory.json").exists()
-    assert not [name for name in read_log(done / "log.h5").signals if name.startswith("V")]
+    logged = read_log(done / "log.h5").signals
+    assert not [name for name in logged if name.startswith("V") or name in (*ERRORS, *NETWORKS)]
 
 
 def test_thinned_logs_are_monitored_where_they_are_logged(tmp_path: Path, log: Recording) -> None:
@@ -121,9 +125,32 @@ def test_a_stack_shows_parts_that_make_up_all_of_V(log: Recording) -> None:
     assert np.all(np.diff(tops) >= 0.0)
 
 
-def test_derived_signals_of_the_monitor(log: Recording) -> None:
-    from podusv_cli.derived import DERIVED
+def test_the_log_has_filter_errors_norms_and_nodes(log: Recording) -> None:
+    for name in (*ERRORS, *NETWORKS):
+        np.testing.assert_allclose(
+            log.signals[name], DERIVED[name].compute(log), rtol=1e-12, atol=1e-15
+        )
 
+
+def test_nearest_node_of_a_list_of_centres_far_from_all_of_them() -> None:
+    centers = ((0.0, 0.0, 0.0), (1.0, 0.5, -0.2))
+    network = Network(centers=centers, widths=(0.5, 0.2, 0.1))
+    nu = np.array([[0.9, 0.4, 0.0], [40.0, 0.0, 0.0]])
+    log = Recording("finished", "", dict(zip("uvr", nu.T, strict=True)))
+    scaled = (nu[:, None, :] - np.array(centers)) / [0.5, 0.2, 0.1]
+    expected = np.sqrt((scaled**2).sum(axis=2)).min(axis=1)
+    np.testing.assert_allclose(node_distance(network, exponents(network, log)), expected)
+
+
+def test_law_without_a_filter_has_no_filter_error(tmp_path: Path) -> None:
+    request = Request(("simulation.duration=1", "controller={kind: backstepping}"), tmp_path / "r",
+                      figures=False)  # fmt: skip
+    log = read_log(run(CONFIGS / "theory/base.yaml", request).folder / "log.h5")
+    assert not any(name in log for name in ERRORS)
+    assert all(name in log for name in NETWORKS)
+
+
+def test_derived_signals_of_the_monitor(log: Recording) -> None:
     near, largest = (DERIVED[name].compute(log) for name in ("node_distance", "activation"))
     nu = np.column_stack([log["u"], log["v"], log["r"]])[::50]
     apart = (nu[:, None, :] - log["rbf_center"]) / log["rbf_width"]

@@ -9,9 +9,9 @@ from functools import cached_property
 
 import numpy as np
 
+from podusv_cli import derived
 from podusv_cli.comparison.checks import CHECKS
 from podusv_cli.config.scenario import Scenario
-from podusv_cli.derived import DERIVED
 from podusv_cli.kernels import Vector
 from podusv_cli.logbook.folder import Run
 from podusv_cli.recording import Recording
@@ -54,10 +54,8 @@ class Entry:
 
     def signal(self, name: str) -> Vector:
         """A logged or derived signal; empty where the run has none of this name."""
-        if name in DERIVED:
-            has = all(part in self.recording for part in DERIVED[name].needs)
-            return DERIVED[name].compute(self.recording) if has else np.empty(0)
-        return self.recording[name] if name in self.recording else np.empty(0)
+        has = derived.has(self.recording, name)
+        return derived.signal(self.recording, name) if has else np.empty(0)
 
     def check(self, name: str) -> bool | None:
         """Whether a named property holds."""

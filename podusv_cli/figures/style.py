@@ -17,8 +17,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import ScalarFormatter
 
+from podusv_cli import derived
 from podusv_cli.config.scenario import Scenario
-from podusv_cli.derived import DERIVED
 from podusv_cli.kernels import Vector
 from podusv_cli.recording import Recording
 from podusv_cli.signals import SIGNALS
@@ -85,14 +85,11 @@ class Shown:
 
     def has(self, name: str) -> bool:
         """Whether the run has the signal, logged or derivable."""
-        needs = DERIVED[name].needs if name in DERIVED else (name,)
-        return all(part in self.recording for part in needs)
+        return derived.has(self.recording, name)
 
     def signal(self, name: str) -> Vector:
         """A logged or derived signal."""
-        if name not in DERIVED:
-            return self.recording[name]
-        return DERIVED[name].compute(self.recording)
+        return derived.signal(self.recording, name)
 
     def during(self, name: str, span: tuple[float, float] | None) -> tuple[Vector, Vector]:
         """Time and a signal, all of it or that of a part [s]."""

@@ -41,14 +41,31 @@ def unloaded_accelerations(loop: ClosedLoop, now: Replayed) -> tuple[Vector, Vec
 
 def node_outputs(network: Network, log: Recording) -> Vector:
     """Phi (14) at every logged row, shape (rows, nodes), in factors as the law has them."""
+    return outputs(network, exponents(network, log))
+
+
+def exponents(network: Network, log: Recording) -> Vector:
+    """Half the squared distance in widths in every factor of a node, shape (rows, factors)."""
     along, plane = network.factors
-    centers, exponents = network.table().reshape(2, 3, -1)[..., : along + plane]
+    centers, steep = network.table().reshape(2, 3, -1)[..., : along + plane]
     nu = np.column_stack([log["u"], log["v"], log["r"]])
     squares = np.zeros((len(nu), along + plane))
     for axis in range(3):
-        squares += exponents[axis] * (nu[:, axis, None] - centers[axis]) ** 2
-    bells = np.exp(-np.nan_to_num(squares, nan=np.inf))  # velocities may have left all numbers
-    return (bells[:, plane:, None] * bells[:, None, :plane]).reshape(len(nu), -1)
+        squares += steep[axis] * (nu[:, axis, None] - centers[axis]) ** 2
+    return np.nan_to_num(squares, nan=np.inf)  # velocities may have left all numbers
+
+
+def outputs(network: Network, factors: Vector) -> Vector:
+    """Phi (14), shape (rows, nodes), of what `exponents` gives."""
+    plane, bells = network.factors[1], np.exp(-factors)
+    return (bells[:, plane:, None] * bells[:, None, :plane]).reshape(len(bells), -1)
+
+
+def node_distance(network: Network, factors: Vector) -> Vector:
+    """Distance of (u, v, r) to the nearest centre in widths, of what `exponents` gives."""
+    plane = network.factors[1]
+    nearest = factors[:, plane:].min(axis=1) + factors[:, :plane].min(axis=1)
+    return np.asarray(np.sqrt(2.0 * nearest))
 
 
 def network_output(phi: Vector, weights: Vector) -> Vector:

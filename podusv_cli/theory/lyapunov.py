@@ -45,6 +45,11 @@ def _dot(a: Vector, b: Vector) -> Vector:
     return np.asarray(np.einsum("ij,ij->i", a, b))
 
 
+def norms(weights: Vector) -> Vector:
+    """Euclidean norm of the weights, shape (rows, nodes), at every row."""
+    return np.sqrt(_dot(weights, weights))
+
+
 def lyapunov(
     loop: ClosedLoop, law: PolarBackstepping, e: Errors, found: Estimates
 ) -> dict[str, Vector]:

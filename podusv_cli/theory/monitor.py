@@ -15,13 +15,15 @@ from podusv_cli.recording import Recording
 from podusv_cli.theory.bounds import Observed, Pair, UltimateBound, ultimate_bound
 from podusv_cli.theory.ideal import (
     Ideal,
+    exponents,
     ideal_weights,
     network_output,
-    node_outputs,
+    node_distance,
+    outputs,
     rows_to_fit,
     unloaded_accelerations,
 )
-from podusv_cli.theory.lyapunov import estimates, lyapunov, remainders
+from podusv_cli.theory.lyapunov import estimates, lyapunov, norms, remainders
 from podusv_cli.theory.rates import error_rates
 from podusv_cli.theory.sway import SwayBound, sway_bound, sway_push
 
@@ -30,6 +32,9 @@ BLOCK = 4096  # rows that are worked on together, so that they stay in the cache
 TERMS = (
     "V_z_e", "V_psi_e", "V_u_e", "V_r_e", "V_y_u", "V_y_r", "V_W_u", "V_W_r", "V_b_u", "V_b_r",
 )  # fmt: skip
+
+ERRORS = ("y_u", "y_r")  # of the filters; a law without them has none
+NETWORKS = ("W_norm_u", "W_norm_r", "activation", "node_distance")
 
 Traces = dict[str, Vector]
 
@@ -125,7 +130,8 @@ def _traces(
 ) -> Traces:  # fmt: skip
     ideal, b = unknown
     e = error_rates(log, now, law)
-    phi = node_outputs(law.network, log)
+    factors = exponents(law.network, log)
+    phi, distance = outputs(law.network, factors), node_distance(law.network, factors)
     fit_u, fit_r = network_output(phi, ideal.W_u), network_output(phi, ideal.W_r)
     f_u, f_r = unloaded_accelerations(loop, now)
     rest_u, rest_r = remainders(loop, law, log, now, e)
@@ -143,6 +149,12 @@ def _traces(
         "push": push,
         "printed_push": printed_push,
         "turn": e.turn,
+        "y_u": e.y_u,
+        "y_r": e.y_r,
+        "W_norm_u": norms(log["W_hat_u"]),
+        "W_norm_r": norms(log["W_hat_r"]),
+        "activation": np.exp(-0.5 * distance**2),
+        "node_distance": distance,
     }
 
 
@@ -201,7 +213,9 @@ def _extended(
     }
     fixed = {"W_star_u": ideal.W_u, "W_star_r": ideal.W_r}
     fixed |= {name: np.array(values) for name, values in numbers.items()}
-    names = ("V", "V_dot", *TERMS) if grid.hold_every == 0 else ("V", *TERMS)
+    rate = ("V_dot",) if grid.hold_every == 0 else ()
+    errors = ERRORS if "beta_u" in recording else ()
+    names = ("V", *rate, *TERMS, *errors, *NETWORKS)
     return replace(
         recording,
         signals={**recording.signals, **{name: traces[name] for name in names}},
