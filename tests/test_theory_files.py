@@ -8,11 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
 
 from podusv_cli.config.loading import load
 from podusv_cli.controllers.network import Network
 from podusv_cli.derived import DERIVED
 from podusv_cli.figures.drawing import FIGURES, draw, dressed
+from podusv_cli.figures.stability import FAR, POINTS, THIN
 from podusv_cli.logbook.reading import read_log
 from podusv_cli.recording import Recording
 from podusv_cli.theory.ideal import exponents, node_distance
@@ -116,13 +118,44 @@ def test_figures_of_the_monitor(name: str, log: Recording) -> None:
 
 def test_a_stack_shows_parts_that_make_up_all_of_V(log: Recording) -> None:
     scenario = load(CONFIGS / "theory/monitor.yaml", SHORT).scenario
-    figure = FIGURES["stability"].family(dressed([("one", log, scenario)]), 2)
-    value, _, stack = figure.axes[:3]
+    shown = dressed([("one", log, scenario), ("other", log, scenario)])
+    value, _, *stacks = FIGURES["stability"].family(shown, 2).axes
     assert value.get_yscale() == "log"
-    tops = [layer.get_paths()[0].vertices[:, 1].max() for layer in stack.collections]
+    for stack in stacks:
+        tops = tops_of(stack)
+        assert len(tops) == len(TERMS)
+        assert tops[-1] == pytest.approx(1.0)
+        assert np.all(np.diff(tops) >= 0.0)
+
+
+def tops_of(stack: Axes) -> list[float]:
+    return [layer.get_paths()[0].vertices[:, 1].max() for layer in stack.collections]
+
+
+def test_V_of_a_single_run_is_stacked_below_its_bound(log: Recording) -> None:
+    scenario = load(CONFIGS / "theory/monitor.yaml", SHORT).scenario
+    stack = FIGURES["stability"].family(dressed([("one", log, scenario)]), 2).axes[0]
+    tops = tops_of(stack)
     assert len(tops) == len(TERMS)
-    assert tops[-1] == pytest.approx(1.0)
-    assert np.all(np.diff(tops) >= 0.0)
+    width = -(-len(log["V"]) // POINTS)
+    assert tops[-1] == pytest.approx(log["V"][:width].mean())  # V is largest at the start
+    drawn = [line.get_ydata()[0] for line in stack.lines if len(line.get_ydata()) == 2]
+    near = [bound for bound in log["V_bound"] if bound <= FAR * log["V"].max()]
+    assert near
+    assert drawn == near
+    assert stack.get_ylim()[1] > max(near)
+
+
+def test_bounds_have_their_runs_line_styles(log: Recording) -> None:
+    scenario = load(CONFIGS / "theory/monitor.yaml", SHORT).scenario
+    shown = dressed([("one", log, scenario), ("other", log, scenario)])
+    for name, place in (("stability", 0), ("stability", 1), ("validity", -1)):
+        axes = FIGURES[name].family(shown, 2).axes[place]
+        thin = [line for line in axes.lines if line.get_linewidth() == THIN]
+        styles = {
+            (line.get_color(), line.get_linestyle()) for line in thin if len(line.get_xdata())
+        }
+        assert styles == {(shown[0].color, "-"), (shown[1].color, "--")}
 
 
 def test_the_log_has_filter_errors_norms_and_nodes(log: Recording) -> None:

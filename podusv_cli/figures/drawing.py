@@ -77,7 +77,7 @@ FIGURES: dict[str, Sheet] = {
     ),
     "stability": Sheet(
         "Lyapunov function (46) with its ultimate bound, its rate with what it should stay below "
-        "(49), and its terms, stacked, as parts of it",
+        "(49), and its terms, stacked, as parts of it; of a single run V itself is stacked, too",
         ("V",),
         stability,
     ),

@@ -10,60 +10,89 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
-from matplotlib.ticker import SymmetricalLogLocator
+from matplotlib.ticker import Locator
 
 from podusv_cli.figures.curves import thinned
 from podusv_cli.figures.panels import TIME
 from podusv_cli.figures.style import Shown, axis_label, legend, new_figure
 from podusv_cli.kernels import Vector
-from podusv_cli.signals import SIGNALS
 from podusv_cli.theory.monitor import TERMS
 
 POINTS = 600  # of a stack; every column is a mean, so that no extreme stands for its surroundings
 FAR = 100.0  # a bound this many times above all of V is left out of the picture and told in words
-LAYERS = (
-    "#0072B2", "#56B4E9", "#D55E00", "#E69F00", "#009E73",
-    "#8FD1BA", "#CC79A7", "#E6B8D2", "#555555", "#AAAAAA",
-)  # fmt: skip
-BOUND: dict[str, Any] = {"linewidth": 0.8, "linestyle": (0, (4, 2))}
+LAYERS = {
+    "z_e": "#0072B2", r"\psi_e": "#56B4E9", "u_e": "#D55E00", "r_e": "#E69F00", "y_u": "#009E73",
+    "y_r": "#8FD1BA", r"\tilde W_u": "#CC79A7", r"\tilde W_r": "#E6B8D2", r"\tilde b_u": "#555555",
+    r"\tilde b_r": "#AAAAAA",
+}  # fmt: skip
+THIN = 0.6  # points: bounds, each in its run's line style
+OUTLINE: dict[str, Any] = {"color": "black", "linewidth": 0.9}
+SIDE_TICKS = 4  # at most, on either side of 0
 
 
 def stability(runs: Sequence[Shown], columns: int) -> Figure:
-    """V with its ultimate bound, V' with what it should stay below, and V's terms, run by run."""
+    """V with its ultimate bound, V' with what it should stay below, and V's terms, run by run.
+
+    V of a single run is stacked by its terms, with its bound over the stack.
+    """
     runs = [run for run in runs if run.has("V")]
-    figure = new_figure(columns, 3.4 + 1.5 * len(runs))
+    figure = new_figure(columns, 3.6 + 1.5 * len(runs))
     over_time = figure.subplots(2 + len(runs), 1, sharex=True)
-    _value(over_time[0], runs)
+    draw_V = _curves if len(runs) > 1 else _stack
+    draw_V(over_time[0], runs)
+    _ultimate(over_time[0], runs)
     _rate(over_time[1], runs)
     layers = [_shares(axes, run) for axes, run in zip(over_time[2:], runs, strict=True)]
     over_time[-1].set_xlabel(TIME)
     over_time[-1].set_xlim(0.0, max(run.end for run in runs))
-    names = [f"${SIGNALS[name].symbol}$" for name in TERMS]
     over_time[-1].legend(
-        layers[-1], names, loc="upper center", bbox_to_anchor=(0.5, -0.35), ncols=5 * columns,
-        fontsize="small", handlelength=0.8, columnspacing=0.8,
+        layers[-1], [f"${error}$" for error in LAYERS], title="terms of $V$, by their error",
+        loc="upper center", bbox_to_anchor=(0.5, -0.35), ncols=5 * columns,
+        handlelength=1.0, columnspacing=1.2,
     )  # fmt: skip
     legend(figure, columns)
     return figure
 
 
-def _value(axes: Axes, runs: Sequence[Shown]) -> None:
+def _curves(axes: Axes, runs: Sequence[Shown]) -> None:
     axes.set_yscale("log")
     axes.set_ylabel(axis_label("V"))
     for run in runs:
         axes.plot(*thinned(run.recording["time"], run.signal("V")), **run.look)
-    largest = max(axes.dataLim.intervaly)
-    told = []
+
+
+def _stack(axes: Axes, runs: Sequence[Shown]) -> None:
+    """V's terms on top of each other; the axis is logarithmic beyond the settled values."""
+    (run,) = runs
+    terms = [_means(run.signal(name)) for name in TERMS]
+    axes.stackplot(_means(run.recording["time"]), terms, colors=LAYERS.values(), linewidth=0.0)
+    V = run.signal("V")
+    axes.plot(*thinned(run.recording["time"], V), **OUTLINE, label="$V$")
+    _compress(axes, _settled(run, "V") or float(np.max(V)))
+    axes.set_ylim(bottom=0.0)
+    axes.set_ylabel(axis_label("V") + ", stacked")
+
+
+def _ultimate(axes: Axes, runs: Sequence[Shown]) -> None:
+    """The bound of V in each part of every run, drawn or, where it is far off, told in words."""
+    largest = max(float(np.max(run.signal("V"))) for run in runs)
+    told, top = [], largest
     for run in runs:
         for start, end, bound in _bounds(run):
             if bound <= FAR * largest:
-                axes.plot([start, end], [bound, bound], color=run.color, **BOUND)
+                axes.plot([start, end], [bound, bound], **_thin(run))
+                top = max(top, bound)
             else:
                 size = f"{bound:.2g}, not drawn" if math.isfinite(bound) else "none"
                 told.append(f"bound of {run.label} from {start:g} s on: {size}")
-    axes.plot([], [], color="#444444", label=r"bound $\Delta/2\lambda$", **BOUND)
+    axes.set_ylim(top=2.0 * top)
+    axes.plot([], [], color="#444444", linewidth=THIN, label=r"thin: bound $\Delta/2\lambda$")
     if told:
         axes.set_title("\n".join(told), fontsize="x-small", loc="left")
+
+
+def _thin(run: Shown) -> dict[str, Any]:
+    return {"color": run.color, "linestyle": run.linestyle, "linewidth": THIN}
 
 
 def _bounds(run: Shown) -> Iterator[tuple[float, float, float]]:
@@ -84,20 +113,42 @@ def _rate(axes: Axes, runs: Sequence[Shown]) -> None:
     for run in runs:
         limit = run.signal("V_dot_bound")
         near = np.where(np.abs(limit) <= FAR * largest, limit, np.nan)
-        axes.plot(run.recording["time"], near, color=run.color, **BOUND)
-    threshold = 10.0 ** math.ceil(math.log10(max([*map(_settled_rate, runs), 1e-9])))
-    axes.set_yscale("symlog", linthresh=threshold)
-    locator = SymmetricalLogLocator(base=10.0, linthresh=threshold)
-    locator.set_params(numticks=7)
-    axes.yaxis.set_major_locator(locator)
+        axes.plot(run.recording["time"], near, **_thin(run))
+    _compress(axes, max([*(_settled(run, "V_dot") for run in runs), 1e-9]))
     axes.axhline(0.0, color="#444444", linewidth=0.5)
     axes.autoscale_view()
 
 
-def _settled_rate(run: Shown) -> float:
-    """The largest |V'| of the run's settled end, 0 where it did not get there."""
+def _compress(axes: Axes, settled: float) -> None:
+    """A vertical axis that is logarithmic beyond the settled values, with ticks at some decades."""
+    threshold = 10.0 ** math.ceil(math.log10(settled))
+    axes.set_yscale("symlog", linthresh=threshold, linscale=2.0)
+    axes.yaxis.set_major_locator(_Decades(threshold))
+
+
+class _Decades(Locator):
+    """Ticks at 0 and at few of the decades from a threshold on, none near another."""
+
+    def __init__(self, threshold: float) -> None:
+        self.first = round(math.log10(threshold))
+
+    def __call__(self) -> list[float]:
+        return self.tick_values(*self.axis.get_view_interval())  # type: ignore[union-attr]
+
+    def tick_values(self, vmin: float, vmax: float) -> list[float]:
+        """Ticks between two values."""
+        largest = max(abs(vmin), abs(vmax), 10.0**self.first)
+        count = math.floor(math.log10(largest)) - self.first + 1
+        steps = range(self.first, self.first + count, -(-count // SIDE_TICKS))
+        sizes = [10.0**power for power in steps]
+        ticks = [*(-size for size in reversed(sizes)), 0.0, *sizes]
+        return [tick for tick in ticks if vmin <= tick <= vmax]
+
+
+def _settled(run: Shown, name: str) -> float:
+    """The largest size of a signal in the run's settled end, 0 where it did not get there."""
     settled = run.recording["time"] >= run.recording["window_start"][-1]
-    return float(np.max(np.abs(run.signal("V_dot")[settled]), initial=0.0))
+    return float(np.max(np.abs(run.signal(name)[settled]), initial=0.0))
 
 
 def _shares(axes: Axes, run: Shown) -> list[PolyCollection]:
@@ -106,7 +157,7 @@ def _shares(axes: Axes, run: Shown) -> list[PolyCollection]:
     terms = np.stack([_means(run.signal(name)) for name in TERMS])
     total = terms.sum(axis=0)
     parts = np.divide(terms, total, out=np.zeros_like(terms), where=total > 0.0)
-    layers = axes.stackplot(_means(time), parts, colors=LAYERS, linewidth=0.0)
+    layers = axes.stackplot(_means(time), parts, colors=LAYERS.values(), linewidth=0.0)
     axes.set_ylim(0.0, 1.0)
     axes.set_ylabel(f"parts of $V$ [1]\n{run.label}")
     return layers

@@ -12,6 +12,7 @@ from podusv_cli.figures.curves import draw_signal
 from podusv_cli.figures.panels import TIME
 from podusv_cli.figures.style import Shown, axis_label, legend, new_figure
 
+THIN = 0.6  # points: bounds, each in its run's line style
 REACH = 2.0  # widths; farther from every node a network says next to nothing
 LABELS = {"node_distance": "nearest node [widths]"}
 PANELS = ("node_distance", "activation", "y_u", "y_r")
@@ -47,7 +48,7 @@ def _sway(axes: Axes, runs: Sequence[Shown]) -> None:
             if start <= end and np.isfinite(bound):
                 for side in (bound, -bound):
                     axes.plot([start, end], [side, side], color=run.color,
-                              linewidth=0.8, linestyle=(0, (4, 2)))  # fmt: skip
-    axes.plot([], [], color="#444444", linewidth=0.8, linestyle=(0, (4, 2)), label="bound of $|v|$")
+                              linewidth=THIN, linestyle=run.linestyle)  # fmt: skip
+    axes.plot([], [], color="#444444", linewidth=THIN, label="thin: bound of $|v|$")
     axes.set_ylabel(axis_label("v"))
     axes.set_xlabel(TIME)
