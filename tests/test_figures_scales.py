@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 from drawn_samples import changed, drawn, line, panels, recording, scenario, shown
 
-from podusv_cli.figures.style import house_style, image, new_figure
-
 
 def inside(limits, values):
     return limits[0] <= np.min(values) and np.max(values) <= limits[1]
@@ -251,15 +249,3 @@ def test_limits_that_act_to_the_end_are_marked_to_the_end():
 def test_settled_starts_where_the_scenario_says():
     (run,) = shown(("a", recording(), scenario(duration=200.0)))
     assert run.steady_from == pytest.approx(150.0)
-
-
-@pytest.mark.parametrize("end", [300.0, 1000.0])
-def test_the_label_at_an_axis_end_is_all_on_the_page(end):
-    with house_style():
-        figure = new_figure(2, 2.0)
-        axes = figure.add_subplot()
-        axes.set_xlim(0.0, end)
-        image(figure, "png")
-    last = axes.get_xticklabels()[-1]
-    assert last.get_text() == f"{end:.0f}"
-    assert last.get_window_extent().x1 <= figure.bbox.x1

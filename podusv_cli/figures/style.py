@@ -27,7 +27,7 @@ from podusv_cli.signals import SIGNALS
 FORMATS = ("png", "pdf", "svg")
 WIDTHS = {1: 3.46, 2: 7.09}  # inches: one column and two columns of a journal page
 
-OVERHANG = 0.1  # inches at the right, for half a label at an axis' end: the layout sees none of it
+OVERHANG = 0.1  # inches at the right, for half a label at an end that got its tick by the layout
 
 # Okabe and Ito's palette, with line styles that tell the curves apart in grey print too.
 LOOKS: tuple[tuple[str, Any], ...] = (
