@@ -1,5 +1,19 @@
-"""`python -m podusv_cli` is `podusv`."""
+"""`podusv`, also as `python -m podusv_cli`."""
 
-from podusv_cli.cli import main
+import signal
 
-main()
+
+def main() -> None:
+    """Import the command line and run it; Ctrl-C ends what has not begun yet without a word.
+
+    Python's own handler would print where in the imports it was.
+    """
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # not so under nohup
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+    from podusv_cli import cli
+
+    cli.main()
+
+
+if __name__ == "__main__":
+    main()

@@ -45,3 +45,9 @@ class StorageError(PodusvError):
     """Reading or writing failed: disk full, not writable, missing or damaged file."""
 
     exit_code = 5
+
+
+class LawError(PodusvError):
+    """A law that does not keep to its declaration, or that fails when it is asked."""
+
+    exit_code = 2

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import atexit
+import os
 import signal
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import TypeVar
 
@@ -15,14 +16,18 @@ Result = TypeVar("Result")
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 # s; a terminal interrupts a command and its workers, the command its workers again, and people
 # press twice: what follows this closely on an interrupt is the same interrupt.
-ECHO = 5.0
+ECHO = 3.0
+SIGNALLED = 128  # and the signal's number: 130 for SIGINT, 143 for SIGTERM
+STDERR = 2
+CUT_OFF = b"podusv: interrupted again; what was still being made is lost\n"
 
 
 class Interrupts:
     """A handler of signals: raises KeyboardInterrupt, at once or when the signals are heard again.
 
-    `number` is the signal that came first, 0 as long as there was none. Once `ending` is set the
-    process is about to end, and signals, then and during its shutdown, change nothing any more.
+    Whoever interrupts a second time gets the end of the process, whatever it is doing. `number` is
+    the signal that came first, 0 as long as there was none. Once `ending` is set the process is
+    about to end, and signals, then and during its shutdown, change nothing any more.
     """
 
     def __init__(self) -> None:
@@ -37,7 +42,9 @@ class Interrupts:
         """Take in a signal."""
         if self.ending or time.monotonic() - self._last < ECHO:
             return
-        self._last, self.number = time.monotonic(), self.number or number
+        if self.number:
+            _cut_off(self.number)
+        self._last, self.number = time.monotonic(), number
         self._waiting = True
         self.deliver()
 
@@ -46,6 +53,17 @@ class Interrupts:
         if self._waiting and not self.held:
             self._waiting = False
             raise KeyboardInterrupt
+
+
+def _cut_off(number: int) -> None:
+    """End this process and its workers at once; folders in the making are swept by the next run."""
+    import multiprocessing  # which not every command needs
+
+    with suppress(OSError):
+        os.write(STDERR, CUT_OFF)
+    for worker in multiprocessing.active_children():
+        worker.kill()
+    os._exit(SIGNALLED + number)
 
 
 @contextmanager

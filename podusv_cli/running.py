@@ -13,6 +13,7 @@ from typing import Any
 from podusv_cli import __version__
 from podusv_cli.config.loading import resolved_yaml
 from podusv_cli.config.scenario import Scenario
+from podusv_cli.engine.asking import check_law
 from podusv_cli.engine.simulate import Observer, marcher, simulate
 from podusv_cli.findings.after import aftermath
 from podusv_cli.findings.finding import Finding, heard
@@ -133,8 +134,9 @@ def execute(
 
 
 def warm_up(scenario: Scenario) -> None:
-    """Have all code of this scenario's loop compiled and loaded."""
+    """Have all code of this scenario's loop compiled and loaded. Raises LawError."""
     loop, compiled = scenario.closed_loop(), scenario.simulation.compiled
+    check_law(loop)
     marcher(loop, _observer(scenario), compiled)
     if scenario.log.monitor:
         monitor.prepare(loop, scenario.time_grid(), compiled)

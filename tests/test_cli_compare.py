@@ -5,35 +5,20 @@ from __future__ import annotations
 import json
 import os
 import signal
-import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+from command_samples import BASE, LONG, SIGNALS, TWO, gone, send, under_way, wait_for, write
 
-import podusv_cli
 from podusv_cli import cli, comparing, running
 from podusv_cli.logbook import manifest
 from podusv_cli.logbook.folder import open_run
 from podusv_cli.parallel import INTERRUPTED, Outcome
-
-ROOT = Path(podusv_cli.__file__).parents[1]
-BASE = """
-vessel: {preset: paper_nonlinear}
-path: {kind: line}
-disturbance: {kind: none}
-actuator: {kind: saturated}
-start: {x: -5.0, y: -2.0, u: 0.3}
-simulation: {duration: 1.0}
-controller: {kind: pid, K_Pu: 100.0}
-silence: [saturated] # the gains are large on purpose
-"""
-TWO = BASE + "controllers: {stiff: {K_Pu: 200.0}, soft: {K_Pu: 5.0}}\n"
 
 
 class Said(NamedTuple):
@@ -67,12 +52,6 @@ def podusv(
 def claim(name: str, expect: str) -> str:
     """A scenario's section with one claim."""
     return f"claims:\n  {name}: {{says: s, source: p, expect: {expect!r}}}\n"
-
-
-def write(name: str, text: str) -> str:
-    """A scenario file; its name."""
-    Path(name).write_text(text)
-    return name
 
 
 def claims_of(said: Said) -> dict[str, dict]:
@@ -304,46 +283,6 @@ def test_runs_that_all_die_are_reported(podusv: Podusv, monkeypatch: pytest.Monk
     assert Path("x/comparison.csv").read_text().startswith("metric,unit,stiff,soft")
 
 
-LONG = BASE.replace("duration: 1.0", "duration: 2e5, step: 1e-3") + "log: {every: 1000}\n"
-
-
-@contextmanager
-def under_way(*words: str) -> Iterator[subprocess.Popen[str]]:
-    """`podusv` in a session of its own; nothing of it is left behind."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", "podusv_cli", *words],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-    )  # fmt: skip
-    try:
-        yield process
-    finally:
-        with suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
-        process.communicate()
-
-
-def wait_for(pattern: str) -> None:
-    """Wait until a file of this name is there."""
-    end = time.monotonic() + 60
-    while not list(Path().glob(pattern)):
-        assert time.monotonic() < end, f"there is no {pattern}"
-        time.sleep(0.01)
-
-
-def send(process: subprocess.Popen[str], number: signal.Signals, times: int) -> None:
-    """As a terminal does it: SIGINT to all processes; SIGTERM to the first alone."""
-    for _ in range(times):
-        if number == signal.SIGINT:
-            os.killpg(process.pid, number)
-        else:
-            process.send_signal(number)
-        time.sleep(0.2)
-
-
-SIGNALS = [(signal.SIGINT, 130), (signal.SIGTERM, 143)]
-
-
 @pytest.mark.parametrize(("number", "code"), SIGNALS)
 @pytest.mark.parametrize("times", [1, 3])
 def test_an_interrupted_comparison_keeps_what_it_has(
@@ -356,8 +295,7 @@ def test_an_interrupted_comparison_keeps_what_it_has(
         send(process, number, times)
         out, err = process.communicate(timeout=30)
         assert process.returncode == code, err
-        with pytest.raises(ProcessLookupError):
-            os.killpg(process.pid, 0)
+        assert gone(process)
     assert "long: interrupted after t = " in err
     assert "Traceback" not in err
     assert "compared 2 runs: x" in out
@@ -377,8 +315,7 @@ def test_an_interrupt_while_drawing_costs_the_figures_only(
         send(process, number, 1)
         out, err = process.communicate(timeout=30)
         assert process.returncode == code, err
-        with pytest.raises(ProcessLookupError):
-            os.killpg(process.pid, 0)
+        assert gone(process)
     assert "compared 2 runs: x" in out
     assert "Traceback" not in err
     assert manifest.check(Path("x")).status == "interrupted"

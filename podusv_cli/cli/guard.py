@@ -12,10 +12,9 @@ from typing import ParamSpec
 import typer
 
 from podusv_cli.errors import PodusvError, StorageError
-from podusv_cli.interrupts import Interrupts, interrupts_caught
+from podusv_cli.interrupts import SIGNALLED, Interrupts, interrupts_caught
 
 Given = ParamSpec("Given")
-SIGNALLED = 128  # and the signal's number: 130 for SIGINT, 143 for SIGTERM
 INTERRUPTED = 130
 PIPE_CLOSED = 141  # what a shell reports for a program that SIGPIPE ended
 BUG = 1

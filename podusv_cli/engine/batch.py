@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from podusv_cli.engine.blocks import in_blocks
 from podusv_cli.engine.closed_loop import Plan, Wires
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import (
@@ -22,7 +23,6 @@ from podusv_cli.engine.simulate import (
     ClosedLoop,
     Observer,
     entries,
-    in_blocks,
     marcher,
     wire,
 )
@@ -76,8 +76,8 @@ def simulate_many(
     def run(i: int) -> None:
         go_on(0.0)
         wires = _apart(wire(loops[i], grid, plan, observer))
-        batch.reached[i], batch.status[i] = in_blocks(
-            lambda a, b: march(a, b, grid.step, wires, plan), plan, go_on
+        batch.reached[i], batch.status[i], _ = in_blocks(
+            lambda a, b: march(a, b, grid.step, wires, plan), plan, wires.under_way, go_on
         )
         batch.state[i], batch.seen[i] = wires.s[: len(STATE)], wires.seen
 

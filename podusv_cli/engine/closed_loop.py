@@ -56,6 +56,7 @@ class Wires(NamedTuple):
     held: Vector  # t, x, target of the last sample; demand and signals that nobody reads
     work: Vector
     seen: Vector  # the observer's
+    under_way: Vector  # which instant, or the step from it
     log: Vector  # rows of t, s, row
 
 
@@ -181,6 +182,7 @@ def instant(
 ) -> bool:  # fmt: skip
     """Sample, evaluate, observe and log instant k; whether all its numbers are finite."""
     t = k * h
+    c.under_way[0] = k
     again = k > first and t == (k - 1) * h + h  # where the last stage of the step before was
     if n.sample_every > 0 or n.hold_every > 0:
         sample_and_hold(k, t, path, law, sample, c, n)

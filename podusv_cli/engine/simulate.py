@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
@@ -13,20 +12,19 @@ from podusv_cli.actuators.base import Actuator
 from podusv_cli.controllers.base import Controller
 from podusv_cli.disturbances.base import Disturbance
 from podusv_cli.engine import closed_loop, signatures
+from podusv_cli.engine.blocks import Ending, in_blocks
 from podusv_cli.engine.closed_loop import Plan, Wires
 from podusv_cli.engine.grid import TimeGrid, whole_steps
-from podusv_cli.interrupts import interrupts_heard, interrupts_held
+from podusv_cli.interrupts import interrupts_held
 from podusv_cli.kernels import Vector, bundle, kernel
 from podusv_cli.paths.base import TARGET, Path
-from podusv_cli.recording import Recording, Status
+from podusv_cli.recording import Recording
 from podusv_cli.signals import SIGNALS
 from podusv_cli.vessels.vessel import Vessel
 
 STATE = ("x", "y", "psi", "u", "v", "r")
 DEMAND = ("tau_u_cmd", "tau_r_cmd")
 LOADS = ("tau_u", "tau_v", "tau_r", "b_u", "b_v", "b_r")
-FIRST_BLOCK = 256  # steps
-LONGEST_BLOCK = 0.05  # s; a key press or a progress bar waits no longer
 
 
 @kernel
@@ -69,9 +67,13 @@ class ClosedLoop:
 
     def first_memory(self) -> Vector:
         """The law's memory at t = 0."""
+        return self.controller.start(np.array(self.start), self.first_target(), self.nominal)
+
+    def first_target(self) -> Vector:
+        """Where the target is at t = 0."""
         target = np.zeros(len(TARGET))
         self.path.evaluate(0.0, bundle(self.path.constants()), self.path.table(), target)
-        return self.controller.start(np.array(self.start), target, self.nominal)
+        return target
 
     def layout(self, grid: TimeGrid) -> Plan:
         """Sizes and offsets of the loop on this grid."""
@@ -121,10 +123,10 @@ def simulate(
     wires = wire(loop, grid, plan, observer)
     march = marcher(loop, observer, compiled)
     with np.errstate(all="ignore"), interrupts_held():
-        reached, status = in_blocks(
-            lambda a, b: march(a, b, grid.step, wires, plan), plan, progress
+        ending = in_blocks(
+            lambda a, b: march(a, b, grid.step, wires, plan), plan, wires.under_way, progress
         )
-        return _record(loop, grid, plan, wires, reached, status)
+        return _record(loop, grid, wires, ending)
 
 
 def entries(loop: ClosedLoop, observer: Observer) -> Iterator[tuple[Any, Any, tuple[str, ...]]]:
@@ -176,31 +178,9 @@ def wire(loop: ClosedLoop, grid: TimeGrid, plan: Plan, observer: Observer) -> Wi
         s=np.concatenate([loop.start, actuator.rest(), loop.first_memory()]),
         row=np.zeros(plan.columns), stages=np.zeros(5 * plan.states),
         held=np.zeros(closed_loop.HELD_SIGNALS + len(law.signals)),
-        work=np.zeros(law.workspace()), seen=np.zeros(observer.size),
+        work=np.zeros(law.workspace()), seen=np.zeros(observer.size), under_way=np.zeros(1),
         log=np.empty(grid.rows * width),
     )  # fmt: skip
-
-
-def in_blocks(
-    march: Callable[[int, int], int], plan: Plan, progress: Callable[[float], None] | None
-) -> tuple[int, Status]:
-    """March until the end or trouble; how many instants are good, and the status."""
-    end, size, done = plan.steps + 1, FIRST_BLOCK, 0
-    try:
-        with interrupts_heard():
-            while done < end:
-                began = time.perf_counter()
-                goal = min(done + size, end)
-                reached = march(done, goal)
-                if reached < goal:
-                    return reached, "diverged"
-                done, took = goal, time.perf_counter() - began
-                if progress:
-                    progress(done / end)
-                size = max(1, int(size * min(100.0, 0.7 * LONGEST_BLOCK / max(took, 1e-9))))
-    except KeyboardInterrupt:
-        return done, "interrupted"
-    return done, "finished"
 
 
 def names(loop: ClosedLoop) -> list[str]:
@@ -222,9 +202,8 @@ def by_name(labels: list[str], table: Vector) -> dict[str, Vector]:
     }
 
 
-def _record(
-    loop: ClosedLoop, grid: TimeGrid, plan: Plan, wires: Wires, reached: int, status: Status
-) -> Recording:
+def _record(loop: ClosedLoop, grid: TimeGrid, wires: Wires, ending: Ending) -> Recording:
+    reached, status, cause = ending
     rows = (reached + grid.log_every - 1) // grid.log_every
     table = wires.log.reshape(grid.rows, -1)[:rows]
     labels = names(loop)
@@ -237,18 +216,23 @@ def _record(
     if status == "interrupted":
         message = f"interrupted after t = {max(reached - 1, 0) * grid.step:.6g} s"
     if status == "diverged":
-        message = _last_words(wires, labels, signals, reached * grid.step)
+        cause = cause or _culprit(wires, labels, reached * grid.step)
+        message = f"diverged at t = {reached * grid.step:.6g} s: {cause}; {_last_words(signals)}"
     fixed = loop.controller.fixed_signals()
     return Recording(status, loop.controller.label, signals, fixed, wires.seen, message)
 
 
-def _last_words(wires: Wires, labels: list[str], signals: dict[str, Vector], at: float) -> str:
+def _culprit(wires: Wires, labels: list[str], at: float) -> str:
     now = np.concatenate([[at], wires.s, wires.row])
-    bad = next((name for name, number in zip(labels, now, strict=True)
-                if not abs(number) <= closed_loop.LARGEST), "?")  # fmt: skip
+    named = zip(labels, now, strict=True)
+    bad = next((name for name, x in named if not abs(x) <= closed_loop.LARGEST), "?")
+    return f"{bad} is not finite"
+
+
+def _last_words(signals: dict[str, Vector]) -> str:
     last = ", ".join(
         f"{name} {signals[name][-1]:.4g}"
         for name in ("time", *STATE, *DEMAND)
         if len(signals[name])
     )
-    return f"diverged at t = {at:.6g} s: {bad} is not finite; last logged values: {last or 'none'}"
+    return f"last logged values: {last or 'none'}"

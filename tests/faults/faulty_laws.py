@@ -1,0 +1,94 @@
+"""Laws that fail, each in its own way, from t = 0.5 s on; `install` puts one in the PID's place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from podusv_cli.controllers.pid import Pid
+from podusv_cli.kernels import Vector, kernel
+
+BEGIN = 0.4999
+plain = Pid.law
+
+
+@kernel
+def endless(
+    t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
+    tau: Vector, rate: Vector, signals: Vector, work: Vector,
+) -> None:  # fmt: skip
+    """It never returns."""
+    plain(t, x, memory, target, k, table, tau, rate, signals, work)
+    while t > BEGIN and tau[0] > -1e300:
+        tau[0] = tau[0] + 1.0
+
+
+@kernel
+def undefined(
+    t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
+    tau: Vector, rate: Vector, signals: Vector, work: Vector,
+) -> None:  # fmt: skip
+    """Its demand in yaw is no number."""
+    plain(t, x, memory, target, k, table, tau, rate, signals, work)
+    if t > BEGIN:
+        tau[1] = (tau[0] - tau[0]) / (tau[0] - tau[0])
+
+
+@kernel
+def raising(
+    t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
+    tau: Vector, rate: Vector, signals: Vector, work: Vector,
+) -> None:  # fmt: skip
+    """It raises, which only plain Python can."""
+    plain(t, x, memory, target, k, table, tau, rate, signals, work)
+    if t > BEGIN:
+        raise KeyError("no gain for this speed")
+
+
+@kernel
+def unstable(
+    t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
+    tau: Vector, rate: Vector, signals: Vector, work: Vector,
+) -> None:  # fmt: skip
+    """It pushes the harder the faster it goes."""
+    plain(t, x, memory, target, k, table, tau, rate, signals, work)
+    tau[0] = 1e6 * x[3]
+
+
+@kernel
+def too_long(
+    t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
+    tau: Vector, rate: Vector, signals: Vector, work: Vector,
+) -> None:  # fmt: skip
+    """It writes a third demand."""
+    plain(t, x, memory, target, k, table, tau, rate, signals, work)
+    tau[2] = 0.0
+
+
+@kernel
+def too_short(
+    t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
+    tau: Vector, rate: Vector, signals: Vector, work: Vector,
+) -> None:  # fmt: skip
+    """It writes one demand only."""
+    tau[0] = 0.0
+
+
+@kernel
+def endless_at_once(
+    t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
+    tau: Vector, rate: Vector, signals: Vector, work: Vector,
+) -> None:  # fmt: skip
+    """It never returns, from the start."""
+    while x[0] > -1e300:
+        tau[0] = 1.0
+
+
+def install(name: str) -> Callable[[], None]:
+    """Put the law of this name in the PID's place; gives what puts the PID back."""
+    Pid.law = staticmethod(globals()[name])  # type: ignore[method-assign]
+
+    def restore() -> None:
+        Pid.law = staticmethod(plain)  # type: ignore[method-assign]
+
+    return restore

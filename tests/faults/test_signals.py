@@ -1,0 +1,159 @@
+"""Ctrl-C and SIGTERM at every stage: it stops soon, says which it was, keeps what was finished.
+
+That it stops soon is measured in processor time and in a generous bound on the clock: the processor
+may be busy with other things.
+"""
+
+from __future__ import annotations
+
+import signal
+import time
+from pathlib import Path
+
+import pytest
+from command_samples import BASE, LONG, SIGNALS, TWO, gone, send, under_way, wait_for, write
+
+from podusv_cli.logbook import manifest
+from podusv_cli.logbook.folder import open_run
+
+SOON = 10.0  # s on a busy machine; some 0.2 s on a quiet one
+INTERRUPTS = pytest.mark.parametrize(("number", "code"), SIGNALS)
+SLOW_MODULE = """
+import time
+open("imported", "w").close()
+time.sleep(60)
+"""
+# The command line with something in its way: `patch` replaces a function by one that begins with
+# a file called `reached`, then does what `instead` says.
+PATCHED = """
+import sys, time
+from pathlib import Path
+from podusv_cli import cli, interrupts, running, workflows, parallel
+
+def patch(room, name, instead):
+    old = getattr(room, name)
+    def new(*given, **more):
+        Path("reached").touch()
+        return instead(old, *given, **more)
+    setattr(room, name, new)
+
+{patches}
+sys.argv[0] = "podusv"
+cli.main()
+"""
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def ended(process: object, number: signal.Signals, times: int = 1) -> tuple[int, str, str]:
+    """Interrupt a process; its exit code as a shell reports it, stdout, stderr."""
+    send(process, number, times)
+    began = time.monotonic()
+    out, err = process.communicate(timeout=SOON)
+    took = time.monotonic() - began
+    assert took < SOON
+    assert gone(process)
+    code = process.returncode
+    return (code if code >= 0 else 128 - code), out, err
+
+
+@INTERRUPTS
+@pytest.mark.parametrize("module", ["typer", "numpy", "h5py", "pandas"])
+def test_while_importing(folder: Path, module: str, number: signal.Signals, code: int) -> None:
+    """typer is imported before there is a command, the others by the command."""
+    (folder / "first").mkdir()
+    (folder / "first" / f"{module}.py").write_text(SLOW_MODULE)
+    config = write("two.yaml", TWO)
+    with under_way("compare", config, "--out", "x", first=str(folder / "first")) as process:
+        wait_for("imported")
+        assert ended(process, number) == (code, "", "")
+    assert not Path("x").exists()
+
+
+@INTERRUPTS
+def test_in_the_compiled_loop(number: signal.Signals, code: int) -> None:
+    patches = 'patch(running, "simulate", lambda old, *given, **more: old(*given, **more))'
+    script = PATCHED.format(patches=patches)
+    words = ("run", write("long.yaml", LONG), "--out", "x", "--no-figures")
+    with under_way(*words, script=script) as process:
+        wait_for("reached")
+        time.sleep(0.3)
+        got, out, err = ended(process, number)
+    assert (got, out) == (code, "pid interrupted: x\n")
+    assert err.startswith("long.yaml: interrupted after t = ")
+    run = open_run(Path("x"))
+    assert (manifest.check(Path("x")).status, run.recording.status) == ("interrupted",) * 2
+    assert 0 < run.recording["time"][-1] < 2e5
+    assert not list(Path().glob(".x*"))
+
+
+@INTERRUPTS
+def test_while_writing(number: signal.Signals, code: int) -> None:
+    patches = 'patch(running, "_write", lambda old, *given: (time.sleep(1.0), old(*given)))'
+    script = PATCHED.format(patches=patches)
+    with under_way("run", write("a.yaml", BASE), "--out", "x", script=script) as process:
+        wait_for("reached")
+        got, out, err = ended(process, number)
+    assert (got, out) == (code, "pid interrupted: x\n")
+    assert err.startswith("a.yaml: interrupted after the simulation; the log is whole")
+    assert open_run(Path("x")).recording.status == "finished"
+    assert not Path("x/figures").exists()
+
+
+@INTERRUPTS
+def test_while_a_run_is_drawn(number: signal.Signals, code: int) -> None:
+    patches = 'patch(running, "_drawn", lambda old, *given: time.sleep(60))'
+    script = PATCHED.format(patches=patches)
+    with under_way("run", write("a.yaml", BASE), "--out", "x", script=script) as process:
+        wait_for("reached")
+        got, out, _ = ended(process, number, times=3)  # in a row: one interrupt
+    assert (got, out) == (code, "pid interrupted: x\n")
+    assert manifest.check(Path("x")).status == "interrupted"
+
+
+@INTERRUPTS
+def test_twice_ends_what_does_not_listen_and_its_workers(number: signal.Signals, code: int) -> None:
+    patches = """
+import multiprocessing
+interrupts.ECHO = 0.5
+def deaf(old, *given):
+    multiprocessing.get_context("fork").Process(target=time.sleep, args=(60,)).start()
+    for _ in range(600):
+        time.sleep(0.1)
+patch(running, "_write", deaf)
+"""
+    script = PATCHED.format(patches=patches)
+    with under_way("run", write("a.yaml", BASE), "--out", "x", script=script) as process:
+        wait_for("reached")
+        process.send_signal(number)
+        time.sleep(1.5)
+        assert process.poll() is None
+        process.send_signal(number)
+        out, err = process.communicate(timeout=SOON)
+        assert gone(process)
+    assert (process.returncode, out) == (code, "")
+    assert err == "podusv: interrupted again; what was still being made is lost\n"
+    assert not Path("x").exists()
+
+
+@INTERRUPTS
+def test_in_a_law_that_never_returns(number: signal.Signals, code: int) -> None:
+    """Machine code hears nothing: the run is kept up to there, the law is left behind."""
+    patches = """
+import faulty_laws
+patch(running, "simulate", lambda old, *given, **more: old(*given, **more))
+faulty_laws.install("endless")
+"""
+    script = PATCHED.format(patches=patches)
+    words = ("run", write("a.yaml", BASE), "--out", "x", "--no-figures")
+    with under_way(*words, script=script, first=str(Path(__file__).parent)) as process:
+        wait_for("reached")
+        time.sleep(0.5)
+        got, out, err = ended(process, number)
+    assert (got, out) == (code, "pid interrupted: x\n")
+    assert err.startswith("a.yaml: interrupted after t = ")
+    assert open_run(Path("x")).recording["time"][-1] < 0.5
