@@ -12,6 +12,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
+from pickle import PicklingError, UnpicklingError
 from typing import Any
 
 from podusv_cli.errors import PodusvError
@@ -115,17 +116,26 @@ def _started(shift: _Shift, position: int) -> _Worker:
     forks = "fork" in multiprocessing.get_all_start_methods()
     context: Any = multiprocessing.get_context("fork" if forks else "spawn")
     ours, theirs = context.Pipe(duplex=False)
-    process = context.Process(target=_work, args=(shift.jobs[position], theirs))
+    # A pipe is closed only when nobody holds its end: without that a worker would not notice that
+    # this process was killed.
+    inherited = [ours, *(worker.channel for worker in shift.busy)] if forks else []
+    process = context.Process(target=_work, args=(shift.jobs[position], theirs, inherited))
     process.start()
     theirs.close()
     shift.tries[position] = shift.tries.get(position, 0) + 1
     return _Worker(position, process, ours)
 
 
-def _work(job: Job, channel: Connection) -> None:
+def _work(job: Job, channel: Connection, inherited: Sequence[Connection]) -> None:
+    for end in inherited:
+        end.close()
     # Where nobody listens any more there is nobody to tell.
     with interrupts_caught() as interrupts, interrupts_held(), suppress(BrokenPipeError):
-        channel.send(_outcome(job, channel.send, interrupts))
+        outcome = _outcome(job, channel.send, interrupts)
+        try:
+            channel.send(outcome)
+        except (AttributeError, TypeError, PicklingError) as error:
+            channel.send(Outcome(failure=f"its result cannot be sent: {error}"))
 
 
 def _outcome(job: Job, progress: Progress, interrupts: Interrupts) -> Outcome:
@@ -144,7 +154,7 @@ def _outcome(job: Job, progress: Progress, interrupts: Interrupts) -> Outcome:
 def _listen(shift: _Shift, worker: _Worker, progress: Callable[[int, float], None] | None) -> None:
     try:
         said = worker.channel.recv()
-    except EOFError:
+    except (EOFError, OSError, UnpicklingError):  # it died, perhaps in the middle of a message
         said = _buried(shift, worker)
     if isinstance(said, float):
         if progress:
