@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -9,6 +10,7 @@ from podusv_cli.controllers.pid import Pid
 from podusv_cli.kernels import Vector, kernel
 
 BEGIN = 0.4999
+MANY = 100_000_000
 plain = Pid.law
 
 
@@ -75,13 +77,38 @@ def too_short(
 
 
 @kernel
-def endless_at_once(
+def slow(
     t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
     tau: Vector, rate: Vector, signals: Vector, work: Vector,
 ) -> None:  # fmt: skip
-    """It never returns, from the start."""
-    while x[0] > -1e300:
-        tau[0] = 1.0
+    """It takes seconds, not for ever: in the tests' own process it must not stay."""
+    plain(t, x, memory, target, k, table, tau, rate, signals, work)
+    if t > BEGIN:
+        for i in range(MANY):
+            tau[0] = math.sin(tau[0] + i)
+
+
+@kernel
+def slow_when_told(
+    t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
+    tau: Vector, rate: Vector, signals: Vector, work: Vector,
+) -> None:  # fmt: skip
+    """The same for one demand only."""
+    tau[0] = k.surge
+    tau[1] = 0.0
+    if t > BEGIN and k.surge == 2.0:
+        for i in range(MANY):
+            tau[1] = math.sin(tau[1] + i)
+
+
+@kernel
+def slow_at_once(
+    t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
+    tau: Vector, rate: Vector, signals: Vector, work: Vector,
+) -> None:  # fmt: skip
+    """It takes seconds from the start, in plain Python."""
+    for i in range(10_000_000):
+        tau[0] = math.sin(tau[0] + i)
 
 
 def install(name: str) -> Callable[[], None]:

@@ -1,0 +1,156 @@
+"""Runs that go wrong, each in its own way: an exit code, the first bad step, a log to look at."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import faulty_laws
+import numpy as np
+import pytest
+from command_samples import BASE, write
+from conftest import Constant, adrift, run
+
+from podusv_cli import cli
+from podusv_cli.engine import blocks
+from podusv_cli.engine.asking import check_law
+from podusv_cli.engine.batch import simulate_many
+from podusv_cli.engine.grid import TimeGrid
+from podusv_cli.errors import LawError
+from podusv_cli.logbook import manifest
+from podusv_cli.logbook.folder import open_run
+
+QUICK = 0.4  # s of computing; what a law may take in these tests
+
+
+class Said(NamedTuple):
+    """What a command left behind."""
+
+    code: object
+    out: str
+    err: str
+
+
+@pytest.fixture
+def podusv(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Callable[..., Said]:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(blocks, "PATIENCE", QUICK)
+
+    def run(*words: str) -> Said:
+        monkeypatch.setattr(sys, "argv", ["podusv", *words])
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        return Said(ended.value.code, *capsys.readouterr())
+
+    return run
+
+
+@pytest.fixture
+def law() -> Iterator[Callable[[str], None]]:
+    """Puts a faulty law in the PID's place, until the test is over."""
+    restore = []
+    yield lambda name: restore.append(faulty_laws.install(name))
+    for back in restore:
+        back()
+
+
+WAYS = {
+    "undefined": ("true", "0.49", "diverged at t = 0.5 s: v is not finite; last logged"),
+    "slow": ("true", "0.48", "diverged at t = 0.49 s: it is not over after 0.4 s of computing; "),
+    "raising": ("false", "0.48", "diverged at t = 0.49 s: KeyError: 'no gain for this speed' "),
+    "unstable": ("true", "", "diverged at t = "),
+}
+
+
+@pytest.mark.parametrize("name", WAYS)
+def test_a_law_that_fails_on_the_way_leaves_its_log(
+    podusv: Callable[..., Said], law: Callable[[str], None], name: str
+) -> None:
+    compiled, last, says = WAYS[name]
+    law(name)
+    write("a.yaml", BASE.replace("saturated", "ideal", 1))
+    options = ("--no-figures", "--set", f"simulation.compiled={compiled}")
+    said = podusv("run", "a.yaml", "--out", "x", *options)
+    assert said.code == 4
+    assert said.out == "pid diverged: x\n"
+    assert said.err.startswith(f"a.yaml: {says}")
+    assert said.err.count("\n") == 1
+    run = open_run(Path("x"))
+    assert manifest.check(Path("x")).status == run.recording.status == "diverged"
+    if last:
+        assert f"{run.recording['time'][-1]:.6g}" == last
+    assert all(np.isfinite(signal).all() for signal in run.recording.signals.values())
+    assert podusv("plot", "x", "--figure", "trajectory", "--out", "figures").code == 0
+    assert list(Path("figures").glob("*"))
+
+
+REFUSED = {
+    "too_long": "law pid: asked at the start, IndexError: index 2 is out of bounds for axis 0 with "
+    "size 2 (faulty_laws.py, line ",
+    "too_short": "law pid: it leaves tau_r_cmd unwritten\n",
+    "slow_at_once": "law pid: asked at the start, it is not over after 0.4 s of computing\n",
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_a_law_that_is_not_what_it_says_is_refused_before_the_run(
+    podusv: Callable[..., Said], law: Callable[[str], None], name: str
+) -> None:
+    law(name)
+    said = podusv("run", write("a.yaml", BASE), "--out", "x")
+    assert (said.code, said.out) == (2, "")
+    assert said.err.startswith(REFUSED[name])
+    assert said.err.count("\n") == 1
+    assert not Path("x").exists()
+
+
+def test_a_memory_of_another_size_is_refused() -> None:
+    class Forgetful(Constant):
+        def slots(self) -> tuple[tuple[str, int], ...]:
+            return (("integral_u", 2),)
+
+    with pytest.raises(LawError, match=r"memory of shape \(0,\), its slots are \(2,\)"):
+        check_law(adrift(controller=Forgetful()))
+
+
+def test_what_a_law_raises_is_not_taken_for_the_end_of_its_thread() -> None:
+    class Leaving(Constant):
+        @staticmethod
+        def law(t, x, memory, target, k, table, tau, rate, signals, work):  # type: ignore[no-untyped-def, override]
+            sys.exit(7)
+
+    out = run(adrift(controller=Leaving()), 1.0, compiled=False)
+    assert out.status == "diverged"
+    assert out.message.startswith("diverged at t = 0 s: SystemExit: 7 (test_divergence.py, line ")
+
+
+def test_in_a_batch_one_law_that_does_not_return_costs_no_other_run(
+    law: Callable[[str], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Stubborn(Constant):
+        law = staticmethod(faulty_laws.slow_when_told)
+
+    monkeypatch.setattr(blocks, "PATIENCE", QUICK)
+    loops = [adrift(controller=Stubborn(surge=surge)) for surge in (1.0, 2.0, 3.0)]
+    batch = simulate_many(loops, TimeGrid(0.01, 100), workers=2)
+    assert batch.status.tolist() == ["finished", "diverged", "finished"]
+    assert batch.reached.tolist() == [101, 49, 101]
+
+
+def test_computing_counts_and_not_the_clock(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A process that was stopped for an hour, or a busy machine, is no law that hangs."""
+    import time
+
+    class Waiting(Constant):
+        @staticmethod
+        def law(t, x, memory, target, k, table, tau, rate, signals, work):  # type: ignore[no-untyped-def, override]
+            if t == 0.05:
+                time.sleep(1.0)
+            tau[:] = 0.0
+
+    monkeypatch.setattr(blocks, "PATIENCE", 0.3)
+    assert run(adrift(controller=Waiting()), 0.1, compiled=False).status == "finished"
