@@ -1,0 +1,155 @@
+"""Shipped scenarios, spoilt at random: each is a scenario still, or a scenario error, and soon."""
+
+from __future__ import annotations
+
+import random
+import re
+import resource
+import shutil
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+import podusv_cli
+from podusv_cli.comparison.claims import misfits
+from podusv_cli.config.loading import load
+from podusv_cli.errors import ScenarioError
+
+CONFIGS = Path(podusv_cli.__file__).parents[1] / "configs"
+MEBIBYTE = 1024 if sys.platform == "linux" else 1024**2  # in units of ru_maxrss
+SEED = 20260301
+SECONDS, MEMORY = 0.5, 200  # each; CPU time, MiB
+ODD = [
+    *("no", "yes", "017", "1:30", "1e-3", "1_000", "0x1F", "1e999", "-1e999", ".nan", ".inf"),
+    *("~", "null", "[]", "{}", "[[]]", "*a", "&a 1", "!!python/object:x {}", "'", '"', "|", ">"),
+    *("0", "-0.0", "-1", "1e-320", "1e300", "9" * 40, "9" * 5000, "true", "[1, 2, 3]", "{a: b}"),
+    *("%", "@", "\t", "#", "---", "...", "<<: {a: 1}", "? a", "- ", "é", "\ufeff", "\x00", "\x85"),
+    *('"\\ud800"', '"\\U99999999"', "\U0001f6a2", "\u202e", "a" * 3000, "../../etc/passwd", "/"),
+    *("kind", "extends", "controllers", "claims", "__class__", "{kind: pid}", "{preset: paper}"),
+]
+Mutation = Callable[[random.Random, bytearray], None]
+
+
+def _spot(draw: random.Random, data: bytearray) -> int:
+    return draw.randrange(len(data) + 1)
+
+
+def flip_a_bit(draw: random.Random, data: bytearray) -> None:
+    if data:
+        data[draw.randrange(len(data))] ^= 1 << draw.randrange(8)
+
+
+def cut_out(draw: random.Random, data: bytearray) -> None:
+    at = _spot(draw, data)
+    del data[at : at + draw.randrange(1, 40)]
+
+
+def cut_off(draw: random.Random, data: bytearray) -> None:
+    del data[_spot(draw, data) :]
+
+
+def put_in(draw: random.Random, data: bytearray) -> None:
+    at = _spot(draw, data)
+    data[at:at] = draw.choice(ODD).encode("utf-8", "surrogatepass")
+
+
+def put_in_many(draw: random.Random, data: bytearray) -> None:
+    at = _spot(draw, data)
+    data[at:at] = draw.choice([b"[", b"{a: ", b"- ", b"? ", b"(", b"not ", b" ", b"1,"]) * 3000
+
+
+def copy_a_part(draw: random.Random, data: bytearray) -> None:
+    at, to = _spot(draw, data), _spot(draw, data)
+    data[to:to] = data[at : at + draw.randrange(1, 400)]
+
+
+def _lines(change: Callable[[random.Random, list[bytes], int], None]) -> Mutation:
+    def mutation(draw: random.Random, data: bytearray) -> None:
+        lines = bytes(data).splitlines(keepends=True)
+        if lines:
+            change(draw, lines, draw.randrange(len(lines)))
+            data[:] = b"".join(lines)
+
+    return mutation
+
+
+def _indent(draw: random.Random, lines: list[bytes], at: int) -> None:
+    lines[at] = b" " * draw.randrange(1, 5) + lines[at]
+
+
+def _swap(draw: random.Random, lines: list[bytes], at: int) -> None:
+    other = draw.randrange(len(lines))
+    lines[at], lines[other] = lines[other], lines[at]
+
+
+def _give_another_value(draw: random.Random, lines: list[bytes], at: int) -> None:
+    odd = draw.choice(ODD).encode("utf-8", "surrogatepass")
+    lines[at] = re.sub(rb":[^:\n]*", lambda _: b": " + odd, lines[at], count=1)
+
+
+def _twice(draw: random.Random, lines: list[bytes], at: int) -> None:
+    lines.insert(at, lines[at])
+
+
+MUTATIONS: list[Mutation] = [
+    flip_a_bit, cut_out, cut_off, put_in, put_in_many, copy_a_part,
+    *map(_lines, (_indent, _swap, _give_another_value, _give_another_value, _twice)),
+]  # fmt: skip
+
+
+def spoilt(seed: int) -> Iterator[tuple[Path, bytes]]:
+    """For ever: a shipped scenario and its text after one to four mutations."""
+    draw = random.Random(seed)
+    files = sorted(CONFIGS.rglob("*.yaml"))
+    while True:
+        file = draw.choice(files)
+        data = bytearray(file.read_bytes())
+        for _ in range(draw.randrange(1, 5)):
+            draw.choice(MUTATIONS)(draw, data)
+        yield file.relative_to(CONFIGS), bytes(data)
+
+
+def verdict(path: Path) -> str:
+    """`ok`, or the lines that every command would print instead of running it."""
+    try:
+        load(path, checks=(misfits,))
+    except ScenarioError as error:
+        return str(error)
+    return "ok"
+
+
+def check(folder: Path, name: Path, data: bytes) -> bool:
+    """Whether the text is a scenario; asserts what holds for every text."""
+    path = folder / name.parent / "spoilt.yaml"
+    path.write_bytes(data)
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    began = time.process_time()
+    said = verdict(path)
+    took = time.process_time() - began
+    grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - memory) / MEBIBYTE
+    assert took < SECONDS, f"{took:.2f} s for {data!r}"
+    assert grown < MEMORY, f"{grown:.0f} MiB for {data!r}"
+    assert said.strip(), f"nothing said of {data!r}"
+    assert all(line.isprintable() for line in said.splitlines()), f"{said!r} for {data!r}"
+    return said == "ok"
+
+
+def fuzz(folder: Path, count: int) -> int:
+    """Check `count` spoilt scenarios; how many are scenarios still."""
+    shutil.copytree(CONFIGS, folder / "configs")
+    texts = spoilt(SEED)
+    return sum(check(folder / "configs", *next(texts)) for _ in range(count))
+
+
+def test_spoilt_scenarios_are_told_and_nothing_else(tmp_path: Path) -> None:
+    whole = verdict(CONFIGS / "paper" / "corrected.yaml")  # imports and tables are made once
+    assert whole == "ok"
+    assert 10 < fuzz(tmp_path, 300) < 200  # it is neither always spoilt nor never
+
+
+@pytest.mark.slow
+def test_many_spoilt_scenarios(tmp_path: Path) -> None:
+    assert 300 < fuzz(tmp_path, 10_000) < 6_000
