@@ -91,14 +91,17 @@ def distinct(parts: Iterable[Part]) -> list[Part]:
 
 
 def told_apart(names: Iterable[str], taken: Iterable[str] = ()) -> list[str]:
-    """The names, with a number after those that are taken or came before."""
-    found, taken = list[str](), set(taken)
+    """The names, with a number after those that are taken or came before.
+
+    Names that differ in case alone are the same to some disks.
+    """
+    found, taken = list[str](), {name.casefold() for name in taken}
     for name in names:
         label, count = name, 1
-        while label in taken:
+        while label.casefold() in taken:
             count += 1
             label = f"{name}_{count}"
-        taken.add(label)
+        taken.add(label.casefold())
         found.append(label)
     return found
 

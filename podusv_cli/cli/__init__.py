@@ -14,7 +14,7 @@ from typing import Annotated
 import typer
 
 from podusv_cli import __version__
-from podusv_cli.cli.guard import flushed, guarded
+from podusv_cli.cli.guard import flushed, guarded, open_streams, told
 
 # NAME is the function NAME of cli/NAME.py
 COMMANDS = (
@@ -58,11 +58,15 @@ def main() -> None:
     gc.set_threshold(OBJECTS_BETWEEN_COLLECTIONS)
     # pydantic would look through every installed package for plugins.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+    open_streams()
     for stream in (sys.stdout, sys.stderr):
         # A file name or text that the terminal's encoding lacks must not end in a traceback.
         getattr(stream, "reconfigure", lambda errors: None)(errors="backslashreplace")
     try:
         app()
     except SystemExit as end:
-        gc.freeze()  # or Python looks through everything once more before it ends
-        sys.exit(flushed(end.code))
+        code = end.code
+    except OSError as error:  # of help, which is printed outside of any command
+        code = told(error)
+    gc.freeze()  # or Python looks through everything once more before it ends
+    sys.exit(flushed(code))

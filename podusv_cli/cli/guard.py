@@ -12,7 +12,7 @@ from typing import ParamSpec
 import typer
 
 from podusv_cli.errors import PodusvError, StorageError
-from podusv_cli.interrupts import SIGNALLED, Interrupts, interrupts_caught
+from podusv_cli.interrupts import SIGNALLED, STDERR, Interrupts, interrupts_caught
 
 Given = ParamSpec("Given")
 INTERRUPTED = 130
@@ -47,11 +47,11 @@ def _code_of(command: Callable[[], None], interrupts: Interrupts) -> int:
         foreseen = isinstance(error, (PodusvError, OSError))
         if interrupts.number and not foreseen:  # which machine code may have turned into anything
             return INTERRUPTED
-        return _exit_code(error)
+        return told(error)
     return 0
 
 
-def _exit_code(error: BaseException) -> int:
+def told(error: BaseException) -> int:
     """Tell about an error; the exit code it stands for."""
     if isinstance(error, KeyboardInterrupt):
         return INTERRUPTED
@@ -69,12 +69,24 @@ def _exit_code(error: BaseException) -> int:
     return BUG
 
 
+def open_streams() -> None:
+    """Where the caller closed stdin, stdout or stderr (`>&-`), nothing stands in its place.
+
+    Otherwise the next file that is opened would, and messages would go into it.
+    """
+    while (number := os.open(os.devnull, os.O_RDWR)) <= STDERR:  # the lowest that is free
+        os.set_inheritable(number, True)
+    os.close(number)
+    sys.stdout = sys.stdout or open(os.devnull, "w")  # noqa: SIM115
+    sys.stderr = sys.stderr or open(os.devnull, "w")  # noqa: SIM115
+
+
 def flushed(code: str | int | None) -> str | int | None:
     """The exit code after everything is printed; another one where printing failed."""
     try:
         sys.stdout.flush()
     except OSError as error:
-        return _exit_code(error)
+        return told(error)
     return code
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import sys
 import textwrap
+from typing import TextIO
 
 import typer
 
@@ -21,9 +23,17 @@ def echo_entry(name: str, *lines: str, facts: str = "") -> None:
         )
 
     head = wrapped(f"{name}  {facts}".rstrip(), "")
-    typer.echo(head.replace(name, typer.style(name, bold=True), 1))
+    typer.echo(
+        head.replace(name, typer.style(name, bold=True), 1) if takes_codes(sys.stdout) else head
+    )
     for line in filter(None, lines):
         typer.echo(wrapped(line, "    "))
+
+
+def takes_codes(stream: TextIO) -> bool:
+    """Whether this is a terminal that takes codes, and nobody asked for plain text (NO_COLOR)."""
+    wanted = os.environ.get("TERM", "") not in ("", "dumb") and not os.environ.get("NO_COLOR")
+    return wanted and stream.isatty()
 
 
 def echo_table(head: list[str], rows: list[list[str]]) -> None:

@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from functools import partial
 
+from podusv_cli.cli.layout import takes_codes
+
 PATIENCE = 0.7  # s before a bar appears
 
 
@@ -15,9 +17,9 @@ PATIENCE = 0.7  # s before a bar appears
 def progress_bars(*, wanted: bool) -> Iterator[Callable[[str, float], None] | None]:
     """A function to call with a run's name and the fraction done; a bar a run, on stderr.
 
-    None where stderr is no terminal.
+    None where stderr is no terminal that takes codes.
     """
-    if not (wanted and sys.stderr.isatty()):
+    if not (wanted and takes_codes(sys.stderr)):
         yield None
         return
     from rich.console import Console

@@ -14,7 +14,7 @@ from podusv_cli.config.composing import composed
 from podusv_cli.config.references import complete
 from podusv_cli.config.scenario import Scenario
 from podusv_cli.config.source import read_text, resolve
-from podusv_cli.config.tree import Fault, Mark, Node, Route, dotted, find
+from podusv_cli.config.tree import Fault, Mark, Node, Route, dotted, find, printable
 from podusv_cli.errors import Finding, ScenarioError
 
 HEADING = "# A complete scenario, every value written out; it runs again to the same log.\n"
@@ -71,7 +71,7 @@ def _findings(faults: list[Fault], first: str) -> list[Finding]:
     ordered = sorted(
         faults, key=lambda f: (sources.index(f.mark.source), f.mark.line, f.mark.column)
     )
-    return [Finding(str(fault.mark), fault.key, fault.text) for fault in ordered]
+    return [Finding(str(fault.mark), printable(fault.key), fault.text) for fault in ordered]
 
 
 def values(scenario: Scenario) -> dict[str, Any]:

@@ -63,7 +63,12 @@ class Node:
 def dotted(route: Route) -> str:
     """`network.nodes[0]` for ("network", "nodes", 0)."""
     parts = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in route)
-    return (parts if parts.isprintable() else ascii(parts)[1:-1]).removeprefix(".")
+    return printable(parts).removeprefix(".")
+
+
+def printable(text: str) -> str:
+    """The text, with escapes where it has characters that do not show or turn others around."""
+    return text if text.isprintable() else ascii(text)[1:-1]
 
 
 def follow(root: Node, route: Route) -> list[Node]:

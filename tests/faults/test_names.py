@@ -1,0 +1,141 @@
+"""Names that try to leave, links in the way, names that are too long or too odd for a folder."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+from command_samples import BASE, write
+
+from podusv_cli import cli
+from podusv_cli.logbook import manifest
+
+
+class Said(NamedTuple):
+    """What a command left behind."""
+
+    code: object
+    out: str
+    err: str
+
+
+Podusv = Callable[..., Said]
+
+
+@pytest.fixture
+def podusv(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Podusv:
+    """A command without figures, in a folder inside the test's own."""
+    (tmp_path / "work").mkdir()
+    monkeypatch.chdir(tmp_path / "work")
+
+    def run(*words: str) -> Said:
+        monkeypatch.setattr(sys, "argv", ["podusv", *words])
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        return Said(ended.value.code, *capsys.readouterr())
+
+    return run
+
+
+LEAVING = ["../up", "/tmp/up", "a/b", "..", ".", ".hidden", "-rf", "--help", "a\\b", "a:b", "~"]
+ODD = [
+    "a b",
+    "ship\u202e",
+    "\u0130stanbul",
+    "e\u0301",
+    "\U0001f6a2",
+    "a\u200bb",
+    "\uff0e\uff0e",
+    "",
+]
+
+
+@pytest.mark.parametrize("name", [*LEAVING, *ODD, "a" * 81, "a" * 300], ids=ascii)
+@pytest.mark.parametrize("where", ["name", "label", "claim", "assigned"])
+def test_a_name_that_is_no_plain_word_is_refused(podusv: Podusv, name: str, where: str) -> None:
+    words: list[str] = []
+    quoted = json.dumps(name)
+    text = {
+        "name": f"name: {quoted}",
+        "label": f"controllers: {{{quoted}: {{kind: dsc}}}}",
+        "claim": f'claims: {{{quoted}: {{says: s, source: p, expect: "1 < 2"}}}}',
+        "assigned": "",
+    }[where]
+    if where == "assigned":
+        words = ["--set", f"name={name}"]
+    said = podusv("compare", write("a.yaml", f"{BASE}{text}\n"), "--no-figures", *words)
+    assert said.code == 2
+    assert said.out == ""
+    assert said.err.count("\n") == 1
+    assert said.err.rstrip("\n").isprintable()
+    assert [path.name for path in Path().iterdir()] == ["a.yaml"]
+    assert [path.name for path in Path("..").iterdir()] == ["work"]
+
+
+@pytest.mark.parametrize("labels", [("A", "a"), ("CON", "x"), ("Stiff", "soft")])
+def test_labels_cannot_differ_in_case_alone(podusv: Podusv, labels: tuple[str, str]) -> None:
+    """On disks that do not tell cases apart they would share a folder."""
+    runs = ", ".join(f"{label}: {{kind: dsc}}" for label in labels)
+    said = podusv("compare", write("a.yaml", BASE + f"controllers: {{{runs}}}\n"), "--no-figures")
+    assert said.code == 2
+    assert f"controllers.{labels[0]}" in said.err
+
+
+def test_scenarios_whose_names_differ_in_case_alone_get_folders_of_their_own(
+    podusv: Podusv,
+) -> None:
+    write("Ship.yaml", BASE)
+    write("other.yaml", BASE + "name: ship\n")
+    said = podusv("compare", "Ship.yaml", "other.yaml", "--out", "x", "--no-figures", "-q")
+    assert said.code == 0
+    folders = [path.name for path in Path("x").iterdir() if path.is_dir()]
+    assert len({name.casefold() for name in folders}) == len(folders) == 2
+
+
+@pytest.mark.parametrize("target", ["elsewhere", "nowhere", "."])
+@pytest.mark.parametrize("force", [[], ["--force"]])
+def test_a_link_in_place_of_the_folder_is_left_alone(
+    podusv: Podusv, target: str, force: list[str]
+) -> None:
+    Path("elsewhere").mkdir()
+    Path("elsewhere/kept").write_text("kept")
+    Path("x").symlink_to(target)
+    said = podusv("run", write("a.yaml", BASE), "--out", "x", "--no-figures", *force)
+    assert said.code == 5
+    assert said.err.count("\n") == 1
+    assert Path("x").is_symlink()
+    assert [path.name for path in Path("elsewhere").iterdir()] == ["kept"]
+
+
+def test_a_folder_reached_by_a_link_is_a_folder(podusv: Podusv) -> None:
+    Path("real").mkdir()
+    Path("link").symlink_to("real")
+    said = podusv("run", write("a.yaml", BASE), "--out", "link/x", "--no-figures", "-q")
+    assert (said.code, manifest.check(Path("real/x")).status) == (0, "finished")
+
+
+def test_out_may_begin_with_a_dash_and_hold_any_letters(podusv: Podusv) -> None:
+    config = write("a.yaml", BASE)
+    for out in ("-x", "\u0130 \u202e\U0001f6a2", "e\u0301", "a'b\"c", "new\nline"):
+        said = podusv("run", config, f"--out={out}", "--no-figures", "-q")
+        assert said.code == 0, said.err
+        assert manifest.check(Path(out)).status == "finished"
+
+
+def test_a_scenario_may_begin_with_a_dash(podusv: Podusv) -> None:
+    write("-a.yaml", BASE + "name: a\n")
+    assert podusv("run", "--out", "x", "--no-figures", "-q", "--", "-a.yaml").code == 0
+
+
+@pytest.mark.parametrize("out", ["a" * 300, "a" * 255, "a/" * 3000])
+def test_a_folder_that_cannot_be_is_one_line(podusv: Podusv, out: str) -> None:
+    said = podusv("run", write("a.yaml", BASE), "--out", out, "--no-figures")
+    assert said.code in (2, 5)
+    assert said.err.count("\n") == 1
+    assert "Traceback" not in said.err

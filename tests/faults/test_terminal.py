@@ -1,0 +1,120 @@
+"""Nobody listens, no terminal, a plain one: no traceback, and codes for terminals only."""
+
+from __future__ import annotations
+
+import os
+import pty
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+from command_samples import BASE, ROOT, write
+
+ESCAPE = b"\x1b"
+RUN = ("run", "a.yaml", "--out", "x", "--force", "--no-figures")
+PLAIN = [{"TERM": "dumb"}, {"TERM": ""}, {"NO_COLOR": "1", "TERM": "xterm"}]
+FULL = Path("/dev/full")
+
+
+@pytest.fixture(autouse=True)
+def scenario(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    write("a.yaml", BASE)
+
+
+def environment(extra: Mapping[str, str]) -> dict[str, str]:
+    own = {name: text for name, text in os.environ.items() if name not in ("NO_COLOR", "TERM")}
+    return {**own, "PYTHONPATH": str(ROOT), **extra}
+
+
+def podusv(*words: str, extra: Mapping[str, str] | None = None, **streams: Any) -> Any:
+    return subprocess.run(
+        [sys.executable, "-m", "podusv_cli", *words], env=environment(extra or {}),
+        timeout=60, check=False, **streams,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("words", [("list",), ("--help",), ("--version",), ("nope",), RUN])
+def test_closed_streams_are_as_good_as_dev_null(words: tuple[str, ...]) -> None:
+    """Also no file of the run gets the number of a stream, and messages with it."""
+    wanted = podusv(*words, capture_output=True).returncode
+    for closing in (">&-", "<&- >&- 2>&-"):
+        script = f'exec "$@" {closing}'
+        command = ["sh", "-c", script, "sh", sys.executable, "-m", "podusv_cli", *words]
+        done = subprocess.run(
+            command, env=environment({}), capture_output=True, timeout=60, check=False
+        )
+        assert done.returncode == wanted
+        assert b"Traceback" not in done.stderr
+    if words == RUN:
+        assert podusv("diff", "x", "x", capture_output=True).returncode == 0
+
+
+@pytest.mark.skipif(not FULL.exists(), reason="there is no /dev/full")
+@pytest.mark.parametrize("words", [("list",), ("--help",), ("--version",), ("run", "--help")])
+def test_a_full_disk_behind_stdout_is_a_line(words: tuple[str, ...]) -> None:
+    with FULL.open("w") as full:
+        done = podusv(*words, stdout=full, stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 5
+    assert done.stderr == "podusv: [Errno 28] No space left on device\n"
+
+
+@pytest.mark.parametrize("words", [("list",), ("schema",), ("validate", "a.yaml", "-v")])
+def test_a_reader_that_leaves_ends_it_quietly(words: tuple[str, ...]) -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    done = podusv(*words, stdout=writing, stderr=subprocess.PIPE)
+    os.close(writing)
+    assert (done.returncode, done.stderr) == (141, b"")
+
+
+@pytest.mark.parametrize("extra", [{}, {"LC_ALL": "C", "PYTHONUTF8": "0"}, *PLAIN], ids=str)
+@pytest.mark.parametrize("words", [("list",), RUN])
+def test_pipes_get_no_codes(words: tuple[str, ...], extra: dict[str, str]) -> None:
+    done = podusv(*words, extra={"TERM": "xterm", **extra}, capture_output=True)
+    assert done.returncode == 0
+    assert ESCAPE not in done.stdout + done.stderr
+    assert b"Traceback" not in done.stderr
+    files = [path for path in Path("x").rglob("*") if path.is_file() and path.suffix != ".h5"]
+    assert not any(ESCAPE in path.read_bytes() for path in files)
+
+
+def on_a_terminal(extra: Mapping[str, str], *words: str) -> bytes:
+    """What a terminal gets to see."""
+    ours, theirs = pty.openpty()
+    with subprocess.Popen(
+        [sys.executable, "-m", "podusv_cli", *words], stdin=theirs, stdout=theirs, stderr=theirs,
+        env=environment(extra),
+    ) as process:  # fmt: skip
+        os.close(theirs)
+        shown = b""
+        while part := _read(ours):
+            shown += part
+    os.close(ours)
+    assert process.returncode == 0, shown
+    return shown
+
+
+def _read(terminal: int) -> bytes:
+    try:
+        return os.read(terminal, 65536)
+    except OSError:  # the other end is closed
+        return b""
+
+
+def test_a_plain_terminal_gets_no_codes_and_another_one_does() -> None:
+    for extra in PLAIN:
+        assert ESCAPE not in on_a_terminal(extra, "list")
+    assert ESCAPE in on_a_terminal({"TERM": "xterm"}, "list")
+
+
+def test_a_plain_terminal_gets_no_bar() -> None:
+    write(
+        "a.yaml",
+        BASE.replace("duration: 1.0", "duration: 3e3, step: 1e-3") + "log: {every: 1000}\n",
+    )
+    assert ESCAPE not in on_a_terminal({"NO_COLOR": "1", "TERM": "xterm"}, *RUN)
+    assert ESCAPE in on_a_terminal({"TERM": "xterm"}, *RUN)
