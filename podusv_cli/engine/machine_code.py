@@ -80,7 +80,7 @@ def _loaded(prototype: Any, code: Code) -> Any:
 def _read(path: Path) -> Code | None:
     with suppress(OSError):
         digest, _, rest = path.read_bytes().partition(b"\n")
-        if _digest(rest).encode() == digest:
+        if _seal(path, rest) == digest:
             symbol, _, content = rest.partition(b"\n")
             return Code(symbol.decode(), content)
     return None
@@ -91,11 +91,16 @@ def _write(path: Path, code: Code) -> None:
     file, name = tempfile.mkstemp(dir=path.parent)
     try:
         with open(file, "wb") as out:
-            out.write(_digest(rest).encode() + b"\n" + rest)
+            out.write(_seal(path, rest) + b"\n" + rest)
         os.replace(name, path)  # whole, whoever else writes or reads it now
     except BaseException:
         os.unlink(name)
         raise
+
+
+def _seal(path: Path, rest: bytes) -> bytes:
+    """Digest of a piece and of its name: whole, but under another's name, it is damaged."""
+    return _digest(path.name.encode() + b"\0" + rest).encode()
 
 
 def _digest(content: bytes) -> str:
@@ -165,10 +170,7 @@ def cache_folder() -> Path | None:
 
     $PODUSV_CACHE, else podusv under $XDG_CACHE_HOME or ~/.cache, else under the temporary folder.
     """
-    home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    private = f"podusv-{os.getuid() if hasattr(os, 'getuid') else 'user'}"
-    roots = [os.environ.get("PODUSV_CACHE"), f"{home}/podusv", f"{tempfile.gettempdir()}/{private}"]
-    for root in filter(None, roots):
+    for root in _roots():
         folder = Path(root) / source_digest()
         with suppress(OSError):
             folder.mkdir(parents=True, exist_ok=True, mode=0o700)
@@ -177,6 +179,16 @@ def cache_folder() -> Path | None:
                 _forget_old(folder)
                 return folder
     return None
+
+
+def _roots() -> Iterator[str]:
+    if given := os.environ.get("PODUSV_CACHE"):
+        yield given
+    home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    if os.path.isabs(home):  # without a home it is `~`, which is no place to make a folder
+        yield f"{home}/podusv"
+    private = f"podusv-{os.getuid() if hasattr(os, 'getuid') else 'user'}"
+    yield f"{tempfile.gettempdir()}/{private}"
 
 
 def _forget_old(current: Path) -> None:
