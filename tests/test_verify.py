@@ -13,6 +13,7 @@ from conftest import corrected, run
 from findings_samples import CONFIGS, scene
 from test_cli_words import podusv
 
+from podusv_cli.cli.verify import _in_order
 from podusv_cli.config.loading import load
 from podusv_cli.config.scenario import Scenario
 from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
@@ -201,10 +202,33 @@ def test_equal_numbers_are_a_tie_and_missing_ones_are_left_out() -> None:
     tie = ranking({"a": zero, "b": zero, "c": never})
     assert tie is not None
     assert tie.converged
+    assert tie.equal == (("a", "b"),)
+    assert not tie.close
     assert ranking({"a": zero, "c": never}) is None
     gone = ranking({"a": zero, "b": estimate([0.0, math.nan, 0.0])})
     assert gone is not None
     assert not gone.converged
+
+
+def test_a_tie_is_called_equal_and_no_ranking() -> None:
+    zero, one = estimate([0.0] * 3), estimate([1.0, 1.001, 1.0012])
+    all_tie, two_tie = ranking({"a": zero, "b": zero}), ranking({"c": one, "a": zero, "b": zero})
+    apart = ranking({"a": zero, "c": one})
+    assert all_tie
+    assert two_tie
+    assert apart
+    assert _in_order(all_tie) == "a = b; equal at all steps, no ranking"
+    assert _in_order(two_tie) == "a = b, c; the same at all steps, beyond the errors"
+    assert _in_order(apart) == "a, c; the same at all steps, beyond the errors"
+
+
+def test_runs_of_the_same_law_are_equal_though_their_numbers_have_errors() -> None:
+    law, other = estimate([1.0, 1.1, 1.12]), estimate([1.0, 1.1, 1.13])
+    same, alike = ranking({"a": law, "b": law}), ranking({"a": law, "b": other})
+    assert same
+    assert alike
+    assert (same.equal, same.close) == ((("a", "b"),), ())
+    assert (alike.equal, alike.close) == ((), (("a", "b"),))
 
 
 # --- the command

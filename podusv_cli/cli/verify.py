@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -98,12 +99,19 @@ def _show_rankings(rankings: dict[str, Ranking]) -> None:
 
     typer.echo("ranking, smallest first:")
     for name, rank in rankings.items():
-        if not rank.same:
-            verdict = "changes with the step: " + "; ".join(", ".join(o) for o in rank.orders)
-        elif rank.close:
-            pairs = "; ".join(" and ".join(pair) for pair in rank.close)
-            verdict = f"{', '.join(rank.orders[0])}; closer than their errors: {pairs}"
-        else:
-            verdict = f"{', '.join(rank.orders[0])}; the same at all steps, beyond the errors"
-        echo_entry(f"  {name}", verdict)
+        echo_entry(f"  {name}", _in_order(rank))
     typer.echo("")
+
+
+def _in_order(rank: Ranking) -> str:
+    if not rank.same:
+        return "changes with the step: " + "; ".join(", ".join(o) for o in rank.orders)
+    first = rank.orders[0]
+    marks = (" = " if pair in rank.equal else ", " for pair in pairwise(first))
+    order = first[0] + "".join(mark + label for mark, label in zip(marks, first[1:], strict=True))
+    if len(rank.equal) == len(first) - 1:
+        return f"{order}; equal at all steps, no ranking"
+    if rank.close:
+        pairs = "; ".join(" and ".join(pair) for pair in rank.close)
+        return f"{order}; closer than their errors: {pairs}"
+    return f"{order}; the same at all steps, beyond the errors"

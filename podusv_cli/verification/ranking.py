@@ -14,11 +14,13 @@ from podusv_cli.verification.convergence import Estimate
 class Ranking:
     """Labels from the smallest number on, at each of the three steps.
 
-    `close` are neighbours that lie closer together than their errors.
+    `equal` are neighbours with the same numbers at all steps; `close` are others that lie closer
+    together than their errors.
     """
 
     orders: tuple[tuple[str, ...], ...]
     close: tuple[tuple[str, str], ...]
+    equal: tuple[tuple[str, str], ...] = ()
 
     @property
     def same(self) -> bool:
@@ -37,8 +39,12 @@ def ranking(estimates: Mapping[str, Estimate]) -> Ranking | None:
     if len(known) < 2:
         return None
     orders = tuple(_order({label: e.values[i] for label, e in known.items()}) for i in range(3))
-    close = tuple((a, b) for a, b in pairwise(orders[0]) if _too_close(known[a], known[b]))
-    return Ranking(orders, close)
+    pairs = tuple(pairwise(orders[0]))
+    equal = tuple((a, b) for a, b in pairs if known[a].values == known[b].values)
+    close = tuple(
+        (a, b) for a, b in pairs if (a, b) not in equal and _too_close(known[a], known[b])
+    )
+    return Ranking(orders, close, equal)
 
 
 def _order(values: Mapping[str, float]) -> tuple[str, ...]:

@@ -96,6 +96,7 @@ class Verified:
                 name: {
                     "orders": [list(order) for order in rank.orders],
                     "too_close": [list(pair) for pair in rank.close],
+                    "equal": [list(pair) for pair in rank.equal],
                     "converged": rank.converged,
                 }
                 for name, rank in self.rankings.items()
