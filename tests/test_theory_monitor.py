@@ -71,8 +71,7 @@ def test_rate_integrates_to_the_change_of_V_to_fourth_order(law: PolarBacksteppi
         change = log["V"][-1] - log["V"][0]
         gaps.append(abs(change - simpson(log["V_dot"], step)))
     orders = np.log2(np.array(gaps[:-1]) / gaps[1:])
-    print(law.label, gaps, orders)
-    assert orders[-1] == pytest.approx(4.0, abs=0.5)
+    assert orders[-1] == pytest.approx(4.0, abs=0.5), (gaps, orders)
 
 
 @pytest.mark.parametrize("anti_windup", ["none", "auxiliary"])
