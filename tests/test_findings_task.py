@@ -11,7 +11,8 @@ from findings_samples import codes, finding, late, log, scene
 
 from podusv_cli.findings.finding import Case
 from podusv_cli.findings.reference import drift, reference
-from podusv_cli.kernels import bundle
+from podusv_cli.findings.task import sliding_distance
+from podusv_cli.kernels import Vector, bundle
 from podusv_cli.vessels.plant import plant
 
 LONG = "simulation.duration=300"
@@ -108,6 +109,77 @@ def test_a_hull_too_slippery_to_point_at_the_target_is_told_and_slides_away() ->
     gentle = (*SLIDES, "controller.k_ze=0.03")  # below d22/m11 = 0.0345
     assert "sway-unstable" not in codes(*gentle)
     assert np.abs(late("z_e", *gentle) - 0.5).max() < 0.1
+
+
+CALM = ("vessel={preset: paper}", "disturbance={kind: none}", LONG)
+
+
+def astern(distance: float) -> str:
+    """A start so far behind the target, which lies 45 degrees off the bow."""
+    return f"start={{x: {-distance / math.sqrt(2.0)}, y: {-distance / math.sqrt(2.0)}}}"
+
+
+@pytest.mark.parametrize("k_ze", [0.06, 0.1, 0.2])
+def test_a_hull_slides_from_beyond_the_distance_that_is_told_and_not_from_within(
+    k_ze: float,
+) -> None:
+    law = (*CALM, f"controller.k_ze={k_ze}")
+    case = Case(scene(*law))
+    distance = sliding_distance(case, 0.8896)
+    assert distance == pytest.approx(
+        (0.5 * 8.0 + 25.8 * k_ze * 0.5) / (25.8 * k_ze - 0.8896)  # m22 - m11 = 8 kg
+    )
+    assert f"further than {distance:.2g} m" in finding("sway-unstable", *law).text
+    within, beyond = (*law, astern(0.9 * distance)), (*law, astern(1.5 * distance))
+    assert np.abs(late("z_e", *within) - 0.5).max() < 0.02
+    assert late("z_e", *beyond).min() > 1.0
+    assert np.abs(late("v", *beyond)).min() > 1.0
+
+
+@pytest.mark.parametrize("standoff", [0.0, 0.5, 2.0])
+def test_the_distance_is_where_the_plants_sway_starts_to_grow(standoff: float) -> None:
+    """Eigenvalues of the hull that points at the target, by differences of the plant's kernel."""
+    case = Case(scene(*CALM, f"controller.standoff={standoff}"))
+    k, U, h = bundle(VESSELS["paper"].constants()), 0.5, 1e-6
+
+    def rates(theta: float, v: float, D: float) -> Vector:
+        u = 0.1 * (D - standoff) + U * math.cos(theta)
+        r = (U * math.sin(theta) - v) / D
+        rate = np.zeros(6)
+        plant(np.array([0.0, 0.0, 0.0, u, v, r]), np.zeros(3), np.zeros(3), k, rate)
+        return np.array([-r, rate[4]])
+
+    def growth(D: float) -> float:
+        columns = [(rates(*d, D) - rates(*-d, D)) / (2.0 * h) for d in h * np.eye(2)]
+        return float(np.linalg.eigvals(np.column_stack(columns)).real.max())
+
+    distance = sliding_distance(case, 0.8896)
+    assert growth(0.99 * distance) < 0.0 < growth(1.01 * distance)
+
+
+def with_damping(ratio: float) -> str:
+    """The paper's hull, whose growing sway nonlinear damping stops at so many target speeds."""
+    return f"vessel={{preset: paper, Y_vv: {-(2.58 - 0.8896) / (0.5 * ratio)}}}"
+
+
+@pytest.mark.parametrize("distance", [10.0, 14.0, 28.0])
+@pytest.mark.parametrize("scale", [0.0, 0.3])
+def test_sway_that_stops_short_of_the_targets_speed_is_not_told_and_the_hull_holds(
+    distance: float, scale: float
+) -> None:
+    slow = (with_damping(0.9), f"disturbance.scale={scale}", astern(distance), LONG)
+    assert "sway-unstable" not in codes(*slow)
+    assert np.abs(late("z_e", *slow) - 0.5).max() < 0.05
+
+
+@pytest.mark.parametrize("ratio", [1.75, 2.5])
+def test_sway_that_outgrows_the_targets_speed_is_told_and_the_hull_circles_the_target(
+    ratio: float,
+) -> None:
+    fast = (with_damping(ratio), "disturbance={kind: none}", astern(7.0 * math.sqrt(2.0)), LONG)
+    assert "sway-unstable" in codes(*fast)
+    assert late("z_e", *fast).min() > 0.8
+    assert np.abs(late("v", *fast)).min() > 1.0  # twice the target's speed
 
 
 @pytest.mark.parametrize("k_ze", [0.1, 0.5])

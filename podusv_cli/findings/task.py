@@ -13,7 +13,7 @@ from podusv_cli.kernels import Vector, bundle
 from podusv_cli.paths.base import TARGET
 from podusv_cli.vessels.plant import sway_force
 
-RUNAWAY = 4.0  # target speeds; sway that damping stops below did no harm in any run
+RUNAWAY = 1.0  # target speeds; with faster sway a hull can circle the target instead of following
 BESIDE = 1e-9  # s; how far from a break the target is looked at on both sides
 STABLE = 2.785  # step over time constant up to which RK4 decays
 AHEAD = 0.5  # of the largest surge force needed
@@ -94,8 +94,8 @@ def sway_drift(case: Case) -> Iterator[Finding]:
 def sway_unstable(case: Case) -> Iterator[Finding]:
     """A hull that points at the target slides away sideways.
 
-    v' = ((m11 k_ze - d) v)/m22 on the way to the target, with d the sway damping at the steady
-    sway; nonlinear damping stops the growth where it catches up.
+    With d the sway damping at the steady sway, growing sway is held by nonlinear damping where that
+    catches up with m11 k_ze; it grows further away than `sliding_distance`.
     """
     law, vessel = case.scenario.controller, case.scenario.vessel
     if not isinstance(law, TrackingController):
@@ -107,10 +107,32 @@ def sway_unstable(case: Case) -> Iterator[Finding]:
         yield found(
             "sway-unstable",
             f"m11 k_ze = {vessel.m11 * law.k_ze:.3g} kg/s exceeds the sway damping "
-            f"{damping:.3g} kg/s: a hull that points at the target can slide sideways, growing "
-            f"{reach}, against the target's {speed:.2g} m/s; take k_ze below "
-            f"{damping / vessel.m11:.2g} 1/s, or a hull with more sway damping",
+            f"{damping:.3g} kg/s: further than {sliding_distance(case, damping):.2g} m from the "
+            f"target, sway of a hull that points at it grows, {reach}, against the target's "
+            f"{speed:.2g} m/s; take k_ze below {damping / vessel.m11:.2g} 1/s, or a hull with more "
+            "sway damping",
         )
+
+
+def sliding_distance(case: Case, damping: float) -> float:
+    """Distance [m] from the target beyond which sway grows; `damping` d [kg/s] is below m11 k_ze.
+
+    For a hull that points at a target of speed U from the distance D, psi_e = 0 and u = alpha_u of
+    (21), with theta from the line of sight to the target's course and D held,
+
+        theta' = -(U sin theta - v)/D,
+        m22 v' = -m11 (k_ze (D - standoff) + U cos theta) (U sin theta - v)/D - d v.
+
+    About theta = v = 0 the determinant U d/(m22 D) is positive and the trace is that of growth for
+    D > (U (m22 - m11) + m11 k_ze standoff)/(m11 k_ze - d).
+    """
+    law, vessel = case.scenario.controller, case.scenario.vessel
+    if not isinstance(law, TrackingController):
+        return np.inf
+    speed = float(np.median(case.reference.speed))
+    drive = vessel.m11 * law.k_ze
+    free = speed * (vessel.m22 - vessel.m11) + drive * law.standoff
+    return max(0.0, free / (drive - damping))
 
 
 def _damping(case: Case, drive: float) -> tuple[float, float]:
