@@ -19,6 +19,7 @@ from podusv_cli.comparison.expressions import Source
 from podusv_cli.config.loading import load_text
 from podusv_cli.config.scenario import Scenario
 from podusv_cli.findings.finding import Finding
+from podusv_cli.findings.preflight import together
 from podusv_cli.interrupts import Extras, interrupts_heard
 from podusv_cli.logbook import jsonfile
 from podusv_cli.logbook.folder import Run, RunWriter, open_run
@@ -59,7 +60,7 @@ class Result:
     table: pd.DataFrame
     verdicts: Sequence[claims.Verdict]
     timings: Mapping[str, Mapping[str, float]]
-    warnings: Mapping[str, Sequence[Finding]]  # of the runs that were made
+    warnings: Mapping[str, Sequence[Finding]]  # by run; none of those that were there
 
 
 def from_folder(path: Path) -> list[Part]:
@@ -150,8 +151,9 @@ def collect(
         endings[part.label] = outcome.failure or (run.recording.message if run else "")
         if run:
             entries.append(Entry(part.label, run, part.scenario))
+        warnings[part.label] = done.warnings if done else part.noticed
         if done:
-            timings[part.label], warnings[part.label] = done.timing, done.warnings
+            timings[part.label] = done.timing
     entries = _with_costs(entries, extras)
     sources: dict[str, Source] = {e.label: e for e in entries}
     for part in parts:
@@ -236,8 +238,8 @@ def as_report(
     story = report.Story(
         title=title, scenario=result.parts[0].scenario,
         controllers={part.label: part.scenario.controller for part in result.parts},
-        endings=result.endings, differences=result.differences, table=result.table,
-        verdicts=result.verdicts, theories=_theories(result), figures=pictures,
-        provenance=provenance,
+        endings=result.endings, differences=result.differences,
+        noticed=together(result.warnings), table=result.table, verdicts=result.verdicts,
+        theories=_theories(result), figures=pictures, provenance=provenance,
     )  # fmt: skip
     return report.page(story)

@@ -99,7 +99,7 @@ class Compared:
             "controller": entry.recording.controller,
             "metrics": dict(entry.run.metrics),
             "timing": dict(self.result.timings.get(entry.label, {})),
-            "warnings": [f.as_json() for f in self.result.warnings.get(entry.label, ())],
+            "warnings": [f.as_json() for f in self.result.warnings[entry.label]],
         }
 
 

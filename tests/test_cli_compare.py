@@ -80,7 +80,7 @@ def test_runs_that_differ_in_more_are_warned_of_by_key(podusv: Podusv) -> None:
     said = podusv("a.yaml", "b.yaml", "--out", "x")
     assert said.code == 0
     assert said.err == (
-        "warning: the runs differ in more than the controller:\n  start.y: a -2.0, b -3.0\n"
+        "warning: the runs differ in more than the controller:\n  start.y: a -2, b -3\n"
     )
     assert podusv(write("two.yaml", TWO), "--out", "y").err == ""
 

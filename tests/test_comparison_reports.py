@@ -2,6 +2,7 @@
 
 import math
 import re
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -12,10 +13,11 @@ from podusv_cli.cli.progress import progress_bars
 from podusv_cli.comparison import claims, report, table
 from podusv_cli.comparison.checks import CHECKS
 from podusv_cli.comparison.claims import Stated
-from podusv_cli.comparison.differences import differences
+from podusv_cli.comparison.differences import differences, in_words
 from podusv_cli.comparison.entries import Absent, Entry
 from podusv_cli.config.loading import load_text
 from podusv_cli.config.scenario import Claim
+from podusv_cli.findings.finding import Finding
 from podusv_cli.metrics import cost
 from podusv_cli.recording import Recording
 
@@ -139,6 +141,31 @@ def test_a_key_that_a_run_lacks_is_a_difference():
     assert found["disturbance.b_u.mean"]["b"] is None
 
 
+def test_a_sections_keys_stand_together():
+    trees = [{"path": {"kind": "a", "k": 1}, "start": {"x": 1}}, {"path": {"kind": "b", "r": 2}}]
+    keys = ["path.kind", "path.k", "path.r", "start.x"]
+    assert list(differences(dict(enumerate(trees)))) == keys
+
+
+def test_where_kinds_differ_only_the_kind_and_what_both_have_is_shown():
+    calm, rough = scenario("disturbance.kind=none"), scenario("disturbance.scale=2")
+    trees = {"a": scenario().model_dump(), "b": calm.model_dump()}
+    assert in_words(differences(trees)) == {"disturbance.kind": {"a": "harmonic", "b": "none"}}
+    third = in_words(differences({**trees, "c": rough.model_dump()}))
+    assert list(third) == ["disturbance.kind", "disturbance.scale"]
+    assert third["disturbance.scale"] == {"a": "1", "b": "-", "c": "2"}
+
+
+def test_a_key_that_is_lacking_under_the_same_kind_is_shown():
+    trees = {"a": {"path": {"kind": "line", "speed": 0.5}}, "b": {"path": {"kind": "line"}}}
+    assert in_words(differences(trees)) == {"path.speed": {"a": "0.5", "b": "-"}}
+
+
+def test_different_numbers_never_look_the_same():
+    trees = {"a": {"path": {"speed": 0.5}}, "b": {"path": {"speed": 0.5 + 1e-9}}}
+    assert in_words(differences(trees)) == {"path.speed": {"a": "0.5", "b": "0.500000001"}}
+
+
 # --- entries
 
 
@@ -227,6 +254,7 @@ def page(**parts):
         "title": "planted", "scenario": scenario(),
         "controllers": {"a": scenario().controller}, "endings": {"a": "", "lost": "killed <9>"},
         "differences": {"start.x": {"a": 1.0, "lost": [1.0, 2.5]}}, "table": FRAME,
+        "noticed": [Finding("crosswise", "controller", "|x| < 1", ("<a>",))],
         "verdicts": verdicts(), "theories": {}, "figures": [("errors", "x_e & y_e", b"<svg/>")],
         "provenance": {"git": {"commit": "abc"}},
     }  # fmt: skip
@@ -280,6 +308,25 @@ def test_the_report_has_every_verdict_escaped():
     assert "lost.iae: lost has no log: killed" in text
     assert "<b>" not in re.sub(r"</?b>", "", text)
     assert "Claims" not in page(verdicts=[])
+
+
+def test_the_report_has_what_was_noticed_escaped():
+    row = "<tr><td><code>crosswise</code></td><td>{}controller</td><td>|x| &lt; 1</td></tr>"
+    assert row.format("&lt;a&gt;: ") in page()
+    assert row.format("") in page(noticed=[Finding("crosswise", "controller", "|x| < 1")])
+    assert "Noticed" not in page(noticed=[])
+
+
+def test_the_report_of_a_comparison_has_its_warnings():
+    saturated = Finding("saturated", "actuator", "long <b>")
+    parts = [comparing.Part(label, scenario()) for label in ("a", "b")]
+    entries = [Entry(label, Folder({}), scenario()) for label in ("a", "b")]
+    for entry in entries:
+        entry.run.folder = Path("nowhere")
+    told = {"a": [saturated], "b": []}
+    result = comparing.Result(parts, entries, {}, {}, FRAME, [], {}, told)
+    text = comparing.as_report(result, "title", {}, {})
+    assert "<td>a: actuator</td><td>long &lt;b&gt;</td>" in text
 
 
 def test_the_report_has_scenario_figures_and_provenance():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,8 @@ from podusv_cli.codes import CODES
 from podusv_cli.config.loading import load
 from podusv_cli.config.scenario import Scenario
 from podusv_cli.findings.after import LOOKS, aftermath
-from podusv_cli.findings.preflight import CHECKS, preflight
+from podusv_cli.findings.finding import Finding
+from podusv_cli.findings.preflight import CHECKS, preflight, together
 from podusv_cli.findings.underactuation import argument, input_rank
 from podusv_cli.recording import Recording
 
@@ -140,8 +142,8 @@ def test_the_printed_scenario_is_told_why_it_cannot_track() -> None:
 def test_what_laws_share_is_told_once_and_names_them() -> None:
     found = preflight(load(CONFIGS / "figures_compare.yaml").scenario)
     assert len(found) == len(set(found))
-    kicks = [f.where for f in found if f.code == "start-kick"]
-    assert kicks == ["controllers.proposed|dsc.first_difference"]
+    kicks = [(f.runs, f.where) for f in found if f.code == "start-kick"]
+    assert kicks == [(("proposed", "dsc"), "controller.first_difference")]
 
 
 @pytest.mark.parametrize(
@@ -201,9 +203,57 @@ def test_a_comparison_warns_once_for_all_laws_it_holds_for(podusv: Any) -> None:
         "compare", scenario_file("printed_compare.yaml"), "--set", "simulation.duration=0.5",
         "--no-figures", "--json", "--out", "c",
     )  # fmt: skip
-    assert said.err.count("warning[sway-unstable]: controllers.proposed|dsc|li|pid.k_ze") == 1
+    assert said.err.count("warning[sway-unstable]: controller.k_ze") == 1
+    assert said.err.count("warning[sway-drift]: path: ") == said.err.count("[sway-drift]") == 1
     runs = {Path(run["run"]).name: run["warnings"] for run in json.loads(said.out)["runs"]}
     assert "sway-drift" in {w["code"] for w in runs["li"]}
+
+
+def test_findings_that_not_all_runs_share_name_their_runs() -> None:
+    shared, some, own = (Finding(code, "actuator", code) for code in ("a", "b", "c"))
+    found = together({"x": [shared, some], "y": [some, shared, own], "z": [shared, own, own]})
+    assert [str(finding) for finding in found] == [
+        "warning[a]: actuator: a", "warning[b]: x, y: actuator: b", "warning[c]: y, z: actuator: c",
+    ]  # fmt: skip
+    assert together({"x": [shared], "there already": []})[0].runs == ("x",)
+    assert together({"x": [shared]}) == [shared]
+
+
+def transcripts() -> list[tuple[str, list[str]]]:
+    """Every `podusv validate` of docs/findings.md, with the lines shown below it."""
+    text = (PACKAGE.parent / "docs" / "findings.md").read_text()
+    blocks = re.findall(r"^    \$ podusv validate (\S+)\n((?:    .*\n)+)", text, re.MULTILINE)
+    return [(config, shown.replace("\n    ", "\n")[4:].splitlines()) for config, shown in blocks]
+
+
+def test_docs_show_what_a_terminal_shows(podusv: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("podusv_cli.cli.layout.sys.stdout.isatty", lambda: True, raising=False)
+    monkeypatch.setenv("COLUMNS", "100")
+    monkeypatch.chdir(PACKAGE.parent)
+    assert len(transcripts()) == 2
+    for config, shown in transcripts():
+        assert podusv("validate", config).out.splitlines() == shown
+
+
+def test_findings_are_wrapped_on_a_terminal_and_whole_in_a_pipe(
+    podusv: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "60")
+    validate, run = (
+        (command, scenario_file("corrected.yaml"), *SWAYING, *SHORT[:4])
+        for command in ("validate", "run")
+    )
+    whole = podusv(*validate).out.splitlines()[1:]
+    assert podusv(*run, "--no-figures", "--out", "a").err.splitlines() == whole
+    assert len(whole) == 2
+    for stream in ("stdout", "stderr"):
+        monkeypatch.setattr(
+            f"podusv_cli.cli.layout.sys.{stream}.isatty", lambda: True, raising=False
+        )
+    err = podusv(*run, "--no-figures", "--out", "b").err
+    for shown in (podusv(*validate).out.splitlines()[1:], err.splitlines()):
+        assert max(map(len, shown)) <= 60 < len(shown) * 60 / 2
+        assert " ".join(line.strip() for line in shown) == " ".join(whole)
 
 
 def test_silencing_is_no_difference_between_runs_and_survives_resolving(podusv: Any) -> None:

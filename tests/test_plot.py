@@ -195,7 +195,7 @@ def test_the_command_prints_files_and_warns_beside_them(one, place, stillborn, t
         "replaced what was in figures/errors.png",
         "stillborn: nothing to draw: diverged at t = 0 s",
         "warning: the runs differ in more than the controller:",
-        "simulation.duration: pid 100.0, brief 40.0",
+        "simulation.duration: pid 100, brief 40",
     ):
         assert word in done.stderr
 

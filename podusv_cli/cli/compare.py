@@ -75,11 +75,9 @@ def _report(done: Compared, verbose: bool) -> None:
 
 
 def _warn(done: Compared) -> None:
-    if done.result.differences:
-        typer.echo("warning: the runs differ in more than the controller:", err=True)
-    for key, values in done.result.differences.items():
-        shown = ", ".join(f"{label} {value}" for label, value in values.items())
-        typer.echo(f"  {key}: {shown}", err=True)
+    from podusv_cli.cli.layout import warn_of
+
+    warn_of(done.result.differences)
     for label, ending in done.result.endings.items():
         if ending:
             typer.echo(f"{label}: {ending}", err=True)

@@ -6,7 +6,8 @@ import os
 import shutil
 import sys
 import textwrap
-from typing import TextIO
+from collections.abc import Mapping
+from typing import Any, TextIO
 
 import typer
 
@@ -15,7 +16,7 @@ WIDEST = 100
 
 def echo_entry(name: str, *lines: str, facts: str = "") -> None:
     """An entry: its name (bold on a terminal) and facts, then lines below, indented and wrapped."""
-    width = max(20, min(WIDEST, shutil.get_terminal_size().columns))
+    width = _width()
 
     def wrapped(text: str, indent: str) -> str:
         return textwrap.fill(
@@ -49,6 +50,33 @@ def echo_table(head: list[str], rows: list[list[str]]) -> None:
         typer.echo("  ".join(padded).rstrip())
 
 
+def echo_line(text: str, *, err: bool = False) -> None:
+    """One line, on stderr where `err`; wrapped and indented on a terminal, whole in a pipe."""
+    if (sys.stderr if err else sys.stdout).isatty():
+        text = folded(text, _width())
+    typer.echo(text, err=err)
+
+
+def folded(text: str, width: int) -> str:
+    """A line wrapped at words, the rest of it indented by two."""
+    return textwrap.fill(text, width, subsequent_indent="  ", break_on_hyphens=False)
+
+
+def _width() -> int:
+    return max(20, min(WIDEST, shutil.get_terminal_size().columns))
+
+
+def warn_of(differences: Mapping[str, Mapping[str, Any]]) -> None:
+    """Show on stderr what compared runs differ in besides the controller."""
+    from podusv_cli.comparison.differences import in_words
+
+    if differences:
+        typer.echo("warning: the runs differ in more than the controller:", err=True)
+    for key, values in in_words(differences).items():
+        shown = ", ".join(f"{label} {value}" for label, value in values.items())
+        typer.echo(f"  {key}: {shown}", err=True)
+
+
 class Warned:
     """Shows warnings on stderr, each once; none where `quiet`."""
 
@@ -61,5 +89,5 @@ class Warned:
         """Show one."""
         line = str(finding)
         if line not in self._shown and not self._quiet:
-            typer.echo(line, err=True)
+            echo_line(line, err=True)
         self._shown.add(line)

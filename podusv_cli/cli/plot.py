@@ -40,12 +40,10 @@ def plot(
 
 
 def _warn(drawn: Drawn) -> None:
+    from podusv_cli.cli.layout import warn_of
+
     for path in drawn.replaced:
         typer.echo(f"replaced what was in {path}", err=True)
     for label, ending in drawn.empty.items():
         typer.echo(f"{label}: nothing to draw: {ending}", err=True)
-    if drawn.differences:
-        typer.echo("warning: the runs differ in more than the controller:", err=True)
-    for key, values in drawn.differences.items():
-        shown = ", ".join(f"{label} {value}" for label, value in values.items())
-        typer.echo(f"  {key}: {shown}", err=True)
+    warn_of(drawn.differences)

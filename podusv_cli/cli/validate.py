@@ -29,6 +29,7 @@ def validate(
 
     Exit code 0, with a line for each finding; or 2 with a line for each fault.
     """
+    from podusv_cli.cli.layout import echo_line
     from podusv_cli.comparison.claims import misfits
     from podusv_cli.config.loading import load
     from podusv_cli.findings.finding import heard
@@ -39,19 +40,20 @@ def validate(
     laws, steps = ", ".join(scenario.labels()), scenario.time_grid().steps
     typer.echo(f"{config}: ok ({scenario.name}, {laws}, {steps} steps)")
     for finding in heard(preflight(scenario), scenario):
-        typer.echo(str(finding))
+        echo_line(str(finding))
     if verbose:
         _explain(loaded)
 
 
 def _explain(loaded: Loaded) -> None:
+    from podusv_cli.cli.layout import echo_line
     from podusv_cli.config.loading import values
     from podusv_cli.config.words import as_written
     from podusv_cli.findings.gains import conditions
     from podusv_cli.findings.underactuation import argument
 
-    typer.echo(argument(loaded.scenario))
+    echo_line(argument(loaded.scenario))
     for line in conditions(loaded.scenario):
-        typer.echo(line)
+        echo_line(line)
     for key, content in values(loaded.scenario).items():
         typer.echo(f"{key}: {as_written(content)}  # {loaded.origins[key]}")

@@ -16,9 +16,10 @@ import pandas as pd
 
 from podusv_cli.comparison import stability
 from podusv_cli.comparison.claims import Verdict
-from podusv_cli.comparison.differences import flat
+from podusv_cli.comparison.differences import flat, in_short, in_words
 from podusv_cli.comparison.table import cells
 from podusv_cli.config.scenario import Scenario
+from podusv_cli.findings.finding import Finding
 from podusv_cli.registry import Component
 
 STYLE = """
@@ -48,6 +49,7 @@ class Story:
     controllers: Mapping[str, Component]
     endings: Mapping[str, str]  # how each run ended
     differences: Mapping[str, Mapping[str, Any]]
+    noticed: Sequence[Finding]
     table: pd.DataFrame
     verdicts: Sequence[Verdict]
     theories: Mapping[str, Mapping[str, Any]]  # theory.json of the runs that have one
@@ -68,6 +70,7 @@ def page(story: Story) -> str:
             "<h2>Comparison</h2>",
             _numbers(story.table),
             _claims(story.verdicts),
+            _noticed(story.noticed),
             _stability(story.theories),
             "<h2>Figures</h2>" if story.figures else "",
             *(_figure(*figure) for figure in story.figures),
@@ -103,13 +106,7 @@ def _table(
 
 
 def _rows(head: tuple[str, str], pairs: Iterable[tuple[str, Any]]) -> str:
-    return _table(head, ((html.escape(key), html.escape(_short(value))) for key, value in pairs))
-
-
-def _short(value: Any) -> str:
-    if isinstance(value, (list, tuple)):
-        return " ".join(map(_short, value))
-    return f"{value:g}" if isinstance(value, float) else str(value)
+    return _table(head, ((html.escape(key), html.escape(in_short(value))) for key, value in pairs))
 
 
 def _endings(story: Story) -> str:
@@ -127,8 +124,8 @@ def _differences(story: Story) -> str:
         return ""
     labels = list(next(iter(story.differences.values())))
     rows = (
-        [html.escape(key), *(html.escape(_short(values[label])) for label in labels)]
-        for key, values in story.differences.items()
+        map(html.escape, [key, *(values[label] for label in labels)])
+        for key, values in in_words(story.differences).items()
     )
     text = "These runs differ in more than the controller:"
     return f"<div class=warning><p>{text}</p>{_table(['key', *labels], rows)}</div>"
@@ -162,6 +159,17 @@ def _claims(verdicts: Sequence[Verdict]) -> str:
     return "<h2>Claims</h2>" + _table(("", "claim", "verdict", "put as, and the numbers"), rows)
 
 
+def _noticed(findings: Sequence[Finding]) -> str:
+    if not findings:
+        return ""
+    note = (
+        "<p><small>About the runs that this comparison made, before and after them: what to know, "
+        "no errors. No run is named where it is true of all.</small></p>"
+    )
+    rows = ([f"<code>{f.code}</code>", *map(html.escape, (f.place, f.text))] for f in findings)
+    return "<h2>Noticed</h2>" + _table(("code", "where", "finding"), rows) + note
+
+
 def _stability(theories: Mapping[str, Mapping[str, Any]]) -> str:
     if not theories:
         return ""
@@ -191,6 +199,6 @@ def _scenario(story: Story) -> str:
 
 def _in_words(part: Component) -> str:
     said = (inspect.getdoc(type(part)) or "").partition("\n")[0]
-    values = ", ".join(f"{key} {_short(value)}" for key, value in flat(part.model_dump()))
+    values = ", ".join(f"{key} {in_short(value)}" for key, value in flat(part.model_dump()))
     told = re.sub(r"`([^`]+)`", r"<code>\1</code>", html.escape(said))
     return f"{told}<br><small>{html.escape(values)}</small>"

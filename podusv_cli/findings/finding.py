@@ -17,18 +17,27 @@ from podusv_cli.paths.base import TARGET
 
 @dataclass(frozen=True)
 class Finding:
-    """Something that a user should know: a code of `codes.CODES`, a scenario key, a sentence."""
+    """Something that a user should know: a code of `codes.CODES`, a scenario key, a sentence.
+
+    `runs` are labels of the runs that it is about, where the comparison has others as well.
+    """
 
     code: str
     where: str
     text: str
+    runs: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         """One line, as a command shows it."""
-        return f"warning[{self.code}]: {self.where}: {self.text}"
+        return f"warning[{self.code}]: {self.place}: {self.text}"
+
+    @property
+    def place(self) -> str:
+        """Runs and key: `dsc, pid: actuator`; the key alone where no run is named."""
+        return ": ".join(filter(None, (", ".join(self.runs), self.where)))
 
     def as_json(self) -> dict[str, str]:
-        """What `--json` prints and metrics.json holds."""
+        """What `--json` prints of a run and metrics.json holds."""
         return {"code": self.code, "where": self.where, "text": self.text}
 
 

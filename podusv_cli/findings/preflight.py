@@ -47,15 +47,12 @@ def preflight(scenario: Scenario) -> list[Finding]:
 
 
 def together(findings: Mapping[str, Sequence[Finding]]) -> list[Finding]:
-    """Findings about several runs, by label, with those that are the same told once."""
+    """Findings about several runs, by label: the same told once, with its runs unless it is all."""
     alike: dict[Finding, list[str]] = {}
     for label, several in findings.items():
-        for finding in several:
+        for finding in dict.fromkeys(several):
             alike.setdefault(finding, []).append(label)
-    return [replace(f, where=_in_its_place(f.where, labels)) for f, labels in alike.items()]
-
-
-def _in_its_place(where: str, labels: Sequence[str]) -> str:
-    """A key of `controller` as the key below `controllers` of the laws that share it."""
-    section, dot, rest = where.partition(".")
-    return f"controllers.{'|'.join(labels)}{dot}{rest}" if section == "controller" else where
+    return [
+        replace(finding, runs=() if len(labels) == len(findings) else tuple(labels))
+        for finding, labels in alike.items()
+    ]
