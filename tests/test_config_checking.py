@@ -134,7 +134,8 @@ def test_a_wrong_section_is_one_sentence_at_its_place(text: str, says: str) -> N
         (
             "{preset: paper}",
             "{m: 3}",
-            "1:9: vessel.preset: missing (allowed: " + VESSEL_NAMES + ")",
+            "1:9: vessel.preset: missing (allowed: " + VESSEL_NAMES + "); a vessel without one "
+            "needs length, beam, I_z",
         ),
         (
             "{preset: paper}",
@@ -241,7 +242,8 @@ def test_a_key_of_a_kind_is_told_without_the_kind(text: str, says: list[str]) ->
 
 def test_what_is_missing_is_told_at_the_file() -> None:
     assert told("description: nothing else\n") == [
-        "a.yaml: vessel.preset: missing (allowed: " + VESSEL_NAMES + ")",
+        "a.yaml: vessel.preset: missing (allowed: " + VESSEL_NAMES + "); a vessel without one "
+        "needs length, beam, m, I_z",
         "a.yaml: path: missing; must be a mapping of keys with kind circle, line, line_circle or "
         "waypoints",
         "a.yaml: disturbance: missing; must be a mapping of keys with kind harmonic or none",

@@ -8,7 +8,7 @@ import pytest
 from config_samples import SOUND, VESSEL_NAMES, findings, loaded, told, write
 
 from podusv_cli.actuators.pod import Pods
-from podusv_cli.config.loading import load, load_text
+from podusv_cli.config.loading import load, load_text, resolved_yaml
 from podusv_cli.config.references import MAX_POINTS, pod_names, vessel_file, vessel_names
 from podusv_cli.config.tree import plain
 from podusv_cli.errors import ScenarioError
@@ -48,13 +48,41 @@ def test_the_nominal_vessel_is_the_vessel_with_its_changes() -> None:
 
 def test_a_nominal_vessel_without_preset_is_the_vessel_but_for_what_it_says() -> None:
     got = loaded(SOUND, ["vessel.m=30", "nominal.X_u=-1"]).scenario
-    assert got.nominal == got.vessel.model_copy(update={"X_u": -1.0})
+    source = got.vessel.source.replace("; m changed", "; m, X_u changed")
+    assert source != got.vessel.source
+    assert got.nominal == got.vessel.model_copy(update={"X_u": -1.0, "source": source})
 
 
 def test_a_nominal_vessel_with_preset_starts_from_it() -> None:
     got = loaded(SOUND, ["vessel.m=30", "nominal={preset: cybership2, X_u: -1}"]).scenario
     whole = loaded(SOUND.replace("paper", "cybership2")).scenario.vessel
-    assert got.nominal == whole.model_copy(update={"X_u": -1.0})
+    source = whole.source.removesuffix(".") + "; X_u changed by the scenario."
+    assert got.nominal == whole.model_copy(update={"X_u": -1.0, "source": source})
+
+
+OWN = "length: 2.0, beam: 1.0, m: 60.0, I_z: 20.0, X_u: -9.0"
+
+
+@pytest.mark.parametrize("given", [OWN, OWN + ", preset: ''"])
+def test_a_vessel_without_preset_has_what_it_says_and_no_more(given: str) -> None:
+    text = SOUND.replace("preset: paper", given)
+    own = Vessel(length=2.0, beam=1.0, m=60.0, I_z=20.0, X_u=-9.0)
+    assert loaded(text).scenario.vessel == own
+    write("base.yaml", SOUND)
+    other = loaded(f"extends: base.yaml\nvessel: {{{given}}}\n").scenario.vessel
+    assert (other == own) == ("preset" in given), "without the key it changes what it extends"
+
+
+def test_a_source_tells_what_the_scenario_changed_and_is_the_same_when_loaded_again() -> None:
+    changed = loaded(SOUND, ["vessel.I_z=2", "vessel.m=30", "vessel.X_u=-0.72", "vessel.X_uu=0"])
+    whole = loaded(SOUND).scenario.vessel.source
+    told = whole.removesuffix(".") + "; m, I_z changed by the scenario."
+    assert changed.scenario.vessel.source == told
+    resolved = resolved_yaml(changed.scenario)
+    assert loaded(resolved).scenario == changed.scenario
+    assert loaded(resolved, ["vessel.m=23.8", "vessel.I_z=1.76"]).scenario.vessel.source == whole
+    own = loaded(SOUND, ["vessel.m=30", "vessel.source=my tank"]).scenario.vessel
+    assert own.source == "my tank"
 
 
 def test_a_wrong_nominal_value_is_told_at_its_place() -> None:

@@ -114,7 +114,7 @@ def test_a_kind_is_one_word_and_a_preset_one_of_the_vessels() -> None:
     laws = sections(Scenario.model_fields["controller"].annotation)
     assert {schema["const"] for schema in places(SCHEMA, ("controller", "kind"))} == set(laws)
     (preset,) = places(SCHEMA, ("vessel", "preset"))
-    assert preset["enum"] == list(vessel_names())
+    assert preset["enum"] == ["", *vessel_names()]
 
 
 def test_defaults_are_there_but_where_they_depend_on_the_place() -> None:

@@ -130,3 +130,13 @@ def test_every_config_says_what_it_is_for_and_is_sound(path):
         scenario = load(path).scenario
         assert scenario.description
         assert load_text(path.read_text(), str(path)).scenario == scenario
+
+
+def test_a_vessel_of_ones_own_settles_where_its_thrust_is_its_drag(tmp_path):
+    request = workflows.Request(out=tmp_path / "own", figures=False)
+    done = workflows.run(CONFIGS / "own_vessel.yaml", request)
+    run = open_run(done.folder)
+    assert 'preset: ""' in run.resolved_yaml
+    assert run.recording["u"][-1] == pytest.approx(0.8, rel=1e-3)
+    assert run.recording["tau_u"][-1] == pytest.approx(20.0 * 0.8 + 15.0 * 0.8**2, rel=1e-2)
+    assert run.recording["z_e"][-1] == pytest.approx(0.5, abs=0.01)

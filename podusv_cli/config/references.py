@@ -18,6 +18,7 @@ from podusv_cli.config.source import MAX_NODES, read, read_text, resolve
 from podusv_cli.config.tree import Fault, Mark, Node, merge, overlay
 from podusv_cli.config.words import found, quoted, unknown
 from podusv_cli.registry import Component
+from podusv_cli.vessels.vessel import COEFFICIENTS, Vessel
 
 MAX_POINTS = MAX_NODES // 4  # a point is three values, and the resolved scenario has to be readable
 MOST_FAULTS = 10  # in one file of points
@@ -99,17 +100,14 @@ def _name(root: Node, faults: list[Fault]) -> Node:
 def _vessel(root: Node, faults: list[Fault]) -> Node:
     given = root.mapping.get("vessel")
     if given is None:
-        if not root.faulty:
-            known = ", ".join(vessel_names())
-            faults.append(Fault(root.mark, "vessel.preset", f"missing (allowed: {known})"))
-        return root.with_entry("vessel", Node({}, root.mark, faulty=True))
+        given = Node({}, root.mark, faulty=root.faulty)
     if not isinstance(given.content, dict):
         return root
     return root.with_entry("vessel", _from_preset(given, "vessel", faults))
 
 
 def _nominal(root: Node, faults: list[Fault]) -> Node:
-    """`nominal` is the vessel unless given; with a preset of its own it starts from that."""
+    """`nominal` is the vessel unless given; with `preset` it starts from that, or from nothing."""
     vessel = root.mapping["vessel"]
     given = root.mapping.get("nominal")
     if given is None:
@@ -118,25 +116,59 @@ def _nominal(root: Node, faults: list[Fault]) -> Node:
         return root
     if "preset" in given.content:
         return root.with_entry("nominal", _from_preset(given, "nominal", faults))
-    return root.with_entry("nominal", merge(vessel, given))
+    return root.with_entry("nominal", _sourced(merge(vessel, given)))
 
 
 def _from_preset(given: Node, key: str, faults: list[Fault]) -> Node:
-    """The vessel's values over those of its preset."""
+    """The vessel's values over those of its preset, where it has one."""
     preset = given.mapping.get("preset")
-    if preset and preset.content in vessel_names():
-        base = vessel_file(preset.content, faults)
+    if preset is None or preset.content == "":
+        return _whole(given, key, faults)
+    if preset.content in vessel_names():
+        base = vessel_file(str(preset.content), faults)
         assert base
-        return merge(base, given)
-    if preset is None and not given.faulty:
-        known = ", ".join(vessel_names())
-        faults.append(Fault(given.mark, f"{key}.preset", f"missing (allowed: {known})"))
-    elif preset and not preset.faulty:
+        return _sourced(merge(base, given))
+    if not preset.faulty:
         what = f"vessel {found(preset.content, preset.text)}"
         text = unknown(what, str(preset.content), vessel_names())
         faults.append(Fault(preset.mark, f"{key}.preset", text))
         given = given.with_entry("preset", replace(preset, content=None, faulty=True))
     return replace(given, faulty=True)
+
+
+def _whole(given: Node, key: str, faults: list[Fault]) -> Node:
+    """A vessel without preset; a fault where it lacks what no vessel can do without."""
+    fields = Vessel.model_fields.items()
+    lacking = [name for name, field in fields if field.is_required() and name not in given.mapping]
+    if not lacking or given.faulty:
+        return given
+    text = f"missing (allowed: {', '.join(vessel_names())}); a vessel without one needs "
+    faults.append(Fault(given.mark, f"{key}.preset", text + ", ".join(lacking)))
+    return replace(given, faulty=True)
+
+
+def _sourced(vessel: Node) -> Node:
+    """The vessel with a `source` that names the numbers that are not its preset's.
+
+    A source that is not the preset's own is left as it is.
+    """
+    base, source = vessel_file(str(vessel.get("preset")), []), vessel.mapping.get("source")
+    if not base or not source or not str(source.content).startswith(_stem(base)):
+        return vessel
+    numbers = [name for name in COEFFICIENTS if name in Vessel.model_fields]
+    changed = [name for name in numbers if name in vessel.mapping and _differs(vessel, base, name)]
+    text = f"{_stem(base)}; {', '.join(changed)} changed by the scenario."
+    told = text if changed else str(base.get("source"))
+    return vessel.with_entry("source", replace(source, content=told))
+
+
+def _stem(base: Node) -> str:
+    return str(base.get("source")).removesuffix(".")
+
+
+def _differs(vessel: Node, base: Node, name: str) -> bool:
+    here, there = vessel.get(name), base.get(name)
+    return bool(here != (Vessel.model_fields[name].default if there is None else there))
 
 
 def _pods(root: Node, faults: list[Fault]) -> Node:

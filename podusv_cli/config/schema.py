@@ -27,7 +27,7 @@ def json_schema() -> dict[str, Any]:
     for name in _filled_from_outside():
         for part in definitions[name]["properties"].values():
             part.pop("default", None)
-    definitions["Vessel"]["properties"]["preset"]["enum"] = list(vessel_names())
+    definitions["Vessel"]["properties"]["preset"]["enum"] = ["", *vessel_names()]
     definitions["Pods"]["properties"]["preset"]["enum"] = ["", *pod_names()]
     scenario = _converted(made)
     names = {"type": "array", "items": {"type": "string"}}

@@ -29,5 +29,6 @@ def argument(scenario: Scenario) -> str:
     kind = type(scenario.actuator).model_fields["kind"].default
     return (
         f"{verdict}: from (tau_u, tau_r) asked for to (tau_u, tau_v, tau_r) on the hull, "
-        f"{kind} on {scenario.vessel.preset} is [{rows}], rank {rank} of {len(matrix)}; {sway}"
+        f"{kind} on {scenario.vessel.preset or 'the vessel'} is [{rows}], "
+        f"rank {rank} of {len(matrix)}; {sway}"
     )

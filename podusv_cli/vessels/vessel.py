@@ -22,7 +22,9 @@ class Vessel(Component):
     damping on the diagonal would drive the motion.
     """
 
-    preset: str = value(..., "", "name of the parameter file that the other values come from")
+    preset: str = value(
+        "", "", "name of the parameter file that the other values come from; none where empty"
+    )
     source: str = value("", "", "where the numbers come from")
     validity: str = value("", "", "what the numbers hold for")
     length: float = value(..., "m", "length over all, for figures", gt=0)
