@@ -21,6 +21,8 @@ class Code:
 
 
 _ROWS = (
+    Code("damping-sign", "vessel", "before", "nonlinear damping drives the motion"),
+    Code("large-angle", "start.psi", "before", "an angle is beyond a whole turn"),
     Code("path-jump", "path", "before", "the target's position jumps"),
     Code("path-corner", "path", "before", "the target's velocity jumps"),
     Code("path-bend", "path", "before", "the target's acceleration jumps"),

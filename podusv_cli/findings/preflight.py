@@ -8,13 +8,15 @@ from dataclasses import replace
 import numpy as np
 
 from podusv_cli.config.scenario import Scenario
-from podusv_cli.findings import law, task
+from podusv_cli.findings import law, task, values
 from podusv_cli.findings.finding import Case, Finding
 
 Check = Callable[[Case], Iterator[Finding]]
 
 # One function a code, in the order in which findings are shown.
 CHECKS: dict[str, Check] = {
+    "damping-sign": values.damping_sign,
+    "large-angle": values.large_angle,
     "path-jump": task.path_jump,
     "path-corner": task.path_corner,
     "path-bend": task.path_bend,

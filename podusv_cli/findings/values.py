@@ -1,0 +1,45 @@
+"""Findings about numbers that are allowed but look like a wrong sign or a wrong unit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from podusv_cli.findings.finding import Case, Finding, found
+from podusv_cli.registry import unit_of
+from podusv_cli.vessels.vessel import Vessel
+
+BRAKES = ("X_uu", "X_uuu", "Y_vv", "N_rr")  # the linear ones cannot be positive at all
+TURN = 2.0 * math.pi
+
+
+def damping_sign(case: Case) -> Iterator[Finding]:
+    """Nonlinear damping on the diagonal that drives what it should brake."""
+    vessels = {"vessel": case.scenario.vessel, "nominal": case.scenario.nominal}
+    told = set[tuple[str, float]]()
+    for section, vessel in vessels.items():
+        for name in BRAKES:
+            number = getattr(vessel, name)
+            if number > 0.0 and (name, number) not in told:
+                told.add((name, number))
+                unit = unit_of(Vessel.model_fields[name])
+                yield found(
+                    "damping-sign",
+                    f"{number:g} {unit} drives the motion that it should brake, the more the "
+                    f"faster it is; damping is negative here: {-number:g}?",
+                    f"{section}.{name}",
+                )
+
+
+def large_angle(case: Case) -> Iterator[Finding]:
+    """An angle of the start or the path beyond a whole turn."""
+    for section, part in (("start", case.scenario.start), ("path", case.scenario.path)):
+        for name, field in type(part).model_fields.items():
+            if unit_of(field) == "rad" and abs(getattr(part, name)) > TURN:
+                angle = getattr(part, name)
+                yield found(
+                    "large-angle",
+                    f"{angle:g} rad is more than a whole turn; angles are in radians, and "
+                    f"{angle:g} deg is {math.radians(angle):.4g}",
+                    f"{section}.{name}",
+                )
