@@ -10,13 +10,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Signal:
-    """A logged quantity."""
+    """A logged quantity; `wrapped` is an angle that jumps by 2 pi and means the same."""
 
     name: str
     symbol: str
     unit: str
     meaning: str
     axes: tuple[str, ...] = ()
+    wrapped: bool = False
 
 
 # fmt: off
@@ -33,8 +34,12 @@ _ROWS = (
     Signal("x_e", "x_e", "m", "target ahead of the vessel, north (18); derived, not logged"),
     Signal("y_e", "y_e", "m", "target ahead of the vessel, east (18); derived, not logged"),
     Signal("z_e", "z_e", "m", "distance to the target (18)"),
-    Signal("psi_d", r"\psi_d", "rad", "direction of the target (19), in (-pi, pi]"),
-    Signal("psi_e", r"\psi_e", "rad", "heading error that the law acts on, after folding"),
+    Signal(
+        "psi_d", r"\psi_d", "rad", "direction of the target (19), in (-pi, pi]", wrapped=True
+    ),
+    Signal(
+        "psi_e", r"\psi_e", "rad", "heading error that the law acts on, after folding", wrapped=True
+    ),
     Signal("alpha_u", r"\alpha_u", "m/s", "virtual surge velocity (21)"),
     Signal("alpha_r", r"\alpha_r", "rad/s", "virtual yaw rate (30)"),
     Signal("beta_u", r"\beta_u", "m/s", "filtered virtual surge velocity (22)"),
@@ -70,7 +75,9 @@ _ROWS = (
     ),
     Signal("f_hat_u", r"\hat f_u", "m/s2", "network's estimate of f_u (25)"),
     Signal("f_hat_r", r"\hat f_r", "rad/s2", "network's estimate of f_r (34)"),
-    Signal("psi_d_held", r"\psi_d^-", "rad", "target direction at the law's last sample"),
+    Signal(
+        "psi_d_held", r"\psi_d^-", "rad", "target direction at the law's last sample", wrapped=True
+    ),
     Signal("psi_d_rate_held", r"\dot\psi_d^-", "rad/s", "difference quotient held by the law"),
     Signal("integral_u", r"\int u_p", "m", "integral of the surge velocity error (PID)"),
     Signal("integral_r", r"\int r_p", "rad", "integral of the yaw rate error (PID)"),

@@ -51,6 +51,20 @@ def test_units_in_the_last_place_are_counted_also_across_zero(start: float, coun
         assert deviation(start, number).ulps == deviation(number, start).ulps == count
 
 
+@pytest.mark.parametrize("name", ["psi_d", "psi_e", "psi_d_held"])
+def test_wrapped_angles_are_the_shorter_way_round_apart(name: str) -> None:
+    angle = np.zeros(50)
+    one, other = np.array(angle), np.array(angle)
+    one[10], other[10] = 3.13, -3.12  # across the seam
+    one[20], other[20] = 0.3, 0.2
+    found = compare(changed(**{name: one}), changed(**{name: other}))
+    (largest,) = found.largest
+    assert (largest.time, largest.gap) == (0.2, pytest.approx(0.1))
+    assert found.first is not None
+    assert found.first.gap == pytest.approx(2.0 * math.pi - 6.25)
+    assert compare(changed(psi=one), changed(psi=other)).largest[0].gap == pytest.approx(6.25)
+
+
 def test_zeros_of_either_sign_are_no_distance_apart_but_differ() -> None:
     assert deviation(0.0, -0.0).ulps == 0
     assert differing(np.array([0.0]), np.array([-0.0]))[0]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 from podusv_cli.kernels import Vector
 from podusv_cli.recording import Recording
 from podusv_cli.repetition.numbers import Deviation, differing, gaps
+from podusv_cli.signals import SIGNALS
 
 Place = tuple[int, ...]
 ENDINGS = ("status", "controller", "message")
@@ -70,6 +72,12 @@ class _Row:
     one: Vector
     other: Vector
     times: Vector | None
+
+    @property
+    def period(self) -> float:
+        """2 pi for an angle that is wrapped."""
+        known = SIGNALS.get(self.name)
+        return 2.0 * math.pi if known and known.wrapped else math.inf
 
 
 def compare(one: Recording, other: Recording) -> Logs:
@@ -139,7 +147,8 @@ def _place_of_first(row: _Row) -> Place:
 def _place_of_largest(row: _Row) -> Place:
     # Zeros of different sign are no distance apart, but they differ.
     apart = differing(row.one, row.other)
-    return _place(row, np.where(apart, gaps(row.one, row.other), -1.0), np.argmax)
+    distances = gaps(row.one, row.other, period=row.period)
+    return _place(row, np.where(apart, distances, -1.0), np.argmax)
 
 
 def _place(row: _Row, of: Any, choose: Callable[[Any], Any]) -> Place:
@@ -154,5 +163,5 @@ def _deviation(row: _Row, place: Place) -> Deviation:
         signal=f"{row.name}{index}",
         time=None if row.times is None else float(row.times[place[0]]),
         one=float(row.one[place]), other=float(row.other[place]),
-        peak=float(both[np.isfinite(both)].max(initial=0.0)),
+        peak=float(both[np.isfinite(both)].max(initial=0.0)), period=row.period,
     )  # fmt: skip

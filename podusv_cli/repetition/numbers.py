@@ -24,11 +24,15 @@ def _bits(array: Vector) -> npt.NDArray[np.int64]:
     return np.ascontiguousarray(array, dtype=np.float64).view(np.int64)
 
 
-def gaps(one: Vector, other: Vector) -> Vector:
-    """|one - other|, infinite where only one of them is a finite number; 0 where they agree."""
+def gaps(one: Vector, other: Vector, *, period: float = math.inf) -> Vector:
+    """|one - other|, infinite where only one of them is a finite number; 0 where they agree.
+
+    Of numbers that are the same a `period` further on, it is the shorter way round.
+    """
     apart = differing(one, other)
     with np.errstate(all="ignore"):
-        distance = np.where(apart, np.abs(one - other), 0.0)
+        straight = np.abs(one - other)
+        distance = np.where(apart, np.minimum(straight, np.abs(period - straight)), 0.0)
     return np.where(np.isfinite(distance), distance, np.inf)
 
 
@@ -37,7 +41,7 @@ class Deviation:
     """A number of a signal and what stands in its place in the other recording.
 
     `signal` has an index for one of several nodes; `time` [s] is None for what does not run over
-    time. `peak` is the signal's largest finite magnitude.
+    time. `peak` is the signal's largest finite magnitude; `period` that of a wrapped angle.
     """
 
     signal: str
@@ -45,11 +49,13 @@ class Deviation:
     one: float
     other: float
     peak: float
+    period: float = math.inf
 
     @property
     def gap(self) -> float:
-        """|one - other|, infinite where one is no finite number."""
-        distance = abs(self.one - self.other)
+        """|one - other|, the shorter way round; infinite where one is no finite number."""
+        straight = abs(self.one - self.other)
+        distance = min(straight, abs(self.period - straight))
         return distance if math.isfinite(distance) else math.inf
 
     @property
