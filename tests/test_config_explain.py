@@ -109,6 +109,18 @@ def test_a_kind_is_explained_key_by_key() -> None:
     ]  # fmt: skip
 
 
+@pytest.mark.parametrize("asked", ["actuator.pod", "actuator.pods", "actuator.pod.pods", "pods"])
+def test_keys_of_a_lists_items_are_explained_with_the_list(asked: str) -> None:
+    rows = {row.key: row for row in explain(asked)}
+    pod = sections(Scenario.model_fields["actuator"].annotation)["pod"].model_fields["pods"]
+    (one,) = _classes(pod.annotation)
+    found = [key.removeprefix("actuator.pods.NUMBER.") for key in rows if "NUMBER" in key]
+    assert found == list(one.model_fields)
+    row = rows["actuator.pods.NUMBER.angle_rate"]
+    assert (row.unit, row.range, row.default) == ("rad/s", "> 0", "required")
+    assert row.meaning == "fastest change of the angle"
+
+
 def test_a_key_says_everything_that_its_field_says() -> None:
     assert explain("controller.pid.T_d") == [
         Row(

@@ -112,15 +112,16 @@ def _at(place: tuple[str, ...]) -> list[Row]:
         return [*_together(entries), *rows.values()]
     if not entries:
         return _of_kind(place)
-    places = (place, (*place, NAME), (*place, NUMBER))
-    inside = [e for e in _keys() if e.path[:-1] in places or e.route[:-1] in places]
+    inside = [e for e in _keys() if {e.path[:-1], e.route[:-1]} & {place, *_items(place)}]
     heads = (replace(row, choices=() if inside else row.choices) for row in _together(entries))
     return [*heads, *_together(inside)]
 
 
 def _of_kind(place: tuple[str, ...]) -> list[Row]:
     """One kind of a section and its keys."""
-    inside = [entry for entry in _keys() if place == entry.route[:-1]]
+    own = [entry.route for entry in _keys() if place == entry.route[:-1]]
+    places = {place, *(item for route in own for item in _items(route))}
+    inside = [entry for entry in _keys() if entry.route[:-1] in places]
     above = [entry for entry in _keys() if place[:-1] in (entry.path, entry.route)]
     heads = [
         _kind_row(place, sections(entry.field.annotation)[place[-1]]) for entry in above if inside
@@ -132,8 +133,15 @@ def _of_kind(place: tuple[str, ...]) -> list[Row]:
 
 
 def _named(name: str) -> list[Row]:
-    """Every key whose last word this is."""
-    return _together(entry for entry in _keys() if entry.path[-1] == name)
+    """Every key whose last word this is, and what is in the items of one that has several."""
+    own = {entry.route for entry in _keys() if entry.path[-1] == name}
+    items = {item for route in own for item in _items(route)}
+    return _together(e for e in _keys() if e.route in own or e.route[:-1] in items)
+
+
+def _items(place: tuple[str, ...]) -> tuple[tuple[str, ...], ...]:
+    """Where the keys of a mapping's or a list's items are."""
+    return (*place, NAME), (*place, NUMBER)
 
 
 def _signal(name: str) -> list[Row]:
