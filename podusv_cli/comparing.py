@@ -18,10 +18,11 @@ from podusv_cli.comparison.entries import Absent, Entry
 from podusv_cli.comparison.expressions import Source
 from podusv_cli.config.loading import load_text
 from podusv_cli.config.scenario import Scenario
+from podusv_cli.errors import UsageError
 from podusv_cli.findings.finding import Finding
 from podusv_cli.findings.preflight import together
 from podusv_cli.interrupts import Extras, interrupts_heard
-from podusv_cli.logbook import jsonfile
+from podusv_cli.logbook import jsonfile, manifest
 from podusv_cli.logbook.folder import Run, RunWriter, open_run
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.parallel import Outcome, run_all
@@ -64,9 +65,14 @@ class Result:
 
 
 def from_folder(path: Path) -> list[Part]:
-    """The finished runs of a folder: one run, or all those of a comparison."""
+    """The finished runs of a folder: one run, or all those of a comparison.
+
+    Raises UsageError where it is nothing of the kind, StorageError where it is damaged.
+    """
     children = path.iterdir() if path.is_dir() else ()
     inner = sorted((c for c in children if (c / "log.h5").is_file()), key=_place(path))
+    if not inner and not (path / manifest.NAME).is_file():
+        raise UsageError(f"{path} is no run folder: it has no {manifest.NAME}")
     return [_from_run(child) for child in (inner or [path])]
 
 

@@ -232,8 +232,10 @@ def verify(
 ) -> Verified:  # fmt: skip
     """Verify a scenario's numbers; written to the file `out`, if there is one, as JSON.
 
-    Raises ScenarioError and StorageError.
+    Raises UsageError for a run folder, ScenarioError and StorageError.
     """
+    if (config / "resolved.yaml").is_file():
+        raise UsageError(f"{config} is a run folder; verify its resolved.yaml")
     from podusv_cli.verification import verify as verification  # not needed by a run
 
     done = verification.verify(load(config, overrides).scenario, tolerance, progress)

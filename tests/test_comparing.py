@@ -13,7 +13,7 @@ from podusv_cli import comparing, workflows
 from podusv_cli.comparison import table
 from podusv_cli.comparison.differences import differences
 from podusv_cli.config.loading import load
-from podusv_cli.errors import ScenarioError, StorageError
+from podusv_cli.errors import ScenarioError, UsageError
 from podusv_cli.figures.drawing import FIGURES, dressed
 from podusv_cli.figures.style import FORMATS
 
@@ -177,7 +177,7 @@ def test_a_wrong_expression_is_an_error_at_its_line(tmp_path):
 
 
 def test_something_that_is_no_run_is_refused(tmp_path):
-    with pytest.raises(StorageError):
+    with pytest.raises(UsageError, match="is no run folder"):
         workflows.compare([tmp_path], quick(out=tmp_path / "x"))
 
 

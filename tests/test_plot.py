@@ -9,7 +9,7 @@ from drawn_samples import recording, scenario
 
 from podusv_cli import __version__, workflows
 from podusv_cli.config.loading import resolved_yaml
-from podusv_cli.errors import StorageError, UsageError
+from podusv_cli.errors import UsageError
 from podusv_cli.figures import animation
 from podusv_cli.figures.drawing import FIGURES
 from podusv_cli.logbook import folder, hdf5
@@ -176,8 +176,11 @@ def test_the_film_is_a_file_beside_the_figures(one, tmp_path, monkeypatch):
 
 
 def test_a_folder_that_is_no_run_is_refused(tmp_path):
-    with pytest.raises(StorageError, match=r"manifest\.json"):
-        plot(tmp_path, out=tmp_path / "x")
+    (tmp_path / "mine.yaml").touch()
+    (tmp_path / "folders" / "of" / "runs").mkdir(parents=True)
+    for name in ("", "mine.yaml", "folders", "nowhere"):
+        with pytest.raises(UsageError, match=r" is no run folder: it has no manifest\.json"):
+            plot(tmp_path / name, out=tmp_path / "x")
 
 
 def command(*arguments, cwd):

@@ -291,3 +291,9 @@ def test_what_is_not_converged_ends_with_3_and_is_named(podusv: Any) -> None:
 
 def test_a_wrong_scenario_is_told_as_everywhere(podusv: Any) -> None:
     assert podusv("verify", "nope.yaml").code == 2
+
+
+def test_a_run_folder_leads_to_its_scenario(podusv: Any, tmp_path: Path) -> None:
+    (tmp_path / "resolved.yaml").touch()
+    said = podusv("verify", str(tmp_path))
+    assert said == (2, "", f"{tmp_path} is a run folder; verify its resolved.yaml\n")
