@@ -86,6 +86,11 @@ def test_a_wrong_value_is_one_sentence_at_its_place(text: str, says: str) -> Non
             "simulaton: 1",
             f"1: simulaton: unknown key; did you mean 'simulation'? (allowed: {KEYS})",
         ),
+        (
+            "K_Pu: 60",
+            f"1: K_Pu: unknown key; did you mean 'controller.K_Pu'? (allowed: {KEYS})",
+        ),
+        ("x: 1", f"1: x: unknown key; did you mean 'start.x' or 'path.x'? (allowed: {KEYS})"),
         ('"a\\nb": 1', rf"1: a\nb: unknown key (allowed: {KEYS})"),
         (
             "simulation: {duration: 0.015}",
@@ -160,6 +165,12 @@ def test_a_wrong_section_is_one_sentence_at_its_place(text: str, says: str) -> N
             "2:7: path.kind: missing (allowed: circle, line, line_circle, waypoints)",
         ),
         (
+            "{kind: pid}",
+            "{k_ze: 0.1, K_Pu: 60}",
+            "5:13: controller.kind: missing (allowed: adaptive_neural, backstepping, dsc, pid); "
+            "K_Pu belongs to kind pid",
+        ),
+        (
             "{kind: line}",
             "line",
             "2:7: path: must be a mapping of keys with kind circle, line, line_circle or "
@@ -168,7 +179,8 @@ def test_a_wrong_section_is_one_sentence_at_its_place(text: str, says: str) -> N
         (
             "{kind: line}",
             "{kind: line, radius: 1}",
-            "2:20: path.radius: unknown key (allowed: kind, x, y, course, speed)",
+            "2:20: path.radius: unknown key; radius belongs to kind circle "
+            "(allowed: kind, x, y, course, speed)",
         ),
         ("{kind: line}", "{kind: waypoints}", "2:7: path: needs at least two points, has 0"),
         (

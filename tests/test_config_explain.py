@@ -121,6 +121,12 @@ def test_keys_of_a_lists_items_are_explained_with_the_list(asked: str) -> None:
     assert row.meaning == "fastest change of the angle"
 
 
+def test_a_kind_is_explained_by_its_name_alone() -> None:
+    assert explain("pid") == explain("controller.pid")
+    heads = [row.key for row in explain("none") if row.type == "keys"]
+    assert heads == ["disturbance.none"]
+
+
 def test_a_key_says_everything_that_its_field_says() -> None:
     assert explain("controller.pid.T_d") == [
         Row(
@@ -171,6 +177,7 @@ def test_a_word_that_is_a_signal_and_a_key_is_explained_as_both() -> None:
         ("contoller", "; did you mean 'controller'?"),
         ("controller.pidd", "; did you mean 'controller.pid'?"),
         ("controller.k_z", "; did you mean 'controller.k_ze'?"),
+        ("Kiu", "; did you mean 'K_Iu'?"),
         ("Z_E", "; did you mean 'z_e'?"),
         ("qqq", ""),
         ("", ""),

@@ -60,7 +60,7 @@ def test_a_fault_of_a_law_to_compare_is_told_without_its_kind() -> None:
         SEVERAL + "controllers: {slow: {kind: pid, T_u: x, K_Pu: -1}, fast: {T_u: x}, other: 3}\n"
     )
     assert told(text) == [
-        "a.yaml:6:33: controllers.slow.T_u: unknown key; did you mean 'T_d'? "
+        "a.yaml:6:33: controllers.slow.T_u: unknown key; T_u belongs to kind dsc "
         f"(allowed: {', '.join(Pid.model_fields)})",
         "a.yaml:6:47: controllers.slow.K_Pu: must be a number not below 0 [kg/s], found -1",
         "a.yaml:6:64: controllers.fast.T_u: must be a number above 0 [s], found 'x'",

@@ -11,11 +11,21 @@ from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
 from podusv_cli.config import words
-from podusv_cli.config.annotations import choices, inside, is_component, members, noun, sections
-from podusv_cli.config.fields import wanted
+from podusv_cli.config.annotations import (
+    choices,
+    inside,
+    is_component,
+    joined,
+    members,
+    noun,
+    sections,
+)
+from podusv_cli.config.fields import NAME, NUMBER, keys, wanted
 from podusv_cli.config.scenario import Scenario
 from podusv_cli.config.tree import Fault, Node, Route, dotted, follow, plain
 from podusv_cli.registry import Component
+
+MOST_PLACES = 4  # of a key, in a message
 
 
 @dataclass(frozen=True)
@@ -121,9 +131,26 @@ def _told(root: Node, route: Route) -> bool:
 def _unknown_key(root: Node, spot: Spot, complaint: Any) -> Iterator[Fault]:
     *above, key = complaint["loc"]
     model = _model(_spot(tuple(above)).annotation)
-    node = follow(root, spot.route)[-1]
-    text = words.unknown("key", str(key), model.model_fields if model else ())
+    node, known = follow(root, spot.route)[-1], tuple(model.model_fields if model else ())
+    hint = _elsewhere(spot.route, str(key)) or words.did_you_mean(str(key), known)
+    text = f"unknown key{hint} (allowed: {', '.join(known)})"
     yield Fault(node.key_mark or node.mark, dotted(spot.route), text)
+
+
+def _elsewhere(route: Route, key: str) -> str:
+    """`; K_Pu belongs to kind pid`, or at the top `; did you mean 'controller.K_Pu'?`."""
+    if len(route) > 1:
+        above = _spot(tuple(route[:-1]))
+        return _home(key, sections(above.annotation)) if above.route == route[:-1] else ""
+    alike = (k.path for k in keys(Scenario) if words.folded(k.path[-1]) == words.folded(key))
+    places = dict.fromkeys(".".join(path) for path in alike if {NAME, NUMBER}.isdisjoint(path))
+    return f"; did you mean {joined([repr(p) for p in places][:MOST_PLACES])}?" if places else ""
+
+
+def _home(key: str, parts: dict[str, type[Component]]) -> str:
+    """Which kinds of a section have a key that not all of them have."""
+    kinds = [kind for kind, part in parts.items() if kind and key in part.model_fields]
+    return f"; {key} belongs to kind {joined(kinds)}" if 0 < len(kinds) < len(parts) else ""
 
 
 def _missing(root: Node, spot: Spot, complaint: Any) -> Iterator[Fault]:
@@ -138,8 +165,9 @@ def _no_kind(root: Node, spot: Spot, complaint: Any) -> Iterator[Fault]:
     route = (*spot.route, "kind")
     if not _told(root, route):
         kinds = ", ".join(sections(spot.annotation))
-        mark = follow(root, spot.route)[-1].mark
-        yield Fault(mark, dotted(route), f"missing (allowed: {kinds})")
+        node, parts = follow(root, spot.route)[-1], sections(spot.annotation)
+        homes = filter(None, (_home(key, parts) for key in node.mapping))
+        yield Fault(node.mark, dotted(route), f"missing (allowed: {kinds}){next(homes, '')}")
 
 
 def _unknown_kind(root: Node, spot: Spot, complaint: Any) -> Iterator[Fault]:

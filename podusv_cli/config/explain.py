@@ -54,14 +54,14 @@ def explain(key: str | None = None) -> list[Row]:
     """Rows for a key, a kind, a section, a signal or, with None, the sections of a scenario.
 
     `controller` gives its kinds, `controller.pid` that kind's keys, `controller.k_ze` or just
-    `k_ze` one key. Raises UnknownKeyError, with what was probably meant.
+    `k_ze` one key, and `pid` alone the kind. Raises UnknownKeyError, with what was probably meant.
     """
     if key is None:
         return [EXTENDS, *_together(entry for entry in _keys() if len(entry.path) == 1)]
     if key == EXTENDS.key:
         return [EXTENDS]
     place = tuple(NUMBER if step.isdecimal() else step for step in key.split("."))
-    found = _at(place) or [*_signal(key), *_named(key)]
+    found = _at(place) or [*_signal(key), *_named(key), *_kinds_named(key)]
     if not found:
         raise UnknownKeyError(f"{key}: no such key or signal{did_you_mean(key, _names())}")
     return found
@@ -137,6 +137,12 @@ def _named(name: str) -> list[Row]:
     own = {entry.route for entry in _keys() if entry.path[-1] == name}
     items = {item for route in own for item in _items(route)}
     return _together(e for e in _keys() if e.route in own or e.route[:-1] in items)
+
+
+def _kinds_named(name: str) -> list[Row]:
+    """Every kind of this name, and its keys."""
+    parts = {entry.path: sections(entry.field.annotation) for entry in _keys()}
+    return [row for path, kinds in parts.items() if name in kinds for row in _at((*path, name))]
 
 
 def _items(place: tuple[str, ...]) -> tuple[tuple[str, ...], ...]:
