@@ -275,3 +275,23 @@ def test_the_figure_shows_what_each_pod_did_over_what_it_was_asked_for() -> None
             np.testing.assert_array_equal(asked, log[f"{name}_cmd"][:, pod])
             np.testing.assert_array_equal(done, log[name][:, pod])
     assert not FIGURES["pods"].fits(shown(("ideal", run(corrected(), 0.1))))
+
+
+@pytest.mark.parametrize(
+    "one",
+    [
+        pods(*TWIN),
+        pods({"T_nV": 0.05}),
+        pods(*({**own, "T_nV": 0.02} for own in TWIN), horizon=0.05),
+        pods(horizon=0.02),
+    ],
+)
+def test_settled_force_and_moment_are_where_lags_and_limits_end(one: Pods) -> None:
+    x, demand, step = np.array([0, 0, 0, 0.5, 0.1, 0.05]), np.array([3.0, 0.8]), 0.02
+    state = one.rest()
+    for _ in range(400):
+        tau, rate, _ = loads(one, state, x, (3.0, 0.8))
+        state = state + step * rate
+    # Two pods with a horizon may end at other angles, of which the sway force alone tells.
+    both = [0, 2] if one.horizon else [0, 1, 2]
+    np.testing.assert_allclose(one.settled(x, demand)[both], tau[both], atol=1e-5)
