@@ -24,7 +24,7 @@ def check_law(loop: ClosedLoop) -> None:
     """
     law = loop.controller
     try:
-        with Aside() as aside, np.errstate(all="ignore"):
+        with np.errstate(all="ignore"), Aside() as aside:  # which takes it along
             aside.finish(lambda: _ask(loop))
     except TimeoutError:
         raise LawError(f"law {law.label}: asked at the start, {never_returns()}") from None

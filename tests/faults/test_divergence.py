@@ -154,3 +154,14 @@ def test_computing_counts_and_not_the_clock(monkeypatch: pytest.MonkeyPatch) -> 
 
     monkeypatch.setattr(blocks, "PATIENCE", 0.3)
     assert run(adrift(controller=Waiting()), 0.1, compiled=False).status == "finished"
+
+
+@pytest.mark.filterwarnings("error")
+def test_numbers_that_overflow_are_left_for_the_run_to_tell() -> None:
+    class Overflowing(Constant):
+        @staticmethod
+        def law(t, x, memory, target, k, table, tau, rate, signals, work):  # type: ignore[no-untyped-def, override]
+            tau[:] = np.float64(1e200) * np.float64(1e200)
+
+    check_law(adrift(controller=Overflowing()))
+    assert run(adrift(controller=Overflowing()), 1.0, compiled=False).status == "diverged"
