@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from podusv_cli.comparison import expressions
 from podusv_cli.comparison.conditions import Evidence
 from podusv_cli.comparison.parsing import ExpressionError, parse, renamed
 
@@ -218,3 +219,12 @@ def test_what_means_nothing_gets_a_sentence(text, says):
     with pytest.raises(ExpressionError) as error:
         parse(text, RUNS)
     assert says in str(error.value)
+
+
+def test_curves_of_different_logs_meet_at_the_same_times():
+    fine, coarse = np.arange(5.0), np.arange(0.0, 9.0, 2.0)
+    curves = [expressions.Curve(t, 3.0 * t, ()) for t in (fine, coarse)]
+    times = expressions._shared(curves)
+    assert times.tolist() == fine.tolist()
+    first, second = (expressions._at(curve, times) for curve in curves)
+    assert (first == second).all()

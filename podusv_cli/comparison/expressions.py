@@ -149,16 +149,29 @@ class Applied:
         """The operation's result, on the time of the curves."""
         got = [part.value(runs) for part in self.parts]
         curves = [part for part in got if isinstance(part, Curve)]
-        rows = min((len(curve.time) for curve in curves), default=0)
-        plain = [
-            part.values[:rows] if isinstance(part, Curve) else np.float64(part) for part in got
-        ]
+        times = _shared(curves)
+        plain = [_at(part, times) if isinstance(part, Curve) else np.float64(part) for part in got]
         with np.errstate(all="ignore"):
             result = self.operation(*plain)
         if not curves:
             return float(result)
         reaches = tuple(dict.fromkeys(reach for curve in curves for reach in curve.reaches))
-        return Curve(curves[0].time[:rows], np.asarray(result), reaches)
+        return Curve(times, np.asarray(result), reaches)
+
+
+def _shared(curves: list[Curve]) -> Vector:
+    """The first curve's times, as far as all curves go."""
+    if not curves or not all(len(curve.time) for curve in curves):
+        return np.zeros(0)
+    times: Vector = curves[0].time
+    return np.asarray(times[times <= min(curve.time[-1] for curve in curves)])
+
+
+def _at(curve: Curve, times: Vector) -> Vector:
+    """The curve at these times; logs of other intervals are interpolated."""
+    if np.array_equal(curve.time[: len(times)], times):
+        return curve.values[: len(times)]
+    return np.asarray(np.interp(times, curve.time, curve.values))
 
 
 @dataclass(frozen=True)
