@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from time import thread_time
+from time import process_time
 from typing import Any
 
 from benchmarks.c_program import agreement, timer
@@ -31,9 +31,9 @@ def engine_timers(case: Case) -> dict[str, Timer]:
     loop, over = case.loop(), grid()
     watching = metrics_observer(loop, over)
     return {
-        "podusv": timed(partial(simulate, loop, over), clock=thread_time),
+        "podusv": timed(partial(simulate, loop, over), clock=process_time),
         "podusv with metrics": timed(
-            partial(simulate, loop, over, observer=watching), clock=thread_time
+            partial(simulate, loop, over, observer=watching), clock=process_time
         ),
     }
 
@@ -78,7 +78,7 @@ def _with_nodes(n: int) -> Controller:
 
 def _a_step(runs: dict[str, tuple[ClosedLoop, TimeGrid]], rounds: int) -> dict[str, list[float]]:
     timers = {
-        label: timed(partial(simulate, *run), clock=thread_time) for label, run in runs.items()
+        label: timed(partial(simulate, *run), clock=process_time) for label, run in runs.items()
     }
     times = in_turns(timers, rounds)
     return {label: quartiles(times[label] / over.steps) for label, (_, over) in runs.items()}

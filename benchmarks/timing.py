@@ -25,7 +25,7 @@ def timed(
 ) -> Timer:
     """A function that gives the median time of `work` over a few repeats [s].
 
-    `time.thread_time` as the clock leaves out what other programs use of the processor.
+    `time.process_time` as the clock leaves out what other programs use of the processor.
     """
 
     def once() -> float:
