@@ -7,11 +7,15 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
 
 import podusv_cli
+from podusv_cli import cli
 
 ROOT = Path(podusv_cli.__file__).parents[1]
 BASE = """
@@ -26,6 +30,32 @@ silence: [saturated] # the gains are large on purpose
 """
 TWO = BASE + "controllers: {stiff: {K_Pu: 200.0}, soft: {K_Pu: 5.0}}\n"
 LONG = BASE.replace("duration: 1.0", "duration: 2e5, step: 1e-3") + "log: {every: 1000}\n"
+
+
+class Said(NamedTuple):
+    """What a command left behind."""
+
+    code: object
+    out: str
+    err: str
+
+
+Command = Callable[..., Said]
+
+
+def commanded(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], *, columns: int = 100
+) -> Command:
+    """The command line in this process, on a terminal that wide."""
+    monkeypatch.setenv("COLUMNS", str(columns))
+
+    def run(*words: Any) -> Said:
+        monkeypatch.setattr(sys, "argv", ["podusv", *map(str, words)])
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        return Said(ended.value.code, *capsys.readouterr())
+
+    return run
 
 
 def write(name: str, text: str) -> str:

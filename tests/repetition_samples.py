@@ -3,48 +3,22 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-import pytest
 from config_samples import SOUND
 from logbook_samples import files
 
 import podusv_cli
-from podusv_cli import cli, workflows
+from podusv_cli import workflows
 from podusv_cli.logbook import hdf5, jsonfile, reading
 from podusv_cli.logbook.folder import RunWriter
 from podusv_cli.recording import Recording
 
 SCENARIO = SOUND + "name: sample\nsimulation: {step: 0.01, duration: 0.5, compiled: false}\n"
-
-
-class Said(NamedTuple):
-    """What a command left behind."""
-
-    code: object
-    out: str
-    err: str
-
-
-Command = Callable[..., Said]
-
-
-def commanded(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Command:
-    """The command line on a terminal of 100 columns."""
-    monkeypatch.setenv("COLUMNS", "100")
-
-    def run(*words: Any) -> Said:
-        monkeypatch.setattr(sys, "argv", ["podusv", *map(str, words)])
-        with pytest.raises(SystemExit) as ended:
-            cli.main()
-        return Said(ended.value.code, *capsys.readouterr())
-
-    return run
 
 
 def made(folder: Path, *overrides: str, text: str = SCENARIO) -> Path:

@@ -3,50 +3,24 @@
 from __future__ import annotations
 
 import json
-import os
-import signal
-import sys
-import threading
-import time
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import NamedTuple
 
 import pytest
-from command_samples import BASE, LONG, SIGNALS, TWO, gone, send, under_way, wait_for, write
+from command_samples import BASE, TWO, Command, Said, commanded, write
 
-from podusv_cli import cli, comparing, running
+from podusv_cli import comparing
 from podusv_cli.logbook import manifest
-from podusv_cli.logbook.folder import open_run
-from podusv_cli.parallel import INTERRUPTED, Outcome
-
-
-class Said(NamedTuple):
-    """What a command left behind."""
-
-    code: object
-    out: str
-    err: str
-
-
-Podusv = Callable[..., Said]
+from podusv_cli.parallel import Outcome
 
 
 @pytest.fixture
 def podusv(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Podusv:
+) -> Command:
     """`podusv compare` without figures, in a folder of its own."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "100")
-
-    def run(*words: str) -> Said:
-        monkeypatch.setattr(sys, "argv", ["podusv", "compare", "--no-figures", *words])
-        with pytest.raises(SystemExit) as ended:
-            cli.main()
-        return Said(ended.value.code, *capsys.readouterr())
-
-    return run
+    return partial(commanded(monkeypatch, capsys), "compare", "--no-figures")
 
 
 def claim(name: str, expect: str) -> str:
@@ -62,7 +36,7 @@ def claims_of(said: Said) -> dict[str, dict]:
 # --- what is told
 
 
-def test_a_diverging_run_is_exit_code_3_and_hides_no_other(podusv: Podusv) -> None:
+def test_a_diverging_run_is_exit_code_3_and_hides_no_other(podusv: Command) -> None:
     config = write("two.yaml", TWO)
     said = podusv(config, "--out", "x", "--set", "controllers.soft.T_d=1e-5")
     assert said.code == 3
@@ -74,7 +48,7 @@ def test_a_diverging_run_is_exit_code_3_and_hides_no_other(podusv: Podusv) -> No
     assert manifest.check(Path("x")).status == "finished"
 
 
-def test_runs_that_differ_in_more_are_warned_of_by_key(podusv: Podusv) -> None:
+def test_runs_that_differ_in_more_are_warned_of_by_key(podusv: Command) -> None:
     write("a.yaml", BASE)
     write("b.yaml", BASE.replace("y: -2.0", "y: -3.0"))
     said = podusv("a.yaml", "b.yaml", "--out", "x")
@@ -85,7 +59,7 @@ def test_runs_that_differ_in_more_are_warned_of_by_key(podusv: Podusv) -> None:
     assert podusv(write("two.yaml", TWO), "--out", "y").err == ""
 
 
-def test_json_has_the_documented_shape(podusv: Podusv) -> None:
+def test_json_has_the_documented_shape(podusv: Command) -> None:
     config = write("two.yaml", TWO + claim("C1", "stiff.iae <= soft.iae"))
     said = podusv(config, "--out", "x", "--json")
     found = json.loads(said.out)
@@ -104,11 +78,11 @@ def test_json_has_the_documented_shape(podusv: Podusv) -> None:
     assert found["claims"][0]["verdict"] == "reproduced"
 
 
-def test_quiet_is_the_folder_alone(podusv: Podusv) -> None:
+def test_quiet_is_the_folder_alone(podusv: Command) -> None:
     assert podusv(write("two.yaml", TWO), "--out", "x", "-q") == (0, "x\n", "")
 
 
-def test_finished_folders_and_a_scenario_mix(podusv: Podusv) -> None:
+def test_finished_folders_and_a_scenario_mix(podusv: Command) -> None:
     podusv(write("two.yaml", TWO), "--out", "x")
     said = podusv("x", "x/soft", write("one.yaml", BASE), "--out", "y", "--json")
     found = json.loads(said.out)
@@ -119,13 +93,13 @@ def test_finished_folders_and_a_scenario_mix(podusv: Podusv) -> None:
 
 
 @pytest.mark.parametrize("name", ["nope.yaml", "nope"])
-def test_an_unknown_file_is_a_line(podusv: Podusv, name: str) -> None:
+def test_an_unknown_file_is_a_line(podusv: Command, name: str) -> None:
     said = podusv(name, "--out", "x")
     assert said == (2, "", f"{name}: cannot be read: no such file or directory\n")
     assert not Path("x").exists()
 
 
-def test_a_scenario_may_be_called_like_a_file_of_the_comparison(podusv: Podusv) -> None:
+def test_a_scenario_may_be_called_like_a_file_of_the_comparison(podusv: Command) -> None:
     write("figures.yaml", BASE)
     write("unit.yaml", BASE)
     said = podusv("figures.yaml", "unit.yaml", "--out", "x", "--json")
@@ -136,7 +110,7 @@ def test_a_scenario_may_be_called_like_a_file_of_the_comparison(podusv: Podusv) 
 # --- claims of several scenarios
 
 
-def test_claims_speak_of_their_own_scenarios_runs(podusv: Podusv) -> None:
+def test_claims_speak_of_their_own_scenarios_runs(podusv: Command) -> None:
     """The second scenario's `stiff` and `soft` are swapped, and run under other names."""
     swapped = BASE + "controllers: {soft: {K_Pu: 200.0}, stiff: {K_Pu: 5.0}}\n"
     write("a.yaml", TWO + claim("C1", "stiff.peak_tau_u > soft.peak_tau_u"))
@@ -151,7 +125,7 @@ def test_claims_speak_of_their_own_scenarios_runs(podusv: Podusv) -> None:
     assert found["C2"]["expect"].startswith("stiff_2.peak_tau_u > soft_2.peak_tau_u")
 
 
-def test_claims_reach_runs_that_are_named_after_their_scenario(podusv: Podusv) -> None:
+def test_claims_reach_runs_that_are_named_after_their_scenario(podusv: Command) -> None:
     write("my-a.yaml", BASE + claim("C1", "pid.peak_tau_u > 1 and max(pid.u, 0, 1) > 0"))
     write("my-b.yaml", BASE)
     found = claims_of(podusv("my-a.yaml", "my-b.yaml", "--out", "x", "--json"))
@@ -159,7 +133,7 @@ def test_claims_reach_runs_that_are_named_after_their_scenario(podusv: Podusv) -
     assert list(found["C1"]["numbers"]) == ["my-a.peak_tau_u", "max(my-a.u, 0, 1)"]
 
 
-def test_claims_are_not_about_finished_runs_of_the_same_name(podusv: Podusv) -> None:
+def test_claims_are_not_about_finished_runs_of_the_same_name(podusv: Command) -> None:
     config = write("two.yaml", TWO + claim("C1", "soft.peak_tau_u < 100"))
     podusv(config, "--out", "old", "--set", "controllers.soft.K_Pu=900")
     found = claims_of(podusv("old/soft", config, "--out", "x", "--json"))
@@ -167,7 +141,7 @@ def test_claims_are_not_about_finished_runs_of_the_same_name(podusv: Podusv) -> 
     assert list(found["C1"]["numbers"]) == ["soft_2.peak_tau_u"]
 
 
-def test_claims_of_the_same_name_keep_apart(podusv: Podusv) -> None:
+def test_claims_of_the_same_name_keep_apart(podusv: Command) -> None:
     write("a.yaml", TWO + claim("C1", "finished(soft)"))
     write("b.yaml", TWO + claim("C1", "not finished(soft)"))
     found = claims_of(podusv("a.yaml", "b.yaml", "a.yaml", "--out", "x", "--json"))
@@ -176,7 +150,7 @@ def test_claims_of_the_same_name_keep_apart(podusv: Podusv) -> None:
     }  # fmt: skip
 
 
-def test_cannot_tell_says_why(podusv: Podusv) -> None:
+def test_cannot_tell_says_why(podusv: Command) -> None:
     config = write("two.yaml", TWO + claim("C1", "soft.iae < stiff.iae"))
     said = podusv(config, "--out", "x", "--set", "controllers.soft.T_d=1e-5")
     assert "C1  cannot tell" in said.out
@@ -191,7 +165,7 @@ def test_cannot_tell_says_why(podusv: Podusv) -> None:
 
 @pytest.mark.parametrize("out", ["x", "x/", "./x/../x", "x/soft", "x/new", "."])
 @pytest.mark.parametrize("force", [[], ["--force"]])
-def test_what_is_compared_is_not_overwritten(podusv: Podusv, out: str, force: list[str]) -> None:
+def test_what_is_compared_is_not_overwritten(podusv: Command, out: str, force: list[str]) -> None:
     podusv(write("two.yaml", TWO), "--out", "x")
     before = manifest.check(Path("x"))
     said = podusv("x", "--out", out, *force)
@@ -203,21 +177,21 @@ def test_what_is_compared_is_not_overwritten(podusv: Podusv, out: str, force: li
     assert not Path("x/new").exists()
 
 
-def test_a_scenario_inside_what_would_be_replaced_is_refused(podusv: Podusv) -> None:
+def test_a_scenario_inside_what_would_be_replaced_is_refused(podusv: Command) -> None:
     podusv(write("two.yaml", TWO), "--out", "x")
     said = podusv("x/soft/scenario.yaml", "--out", "x", "--force")
     assert said.code == 2
     assert Path("x/soft/scenario.yaml").is_file()
 
 
-def test_a_link_is_no_way_around(podusv: Podusv) -> None:
+def test_a_link_is_no_way_around(podusv: Command) -> None:
     podusv(write("two.yaml", TWO), "--out", "x")
     Path("link").symlink_to("x")
     assert podusv("link/soft", "--out", "x", "--force").code == 2
     assert Path("x/soft/log.h5").is_file()
 
 
-def test_set_without_a_scenario_is_refused(podusv: Podusv) -> None:
+def test_set_without_a_scenario_is_refused(podusv: Command) -> None:
     podusv(write("two.yaml", TWO), "--out", "x")
     said = podusv("x/soft", "x/stiff", "--set", "start.x=1", "--out", "y")
     assert said.code == 2
@@ -240,7 +214,7 @@ def test_set_without_a_scenario_is_refused(podusv: Podusv) -> None:
     ],
 )
 def test_a_claim_without_meaning_is_a_scenario_error(
-    podusv: Podusv, expect: str, says: str
+    podusv: Command, expect: str, says: str
 ) -> None:
     config = write("two.yaml", TWO + claim("C1", expect))
     said = podusv(config, "--out", "x")
@@ -252,24 +226,14 @@ def test_a_claim_without_meaning_is_a_scenario_error(
 
 
 @pytest.mark.parametrize("name", ["<b>", "a|b", "a b", "", "9" * 31])
-def test_claims_have_plain_names(podusv: Podusv, name: str) -> None:
+def test_claims_have_plain_names(podusv: Command, name: str) -> None:
     config = write("two.yaml", TWO + claim(f"{name!r}", "finished(soft)"))
     said = podusv(config, "--out", "x")
     assert said.code == 2
     assert "a claim's name is at most 30 of" in said.err
 
 
-# --- interrupts
-
-
-def test_nothing_finished_leaves_nothing(podusv: Podusv, monkeypatch: pytest.MonkeyPatch) -> None:
-    lost = Outcome(failure=INTERRUPTED, cut=True)
-    monkeypatch.setattr(comparing, "run_all", lambda jobs, *rest: [lost] * len(jobs))
-    assert podusv(write("two.yaml", TWO), "--out", "x") == (130, "", "")
-    assert [path.name for path in Path().iterdir()] == ["two.yaml"]
-
-
-def test_runs_that_all_die_are_reported(podusv: Podusv, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_runs_that_all_die_are_reported(podusv: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     lost = Outcome(failure="its process ended with exit code -9, 2 times")
     monkeypatch.setattr(comparing, "run_all", lambda jobs, *rest: [lost] * len(jobs))
     config = write("two.yaml", TWO + claim("C1", "soft.iae < stiff.iae"))
@@ -281,91 +245,3 @@ def test_runs_that_all_die_are_reported(podusv: Podusv, monkeypatch: pytest.Monk
     ]
     assert "soft.iae: soft has no log: its process ended with exit code -9" in said.out
     assert Path("x/comparison.csv").read_text().startswith("metric,unit,stiff,soft")
-
-
-@pytest.mark.parametrize(("number", "code"), SIGNALS)
-@pytest.mark.parametrize("times", [1, 3])
-def test_an_interrupted_comparison_keeps_what_it_has(
-    podusv: Podusv, number: signal.Signals, code: int, times: int
-) -> None:
-    write("short.yaml", BASE)
-    write("long.yaml", LONG)
-    with under_way("compare", "short.yaml", "long.yaml", "--out", "x") as process:
-        wait_for(".x.podusv-*.part/new/short/manifest.json")
-        send(process, number, times)
-        out, err = process.communicate(timeout=30)
-        assert process.returncode == code, err
-        assert gone(process)
-    assert "long: interrupted after t = " in err
-    assert "Traceback" not in err
-    assert "compared 2 runs: x" in out
-    assert manifest.check(Path("x")).status == "interrupted"
-    assert manifest.check(Path("x/short")).status == "finished"
-    assert manifest.check(Path("x/long")).status == "interrupted"
-    assert not list(Path().glob(".x*"))
-
-
-@pytest.mark.parametrize(("number", "code"), SIGNALS)
-def test_an_interrupt_while_drawing_costs_the_figures_only(
-    podusv: Podusv, number: signal.Signals, code: int
-) -> None:
-    config = write("two.yaml", TWO)
-    with under_way("compare", config, "--out", "x") as process:
-        wait_for(".x.podusv-*.part/new/comparison.csv")
-        send(process, number, 1)
-        out, err = process.communicate(timeout=30)
-        assert process.returncode == code, err
-        assert gone(process)
-    assert "compared 2 runs: x" in out
-    assert "Traceback" not in err
-    assert manifest.check(Path("x")).status == "interrupted"
-    assert manifest.check(Path("x/soft")).status == "finished"
-    assert Path("x/report.html").is_file()
-    assert not Path("x/figures").exists()
-
-
-def soon(number: signal.Signals, work: Callable[..., object]) -> Callable[..., object]:
-    """The work, with a signal to this process after it has begun."""
-
-    def begun(*args: object, **options: object) -> object:
-        threading.Timer(0.1, os.kill, (os.getpid(), number)).start()
-        return work(*args, **options)
-
-    return begun
-
-
-def run_until_stopped(capsys: pytest.CaptureFixture[str], *words: str) -> Said:
-    """`podusv run` in this process."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys, "argv", ["podusv", "run", *words])
-        with pytest.raises(SystemExit) as ended:
-            cli.main()
-    return Said(ended.value.code, *capsys.readouterr())
-
-
-@pytest.mark.parametrize(("number", "code"), SIGNALS)
-def test_an_interrupted_run_is_kept(
-    podusv: Podusv, number: signal.Signals, code: int,
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
-) -> None:  # fmt: skip
-    monkeypatch.setattr(running, "simulate", soon(number, running.simulate))
-    said = run_until_stopped(capsys, write("long.yaml", LONG), "--out", "x")
-    assert said.code == code
-    assert said.err.startswith("long.yaml: interrupted after t = ")
-    assert manifest.check(Path("x")).status == "interrupted"
-    assert 0 < open_run(Path("x")).recording["time"][-1] < 2e5
-
-
-@pytest.mark.parametrize(("number", "code"), SIGNALS)
-@pytest.mark.parametrize("stage", ["_drawn", "_cost"])
-def test_a_run_that_is_interrupted_after_its_simulation_is_whole(
-    podusv: Podusv, number: signal.Signals, code: int, stage: str,
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
-) -> None:  # fmt: skip
-    monkeypatch.setattr(running, stage, soon(number, lambda *given: time.sleep(60)))
-    said = run_until_stopped(capsys, write("short.yaml", BASE), "--out", "x")
-    assert said.code == code
-    assert said.err.startswith("short.yaml: interrupted after the simulation; the log is whole")
-    assert manifest.check(Path("x")).status == "interrupted"
-    assert open_run(Path("x")).recording.status == "finished"
-    assert not Path("x/figures").exists()

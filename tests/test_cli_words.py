@@ -6,13 +6,12 @@ import ast
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
-from typing import NamedTuple
 
 import pytest
 import typer
+from command_samples import Command, commanded
 from config_samples import SOUND, write
 
 import podusv_cli
@@ -29,30 +28,14 @@ HEAVY = {
 ROOT = Path(podusv_cli.__file__).parents[1]
 
 
-class Said(NamedTuple):
-    """What a command left behind."""
-
-    code: object
-    out: str
-    err: str
-
-
 @pytest.fixture
 def podusv(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Callable[..., Said]:
+) -> Command:
     """The command line, in a folder of its own with one sound scenario."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "80")
     write("a.yaml", SOUND)
-
-    def run(*words: str) -> Said:
-        monkeypatch.setattr(sys, "argv", ["podusv", *words])
-        with pytest.raises(SystemExit) as ended:
-            cli.main()
-        return Said(ended.value.code, *capsys.readouterr())
-
-    return run
+    return commanded(monkeypatch, capsys, columns=80)
 
 
 def python(*words: str, stdout: int = subprocess.PIPE) -> subprocess.CompletedProcess[str]:
@@ -76,12 +59,12 @@ def podusv_process(*words: str, stdout: int = subprocess.PIPE) -> subprocess.Com
 # --- validate
 
 
-def test_a_sound_scenario_is_one_line(podusv: Callable[..., Said]) -> None:
+def test_a_sound_scenario_is_one_line(podusv: Command) -> None:
     said = podusv("validate", "a.yaml", "--set", "controller.k_ze=0.03")
     assert said == (0, "a.yaml: ok (a, pid, 31000 steps)\n", "")
 
 
-def test_every_fault_is_a_line_on_stderr(podusv: Callable[..., Said]) -> None:
+def test_every_fault_is_a_line_on_stderr(podusv: Command) -> None:
     write("bad.yaml", SOUND + "start: {x: no, z: 1}\n")
     assert podusv("validate", "bad.yaml", "--set", "log.every=0") == (
         2,
@@ -92,12 +75,12 @@ def test_every_fault_is_a_line_on_stderr(podusv: Callable[..., Said]) -> None:
     )
 
 
-def test_a_missing_file_is_a_line_on_stderr(podusv: Callable[..., Said]) -> None:
+def test_a_missing_file_is_a_line_on_stderr(podusv: Command) -> None:
     said = podusv("validate", "nope.yaml")
     assert said == (2, "", "nope.yaml: cannot be read: no such file or directory\n")
 
 
-def test_the_laws_to_compare_are_named_and_claims_are_checked(podusv: Callable[..., Said]) -> None:
+def test_the_laws_to_compare_are_named_and_claims_are_checked(podusv: Command) -> None:
     several = SOUND + "controllers: {slow: {k_ze: 0.01}, fast: {k_ze: 1}}\nclaims:\n"
     write("b.yaml", several + "  C1: {says: s, source: p, expect: slow.iae > fast.iae}\n")
     ok, *_ = podusv("validate", "b.yaml").out.splitlines()
@@ -108,7 +91,7 @@ def test_the_laws_to_compare_are_named_and_claims_are_checked(podusv: Callable[.
     assert said.err.startswith("c.yaml:8:36: claims.C1.expect: ")
 
 
-def test_verbose_shows_every_value_and_where_it_comes_from(podusv: Callable[..., Said]) -> None:
+def test_verbose_shows_every_value_and_where_it_comes_from(podusv: Command) -> None:
     said = podusv("validate", "a.yaml", "-v", "--set", "start.x=-5", "--set", "name=b")
     assert said.code == 0
     lines = said.out.splitlines()
@@ -124,7 +107,7 @@ def test_verbose_shows_every_value_and_where_it_comes_from(podusv: Callable[...,
 # --- explain, list, schema
 
 
-def test_explain_shows_everything_about_a_key(podusv: Callable[..., Said]) -> None:
+def test_explain_shows_everything_about_a_key(podusv: Command) -> None:
     assert podusv("explain", "controller.K_Pu") == (
         0,
         "controller.K_Pu  a number >= 0 [kg/s], default 1100.0\n"
@@ -134,7 +117,7 @@ def test_explain_shows_everything_about_a_key(podusv: Callable[..., Said]) -> No
     )
 
 
-def test_explain_shows_the_sections_without_a_key(podusv: Callable[..., Said]) -> None:
+def test_explain_shows_the_sections_without_a_key(podusv: Command) -> None:
     out = podusv("explain").out
     assert [line for line in out.splitlines() if line in Scenario.model_fields] == [
         "vessel", "nominal", "start", "path", "disturbance", "actuator", "controller", "simulation",
@@ -143,14 +126,14 @@ def test_explain_shows_the_sections_without_a_key(podusv: Callable[..., Said]) -
     assert "    kinds: circle, line, line_circle, waypoints\n" in out
 
 
-def test_explain_tells_an_unknown_key(podusv: Callable[..., Said]) -> None:
+def test_explain_tells_an_unknown_key(podusv: Command) -> None:
     said = podusv("explain", "contoller")
     assert said == (2, "", "contoller: no such key or signal; did you mean 'controller'?\n")
 
 
 @pytest.mark.parametrize("columns", ["20", "40", "300"])
 def test_text_fits_the_terminal(
-    podusv: Callable[..., Said], monkeypatch: pytest.MonkeyPatch, columns: str
+    podusv: Command, monkeypatch: pytest.MonkeyPatch, columns: str
 ) -> None:
     monkeypatch.setenv("COLUMNS", columns)
     out = podusv("explain", "metrics").out
@@ -158,19 +141,19 @@ def test_text_fits_the_terminal(
     assert "the last part of the run" in " ".join(out.split())
 
 
-def test_nothing_but_plain_text_goes_into_a_pipe(podusv: Callable[..., Said]) -> None:
+def test_nothing_but_plain_text_goes_into_a_pipe(podusv: Command) -> None:
     for words in (["explain"], ["explain", "controller"], ["list"], ["--help"], ["schema"]):
         assert "\x1b" not in podusv(*words).out
 
 
-def test_list_names_every_kind_and_every_vessel(podusv: Callable[..., Said]) -> None:
+def test_list_names_every_kind_and_every_vessel(podusv: Command) -> None:
     out = podusv("list").out
     for kind in ("line_circle", "harmonic", "saturated", "adaptive_neural", *vessel_names()):
         assert f"\n  {kind}\n" in out
     assert "CyberShip II" in out
 
 
-def test_schema_prints_the_schema(podusv: Callable[..., Said]) -> None:
+def test_schema_prints_the_schema(podusv: Command) -> None:
     assert podusv("schema") == (0, schema_text(), "")
 
 
@@ -178,7 +161,7 @@ def test_schema_prints_the_schema(podusv: Callable[..., Said]) -> None:
 
 
 @pytest.mark.parametrize("name", cli.COMMANDS)
-def test_every_command_and_option_has_help(name: str, podusv: Callable[..., Said]) -> None:
+def test_every_command_and_option_has_help(name: str, podusv: Command) -> None:
     command = typer.main.get_command(cli.app).commands[name]
     assert command.help
     assert all(getattr(option, "help", "") for option in command.params), name
@@ -193,14 +176,14 @@ def test_a_command_is_a_function_of_its_name() -> None:
         assert callable(getattr(import_module(f"podusv_cli.cli.{name}"), name))
 
 
-def test_version(podusv: Callable[..., Said]) -> None:
+def test_version(podusv: Command) -> None:
     assert podusv("--version") == (0, f"podusv {podusv_cli.__version__}\n", "")
 
 
 @pytest.mark.parametrize(
     "words", [["validate"], ["valdate", "a.yaml"], ["validate", "a.yaml", "--x"]]
 )
-def test_wrong_usage_exits_with_2(podusv: Callable[..., Said], words: list[str]) -> None:
+def test_wrong_usage_exits_with_2(podusv: Command, words: list[str]) -> None:
     said = podusv(*words)
     assert said.code == 2
     assert said.out == ""

@@ -11,12 +11,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command_samples import Command, commanded
 from hypothesis import given
 from hypothesis import strategies as st
 from logbook_samples import recording
 from repetition_samples import (
-    Command,
-    commanded,
     copied,
     flip,
     made,

@@ -13,11 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from command_samples import Command, commanded
 from logbook_samples import ENVIRONMENT, beside, files
 from repetition_samples import (
     SCENARIO,
-    Command,
-    commanded,
     copied,
     flip,
     made,

@@ -5,15 +5,13 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import NamedTuple
 
 import faulty_laws
 import numpy as np
 import pytest
-from command_samples import BASE, write
+from command_samples import BASE, Command, commanded, write
 from conftest import Constant, adrift, run
 
-from podusv_cli import cli
 from podusv_cli.engine import blocks
 from podusv_cli.engine.asking import check_law
 from podusv_cli.engine.batch import simulate_many
@@ -25,28 +23,13 @@ from podusv_cli.logbook.folder import open_run
 QUICK = 0.4  # s of computing; what a law may take in these tests
 
 
-class Said(NamedTuple):
-    """What a command left behind."""
-
-    code: object
-    out: str
-    err: str
-
-
 @pytest.fixture
 def podusv(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Callable[..., Said]:
+) -> Command:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(blocks, "PATIENCE", QUICK)
-
-    def run(*words: str) -> Said:
-        monkeypatch.setattr(sys, "argv", ["podusv", *words])
-        with pytest.raises(SystemExit) as ended:
-            cli.main()
-        return Said(ended.value.code, *capsys.readouterr())
-
-    return run
+    return commanded(monkeypatch, capsys)
 
 
 @pytest.fixture
@@ -68,7 +51,7 @@ WAYS = {
 
 @pytest.mark.parametrize("name", WAYS)
 def test_a_law_that_fails_on_the_way_leaves_its_log(
-    podusv: Callable[..., Said], law: Callable[[str], None], name: str
+    podusv: Command, law: Callable[[str], None], name: str
 ) -> None:
     compiled, last, says = WAYS[name]
     law(name)
@@ -98,7 +81,7 @@ REFUSED = {
 
 @pytest.mark.parametrize("name", REFUSED)
 def test_a_law_that_is_not_what_it_says_is_refused_before_the_run(
-    podusv: Callable[..., Said], law: Callable[[str], None], name: str
+    podusv: Command, law: Callable[[str], None], name: str
 ) -> None:
     law(name)
     said = podusv("run", write("a.yaml", BASE), "--out", "x")

@@ -1,0 +1,122 @@
+"""Interrupts of runs and comparisons: what was finished is kept, and says that it was cut."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from command_samples import (
+    BASE,
+    LONG,
+    SIGNALS,
+    TWO,
+    Command,
+    commanded,
+    gone,
+    send,
+    under_way,
+    wait_for,
+    write,
+)  # fmt: skip
+
+from podusv_cli import comparing, running
+from podusv_cli.logbook import manifest
+from podusv_cli.logbook.folder import open_run
+from podusv_cli.parallel import INTERRUPTED, Outcome
+
+
+@pytest.fixture
+def podusv(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Command:
+    monkeypatch.chdir(tmp_path)
+    return commanded(monkeypatch, capsys)
+
+
+def test_nothing_finished_leaves_nothing(podusv: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    lost = Outcome(failure=INTERRUPTED, cut=True)
+    monkeypatch.setattr(comparing, "run_all", lambda jobs, *rest: [lost] * len(jobs))
+    assert podusv("compare", "--no-figures", write("two.yaml", TWO), "--out", "x") == (130, "", "")
+    assert [path.name for path in Path().iterdir()] == ["two.yaml"]
+
+
+@pytest.mark.parametrize(("number", "code"), SIGNALS)
+@pytest.mark.parametrize("times", [1, 3])
+def test_an_interrupted_comparison_keeps_what_it_has(
+    podusv: Command, number: signal.Signals, code: int, times: int
+) -> None:
+    write("short.yaml", BASE)
+    write("long.yaml", LONG)
+    with under_way("compare", "short.yaml", "long.yaml", "--out", "x") as process:
+        wait_for(".x.podusv-*.part/new/short/manifest.json")
+        send(process, number, times)
+        out, err = process.communicate(timeout=30)
+        assert process.returncode == code, err
+        assert gone(process)
+    assert "long: interrupted after t = " in err
+    assert "Traceback" not in err
+    assert "compared 2 runs: x" in out
+    assert manifest.check(Path("x")).status == "interrupted"
+    assert manifest.check(Path("x/short")).status == "finished"
+    assert manifest.check(Path("x/long")).status == "interrupted"
+    assert not list(Path().glob(".x*"))
+
+
+@pytest.mark.parametrize(("number", "code"), SIGNALS)
+def test_an_interrupt_while_drawing_costs_the_figures_only(
+    podusv: Command, number: signal.Signals, code: int
+) -> None:
+    config = write("two.yaml", TWO)
+    with under_way("compare", config, "--out", "x") as process:
+        wait_for(".x.podusv-*.part/new/comparison.csv")
+        send(process, number, 1)
+        out, err = process.communicate(timeout=30)
+        assert process.returncode == code, err
+        assert gone(process)
+    assert "compared 2 runs: x" in out
+    assert "Traceback" not in err
+    assert manifest.check(Path("x")).status == "interrupted"
+    assert manifest.check(Path("x/soft")).status == "finished"
+    assert Path("x/report.html").is_file()
+    assert not Path("x/figures").exists()
+
+
+def soon(number: signal.Signals, work: Callable[..., object]) -> Callable[..., object]:
+    """The work, with a signal to this process after it has begun."""
+
+    def begun(*args: object, **options: object) -> object:
+        threading.Timer(0.1, os.kill, (os.getpid(), number)).start()
+        return work(*args, **options)
+
+    return begun
+
+
+@pytest.mark.parametrize(("number", "code"), SIGNALS)
+def test_an_interrupted_run_is_kept(
+    podusv: Command, number: signal.Signals, code: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(running, "simulate", soon(number, running.simulate))
+    said = podusv("run", write("long.yaml", LONG), "--out", "x")
+    assert said.code == code
+    assert said.err.startswith("long.yaml: interrupted after t = ")
+    assert manifest.check(Path("x")).status == "interrupted"
+    assert 0 < open_run(Path("x")).recording["time"][-1] < 2e5
+
+
+@pytest.mark.parametrize(("number", "code"), SIGNALS)
+@pytest.mark.parametrize("stage", ["_drawn", "_cost"])
+def test_a_run_that_is_interrupted_after_its_simulation_is_whole(
+    podusv: Command, number: signal.Signals, code: int, stage: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(running, stage, soon(number, lambda *given: time.sleep(60)))
+    said = podusv("run", write("short.yaml", BASE), "--out", "x")
+    assert said.code == code
+    assert said.err.startswith("short.yaml: interrupted after the simulation; the log is whole")
+    assert manifest.check(Path("x")).status == "interrupted"
+    assert open_run(Path("x")).recording.status == "finished"
+    assert not Path("x/figures").exists()
