@@ -1,0 +1,64 @@
+"""Runs, a table and verdicts planted by hand, for the tests of what a comparison writes."""
+
+import math
+
+import numpy as np
+
+from podusv_cli.comparison import claims, table
+from podusv_cli.comparison.claims import Stated
+from podusv_cli.comparison.entries import Absent, Entry
+from podusv_cli.config.loading import load_text
+from podusv_cli.config.scenario import Claim
+from podusv_cli.recording import Recording
+
+SCENARIO = """
+name: planted
+description: What the <test> is for.
+vessel: {preset: paper_nonlinear}
+path: {kind: line}
+disturbance: {kind: harmonic}
+actuator: {kind: saturated}
+simulation: {duration: 4.0}
+controller: {kind: pid}
+"""
+FRAME = table.table(
+    {
+        "a": {"iae": 4.0, "law_ns": 10.0, "energy": 0.0},
+        "b": {"iae": 2.0, "law_ns": math.nan, "energy": 3.0},
+        "c": {"iae": 8.0, "law_ns": 5.0, "energy": 1.0},
+        "lost": {},
+    }
+)
+
+
+def scenario(*overrides):
+    return load_text(SCENARIO, "a.yaml", overrides).scenario
+
+
+class Folder:
+    """What an entry needs of a run folder."""
+
+    def __init__(self, metrics, status="finished", message=""):
+        self.metrics = metrics
+        t = np.linspace(0.0, 3.0, 4)
+        signals = {"time": t, "x": 2 * t, "x_d": 3 * t, "u": t}
+        self.recording = Recording(status, "pid", signals, message=message)
+
+
+def verdicts():
+    runs = {
+        "a": Entry("a", Folder({"iae": 3.0}), scenario()),
+        "lost": Absent(scenario(), "killed"),
+    }
+    texts = {
+        "C1": "x.iae == 3", "C2": "x.iae > 4", "C3": "lost.iae < x.iae", "C4": "1 / 3 < 0 * x.iae",
+    }  # fmt: skip
+    stated = [
+        Stated(
+            name,
+            Claim(says="a | <b>", source="here", expect=text, remark="Not <stated>."),
+            {"x": "a", "lost": "lost"},
+        )
+        for name, text in texts.items()
+    ]
+    return claims.judge(stated, runs)

@@ -1,0 +1,46 @@
+"""Costs, names and progress of a comparison."""
+
+import numpy as np
+import pandas as pd
+from comparison_samples import Folder, scenario
+
+from podusv_cli import comparing
+from podusv_cli.cli.progress import progress_bars
+from podusv_cli.comparison.entries import Entry
+from podusv_cli.metrics import cost
+from podusv_cli.recording import Recording
+
+
+def test_costs_are_median_and_quartiles(monkeypatch):
+    clock = iter(range(1, 51))
+    monkeypatch.setattr(cost, "replayer", lambda loop, recording: lambda: float(next(clock)))
+    first, second = cost.law_costs([(None, None), (None, None)])  # 1, 3 .. 49 and 2, 4 .. 50
+    assert first == {"law_ns": 25.0, "law_ns_low": 13.0, "law_ns_high": 37.0}
+    assert second == {"law_ns": 26.0, "law_ns_low": 14.0, "law_ns_high": 38.0}
+
+
+def test_names_are_told_apart():
+    assert comparing.told_apart(["a", "a", "a_2", "b", "a"]) == ["a", "a_2", "a_2_2", "b", "a_3"]
+    assert comparing.told_apart(["figures", "unit"], comparing.RESERVED) == ["figures_2", "unit_2"]
+
+
+def test_drawing_is_progress_too(monkeypatch):
+    seen = []
+    t = np.linspace(0, 1, 5)
+    signals = dict.fromkeys(("time", "x", "y", "x_d", "y_d", "psi", "u", "v", "r"), t)
+    run = Folder({})
+    run.recording = Recording("finished", "pid", signals)
+    entry = Entry("a", run, scenario())
+    result = comparing.Result([], [entry], {}, {}, pd.DataFrame(), [], {}, {})
+    monkeypatch.setattr("podusv_cli.figures.style.FORMATS", {"png": None})
+    drawn = comparing.drawn(result, lambda name, fraction: seen.append((name, fraction)))
+    assert "velocities.png" in drawn
+    assert {name for name, _ in seen} == {"drawing figures"}
+    fractions = [fraction for _, fraction in seen]
+    assert fractions == sorted(fractions)
+    assert (fractions[0], fractions[-1]) == (0.0, 1.0)
+
+
+def test_there_is_no_bar_without_a_terminal():
+    with progress_bars(wanted=True) as advance:
+        assert advance is None

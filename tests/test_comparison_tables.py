@@ -1,0 +1,184 @@
+"""Table, differences, entries and verdicts as texts, from numbers planted by hand."""
+
+import math
+
+import pytest
+from comparison_samples import FRAME, Folder, scenario, verdicts
+
+from podusv_cli.comparison import claims, table
+from podusv_cli.comparison.checks import CHECKS
+from podusv_cli.comparison.differences import differences, in_words
+from podusv_cli.comparison.entries import Absent, Entry
+
+# A key of every section that a run has besides its law, and another value.
+OTHERWISE = {
+    "vessel.m": "24.5", "nominal.m": "24.5", "start.x": "1.5", "path.speed": "0.25",
+    "disturbance.b_u.mean": "0.75", "actuator.surge_limit": "4.0", "simulation.step": "0.02",
+    "simulation.duration": "5.0", "control.period": "0.1", "log.every": "2",
+    "metrics.settling_radius": "3.0",
+}  # fmt: skip
+
+
+# --- table
+
+
+def test_cells_have_number_mark_and_ratio():
+    assert table.cells(FRAME) == [
+        ["iae", "m s", "4", "2* (0.5)", "8 (2)", "-"],
+        ["energy", "J", "0*", "3", "1", "-"],
+        ["law_ns", "ns", "10", "-", "5* (0.5)", "-"],
+    ]
+
+
+def test_numbers_that_read_the_same_are_marked_the_same():
+    frame = table.table({"a": {"iae": 0.500653}, "b": {"iae": 0.500649}, "c": {"iae": 0.50066}})
+    assert table.cells(frame) == [["iae", "m s", "0.50065*", "0.50065* (1)", "0.50066 (1)"]]
+
+
+def test_csv_has_units_first_and_ratios_last():
+    full = table.with_ratios(FRAME)
+    assert list(full) == ["unit", "a", "b", "c", "lost", "b/a", "c/a", "lost/a"]
+    assert full.loc["iae", ["b/a", "c/a"]].tolist() == [0.5, 2.0]
+    assert full.loc["energy", ["b/a", "lost/a"]].isna().all()
+    assert table.as_csv(FRAME).splitlines()[1] == "iae,m s,4.0,2.0,8.0,,0.5,2.0,"
+
+
+def test_a_table_without_numbers_is_a_table():
+    frame = table.table({"a": {}, "b": {}})
+    assert table.as_csv(frame) == "metric,unit,a,b,b/a\n"
+    assert table.cells(frame) == []
+    assert r"\begin{tabular}{llrr}" in table.as_latex(frame)
+
+
+def test_markdown_tells_how_runs_ended():
+    text = table.as_markdown(FRAME, {"a": "", "lost": "killed"})
+    lines = text.splitlines()
+    assert lines[0] == "| metric | unit | a | b | c | lost |"
+    assert lines[1] == "| --- | --- | ---: | ---: | ---: | ---: |"
+    assert lines[2] == "| iae | m s | 4 | 2* (0.5) | 8 (2) | - |"
+    assert lines[-2:] == ["", "- lost: killed"]
+    assert table.as_markdown(FRAME, {"a": ""}).endswith(table.NOTE + "\n")
+
+
+def test_latex_escapes_and_marks():
+    frame = table.table({"a_b&~^\\{}": {"iae": 1.0}, "#$%": {"iae": 2.0}})
+    lines = table.as_latex(frame).splitlines()
+    head = r"a\_b\&\textasciitilde{}\textasciicircum{}\textbackslash{}\{\} & \#\$\% \\"
+    assert lines[2].endswith(head)
+    assert lines[4] == r"iae & m s & \textbf{1} & 2 (2) \\"
+
+
+# --- differences
+
+
+@pytest.mark.parametrize("key", OTHERWISE)
+def test_a_difference_in_any_section_is_found(key):
+    other = scenario(f"{key}={OTHERWISE[key]}")
+    found = differences({"a": scenario().model_dump(), "b": other.model_dump()})
+    also = {"vessel.m": ["nominal.m"]}.get(key, [])  # the law is told about the vessel as it is
+    assert list(found) == [key, *also]
+    assert found[key]["b"] == float(OTHERWISE[key]) != found[key]["a"]
+
+
+def test_every_section_of_a_scenario_is_looked_at():
+    sections = {key.partition(".")[0] for key in OTHERWISE}
+    rest = {"name", "description", "controller", "controllers", "claims", "silence"}
+    assert sections | rest == set(type(scenario()).model_fields)
+
+
+@pytest.mark.parametrize("key", ["name=b", "description=b", "controller.K_Pu=3"])
+def test_names_and_laws_are_no_difference(key):
+    assert not differences({"a": scenario().model_dump(), "b": scenario(key).model_dump()})
+
+
+def test_a_key_that_a_run_lacks_is_a_difference():
+    other = scenario("disturbance.kind=none").model_dump()
+    found = differences({"a": scenario().model_dump(), "b": other})
+    assert found["disturbance.kind"] == {"a": "harmonic", "b": "none"}
+    assert found["disturbance.b_u.mean"]["b"] is None
+
+
+def test_a_sections_keys_stand_together():
+    trees = [{"path": {"kind": "a", "k": 1}, "start": {"x": 1}}, {"path": {"kind": "b", "r": 2}}]
+    keys = ["path.kind", "path.k", "path.r", "start.x"]
+    assert list(differences(dict(enumerate(trees)))) == keys
+
+
+def test_where_kinds_differ_only_the_kind_and_what_both_have_is_shown():
+    calm, rough = scenario("disturbance.kind=none"), scenario("disturbance.scale=2")
+    trees = {"a": scenario().model_dump(), "b": calm.model_dump()}
+    assert in_words(differences(trees)) == {"disturbance.kind": {"a": "harmonic", "b": "none"}}
+    third = in_words(differences({**trees, "c": rough.model_dump()}))
+    assert list(third) == ["disturbance.kind", "disturbance.scale"]
+    assert third["disturbance.scale"] == {"a": "1", "b": "-", "c": "2"}
+
+
+def test_a_key_that_is_lacking_under_the_same_kind_is_shown():
+    trees = {"a": {"path": {"kind": "line", "speed": 0.5}}, "b": {"path": {"kind": "line"}}}
+    assert in_words(differences(trees)) == {"path.speed": {"a": "0.5", "b": "-"}}
+
+
+def test_different_numbers_never_look_the_same():
+    trees = {"a": {"path": {"speed": 0.5}}, "b": {"path": {"speed": 0.5 + 1e-9}}}
+    assert in_words(differences(trees)) == {"path.speed": {"a": "0.5", "b": "0.500000001"}}
+
+
+# --- entries
+
+
+def test_an_entry_answers_for_its_run():
+    entry = Entry("a", Folder({"iae": 3.0, "rmse": None, "law_ns": 7.0}), scenario(), {"law_ns": 9})
+    assert (entry.metric("iae"), entry.metric("law_ns")) == (3.0, 9.0)
+    assert math.isnan(entry.metric("rmse"))
+    assert math.isnan(entry.metric("ise"))
+    assert entry.signal("x_e").tolist() == [0, 1, 2, 3]
+    assert len(entry.signal("y_e")) == len(entry.signal("W_norm_u")) == len(entry.signal("v")) == 0
+    assert (entry.until, entry.ending) == (4.0, "")
+    assert entry.check("finished") is True
+
+
+def test_an_entry_that_diverged_has_no_metrics_and_ends_early():
+    run = Folder({"iae": 3.0}, "diverged", "diverged at t = 3.5 s: u is not finite; last ...")
+    entry = Entry("a", run, scenario(), {"law_ns": 9.0})
+    assert math.isnan(entry.metric("iae"))
+    assert math.isnan(entry.metric("law_ns"))
+    assert (entry.until, entry.ending) == (3.0, "diverged at t = 3.5 s")
+    assert entry.check("finished") is False
+    assert entry.check("underactuated") is True
+
+
+def test_an_absent_run_has_nothing_but_its_scenario():
+    absent = Absent(scenario(), "Traceback\n  File\nZeroDivisionError: oops\n")
+    assert absent.ending == "has no log: ZeroDivisionError: oops"
+    assert math.isnan(absent.metric("iae"))
+    assert (len(absent.signal("x")), absent.until) == (0, 0.0)
+    assert absent.check("finished") is None
+    assert absent.check("underactuated") is True
+
+
+def test_whether_an_interrupted_run_would_have_finished_cannot_be_told():
+    assert CHECKS["finished"](scenario(), "interrupted") is None
+
+
+# --- verdicts
+
+
+def test_verdicts_have_numbers_reasons_and_the_labels_of_the_comparison():
+    found = {verdict.name: verdict.as_json() for verdict in verdicts()}
+    assert [v["verdict"] for v in found.values()] == [
+        "reproduced", "not reproduced", "cannot tell", "not reproduced",
+    ]  # fmt: skip
+    assert found["C1"]["expect"] == "a.iae == 3"
+    assert found["C1"]["numbers"] == {"a.iae": 3.0}
+    assert found["C1"]["reason"] == ""
+    assert found["C3"]["numbers"] == {"lost.iae": None, "a.iae": 3.0}
+    assert found["C3"]["reason"] == "lost.iae: lost has no log: killed"
+    assert verdicts()[2].shown() == "a.iae = 3; lost.iae: lost has no log: killed"
+
+
+def test_claims_in_markdown_stay_in_their_cells():
+    lines = claims.as_markdown(verdicts()).splitlines()
+    assert lines[2] == (
+        r"| C1 | a \| <b> (here) | **reproduced** | `a.iae == 3`, tolerance 0.05 | a.iae = 3 |"
+    )
+    assert lines[-1] == "- C4: Not <stated>."
