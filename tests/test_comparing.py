@@ -207,12 +207,6 @@ def test_the_report_tells_everything(done):
         assert expected in page
 
 
-def test_the_report_escapes_what_it_is_given(config, tmp_path):
-    request = workflows.Request(("description='<b>&'", "simulation.duration=1"), tmp_path / "x")
-    page = (workflows.compare([config], request).folder / "report.html").read_text()
-    assert "&lt;b&gt;&amp;" in page
-
-
 def test_ratios_to_a_first_run_that_is_zero_are_left_out():
     frame = table.table({"a": {"iae": 0.0}, "b": {"iae": 2.0}})
     assert np.isnan(table.with_ratios(frame).loc["iae", "b/a"])
