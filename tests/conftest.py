@@ -12,6 +12,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import pytest
 import yaml
+from command_samples import Command, commanded, write
 from hypothesis import settings
 
 import podusv_cli
@@ -189,6 +190,18 @@ class Constant(Controller):
     def slots(self) -> Slots:
         """No memory."""
         return ()
+
+
+@pytest.fixture
+def podusv(
+    tmp_path: File, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Command:
+    """The command line, in a folder of its own with one sound scenario."""
+    from config_samples import SOUND  # which has this module's vessels
+
+    monkeypatch.chdir(tmp_path)
+    write("a.yaml", SOUND)
+    return commanded(monkeypatch, capsys, columns=80)
 
 
 @pytest.fixture(autouse=True)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 import typer
-from command_samples import Command, commanded
+from command_samples import Command
 from config_samples import SOUND, write
 
 import podusv_cli
@@ -26,16 +26,6 @@ HEAVY = {
     "numpy", "scipy", "numba", "llvmlite", "pandas", "matplotlib", "h5py", "pydantic", "yaml",
 }  # fmt: skip
 ROOT = Path(podusv_cli.__file__).parents[1]
-
-
-@pytest.fixture
-def podusv(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Command:
-    """The command line, in a folder of its own with one sound scenario."""
-    monkeypatch.chdir(tmp_path)
-    write("a.yaml", SOUND)
-    return commanded(monkeypatch, capsys, columns=80)
 
 
 def python(*words: str, stdout: int = subprocess.PIPE) -> subprocess.CompletedProcess[str]:

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command_samples import Said
 from conftest import PACKAGE, VESSELS, example, kinds
 from findings_samples import CONFIGS, PLAIN, log, scene
-from test_cli_words import Said, podusv
 
 from podusv_cli.codes import CODES
 from podusv_cli.config.loading import load
@@ -23,8 +23,6 @@ from podusv_cli.findings.finding import Finding
 from podusv_cli.findings.preflight import CHECKS, preflight, together
 from podusv_cli.findings.underactuation import argument, input_rank
 from podusv_cli.recording import Recording
-
-__all__ = ["podusv"]  # a fixture that is used here too
 
 
 def told(code: str, *overrides: str) -> list[str]:

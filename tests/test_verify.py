@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from conftest import corrected, run
 from findings_samples import CONFIGS, scene
-from test_cli_words import podusv
 
 from podusv_cli.cli.verify import _in_order
 from podusv_cli.config.loading import load
@@ -23,8 +22,6 @@ from podusv_cli.verification.independent import integrate, left_out
 from podusv_cli.verification.ranking import ranking
 from podusv_cli.verification.refining import refined, run_level
 from podusv_cli.verification.verify import POSITION, Checked, check, verify
-
-__all__ = ["podusv"]  # a fixture that is used here too
 
 # Behind the target, facing it and moving; a step at which the adaptation is well resolved.
 SMOOTH = (
