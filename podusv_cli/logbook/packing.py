@@ -3,10 +3,14 @@
 Shuffled, the numbers of a chunk lie in planes: all first bytes, all second bytes, and so on. Most
 planes of a computed signal are noise, on which deflate spends its time and gains nothing. They are
 stored as they are, which a deflate stream may do; every reader unpacks the result.
+
+Unpacked here, too, a chunk can neither hold more than it should nor less. HDF5's deflate makes room
+for whatever comes out, be it gigabytes, and reads on behind what is too short.
 """
 
 from __future__ import annotations
 
+import math
 import zlib
 
 import numpy as np
@@ -20,6 +24,7 @@ RAW = -zlib.MAX_WBITS  # a deflate stream without head and sum, to be put togeth
 HEAD = b"\x78\x5e"  # of a zlib stream
 MODULUS = 0xFFFF
 BLOCK = 512  # words that are added at a time
+CHECKSUM = 4  # bytes that Fletcher's adds to a chunk
 
 
 def packed(numbers: Vector) -> bytes:
@@ -28,7 +33,29 @@ def packed(numbers: Vector) -> bytes:
     planes = np.ascontiguousarray(little.reshape(-1).view(np.uint8).reshape(-1, 8).T)
     parts = [_deflated(memoryview(plane), last=i == 7) for i, plane in enumerate(planes)]
     content = b"".join([HEAD, *parts, zlib.adler32(planes.data).to_bytes(4, "big")])
-    return content + fletcher32(content).to_bytes(4, "little")
+    return content + fletcher32(content).to_bytes(CHECKSUM, "little")
+
+
+def unpacked(content: bytes, shape: tuple[int, ...]) -> Vector:
+    """The numbers of a chunk of that shape; ValueError where it does not hold exactly these."""
+    stream, stated = content[:-CHECKSUM], int.from_bytes(content[-CHECKSUM:], "little")
+    if not stream or fletcher32(stream) != stated:
+        raise ValueError("a chunk does not fit its checksum")
+    planes = _inflated(stream, 8 * math.prod(shape))
+    numbers = np.frombuffer(planes, np.uint8).reshape(8, -1).T
+    return np.ascontiguousarray(numbers).view("<f8").reshape(shape)
+
+
+def _inflated(stream: bytes, size: int) -> bytes:
+    unpacker = zlib.decompressobj()
+    try:
+        content = unpacker.decompress(stream, size)
+        beyond = unpacker.decompress(unpacker.unconsumed_tail, 1)  # the sum, and no byte more
+    except zlib.error as error:
+        raise ValueError(f"a chunk cannot be unpacked: {error}") from error
+    if len(content) != size or beyond or not unpacker.eof or unpacker.unused_data:
+        raise ValueError(f"a chunk does not unpack to {size} bytes")
+    return content
 
 
 def _deflated(plane: memoryview, *, last: bool) -> bytes:

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import hashlib
 import math
+import unicodedata
 from collections.abc import Iterator
 from contextlib import contextmanager
-from itertools import product
+from itertools import product, repeat
 from pathlib import Path
 from typing import get_args
 
@@ -20,25 +21,24 @@ import numpy as np
 from podusv_cli.errors import StorageError
 from podusv_cli.kernels import Vector
 from podusv_cli.logbook import layout
-from podusv_cli.logbook.regular import LARGEST_TEXT, read_bytes
+from podusv_cli.logbook.packing import unpacked
+from podusv_cli.logbook.regular import LARGEST_FILE, LARGEST_TEXT, read_bytes
 from podusv_cli.recording import Recording, Status
 from podusv_cli.signals import SIGNALS
 
-LARGEST_FILE = 2 * 2**30  # bytes
 LARGEST_CONTENT = 4 * 2**30  # bytes, unpacked
-_FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32}
-_CHECKSUM = 4  # bytes that Fletcher's adds to a chunk
+_FILTERS = [h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_FLETCHER32]
 # What h5py raises on damaged files; ValueError includes text that is not UTF-8.
 _DAMAGE = (OSError, RuntimeError, ValueError, KeyError, TypeError, MemoryError, OverflowError)
 
 
 def read_log(path: Path) -> Recording:
     """The recording in a log file; `seen` is not logged and stays None. Raises StorageError."""
-    with _opened(path) as file:
-        arrays = _arrays(file)
+    with _opened(path) as (file, image):
+        arrays = _arrays(file, image)
         return Recording(
             status=_status(file),
-            controller=_text(h5py.h5a.open(file.id, b"controller")).decode(),
+            controller=_words(file, "controller"),
             signals={k: v for k, v in arrays.items() if k not in layout.FIXED_AXES},
             fixed={k: v for k, v in arrays.items() if k in layout.FIXED_AXES},
             message=_message(file),
@@ -47,7 +47,7 @@ def read_log(path: Path) -> Recording:
 
 def resolved_yaml(path: Path) -> str:
     """The scenario, every value explicit, that a log file was made from. Raises StorageError."""
-    with _opened(path) as file:
+    with _opened(path) as (file, _):
         _check_hard_link(file.id, layout.PROVENANCE)
         group = h5py.h5g.open(file.id, layout.PROVENANCE.encode())
         dataset = _dataset(group, layout.RESOLVED)
@@ -59,13 +59,13 @@ def resolved_yaml(path: Path) -> str:
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[h5py.File]:
-    """The log in memory, its format checked; what goes wrong inside becomes a StorageError."""
+def _opened(path: Path) -> Iterator[tuple[h5py.File, bytes]]:
+    """The log in memory, its format checked, and its bytes; faults inside become a StorageError."""
     image = read_bytes(path, LARGEST_FILE)
     try:
         with h5py.File(h5py.h5f.open_file_image(image)) as file:
             _check_format(file)
-            yield file
+            yield file, image
     except _DAMAGE as error:
         reason = " ".join(str(error).split()) or type(error).__name__
         raise StorageError(f"{path}: damaged, or not a log of podusv: {reason}") from error
@@ -82,7 +82,7 @@ def _check_format(file: h5py.File) -> None:
 
 
 def _status(file: h5py.File) -> Status:
-    found = _text(h5py.h5a.open(file.id, b"status")).decode()
+    found = _words(file, "status")
     for status in get_args(Status):
         if found == status:
             return status  # type: ignore[no-any-return]
@@ -92,7 +92,14 @@ def _status(file: h5py.File) -> Status:
 def _message(file: h5py.File) -> str:
     if not h5py.h5a.exists(file.id, b"message"):
         return ""
-    return _text(h5py.h5a.open(file.id, b"message")).decode()
+    return _words(file, "message")
+
+
+def _words(file: h5py.File, name: str) -> str:
+    words = _text(h5py.h5a.open(file.id, name.encode())).decode()
+    if any(unicodedata.category(c) == "Cc" and c not in "\t\n\r" for c in words):
+        raise ValueError(f"{name} holds characters that are no text")
+    return words
 
 
 def _text(holder: h5py.h5a.AttrID | h5py.h5d.DatasetID) -> bytes:
@@ -123,7 +130,7 @@ def _dataset(group: h5py.h5g.GroupID, name: str) -> h5py.h5d.DatasetID:
     made = dataset.get_create_plist()
     if made.get_layout() == h5py.h5d.VIRTUAL or made.get_external_count():
         raise ValueError(f"{name} keeps its data in another file")
-    if not set(_filters(made)) <= _FILTERS:
+    if not set(_filters(made)) <= set(_FILTERS):
         raise ValueError(f"{name} is packed in an unknown way")
     if dataset.shape is None:
         raise ValueError(f"{name} is empty")
@@ -134,7 +141,7 @@ def _filters(made: h5py.h5p.PropDCID) -> list[int]:
     return [made.get_filter(i)[0] for i in range(made.get_nfilters())]
 
 
-def _arrays(file: h5py.File) -> dict[str, Vector]:
+def _arrays(file: h5py.File, image: bytes) -> dict[str, Vector]:
     """All signals, in the order in which they were written."""
     datasets = {name: _dataset(file.id, name) for name in _names(file)}
     lengths = {"time": math.prod(datasets["time"].shape)}
@@ -143,12 +150,12 @@ def _arrays(file: h5py.File) -> dict[str, Vector]:
     total = sum(8 * math.prod(dataset.shape) for dataset in datasets.values())
     if total > LARGEST_CONTENT:
         raise ValueError(f"claims {total} bytes of data, at most {LARGEST_CONTENT} allowed")
-    for name, dataset in datasets.items():
-        _check_chunks(name, dataset)
-    return {name: h5py.Dataset(dataset)[()] for name, dataset in datasets.items()}
+    return {name: _unpacked(name, dataset, image) for name, dataset in datasets.items()}
 
 
 def _names(file: h5py.File) -> list[str]:
+    if len(file) > len(SIGNALS) + len(layout.AXES) + 1:
+        raise ValueError(f"it has {len(file)} members, more than podusv knows")
     names = [name for name in file if name not in layout.AXES and name != layout.PROVENANCE]
     unknown = [name for name in names if name not in SIGNALS]
     if unknown:
@@ -168,25 +175,41 @@ def _check_numbers(name: str, dataset: h5py.h5d.DatasetID, lengths: dict[str, in
     for axis, size in zip(axes, dataset.shape, strict=True):
         if lengths.setdefault(axis, size) != size:
             raise ValueError(f"{name} has {size} values along {axis} instead of {lengths[axis]}")
+        if not size and axis != "time":
+            raise ValueError(f"{name} has no values along {axis}")
 
 
-def _check_chunks(name: str, dataset: h5py.h5d.DatasetID) -> None:
-    """Every chunk can be found and went through every filter, so that its checksum counts.
+def _unpacked(name: str, dataset: h5py.h5d.DatasetID, image: bytes) -> Vector:
+    """The numbers of a dataset, chunk by chunk, each behind its checksum.
 
     The index of chunks has no checksum. Where an entry is damaged, HDF5 itself would quietly fill
     in zeros, or end the process for a chunk that is shorter than its own checksum.
     """
     shape, made = dataset.shape, dataset.get_create_plist()
-    if math.prod(shape) == 0:
-        return
-    if sorted(_filters(made)) != sorted(_FILTERS):
+    numbers = np.empty(shape)
+    if not numbers.size:
+        return numbers
+    if _filters(made) != _FILTERS:
         raise ValueError(f"{name} has no checksums")
-    sides = list(zip(shape, made.get_chunk(), strict=True))
-    count = math.prod(-(-size // part) for size, part in sides)
-    # The count bounds the search; a chunk larger than the array would only cost memory.
-    if dataset.get_num_chunks() != count or any(part > size for size, part in sides):
-        raise ValueError(f"{name} is incomplete")
-    for corner in product(*(range(0, size, part) for size, part in sides)):
-        left_out, content = dataset.read_direct_chunk(corner)
-        if left_out or len(content) <= _CHECKSUM:
-            raise ValueError(f"{name} is packed in an unknown way")
+    part = made.get_chunk()
+    # A chunk larger than the array would only cost memory.
+    if any(side > size for side, size in zip(part, shape, strict=True)):
+        raise ValueError(f"{name} is packed in an unknown way")
+    for corner in product(*map(range, repeat(0), shape, part)):
+        place = numbers[tuple(slice(at, at + side) for at, side in zip(corner, part, strict=True))]
+        try:
+            chunk = unpacked(_stored(dataset, corner, image), part)
+        except ValueError as error:
+            raise ValueError(f"{name} is damaged: {error}") from error
+        place[...] = chunk[tuple(map(slice, place.shape))]
+    return numbers
+
+
+def _stored(dataset: h5py.h5d.DatasetID, corner: tuple[int, ...], image: bytes) -> bytes:
+    """The bytes of a chunk as they lie in the file."""
+    found = dataset.get_chunk_info_by_coord(corner)
+    if found.byte_offset is None or found.byte_offset + found.size > len(image):
+        raise ValueError("a chunk is missing")
+    if found.filter_mask:
+        raise ValueError("a chunk is packed in an unknown way")
+    return image[found.byte_offset : found.byte_offset + found.size]

@@ -14,6 +14,7 @@ from podusv_cli.errors import StorageError
 from podusv_cli.logbook.atomic import explained
 
 LARGEST_TEXT = 16 * 2**20  # bytes
+LARGEST_FILE = 2 * 2**30  # bytes
 
 
 @contextmanager
@@ -39,10 +40,10 @@ def read_bytes(path: Path, limit: int) -> bytes:
         return file.read(size)
 
 
-def read_text(path: Path) -> str:
-    """A UTF-8 text of at most LARGEST_TEXT bytes; raises StorageError."""
+def read_text(path: Path, limit: int = LARGEST_TEXT) -> str:
+    """A UTF-8 text of at most `limit` bytes; raises StorageError."""
     try:
-        return read_bytes(path, LARGEST_TEXT).decode()
+        return read_bytes(path, limit).decode()
     except UnicodeDecodeError as error:
         raise StorageError(f"cannot read {path}: not UTF-8 text ({error})") from error
 
