@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -12,25 +13,27 @@ from typing import Any
 
 import pandas as pd
 
-from podusv_cli.comparison import claims, report, table
+from podusv_cli.comparison import claims, report, stability, table
 from podusv_cli.comparison.differences import differences
 from podusv_cli.comparison.entries import Absent, Entry
 from podusv_cli.comparison.expressions import Source
-from podusv_cli.config.loading import load_text
+from podusv_cli.config.loading import load_resolved
 from podusv_cli.config.scenario import Scenario
-from podusv_cli.errors import UsageError
+from podusv_cli.errors import StorageError, UsageError
 from podusv_cli.findings.finding import Finding
 from podusv_cli.findings.preflight import together
 from podusv_cli.interrupts import Extras, interrupts_heard
-from podusv_cli.logbook import jsonfile, manifest
-from podusv_cli.logbook.folder import Run, RunWriter, open_run
+from podusv_cli.logbook import manifest, soundness
+from podusv_cli.logbook.folder import LOG, THEORY, Run, RunWriter, open_run
+from podusv_cli.logbook.regular import read_text
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.parallel import Outcome, run_all
 from podusv_cli.running import Finished, Task, execute, warm_up
 
+TABLE = "comparison.csv"
 # What a comparison has of its own: in its folder, or as a column of its table.
 RESERVED = (
-    "comparison.csv", "comparison.md", "comparison.tex", "claims.json", "claims.md", "figures",
+    TABLE, "comparison.md", "comparison.tex", "claims.json", "claims.md", "figures",
     "manifest.json", "metric", "provenance.json", "report.html", "unit",
 )  # fmt: skip
 UNMEASURED = dict.fromkeys(("law_ns", "law_ns_low", "law_ns_high"), math.nan)
@@ -69,25 +72,70 @@ def from_folder(path: Path) -> list[Part]:
 
     Raises UsageError where it is nothing of the kind, StorageError where it is damaged.
     """
-    children = path.iterdir() if path.is_dir() else ()
-    inner = sorted((c for c in children if (c / "log.h5").is_file()), key=_place(path))
-    if not inner and not (path / manifest.NAME).is_file():
+    finished = os.path.lexists(path / manifest.NAME)
+    inner = _listed(path) if finished else _found(path)
+    if not inner and not finished:
         raise UsageError(f"{path} is no run folder: it has no {manifest.NAME}")
     return [_from_run(child) for child in (inner or [path])]
 
 
-def _place(comparison: Path) -> Callable[[Path], tuple[int, str]]:
-    """Where a run stands in a comparison: as in its table, else by name."""
-    table_file = comparison / "comparison.csv"
-    head = table_file.read_text().splitlines()[:1] if table_file.is_file() else []
-    order = {label: place for row in csv.reader(head) for place, label in enumerate(row)}
-    return lambda run: (order.get(run.name, len(order)), run.name)
+def _found(path: Path) -> list[Path]:
+    """Run folders that somebody put into a folder; links lead elsewhere and do not count."""
+    children = sorted(path.iterdir()) if path.is_dir() else ()
+    return [c for c in children if not c.is_symlink() and os.path.lexists(c / LOG)]
+
+
+def _listed(path: Path) -> list[Path]:
+    """The runs of a finished comparison, as in its table, else by name; none in a single run."""
+    files = manifest.check(path).files
+    runs = sorted(name.removesuffix(f"/{LOG}") for name in files if name.endswith(f"/{LOG}"))
+    head = _first_row(path / TABLE) if TABLE in files else []
+    runs.sort(key=lambda run: head.index(run) if run in head else len(head))
+    return [path / run for run in runs]
+
+
+def _first_row(path: Path) -> list[str]:
+    try:
+        return next(csv.reader(read_text(path).splitlines()[:1]), [])
+    except csv.Error as error:
+        raise StorageError(f"cannot read {path}: no CSV ({error})") from error
 
 
 def _from_run(path: Path) -> Part:
+    """A run, opened with all that may be asked of it later. Raises StorageError, ScenarioError."""
     run = open_run(path)
-    scenario = load_text(run.resolved_yaml, str(path / "resolved.yaml")).scenario
+    scenario = load_resolved(run.resolved_yaml, str(path / "resolved.yaml"))
+    if wrong := soundness.fault(run.recording):
+        raise StorageError(f"{path / LOG}: damaged, or not a log of a run: {wrong}")
+    _check_theory(run)
     return Part(path.name, scenario, run=run)
+
+
+def comparable(path: Path) -> list[Part]:
+    """The finished runs of a folder, as `from_folder`, with all that their laws are timed with."""
+    parts = from_folder(path)
+    for part in parts:
+        if part.run:
+            _check_memory(part.run, part.scenario)
+    return parts
+
+
+def _check_memory(run: Run, scenario: Scenario) -> None:
+    log = run.recording
+    for name, size in scenario.closed_loop().controller.slots():
+        if name not in log or math.prod(log[name].shape[1:]) != size:
+            raise StorageError(
+                f"{run.folder / LOG}: damaged, or not of the scenario beside it: "
+                f"{name} does not have {size} values in a row"
+            )
+
+
+def _check_theory(run: Run) -> None:
+    try:
+        list(stability.rows({"": run.theory} if run.theory else {}))
+    except (LookupError, TypeError, ValueError, AttributeError) as error:
+        path = run.folder / THEORY
+        raise StorageError(f"{path}: damaged: not as podusv writes it ({error})") from error
 
 
 def distinct(parts: Iterable[Part]) -> list[Part]:
@@ -198,7 +246,7 @@ def numbers(frame: pd.DataFrame) -> dict[str, dict[str, float | None]]:
 def write(writer: RunWriter, result: Result) -> None:
     """Table and verdicts, in every form, into the comparison's folder."""
     forms = {
-        "comparison.csv": table.as_csv(result.table),
+        TABLE: table.as_csv(result.table),
         "comparison.md": table.as_markdown(result.table, result.endings),
         "comparison.tex": table.as_latex(result.table),
     }
@@ -224,8 +272,7 @@ def drawn(result: Result, progress: Callable[[str, float], None] | None = None) 
 
 
 def _theories(result: Result) -> dict[str, dict[str, Any]]:
-    files = {entry.label: entry.run.folder / "theory.json" for entry in result.entries}
-    return {label: jsonfile.read(path) for label, path in files.items() if path.is_file()}
+    return {entry.label: entry.run.theory for entry in result.entries if entry.run.theory}
 
 
 def as_report(

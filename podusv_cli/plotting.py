@@ -109,7 +109,7 @@ def put(out: Path, contents: Mapping[str, bytes]) -> list[Path]:
     for name, content in contents.items():
         path = out / name
         with atomic.explained(f"cannot read {path}"):
-            if path.exists() and path.read_bytes() != content:
+            if path.is_file() and path.read_bytes() != content:
                 replaced.append(path)
         atomic.write_bytes(path, content)
     return replaced

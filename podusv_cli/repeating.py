@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -99,7 +100,7 @@ def rerun(path: Path, request: Request, progress: Progress | None = None) -> Rep
 
 def _parts(path: Path) -> list[Part]:
     """The finished runs of a folder; UsageError where it is none."""
-    if not (path / manifest.NAME).is_file():
+    if not os.path.lexists(path / manifest.NAME):
         raise UsageError(f"{path} is no run folder: it has no {manifest.NAME}")
     return comparing.from_folder(path)
 

@@ -198,7 +198,7 @@ def _opened(path: Path, request: Request, *, alone: bool) -> _Item:
     from podusv_cli.comparison.claims import misfits
 
     if path.is_dir():
-        parts = comparing.from_folder(path)
+        parts = comparing.comparable(path)
         return _Item(path.resolve().name, parts, [part.label for part in parts])
     loaded = load(path, request.overrides, checks=(misfits,))
     scenario, singles = loaded.scenario, loaded.scenario.singles()

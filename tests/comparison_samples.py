@@ -40,6 +40,7 @@ class Folder:
 
     def __init__(self, metrics, status="finished", message=""):
         self.metrics = metrics
+        self.theory = {}
         t = np.linspace(0.0, 3.0, 4)
         signals = {"time": t, "x": 2 * t, "x_d": 3 * t, "u": t}
         self.recording = Recording(status, "pid", signals, message=message)

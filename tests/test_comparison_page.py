@@ -1,7 +1,6 @@
 """The HTML report, from numbers planted by hand."""
 
 import re
-from pathlib import Path
 
 from comparison_samples import FRAME, Folder, scenario, verdicts
 
@@ -83,8 +82,6 @@ def test_the_report_of_a_comparison_has_its_warnings():
     saturated = Finding("saturated", "actuator", "long <b>")
     parts = [comparing.Part(label, scenario()) for label in ("a", "b")]
     entries = [Entry(label, Folder({}), scenario()) for label in ("a", "b")]
-    for entry in entries:
-        entry.run.folder = Path("nowhere")
     told = {"a": [saturated], "b": []}
     result = comparing.Result(parts, entries, {}, {}, FRAME, [], {}, told)
     text = comparing.as_report(result, "title", {}, {})

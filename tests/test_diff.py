@@ -25,7 +25,7 @@ from repetition_samples import (
 )  # fmt: skip
 
 from podusv_cli.errors import StorageError
-from podusv_cli.logbook import jsonfile
+from podusv_cli.logbook import jsonfile, manifest
 from podusv_cli.recording import Recording
 from podusv_cli.repetition.causes import scenario_changes, version_changes
 from podusv_cli.repetition.logs import compare
@@ -265,7 +265,7 @@ def test_comparisons_are_held_together_run_by_run(
     for name, labels in (("one", ("a", "b")), ("two", ("b", "c"))):
         for label in labels:
             copied(run, tmp_path / name / label)
-        (tmp_path / name / "manifest.json").write_text("{}")
+        manifest.write(tmp_path / name, "finished")
     said = podusv("diff", tmp_path / "one", tmp_path / "two")
     assert said.code == 3
     assert said.out == (

@@ -26,11 +26,13 @@ def rows(theories: Mapping[str, Mapping[str, Any]]) -> Iterator[list[str]]:
 def _missing(theory: Mapping[str, Any]) -> Iterator[str]:
     for condition in theory["conditions"]:
         if not condition["holds"]:
-            yield "{name} = {value:g} has to exceed {limit:.3g}".format(**condition)
+            value, limit = _number(condition["value"], "g"), _number(condition["limit"])
+            yield f"{condition['name']} = {value} has to exceed {limit}"
     for said in theory["assumptions"]:
         if not said["holds"]:
-            yield said["assumption"] + (f" (off by {said['found']:.3g})" if "found" in said else "")
+            off = f" (off by {_number(said['found'])})" if "found" in said else ""
+            yield f"{said['assumption']}{off}"
 
 
-def _number(number: float | None) -> str:
-    return "none" if number is None else f"{number:.3g}"
+def _number(number: float | None, form: str = ".3g") -> str:
+    return "none" if number is None else f"{number:{form}}"

@@ -13,10 +13,11 @@ from podusv_cli.config.checking import Check, check
 from podusv_cli.config.composing import composed
 from podusv_cli.config.references import complete
 from podusv_cli.config.scenario import Scenario
-from podusv_cli.config.source import read_text, resolve
+from podusv_cli.config.source import read, read_text, resolve
 from podusv_cli.config.tree import Fault, Mark, Node, Route, dotted, find, printable
-from podusv_cli.errors import Finding, ScenarioError
+from podusv_cli.errors import Finding, ScenarioError, StorageError
 
+REFERENCES: tuple[Route, ...] = (("extends",), ("path", "file"))  # to other files
 HEADING = "# A complete scenario, every value written out; it runs again to the same log.\n"
 
 
@@ -63,6 +64,25 @@ def load_text(
     if scenario is None or root is None or faults:
         raise ScenarioError(_findings(faults, source))
     return Loaded(scenario, _origins(scenario, root), text)
+
+
+def load_resolved(text: str, source: str) -> Scenario:
+    """The scenario of a finished run, which refers to no other file.
+
+    Raises StorageError where it does or is no YAML mapping at all, ScenarioError where it is one
+    that this podusv does not know.
+    """
+    faults: list[Fault] = []
+    root = read(text, source, faults)
+    faults += [
+        Fault(node.mark, dotted(route), "refers to another file, which no finished run does")
+        for route in REFERENCES
+        if root and (node := find(root, route))
+    ]
+    if faults or not root:
+        (first, *_) = _findings(faults, source)
+        raise StorageError(f"{first} (damaged: not as podusv wrote it)")
+    return load_text(text, source).scenario
 
 
 def _findings(faults: list[Fault], first: str) -> list[Finding]:

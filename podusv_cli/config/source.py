@@ -113,6 +113,9 @@ def read(text: str, source: str, faults: list[Fault], *, placed: bool = True) ->
 
     Every fault found on the way is appended to `faults`. Marks have lines only where `placed`.
     """
+    if len(text) > MAX_BYTES:
+        faults.append(Fault(Mark(source), "", f"is larger than {MAX_BYTES:,} bytes"))
+        return None
     reader = _Reader(text, source, faults, placed)
     try:
         return reader.document()

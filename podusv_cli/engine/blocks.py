@@ -79,7 +79,7 @@ class Failed(Exception):
         error = self.__cause__
         place = traceback.extract_tb(error.__traceback__)[-1] if error else None
         where = f" ({Path(place.filename).name}, line {place.lineno})" if place else ""
-        return f"{type(error).__name__}: {error}{where}"
+        return f"{type(error).__name__}: {' '.join(str(error).split())}{where}"
 
 
 class Aside:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import cached_property
 from pathlib import Path
@@ -18,7 +18,8 @@ from podusv_cli.logbook.regular import read_text
 from podusv_cli.logbook.staging import Staging, sweep
 from podusv_cli.recording import Recording, Status
 
-NEEDED = ("log.h5", "metrics.json", "provenance.json", "resolved.yaml")
+LOG, THEORY = "log.h5", "theory.json"
+NEEDED = (LOG, "metrics.json", "provenance.json", "resolved.yaml")
 
 
 def default_folder(root: Path, name: str, resolved_yaml: str) -> Path:
@@ -119,11 +120,12 @@ class Run:
     metrics: dict[str, float | None]
     provenance: dict[str, Any]
     resolved_yaml: str
+    theory: dict[str, Any] = field(default_factory=dict)  # empty without a Lyapunov function
 
     @cached_property
     def recording(self) -> Recording:
         """What log.h5 holds, read when first asked for. Raises StorageError."""
-        return reading.read_log(self.folder / "log.h5")
+        return reading.read_log(self.folder / LOG)
 
 
 def open_run(folder: Path) -> Run:
@@ -141,6 +143,7 @@ def open_run(folder: Path) -> Run:
         metrics=_metrics(folder / "metrics.json"),
         provenance=jsonfile.read(folder / "provenance.json"),
         resolved_yaml=read_text(folder / "resolved.yaml"),
+        theory=jsonfile.read(folder / THEORY) if THEORY in found.files else {},
     )
 
 
@@ -148,4 +151,7 @@ def _metrics(path: Path) -> dict[str, float | None]:
     metrics = jsonfile.read(path).get("metrics")
     if not isinstance(metrics, dict):
         raise StorageError(f"{path} holds no metrics")
+    for name, number in metrics.items():
+        if type(number) not in (int, float, type(None)):
+            raise StorageError(f"{path}: damaged: {name} is no number")
     return metrics

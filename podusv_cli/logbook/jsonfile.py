@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,10 @@ import numpy as np
 
 from podusv_cli.errors import StorageError
 from podusv_cli.logbook.regular import read_text
+
+LARGEST = 4 * 2**20  # bytes
+DEEPEST = 32  # levels
+LONGEST = 300  # digits that surely are a finite float
 
 
 def encode(content: Mapping[str, Any]) -> bytes:
@@ -32,11 +37,52 @@ def _plain(value: Any) -> Any:
 
 
 def read(path: Path) -> dict[str, Any]:
-    """A JSON object; raises StorageError where the file holds anything else."""
+    """A JSON object as podusv writes it; raises StorageError where the file holds anything else."""
     try:
-        content = json.loads(read_text(path))
+        content = json.loads(
+            read_text(path, LARGEST), object_pairs_hook=_object,
+            parse_float=_finite, parse_int=_whole, parse_constant=_finite,
+        )  # fmt: skip
+        _check_depth(content)
     except (ValueError, RecursionError) as error:
-        raise StorageError(f"cannot read {path}: no JSON ({error})") from error
+        reason = " ".join(str(error).split())
+        raise StorageError(f"cannot read {path}: no JSON of podusv ({reason})") from error
     if not isinstance(content, dict):
         raise StorageError(f"cannot read {path}: no JSON object")
     return content
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    entries = dict(pairs)
+    if len(entries) != len(pairs):
+        ((twice, _),) = Counter(key for key, _ in pairs).most_common(1)
+        raise ValueError(f"{twice[:60]!r} is given twice")
+    if not all(map(str.isprintable, entries)):
+        raise ValueError("a key holds characters that do not show")
+    return entries
+
+
+def _finite(digits: str) -> float:
+    number = float(digits)
+    if not math.isfinite(number):
+        raise ValueError(f"{digits:.40} is no finite number")
+    return number
+
+
+def _whole(digits: str) -> int:
+    # Whatever reads the number may want it as a float.
+    return int(digits) if len(digits) < LONGEST else int(_finite(digits))
+
+
+def _check_depth(content: Any) -> None:
+    level = [content]
+    for _ in range(DEEPEST):
+        level = [inner for outer in level for inner in _inside(outer)]
+    if level:
+        raise ValueError(f"nested deeper than {DEEPEST} levels")
+
+
+def _inside(thing: Any) -> Iterable[Any]:
+    if isinstance(thing, dict):
+        return thing.values()
+    return thing if isinstance(thing, list) else ()

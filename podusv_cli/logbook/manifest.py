@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from podusv_cli.errors import StorageError
 from podusv_cli.logbook import atomic, jsonfile
 from podusv_cli.logbook.layout import FORMAT
-from podusv_cli.logbook.regular import fingerprint
+from podusv_cli.logbook.regular import LARGEST_FILE, fingerprint
 from podusv_cli.recording import Status
 
 NAME = "manifest.json"
@@ -75,6 +75,8 @@ def check(folder: Path) -> Manifest:
         path = place(folder, name)
         if not os.path.lexists(path):
             raise StorageError(f"{folder} is not a finished folder: {name} is missing")
+        if entry.bytes > LARGEST_FILE:  # it might be a hole of any size
+            raise StorageError(f"{path}: {entry.bytes} bytes, at most {LARGEST_FILE} allowed")
         if os.lstat(path).st_size != entry.bytes or _entry(path) != entry:
             raise StorageError(f"{folder} is not a finished folder: {name} was altered")
     return manifest
@@ -102,7 +104,7 @@ def _names(folder: Path, above: str = "") -> Iterator[str]:
 def place(folder: Path, name: str) -> Path:
     """Where a listed file lies; StorageError where that is not inside the folder."""
     relative = PurePosixPath(name)
-    plain = str(relative) == name and "\0" not in name and name not in (".", NAME)
+    plain = str(relative) == name and name.isprintable() and name not in (".", NAME)
     if not plain or relative.is_absolute() or ".." in relative.parts:
         raise StorageError(f"{folder / NAME}: damaged: {name!r} is no file of this folder")
     path = folder / relative
