@@ -99,7 +99,7 @@ def test_a_folder_without_a_manifest_is_not_finished(tmp_path: Path) -> None:
 def test_names_that_leave_the_folder_are_refused(folder: Path, name: str) -> None:
     (folder.parent / "secret").write_bytes(b"numbers")
     rewrite(folder, lambda it: it["files"].update({name: it["files"]["log.h5"]}))
-    with pytest.raises(StorageError, match="is no file of this folder|do not show"):
+    with pytest.raises(StorageError, match=r"is no file of this folder|do not show"):
         manifest.check(folder)
 
 

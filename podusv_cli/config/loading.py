@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import yaml
@@ -15,6 +15,7 @@ from podusv_cli.config.references import complete
 from podusv_cli.config.scenario import Scenario
 from podusv_cli.config.source import read, read_text, resolve
 from podusv_cli.config.tree import Fault, Mark, Node, Route, dotted, find, printable
+from podusv_cli.config.words import found
 from podusv_cli.errors import Finding, ScenarioError, StorageError
 
 REFERENCES: tuple[Route, ...] = (("extends",), ("path", "file"))  # to other files
@@ -58,7 +59,12 @@ def load_text(
     Raises ScenarioError with everything that is wrong.
     """
     faults: list[Fault] = []
-    root = composed(text, source, overrides, faults)
+    return _checked(composed(text, source, overrides, faults), text, source, faults, checks)
+
+
+def _checked(
+    root: Node | None, text: str, source: str, faults: list[Fault], checks: Sequence[Check] = ()
+) -> Loaded:
     root = root and complete(root, faults)
     scenario = check(root, faults, checks) if root else None
     if scenario is None or root is None or faults:
@@ -79,10 +85,12 @@ def load_resolved(text: str, source: str) -> Scenario:
         for route in REFERENCES
         if root and (node := find(root, route))
     ]
+    if root and not isinstance(root.content, dict):
+        faults.append(Fault(root.mark, "", f"is {found(root.content, root.text)}, no scenario"))
     if faults or not root:
         (first, *_) = _findings(faults, source)
         raise StorageError(f"{first} (damaged: not as podusv wrote it)")
-    return load_text(text, source).scenario
+    return _checked(replace(root, mark=Mark(source)), text, source, faults).scenario
 
 
 def _findings(faults: list[Fault], first: str) -> list[Finding]:

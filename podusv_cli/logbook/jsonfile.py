@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ import numpy as np
 from podusv_cli.errors import StorageError
 from podusv_cli.logbook.regular import read_text
 
-LARGEST = 4 * 2**20  # bytes
+LARGEST = 2 * 2**20  # bytes
 DEEPEST = 32  # levels
 LONGEST = 300  # digits that surely are a finite float
 
@@ -77,12 +78,8 @@ def _whole(digits: str) -> int:
 def _check_depth(content: Any) -> None:
     level = [content]
     for _ in range(DEEPEST):
-        level = [inner for outer in level for inner in _inside(outer)]
+        lists = (thing for thing in level if isinstance(thing, list))
+        mappings = (thing.values() for thing in level if isinstance(thing, dict))
+        level = [*chain.from_iterable(chain(lists, mappings))]
     if level:
         raise ValueError(f"nested deeper than {DEEPEST} levels")
-
-
-def _inside(thing: Any) -> Iterable[Any]:
-    if isinstance(thing, dict):
-        return thing.values()
-    return thing if isinstance(thing, list) else ()

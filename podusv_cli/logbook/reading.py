@@ -20,7 +20,7 @@ import numpy as np
 
 from podusv_cli.errors import StorageError
 from podusv_cli.kernels import Vector
-from podusv_cli.logbook import layout
+from podusv_cli.logbook import layout, trees
 from podusv_cli.logbook.packing import unpacked
 from podusv_cli.logbook.regular import LARGEST_FILE, LARGEST_TEXT, read_bytes
 from podusv_cli.recording import Recording, Status
@@ -63,6 +63,7 @@ def _opened(path: Path) -> Iterator[tuple[h5py.File, bytes]]:
     """The log in memory, its format checked, and its bytes; faults inside become a StorageError."""
     image = read_bytes(path, LARGEST_FILE)
     try:
+        trees.check(image)
         with h5py.File(h5py.h5f.open_file_image(image)) as file:
             _check_format(file)
             yield file, image

@@ -1,0 +1,335 @@
+"""Ways to damage a finished run: each changes its folder, by an argument in words."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import random
+import socket
+import struct
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from podusv_cli.logbook.packing import fletcher32
+
+Damage = Callable[[Path, str], None]
+Change = Callable[[h5py.File], object]
+LOG = "log.h5"
+PIPE = "pipe"  # beside the folder: whoever reads there waits for ever
+
+
+def flip(folder: Path, argument: str) -> None:
+    """`name seed`: turn a bit anywhere in a file."""
+    name, seed = argument.split()
+    data = bytearray((folder / name).read_bytes())
+    bit = random.Random(int(seed)).randrange(8 * len(data))
+    data[bit >> 3] ^= 1 << (bit & 7)
+    (folder / name).write_bytes(data)
+
+
+def cut(folder: Path, argument: str) -> None:
+    """`name length`: leave the first bytes of a file."""
+    name, length = argument.split()
+    os.truncate(folder / name, int(length))
+
+
+def become(folder: Path, argument: str) -> None:
+    """`name what`: put something else in place of a file."""
+    name, what = argument.split()
+    (folder / name).unlink()
+    OTHERS[what](folder / name)
+
+
+def _socket(path: Path) -> None:
+    before = os.getcwd()
+    os.chdir(path.parent)  # names of sockets are short
+    with socket.socket(socket.AF_UNIX) as end:
+        end.bind(path.name)
+    os.chdir(before)
+
+
+OTHERS: dict[str, Callable[[Path], object]] = {
+    "nothing": lambda path: None,
+    "folder": Path.mkdir,
+    "pipe": os.mkfifo,
+    "socket": _socket,
+    "device": lambda path: path.symlink_to("/dev/zero"),  # a device of one's own takes root
+    "link": lambda path: path.symlink_to(path.parent.parent / PIPE),
+    "hole": lambda path: (path.touch(), os.truncate(path, 2**40)),
+    "empty": Path.touch,
+    "zeros": lambda path: path.write_bytes(bytes(100_000)),
+    "noise": lambda path: path.write_bytes(random.Random(1).randbytes(100_000)),
+}  # fmt: skip
+
+
+def text(folder: Path, argument: str) -> None:
+    """`name which`: put a text in place of a file."""
+    name, which = argument.split()
+    content = TEXTS[which]
+    if "{whole}" in content:
+        whole = (folder / name).read_text().strip()
+        content = content.replace("{whole}", whole.removeprefix("{").removesuffix("}"))
+    (folder / name).write_bytes(content.encode("utf-8", "surrogateescape"))
+
+
+# `{whole}` stands for what is between the outer brackets of the file as it was.
+TEXTS = {
+    "list": "[]", "number": "1", "word": '"a"', "null": "null", "true": "true",
+    "no JSON": "{whole}", "open": "{{whole}", "twice": "{{whole}}{}", "no text": "{\udcff}",
+    "mark": "\ufeff{{whole}}", "zero": "{{whole}, \0}", "comma": "{{whole},}",
+    "deep": "[" * 100_000, "nested": '{{whole}, "a": ' + "[" * 900 + "]" * 900 + "}",
+    "mappings": '{{whole}, "a": ' + '{"a": ' * 900 + "1" + "}" * 901,
+    "nan": '{{whole}, "a": NaN}', "infinity": '{{whole}, "a": -Infinity}',
+    "large": '{{whole}, "a": 1e999}', "digits": '{{whole}, "a": ' + "9" * 4000 + "}",
+    "more digits": '{{whole}, "a": ' + "9" * 1_000_000 + "}",
+    "same": '{{whole}, "a": 1, "a": 2}', "escape": '{{whole}, "\\u001b[2J\\n": 1}',
+    # Below the limit of size.
+    "wide": '{{whole}, "a": [' + ",".join(["[]"] * 695_000) + "]}",
+    "keys": '{{whole}, "a": {' + ",".join(f'"{i}":{{}}' for i in range(175_000)) + "}}",
+    "long": '{{whole}, "a": "' + "a" * 20_000_000 + '"}',
+}  # fmt: skip
+TEXTS = {name.replace(" ", "_"): content for name, content in TEXTS.items()}
+
+
+def entry(folder: Path, argument: str) -> None:
+    """`name a.b value`: set an entry of a JSON file, the value in JSON, or drop it."""
+    name, route, value = argument.split(maxsplit=2)
+    content = json.loads((folder / name).read_text())
+    *above, last = route.split(".")
+    place = content
+    for key in above:
+        place = place[key]
+    if value == "drop":
+        del place[last]
+    else:
+        place[last] = json.loads(value)
+    (folder / name).write_text(json.dumps(content))
+
+
+def yaml(folder: Path, argument: str) -> None:
+    """`which`: put a text in place of the resolved scenario, or in front of it."""
+    path = folder / "resolved.yaml"
+    content = YAML[argument].replace("{pipe}", str(folder.parent / PIPE))
+    path.write_text(content.replace("{whole}", path.read_text()), errors="surrogateescape")
+
+
+YAML = {
+    "empty": "", "list": "- a", "word": "a", "open": "{a: [", "no_text": "a: \udcff",
+    "deep": "a: " + "[" * 100_000, "long": "a: '" + "a" * 3_000_000 + "'",
+    "many": "a: [" + "1, " * 300_000 + "]", "lines": "a:\n" + "- 1\n" * 200_000,
+    "comments": "#\n" * 450_000 + "{whole}", "aliases": "a: &a [1]\nb: [*a, *a]\n{whole}",
+    "extends": "extends: {pipe}\n{whole}", "file": "path: {kind: waypoints, file: {pipe}}\n",
+    "escaped": '"\\e[2J": 1\n{whole}', "tag": "a: !!python/object/apply:os.abort []\n{whole}",
+}  # fmt: skip
+
+
+def hdf5(folder: Path, argument: str) -> None:
+    """`which`: change the log as a program with HDF5 can."""
+    content = io.BytesIO((folder / LOG).read_bytes())
+    with h5py.File(content, "r+") as file:
+        HDF5[argument](file, folder.parent / PIPE)
+    (folder / LOG).write_bytes(content.getvalue())
+
+
+def _replaced(name: str, **how: Any) -> Callable[[h5py.File, Path], object]:
+    def change(file: h5py.File, pipe: Path) -> None:
+        del file[name]
+        file.create_dataset(name, **how)
+
+    return change
+
+
+PACKED = {"compression": "gzip", "shuffle": True, "fletcher32": True}
+
+
+def _bomb(size: int, *, rows: int = 0) -> Callable[[h5py.File, Path], object]:
+    """`u` in a single chunk that unpacks to `size` bytes whatever its shape says."""
+
+    def change(file: h5py.File, pipe: Path) -> None:
+        shape = (rows or len(file["u"]),)
+        del file["u"]
+        dataset = file.create_dataset("u", shape, dtype="<f8", chunks=shape, **PACKED)
+        stream = _zeros(size)
+        chunk = stream + fletcher32(stream).to_bytes(4, "little")
+        dataset.id.write_direct_chunk((0,), chunk)
+
+    return change
+
+
+def _zeros(size: int) -> bytes:
+    """A zlib stream of so many zeros."""
+    packer, block = zlib.compressobj(9, wbits=-15), bytes(2**20)
+    piece, count = packer.compress(block) + packer.flush(zlib.Z_FULL_FLUSH), size >> 20
+    rest = bytes(size & 2**20 - 1)
+    total = zlib.adler32(rest)
+    for _ in range(count):
+        total = zlib.adler32(block, total)
+    last = packer.compress(rest) + packer.flush()
+    return b"\x78\xda" + count * piece + last + total.to_bytes(4, "big")
+
+
+def _linked(name: str, link: Callable[[Path], object]) -> Callable[[h5py.File, Path], object]:
+    def change(file: h5py.File, pipe: Path) -> None:
+        if name in file:
+            del file[name]
+        file[name] = link(pipe)
+
+    return change
+
+
+def _virtual(file: h5py.File, pipe: Path) -> None:
+    shape = file["u"].shape
+    del file["u"]
+    made = h5py.VirtualLayout(shape=shape, dtype="<f8")
+    made[:] = h5py.VirtualSource(str(pipe), "u", shape=shape)
+    file.create_virtual_dataset("u", made)
+
+
+def _external(file: h5py.File, pipe: Path) -> None:
+    shape = file["u"].shape
+    del file["u"]
+    file.create_dataset("u", shape, dtype="<f8", external=[(str(pipe), 0, 8 * shape[0])])
+
+
+def _attributes(count: int) -> Callable[[h5py.File, Path], object]:
+    def change(file: h5py.File, pipe: Path) -> None:
+        room, kind = h5py.h5s.create(h5py.h5s.SCALAR), h5py.h5t.STD_I8LE
+        for i in range(count):
+            h5py.h5a.create(file["u"].id, b"a%d" % i, kind, room)
+
+    return change
+
+
+def _nested(depth: int) -> Callable[[h5py.File, Path], object]:
+    def change(file: h5py.File, pipe: Path) -> None:
+        group = file["provenance"].id
+        for _ in range(depth):
+            group = h5py.h5g.create(group, b"a")
+
+    return change
+
+
+def _members(count: int) -> Callable[[h5py.File, Path], object]:
+    def change(file: h5py.File, pipe: Path) -> None:
+        for i in range(count):
+            h5py.h5o.link(file["x"].id, file.id, f"x{i}".encode())
+
+    return change
+
+
+def _again(*names: str) -> Callable[[h5py.File, Path], object]:
+    """The group of these names is its own child, and the root's."""
+
+    def change(file: h5py.File, pipe: Path) -> None:
+        for name in names:
+            if name in file:
+                del file[name]
+            file[name] = file["/"]
+
+    return change
+
+
+def _giant(file: h5py.File, pipe: Path) -> None:
+    """Every signal a petabyte long, without a chunk of it."""
+    for name, dataset in list(file.items()):
+        if isinstance(dataset, h5py.Dataset) and len(dataset.shape) == 1 and dataset.shape[0] == 11:
+            del file[name]
+            file.create_dataset(name, (2**47,), dtype="<f8", chunks=(2**17,), **PACKED)
+
+
+HDF5: dict[str, Callable[[h5py.File, Path], object]] = {
+    "bomb": _bomb(2**30), "short": _bomb(16), "byte_more": _bomb(8 * 11 + 1),
+    "byte_less": _bomb(8 * 11 - 1),
+    "giant": _giant,
+    "declared": _replaced("u", shape=(2**47,), dtype="<f8", chunks=(2**17,), **PACKED),
+    "wide_chunk": _replaced("u", shape=(11,), dtype="<f8", chunks=(2**28,), maxshape=(None,)),
+    "enum": _replaced("u", shape=(11,), dtype=h5py.enum_dtype({"a": 1})),
+    "opaque": _replaced("u", shape=(11,), dtype="V8"),
+    "array": _replaced("u", shape=(11,), dtype=np.dtype(("<f8", (1,)))),
+    "nested_ragged": _replaced("u", shape=(11,), dtype=h5py.vlen_dtype(np.dtype("V16"))),
+    "virtual": _virtual,
+    "external": _external,
+    "external_link": _linked("u", lambda pipe: h5py.ExternalLink(str(pipe), "/u")),
+    "external_provenance": _linked("provenance", lambda pipe: h5py.ExternalLink(str(pipe), "/")),
+    "soft_link_to_itself": _linked("u", lambda pipe: h5py.SoftLink("/u")),
+    "attributes": _attributes(2000),
+    "many_attributes": _attributes(1_000_000),
+    "nested": _nested(1000),
+    "deeply_nested": _nested(50_000),
+    "members": _members(2000),
+    "many_members": _members(200_000),
+    "root_in_itself": _again("u"),
+    "root_in_provenance": _again("provenance"),
+    "cycle_aside": _again("provenance/again"),
+}  # fmt: skip
+
+
+def foreign(folder: Path, argument: str) -> None:
+    """`which`: a file of another program in place of the log."""
+    (folder / LOG).unlink()
+    FOREIGN[argument](folder / LOG)
+
+
+def _table(path: Path) -> None:
+    with h5py.File(path, "w", libver="latest") as file:
+        file["data/values"] = np.zeros((100, 100))
+
+
+def _late(path: Path) -> None:
+    """A log of no program: HDF5 behind a block of the user's."""
+    with h5py.File(path, "w", userblock_size=512) as file:
+        file.attrs.create("podusv_format", np.int32(1))
+
+
+FOREIGN: dict[str, Callable[[Path], object]] = {
+    "table": _table,
+    "late": _late,
+    "signature": lambda path: path.write_bytes(b"\x89HDF\r\n\x1a\n"),
+    "signature_and_noise": lambda path: path.write_bytes(
+        b"\x89HDF\r\n\x1a\n" + random.Random(2).randbytes(5000)
+    ),
+    "classic_netcdf": lambda path: path.write_bytes(b"CDF\x01" + bytes(100)),
+    "picture": lambda path: path.write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(100)),
+}  # fmt: skip
+
+
+def index(folder: Path, argument: str) -> None:
+    """`what`: the index of the last signal's chunks, which no checksum guards."""
+    data = bytearray((folder / LOG).read_bytes())
+    tree = data.rindex(b"TREE")
+    INDEX[argument](data, tree)
+    (folder / LOG).write_bytes(data)
+
+
+def _set(data: bytearray, at: int, form: str, number: int) -> None:
+    struct.pack_into(form, data, at, number)
+
+
+CHILD = 24 + 8 + 16  # of a vector's first entry: head; size and mask; two offsets
+
+
+def _circle(data: bytearray, tree: int) -> None:
+    _set(data, tree + 5, "<B", 1)  # it has children
+    _set(data, tree + CHILD, "<Q", tree)
+
+
+INDEX: dict[str, Callable[[bytearray, int], None]] = {
+    "circle": _circle,
+    "sibling": lambda data, tree: _set(data, tree + 16, "<Q", tree),
+    "many": lambda data, tree: _set(data, tree + 6, "<H", 60_000),
+    "none": lambda data, tree: _set(data, tree + 6, "<H", 0),
+    "high": lambda data, tree: _set(data, tree + 5, "<B", 255),
+    "size": lambda data, tree: _set(data, tree + 24, "<I", 2**32 - 1),
+    "far": lambda data, tree: _set(data, tree + CHILD, "<Q", 2**62),
+    "undefined": lambda data, tree: _set(data, tree + CHILD, "<Q", 2**64 - 1),
+    "masked": lambda data, tree: _set(data, tree + 28, "<I", 7),
+}  # fmt: skip
+DAMAGES: dict[str, Damage] = {
+    f.__name__: f for f in (flip, cut, become, text, entry, yaml, hdf5, foreign, index)
+}

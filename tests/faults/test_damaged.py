@@ -1,0 +1,363 @@
+"""Damaged results: the manifest tells, or else the reader does; soon, in a line, and from no other
+file."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from command_samples import Command, commanded
+from counts import count
+from damages import FOREIGN, HDF5, INDEX, OTHERS, PIPE, TEXTS, YAML
+from damaging import __file__ as DAMAGING
+from damaging import damaged
+from logbook_samples import ENVIRONMENT, deadline, files
+from repetition_samples import copied, made, relogged
+
+from podusv_cli import comparing
+from podusv_cli.errors import StorageError, UsageError
+from podusv_cli.logbook import manifest
+
+SCENARIO = """
+name: whole
+vessel: {preset: paper_nonlinear}
+path: {kind: line_circle}
+disturbance: {kind: harmonic}
+actuator: {kind: saturated}
+simulation: {duration: 0.1, compiled: false}
+controller: {kind: adaptive_neural}
+"""
+SECONDS, MEMORY = 1.0, 300  # of a processor; MiB
+JSON = ("metrics.json", "provenance.json", "theory.json")
+UNREAD = ("scenario.yaml", "metrics.csv")
+READ = ("log.h5", "resolved.yaml", *JSON)
+FULL = ("many_attributes", "deeply_nested", "many_members")  # take minutes to make
+HARMLESS = ("attributes", "many_attributes", "nested", "deeply_nested", "cycle_aside")  # unread
+
+
+class Outcome(NamedTuple):
+    """What came of opening a damaged folder; negative `code` is a signal that ended the process."""
+
+    word: str
+    code: int
+    said: str = ""
+    seconds: float = 0.0
+    mebibytes: float = 0.0
+
+
+class Opener:
+    """Opens damaged copies of a run in a process that may die of it, and is then replaced."""
+
+    def __init__(self, run: Path) -> None:
+        self.run, self._process = run, self._started(run)
+
+    def _started(self, run: Path) -> subprocess.Popen[str]:
+        way = f"{Path(DAMAGING).parent}:{Path(DAMAGING).parents[2]}"
+        return subprocess.Popen(
+            [sys.executable, DAMAGING, str(run)], text=True, env={**ENVIRONMENT, "PYTHONPATH": way},
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+        )  # fmt: skip
+
+    def __call__(self, way: str) -> Outcome:
+        if self._process.poll() is not None:
+            self._process = self._started(self.run)
+        assert self._process.stdin
+        assert self._process.stdout
+        self._process.stdin.write(f"{way}\n")
+        self._process.stdin.flush()
+        try:
+            with deadline():
+                answer = self._process.stdout.readline()
+        except BaseException:
+            self.close()
+            raise
+        return Outcome(*json.loads(answer)) if answer else Outcome("died", self._process.wait())
+
+    def close(self) -> None:
+        self._process.kill()
+        self._process.communicate()
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("damaged")
+    os.mkfifo(place / PIPE)
+    return made(place / "whole", text=SCENARIO)
+
+
+@pytest.fixture(scope="module")
+def opened(run: Path) -> Iterator[Opener]:
+    opener = Opener(run)
+    yield opener
+    opener.close()
+
+
+def check(way: str, found: Outcome, *allowed: str) -> None:
+    """Whether the outcome is one that is allowed, and soon and small."""
+    assert found.word in allowed, (way, found)
+    assert found.code == (0 if found.word == "same" else 5), (way, found)
+    assert found.seconds < SECONDS, (way, found)
+    assert found.mebibytes < MEMORY, (way, found)
+    assert found.said.isprintable(), (way, found)  # on one line, too
+    assert len(found.said) < 400, (way, found)
+
+
+def size(run: Path, name: str = "log.h5") -> int:
+    return (run / name).stat().st_size
+
+
+def test_an_undamaged_run_is_opened(opened: Opener) -> None:
+    assert opened("entry provenance.json argv [1]").word == "refused"
+    assert opened("!entry provenance.json argv [1]").word == "same"
+
+
+def test_a_log_cut_short_is_refused(opened: Opener, run: Path) -> None:
+    whole = size(run)
+    step = 512 * count(max(1, whole // 512 // 20), 1)
+    for length in [*range(0, whole, step), whole - 1]:
+        for way in (f"cut log.h5 {length}", f"!cut log.h5 {length}"):
+            check(way, opened(way), "refused")
+
+
+def test_a_flipped_bit_is_told_by_the_manifest(opened: Opener) -> None:
+    for name in ("manifest.json", *READ, *UNREAD):
+        for seed in range(count(5, 300)):
+            way = f"flip {name} {seed}"
+            check(way, opened(way), "refused")
+
+
+def test_a_flipped_bit_that_the_manifest_does_not_tell_leaves_all_numbers(opened: Opener) -> None:
+    words = set()
+    for seed in range(count(50, 2000)):
+        way = f"!flip log.h5 {seed}"
+        found = opened(way)
+        check(way, found, "refused", "same")
+        words.add(found.word)
+    assert words == {"refused", "same"}  # some bytes of the file mean nothing
+
+
+@pytest.mark.parametrize("what", OTHERS)
+def test_what_stands_in_place_of_a_file(opened: Opener, what: str) -> None:
+    for name in (*READ, *UNREAD):
+        way = f"become {name} {what}"
+        check(way, opened(way), "refused")
+        harmless = name in UNREAD and what in ("empty", "zeros", "noise")
+        check(f"!{way}", opened(f"!{way}"), "same" if harmless else "refused")
+    if what != "nothing":  # without a manifest it is no run folder
+        check(what, opened(f"become manifest.json {what}"), "refused")
+
+
+@pytest.mark.parametrize("which", TEXTS)
+def test_json_that_podusv_does_not_write(opened: Opener, which: str) -> None:
+    check(which, opened(f"text manifest.json {which}"), "refused")
+    large = which in ("wide", "keys")
+    for name in JSON[-1:] if large else JSON:
+        way = f"!text {name} {which}"
+        check(way, opened(way), "same" if large else "refused")
+
+
+WRONG = [
+    *(f"metrics.json metrics {value}" for value in ("[]", "1", "null", "drop")),
+    *(f"metrics.json metrics.iae {value}" for value in ("true", '"1"', "[1]", "{}", '"nan"')),
+    *(f"theory.json windows {value}" for value in ("[]", "1", "null", '{"a": 1}', "drop")),
+    *(f"theory.json conditions {value}" for value in ("1", "[1]", '[{"holds": false}]', "drop")),
+    "theory.json conditions [{}]", "theory.json windows.whole.largest_V []",
+    'theory.json windows.whole.corrected.bound "a"', "theory.json assumptions [[]]",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_values_of_another_type(opened: Opener, what: str) -> None:
+    check(what, opened(f"!entry {what}"), "refused")
+
+
+@pytest.mark.parametrize("which", YAML)
+def test_a_scenario_that_podusv_does_not_write(opened: Opener, which: str) -> None:
+    check(which, opened(f"!yaml {which}"), "same" if which == "comments" else "refused")
+
+
+@pytest.mark.parametrize(
+    "way",
+    [
+        *(f"hdf5 {which}" for which in HDF5 if count(which not in FULL, True)),
+        *(f"foreign {which}" for which in FOREIGN),
+        *(f"index {which}" for which in INDEX),
+    ],
+)
+def test_a_log_of_another_program(opened: Opener, way: str) -> None:
+    harmless = way.removeprefix("hdf5 ") in HARMLESS or way == "index sibling"
+    check(way, opened(way), "refused")
+    check(way, opened(f"!{way}"), "same" if harmless else "refused")
+
+
+# --- logs that are whole and yet not a run's
+
+
+def _without(*names: str) -> Callable[[dict[str, Any]], None]:
+    return lambda signals: [signals.pop(name) for name in names] and None
+
+
+def _with(name: str, row: int, number: float) -> Callable[[dict[str, Any]], None]:
+    return lambda signals: signals[name].__setitem__(row, number)
+
+
+def _backwards(signals: dict[str, Any]) -> None:
+    signals["time"] = np.ascontiguousarray(signals["time"][::-1])
+
+
+UNSOUND = {
+    "no position": (_without("x"), "it has no x"),
+    "no demand": (_without("tau_r_cmd"), "it has no tau_r_cmd"),
+    "no terms": (_without("V_W_u"), "it has no V_W_u"),
+    "not a number": (_with("psi", 3, np.nan), "psi holds something that is no finite number"),
+    "infinite time": (_with("time", -1, np.inf), "time holds something that is no finite"),
+    "beyond the engine": (_with("y", 0, -1e305), "y holds something that is no finite number"),
+    "backwards": (_backwards, "its times do not increase"),
+    "twice": (_with("time", 3, 0.02), "its times do not increase"),
+}
+
+
+@pytest.mark.parametrize("case", UNSOUND)
+def test_a_log_that_lacks_what_every_run_has(run: Path, tmp_path: Path, case: str) -> None:
+    change, words = UNSOUND[case]
+    other = copied(run, tmp_path / "other", log_h5=relogged(run, change))
+    with pytest.raises(StorageError, match=words):
+        comparing.from_folder(other)
+
+
+def test_a_law_is_not_timed_with_the_memory_of_another(run: Path, tmp_path: Path) -> None:
+    # In machine code it would read beyond the end of what it remembers.
+    def shorter(signals: dict[str, Any]) -> None:
+        for name in ("W_hat_u", "W_hat_r"):
+            del signals[name]
+
+    other = copied(run, tmp_path / "other", log_h5=relogged(run, shorter))
+    assert comparing.from_folder(other)  # it can be drawn
+    with pytest.raises(StorageError, match="W_hat_u does not have 27 values in a row"):
+        comparing.comparable(other)
+
+
+# --- comparisons
+
+
+@pytest.fixture
+def comparison(run: Path, tmp_path: Path) -> Path:
+    for label in ("a", "b"):
+        copied(run, tmp_path / "two" / label)
+    (tmp_path / "two/comparison.csv").write_text("metric,unit,b,a\niae,m s,1,2\n")
+    manifest.write(tmp_path / "two", "finished")
+    return tmp_path / "two"
+
+
+def labels(folder: Path) -> list[str]:
+    return [part.label for part in comparing.from_folder(folder)]
+
+
+def test_runs_of_a_comparison_stand_as_in_its_table(comparison: Path) -> None:
+    assert labels(comparison) == ["b", "a"]
+
+
+@pytest.mark.parametrize("what", [w for w in OTHERS if w != "hole"])
+def test_a_damaged_table_of_a_comparison(comparison: Path, what: str) -> None:
+    table = comparison / "comparison.csv"
+    table.unlink()
+    OTHERS[what](table)
+    with deadline(10), pytest.raises(StorageError, match=r"comparison\.csv"):
+        comparing.from_folder(comparison)
+
+
+@pytest.mark.parametrize("content", [b"\xff", b"a" * 200_000, b"a" * 20_000_000])
+def test_a_table_of_another_program(comparison: Path, content: bytes) -> None:
+    (comparison / "comparison.csv").write_bytes(content)
+    manifest.write(comparison, "finished")
+    with pytest.raises(StorageError, match=r"comparison\.csv"):
+        comparing.from_folder(comparison)
+
+
+def test_a_run_that_a_comparison_has_lost_is_missed(comparison: Path) -> None:
+    (comparison / "a/log.h5").unlink()
+    with pytest.raises(StorageError, match=r"a/log\.h5 is missing"):
+        comparing.from_folder(comparison)
+
+
+def test_links_among_runs_do_not_count(run: Path, comparison: Path) -> None:
+    (comparison / "c").symlink_to(run)
+    assert labels(comparison) == ["b", "a"]
+    (comparison / "manifest.json").unlink()
+    assert labels(comparison) == ["a", "b"]
+
+
+def test_a_log_that_is_no_file_is_no_reason_to_overlook_its_run(comparison: Path) -> None:
+    (comparison / "manifest.json").unlink()
+    (comparison / "a/log.h5").unlink()
+    os.mkfifo(comparison / "a/log.h5")
+    with pytest.raises(StorageError, match=r"log\.h5"):
+        comparing.from_folder(comparison)
+
+
+# --- commands
+
+
+@pytest.fixture
+def podusv(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Command:
+    monkeypatch.chdir(tmp_path)
+    return commanded(monkeypatch, capsys)
+
+
+WAYS = [
+    "cut log.h5 5000", "!cut log.h5 5000", "!become log.h5 pipe", "!hdf5 external",
+    "!text metrics.json nan", "!text provenance.json deep", "!text theory.json same",
+    "!yaml extends", "text manifest.json escape", "become manifest.json pipe",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_every_command_says_so_in_a_line_and_leaves_nothing(
+    run: Path, tmp_path: Path, podusv: Command, way: str
+) -> None:
+    folder = run.with_name("commanded")
+    damaged(run, folder, way)
+    before = files(folder) if "pipe" not in way else {}
+    for words in (["plot", folder], ["plot", run, folder], ["compare", run, folder],
+                  ["rerun", folder], ["diff", run, folder]):  # fmt: skip
+        with deadline(20):
+            said = podusv(*words)
+        assert (said.code, said.out) == (5, ""), (words, said)
+        assert said.err.count("\n") == 1, said.err
+        assert str(folder) in said.err
+    assert not list(tmp_path.iterdir())
+    assert before == (files(folder) if "pipe" not in way else {})
+
+
+def test_a_run_folder_is_no_scenario_damaged_or_not(run: Path, podusv: Command) -> None:
+    folder = run.with_name("commanded")
+    damaged(run, folder, "become log.h5 pipe")
+    for path in (run, folder):
+        said = podusv("validate", path)
+        assert said.code == 2
+        assert said.err.count("\n") == 1
+
+
+def test_a_folder_without_a_manifest_is_no_run_folder(run: Path) -> None:
+    folder = run.with_name("bare")
+    damaged(run, folder, "become manifest.json nothing")
+    (folder / "log.h5").unlink()
+    with pytest.raises(UsageError, match=r"no run folder: it has no manifest\.json"):
+        comparing.from_folder(folder)
+
+
+def test_a_pipe_where_a_figure_is_to_be_written(run: Path, tmp_path: Path, podusv: Command) -> None:
+    (tmp_path / "figures").mkdir()
+    os.mkfifo(tmp_path / "figures/errors.png")
+    with deadline(20):
+        assert podusv("plot", run, "--figure", "errors").code == 0
+    assert (tmp_path / "figures/errors.png").read_bytes().startswith(b"\x89PNG")
