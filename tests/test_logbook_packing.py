@@ -80,3 +80,25 @@ def test_planes_of_noise_are_stored_and_the_others_deflated() -> None:
 def test_the_same_numbers_give_the_same_bytes() -> None:
     for numbers in SIGNALS.values():
         assert packing.packed(numbers) == packing.packed(numbers.copy())
+
+
+@pytest.mark.parametrize("name", SIGNALS)
+def test_what_was_packed_is_unpacked_to_the_last_bit(name: str) -> None:
+    numbers = SIGNALS[name]
+    found = packing.unpacked(packing.packed(numbers), numbers.shape)
+    assert (found.shape, found.tobytes()) == (numbers.shape, numbers.tobytes())
+
+
+def test_no_bit_of_a_chunk_can_be_flipped() -> None:
+    content = packing.packed(np.sin(np.arange(20.0)))
+    for bit in range(8 * len(content)):
+        damaged = bytearray(content)
+        damaged[bit >> 3] ^= 1 << (bit & 7)
+        with pytest.raises(ValueError, match="chunk"):
+            packing.unpacked(bytes(damaged), (20,))
+
+
+@pytest.mark.parametrize("shape", [(19,), (21,), (0,), (20, 2)])
+def test_a_chunk_holds_exactly_its_shape(shape: tuple[int, ...]) -> None:
+    with pytest.raises(ValueError, match="does not unpack to"):
+        packing.unpacked(packing.packed(np.arange(20.0)), shape)

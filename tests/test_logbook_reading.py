@@ -222,6 +222,19 @@ def test_a_log_that_is_not_as_podusv_writes_it_is_refused(path: Path, case: str)
     assert "\n" not in str(caught.value)
 
 
+def test_a_log_behind_something_else_is_refused(path: Path) -> None:
+    # HDF5 would find it there, and count all places in the file from there.
+    with pytest.raises(StorageError, match="no HDF5 file of the kind that podusv writes"):
+        read(path, bytes(512) + log())
+
+
+def test_the_tree_of_a_long_signal_goes_round_in_no_circle(path: Path) -> None:
+    long = recording(rows=66, nodes=2**17)  # 66 chunks, more than a node of the tree holds
+    content = log(long)
+    assert b"TREE\x01\x01" in content
+    assert_same(long, read(path, content))
+
+
 def test_a_scenario_altered_in_its_place_is_refused(path: Path) -> None:
     path.write_bytes(log().replace(b"x: -10.0", b"x: -90.0"))
     with pytest.raises(StorageError, match="does not fit its checksum"):
