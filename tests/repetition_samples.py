@@ -16,7 +16,7 @@ import podusv_cli
 from podusv_cli import workflows
 from podusv_cli.logbook import hdf5, jsonfile, reading
 from podusv_cli.logbook.folder import RunWriter
-from podusv_cli.recording import Recording
+from podusv_cli.recording import Recording, Status
 
 SCENARIO = SOUND + "name: sample\nsimulation: {step: 0.01, duration: 0.5, compiled: false}\n"
 
@@ -28,7 +28,9 @@ def made(folder: Path, *overrides: str, text: str = SCENARIO) -> Path:
     return workflows.run(config, workflows.Request(overrides, folder, figures=False)).folder
 
 
-def copied(folder: Path, target: Path, **changes: Callable[[bytes], bytes]) -> Path:
+def copied(
+    folder: Path, target: Path, status: Status = "finished", **changes: Callable[[bytes], bytes]
+) -> Path:
     """A finished copy, manifest included, with changed files: `log_h5` changes log.h5."""
     with RunWriter(target) as writer:
         for name, content in files(folder).items():
@@ -36,7 +38,7 @@ def copied(folder: Path, target: Path, **changes: Callable[[bytes], bytes]) -> P
                 change = changes.pop(name.replace(".", "_"), lambda content: content)
                 writer.add(name, change(content))
         assert not changes
-        return writer.finish("finished")
+        return writer.finish(status)
 
 
 def relogged(folder: Path, change: Callable[[dict[str, Any]], None]) -> Callable[[bytes], bytes]:
