@@ -171,6 +171,12 @@ def only_time(count: int) -> Callable[[h5py.File], None]:
     return change
 
 
+def no_nodes(file: h5py.File) -> None:
+    for name, shape in (("W_hat_u", (50, 0)), ("rbf_center", (0, 3))):
+        del file[name]
+        file.create_dataset(name, shape=shape, dtype="<f8")
+
+
 PACKED = {"compression": "gzip", "shuffle": True, "fletcher32": True}
 FIFTY = np.zeros(50)
 HOSTILE = {
@@ -210,6 +216,8 @@ HOSTILE = {
     "endless status": (described("status", "finished"), "no single string of fixed length"),
     "statuses": (described("status", [b"finished"], "S8"), "no single string of fixed length"),
     "empty status": (described("status", h5py.Empty("S8")), "no single string|unknown status"),
+    "no nodes": (no_nodes, "W_hat_u has no values along node"),
+    "escape": (described("controller", np.bytes_(b"pid\x1b[2J")), "holds characters that are no text"),
     "no text": (described("controller", np.bytes_(b"\xff")), "utf-8"),
 }  # fmt: skip
 

@@ -120,7 +120,7 @@ SOON = ("vessel", "path", "disturbance", "actuator.pods", "start", "simulation",
         "controllers", "claims", "extends")  # fmt: skip
 LATE = ("vessel.m", "vessel.X_udot", "vessel.preset", "path.kind", "disturbance.kind",
         "actuator.preset", "actuator.kind", "actuator.pods[0].x", "actuator.pods[0].T_nn",
-        "controller.anti_windup", "controller.network", "metrics", "log", "silence")  # fmt: skip
+        "controller.anti_windup", "controller.network", "metrics", "log")  # fmt: skip
 
 
 @cache
