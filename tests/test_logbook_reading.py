@@ -217,7 +217,7 @@ HOSTILE = {
     "statuses": (described("status", [b"finished"], "S8"), "no single string of fixed length"),
     "empty status": (described("status", h5py.Empty("S8")), "no single string|unknown status"),
     "no nodes": (no_nodes, "W_hat_u has no values along node"),
-    "escape": (described("controller", np.bytes_(b"pid\x1b[2J")), "holds characters that are no text"),
+    "escape": (described("controller", np.bytes_(b"pid\x1b[2J")), "characters that are no text"),
     "no text": (described("controller", np.bytes_(b"\xff")), "utf-8"),
 }  # fmt: skip
 

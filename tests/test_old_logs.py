@@ -16,7 +16,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from command_samples import Command, commanded
+from command_samples import Command
 from numpy.testing import assert_array_equal
 
 from podusv_cli.errors import StorageError
@@ -50,11 +50,6 @@ def run(archive: Path, tmp_path: Path) -> Path:
 def told(archive: Path) -> Any:
     """What is in the run, in plain text."""
     return json.loads(archive.with_name(archive.name.replace(".tar.gz", ".json")).read_text())
-
-
-@pytest.fixture
-def podusv(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Command:
-    return commanded(monkeypatch, capsys)
 
 
 def test_there_are_runs_of_every_format() -> None:

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from command_samples import Command, commanded
+from command_samples import Command
 from counts import count
 from damages import FOREIGN, HDF5, INDEX, OTHERS, PIPE, TEXTS, YAML
 from damaging import __file__ as DAMAGING
@@ -305,14 +305,6 @@ def test_a_log_that_is_no_file_is_no_reason_to_overlook_its_run(comparison: Path
 # --- commands
 
 
-@pytest.fixture
-def podusv(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Command:
-    monkeypatch.chdir(tmp_path)
-    return commanded(monkeypatch, capsys)
-
-
 WAYS = [
     "cut log.h5 5000", "!cut log.h5 5000", "!become log.h5 pipe", "!hdf5 external",
     "!text metrics.json nan", "!text provenance.json deep", "!text theory.json same",
@@ -334,7 +326,7 @@ def test_every_command_says_so_in_a_line_and_leaves_nothing(
         assert (said.code, said.out) == (5, ""), (words, said)
         assert said.err.count("\n") == 1, said.err
         assert str(folder) in said.err
-    assert not list(tmp_path.iterdir())
+    assert [path.name for path in tmp_path.iterdir()] == ["a.yaml"]
     assert before == (files(folder) if "pipe" not in way else {})
 
 

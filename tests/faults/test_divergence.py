@@ -139,6 +139,18 @@ def test_computing_counts_and_not_the_clock(monkeypatch: pytest.MonkeyPatch) -> 
     assert run(adrift(controller=Waiting()), 0.1, compiled=False).status == "finished"
 
 
+def test_what_a_law_raises_in_several_lines_is_told_in_one() -> None:
+    class Talkative(Constant):
+        @staticmethod
+        def law(t, x, memory, target, k, table, tau, rate, signals, work):  # type: ignore[no-untyped-def, override]
+            if t == 0.05:
+                raise RuntimeError("first\n  second")
+            tau[:] = 0.0
+
+    message = run(adrift(controller=Talkative()), 0.1, compiled=False).message
+    assert "RuntimeError: first second (" in message
+
+
 @pytest.mark.filterwarnings("error")
 def test_numbers_that_overflow_are_left_for_the_run_to_tell() -> None:
     class Overflowing(Constant):
