@@ -15,6 +15,7 @@ from podusv_cli.config.loading import load
 
 ROOT = Path(__file__).parent.parent
 NAMES = ("ideal", "kept", "dropped", "single", "no_anti_windup")
+SOON = ("kept", "single")  # the others take 20 s, and what `make test` sees of them is in the lines
 LAWS = ["proposed", "dsc", "li", "pid"]
 TIMED = ["law_ns", "law_ns_low", "law_ns_high"]
 FOUND = (ROOT / "results/pod.md").read_text()
@@ -28,7 +29,9 @@ def committed(name: str, folder: Path = ROOT / "results/pod") -> Any:
     return pd.read_csv(folder / name / "comparison.csv", index_col=0).drop(index=TIMED)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[pytest.mark.slow] * (n not in SOON)) for n in NAMES]
+)
 def test_the_committed_table_is_what_comes_out(name: str, tmp_path: Path) -> None:
     request = workflows.Request(out=tmp_path / name, figures=False)
     workflows.compare([ROOT / f"configs/pod/{name}.yaml"], request)
