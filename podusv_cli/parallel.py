@@ -29,12 +29,13 @@ TRIES = 2  # a worker that was killed is replaced once
 class Outcome:
     """What became of a job: its result, or in `failure` the reason why there is none.
 
-    `cut`: it was not over when an interrupt came.
+    `cut`: it was not over when an interrupt came. `code`: the exit code that its error stands for.
     """
 
     result: Any = None
     failure: str = ""
     cut: bool = False
+    code: int = 0
 
 
 @dataclass
@@ -144,7 +145,7 @@ def _outcome(job: Job, progress: Progress, interrupts: Interrupts) -> Outcome:
     except BrokenPipeError:
         raise
     except PodusvError as error:
-        return Outcome(failure=str(error))
+        return Outcome(failure=str(error), code=error.exit_code)
     except KeyboardInterrupt:
         return Outcome(failure=INTERRUPTED)
     except Exception:  # machine code may turn an interrupt into another exception

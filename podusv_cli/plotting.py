@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -83,8 +84,7 @@ def chosen(asked: Sequence[str], shown: Sequence[Shown]) -> tuple[str, ...]:
 
 def spared(out: Path, names: Iterable[str]) -> None:
     """UsageError where a file to be written belongs to a finished folder, by its manifest."""
-    with atomic.explained(f"cannot look into {out}"):
-        place = out.resolve()
+    place = Path(os.path.realpath(out))
     for folder in (place, *place.parents):
         listed = _listed(folder)
         for name in names:
@@ -105,11 +105,12 @@ def _listed(folder: Path) -> frozenset[str]:
 def put(out: Path, contents: Mapping[str, bytes]) -> list[Path]:
     """Write files into a folder; those that were there with another content. StorageError."""
     atomic.make_folder(out)
-    replaced = []
-    for name, content in contents.items():
-        path = out / name
-        with atomic.explained(f"cannot read {path}"):
-            if path.is_file() and path.read_bytes() != content:
-                replaced.append(path)
-        atomic.write_bytes(path, content)
+    files = {out / name: content for name, content in contents.items()}
+    replaced = [path for path, content in files.items() if _differs(path, content)]
+    atomic.write_all(files)
     return replaced
+
+
+def _differs(path: Path, content: bytes) -> bool:
+    with atomic.explained(f"cannot read {path}"):
+        return path.is_file() and path.read_bytes() != content

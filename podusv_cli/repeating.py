@@ -16,10 +16,11 @@ from podusv_cli import comparing
 from podusv_cli.comparing import Part
 from podusv_cli.errors import UsageError
 from podusv_cli.logbook import folder, manifest, provenance
+from podusv_cli.logbook.staging import Staging, sweep
 from podusv_cli.parallel import INTERRUPTED, Outcome, run_all
 from podusv_cli.recording import Status
 from podusv_cli.repetition.difference import Difference, difference
-from podusv_cli.running import Task, execute, warm_up
+from podusv_cli.running import Task, execute, unwritten, warm_up
 
 Progress = Callable[[str, float], None]
 
@@ -126,10 +127,12 @@ def _several(parts: Sequence[Part], request: Request, progress: Progress | None)
         target = request.out or place / "again"
         with folder.RunWriter(target, force=request.force) as writer:
             jobs = [partial(_repeat, p, writer.folder / p.label, request) for p in parts]
-            done = _repetition(parts, run_all(jobs, tell))
+            outcomes = run_all(jobs, tell)
+            missing = unwritten(outcomes)
+            done = _repetition(parts, outcomes)
             origin = provenance.collect(request.argv, started, datetime.now(UTC))
             writer.add_json("provenance.json", origin)
-            writer.finish("interrupted" if done.interrupted else "finished")
+            writer.finish("interrupted" if done.interrupted else "finished", missing)
         return done
 
 
@@ -146,8 +149,13 @@ def _passing(request: Request) -> Iterator[Path]:
     if request.out is not None:
         yield request.out.parent
         return
-    with tempfile.TemporaryDirectory(prefix="podusv-") as place:
-        yield Path(place)
+    place = Path(tempfile.gettempdir())
+    sweep(place)  # what a killed one left
+    staging = Staging(place / "podusv-rerun")
+    try:
+        yield staging.folder
+    finally:
+        staging.discard()
 
 
 def _repeat(

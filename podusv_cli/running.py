@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -15,6 +15,7 @@ from podusv_cli.config.loading import resolved_yaml
 from podusv_cli.config.scenario import Scenario
 from podusv_cli.engine.asking import check_law
 from podusv_cli.engine.simulate import Observer, marcher, simulate
+from podusv_cli.errors import StorageError
 from podusv_cli.findings.after import aftermath
 from podusv_cli.findings.finding import Finding, heard
 from podusv_cli.interrupts import Extras, interrupts_heard, interrupts_held
@@ -22,6 +23,7 @@ from podusv_cli.logbook import folder, hdf5, provenance
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.metrics.watching import observer, summarise
+from podusv_cli.parallel import Outcome
 from podusv_cli.recording import Recording, Status
 from podusv_cli.theory import monitor
 from podusv_cli.theory.report import as_json as theory_report
@@ -58,13 +60,14 @@ class Stopwatch:
 class Task:
     """A scenario, its file's text, where its run folder goes, how it is called and drawn.
 
-    `noticed` is what was found before the run.
+    `named`: the user asked for this folder. `noticed` is what was found before the run.
     """
 
     scenario: Scenario
     text: str
     target: Path
     force: bool = False
+    named: bool = True
     figures: Sequence[str] = ()
     argv: Sequence[str] = ()
     label: str = ""  # in figures; the law's kind by default
@@ -106,7 +109,10 @@ def execute(
     after the simulation costs the figures or the law's cost, nothing else. Raises StorageError.
     """
     started, watch = datetime.now(UTC), watch or Stopwatch()
-    with interrupts_held(), folder.RunWriter(task.target, force=task.force) as writer:
+    with (
+        interrupts_held(),
+        folder.RunWriter(task.target, force=task.force, named=task.named) as writer,
+    ):
         recording, metrics = measured(task.scenario, watch, progress)
         extras = Extras(recording.status == "interrupted")
         with watch.part("metrics"):
@@ -131,6 +137,19 @@ def execute(
     return Finished(
         final, recording.controller, status, message, metrics, watch.total(), warnings=warnings
     )
+
+
+def unwritten(outcomes: Iterable[Outcome]) -> str:
+    """Why a run could not be written, "" where none failed for that.
+
+    A result without such a run is not worth an older one's place. Raises StorageError where there
+    is no run at all.
+    """
+    outcomes = tuple(outcomes)
+    causes = [o.failure for o in outcomes if o.code == StorageError.exit_code]
+    if causes and not any(outcome.result for outcome in outcomes):
+        raise StorageError(causes[0])
+    return next(iter(causes), "")
 
 
 def warm_up(scenario: Scenario) -> None:

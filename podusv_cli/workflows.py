@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -16,15 +17,14 @@ from podusv_cli.errors import UsageError
 from podusv_cli.findings.finding import Finding, heard
 from podusv_cli.findings.preflight import preflight, together
 from podusv_cli.interrupts import Extras, interrupts_held
-from podusv_cli.logbook import atomic, folder, jsonfile, provenance
+from podusv_cli.logbook import atomic, folder, provenance
 from podusv_cli.recording import Status
-from podusv_cli.running import Finished, Progress, Stopwatch, Task, execute
+from podusv_cli.running import Finished, Progress, Stopwatch, Task, execute, unwritten
 
 if TYPE_CHECKING:
     from podusv_cli import comparing
     from podusv_cli.comparison.claims import Stated
     from podusv_cli.comparison.entries import Entry
-    from podusv_cli.verification.verify import Verified
 
 RESULTS = Path("results")
 DRAWN = ("controls", "trajectory", "errors")  # by `run`; the longest to draw first
@@ -56,8 +56,9 @@ def run(config: Path, request: Request, progress: Progress | None = None) -> Fin
         request.warn(finding)
     figures = DRAWN if request.figures else ()
     task = Task(
-        scenario, loaded.text, target, request.force, figures, request.argv, noticed=noticed
-    )
+        scenario, loaded.text, target, request.force, request.out is not None, figures,
+        request.argv, noticed=noticed,
+    )  # fmt: skip
     return replace(execute(task, progress, watch), others=tuple(loaded.scenario.controllers))
 
 
@@ -123,10 +124,12 @@ def compare(
     text = "".join(f"{part.label}\n{resolved_yaml(part.scenario)}" for part in parts)
     target = request.out or folder.default_folder(RESULTS, title, text)
     _keep_apart(items, target)
-    with interrupts_held(), folder.RunWriter(target, force=request.force) as writer:
+    named = request.out is not None
+    with interrupts_held(), folder.RunWriter(target, force=request.force, named=named) as writer:
         outcomes = comparing.make_runs(
             parts, writer.folder, figures=request.figures, argv=argv, progress=progress
         )
+        missing = unwritten(outcomes.values())
         extras = Extras(interrupted=any(outcome.cut for outcome in outcomes.values()))
         result = comparing.collect(parts, outcomes, gathered.stated, extras)
         if extras.interrupted and not result.entries:
@@ -141,14 +144,14 @@ def compare(
             writer.add("report.html", page.encode())
         writer.add_json("provenance.json", origin)
         status: Status = "interrupted" if extras.interrupted else "finished"
-        return Compared(writer.finish(status), result, status)
+        return Compared(writer.finish(status, missing), result, status)
 
 
 def _keep_apart(items: Sequence[Path], target: Path) -> None:
     """UsageError where writing the comparison would touch what is compared."""
-    there = target.resolve()
+    there = Path(os.path.realpath(target))
     for item in items:
-        here = item.resolve()
+        here = Path(os.path.realpath(item))
         within = there.is_relative_to(here) and (here / "manifest.json").exists()
         if here.is_relative_to(there) or within:
             raise UsageError(
@@ -226,24 +229,6 @@ def _stated(found: Sequence[_Item], called: Sequence[Mapping[str, str]]) -> list
     return [replace(said, name=name) for said, name in zip(stated, names, strict=True)]
 
 
-def verify(
-    config: Path, overrides: Sequence[str], tolerance: float, out: Path | None = None,
-    progress: Callable[[str, float], None] | None = None,
-) -> Verified:  # fmt: skip
-    """Verify a scenario's numbers; written to the file `out`, if there is one, as JSON.
-
-    Raises UsageError for a run folder, ScenarioError and StorageError.
-    """
-    if (config / "resolved.yaml").is_file():
-        raise UsageError(f"{config} is a run folder; verify its resolved.yaml")
-    from podusv_cli.verification import verify as verification  # not needed by a run
-
-    done = verification.verify(load(config, overrides).scenario, tolerance, progress)
-    if out:
-        atomic.write_bytes(out, jsonfile.encode(done.as_json()))
-    return done
-
-
 @dataclass(frozen=True)
 class Drawing:
     """What to draw of finished runs, how, and into which folder."""
@@ -285,7 +270,9 @@ def plot(runs: Sequence[Path], drawing: Drawing) -> Drawn:
     empty = plotting.empty(parts, shown)
     names = plotting.chosen(drawing.figures, shown)
     planned = [f"{name}.{form}" for name in names for form in drawing.formats]
-    plotting.spared(drawing.out, [*planned, FILE] if drawing.animate else planned)
+    planned += [FILE] * drawing.animate
+    plotting.spared(drawing.out, planned)
+    atomic.check_places(drawing.out / name for name in planned)
     drawn = dict(draw_in_parallel(shown, names, drawing.formats, drawing.columns))
     if drawing.animate:
         drawn[FILE] = animate(shown)

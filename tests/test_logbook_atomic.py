@@ -55,7 +55,7 @@ def test_it_lasts_before_it_has_its_name_and_then_so_does_the_name(
     atomic.write_bytes(path, NEW)
     (first, part), *rest = steps
     assert first == "sync"
-    assert re.fullmatch(rf"{path.parent}/\.podusv-[0-9a-f]+\.part", part)
+    assert re.fullmatch(rf"{path.parent}/\.podusv-[0-9a-f-]+\.part", part)
     assert rest == [("name", str(path)), ("sync", str(path.parent))]
 
 

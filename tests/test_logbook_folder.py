@@ -130,7 +130,8 @@ def test_what_became_no_run_folder_meanwhile_is_not_replaced(final: Path, force:
         with pytest.raises(StorageError, match="not a finished run folder"):
             writer.finish("finished")
     assert files(final) == {"thesis.tex": b"ten years"}
-    assert beside(final) == set()
+    assert content(final.with_name("run-2")) == {"log.h5": b"new log"}
+    assert beside(final) == {"run-2"}
 
 
 @pytest.mark.parametrize("force", [False, True])

@@ -31,8 +31,9 @@ from logbook_samples import (
 )
 
 from podusv_cli.errors import StorageError
+from podusv_cli.logbook import atomic
 from podusv_cli.logbook.folder import RunWriter
-from podusv_cli.logbook.staging import Staging
+from podusv_cli.logbook.staging import Staging, Taken
 
 CALLS = ("mkdir", "write", "fsync", "replace", "rename")
 DEADLY = (*CALLS, "open", "unlink", "rmdir")
@@ -43,19 +44,57 @@ def final(tmp_path: Path) -> Path:
     return tmp_path / "results" / "run"
 
 
-def test_of_two_writers_the_first_to_finish_wins(final: Path) -> None:
-    with RunWriter(final) as one, RunWriter(final) as other:
+@pytest.mark.parametrize("named", [False, True])
+def test_of_two_writers_the_first_to_finish_wins_and_the_other_keeps_what_it_has(
+    final: Path, named: bool
+) -> None:
+    """An error only where the user asked for this very name."""
+    with RunWriter(final, named=named) as one, RunWriter(final, force=not named) as other:
         one.add("log.h5", b"one")
         other.add("log.h5", b"other")
-        other.finish("finished")
-        with pytest.raises(StorageError, match="exists already"):
-            one.finish("finished")
+        assert other.finish("finished") == final
+        if named:
+            with pytest.raises(StorageError, match=r"exists already; .* in .*/run-2 instead"):
+                one.finish("finished")
+        else:
+            assert one.finish("finished").name == "run-2"
     assert content(final) == {"log.h5": b"other"}
-    assert beside(final) == set()
+    assert content(final.with_name("run-2")) == {"log.h5": b"one"}
+    assert beside(final) == {"run-2"}
+
+
+@pytest.mark.parametrize("named", [False, True])
+def test_a_name_that_nobody_asked_for_is_never_taken_from_another_run(
+    final: Path, named: bool
+) -> None:
+    with RunWriter(final, force=True, named=named) as writer:
+        writer.add("log.h5", b"new")
+        write(final, OLD)
+        writer.finish("finished")
+    assert content(final) == ({"log.h5": b"new"} if named else OLD)
+    assert beside(final) == (set() if named else {"run-2"})
+
+
+def test_a_lesser_one_takes_no_place(final: Path) -> None:
+    write(final, OLD)
+    with RunWriter(final, force=True) as writer:
+        writer.add("log.h5", b"half")
+        with pytest.raises(StorageError, match=r"full; .*left as it is; .* in .*/run-2 instead"):
+            writer.finish("finished", "the disk is full")
+    assert content(final) == OLD
+    assert content(final.with_name("run-2")) == {"log.h5": b"half"}
+
+
+@pytest.fixture(params=[True, False], ids=["exchanging", "plain"])
+def exchanging(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> bool:
+    """Whether the file system lets two names trade places."""
+    if not request.param:
+        monkeypatch.setattr(atomic, "exchange", lambda one, other: fails(errno.EINVAL)())
+    return bool(request.param)
 
 
 @pytest.mark.parametrize("force", [False, True])
-def test_writers_that_finish_at_the_same_time(final: Path, force: bool) -> None:
+def test_writers_that_finish_at_the_same_time(final: Path, force: bool, exchanging: bool) -> None:
     writers = [RunWriter(final, force=force) for _ in range(8)]
     for number, writer in enumerate(writers):
         writer.add("log.h5", bytes([number]) * 1000)
@@ -75,13 +114,15 @@ def test_writers_that_finish_at_the_same_time(final: Path, force: bool) -> None:
     found = content(final)["log.h5"]
     assert found in [bytes([number]) * 1000 for number in winners]
     assert force or len(winners) == 1
-    assert beside(final) == set()
+    assert not (force and exchanging) or len(winners) == 8
+    others = {content(final.with_name(name))["log.h5"][0] for name in beside(final)}
+    assert others == set(range(8)) - set(winners)
 
 
 @pytest.mark.parametrize("deed", [fails(errno.ENOSPC), interrupts])
 @pytest.mark.parametrize("before", [None, OLD])
 def test_a_failure_at_any_step_leaves_the_old_run_or_the_new_one(
-    final: Path, before: dict[str, bytes] | None, deed: Deed
+    final: Path, before: dict[str, bytes] | None, deed: Deed, exchanging: bool
 ) -> None:
     def attempt(saboteur: Saboteur) -> None:
         shutil.rmtree(final, ignore_errors=True)
@@ -119,15 +160,21 @@ def test_a_folder_made_by_others_at_the_last_moment_is_left_as_it_is(final: Path
     staging = Staging(final)
     final.mkdir()
     (final / "thesis.tex").write_text("ten years")
-    with pytest.raises(StorageError, match="made by somebody else in the meantime"):
+    with pytest.raises(Taken, match="is there already and is left as it is"):
         staging.publish(replace=False)
+    staging.discard()
     assert files(final) == {"thesis.tex": b"ten years"}
     assert beside(final) == set()
 
 
 @pytest.mark.parametrize("lost", [False, True])
-def test_killed_at_any_step_the_old_run_or_the_new_one_comes_back(final: Path, lost: bool) -> None:
-    """`lost`: somebody deletes the folder before the next run clears up; no half of one appears."""
+def test_killed_at_any_step_the_old_run_or_the_new_one_comes_back(
+    final: Path, lost: bool, exchanging: bool
+) -> None:
+    """`lost`: somebody deletes the folder before the next run clears up; no half of one appears.
+
+    It need not even come back where names can trade places: it was there all the time.
+    """
     other = final.with_name("other")
 
     def attempt(saboteur: Saboteur) -> None:
@@ -147,13 +194,14 @@ def test_killed_at_any_step_the_old_run_or_the_new_one_comes_back(final: Path, l
 
     seen = []
     for _ in until_nothing_breaks(attempt, kills):
+        assert not exchanging or content(final) in (OLD, NEW)
         if lost:
             shutil.rmtree(final, ignore_errors=True)
         write(other, NEW, force=True)  # the next run to the same place clears up
         assert beside(final) == {"other"}
         seen.append(content(final) if final.exists() else None)
     assert len(seen) > 30
-    assert OLD in seen
+    assert (OLD in seen) != (lost and exchanging)
     assert seen[-1] == (None if lost else NEW)
     assert all(found in ((None, OLD) if lost else (OLD, NEW)) for found in seen)
 

@@ -6,6 +6,7 @@ import os
 import sys
 import traceback
 from collections.abc import Callable
+from contextlib import suppress
 from functools import wraps
 from typing import ParamSpec
 
@@ -59,14 +60,18 @@ def told(error: BaseException) -> int:
         _silence()
         return PIPE_CLOSED
     if isinstance(error, PodusvError):
-        typer.echo(str(error), err=True)
+        _say(str(error))
         return error.exit_code
     if isinstance(error, OSError):
-        typer.echo(f"podusv: {error}", err=True)
+        _say(f"podusv: {error}")
         return StorageError.exit_code
-    traceback.print_exception(error)
-    typer.echo(PLEASE_REPORT, err=True)
+    _say("".join(traceback.format_exception(error)) + PLEASE_REPORT)
     return BUG
+
+
+def _say(text: str) -> None:
+    with suppress(OSError):  # nobody is left to tell that stderr cannot be written to
+        typer.echo(text, err=True)
 
 
 def open_streams() -> None:

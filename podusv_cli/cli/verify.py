@@ -38,16 +38,20 @@ def verify(
     Shows order and error of every metric, and in a comparison whether the ranking is the same.
     Exit code 3 when something is not converged.
     """
-    from podusv_cli import workflows  # heavy imports only when they are needed
+    from podusv_cli import verifying  # heavy imports only when they are needed
     from podusv_cli.cli.progress import progress_bars
     from podusv_cli.logbook.jsonfile import encode
 
     with progress_bars(wanted=not (quiet or as_json)) as progress:
-        done = workflows.verify(Path(config), assign or (), tolerance, out, progress)
-    if as_json:
-        typer.echo(encode(done.as_json()), nl=False)
-    elif not quiet:
-        _report(done)
+        done = verifying.verify(Path(config), assign or (), tolerance, out, progress)
+    try:
+        if out:
+            verifying.keep(done, out)
+    finally:  # what cannot be written can still be read
+        if as_json:
+            typer.echo(encode(done.as_json()), nl=False)
+        elif not quiet:
+            _report(done)
     raise typer.Exit(NOT_CONVERGED if done.doubts else 0)
 
 

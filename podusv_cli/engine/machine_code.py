@@ -27,6 +27,7 @@ import llvmlite.binding as llvm
 import numpy as np
 
 from podusv_cli import kernels
+from podusv_cli.parts import forget_files, part_name
 
 OWN = re.compile(r"[0-9a-f]{16}")
 KEPT = 8  # caches of this many states of the source stay on disk
@@ -34,7 +35,7 @@ NUMBERS = (bool, int, float, str, tuple)
 # Rooms and files that hold no kernel: what is edited there leaves machine code as it is.
 APART = (
     "cli", "comparison", "config", "figures", "findings", "logbook", "repetition", "verification",
-    "comparing.py", "repeating.py", "running.py", "workflows.py",
+    "comparing.py", "repeating.py", "running.py", "verifying.py", "workflows.py",
 )  # fmt: skip
 
 
@@ -88,13 +89,12 @@ def _read(path: Path) -> Code | None:
 
 def _write(path: Path, code: Code) -> None:
     rest = code.symbol.encode() + b"\n" + code.content
-    file, name = tempfile.mkstemp(dir=path.parent)
+    part = path.with_name(part_name())
     try:
-        with open(file, "wb") as out:
-            out.write(_seal(path, rest) + b"\n" + rest)
-        os.replace(name, path)  # whole, whoever else writes or reads it now
+        part.write_bytes(_seal(path, rest) + b"\n" + rest)
+        os.replace(part, path)  # whole, whoever else writes or reads it now
     except BaseException:
-        os.unlink(name)
+        part.unlink(missing_ok=True)
         raise
 
 
@@ -177,6 +177,7 @@ def cache_folder() -> Path | None:
             tempfile.TemporaryFile(dir=folder).close()
             if folder.stat().st_uid == os.getuid():  # never run code that someone else put there
                 _forget_old(folder)
+                forget_files(folder)
                 return folder
     return None
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import ctypes
 import errno
 import os
-import secrets
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from podusv_cli.errors import StorageError
+from podusv_cli.parts import forget_files, part_name
 
 CAUSES = {
     errno.ENOSPC: "the disk is full",
@@ -19,6 +20,7 @@ CAUSES = {
     errno.EPERM: "not permitted",
     errno.EROFS: "the file system is read-only",
     errno.ENOENT: "no such file or folder",
+    errno.EEXIST: "something else of that name exists",
     errno.ENOTDIR: "a part of the path is a file, not a folder",
     errno.ELOOP: "a symbolic link, which podusv does not follow here",
     errno.ENAMETOOLONG: "the name is too long",
@@ -41,15 +43,65 @@ def write_bytes(path: Path, content: bytes) -> None:
     Raises StorageError naming path, size and cause; the old file, if any, is then untouched, unless
     only the last step failed, which makes the new name durable.
     """
-    part = path.with_name(f".podusv-{secrets.token_hex(8)}.part")
-    with explained(f"cannot write {path} ({len(content)} bytes)"):
-        try:
-            _create(part, content)
-            os.replace(part, path)
-        finally:
+    write_all({path: content})
+
+
+def write_all(contents: Mapping[Path, bytes]) -> None:
+    """The same for several files; all are on the disk before the first gets its name.
+
+    A disk that fills up leaves the old files. StorageError also where something that is no file has
+    the name.
+    """
+    parts = {path: path.with_name(part_name()) for path in contents}
+    folders = dict.fromkeys(path.parent for path in contents)
+    for folder in folders:
+        forget_files(folder)
+    try:
+        for path, part in parts.items():
+            with explained(f"cannot write {path} ({len(contents[path])} bytes)"):
+                _refuse_odd(path)
+                _create(part, contents[path])
+        for path, part in parts.items():
+            with explained(f"cannot write {path} ({len(contents[path])} bytes)"):
+                os.replace(part, path)
+    finally:
+        for part in parts.values():
             with suppress(OSError):
                 part.unlink()
-        _sync_folder(path.parent)
+    for folder in folders:
+        sync_folder(folder)
+
+
+def check_places(paths: Iterable[Path]) -> None:
+    """Raise the StorageError that writing these files would end with, as far as can be known.
+
+    Folders need not be there yet. Nothing is left behind.
+    """
+    for path in paths:
+        with explained(f"cannot write {path}"):
+            _refuse_odd(path)
+            probe = next(p for p in path.parents if os.path.lexists(p)) / part_name()
+            try:
+                _create(probe, b"")
+            finally:
+                probe.unlink(missing_ok=True)
+
+
+def _refuse_odd(path: Path) -> None:
+    """What is no file would be replaced by one, a device too."""
+    if path.is_symlink() or (path.exists() and not path.is_file()):
+        raise StorageError(f"cannot write {path}: it is there already and is not a file")
+
+
+def exchange(one: Path, other: Path) -> None:
+    """Two names trade places at one instant. OSError, ENOSYS where the system has no such call."""
+    rename = getattr(ctypes.CDLL(None, use_errno=True), "renameat2", None)
+    if rename is None:
+        raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
+    here, swapping = -100, 2  # AT_FDCWD, RENAME_EXCHANGE
+    if rename(here, os.fsencode(one), here, os.fsencode(other), swapping) != 0:
+        number = ctypes.get_errno()
+        raise OSError(number, os.strerror(number))
 
 
 def create(path: Path, content: bytes) -> None:

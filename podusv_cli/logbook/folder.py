@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import cached_property
+from itertools import count, islice
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -15,7 +17,7 @@ from typing import Any, Self
 from podusv_cli.errors import StorageError
 from podusv_cli.logbook import atomic, jsonfile, manifest, reading
 from podusv_cli.logbook.regular import read_text
-from podusv_cli.logbook.staging import Staging, sweep
+from podusv_cli.logbook.staging import Staging, Taken, sweep
 from podusv_cli.recording import Recording, Status
 
 LOG, THEORY = "log.h5", "theory.json"
@@ -29,11 +31,14 @@ def default_folder(root: Path, name: str, resolved_yaml: str) -> Path:
     """
     stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
     digest = hashlib.sha256(resolved_yaml.encode()).hexdigest()[:8]
-    folder, count = root / name / f"{stamp}-{digest}", 1
-    while folder.exists():
-        count += 1
-        folder = folder.with_name(f"{stamp}-{digest}-{count}")
-    return folder
+    folder = root / name / f"{stamp}-{digest}"
+    return next(path for path in _numbered(folder) if not os.path.lexists(path))
+
+
+def _numbered(folder: Path) -> Iterator[Path]:
+    yield folder
+    for number in count(2):
+        yield folder.with_name(f"{folder.name}-{number}")
 
 
 class RunWriter:
@@ -43,11 +48,14 @@ class RunWriter:
     the `with` block without `finish` leaves nothing behind. A run folder that exists is replaced,
     whole, only with `force`; anything else, except an empty folder, never is. A run folder is one
     with a readable manifest, damaged files or not. Every method raises StorageError.
+
+    Where somebody else takes the name in the meantime, a number is appended to it. That is as good
+    where `named` says that nobody asked for this name, and an error else.
     """
 
-    def __init__(self, final: Path, *, force: bool = False) -> None:
+    def __init__(self, final: Path, *, force: bool = False, named: bool = True) -> None:
         """Check that `final` can be made, and make the hidden folder beside it."""
-        self.final, self._force = final, force
+        self.final, self._force, self._named = final, force and named, named
         sweep(final.parent)  # may put back a run folder that a killed run was replacing
         _refuse(final, force)
         self._staging = Staging(final)
@@ -68,15 +76,34 @@ class RunWriter:
         """Write a new JSON file, null for numbers that are not finite."""
         self.add(name, jsonfile.encode(content))
 
-    def finish(self, status: Status) -> Path:
-        """Write the manifest and give the folder its name, which is returned."""
+    def finish(self, status: Status, missing: str = "") -> Path:
+        """Write the manifest and give the folder its name, which is returned.
+
+        What lacks something, for the reason `missing`, replaces nothing. After an error that says
+        where the folder is instead, it is there, whole.
+        """
         sweep(self.folder)  # of runs nested in here whose process was killed
         manifest.write(self.folder, status)
         for inner, _, _ in os.walk(self.folder):
             atomic.sync_folder(Path(inner))
-        _refuse(self.final, self._force)
-        self._staging.publish(replace=self._force)
-        return self.final
+        try:
+            _refuse(self.final, self._force)
+            self._staging.publish(replace=self._force and not missing)
+        except Taken as error:
+            other = self._publish_beside()
+            if self._named:
+                texts = (missing, str(error), f"this one is in {other} instead")
+                raise StorageError("; ".join(filter(None, texts))) from error
+        return self._staging.final
+
+    def _publish_beside(self) -> Path:
+        for path in islice(_numbered(self.final), 1, None):
+            with suppress(Taken):
+                _refuse(path, force=False)
+                self._staging.final = path
+                self._staging.publish(replace=False)
+                return path
+        raise AssertionError("there is always another number")
 
     def __enter__(self) -> Self:
         """The writer itself."""
@@ -100,15 +127,15 @@ def _refuse(final: Path, force: bool) -> None:
         if not os.path.lexists(final):
             return
         if final.is_symlink() or not final.is_dir():
-            raise StorageError(f"{final} exists and is not a folder")
+            raise Taken(f"{final} exists and is not a folder")
         if not any(final.iterdir()):
             return
     try:
         manifest.read(final)
     except StorageError as error:
-        raise StorageError(f"{final} exists and is not a finished run folder") from error
+        raise Taken(f"{final} exists and is not a finished run folder") from error
     if not force:
-        raise StorageError(f"{final} exists already; --force replaces it")
+        raise Taken(f"{final} exists already; --force replaces it")
 
 
 @dataclass(frozen=True)

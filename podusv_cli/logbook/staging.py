@@ -1,29 +1,29 @@
 """Folders that appear whole: filled under a hidden name beside their place, then renamed.
 
-A box `.<name>.podusv-<machine>-<process>-<random>.part` holds `new`, the folder in the making, and
-for a moment `old`, the folder that it replaces. The box's own name says who made it, so that no
-instant exists at which it belongs to nobody.
+A box, whose hidden name says who made it, holds `new`, the folder in the making. A folder that it
+replaces trades places with it at one instant; where the file system cannot do that, the box holds
+it for a moment as `old`.
 """
 
 from __future__ import annotations
 
 import errno
-import hashlib
 import os
-import platform
-import re
-import secrets
 import shutil
 from contextlib import suppress
 from pathlib import Path
 
 from podusv_cli.errors import StorageError
 from podusv_cli.logbook import atomic
+from podusv_cli.parts import abandoned, part_name
 
-_BOX = re.compile(
-    r"\.(?P<name>.+)\.podusv-(?P<machine>[0-9a-f]{8})-(?P<process>[0-9]+)-[0-9a-f]{8}\.part"
-)
 _TAKEN = (errno.ENOTEMPTY, errno.EEXIST, errno.ENOTDIR)
+# There is nothing to trade places with, or a system or file system that cannot.
+_NO_EXCHANGE = (errno.ENOENT, errno.ENOSYS, errno.EINVAL, errno.ENOTSUP)
+
+
+class Taken(StorageError):
+    """Something has that name already, and is not to be replaced."""
 
 
 class Staging:
@@ -31,9 +31,8 @@ class Staging:
 
     def __init__(self, final: Path) -> None:
         """Make the box, and the folders above it. Raises StorageError where that is impossible."""
-        owner = f"{_machine()}-{os.getpid()}-{secrets.token_hex(4)}"
         self.final = final
-        self._box = final.with_name(f".{final.name}.podusv-{owner}.part")
+        self._box = final.with_name(part_name(final.name))
         try:
             with atomic.explained(f"cannot make {final}"):
                 final.parent.mkdir(parents=True, exist_ok=True)
@@ -51,16 +50,17 @@ class Staging:
     def publish(self, *, replace: bool) -> None:
         """Rename the folder to its final name, with `replace` in place of what is there.
 
-        Raises StorageError; what was there before is then there again.
+        Raises StorageError; `discard` then brings back what was there before. After Taken the
+        folder in the making is whole and may be given another `final` name.
         """
-        try:
-            with atomic.explained(f"cannot make {self.final}"):
-                if replace:
-                    with suppress(FileNotFoundError):
-                        os.rename(self.final, _old(self._box))
+        with atomic.explained(f"cannot make {self.final}"):
+            try:
                 self._rename()
-        finally:
-            _settle(self._box, self.final)
+            except Taken:
+                if not replace:
+                    raise
+                self._replace()
+        self.discard()
         atomic.sync_folder(self.final.parent)
 
     def discard(self) -> None:
@@ -73,20 +73,30 @@ class Staging:
         except OSError as error:
             if error.errno not in _TAKEN:
                 raise
-            text = f"{self.final} was made by somebody else in the meantime and is left as it is"
-            raise StorageError(text) from error
+            text = f"{self.final} is there already and is left as it is"
+            raise Taken(text) from error
+
+    def _replace(self) -> None:
+        if not self._exchanged():
+            with suppress(FileNotFoundError):
+                os.rename(self.final, _old(self._box))
+            self._rename()
+
+    def _exchanged(self) -> bool:
+        try:
+            atomic.exchange(self.folder, self.final)
+        except OSError as error:
+            if error.errno not in _NO_EXCHANGE:
+                raise
+            return False
+        return True
 
 
 def sweep(parent: Path) -> None:
-    """Clear away the boxes in `parent` whose makers are dead, and put back what they replaced.
-
-    Boxes of other machines are left alone: nobody here can tell whether their makers live.
-    """
-    with suppress(OSError):
-        for entry in list(os.scandir(parent)):
-            found = _BOX.fullmatch(entry.name)
-            if found and found["machine"] == _machine() and not _alive(int(found["process"])):
-                _settle(Path(entry.path), parent / found["name"])
+    """Clear away the boxes in `parent` whose makers are dead, and put back what they replaced."""
+    for box, final in abandoned(parent):
+        if final:
+            _settle(box, parent / final)
 
 
 def _settle(box: Path, final: Path) -> None:
@@ -100,17 +110,3 @@ def _settle(box: Path, final: Path) -> None:
 
 def _old(box: Path) -> Path:
     return box / "old"
-
-
-def _machine() -> str:
-    return hashlib.sha256(platform.node().encode()).hexdigest()[:8]
-
-
-def _alive(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except (OSError, OverflowError):  # somebody else's, or no process number at all
-        return True
-    return True

@@ -1,0 +1,118 @@
+"""Work in a forked process: killed, limited, without rights, without Python's start each time."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import traceback
+from collections.abc import Callable
+from ctypes import CDLL, c_char_p, c_ulong, get_errno
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
+from typing import Any, TypeVar
+
+import pytest
+from command_samples import gone
+
+Result = TypeVar("Result")
+FORK = multiprocessing.get_context("fork")
+PATIENCE = 60.0  # s
+NOBODY = 65534
+NEW_NAMESPACE, PRIVATE = 0x20000, 0x44000  # CLONE_NEWNS; MS_REC | MS_PRIVATE
+
+
+class Died(Exception):
+    """The process ended without a result."""
+
+
+def in_a_child(
+    work: Callable[[], Result], meanwhile: Callable[[int], None] = lambda process: None
+) -> Result:
+    """What `work` returns in a process and session of its own; Died where it was killed.
+
+    `meanwhile` is called with the number of the process. All that the process starts has to end
+    with it, or soon after it.
+    """
+    ours, theirs = FORK.Pipe(duplex=False)
+    process = FORK.Process(target=_work, args=(work, theirs))
+    process.start()
+    theirs.close()
+    try:
+        meanwhile(process.pid)
+        assert ours.poll(PATIENCE), "the process hangs"
+        done, result = ours.recv()
+    except EOFError:
+        raise Died from None
+    finally:
+        _end(process)
+    assert done, result
+    return result  # type: ignore[no-any-return]
+
+
+def _work(work: Callable[[], Any], channel: Connection) -> None:
+    os.setsid()
+    try:
+        channel.send((True, work()))
+    except BaseException:
+        channel.send((False, traceback.format_exc()))
+
+
+def _end(process: BaseProcess) -> None:
+    process.join(PATIENCE)
+    process.kill()
+    process.join()
+    left = not gone(process)
+    if left:
+        os.killpg(process.pid, signal.SIGKILL)
+    assert not left, "a process was left behind"
+
+
+def give_up_rights() -> None:
+    """Become a user who owns nothing; permissions mean nothing to root."""
+    if os.geteuid() == 0:
+        os.setgroups([])
+        os.setgid(NOBODY)
+        os.setuid(NOBODY)
+
+
+def small_disk(place: str, size: int) -> None:
+    """Mount a file system of `size` bytes that this process alone sees, and that ends with it.
+
+    PermissionError or the like where the system does not let us.
+    """
+    libc = CDLL(None, use_errno=True)
+    types = c_char_p, c_char_p, c_char_p, c_ulong, c_char_p
+    libc.mount.argtypes = types
+    _done(libc.unshare(NEW_NAMESPACE))
+    _done(libc.mount(b"none", b"/", None, PRIVATE, None))
+    _done(libc.mount(b"none", os.fsencode(place), b"tmpfs", 0, b"size=%d" % size))
+
+
+def _done(result: int) -> None:
+    if result != 0:
+        raise OSError(get_errno(), os.strerror(get_errno()))
+
+
+def _can_mount() -> bool:
+    def attempt() -> bool:
+        try:
+            small_disk("/tmp", 4096)
+        except OSError:
+            return False
+        return True
+
+    return in_a_child(attempt)
+
+
+CAN_MOUNT = hasattr(os, "fork") and os.path.isdir("/proc/self/ns") and _can_mount()
+needs_mount = pytest.mark.skipif(
+    not CAN_MOUNT, reason="mounting a small disk needs root and a mount namespace of one's own"
+)
+
+
+def one_line(text: str) -> str:
+    """The text, which has to be one line for people."""
+    assert text.count("\n") == 1, text
+    assert "Traceback" not in text
+    return text.removesuffix("\n")

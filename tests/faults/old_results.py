@@ -1,0 +1,95 @@
+"""Old results of every kind, and whether they are still there, or new ones, whole."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+from command_samples import BASE, TWO, Command, commanded, write
+from logbook_samples import files
+
+from podusv_cli.figures import drawing
+from podusv_cli.logbook import manifest
+
+SET = ("--set", "controller.K_Pu=50.0", "--no-figures", "-q")
+# What is made or replaced, and the command that does it; the last leaves nothing.
+COMMANDS = [
+    ("new", ("run", "a.yaml", "--out", "new", "--force", *SET)),
+    ("x", ("run", "a.yaml", "--out", "x", "--force", *SET)),
+    ("new", ("compare", "two.yaml", "--out", "new", "--force", *SET)),
+    ("both", ("compare", "two.yaml", "--out", "both", "--force", *SET)),
+    ("again", ("rerun", "both", "--out", "again", "--force")),
+    ("figures", ("plot", "both", "--out", "figures")),
+    ("v.json", ("verify", "a.yaml", "--out", "v.json", "-q")),
+    ("", ("rerun", "x")),
+]
+SUCCESS = {"verify": 3}  # else 0; what these scenarios verify is not converged
+
+
+def quickly(shown: object, names: Sequence[str], forms: Sequence[str], *more: object) -> object:
+    """Figures of which only the bytes matter."""
+    return [(f"{name}.{form}", name.encode() * 1000) for name in names for form in forms]
+
+
+def among_old_results(
+    old: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Command:
+    """The command line in a folder like `old`, which is filled the first time."""
+    podusv = commanded(monkeypatch, capsys)
+    monkeypatch.setattr(drawing, "draw_in_parallel", quickly)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "passing"))
+    (tmp_path / "passing").mkdir()
+    if not any(old.iterdir()):
+        monkeypatch.chdir(old)
+        _make(podusv)
+    (tmp_path / "work").mkdir()
+    monkeypatch.chdir(tmp_path / "work")
+    bring_back(old)
+    return podusv
+
+
+def _make(podusv: Command) -> None:
+    write("a.yaml", BASE)
+    write("two.yaml", TWO)
+    assert podusv("run", "a.yaml", "--out", "x", "--no-figures").code == 0
+    assert podusv("compare", "two.yaml", "--out", "both", "--no-figures").code == 0
+    assert podusv("rerun", "both", "--out", "again").code == 0
+    assert podusv("verify", "a.yaml", "--out", "v.json").code == 3
+    Path("figures").mkdir()
+    for name in ("controls", "trajectory"):
+        Path(f"figures/{name}.png").write_bytes(b"old")
+
+
+def bring_back(old: Path) -> None:
+    """Make this folder as it was."""
+    for path in Path().iterdir():
+        shutil.rmtree(path) if path.is_dir() else path.unlink()
+    shutil.copytree(old, ".", dirs_exist_ok=True)
+
+
+def left_over() -> list[Path]:
+    """What is in the making, or was, here and where things pass."""
+    return [path for path in Path("..").rglob("*") if ".podusv-" in path.name]
+
+
+def _parted(found: dict[str, bytes], made: str) -> tuple[dict[str, bytes], dict[str, bytes]]:
+    """Of what is not hidden, what is part of `made`, and what is not."""
+    parts = {name: part for name, part in found.items() if ".podusv-" not in name}
+    inside = {name: part for name, part in parts.items() if Path(name).parts[0] == made}
+    return inside, {name: part for name, part in parts.items() if name not in inside}
+
+
+def assert_whole(made: str, old: dict[str, bytes], new: dict[str, bytes]) -> None:
+    """Nothing else has changed, and what was to be made is as it was or wholly new."""
+    was, others_were = _parted(old, made)
+    now, others_are = _parted(files(Path()), made)
+    assert others_are == others_were
+    if made in ("figures", "v.json"):  # file by file
+        assert was.keys() <= now.keys()
+        assert all(part in (was.get(name), new[name]) for name, part in now.items())
+    elif now != was:
+        assert not manifest.foreign(Path(made), manifest.check(Path(made)))
+        assert now.keys() == _parted(new, made)[0].keys()

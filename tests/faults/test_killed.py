@@ -1,0 +1,137 @@
+"""Killed at any moment: what was there is there, or what is new; the next one clears up.
+
+The moment is the n-th call of the system that makes, fills or names something, or any time at all.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import time
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import pytest
+from children import Died, in_a_child
+from command_samples import Command
+from counts import count
+from logbook_samples import Saboteur, files, until_nothing_breaks
+from old_results import (
+    COMMANDS,
+    SUCCESS,
+    among_old_results,
+    assert_whole,
+    bring_back,
+    left_over,
+)
+
+from podusv_cli.engine import machine_code
+from podusv_cli.parts import part_name
+
+CALLS = ("mkdir", "open", "write", "fsync", "replace", "rename", "unlink", "rmdir")
+
+
+@pytest.fixture(scope="module")
+def before(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where old results are, once they are made."""
+    return tmp_path_factory.mktemp("before")
+
+
+@pytest.fixture
+def podusv(
+    before: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> Command:  # fmt: skip
+    return among_old_results(before, tmp_path, monkeypatch, capsys)
+
+
+def counted(work: Callable[[], object], nth: int = 0) -> int:
+    """Do some work and die before the nth of CALLS in this process; how many there were."""
+    here = os.getpid()
+    saboteur = Saboteur(lambda: kill() if os.getpid() == here else None, nth)
+    saboteur.watch(pytest.MonkeyPatch(), *CALLS)
+    work()
+    return nth - saboteur.left
+
+
+def kill(process: int = 0, after: float = 0.0) -> None:
+    time.sleep(after)
+    os.kill(process or os.getpid(), signal.SIGKILL)
+
+
+def attempts(work: Callable[[], object], seeds: range) -> list[Callable[[], object]]:
+    """Ways to do some work in a process that is killed before its end, after doing it once."""
+    began = time.monotonic()
+    total = in_a_child(partial(counted, work))
+    took = time.monotonic() - began
+    chances = [random.Random(seed) for seed in seeds]
+    at_calls = [
+        partial(in_a_child, partial(counted, work, c.randint(1, total))) for c in chances[::2]
+    ]
+    at_times = [
+        partial(in_a_child, work, partial(kill, after=c.uniform(0.0, took))) for c in chances[1::2]
+    ]
+    return [*at_calls, *at_times]
+
+
+@pytest.mark.parametrize(("made", "words"), COMMANDS, ids=str)
+def test_old_or_new_and_the_next_one_clears_up(
+    podusv: Command, before: Path, made: str, words: tuple[str, ...]
+) -> None:
+    old, work = files(before), partial(podusv, *words)
+    deaths, seen = attempts(work, range(count(2, 26))), []
+    new = files(Path())
+    for attempt in deaths:
+        bring_back(before)
+        try:
+            attempt()
+        except Died:
+            seen.append(attempt)
+        assert_whole(made, old, new)
+        assert work().code == SUCCESS.get(words[0], 0)
+        assert_whole(made, old, new)
+        assert not left_over()
+    assert len(seen) >= len(deaths) / 2  # a process may be faster than it was
+
+
+def test_no_piece_of_code_is_left_half_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PODUSV_CACHE", str(tmp_path))
+    found = machine_code.cache_folder.__wrapped__
+    path, piece = found() / "law.code", machine_code.Code("law", b"\x90" * 1000)
+
+    def attempt(saboteur: Saboteur) -> None:
+        path.unlink(missing_ok=True)
+
+        def keep() -> int:
+            saboteur.watch(pytest.MonkeyPatch(), *CALLS)
+            machine_code._write(path, piece)
+            return saboteur.left
+
+        try:
+            saboteur.left = in_a_child(keep)
+        except Died:
+            saboteur.left = 0
+
+    seen = []
+    for _ in until_nothing_breaks(attempt, kill):
+        found()  # as the next process does
+        assert {each.name for each in path.parent.iterdir()} <= {path.name}
+        seen.append(machine_code._read(path))
+    assert set(seen) == {None}
+    assert machine_code._read(path) == piece
+
+
+def test_what_others_may_be_making_is_left_alone(podusv: Command) -> None:
+    """Parts of a process that lives or of another machine, and names that only look like parts."""
+    mine = part_name()
+    dead = in_a_child(part_name)
+    machine = mine.split("-")[1]
+    kept = [mine, dead.replace(machine, "0" * 8), ".podusv-notes.part", f"my{dead}"]
+    for name in (*kept, dead):
+        Path("figures", name).write_bytes(b"")
+    assert podusv("plot", "x", "--out", "figures").code == 0
+    assert {path.name for path in Path("figures").iterdir() if "podusv" in path.name} == set(kept)

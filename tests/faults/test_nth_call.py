@@ -1,0 +1,132 @@
+"""The n-th call that makes, writes or names something fails, for every n (by default some)."""
+
+from __future__ import annotations
+
+import errno
+import itertools
+import os
+import shutil
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+from children import one_line
+from command_samples import Command, Said
+from counts import count
+from logbook_samples import Saboteur, fails, files
+from old_results import COMMANDS, SUCCESS, among_old_results, assert_whole, bring_back, left_over
+
+from podusv_cli import comparing, parallel, repeating
+from podusv_cli.interrupts import Interrupts
+from podusv_cli.logbook import atomic, manifest, provenance
+
+NAMING = ("replace", "rename")
+FILLING = ("write", "fsync")
+
+
+def one_by_one(jobs: Sequence[parallel.Job], *more: object) -> list[parallel.Outcome]:
+    """The jobs of a comparison in this process, where their calls are counted."""
+    return [parallel._outcome(job, lambda fraction: None, Interrupts()) for job in jobs]
+
+
+@pytest.fixture(scope="module")
+def before(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where old results are, once they are made."""
+    return tmp_path_factory.mktemp("before")
+
+
+@pytest.fixture
+def podusv(
+    before: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> Command:  # fmt: skip
+    monkeypatch.setattr(provenance, "collect", lambda *of_a_run: {})  # which takes its time
+    for room in (comparing, repeating):
+        monkeypatch.setattr(room, "run_all", one_by_one)
+    return among_old_results(before, tmp_path, monkeypatch, capsys)
+
+
+def sabotaged(
+    work: Callable[[], Said], error: int, nth: int, *, lasting: bool = False
+) -> tuple[int, Said]:
+    """Do some work whose nth call fails, and with `lasting` all that fill something from there on.
+
+    How often calls failed, and what the work said.
+    """
+    failures = []
+
+    def deed() -> None:
+        failures.append(nth)
+        saboteur.left += lasting
+        fails(error)()
+
+    saboteur = Saboteur(deed, nth)
+    with pytest.MonkeyPatch.context() as patch:
+        saboteur.watch(patch, *FILLING, *(() if lasting else NAMING))
+        if not lasting:
+            patch.setattr(atomic, "exchange", saboteur._instead_of(atomic.exchange))
+        watch_where(patch, saboteur, "open", to_write)
+        watch_where(patch, saboteur, "mkdir", lambda path, *mode: not os.path.isdir(path))
+        said = work()
+    return len(failures), said
+
+
+def watch_where(
+    patch: pytest.MonkeyPatch, saboteur: Saboteur, name: str, counts: Callable[..., object]
+) -> None:
+    """Watch those calls of a function whose arguments count."""
+    plain = getattr(os, name)
+    watched = saboteur._instead_of(plain)
+
+    def call(*given: Any, **more: Any) -> object:
+        return (watched if counts(*given) else plain)(*given, **more)
+
+    patch.setattr(os, name, call)
+
+
+def to_write(path: object, flags: int, *mode: int) -> int:
+    """New files, and folders that are synced: neither what deletes nor what reads."""
+    return flags & (os.O_CREAT | os.O_DIRECTORY)
+
+
+@pytest.mark.parametrize(("error", "lasting"), [(errno.EIO, False), (errno.ENOSPC, True)])
+@pytest.mark.parametrize(("made", "words"), COMMANDS, ids=str)
+def test_it_is_a_line_and_nothing_is_lost(
+    podusv: Command, before: Path, made: str, words: tuple[str, ...], error: int, lasting: bool
+) -> None:
+    old, said = files(before), podusv(*words)
+    assert said.code == SUCCESS.get(words[0], 0)
+    new = files(Path())
+    every = count(9 if words[1] in ("a.yaml", "x") else 20, 1)
+    for nth in itertools.count(1 + len(made + words[0]) % every, every):
+        bring_back(before)
+        failures, said = sabotaged(lambda: podusv(*words), error, nth, lasting=lasting)
+        if not failures:
+            break
+        assert "Traceback" not in said.err
+        if said.code == 3:
+            assert_without_a_run(made, old, said)
+        else:
+            assert said.code == 5
+            assert_kept_beside(made, one_line(said.err))
+            assert_whole(made, old, new)
+        assert not left_over()
+    assert nth > 2 * every or words[0] == "verify"
+
+
+def assert_without_a_run(made: str, old: dict[str, bytes], said: Said) -> None:
+    """A comparison lacks a run that could not be written, says so, and took no other's place."""
+    assert f"{made}/manifest.json" not in old
+    assert manifest.check(Path(made)).status == "finished"
+    assert "cannot" in one_line(said.err)
+
+
+def assert_kept_beside(made: str, line: str) -> None:
+    """What lacks a run is whole where the line says, and taken away."""
+    other = Path(f"{made}-2")
+    assert other.exists() == (f"in {other} instead" in line)
+    if other.exists():
+        assert manifest.check(other).status == "finished"
+        assert "left as it is" in line
+        shutil.rmtree(other)
