@@ -16,7 +16,7 @@ from config_samples import SOUND, write
 
 import podusv_cli
 from podusv_cli import cli
-from podusv_cli.cli.guard import PLEASE_REPORT, flushed, guarded
+from podusv_cli.cli.guard import PLEASE_REPORT, guarded
 from podusv_cli.config.references import vessel_names
 from podusv_cli.config.scenario import Scenario
 from podusv_cli.config.schema import schema_text
@@ -225,18 +225,6 @@ def test_a_bug_shows_its_trace_and_asks_for_a_report(capsys: pytest.CaptureFixtu
 
 def test_the_exit_code_of_a_command_is_kept() -> None:
     assert outcome(typer.Exit(4)) == 4
-
-
-def test_a_full_disk_behind_stdout_is_told(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    class Full:
-        def flush(self) -> None:
-            raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(sys, "stdout", Full())
-    assert flushed(0) == 5
-    assert capsys.readouterr().err == "podusv: [Errno 28] No space left on device\n"
 
 
 @pytest.mark.parametrize("words", [["explain", "vessel"], ["schema"], ["--help"]])

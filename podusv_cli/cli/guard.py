@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import os
 import sys
 import traceback
 from collections.abc import Callable
 from contextlib import suppress
 from functools import wraps
-from typing import ParamSpec
+from typing import ParamSpec, TextIO
 
 import typer
 
@@ -57,7 +58,7 @@ def told(error: BaseException) -> int:
     if isinstance(error, KeyboardInterrupt):
         return INTERRUPTED
     if isinstance(error, BrokenPipeError):
-        _silence()
+        _silence(sys.stdout)
         return PIPE_CLOSED
     if isinstance(error, PodusvError):
         _say(str(error))
@@ -82,19 +83,34 @@ def open_streams() -> None:
     while (number := os.open(os.devnull, os.O_RDWR)) <= STDERR:  # the lowest that is free
         os.set_inheritable(number, True)
     os.close(number)
-    sys.stdout = sys.stdout or open(os.devnull, "w")  # noqa: SIM115
-    sys.stderr = sys.stderr or open(os.devnull, "w")  # noqa: SIM115
+    sys.stdout = _whole(sys.stdout or open(os.devnull, "w"))  # noqa: SIM115
+    sys.stderr = _whole(sys.stderr or open(os.devnull, "w"))  # noqa: SIM115
+
+
+def _whole(stream: TextIO) -> TextIO:
+    """The stream with a buffer: Python drops, unseen, what a full disk takes no more without one.
+
+    There is none where PYTHONUNBUFFERED is set.
+    """
+    raw = getattr(stream, "buffer", None)
+    if not isinstance(raw, io.RawIOBase):
+        return stream
+    buffered = io.BufferedWriter(raw)
+    return io.TextIOWrapper(buffered, stream.encoding, stream.errors, line_buffering=True)
 
 
 def flushed(code: str | int | None) -> str | int | None:
     """The exit code after everything is printed; another one where printing failed."""
-    try:
-        sys.stdout.flush()
-    except OSError as error:
-        return told(error)
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except OSError as error:
+            _silence(stream)
+            if code != StorageError.exit_code:  # or it has been told, as far as that was possible
+                code = told(error)
     return code
 
 
-def _silence() -> None:
-    """Nobody reads stdout any more; keep Python from complaining about it at the very end."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+def _silence(stream: TextIO) -> None:
+    """Nothing gets out there any more; keep Python from trying and complaining at the very end."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())

@@ -8,7 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
-from command_samples import BASE, TWO, Command, commanded, write
+from children import one_line
+from command_samples import BASE, TWO, Command, Said, commanded, write
 from logbook_samples import files
 
 from podusv_cli.figures import drawing
@@ -89,7 +90,40 @@ def assert_whole(made: str, old: dict[str, bytes], new: dict[str, bytes]) -> Non
     assert others_are == others_were
     if made in ("figures", "v.json"):  # file by file
         assert was.keys() <= now.keys()
-        assert all(part in (was.get(name), new[name]) for name, part in now.items())
+        assert all(part in (was.get(name), new.get(name)) for name, part in now.items())
     elif now != was:
         assert not manifest.foreign(Path(made), manifest.check(Path(made)))
         assert now.keys() == _parted(new, made)[0].keys()
+
+
+def assert_nothing_lost(
+    made: str, old: dict[str, bytes], new: dict[str, bytes], said: Said
+) -> None:
+    """A command that could not write says so in a line, and old results are what they were.
+
+    Or new, where only the last step failed. What was made of a comparison is kept.
+    """
+    if said.code == 3:
+        _assert_without_a_run(made, old, one_line(said.err))
+    else:
+        assert said.code == 5
+        _assert_kept_beside(made, one_line(said.err))
+        assert_whole(made, old, new)
+    assert not left_over()
+
+
+def _assert_without_a_run(made: str, old: dict[str, bytes], line: str) -> None:
+    """A comparison lacks a run that could not be written, says so, and took no other's place."""
+    assert f"{made}/manifest.json" not in old
+    assert manifest.check(Path(made)).status == "finished"
+    assert "cannot" in line
+
+
+def _assert_kept_beside(made: str, line: str) -> None:
+    """What lacks a run is whole where the line says, and taken away."""
+    other = Path(f"{made}-2")
+    assert other.exists() == (f"in {other} instead" in line)
+    if other.exists():
+        assert manifest.check(other).status == "finished"
+        assert "left as it is" in line
+        shutil.rmtree(other)

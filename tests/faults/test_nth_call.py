@@ -5,21 +5,19 @@ from __future__ import annotations
 import errno
 import itertools
 import os
-import shutil
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import pytest
-from children import one_line
 from command_samples import Command, Said
 from counts import count
 from logbook_samples import Saboteur, fails, files
-from old_results import COMMANDS, SUCCESS, among_old_results, assert_whole, bring_back, left_over
+from old_results import COMMANDS, SUCCESS, among_old_results, assert_nothing_lost, bring_back
 
 from podusv_cli import comparing, parallel, repeating
 from podusv_cli.interrupts import Interrupts
-from podusv_cli.logbook import atomic, manifest, provenance
+from podusv_cli.logbook import atomic, provenance
 
 NAMING = ("replace", "rename")
 FILLING = ("write", "fsync")
@@ -104,29 +102,5 @@ def test_it_is_a_line_and_nothing_is_lost(
         failures, said = sabotaged(lambda: podusv(*words), error, nth, lasting=lasting)
         if not failures:
             break
-        assert "Traceback" not in said.err
-        if said.code == 3:
-            assert_without_a_run(made, old, said)
-        else:
-            assert said.code == 5
-            assert_kept_beside(made, one_line(said.err))
-            assert_whole(made, old, new)
-        assert not left_over()
+        assert_nothing_lost(made, old, new, said)
     assert nth > 2 * every or words[0] == "verify"
-
-
-def assert_without_a_run(made: str, old: dict[str, bytes], said: Said) -> None:
-    """A comparison lacks a run that could not be written, says so, and took no other's place."""
-    assert f"{made}/manifest.json" not in old
-    assert manifest.check(Path(made)).status == "finished"
-    assert "cannot" in one_line(said.err)
-
-
-def assert_kept_beside(made: str, line: str) -> None:
-    """What lacks a run is whole where the line says, and taken away."""
-    other = Path(f"{made}-2")
-    assert other.exists() == (f"in {other} instead" in line)
-    if other.exists():
-        assert manifest.check(other).status == "finished"
-        assert "left as it is" in line
-        shutil.rmtree(other)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pty
+import resource
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -54,12 +55,29 @@ def test_closed_streams_are_as_good_as_dev_null(words: tuple[str, ...]) -> None:
 
 
 @pytest.mark.skipif(not FULL.exists(), reason="there is no /dev/full")
+@pytest.mark.parametrize("unbuffered", ["", "1"])
 @pytest.mark.parametrize("words", [("list",), ("--help",), ("--version",), ("run", "--help")])
-def test_a_full_disk_behind_stdout_is_a_line(words: tuple[str, ...]) -> None:
+def test_a_full_disk_behind_stdout_is_a_line(words: tuple[str, ...], unbuffered: str) -> None:
+    extra = {"PYTHONUNBUFFERED": unbuffered}
     with FULL.open("w") as full:
-        done = podusv(*words, stdout=full, stderr=subprocess.PIPE, text=True)
+        done = podusv(*words, extra=extra, stdout=full, stderr=subprocess.PIPE, text=True)
     assert done.returncode == 5
     assert done.stderr == "podusv: [Errno 28] No space left on device\n"
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_a_disk_that_fills_up_behind_stdout_is_a_line(unbuffered: str) -> None:
+    """Half of the text is there, and it is known."""
+
+    def limit() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
+
+    extra = {"PYTHONUNBUFFERED": unbuffered}
+    with Path("schema.json").open("w") as file:
+        done = podusv(
+            "schema", extra=extra, stdout=file, stderr=subprocess.PIPE, text=True, preexec_fn=limit
+        )
+    assert (done.returncode, done.stderr) == (5, "podusv: [Errno 27] File too large\n")
 
 
 @pytest.mark.parametrize("words", [("list",), ("schema",), ("validate", "a.yaml", "-v")])

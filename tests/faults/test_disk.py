@@ -1,0 +1,177 @@
+"""Full disks, limits of file sizes, streams that take nothing: a line, and nothing is lost."""
+
+from __future__ import annotations
+
+import os
+import re
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from children import in_a_child, needs_mount, one_line, small_disk
+from command_samples import BASE, ROOT, Command, Said, write
+from logbook_samples import deadline, files
+from old_results import (
+    COMMANDS,
+    SUCCESS,
+    among_old_results,
+    assert_nothing_lost,
+    assert_whole,
+    bring_back,
+    left_over,
+)
+
+from podusv_cli.engine import machine_code
+from podusv_cli.engine.machine_code import Code, cache_folder
+from podusv_cli.logbook import manifest
+
+FULL = Path("/dev/full")
+needs_full = pytest.mark.skipif(not FULL.exists(), reason="there is no /dev/full")
+WRITING = [(made, words) for made, words in COMMANDS if made]
+LIMITS = [(made, words, limit) for made, words in WRITING for limit in (0, 1000)]
+# The log alone is larger than this, and what compares the runs is not.
+LIMITS += [(made, words, 50_000) for made, words in WRITING if words[0] not in ("plot", "verify")]
+
+
+@pytest.fixture(scope="module")
+def before(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where old results are, once they are made."""
+    return tmp_path_factory.mktemp("before")
+
+
+@pytest.fixture
+def podusv(
+    before: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> Command:  # fmt: skip
+    return among_old_results(before, tmp_path, monkeypatch, capsys)
+
+
+@pytest.mark.parametrize(("made", "words", "limit"), LIMITS, ids=str)
+def test_past_the_file_size_limit(
+    podusv: Command, made: str, words: tuple[str, ...], limit: int
+) -> None:
+    old = files(Path())
+
+    def limited() -> Said:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+        return podusv(*words)
+
+    said = in_a_child(limited)
+    assert said.code == 5
+    place = r"cannot write \S*{}\S* \(\d+ bytes\): larger than the file size limit of this session"
+    assert re.fullmatch(place.format(made), one_line(said.err))
+    assert files(Path()) == old
+    assert not left_over()
+
+
+@needs_mount
+@pytest.mark.parametrize("free", [4096, 150_000])
+@pytest.mark.parametrize(("made", "words"), WRITING, ids=str)
+def test_on_a_full_disk(
+    podusv: Command, before: Path, made: str, words: tuple[str, ...], free: int
+) -> None:
+    """With old results on it, where only the child sees it."""
+
+    def on_a_small_disk() -> object:
+        small_disk(".", 4 * 2**20)
+        os.chdir(os.getcwd())  # to what is mounted there now
+        bring_back(before)
+        old = files(Path())
+        fill(free)
+        said = podusv(*words)
+        Path("filler").unlink()
+        if said.code == SUCCESS.get(words[0], 0):
+            assert free > 4096
+        else:
+            assert_nothing_lost(made, old, {}, said)
+        return said.code
+
+    in_a_child(on_a_small_disk)
+
+
+def fill(free: int) -> None:
+    """Leave that many bytes on this disk."""
+    disk = os.statvfs(".")
+    Path("filler").write_bytes(bytes(disk.f_bavail * disk.f_bsize - free))
+
+
+@needs_mount
+def test_a_full_disk_for_compiled_code_costs_time_and_nothing_else(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PODUSV_CACHE", str(tmp_path))
+    law = Code("law", b"\x90" * 100_000)
+
+    def on_a_small_disk() -> tuple[set[str], bool]:
+        small_disk(str(tmp_path), 20_000)
+        folder = cache_folder.__wrapped__()
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(machine_code, "cache_folder", lambda: folder)
+            patch.setattr(machine_code, "_loaded", lambda prototype, code: code)
+            made = machine_code.stored(None, "law", lambda: law)
+        return {path.name for path in folder.iterdir()}, made == law
+
+    assert in_a_child(on_a_small_disk) == (set(), True)
+
+
+@needs_full
+@pytest.mark.parametrize(("made", "words"), COMMANDS, ids=str)
+def test_stdout_that_takes_nothing(podusv: Command, made: str, words: tuple[str, ...]) -> None:
+    """What is made is made all the same."""
+    old = files(Path())
+
+    def unheard() -> Said:
+        sys.stdout = FULL.open("w")
+        return podusv(*words, *["--json"] * (words[0] != "plot"))
+
+    said = in_a_child(unheard)
+    assert said.code == 5
+    assert one_line(said.err) == "podusv: [Errno 28] No space left on device"
+    assert_whole(made, old, files(Path()))
+    assert not made or Path(made).exists()
+    assert not left_over()
+
+
+@needs_full
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+@pytest.mark.parametrize("streams", ["out", "err", "out err"])
+def test_streams_that_take_nothing_until_python_ends(
+    podusv: Command, streams: str, unbuffered: str
+) -> None:
+    """When nothing can be told, the exit code is all there is, and it is not a bug's."""
+    write("a.yaml", BASE.replace("silence", "# silence"))  # so that there is something to say
+    words = ["run", "a.yaml", "--out", "new", "--no-figures", "--json"]
+    extra = {"PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": unbuffered}
+    with FULL.open("w") as full:
+        out, err = (full if name in streams else subprocess.PIPE for name in ("out", "err"))
+        done = subprocess.run(
+            [sys.executable, "-m", "podusv_cli", *words], text=True, timeout=60, check=False,
+            env=os.environ | extra, stdout=out, stderr=err,
+        )  # fmt: skip
+    assert done.returncode == 5
+    assert "Traceback" not in (done.stderr or "")
+    assert "ignored" not in (done.stderr or "")
+    assert not Path("new").exists() or manifest.check(Path("new")).status == "finished"
+
+
+@pytest.mark.parametrize("place", ["/dev/full", "/dev/null", "pipe", "folder", "link"])
+def test_what_is_no_file_is_not_replaced_by_one(podusv: Command, place: str) -> None:
+    """As root even a device would be."""
+    os.mkfifo("pipe")
+    Path("folder").mkdir()
+    Path("link").symlink_to("v.json")
+    Path("figures/controls.png").unlink()
+    Path("figures/controls.png").symlink_to(Path(place).absolute())
+    kind = os.lstat(place).st_mode
+    old = files(Path())
+    for words in (("verify", "a.yaml", "--out", place), ("plot", "x", "--out", "figures")):
+        with deadline():
+            said = podusv(*words)
+        assert said.code == 5
+        assert said.out == ""
+        assert "is there already and is not a file" in one_line(said.err)
+    assert os.lstat(place).st_mode == kind
+    assert files(Path()) == old

@@ -1,0 +1,135 @@
+"""Places where nothing can be written: told in a line, before anything is computed."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from children import give_up_rights, in_a_child, one_line
+from command_samples import LONG, TWO, Command, Said, write
+from logbook_samples import deadline
+from old_results import among_old_results
+
+from podusv_cli import running
+from podusv_cli.figures import drawing
+
+MINUTES = LONG + TWO.splitlines()[-1] + "\n"
+SOON = 20  # s; the scenario takes minutes
+RUN, COMPARE = ("run", "long.yaml", "--no-figures"), ("compare", "long.yaml", "--no-figures")
+RERUNS = [("rerun", "x"), ("rerun", "both")]
+PLACED = [("plot", "x"), ("verify", "long.yaml")]
+
+
+def a_file(place: Path) -> None:
+    place.touch()
+
+
+def dangling(place: Path) -> None:
+    place.symlink_to("nowhere")
+
+
+def circular(place: Path) -> None:
+    place.symlink_to(place.name)
+
+
+def pipe(place: Path) -> None:
+    os.mkfifo(place)
+
+
+def closed(place: Path) -> None:
+    place.mkdir(0)
+
+
+def read_only(place: Path) -> None:
+    place.mkdir(0o555)
+
+
+ODD, FORBIDDEN = [a_file, dangling, circular, pipe], [closed, read_only]
+# Commands that write, with the odd place in the way of where to.
+INSIDE = [(*words, "--out", "place/new") for words in (RUN, COMPARE, *RERUNS, *PLACED)]
+ITSELF = [(*words, "--out", "place") for words in (RUN, COMPARE, *RERUNS, ("plot", "x"))]
+
+
+@pytest.fixture(scope="module")
+def before(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where old results are, once they are made."""
+    return tmp_path_factory.mktemp("before")
+
+
+@pytest.fixture
+def podusv(
+    before: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> Command:  # fmt: skip
+    run = among_old_results(before, tmp_path, monkeypatch, capsys)
+    write("long.yaml", MINUTES)
+    Path().chmod(0o755)
+    monkeypatch.setattr(running, "simulate", begun)
+    monkeypatch.setattr(drawing, "draw_in_parallel", begun)
+    return run
+
+
+def begun(*given: object, **more: object) -> None:
+    raise AssertionError("it began")
+
+
+def tree() -> dict[str, int]:
+    """Everything here, and what kind of thing it is."""
+    return {str(path): os.lstat(path).st_mode for path in Path().rglob("*")}
+
+
+def refused(podusv: Command, words: tuple[str, ...], before: Callable[[], None]) -> str:
+    """The line in which a command is refused, by a process that does something first."""
+
+    def attempt() -> Said:
+        before()
+        return podusv(*words)
+
+    here = tree()
+    with deadline(SOON):
+        said = in_a_child(attempt)
+    assert (said.code, said.out) == (5, "")
+    assert tree() == here
+    return one_line(said.err)
+
+
+@pytest.mark.parametrize("make", ODD)
+@pytest.mark.parametrize("words", [*INSIDE, *ITSELF], ids=" ".join)
+def test_something_that_is_no_folder(
+    podusv: Command, words: tuple[str, ...], make: Callable[[Path], None]
+) -> None:
+    make(Path("place"))
+    assert "place" in refused(podusv, words, lambda: None)
+
+
+@pytest.mark.parametrize("make", ODD)
+@pytest.mark.parametrize("words", [RUN, COMPARE, ("plot", "x")], ids=" ".join)
+def test_something_that_is_no_folder_where_results_go_by_default(
+    podusv: Command, words: tuple[str, ...], make: Callable[[Path], None]
+) -> None:
+    place = Path("figures" if words[0] == "plot" else "results")
+    for path in place.glob("*"):
+        path.unlink()
+    if place.exists():
+        place.rmdir()
+    make(place)
+    assert place.name in refused(podusv, words, lambda: None)
+
+
+@pytest.mark.parametrize("make", FORBIDDEN)
+@pytest.mark.parametrize("words", INSIDE, ids=" ".join)
+def test_somewhere_where_one_may_not(
+    podusv: Command, words: tuple[str, ...], make: Callable[[Path], None]
+) -> None:
+    make(Path("place"))
+    line = refused(podusv, words, give_up_rights)
+    assert "place" in line
+    assert line.endswith(": not permitted")
+
+
+@pytest.mark.parametrize("words", [RUN, COMPARE], ids=" ".join)
+def test_results_go_by_default_where_one_may_not(podusv: Command, words: tuple[str, ...]) -> None:
+    closed(Path("results"))
+    assert refused(podusv, words, give_up_rights).endswith(": not permitted")
