@@ -8,6 +8,7 @@ import signal
 import traceback
 from collections.abc import Callable
 from ctypes import CDLL, c_char_p, c_ulong, get_errno
+from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from typing import Any, TypeVar
@@ -26,28 +27,41 @@ class Died(Exception):
     """The process ended without a result."""
 
 
-def in_a_child(
-    work: Callable[[], Result], meanwhile: Callable[[int], None] = lambda process: None
-) -> Result:
-    """What `work` returns in a process and session of its own; Died where it was killed.
+@dataclass
+class Child:
+    """A forked process in a session of its own, at work."""
 
-    `meanwhile` is called with the number of the process. All that the process starts has to end
-    with it, or soon after it.
-    """
+    process: BaseProcess
+    channel: Connection
+
+    def result(self) -> Any:
+        """What its work returned; Died where it was killed.
+
+        All that it started has to end with it, or soon after it.
+        """
+        try:
+            assert self.channel.poll(PATIENCE), "the process hangs"
+            done, result = self.channel.recv()
+        except EOFError:
+            raise Died from None
+        finally:
+            _end(self.process)
+        assert done, result
+        return result
+
+
+def begun(work: Callable[[], object]) -> Child:
+    """A process that has begun to work."""
     ours, theirs = FORK.Pipe(duplex=False)
     process = FORK.Process(target=_work, args=(work, theirs))
     process.start()
     theirs.close()
-    try:
-        meanwhile(process.pid)
-        assert ours.poll(PATIENCE), "the process hangs"
-        done, result = ours.recv()
-    except EOFError:
-        raise Died from None
-    finally:
-        _end(process)
-    assert done, result
-    return result  # type: ignore[no-any-return]
+    return Child(process, ours)
+
+
+def in_a_child(work: Callable[[], Result]) -> Result:
+    """What `work` returns in a process of its own."""
+    return begun(work).result()  # type: ignore[no-any-return]
 
 
 def _work(work: Callable[[], Any], channel: Connection) -> None:

@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from children import Died, in_a_child
+from children import Died, begun, in_a_child
 from command_samples import Command
 from counts import count
 from logbook_samples import Saboteur, files, until_nothing_breaks
@@ -56,9 +56,15 @@ def counted(work: Callable[[], object], nth: int = 0) -> int:
     return nth - saboteur.left
 
 
-def kill(process: int = 0, after: float = 0.0) -> None:
-    time.sleep(after)
-    os.kill(process or os.getpid(), signal.SIGKILL)
+def kill() -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def killed_after(work: Callable[[], object], seconds: float) -> object:
+    child = begun(work)
+    time.sleep(seconds)
+    child.process.kill()
+    return child.result()
 
 
 def attempts(work: Callable[[], object], seeds: range) -> list[Callable[[], object]]:
@@ -70,9 +76,7 @@ def attempts(work: Callable[[], object], seeds: range) -> list[Callable[[], obje
     at_calls = [
         partial(in_a_child, partial(counted, work, c.randint(1, total))) for c in chances[::2]
     ]
-    at_times = [
-        partial(in_a_child, work, partial(kill, after=c.uniform(0.0, took))) for c in chances[1::2]
-    ]
+    at_times = [partial(killed_after, work, c.uniform(0.0, took)) for c in chances[1::2]]
     return [*at_calls, *at_times]
 
 
