@@ -10,7 +10,7 @@ PODS := kept dropped ideal no_anti_windup single
 COMPARISONS := printed_compare figures_compare figures_compare_standoff corrected_compare
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce pod test test-all bench lint types contracts clean
+.PHONY: help reproduce pod test test-all test-faults bench lint types contracts clean
 
 help: ## what can be made
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -39,6 +39,9 @@ test: lint types contracts ## lint, types, import contracts, all tests but the s
 
 test-all: lint types contracts ## as test, with the slow tests
 	@$(BIN)/pytest -m "not benchmark"
+
+test-faults: $(VENV)/dev.done ## the fault tests with their full counts
+	@PODUSV_FAULTS=full $(BIN)/pytest -m "not benchmark" tests/faults
 
 bench: $(VENV)/dev.done ## speed beside hand-written C (needs a C compiler), into benchmarks/results.md
 	@$(BIN)/python -m benchmarks.bench
