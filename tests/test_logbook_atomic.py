@@ -91,6 +91,24 @@ def test_a_failure_at_any_step_leaves_the_old_file_or_the_new_one(path: Path, de
     assert len(seen) > len(NEW) / 700 + 6, "every write was sabotaged"
 
 
+def test_a_disk_that_fills_up_leaves_all_of_several_files(path: Path) -> None:
+    """None is new unless all are."""
+    contents = {path: NEW, path.with_name("metrics.csv"): NEW}
+
+    def attempt(saboteur: Saboteur) -> None:
+        with pytest.MonkeyPatch.context() as patch:
+            in_pieces(patch)
+            saboteur.watch(patch, "write")
+            try:
+                atomic.write_all(contents)
+            except StorageError:
+                assert files(path.parent) == {path.name: OLD}
+
+    for _ in until_nothing_breaks(attempt, fails(errno.ENOSPC)):
+        pass
+    assert files(path.parent) == {each.name: content for each, content in contents.items()}
+
+
 @pytest.mark.parametrize(
     ("number", "cause"),
     [
