@@ -19,7 +19,7 @@ from podusv_cli.comparison.entries import Absent, Entry
 from podusv_cli.comparison.expressions import Source
 from podusv_cli.config.loading import load_resolved
 from podusv_cli.config.scenario import Scenario
-from podusv_cli.errors import StorageError, UsageError
+from podusv_cli.errors import StorageError
 from podusv_cli.findings.finding import Finding
 from podusv_cli.findings.preflight import together
 from podusv_cli.interrupts import Extras, interrupts_heard
@@ -72,10 +72,9 @@ def from_folder(path: Path) -> list[Part]:
 
     Raises UsageError where it is nothing of the kind, StorageError where it is damaged.
     """
-    finished = os.path.lexists(path / manifest.NAME)
-    inner = _listed(path) if finished else _found(path)
-    if not inner and not finished:
-        raise UsageError(f"{path} is no run folder: it has no {manifest.NAME}")
+    inner = _listed(path) if os.path.lexists(path / manifest.NAME) else _found(path)
+    if not inner:
+        manifest.demand(path)
     return [_from_run(child) for child in (inner or [path])]
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -101,8 +100,7 @@ def rerun(path: Path, request: Request, progress: Progress | None = None) -> Rep
 
 def _parts(path: Path) -> list[Part]:
     """The finished runs of a folder; UsageError where it is none."""
-    if not os.path.lexists(path / manifest.NAME):
-        raise UsageError(f"{path} is no run folder: it has no {manifest.NAME}")
+    manifest.demand(path)
     return comparing.from_folder(path)
 
 

@@ -35,7 +35,7 @@ NUMBERS = (bool, int, float, str, tuple)
 # Rooms and files that hold no kernel: what is edited there leaves machine code as it is.
 APART = (
     "cli", "comparison", "config", "figures", "findings", "logbook", "repetition", "verification",
-    "comparing.py", "repeating.py", "running.py", "verifying.py", "workflows.py",
+    "comparing.py", "plotting.py", "repeating.py", "running.py", "verifying.py", "workflows.py",
 )  # fmt: skip
 
 

@@ -49,8 +49,8 @@ class RunWriter:
     whole, only with `force`; anything else, except an empty folder, never is. A run folder is one
     with a readable manifest, damaged files or not. Every method raises StorageError.
 
-    Where somebody else takes the name in the meantime, a number is appended to it. That is as good
-    where `named` says that nobody asked for this name, and an error else.
+    Where somebody else takes the name in the meantime, a number is appended to it. That is an error
+    where somebody asked for just this name (`named`), and as good otherwise.
     """
 
     def __init__(self, final: Path, *, force: bool = False, named: bool = True) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path, PurePosixPath
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from podusv_cli.errors import StorageError
+from podusv_cli.errors import StorageError, UsageError
 from podusv_cli.logbook import atomic, jsonfile
 from podusv_cli.logbook.layout import FORMAT
 from podusv_cli.logbook.regular import LARGEST_FILE, fingerprint
@@ -44,6 +44,12 @@ def write(folder: Path, status: Status) -> Manifest:
     )
     atomic.write_bytes(folder / NAME, jsonfile.encode(manifest.model_dump()))
     return manifest
+
+
+def demand(folder: Path) -> None:
+    """UsageError where a folder has no manifest: it is no run's and no comparison's."""
+    if not os.path.lexists(folder / NAME):
+        raise UsageError(f"{folder} is no run folder: it has no {NAME}")
 
 
 def read(folder: Path) -> Manifest:
