@@ -161,7 +161,7 @@ def test_ctrl_c_ends_it_and_leaves_nothing(run: Path, tmp_path: Path) -> None:
         env={**ENVIRONMENT, "TMPDIR": str(room)}, stdout=subprocess.PIPE, text=True,
     )  # fmt: skip
     try:
-        while not any(room.glob("podusv-*/.again.*")) and process.poll() is None:
+        while not any(room.rglob(".again.*")) and process.poll() is None:
             time.sleep(0.05)
         time.sleep(0.5)
         process.send_signal(signal.SIGINT)
