@@ -114,8 +114,6 @@ def _one(part: Part, request: Request, progress: Progress | None) -> Repetition:
 
 def _several(parts: Sequence[Part], request: Request, progress: Progress | None) -> Repetition:
     started = datetime.now(UTC)
-    for part in parts:
-        warm_up(part.scenario)
 
     def tell(position: int, fraction: float) -> None:
         if progress:
@@ -124,6 +122,8 @@ def _several(parts: Sequence[Part], request: Request, progress: Progress | None)
     with _passing(request) as place:
         target = request.out or place / "again"
         with folder.RunWriter(target, force=request.force) as writer:
+            for part in parts:
+                warm_up(part.scenario)
             jobs = [partial(_repeat, p, writer.folder / p.label, request) for p in parts]
             outcomes = run_all(jobs, tell)
             missing = unwritten(outcomes)

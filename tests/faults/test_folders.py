@@ -12,7 +12,7 @@ from command_samples import LONG, TWO, Command, Said, write
 from logbook_samples import deadline
 from old_results import among_old_results
 
-from podusv_cli import running
+from podusv_cli import comparing, repeating, running
 from podusv_cli.figures import drawing
 
 MINUTES = LONG + TWO.splitlines()[-1] + "\n"
@@ -67,6 +67,9 @@ def podusv(
     write("long.yaml", MINUTES)
     Path().chmod(0o755)
     monkeypatch.setattr(running, "simulate", begun)
+    for room in (comparing, repeating):  # whose runs are made in processes of their own
+        monkeypatch.setattr(room, "run_all", begun)
+        monkeypatch.setattr(room, "warm_up", begun)
     monkeypatch.setattr(drawing, "draw_in_parallel", begun)
     return run
 
