@@ -345,11 +345,3 @@ def test_a_folder_without_a_manifest_is_no_run_folder(run: Path) -> None:
     (folder / "log.h5").unlink()
     with pytest.raises(UsageError, match=r"no run folder: it has no manifest\.json"):
         comparing.from_folder(folder)
-
-
-def test_a_pipe_where_a_figure_is_to_be_written(run: Path, tmp_path: Path, podusv: Command) -> None:
-    (tmp_path / "figures").mkdir()
-    os.mkfifo(tmp_path / "figures/errors.png")
-    with deadline(20):
-        assert podusv("plot", run, "--figure", "errors").code == 0
-    assert (tmp_path / "figures/errors.png").read_bytes().startswith(b"\x89PNG")
