@@ -16,6 +16,7 @@ from logbook_samples import deadline
 
 from podusv_cli.errors import StorageError
 from podusv_cli.logbook import jsonfile, manifest
+from podusv_cli.logbook.regular import LARGEST_FILE
 
 FILES = {"log.h5": b"numbers", "figures/path.png": b"picture", "metrics.csv": b""}
 
@@ -70,6 +71,12 @@ def test_a_missing_file_is_named(folder: Path, name: str) -> None:
 def test_an_altered_file_is_named(folder: Path, name: str, content: bytes) -> None:
     (folder / name).write_bytes(content)
     with pytest.raises(StorageError, match=f"{name} was altered"):
+        manifest.check(folder)
+
+
+def test_a_file_that_claims_to_be_beyond_all_measure_is_not_read(folder: Path) -> None:
+    rewrite(folder, lambda content: content["files"]["log.h5"].update(bytes=LARGEST_FILE + 1))
+    with pytest.raises(StorageError, match=r"log\.h5: .* at most .* read it with h5py or xarray"):
         manifest.check(folder)
 
 

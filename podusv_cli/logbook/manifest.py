@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from podusv_cli.errors import StorageError, UsageError
 from podusv_cli.logbook import atomic, jsonfile
 from podusv_cli.logbook.layout import FORMAT
-from podusv_cli.logbook.regular import LARGEST_FILE, fingerprint
+from podusv_cli.logbook.regular import ELSEWHERE, LARGEST_FILE, fingerprint
 from podusv_cli.recording import Status
 
 NAME = "manifest.json"
@@ -82,7 +82,8 @@ def check(folder: Path) -> Manifest:
         if not os.path.lexists(path):
             raise StorageError(f"{folder} is not a finished folder: {name} is missing")
         if entry.bytes > LARGEST_FILE:  # it might be a hole of any size
-            raise StorageError(f"{path}: {entry.bytes} bytes, at most {LARGEST_FILE} allowed")
+            claim = f"{entry.bytes} bytes, at most {LARGEST_FILE} allowed"
+            raise StorageError(f"cannot read {path}: {claim}{ELSEWHERE}")
         if os.lstat(path).st_size != entry.bytes or _entry(path) != entry:
             raise StorageError(f"{folder} is not a finished folder: {name} was altered")
     return manifest

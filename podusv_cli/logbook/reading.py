@@ -7,6 +7,7 @@ first, only known names are looked at, and sizes are added up before the first a
 from __future__ import annotations
 
 import hashlib
+import io
 import math
 import unicodedata
 from collections.abc import Iterator
@@ -22,11 +23,11 @@ from podusv_cli.errors import StorageError
 from podusv_cli.kernels import Vector
 from podusv_cli.logbook import layout, trees
 from podusv_cli.logbook.packing import unpacked
-from podusv_cli.logbook.regular import LARGEST_FILE, LARGEST_TEXT, read_bytes
+from podusv_cli.logbook.regular import ELSEWHERE, LARGEST_FILE, LARGEST_TEXT, read_bytes
 from podusv_cli.recording import Recording, Status
 from podusv_cli.signals import SIGNALS
 
-LARGEST_CONTENT = 4 * 2**30  # bytes, unpacked
+LARGEST_CONTENT = LARGEST_FILE  # bytes, unpacked; packed, no log is larger
 _FILTERS = [h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_FLETCHER32]
 # What h5py raises on damaged files; ValueError includes text that is not UTF-8.
 _DAMAGE = (OSError, RuntimeError, ValueError, KeyError, TypeError, MemoryError, OverflowError)
@@ -35,7 +36,7 @@ _DAMAGE = (OSError, RuntimeError, ValueError, KeyError, TypeError, MemoryError, 
 def read_log(path: Path) -> Recording:
     """The recording in a log file; `seen` is not logged and stays None. Raises StorageError."""
     with _opened(path) as (file, image):
-        arrays = _arrays(file, image)
+        arrays = _arrays(file, image, path)
         return Recording(
             status=_status(file),
             controller=_words(file, "controller"),
@@ -61,10 +62,10 @@ def resolved_yaml(path: Path) -> str:
 @contextmanager
 def _opened(path: Path) -> Iterator[tuple[h5py.File, bytes]]:
     """The log in memory, its format checked, and its bytes; faults inside become a StorageError."""
-    image = read_bytes(path, LARGEST_FILE)
+    image = read_bytes(path, LARGEST_FILE, ELSEWHERE)
     try:
         trees.check(image)
-        with h5py.File(h5py.h5f.open_file_image(image)) as file:
+        with h5py.File(io.BytesIO(image)) as file:
             _check_format(file)
             yield file, image
     except _DAMAGE as error:
@@ -142,7 +143,7 @@ def _filters(made: h5py.h5p.PropDCID) -> list[int]:
     return [made.get_filter(i)[0] for i in range(made.get_nfilters())]
 
 
-def _arrays(file: h5py.File, image: bytes) -> dict[str, Vector]:
+def _arrays(file: h5py.File, image: bytes, path: Path) -> dict[str, Vector]:
     """All signals, in the order in which they were written."""
     datasets = {name: _dataset(file.id, name) for name in _names(file)}
     lengths = {"time": math.prod(datasets["time"].shape)}
@@ -150,7 +151,8 @@ def _arrays(file: h5py.File, image: bytes) -> dict[str, Vector]:
         _check_numbers(name, dataset, lengths)
     total = sum(8 * math.prod(dataset.shape) for dataset in datasets.values())
     if total > LARGEST_CONTENT:
-        raise ValueError(f"claims {total} bytes of data, at most {LARGEST_CONTENT} allowed")
+        claim = f"claims {total} bytes of data, at most {LARGEST_CONTENT} allowed"
+        raise StorageError(f"cannot read {path}: {claim}{ELSEWHERE}")
     return {name: _unpacked(name, dataset, image) for name, dataset in datasets.items()}
 
 

@@ -14,7 +14,8 @@ from podusv_cli.errors import StorageError
 from podusv_cli.logbook.atomic import explained
 
 LARGEST_TEXT = 16 * 2**20  # bytes
-LARGEST_FILE = 2 * 2**30  # bytes
+LARGEST_FILE = 4 * 2**30  # bytes
+ELSEWHERE = "; read it with h5py or xarray, or log less often (log.every)"
 
 
 @contextmanager
@@ -31,12 +32,12 @@ def opened(path: Path) -> Iterator[BufferedReader]:
             yield file
 
 
-def read_bytes(path: Path, limit: int) -> bytes:
-    """The whole file; raises StorageError where it holds more than `limit` bytes."""
+def read_bytes(path: Path, limit: int, remedy: str = "") -> bytes:
+    """The whole file; StorageError, with a remedy, where it holds more than `limit` bytes."""
     with opened(path) as file:
         size = os.fstat(file.fileno()).st_size
         if size > limit:
-            raise StorageError(f"cannot read {path}: {size} bytes, at most {limit} allowed")
+            raise StorageError(f"cannot read {path}: {size} bytes, at most {limit} allowed{remedy}")
         return file.read(size)
 
 
