@@ -13,18 +13,21 @@ from typing import Any
 from podusv_cli import __version__
 from podusv_cli.config.loading import resolved_yaml
 from podusv_cli.config.scenario import Scenario
+from podusv_cli.config.size import HELD, estimate
 from podusv_cli.engine.asking import check_law
+from podusv_cli.engine.pieces import PIECE
 from podusv_cli.engine.simulate import Observer, marcher, simulate
 from podusv_cli.errors import StorageError
 from podusv_cli.findings.after import aftermath
 from podusv_cli.findings.finding import Finding, heard
 from podusv_cli.interrupts import Extras, interrupts_heard, interrupts_held
 from podusv_cli.logbook import folder, hdf5, provenance
+from podusv_cli.logbook.columns import ColumnFiles
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.metrics.watching import observer, summarise
 from podusv_cli.parallel import Outcome
-from podusv_cli.recording import Recording, Status
+from podusv_cli.recording import Columns, Recording, Status
 from podusv_cli.theory import monitor
 from podusv_cli.theory.report import as_json as theory_report
 
@@ -57,6 +60,14 @@ class Stopwatch:
 
 
 @dataclass(frozen=True)
+class Room:
+    """How large a log is held in memory, and how much of one that is not [bytes]."""
+
+    log: int = HELD
+    piece: int = PIECE
+
+
+@dataclass(frozen=True)
 class Task:
     """A scenario, its file's text, where its run folder goes, how it is called and drawn.
 
@@ -72,6 +83,7 @@ class Task:
     argv: Sequence[str] = ()
     label: str = ""  # in figures; the law's kind by default
     noticed: Sequence[Finding] = ()
+    room: Room = Room()
 
 
 @dataclass(frozen=True)
@@ -108,19 +120,27 @@ def execute(
     A run that diverges or is interrupted is written like any other; its status tells. An interrupt
     after the simulation costs the figures or the law's cost, nothing else. Raises StorageError.
     """
-    started, watch = datetime.now(UTC), watch or Stopwatch()
+    started, watch, size = datetime.now(UTC), watch or Stopwatch(), estimate(task.scenario)
     with (
         interrupts_held(),
-        folder.RunWriter(task.target, force=task.force, named=task.named) as writer,
+        folder.RunWriter(
+            task.target, force=task.force, named=task.named, needed=size.needed
+        ) as writer,
     ):
-        recording, metrics = measured(task.scenario, watch, progress)
+
+        def columns(name: str) -> Columns | None:
+            return ColumnFiles(writer.scratch / name) if size.content > task.room.log else None
+
+        recording, metrics = measured(
+            task.scenario, watch, progress, columns=columns("log"), piece=task.room.piece
+        )
         extras = Extras(recording.status == "interrupted")
         with watch.part("metrics"):
             metrics |= extras.attempt(lambda: _cost(task.scenario, recording)) or {}
             seen_after = heard(aftermath(task.scenario, recording), task.scenario)
         warnings = (*task.noticed, *seen_after)
         with watch.part("theory"):
-            recording, theory = monitored(task.scenario, recording)
+            recording, theory = monitored(task.scenario, recording, columns("theory"))
         with watch.part("write"):
             _write(writer, task, recording, metrics, warnings)
             if theory:
@@ -170,15 +190,19 @@ def _observer(scenario: Scenario) -> Observer:
 
 
 def measured(
-    scenario: Scenario, watch: Stopwatch, progress: Progress | None = None
-) -> tuple[Recording, dict[str, float]]:
-    """Simulate a scenario and sum it up in metrics."""
+    scenario: Scenario, watch: Stopwatch, progress: Progress | None = None,
+    *, columns: Columns | None = None, piece: int = PIECE,
+) -> tuple[Recording, dict[str, float]]:  # fmt: skip
+    """Simulate a scenario and sum it up in metrics; `columns` and `piece` as `simulate` has it."""
     loop, grid, seeing = scenario.closed_loop(), scenario.time_grid(), _observer(scenario)
     compiled = scenario.simulation.compiled
     with watch.part("compile"), interrupts_heard():
         warm_up(scenario)
     with watch.part("engine"):
-        recording = simulate(loop, grid, observer=seeing, compiled=compiled, progress=progress)
+        recording = simulate(
+            loop, grid, observer=seeing, compiled=compiled, progress=progress,
+            columns=columns, piece=piece,
+        )  # fmt: skip
     with watch.part("metrics"):
         metrics = summarise(recording.seen, grid.step) if recording.seen is not None else {}
     return recording, metrics
@@ -189,12 +213,15 @@ def _cost(scenario: Scenario, recording: Recording) -> dict[str, float]:
     return law_costs([(scenario.closed_loop(), recording)])[0] if timed else {}
 
 
-def monitored(scenario: Scenario, recording: Recording) -> tuple[Recording, dict[str, Any]]:
+def monitored(
+    scenario: Scenario, recording: Recording, columns: Columns | None = None
+) -> tuple[Recording, dict[str, Any]]:
     """The recording with what the stability monitor adds, and its findings; none without V."""
     loop, grid = scenario.closed_loop(), scenario.time_grid()
     found = scenario.log.monitor and monitor.monitored(
         loop, grid, recording,
         steady_fraction=scenario.metrics.steady_fraction, compiled=scenario.simulation.compiled,
+        columns=columns,
     )  # fmt: skip
     return (found.recording, theory_report(loop, grid, found)) if found else (recording, {})
 
@@ -204,13 +231,13 @@ def _write(
     warnings: Sequence[Finding],
 ) -> None:  # fmt: skip
     scenario, resolved = task.scenario, resolved_yaml(task.scenario)
-    log = hdf5.encode(
-        recording, resolved_yaml=resolved, title=scenario.description or scenario.name,
-        source=scenario.vessel.source, version=__version__,
-    )  # fmt: skip
     writer.add("scenario.yaml", task.text.encode())
     writer.add("resolved.yaml", resolved.encode())
-    writer.add("log.h5", log)
+    with writer.growing("log.h5") as stream:
+        hdf5.write(
+            stream, recording, resolved_yaml=resolved, title=scenario.description or scenario.name,
+            source=scenario.vessel.source, version=__version__,
+        )  # fmt: skip
     status = {"status": recording.status, "controller": recording.controller}
     told = [finding.as_json() for finding in warnings]
     writer.add_json("metrics.json", {**status, "metrics": metrics, "warnings": told})

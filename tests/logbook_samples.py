@@ -21,6 +21,7 @@ from numpy.testing import assert_array_equal
 import podusv_cli
 from podusv_cli.logbook import hdf5, manifest
 from podusv_cli.logbook.folder import RunWriter
+from podusv_cli.logbook.stream import Stream
 from podusv_cli.recording import Recording
 
 YAML = "name: kleine Fähre\nstart: {x: -10.0}\n"
@@ -50,7 +51,9 @@ def recording(rows: int = 50, nodes: int = 8, **changes: Any) -> Recording:
 
 def log(recorded: Recording | None = None, **texts: str) -> bytes:
     """log.h5 of a recording, the small one if none is given."""
-    return hdf5.encode(recorded or recording(), **TEXTS | texts)
+    content = io.BytesIO()
+    hdf5.write(Stream(content), recorded or recording(), **TEXTS | texts)
+    return content.getvalue()
 
 
 def rewritten(change: Callable[[h5py.File], object]) -> bytes:

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 from config_samples import SOUND
-from logbook_samples import files
+from logbook_samples import files, log
 
 import podusv_cli
 from podusv_cli import workflows
-from podusv_cli.logbook import hdf5, jsonfile, reading
+from podusv_cli.logbook import jsonfile, reading
 from podusv_cli.logbook.folder import RunWriter
 from podusv_cli.recording import Recording, Status
 
@@ -50,7 +50,7 @@ def relogged(folder: Path, change: Callable[[dict[str, Any]], None]) -> Callable
         "resolved_yaml": reading.resolved_yaml(folder / "log.h5"), "title": "t", "source": "s",
         "version": podusv_cli.__version__,
     }  # fmt: skip
-    return lambda _: hdf5.encode(replace(recorded, signals=signals), **texts)
+    return lambda _: log(replace(recorded, signals=signals), **texts)
 
 
 def flip(array: Any, row: int) -> None:

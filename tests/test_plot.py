@@ -6,13 +6,14 @@ import sys
 
 import pytest
 from drawn_samples import recording, scenario
+from logbook_samples import log as encode
 
 from podusv_cli import __version__, workflows
 from podusv_cli.config.loading import resolved_yaml
 from podusv_cli.errors import UsageError
 from podusv_cli.figures import animation
 from podusv_cli.figures.drawing import FIGURES
-from podusv_cli.logbook import folder, hdf5
+from podusv_cli.logbook import folder
 from podusv_cli.recording import Recording
 
 LAWLESS = ("W_hat_u", "W_hat_r", "b_hat_u", "b_hat_r", "f_hat_u", "f_hat_r", "rbf_center")
@@ -22,7 +23,7 @@ def keep(target, log, plan=None):
     """A finished run folder that holds a log made by hand."""
     plan = plan or scenario()
     text = resolved_yaml(plan)
-    encoded = hdf5.encode(log, resolved_yaml=text, title="", source="", version=__version__)
+    encoded = encode(log, resolved_yaml=text, title="", source="", version=__version__)
     with folder.RunWriter(target) as writer:
         writer.add("log.h5", encoded)
         writer.add("resolved.yaml", text.encode())

@@ -31,7 +31,7 @@ else:
 
 
 Misfits = Iterator[tuple[str, str]]  # keys, and what is wrong with them
-MOST_GIGABYTES = 4.0  # of a log, which is held in memory
+MOST_INSTANTS = 2**53  # that can be told apart
 LABEL = re.compile(r"[a-z][a-z0-9_]{0,29}")  # usable as a name in claims and as a folder
 LABEL_IN_WORDS = "a name here is at most 30 of a-z, 0-9 and _, starting with a letter"
 CLAIM = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,29}")
@@ -57,6 +57,13 @@ class Simulation(Component):
     step: float = value(0.01, "s", "step of the classical Runge-Kutta method", gt=0)
     duration: float = value(310.0, "s", "simulated time, a whole number of steps", gt=0)
     compiled: bool = value(True, "", "machine code, or (slowly, same result) plain Python")
+
+    @property
+    def outlier(self) -> str:
+        """The key, of step and duration, that is further from the usual."""
+        usual = Simulation()
+        longer, finer = self.duration / usual.duration, usual.step / self.step
+        return "simulation.duration" if longer > finer else "simulation.step"
 
 
 class Control(Component):
@@ -161,7 +168,9 @@ class Scenario(Component):
         """The instants of the run; call `misfits` first."""
         step = self.simulation.step
         steps = whole_steps(self.simulation.duration, step) or 0
-        return TimeGrid(step, steps, self.log.every, whole_steps(self.control.period, step) or 0)
+        # Beyond the last step only the first is logged; machine code knows no larger numbers.
+        every = min(self.log.every, steps + 1)
+        return TimeGrid(step, steps, every, whole_steps(self.control.period, step) or 0)
 
     def steady_from(self) -> float:
         """When the part of the run begins that counts as settled [s]."""
@@ -169,7 +178,7 @@ class Scenario(Component):
 
     def misfits(self) -> list[tuple[str, str]]:
         """Key and sentence for every pair of values that cannot go together."""
-        return [*self._times(), *self._samples(), *self._names(), *self._size()]
+        return [*self._times(), *self._samples(), *self._names()]
 
     def _laws(self) -> dict[str, Controller]:
         several = {f"controllers.{label}": law for label, law in self.controllers.items()}
@@ -182,6 +191,12 @@ class Scenario(Component):
             "control.period": self.control.period,
             **{f"{key}.difference_step": law.sample_period() for key, law in self._laws().items()},
         }
+        if max(times.values()) / step > MOST_INSTANTS:
+            key, time = max(times.items(), key=lambda item: item[1])
+            key = self.simulation.outlier if key == "simulation.duration" else key
+            count = f"{time:g} s in steps of {step:g} s are {time / step:.3g} steps"
+            yield key, f"{count}; no more than {MOST_INSTANTS:.2g} have times of their own"
+            return
         for key, time in times.items():
             if time and not whole_steps(time, step):
                 yield (
@@ -209,15 +224,6 @@ class Scenario(Component):
         for name in self.claims:
             if not CLAIM.fullmatch(name):
                 yield f"claims.{name}", CLAIM_IN_WORDS
-
-    def _size(self) -> Misfits:
-        columns = 40 + max(sum(n for _, n in law.slots()) for law in self._laws().values())
-        gigabytes = (
-            self.simulation.duration / self.simulation.step / self.log.every * columns * 8e-9
-        )
-        if gigabytes > MOST_GIGABYTES:
-            text = f"the log would take about {gigabytes:.3g} GB, at most {MOST_GIGABYTES:g} fit"
-            yield "log.every", f"{text}; log less often, or simulate less"
 
 
 def _near(time: float, step: float) -> str:

@@ -75,7 +75,7 @@ def simulate_many(
 
     def run(i: int) -> None:
         go_on(0.0)
-        wires = _apart(wire(loops[i], grid, plan, observer))
+        wires = _apart(wire(loops[i], plan, observer))
         batch.reached[i], batch.status[i], _ = in_blocks(
             lambda a, b: march(a, b, grid.step, wires, plan), plan, wires.under_way, go_on
         )

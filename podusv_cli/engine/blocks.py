@@ -17,7 +17,8 @@ from threading import Thread
 from typing import NamedTuple
 
 from podusv_cli.engine.closed_loop import Plan
-from podusv_cli.interrupts import interrupts_heard
+from podusv_cli.engine.pieces import Pieces
+from podusv_cli.interrupts import interrupts_heard, interrupts_held
 from podusv_cli.kernels import Vector
 from podusv_cli.recording import Status
 
@@ -38,22 +39,27 @@ class Ending(NamedTuple):
 
 def in_blocks(
     march: Callable[[int, int], int], plan: Plan, under_way: Vector,
-    progress: Callable[[float], None] | None,
+    progress: Callable[[float], None] | None, pieces: Pieces | None = None,
 ) -> Ending:  # fmt: skip
     """March until the end or trouble; `under_way` is where the march notes its instant.
 
     A block that never ends is left behind with its thread; what is before that instant is good.
+    A block ends where the table of `pieces` is full, and the next begins when it is handed on.
     """
     end, size, done = plan.steps + 1, FIRST_BLOCK, 0
     with Aside() as aside:
         try:
             with interrupts_heard():
                 while done < end:
-                    began, goal = time.perf_counter(), min(done + size, end)
+                    if pieces and done == pieces.border:
+                        with interrupts_held():
+                            pieces.hand_on(done)
+                    goal = min(done + size, end, pieces.border if pieces else end)
+                    began = time.perf_counter()
                     reached = aside.finish(lambda a=done, b=goal: march(a, b))  # type: ignore[misc]
                     if reached < goal:
                         return Ending(reached, "diverged")
-                    done, took = goal, time.perf_counter() - began
+                    size, done, took = goal - done, goal, time.perf_counter() - began
                     if progress:
                         progress(done / end)
                     size = max(1, int(size * min(100.0, 0.7 * LONGEST_BLOCK / max(took, 1e-9))))

@@ -23,7 +23,7 @@ def continuous(loop: ClosedLoop, *, compiled: bool = True) -> tuple[Slope, Vecto
         raise ValueError("a law that takes samples has no continuous right-hand side")
     grid = TimeGrid(1.0, 1, log_every=2)
     plan = loop.layout(grid)
-    wires = wire(loop, grid, plan, Observer())
+    wires = wire(loop, plan, Observer())
     march = marcher(loop, Observer(), compiled)
 
     def slope(t: float, s: Vector) -> Vector:

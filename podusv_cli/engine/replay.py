@@ -79,7 +79,7 @@ def rates_replay(
     plan = loop.layout(grid)._replace(hold_every=0)
     labels, split = names(loop), 1 + plan.states
     state = list(dict.fromkeys(labels[:split]))
-    wires = wire(loop, TimeGrid(grid.step, 0), plan, Observer())
+    wires = wire(loop, plan, Observer())
     run = _rates_runner(loop, compiled)
 
     def replayed(recording: Recording) -> Replayed:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,10 +15,11 @@ from podusv_cli.engine import closed_loop, signatures
 from podusv_cli.engine.blocks import Ending, in_blocks
 from podusv_cli.engine.closed_loop import Plan, Wires
 from podusv_cli.engine.grid import TimeGrid, whole_steps
+from podusv_cli.engine.pieces import PIECE, Pieces, rows_held
 from podusv_cli.interrupts import interrupts_held
 from podusv_cli.kernels import Vector, bundle, kernel
 from podusv_cli.paths.base import TARGET, Path
-from podusv_cli.recording import Recording
+from podusv_cli.recording import Columns, Recording
 from podusv_cli.signals import SIGNALS
 from podusv_cli.vessels.vessel import Vessel
 
@@ -112,21 +113,28 @@ def simulate(
     observer: Observer | None = None,
     compiled: bool = True,
     progress: Callable[[float], None] | None = None,
+    columns: Columns | None = None,
+    piece: int = PIECE,
 ) -> Recording:
     """Integrate the closed loop over the grid.
 
     `progress` is called between blocks with the fraction done. An interrupt ends the march and
-    keeps what was logged; `compiled=False` runs the same kernels as plain Python.
+    keeps what was logged; `compiled=False` runs the same kernels as plain Python. The log is held
+    in memory, or with `columns` goes there in pieces of about `piece` bytes, and the recording's
+    signals are what the columns give. What they raise ends the march.
     """
     observer = observer or Observer()
     plan = loop.layout(grid)
-    wires = wire(loop, grid, plan, observer)
+    rows = grid.rows if columns is None else rows_held(plan, grid, piece)
+    wires = wire(loop, plan, observer, rows)
+    pieces = Pieces(plan, wires.log, columns, lambda table: _logged(loop, grid, table))
     march = marcher(loop, observer, compiled)
     with np.errstate(all="ignore"), interrupts_held():
         ending = in_blocks(
-            lambda a, b: march(a, b, grid.step, wires, plan), plan, wires.under_way, progress
-        )
-        return _record(loop, grid, wires, ending)
+            lambda a, b: march(a, b, grid.step, wires, pieces.plan), plan, wires.under_way,
+            progress, pieces,
+        )  # fmt: skip
+        return _record(loop, grid, wires, pieces, ending)
 
 
 def entries(loop: ClosedLoop, observer: Observer) -> Iterator[tuple[Any, Any, tuple[str, ...]]]:
@@ -161,14 +169,13 @@ def marcher(loop: ClosedLoop, observer: Observer, compiled: bool) -> Callable[..
     return compiled_march
 
 
-def wire(loop: ClosedLoop, grid: TimeGrid, plan: Plan, observer: Observer) -> Wires:
-    """The loop's vectors, ready for the march to begin."""
+def wire(loop: ClosedLoop, plan: Plan, observer: Observer, rows: int = 1) -> Wires:
+    """The loop's vectors, ready for the march to begin, with room for this many logged rows."""
 
     def numbers(constants: dict[str, float]) -> Vector:
         return np.array(list(constants.values()) or [0.0])
 
     law, path, disturbance, actuator = loop.controller, loop.path, loop.disturbance, loop.actuator
-    width = 1 + plan.states + plan.columns
     return Wires(
         path=numbers(path.constants()), path_table=path.table(),
         disturbance=numbers(disturbance.constants()), disturbance_table=disturbance.table(),
@@ -179,7 +186,7 @@ def wire(loop: ClosedLoop, grid: TimeGrid, plan: Plan, observer: Observer) -> Wi
         row=np.zeros(plan.columns), stages=np.zeros(5 * plan.states),
         held=np.zeros(closed_loop.HELD_SIGNALS + len(law.signals)),
         work=np.zeros(law.workspace()), seen=np.zeros(observer.size), under_way=np.zeros(1),
-        log=np.empty(grid.rows * width),
+        log=np.empty(rows * plan.width),
     )  # fmt: skip
 
 
@@ -202,21 +209,25 @@ def by_name(labels: list[str], table: Vector) -> dict[str, Vector]:
     }
 
 
-def _record(loop: ClosedLoop, grid: TimeGrid, wires: Wires, ending: Ending) -> Recording:
-    reached, status, cause = ending
-    rows = (reached + grid.log_every - 1) // grid.log_every
-    table = wires.log.reshape(grid.rows, -1)[:rows]
-    labels = names(loop)
-    named = by_name(labels, table)
+def _logged(loop: ClosedLoop, grid: TimeGrid, table: Vector) -> dict[str, Vector]:
+    """The signals of a recording in some logged rows."""
+    named = by_name(names(loop), table)
     signals = {name: column for name, column in named.items() if name not in TARGET[2:]}
     if grid.hold_every and "z_e" in signals:  # the law's own goes back to its last sample
         x_e, y_e = (signals[f"{axis}_d"] - signals[axis] for axis in "xy")
         signals["z_e"] = np.sqrt(x_e * x_e + y_e * y_e)
-    message = ""
+    return signals
+
+
+def _record(
+    loop: ClosedLoop, grid: TimeGrid, wires: Wires, pieces: Pieces, ending: Ending
+) -> Recording:
+    reached, status, cause = ending
+    signals, message = pieces.signals(reached), ""
     if status == "interrupted":
         message = f"interrupted after t = {max(reached - 1, 0) * grid.step:.6g} s"
     if status == "diverged":
-        cause = cause or _culprit(wires, labels, reached * grid.step)
+        cause = cause or _culprit(wires, names(loop), reached * grid.step)
         message = f"diverged at t = {reached * grid.step:.6g} s: {cause}; {_last_words(signals)}"
     fixed = loop.controller.fixed_signals()
     return Recording(status, loop.controller.label, signals, fixed, wires.seen, message)
@@ -229,7 +240,7 @@ def _culprit(wires: Wires, labels: list[str], at: float) -> str:
     return f"{bad} is not finite"
 
 
-def _last_words(signals: dict[str, Vector]) -> str:
+def _last_words(signals: Mapping[str, Vector]) -> str:
     last = ", ".join(
         f"{name} {signals[name][-1]:.4g}"
         for name in ("time", *STATE, *DEMAND)

@@ -12,6 +12,7 @@ from matplotlib.lines import Line2D
 
 from podusv_cli.figures.style import Shown
 from podusv_cli.kernels import Vector
+from podusv_cli.recording import largest
 
 THIN: dict[str, Any] = {"linewidth": 0.5, "alpha": 0.6}
 TALL = 20.0  # a peak this many times the usual values gets a logarithmic axis
@@ -87,6 +88,8 @@ def compress(axes: Axes, runs: Sequence[Shown], name: str) -> None:
 
 def _usual(run: Shown, name: str) -> float:
     """The largest settled value; of a run that did not get there, the median."""
-    sizes = np.abs(run.signal(name))
-    settled = sizes[run.recording["time"] >= run.steady_from]
-    return float(settled.max() if run.whole and len(settled) else np.median(sizes))
+    values = run.signal(name)
+    settled = values[np.searchsorted(run.recording["time"], run.steady_from) :]
+    if run.whole and len(settled):
+        return largest(len(settled), lambda rows: settled[rows])
+    return float(np.median(np.abs(values)))

@@ -97,7 +97,8 @@ class Shown:
     def during(self, name: str, span: tuple[float, float] | None) -> tuple[Vector, Vector]:
         """Time and a signal, all of it or that of a part [s]."""
         t, y = self.recording["time"], self.signal(name)
-        inside = (t >= span[0]) & (t <= span[1]) if span else slice(None)
+        first, last = span or (t[0], t[-1])
+        inside = slice(np.searchsorted(t, first), np.searchsorted(t, last, side="right"))
         return t[inside], y[inside]
 
     def row(self, t: float) -> int:

@@ -78,7 +78,8 @@ def bounds(runs: Sequence[Shown]) -> tuple[Span, Span]:
     pairs = [(log["y_d"], log["x_d"]) for log in logs]
     pairs += [(run.recording["y"], run.recording["x"]) for run in runs if run.whole]
     pairs += [(run.recording["y"][:1], run.recording["x"][:1]) for run in runs]
-    east, north = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
+    corners = ([(part.min(), part.max()) for part in parts] for parts in zip(*pairs, strict=True))
+    east, north = (np.ravel(extremes) for extremes in corners)
     margin = 0.06 * max(float(np.ptp(east)), float(np.ptp(north)), 1.0)
     return (
         (float(east.min()) - margin, float(east.max()) + margin),

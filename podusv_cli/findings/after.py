@@ -12,7 +12,8 @@ from podusv_cli.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.controllers.tracking import TrackingController
 from podusv_cli.findings.finding import Finding, found
 from podusv_cli.findings.law import FAR, nearest
-from podusv_cli.recording import Recording
+from podusv_cli.kernels import Vector
+from podusv_cli.recording import Recording, blocks
 
 NEAR = 0.05  # hull lengths
 CROSSWISE = 0.05  # |cos psi_e|; the virtual surge velocity is magnified twentyfold
@@ -30,7 +31,7 @@ def near_target(scenario: Scenario, log: Recording) -> Iterator[Finding]:
     if not isinstance(law, TrackingController):
         return
     near = NEAR * scenario.vessel.length
-    close = log["z_e"] < near
+    close = _where(log, lambda part: part["z_e"] < near)
     if close.any() and law.hold_below < near:
         at = int(log["z_e"].argmin())
         kept = f"the standoff of {law.standoff:g} m did not keep it away; take hold_below"
@@ -47,7 +48,7 @@ def crosswise(scenario: Scenario, log: Recording) -> Iterator[Finding]:
     """cos psi_e comes near 0, by which (21) divides."""
     law = scenario.controller
     if isinstance(law, TrackingController):
-        across = np.abs(np.cos(log["psi_e"])) < CROSSWISE
+        across = _where(log, lambda part: np.abs(np.cos(part["psi_e"])) < CROSSWISE)
         if across.any():
             yield found(
                 "crosswise",
@@ -58,9 +59,8 @@ def crosswise(scenario: Scenario, log: Recording) -> Iterator[Finding]:
 
 def off_network(scenario: Scenario, log: Recording) -> Iterator[Finding]:
     """No node of the network within two widths of (u, v, r)."""
-    if isinstance(scenario.controller, PolarBackstepping):
-        nu = np.column_stack([log["u"], log["v"], log["r"]])
-        off = nearest(scenario.controller.network, nu) > FAR
+    if isinstance(law := scenario.controller, PolarBackstepping):
+        off = _where(log, lambda part: nearest(law.network, _velocities(part)) > FAR)
         if off.any():
             yield found(
                 "off-network",
@@ -75,12 +75,13 @@ def bound_growing(scenario: Scenario, log: Recording) -> Iterator[Finding]:
         if name not in log or log.status != "finished" or len(log["time"]) < 2:
             continue
         time, bound = log["time"], log[name]
-        before = bound[time <= time[-1] - LAST * (time[-1] - time[0])].max()
+        since = time[-1] - LAST * (time[-1] - time[0])
+        before = bound[: np.searchsorted(time, since, side="right")].max()
         if bound[-1] > (1.0 + GROWN) * before and bound[-1] == bound.max():
             yield found(
                 "bound-growing",
                 f"{name} still grows at the end: {bound[-1]:.3g} against at most {before:.3g} "
-                f"until {time[-1] - LAST * (time[-1] - time[0]):.6g} s; the run is not settled, "
+                f"until {since:.6g} s; the run is not settled, "
                 "or the leakage is too small",
             )
 
@@ -89,7 +90,7 @@ def saturated(scenario: Scenario, log: Recording) -> Iterator[Finding]:
     """The actuator limits the law for long."""
     if "saturated" not in log:
         return
-    limited = log["saturated"] > 0.5
+    limited = _where(log, lambda part: part["saturated"] > 0.5)
     part = float(limited.mean())
     if part > LONG:
         learnt = (
@@ -123,10 +124,19 @@ def aftermath(scenario: Scenario, log: Recording) -> list[Finding]:
         return [finding for look in LOOKS.values() for finding in look(scenario, log)]
 
 
+def _where(log: Recording, test: Callable[[Recording], Mask]) -> Mask:
+    """In which rows a test comes true, asked of some of them at a time."""
+    return np.concatenate([test(log.part(rows)) for rows in blocks(len(log["time"]))])
+
+
+def _velocities(log: Recording) -> Vector:
+    return np.column_stack([log["u"], log["v"], log["r"]])
+
+
 def _when(log: Recording, mask: Mask) -> str:
     """`at 3.1 s`, `from 3.1 s to 4 s`, `3 times between 3.1 s and 80 s`."""
-    edges = np.diff(np.concatenate([[0], mask.astype(int), [0]]))
-    begins, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
+    changes = np.flatnonzero(np.diff(mask, prepend=False, append=False))
+    begins, ends = changes[::2], changes[1::2] - 1
     first, last = log["time"][begins[0]], log["time"][ends[-1]]
     if first == last:
         return f"at {first:.6g} s"

@@ -12,6 +12,7 @@ from pathlib import Path
 from podusv_cli.errors import StorageError
 from podusv_cli.parts import forget_files, part_name
 
+CREATE = os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
 CAUSES = {
     errno.ENOSPC: "the disk is full",
     errno.EDQUOT: "the disk quota is used up",
@@ -125,12 +126,17 @@ def sync_folder(folder: Path) -> None:
         _sync_folder(folder)
 
 
+def write_out(descriptor: int, content: bytes | memoryview) -> None:
+    """Write all of the content to an open file. Raises OSError."""
+    rest = memoryview(content)
+    while rest:
+        rest = rest[os.write(descriptor, rest) :]
+
+
 def _create(path: Path, content: bytes) -> None:
-    descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)
+    descriptor = os.open(path, CREATE | os.O_WRONLY, 0o666)
     try:
-        rest = memoryview(content)
-        while rest:
-            rest = rest[os.write(descriptor, rest) :]
+        write_out(descriptor, content)
         os.fsync(descriptor)
     finally:
         os.close(descriptor)

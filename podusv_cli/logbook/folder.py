@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import os
+import shutil
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import cached_property
@@ -18,8 +19,10 @@ from podusv_cli.errors import StorageError
 from podusv_cli.logbook import atomic, jsonfile, manifest, reading
 from podusv_cli.logbook.regular import read_text
 from podusv_cli.logbook.staging import Staging, Taken, sweep
+from podusv_cli.logbook.stream import Stream, growing
 from podusv_cli.recording import Recording, Status
 
+GB = 1e9  # bytes
 LOG, THEORY = "log.h5", "theory.json"
 NEEDED = (LOG, "metrics.json", "provenance.json", "resolved.yaml")
 
@@ -53,24 +56,39 @@ class RunWriter:
     where somebody asked for just this name (`named`), and as good otherwise.
     """
 
-    def __init__(self, final: Path, *, force: bool = False, named: bool = True) -> None:
-        """Check that `final` can be made, and make the hidden folder beside it."""
+    def __init__(
+        self, final: Path, *, force: bool = False, named: bool = True, needed: float = 0.0
+    ) -> None:
+        """Check that `final` can be made and `needed` bytes are free; make the hidden folder."""
         self.final, self._force, self._named = final, force and named, named
         sweep(final.parent)  # may put back a run folder that a killed run was replacing
         _refuse(final, force)
         self._staging = Staging(final)
+        try:
+            _require(final, needed)
+        except StorageError:
+            self._staging.discard()
+            raise
 
     @property
     def folder(self) -> Path:
         """Where the files are until `finish`; a RunWriter for a folder in here nests a run."""
         return self._staging.folder
 
+    @property
+    def scratch(self) -> Path:
+        """Where a folder can be made for what is needed until this is over, and not kept."""
+        return self._staging.scratch
+
     def add(self, name: str, content: bytes) -> None:
         """Write a new file; `name` is relative, with `/` for a file in a folder inside."""
-        path = manifest.place(self.folder, name)
-        with atomic.explained(f"cannot make {path.parent}"):
-            path.parent.mkdir(parents=True, exist_ok=True)
-        atomic.create(path, content)
+        atomic.create(self._place(name), content)
+
+    @contextmanager
+    def growing(self, name: str) -> Iterator[Stream]:
+        """A new file to be written to in the block."""
+        with growing(self._place(name)) as stream:
+            yield stream
 
     def add_json(self, name: str, content: Mapping[str, Any]) -> None:
         """Write a new JSON file, null for numbers that are not finite."""
@@ -105,6 +123,11 @@ class RunWriter:
                 return path
         raise AssertionError("there is always another number")
 
+    def _place(self, name: str) -> Path:
+        path = manifest.place(self.folder, name)
+        atomic.make_folder(path.parent)
+        return path
+
     def __enter__(self) -> Self:
         """The writer itself."""
         return self
@@ -136,6 +159,17 @@ def _refuse(final: Path, force: bool) -> None:
         raise Taken(f"{final} exists and is not a finished run folder") from error
     if not force:
         raise Taken(f"{final} exists already; --force replaces it")
+
+
+def _require(final: Path, needed: float) -> None:
+    """StorageError where so many bytes are not free on the disk of `final`."""
+    with atomic.explained(f"cannot make {final}"):
+        free = shutil.disk_usage(final.parent).free
+    if needed > free:
+        raise StorageError(
+            f"cannot make {final}: it takes {needed / GB:.3g} GB of disk or more, and "
+            f"{free / GB:.3g} GB are free; log less often (log.every), or elsewhere (--out)"
+        )
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,8 @@
-"""Writing log.h5, built in memory: HDF5 on a full disk ends the process instead of raising."""
+"""Writing log.h5, chunk by chunk, so that of the file nothing is in memory."""
 
 from __future__ import annotations
 
 import hashlib
-import io
 from collections.abc import Mapping
 
 import h5py
@@ -12,6 +11,7 @@ import numpy as np
 from podusv_cli.kernels import Vector
 from podusv_cli.logbook import layout
 from podusv_cli.logbook.packing import LEVEL, packed
+from podusv_cli.logbook.stream import Stream
 from podusv_cli.recording import Recording
 from podusv_cli.signals import SIGNALS
 
@@ -24,14 +24,15 @@ _FILTERS = {"compression": "gzip", "compression_opts": LEVEL, "shuffle": True, "
 Scales = Mapping[str, h5py.Dataset]
 
 
-def encode(
-    recording: Recording, *, resolved_yaml: str, title: str, source: str, version: str
-) -> bytes:
-    """The log file of a recording; the same arguments give the same bytes.
+def write(
+    stream: Stream, recording: Recording,
+    *, resolved_yaml: str, title: str, source: str, version: str,
+) -> None:  # fmt: skip
+    """Write the log file of a recording; the same arguments give the same bytes.
 
     `resolved_yaml` is the scenario with every value explicit, `source` where the vessel's data come
     from, `version` podusv's. KeyError for a signal that is not in SIGNALS, ValueError for one whose
-    shape does not fit its axes.
+    shape does not fit its axes, OSError for what the stream ran into.
     """
     facts = {
         "Conventions": layout.CONVENTIONS,
@@ -43,16 +44,12 @@ def encode(
     }
     if recording.message:
         facts["message"] = recording.message
-    # Nothing but the growing file itself is kept in memory beside the recording.
-    content = io.BytesIO()
-    with h5py.File(
-        content, "w", libver=_FORMAT, track_order=True, track_times=False
-    ) as file:  # fmt: skip
+    with h5py.File(stream, "w", libver=_FORMAT, track_order=True, track_times=False) as file:
         file.attrs.create("podusv_format", np.int32(layout.FORMAT))
         _describe(file, facts)
-        _write_signals(file, recording)
+        _write_signals(file, recording, stream)
         _write_provenance(file, resolved_yaml)
-    return content.getvalue()
+    stream.check()
 
 
 def _text(words: str) -> np.ndarray[tuple[()], np.dtype[np.bytes_]]:
@@ -66,14 +63,14 @@ def _describe(thing: h5py.HLObject, facts: Mapping[str, str]) -> None:
         thing.attrs.create(name, _text(words))
 
 
-def _write_signals(file: h5py.File, recording: Recording) -> None:
+def _write_signals(file: h5py.File, recording: Recording, stream: Stream) -> None:
     arrays = {**recording.signals, **recording.fixed}
     lengths = _lengths(arrays)
     scales = {axis: _scale(file, axis, size) for axis, size in lengths.items() if axis != "time"}
-    scales["time"] = _write(file, "time", arrays.pop("time"))
+    scales["time"] = _write(file, "time", arrays.pop("time"), stream)
     scales["time"].make_scale("time")
     for name, array in arrays.items():
-        dataset = _write(file, name, array)
+        dataset = _write(file, name, array, stream)
         for position, axis in enumerate(layout.axes(name)):
             dataset.dims[position].attach_scale(scales[axis])
 
@@ -95,12 +92,13 @@ def _scale(file: h5py.File, axis: str, size: int) -> h5py.Dataset:
     return scale
 
 
-def _write(file: h5py.File, name: str, array: Vector) -> h5py.Dataset:
+def _write(file: h5py.File, name: str, array: Vector, stream: Stream) -> h5py.Dataset:
     # HDF5 has no chunks, hence no filters, for an array without any value.
     packing = {"chunks": layout.chunk(array.shape), **_FILTERS} if array.size else {}
     dataset = file.create_dataset(name, array.shape, dtype="<f8", **packing)
     for first in range(0, len(array), dataset.chunks[0]) if array.size else ():
         _write_chunk(dataset, array, first)
+        stream.check()
     signal = SIGNALS[name]
     _describe(dataset, {"units": signal.unit, "long_name": signal.meaning, "symbol": signal.symbol})
     return dataset

@@ -47,6 +47,11 @@ class Staging:
         """The folder in the making."""
         return self._box / "new"
 
+    @property
+    def scratch(self) -> Path:
+        """Where a folder can be made that is gone when the staging is over."""
+        return self._box / "scratch"
+
     def publish(self, *, replace: bool) -> None:
         """Rename the folder to its final name, with `replace` in place of what is there.
 

@@ -11,8 +11,8 @@ from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.replay import Replayed, rates_replay
 from podusv_cli.engine.simulate import ClosedLoop
 from podusv_cli.kernels import Vector
-from podusv_cli.recording import Recording
-from podusv_cli.theory.bounds import Observed, Pair, UltimateBound, ultimate_bound
+from podusv_cli.recording import Columns, InMemory, Recording, blocks, largest
+from podusv_cli.theory.bounds import Bound, Observed, Pair, UltimateBound, ultimate_bound
 from podusv_cli.theory.ideal import (
     Ideal,
     exponents,
@@ -29,6 +29,7 @@ from podusv_cli.theory.sway import SwayBound, sway_bound, sway_push
 
 WINDOWS = ("whole", "settled")
 BLOCK = 4096  # rows that are worked on together, so that they stay in the cache
+MOST_NUMBERS = 2**22  # in a block, with a number for every node in every row
 TERMS = (
     "V_z_e", "V_psi_e", "V_u_e", "V_r_e", "V_y_u", "V_y_r", "V_W_u", "V_W_r", "V_b_u", "V_b_r",
 )  # fmt: skip
@@ -81,35 +82,30 @@ def prepare(loop: ClosedLoop, grid: TimeGrid, compiled: bool) -> None:
 
 def monitored(
     loop: ClosedLoop, grid: TimeGrid, recording: Recording,
-    *, steady_fraction: float = 0.2, compiled: bool = True,
+    *, steady_fraction: float = 0.2, compiled: bool = True, columns: Columns | None = None,
 ) -> Monitored | None:  # fmt: skip
     """Add V, its terms, V' and its bounds to a fresh recording; None for a law without V.
 
     V takes the true bound of the disturbance, and weights fitted to this run (`theory.ideal`).
-    With sampled control V' and the bound of V are left out: the law acts on old measurements.
+    With sampled control V' and the bound of V are left out: the law acts on old measurements. What
+    is added is held in memory, or goes to `columns`.
     """
-    law, count = loop.controller, len(recording["time"])
+    law, count, columns = loop.controller, len(recording["time"]), columns or InMemory()
     if not isinstance(law, PolarBackstepping) or not count:
         return None
     with np.errstate(all="ignore"):  # a run that diverges leaves all numbers
         replayed = rates_replay(loop, grid, compiled=compiled)
-        chosen = part_of(recording, rows_to_fit(count, law.network.count))
+        chosen = recording.part(rows_to_fit(count, law.network.count))
         ideal = ideal_weights(loop, law, chosen, replayed(chosen))
         b = _disturbance_bound(loop, recording)
-        blocks = []
-        for first in range(0, count, BLOCK):
-            log = part_of(recording, slice(first, first + BLOCK))
-            blocks.append(_traces(loop, law, log, replayed(log), (ideal, b)))
-        traces = {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
+        for rows in blocks(count, min(BLOCK, max(1, MOST_NUMBERS // law.network.count))):
+            log = recording.part(rows)
+            columns.append(_traces(loop, law, log, replayed(log), (ideal, b)))
+        traces = columns.whole()
         observed = _Observer(loop, law, recording, traces, ideal, b, grid.hold_every == 0)
         starts = (0.0, (1.0 - steady_fraction) * grid.steps * grid.step)
         windows = dict(zip(WINDOWS, map(observed.window, starts), strict=True))
     return Monitored(_extended(recording, traces, windows, ideal, grid), windows, traces)
-
-
-def part_of(recording: Recording, rows: slice | Vector) -> Recording:
-    """Some rows of a recording."""
-    return replace(recording, signals={n: a[rows] for n, a in recording.signals.items()})
 
 
 def _disturbance_bound(loop: ClosedLoop, log: Recording) -> Pair:
@@ -121,7 +117,7 @@ def _disturbance_bound(loop: ClosedLoop, log: Recording) -> Pair:
 
 
 def _largest(values: Vector) -> float:
-    return float(np.max(np.abs(values))) if len(values) else np.nan
+    return largest(len(values), lambda rows: values[rows])
 
 
 def _traces(
@@ -176,8 +172,7 @@ class _Observer:
         V, rate = self.traces["V"][rows], self.traces["V_dot"][rows]
         observed = self._observed(rows) if self.continuous and len(V) else None
         bound = ultimate_bound(self.law, self.loop.vessel, observed)
-        limit = -2.0 * bound.corrected.lambda_ * V + bound.corrected.Delta
-        kept = float(np.mean(rate <= limit)) if np.isfinite(bound.corrected.Delta) else np.nan
+        kept = _kept(bound.corrected, V, rate)
         pushes = [_largest(self.traces[name][rows]) for name in ("push", "printed_push")]
         sway = sway_bound(self.loop.vessel, *pushes)
         largest_v = _largest(self.log["v"][rows])
@@ -197,6 +192,14 @@ class _Observer:
 
     def _both(self, rows: slice, u: str, r: str) -> Pair:
         return Pair(_largest(self.traces[u][rows]), _largest(self.traces[r][rows]))
+
+
+def _kept(bound: Bound, V: Vector, rate: Vector) -> float:
+    """In what part of the rows V' <= -2 lambda V + Delta; NaN without a bound or rows."""
+    if not (np.isfinite(bound.Delta) and len(V)):
+        return np.nan
+    keeps = (rate[rows] <= -2.0 * bound.lambda_ * V[rows] + bound.Delta for rows in blocks(len(V)))
+    return sum(int(np.count_nonzero(part)) for part in keeps) / len(V)
 
 
 def _extended(

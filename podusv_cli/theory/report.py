@@ -11,6 +11,7 @@ import numpy as np
 from podusv_cli.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import ClosedLoop
+from podusv_cli.recording import largest
 from podusv_cli.theory.bounds import Bound, Condition
 from podusv_cli.theory.monitor import Monitored, Window
 
@@ -37,7 +38,7 @@ def _assumptions(loop: ClosedLoop, grid: TimeGrid, found: Monitored) -> Iterator
     law, log, turn = loop.controller, found.recording, found.traces["turn"]
     assert isinstance(law, PolarBackstepping)
     asked = max(_gap(found, "u"), _gap(found, "r"))
-    turned = int(np.count_nonzero(np.diff(turn)))
+    turned = int(np.count_nonzero(turn[1:] != turn[:-1]))
     alone = law.fold == "printed" and bool(np.any(turn < 0.0))
     distance = float(np.min(log["z_e"]))
     yield _says("coupling has the sign that cancels the cross terms", law.coupling == "corrected")
@@ -52,7 +53,8 @@ def _assumptions(loop: ClosedLoop, grid: TimeGrid, found: Monitored) -> Iterator
 
 def _gap(found: Monitored, axis: str) -> float:
     log = found.recording
-    return float(np.max(np.abs(log[f"tau_{axis}"] - log[f"tau_{axis}_cmd"])))
+    acting, asked = log[f"tau_{axis}"], log[f"tau_{axis}_cmd"]
+    return largest(len(acting), lambda rows: acting[rows] - asked[rows])
 
 
 def _says(assumption: str, holds: bool, found: float | None = None) -> dict[str, Any]:

@@ -64,7 +64,8 @@ def test_past_the_file_size_limit(
 
     said = in_a_child(limited)
     assert said.code == 5
-    place = r"cannot write \S*{}\S* \(\d+ bytes\): larger than the file size limit of this session"
+    place = r"cannot write \S*{}\S* \((more than )?\d+ bytes\): "
+    place += "larger than the file size limit of this session"
     assert re.fullmatch(place.format(made), one_line(said.err))
     assert files(Path()) == old
     assert not left_over()

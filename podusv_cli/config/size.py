@@ -1,0 +1,146 @@
+"""How large a run will be, and what cannot be meant."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from podusv_cli.config.checking import Check
+from podusv_cli.config.scenario import Scenario, Simulation
+from podusv_cli.controllers.polar_backstepping import PolarBackstepping
+from podusv_cli.engine.pieces import NUMBER, PIECE
+from podusv_cli.engine.simulate import names
+from podusv_cli.paths.base import TARGET
+
+MOST_STEPS = 10**8
+MOST_CONTENT = 4 * 10**9  # bytes; what podusv reads back
+HELD = 256 * 2**20  # bytes of a log that is held in memory; a larger one goes to the disk in pieces
+BYTES = {"bytes": 1.0, "kB": 1e3, "MB": 1e6, "GB": 1e9, "TB": 1e12, "PB": 1e15}
+TIMES = {"s": 1.0, "min": 60.0, "h": 3600.0, "days": 86400.0, "years": 31557600.0}
+MONITORED = 15  # numbers that the stability monitor adds to a row, whatever the law
+# Rough costs on one core, see benchmarks/results.md: a step, a step's part for each number of the
+# law's memory, both with machine code and in plain Python; and what a byte of log takes to be
+# watched, packed and written.
+STEP, MEMORY, PLAIN, BYTE = 1e-6, 6e-9, 5.0e2, 13e-9  # s, s, times, s
+START = 0.5  # s, of a run of no steps
+PROCESS = 150 * 10**6  # bytes of memory without any log
+PACKED = 0.8  # of its content is what a log takes on the disk
+LEAST_PACKED = 0.2  # what even a dull one takes
+
+
+@dataclass(frozen=True)
+class Size:
+    """What a run of a scenario amounts to; but for `steps`, `rows` and `content` rough guesses.
+
+    `content` is what the log's numbers take, `disk` its file [bytes]; `needed` is what has to be
+    free on the disk at the very least while the run is made.
+    """
+
+    steps: int
+    rows: int
+    content: int
+    seconds: float
+
+    @property
+    def disk(self) -> float:
+        """Of the finished log."""
+        return PACKED * self.content
+
+    @property
+    def memory(self) -> float:
+        """Of the process at its peak."""
+        return PROCESS + (self.content if self.content <= HELD else 2 * PIECE)
+
+    @property
+    def needed(self) -> float:
+        """A log that is not held in memory lies on the disk as it is and packed."""
+        return LEAST_PACKED * self.content + (self.content if self.content > HELD else 0)
+
+    def __str__(self) -> str:
+        """Time, memory and disk in words."""
+        memory, disk = bytes_in_words(self.memory), bytes_in_words(self.disk)
+        return f"about {_time(self.seconds)}, {memory} of memory and {disk} of disk"
+
+
+def estimate(scenario: Scenario) -> Size:
+    """The size of one run, with `controller`; nothing is allocated that grows with it."""
+    grid, law = scenario.time_grid(), scenario.controller
+    columns = len(names(scenario.closed_loop())) - len(TARGET[2:]) + _monitored(scenario)
+    content = grid.rows * columns * NUMBER
+    step = STEP + MEMORY * sum(size for _, size in law.slots())
+    pace = 1.0 if scenario.simulation.compiled else PLAIN
+    seconds = START + grid.steps * step * pace + content * BYTE
+    return Size(grid.steps, grid.rows, content, seconds)
+
+
+def largest(scenario: Scenario) -> Size:
+    """Of the runs of a comparison the one with the largest log."""
+    return max(map(estimate, scenario.singles().values()), key=lambda size: size.content)
+
+
+def _monitored(scenario: Scenario) -> int:
+    if not (scenario.log.monitor and isinstance(scenario.controller, PolarBackstepping)):
+        return 0
+    filtered = 2 * ("beta_u" in names(scenario.closed_loop()))
+    return MONITORED + filtered + (scenario.control.period == 0.0)
+
+
+def limits(
+    allow_large: bool = False, *, read_back: bool = False, insist: str = "--allow-large"
+) -> Check:
+    """A check, for `load`, that a scenario is not too large; `insist` is how to run it even so.
+
+    A log that is to be read back must not be larger than that allows, whatever is allowed, nor
+    may one hold no more than the first instant.
+    """
+
+    def look(scenario: Scenario) -> list[tuple[str, str]]:
+        if scenario.misfits():
+            return []
+        size = largest(scenario)
+        if scenario.log.every > size.steps:
+            return [("log.every", _too_thin(size.steps))]
+        if size.steps > MOST_STEPS and not allow_large:
+            return [_too_long(scenario.simulation, size, insist)]
+        if size.content > MOST_CONTENT and (read_back or not allow_large):
+            return [_too_full(scenario.log.every, size, "" if read_back else insist)]
+        return []
+
+    return look
+
+
+def _too_thin(steps: int) -> str:
+    text = f"the run has {steps} steps, so that its first instant alone would be logged"
+    return f"{text}; must be at most {steps}"
+
+
+def _too_long(run: Simulation, size: Size, insist: str) -> tuple[str, str]:
+    text = f"{run.duration:g} s in steps of {run.step:g} s are {size.steps:.3g} steps, more than "
+    remedy = f"simulate less or take a longer step{_or_insist(insist)}"
+    return run.outlier, f"{text}{MOST_STEPS:.0e}: {size}; {remedy}"
+
+
+def _too_full(every: int, size: Size, insist: str) -> tuple[str, str]:
+    content, most = bytes_in_words(size.content), bytes_in_words(MOST_CONTENT)
+    text = f"the log would hold {content} in {size.rows:.3g} rows, more than the {most} that "
+    fitting = every * -(-size.content // MOST_CONTENT)
+    remedy = f"log less often (every: {fitting}){_or_insist(insist)}"
+    return "log.every", f"{text}podusv reads back: {size}; {remedy}"
+
+
+def _or_insist(insist: str) -> str:
+    return f", or insist with {insist}" if insist else ""
+
+
+def bytes_in_words(count: float) -> str:
+    """Such as `3.2 GB`."""
+    return _in_words(count, BYTES)
+
+
+def _time(seconds: float) -> str:
+    return _in_words(seconds, TIMES)
+
+
+def _in_words(amount: float, units: dict[str, float]) -> str:
+    fitting = [unit for unit, size in units.items() if amount >= size] or [next(iter(units))]
+    digits = f"{amount / units[fitting[-1]]:.2g}"
+    return f"{float(digits):g} {fitting[-1]}"
