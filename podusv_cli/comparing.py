@@ -17,6 +17,7 @@ from podusv_cli.comparison import claims, report, stability, table
 from podusv_cli.comparison.differences import differences
 from podusv_cli.comparison.entries import Absent, Entry
 from podusv_cli.comparison.expressions import Source
+from podusv_cli.config.checking import Check
 from podusv_cli.config.loading import load_resolved
 from podusv_cli.config.scenario import Scenario
 from podusv_cli.errors import StorageError
@@ -67,15 +68,16 @@ class Result:
     warnings: Mapping[str, Sequence[Finding]]  # by run; none of those that were there
 
 
-def from_folder(path: Path) -> list[Part]:
+def from_folder(path: Path, checks: Sequence[Check] = ()) -> list[Part]:
     """The finished runs of a folder: one run, or all those of a comparison.
 
-    Raises UsageError where it is nothing of the kind, StorageError where it is damaged.
+    `checks` as `load` has them. Raises UsageError where it is nothing of the kind, StorageError
+    where it is damaged.
     """
     inner = _listed(path) if os.path.lexists(path / manifest.NAME) else _found(path)
     if not inner:
         manifest.demand(path)
-    return [_from_run(child) for child in (inner or [path])]
+    return [_from_run(child, checks) for child in (inner or [path])]
 
 
 def _found(path: Path) -> list[Path]:
@@ -100,10 +102,10 @@ def _first_row(path: Path) -> list[str]:
         raise StorageError(f"cannot read {path}: no CSV ({error})") from error
 
 
-def _from_run(path: Path) -> Part:
+def _from_run(path: Path, checks: Sequence[Check]) -> Part:
     """A run, opened with all that may be asked of it later. Raises StorageError, ScenarioError."""
     run = open_run(path)
-    scenario = load_resolved(run.resolved_yaml, str(path / "resolved.yaml"))
+    scenario = load_resolved(run.resolved_yaml, str(path / "resolved.yaml"), checks)
     if wrong := soundness.fault(run.recording):
         raise StorageError(f"{path / LOG}: damaged, or not a log of a run: {wrong}")
     _check_theory(run)

@@ -13,6 +13,8 @@ from typing import Any
 
 from podusv_cli import comparing
 from podusv_cli.comparing import Part
+from podusv_cli.config.checking import Check
+from podusv_cli.config.size import estimate, limits
 from podusv_cli.errors import UsageError
 from podusv_cli.logbook import folder, manifest, provenance
 from podusv_cli.logbook.staging import Staging, sweep
@@ -26,11 +28,12 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True)
 class Request:
-    """Where repeated runs go (None: nowhere), and whether they may replace what is there."""
+    """Where repeated runs go (None: nowhere), whether they may replace what is there, be large."""
 
     out: Path | None = None
     force: bool = False
     argv: Sequence[str] = ()
+    allow_large: bool = False
 
 
 @dataclass(frozen=True)
@@ -86,9 +89,9 @@ def rerun(path: Path, request: Request, progress: Progress | None = None) -> Rep
     """Make a run, or every run of a comparison, once more from what its folder holds.
 
     Raises UsageError where `path` is no run folder or a run was interrupted, ScenarioError where
-    this podusv does not know a key any more, and StorageError.
+    this podusv does not know a key any more or the run is too large, and StorageError.
     """
-    parts = _parts(path)
+    parts = _parts(path, (limits(request.allow_large, read_back=True),))
     for part in parts:
         if part.run and part.run.status == "interrupted":
             text = f"{part.run.folder} was interrupted; there is no whole run to repeat"
@@ -98,10 +101,10 @@ def rerun(path: Path, request: Request, progress: Progress | None = None) -> Rep
     return _several(parts, request, progress)
 
 
-def _parts(path: Path) -> list[Part]:
+def _parts(path: Path, checks: Sequence[Check] = ()) -> list[Part]:
     """The finished runs of a folder; UsageError where it is none."""
     manifest.demand(path)
-    return comparing.from_folder(path)
+    return comparing.from_folder(path, checks)
 
 
 def _one(part: Part, request: Request, progress: Progress | None) -> Repetition:
@@ -121,7 +124,8 @@ def _several(parts: Sequence[Part], request: Request, progress: Progress | None)
 
     with _passing(request) as place:
         target = request.out or place / "again"
-        with folder.RunWriter(target, force=request.force) as writer:
+        needed = sum(estimate(part.scenario).needed for part in parts)
+        with folder.RunWriter(target, force=request.force, needed=needed) as writer:
             for part in parts:
                 warm_up(part.scenario)
             jobs = [partial(_repeat, p, writer.folder / p.label, request) for p in parts]

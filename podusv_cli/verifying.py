@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from podusv_cli.config.loading import load
+from podusv_cli.config.size import limits
 from podusv_cli.errors import UsageError
 from podusv_cli.logbook import atomic, jsonfile
 from podusv_cli.verification import verify as verification
@@ -23,7 +24,7 @@ def verify(
     """
     if (config / "resolved.yaml").is_file():
         raise UsageError(f"{config} is a run folder; verify its resolved.yaml")
-    scenario = load(config, overrides).scenario
+    scenario = load(config, overrides, checks=(limits(insist=""),)).scenario
     atomic.check_places([out] if out else [])
     return verification.verify(scenario, tolerance, progress)
 

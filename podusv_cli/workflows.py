@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from podusv_cli.config.loading import load, resolved_yaml
 from podusv_cli.config.scenario import Claim
+from podusv_cli.config.size import estimate, limits
 from podusv_cli.config.words import unknown
 from podusv_cli.errors import UsageError
 from podusv_cli.findings.finding import Finding, heard
@@ -40,13 +41,14 @@ class Request:
     figures: bool = True
     argv: Sequence[str] = ()
     warn: Callable[[Finding], None] = lambda finding: None  # before anything is simulated
+    allow_large: bool = False
 
 
 def run(config: Path, request: Request, progress: Progress | None = None) -> Finished:
     """Load a scenario and execute it. Raises ScenarioError and StorageError."""
     watch = Stopwatch()
     with watch.part("load"):
-        loaded = load(config, request.overrides)
+        loaded = load(config, request.overrides, checks=(limits(request.allow_large),))
         scenario = loaded.scenario.alone()
         resolved = resolved_yaml(scenario)
     target = request.out or folder.default_folder(RESULTS, scenario.name, resolved)
@@ -125,7 +127,11 @@ def compare(
     target = request.out or folder.default_folder(RESULTS, title, text)
     _keep_apart(items, target)
     named = request.out is not None
-    with interrupts_held(), folder.RunWriter(target, force=request.force, named=named) as writer:
+    needed = sum(estimate(part.scenario).needed for part in parts if part.run is None)
+    with (
+        interrupts_held(),
+        folder.RunWriter(target, force=request.force, named=named, needed=needed) as writer,
+    ):
         outcomes = comparing.make_runs(
             parts, writer.folder, figures=request.figures, argv=argv, progress=progress
         )
@@ -203,7 +209,8 @@ def _opened(path: Path, request: Request, *, alone: bool) -> _Item:
     if path.is_dir():
         parts = comparing.comparable(path)
         return _Item(path.resolve().name, parts, [part.label for part in parts])
-    loaded = load(path, request.overrides, checks=(misfits,))
+    fits = limits(request.allow_large, read_back=True)
+    loaded = load(path, request.overrides, checks=(misfits, fits))
     scenario, singles = loaded.scenario, loaded.scenario.singles()
     by_law = alone or scenario.controllers
     labels = list(singles) if by_law else [scenario.name]

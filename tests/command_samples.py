@@ -29,7 +29,7 @@ controller: {kind: pid, K_Pu: 100.0}
 silence: [saturated] # the gains are large on purpose
 """
 TWO = BASE + "controllers: {stiff: {K_Pu: 200.0}, soft: {K_Pu: 5.0}}\n"
-LONG = BASE.replace("duration: 1.0", "duration: 2e5, step: 1e-3") + "log: {every: 1000}\n"
+LONG = BASE.replace("duration: 1.0", "duration: 1e5, step: 1e-3") + "log: {every: 1000}\n"
 
 
 class Said(NamedTuple):

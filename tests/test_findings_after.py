@@ -241,7 +241,7 @@ def test_findings_are_wrapped_on_a_terminal_and_whole_in_a_pipe(
         (command, scenario_file("corrected.yaml"), *SWAYING, *SHORT[:4])
         for command in ("validate", "run")
     )
-    whole = podusv(*validate).out.splitlines()[1:]
+    whole = podusv(*validate).out.splitlines()[2:]
     assert podusv(*run, "--no-figures", "--out", "a").err.splitlines() == whole
     assert len(whole) == 2
     for stream in ("stdout", "stderr"):
@@ -249,7 +249,7 @@ def test_findings_are_wrapped_on_a_terminal_and_whole_in_a_pipe(
             f"podusv_cli.cli.layout.sys.{stream}.isatty", lambda: True, raising=False
         )
     err = podusv(*run, "--no-figures", "--out", "b").err
-    for shown in (podusv(*validate).out.splitlines()[1:], err.splitlines()):
+    for shown in (podusv(*validate).out.splitlines()[2:], err.splitlines()):
         assert max(map(len, shown)) <= 60 < len(shown) * 60 / 2
         assert " ".join(line.strip() for line in shown) == " ".join(whole)
 

@@ -10,7 +10,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from podusv_cli.cli.guard import INTERRUPTED
-from podusv_cli.cli.options import AsJson, Assignments, Figures, Force, Out, Quiet, Verbose
+from podusv_cli.cli.options import (
+    AllowLarge,
+    AsJson,
+    Assignments,
+    Figures,
+    Force,
+    Out,
+    Quiet,
+    Verbose,
+)
 
 if TYPE_CHECKING:
     from podusv_cli.workflows import Compared
@@ -28,6 +37,7 @@ def compare(
     force: Force = False,
     figures: Figures = True,
     as_json: AsJson = False,
+    allow_large: AllowLarge = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
@@ -41,7 +51,9 @@ def compare(
     from podusv_cli.cli.progress import progress_bars
 
     warned = Warned(quiet)
-    request = workflows.Request(tuple(assign or ()), out, force, figures, tuple(sys.argv), warned)
+    request = workflows.Request(
+        tuple(assign or ()), out, force, figures, tuple(sys.argv), warned, allow_large
+    )
     with progress_bars(wanted=not (quiet or as_json)) as progress:
         done = workflows.compare([Path(item) for item in items], request, progress)
     if as_json:

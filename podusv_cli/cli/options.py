@@ -18,6 +18,9 @@ Out = Annotated[
 ]
 Force = Annotated[bool, typer.Option("--force", help="Replace finished results.")]
 Figures = Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the results.")]
+AllowLarge = Annotated[
+    bool, typer.Option("--allow-large", help="Also more than 1e8 steps, a log above 4 GB.")
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print the results' folder only.")]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Print where the time went.")]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from podusv_cli.cli.guard import INTERRUPTED
-from podusv_cli.cli.options import AsJson, Force
+from podusv_cli.cli.options import AllowLarge, AsJson, Force
 from podusv_cli.cli.parting import DIFFERENT
 
 if TYPE_CHECKING:
@@ -25,6 +25,7 @@ def rerun(
         Path | None, typer.Option(help="Folder to keep the repeated run in.", show_default="none")
     ] = None,
     force: Force = False,
+    allow_large: AllowLarge = False,
     as_json: AsJson = False,
 ) -> None:
     """Repeat a finished run from its folder and tell whether the log is the same.
@@ -35,7 +36,7 @@ def rerun(
     from podusv_cli import repeating  # heavy imports only when they are needed
     from podusv_cli.cli.progress import progress_bars
 
-    request = repeating.Request(out, force, tuple(sys.argv))
+    request = repeating.Request(out, force, tuple(sys.argv), allow_large)
     with progress_bars(wanted=not as_json) as progress:
         done = repeating.rerun(Path(run), request, progress)
     if as_json:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from podusv_cli.cli.options import (
+    AllowLarge,
     AsJson,
     Assignments,
     Config,
@@ -34,6 +35,7 @@ def run(
     force: Force = False,
     figures: Figures = True,
     as_json: AsJson = False,
+    allow_large: AllowLarge = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
@@ -46,7 +48,9 @@ def run(
     from podusv_cli.cli.progress import progress_bar
 
     warned = Warned(quiet)
-    request = workflows.Request(tuple(assign or ()), out, force, figures, tuple(sys.argv), warned)
+    request = workflows.Request(
+        tuple(assign or ()), out, force, figures, tuple(sys.argv), warned, allow_large
+    )
     with progress_bar(str(config), wanted=not (quiet or as_json)) as progress:
         done = workflows.run(Path(config), request, progress)
     if as_json:

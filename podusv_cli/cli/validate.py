@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from podusv_cli.cli.options import Assignments, Config
+from podusv_cli.cli.options import AllowLarge, Assignments, Config
 
 if TYPE_CHECKING:
     from podusv_cli.config.loading import Loaded
@@ -23,6 +23,7 @@ def validate(
             help="Show the rank argument, the proof's gain conditions, every value and its origin.",
         ),
     ] = False,
+    allow_large: AllowLarge = False,
 ) -> None:
     """Check a scenario: all faults of keys and values at once, then those of claims; or what to
     know before it runs.
@@ -32,13 +33,15 @@ def validate(
     from podusv_cli.cli.layout import echo_line
     from podusv_cli.comparison.claims import misfits
     from podusv_cli.config.loading import load
+    from podusv_cli.config.size import largest, limits
     from podusv_cli.findings.finding import heard
     from podusv_cli.findings.preflight import preflight
 
-    loaded = load(config, assign or (), checks=(misfits,))
+    loaded = load(config, assign or (), checks=(misfits, limits(allow_large)))
     scenario = loaded.scenario
     laws, steps = ", ".join(scenario.labels()), scenario.time_grid().steps
     typer.echo(f"{config}: ok ({scenario.name}, {laws}, {steps} steps)")
+    typer.echo(f"a run takes {largest(scenario)}")
     for finding in heard(preflight(scenario), scenario):
         echo_line(str(finding))
     if verbose:

@@ -72,7 +72,7 @@ def _checked(
     return Loaded(scenario, _origins(scenario, root), text)
 
 
-def load_resolved(text: str, source: str) -> Scenario:
+def load_resolved(text: str, source: str, checks: Sequence[Check] = ()) -> Scenario:
     """The scenario of a finished run, which refers to no other file.
 
     Raises StorageError where it does or is no YAML mapping at all, ScenarioError where it is one
@@ -90,7 +90,7 @@ def load_resolved(text: str, source: str) -> Scenario:
     if faults or not root:
         (first, *_) = _findings(faults, source)
         raise StorageError(f"{first} (damaged: not as podusv wrote it)")
-    return _checked(replace(root, mark=Mark(source)), text, source, faults).scenario
+    return _checked(replace(root, mark=Mark(source)), text, source, faults, checks).scenario
 
 
 def _findings(faults: list[Fault], first: str) -> list[Finding]:
