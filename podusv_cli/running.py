@@ -7,8 +7,10 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from importlib import import_module
 from pathlib import Path
-from typing import Any
+from threading import Thread
+from typing import TYPE_CHECKING, Any
 
 from podusv_cli import __version__
 from podusv_cli.config.loading import resolved_yaml
@@ -21,7 +23,8 @@ from podusv_cli.errors import StorageError
 from podusv_cli.findings.after import aftermath
 from podusv_cli.findings.finding import Finding, heard
 from podusv_cli.interrupts import Extras, interrupts_heard, interrupts_held
-from podusv_cli.logbook import folder, hdf5, provenance
+from podusv_cli.kernels import Vector
+from podusv_cli.logbook import folder, provenance
 from podusv_cli.logbook.columns import ColumnFiles
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.table import METRICS
@@ -30,6 +33,9 @@ from podusv_cli.parallel import Outcome
 from podusv_cli.recording import Columns, Recording, Status
 from podusv_cli.theory import monitor
 from podusv_cli.theory.report import as_json as theory_report
+
+if TYPE_CHECKING:
+    from podusv_cli.logbook.hdf5 import Log
 
 Progress = Callable[[float], None]
 UNDRAWN = (
@@ -137,16 +143,21 @@ def execute(
         extras = Extras(recording.status == "interrupted")
         with watch.part("metrics"):
             metrics |= extras.attempt(lambda: _cost(task.scenario, recording)) or {}
-            seen_after = heard(aftermath(task.scenario, recording), task.scenario)
-        warnings = (*task.noticed, *seen_after)
-        with watch.part("theory"):
-            recording, theory = monitored(task.scenario, recording, columns("theory"))
+        with _log(writer, task.scenario, recording) as log:
+            log.add(recording.signals)  # written while the run is looked at
+            with watch.part("metrics"):
+                warnings = _warnings(task, recording)
+            with watch.part("theory"):
+                whole, theory = monitored(task.scenario, recording, columns("theory"))
+            with watch.part("write"):
+                log.add(_beyond(whole, recording))
+                log.done()
         with watch.part("write"):
-            _write(writer, task, recording, metrics, warnings)
+            _write(writer, task, whole, metrics, warnings)
             if theory:
                 writer.add_json("theory.json", theory)
         with watch.part("figures"):
-            for name, content in extras.attempt(lambda: _drawn(task, recording)) or ():
+            for name, content in extras.attempt(lambda: _drawn(task, whole)) or ():
                 writer.add(f"figures/{name}", content)
         status = "interrupted" if extras.interrupted else recording.status
         with watch.part("write"):
@@ -157,6 +168,10 @@ def execute(
     return Finished(
         final, recording.controller, status, message, metrics, watch.total(), warnings=warnings
     )
+
+
+def _warnings(task: Task, recording: Recording) -> tuple[Finding, ...]:
+    return (*task.noticed, *heard(aftermath(task.scenario, recording), task.scenario))
 
 
 def unwritten(outcomes: Iterable[Outcome]) -> str:
@@ -199,6 +214,8 @@ def measured(
     with watch.part("compile"), interrupts_heard():
         warm_up(scenario)
     with watch.part("engine"):
+        # The march leaves the interpreter alone; what writes its log is imported in the meantime.
+        Thread(target=import_module, args=("podusv_cli.logbook.hdf5",)).start()
         recording = simulate(
             loop, grid, observer=seeing, compiled=compiled, progress=progress,
             columns=columns, piece=piece,
@@ -226,18 +243,30 @@ def monitored(
     return (found.recording, theory_report(loop, grid, found)) if found else (recording, {})
 
 
+@contextmanager
+def _log(writer: folder.RunWriter, scenario: Scenario, recording: Recording) -> Iterator[Log]:
+    from podusv_cli.logbook import hdf5  # `measured` has begun with that
+
+    texts = {
+        "resolved_yaml": resolved_yaml(scenario), "version": __version__,
+        "title": scenario.description or scenario.name, "source": scenario.vessel.source,
+    }  # fmt: skip
+    with writer.growing(folder.LOG) as stream, hdf5.opened(stream, recording, **texts) as log:
+        yield log
+
+
+def _beyond(whole: Recording, recording: Recording) -> dict[str, Vector]:
+    """What the whole recording has beside the first one's signals."""
+    arrays = {**whole.signals, **whole.fixed}
+    return {name: array for name, array in arrays.items() if name not in recording.signals}
+
+
 def _write(
     writer: folder.RunWriter, task: Task, recording: Recording, metrics: dict[str, float],
     warnings: Sequence[Finding],
 ) -> None:  # fmt: skip
-    scenario, resolved = task.scenario, resolved_yaml(task.scenario)
     writer.add("scenario.yaml", task.text.encode())
-    writer.add("resolved.yaml", resolved.encode())
-    with writer.growing("log.h5") as stream:
-        hdf5.write(
-            stream, recording, resolved_yaml=resolved, title=scenario.description or scenario.name,
-            source=scenario.vessel.source, version=__version__,
-        )  # fmt: skip
+    writer.add("resolved.yaml", resolved_yaml(task.scenario).encode())
     status = {"status": recording.status, "controller": recording.controller}
     told = [finding.as_json() for finding in warnings]
     writer.add_json("metrics.json", {**status, "metrics": metrics, "warnings": told})

@@ -49,10 +49,16 @@ def recording(rows: int = 50, nodes: int = 8, **changes: Any) -> Recording:
     return Recording(**parts | changes)
 
 
+def write_log(stream: Stream, recorded: Recording, **texts: str) -> None:
+    """A recording's whole log file."""
+    with hdf5.opened(stream, recorded, **TEXTS | texts) as log:
+        log.add({**recorded.signals, **recorded.fixed})
+
+
 def log(recorded: Recording | None = None, **texts: str) -> bytes:
     """log.h5 of a recording, the small one if none is given."""
     content = io.BytesIO()
-    hdf5.write(Stream(content), recorded or recording(), **TEXTS | texts)
+    write_log(Stream(content), recorded or recording(), **texts)
     return content.getvalue()
 
 

@@ -349,5 +349,5 @@ finally:
         return set(done.stderr.split())
 
     modules("first")  # fills the cache where it is empty
-    heavy = {"numba", "pandas", "matplotlib", "scipy", "rich"}
+    heavy = {"numba", "pandas", "matplotlib", "scipy", "rich", "numpy.ma"}
     assert not modules("second") & heavy

@@ -15,8 +15,9 @@ from conftest import corrected, run
 from logbook_samples import ENVIRONMENT, PYTHON, TEXTS, YAML, assert_same, log, recording
 from numpy.testing import assert_array_equal
 
-from podusv_cli.logbook import layout, reading
+from podusv_cli.logbook import hdf5, layout, reading
 from podusv_cli.logbook.packing import LEVEL
+from podusv_cli.logbook.stream import Stream
 from podusv_cli.signals import SIGNALS
 
 DIMENSIONS = {
@@ -174,3 +175,36 @@ def test_a_simulated_run_comes_back_as_it_was(tmp_path: Path) -> None:
     with xr.open_dataset(path, engine="netcdf4") as found:
         assert found.W_hat_r.dims == ("time", "node")
         assert set(found.data_vars) | {"time"} == {*recorded.signals, *recorded.fixed}
+
+
+# --- written little by little
+
+
+def test_arrays_may_come_little_by_little(tmp_path: Path) -> None:
+    recorded, content = recording(), io.BytesIO()
+    with hdf5.opened(Stream(content), recorded, **TEXTS) as file:
+        file.add({name: recorded[name] for name in ("x", "time")})
+        file.done()
+        file.add({"W_hat_u": recorded["W_hat_u"]})
+        file.add({"z_e": recorded["z_e"], "tau_u_cmd": recorded["tau_u_cmd"], **recorded.fixed})
+    path = tmp_path / "log.h5"
+    path.write_bytes(content.getvalue())
+    found = reading.read_log(path)
+    assert list(found.signals) == ["time", "x", "W_hat_u", "z_e", "tau_u_cmd"]
+    for name in {**recorded.signals, **recorded.fixed}:
+        assert_array_equal(found[name], recorded[name], err_msg=name)
+
+
+@pytest.mark.parametrize(
+    ("late", "error"),
+    [
+        ({"u": np.zeros(49)}, "u: 49 values along time, not 50"),
+        ({"W_hat_r": np.zeros((50, 7))}, "W_hat_r: 7 values along node, not 8"),
+    ],
+)
+def test_what_does_not_fit_what_is_there_is_refused(late: dict, error: str) -> None:
+    recorded = recording()
+    with pytest.raises(ValueError, match=error):  # noqa: PT012, SIM117
+        with hdf5.opened(Stream(io.BytesIO()), recorded, **TEXTS) as file:
+            file.add(recorded.signals)
+            file.add(late)

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from config_samples import loaded
 from conftest import Constant, adrift, corrected, kinds
-from logbook_samples import ENVIRONMENT, PYTHON, TEXTS, assert_same, files, log, recording
+from logbook_samples import ENVIRONMENT, PYTHON, assert_same, files, log, recording, write_log
 
 from podusv_cli.controllers.pid import Pid
 from podusv_cli.engine.grid import TimeGrid
@@ -24,7 +24,6 @@ from podusv_cli.engine.simulate import ClosedLoop, simulate
 from podusv_cli.errors import StorageError
 from podusv_cli.interrupts import interrupts_caught
 from podusv_cli.kernels import Vector
-from podusv_cli.logbook import hdf5
 from podusv_cli.logbook.columns import ColumnFiles
 from podusv_cli.logbook.stream import Stream
 from podusv_cli.recording import InMemory
@@ -177,7 +176,7 @@ class Limited(io.BytesIO):
 
 def test_a_log_written_bit_by_bit_is_the_same() -> None:
     content = Limited(10**9)
-    hdf5.write(Stream(content), recording(), **TEXTS)
+    write_log(Stream(content), recording())
     assert content.getvalue() == log()
 
 
@@ -200,7 +199,7 @@ from test_long_logs import *
 for n in count():
     stream = Stream(Limited(n))
     try:
-        hdf5.write(stream, recording(rows=300), **TEXTS)
+        write_log(stream, recording(rows=300))
     except Exception as error:
         assert error is stream.error, error
     else:

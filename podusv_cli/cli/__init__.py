@@ -58,6 +58,9 @@ def main() -> None:
     gc.set_threshold(OBJECTS_BETWEEN_COLLECTIONS)
     # pydantic would look through every installed package for plugins.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+    # Nothing here is large enough for threads in linear algebra, and with them the last bits of a
+    # sum would depend on the number of cores. To start them costs numpy a tenth of a run.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     open_streams()
     for stream in (sys.stdout, sys.stderr):
         # A file name or text that the terminal's encoding lacks must not end in a traceback.

@@ -19,7 +19,7 @@ from podusv_cli.recording import Recording
 
 def _rows(loop: ClosedLoop, recording: Recording, most: int) -> Vector:
     times = recording["time"]
-    chosen = np.unique(np.linspace(0, len(times) - 1, min(most, len(times))).astype(int))
+    chosen = np.linspace(0, len(times) - 1, min(most, len(times))).astype(int)
     names = [*STATE, *(name for name, _ in loop.controller.slots())]
     logged = np.column_stack([recording[name][chosen] for name in names])
     k, table = bundle(loop.path.constants()), loop.path.table()
@@ -30,7 +30,7 @@ def _rows(loop: ClosedLoop, recording: Recording, most: int) -> Vector:
 
 
 def replayer(
-    loop: ClosedLoop, recording: Recording, *, most: int = 1000, evaluations: int = 4000
+    loop: ClosedLoop, recording: Recording, *, most: int = 250, evaluations: int = 4000
 ) -> Callable[[], float]:
     """A function that times one evaluation of the law [ns], as the mean of one replay.
 

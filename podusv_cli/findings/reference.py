@@ -8,6 +8,7 @@ which the target's course turns, tau_v what the actuator puts on sway along with
 from __future__ import annotations
 
 import math
+import statistics
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -44,15 +45,20 @@ class Reference:
     def working(self) -> Vector:
         """Median velocity (u, v, r) that keeps up; the target's speed straight on where none is."""
         known = self.nu[np.isfinite(self.nu).all(axis=1)]
-        straight = np.array([float(np.median(self.speed)), 0.0, 0.0])
-        return np.median(known, axis=0) if len(known) else straight
+        if not len(known):
+            return np.array([median(self.speed), 0.0, 0.0])
+        return np.array([median(velocity) for velocity in known.T])
 
     @property
     def steady_sway(self) -> float:
         """Median sway velocity that keeps up [m/s]; 0 where nothing does."""
         known = self.nu[:, 1][np.isfinite(self.nu[:, 1])]
-        # np.median would import numpy.ma.
-        return float(np.percentile(known, 50)) if len(known) else 0.0
+        return median(known) if len(known) else 0.0
+
+
+def median(values: Vector) -> float:
+    """The middle of some values; numpy's own would import numpy.ma, 9 ms of every run."""
+    return float(statistics.median(values.tolist()))
 
 
 def reference(scenario: Scenario) -> Reference:

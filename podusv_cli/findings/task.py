@@ -8,7 +8,7 @@ import numpy as np
 
 from podusv_cli.controllers.tracking import TrackingController
 from podusv_cli.findings.finding import Case, Finding, found
-from podusv_cli.findings.reference import FASTEST, drift
+from podusv_cli.findings.reference import FASTEST, drift, median
 from podusv_cli.kernels import Vector, bundle
 from podusv_cli.paths.base import TARGET
 from podusv_cli.vessels.plant import sway_force
@@ -101,7 +101,7 @@ def sway_unstable(case: Case) -> Iterator[Finding]:
     if not isinstance(law, TrackingController):
         return
     damping, limit = _damping(case, vessel.m11 * law.k_ze)
-    speed = float(np.median(case.reference.speed))
+    speed = median(case.reference.speed)
     if vessel.m11 * law.k_ze > damping and limit > RUNAWAY * speed:
         reach = f"up to {limit:.2g} m/s" if limit < FASTEST else "without limit"
         yield found(
@@ -129,7 +129,7 @@ def sliding_distance(case: Case, damping: float) -> float:
     law, vessel = case.scenario.controller, case.scenario.vessel
     if not isinstance(law, TrackingController):
         return np.inf
-    speed = float(np.median(case.reference.speed))
+    speed = median(case.reference.speed)
     drive = vessel.m11 * law.k_ze
     free = speed * (vessel.m22 - vessel.m11) + drive * law.standoff
     return max(0.0, free / (drive - damping))
@@ -138,7 +138,7 @@ def sliding_distance(case: Case, damping: float) -> float:
 def _damping(case: Case, drive: float) -> tuple[float, float]:
     """Sway damping [kg/s] at the steady sway, and where growing at `drive` [kg/s] it stops."""
     k, sway = bundle(case.scenario.vessel.constants()), case.reference.steady_sway
-    u = float(np.median(case.reference.speed))
+    u = median(case.reference.speed)
     at_rest, small = sway_force(u, sway, 0.0, k), 1e-4
     damping = (sway_force(u, sway - small, 0.0, k) - sway_force(u, sway + small, 0.0, k)) / (
         2 * small

@@ -16,7 +16,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from podusv_cli.errors import StorageError
-from podusv_cli.logbook import atomic, jsonfile, manifest, reading
+from podusv_cli.logbook import atomic, jsonfile, manifest
 from podusv_cli.logbook.regular import read_text
 from podusv_cli.logbook.staging import Staging, Taken, sweep
 from podusv_cli.logbook.stream import Stream, growing
@@ -186,6 +186,8 @@ class Run:
     @cached_property
     def recording(self) -> Recording:
         """What log.h5 holds, read when first asked for. Raises StorageError."""
+        from podusv_cli.logbook import reading  # h5py is slow to import
+
         return reading.read_log(self.folder / LOG)
 
 

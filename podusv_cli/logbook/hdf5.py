@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from contextlib import contextmanager
 
 import h5py
 import numpy as np
@@ -21,18 +23,61 @@ _FORMAT = ("v108", "v108")
 # what readers undo; `packing` does them faster than HDF5.
 _FILTERS = {"compression": "gzip", "compression_opts": LEVEL, "shuffle": True, "fletcher32": True}
 
-Scales = Mapping[str, h5py.Dataset]
+
+class Log:
+    """Signals on their way into a log file, written in order by a thread of its own."""
+
+    def __init__(self, file: h5py.File, stream: Stream, thread: Executor) -> None:
+        """`thread` is an executor with one worker; only that touches the file."""
+        self._file, self._stream, self._thread = file, stream, thread
+        self._scales: dict[str, h5py.Dataset] = {}
+        self._under_way: list[Future[None]] = []
+
+    def add(self, arrays: Mapping[str, Vector]) -> None:
+        """Have more arrays written, which stay as they are; `time` with the first ones."""
+        self._under_way.append(self._thread.submit(self._write, arrays))
+
+    def done(self) -> None:
+        """Wait until all is written.
+
+        KeyError for a signal that is not in SIGNALS, ValueError for one whose shape does not fit
+        its axes or what is there already, OSError for what the stream ran into.
+        """
+        while self._under_way:
+            self._under_way.pop(0).result()
+
+    def _write(self, arrays: Mapping[str, Vector]) -> None:
+        for axis, size in self._new_axes(arrays).items():
+            if axis != "time":
+                self._scales[axis] = _scale(self._file, axis, size)
+        for name in sorted(arrays, key="time".__ne__):
+            dataset = _write(self._file, name, arrays[name], self._stream)
+            if name == "time":
+                dataset.make_scale(name)
+                self._scales[name] = dataset
+                continue
+            for position, axis in enumerate(layout.axes(name)):
+                dataset.dims[position].attach_scale(self._scales[axis])
+
+    def _new_axes(self, arrays: Mapping[str, Vector]) -> dict[str, int]:
+        """How long every axis is that has no scale yet, in the order in which they come up."""
+        lengths = {axis: len(scale) for axis, scale in self._scales.items()}
+        for name, array in arrays.items():
+            for axis, size in zip(layout.axes(name), array.shape, strict=True):
+                if lengths.setdefault(axis, size) != size:
+                    raise ValueError(f"{name}: {size} values along {axis}, not {lengths[axis]}")
+        return {axis: size for axis, size in lengths.items() if axis not in self._scales}
 
 
-def write(
+@contextmanager
+def opened(
     stream: Stream, recording: Recording,
     *, resolved_yaml: str, title: str, source: str, version: str,
-) -> None:  # fmt: skip
-    """Write the log file of a recording; the same arguments give the same bytes.
+) -> Iterator[Log]:  # fmt: skip
+    """The log file of a recording, for arrays to be added to; the same ones give the same bytes.
 
     `resolved_yaml` is the scenario with every value explicit, `source` where the vessel's data come
-    from, `version` podusv's. KeyError for a signal that is not in SIGNALS, ValueError for one whose
-    shape does not fit its axes, OSError for what the stream ran into.
+    from, `version` podusv's. The end of the block raises what `Log.done` does.
     """
     facts = {
         "Conventions": layout.CONVENTIONS,
@@ -47,7 +92,10 @@ def write(
     with h5py.File(stream, "w", libver=_FORMAT, track_order=True, track_times=False) as file:
         file.attrs.create("podusv_format", np.int32(layout.FORMAT))
         _describe(file, facts)
-        _write_signals(file, recording, stream)
+        with ThreadPoolExecutor(1) as thread:
+            log = Log(file, stream, thread)
+            yield log
+            log.done()
         _write_provenance(file, resolved_yaml)
     stream.check()
 
@@ -61,28 +109,6 @@ def _text(words: str) -> np.ndarray[tuple[()], np.dtype[np.bytes_]]:
 def _describe(thing: h5py.HLObject, facts: Mapping[str, str]) -> None:
     for name, words in facts.items():
         thing.attrs.create(name, _text(words))
-
-
-def _write_signals(file: h5py.File, recording: Recording, stream: Stream) -> None:
-    arrays = {**recording.signals, **recording.fixed}
-    lengths = _lengths(arrays)
-    scales = {axis: _scale(file, axis, size) for axis, size in lengths.items() if axis != "time"}
-    scales["time"] = _write(file, "time", arrays.pop("time"), stream)
-    scales["time"].make_scale("time")
-    for name, array in arrays.items():
-        dataset = _write(file, name, array, stream)
-        for position, axis in enumerate(layout.axes(name)):
-            dataset.dims[position].attach_scale(scales[axis])
-
-
-def _lengths(arrays: Mapping[str, Vector]) -> dict[str, int]:
-    """How long every axis is, in the order in which they come up."""
-    lengths: dict[str, int] = {}
-    for name, array in arrays.items():
-        for axis, size in zip(layout.axes(name), array.shape, strict=True):
-            if lengths.setdefault(axis, size) != size:
-                raise ValueError(f"{name}: {size} values along {axis}, not {lengths[axis]}")
-    return lengths
 
 
 def _scale(file: h5py.File, axis: str, size: int) -> h5py.Dataset:
