@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 from collections.abc import Iterator
@@ -190,6 +191,15 @@ class Constant(Controller):
     def slots(self) -> Slots:
         """No memory."""
         return ()
+
+
+@pytest.fixture(scope="module")
+def tidy() -> Iterator[None]:
+    """What other tests left is not looked through for garbage while a test takes the time."""
+    gc.collect()
+    gc.freeze()
+    yield
+    gc.unfreeze()
 
 
 @pytest.fixture

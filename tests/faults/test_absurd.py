@@ -20,6 +20,8 @@ from podusv_cli.config.loading import load
 from podusv_cli.config.size import estimate
 
 LAW = BASE.replace("{kind: pid, K_Pu: 100.0}", "{kind: adaptive_neural}")
+pytestmark = pytest.mark.usefixtures("tidy")
+
 SECONDS, BYTES = 0.5, 20e6  # that a refusal may take, the second before the first is over
 HUGE = 10**30  # beyond 64 bits
 

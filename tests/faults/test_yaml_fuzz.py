@@ -13,6 +13,7 @@ from functools import cache
 from itertools import islice
 from pathlib import Path
 
+import pytest
 from counts import count
 
 import podusv_cli
@@ -166,6 +167,7 @@ def check(folder: Path, name: Path, data: bytes) -> str:
     return said
 
 
+@pytest.mark.usefixtures("tidy")
 def test_spoilt_scenarios_are_told_and_nothing_else(tmp_path: Path) -> None:
     whole = verdict(CONFIGS / "paper" / "corrected.yaml")  # imports and tables are made once
     assert whole == "ok"
