@@ -5,6 +5,8 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt
 PODUSV := $(BIN)/podusv
+# A file to a core; what its tests share is made once.
+PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/pytest --numprocesses auto --dist loadfile
 OURS := podusv_cli tests benchmarks
 PODS := kept dropped ideal no_anti_windup single
 COMPARISONS := printed_compare figures_compare figures_compare_standoff corrected_compare
@@ -35,13 +37,13 @@ pod: $(VENV)/run.done ## the laws behind a pod, into results/pod/
 	@echo "what was found: results/pod.md; every table and figure: results/pod/*/report.html"
 
 test: lint types contracts ## lint, types, import contracts, all tests but the slow ones
-	@$(BIN)/pytest
+	@$(PYTEST)
 
 test-all: lint types contracts ## as test, with the slow tests
-	@$(BIN)/pytest -m "not benchmark"
+	@$(PYTEST) -m "not benchmark"
 
 test-faults: $(VENV)/dev.done ## the fault tests with their full counts
-	@PODUSV_FAULTS=full $(BIN)/pytest -m "not benchmark" tests/faults
+	@PODUSV_FAULTS=full $(PYTEST) -m "not benchmark" tests/faults
 
 bench: $(VENV)/dev.done ## speed beside hand-written C (needs a C compiler), into benchmarks/results.md
 	@$(BIN)/python -m benchmarks.bench
