@@ -37,7 +37,7 @@ print(code, took, used.ru_utime + used.ru_stime, used.ru_maxrss, file=sys.stderr
 
 
 def spent(arguments: Sequence[str], folder: Path) -> dict[str, Any]:
-    """Seconds, those that processors were busy, peak memory in MiB and output of podusv.
+    """Seconds, those that processors were busy, peak memory in MB and output of podusv.
 
     It runs in `folder` with its cache there. Raises RuntimeError where the command fails.
     """
@@ -52,7 +52,7 @@ def spent(arguments: Sequence[str], folder: Path) -> dict[str, Any]:
     if code != "0":
         raise RuntimeError(f"podusv {' '.join(arguments)} failed: {done.stderr}")
     unit = 1 if sys.platform == "darwin" else 1024  # of ru_maxrss in bytes
-    megabytes = int(peak) * unit / 2**20
+    megabytes = int(peak) * unit / 1e6
     return {
         "seconds": float(seconds), "busy": float(busy), "megabytes": megabytes,
         "output": done.stdout,

@@ -10,14 +10,15 @@ from time import process_time
 from typing import Any
 
 from benchmarks.c_program import agreement, timer
-from benchmarks.cases import CASES, LAWS, ROOT, Case, grid, metrics_observer
+from benchmarks.cases import CASES, LAWS, ROOT, SCENARIO, Case, grid, metrics_observer
 from benchmarks.timing import Timer, in_turns, quartiles, ratio, timed
 from podusv_cli.config.loading import load
+from podusv_cli.config.size import estimate
 from podusv_cli.controllers.base import Controller
 from podusv_cli.controllers.network import Network
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.replay import replayer
-from podusv_cli.engine.simulate import ClosedLoop, names, simulate
+from podusv_cli.engine.simulate import ClosedLoop, simulate
 
 ROUNDS = 7
 STEPS = (1_000, 3_100, 10_000, 31_000, 100_000)
@@ -84,10 +85,9 @@ def _a_step(runs: dict[str, tuple[ClosedLoop, TimeGrid]], rounds: int) -> dict[s
     return {label: quartiles(times[label] / over.steps) for label, (_, over) in runs.items()}
 
 
-def log_megabytes(case: Case = USUAL) -> float:
-    """Size of the log of a whole run, in memory."""
-    loop, over = case.loop(), grid()
-    return over.rows * len(names(loop)) * 8 / 2**20
+def log_megabytes() -> float:
+    """Size of the log of a whole run, in memory [MB]."""
+    return estimate(load(SCENARIO).scenario).content / 1e6
 
 
 def actuators(rounds: int = ROUNDS) -> dict[str, list[float]]:

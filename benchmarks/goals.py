@@ -49,9 +49,8 @@ def _seconds(command: str) -> Callable[[Results], float]:
     return lambda found: float(found["commands"][command]["seconds"][1])
 
 
-def _memory(found: Results) -> float:
-    peak = max(found["commands"][command]["megabytes"][1] for command in (RUN, "podusv run"))
-    return float(peak - found["log_megabytes"])
+def _memory(command: str) -> Callable[[Results], float]:
+    return lambda found: float(found["commands"][command]["megabytes"][1] - found["log_megabytes"])
 
 
 GOALS = (
@@ -64,7 +63,8 @@ GOALS = (
         "N runs at once beside N / cores single ones", 1.05,
         lambda found: float(found["batch"]["31000"]["cost"][1]),
     ),
-    Goal("peak memory of a run less its log", 150.0, _memory, "MB"),
+    Goal("peak memory less the log, without figures", 150.0, _memory(RUN), "MB"),
+    Goal("peak memory less the log, with figures", 150.0, _memory("podusv run"), "MB"),
     Goal("`podusv run` without figures", 0.7, _seconds(RUN), "s"),
     Goal("`podusv run` with figures", 1.8, _seconds("podusv run"), "s"),
     Goal("the very first run", 10.0, _seconds(f"{RUN}, for the first time"), "s"),

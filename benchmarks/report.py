@@ -163,7 +163,7 @@ def _commands(commands: Results) -> list[str]:
     parts = list(next(iter(runs.values())))
     where = ([name, *(f"{spent[part]:.3f}" for part in parts)] for name, spent in runs.items())
     return [
-        table(["command", "s", "s of processors", "peak memory, MiB"], rows),
+        table(["command", "s", "s of processors", "peak memory, MB"], rows),
         "Where the time of a run goes, in s; the rest is Python and its libraries starting.\n",
         table(["", *parts], where),
     ]

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import time
+import weakref
 from dataclasses import replace
+from functools import partial
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -34,6 +36,7 @@ from podusv_cli.controllers.backstepping import Backstepping
 from podusv_cli.controllers.pid import Pid
 from podusv_cli.disturbances.calm import Calm
 from podusv_cli.disturbances.harmonic import HarmonicDisturbance
+from podusv_cli.engine.blocks import Aside
 from podusv_cli.engine.grid import TimeGrid, whole_steps
 from podusv_cli.engine.simulate import STATE, ClosedLoop, Observer, simulate
 from podusv_cli.kernels import Vector, kernel
@@ -306,3 +309,17 @@ def test_a_run_leaves_its_loop_as_it_was() -> None:
     run(loop, 1.0)
     assert isinstance(loop, ClosedLoop)
     np.testing.assert_array_equal(loop.first_memory(), before)
+
+
+def test_what_was_worked_on_aside_is_nobodys_once_it_is_done() -> None:
+    """The next run's log would have to find room beside it."""
+
+    class Log:
+        """Something that one can have an eye on."""
+
+    with Aside() as aside:
+        log = Log()
+        seen = weakref.ref(log)
+        assert aside.finish(partial(lambda _: 3, log)) == 3
+        del log
+        assert seen() is None

@@ -140,7 +140,10 @@ class Aside:
 
     def _work(self) -> None:
         while order := self._orders.get():
+            answer: int | BaseException
             try:
-                self._answers.put(order())
+                answer = order()
             except BaseException as error:  # whatever a law raises, its thread has to answer
-                self._answers.put(error)
+                answer = error
+            order = None  # or what was worked on, a log perhaps, would live until this thread ends
+            self._answers.put(answer)
