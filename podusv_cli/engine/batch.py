@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from podusv_cli.engine.blocks import in_blocks
+from podusv_cli.engine.blocks import Pace, in_blocks
 from podusv_cli.engine.closed_loop import Plan, Wires
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import (
@@ -67,7 +67,7 @@ def simulate_many(
     batch = _blank(len(loops), observer)
     if plan is None:
         return batch
-    march, stop = marcher(loops[0], observer, True), Event()
+    march, stop, pace = marcher(loops[0], observer, True), Event(), Pace()
 
     def go_on(fraction: float) -> None:
         if fraction < 1.0 and stop.is_set():
@@ -77,8 +77,9 @@ def simulate_many(
         go_on(0.0)
         wires = _apart(wire(loops[i], plan, observer))
         batch.reached[i], batch.status[i], _ = in_blocks(
-            lambda a, b: march(a, b, grid.step, wires, plan), plan, wires.under_way, go_on
-        )
+            lambda a, b: march(a, b, grid.step, wires, plan), plan, wires.under_way, go_on,
+            pace=pace,
+        )  # fmt: skip
         batch.state[i], batch.seen[i] = wires.s[: len(STATE)], wires.seen
 
     _shared_out(run, len(loops), workers or workers_here(), stop, progress)

@@ -37,16 +37,30 @@ class Ending(NamedTuple):
     cause: str = ""
 
 
+class Pace:
+    """How many steps a block may have, by what the one before took; alike marches can share it."""
+
+    def __init__(self) -> None:
+        """Nothing is known yet."""
+        self.steps = FIRST_BLOCK
+
+    def learn(self, steps: int, seconds: float) -> None:
+        """So many steps took so long."""
+        growth = min(100.0, 0.7 * LONGEST_BLOCK / max(seconds, 1e-9))
+        self.steps = max(1, int(steps * growth))
+
+
 def in_blocks(
     march: Callable[[int, int], int], plan: Plan, under_way: Vector,
     progress: Callable[[float], None] | None, pieces: Pieces | None = None,
+    pace: Pace | None = None,
 ) -> Ending:  # fmt: skip
     """March until the end or trouble; `under_way` is where the march notes its instant.
 
     A block that never ends is left behind with its thread; what is before that instant is good.
     A block ends where the table of `pieces` is full, and the next begins when it is handed on.
     """
-    end, size, done = plan.steps + 1, FIRST_BLOCK, 0
+    end, done, pace = plan.steps + 1, 0, pace or Pace()
     with Aside() as aside:
         try:
             with interrupts_heard():
@@ -54,15 +68,15 @@ def in_blocks(
                     if pieces and done == pieces.border:
                         with interrupts_held():
                             pieces.hand_on(done)
-                    goal = min(done + size, end, pieces.border if pieces else end)
+                    goal = min(done + pace.steps, end, pieces.border if pieces else end)
                     began = time.perf_counter()
                     reached = aside.finish(lambda a=done, b=goal: march(a, b))  # type: ignore[misc]
                     if reached < goal:
                         return Ending(reached, "diverged")
-                    size, done, took = goal - done, goal, time.perf_counter() - began
+                    pace.learn(goal - done, time.perf_counter() - began)
+                    done = goal
                     if progress:
                         progress(done / end)
-                    size = max(1, int(size * min(100.0, 0.7 * LONGEST_BLOCK / max(took, 1e-9))))
         except KeyboardInterrupt:
             return Ending(max(done, aside.last_word()), "interrupted")
         except TimeoutError:
