@@ -244,7 +244,8 @@ def under_limit(place: Path, text: str, kind: str, limit: int, room: Room) -> An
     words = [text, str(limit), str(room.log), str(room.piece), kind]
     return subprocess.run(
         [PYTHON, "-c", LIMITED, *words],
-        env=ENVIRONMENT | {"OPENBLAS_NUM_THREADS": "1"},  # each takes memory of its own
+        # Each thread takes memory of its own; Python would write files that are cut off.
+        env=ENVIRONMENT | {"OPENBLAS_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1"},
         capture_output=True,
         text=True,
         cwd=place,

@@ -59,6 +59,7 @@ def test_past_the_file_size_limit(
     old = files(Path())
 
     def limited() -> Said:
+        sys.dont_write_bytecode = True  # Python takes no notice of what does not fit
         resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
         return podusv(*words)
 

@@ -72,7 +72,8 @@ def test_a_disk_that_fills_up_behind_stdout_is_a_line(unbuffered: str) -> None:
     def limit() -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
 
-    extra = {"PYTHONUNBUFFERED": unbuffered}
+    # Python would cut off the compiled files that it writes, and take no notice.
+    extra = {"PYTHONUNBUFFERED": unbuffered, "PYTHONDONTWRITEBYTECODE": "1"}
     with Path("schema.json").open("w") as file:
         done = podusv(
             "schema", extra=extra, stdout=file, stderr=subprocess.PIPE, text=True, preexec_fn=limit
