@@ -14,11 +14,11 @@ from typing import Any
 from podusv_cli import comparing
 from podusv_cli.comparing import Part
 from podusv_cli.config.checking import Check
-from podusv_cli.config.size import estimate, limits
+from podusv_cli.config.size import estimate, limits, needed
 from podusv_cli.errors import UsageError
 from podusv_cli.logbook import folder, manifest, provenance
 from podusv_cli.logbook.staging import Staging, sweep
-from podusv_cli.parallel import INTERRUPTED, Outcome, run_all
+from podusv_cli.parallel import INTERRUPTED, Outcome, run_all, workers_here
 from podusv_cli.recording import Status
 from podusv_cli.repetition.difference import Difference, difference
 from podusv_cli.running import Task, execute, unwritten, warm_up
@@ -124,8 +124,8 @@ def _several(parts: Sequence[Part], request: Request, progress: Progress | None)
 
     with _passing(request) as place:
         target = request.out or place / "again"
-        needed = sum(estimate(part.scenario).needed for part in parts)
-        with folder.RunWriter(target, force=request.force, needed=needed) as writer:
+        room = needed([estimate(part.scenario) for part in parts], workers_here())
+        with folder.RunWriter(target, force=request.force, needed=room) as writer:
             for part in parts:
                 warm_up(part.scenario)
             jobs = [partial(_repeat, p, writer.folder / p.label, request) for p in parts]

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 Progress = Callable[[float], None]
 UNDRAWN = (
-    "interrupted after the simulation; the log is whole, figures or the law's cost are missing"
+    "interrupted after the simulation; the log is whole, what was still to be made of it is missing"
 )
 
 
@@ -215,7 +215,7 @@ def measured(
         warm_up(scenario)
     with watch.part("engine"):
         # The march leaves the interpreter alone; what writes its log is imported in the meantime.
-        Thread(target=import_module, args=("podusv_cli.logbook.hdf5",)).start()
+        Thread(target=import_module, args=("podusv_cli.logbook.hdf5",), daemon=True).start()
         recording = simulate(
             loop, grid, observer=seeing, compiled=compiled, progress=progress,
             columns=columns, piece=piece,

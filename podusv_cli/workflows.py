@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 from podusv_cli.config.loading import load, resolved_yaml
 from podusv_cli.config.scenario import Claim
-from podusv_cli.config.size import estimate, limits
+from podusv_cli.config.size import estimate, limits, needed
 from podusv_cli.config.words import unknown
 from podusv_cli.errors import UsageError
 from podusv_cli.findings.finding import Finding, heard
 from podusv_cli.findings.preflight import preflight, together
 from podusv_cli.interrupts import Extras, interrupts_held
 from podusv_cli.logbook import atomic, folder, provenance
+from podusv_cli.parallel import workers_here
 from podusv_cli.recording import Status
 from podusv_cli.running import Finished, Progress, Stopwatch, Task, execute, unwritten
 
@@ -127,10 +128,11 @@ def compare(
     target = request.out or folder.default_folder(RESULTS, title, text)
     _keep_apart(items, target)
     named = request.out is not None
-    needed = sum(estimate(part.scenario).needed for part in parts if part.run is None)
+    sizes = [estimate(part.scenario) for part in parts if part.run is None]
+    room = needed(sizes, workers_here())
     with (
         interrupts_held(),
-        folder.RunWriter(target, force=request.force, named=named, needed=needed) as writer,
+        folder.RunWriter(target, force=request.force, named=named, needed=room) as writer,
     ):
         outcomes = comparing.make_runs(
             parts, writer.folder, figures=request.figures, argv=argv, progress=progress
@@ -139,7 +141,9 @@ def compare(
         extras = Extras(interrupted=any(outcome.cut for outcome in outcomes.values()))
         result = comparing.collect(parts, outcomes, gathered.stated, extras)
         if extras.interrupted and not result.entries:
-            raise KeyboardInterrupt
+            raise KeyboardInterrupt(
+                "interrupted before a run could be brought home; nothing is kept"
+            )
         origin = provenance.collect(argv, started, datetime.now(UTC))
         comparing.write(writer, result)
         if request.figures:

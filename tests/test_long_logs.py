@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import errno
 import io
+import math
 import os
 import signal
 import subprocess
+import sys
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from config_samples import loaded
 from conftest import Constant, adrift, corrected, kinds
 from logbook_samples import ENVIRONMENT, PYTHON, assert_same, files, log, recording, write_log
 
+from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
+from podusv_cli.controllers.base import Controller
 from podusv_cli.controllers.pid import Pid
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import ClosedLoop, simulate
@@ -106,27 +109,49 @@ def test_a_run_that_diverges_keeps_all_rows_before(
     assert_same(whole, pieces)
 
 
-class Striking(InMemory):
+@pytest.mark.parametrize("every", [1, 3])
+@pytest.mark.parametrize("last", range(13))
+def test_logs_with_vectors_end_wherever_they_end(tmp_path: Path, last: int, every: int) -> None:
+    """At a border of pieces, which have four rows, too."""
+
+    class Ending(AdaptiveNeural):
+        @staticmethod
+        def law(t, x, memory, target, k, table, tau, rate, signals, work):  # type: ignore[no-untyped-def, override]
+            AdaptiveNeural.law(t, x, memory, target, k, table, tau, rate, signals, work)
+            if t > 0.01 * last - 0.005:
+                tau[0] = math.nan
+
+    loop, grid = corrected(controller=Ending()), TimeGrid(0.01, STEPS, log_every=every)
+    whole, pieces = both(tmp_path, loop, grid, 4 * 8 * loop.layout(grid).width)
+    assert whole.status == "diverged"
+    assert len(whole["time"]) <= -(-last // every)
+    assert_same(whole, pieces)
+
+
+class Striking(ColumnFiles):
     """Columns that interrupt the process when they get their n-th piece."""
 
-    def __init__(self, nth: int) -> None:
-        super().__init__()
+    def __init__(self, place: Path, nth: int) -> None:
+        super().__init__(place)
         self.left = nth
 
     def append(self, rows: Mapping[str, Vector]) -> None:
-        super().append({name: np.array(array) for name, array in rows.items()})
+        super().append(rows)
         self.left -= 1
         if self.left == 0:
             os.kill(os.getpid(), signal.SIGINT)
 
 
+@pytest.mark.parametrize("law", [Pid(), AdaptiveNeural()], ids=type)
 @pytest.mark.parametrize("nth", [1, 3])
-def test_an_interrupt_while_a_piece_is_handed_on_loses_and_doubles_nothing(nth: int) -> None:
-    loop, grid, rows = corrected(controller=Pid()), TimeGrid(0.01, STEPS), 8
+def test_an_interrupt_while_a_piece_is_handed_on_loses_and_doubles_nothing(
+    tmp_path: Path, nth: int, law: Controller
+) -> None:
+    loop, grid, rows = corrected(controller=law), TimeGrid(0.01, STEPS), 8
     whole = simulate(loop, grid, compiled=False)
     with interrupts_caught():
         cut = simulate(
-            loop, grid, compiled=False, columns=Striking(nth),
+            loop, grid, compiled=False, columns=Striking(tmp_path / "c", nth),
             piece=rows * 8 * loop.layout(grid).width,
         )  # fmt: skip
     assert cut.status == "interrupted"
@@ -275,6 +300,7 @@ def test_what_cannot_be_written_is_an_error_in_one_line(tmp_path: Path, case: st
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere memory cannot be limited so")
 def test_a_run_takes_far_less_memory_than_its_log(tmp_path: Path) -> None:
     law = {"law": "adaptive_neural", "period": 0, "compiled": "true"}
     text = SCENARIO.format(actuator="{kind: saturated}", **law)

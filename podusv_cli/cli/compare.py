@@ -66,6 +66,7 @@ def compare(
         warned(finding)
     _warn(done)
     if done.status == "interrupted":
+        typer.echo("interrupted; what was done by then is compared, without figures", err=True)
         raise typer.Exit(INTERRUPTED)
     raise typer.Exit(SOME_FAILED if any(done.result.endings.values()) else 0)
 

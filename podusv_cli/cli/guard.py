@@ -46,8 +46,9 @@ def _code_of(command: Callable[[], None], interrupts: Interrupts) -> int:
     except typer.Exit as end:
         return end.exit_code
     except (Exception, KeyboardInterrupt) as error:
-        foreseen = isinstance(error, (PodusvError, OSError))
-        if interrupts.number and not foreseen:  # which machine code may have turned into anything
+        unforeseen = not isinstance(error, (PodusvError, OSError, KeyboardInterrupt))
+        if interrupts.number and unforeseen:  # a library may have turned an interrupt into anything
+            _say(f"podusv: interrupted, and then {type(error).__name__}: {error}")
             return INTERRUPTED
         return told(error)
     return 0
@@ -56,6 +57,8 @@ def _code_of(command: Callable[[], None], interrupts: Interrupts) -> int:
 def told(error: BaseException) -> int:
     """Tell about an error; the exit code it stands for."""
     if isinstance(error, KeyboardInterrupt):
+        if str(error):
+            _say(str(error))
         return INTERRUPTED
     if isinstance(error, BrokenPipeError):
         _silence(sys.stdout)

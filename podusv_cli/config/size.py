@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from podusv_cli.config.checking import Check
@@ -17,6 +18,7 @@ HELD = 256 * 2**20  # bytes of a log that is held in memory; a larger one goes t
 BYTES = {"bytes": 1.0, "kB": 1e3, "MB": 1e6, "GB": 1e9, "TB": 1e12, "PB": 1e15}
 TIMES = {"s": 1.0, "min": 60.0, "h": 3600.0, "days": 86400.0, "years": 31557600.0}
 MONITORED = 15  # numbers that the stability monitor adds to a row, whatever the law
+UNLOGGED = 11  # more, which it needs until the run is made
 # Rough costs on one core, see benchmarks/results.md: a step, a step's part for each number of the
 # law's memory, both with machine code and in plain Python; and what a byte of log takes to be
 # watched, packed and written.
@@ -31,14 +33,16 @@ LEAST_PACKED = 0.2  # what even a dull one takes
 class Size:
     """What a run of a scenario amounts to; but for `steps`, `rows` and `content` rough guesses.
 
-    `content` is what the log's numbers take, `disk` its file [bytes]; `needed` is what has to be
-    free on the disk at the very least while the run is made.
+    `content` is what the log's numbers take, `disk` its file [bytes]; `scratch` is what lies on the
+    disk until the run is made, where memory does not hold it, and `needed` what has to be free at
+    the very least.
     """
 
     steps: int
     rows: int
     content: int
     seconds: float
+    scratch: int
 
     @property
     def disk(self) -> float:
@@ -52,8 +56,8 @@ class Size:
 
     @property
     def needed(self) -> float:
-        """A log that is not held in memory lies on the disk as it is and packed."""
-        return LEAST_PACKED * self.content + (self.content if self.content > HELD else 0)
+        """For this run alone."""
+        return needed([self], 1)
 
     def __str__(self) -> str:
         """Time, memory and disk in words."""
@@ -69,7 +73,15 @@ def estimate(scenario: Scenario) -> Size:
     step = STEP + MEMORY * sum(size for _, size in law.slots())
     pace = 1.0 if scenario.simulation.compiled else PLAIN
     seconds = START + grid.steps * step * pace + content * BYTE
-    return Size(grid.steps, grid.rows, content, seconds)
+    unlogged = grid.rows * UNLOGGED * NUMBER if _monitored(scenario) else 0
+    scratch = content + unlogged if content > HELD else 0
+    return Size(grid.steps, grid.rows, content, seconds, scratch)
+
+
+def needed(sizes: Sequence[Size], at_once: int) -> float:
+    """Bytes that have to be free on the disk for some runs, so many of them made at once."""
+    scratch = sorted(size.scratch for size in sizes)[-at_once:]
+    return LEAST_PACKED * sum(size.content for size in sizes) + sum(scratch)
 
 
 def largest(scenario: Scenario) -> Size:

@@ -68,7 +68,8 @@ class ClosedLoop:
 
     def first_memory(self) -> Vector:
         """The law's memory at t = 0."""
-        return self.controller.start(np.array(self.start), self.first_target(), self.nominal)
+        with np.errstate(all="ignore"):  # a start beyond all numbers is for the run to tell
+            return self.controller.start(np.array(self.start), self.first_target(), self.nominal)
 
     def first_target(self) -> Vector:
         """Where the target is at t = 0."""

@@ -21,7 +21,7 @@ CAUSES = {
     errno.EPERM: "not permitted",
     errno.EROFS: "the file system is read-only",
     errno.ENOENT: "no such file or folder",
-    errno.EEXIST: "something else of that name exists",
+    errno.EEXIST: "something that exists already is in the way",
     errno.ENOTDIR: "a part of the path is a file, not a folder",
     errno.ELOOP: "a symbolic link, which podusv does not follow here",
     errno.ENAMETOOLONG: "the name is too long",

@@ -43,7 +43,7 @@ def _append(path: Path, array: Vector) -> None:
     flags = os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC
     descriptor = os.open(path, flags, 0o600)
     try:
-        write_out(descriptor, np.ascontiguousarray(array).data.cast("B"))
+        write_out(descriptor, np.ascontiguousarray(array).reshape(-1).data.cast("B"))
     finally:
         os.close(descriptor)
 

@@ -97,19 +97,21 @@ class RunWriter:
     def finish(self, status: Status, missing: str = "") -> Path:
         """Write the manifest and give the folder its name, which is returned.
 
-        What lacks something, for the reason `missing`, replaces nothing. After an error that says
-        where the folder is instead, it is there, whole.
+        What was interrupted replaces nothing; it gets a number appended to its name. What lacks
+        something, for the reason `missing`, replaces nothing either. After an error that says where
+        the folder is instead, it is there, whole.
         """
+        whole = status != "interrupted"
         sweep(self.folder)  # of runs nested in here whose process was killed
         manifest.write(self.folder, status)
         for inner, _, _ in os.walk(self.folder):
             atomic.sync_folder(Path(inner))
         try:
             _refuse(self.final, self._force)
-            self._staging.publish(replace=self._force and not missing)
+            self._staging.publish(replace=self._force and whole and not missing)
         except Taken as error:
             other = self._publish_beside()
-            if self._named:
+            if self._named and whole:
                 texts = (missing, str(error), f"this one is in {other} instead")
                 raise StorageError("; ".join(filter(None, texts))) from error
         return self._staging.final

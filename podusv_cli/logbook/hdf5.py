@@ -6,6 +6,7 @@ import hashlib
 from collections.abc import Iterator, Mapping
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
+from functools import partial
 
 import h5py
 import numpy as np
@@ -35,7 +36,9 @@ class Log:
 
     def add(self, arrays: Mapping[str, Vector]) -> None:
         """Have more arrays written, which stay as they are; `time` with the first ones."""
-        self._under_way.append(self._thread.submit(self._write, arrays))
+        steps = [partial(self._make_axes, arrays)]
+        steps += [partial(self._write, n, arrays[n]) for n in sorted(arrays, key="time".__ne__)]
+        self._under_way += map(self._thread.submit, steps)
 
     def done(self) -> None:
         """Wait until all is written.
@@ -46,18 +49,19 @@ class Log:
         while self._under_way:
             self._under_way.pop(0).result()
 
-    def _write(self, arrays: Mapping[str, Vector]) -> None:
+    def _make_axes(self, arrays: Mapping[str, Vector]) -> None:
         for axis, size in self._new_axes(arrays).items():
             if axis != "time":
                 self._scales[axis] = _scale(self._file, axis, size)
-        for name in sorted(arrays, key="time".__ne__):
-            dataset = _write(self._file, name, arrays[name], self._stream)
-            if name == "time":
-                dataset.make_scale(name)
-                self._scales[name] = dataset
-                continue
-            for position, axis in enumerate(layout.axes(name)):
-                dataset.dims[position].attach_scale(self._scales[axis])
+
+    def _write(self, name: str, array: Vector) -> None:
+        dataset = _write(self._file, name, array, self._stream)
+        if name == "time":
+            dataset.make_scale(name)
+            self._scales[name] = dataset
+            return
+        for position, axis in enumerate(layout.axes(name)):
+            dataset.dims[position].attach_scale(self._scales[axis])
 
     def _new_axes(self, arrays: Mapping[str, Vector]) -> dict[str, int]:
         """How long every axis is that has no scale yet, in the order in which they come up."""
@@ -94,8 +98,12 @@ def opened(
         _describe(file, facts)
         with ThreadPoolExecutor(1) as thread:
             log = Log(file, stream, thread)
-            yield log
-            log.done()
+            try:
+                yield log
+                log.done()
+            except BaseException:  # nobody waits for the rest of a log that will not be
+                thread.shutdown(cancel_futures=True)
+                raise
         _write_provenance(file, resolved_yaml)
     stream.check()
 

@@ -11,7 +11,7 @@ from podusv_cli.engine.simulate import ClosedLoop
 from podusv_cli.recording import Recording
 
 REPLAYS = 25
-QUARTILES = [6, 12, 18]  # of the times in order
+QUARTILES = [REPLAYS * quarter // 4 for quarter in (1, 2, 3)]  # of the times in order
 
 
 def law_costs(runs: Sequence[tuple[ClosedLoop, Recording]]) -> list[dict[str, float]]:

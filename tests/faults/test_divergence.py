@@ -10,7 +10,7 @@ import faulty_laws
 import numpy as np
 import pytest
 from command_samples import BASE, Command, commanded, write
-from conftest import Constant, adrift, run
+from conftest import Constant, adrift, corrected, run
 
 from podusv_cli.engine import blocks
 from podusv_cli.engine.asking import check_law
@@ -158,5 +158,6 @@ def test_numbers_that_overflow_are_left_for_the_run_to_tell() -> None:
         def law(t, x, memory, target, k, table, tau, rate, signals, work):  # type: ignore[no-untyped-def, override]
             tau[:] = np.float64(1e200) * np.float64(1e200)
 
+    assert corrected(start=(1e200, 0.0, 0.0, 0.0, 0.0, 0.0)).first_memory().size
     check_law(adrift(controller=Overflowing()))
     assert run(adrift(controller=Overflowing()), 1.0, compiled=False).status == "diverged"

@@ -23,6 +23,7 @@ from command_samples import (
     wait_for,
     write,
 )  # fmt: skip
+from logbook_samples import files
 
 from podusv_cli import comparing, running
 from podusv_cli.logbook import manifest
@@ -41,7 +42,8 @@ def podusv(
 def test_nothing_finished_leaves_nothing(podusv: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     lost = Outcome(failure=INTERRUPTED, cut=True)
     monkeypatch.setattr(comparing, "run_all", lambda jobs, *rest: [lost] * len(jobs))
-    assert podusv("compare", "--no-figures", write("two.yaml", TWO), "--out", "x") == (130, "", "")
+    said = podusv("compare", "--no-figures", write("two.yaml", TWO), "--out", "x")
+    assert said == (130, "", "interrupted before a run could be brought home; nothing is kept\n")
     assert [path.name for path in Path().iterdir()] == ["two.yaml"]
 
 
@@ -79,7 +81,7 @@ def test_an_interrupt_while_drawing_costs_the_figures_only(
         assert process.returncode == code, err
         assert gone(process)
     assert "compared 2 runs: x" in out
-    assert "Traceback" not in err
+    assert err == "interrupted; what was done by then is compared, without figures\n"
     assert manifest.check(Path("x")).status == "interrupted"
     assert manifest.check(Path("x/soft")).status == "finished"
     assert Path("x/report.html").is_file()
@@ -106,6 +108,31 @@ def test_an_interrupted_run_is_kept(
     assert said.err.startswith("long.yaml: interrupted after t = ")
     assert manifest.check(Path("x")).status == "interrupted"
     assert 0 < open_run(Path("x")).recording["time"][-1] < 2e5
+
+
+def test_an_interrupted_run_takes_no_finished_ones_place(
+    podusv: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert podusv("run", write("short.yaml", BASE), "--out", "x", "--no-figures").code == 0
+    old = files(Path("x"))
+    monkeypatch.setattr(running, "simulate", soon(signal.SIGINT, running.simulate))
+    said = podusv("run", write("long.yaml", LONG), "--out", "x", "--force")
+    assert (said.code, said.out) == (130, "pid interrupted: x-2\n")
+    assert files(Path("x")) == old
+    assert manifest.check(Path("x-2")).status == "interrupted"
+
+
+def test_a_fault_after_an_interrupt_is_told(
+    podusv: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def faulty(*args: object) -> None:
+        raise TypeError("no such thing")
+
+    monkeypatch.setattr(running, "simulate", soon(signal.SIGINT, running.simulate))
+    monkeypatch.setattr(running, "_beyond", faulty)
+    said = podusv("run", write("long.yaml", LONG), "--out", "x")
+    assert said == (130, "", "podusv: interrupted, and then TypeError: no such thing\n")
+    assert not Path("x").exists()
 
 
 @pytest.mark.parametrize(("number", "code"), SIGNALS)
