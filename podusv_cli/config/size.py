@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from podusv_cli.amounts import bytes_in_words, time_in_words
 from podusv_cli.config.checking import Check
 from podusv_cli.config.scenario import Scenario, Simulation
 from podusv_cli.controllers.polar_backstepping import PolarBackstepping
@@ -15,8 +16,6 @@ from podusv_cli.paths.base import TARGET
 MOST_STEPS = 10**8
 MOST_CONTENT = 4 * 10**9  # bytes; what podusv reads back
 HELD = 256 * 2**20  # bytes of a log that is held in memory; a larger one goes to the disk in pieces
-BYTES = {"bytes": 1.0, "kB": 1e3, "MB": 1e6, "GB": 1e9, "TB": 1e12, "PB": 1e15}
-TIMES = {"s": 1.0, "min": 60.0, "h": 3600.0, "days": 86400.0, "years": 31557600.0}
 MONITORED = 15  # numbers that the stability monitor adds to a row, whatever the law
 UNLOGGED = 11  # more, which it needs until the run is made
 # Rough costs on one core, see benchmarks/results.md: a step, a step's part for each number of the
@@ -62,7 +61,7 @@ class Size:
     def __str__(self) -> str:
         """Time, memory and disk in words."""
         memory, disk = bytes_in_words(self.memory), bytes_in_words(self.disk)
-        return f"about {_time(self.seconds)}, {memory} of memory and {disk} of disk"
+        return f"about {time_in_words(self.seconds)}, {memory} of memory and {disk} of disk"
 
 
 def estimate(scenario: Scenario) -> Size:
@@ -141,18 +140,3 @@ def _too_full(every: int, size: Size, insist: str) -> tuple[str, str]:
 
 def _or_insist(insist: str) -> str:
     return f", or insist with {insist}" if insist else ""
-
-
-def bytes_in_words(count: float) -> str:
-    """Such as `3.2 GB`."""
-    return _in_words(count, BYTES)
-
-
-def _time(seconds: float) -> str:
-    return _in_words(seconds, TIMES)
-
-
-def _in_words(amount: float, units: dict[str, float]) -> str:
-    fitting = [unit for unit, size in units.items() if amount >= size] or [next(iter(units))]
-    digits = f"{amount / units[fitting[-1]]:.2g}"
-    return f"{float(digits):g} {fitting[-1]}"

@@ -15,6 +15,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from podusv_cli.amounts import bytes_in_words
 from podusv_cli.errors import StorageError
 from podusv_cli.logbook import atomic, jsonfile, manifest
 from podusv_cli.logbook.regular import read_text
@@ -22,7 +23,6 @@ from podusv_cli.logbook.staging import Staging, Taken, sweep
 from podusv_cli.logbook.stream import Stream, growing
 from podusv_cli.recording import Recording, Status
 
-GB = 1e9  # bytes
 LOG, THEORY = "log.h5", "theory.json"
 NEEDED = (LOG, "metrics.json", "provenance.json", "resolved.yaml")
 
@@ -169,8 +169,8 @@ def _require(final: Path, needed: float) -> None:
         free = shutil.disk_usage(final.parent).free
     if needed > free:
         raise StorageError(
-            f"cannot make {final}: it takes {needed / GB:.3g} GB of disk or more, and "
-            f"{free / GB:.3g} GB are free; log less often (log.every), or elsewhere (--out)"
+            f"cannot make {final}: it takes {bytes_in_words(needed)} of disk or more, and "
+            f"{bytes_in_words(free)} are free; log less often (log.every), or elsewhere (--out)"
         )
 
 

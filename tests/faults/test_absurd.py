@@ -219,7 +219,7 @@ def test_what_the_disk_has_no_room_for_is_not_begun(
     said = podusv(command, "a.yaml", *given("simulation.duration=2e4"), "--out", "x")
     assert said.code == 5
     assert said.err == (
-        "cannot make x: it takes 2.19 GB of disk or more, and 2 GB are free; log less often "
+        "cannot make x: it takes 2.2 GB of disk or more, and 2 GB are free; log less often "
         "(log.every), or elsewhere (--out)\n"
     )
     assert {path.name for path in Path().iterdir()} == {"a.yaml"}

@@ -1,0 +1,22 @@
+"""Amounts of data and time in words."""
+
+from __future__ import annotations
+
+BYTES = {"bytes": 1.0, "kB": 1e3, "MB": 1e6, "GB": 1e9, "TB": 1e12, "PB": 1e15}
+TIMES = {"s": 1.0, "min": 60.0, "h": 3600.0, "days": 86400.0, "years": 31557600.0}
+
+
+def bytes_in_words(count: float) -> str:
+    """Such as `3.2 GB`."""
+    return _in_words(count, BYTES)
+
+
+def time_in_words(seconds: float) -> str:
+    """Such as `1.4 min`."""
+    return _in_words(seconds, TIMES)
+
+
+def _in_words(amount: float, units: dict[str, float]) -> str:
+    fitting = [unit for unit, size in units.items() if amount >= size] or [next(iter(units))]
+    digits = f"{amount / units[fitting[-1]]:.2g}"
+    return f"{float(digits):g} {fitting[-1]}"
