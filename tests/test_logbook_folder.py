@@ -108,6 +108,19 @@ def test_a_damaged_run_folder_can_be_replaced_too(final: Path) -> None:
     assert content(final) == NEW
 
 
+@pytest.mark.parametrize("name", ["notes.txt", "figures/mine.png"])
+def test_files_that_others_put_into_a_run_folder_are_not_removed(final: Path, name: str) -> None:
+    write(final, OLD)
+    (final / ".DS_Store").touch()  # of a system that shows folders
+    write(final, OLD, force=True)
+    (final / name).write_text("mine")
+    before = files(final)
+    says = f"run holds {name}, which is not the run's; --force would remove it"
+    with pytest.raises(StorageError, match=re.escape(says)):
+        RunWriter(final, force=True)
+    assert files(final) == before
+
+
 @pytest.mark.parametrize("force", [False, True])
 def test_what_is_no_run_folder_is_never_replaced(final: Path, force: bool) -> None:
     final.mkdir(parents=True)

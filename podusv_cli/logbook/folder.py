@@ -50,7 +50,8 @@ class RunWriter:
     Made before the simulation, so that a place that cannot be written to is known at once; leaving
     the `with` block without `finish` leaves nothing behind. A run folder that exists is replaced,
     whole, only with `force`; anything else, except an empty folder, never is. A run folder is one
-    with a readable manifest, damaged files or not. Every method raises StorageError.
+    with a readable manifest, damaged files or not, and nothing else but hidden files. Every method
+    raises StorageError.
 
     Where somebody else takes the name in the meantime, a number is appended to it. That is an error
     where somebody asked for just this name (`named`), and as good otherwise.
@@ -156,11 +157,14 @@ def _refuse(final: Path, force: bool) -> None:
         if not any(final.iterdir()):
             return
     try:
-        manifest.read(final)
+        found = manifest.read(final)
     except StorageError as error:
         raise Taken(f"{final} exists and is not a finished run folder") from error
     if not force:
         raise Taken(f"{final} exists already; --force replaces it")
+    shown = (name for name in manifest.foreign(final, found) if not Path(name).name.startswith("."))
+    if other := next(shown, ""):
+        raise Taken(f"{final} holds {other}, which is not the run's; --force would remove it")
 
 
 def _require(final: Path, needed: float) -> None:
