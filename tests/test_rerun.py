@@ -174,9 +174,9 @@ def test_ctrl_c_ends_it_and_leaves_nothing(run: Path, tmp_path: Path) -> None:
 
 
 def test_what_is_no_run_folder(run: Path, tmp_path: Path, podusv: Command) -> None:
-    for path in (tmp_path, tmp_path / "nowhere", run / "log.h5"):
-        said = podusv("rerun", path)
-        assert said == (2, "", f"{path} is no run folder: it has no manifest.json\n")
+    reason = {tmp_path: "it has no manifest.json", run / "log.h5": "it has no manifest.json"}
+    for path, why in (reason | {tmp_path / "nowhere": "nothing has that name"}).items():
+        assert podusv("rerun", path) == (2, "", f"{path} is no run folder: {why}\n")
     broken = copied(run, tmp_path / "broken")
     (broken / "resolved.yaml").write_text("name: x\n")
     assert podusv("rerun", broken).code == 5

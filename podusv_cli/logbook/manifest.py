@@ -49,7 +49,8 @@ def write(folder: Path, status: Status) -> Manifest:
 def demand(folder: Path) -> None:
     """UsageError where a folder has no manifest: it is no run's and no comparison's."""
     if not os.path.lexists(folder / NAME):
-        raise UsageError(f"{folder} is no run folder: it has no {NAME}")
+        why = f"it has no {NAME}" if os.path.lexists(folder) else "nothing has that name"
+        raise UsageError(f"{folder} is no run folder: {why}")
 
 
 def read(folder: Path) -> Manifest:
