@@ -150,7 +150,8 @@ def compare(
             figures = extras.attempt(lambda: comparing.drawn(result, progress)) or {}
             for name, content in figures.items():
                 writer.add(f"figures/{name}", content)
-            page = comparing.as_report(result, title, figures, origin)
+            heading = f"{title} (interrupted)" if extras.interrupted else title
+            page = comparing.as_report(result, heading, figures, origin)
             writer.add("report.html", page.encode())
         writer.add_json("provenance.json", origin)
         status: Status = "interrupted" if extras.interrupted else "finished"
