@@ -115,3 +115,10 @@ def gone(process: subprocess.Popen[str]) -> bool:
             return True
         time.sleep(0.02)
     return False
+
+
+def one_line(text: str) -> str:
+    """The text, which has to be one line for people."""
+    assert text.count("\n") == 1, text
+    assert "Traceback" not in text
+    return text.removesuffix("\n")

@@ -15,6 +15,7 @@ import pytest
 import yaml
 from command_samples import Command, commanded, write
 from hypothesis import settings
+from old_results import among_old_results
 
 import podusv_cli
 from podusv_cli.actuators.base import Actuator
@@ -212,6 +213,21 @@ def podusv(
     monkeypatch.chdir(tmp_path)
     write("a.yaml", SOUND)
     return commanded(monkeypatch, capsys, columns=80)
+
+
+@pytest.fixture(scope="module")
+def before(tmp_path_factory: pytest.TempPathFactory) -> File:
+    """Where old results are, once they are made."""
+    return tmp_path_factory.mktemp("before")
+
+
+@pytest.fixture
+def beside_old_results(
+    before: File, tmp_path: File, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> Command:  # fmt: skip
+    """The command line in a folder with finished results, the same for every test of a file."""
+    return among_old_results(before, tmp_path, monkeypatch, capsys)
 
 
 @pytest.fixture(autouse=True)

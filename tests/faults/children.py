@@ -123,10 +123,3 @@ CAN_MOUNT = hasattr(os, "fork") and os.path.isdir("/proc/self/ns") and _can_moun
 needs_mount = pytest.mark.skipif(
     not CAN_MOUNT, reason="mounting a small disk needs root and a mount namespace of one's own"
 )
-
-
-def one_line(text: str) -> str:
-    """The text, which has to be one line for people."""
-    assert text.count("\n") == 1, text
-    assert "Traceback" not in text
-    return text.removesuffix("\n")

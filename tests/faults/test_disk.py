@@ -12,14 +12,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from children import in_a_child, needs_mount, one_line, small_disk
-from command_samples import BASE, ROOT, Command, Said, write
+from children import in_a_child, needs_mount, small_disk
+from command_samples import BASE, ROOT, Command, Said, one_line, write
 from counts import count
 from logbook_samples import deadline, files
 from old_results import (
     COMMANDS,
     SUCCESS,
-    among_old_results,
     assert_nothing_lost,
     assert_whole,
     bring_back,
@@ -38,18 +37,9 @@ LIMITS = [(made, words, limit) for made, words in WRITING for limit in (1000, 0)
 LIMITS += [(made, words, 50_000) for made, words in WRITING if words[0] not in ("plot", "verify")]
 
 
-@pytest.fixture(scope="module")
-def before(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where old results are, once they are made."""
-    return tmp_path_factory.mktemp("before")
-
-
 @pytest.fixture
-def podusv(
-    before: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> Command:  # fmt: skip
-    return among_old_results(before, tmp_path, monkeypatch, capsys)
+def podusv(beside_old_results: Command) -> Command:
+    return beside_old_results
 
 
 @pytest.mark.parametrize(("made", "words", "limit"), LIMITS, ids=str)

@@ -7,11 +7,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from children import give_up_rights, in_a_child, one_line
-from command_samples import LONG, TWO, Command, Said, write
+from children import give_up_rights, in_a_child
+from command_samples import LONG, TWO, Command, Said, one_line, write
 from counts import count
 from logbook_samples import deadline
-from old_results import among_old_results
 
 from podusv_cli import comparing, repeating, running
 from podusv_cli.figures import drawing
@@ -54,18 +53,8 @@ INSIDE = [(*words, "--out", "place/new") for words in (RUN, COMPARE, *RERUNS, *P
 ITSELF = [(*words, "--out", "place") for words in (RUN, COMPARE, *RERUNS, ("plot", "x"))]
 
 
-@pytest.fixture(scope="module")
-def before(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where old results are, once they are made."""
-    return tmp_path_factory.mktemp("before")
-
-
 @pytest.fixture
-def podusv(
-    before: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> Command:  # fmt: skip
-    run = among_old_results(before, tmp_path, monkeypatch, capsys)
+def podusv(beside_old_results: Command, monkeypatch: pytest.MonkeyPatch) -> Command:
     write("long.yaml", MINUTES)
     Path().chmod(0o755)
     monkeypatch.setattr(running, "simulate", begun)
@@ -73,7 +62,7 @@ def podusv(
         monkeypatch.setattr(room, "run_all", begun)
         monkeypatch.setattr(room, "warm_up", begun)
     monkeypatch.setattr(drawing, "draw_in_parallel", begun)
-    return run
+    return beside_old_results
 
 
 def begun(*given: object, **more: object) -> None:

@@ -21,7 +21,6 @@ from logbook_samples import Saboteur, files, until_nothing_breaks
 from old_results import (
     COMMANDS,
     SUCCESS,
-    among_old_results,
     assert_whole,
     bring_back,
     left_over,
@@ -33,18 +32,9 @@ from podusv_cli.parts import part_name
 CALLS = ("mkdir", "open", "write", "fsync", "replace", "rename", "unlink", "rmdir")
 
 
-@pytest.fixture(scope="module")
-def before(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where old results are, once they are made."""
-    return tmp_path_factory.mktemp("before")
-
-
 @pytest.fixture
-def podusv(
-    before: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> Command:  # fmt: skip
-    return among_old_results(before, tmp_path, monkeypatch, capsys)
+def podusv(beside_old_results: Command) -> Command:
+    return beside_old_results
 
 
 def counted(work: Callable[[], object], nth: int = 0) -> int:

@@ -13,7 +13,7 @@ import pytest
 from command_samples import Command, Said
 from counts import count
 from logbook_samples import Saboteur, fails, files
-from old_results import COMMANDS, SUCCESS, among_old_results, assert_nothing_lost, bring_back
+from old_results import COMMANDS, SUCCESS, assert_nothing_lost, bring_back
 
 from podusv_cli import comparing, parallel, repeating
 from podusv_cli.interrupts import Interrupts
@@ -28,21 +28,12 @@ def one_by_one(jobs: Sequence[parallel.Job], *more: object) -> list[parallel.Out
     return [parallel._outcome(job, lambda fraction: None, Interrupts()) for job in jobs]
 
 
-@pytest.fixture(scope="module")
-def before(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where old results are, once they are made."""
-    return tmp_path_factory.mktemp("before")
-
-
 @pytest.fixture
-def podusv(
-    before: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> Command:  # fmt: skip
+def podusv(beside_old_results: Command, monkeypatch: pytest.MonkeyPatch) -> Command:
     monkeypatch.setattr(provenance, "collect", lambda *of_a_run: {})  # which takes its time
     for room in (comparing, repeating):
         monkeypatch.setattr(room, "run_all", one_by_one)
-    return among_old_results(before, tmp_path, monkeypatch, capsys)
+    return beside_old_results
 
 
 def sabotaged(

@@ -8,11 +8,11 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from children import FORK, begun, one_line
-from command_samples import Command, Said
+from children import FORK, begun
+from command_samples import Command, Said, one_line
 from counts import count
 from logbook_samples import files
-from old_results import among_old_results, bring_back, left_over
+from old_results import bring_back, left_over
 
 from podusv_cli.logbook import folder, manifest
 
@@ -21,18 +21,9 @@ COMPARE = ("compare", "two.yaml", "--no-figures")
 TIMES = range(count(2, 40))
 
 
-@pytest.fixture(scope="module")
-def before(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where old results are, once they are made."""
-    return tmp_path_factory.mktemp("before")
-
-
 @pytest.fixture
-def podusv(
-    before: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> Command:  # fmt: skip
-    return among_old_results(before, tmp_path, monkeypatch, capsys)
+def podusv(beside_old_results: Command) -> Command:
+    return beside_old_results
 
 
 def at_once(podusv: Command, *commands: Sequence[str]) -> list[Said]:

@@ -8,8 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
-from children import one_line
-from command_samples import BASE, TWO, Command, Said, commanded, write
+from command_samples import BASE, TWO, Command, Said, commanded, one_line, write
 from logbook_samples import files
 
 from podusv_cli.figures import drawing
