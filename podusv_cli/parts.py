@@ -27,6 +27,11 @@ def part_name(final: str = "") -> str:
     return f"{shown}.podusv-{_machine()}-{os.getpid()}-{secrets.token_hex(4)}.part"
 
 
+def is_part(name: str) -> bool:
+    """Whether this is the name of a part, whoever makes it."""
+    return _PART.fullmatch(name) is not None
+
+
 def abandoned(folder: Path) -> Iterator[tuple[Path, str]]:
     """Parts in `folder` whose makers are dead, and their final names ("" where not told).
 

@@ -8,18 +8,23 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
 from ctypes import CFUNCTYPE, c_double
+from enum import Enum
 from pathlib import Path
 from threading import Thread
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
 from conftest import PACKAGE, Constant, adrift, run
+from numba import njit
 
-from podusv_cli.engine import compiling, machine_code
+from podusv_cli.engine import code_folder, compiling, machine_code
 from podusv_cli.kernels import Vector, kernel, specialise
 from podusv_cli.kinematics import wrap
+from podusv_cli.parts import part_name
 
 SCRIPT = """
 import json, sys
@@ -144,44 +149,78 @@ def test_kernels_that_read_different_constants_are_not_taken_for_each_other() ->
 
 
 @pytest.fixture
-def fresh_folder() -> Any:
-    machine_code.cache_folder.cache_clear()
-    yield machine_code.cache_folder
-    machine_code.cache_folder.cache_clear()
+def code_kept() -> Iterator[Callable[[int], Path | None]]:
+    """Where code of the n-th state of the source is kept, asked anew each time."""
+
+    def asked(number: int) -> Path | None:
+        code_folder.code_folder.cache_clear()
+        return code_folder.code_folder(f"{number:016x}")
+
+    code_folder.code_folder.cache_clear()
+    yield asked
+    code_folder.code_folder.cache_clear()
 
 
-def test_a_cache_in_a_shared_folder_leaves_what_is_not_its_own(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fresh_folder: Any
+MANY = code_folder.KEPT + 4
+
+
+def test_a_cache_among_other_folders_leaves_what_is_not_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code_kept: Any
 ) -> None:
-    for number in range(machine_code.KEPT + 4):
-        (tmp_path / f"measurements-{number}").mkdir()
+    """Also where their names are those of caches, or somebody put a file into a cache."""
     monkeypatch.setenv("PODUSV_CACHE", str(tmp_path))
-    assert fresh_folder() is not None
-    assert len(list(tmp_path.glob("measurements-*"))) == machine_code.KEPT + 4
+    for number in range(MANY):
+        theirs = tmp_path / f"{number:016x}"
+        theirs.mkdir()
+        (theirs / "thesis.tex").touch()
+        (theirs / "of-mine.code").touch()
+        (code_kept(100 + number) / f"notes-{number}").touch()
+        code_kept(200 + number)
+    assert len(list(tmp_path.glob("*/thesis.tex"))) == MANY
+    assert len(list(tmp_path.glob("*/of-mine.code"))) == MANY
+    assert len(list(tmp_path.glob("*/notes-*"))) == MANY
+
+
+def test_a_folder_that_only_looks_like_a_cache_is_left(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code_kept: Any
+) -> None:
+    """Without the mark, with another program's, or with a link in its place."""
+    monkeypatch.setenv("PODUSV_CACHE", str(tmp_path))
+    for number in range(MANY):
+        empty, other, link = (tmp_path / f"{n + number:016x}" for n in (100, 200, 300))
+        empty.mkdir()
+        other.mkdir()
+        (other / code_folder.MARK).write_bytes(b"Signature: 8a477f597d28d172789f06886806bc55")
+        link.symlink_to(code_kept(400))
+        code_kept(500 + number)
+    assert len(list(tmp_path.iterdir())) == 3 * MANY + code_folder.KEPT + 1
 
 
 def test_old_caches_are_forgotten(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fresh_folder: Any
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code_kept: Any
 ) -> None:
     monkeypatch.setenv("PODUSV_CACHE", str(tmp_path))
-    for number in range(machine_code.KEPT + 4):
-        monkeypatch.setattr(machine_code, "source_digest", lambda n=number: f"{n:016x}")
-        fresh_folder.cache_clear()
-        folder = fresh_folder()
+    for number in range(MANY):
+        folder = code_kept(number)
+        (folder / "law_entry_1.code").touch()
+        (folder / part_name()).touch()
         os.utime(folder, (number, number))
-    fresh_folder.cache_clear()
-    assert fresh_folder() == folder
-    left = sorted(int(path.name, 16) for path in tmp_path.iterdir() if path.is_dir())
-    assert left == list(range(machine_code.KEPT + 4))[-machine_code.KEPT - 1 :]
+    assert code_kept(MANY - 1) == folder
+    left = sorted(int(path.name, 16) for path in tmp_path.iterdir())
+    assert left == list(range(MANY))[-code_folder.KEPT - 1 :]
 
 
-def test_a_folder_that_cannot_be_written_is_passed_over(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fresh_folder: Any
+def test_a_folder_that_cannot_be_written_is_passed_over_and_that_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code_kept: Any, caplog: Any
 ) -> None:
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("PODUSV_CACHE", str(tmp_path / "file"))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
-    assert fresh_folder() == tmp_path / "home/podusv" / machine_code.source_digest()
+    assert code_kept(1) == tmp_path / "home/podusv" / f"{1:016x}"
+    assert caplog.messages == [
+        f"podusv: compiled code is kept in {tmp_path}/home/podusv "
+        f"({tmp_path}/file: {tmp_path}/file is not a folder)"
+    ]
 
 
 def test_machine_code_is_what_the_kernel_computes() -> None:
@@ -215,12 +254,75 @@ def one_after_the_other(x: float) -> float:
 
 
 SHIFT = np.array([1.0, 2.0])
+SETTINGS = ModuleType("settings")
 
 
 @kernel
 def shifted(x: float) -> float:
     """A number out of a table."""
     return x + float(SHIFT[1])
+
+
+@kernel
+def tuned(x: float) -> float:
+    """A number of a module, and one of a module in it."""
+    module = SETTINGS
+    return x * module.GAIN + SETTINGS.inner.OFFSET
+
+
+@kernel
+def tuned_twice(x: float) -> float:
+    """The module's numbers are read by a kernel and by the one that it calls."""
+    return tuned(x) * SETTINGS.OTHER
+
+
+def settings(gain: object = 1.0, offset: float = 1.0, other: float = 1.0) -> ModuleType:
+    """A module with these numbers."""
+    module, module.inner = ModuleType("settings"), ModuleType("inner")
+    module.GAIN, module.inner.OFFSET, module.OTHER = gain, offset, other
+    return module
+
+
+def tuned_by(**numbers: Any) -> Any:
+    """The kernels that read the module, with these numbers in it."""
+    inner = specialise(tuned, "tuned", SETTINGS=settings(**numbers))
+    return specialise(tuned_twice, "tuned_twice", tuned=inner, SETTINGS=settings(**numbers))
+
+
+class Slow(Enum):
+    """An enumeration of the same name as another."""
+
+    PACE = 1
+
+
+Fast = Enum("Slow", {"PACE": 2}, module=__name__)
+
+
+@pytest.mark.parametrize(
+    "variants",
+    [
+        [tuned_by(), tuned_by(gain=2.0), tuned_by(offset=2.0), tuned_by(other=2.0)],
+        [tuned_by(gain=njit(doubled)), tuned_by(gain=njit(halved))],
+        [specialise(ready, "ready", FORCE=np.float32(n)) for n in (1, 2)],
+        [specialise(ready, "ready", FORCE=complex(n)) for n in (1, 2)],
+        [specialise(ready, "ready", FORCE=(1.0, np.arange(2000.0) == n)) for n in (900, 901)],
+        [specialise(ready, "ready", FORCE=mode) for mode in (Slow, Fast)],
+        [eval(f"lambda x: (lambda y: {n} * y)(x)") for n in (2, 3)],
+    ],
+    ids=["module", "numba", "float32", "complex", "tuple", "enumeration", "inside"],
+)  # fmt: skip
+def test_whatever_a_kernel_reads_is_in_the_fingerprint(variants: list[Any]) -> None:
+    marks = {machine_code.fingerprint(variant) for variant in variants}
+    assert len(marks) == len(variants)
+
+
+def test_a_changed_number_of_a_module_is_noticed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code_kept: Any
+) -> None:
+    monkeypatch.setenv("PODUSV_CACHE", str(tmp_path))
+    for gain in (2.0, 3.0):
+        code = compiling.compiled(tuned_by(gain=gain), CFUNCTYPE(c_double, c_double))
+        assert code(10.0) == gain * 10.0 + 1.0
 
 
 def test_what_a_name_stands_for_is_in_the_fingerprint() -> None:
@@ -242,15 +344,11 @@ def test_what_a_name_stands_for_is_in_the_fingerprint() -> None:
     assert machine_code.fingerprint(again) == marks[2]
 
 
-def pieces(folder: Path) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-
-
 ONE_TO_ONE = CFUNCTYPE(c_double, c_double)
 
 
 def test_a_damaged_piece_is_made_anew(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fresh_folder: Any
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code_kept: Any
 ) -> None:
     monkeypatch.setenv("PODUSV_CACHE", str(tmp_path))
     assert compiling.compiled(ready, ONE_TO_ONE)(2.5) == 2.5
@@ -265,7 +363,7 @@ def test_a_damaged_piece_is_made_anew(
 
 
 def test_pieces_are_whole_when_several_processes_write_them(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fresh_folder: Any
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code_kept: Any
 ) -> None:
     monkeypatch.setenv("PODUSV_CACHE", str(tmp_path))
     code = machine_code.Code("symbol", bytes(range(256)) * 4000)
@@ -288,15 +386,16 @@ def test_pieces_are_whole_when_several_processes_write_them(
 
 
 def test_a_full_disk_costs_time_only(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fresh_folder: Any
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code_kept: Any
 ) -> None:
-    def full(*paths: Any) -> None:
+    def full(*paths: Any, **folders: Any) -> None:
         raise OSError("no space left on device")
 
     monkeypatch.setenv("PODUSV_CACHE", str(tmp_path))
+    assert code_folder.code_folder(machine_code.source_digest())
     monkeypatch.setattr(os, "replace", full)
     assert compiling.compiled(ready, ONE_TO_ONE)(2.5) == 2.5
-    assert not pieces(tmp_path)
+    assert [path.name for path in tmp_path.rglob("*.*")] == [code_folder.MARK]
 
 
 def test_another_processor_or_version_gets_a_piece_of_its_own(

@@ -12,26 +12,19 @@ from __future__ import annotations
 
 import hashlib
 import os
-import re
-import shutil
-import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
-from functools import cache
+from functools import cache, singledispatch
 from importlib.metadata import version
 from pathlib import Path
-from types import CodeType
+from types import CodeType, FunctionType, ModuleType
 from typing import Any, NamedTuple
 
 import llvmlite.binding as llvm
 import numpy as np
 
-from podusv_cli import kernels
-from podusv_cli.parts import forget_files, part_name
+from podusv_cli.engine import code_folder
 
-OWN = re.compile(r"[0-9a-f]{16}")
-KEPT = 8  # caches of this many states of the source stay on disk
-NUMBERS = (bool, int, float, str, tuple)
 # Rooms and files that hold no kernel: what is edited there leaves machine code as it is.
 APART = (
     "cli", "comparison", "config", "figures", "findings", "logbook", "repetition", "verification",
@@ -48,7 +41,7 @@ class Code(NamedTuple):
 
 def stored(prototype: Any, name: str, translate: Callable[[], Code]) -> Any:
     """The function of this name as ctypes calls it: found on disk, or translated and kept there."""
-    folder = cache_folder()
+    folder = code_folder.code_folder(source_digest())
     path = folder / f"{name}.code" if folder else None
     code = _read(path) if path else None
     if code is None:
@@ -80,7 +73,7 @@ def _loaded(prototype: Any, code: Code) -> Any:
 
 def _read(path: Path) -> Code | None:
     with suppress(OSError):
-        digest, _, rest = path.read_bytes().partition(b"\n")
+        digest, _, rest = code_folder.read(path).partition(b"\n")
         if _seal(path, rest) == digest:
             symbol, _, content = rest.partition(b"\n")
             return Code(symbol.decode(), content)
@@ -89,13 +82,7 @@ def _read(path: Path) -> Code | None:
 
 def _write(path: Path, code: Code) -> None:
     rest = code.symbol.encode() + b"\n" + code.content
-    part = path.with_name(part_name())
-    try:
-        part.write_bytes(_seal(path, rest) + b"\n" + rest)
-        os.replace(part, path)  # whole, whoever else writes or reads it now
-    except BaseException:
-        part.unlink(missing_ok=True)
-        raise
+    code_folder.write(path, _seal(path, rest) + b"\n" + rest)
 
 
 def _seal(path: Path, rest: bytes) -> bytes:
@@ -123,33 +110,74 @@ def _circumstances() -> tuple[str, ...]:
 def ingredients(function: Any, told: dict[Any, int]) -> Iterator[str]:
     """Everything that the machine code of a kernel depends on, the kernels it calls included.
 
-    `told` counts the kernels that have been told already.
+    `told` counts the functions and attributes of modules that have been told already.
     """
     told[function] = len(told)
-    code, outside = function.__code__, function.__globals__
-    yield code.co_code.hex()
-    yield repr([c for c in code.co_consts if not isinstance(c, CodeType)])
-    yield repr((code.co_names, code.co_varnames))
+    names: dict[str, None] = {}
+    for code in _codes(function.__code__):
+        yield code.co_code.hex()
+        yield repr([c for c in code.co_consts if not isinstance(c, CodeType)])
+        yield repr((code.co_names, code.co_varnames))
+        names |= dict.fromkeys(code.co_names)
     # Names of attributes are among these names, too. That one of them may add to the digest what
     # the kernel does not use does no harm.
-    for name in code.co_names:
-        thing = outside.get(name)
-        if not kernels.is_kernel(thing):
-            yield _described(thing)
-        elif thing in told:
-            yield str(told[thing])
-        else:
-            yield from ingredients(thing, told)
+    for name in names:
+        yield from _described(function.__globals__.get(name), names, told)
 
 
-def _described(thing: Any) -> str:
-    """A number by its value, a named tuple by its fields, anything else by what it is called."""
-    if thing is None or isinstance(thing, NUMBERS):
-        return repr(thing)
-    if isinstance(thing, np.ndarray):
-        return f"{thing.dtype}{thing.shape}{thing.tobytes().hex()}"
+def _codes(code: CodeType) -> Iterator[CodeType]:
+    """The code of a function and of the functions inside it."""
+    yield code
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _codes(constant)
+
+
+@singledispatch
+def _described(thing: Any, names: Iterable[str], told: dict[Any, int]) -> Iterator[str]:
+    """What stands behind a name of a function that uses these names.
+
+    A class or a function of a library is told by what it is called. What has no name is told by its
+    address at worst, and then compiled by each process anew.
+    """
     called = getattr(thing, "__qualname__", getattr(thing, "__name__", ""))
-    return repr((getattr(thing, "__module__", ""), called, getattr(thing, "_fields", ())))
+    members = getattr(thing, "__members__", ())  # of an enumeration
+    fields = getattr(thing, "_fields", ())  # of a named tuple
+    yield repr((getattr(thing, "__module__", ""), called or thing, fields, members))
+    if source := getattr(thing, "py_func", None):  # of what numba's own decorators made
+        yield from _described(source, names, told)
+
+
+@_described.register
+def _(thing: FunctionType, names: Iterable[str], told: dict[Any, int]) -> Iterator[str]:
+    if thing in told:
+        yield str(told[thing])
+    else:
+        yield from ingredients(thing, told)
+
+
+@_described.register
+def _(thing: ModuleType, names: Iterable[str], told: dict[Any, int]) -> Iterator[str]:
+    """A module, by what it has of these names: `settings.GAIN`."""
+    yield thing.__name__
+    for name in names:
+        if (thing, name) not in told and hasattr(thing, name):
+            told[thing, name] = len(told)
+            yield name
+            yield from _described(getattr(thing, name), names, told)
+
+
+@_described.register
+def _(thing: tuple, names: Iterable[str], told: dict[Any, int]) -> Iterator[str]:  # type: ignore[type-arg]
+    yield repr((type(thing).__qualname__, getattr(thing, "_fields", ()), len(thing)))
+    for item in thing:
+        yield from _described(item, names, told)
+
+
+@_described.register(np.ndarray)
+@_described.register(np.generic)
+def _(thing: Any, names: Iterable[str], told: dict[Any, int]) -> Iterator[str]:
+    yield f"{thing.dtype}{thing.shape}{thing.tobytes().hex()}"
 
 
 @cache
@@ -162,39 +190,3 @@ def source_digest() -> str:
         if name.parts[0] not in APART:
             digest.update(name.as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()[:16]
-
-
-@cache
-def cache_folder() -> Path | None:
-    """Where compiled code of this state of the source is kept; None where nothing can be written.
-
-    $PODUSV_CACHE, else podusv under $XDG_CACHE_HOME or ~/.cache, else under the temporary folder.
-    """
-    for root in _roots():
-        folder = Path(root) / source_digest()
-        with suppress(OSError):
-            folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-            tempfile.TemporaryFile(dir=folder).close()
-            if folder.stat().st_uid == os.getuid():  # never run code that someone else put there
-                _forget_old(folder)
-                forget_files(folder)
-                return folder
-    return None
-
-
-def _roots() -> Iterator[str]:
-    if given := os.environ.get("PODUSV_CACHE"):
-        yield given
-    home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    if os.path.isabs(home):  # without a home it is `~`, which is no place to make a folder
-        yield f"{home}/podusv"
-    private = f"podusv-{os.getuid() if hasattr(os, 'getuid') else 'user'}"
-    yield f"{tempfile.gettempdir()}/{private}"
-
-
-def _forget_old(current: Path) -> None:
-    # The folder may be shared: only what bears a digest's name is a cache.
-    found = (path for path in current.parent.iterdir() if OWN.fullmatch(path.name))
-    caches = sorted(found, key=lambda path: path.stat().st_mtime, reverse=True)
-    for old in [path for path in caches if path != current and path.is_dir()][KEPT:]:
-        shutil.rmtree(old, ignore_errors=True)

@@ -10,13 +10,15 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from command_samples import BASE, ROOT, write
 
-from podusv_cli.engine import machine_code
+from podusv_cli.engine import code_folder, machine_code
 
-FRESH = machine_code.cache_folder
+FRESH = code_folder.code_folder
+NAME = "0123456789abcdef"
 
 
 @pytest.fixture(autouse=True)
@@ -40,10 +42,12 @@ def begun(out: str, **environment: str) -> subprocess.Popen[str]:
     )  # fmt: skip
 
 
-def log(process: subprocess.Popen[str]) -> bytes:
-    """What the run logged."""
+def log(process: subprocess.Popen[str], said: str = "") -> bytes:
+    """What the run logged; on stderr it began its one line like this."""
     out, err = process.communicate(timeout=120)
-    assert (process.returncode, err) == (0, "")
+    assert process.returncode == 0
+    assert err.startswith(said)
+    assert err.count("\n") == bool(said)
     return (Path(out.strip()) / "log.h5").read_bytes()
 
 
@@ -62,9 +66,10 @@ def test_damage_races_and_missing_places_change_no_byte(folder: Path) -> None:
     together = [begun(out, PODUSV_CACHE=str(cache)) for out in ("a", "b")]
     first, second = map(log, together)
     assert first == second
-    pieces = [path for path in cache.rglob("*") if path.is_file()]
+    pieces = sorted(cache.rglob("*.code"))
     assert len(pieces) >= 8
-    assert all(path.suffix == ".code" for path in pieces)  # nothing half-written is left
+    found = {path for path in cache.rglob("*") if path.is_file()}
+    assert [path.name for path in found - {*pieces}] == [code_folder.MARK]  # no half-written part
     assert log(begun("c", PODUSV_CACHE=str(cache))) == first
     damage = spoil(pieces[0].read_bytes())
     for path in pieces[1:]:
@@ -86,38 +91,122 @@ def test_pieces_swapped_are_not_taken_for_each_other(folder: Path) -> None:
     assert log(begun("b", PODUSV_CACHE=str(cache))) == first
 
 
-def test_without_any_place_it_compiles_and_leaves_nothing(folder: Path) -> None:
+def test_without_any_place_it_compiles_leaves_nothing_and_says_so(folder: Path) -> None:
     nowhere = "/dev/null/nowhere"
     before = {path.name for path in folder.iterdir()}
     process = begun("x", PODUSV_CACHE=nowhere, XDG_CACHE_HOME=nowhere, TMPDIR=str(folder / "tmp"))
-    (folder / "tmp").touch()
-    assert log(process)
+    (folder / "tmp").mkdir()
+    assert log(process, "podusv: compiled code is not kept, so each command compiles anew; set")
     assert {path.name for path in folder.iterdir()} == before | {"tmp", "x"}
+    assert not list((folder / "tmp").iterdir())
 
 
 @pytest.mark.parametrize("home", ["~", "relative", ""])
 def test_without_a_home_no_folder_is_made_here(
-    folder: Path, home: str, monkeypatch: pytest.MonkeyPatch
+    folder: Path, home: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.delenv("PODUSV_CACHE", raising=False)
     monkeypatch.setenv("XDG_CACHE_HOME", home)
     if home != "relative":
         monkeypatch.delenv("XDG_CACHE_HOME")
         monkeypatch.setattr(os.path, "expanduser", lambda path: path)  # who runs it has no entry
-    (folder / "temporary").mkdir()
-    monkeypatch.setattr(machine_code.tempfile, "gettempdir", lambda: str(folder / "temporary"))
-    found = FRESH()
-    assert found is not None
-    assert found.is_relative_to(folder / "temporary")
-    assert sorted(path.name for path in folder.iterdir()) == ["a.yaml", "temporary"]
+    assert FRESH(NAME) is None
+    assert caplog.text.count("there is no home folder") == 1
+    assert [path.name for path in folder.iterdir()] == ["a.yaml"]
+
+
+def refused(place: Path, monkeypatch: pytest.MonkeyPatch, caplog: Any) -> str:
+    """Why a place is not used, after the place itself; nothing is made there."""
+    FRESH.cache_clear()
+    caplog.clear()
+    monkeypatch.setenv("PODUSV_CACHE", str(place))
+    monkeypatch.setenv("XDG_CACHE_HOME", f"{place.anchor}dev/null")
+    before = sorted(place.parent.rglob("*"))
+    assert FRESH(NAME) is None
+    assert sorted(place.parent.rglob("*")) == before
+    (text,) = caplog.messages
+    return text.partition(f"({place}: ")[2].partition(";")[0]
 
 
 def test_a_folder_that_is_not_ones_own_is_not_used(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
+    folder: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     """Code that somebody else could have put there would be run."""
-    monkeypatch.setenv("PODUSV_CACHE", str(folder / "theirs"))
-    monkeypatch.setenv("XDG_CACHE_HOME", str(folder / "theirs too"))
-    monkeypatch.setattr(machine_code.tempfile, "gettempdir", lambda: str(folder))
+    (folder / "theirs").mkdir()
     monkeypatch.setattr(os, "getuid", lambda: 12345)
-    assert FRESH() is None
+    said = refused(folder / "theirs", monkeypatch, caplog)
+    assert said.startswith("another user owns /")
+
+
+@pytest.mark.parametrize("mode", [0o777, 0o707, 0o770])
+def test_a_folder_that_others_can_write_to_is_not_used(
+    folder: Path, mode: int, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Neither it nor one inside it, nor a link to it: they could rename what is in it."""
+    monkeypatch.setattr(code_folder, "_is_own_group", lambda group: False)
+    shared = folder / "shared"
+    (shared / "inside").mkdir(parents=True)
+    shared.chmod(mode)
+    (folder / "link").symlink_to(shared)
+    for place in (shared, shared / "inside", shared / "new" / "deep", folder / "link" / "new"):
+        assert refused(place, monkeypatch, caplog) == f"others can write to {shared}"
+
+
+def test_a_folder_in_one_like_tmp_or_of_ones_own_group_is_used(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    (folder / "tmp").mkdir()
+    (folder / "tmp").chmod(0o1777)  # where nobody can rename what is another's
+    (folder / "grouped").mkdir()
+    (folder / "grouped").chmod(0o775)
+    monkeypatch.setattr(code_folder, "_is_own_group", lambda group: True)
+    for place in (folder / "tmp" / "mine", folder / "grouped" / "mine"):
+        FRESH.cache_clear()
+        monkeypatch.setenv("PODUSV_CACHE", str(place))
+        found = FRESH(NAME)
+        assert found == place / NAME
+        assert found.stat().st_mode & 0o777 == 0o700
+    assert not caplog.messages
+
+
+def test_a_link_or_a_folder_for_all_in_place_of_the_code_is_not_used(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    cache = folder / "cache"
+    cache.mkdir()
+    (folder / "mine").mkdir(mode=0o700)
+    (cache / NAME).symlink_to(folder / "mine")
+    assert refused(cache, monkeypatch, caplog) == "Not a directory"
+    (cache / NAME).unlink()
+    (cache / NAME).mkdir()
+    (cache / NAME).chmod(0o777)
+    assert refused(cache, monkeypatch, caplog) == f"others can write to {cache / NAME}"
+
+
+def test_no_piece_is_read_that_is_a_link_a_pipe_or_anothers(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PODUSV_CACHE", str(folder / "cache"))
+    place = FRESH(NAME)
+    assert place is not None
+    code = machine_code.Code("symbol", b"code")
+    piece, link, pipe = (place / f"{name}.code" for name in ("piece", "link", "pipe"))
+    machine_code._write(piece, code)
+    machine_code._write(link, code)
+    assert (machine_code._read(piece), machine_code._read(link)) == (code, code)
+    link.rename(folder / "elsewhere")
+    link.symlink_to(folder / "elsewhere")
+    os.mkfifo(pipe, 0o600)
+    assert machine_code._read(link) is None
+    assert machine_code._read(pipe) is None
+    for mode in (0o606, 0o660):
+        piece.chmod(mode)
+        assert machine_code._read(piece) is None
+    piece.chmod(0o600)
+    with monkeypatch.context() as other:
+        other.setattr(os, "getuid", lambda: 12345)
+        assert machine_code._read(piece) is None
+    place.chmod(0o777)
+    assert machine_code._read(piece) is None
+    place.chmod(0o700)
+    assert machine_code._read(piece) == code
