@@ -1,4 +1,4 @@
-"""Ctrl-C (SIGINT) and SIGTERM: heard where work can be cut short, held where it cannot."""
+"""Ctrl-C (SIGINT), SIGTERM and SIGHUP: heard where work can be cut short, held where it cannot."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from types import FrameType
 from typing import TypeVar
 
 Result = TypeVar("Result")
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)  # the last: the terminal is lost
 # s; a terminal interrupts a command and its workers, the command its workers again, and people
 # press twice: what follows this closely on an interrupt is the same interrupt.
 ECHO = 3.0
-SIGNALLED = 128  # and the signal's number: 130 for SIGINT, 143 for SIGTERM
+SIGNALLED = 128  # and the signal's number: 129 for SIGHUP, 130 for SIGINT, 143 for SIGTERM
 STDERR = 2
 CUT_OFF = b"podusv: interrupted again; what was still being made is lost\n"
 
@@ -68,7 +68,7 @@ def _cut_off(number: int) -> None:
 
 @contextmanager
 def interrupts_caught() -> Iterator[Interrupts]:
-    """Both signals go to one `Interrupts`: to the one that is there, or else to a new one."""
+    """These signals go to one `Interrupts`: to the one that is there, or else to a new one."""
     handlers = (signal.getsignal(number) for number in SIGNALS)
     caught = (handler for handler in handlers if isinstance(handler, Interrupts))
     there = next((handler for handler in caught if not handler.ending), None)

@@ -27,6 +27,7 @@ from podusv_cli.disturbances.calm import Calm
 from podusv_cli.disturbances.harmonic import HarmonicDisturbance
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import STATE, ClosedLoop, simulate
+from podusv_cli.interrupts import SIGNALS
 from podusv_cli.kernels import Vector, bundle, kernel
 from podusv_cli.paths.base import TARGET, Path
 from podusv_cli.paths.line import Line
@@ -232,8 +233,14 @@ def beside_old_results(
 
 @pytest.fixture(autouse=True)
 def own_handlers() -> Iterator[None]:
-    """A command that was interrupted leaves its process deaf to signals; the tests go on in it."""
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    """A command that was interrupted leaves its process deaf to signals; the tests go on in it.
+
+    Signals that are ignored where the tests begin (`nohup make test &`) are not ignored in them.
+    """
+    before = {number: signal.getsignal(number) for number in SIGNALS}
+    for number in SIGNALS:
+        usual = signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL
+        signal.signal(number, usual)
     yield
     for number, handler in before.items():
         signal.signal(number, handler)

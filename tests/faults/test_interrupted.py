@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -13,6 +15,7 @@ import pytest
 from command_samples import (
     BASE,
     LONG,
+    ROOT,
     SIGNALS,
     TWO,
     Command,
@@ -98,7 +101,7 @@ def soon(number: signal.Signals, work: Callable[..., object]) -> Callable[..., o
     return begun
 
 
-@pytest.mark.parametrize(("number", "code"), SIGNALS)
+@pytest.mark.parametrize(("number", "code"), [*SIGNALS, (signal.SIGHUP, 129)])
 def test_an_interrupted_run_is_kept(
     podusv: Command, number: signal.Signals, code: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -147,3 +150,18 @@ def test_a_run_that_is_interrupted_after_its_simulation_is_whole(
     assert manifest.check(Path("x")).status == "interrupted"
     assert open_run(Path("x")).recording.status == "finished"
     assert not Path("x/figures").exists()
+
+
+def test_these_tests_end_where_signals_are_ignored() -> None:
+    """As in `nohup make test &`."""
+
+    def deaf() -> None:
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, signal.SIG_IGN)
+
+    words = ["-q", "-p", "no:cacheprovider", "-n", "0", "-k", "is_kept", str(Path(__file__))]
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", *words], cwd=ROOT, preexec_fn=deaf, timeout=120,
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM at every stage: it stops soon, says which it was, keeps what was finished.
+"""Ctrl-C, SIGTERM, a lost terminal at every stage: it stops soon, says why, keeps what it has.
 
 That it stops soon is measured in processor time and in a generous bound on the clock: the processor
 may be busy with other things.
@@ -6,12 +6,27 @@ may be busy with other things.
 
 from __future__ import annotations
 
+import os
+import pty
 import signal
+import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from command_samples import BASE, LONG, SIGNALS, TWO, gone, send, under_way, wait_for, write
+from command_samples import (
+    BASE,
+    LONG,
+    ROOT,
+    SIGNALS,
+    TWO,
+    gone,
+    send,
+    under_way,
+    wait_for,
+    write,
+)  # fmt: skip
 
 from podusv_cli.logbook import manifest
 from podusv_cli.logbook.folder import open_run
@@ -90,6 +105,62 @@ def test_in_the_compiled_loop(number: signal.Signals, code: int) -> None:
     assert (manifest.check(Path("x")).status, run.recording.status) == ("interrupted",) * 2
     assert 0 < run.recording["time"][-1] < 2e5
     assert not list(Path().glob(".x*"))
+
+
+def lose_the_terminal(*words: str, hangup: signal.Handlers = signal.SIG_DFL) -> None:
+    """Run podusv on a terminal of its own, which goes away while it simulates."""
+    process, terminal = pty.fork()
+    if process == 0:
+        signal.signal(signal.SIGHUP, hangup)
+        os.environ |= {"PYTHONPATH": str(ROOT), "TERM": "xterm"}
+        os.execv(sys.executable, [sys.executable, "-m", "podusv_cli", *words])
+    try:
+        shown = b""
+        while "\u2501".encode() not in shown:  # the bar
+            shown += os.read(terminal, 65536)
+        os.close(terminal)
+        end = time.monotonic() + 3 * SOON
+        while os.waitpid(process, os.WNOHANG) == (0, 0):
+            assert time.monotonic() < end
+            time.sleep(0.05)
+    finally:
+        with suppress(ProcessLookupError):
+            os.killpg(process, signal.SIGKILL)
+
+
+def test_a_lost_terminal_ends_a_run_and_keeps_it() -> None:
+    """As a lost ssh does; nothing that is still to be printed stands in the way."""
+    lose_the_terminal("run", write("long.yaml", LONG), "--out", "x", "--no-figures")
+    assert manifest.check(Path("x")).status == "interrupted"
+    assert 0 < open_run(Path("x")).recording["time"][-1] < 1e5
+
+
+def test_a_lost_terminal_ends_a_comparison_and_keeps_it() -> None:
+    config = write("long.yaml", LONG + "controllers: {stiff: {K_Pu: 200.0}, soft: {K_Pu: 5.0}}\n")
+    lose_the_terminal("compare", config, "--out", "x")
+    assert manifest.check(Path("x")).status == "interrupted"
+    assert manifest.check(Path("x/soft")).status == "interrupted"
+
+
+def test_where_a_hangup_is_ignored_a_lost_terminal_costs_the_bar_only() -> None:
+    config = write("long.yaml", LONG.replace("1e5", "3e3"))
+    words = ("run", config, "--out", "x", "--no-figures")
+    lose_the_terminal(*words, hangup=signal.SIG_IGN)
+    assert manifest.check(Path("x")).status == "finished"
+
+
+@pytest.mark.parametrize(("ignored", "code"), [(False, 129), (True, 0)])
+def test_a_hangup_ends_it_but_not_under_nohup(ignored: bool, code: int) -> None:
+    patches = 'patch(running, "simulate", lambda old, *given, **more: old(*given, **more))'
+    if ignored:
+        patches = f"import signal; signal.signal(signal.SIGHUP, signal.SIG_IGN); {patches}"
+    config = write("a.yaml", LONG.replace("1e5", "1e3") if ignored else LONG)
+    words = ("run", config, "--out", "x", "--no-figures")
+    with under_way(*words, script=PATCHED.format(patches=patches)) as process:
+        wait_for("reached")
+        process.send_signal(signal.SIGHUP)
+        assert process.wait(60) == code
+    assert manifest.check(Path("x")).status == ("finished" if ignored else "interrupted")
 
 
 @INTERRUPTS
