@@ -1,24 +1,32 @@
 """Metrics against their definitions, computed the long way from a full log."""
 
+import math
+from typing import Any
+
 import numpy as np
 import pytest
-from conftest import SMOOTH_START, corrected, example
+from conftest import NONLINEAR, POD, SMOOTH_START, Constant, corrected, example
 
-from podusv_cli.actuators.pod import Pods
+from podusv_cli.actuators.pod import Pod, Pods
 from podusv_cli.actuators.saturated import Saturated
 from podusv_cli.controllers.backstepping import Backstepping
 from podusv_cli.controllers.pid import Pid
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import simulate
+from podusv_cli.kernels import Vector, kernel
+from podusv_cli.metrics import watching
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.metrics.watching import observer, summarise
+from podusv_cli.registry import value
 
 
-def gathered(loop, *, steps=4000, log_every=1, radius=2.0, steady_fraction=0.25, compiled=True):
+def gathered(
+    loop, *, steps=4000, log_every=1, radius=2.0, steady_fraction=0.25, compiled=True, **options
+):
     grid = TimeGrid(0.01, steps, log_every)
     seeing = observer(loop, grid, steady_fraction=steady_fraction, settling_radius=radius)
-    recording = simulate(loop, grid, observer=seeing, compiled=compiled)
+    recording = simulate(loop, grid, observer=seeing, compiled=compiled, **options)
     return recording, summarise(recording.seen, grid.step)
 
 
@@ -27,31 +35,139 @@ def limited():
     return gathered(corrected(actuator=Saturated()))
 
 
-def test_metrics_follow_their_definitions(limited):
-    log, got = limited
+def by_definition(log, steady):
+    """The integrals, means and variations of a log; the settled part has these rows."""
     t, z_e = log["time"], log["z_e"]
-    steady = t >= 0.75 * t[-1]
-    outside = t[z_e > 2.0]
-    expected = {
+    power = np.abs(log["tau_u"] * log["u"]) + np.abs(log["tau_r"] * log["r"])
+    return {
         "iae": np.trapezoid(z_e, t),
         "ise": np.trapezoid(z_e**2, t),
         "itae": np.trapezoid(t * z_e, t),
         "rmse": np.sqrt(np.trapezoid(z_e**2, t) / t[-1]),
-        "z_e_steady": np.trapezoid(z_e[steady], t[steady]) / (0.25 * t[-1]),
-        "settling_time": outside[-1] + 0.01,
+        "z_e_steady": np.trapezoid(z_e[steady], t[steady]) / np.ptp(t[steady]),
         "peak_tau_u": np.abs(log["tau_u_cmd"]).max(),
         "peak_tau_r": np.abs(log["tau_r_cmd"]).max(),
         "effort_u": np.trapezoid(log["tau_u"] ** 2, t),
         "effort_r": np.trapezoid(log["tau_r"] ** 2, t),
-        "energy": np.trapezoid(
-            np.abs(log["tau_u"] * log["u"]) + np.abs(log["tau_r"] * log["r"]), t
-        ),
+        "energy": np.trapezoid(power, t),
         "tv_tau_u": np.abs(np.diff(log["tau_u_cmd"][steady])).sum(),
         "tv_tau_r": np.abs(np.diff(log["tau_r_cmd"][steady])).sum(),
         "saturated_fraction": np.trapezoid(log["saturated"], t) / t[-1],
     }
+
+
+def test_metrics_follow_their_definitions(limited):
+    log, got = limited
+    t = log["time"]
+    expected = by_definition(log, t >= 0.75 * t[-1])
+    expected["settling_time"] = t[log["z_e"] > 2.0][-1] + 0.01
     assert {name: got[name] for name in expected} == pytest.approx(expected, rel=1e-12)
     assert 0 < got["saturated_fraction"] < 1
+
+
+def cut():
+    """A progress that interrupts a run after its second block, of at most 100 steps."""
+    calls = []
+
+    def progress(done):
+        calls.append(done)
+        if len(calls) == 2:
+            raise KeyboardInterrupt
+
+    return progress
+
+
+class Ending(Constant):
+    """A law that gives 1 N up to a time and no number from then on."""
+
+    last: float = value(..., "s", "time of the last number")
+
+    @staticmethod
+    @kernel
+    def law(
+        t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
+        tau: Vector, rate: Vector, signals: Vector, work: Vector,
+    ) -> None:  # fmt: skip
+        """The demand."""
+        tau[0] = 1.0 if t <= k.last else math.nan
+        tau[1] = 0.0
+
+
+# A hull that its own damping drives leaves all numbers in finite time.
+DRIVEN = NONLINEAR.model_copy(update={"X_uu": 300.0})
+SHORT = {
+    "interrupted": (corrected(actuator=Saturated()), True),
+    "diverged": (corrected(vessel=DRIVEN, nominal=NONLINEAR, actuator=Saturated()), False),
+}
+
+
+@pytest.mark.parametrize("status", SHORT)
+def test_the_last_instant_of_a_run_cut_short_counts_half_as_that_of_every_run(status):
+    loop, interrupted = SHORT[status]
+    log, got = gathered(loop, steady_fraction=1.0, progress=cut() if interrupted else None)
+    assert log.status == status
+    assert 1 < len(log["time"]) < 4001
+    expected = by_definition(log, slice(None))
+    assert {name: got[name] for name in expected} == pytest.approx(expected, rel=1e-12)
+
+
+def test_what_pods_take_in_a_run_cut_short_is_that_of_its_log():
+    pods = example(Pods, pods=tuple(Pod(**POD, y=y, power_nnn=0.01) for y in (-0.1, 0.1)))
+    log, got = gathered(corrected(actuator=pods), progress=cut())
+    t = log["time"]
+    assert got["energy_pod"] == pytest.approx(np.trapezoid(log["power"].sum(axis=1), t))
+    for name in ("speed", "angle", "rate"):
+        part = np.trapezoid(log[f"{name}_limited"], t) / t[-1]
+        assert got[f"at_{name}_limit"] == pytest.approx(part, rel=1e-12)
+
+
+def test_a_settled_part_that_a_run_did_not_reach_has_no_numbers():
+    _, got = gathered(corrected(), steady_fraction=0.2, progress=cut())
+    for name in ("z_e_steady", "tv_tau_u", "tv_tau_r"):
+        assert np.isnan(got[name])
+
+
+@pytest.mark.parametrize(("until", "defined"), [(300, False), (301, True)])
+def test_the_settled_part_has_numbers_from_its_second_instant_on(until, defined):
+    """A law that returns no number from the next instant on ends the run there."""
+    _, got = gathered(
+        corrected(controller=Ending(last=until * 0.01)), steady_fraction=0.7, steps=1000
+    )
+    assert [not np.isnan(got[name]) for name in ("z_e_steady", "tv_tau_u")] == [defined] * 2
+
+
+def test_a_run_without_any_instant_has_no_numbers():
+    _, got = gathered(corrected(controller=Ending(last=-1.0)), steps=10)
+    assert np.isnan(list(got.values())).all()
+
+
+def test_the_integrals_of_a_single_instant_are_zero_and_its_means_undefined():
+    log, got = gathered(corrected(controller=Ending(last=0.0)), steps=10)
+    assert len(log["time"]) == 1
+    assert got["iae"] == got["effort_u"] == got["energy"] == 0.0
+    assert got["peak_tau_u"] == 1.0
+    assert np.isnan([got[name] for name in ("rmse", "z_e_steady", "saturated_fraction")]).all()
+
+
+@pytest.mark.parametrize("steps", [100, 1000, 31000, 100_000_000])
+@pytest.mark.parametrize("percent", [1, 7, 20, 30, 43, 57, 70, 93, 99, 100])
+def test_the_settled_part_begins_at_the_first_instant_that_belongs_to_it(steps, percent):
+    grid = TimeGrid(0.01, steps)
+    assert grid.last_part(percent / 100) == (100 - percent) * steps // 100 * 0.01
+
+
+def test_a_settled_part_between_two_instants_begins_at_the_later_one():
+    assert TimeGrid(0.5, 10).last_part(0.25) == 8 * 0.5  # of 7.5 steps
+    assert TimeGrid(0.5, 10).last_part(1e-9) == 10 * 0.5
+
+
+def test_a_settled_part_of_seven_tenths_has_every_instant():
+    log, got = gathered(corrected(actuator=Saturated()), steps=1000, steady_fraction=0.7)
+    expected = by_definition(log, slice(300, None))
+    names = ("z_e_steady", "tv_tau_u", "tv_tau_r")
+    assert {name: got[name] for name in names} == pytest.approx(
+        {name: expected[name] for name in names}, rel=1e-12
+    )
 
 
 def test_a_thinned_log_leaves_metrics_as_they_are(limited):
@@ -74,6 +190,16 @@ def test_settling_that_never_happens_is_no_number():
 def test_settled_from_the_start_is_zero():
     _, got = gathered(corrected(), steps=200, radius=100.0)
     assert got["settling_time"] == 0.0
+
+
+def test_settling_in_the_last_instant_counts_whatever_the_rounding():
+    seen, step = np.zeros(watching.SIZE), 0.01
+    for last in range(2, 200):
+        seen[watching.NOW], seen[watching.OUTSIDE] = last * step, (last - 1) * step
+        seen[watching.LAST + watching.TIME] = 0.5 * step
+        assert summarise(seen, step)["settling_time"] == pytest.approx(last * step)
+        seen[watching.OUTSIDE] = last * step
+        assert np.isnan(summarise(seen, step)["settling_time"])
 
 
 def test_every_metric_is_computed_and_documented(limited):

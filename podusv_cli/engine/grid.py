@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+ROUNDED = 1e-6  # steps; more than rounding can make of a whole number of them
+
 
 def whole_steps(duration: float, step: float) -> int | None:
     """How many steps make `duration` (both in s), or None where it is no whole number of them."""
@@ -25,8 +27,8 @@ class TimeGrid:
     hold_every: int = 0
 
     def last_part(self, fraction: float) -> float:
-        """When the last part of the run begins that is this fraction of it [s]."""
-        return (1.0 - fraction) * self.steps * self.step
+        """The first instant of the last part of the run that is this fraction of it [s]."""
+        return math.ceil((1.0 - fraction) * self.steps - ROUNDED) * self.step
 
     @property
     def rows(self) -> int:

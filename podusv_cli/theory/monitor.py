@@ -103,7 +103,7 @@ def monitored(
             columns.append(_traces(loop, law, log, replayed(log), (ideal, b)))
         traces = columns.whole()
         observed = _Observer(loop, law, recording, traces, ideal, b, grid.hold_every == 0)
-        starts = (0.0, (1.0 - steady_fraction) * grid.steps * grid.step)
+        starts = (0.0, grid.last_part(steady_fraction))
         windows = dict(zip(WINDOWS, map(observed.window, starts), strict=True))
     return Monitored(_extended(recording, traces, windows, ideal, grid), windows, traces)
 
