@@ -13,7 +13,7 @@ from pydantic import ValidationError
 
 from podusv_cli.config.annotations import inside, members, sections
 from podusv_cli.config.fields import limits
-from podusv_cli.config.loading import HEADING, load_text, resolved_yaml, values
+from podusv_cli.config.loading import HEADING, load_resolved, load_text, resolved_yaml, values
 from podusv_cli.config.scenario import LABEL, Scenario
 from podusv_cli.config.source import read
 from podusv_cli.registry import Component
@@ -109,7 +109,7 @@ def possible(data: dict[str, Any]) -> Scenario:
 @given(SCENARIOS)
 def test_a_resolved_scenario_reads_back_to_the_same_bits(data: dict[str, Any]) -> None:
     scenario = possible(data)
-    again = load_text(resolved_yaml(scenario), "resolved.yaml").scenario
+    again = load_resolved(resolved_yaml(scenario), "resolved.yaml")
     assert again == scenario
     assert repr(again) == repr(scenario), "-0.0 equals 0.0, but is not the same number"
 

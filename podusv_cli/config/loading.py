@@ -83,7 +83,7 @@ def load_resolved(text: str, source: str, checks: Sequence[Check] = ()) -> Scena
     faults += [
         Fault(node.mark, dotted(route), "refers to another file, which no finished run does")
         for route in REFERENCES
-        if root and (node := find(root, route))
+        if root and (node := find(root, route)) and node.content is not None
     ]
     if root and not isinstance(root.content, dict):
         faults.append(Fault(root.mark, "", f"is {found(root.content, root.text)}, no scenario"))

@@ -1,0 +1,77 @@
+"""Every registered component: its runs are read again by all commands that take finished runs."""
+
+from __future__ import annotations
+
+import json
+from itertools import cycle, islice
+from typing import Any
+
+import pytest
+from command_samples import ROOT, Command
+from conftest import ROOMS, example, kinds
+from logbook_samples import files
+
+from podusv_cli.config.loading import load, load_resolved, resolved_yaml
+from podusv_cli.config.references import pod_names, vessel_names
+
+SECTIONS = {room: room.removesuffix("s") for room in ROOMS}
+CSV = "0, 0\n10, 1\n18, 6\n"
+
+
+def registered() -> dict[str, list[dict[str, Any]]]:
+    """Every choice for each section of a scenario, as plain data."""
+    found = {
+        section: [example(kind).model_dump(mode="json") for kind in kinds(room).values()]
+        for room, section in SECTIONS.items()
+    }
+    found["path"].append({"kind": "waypoints", "file": "points.csv"})
+    found["actuator"] += [{"kind": "pod", "preset": name} for name in pod_names()]
+    found["vessel"] = [{"preset": name} for name in vessel_names()]
+    return found
+
+
+def scenarios() -> list[dict[str, Any]]:
+    """So many scenarios that every choice is in one of them."""
+    found = registered()
+    count = max(map(len, found.values()))
+    columns = [islice(cycle(choices), count) for choices in found.values()]
+    return [dict(zip(found, row, strict=True)) for row in zip(*columns, strict=True)]
+
+
+def named(parts: dict[str, Any]) -> str:
+    return "-".join(part.get("preset") or part["kind"] for part in parts.values())
+
+
+@pytest.mark.parametrize("parts", scenarios(), ids=named)
+def test_a_run_of_every_component_is_plotted_repeated_and_compared(
+    podusv: Command, parts: dict[str, Any], tmp_path: Any
+) -> None:
+    brief = {"simulation": {"step": 0.01, "duration": 0.05, "compiled": False}}
+    (tmp_path / "b.yaml").write_text(json.dumps(parts | brief))
+    (tmp_path / "points.csv").write_text(CSV)
+    made = podusv("run", "b.yaml", "--out", "b", "--no-figures", "-q")
+    assert made.code == 0, made.err
+    (tmp_path / "points.csv").unlink()
+    for words in (
+        ("plot", "b", "--figure", "trajectory"),
+        ("rerun", "b", "--out", "again"),
+        ("compare", "b", "again", "--no-figures", "-q"),
+        ("diff", "b", "again"),
+        ("run", "b/resolved.yaml", "--out", "c", "--no-figures", "-q"),
+        ("diff", "b", "c"),
+    ):
+        said = podusv(*words)
+        assert said.code == 0, f"{words}: {said.err}"
+    assert files(tmp_path / "b")["log.h5"] == files(tmp_path / "c")["log.h5"]
+
+
+# What others extend, no scenarios in themselves.
+PARTS = {"paper/base.yaml", "paper/claims.yaml"}
+CONFIGS = ROOT / "configs"
+SHIPPED = {path.relative_to(CONFIGS).as_posix(): path for path in CONFIGS.rglob("*.yaml")}
+
+
+@pytest.mark.parametrize("name", sorted(SHIPPED.keys() - PARTS))
+def test_every_run_of_a_shipped_scenario_reads_back(name: str) -> None:
+    for scenario in load(SHIPPED[name]).scenario.singles().values():
+        assert load_resolved(resolved_yaml(scenario), "resolved.yaml") == scenario
