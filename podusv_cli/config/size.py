@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from podusv_cli.amounts import bytes_in_words, time_in_words
 from podusv_cli.config.checking import Check
+from podusv_cli.config.loading import resolved_yaml, values
 from podusv_cli.config.scenario import Scenario, Simulation
+from podusv_cli.config.source import MAX_CHARACTERS, MAX_NODES
 from podusv_cli.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.engine.pieces import NUMBER, PIECE
 from podusv_cli.engine.simulate import names
@@ -107,6 +110,8 @@ def limits(
     def look(scenario: Scenario) -> list[tuple[str, str]]:
         if scenario.misfits():
             return []
+        if unreadable := _unreadable(scenario):
+            return [unreadable]
         size = largest(scenario)
         if scenario.log.every > size.steps:
             return [("log.every", _too_thin(size.steps))]
@@ -117,6 +122,40 @@ def limits(
         return []
 
     return look
+
+
+def _unreadable(scenario: Scenario) -> tuple[str, str] | None:
+    """The largest value of a scenario whose resolved.yaml podusv would refuse to read."""
+    laws = {f"controllers.{label}": law for label, law in scenario.controllers.items()}
+    for place, law in ({"controller": scenario.controller} | laws).items():
+        single = scenario.alone().model_copy(update={"controller": law})
+        if found := _too_much(single):
+            key, text = found
+            return key.replace("controller", place, 1), text
+    return None
+
+
+def _too_much(scenario: Scenario) -> tuple[str, str] | None:
+    leaves, nodes = values(scenario), _nodes(scenario.model_dump())
+    if nodes > MAX_NODES:
+        key = max(leaves, key=lambda key: _nodes(leaves[key]))
+        return key, _beyond(f"{nodes:,} values", MAX_NODES, "give fewer here")
+    if (length := len(resolved_yaml(scenario))) > MAX_CHARACTERS:
+        key = max(leaves, key=lambda key: len(str(leaves[key])))
+        return key, _beyond(f"{length:,} characters", MAX_CHARACTERS, "shorten this")
+    return None
+
+
+def _nodes(content: Any) -> int:
+    """How many keys and values the reader of resolved.yaml counts."""
+    if isinstance(content, dict):
+        return 1 + sum(1 + _nodes(inner) for inner in content.values())
+    return 1 + sum(map(_nodes, content)) if isinstance(content, tuple) else 1
+
+
+def _beyond(amount: str, most: int, remedy: str) -> str:
+    text = f"with every default written out the scenario has {amount}, more than the {most:,} that "
+    return f"{text}podusv reads back; {remedy}"
 
 
 def _too_thin(steps: int) -> str:

@@ -18,7 +18,7 @@ import yaml
 from podusv_cli.config.tree import Fault, Mark, Node, Route, dotted
 from podusv_cli.config.words import found, quoted
 
-MAX_BYTES = 1_000_000
+MAX_BYTES = MAX_CHARACTERS = 1_000_000
 MAX_DEPTH = 32
 MAX_NODES = 20_000
 
@@ -113,8 +113,9 @@ def read(text: str, source: str, faults: list[Fault], *, placed: bool = True) ->
 
     Every fault found on the way is appended to `faults`. Marks have lines only where `placed`.
     """
-    if len(text) > MAX_BYTES:
-        faults.append(Fault(Mark(source), "", f"is larger than {MAX_BYTES:,} bytes"))
+    if len(text) > MAX_CHARACTERS:
+        text = f"is longer than {MAX_CHARACTERS:,} characters"
+        faults.append(Fault(Mark(source), "", text))
         return None
     reader = _Reader(text, source, faults, placed)
     try:
