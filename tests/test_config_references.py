@@ -73,6 +73,20 @@ def test_a_vessel_without_preset_has_what_it_says_and_no_more(given: str) -> Non
     assert (other == own) == ("preset" in given), "without the key it changes what it extends"
 
 
+@pytest.mark.parametrize("given", [OWN, OWN + ", preset: ''", OWN + ", source: my tank"])
+def test_a_nominal_vessel_over_one_without_preset_changes_what_it_says(given: str) -> None:
+    text = SOUND.replace("preset: paper", given) + "nominal: {m: 66.0}\n"
+    got = loaded(text).scenario
+    assert got.nominal == got.vessel.model_copy(update={"m": 66.0})
+
+
+@pytest.mark.parametrize("given", ["3", "{preset: x}", "{preset: []}", "{preset: 3}", "{m: 3}"])
+def test_a_vessel_that_is_wrong_is_told_once_under_a_nominal_vessel(given: str) -> None:
+    text = SOUND.replace("{preset: paper}", given)
+    assert told(text)
+    assert told(text + "nominal: {m: 66.0}\n") == told(text)
+
+
 def test_a_source_tells_what_the_scenario_changed_and_is_the_same_when_loaded_again() -> None:
     changed = loaded(SOUND, ["vessel.I_z=2", "vessel.m=30", "vessel.X_u=-0.72", "vessel.X_uu=0"])
     whole = loaded(SOUND).scenario.vessel.source

@@ -116,7 +116,9 @@ def _nominal(root: Node, faults: list[Fault]) -> Node:
         return root
     if "preset" in given.content:
         return root.with_entry("nominal", _from_preset(given, "nominal", faults))
-    return root.with_entry("nominal", _sourced(merge(vessel, given)))
+    whole = _sourced(merge(vessel, given))
+    lost = not isinstance(vessel.content, dict)
+    return root.with_entry("nominal", replace(whole, faulty=whole.faulty or lost))
 
 
 def _from_preset(given: Node, key: str, faults: list[Fault]) -> Node:
@@ -152,7 +154,8 @@ def _sourced(vessel: Node) -> Node:
 
     A source that is not the preset's own is left as it is.
     """
-    base, source = vessel_file(str(vessel.get("preset")), []), vessel.mapping.get("source")
+    preset, source = vessel.get("preset"), vessel.mapping.get("source")
+    base = vessel_file(preset, []) if preset in vessel_names() else None
     if not base or not source or not str(source.content).startswith(_stem(base)):
         return vessel
     numbers = [name for name in COEFFICIENTS if name in Vessel.model_fields]
