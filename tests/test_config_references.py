@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import signal
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -160,13 +163,14 @@ def test_a_file_saved_by_a_spreadsheet_is_read() -> None:
 @pytest.mark.parametrize(
     ("rows", "says"),
     [
-        ("0,0\n1;1\n", ["route.csv:2:1: must be two numbers x,y [m], found '1;1'"]),
+        ("0,0\n1;1\n", ["route.csv:2:1: must be two numbers x,y [m], found 1 between commas"]),
         ("0,0\n1,1,1\n2\n", [
-            "route.csv:2:1: must be two numbers x,y [m], found '1,1,1'",
-            "route.csv:3:1: must be two numbers x,y [m], found '2'",
+            "route.csv:2:1: must be two numbers x,y [m], found 3 between commas",
+            "route.csv:3:1: must be two numbers x,y [m], found 1 between commas",
         ]),
-        ("nan,0\n1,1\n", ["route.csv:1:1: must be two numbers x,y [m], found 'nan,0'"]),
-        ("0,0\n017,1\n", ["route.csv:2:1: must be two numbers x,y [m], found '017,1'"]),
+        ("nan,0\n1,1\n", ["route.csv:1:1: must be two numbers x,y [m]; the first is no number"]),
+        ("0,0\n017,1\n", ["route.csv:2:1: must be two numbers x,y [m]; the first is no number"]),
+        ("0,0\n1,\n", ["route.csv:2:1: must be two numbers x,y [m]; the second is no number"]),
         ("0,0\n1e999,1\n", ["route.csv:2:1: path.points[1][0]: must be a number, found 1e999"]),
         ("x,y\n0,0\n", ["a.yaml:2:7: path: needs at least two points, has 1"]),
         ("0,0\n0,0\n", ["a.yaml:2:7: path: two neighbouring points are the same"]),
@@ -241,3 +245,51 @@ def test_what_is_wrong_with_pods_is_one_sentence_at_its_place() -> None:
     assert "actuator.pods[0].T_nn: must be a number above 0 [N s2], found -1" in said
     (said,) = told(SOUND, ["actuator={kind: pod}"])
     assert "actuator.pods: missing; must be a list of" in said
+
+
+def along(file: str) -> str:
+    return f"path: {{kind: waypoints, file: {file}}}\n"
+
+
+SECRET = "root:x:0:0:root:/root:/bin/sh\n'sync':s3cret,4:65534:sync,/bin\ns3cret,1\n"
+
+
+@pytest.mark.parametrize("option", ["path.file", "extends", "scenario"])
+def test_what_a_file_holds_that_is_no_file_of_podusv_is_not_repeated(option: str) -> None:
+    write("passwd", SECRET)
+    write("a.yaml", with_route(along("passwd")) if option == "path.file" else "extends: passwd\n")
+    said = "\n".join(findings("passwd" if option == "scenario" else "a.yaml"))
+    assert "passwd:" in said
+    for word in ("root", "s3cret", "sync", "65534"):
+        assert word not in said
+
+
+@pytest.fixture
+def patience() -> Iterator[None]:
+    """What waits for ever is interrupted."""
+
+    def give_up(*_: object) -> None:
+        raise TimeoutError("waited for somebody to write")
+
+    before = signal.signal(signal.SIGALRM, give_up)
+    signal.alarm(30)
+    yield
+    signal.alarm(0)
+    signal.signal(signal.SIGALRM, before)
+
+
+@pytest.mark.parametrize("special", ["pipe", "/dev/zero", "/dev/tty"])
+@pytest.mark.usefixtures("patience")
+def test_pipes_and_devices_are_not_waited_for(special: str) -> None:
+    os.mkfifo("pipe")
+    write("a.yaml", with_route(along(special)))
+    write("b.yaml", f"extends: {special}\n")
+    for name in ("a.yaml", "b.yaml", special):
+        (said,) = findings(name)
+        assert "cannot be read: " in said
+
+
+@pytest.mark.usefixtures("patience")
+def test_a_pipe_is_told_what_to_do_instead() -> None:
+    os.mkfifo("pipe")
+    assert findings("pipe") == ["pipe: cannot be read: a pipe or device; save it as a file first"]

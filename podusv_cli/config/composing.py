@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import reduce
 
-from podusv_cli.config.source import read, read_text, scalar
-from podusv_cli.config.tree import Fault, Mark, Node, merge, overlay
+from podusv_cli.config.source import (
+    MAX_CHARACTERS,
+    MAX_DEPTH,
+    MAX_NODES,
+    read,
+    read_text,
+    scalar,
+)
+from podusv_cli.config.tree import Fault, Mark, Node, count, merge, overlay
 from podusv_cli.config.words import found
 
+# In a scenario and all that it extends; each file alone has the limits of its reader.
+MOST = {"files": 100, "characters": 2 * MAX_CHARACTERS, "values": 3 * MAX_NODES}
 FLOW = ("[", "{", "'", '"')  # what lists, mappings and text in quotes start with
 
 
@@ -19,7 +29,7 @@ def composed(text: str, source: str, overrides: Sequence[str], faults: list[Faul
 
     None where the text cannot be read to its end. File names in `extends` are relative to `source`.
     """
-    layers = _layers(text, (source,), faults)
+    layers = _layers(text, source, faults)
     settings = [_setting(override, faults) for override in overrides]
     if not layers:
         return None
@@ -29,30 +39,69 @@ def composed(text: str, source: str, overrides: Sequence[str], faults: list[Faul
     return replace(reduce(merge, [*reversed(layers), top]), mark=Mark(source))
 
 
-def _layers(text: str, sources: tuple[str, ...], faults: list[Fault]) -> list[Node]:
-    """The tree of the last of `sources`, then those that it extends, nearest first.
+def _layers(text: str, source: str, faults: list[Fault]) -> list[Node]:
+    """The tree of the scenario's text, then those of all that it extends, nearest first.
 
-    None of them has the key `extends`; the last one is marked faulty where what it extends cannot
-    be had. Of several bases the later one goes over the earlier.
+    None of them has the key `extends`; the first one is marked faulty where a file that is extended
+    cannot be had. Of several bases the later one goes over the earlier.
     """
-    node = _mapping(text, sources[-1], faults)
+    node = _mapping(text, source, faults)
     if not node:
         return []
-    own = {key: entry for key, entry in node.mapping.items() if key != "extends"}
-    layers = [replace(node, content=own)]
-    above = node.mapping.get("extends")
-    named = () if above is None else above.content if isinstance(above.content, tuple) else (above,)
-    for name in reversed(named):
+    bases = list(_bases(node, source, _amounts(text, node), faults))
+    own = replace(_own(node), faulty=node.faulty or not all(bases))
+    return [own, *filter(None, bases)]
+
+
+def _bases(
+    node: Node, source: str, amounts: Counter[str], faults: list[Fault]
+) -> Iterator[Node | None]:
+    """The trees of all that a scenario extends, nearest first; None for one that cannot be had."""
+    waiting: list[tuple[Node, tuple[str, ...]]] = [(name, (source,)) for name in _named(node)]
+    while waiting:
+        name, sources = waiting.pop()
+        if most := _exceeded(amounts):
+            text = f"this scenario and all that it extends are more than {most}; extend fewer files"
+            faults.append(Fault(name.mark, "extends", text))
+            yield None
+            return
         base = _base(name, sources, faults)
-        below = _layers(base[1], (*sources, base[0]), faults) if base else []
-        layers = [*layers, *below] if below else [replace(layers[0], faulty=True), *layers[1:]]
-    return layers
+        tree = _mapping(base[1], base[0], faults) if base else None
+        yield tree and _own(tree)
+        if base and tree:
+            amounts += _amounts(base[1], tree)
+            waiting += [(further, (*sources, base[0])) for further in _named(tree)]
+
+
+def _own(node: Node) -> Node:
+    """The tree without `extends`."""
+    return replace(node, content={k: e for k, e in node.mapping.items() if k != "extends"})
+
+
+def _named(node: Node) -> tuple[Node, ...]:
+    """The file names that `extends` has."""
+    above = node.mapping.get("extends")
+    if above is None:
+        return ()
+    return above.content if isinstance(above.content, tuple) else (above,)
+
+
+def _amounts(text: str, node: Node) -> Counter[str]:
+    """What a file adds to the totals that are limited."""
+    return Counter({"files": 1, "characters": len(text), "values": count(node)})
+
+
+def _exceeded(amounts: Counter[str]) -> str:
+    """A total that allows no further file, in words; empty where there is none."""
+    full = (f"{most:,} {what}" for what, most in MOST.items() if amounts[what] >= most)
+    return next(full, "")
 
 
 def _mapping(text: str, source: str, faults: list[Fault]) -> Node | None:
     node = read(text, source, faults)
     if node and not isinstance(node.content, dict):
-        what = found(node.content, node.text)
+        # The file may be none of the user's: its text is not repeated.
+        what = "text" if isinstance(node.content, str) else found(node.content, node.text)
         faults.append(
             Fault(node.mark, "", f"a scenario is a mapping of keys to values, found {what}")
         )
@@ -87,6 +136,9 @@ def _setting(override: str, faults: list[Fault]) -> Node:
     node: Node | None = None
     if not equals or not all(keys):
         faults.append(Fault(mark, "", "write it as --set section.key=value"))
+    elif len(keys) > MAX_DEPTH:
+        faults.append(Fault(mark, "", f"nested deeper than {MAX_DEPTH} levels"))
+        keys = []
     elif text.lstrip().startswith(FLOW):
         node = read(text, mark.source, faults, placed=False)
     else:

@@ -250,8 +250,13 @@ def _rows(text: str, name: str, faults: list[Fault]) -> Iterator[Node]:
 def _row(line: str, mark: Mark, faults: list[Fault]) -> Node:
     cells = [cell.strip().strip('"') for cell in line.split(",")]
     numbers = [resolve(cell) for cell in cells]
-    if len(numbers) != 2 or any(isinstance(n, (str, bool)) or n is None for n in numbers):
-        text = f"must be two numbers x,y [m], found {quoted(line.strip())}"
+    wrong = [isinstance(n, (str, bool)) or n is None for n in numbers]
+    # What the line holds is not told: the file may be one that only podusv was given to read.
+    if len(numbers) != 2:
+        text = f"must be two numbers x,y [m], found {len(numbers)} between commas"
         faults.append(Fault(mark, "", text))
+    elif any(wrong):
+        place = ("first", "second")[wrong.index(True)]
+        faults.append(Fault(mark, "", f"must be two numbers x,y [m]; the {place} is no number"))
     pairs = zip(numbers, cells, strict=True)
     return Node(tuple(Node(number, mark, text=cell) for number, cell in pairs), mark)

@@ -8,7 +8,9 @@ YAML 1.2: true, false, null, decimal numbers; everything else is text.
 from __future__ import annotations
 
 import math
+import os
 import re
+import stat
 import unicodedata
 from dataclasses import replace
 from typing import Any
@@ -55,7 +57,9 @@ def read_text(path: str, mark: Mark, key: str, faults: list[Fault]) -> str | Non
     """The file's text, or None and a fault at `mark` or at the byte that is no UTF-8."""
     named = "" if mark == Mark(path) else f"{quoted(path)} "
     try:
-        with open(path, "rb") as file:
+        with open(path, "rb", opener=_at_once) as file:
+            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+                raise ValueError("a pipe or device; save it as a file first")
             data = file.read(MAX_BYTES + 1)
     except (OSError, ValueError) as error:
         reason = str((isinstance(error, OSError) and error.strerror) or error)
@@ -71,6 +75,11 @@ def read_text(path: str, mark: Mark, key: str, faults: list[Fault]) -> str | Non
         text = f"byte 0x{data[error.start]:02x} is no UTF-8; save the file as UTF-8"
         faults.append(Fault(place, "", text))
         return None
+
+
+def _at_once(path: str, flags: int) -> int:
+    """Open without waiting for somebody who writes into a pipe."""
+    return os.open(path, flags | os.O_NONBLOCK | os.O_CLOEXEC)
 
 
 def _place(source: str, before: str) -> Mark:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
+LONGEST_PLACE = 9  # digits of a place in a list; Python refuses to read thousands of them
 Route = tuple[str | int, ...]
 
 
@@ -106,6 +107,13 @@ def plain(node: Node) -> Any:
     return node.content
 
 
+def count(node: Node) -> int:
+    """How many values a tree has, keys, lists and mappings included."""
+    if isinstance(node.content, dict):
+        return 1 + sum(1 + count(entry) for entry in node.content.values())
+    return 1 + sum(count(item) for item in _items(node.content))
+
+
 def overlay(base: Node, top: Node, replaces: Callable[[Node, Node], bool]) -> Node:
     """`top` over `base`, mapping by mapping; lists, scalars and what `replaces` says whole.
 
@@ -131,7 +139,8 @@ def _names_places(base: Node, top: Node) -> bool:
     """Whether `top` is a mapping of places in the list `base`."""
     places = top.mapping
     return bool(places) and all(
-        place.isdecimal() and int(place) < len(_items(base.content)) for place in places
+        place.isdecimal() and len(place) <= LONGEST_PLACE and int(place) < len(_items(base.content))
+        for place in places
     )
 
 
