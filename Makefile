@@ -8,11 +8,14 @@ PODUSV := $(BIN)/podusv
 # A file to a core; what its tests share is made once.
 PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/pytest --numprocesses auto --dist loadfile
 OURS := podusv_cli tests benchmarks
+# Every dependency of a run at its lower bound; what tests need beside them, as new as may be.
+OLDEST := .venv-oldest
+LOWEST := sed -n '/^dependencies = \[/,/^\]/s/^ *"\(.*\)>=\(.*\)",/\1==\2/p' pyproject.toml
 PODS := kept dropped ideal no_anti_windup single
 COMPARISONS := printed_compare figures_compare figures_compare_standoff corrected_compare
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce pod test test-all test-faults bench lint types contracts clean
+.PHONY: help reproduce pod test test-all test-faults test-oldest bench lint types contracts clean
 
 help: ## what can be made
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -44,6 +47,13 @@ test-all: lint types contracts ## as test, with the slow tests
 
 test-faults: $(VENV)/dev.done ## the fault tests with their full counts
 	@PODUSV_FAULTS=full $(PYTEST) -m "not benchmark" tests/faults
+
+test-oldest: ## the tests with every dependency at its lower bound, in $(OLDEST)
+	@$(PYTHON) -m venv --clear $(OLDEST)
+	@$(OLDEST)/bin/pip install --quiet --disable-pip-version-check --editable . $$($(LOWEST)) \
+	    pytest pytest-xdist hypothesis sympy xarray h5netcdf netCDF4 import-linter
+	@OPENBLAS_NUM_THREADS=1 $(OLDEST)/bin/pytest --numprocesses auto --dist loadfile \
+	    -W ignore::DeprecationWarning
 
 bench: $(VENV)/dev.done ## speed beside hand-written C (needs a C compiler), into benchmarks/results.md
 	@$(BIN)/python -m benchmarks.bench

@@ -1,4 +1,4 @@
-"""The README's scenarios show podusv at its best: they track, ask for what there is, and converge."""
+"""The README's scenarios track, ask for what the actuator has, and converge."""
 
 from __future__ import annotations
 
