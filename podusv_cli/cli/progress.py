@@ -5,10 +5,14 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
+from typing import TYPE_CHECKING
 
 from podusv_cli.cli.layout import takes_codes
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
 
 PATIENCE = 0.7  # s before a bar appears
 
@@ -17,7 +21,7 @@ PATIENCE = 0.7  # s before a bar appears
 def progress_bars(*, wanted: bool) -> Iterator[Callable[[str, float], None] | None]:
     """A function to call with a run's name and the fraction done; a bar a run, on stderr.
 
-    None where stderr is no terminal that takes codes.
+    None where stderr is no terminal that takes codes. A terminal that is lost costs the bars only.
     """
     if not (wanted and takes_codes(sys.stderr)):
         yield None
@@ -35,16 +39,26 @@ def progress_bars(*, wanted: bool) -> Iterator[Callable[[str, float], None] | No
     tasks: dict[str, TaskID] = {}
     with ExitStack() as stack:
 
-        def advance(name: str, fraction: float) -> None:
+        def draw(name: str, fraction: float) -> None:
             if not bars.live.is_started and time.monotonic() - began > PATIENCE:
-                stack.enter_context(bars)
+                stack.callback(_stop, bars)
+                bars.start()
             if bars.live.is_started:
                 if name not in tasks:
                     tasks[name] = bars.add_task(name, total=1.0)
                 bars.update(tasks[name], completed=fraction)
                 bars.refresh()
 
+        def advance(name: str, fraction: float) -> None:
+            with suppress(OSError):
+                draw(name, fraction)
+
         yield advance
+
+
+def _stop(bars: Progress) -> None:
+    with suppress(OSError):
+        bars.stop()
 
 
 @contextmanager

@@ -107,8 +107,8 @@ def test_in_the_compiled_loop(number: signal.Signals, code: int) -> None:
     assert not list(Path().glob(".x*"))
 
 
-def lose_the_terminal(*words: str) -> None:
-    """Run podusv on a terminal of its own, which goes away while it simulates."""
+def lose_the_terminal(*words: str, until: str) -> None:
+    """Run podusv on a terminal of its own, which goes away once there is a file of this name."""
     process, terminal = pty.fork()
     if process == 0:
         os.environ |= {"PYTHONPATH": str(ROOT), "TERM": "xterm"}
@@ -117,6 +117,7 @@ def lose_the_terminal(*words: str) -> None:
         shown = b""
         while "\u2501".encode() not in shown:  # the bar
             shown += os.read(terminal, 65536)
+        wait_for(until)
         os.close(terminal)
         end = time.monotonic() + SOON
         while os.waitpid(process, os.WNOHANG) == (0, 0):
@@ -129,16 +130,17 @@ def lose_the_terminal(*words: str) -> None:
 
 def test_a_lost_terminal_ends_a_run_and_keeps_it() -> None:
     """As a lost ssh does; nothing that is still to be printed stands in the way."""
-    lose_the_terminal("run", write("long.yaml", LONG), "--out", "x", "--no-figures")
+    words = ("run", write("long.yaml", LONG), "--out", "x", "--no-figures")
+    lose_the_terminal(*words, until="long.yaml")
     assert manifest.check(Path("x")).status == "interrupted"
     assert 0 < open_run(Path("x")).recording["time"][-1] < 1e5
 
 
 def test_a_lost_terminal_ends_a_comparison_and_keeps_it() -> None:
-    config = write("long.yaml", LONG + "controllers: {stiff: {K_Pu: 200.0}, soft: {K_Pu: 5.0}}\n")
-    lose_the_terminal("compare", config, "--out", "x")
+    words = ("compare", write("short.yaml", BASE), write("long.yaml", LONG), "--out", "x")
+    lose_the_terminal(*words, until=".x.podusv-*.part/new/short/manifest.json")
     assert manifest.check(Path("x")).status == "interrupted"
-    assert manifest.check(Path("x/soft")).status == "interrupted"
+    assert manifest.check(Path("x/short")).status == "finished"
 
 
 @pytest.mark.parametrize(("ignored", "code"), [(False, 129), (True, 0)])

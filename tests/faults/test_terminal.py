@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import io
 import os
 import pty
 import resource
@@ -13,6 +15,8 @@ from typing import Any
 
 import pytest
 from command_samples import BASE, ROOT, write
+
+from podusv_cli.cli import progress
 
 ESCAPE = b"\x1b"
 RUN = ("run", "a.yaml", "--out", "x", "--force", "--no-figures")
@@ -128,6 +132,26 @@ def test_a_plain_terminal_gets_no_codes_and_another_one_does() -> None:
     for extra in PLAIN:
         assert ESCAPE not in on_a_terminal(extra, "list")
     assert ESCAPE in on_a_terminal({"TERM": "xterm"}, "list")
+
+
+class Lost(io.StringIO):
+    """A terminal that goes away while something is written to it."""
+
+    def isatty(self) -> bool:
+        return True
+
+    def write(self, text: str) -> int:
+        raise OSError(errno.EIO, "Input/output error")
+
+
+def test_a_terminal_that_is_lost_costs_the_bar_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setattr(progress, "PATIENCE", -1.0)
+    monkeypatch.setattr(sys, "stderr", Lost())
+    with progress.progress_bars(wanted=True) as advance:
+        assert advance is not None
+        for part in range(3):
+            advance("run", part / 2)
 
 
 def test_a_plain_terminal_gets_no_bar() -> None:
