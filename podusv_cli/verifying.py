@@ -3,33 +3,52 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from podusv_cli.config.loading import load
 from podusv_cli.config.size import limits
-from podusv_cli.errors import UsageError
+from podusv_cli.errors import StorageError, UsageError
 from podusv_cli.logbook import atomic, jsonfile
 from podusv_cli.verification import verify as verification
 from podusv_cli.verification.verify import Verified
 
+RESULT = {"format", "tolerance", "steps", "runs", "converged"}  # keys of what `keep` writes
+
 
 def verify(
     config: Path, overrides: Sequence[str], tolerance: float, out: Path | None = None,
-    progress: Callable[[str, float], None] | None = None,
+    progress: Callable[[str, float], None] | None = None, *, force: bool = False,
 ) -> Verified:  # fmt: skip
     """Verify a scenario's numbers, which `keep` can write to the file `out`.
 
     Raises UsageError for a run folder, ScenarioError, and StorageError where `out` is no place for
-    a file, before anything is computed.
+    a file, or is another file and not replaced by `force`, before anything is computed.
     """
     if (config / "resolved.yaml").is_file():
         raise UsageError(f"{config} is a run folder; verify its resolved.yaml")
     scenario = load(config, overrides, checks=(limits(insist=""),)).scenario
-    atomic.check_places([out] if out else [])
+    if out:
+        atomic.check_places([out])
+        _spare(out, force)
     return verification.verify(scenario, tolerance, progress)
 
 
-def keep(done: Verified, out: Path) -> None:
-    """Write a verification as JSON to the file `out`. Raises StorageError."""
+def keep(done: Verified, out: Path, *, force: bool = False) -> None:
+    """Write a verification as JSON to the file `out`. Raises StorageError, as `verify`."""
+    _spare(out, force)
     atomic.make_folder(out.parent)
     atomic.write_bytes(out, jsonfile.encode(done.as_json()))
+
+
+def _spare(out: Path, force: bool) -> None:
+    """StorageError where `out` holds anything but an earlier verification."""
+    if force or not out.exists() or not out.stat().st_size:
+        return
+    with suppress(StorageError):
+        if jsonfile.read(out).keys() >= RESULT:
+            return
+    raise StorageError(
+        f"{out} exists and is not a result of podusv verify; --force replaces it, or name another "
+        "file"
+    )

@@ -12,6 +12,7 @@ import pytest
 from conftest import corrected, run
 from findings_samples import CONFIGS, scene
 
+from podusv_cli import verifying
 from podusv_cli.cli.verify import _in_order
 from podusv_cli.config.loading import load
 from podusv_cli.config.scenario import Scenario
@@ -272,6 +273,43 @@ def test_the_command_prints_and_writes_the_same_json(podusv: Any) -> None:
     assert got["steps"] == [0.0025, 0.00125, 0.000625]
     assert got["rankings"]["iae"]["orders"] == [["quick", "slow"]] * 3
     assert got["runs"]["slow"]["numbers"]["iae"]["converged"] is True
+
+
+def test_only_an_earlier_verification_is_replaced_without_force(podusv: Any) -> None:
+    scenario = Path("two.yaml")
+    two()
+    before = scenario.read_text()
+    for place, content in (("two.yaml", before), ("v.json", '{"format": 1}'), ("v.json", "[]")):
+        Path(place).write_text(content)
+        assert podusv("verify", "two.yaml", "-q", "--out", place) == (
+            5,
+            "",
+            f"{place} exists and is not a result of podusv verify; --force replaces it, or name "
+            "another file\n",
+        )
+        assert Path(place).read_text() == content
+    assert podusv("verify", "two.yaml", "-q", "--out", "v.json", "--force").code == 0
+    Path("v.json").write_text(Path("v.json").read_text().replace("0.01", "0.5"))
+    for start in ('"tolerance": 0.5', ""):
+        assert start in Path("v.json").read_text()
+        assert podusv("verify", "two.yaml", "-q", "--out", "v.json").code == 0
+        assert json.loads(Path("v.json").read_text())["tolerance"] == 0.01
+        Path("v.json").write_text("")
+
+
+def test_a_file_that_comes_while_it_computes_is_spared_and_the_numbers_are_printed(
+    podusv: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def meanwhile(*given: Any) -> Any:
+        Path("v.json").write_text("mine")
+        return verify(*given)
+
+    two()
+    monkeypatch.setattr(verifying.verification, "verify", meanwhile)
+    said = podusv("verify", "two.yaml", "--out", "v.json")
+    assert said.code == 5
+    assert said.out.endswith("converged within 0.01 relative\n")
+    assert Path("v.json").read_text() == "mine"
 
 
 def test_what_is_not_converged_ends_with_3_and_is_named(podusv: Any) -> None:

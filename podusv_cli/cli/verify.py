@@ -26,8 +26,12 @@ def verify(
         float, typer.Option(min=0.0, help="Relative error up to which a number is converged.")
     ] = 0.01,
     out: Annotated[
-        Path | None, typer.Option(help="File to write the JSON object to as well.")
+        Path | None,
+        typer.Option(help="File to write the JSON object to as well; replaces an earlier one."),
     ] = None,
+    force: Annotated[
+        bool, typer.Option("--force", help="Replace a file that is no verification, too.")
+    ] = False,
     as_json: AsJson = False,
     quiet: Annotated[
         bool, typer.Option("--quiet", "-q", help="Print nothing; the exit code tells.")
@@ -43,10 +47,10 @@ def verify(
     from podusv_cli.logbook.jsonfile import encode
 
     with progress_bars(wanted=not (quiet or as_json)) as progress:
-        done = verifying.verify(Path(config), assign or (), tolerance, out, progress)
+        done = verifying.verify(Path(config), assign or (), tolerance, out, progress, force=force)
     try:
         if out:
-            verifying.keep(done, out)
+            verifying.keep(done, out, force=force)
     finally:  # what cannot be written can still be read
         if as_json:
             typer.echo(encode(done.as_json()), nl=False)
