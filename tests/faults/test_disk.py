@@ -25,8 +25,8 @@ from old_results import (
     left_over,
 )
 
-from podusv_cli.engine import machine_code
-from podusv_cli.engine.machine_code import Code, cache_folder
+from podusv_cli.engine import code_folder, machine_code
+from podusv_cli.engine.machine_code import Code
 from podusv_cli.logbook import manifest
 
 FULL = Path("/dev/full")
@@ -102,14 +102,14 @@ def test_a_full_disk_for_compiled_code_costs_time_and_nothing_else(
 
     def on_a_small_disk() -> tuple[set[str], bool]:
         small_disk(str(tmp_path), 20_000)
-        folder = cache_folder.__wrapped__()
+        folder = code_folder.code_folder.__wrapped__("0123456789abcdef")
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(machine_code, "cache_folder", lambda: folder)
+            patch.setattr(code_folder, "code_folder", lambda name: folder)
             patch.setattr(machine_code, "_loaded", lambda prototype, code: code)
             made = machine_code.stored(None, "law", lambda: law)
         return {path.name for path in folder.iterdir()}, made == law
 
-    assert in_a_child(on_a_small_disk) == (set(), True)
+    assert in_a_child(on_a_small_disk) == ({code_folder.MARK}, True)
 
 
 @needs_full

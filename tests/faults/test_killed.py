@@ -26,7 +26,7 @@ from old_results import (
     left_over,
 )
 
-from podusv_cli.engine import machine_code
+from podusv_cli.engine import code_folder, machine_code
 from podusv_cli.parts import part_name
 
 CALLS = ("mkdir", "open", "write", "fsync", "replace", "rename", "unlink", "rmdir")
@@ -94,7 +94,7 @@ def test_no_piece_of_code_is_left_half_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PODUSV_CACHE", str(tmp_path))
-    found = machine_code.cache_folder.__wrapped__
+    found = partial(code_folder.code_folder.__wrapped__, "0123456789abcdef")
     path, piece = found() / "law.code", machine_code.Code("law", b"\x90" * 1000)
 
     def attempt(saboteur: Saboteur) -> None:
@@ -113,7 +113,7 @@ def test_no_piece_of_code_is_left_half_written(
     seen = []
     for _ in until_nothing_breaks(attempt, kill):
         found()  # as the next process does
-        assert {each.name for each in path.parent.iterdir()} <= {path.name}
+        assert {each.name for each in path.parent.iterdir()} <= {path.name, code_folder.MARK}
         seen.append(machine_code._read(path))
     assert set(seen) == {None}
     assert machine_code._read(path) == piece
