@@ -32,6 +32,9 @@ TWO = BASE + "controllers: {stiff: {K_Pu: 200.0}, soft: {K_Pu: 5.0}}\n"
 LONG = BASE.replace("duration: 1.0", "duration: 1e5, step: 1e-3") + "log: {every: 1000}\n"
 
 
+PATIENCE = 120  # s; ends what hangs, however busy the machine is, and says nothing of speed
+
+
 class Said(NamedTuple):
     """What a command left behind."""
 
@@ -86,7 +89,7 @@ def under_way(*words: str, script: str = "", first: str = "") -> Iterator[subpro
 
 def wait_for(pattern: str) -> None:
     """Wait until a file of this name is there."""
-    end = time.monotonic() + 60
+    end = time.monotonic() + PATIENCE
     while not list(Path().glob(pattern)):
         assert time.monotonic() < end, f"there is no {pattern}"
         time.sleep(0.01)
@@ -107,7 +110,7 @@ SIGNALS = [(signal.SIGINT, 130), (signal.SIGTERM, 143)]
 
 def gone(process: subprocess.Popen[str]) -> bool:
     """Whether nothing is left of a process and all that it started."""
-    end = time.monotonic() + 10
+    end = time.monotonic() + PATIENCE
     while time.monotonic() < end:
         try:
             os.killpg(process.pid, 0)

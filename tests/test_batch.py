@@ -6,6 +6,7 @@ import math
 import re
 import threading
 import time
+from _ctypes import FUNCFLAG_PYTHONAPI
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
@@ -19,6 +20,7 @@ from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
 from podusv_cli.controllers.dsc import DynamicSurface
 from podusv_cli.controllers.network import Network
 from podusv_cli.controllers.pid import Pid
+from podusv_cli.engine import signatures
 from podusv_cli.engine.batch import Batch, simulate_many
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import STATE, ClosedLoop, simulate
@@ -104,6 +106,12 @@ def test_a_run_that_diverges_stops_no_other() -> None:
         np.testing.assert_array_equal(row, simulate(loop, GRID, observer=watching).seen)
 
 
+def test_a_march_lets_go_of_the_interpreters_lock() -> None:
+    for prototype in (signatures.ADVANCE, signatures.RATES_ALONG):
+        assert not prototype._flags_ & FUNCFLAG_PYTHONAPI
+
+
+@pytest.mark.benchmark
 def test_other_threads_go_on_while_one_marches() -> None:
     runs = threading.Thread(
         target=simulate_many, args=([corrected(controller=Pid())], TimeGrid(0.01, 1_000_000))

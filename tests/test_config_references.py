@@ -272,7 +272,7 @@ def patience() -> Iterator[None]:
         raise TimeoutError("waited for somebody to write")
 
     before = signal.signal(signal.SIGALRM, give_up)
-    signal.alarm(30)
+    signal.alarm(60)
     yield
     signal.alarm(0)
     signal.signal(signal.SIGALRM, before)

@@ -211,6 +211,7 @@ def test_every_metric_is_computed_and_documented(limited):
     assert all(metric.unit and metric.meaning for metric in METRICS.values())
 
 
+@pytest.mark.benchmark
 def test_full_derivatives_cost_more_than_pid():
     """A replay that timed nothing would not tell the cheapest law from the dearest."""
     dear, cheap = corrected(controller=Backstepping()), corrected(controller=Pid())

@@ -4,7 +4,7 @@
 
 A way is a line on stdin, `kind argument` out of DAMAGES, with `!` in front where the manifest is
 made to fit the damage. What came of it is a line of JSON on stdout: in a word, as an exit code, in
-a sentence, and how much processor time [s] and memory [MiB] it took.
+a sentence, and how much work [calls] and memory [MiB] it took.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ import resource
 import shutil
 import stat
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from counting import counted
 from damages import DAMAGES
 
 from podusv_cli import comparing
@@ -88,10 +88,9 @@ def main(original: Path) -> None:
     whole = opened(original)
     for way in map(str.strip, sys.stdin):
         damaged(original, folder, way)
-        peak, began = _peak(), time.process_time()
-        word, code, said = verdict(lambda: opened(folder), whole)
-        took, grown = time.process_time() - began, _peak() - peak
-        print(json.dumps([word, code, said, took, grown]), flush=True)
+        peak = _peak()
+        (word, code, said), calls = counted(lambda: verdict(lambda: opened(folder), whole))
+        print(json.dumps([word, code, said, calls, _peak() - peak]), flush=True)
 
 
 if __name__ == "__main__":

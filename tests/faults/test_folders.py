@@ -16,7 +16,6 @@ from podusv_cli import comparing, repeating, running
 from podusv_cli.figures import drawing
 
 MINUTES = LONG + TWO.splitlines()[-1] + "\n"
-SOON = 20  # s; the scenario takes minutes
 RUN, COMPARE = ("run", "long.yaml", "--no-figures"), ("compare", "long.yaml", "--no-figures")
 RERUNS = [("rerun", "x"), ("rerun", "both")]
 PLACED = [("plot", "x"), ("verify", "long.yaml")]
@@ -82,7 +81,7 @@ def refused(podusv: Command, words: tuple[str, ...], before: Callable[[], None])
         return podusv(*words)
 
     here = tree()
-    with deadline(SOON):
+    with deadline():
         said = in_a_child(attempt)
     assert (said.code, said.out) == (5, "")
     assert tree() == here

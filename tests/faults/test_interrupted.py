@@ -15,6 +15,7 @@ import pytest
 from command_samples import (
     BASE,
     LONG,
+    PATIENCE,
     ROOT,
     SIGNALS,
     TWO,
@@ -60,7 +61,7 @@ def test_an_interrupted_comparison_keeps_what_it_has(
     with under_way("compare", "short.yaml", "long.yaml", "--out", "x") as process:
         wait_for(".x.podusv-*.part/new/short/manifest.json")
         send(process, number, times)
-        out, err = process.communicate(timeout=30)
+        out, err = process.communicate(timeout=PATIENCE)
         assert process.returncode == code, err
         assert gone(process)
     assert "long: interrupted after t = " in err
@@ -80,7 +81,7 @@ def test_an_interrupt_while_drawing_costs_the_figures_only(
     with under_way("compare", config, "--out", "x") as process:
         wait_for(".x.podusv-*.part/new/comparison.csv")
         send(process, number, 1)
-        out, err = process.communicate(timeout=30)
+        out, err = process.communicate(timeout=PATIENCE)
         assert process.returncode == code, err
         assert gone(process)
     assert "compared 2 runs: x" in out

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from command_samples import BASE, LONG, gone, under_way, wait_for, write
+from command_samples import BASE, LONG, PATIENCE, gone, under_way, wait_for, write
 
 from podusv_cli.logbook import manifest
 from podusv_cli.parallel import run_all
@@ -22,7 +22,7 @@ pytestmark = pytest.mark.skipif(not PROC.is_dir(), reason="looks for workers in 
 
 def worker_of(parent: int, but: int = 0) -> int:
     """The one worker of a process, once there is no other."""
-    end = time.monotonic() + 30
+    end = time.monotonic() + PATIENCE
     while time.monotonic() < end:
         children = (PROC / f"{parent}/task/{parent}/children").read_text().split()
         alive = [int(child) for child in children if int(child) != but]
@@ -43,7 +43,7 @@ def test_a_worker_killed_twice_is_reported_and_the_others_finish(
         first = worker_of(process.pid)
         os.kill(first, signal.SIGKILL)
         os.kill(worker_of(process.pid, but=first), signal.SIGKILL)
-        out, err = process.communicate(timeout=30)
+        out, err = process.communicate(timeout=PATIENCE)
         assert process.returncode == 3, err
         assert gone(process)
     told = "its process ended with exit code -9, 2 times"
@@ -63,7 +63,7 @@ def test_workers_do_not_outlive_a_comparison_that_is_killed(
     with under_way("compare", *names, "--out", "x", "--no-figures") as process:
         wait_for(".x.podusv-*.part/new/.b.podusv-*.part")
         os.kill(process.pid, signal.SIGKILL)
-        process.communicate(timeout=30)
+        process.communicate(timeout=PATIENCE)
         assert gone(process)
 
 
