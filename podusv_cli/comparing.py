@@ -21,10 +21,11 @@ from podusv_cli.config.checking import Check
 from podusv_cli.config.loading import load_resolved
 from podusv_cli.config.scenario import Scenario
 from podusv_cli.errors import StorageError
+from podusv_cli.extras import Extras
 from podusv_cli.findings.finding import Finding
 from podusv_cli.findings.preflight import together
-from podusv_cli.interrupts import Extras, interrupts_heard
-from podusv_cli.logbook import manifest, soundness
+from podusv_cli.interrupts import interrupts_heard
+from podusv_cli.logbook import jsonfile, manifest, soundness
 from podusv_cli.logbook.folder import LOG, THEORY, Run, RunWriter, open_run
 from podusv_cli.logbook.regular import read_text
 from podusv_cli.metrics.cost import law_costs
@@ -35,7 +36,7 @@ TABLE = "comparison.csv"
 # What a comparison has of its own: in its folder, or as a column of its table.
 RESERVED = (
     TABLE, "comparison.md", "comparison.tex", "claims.json", "claims.md", "figures",
-    "manifest.json", "metric", "provenance.json", "report.html", "unit",
+    "manifest.json", "metric", "missing.json", "provenance.json", "report.html", "unit",
 )  # fmt: skip
 UNMEASURED = dict.fromkeys(("law_ns", "law_ns_low", "law_ns_high"), math.nan)
 
@@ -108,7 +109,7 @@ def _from_run(path: Path, checks: Sequence[Check]) -> Part:
     scenario = load_resolved(run.resolved_yaml, str(path / "resolved.yaml"), checks)
     if wrong := soundness.fault(run.recording):
         raise StorageError(f"{path / LOG}: damaged, or not a log of a run: {wrong}")
-    _check_theory(run)
+    stability.check(run.theory, run.folder / THEORY)
     return Part(path.name, scenario, run=run)
 
 
@@ -129,14 +130,6 @@ def _check_memory(run: Run, scenario: Scenario) -> None:
                 f"{run.folder / LOG}: damaged, or not of the scenario beside it: "
                 f"{name} does not have {size} values in a row"
             )
-
-
-def _check_theory(run: Run) -> None:
-    try:
-        list(stability.rows({"": run.theory} if run.theory else {}))
-    except (LookupError, TypeError, ValueError, AttributeError) as error:
-        path = run.folder / THEORY
-        raise StorageError(f"{path}: damaged: not as podusv writes it ({error})") from error
 
 
 def distinct(parts: Iterable[Part]) -> list[Part]:
@@ -196,7 +189,10 @@ def collect(
     parts: Sequence[Part], outcomes: Mapping[str, Outcome],
     stated: Sequence[claims.Stated], extras: Extras,
 ) -> Result:  # fmt: skip
-    """Open the runs that were made, and compare; the laws' cost is one of the `extras`."""
+    """Open the runs that were made, and compare; costs and verdicts are `extras`.
+
+    What the runs lack is missing in the comparison, too.
+    """
     entries: list[Entry] = []
     endings, timings, warnings = {}, {}, {}
     for part in parts:
@@ -209,6 +205,8 @@ def collect(
         warnings[part.label] = done.warnings if done else part.noticed
         if done:
             timings[part.label] = done.timing
+            lacks = (replace(m, what=f"{part.label}: {m.what}") for m in done.missing)
+            extras.missing += lacks
     entries = _with_costs(entries, extras)
     sources: dict[str, Source] = {e.label: e for e in entries}
     for part in parts:
@@ -218,7 +216,7 @@ def collect(
     for entry in entries:
         names = dict.fromkeys([*entry.run.metrics, *entry.cost])
         measured[entry.label] = {name: entry.metric(name) for name in names}
-    verdicts = claims.judge(stated, sources)
+    verdicts = extras.made("the claims' verdicts", lambda: claims.judge(stated, sources)) or []
     compared = table.table(measured)
     return Result(parts, entries, endings, differing, compared, verdicts, timings, warnings)
 
@@ -231,35 +229,36 @@ def _with_costs(entries: list[Entry], extras: Extras) -> list[Entry]:
     """
     timed = [e for e in entries if e.scenario.simulation.compiled and len(e.recording["time"])]
     loops = [(entry.scenario.closed_loop(), entry.recording) for entry in timed]
-    costs = extras.attempt(lambda: law_costs(loops)) or [UNMEASURED] * len(timed)
+    costs = extras.attempt("law_ns", lambda: law_costs(loops)) or [UNMEASURED] * len(timed)
     by_label = {entry.label: cost for entry, cost in zip(timed, costs, strict=True)}
     return [replace(entry, cost=by_label.get(entry.label, UNMEASURED)) for entry in entries]
 
 
-def numbers(frame: pd.DataFrame) -> dict[str, dict[str, float | None]]:
-    """The table as plain data: metric, run, number or None."""
-    return {
-        str(name): {str(label): None if math.isnan(x) else float(x) for label, x in row.items()}
-        for name, row in frame.iterrows()
-    }
-
-
-def write(writer: RunWriter, result: Result) -> None:
+def write(writer: RunWriter, result: Result, extras: Extras) -> None:
     """Table and verdicts, in every form, into the comparison's folder."""
-    forms = {
-        TABLE: table.as_csv(result.table),
-        "comparison.md": table.as_markdown(result.table, result.endings),
-        "comparison.tex": table.as_latex(result.table),
+    forms: dict[str, Callable[[], bytes]] = {
+        TABLE: lambda: table.as_csv(result.table).encode(),
+        "comparison.md": lambda: table.as_markdown(result.table, result.endings).encode(),
+        "comparison.tex": lambda: table.as_latex(result.table).encode(),
     }
-    for name, text in forms.items():
-        writer.add(name, text.encode())
     if result.verdicts:
-        writer.add("claims.md", claims.as_markdown(result.verdicts).encode())
         verdicts = [verdict.as_json() for verdict in result.verdicts]
-        writer.add_json("claims.json", {"format": 1, "claims": verdicts})
+        forms["claims.md"] = lambda: claims.as_markdown(result.verdicts).encode()
+        forms["claims.json"] = lambda: jsonfile.encode({"format": 1, "claims": verdicts})
+    for name, form in forms.items():
+        add_made(writer, extras, name, form)
 
 
-def drawn(result: Result, progress: Callable[[str, float], None] | None = None) -> dict[str, bytes]:
+def add_made(writer: RunWriter, extras: Extras, name: str, form: Callable[[], bytes]) -> None:
+    """Write what `form` returns into a file of the folder; it is one of the `extras`."""
+    content = extras.made(name, form)
+    if content is not None:
+        writer.add(name, content)
+
+
+def drawn(
+    result: Result, extras: Extras, progress: Callable[[str, float], None] | None = None
+) -> dict[str, bytes]:
     """Shared figures in every format, by file name."""
     # matplotlib is slow to import
     from podusv_cli.figures.drawing import FIGURES, draw_in_parallel, dressed
@@ -269,7 +268,7 @@ def drawn(result: Result, progress: Callable[[str, float], None] | None = None) 
     if tell:
         tell(0.0)
     shown = dressed([(e.label, e.recording, e.scenario) for e in result.entries])
-    return dict(draw_in_parallel(shown, FIGURES, FORMATS, progress=tell))
+    return draw_in_parallel(shown, FIGURES, FORMATS, extras, progress=tell)
 
 
 def _theories(result: Result) -> dict[str, dict[str, Any]]:
@@ -277,8 +276,9 @@ def _theories(result: Result) -> dict[str, dict[str, Any]]:
 
 
 def as_report(
-    result: Result, title: str, figures: Mapping[str, bytes], provenance: Mapping[str, Any]
-) -> str:
+    result: Result, title: str, figures: Mapping[str, bytes], provenance: Mapping[str, Any],
+    missing: Iterable[object] = (),
+) -> str:  # fmt: skip
     """The report; `figures` as `drawn` gives them."""
     pictures: list[tuple[str, str, bytes]] = []
     if figures:
@@ -292,7 +292,8 @@ def as_report(
     story = report.Story(
         title=title, scenario=result.parts[0].scenario,
         controllers={part.label: part.scenario.controller for part in result.parts},
-        endings=result.endings, differences=result.differences,
+        endings=result.endings, missing=[str(part) for part in missing],
+        differences=result.differences,
         noticed=together(result.warnings), table=result.table, verdicts=result.verdicts,
         theories=_theories(result), figures=pictures, provenance=provenance,
     )  # fmt: skip

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import traceback
 from dataclasses import dataclass
+from pathlib import Path
 
 
 class PodusvError(Exception):
@@ -51,3 +53,10 @@ class LawError(PodusvError):
     """A law that does not keep to its declaration, or that fails when it is asked."""
 
     exit_code = 2
+
+
+def in_a_line(error: BaseException) -> str:
+    """What was raised, in what words and where: `KeyError: 'gain' (pid.py, line 60)`."""
+    frames = traceback.extract_tb(error.__traceback__)
+    where = f" ({Path(frames[-1].filename).name}, line {frames[-1].lineno})" if frames else ""
+    return f"{type(error).__name__}: {' '.join(str(error).split())}{where}"

@@ -7,12 +7,10 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
-from typing import TypeVar
 
-Result = TypeVar("Result")
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)  # the last: the terminal is lost
 # s; a terminal interrupts a command and its workers, the command its workers again, and people
 # press twice: what follows this closely on an interrupt is the same interrupt.
@@ -124,30 +122,3 @@ def _holding(held: bool) -> Iterator[None]:
         finally:
             here.held = before
             here.deliver()
-
-
-class Extras:
-    """Work that is worth having but not worth waiting for: after an interrupt it is left out.
-
-    For use while interrupts are held.
-    """
-
-    def __init__(self, interrupted: bool = False) -> None:
-        """`interrupted`: leave out everything from the start."""
-        self.interrupted = interrupted
-
-    def attempt(self, work: Callable[[], Result]) -> Result | None:
-        """What the work returns, or None where an interrupt came before its end."""
-        if self.interrupted:
-            return None
-        with interrupts_caught() as here:
-            try:
-                with interrupts_heard():
-                    return work()
-            except KeyboardInterrupt:
-                pass
-            except Exception:
-                if not here.number:  # machine code may turn an interrupt into another exception
-                    raise
-        self.interrupted = True
-        return None

@@ -11,6 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from podusv_cli.comparing import Part
+from podusv_cli.config.words import unknown
 from podusv_cli.errors import StorageError, UsageError
 from podusv_cli.figures.drawing import FIGURES
 from podusv_cli.figures.style import Shown
@@ -80,6 +81,14 @@ def chosen(asked: Sequence[str], shown: Sequence[Shown]) -> tuple[str, ...]:
                 f"(figures there are: {', '.join(fitting)})"
             )
     return tuple(dict.fromkeys(asked)) or fitting
+
+
+def all_known(what: str, names: Sequence[str], known: Iterable[str]) -> None:
+    """UsageError for a name that is not known."""
+    known = tuple(known)
+    for name in names:
+        if name not in known:
+            raise UsageError(unknown(f"{what} {name!r}", name, known))
 
 
 def spared(out: Path, names: Iterable[str]) -> None:

@@ -20,9 +20,10 @@ from podusv_cli.engine.asking import check_law
 from podusv_cli.engine.pieces import PIECE
 from podusv_cli.engine.simulate import Observer, marcher, simulate
 from podusv_cli.errors import StorageError
+from podusv_cli.extras import Extras, Missing
 from podusv_cli.findings.after import aftermath
 from podusv_cli.findings.finding import Finding, heard
-from podusv_cli.interrupts import Extras, interrupts_heard, interrupts_held
+from podusv_cli.interrupts import interrupts_heard, interrupts_held
 from podusv_cli.kernels import Vector
 from podusv_cli.logbook import folder, provenance
 from podusv_cli.logbook.columns import ColumnFiles
@@ -104,6 +105,7 @@ class Finished:
     timing: dict[str, float]
     others: tuple[str, ...] = ()  # runs of a comparison that the scenario also has
     warnings: tuple[Finding, ...] = ()
+    missing: tuple[Missing, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints of a run."""
@@ -115,6 +117,7 @@ class Finished:
             "metrics": self.metrics,
             "timing": self.timing,
             "warnings": [finding.as_json() for finding in self.warnings],
+            "missing": [str(part) for part in self.missing],
         }
 
 
@@ -124,7 +127,8 @@ def execute(
     """Simulate, measure, write, draw; `target` is there only when all of it is.
 
     A run that diverges or is interrupted is written like any other; its status tells. An interrupt
-    after the simulation costs the figures or the law's cost, nothing else. Raises StorageError.
+    after the simulation costs the figures or the law's cost, nothing else; what fails after it is
+    left out, and missing.json says why. Raises StorageError.
     """
     started, watch, size = datetime.now(UTC), watch or Stopwatch(), estimate(task.scenario)
     with (
@@ -137,41 +141,49 @@ def execute(
         def columns(name: str) -> Columns | None:
             return ColumnFiles(writer.scratch / name) if size.content > task.room.log else None
 
-        recording, metrics = measured(
+        recording = simulated(
             task.scenario, watch, progress, columns=columns("log"), piece=task.room.piece
         )
         extras = Extras(recording.status == "interrupted")
         with watch.part("metrics"):
-            metrics |= extras.attempt(lambda: _cost(task.scenario, recording)) or {}
+            metrics = extras.made("the metrics", lambda: summary(task.scenario, recording)) or {}
+            metrics |= extras.attempt("law_ns", lambda: _cost(task.scenario, recording)) or {}
         with _log(writer, task.scenario, recording) as log:
             log.add(recording.signals)  # written while the run is looked at
             with watch.part("metrics"):
-                warnings = _warnings(task, recording)
+                noticed = extras.made("warnings", lambda: _noticed(task.scenario, recording))
             with watch.part("theory"):
-                whole, theory = monitored(task.scenario, recording, columns("theory"))
+                whole, theory = extras.made(
+                    "theory.json with the stability monitor's signals",
+                    lambda: monitored(task.scenario, recording, columns("theory")),
+                ) or (recording, {})
             with watch.part("write"):
                 log.add(_beyond(whole, recording))
                 log.done()
+        warnings = (*task.noticed, *(noticed or ()))
         with watch.part("write"):
             _write(writer, task, whole, metrics, warnings)
             if theory:
                 writer.add_json("theory.json", theory)
         with watch.part("figures"):
-            for name, content in extras.attempt(lambda: _drawn(task, whole)) or ():
+            figures = extras.attempt("figures", lambda: _drawn(task, whole, extras)) or {}
+            for name, content in figures.items():
                 writer.add(f"figures/{name}", content)
         status = "interrupted" if extras.interrupted else recording.status
         with watch.part("write"):
             origin = provenance.collect(list(task.argv), started, datetime.now(UTC))
             writer.add_json("provenance.json", origin)
+            writer.add_missing(extras)
             final = writer.finish(status)
     message = recording.message or ("" if status == "finished" else UNDRAWN)
     return Finished(
-        final, recording.controller, status, message, metrics, watch.total(), warnings=warnings
-    )
+        final, recording.controller, status, message, metrics, watch.total(),
+        warnings=warnings, missing=tuple(extras.missing),
+    )  # fmt: skip
 
 
-def _warnings(task: Task, recording: Recording) -> tuple[Finding, ...]:
-    return (*task.noticed, *heard(aftermath(task.scenario, recording), task.scenario))
+def _noticed(scenario: Scenario, recording: Recording) -> list[Finding]:
+    return heard(aftermath(scenario, recording), scenario)
 
 
 def unwritten(outcomes: Iterable[Outcome]) -> str:
@@ -204,11 +216,11 @@ def _observer(scenario: Scenario) -> Observer:
     )  # fmt: skip
 
 
-def measured(
+def simulated(
     scenario: Scenario, watch: Stopwatch, progress: Progress | None = None,
     *, columns: Columns | None = None, piece: int = PIECE,
-) -> tuple[Recording, dict[str, float]]:  # fmt: skip
-    """Simulate a scenario and sum it up in metrics; `columns` and `piece` as `simulate` has it."""
+) -> Recording:  # fmt: skip
+    """Simulate a scenario, observed for its metrics; `columns` and `piece` as `simulate` has it."""
     loop, grid, seeing = scenario.closed_loop(), scenario.time_grid(), _observer(scenario)
     compiled = scenario.simulation.compiled
     with watch.part("compile"), interrupts_heard():
@@ -216,13 +228,16 @@ def measured(
     with watch.part("engine"):
         # The march leaves the interpreter alone; what writes its log is imported in the meantime.
         Thread(target=import_module, args=("podusv_cli.logbook.hdf5",), daemon=True).start()
-        recording = simulate(
+        return simulate(
             loop, grid, observer=seeing, compiled=compiled, progress=progress,
             columns=columns, piece=piece,
         )  # fmt: skip
-    with watch.part("metrics"):
-        metrics = summarise(recording.seen, grid.step) if recording.seen is not None else {}
-    return recording, metrics
+
+
+def summary(scenario: Scenario, recording: Recording) -> dict[str, float]:
+    """The metrics of a run that was observed."""
+    seen = recording.seen
+    return summarise(seen, scenario.time_grid().step) if seen is not None else {}
 
 
 def _cost(scenario: Scenario, recording: Recording) -> dict[str, float]:
@@ -245,7 +260,7 @@ def monitored(
 
 @contextmanager
 def _log(writer: folder.RunWriter, scenario: Scenario, recording: Recording) -> Iterator[Log]:
-    from podusv_cli.logbook import hdf5  # `measured` has begun with that
+    from podusv_cli.logbook import hdf5  # `simulated` has begun with that
 
     texts = {
         "resolved_yaml": resolved_yaml(scenario), "version": __version__,
@@ -274,10 +289,10 @@ def _write(
     writer.add("metrics.csv", "\n".join(["metric,value,unit", *rows, ""]).encode())
 
 
-def _drawn(task: Task, recording: Recording) -> list[tuple[str, bytes]]:
+def _drawn(task: Task, recording: Recording, extras: Extras) -> dict[str, bytes]:
     if not task.figures:
-        return []
+        return {}
     from podusv_cli.figures.drawing import draw_in_parallel, dressed  # matplotlib is slow to import
 
     shown = dressed([(task.label or recording.controller, recording, task.scenario)])
-    return list(draw_in_parallel(shown, task.figures, ("png",)))
+    return draw_in_parallel(shown, task.figures, ("png",), extras)

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from podusv_cli.config.loading import load, resolved_yaml
 from podusv_cli.config.scenario import Claim
 from podusv_cli.config.size import estimate, limits, needed
-from podusv_cli.config.words import unknown
 from podusv_cli.errors import UsageError
+from podusv_cli.extras import Extras, Missing
 from podusv_cli.findings.finding import Finding, heard
 from podusv_cli.findings.preflight import preflight, together
-from podusv_cli.interrupts import Extras, interrupts_held
+from podusv_cli.interrupts import interrupts_held
 from podusv_cli.logbook import atomic, folder, provenance
 from podusv_cli.parallel import workers_here
 from podusv_cli.recording import Status
@@ -72,10 +73,11 @@ class Compared:
     folder: Path
     result: comparing.Result
     status: Status  # interrupted where a run or the figures were, else finished
+    missing: tuple[Missing, ...] = ()  # in the comparison and its runs
 
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints of a comparison."""
-        from podusv_cli import comparing
+        from podusv_cli.comparison.table import numbers  # pandas is slow to import
 
         result = self.result
         return {
@@ -83,10 +85,11 @@ class Compared:
             "status": self.status,
             "folder": str(self.folder),
             "runs": [self._run_as_json(entry) for entry in result.entries],
-            "comparison": comparing.numbers(result.table),
+            "comparison": numbers(result.table),
             "failed": {label: text for label, text in result.endings.items() if text},
             "differences": result.differences,
             "claims": [verdict.as_json() for verdict in result.verdicts],
+            "missing": [str(part) for part in self.missing],
         }
 
     def warnings(self) -> list[Finding]:
@@ -94,7 +97,7 @@ class Compared:
         return together(self.result.warnings)
 
     def _run_as_json(self, entry: Entry) -> dict[str, Any]:
-        """A run as `podusv run --json` prints it; timing only where it was run now."""
+        """As `podusv run --json`, without what is missing; timing only where it was run now."""
         here = entry.label in self.result.timings
         return {
             "format": 1,
@@ -137,7 +140,7 @@ def compare(
         outcomes = comparing.make_runs(
             parts, writer.folder, figures=request.figures, argv=argv, progress=progress
         )
-        missing = unwritten(outcomes.values())
+        lost = unwritten(outcomes.values())
         extras = Extras(interrupted=any(outcome.cut for outcome in outcomes.values()))
         result = comparing.collect(parts, outcomes, gathered.stated, extras)
         if extras.interrupted and not result.entries:
@@ -145,17 +148,19 @@ def compare(
                 "interrupted before a run could be brought home; nothing is kept"
             )
         origin = provenance.collect(argv, started, datetime.now(UTC))
-        comparing.write(writer, result)
+        comparing.write(writer, result, extras)
         if request.figures:
-            figures = extras.attempt(lambda: comparing.drawn(result, progress)) or {}
+            work = partial(comparing.drawn, result, extras, progress)
+            figures = extras.attempt("figures", work) or {}
             for name, content in figures.items():
                 writer.add(f"figures/{name}", content)
             heading = f"{title} (interrupted)" if extras.interrupted else title
-            page = comparing.as_report(result, heading, figures, origin)
-            writer.add("report.html", page.encode())
+            page = partial(comparing.as_report, result, heading, figures, origin, extras.missing)
+            comparing.add_made(writer, extras, "report.html", lambda: page().encode())
         writer.add_json("provenance.json", origin)
+        writer.add_missing(extras)
         status: Status = "interrupted" if extras.interrupted else "finished"
-        return Compared(writer.finish(status, missing), result, status)
+        return Compared(writer.finish(status, lost), result, status, tuple(extras.missing))
 
 
 def _keep_apart(items: Sequence[Path], target: Path) -> None:
@@ -259,6 +264,7 @@ class Drawn:
     files: Sequence[Path]
     replaced: Sequence[Path]  # of `files`, those that were there with another content
     empty: Mapping[str, str]  # runs that ended before there was anything to draw, and how
+    missing: Sequence[Missing]  # figures that could not be drawn
     differences: Mapping[str, Mapping[str, Any]]  # in more than the controller
 
 
@@ -275,8 +281,8 @@ def plot(runs: Sequence[Path], drawing: Drawing) -> Drawn:
     from podusv_cli.figures.drawing import FIGURES, draw_in_parallel, dressed
     from podusv_cli.figures.style import FORMATS
 
-    _all_known("figure", drawing.figures, FIGURES)
-    _all_known("format", drawing.formats, FORMATS)
+    plotting.all_known("figure", drawing.figures, FIGURES)
+    plotting.all_known("format", drawing.formats, FORMATS)
     parts = plotting.named(part for path in runs for part in comparing.from_folder(path))
     shown = dressed([(p.label, p.run.recording, p.scenario) for p in parts if p.run])
     empty = plotting.empty(parts, shown)
@@ -285,16 +291,12 @@ def plot(runs: Sequence[Path], drawing: Drawing) -> Drawn:
     planned += [FILE] * drawing.animate
     plotting.spared(drawing.out, planned)
     atomic.check_places(drawing.out / name for name in planned)
-    drawn = dict(draw_in_parallel(shown, names, drawing.formats, drawing.columns))
+    extras = Extras()
+    drawn = draw_in_parallel(shown, names, drawing.formats, extras, drawing.columns)
     if drawing.animate:
-        drawn[FILE] = animate(shown)
+        drawn |= extras.attempt(FILE, lambda: {FILE: animate(shown)}) or {}
+    if extras.interrupted:
+        raise KeyboardInterrupt
     replaced = plotting.put(drawing.out, drawn)
     differing = differences({part.label: part.scenario.model_dump() for part in parts})
-    return Drawn([drawing.out / name for name in drawn], replaced, empty, differing)
-
-
-def _all_known(what: str, names: Sequence[str], known: Iterable[str]) -> None:
-    known = tuple(known)
-    for name in names:
-        if name not in known:
-            raise UsageError(unknown(f"{what} {name!r}", name, known))
+    return Drawn([drawing.out / n for n in drawn], replaced, empty, extras.missing, differing)

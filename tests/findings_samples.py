@@ -7,13 +7,13 @@ from functools import cache
 import numpy as np
 from conftest import PACKAGE
 
+from podusv_cli import running
 from podusv_cli.config.loading import load
 from podusv_cli.config.scenario import Scenario
 from podusv_cli.findings.finding import Finding
 from podusv_cli.findings.preflight import preflight
 from podusv_cli.kernels import Vector
 from podusv_cli.recording import Recording
-from podusv_cli.running import Stopwatch, measured
 
 CONFIGS = PACKAGE.parent / "configs" / "paper"
 PLAIN = ("path={kind: line}", "actuator={kind: ideal}", "simulation.duration=20")
@@ -42,7 +42,9 @@ def finding(code: str, *overrides: str) -> Finding:
 @cache
 def simulated(*overrides: str) -> tuple[Recording, dict[str, float]]:
     """The run of that scenario, and its metrics."""
-    return measured(scene(*overrides).alone(), Stopwatch())
+    scenario = scene(*overrides).alone()
+    recording = running.simulated(scenario, running.Stopwatch())
+    return recording, running.summary(scenario, recording)
 
 
 def log(*overrides: str) -> Recording:

@@ -31,7 +31,7 @@ SUCCESS = {"verify": 3}  # else 0; what these scenarios verify is not converged
 
 def quickly(shown: object, names: Sequence[str], forms: Sequence[str], *more: object) -> object:
     """Figures of which only the bytes matter."""
-    return [(f"{name}.{form}", name.encode() * 1000) for name in names for form in forms]
+    return {f"{name}.{form}": name.encode() * 1000 for name in names for form in forms}
 
 
 def among_old_results(

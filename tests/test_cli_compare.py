@@ -65,6 +65,7 @@ def test_json_has_the_documented_shape(podusv: Command) -> None:
     found = json.loads(said.out)
     assert list(found) == [
         "format", "status", "folder", "runs", "comparison", "failed", "differences", "claims",
+        "missing",
     ]  # fmt: skip
     assert (found["format"], found["status"], found["folder"]) == (1, "finished", "x")
     for run, label in zip(found["runs"], ("stiff", "soft"), strict=True):

@@ -7,6 +7,7 @@ from comparison_samples import Folder, scenario
 from podusv_cli import comparing
 from podusv_cli.cli.progress import progress_bars
 from podusv_cli.comparison.entries import Entry
+from podusv_cli.extras import Extras
 from podusv_cli.metrics import cost
 from podusv_cli.recording import Recording
 
@@ -33,7 +34,7 @@ def test_drawing_is_progress_too(monkeypatch):
     entry = Entry("a", run, scenario())
     result = comparing.Result([], [entry], {}, {}, pd.DataFrame(), [], {}, {})
     monkeypatch.setattr("podusv_cli.figures.style.FORMATS", {"png": None})
-    drawn = comparing.drawn(result, lambda name, fraction: seen.append((name, fraction)))
+    drawn = comparing.drawn(result, Extras(), lambda name, fraction: seen.append((name, fraction)))
     assert "velocities.png" in drawn
     assert {name for name, _ in seen} == {"drawing figures"}
     fractions = [fraction for _, fraction in seen]

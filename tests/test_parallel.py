@@ -1,6 +1,7 @@
 """Jobs in processes of their own."""
 
 import os
+import re
 import signal
 import time
 from functools import partial
@@ -10,8 +11,9 @@ import pytest
 from logbook_samples import deadline
 
 from podusv_cli.errors import StorageError
+from podusv_cli.extras import Extras
 from podusv_cli.figures import drawing
-from podusv_cli.interrupts import Extras, Interrupts, interrupts_heard, interrupts_held
+from podusv_cli.interrupts import Interrupts, interrupts_heard, interrupts_held
 from podusv_cli.parallel import INTERRUPTED, Outcome, run_all
 
 
@@ -118,7 +120,7 @@ def test_an_interrupt_while_figures_are_drawn_is_one_and_no_bug(
         drawing, "run_all", lambda jobs, *rest: [Outcome(failure=INTERRUPTED, cut=True)] * 2
     )
     with pytest.raises(KeyboardInterrupt):
-        list(drawing.draw_in_parallel([], ["errors", "loads"], ["png"]))
+        drawing.draw_in_parallel([], ["errors", "loads"], ["png"], Extras())
 
 
 def test_an_interrupt_that_became_another_exception_is_one(tmp_path):
@@ -131,14 +133,28 @@ def test_an_interrupt_that_became_another_exception_is_one(tmp_path):
 
     with interrupts_held():
         extras = Extras()
-        assert extras.attempt(confused) is None
+        assert extras.attempt("it", confused) is None
     assert extras.interrupted
-    assert extras.attempt(lambda: 1) is None
+    assert extras.attempt("it", lambda: 1) is None
+    assert not extras.missing
 
 
-def test_other_exceptions_of_extras_are_raised():
-    with interrupts_held(), pytest.raises(ZeroDivisionError):
-        Extras().attempt(lambda: 1 / 0)
+@pytest.mark.parametrize("way", ["made", "attempt"])
+def test_extras_that_fail_are_missing_and_what_cannot_be_stored_is_an_error(way):
+    def unstorable():
+        raise StorageError("the disk is full")
+
+    with interrupts_held():
+        extras = Extras()
+        assert getattr(extras, way)("the quotient", lambda: 1 / 0) is None
+        assert getattr(extras, way)("the sum", lambda: 1 + 1) == 2
+        with pytest.raises(StorageError, match="full"):
+            getattr(extras, way)("the file", unstorable)
+    (missing,) = extras.missing
+    here = r"the quotient could not be made: ZeroDivisionError: .* \(test_parallel.py, line \d+\)"
+    assert re.fullmatch(here, str(missing))
+    assert missing.trace.startswith("Traceback")
+    assert not extras.interrupted
 
 
 def test_held_interrupts_come_when_they_are_heard():

@@ -228,7 +228,7 @@ class Pods(Actuator):
 
         At rest with no demand an angle has no effect yet, and loads follow the demand with a lag.
         """
-        force = sum(pod.T_nn * pod.n_max**2 for pod in self.pods) / 3.0
+        force = sum(pod.T_nn * pod.n_max * pod.n_max for pod in self.pods) / 3.0
         at, still, small = np.array([force, 0.0]), np.zeros(6), SMALL * force
         columns = [
             (self.settled(still, at + change) - self.settled(still, at - change)) / (2.0 * small)

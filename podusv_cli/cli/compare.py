@@ -20,6 +20,7 @@ from podusv_cli.cli.options import (
     Quiet,
     Verbose,
 )
+from podusv_cli.cli.run import TRACED
 
 if TYPE_CHECKING:
     from podusv_cli.workflows import Compared
@@ -65,6 +66,8 @@ def compare(
     for finding in done.warnings():
         warned(finding)
     _warn(done)
+    for part in done.missing:
+        typer.echo(f"{part}; {TRACED}", err=True)
     if done.status == "interrupted":
         typer.echo("interrupted; what was done by then is compared, without figures", err=True)
         raise typer.Exit(INTERRUPTED)

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+SOME_FAILED = 3
+
 if TYPE_CHECKING:
     from podusv_cli.workflows import Drawn
 
@@ -37,11 +39,14 @@ def plot(
     for path in drawn.files:
         typer.echo(path)
     _warn(drawn)
+    raise typer.Exit(SOME_FAILED if drawn.missing else 0)
 
 
 def _warn(drawn: Drawn) -> None:
     from podusv_cli.cli.layout import warn_of
 
+    for part in drawn.missing:
+        typer.echo(str(part), err=True)
     for path in drawn.replaced:
         typer.echo(f"replaced what was in {path}", err=True)
     for label, ending in drawn.empty.items():

@@ -25,6 +25,7 @@ from podusv_cli.cli.options import (
 if TYPE_CHECKING:
     from podusv_cli.running import Finished
 
+TRACED = "missing.json in the folder has the traceback"
 EXIT_CODES = {"finished": 0, "diverged": 4, "interrupted": 130}
 
 
@@ -63,6 +64,8 @@ def run(
         warned(finding)
     if done.message:
         typer.echo(f"{config}: {done.message}", err=True)
+    for part in done.missing:
+        typer.echo(f"{config}: {part}; {TRACED}", err=True)
     if done.others:
         names = ", ".join(done.others)
         typer.echo(f"{config}: ran `controller` only; `podusv compare` runs {names}", err=True)

@@ -55,6 +55,7 @@ class Story:
     theories: Mapping[str, Mapping[str, Any]]  # theory.json of the runs that have one
     figures: Sequence[tuple[str, str, bytes]]  # name, caption, SVG
     provenance: Mapping[str, Any]
+    missing: Sequence[str] = ()  # what could not be made, and why
 
 
 def page(story: Story) -> str:
@@ -66,6 +67,7 @@ def page(story: Story) -> str:
             f"<h1>{title}</h1>",
             f"<p>{html.escape(story.scenario.description)}</p>",
             _endings(story),
+            _missing(story),
             _differences(story),
             "<h2>Comparison</h2>",
             _numbers(story.table),
@@ -117,6 +119,12 @@ def _endings(story: Story) -> str:
     return (
         f"<div class=warning>Not all runs finished:<ul>{''.join(lines)}</ul></div>" if bad else ""
     )
+
+
+def _missing(story: Story) -> str:
+    lines = (f"<li>{html.escape(text)}</li>" for text in story.missing)
+    listed = f"<div class=warning>Not all could be made:<ul>{''.join(lines)}</ul></div>"
+    return listed if story.missing else ""
 
 
 def _differences(story: Story) -> str:

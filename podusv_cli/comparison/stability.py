@@ -3,12 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
+
+from podusv_cli.errors import StorageError
 
 HEAD = (
     "run", "part", "lambda [1/s]", "bound of V", "printed form's", "largest V",
     "what the proof needs and this run does not have",
 )  # fmt: skip
+
+
+def check(theory: Mapping[str, Any], path: Path) -> None:
+    """StorageError where a run's theory.json is not as podusv writes it."""
+    try:
+        list(rows({"": theory} if theory else {}))
+    except (LookupError, TypeError, ValueError, AttributeError) as error:
+        raise StorageError(f"{path}: damaged: not as podusv writes it ({error})") from error
 
 
 def rows(theories: Mapping[str, Mapping[str, Any]]) -> Iterator[list[str]]:

@@ -29,6 +29,14 @@ def table(metrics: Mapping[str, Mapping[str, float]]) -> pd.DataFrame:
     return frame.rename_axis(METRIC)
 
 
+def numbers(frame: pd.DataFrame) -> dict[str, dict[str, float | None]]:
+    """The table as plain data: metric, run, number or None."""
+    return {
+        str(name): {str(label): None if math.isnan(x) else float(x) for label, x in row.items()}
+        for name, row in frame.iterrows()
+    }
+
+
 def with_ratios(frame: pd.DataFrame) -> pd.DataFrame:
     """The table with units, and a column of ratios to the first run for each further run."""
     first = frame.columns[0]

@@ -7,17 +7,16 @@ for the block, for an interrupt, or until the block has taken more computing tha
 from __future__ import annotations
 
 import time
-import traceback
 from collections.abc import Callable
 from contextlib import suppress
 from contextvars import copy_context
-from pathlib import Path
 from queue import Empty, SimpleQueue
 from threading import Thread
 from typing import NamedTuple
 
 from podusv_cli.engine.closed_loop import Plan
 from podusv_cli.engine.pieces import Pieces
+from podusv_cli.errors import in_a_line
 from podusv_cli.interrupts import interrupts_heard, interrupts_held
 from podusv_cli.kernels import Vector
 from podusv_cli.recording import Status
@@ -96,10 +95,7 @@ class Failed(Exception):
 
     def told(self) -> str:
         """What was raised, where."""
-        error = self.__cause__
-        place = traceback.extract_tb(error.__traceback__)[-1] if error else None
-        where = f" ({Path(place.filename).name}, line {place.lineno})" if place else ""
-        return f"{type(error).__name__}: {' '.join(str(error).split())}{where}"
+        return in_a_line(self.__cause__ or self)
 
 
 class Aside:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 
+import numpy as np
+
 from podusv_cli.config.scenario import Scenario
+from podusv_cli.extras import Extras, Missing
 from podusv_cli.figures.controls import controls
 from podusv_cli.figures.filters import filters
 from podusv_cli.figures.loads import loads
@@ -107,7 +111,8 @@ def draw(
     runs: Sequence[Shown], names: Iterable[str], formats: Sequence[str], columns: int = 2
 ) -> Iterator[tuple[str, bytes]]:
     """File name and content of each figure that fits the runs, in each format."""
-    with house_style():
+    with house_style(), np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of numbers near the end of all, as diverged runs have
         for name in (name for name in names if FIGURES[name].fits(runs)):
             figure = FIGURES[name].family(runs, columns)
             for form in formats:
@@ -115,35 +120,39 @@ def draw(
 
 
 def draw_in_parallel(
-    runs: Sequence[Shown], names: Iterable[str], formats: Sequence[str], columns: int = 2,
-    progress: Callable[[float], None] | None = None,
-) -> Iterator[tuple[str, bytes]]:  # fmt: skip
+    runs: Sequence[Shown], names: Iterable[str], formats: Sequence[str], extras: Extras,
+    columns: int = 2, progress: Callable[[float], None] | None = None,
+) -> dict[str, bytes]:  # fmt: skip
     """The same as `draw`, each of several figures in a process of its own.
 
-    `progress` is called with the fraction of figures drawn. Raises RuntimeError if one fails, and
-    KeyboardInterrupt where they were interrupted.
+    A figure that fails is missing among the `extras`. `progress` is called with the fraction of
+    figures that are over. Raises KeyboardInterrupt where several were interrupted.
     """
-
-    def job(name: str, tell: Callable[[float], None]) -> list[tuple[str, bytes]]:
-        with interrupts_heard():
-            drawn = list(draw(runs, [name], formats, columns))
-        tell(1.0)
-        return drawn
-
     names, done = tuple(names), set[int]()
-    if len(names) == 1:
-        yield from draw(runs, names, formats, columns)
-        return
+
+    def drawn(name: str) -> dict[str, bytes]:
+        return dict(draw(runs, [name], formats, columns))
+
+    def job(name: str, tell: Callable[[float], None]) -> tuple[dict[str, bytes], list[Missing]]:
+        own = Extras()
+        with interrupts_heard():
+            files = own.made(f"figure {name}", partial(drawn, name))
+        tell(1.0)
+        return files or {}, own.missing
 
     def tell(position: int, _: float) -> None:
         done.add(position)
         if progress:
             progress(len(done) / len(names))
 
+    if len(names) == 1:
+        return extras.attempt(f"figure {names[0]}", partial(drawn, names[0])) or {}
     outcomes = run_all([partial(job, name) for name in names], tell)
     if any(outcome.cut for outcome in outcomes):
         raise KeyboardInterrupt
+    found: dict[str, bytes] = {}
     for name, outcome in zip(names, outcomes, strict=True):
-        if outcome.failure:
-            raise RuntimeError(f"drawing {name} failed: {outcome.failure}")
-        yield from outcome.result
+        files, missing = outcome.result or ({}, [Missing(f"figure {name}", outcome.failure)])
+        found |= files
+        extras.missing += missing
+    return found

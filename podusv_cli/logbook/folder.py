@@ -17,13 +17,14 @@ from typing import Any, Self
 
 from podusv_cli.amounts import bytes_in_words
 from podusv_cli.errors import StorageError
+from podusv_cli.extras import Extras
 from podusv_cli.logbook import atomic, jsonfile, manifest
 from podusv_cli.logbook.regular import read_text
 from podusv_cli.logbook.staging import Staging, Taken, sweep
 from podusv_cli.logbook.stream import Stream, growing
 from podusv_cli.recording import Recording, Status
 
-LOG, THEORY = "log.h5", "theory.json"
+LOG, THEORY, MISSING = "log.h5", "theory.json", "missing.json"
 NEEDED = (LOG, "metrics.json", "provenance.json", "resolved.yaml")
 
 
@@ -94,6 +95,11 @@ class RunWriter:
     def add_json(self, name: str, content: Mapping[str, Any]) -> None:
         """Write a new JSON file, null for numbers that are not finite."""
         self.add(name, jsonfile.encode(content))
+
+    def add_missing(self, extras: Extras) -> None:
+        """Write missing.json where something could not be made."""
+        if extras.missing:
+            self.add_json(MISSING, extras.as_json())
 
     def finish(self, status: Status, missing: str = "") -> Path:
         """Write the manifest and give the folder its name, which is returned.

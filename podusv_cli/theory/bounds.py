@@ -103,7 +103,8 @@ class _Axis:
         form[2, 2] = self.A if math.isfinite(self.A) else 0.0
         size = 3 if math.isfinite(self.A) else 2  # without a filter there is no y
         scale = np.sqrt([1.0, self.mass, 1.0])
-        return float(np.linalg.eigvalsh((form / np.outer(scale, scale))[:size, :size])[0])
+        scaled = (form / np.outer(scale, scale))[:size, :size]
+        return float(np.linalg.eigvalsh(scaled)[0]) if np.isfinite(scaled).all() else math.nan
 
     def limit(self) -> float:
         """What k has to exceed for that lambda to be positive."""
@@ -155,10 +156,10 @@ def _corrected(law: PolarBackstepping, axes: Axes, observed: Observed | None) ->
     if observed is None:
         return _unobserved(candidates)
     terms = _fixed_terms(law, observed) | {
-        "rest_u": observed.rest.u**2 / 2.0,
-        "rest_r": observed.rest.r**2 / 2.0,
+        "rest_u": _half_square(observed.rest.u),
+        "rest_r": _half_square(observed.rest.r),
     }
-    rates = np.arange(1, TRIES) / TRIES * min(candidates.values())
+    rates = np.arange(1, TRIES) / TRIES * _least(candidates)
     rooms = (surge.room(rates), yaw.room(rates))
     return _best(candidates, terms, rates, rooms, observed.drift)
 
@@ -174,25 +175,25 @@ def _printed(law: PolarBackstepping, axes: Axes, observed: Observed | None) -> B
     if observed is None:
         return _unobserved(candidates)
     terms = _fixed_terms(law, observed) | {
-        "epsilon_u": observed.epsilon.u**2 / 2.0,
-        "epsilon_r": observed.epsilon.r**2 / 2.0,
+        "epsilon_u": _half_square(observed.epsilon.u),
+        "epsilon_r": _half_square(observed.epsilon.r),
     }
-    rates = np.arange(1, TRIES) / TRIES * min(candidates.values())
+    rates = np.arange(1, TRIES) / TRIES * _least(candidates)
     rooms = (2.0 * (surge.A - rates), 2.0 * (yaw.A - rates))
     return _best(candidates, terms, rates, rooms, observed.alpha_dot)
 
 
 def _unobserved(candidates: dict[str, float]) -> Bound:
-    return Bound(min(candidates.values()), math.nan, math.nan, candidates)
+    return Bound(_least(candidates), math.nan, math.nan, candidates)
 
 
 def _fixed_terms(law: PolarBackstepping, observed: Observed) -> dict[str, float]:
     """The terms of Delta that are the same in both forms and for every lambda."""
     return {
-        "W_u": law.sigma_u * observed.W.u**2 / 2.0,
-        "W_r": law.sigma_r * observed.W.r**2 / 2.0,
-        "b_u": law.sigma_bu * (observed.b.u - law.b_hat_u0) ** 2 / 2.0,
-        "b_r": law.sigma_br * (observed.b.r - law.b_hat_r0) ** 2 / 2.0,
+        "W_u": law.sigma_u * _half_square(observed.W.u),
+        "W_r": law.sigma_r * _half_square(observed.W.r),
+        "b_u": law.sigma_bu * _half_square(observed.b.u - law.b_hat_u0),
+        "b_r": law.sigma_br * _half_square(observed.b.r - law.b_hat_r0),
         "lemma": law.partial * (observed.b.u + observed.b.r),
     }
 
@@ -202,15 +203,24 @@ def _best(
     rooms: tuple[Vector, Vector], drift: Pair,
 ) -> Bound:  # fmt: skip
     """The lambda, and with it sigma_yu and sigma_yr of (47), that give the lowest bound."""
-    largest = min(candidates.values())
+    largest = _least(candidates)
     if largest <= 0.0:
         return Bound(largest, math.nan, math.inf, candidates, terms)
-    y_u, y_r = drift.u**2 / (2.0 * rooms[0]), drift.r**2 / (2.0 * rooms[1])
+    y_u, y_r = _half_square(drift.u) / rooms[0], _half_square(drift.r) / rooms[1]
     Delta = sum(terms.values()) + y_u + y_r
-    best = int(np.argmin(Delta / rates))
+    bounds = Delta / (2.0 * rates)
+    best = int(np.argmin(bounds))
     terms = terms | {"y_u": float(y_u[best]), "y_r": float(y_r[best])}
-    rate, total = float(rates[best]), float(Delta[best])
-    return Bound(rate, total, total / (2.0 * rate), candidates, terms)
+    rate, total, value = float(rates[best]), float(Delta[best]), float(bounds[best])
+    return Bound(rate, total, value, candidates, terms)
+
+
+def _least(candidates: dict[str, float]) -> float:
+    return float(np.min([*candidates.values()]))  # NaN where one is, unlike Python's min
+
+
+def _half_square(x: float) -> float:
+    return x * x / 2.0  # infinite where it leaves all numbers; x**2 would raise
 
 
 def _conditions(law: PolarBackstepping, axes: Axes) -> tuple[Condition, ...]:

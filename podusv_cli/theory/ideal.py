@@ -84,7 +84,8 @@ def ideal_weights(loop: ClosedLoop, law: PolarBackstepping, log: Recording, now:
         (f_r, loop.vessel.m33, loop.nominal.m33, law.sigma_r),
     ):
         aim = f[usable] * (mass / told) - start * phi.sum(axis=1)
-        weights.append(start + inverse(aim, sigma * len(phi) / told**2))
+        damping = np.float64(sigma * len(phi)) / (told * told)  # a float would raise beyond numbers
+        weights.append(start + inverse(aim, float(damping)))
     return Ideal(*weights)
 
 

@@ -191,7 +191,7 @@ control: {{period: {shape["period"]}}}
 log: {{every: {shape["every"]}, monitor: {shape["monitor"]}}}
 """
     scenario = loaded(text).scenario
-    recording, _ = running.measured(scenario, running.Stopwatch())
+    recording = running.simulated(scenario, running.Stopwatch())
     recording, _ = running.monitored(scenario, recording)
     expected = estimate(scenario)
     assert expected.steps == 10
