@@ -14,7 +14,7 @@ from podusv_cli.comparing import Part
 from podusv_cli.config.words import unknown
 from podusv_cli.errors import StorageError, UsageError
 from podusv_cli.figures.drawing import FIGURES
-from podusv_cli.figures.style import Shown
+from podusv_cli.figures.style import FORMATS, Shown
 from podusv_cli.logbook import atomic, manifest
 
 STAMP = re.compile(r"\d{8}T\d{6}Z-[0-9a-f]{8}(-\d+)?")  # a run folder that nobody named
@@ -83,12 +83,12 @@ def chosen(asked: Sequence[str], shown: Sequence[Shown]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(asked)) or fitting
 
 
-def all_known(what: str, names: Sequence[str], known: Iterable[str]) -> None:
-    """UsageError for a name that is not known."""
-    known = tuple(known)
-    for name in names:
-        if name not in known:
-            raise UsageError(unknown(f"{what} {name!r}", name, known))
+def check_names(figures: Sequence[str], formats: Sequence[str]) -> None:
+    """UsageError for a figure or format that there is not."""
+    for what, names, known in (("figure", figures, tuple(FIGURES)), ("format", formats, FORMATS)):
+        for name in names:
+            if name not in known:
+                raise UsageError(unknown(f"{what} {name!r}", name, known))
 
 
 def spared(out: Path, names: Iterable[str]) -> None:

@@ -278,11 +278,9 @@ def plot(runs: Sequence[Path], drawing: Drawing) -> Drawn:
     from podusv_cli import comparing, plotting
     from podusv_cli.comparison.differences import differences
     from podusv_cli.figures.animation import FILE, animate
-    from podusv_cli.figures.drawing import FIGURES, draw_in_parallel, dressed
-    from podusv_cli.figures.style import FORMATS
+    from podusv_cli.figures.drawing import draw_in_parallel, dressed
 
-    plotting.all_known("figure", drawing.figures, FIGURES)
-    plotting.all_known("format", drawing.formats, FORMATS)
+    plotting.check_names(drawing.figures, drawing.formats)
     parts = plotting.named(part for path in runs for part in comparing.from_folder(path))
     shown = dressed([(p.label, p.run.recording, p.scenario) for p in parts if p.run])
     empty = plotting.empty(parts, shown)
