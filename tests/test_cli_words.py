@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import os
+import re
 import subprocess
 import sys
 from importlib import import_module
@@ -17,7 +18,7 @@ from config_samples import SOUND, write
 import podusv_cli
 from podusv_cli import cli
 from podusv_cli.cli.guard import PLEASE_REPORT, guarded
-from podusv_cli.config.references import vessel_names
+from podusv_cli.config.references import pod_text, vessel_names, vessel_text
 from podusv_cli.config.scenario import Scenario
 from podusv_cli.config.schema import schema_text
 from podusv_cli.errors import Finding, ScenarioError, StorageError
@@ -119,7 +120,7 @@ def test_explain_shows_the_sections_without_a_key(podusv: Command) -> None:
 
 def test_explain_tells_an_unknown_key(podusv: Command) -> None:
     said = podusv("explain", "contoller")
-    assert said == (2, "", "contoller: no such key or signal; did you mean 'controller'?\n")
+    assert said == (2, "", "contoller: no such name; did you mean 'controller'?\n")
 
 
 @pytest.mark.parametrize("columns", ["20", "40", "300"])
@@ -142,6 +143,25 @@ def test_list_names_every_kind_and_every_vessel(podusv: Command) -> None:
     for kind in ("line_circle", "harmonic", "saturated", "adaptive_neural", *vessel_names()):
         assert f"\n  {kind}\n" in out
     assert "CyberShip II" in out
+
+
+def test_every_name_that_is_listed_is_explained(podusv: Command) -> None:
+    out = podusv("list").out
+    names = re.findall(r"^  (\S+)", out, re.MULTILINE)
+    assert {"otter", "near-target", "iae", "line", "none"} <= set(names)
+    for name in names:
+        said = podusv("explain", name)
+        assert (said.code, said.err) == (0, ""), name
+        assert re.search(rf"^(\w+\.)*{name}\b", said.out, re.MULTILINE), name
+
+
+def test_a_preset_is_explained_with_its_source_and_what_it_holds_for(podusv: Command) -> None:
+    vessel, pods = podusv("explain", "otter").out.split("otter  ")[1:]
+    assert vessel.startswith("vessel (vessel.preset)\n")
+    assert pods.startswith("set of pods (actuator.preset)\n")
+    for text, section in ((vessel, vessel_text), (pods, pod_text)):
+        for key in ("source", "validity"):
+            assert section("otter", key) in " ".join(text.split())
 
 
 def test_schema_prints_the_schema(podusv: Command) -> None:

@@ -179,6 +179,8 @@ def test_a_word_that_is_a_signal_and_a_key_is_explained_as_both() -> None:
         ("controller.k_z", "; did you mean 'controller.k_ze'?"),
         ("Kiu", "; did you mean 'K_Iu'?"),
         ("Z_E", "; did you mean 'z_e'?"),
+        ("Oter", "; did you mean 'otter'?"),
+        ("near_target", "; did you mean 'near-target'?"),
         ("qqq", ""),
         ("", ""),
     ],
@@ -186,7 +188,7 @@ def test_a_word_that_is_a_signal_and_a_key_is_explained_as_both() -> None:
 def test_an_unknown_key_is_told_with_what_was_probably_meant(key: str, hint: str) -> None:
     with pytest.raises(UnknownKeyError) as raised:
         explain(key)
-    assert str(raised.value) == f"{key}: no such key or signal{hint}"
+    assert str(raised.value) == f"{key}: no such name{hint}"
     assert raised.value.exit_code == 2
 
 

@@ -26,7 +26,6 @@ OBJECTS_BETWEEN_COLLECTIONS = 100_000
 app = typer.Typer(
     name="podusv",
     no_args_is_help=True,
-    add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )

@@ -1,4 +1,4 @@
-"""`podusv explain`: keys, kinds and signals in words."""
+"""`podusv explain`: what every name means, in words."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ def explain(
         typer.Argument(
             metavar="KEY",
             help="A section (controller), a kind (controller.pid), a key (controller.k_ze or k_ze) "
-            "a signal (z_e) or a metric (iae).",
+            "a signal (z_e), a metric (iae), a preset (otter) or a finding (near-target).",
             show_default=False,
         ),
     ] = None,
 ) -> None:
-    """Explain keys, kinds, signals and metrics in words.
+    """Explain keys, kinds, signals, metrics, presets and findings in words.
 
     Without a key: the sections of a scenario.
     """

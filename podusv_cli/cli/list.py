@@ -8,7 +8,11 @@ from podusv_cli.cli.layout import echo_entry
 
 
 def list() -> None:
-    """List the kinds of components, the vessels, the sets of pods and the metrics."""
+    """List the kinds of components, vessels, sets of pods, metrics and findings.
+
+    `podusv explain NAME` tells more about each.
+    """
+    from podusv_cli.codes import CODES
     from podusv_cli.config.explain import first_sentence, kinds
     from podusv_cli.config.references import pod_names, pod_text, vessel_names, vessel_text
     from podusv_cli.metrics.table import METRICS
@@ -26,3 +30,6 @@ def list() -> None:
     typer.echo("metrics:")
     for name, metric in METRICS.items():
         echo_entry(f"  {name}", metric.meaning, facts=f"[{metric.unit}]")
+    typer.echo("findings:")
+    for name, code in CODES.items():
+        echo_entry(f"  {name}", code.meaning)

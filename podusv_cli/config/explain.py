@@ -7,9 +7,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cache
 
+from podusv_cli.codes import CODES
 from podusv_cli.config.annotations import choices, joined, sections
 from podusv_cli.config.fields import MISSING, NAME, NUMBER, Key, keys, range_of, type_of
-from podusv_cli.config.references import pod_names, vessel_names
+from podusv_cli.config.references import pod_names, pod_text, vessel_names, vessel_text
 from podusv_cli.config.scenario import Scenario
 from podusv_cli.config.words import as_written, did_you_mean
 from podusv_cli.errors import PodusvError
@@ -22,7 +23,7 @@ FROM_PRESET = {"vessel": "the preset's", "nominal": "the vessel's"}
 
 
 class UnknownKeyError(PodusvError):
-    """Neither a key nor a signal has that name."""
+    """Nothing that podusv knows has that name."""
 
     exit_code = 2
 
@@ -51,7 +52,7 @@ EXTENDS = Row(
 
 
 def explain(key: str | None = None) -> list[Row]:
-    """Rows for a key, a kind, a section, a signal or, with None, the sections of a scenario.
+    """Rows for a key, a kind, a section, a signal, a preset, a finding or, with None, all sections.
 
     `controller` gives its kinds, `controller.pid` that kind's keys, `controller.k_ze` or just
     `k_ze` one key, and `pid` alone the kind. Raises UnknownKeyError, with what was probably meant.
@@ -61,9 +62,10 @@ def explain(key: str | None = None) -> list[Row]:
     if key == EXTENDS.key:
         return [EXTENDS]
     place = tuple(NUMBER if step.isdecimal() else step for step in key.split("."))
-    found = _at(place) or [*_signal(key), *_named(key), *_kinds_named(key)]
+    parts = (_signal, _named, _kinds_named, _presets, _finding)
+    found = _at(place) or [row for look in parts for row in look(key)]
     if not found:
-        raise UnknownKeyError(f"{key}: no such key or signal{did_you_mean(key, _names())}")
+        raise UnknownKeyError(f"{key}: no such name{did_you_mean(key, _names())}")
     return found
 
 
@@ -98,7 +100,8 @@ def _names() -> list[str]:
     asked = [
         (e.path, e.route, e.path[-1:], (*e.path[:1], e.kind)[: 1 + bool(e.kind)]) for e in _keys()
     ]
-    return list(dict.fromkeys([".".join(name) for names in asked for name in names] + [*SIGNALS]))
+    keyed = [".".join(name) for names in asked for name in names]
+    return list(dict.fromkeys([*keyed, *SIGNALS, *vessel_names(), *pod_names(), *CODES]))
 
 
 def _at(place: tuple[str, ...]) -> list[Row]:
@@ -153,6 +156,25 @@ def _items(place: tuple[str, ...]) -> tuple[tuple[str, ...], ...]:
 def _signal(name: str) -> list[Row]:
     signal = SIGNALS.get(name)
     return [Row(name, signal.meaning, "signal", signal.unit)] if signal else []
+
+
+def _presets(name: str) -> list[Row]:
+    """The vessel and the set of pods of this name: where the numbers come from, what they are for.
+
+    Their keys are those of `vessel` and of `actuator.pod`.
+    """
+    found = [(vessel_text, "vessel (vessel.preset)")] * (name in vessel_names())
+    found += [(pod_text, "set of pods (actuator.preset)")] * (name in pod_names())
+    return [
+        Row(name, f"{text(name, 'source')} Validity: {text(name, 'validity')}", what)
+        for text, what in found
+    ]
+
+
+def _finding(name: str) -> list[Row]:
+    code = CODES.get(name)
+    what = f"finding about {code.key}, told {code.when} a run" if code else ""
+    return [Row(name, code.meaning, what)] if code else []
 
 
 def _together(entries: Iterable[Key]) -> list[Row]:
