@@ -10,6 +10,7 @@ import pytest
 from command_samples import BASE, TWO, Command, Said, commanded, write
 
 from podusv_cli import comparing
+from podusv_cli.figures import drawing
 from podusv_cli.logbook import manifest
 from podusv_cli.parallel import Outcome
 
@@ -246,3 +247,41 @@ def test_runs_that_all_die_are_reported(podusv: Command, monkeypatch: pytest.Mon
     ]
     assert "soft.iae: soft has no log: its process ended with exit code -9" in said.out
     assert Path("x/comparison.csv").read_text().startswith("metric,unit,stiff,soft")
+
+
+# --- on a terminal
+
+
+FIVE = BASE.replace("duration: 1.0", "duration: 0.1, compiled: false") + (
+    "controllers: {one: {}, another: {K_Pu: 60}, third: {K_Pu: 70}, the_fourth: {}, last: {}}\n"
+)
+
+
+def test_five_runs_are_tables_below_each_other_on_a_narrow_terminal(
+    podusv: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config = write("five.yaml", FIVE)
+    whole = podusv(config, "--out", "x").out.splitlines()
+    assert whole[0].split() == ["metric", "unit", "one", "another", "third", "the_fourth", "last"]
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setattr("podusv_cli.cli.layout.sys.stdout.isatty", lambda: True, raising=False)
+    out = podusv(config, "--out", "y").out
+    assert max(map(len, out.splitlines())) <= 80
+    first, second = (part.splitlines() for part in out.split("\n\n"))
+    for lines, labels in ((first, ["one", "another", "third"]), (second, ["the_fourth", "last"])):
+        assert lines[0].split() == ["metric", "unit", *labels]
+        assert [line.split()[0] for line in lines[: len(first)]] == [
+            line.split()[0] for line in whole[: len(first)]
+        ]
+        starts = [lines[0].index(label) for label in labels]
+        assert all(line[start - 1] == " " for line in lines[: len(first)] for start in starts)
+
+
+def test_the_report_is_named_last(podusv: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(drawing, "draw_in_parallel", lambda *_, **__: ())
+    config = write("two.yaml", TWO.replace("duration: 1.0", "duration: 0.1, compiled: false"))
+    said = podusv(config, "--out", "x", "--figures")
+    assert said.out.splitlines()[-1] == "report: x/report.html"
+    assert Path("x/report.html").exists()
+    assert "report" not in podusv(config, "--out", "y").out
+    assert podusv(config, "--out", "z", "--figures", "-q").out == "z\n"

@@ -68,6 +68,8 @@ def compare(
     _warn(done)
     for part in done.missing:
         typer.echo(f"{part}; {TRACED}", err=True)
+    if not (as_json or quiet):
+        _name_report(done.folder / "report.html")
     if done.status == "interrupted":
         typer.echo("interrupted; what was done by then is compared, without figures", err=True)
         raise typer.Exit(INTERRUPTED)
@@ -75,12 +77,12 @@ def compare(
 
 
 def _report(done: Compared, verbose: bool) -> None:
-    from podusv_cli.cli.layout import echo_entry, echo_table
+    from podusv_cli.cli.layout import echo_entry, echo_line, echo_table
     from podusv_cli.comparison.table import NOTE, cells
 
     result = done.result
     echo_table(["metric", "unit", *map(str, result.table.columns)], cells(result.table))
-    typer.echo(NOTE)
+    echo_line(NOTE)
     for v in result.verdicts:
         echo_entry(v.name, v.claim.says, v.shown(), facts=v.answer)
     if verbose:
@@ -88,6 +90,12 @@ def _report(done: Compared, verbose: bool) -> None:
             shown = ", ".join(f"{name} {seconds:.3f}" for name, seconds in timing.items())
             typer.echo(f"{label}: {shown}")
     typer.echo(f"compared {len(result.entries)} runs: {done.folder}")
+
+
+def _name_report(page: Path) -> None:
+    """Say last where the page is; there is none without figures."""
+    if page.exists():
+        typer.echo(f"report: {page}")
 
 
 def _warn(done: Compared) -> None:

@@ -6,12 +6,13 @@ import os
 import shutil
 import sys
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, TextIO
 
 import typer
 
 WIDEST = 100
+SPACE = "  "  # between the columns of a table
 
 
 def echo_entry(name: str, *lines: str, facts: str = "") -> None:
@@ -38,16 +39,38 @@ def takes_codes(stream: TextIO) -> bool:
 
 
 def echo_table(head: list[str], rows: list[list[str]]) -> None:
-    """A table in columns; where the terminal is too narrow for it, a block for each row."""
+    """A table in columns, whole in a pipe.
+
+    Where the terminal is too narrow for it, it is cut into tables below each other, each with the
+    first two columns; where it is too narrow even for one further column, a block for each row.
+    """
     widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
-    if sys.stdout.isatty() and sum(widths) + 2 * len(widths) > shutil.get_terminal_size().columns:
-        for row in rows:
-            cells = [f"{title} {cell}" for title, cell in zip(head[2:], row[2:], strict=True)]
-            echo_entry(row[0], ", ".join(cells), facts=f"[{row[1]}]")
+    room = shutil.get_terminal_size().columns if sys.stdout.isatty() else sys.maxsize
+    if sum(widths[:2]) + max(widths[2:]) + 2 * len(SPACE) > room:
+        _echo_blocks(head, rows)
         return
-    for row in (head, *rows):
-        padded = (cell.ljust(width) for cell, width in zip(row, widths, strict=True))
-        typer.echo("  ".join(padded).rstrip())
+    for place, part in enumerate(_parts(widths, room)):
+        if place:
+            typer.echo("")
+        for row in (head, *rows):
+            typer.echo(SPACE.join(row[i].ljust(widths[i]) for i in part).rstrip())
+
+
+def _parts(widths: list[int], room: int) -> Iterator[list[int]]:
+    """The columns of each table, as many as there is room for, after the first two."""
+    part = [0, 1]
+    for i in range(2, len(widths)):
+        if sum(widths[j] for j in (*part, i)) + len(SPACE) * len(part) > room:
+            yield part
+            part = [0, 1]
+        part.append(i)
+    yield part
+
+
+def _echo_blocks(head: list[str], rows: list[list[str]]) -> None:
+    for row in rows:
+        cells = [f"{title} {cell}" for title, cell in zip(head[2:], row[2:], strict=True)]
+        echo_entry(row[0], ", ".join(cells), facts=f"[{row[1]}]")
 
 
 def echo_line(text: str, *, err: bool = False) -> None:
