@@ -12,6 +12,10 @@ class PodusvError(Exception):
 
     exit_code = 1
 
+    def lines(self) -> list[str]:
+        """The lines to be shown; a name in one of them may hold anything, a new line too."""
+        return [str(self)]
+
 
 @dataclass(frozen=True)
 class Finding:
@@ -34,7 +38,11 @@ class ScenarioError(PodusvError):
     def __init__(self, findings: list[Finding]) -> None:
         """Take the findings; the message has one line each."""
         self.findings = findings
-        super().__init__("\n".join(str(finding) for finding in findings))
+        super().__init__("\n".join(self.lines()))
+
+    def lines(self) -> list[str]:
+        """A line a finding."""
+        return [str(finding) for finding in self.findings]
 
 
 class UsageError(PodusvError):

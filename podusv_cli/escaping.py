@@ -5,11 +5,70 @@ Folder names, descriptions, claims and arguments may hold anything. One function
 
 from __future__ import annotations
 
+import html as markup
+import re
+import unicodedata
 
-def visible(text: str) -> str:
-    r"""The text on one line, what does not show, or turns other letters around, as `\x1b`."""
-    return "".join(letter if letter.isprintable() else _named(letter) for letter in text)
+# Also * and _ at an end of a word, and ] where a link's target follows.
+MARKDOWN = re.compile(r"[\\`<>&]|(?<!\s)\*|\*(?!\s)|(?<![^\W_])_|_(?![^\W_])|\](?=[(\[])")
+LATEX = str.maketrans(
+    {sign: rf"\{sign}" for sign in "_%&#${}"}
+    | {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
+)
+# What a spreadsheet takes for the beginning of a formula, in the wide forms of East Asia, too.
+FORMULA = tuple("=+-@\uff1d\uff0b\uff0d\uff20")
+
+
+def visible(text: object) -> str:
+    r"""The text on one line; what would move a cursor or turn letters around, as `\x1b`."""
+    return "".join(c if _shows(c) else _named(c) for c in str(text))
+
+
+def markdown(text: str) -> str:
+    """Text in one line that is nothing but text, inside a paragraph."""
+    return MARKDOWN.sub(r"\\\g<0>", visible(" ".join(text.split())))
+
+
+def markdown_cell(text: str) -> str:
+    """The same in a cell of a table."""
+    return markdown(text).replace("|", "\\|")
+
+
+def markdown_code(text: str) -> str:
+    """A cell in the type of code; there, nothing but the end of the cell is escaped."""
+    one_line = visible(" ".join(text.split()))
+    return "`" + one_line.replace("`", "'").replace("|", "\\|") + "`"
+
+
+def csv(text: str) -> str:
+    """A cell, before a CSV writer quotes it; a formula begins with ', so that it is none."""
+    shown = visible(text)
+    return f"'{shown}" if shown.startswith(FORMULA) else shown
+
+
+def latex(text: str) -> str:
+    """Text outside of formulas."""
+    return visible(text).translate(LATEX)
+
+
+def html(text: str) -> str:
+    """Text of an element, or of an attribute in quotes."""
+    return markup.escape("\n".join(map(visible, text.split("\n"))))
+
+
+def json(encoded: str) -> str:
+    """Encoded JSON; letters that do not show, which only strings can hold, as JSON escapes them."""
+    return "".join(c if c == "\n" or _shows(c) else _json_named(c) for c in encoded)
+
+
+def _shows(letter: str) -> bool:
+    return letter.isprintable() or unicodedata.category(letter) == "Zs"  # spaces of any width
 
 
 def _named(letter: str) -> str:
     return letter.encode("unicode_escape").decode()
+
+
+def _json_named(letter: str) -> str:
+    units = letter.encode("utf-16-be", "surrogatepass").hex()
+    return "".join(f"\\u{units[i : i + 4]}" for i in range(0, len(units), 4))

@@ -179,6 +179,6 @@ def test_verdicts_have_numbers_reasons_and_the_labels_of_the_comparison():
 def test_claims_in_markdown_stay_in_their_cells():
     lines = claims.as_markdown(verdicts()).splitlines()
     assert lines[2] == (
-        r"| C1 | a \| <b> (here) | **reproduced** | `a.iae == 3`, tolerance 0.05 | a.iae = 3 |"
+        r"| C1 | a \| \<b\> (here) | **reproduced** | `a.iae == 3`, tolerance 0.05 | a.iae = 3 |"
     )
-    assert lines[-1] == "- C4: Not <stated>."
+    assert lines[-1] == r"- C4: Not \<stated\>."

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,6 +9,15 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from podusv_cli.cli.guard import INTERRUPTED
+from podusv_cli.cli.layout import (
+    Warned,
+    echo,
+    echo_entry,
+    echo_line,
+    echo_path,
+    echo_table,
+    warn_of,
+)
 from podusv_cli.cli.options import (
     AllowLarge,
     AsJson,
@@ -48,8 +56,8 @@ def compare(
     when a run failed or diverged; the others are compared all the same.
     """
     from podusv_cli import workflows  # heavy imports only when they are needed
-    from podusv_cli.cli.layout import Warned
     from podusv_cli.cli.progress import progress_bars
+    from podusv_cli.logbook.jsonfile import encode
 
     warned = Warned(quiet)
     request = workflows.Request(
@@ -58,26 +66,25 @@ def compare(
     with progress_bars(wanted=not (quiet or as_json)) as progress:
         done = workflows.compare([Path(item) for item in items], request, progress)
     if as_json:
-        typer.echo(json.dumps(done.as_json(), indent=2, ensure_ascii=False))
+        typer.echo(encode(done.as_json()), nl=False)
     elif quiet:
-        typer.echo(done.folder)
+        echo_path(done.folder)
     else:
         _report(done, verbose)
     for finding in done.warnings():
         warned(finding)
     _warn(done)
     for part in done.missing:
-        typer.echo(f"{part}; {TRACED}", err=True)
+        echo(f"{part}; {TRACED}", err=True)
     if not (as_json or quiet):
         _name_report(done.folder / "report.html")
     if done.status == "interrupted":
-        typer.echo("interrupted; what was done by then is compared, without figures", err=True)
+        echo("interrupted; what was done by then is compared, without figures", err=True)
         raise typer.Exit(INTERRUPTED)
     raise typer.Exit(SOME_FAILED if any(done.result.endings.values()) else 0)
 
 
 def _report(done: Compared, verbose: bool) -> None:
-    from podusv_cli.cli.layout import echo_entry, echo_line, echo_table
     from podusv_cli.comparison.table import NOTE, cells
 
     result = done.result
@@ -88,20 +95,18 @@ def _report(done: Compared, verbose: bool) -> None:
     if verbose:
         for label, timing in result.timings.items():
             shown = ", ".join(f"{name} {seconds:.3f}" for name, seconds in timing.items())
-            typer.echo(f"{label}: {shown}")
-    typer.echo(f"compared {len(result.entries)} runs: {done.folder}")
+            echo(f"{label}: {shown}")
+    echo(f"compared {len(result.entries)} runs: {done.folder}")
 
 
 def _name_report(page: Path) -> None:
     """Say last where the page is; there is none without figures."""
     if page.exists():
-        typer.echo(f"report: {page}")
+        echo(f"report: {page}")
 
 
 def _warn(done: Compared) -> None:
-    from podusv_cli.cli.layout import warn_of
-
     warn_of(done.result.differences)
     for label, ending in done.result.endings.items():
         if ending:
-            typer.echo(f"{label}: {ending}", err=True)
+            echo(*f"{label}: {ending}".splitlines(), err=True)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from podusv_cli.cli.layout import echo, echo_entry, echo_table
 from podusv_cli.cli.options import AsJson
 from podusv_cli.cli.parting import DIFFERENT
 
@@ -39,18 +40,16 @@ def diff(
             _report(label, difference)
         for path, names in ((one, found.only_one), (other, found.only_other)):
             if names:
-                typer.echo(f"only in {path}: {', '.join(names)}")
+                echo(f"only in {path}: {', '.join(names)}")
     raise typer.Exit(0 if found.nothing else DIFFERENT)
 
 
 def _report(label: str, found: Difference) -> None:
-    from podusv_cli.cli.layout import echo_entry
-
     if label:
         echo_entry(label)
     if found.nothing:
         log = "log.h5 byte for byte" if found.same_bytes else "every number of log.h5"
-        typer.echo(f"identical: scenario, metrics, {log}")
+        echo(f"identical: scenario, metrics, {log}")
     _show_changes("scenario", found.scenario)
     _show_changes("versions", found.versions)
     _show_metrics(found)
@@ -58,7 +57,6 @@ def _report(label: str, found: Difference) -> None:
 
 
 def _show_changes(what: str, changes: Mapping[str, Change]) -> None:
-    from podusv_cli.cli.layout import echo_entry
     from podusv_cli.cli.parting import change_in_words
 
     if changes:
@@ -66,7 +64,6 @@ def _show_changes(what: str, changes: Mapping[str, Change]) -> None:
 
 
 def _show_metrics(found: Difference) -> None:
-    from podusv_cli.cli.layout import echo_table
     from podusv_cli.metrics.table import METRICS
     from podusv_cli.repetition.difference import relative
 
@@ -80,7 +77,6 @@ def _show_metrics(found: Difference) -> None:
 
 
 def _show_log(log: Logs) -> None:
-    from podusv_cli.cli.layout import echo_entry, echo_table
     from podusv_cli.cli.parting import log_in_words, unit
 
     rows = [

@@ -14,6 +14,7 @@ from typing import ParamSpec, TextIO
 import typer
 
 from podusv_cli.errors import PodusvError, StorageError
+from podusv_cli.escaping import visible
 from podusv_cli.interrupts import SIGNALLED, STDERR, Interrupts, interrupts_caught
 
 Given = ParamSpec("Given")
@@ -64,18 +65,18 @@ def told(error: BaseException) -> int:
         _silence(sys.stdout)
         return PIPE_CLOSED
     if isinstance(error, PodusvError):
-        _say(str(error))
+        _say(*error.lines())
         return error.exit_code
     if isinstance(error, OSError):
         _say(f"podusv: {error}")
         return StorageError.exit_code
-    _say("".join(traceback.format_exception(error)) + PLEASE_REPORT)
+    _say(*"".join(traceback.format_exception(error)).splitlines(), PLEASE_REPORT)
     return BUG
 
 
-def _say(text: str) -> None:
+def _say(*lines: str) -> None:
     with suppress(OSError):  # nobody is left to tell that stderr cannot be written to
-        typer.echo(text, err=True)
+        typer.echo("\n".join(map(visible, lines)), err=True)
 
 
 def open_streams() -> None:

@@ -7,17 +7,32 @@ import shutil
 import sys
 import textwrap
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any, TextIO
 
 import typer
+
+from podusv_cli.escaping import visible
 
 WIDEST = 100
 SPACE = "  "  # between the columns of a table
 
 
+def echo(*lines: object, err: bool = False) -> None:
+    """Lines, on stderr where `err`; what users wrote moves no cursor and adds no line."""
+    typer.echo("\n".join(map(visible, lines)), err=err)
+
+
+def echo_path(path: Path) -> None:
+    """A path alone, for scripts; byte for byte in a pipe, as `ls` does it."""
+    shown = visible(path).encode() if sys.stdout.isatty() else os.fsencode(path)
+    typer.echo(shown + b"\n", nl=False)
+
+
 def echo_entry(name: str, *lines: str, facts: str = "") -> None:
     """An entry: its name (bold on a terminal) and facts, then lines below, indented and wrapped."""
     width = _width()
+    name, facts, lines = visible(name), visible(facts), tuple(map(visible, lines))
 
     def wrapped(text: str, indent: str) -> str:
         return textwrap.fill(
@@ -44,6 +59,7 @@ def echo_table(head: list[str], rows: list[list[str]]) -> None:
     Where the terminal is too narrow for it, it is cut into tables below each other, each with the
     first two columns; where it is too narrow even for one further column, a block for each row.
     """
+    head, rows = [*map(visible, head)], [[*map(visible, row)] for row in rows]
     widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
     room = shutil.get_terminal_size().columns if sys.stdout.isatty() else sys.maxsize
     if sum(widths[:2]) + max(widths[2:]) + 2 * len(SPACE) > room:
@@ -75,6 +91,7 @@ def _echo_blocks(head: list[str], rows: list[list[str]]) -> None:
 
 def echo_line(text: str, *, err: bool = False) -> None:
     """One line, on stderr where `err`; wrapped and indented on a terminal, whole in a pipe."""
+    text = visible(text)
     if (sys.stderr if err else sys.stdout).isatty():
         text = folded(text, _width())
     typer.echo(text, err=err)
@@ -94,10 +111,10 @@ def warn_of(differences: Mapping[str, Mapping[str, Any]]) -> None:
     from podusv_cli.comparison.differences import in_words
 
     if differences:
-        typer.echo("warning: the runs differ in more than the controller:", err=True)
+        echo("warning: the runs differ in more than the controller:", err=True)
     for key, values in in_words(differences).items():
         shown = ", ".join(f"{label} {value}" for label, value in values.items())
-        typer.echo(f"  {key}: {shown}", err=True)
+        echo(f"  {key}: {shown}", err=True)
 
 
 class Warned:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import typer
-
-from podusv_cli.cli.layout import echo_entry
+from podusv_cli.cli.layout import echo, echo_entry
 
 
 def list() -> None:
@@ -18,18 +16,18 @@ def list() -> None:
     from podusv_cli.metrics.table import METRICS
 
     for section, summaries in kinds().items():
-        typer.echo(f"{section}:")
+        echo(f"{section}:")
         for kind, summary in summaries.items():
             echo_entry(f"  {kind}", summary)
-    typer.echo("vessel:")
+    echo("vessel:")
     for name in vessel_names():
         echo_entry(f"  {name}", first_sentence(vessel_text(name, "source")))
-    typer.echo("pods (actuator.preset):")
+    echo("pods (actuator.preset):")
     for name in pod_names():
         echo_entry(f"  {name}", first_sentence(pod_text(name, "source")))
-    typer.echo("metrics:")
+    echo("metrics:")
     for name, metric in METRICS.items():
         echo_entry(f"  {name}", metric.meaning, facts=f"[{metric.unit}]")
-    typer.echo("findings:")
+    echo("findings:")
     for name, code in CODES.items():
         echo_entry(f"  {name}", code.meaning)

@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-SOME_FAILED = 3
+from podusv_cli.cli.layout import echo, echo_path, warn_of
 
 if TYPE_CHECKING:
     from podusv_cli.workflows import Drawn
+
+SOME_FAILED = 3
 
 
 def plot(
@@ -37,18 +39,16 @@ def plot(
     drawing = workflows.Drawing(tuple(figure or ()), formats, columns, animate, out)
     drawn = workflows.plot([Path(run) for run in runs], drawing)
     for path in drawn.files:
-        typer.echo(path)
+        echo_path(path)
     _warn(drawn)
     raise typer.Exit(SOME_FAILED if drawn.missing else 0)
 
 
 def _warn(drawn: Drawn) -> None:
-    from podusv_cli.cli.layout import warn_of
-
     for part in drawn.missing:
-        typer.echo(str(part), err=True)
+        echo(str(part), err=True)
     for path in drawn.replaced:
-        typer.echo(f"replaced what was in {path}", err=True)
+        echo(f"replaced what was in {path}", err=True)
     for label, ending in drawn.empty.items():
-        typer.echo(f"{label}: nothing to draw: {ending}", err=True)
+        echo(f"{label}: nothing to draw: {ending}", err=True)
     warn_of(drawn.differences)

@@ -10,6 +10,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from podusv_cli.cli.layout import takes_codes
+from podusv_cli.escaping import visible
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -32,7 +33,7 @@ def progress_bars(*, wanted: bool) -> Iterator[Callable[[str, float], None] | No
     began = time.monotonic()
     # Drawn from here only: a thread that draws would not survive the forks of a comparison.
     bars = Progress(
-        TextColumn("{task.description}"), BarColumn(),
+        TextColumn("{task.description}", markup=False), BarColumn(),
         TimeRemainingColumn(elapsed_when_finished=True),
         console=Console(stderr=True), transient=True, auto_refresh=False,
     )  # fmt: skip
@@ -45,7 +46,7 @@ def progress_bars(*, wanted: bool) -> Iterator[Callable[[str, float], None] | No
                 bars.start()
             if bars.live.is_started:
                 if name not in tasks:
-                    tasks[name] = bars.add_task(name, total=1.0)
+                    tasks[name] = bars.add_task(visible(name), total=1.0)
                 bars.update(tasks[name], completed=fraction)
                 bars.refresh()
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from podusv_cli.cli.guard import INTERRUPTED
+from podusv_cli.cli.layout import echo, echo_entry
 from podusv_cli.cli.options import AllowLarge, AsJson, Force
 from podusv_cli.cli.parting import DIFFERENT
 
@@ -44,9 +45,9 @@ def rerun(
     else:
         _report(done)
         if out:
-            typer.echo(f"repeated: {out}")
+            echo(f"repeated: {out}")
     for label, failure in done.failures.items():
-        typer.echo(f"{label}: {failure}", err=True)
+        echo(*f"{label}: {failure}".splitlines(), err=True)
     raise typer.Exit(_exit_code(done))
 
 
@@ -70,8 +71,6 @@ def _print_json(done: Repetition, folder: Path | None) -> None:
 
 
 def _report(done: Repetition) -> None:
-    from podusv_cli.cli.layout import echo_entry
-
     for label, run in done.runs.items():
         echo_entry(label, *_lines(run), facts=_verdict(run))
 

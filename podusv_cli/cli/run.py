@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import sys
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from podusv_cli.cli.layout import Warned, echo, echo_path
 from podusv_cli.cli.options import (
     AllowLarge,
     AsJson,
@@ -45,8 +45,8 @@ def run(
     Draws trajectory, errors and controls; `podusv plot RUN` draws all that the run has signals for.
     """
     from podusv_cli import workflows  # heavy imports only when they are needed
-    from podusv_cli.cli.layout import Warned
     from podusv_cli.cli.progress import progress_bar
+    from podusv_cli.logbook.jsonfile import encode
 
     warned = Warned(quiet)
     request = workflows.Request(
@@ -55,20 +55,20 @@ def run(
     with progress_bar(str(config), wanted=not (quiet or as_json)) as progress:
         done = workflows.run(Path(config), request, progress)
     if as_json:
-        typer.echo(json.dumps(_finite(done.as_json()), indent=2, ensure_ascii=False))
+        typer.echo(encode(done.as_json()), nl=False)
     elif quiet:
-        typer.echo(done.folder)
+        echo_path(done.folder)
     else:
         _report(done, verbose)
     for finding in done.warnings:
         warned(finding)
     if done.message:
-        typer.echo(f"{config}: {done.message}", err=True)
+        echo(f"{config}: {done.message}", err=True)
     for part in done.missing:
-        typer.echo(f"{config}: {part}; {TRACED}", err=True)
+        echo(f"{config}: {part}; {TRACED}", err=True)
     if done.others:
         names = ", ".join(done.others)
-        typer.echo(f"{config}: ran `controller` only; `podusv compare` runs {names}", err=True)
+        echo(f"{config}: ran `controller` only; `podusv compare` runs {names}", err=True)
     raise typer.Exit(EXIT_CODES[done.status])
 
 
@@ -79,15 +79,8 @@ def _report(done: Finished, verbose: bool) -> None:
         if name in done.metrics and done.status == "finished":
             number = done.metrics[name]
             shown = "never" if name == "settling_time" and math.isnan(number) else f"{number:.6g}"
-            typer.echo(f"{name:<18} {shown:>12} {metric.unit if shown != 'never' else ''}".rstrip())
+            echo(f"{name:<18} {shown:>12} {metric.unit if shown != 'never' else ''}".rstrip())
     if verbose:
         for name, seconds in done.timing.items():
-            typer.echo(f"{name:<18} {seconds:>12.4f} s")
-    typer.echo(f"{done.controller} {done.status}: {done.folder}")
-
-
-def _finite(content: object) -> object:
-    """The same with null for what JSON has no number for."""
-    if isinstance(content, dict):
-        return {key: _finite(value) for key, value in content.items()}
-    return None if isinstance(content, float) and not math.isfinite(content) else content
+            echo(f"{name:<18} {seconds:>12.4f} s")
+    echo(f"{done.controller} {done.status}: {done.folder}")

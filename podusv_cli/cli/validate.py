@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from podusv_cli.cli.layout import echo, echo_line
 from podusv_cli.cli.options import AllowLarge, Assignments, Config
 
 if TYPE_CHECKING:
@@ -30,7 +31,6 @@ def validate(
 
     Exit code 0, with a line for each finding; or 2 with a line for each fault.
     """
-    from podusv_cli.cli.layout import echo_line
     from podusv_cli.comparison.claims import misfits
     from podusv_cli.config.loading import load
     from podusv_cli.config.size import largest, limits
@@ -40,8 +40,8 @@ def validate(
     loaded = load(config, assign or (), checks=(misfits, limits(allow_large)))
     scenario = loaded.scenario
     laws, steps = ", ".join(scenario.labels()), scenario.time_grid().steps
-    typer.echo(f"{config}: ok ({scenario.name}, {laws}, {steps} steps)")
-    typer.echo(f"a run takes {largest(scenario)}")
+    echo(f"{config}: ok ({scenario.name}, {laws}, {steps} steps)")
+    echo(f"a run takes {largest(scenario)}")
     for finding in heard(preflight(scenario), scenario):
         echo_line(str(finding))
     if verbose:
@@ -49,7 +49,6 @@ def validate(
 
 
 def _explain(loaded: Loaded) -> None:
-    from podusv_cli.cli.layout import echo_line
     from podusv_cli.config.loading import values
     from podusv_cli.config.words import as_written
     from podusv_cli.findings.gains import conditions
@@ -59,4 +58,4 @@ def _explain(loaded: Loaded) -> None:
     for line in conditions(loaded.scenario):
         echo_line(line)
     for key, content in values(loaded.scenario).items():
-        typer.echo(f"{key}: {as_written(content)}  # {loaded.origins[key]}")
+        echo(f"{key}: {as_written(content)}  # {loaded.origins[key]}")

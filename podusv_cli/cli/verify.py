@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from podusv_cli.cli.layout import echo, echo_entry, echo_table
 from podusv_cli.cli.options import AsJson, Assignments, Config
 
 if TYPE_CHECKING:
@@ -66,12 +67,11 @@ def _report(done: Verified) -> None:
         _show_rankings(done.rankings)
     doubts = [f"{label}: {', '.join(names)}" for label, names in done.doubts.items()]
     heading = "not converged" if doubts else "converged"
-    typer.echo("end_position: distance from where the run with the smallest step ends")
-    typer.echo("\n".join([f"{heading} within {done.tolerance:.3g} relative", *doubts]))
+    echo("end_position: distance from where the run with the smallest step ends")
+    echo(f"{heading} within {done.tolerance:.3g} relative", *doubts)
 
 
 def _show_run(label: str, run: Checked, tolerance: float) -> None:
-    from podusv_cli.cli.layout import echo_table
     from podusv_cli.metrics.table import METRICS
 
     units = {name: metric.unit for name, metric in METRICS.items()}
@@ -79,12 +79,12 @@ def _show_run(label: str, run: Checked, tolerance: float) -> None:
     rows = [
         [name, units.get(name, "m"), *_cells(e, tolerance)] for name, e in run.estimates.items()
     ]
-    typer.echo(f"{label}:")
+    echo(f"{label}:")
     echo_table(["number", "unit", *steps, "order", "rel. error", "verdict"], rows)
     for level in run.levels:
         if level.message:
-            typer.echo(f"at {level.step:.6g} s: {level.message}")
-    typer.echo(f"{_independent(run)}\n")
+            echo(f"at {level.step:.6g} s: {level.message}")
+    echo(_independent(run), "")
 
 
 def _cells(e: Estimate, tolerance: float) -> list[str]:
@@ -103,12 +103,10 @@ def _independent(run: Checked) -> str:
 
 
 def _show_rankings(rankings: dict[str, Ranking]) -> None:
-    from podusv_cli.cli.layout import echo_entry
-
-    typer.echo("ranking, smallest first:")
+    echo("ranking, smallest first:")
     for name, rank in rankings.items():
         echo_entry(f"  {name}", _in_order(rank))
-    typer.echo("")
+    echo("")
 
 
 def _in_order(rank: Ranking) -> str:

@@ -11,6 +11,7 @@ from podusv_cli.comparison.conditions import Evidence
 from podusv_cli.comparison.expressions import Sources
 from podusv_cli.comparison.parsing import ExpressionError, parse, renamed
 from podusv_cli.config.scenario import Claim, Scenario
+from podusv_cli.escaping import markdown, markdown_cell, markdown_code
 
 Answer = Literal["reproduced", "not reproduced", "cannot tell"]
 ANSWERS: dict[bool | None, Answer] = {
@@ -93,15 +94,14 @@ def _verdict(said: Stated, runs: Sources) -> Verdict:
 def as_markdown(verdicts: Sequence[Verdict]) -> str:
     """The verdicts as a table, choices and remarks below it."""
     rows = [
-        f"| {v.name} | {_cell(v.claim.says)} ({_cell(v.claim.source)}) | **{v.answer}** | "
-        f"`{_cell(v.claim.expect)}`, tolerance {v.claim.tolerance:g} | {_cell(v.shown())} |"
+        f"| {markdown_cell(v.name)} | "
+        f"{markdown_cell(v.claim.says)} ({markdown_cell(v.claim.source)}) | "
+        f"**{v.answer}** | {markdown_code(v.claim.expect)}, tolerance {v.claim.tolerance:g} | "
+        f"{markdown_cell(v.shown())} |"
         for v in verdicts
     ]
-    remarks = [f"- {v.name}: {v.claim.remark}" for v in verdicts if v.claim.remark]
+    remarks = [
+        f"- {markdown(v.name)}: {markdown(v.claim.remark)}" for v in verdicts if v.claim.remark
+    ]
     head = ["| | claim | verdict | put as | numbers |", "|---|---|---|---|---|"]
     return "\n".join([*head, *rows, *(["", *remarks] if remarks else []), ""])
-
-
-def _cell(text: str) -> str:
-    """Text in one line that ends no cell of a table."""
-    return " ".join(text.split()).replace("|", "\\|")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import html
 import inspect
 import math
 import re
@@ -19,6 +18,7 @@ from podusv_cli.comparison.claims import Verdict
 from podusv_cli.comparison.differences import flat, in_short, in_words
 from podusv_cli.comparison.table import cells
 from podusv_cli.config.scenario import Scenario
+from podusv_cli.escaping import html
 from podusv_cli.findings.finding import Finding
 from podusv_cli.registry import Component
 
@@ -60,12 +60,12 @@ class Story:
 
 def page(story: Story) -> str:
     """The whole report."""
-    title = html.escape(story.title)
+    title = html(story.title)
     body = "\n".join(
         part
         for part in (
             f"<h1>{title}</h1>",
-            f"<p>{html.escape(story.scenario.description)}</p>",
+            f"<p>{html(story.scenario.description)}</p>",
             _endings(story),
             _missing(story),
             _differences(story),
@@ -99,7 +99,7 @@ def _table(
         cells_ = (f"<{tag}{kind}>{cell}</{tag}>" for kind, cell in zip(kinds, row, strict=False))
         return f"<tr>{''.join(cells_)}</tr>"
 
-    top = line("th", map(html.escape, head))
+    top = line("th", map(html, head))
     return (
         f"<div class=wide><table>{top}"
         + "\n".join(line("td", row) for row in rows)
@@ -108,21 +108,19 @@ def _table(
 
 
 def _rows(head: tuple[str, str], pairs: Iterable[tuple[str, Any]]) -> str:
-    return _table(head, ((html.escape(key), html.escape(in_short(value))) for key, value in pairs))
+    return _table(head, ((html(key), html(in_short(value))) for key, value in pairs))
 
 
 def _endings(story: Story) -> str:
     bad = {label: ending for label, ending in story.endings.items() if ending}
-    lines = (
-        f"<li><b>{html.escape(label)}</b>: {html.escape(text)}</li>" for label, text in bad.items()
-    )
+    lines = (f"<li><b>{html(label)}</b>: {html(text)}</li>" for label, text in bad.items())
     return (
         f"<div class=warning>Not all runs finished:<ul>{''.join(lines)}</ul></div>" if bad else ""
     )
 
 
 def _missing(story: Story) -> str:
-    lines = (f"<li>{html.escape(text)}</li>" for text in story.missing)
+    lines = (f"<li>{html(text)}</li>" for text in story.missing)
     listed = f"<div class=warning>Not all could be made:<ul>{''.join(lines)}</ul></div>"
     return listed if story.missing else ""
 
@@ -132,7 +130,7 @@ def _differences(story: Story) -> str:
         return ""
     labels = list(next(iter(story.differences.values())))
     rows = (
-        map(html.escape, [key, *(values[label] for label in labels)])
+        map(html, [key, *(values[label] for label in labels)])
         for key, values in in_words(story.differences).items()
     )
     text = "These runs differ in more than the controller:"
@@ -141,10 +139,7 @@ def _differences(story: Story) -> str:
 
 def _numbers(frame: pd.DataFrame) -> str:
     rows = (
-        [
-            f"<b>{html.escape(cell.replace('*', ''))}</b>" if "*" in cell else html.escape(cell)
-            for cell in row
-        ]
+        [f"<b>{html(cell.replace('*', ''))}</b>" if "*" in cell else html(cell) for cell in row]
         for row in cells(frame)
     )
     note = (
@@ -159,11 +154,11 @@ def _claims(verdicts: Sequence[Verdict]) -> str:
         return ""
     rows = []
     for v in verdicts:
-        remark = f"<br><small>{html.escape(v.claim.remark)}</small>" if v.claim.remark else ""
-        says = f"{html.escape(v.claim.says)} <small>({html.escape(v.claim.source)})</small>{remark}"
+        remark = f"<br><small>{html(v.claim.remark)}</small>" if v.claim.remark else ""
+        says = f"{html(v.claim.says)} <small>({html(v.claim.source)})</small>{remark}"
         mark = f"<b class='{v.answer.split()[0]}'>{v.answer}</b>"
-        put = f"<code>{html.escape(v.claim.expect)}</code>, tolerance {v.claim.tolerance:g}"
-        rows.append([html.escape(v.name), says, mark, f"{put}<br>{html.escape(v.shown())}"])
+        put = f"<code>{html(v.claim.expect)}</code>, tolerance {v.claim.tolerance:g}"
+        rows.append([html(v.name), says, mark, f"{put}<br>{html(v.shown())}"])
     return "<h2>Claims</h2>" + _table(("", "claim", "verdict", "put as, and the numbers"), rows)
 
 
@@ -174,7 +169,7 @@ def _noticed(findings: Sequence[Finding]) -> str:
         "<p><small>About the runs that this comparison made, before and after them: what to know, "
         "no errors. No run is named where it is true of all.</small></p>"
     )
-    rows = ([f"<code>{f.code}</code>", *map(html.escape, (f.place, f.text))] for f in findings)
+    rows = ([f"<code>{f.code}</code>", *map(html, (f.place, f.text))] for f in findings)
     return "<h2>Noticed</h2>" + _table(("code", "where", "finding"), rows) + note
 
 
@@ -186,27 +181,27 @@ def _stability(theories: Mapping[str, Mapping[str, Any]]) -> str:
         "constants are the largest of this very run, so it is no prediction. None: lambda is not "
         "positive, or control is sampled. Term by term: theory.json.</small></p>"
     )
-    rows = (map(html.escape, row) for row in stability.rows(theories))
+    rows = (map(html, row) for row in stability.rows(theories))
     return "<h2>Stability (46)-(49)</h2>" + _table(stability.HEAD, rows) + note
 
 
 def _figure(name: str, caption: str, svg: bytes) -> str:
     # As data rather than inline markup: the figures' internal names would collide in one page.
     data = base64.b64encode(svg).decode()
-    text = html.escape(f"{name}: {caption}")
-    image = f'<img alt="{html.escape(name)}" src="data:image/svg+xml;base64,{data}">'
+    text = html(f"{name}: {caption}")
+    image = f'<img alt="{html(name)}" src="data:image/svg+xml;base64,{data}">'
     return f"<figure>{image}<figcaption>{text}</figcaption></figure>"
 
 
 def _scenario(story: Story) -> str:
     parts: dict[str, Component] = {name: getattr(story.scenario, name) for name in SECTIONS}
     parts |= {f"controller {label}": part for label, part in story.controllers.items()}
-    rows = ([f"<b>{html.escape(name)}</b>", _in_words(part)] for name, part in parts.items())
+    rows = ([f"<b>{html(name)}</b>", _in_words(part)] for name, part in parts.items())
     return _table(("", ""), rows)
 
 
 def _in_words(part: Component) -> str:
     said = (inspect.getdoc(type(part)) or "").partition("\n")[0]
     values = ", ".join(f"{key} {in_short(value)}" for key, value in flat(part.model_dump()))
-    told = re.sub(r"`([^`]+)`", r"<code>\1</code>", html.escape(said))
-    return f"{told}<br><small>{html.escape(values)}</small>"
+    told = re.sub(r"`([^`]+)`", r"<code>\1</code>", html(said))
+    return f"{told}<br><small>{html(values)}</small>"

@@ -7,17 +7,13 @@ from collections.abc import Mapping
 
 import pandas as pd
 
+from podusv_cli import escaping
 from podusv_cli.metrics.table import METRICS
 
 METRIC = "metric"
 NOTE = (
     "* smallest of its row; in brackets the ratio to the first run; - not defined, or the run did "
     "not finish"
-)
-# run labels may be folder names, with anything in them
-LATEX = str.maketrans(
-    {sign: rf"\{sign}" for sign in "_%&#${}"}
-    | {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
 )
 
 
@@ -49,7 +45,8 @@ def with_ratios(frame: pd.DataFrame) -> pd.DataFrame:
 
 def as_csv(frame: pd.DataFrame) -> str:
     """Full precision, ratios last."""
-    return with_ratios(frame).to_csv(lineterminator="\n")
+    full = with_ratios(frame)
+    return full.to_csv(lineterminator="\n", header=[escaping.csv(str(c)) for c in full.columns])
 
 
 def cells(frame: pd.DataFrame) -> list[list[str]]:
@@ -73,8 +70,12 @@ def _cell(number: float, first: float, best: float, position: int) -> str:
 def as_markdown(frame: pd.DataFrame, endings: Mapping[str, str]) -> str:
     """The table for people, in Markdown, and below it how runs ended that did not finish."""
     last = {label: ending.strip().splitlines()[-1:] for label, ending in endings.items()}
-    told = [f"- {label}: {line}" for label, lines in last.items() for line in lines]
-    head = ["metric", "unit", *map(str, frame.columns)]
+    told = [
+        f"- {escaping.markdown(label)}: {escaping.markdown(line)}"
+        for label, lines in last.items()
+        for line in lines
+    ]
+    head = ["metric", "unit", *(escaping.markdown_cell(str(label)) for label in frame.columns)]
     lines = [head, ["---", "---", *["---:"] * len(frame.columns)], *cells(frame)]
     return (
         "\n".join("| " + " | ".join(line) + " |" for line in lines)
@@ -86,7 +87,7 @@ def as_markdown(frame: pd.DataFrame, endings: Mapping[str, str]) -> str:
 def as_latex(frame: pd.DataFrame) -> str:
     """The table for a paper, with booktabs; the best in bold face."""
     head = ["metric", "unit", *map(str, frame.columns)]
-    body = [[_escaped(cell) for cell in head]]
+    body = [[escaping.latex(cell) for cell in head]]
     body += [[_marked(cell) for cell in row] for row in cells(frame)]
     lines = [" & ".join(row) + r" \\" for row in body]
     columns = "ll" + "r" * len(frame.columns)
@@ -95,9 +96,5 @@ def as_latex(frame: pd.DataFrame) -> str:
 
 
 def _marked(cell: str) -> str:
-    number, marked, ratio = _escaped(cell).partition("*")
+    number, marked, ratio = escaping.latex(cell).partition("*")
     return rf"\textbf{{{number}}}{ratio}" if marked else number
-
-
-def _escaped(text: str) -> str:
-    return text.translate(LATEX)

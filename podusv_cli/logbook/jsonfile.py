@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from podusv_cli import escaping
 from podusv_cli.errors import StorageError
 from podusv_cli.logbook.regular import read_text
 
@@ -23,8 +24,7 @@ LONGEST = 300  # digits that surely are a finite float
 def encode(content: Mapping[str, Any]) -> bytes:
     """UTF-8 text with a final newline. TypeError for values that JSON does not know."""
     text = json.dumps(_plain(content), indent=2, ensure_ascii=False, allow_nan=False)
-    # What the system could not decode in a name or argument keeps its JSON escape.
-    return f"{text}\n".encode("utf-8", "backslashreplace")
+    return f"{escaping.json(text)}\n".encode()
 
 
 def _plain(value: Any) -> Any:

@@ -1,0 +1,205 @@
+"""What users write and call their folders, in a terminal, Markdown, CSV, LaTeX, HTML, JSON."""
+
+from __future__ import annotations
+
+import csv
+import html.parser
+import io
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from command_samples import BASE, Command, commanded, write
+from comparison_samples import FRAME, verdicts
+from test_comparison_page import page
+
+from podusv_cli import escaping
+from podusv_cli.cli import progress
+from podusv_cli.comparison import claims, table
+from podusv_cli.logbook import jsonfile
+
+TURNED, COLOUR = "\u202e", "\x1b[31m"  # letters from right to left from here on; red from here on
+EVIL = f"=cmd|'/C x'!A0{COLOUR}{TURNED}\x9b1m\n# <script>[a](b)`*_\u200b"
+NASTY = [chr(n) for n in (*range(32), *range(127, 160), 0x200B, 0x200E, 0x2028, 0x202E, 0x2066)]
+
+
+@pytest.fixture
+def podusv(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Command:
+    monkeypatch.chdir(tmp_path)
+    write("a.yaml", BASE)
+    return commanded(monkeypatch, capsys)
+
+
+def nasty(text: str) -> set[str]:
+    """The letters in it that move a cursor or turn others around, but new lines."""
+    return {*text} & {*NASTY} - {"\n"}
+
+
+@pytest.mark.parametrize("letter", [*NASTY, "\ud800", "\U000e0041"], ids=ascii)
+@pytest.mark.parametrize(
+    "form", [escaping.visible, escaping.csv, escaping.latex, escaping.markdown], ids=str
+)
+def test_no_format_has_a_letter_that_does_not_show(form: Any, letter: str) -> None:
+    assert form(f"a{letter}b").isprintable()
+
+
+def test_text_of_any_language_is_left_as_it_is() -> None:
+    for text in (
+        "Kurs 5 m/s",
+        "\u03b1 = 1\u202f\u00b0",
+        "\u8239 \U0001f6a2",
+        "\u05e1\u05d9\u05e8\u05d4",
+    ):
+        assert escaping.visible(text) == text
+        assert escaping.markdown(text).split() == text.split()
+        assert escaping.csv(text) == escaping.html(text) == escaping.json(text) == text
+
+
+def test_markdown_is_text_and_stays_in_its_line() -> None:
+    assert escaping.markdown("a_b_c\n# d | <b> [e](f) ![g][h] *i* `j` &lt; \\ _k_ l_") == (
+        "a_b_c # d | \\<b\\> [e\\](f) ![g\\][h] \\*i\\* \\`j\\` \\&lt; \\\\ \\_k\\_ l\\_"
+    )
+    assert escaping.markdown("2 * max(abs(a.tau_u)) in [0, 1]") == "2 * max(abs(a.tau_u)) in [0, 1]"
+    assert escaping.markdown_cell("|x|") == "\\|x\\|"
+    assert escaping.markdown_code("a < b |\n`c`") == "`a < b \\| 'c'`"
+
+
+@pytest.mark.parametrize("sign", [*"=+-@", "\uff1d", "\t=", "\r="])
+def test_a_cell_is_no_formula(sign: str) -> None:
+    assert escaping.csv(f"{sign}1+1")[0] in "'\\"
+    assert escaping.csv("1=1") == "1=1"
+
+
+def test_html_is_text() -> None:
+    assert escaping.html(f"<b a='\"'>&\n{COLOUR}") == (
+        "&lt;b a=&#x27;&quot;&#x27;&gt;&amp;\n\\x1b[31m"
+    )
+
+
+def test_json_says_the_same_without_the_letters() -> None:
+    content = {"a": "".join(NASTY) + "\U000e0041\u8239", "b": [1, "\ud800"]}
+    text = jsonfile.encode(content).decode()
+    assert not nasty(text)
+    assert "\u8239" in text
+    assert json.loads(text) == content
+
+
+def test_the_tables_of_a_comparison_hold_no_label_that_is_more_than_text() -> None:
+    frame = FRAME[["a", "lost"]].set_axis([EVIL, "=b"], axis=1)
+    head = next(csv.reader(io.StringIO(table.as_csv(frame))))
+    assert head[2:] == [escaping.csv(EVIL), "'=b", f"'=b/{escaping.visible(EVIL)}"]
+    for text in (table.as_markdown(frame, {EVIL: EVIL}), table.as_latex(frame)):
+        assert not nasty(text)
+        assert "\n#" not in text
+    assert "<script>" not in table.as_markdown(frame, {EVIL: EVIL})
+    assert f"\n- {escaping.markdown('=cmd')}" in table.as_markdown(frame, {EVIL: "killed"})
+    assert r"\textbackslash{}x1b" in table.as_latex(frame)
+
+
+def test_the_verdicts_in_markdown_are_text() -> None:
+    plain = verdicts()[0]
+    odd = {name: f"{name} {EVIL}" for name in ("says", "source", "remark")}
+    verdict = claims.Verdict(
+        "name", plain.claim.model_copy(update=odd), "cannot tell", {EVIL: 1.0}, EVIL
+    )
+    text = claims.as_markdown([verdict])
+    assert not nasty(text)
+    assert "<script>" not in text
+    assert "\n#" not in text
+    assert f"- name: {escaping.markdown(odd['remark'])}\n" in text
+    row = text.splitlines()[2]
+    assert row.replace("\\|", "").count("|") == 6
+
+
+class Tags(html.parser.HTMLParser):
+    """The tags and the text of a page."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.tags, self.text = list[str](), ""
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: object) -> None:
+        self.tags.append(tag)
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+
+def test_the_report_shows_provenance_as_text() -> None:
+    """Arguments of the command and the processor's name are anybody's."""
+    origin = {"argv": ["podusv", f"<script>alert(1)</script>{EVIL}"], EVIL: {"b": "<img src=x>"}}
+    text = page(provenance=origin)
+    found = Tags(text)
+    assert "script" not in found.tags
+    assert "img" not in Tags(page(provenance=origin, figures=[])).tags
+    assert "<script>alert(1)</script>" in found.text
+    assert "<img src=x>" in found.text
+    assert not nasty(text)
+
+
+def test_every_text_of_the_report_is_text() -> None:
+    odd = f"<script>{EVIL}"
+    plain = page()
+    text = page(
+        title=odd, endings={odd: odd}, differences={odd: {odd: odd}},
+        table=FRAME.set_axis([odd, *FRAME.columns[1:]], axis=1),
+        figures=[(odd, odd, b"<svg/>")], provenance={odd: odd},
+    )  # fmt: skip
+    assert not nasty(text)
+    assert Tags(plain).tags.count("script") == Tags(text).tags.count("script") == 0
+
+
+def made(podusv: Command, names: tuple[str, str]) -> tuple[str, str]:
+    """Finished runs in folders of these names."""
+    for name in names:
+        said = podusv("run", "a.yaml", f"--out={name}", "--no-figures", "-q")
+        assert said == (0, f"{name}\n", "")  # in a pipe a script gets the very name
+    return names
+
+
+def test_no_command_lets_a_folders_name_through(podusv: Command) -> None:
+    one, other = made(podusv, (f"=a{COLOUR}\n{TURNED}", f"-b\x9b{TURNED}"))
+    for words in (
+        ("compare", "--out", "x", one, f"./{other}"),
+        ("compare", "--json", "--out", "x", "--force", one, f"./{other}"),
+        ("rerun", one),
+        ("rerun", one, "--out", f"again{COLOUR}"),
+        ("rerun", "--json", one),
+        ("diff", one, "x"),
+        ("diff", "--json", one, f"./{other}"),
+        ("run", "a.yaml", f"--out={one}"),
+        ("run", "--json", "a.yaml", f"--out=c{COLOUR}"),
+        ("run", f"{COLOUR}\n.yaml"),
+        ("validate", f"{COLOUR}\n.yaml"),
+        ("verify", f"{COLOUR}\n.yaml"),
+        ("verify", one),
+        ("plot", one, "--out", "x"),
+    ):
+        said = podusv(*words)
+        assert said.code in (0, 2, 3, 5), said
+        assert not nasty(said.out + said.err), words
+        assert "Traceback" not in said.err
+    texts = ("comparison.csv", "comparison.md", "comparison.tex", "report.html", "provenance.json")
+    for name in texts:
+        assert not nasty(Path("x", name).read_text()), name
+    assert podusv("run", "a.yaml", f"--out={one}").err.count("\n") == 1
+
+
+def test_a_bar_shows_names_as_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Terminal(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setattr(progress, "PATIENCE", -1.0)
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    with progress.progress_bars(wanted=True) as advance:
+        assert advance is not None
+        advance(f"[/red]{TURNED}{COLOUR}", 0.5)
+    shown = sys.stderr.getvalue()  # type: ignore[attr-defined]
+    assert "[/red]\\u202e\\x1b[31m" in shown
