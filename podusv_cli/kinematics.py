@@ -19,6 +19,15 @@ def wrap(angle: float) -> float:
 
 
 @kernel
+def direction(x: float, y: float) -> float:
+    """Angle [rad] of the vector (x, y) from the x axis, in [-pi, pi]; 0 where both are 0.
+
+    Of -0.0 alone `atan2` makes half a turn: adding 0.0 takes the sign of a zero away.
+    """
+    return math.atan2(y + 0.0, x + 0.0)
+
+
+@kernel
 def earth_velocity(x: Vector, rate: Vector) -> None:
     """Rates of (x, y, psi) from the state (x, y, psi, u, v, r); paper (3)."""
     cos_psi, sin_psi = cos_sin(x[2])

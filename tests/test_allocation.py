@@ -229,3 +229,35 @@ def test_with_a_horizon_only_what_rates_allow_is_asked_for() -> None:
         assert (ahead * (1 + 1e-9) >= T).all()
         free = pods.model_copy(update={"horizon": 0.0})
         assert np.abs(allocated(free, np.array([7.0, -3.0]), state)[1]).max() > 0.2 + 2 * turn
+
+
+ZEROS = (0.0, -0.0)
+
+
+@pytest.mark.parametrize("priority", [0.0, 1.0])
+@pytest.mark.parametrize("X", ZEROS)
+@pytest.mark.parametrize("Y", ZEROS)
+def test_one_pod_that_is_asked_for_nothing_does_not_turn(
+    X: float, Y: float, priority: float
+) -> None:
+    assert one(X, Y, priority)[:2] == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+@pytest.mark.parametrize("horizon", [0.0, 0.3])
+@pytest.mark.parametrize("astern", [0.0, POD["n_max_astern"]])
+def test_no_pod_is_asked_for_an_angle_out_of_its_reach(
+    layout: str, horizon: float, astern: float
+) -> None:
+    """Nor does the sign of a thrust of zero turn it by half a turn."""
+    free = several(LAYOUTS[layout], horizon=horizon)
+    own = tuple(pod.model_copy(update={"n_max_astern": astern}) for pod in free.pods)
+    pods = free.model_copy(update={"pods": own})
+    limit, count = np.array([pod.angle_limit for pod in own]), len(own)
+    turned = np.minimum(limit, 0.7) if horizon else 0.0 * limit
+    state = np.concatenate([np.zeros(count), turned])
+    turn = POD["angle_rate"] * horizon if horizon else math.inf
+    for surge, yaw in product([*ZEROS, -1e-9, -1.0, -50.0, 50.0], [*ZEROS, -0.2, 0.2, -9.0]):
+        _, delta = allocated(pods, np.array([surge, yaw]), state)
+        assert (np.abs(delta) <= limit * (1 + 1e-12)).all()
+        assert (np.abs(delta - turned) <= turn + 1e-12).all()

@@ -52,3 +52,26 @@ def test_every_set_of_pods_says_where_its_numbers_come_from_and_what_they_hold_f
 ) -> None:
     assert len(pod_text(name, "source")) > 60
     assert len(pod_text(name, "validity")) > 30
+
+
+ASTERN = ("actuator.pods.0.n_max_astern=0", "actuator.pods.1.n_max_astern=0")
+
+
+@pytest.mark.parametrize(
+    ("name", "keys"),
+    [
+        ("vessels/otter", (*ASTERN, "start.u=2", "path.speed=0.2")),  # fixed propellers that brake
+        ("vessels/revolt", ("actuator.horizon=0.3",)),
+        ("kept", ASTERN),
+    ],
+)
+def test_no_pod_turns_half_a_turn_where_its_thrust_goes_through_zero(
+    name: str, keys: tuple[str, ...]
+) -> None:
+    scenario = load(CONFIGS.parent / f"{name}.yaml", keys).scenario
+    log = simulate(scenario.closed_loop(), scenario.time_grid())
+    assert log.status == "finished"
+    assert isinstance(scenario.actuator, Pods)
+    limits = np.array([pod.angle_limit for pod in scenario.actuator.pods])
+    assert (np.abs(log["delta_cmd"]) <= limits * (1 + 1e-12)).all()
+    assert (np.abs(log["delta"]) <= limits * (1 + 1e-12)).all()

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
 from podusv_cli.controllers.tracking import PSI_D_HELD, PSI_D_RATE_HELD, Tracking, track
 from podusv_cli.kernels import Vector, bundle
+from podusv_cli.kinematics import direction
 from podusv_cli.paths.line import Line
 
 DIFFERENCE = {"rate": "difference", "difference_step": 0.01}
@@ -39,6 +40,24 @@ def near_target(distance: float, psi: float = 0.1) -> Situation:
     memory[PSI_D_HELD] = 0.9
     x = np.array([0, 0, psi, 0.4, 0.1, 0.2])
     return Situation(x, memory, np.array([distance, 0, 0.3, 0.4, 0, 0]))
+
+
+def test_the_sign_of_a_zero_is_no_direction() -> None:
+    for x in (0.0, -0.0):
+        for y in (0.0, -0.0):
+            assert direction(x, y) == 0.0
+            assert direction(2.0, y) == 0.0
+            assert direction(-2.0, y) == math.pi
+            assert direction(x, 2.0) == -direction(x, -2.0) == 0.5 * math.pi
+
+
+@pytest.mark.parametrize("velocity", [(0.0, 0.0), (-0.0, 0.0), (-0.0, -0.0)])
+def test_a_target_that_rests_where_the_vessel_is_lies_in_no_direction(
+    velocity: tuple[float, float],
+) -> None:
+    target = np.array([1.0, 2.0, *velocity, 0.0, 0.0])
+    memory = AdaptiveNeural().start(np.array([1.0, 2.0, 0, 0, 0, 0]), target, NONLINEAR)
+    assert memory[PSI_D_HELD] == 0.0
 
 
 def around(law: AdaptiveNeural, count: int = 200) -> list[tuple[Situation, Tracking]]:

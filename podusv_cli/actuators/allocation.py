@@ -35,6 +35,7 @@ from podusv_cli.actuators.several_pods import (
     several_pods,
 )
 from podusv_cli.kernels import Vector, kernel, scratch, tail
+from podusv_cli.kinematics import direction
 
 PREFERENCE = 1e4  # how much more the preferred axis counts in the squares
 EFFORT = 1e-6  # what the squared parts of full thrust count
@@ -92,11 +93,13 @@ def by_least_squares(
     """
     count = int(k.count)
     sectors, most = scratch(SECTORS), scratch(MOST_PODS)
+    low, high = scratch(MOST_PODS), scratch(MOST_PODS)
     all_u, all_r = 0.0, 0.0
     for i in range(count):
         pod = tail(table, i * WIDTH)
         at = reach(state[i], state[count + i], gains[i], pod, k)
         most[i] = max(at.most_ahead, at.most_astern, 1e-12)
+        low[i], high[i] = at.low, at.high
         shape(at, pod, most[i], tail(sectors, i * SECTOR))
         all_u += most[i]
         all_r += most[i] * math.sqrt(pod[X] * pod[X] + pod[Y] * pod[Y])
@@ -118,7 +121,9 @@ def by_least_squares(
         along, across = most[i] * g[2 * i], most[i] * g[2 * i + 1]
         side = 1.0 if along >= 0.0 else -1.0
         T[i] = side * math.sqrt(along * along + across * across)
-        delta[i] = math.atan2(side * across, side * along)
+        delta[i] = direction(side * along, side * across)
+        if T[i] == 0.0:  # any angle does, so the one in reach that is nearest to 0 is taken
+            delta[i] = within(0.0, low[i], high[i])
     return made(demand, all_u, all_r, k, table, T, delta)
 
 

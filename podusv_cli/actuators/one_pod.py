@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from podusv_cli.kernels import Vector, kernel
+from podusv_cli.kinematics import direction
 
 YAW = 0.0
 
@@ -39,7 +40,7 @@ def one_pod(
         least = max(along * math.tan(low), -room)
         across = within(across, least, min(along * math.tan(high), room))
     out[0] = side * math.sqrt(along * along + across * across)
-    out[1] = within(math.atan2(across, along), low, high)
+    out[1] = within(direction(along, across), low, high)
 
 
 @kernel

@@ -13,7 +13,7 @@ import numpy as np
 from podusv_cli.controllers.base import Controller
 from podusv_cli.elementary import cos_sin
 from podusv_cli.kernels import Vector, kernel
-from podusv_cli.kinematics import wrap
+from podusv_cli.kinematics import direction, wrap
 from podusv_cli.registry import value
 
 ANALYTIC, DIFFERENCE = 0.0, 1.0
@@ -68,7 +68,7 @@ def bearing(x: Vector, memory: Vector, target: Vector, k: Any) -> Bearing:
     if distance <= k.hold_below:
         psi_d = memory[PSI_D_HELD]
         return Bearing(distance, psi_d, math.cos(psi_d), math.sin(psi_d), True)
-    return Bearing(distance, math.atan2(y_e, x_e), x_e / distance, y_e / distance, False)
+    return Bearing(distance, direction(x_e, y_e), x_e / distance, y_e / distance, False)
 
 
 @kernel
@@ -172,7 +172,5 @@ class TrackingController(Controller):
         """All zero but the held direction: to the target, or its course where it is right here."""
         memory = np.zeros(sum(size for _, size in self.slots()))
         x_e, y_e = target[:2] - x[:2]
-        memory[PSI_D_HELD] = (
-            math.atan2(y_e, x_e) if x_e or y_e else math.atan2(target[3], target[2])
-        )
+        memory[PSI_D_HELD] = direction(x_e, y_e) if x_e or y_e else direction(*target[2:4])
         return memory

@@ -99,7 +99,7 @@ def _loads(scenario: Scenario, time: Vector, target: Vector, turn: Vector) -> Ve
     """The disturbance on a hull that rides on the target."""
     sea, load = scenario.disturbance, np.zeros((len(time), 3))
     k, table = bundle(sea.constants()), sea.table()
-    course = np.arctan2(target[:, 3], target[:, 2])
+    course = np.arctan2(target[:, 3] + 0.0, target[:, 2] + 0.0)  # -0.0 is no half turn
     speed = np.hypot(target[:, 2], target[:, 3])
     states = np.column_stack([target[:, :2], course, speed, 0.0 * speed, turn])
     for t, x, row in zip(time.tolist(), states, load, strict=True):
