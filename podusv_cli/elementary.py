@@ -15,6 +15,7 @@ from podusv_cli.kernels import kernel
 
 ROUND = 1.5 * 2.0**52  # added and taken away again it leaves the nearest whole number
 SMALLEST = -708.0  # below, e^x is no normal number any more
+LARGEST_ANGLE = 1e15  # rad; beyond, neighbouring numbers are too far apart to be directions
 LOG2_E = 1.0 / math.log(2.0)
 # Long constants in parts, all but the last so short that a whole number times it is exact.
 LN2 = (float.fromhex("0x1.62e42feep-1"), float.fromhex("0x1.a39ef35793c76p-33"))
@@ -53,8 +54,9 @@ def exponential(x: float) -> float:
 def cos_sin(angle: float) -> tuple[float, float]:
     """Cosine and sine of `angle` [rad], to one unit in the last place.
 
-    Beyond 1e6 rad the angle itself is off by up to its last place.
+    Beyond 1e6 rad the angle itself is off by up to its last place; beyond 1e15 rad there are none.
     """
+    angle = angle if abs(angle) <= LARGEST_ANGLE else math.nan
     z = angle * (2.0 / math.pi) + ROUND
     n = z - ROUND
     r = ((angle - n * QUARTER[0]) - n * QUARTER[1]) - n * QUARTER[2]

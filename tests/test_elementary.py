@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from conftest import adrift, run
 from hypothesis import example, given
 from hypothesis import strategies as st
 from numba import njit
 
+from podusv_cli.disturbances.harmonic import Harmonic, HarmonicDisturbance
 from podusv_cli.elementary import cos_sin, exponential
 from podusv_cli.engine import translating
 from podusv_cli.kernels import Vector
@@ -53,13 +55,34 @@ def test_far_out_they_are_those_of_a_neighbouring_angle(angle: float) -> None:
     assert cos_sin(angle) == pytest.approx((math.cos(angle), math.sin(angle)), abs=near)
 
 
+@given(angle=st.floats(allow_nan=False))
+@example(angle=1e15)
+@example(angle=1e16)
+@example(angle=-1e17)
+@example(angle=1e308)
+def test_what_they_give_is_a_rotation_or_no_number(angle: float) -> None:
+    cosine, sine = cos_sin(angle)
+    if abs(angle) <= 1e15:
+        assert cosine * cosine + sine * sine == pytest.approx(1.0, abs=4 * EPSILON)
+    else:
+        assert math.isnan(cosine)
+        assert math.isnan(sine)
+
+
 def test_no_angle_has_no_cosine() -> None:
     for angle in (math.nan, math.inf, -math.inf):
         assert np.isnan(cos_sin(angle)).all()
 
 
+def test_a_disturbance_of_which_no_phase_is_known_ends_the_run() -> None:
+    sea = HarmonicDisturbance(b_u=Harmonic(sin=1.0, sin_rate=1e19))
+    out = run(adrift(disturbance=sea), 1.0)
+    assert (out.status, len(out["time"])) == ("diverged", 1)
+
+
 @pytest.mark.parametrize("function", [exponential, cos_sin])
 def test_machine_code_gives_the_same_bits(function: Any) -> None:
     numbers = -np.random.default_rng(3).exponential(20.0, 2000)
+    numbers = np.append(numbers, [-1e15, -1e17, -1e308])
     plain = np.array([function(float(x)) for x in numbers])
     np.testing.assert_array_equal(compiled(function, numbers), plain)

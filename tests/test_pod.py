@@ -16,6 +16,8 @@ from test_actuators import drive
 from test_closed_loop import order
 from test_metrics import gathered
 
+from podusv_cli.actuators import several_pods
+from podusv_cli.actuators.allocation import allocate
 from podusv_cli.actuators.pod import Pod, Pods
 from podusv_cli.actuators.propeller import speed_for, speed_gain, thrust
 from podusv_cli.controllers.pid import Pid
@@ -254,11 +256,39 @@ def test_two_inputs_for_three_axes() -> None:
         ([{"angle_rate": 0.0}], "angle_rate"),
         ([{"n_lag": 0.0}], "n_lag"),
         ([], "has 0 pods"),
+        *(
+            ([{key: 1e308}, {}], "no more than 1e\\+15 can be computed with; take smaller")
+            for key in ("x", "y", "T_nn", "T_nn_astern", "n_max", "n_max_astern")
+        ),
     ],
 )
 def test_pods_that_cannot_be_are_refused(several: list[dict[str, float]], words: str) -> None:
     with pytest.raises(ValidationError, match=words):
         Pods(pods=tuple({**POD, **own} for own in several))
+
+
+@pytest.mark.parametrize("demand", [(math.nan, 1.0), (5.0, 1.0)])
+@pytest.mark.parametrize("gain", [0.0, math.nan, math.inf])
+def test_what_is_no_number_is_no_allocation_and_none_is_searched_for(
+    demand: tuple[float, float], gain: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tried: list[int] = []
+
+    def pull(*arguments: Any) -> None:
+        tried.append(1)
+        solved(*arguments)
+
+    solved = several_pods.pull
+    monkeypatch.setattr(several_pods, "pull", pull)
+    pair = pods(*TWIN)
+    T, delta, k = np.zeros(2), np.zeros(2), bundle(pair.constants())
+    gains = np.full(2, gain)
+    with np.errstate(all="ignore"):
+        allocate(pair.rest(), np.array(demand), gains, k, pair.table(), T, delta)
+    if gain == 0.0:
+        known = math.isfinite(demand[0])
+        assert np.isfinite(T).tolist() == np.isfinite(delta).tolist() == [known] * 2
+    assert len(tried) < 200
 
 
 def test_the_paper_s_vessel_has_the_drag_of_the_hand_calculation() -> None:

@@ -33,6 +33,7 @@ from podusv_cli.registry import Component, value
 SATURATED, SPEED_LIMITED, ANGLE_LIMITED, RATE_LIMITED, FLAGS = range(5)
 NEARLY = 1.0 - 1e-9
 ROUNDS = 20  # until speeds and angles agree
+STRONGEST = 1e15  # N, N m; beside it a demand of 1 is lost in rounding
 SMALL = 1e-3  # of what the pods can do, for finite differences
 
 
@@ -163,6 +164,25 @@ class Pods(Actuator):
             raise ValueError(
                 "has only fixed propellers side by side at the same y, which cannot make surge "
                 "force and yaw moment apart from each other; place them at different y"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _computable(self) -> Self:
+        most = [
+            max(
+                pod.T_nn * pod.n_max * pod.n_max,
+                pod.T_nn_astern * pod.n_max_astern * pod.n_max_astern,
+            )
+            for pod in self.pods
+        ]
+        arms = [math.sqrt(pod.x * pod.x + pod.y * pod.y) for pod in self.pods]
+        force, moment = sum(most), sum(T * arm for T, arm in zip(most, arms, strict=True))
+        if not max(force, moment) <= STRONGEST:
+            raise ValueError(
+                f"has a full thrust of {force:g} N and a yaw moment of {moment:g} N m, of which no "
+                f"more than {STRONGEST:g} can be computed with; take smaller T_nn, T_nn_astern, "
+                "n_max, n_max_astern, x or y"
             )
         return self
 

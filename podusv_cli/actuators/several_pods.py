@@ -114,7 +114,7 @@ def climb(
     way, curve = scratch(3), scratch(6)
     pull(count, C, tau, sides, sectors, eps, y, g, slope, curve)
     for _ in range(ITERATIONS):
-        if abs(slope[0]) + abs(slope[1]) + abs(slope[2]) <= settled:
+        if not abs(slope[0]) + abs(slope[1]) + abs(slope[2]) > settled:  # or it is no number
             break
         ascent(curve, slope, way)
         along(count, C, tau, sides, sectors, eps, way, y, g, slope, curve)
@@ -172,9 +172,14 @@ def on_these_sides(
 def several_pods(
     count: int, C: Vector, tau: Vector, sectors: Vector, eps: float, best: Vector
 ) -> float:
-    """The best forces g over all sides into `best`, two numbers a pod; gives their cost."""
+    """The best forces g over all sides into `best`, two numbers a pod; gives their cost.
+
+    No numbers, at an infinite cost, where `C` or `tau` leave all numbers.
+    """
     g, sides = scratch(FORCES), scratch(MOST_PODS)
     least = math.inf
+    for i in range(2 * count):
+        best[i] = math.nan
     for choice in range(1 << count):
         wanted = True
         for i in range(count):
