@@ -172,8 +172,8 @@ def durable_steps(patch: pytest.MonkeyPatch) -> list[tuple[str, str]]:
         steps.append(("sync", os.readlink(f"/proc/self/fd/{descriptor}")))
         fsync(descriptor)
 
-    def note_name(move: Callable[[Any, Any], None]) -> Callable[[Any, Any], None]:
-        return lambda old, new: (steps.append(("name", str(new))), move(old, new))[1]
+    def note_name(move: Callable[..., None]) -> Callable[..., None]:
+        return lambda old, new, **at: (steps.append(("name", str(new))), move(old, new, **at))[1]
 
     patch.setattr(os, "fsync", note_sync)
     patch.setattr(os, "replace", note_name(replace))

@@ -178,7 +178,9 @@ def test_a_cache_among_other_folders_leaves_what_is_not_its_own(
         code_kept(200 + number)
     assert len(list(tmp_path.glob("*/thesis.tex"))) == MANY
     assert len(list(tmp_path.glob("*/of-mine.code"))) == MANY
-    assert len(list(tmp_path.glob("*/notes-*"))) == MANY
+    noted = list(tmp_path.glob("*/notes-*"))
+    assert len(noted) == MANY
+    assert all((path.parent / code_folder.MARK).exists() for path in noted)
 
 
 def test_a_folder_that_only_looks_like_a_cache_is_left(

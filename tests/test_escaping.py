@@ -16,7 +16,7 @@ from comparison_samples import FRAME, verdicts
 from test_comparison_page import page
 
 from podusv_cli import escaping
-from podusv_cli.cli import progress
+from podusv_cli.cli import layout, progress
 from podusv_cli.comparison import claims, table
 from podusv_cli.logbook import jsonfile
 
@@ -188,6 +188,19 @@ def test_no_command_lets_a_folders_name_through(podusv: Command) -> None:
     for name in texts:
         assert not nasty(Path("x", name).read_text()), name
     assert podusv("run", "a.yaml", f"--out={one}").err.count("\n") == 1
+
+
+def test_whatever_prints_lines_prints_text(capsys: pytest.CaptureFixture[str]) -> None:
+    layout.echo(EVIL, EVIL, err=True)
+    layout.echo_line(EVIL)
+    layout.echo_entry(EVIL, EVIL, facts=EVIL)
+    layout.echo_table([EVIL, EVIL, EVIL], [[EVIL, EVIL, EVIL]])
+    layout.warn_of({EVIL: {EVIL: EVIL, "b": EVIL}})
+    layout.Warned()(EVIL)
+    for shown in capsys.readouterr():
+        assert escaping.visible(EVIL)[:8] in shown
+        assert not nasty(shown)
+        assert "\n#" not in shown
 
 
 def test_a_bar_shows_names_as_they_are(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
+from command_samples import Command
 from logbook_samples import (
     NEW,
     OLD,
@@ -72,6 +73,19 @@ def test_everything_in_it_lasts_before_it_has_its_name(
     before = {path for step, path in steps[:named] if step == "sync"}
     assert {str(making), str(making / "figures"), *(str(making / name) for name in NEW)} <= before
     assert ("sync", str(final.parent)) in steps[named:]
+
+
+def test_every_file_of_a_run_is_synced_before_the_run_has_its_name(
+    podusv: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The log, too, which is written in another way than the other files."""
+    steps = durable_steps(monkeypatch)
+    assert podusv("run", "a.yaml", "--out", "x", "-q").code == 0
+    named = [Path(path).name if step == "name" else "" for step, path in steps].index("x")
+    synced = {Path(path).name for step, path in steps[:named] if step == "sync"}
+    made = {path.name for path in Path("x").rglob("*") if path.is_file()}
+    assert {"log.h5", "metrics.json", "errors.png"} <= made
+    assert made - synced == {"manifest.json"}  # which is synced under a hidden name
 
 
 def test_without_finish_nothing_is_left(final: Path) -> None:
