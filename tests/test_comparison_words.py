@@ -1,20 +1,27 @@
 """The language of claims: what it computes, what it refuses, every verdict planted both ways."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
+from test_reproduction import rerun
 
 from podusv_cli.comparison import expressions
 from podusv_cli.comparison.conditions import Evidence
 from podusv_cli.comparison.parsing import ExpressionError, parse, renamed
+from podusv_cli.config.loading import load
+
+CORRECTED = Path(__file__).parent.parent / "configs/paper/corrected.yaml"
 
 
 class Planted:
     """A run with known numbers: z_e falls linearly from 10 m to 0 over 10 s."""
 
-    def __init__(self, scale: float = 1.0, until: float = 10.0, every: int = 1) -> None:
-        self.scale, self.until, self.every = scale, until, every
+    def __init__(
+        self, scale: float = 1.0, until: float = 10.0, every: int = 1, step: int = 1
+    ) -> None:
+        self.scale, self.until, self.every, self.step = scale, until, every, step
         self.ending = "" if until == 10.0 else f"diverged at t = {until:g} s"
 
     def metric(self, name: str) -> float:
@@ -23,7 +30,7 @@ class Planted:
 
     def signal(self, name: str) -> np.ndarray:
         t = np.linspace(0.0, 10.0, 101)
-        t = t[t <= self.until + 1e-9][:: self.every]
+        t = t[t <= self.until + 1e-9][:: self.every * self.step]
         known = {"time": t, "z_e": self.scale * (10.0 - t), "x_d": 0.5 * t, "tau_u": 0 * t + 2.0}
         return known.get(name, np.empty(0))
 
@@ -38,6 +45,8 @@ RUNS = {
     "lost": Planted(until=8.1),
     "cut": Planted(until=3.0),
     "thin": Planted(every=30),  # logged up to 9 s
+    "even": Planted(every=20),  # logged up to 10 s
+    "coarse": Planted(step=20),  # a step of 2 s, each logged
 }
 
 
@@ -87,9 +96,20 @@ def test_planted_claims_of_every_kind(kind, true, false):
         ("max(lost.z_e) < 100", "max(lost.z_e): lost diverged at t = 8.1 s"),
         ("max(lost.z_e, 0, 8.2) < 100", "max(lost.z_e, 0, 8.2): lost diverged at t = 8.1 s"),
         ("max(a.z_e - lost.z_e, 0, 9) < 1", "max(a.z_e - lost.z_e, 0, 9): lost diverged"),
-        ("max(thin.z_e, 4, 5) < 1", "max(thin.z_e, 4, 5): nothing is logged in this window"),
-        ("integral(thin.z_e, 5, 7) < 1", "integral(thin.z_e, 5, 7) is no finite number"),
-        ("variation(thin.z_e, 5, 7) < 1", "variation(thin.z_e, 5, 7) is no finite number"),
+        ("max(a.z_e, 4.01, 4.09) < 1", "max(a.z_e, 4.01, 4.09): nothing is logged in this window"),
+        ("integral(a.z_e, 5, 5.05) < 1", "integral(a.z_e, 5, 5.05) is no finite number"),
+        ("variation(a.z_e, 5, 5.05) < 1", "variation(a.z_e, 5, 5.05) is no finite number"),
+        ("max(thin.z_e) < 1", "max(thin.z_e): thin logs one step in 30 only, and"),
+        ("max(abs(thin.z_e)) > 1", "log each (log.every: 1), or use a metric, which sees every"),
+        ("min(thin.z_e, 4, 5) < 1", "min(thin.z_e, 4, 5): thin logs one step in 30 only"),
+        ("mean(thin.z_e) < 1", "thin logs one step in 30 only"),
+        ("integral(thin.z_e, 5, 7) < 1", "thin logs one step in 30 only"),
+        ("variation(thin.z_e) < 1", "thin logs one step in 30 only"),
+        ("max(a.z_e - thin.z_e, 0, 9) < 1", "thin logs one step in 30 only"),
+        ("max(rate(thin.x_d)) < 1", "rate: thin logs one step in 30 only"),
+        ("final(rate(even.x_d)) < 1", "rate: even logs one step in 20 only"),
+        ("final(even.x_d, 0, 5) < 1", "even logs one step in 20 only"),
+        ("final(thin.z_e) == 1", "thin logs one step in 30 only"),  # 0, at 10 s, is not logged
         ("a.iae / (a.iae - a.iae) < 1", "a.iae / (a.iae - a.iae) is no finite number"),
         ("max(1 / (a.z_e - a.z_e)) < 1", "is no finite number"),
     ],
@@ -108,13 +128,26 @@ def test_what_cannot_be_told_and_why(text, why):
         "min(lost.z_e, 0, 8.1) == 1.9",  # up to its last instant
         "max(rate(lost.x_d), 1, 2) == 0.5",
         "mean(abs(a.z_e - lost.z_e), 0, 8) == 0",
-        "final(thin.z_e) == 1",  # logged up to 9 s, simulated up to 10 s
-        "final(thin.z_e, 0, 10) == 1",
+        "final(even.x_d) == 5",  # the last instant is logged
+        "final(even.x_d - a.x_d) == 0",
+        "max(abs(a.x_d - coarse.x_d)) == 0",  # another step is interpolated
+        "thin.iae == a.iae",  # metrics see every step
     ],
 )
 def test_windows_that_a_run_covers_are_judged_whatever_became_of_it(text):
     assert judged(text, tolerance=1e-9) == (True, judged(text)[1])
     assert not judged(text)[1].doubts
+
+
+def test_no_verdict_flips_with_the_log_s_interval():
+    answers, peaks = [], []
+    for every in (1, 5000):
+        keys = ("simulation.duration=60", f"log.every={every}")
+        runs = {"law": rerun(load(CORRECTED, keys).scenario)}
+        answers.append(parse("max(abs(law.tau_u_cmd)) < 200", runs).holds(runs, 0.0, Evidence()))
+        peaks.append(runs["law"].metric("peak_tau_u"))
+    assert answers == [False, None]
+    assert peaks[0] == peaks[1] > 25_000
 
 
 def test_both_ends_of_a_window_belong_to_it():
@@ -151,8 +184,8 @@ def test_the_tolerance_of_an_order_is_of_the_larger_number():
 
 
 def test_an_integral_knows_its_time():
-    assert verdict("integral(thin.tau_u) == 18", tolerance=1e-9)[0] is True
-    assert verdict("mean(thin.tau_u, 5, 7) == 2", tolerance=1e-9)[0] is True
+    assert verdict("integral(coarse.tau_u) == 20", tolerance=1e-9)[0] is True
+    assert verdict("mean(coarse.tau_u, 4, 8) == 2", tolerance=1e-9)[0] is True
 
 
 def test_names_of_a_scenario_stand_for_other_runs():
@@ -185,7 +218,7 @@ def test_the_numbers_are_shown_by_their_text():
         ("a.iae", "is no condition"),
         ("a.z_e < 3", "runs over time: sum it up with one of"),
         ("a.ia < 3", "unknown signal or metric 'ia'; did you mean 'iae'?"),
-        ("d.iae < 3", "unknown run 'd' (allowed: a, b, c, cut, lost, thin)"),
+        ("d.iae < 3", "unknown run 'd' (allowed: a, b, c, coarse, cut, even, lost, thin)"),
         ("maximum(a.z_e) < 3", "unknown function 'maximum'"),
         ("max(a.iae) < 3", "is a number, a signal is wanted"),
         ("max(a.z_e, 5) < 3", "takes a signal, or a signal and two times"),

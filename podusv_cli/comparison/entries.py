@@ -42,6 +42,11 @@ class Entry:
         return float(self.recording["time"][-1]) if len(self.recording["time"]) else 0.0
 
     @property
+    def every(self) -> int:
+        """How many steps are between two logged instants."""
+        return self.scenario.time_grid().log_every
+
+    @property
     def ending(self) -> str:
         """The first words of what the run says about its end, empty where it finished."""
         return self.recording.message.partition(":")[0]
@@ -69,6 +74,7 @@ class Absent:
     scenario: Scenario
     failure: str
     until = 0.0
+    every = 1
 
     @property
     def ending(self) -> str:

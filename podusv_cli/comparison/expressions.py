@@ -32,6 +32,10 @@ class Source(Protocol):
         """The time up to which the run was simulated [s]."""
 
     @property
+    def every(self) -> int:
+        """How many steps a logged instant is after the one before; 1 where each is logged."""
+
+    @property
     def ending(self) -> str:
         """Why the run did not reach its end, as `diverged at t = 2 s`; empty where it did."""
 
@@ -54,11 +58,19 @@ class Untold(Exception):
 
 @dataclass(frozen=True)
 class Reach:
-    """How far a run goes; see `Source`."""
+    """How far a run goes, and how much of it is logged; see `Source`."""
 
     run: str
     until: float
     ending: str
+    every: int
+
+    def thinned(self, text: str) -> Untold:
+        """The doubt about what this text asks of a log that leaves steps out."""
+        return Untold(
+            f"{text}: {self.run} logs one step in {self.every} only, and nobody knows what was in "
+            "between; log each (log.every: 1), or use a metric, which sees every step"
+        )
 
 
 @dataclass(frozen=True)
@@ -129,7 +141,7 @@ class SignalOf:
         values = run.signal(self.name)
         if not len(values):
             raise Untold(f"{self.run}.{self.name}: {self.run} {run.ending or 'does not log it'}")
-        reach = Reach(self.run, run.until, run.ending)
+        reach = Reach(self.run, run.until, run.ending, run.every)
         return Curve(run.signal("time")[: len(values)], values, (reach,))
 
 
@@ -185,6 +197,9 @@ class Rate:
         """Central differences, one-sided at the ends; NaN for a single sample."""
         got = self.part.value(runs)
         assert isinstance(got, Curve)
+        for reach in got.reaches:
+            if reach.every > 1:
+                raise reach.thinned("rate")
         if len(got.values) < 2:
             return Curve(got.time, got.values * np.nan, got.reaches)
         return Curve(got.time, np.gradient(got.values, got.time), got.reaches)
@@ -201,11 +216,17 @@ class Reduced:
     curve = False
 
     def value(self, runs: Sources) -> Quantity:
-        """The number; Untold where a run does not cover the window, or did not reach its end."""
+        """The number; Untold where a run does not cover the window, or did not reach its end.
+
+        Of a thinned log only the end of the run is known, where that is logged.
+        """
         got = self.part.value(runs)
         assert isinstance(got, Curve)
         for reach in got.reaches:
             self._demand(reach)
+            at_end = self.reducer is final and not self.window
+            if reach.every > 1 and not (at_end and abs(got.time[-1] - reach.until) <= NEAR):
+                raise reach.thinned(self.text)
         t, y = got.time, got.values
         if self.window:
             inside = (t >= self.window[0] - NEAR) & (t <= self.window[1] + NEAR)
@@ -222,11 +243,16 @@ class Reduced:
             raise Untold(f"{self.text}: {reach.run} {why}")
 
 
+def final(t: Vector, y: Vector) -> float:
+    """The last value."""
+    return float(y[-1])
+
+
 REDUCERS: dict[str, Callable[[Vector, Vector], float]] = {
     "max": lambda t, y: float(np.max(y)),
     "min": lambda t, y: float(np.min(y)),
     "mean": lambda t, y: float(np.trapezoid(y, t) / (t[-1] - t[0])) if len(t) > 1 else float(y[0]),
-    "final": lambda t, y: float(y[-1]),
+    "final": final,
     "variation": lambda t, y: float(np.sum(np.abs(np.diff(y)))) if len(t) > 1 else float("nan"),
     "integral": lambda t, y: float(np.trapezoid(y, t)) if len(t) > 1 else float("nan"),
 }

@@ -78,7 +78,12 @@ class Control(Component):
 class Log(Component):
     """What is written to log.h5."""
 
-    every: int = value(1, "steps", "every n-th step is logged; metrics always see every step", ge=1)
+    every: int = value(
+        1,
+        "steps",
+        "every n-th step is logged; metrics always see every step, claims about signals need 1",
+        ge=1,
+    )
     monitor: bool = value(
         True,
         "",
