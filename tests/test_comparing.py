@@ -14,9 +14,9 @@ from podusv_cli.comparison import table
 from podusv_cli.comparison.differences import differences
 from podusv_cli.config.loading import load
 from podusv_cli.errors import ScenarioError, UsageError
+from podusv_cli.extras import Extras
 from podusv_cli.figures.drawing import FIGURES, dressed
 from podusv_cli.figures.style import FORMATS
-from podusv_cli.interrupts import Extras
 
 SCENARIO = """
 vessel: {preset: paper_nonlinear}
