@@ -58,7 +58,7 @@ class StorageError(PodusvError):
 
 
 class LawError(PodusvError):
-    """A law that does not keep to its declaration, or that fails when it is asked."""
+    """A law, or another component, that does not keep to its declaration or fails when asked."""
 
     exit_code = 2
 

@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.fields import FieldInfo
 
+from podusv_cli.errors import LawError, in_a_line
 from podusv_cli.kernels import Vector
 
 
@@ -71,10 +72,34 @@ def catalogue(package: str, base: type[Kind]) -> dict[str, type[Kind]]:
     """Every component of `package` that derives from `base`, by its `kind`, sorted."""
     found: dict[str, type[Kind]] = {}
     for module in iter_modules(import_module(package).__path__, f"{package}."):
-        for thing in vars(import_module(module.name)).values():
+        for thing in vars(_imported(module.name)).values():
             if isinstance(thing, type) and issubclass(thing, base) and "kind" in thing.model_fields:
-                found[thing.model_fields["kind"].default] = thing
+                kind = _kind(thing)
+                if found.setdefault(kind, thing) is not thing:
+                    raise LawError(
+                        f"{thing.__module__}.{thing.__name__}: its kind {kind} is that of "
+                        f"{found[kind].__module__}, too; take another name"
+                    )
     return dict(sorted(found.items()))
+
+
+def _imported(module: str) -> Any:
+    try:
+        return import_module(module)
+    except SyntaxError as error:  # which names its place
+        raise LawError(f"{module} cannot be imported: {type(error).__name__}: {error}") from error
+    except Exception as error:
+        raise LawError(f"{module} cannot be imported: {in_a_line(error)}") from error
+
+
+def _kind(component: type[Component]) -> str:
+    field = component.model_fields["kind"]
+    if get_origin(field.annotation) is not Literal:
+        raise LawError(
+            f"{component.__module__}.{component.__name__}: its kind is no fixed word; write "
+            'kind: Literal["mine"] = "mine"'
+        )
+    return str(field.default)
 
 
 def any_of(package: str, base: type[Kind]) -> Any:

@@ -27,6 +27,7 @@ from podusv_cli.interrupts import interrupts_heard, interrupts_held
 from podusv_cli.kernels import Vector
 from podusv_cli.logbook import folder, provenance
 from podusv_cli.logbook.columns import ColumnFiles
+from podusv_cli.logbook.soundness import check_declared
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.metrics.watching import observer, summarise
@@ -203,6 +204,7 @@ def warm_up(scenario: Scenario) -> None:
     """Have all code of this scenario's loop compiled and loaded. Raises LawError."""
     loop, compiled = scenario.closed_loop(), scenario.simulation.compiled
     check_law(loop)
+    check_declared(loop)
     marcher(loop, _observer(scenario), compiled)
     if scenario.log.monitor:
         monitor.prepare(loop, scenario.time_grid(), compiled)

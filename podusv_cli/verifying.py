@@ -8,6 +8,7 @@ from pathlib import Path
 
 from podusv_cli.config.loading import load
 from podusv_cli.config.size import limits
+from podusv_cli.engine.asking import check_law
 from podusv_cli.errors import StorageError, UsageError
 from podusv_cli.logbook import atomic, jsonfile
 from podusv_cli.verification import verify as verification
@@ -22,8 +23,8 @@ def verify(
 ) -> Verified:  # fmt: skip
     """Verify a scenario's numbers, which `keep` can write to the file `out`.
 
-    Raises UsageError for a run folder, ScenarioError, and StorageError where `out` is no place for
-    a file, or is another file and not replaced by `force`, before anything is computed.
+    Raises UsageError for a run folder, ScenarioError, LawError, and StorageError where `out` is no
+    place for a file, or is another file and not replaced by `force`, before anything is computed.
     """
     if (config / "resolved.yaml").is_file():
         raise UsageError(f"{config} is a run folder; verify its resolved.yaml")
@@ -31,6 +32,8 @@ def verify(
     if out:
         atomic.check_places([out])
         _spare(out, force)
+    for single in scenario.singles().values():
+        check_law(single.closed_loop())
     return verification.verify(scenario, tolerance, progress)
 
 

@@ -7,19 +7,36 @@ from __future__ import annotations
 
 import re
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 from podusv_cli.engine import machine_code, signatures
 from podusv_cli.engine.closed_loop import advance, evaluate_all, rates_along
+from podusv_cli.errors import LawError
 from podusv_cli.interrupts import interrupts_held
+
+RULES = (
+    "a kernel is marked with @kernel, reads and writes numbers of vectors one by one (x[2], "
+    "tau[0] = ...), calls math.sin and the like and other kernels, and allocates, prints and "
+    "raises nothing"
+)
 
 
 @cache
 def entry(door: Any, inner: Any, names: tuple[str, ...]) -> Any:
-    """Machine code of a component's kernel behind its door, callable by the loop."""
+    """Machine code of a component's kernel behind its door, callable by the loop.
+
+    Raises LawError for a kernel that cannot become machine code.
+    """
     label = f"{door.__name__}_{inner.__module__}_{inner.__qualname__}"
     bound = signatures.bind(door, inner, names)
-    return compiled(bound, signatures.PROTOTYPES[door], label)
+    try:
+        return compiled(bound, signatures.PROTOTYPES[door], label)
+    except TypeError as error:
+        place = f"{Path(inner.__code__.co_filename).name}, line {inner.__code__.co_firstlineno}"
+        raise LawError(
+            f"kernel {inner.__qualname__} ({place}) cannot become machine code: {error}; {RULES}"
+        ) from error
 
 
 @cache

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import ctypes
 import dis
+import re
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import llvmlite.binding as llvm
 from numba import cfunc, njit, types
 from numba.core import cgutils
+from numba.core.errors import NumbaError
 from numba.core.typing.ctypes_utils import from_ctypes
 from numba.extending import intrinsic
 
@@ -48,7 +51,10 @@ def translate(function: Any, prototype: Any) -> Code:
 
     Raises TypeError for a kernel that needs more than arithmetic and the mathematical library.
     """
-    compiled = cfunc(_signature(prototype), **OPTIONS)(_with_machine_code(function))
+    try:
+        compiled = cfunc(_signature(prototype), **OPTIONS)(_with_machine_code(function))
+    except NumbaError as error:
+        raise TypeError(_in_short(str(error))) from error
     module = llvm.parse_assembly(compiled.inspect_llvm())
     _check_calls(module, function.__qualname__)
     return Code(compiled.native_name, target().emit_object(module))
@@ -60,6 +66,15 @@ def machine(function: Any) -> Any:
     if function in PRIMITIVES:
         return PRIMITIVES[function]
     return njit(**INNER)(_with_machine_code(function))
+
+
+def _in_short(told: str) -> str:
+    """What numba says of the innermost place, and where that is."""
+    words = told.split("\n\nFile")[0].split("\nThere are")[0].split("\nDuring")[0]
+    kept = [line for line in words.splitlines() if not line.startswith("Failed in nopython mode")]
+    place = re.search(r'^File "([^"]+)", line (\d+):\n(?:.*\n)*?(.*)\n +\^', told, re.MULTILINE)
+    where = f" ({Path(place[1]).name}, line {place[2]}: {place[3].strip()})" if place else ""
+    return f"{' '.join(' '.join(kept).split())}{where}"
 
 
 def _with_machine_code(function: Any) -> Any:
@@ -89,6 +104,6 @@ def _check_calls(module: Any, name: str) -> None:
     for wanted in declared:
         if not wanted.startswith("llvm.") and not hasattr(process, wanted):
             raise TypeError(
-                f"kernel {name} needs {wanted}: kernels allocate nothing, raise nothing and call "
-                "arithmetic, the mathematical library and other kernels only"
+                f"{name} needs {wanted}, which is no function of the mathematical library: it "
+                "allocates, prints or raises"
             )

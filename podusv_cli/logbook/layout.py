@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
+from podusv_cli.kernels import Vector
 from podusv_cli.signals import SIGNALS
 
 FORMAT = 1
@@ -36,6 +38,19 @@ FIXED_AXES = {
 def axes(name: str) -> tuple[str, ...]:
     """Names of a signal's axes, `time` first where it has one. KeyError for an unknown signal."""
     return FIXED_AXES.get(name, ("time", *SIGNALS[name].axes))
+
+
+def misfit(arrays: Mapping[str, Vector]) -> str:
+    """Why arrays of these names and shapes make no log; empty where they do."""
+    lengths: dict[str, int] = {}
+    for name, array in arrays.items():
+        wanted = axes(name)
+        if array.ndim != len(wanted):
+            return f"{name} has the shape {array.shape}, and its axes are {', '.join(wanted)}"
+        for axis, size in zip(wanted, array.shape, strict=True):
+            if lengths.setdefault(axis, size) != size:
+                return f"{name} has {size} values along {axis}, where others have {lengths[axis]}"
+    return ""
 
 
 def chunk(shape: tuple[int, ...]) -> tuple[int, ...]:

@@ -4,6 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from podusv_cli.engine.asking import called
+from podusv_cli.engine.simulate import ClosedLoop, by_name, names
+from podusv_cli.errors import LawError
+from podusv_cli.logbook.layout import misfit
+from podusv_cli.paths.base import TARGET
 from podusv_cli.recording import Recording
 
 NEEDED = (
@@ -21,6 +26,15 @@ BESIDE = {
     "power": ("delta",),
 }
 LARGEST = 1e300  # the engine takes anything beyond for divergence and does not log it
+
+
+def check_declared(loop: ClosedLoop) -> None:
+    """LawError where the arrays that a loop will log do not fit each other."""
+    columns = names(loop)
+    row = by_name(columns, np.zeros((1, len(columns))))
+    logged = {name: array for name, array in row.items() if name not in TARGET[2:]}
+    if wrong := misfit(logged | loop.controller.fixed_signals()):
+        raise LawError(f"{called(loop.controller)}: its log cannot be written: {wrong}")
 
 
 def fault(log: Recording) -> str:

@@ -74,7 +74,7 @@ def test_a_law_that_fails_on_the_way_leaves_its_log(
 REFUSED = {
     "too_long": "law pid: asked at the start, IndexError: index 2 is out of bounds for axis 0 with "
     "size 2 (faulty_laws.py, line ",
-    "too_short": "law pid: it leaves tau_r_cmd unwritten\n",
+    "too_short": "law pid (pid.py, line 19): it leaves tau_r_cmd unwritten\n",
     "slow_at_once": "law pid: asked at the start, it is not over after 0.4 s of computing\n",
 }
 
@@ -94,7 +94,7 @@ def test_a_law_that_is_not_what_it_says_is_refused_before_the_run(
 def test_a_memory_of_another_size_is_refused() -> None:
     class Forgetful(Constant):
         def slots(self) -> tuple[tuple[str, int], ...]:
-            return (("integral_u", 2),)
+            return (("W_hat_u", 2),)
 
     with pytest.raises(LawError, match=r"memory of shape \(0,\), its slots are \(2,\)"):
         check_law(adrift(controller=Forgetful()))

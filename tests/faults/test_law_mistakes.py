@@ -1,0 +1,252 @@
+"""A mistake in somebody's own law is refused before the run: where it is, and what to write."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+from command_samples import BASE, Command, write
+from conftest import Constant, adrift
+
+from podusv_cli.controllers.base import Controller
+from podusv_cli.controllers.pid import Pid
+from podusv_cli.engine.asking import check_law
+from podusv_cli.engine.simulate import ClosedLoop, Observer, marcher
+from podusv_cli.errors import LawError
+from podusv_cli.kernels import Vector, kernel
+from podusv_cli.logbook.soundness import check_declared
+from podusv_cli.registry import catalogue
+from podusv_cli.vessels.vessel import Vessel
+
+
+class Undeclared(Constant):
+    signals: ClassVar[tuple[str, ...]] = ("my_error",)
+
+
+class Text(Constant):
+    signals: Any = "psi_e"
+
+
+class Twice(Constant):
+    signals: ClassVar[tuple[str, ...]] = ("u",)
+
+
+class Slots(Constant):
+    def slots(self) -> tuple[tuple[str, int], ...]:
+        return (("my_integral", 1),)
+
+
+class Wide(Constant):
+    def slots(self) -> tuple[tuple[str, int], ...]:
+        return (("integral_u", 2),)
+
+
+class Fixed(Constant):
+    def fixed_signals(self) -> dict[str, Vector]:
+        return {"my_centre": np.zeros(3)}
+
+
+class Flat(Constant):
+    def fixed_signals(self) -> dict[str, Vector]:
+        return {"rbf_center": np.zeros(3)}
+
+
+class Uneven(Constant):
+    def fixed_signals(self) -> dict[str, Vector]:
+        return {"W_star_u": np.zeros(3), "W_star_r": np.zeros(4)}
+
+
+class Starting(Constant):
+    def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
+        return np.full(1, 1.0 / 0.0)
+
+
+class Worded(Constant):
+    def informed(self, nominal: Vessel) -> dict[str, Any]:
+        return {"surge": "much", "yaw": 0.0}
+
+
+class Short(Constant):
+    def table(self) -> Vector:
+        return np.zeros(3, np.float32)  # type: ignore[return-value]
+
+
+class Sampling(Constant):
+    def sample_period(self) -> float:
+        return 0.1
+
+    @staticmethod
+    @kernel
+    def sample(t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector) -> None:
+        memory[3] = 1.0
+
+
+class Settling(Constant):
+    def settles(self) -> bool:
+        return True
+
+
+DECLARED: dict[type[Controller], str] = {
+    Undeclared: "it declares my_error, which is in no table of signals; add a row "
+    'Signal("my_error", symbol, unit, meaning) to podusv_cli/signals.py',
+    Text: r'its signals are no tuple; write ("psi_e",)',
+    Twice: "it declares u, which the run logs already; take another name",
+    Slots: "it declares my_integral, which is in no table of signals; add a row "
+    'Signal("my_integral", symbol, unit, meaning) to podusv_cli/signals.py',
+    Wide: "integral_u has 2 numbers and no axis in podusv_cli/signals.py that tells them apart; "
+    "give each of them a name of its own",
+    Fixed: "it declares my_centre, which is in no table of signals; add a row "
+    'Signal("my_centre", symbol, unit, meaning) to podusv_cli/signals.py',
+    Flat: "its log cannot be written: rbf_center has the shape (3,), and its axes are node, input",
+    Uneven: "its log cannot be written: W_star_r has 4 values along node, where others have 3",
+    Worded: "its constant surge = 'much' is no named number",
+    Short: "its table is no vector of float64; write np.array([1.0])",
+}
+
+
+def begun(loop: ClosedLoop) -> None:
+    """All that is done before a run."""
+    check_law(loop)
+    check_declared(loop)
+    marcher(loop, Observer(), compiled=True)
+
+
+def refused(law: type[Controller]) -> str:
+    """Why a law is refused before its run."""
+    with pytest.raises(LawError) as found:
+        begun(adrift(controller=law()))
+    assert found.value.exit_code == 2
+    return str(found.value)
+
+
+@pytest.mark.parametrize("law", DECLARED)
+def test_what_it_declares_is_checked(law: type[Controller]) -> None:
+    line = _line(law.__name__)
+    assert refused(law) == f"law constant (test_law_mistakes.py, line {line}): {DECLARED[law]}"
+
+
+def _line(name: str) -> int:
+    lines = Path(__file__).read_text().splitlines()
+    return 1 + next(i for i, line in enumerate(lines) if line.startswith(f"class {name}("))
+
+
+ASKED: dict[type[Controller], str] = {
+    Starting: "ZeroDivisionError: float division by zero (test_law_mistakes.py, line ",
+    Sampling: "IndexError: index 3 is out of bounds for axis 0 with size 0 (test_law_mistakes.py, ",
+    Settling: "NotImplementedError:  (base.py, line ",
+}
+
+
+@pytest.mark.parametrize("law", ASKED)
+def test_all_its_functions_are_asked(law: type[Controller]) -> None:
+    assert refused(law).startswith(f"law constant: asked at the start, {ASKED[law]}")
+
+
+def helper(t: float) -> float:
+    """Not marked as a kernel."""
+    return 2.0 * t
+
+
+def no_kernel(t, x, memory, target, k, table, tau, rate, signals, work):  # type: ignore[no-untyped-def]
+    tau[0] = tau[1] = 0.0
+
+
+@kernel
+def helped(t, x, memory, target, k, table, tau, rate, signals, work):  # type: ignore[no-untyped-def]
+    tau[0] = helper(t)
+    tau[1] = 0.0
+
+
+@kernel
+def slicing(t, x, memory, target, k, table, tau, rate, signals, work):  # type: ignore[no-untyped-def]
+    tau[:] = 0.0
+
+
+@kernel
+def numpy_inside(t, x, memory, target, k, table, tau, rate, signals, work):  # type: ignore[no-untyped-def]
+    tau[0] = np.dot(x, x)
+    tau[1] = 0.0
+
+
+@kernel
+def allocating(t, x, memory, target, k, table, tau, rate, signals, work):  # type: ignore[no-untyped-def]
+    both = np.array([x[0], x[1]])
+    tau[0] = tau[1] = both[0]
+
+
+@kernel
+def raising(t, x, memory, target, k, table, tau, rate, signals, work):  # type: ignore[no-untyped-def]
+    tau[0] = tau[1] = 0.0
+    if t > math.pi:
+        raise ValueError("late")
+
+
+COMPILED: dict[Callable[..., None], str] = {
+    no_kernel: "Untyped global name 'kernel'",
+    helped: "Untyped global name 'helper': Cannot determine Numba type of <class 'function'> "
+    "(test_law_mistakes.py, line {2}: tau[0] = helper(t))",
+    slicing: "(test_law_mistakes.py, line {2}: tau[:] = 0.0)",
+    numpy_inside: ">>> dot(float64*, float64*) (test_law_mistakes.py, line {2}: tau[0] = np.dot(x",
+    allocating: "which is no function of the mathematical library: it allocates, prints or raises",
+    raising: "which is no function of the mathematical library: it allocates, prints or raises",
+}
+
+
+@pytest.mark.parametrize("inner", COMPILED)
+def test_what_cannot_become_machine_code_is_its_kernels_fault(inner: Callable[..., None]) -> None:
+    class Own(Constant):
+        law = staticmethod(inner)
+
+    line, told = inner.__code__.co_firstlineno, refused(Own)
+    place = (
+        f"kernel {inner.__name__} (test_law_mistakes.py, line {line}) cannot become machine code"
+    )
+    assert told.startswith(f"{place}: ")
+    assert COMPILED[inner].replace("{2}", str(line + 2)) in told
+    assert "a kernel is marked with @kernel" in told
+    assert "\n" not in told
+
+
+def test_a_command_refuses_it_in_a_line(podusv: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Pid, "signals", (*Pid.signals, "my_error"))
+    for command in ("run", "compare", "verify"):
+        said = podusv(command, write("a.yaml", BASE), "--out", "x")
+        assert (said.code, said.out) == (2, "")
+        assert said.err.startswith("law pid (pid.py, line ")
+        assert said.err.count("\n") == 1
+        assert not Path("x").exists()
+
+
+IMPORTED = {
+    "def (": "own_laws.mine cannot be imported: SyntaxError: invalid syntax (mine.py, line 1)",
+    "import nothing_of_this_name": "own_laws.mine cannot be imported: ModuleNotFoundError: No "
+    "module named 'nothing_of_this_name' (mine.py, line 1)",
+    "from podusv_cli.controllers.pid import Pid\nclass Mine(Pid):\n    kind: str = 'mine'": (
+        "own_laws.mine.Mine: its kind is no fixed word; write kind: Literal[\"mine\"] = \"mine\""
+    ),
+    "from podusv_cli.controllers.pid import Pid\nclass Mine(Pid): pass": (
+        "own_laws.mine.Mine: its kind pid is that of podusv_cli.controllers.pid, too; take "
+        "another name"
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("text", IMPORTED)
+def test_a_file_that_cannot_be_imported_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str
+) -> None:
+    package = tmp_path / "own_laws"
+    package.mkdir()
+    (package / "__init__.py").touch()
+    (package / "mine.py").write_text(text + "\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    for name in ("own_laws", "own_laws.mine"):
+        monkeypatch.delitem(sys.modules, name, raising=False)
+    with pytest.raises(LawError) as found:
+        catalogue("own_laws", Controller)
+    assert str(found.value) == IMPORTED[text]
