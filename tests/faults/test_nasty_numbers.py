@@ -1,0 +1,137 @@
+"""Every numeric key of every shipped scenario takes numbers that nobody would give it.
+
+Whatever comes of it is told in words: no traceback, no exit code 1, and in time.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import random
+import sys
+import time
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import redirect_stderr, redirect_stdout
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+import yaml
+from command_samples import ROOT
+from counts import count
+
+from podusv_cli import cli
+from podusv_cli.config.loading import load, resolved_yaml
+from podusv_cli.logbook import provenance
+from podusv_cli.metrics import cost
+from podusv_cli.parallel import workers_here
+from podusv_cli.running import warm_up
+
+VALUES = (
+    "0", "-0.0", "5e-324", "1e-300", "1e-9", "-1.0", "1e9", "1e30", "1e150", "1e200", "1.7e308",
+    "-1e308",
+)  # fmt: skip
+SHORT = "simulation.duration=0.5"
+PARTS = [ROOT / "configs/paper" / name for name in ("base.yaml", "claims.yaml")]  # to be extended
+MOST = count(24, 10**9)  # commands
+COMPARED, DRAWN = 100, 10  # one command in so many compares, or draws figures as well
+SECONDS = count(10**9, 10)  # of the processor; no test of `make test` takes the time
+HANGS = 600.0  # s
+FINE = (0, 2, 3, 4)
+
+
+class Try(NamedTuple):
+    """A scenario with one number in it."""
+
+    config: str
+    key: str
+    value: str
+
+
+class Found(NamedTuple):
+    """What a command came to."""
+
+    words: tuple[str, ...]
+    code: object
+    err: str
+    seconds: float
+
+
+def tries() -> Iterator[Try]:
+    """All of them; of scenarios that differ in words alone, one."""
+    seen = set()
+    for path in sorted((ROOT / "configs").rglob("*.yaml")):
+        if path in PARTS:
+            continue
+        tree = yaml.safe_load(resolved_yaml(load(path).scenario.alone()))
+        for words in ("name", "description", "claims", "controllers", "silence", "metrics"):
+            tree.pop(words, None)
+        if (text := str(tree)) not in seen:
+            seen.add(text)
+            config = str(path.relative_to(ROOT))
+            yield from (Try(config, key, value) for key in numeric(tree) for value in VALUES)
+
+
+def numeric(tree: Any, above: tuple[str, ...] = ()) -> Iterator[str]:
+    """Dotted paths of all numbers."""
+    if isinstance(tree, dict | list):
+        pairs = tree.items() if isinstance(tree, dict) else enumerate(tree)
+        for key, inner in pairs:
+            yield from numeric(inner, (*above, str(key)))
+    elif isinstance(tree, int | float) and not isinstance(tree, bool):
+        yield ".".join(above)
+
+
+def words(number: int, one: Try) -> tuple[str, ...]:
+    """The command for a try."""
+    compares = number % COMPARED == 0 and bool(load(ROOT / one.config).scenario.controllers)
+    short = () if one.key == "simulation.duration" else ("--set", SHORT)
+    change = ("--set", f"{one.key}={one.value}")
+    drawn = () if number % DRAWN == 0 and not compares else ("--no-figures",)
+    command = "compare" if compares else "run"
+    return (command, str(ROOT / one.config), *short, *change, "-q", "--force", *drawn, "--out")
+
+
+def careless() -> None:
+    """For processes whose results are thrown away: sync nothing, ask nobody, time little."""
+    os.fsync = lambda _: None
+    provenance.collect = lambda *_: {}
+    cost.REPLAYS = 4
+
+
+def attempt(given: tuple[str, ...]) -> Found:
+    """Run a command in this process."""
+    out, err, code, began = io.StringIO(), io.StringIO(), None, time.process_time()
+    sys.argv = ["podusv", *given, f"out-{os.getpid()}"]
+    with redirect_stdout(out), redirect_stderr(err):
+        try:
+            cli.main()
+        except SystemExit as ended:
+            code = ended.code
+    return Found(given, code, err.getvalue(), time.process_time() - began)
+
+
+def fault(found: Found) -> str:
+    """What is wrong with how a command ended; empty where nothing is."""
+    if found.code not in FINE or "Traceback" in found.err:
+        return f"{found.code}: {found.err[-1500:]}"
+    if not found.err and found.code:
+        return f"{found.code} without a word"
+    return f"{found.seconds:.1f} s" if found.seconds > SECONDS else ""
+
+
+def test_no_number_ends_in_a_traceback(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    every = list(tries())
+    chosen = random.Random(1).sample(every, min(MOST, len(every)))
+    for config in sorted({one.config for one in chosen}):
+        warm_up(load(ROOT / config).scenario.alone())  # here, and not in every process
+    commands = [words(number, one) for number, one in enumerate(chosen)]
+    fork = get_context("fork")
+    with ProcessPoolExecutor(workers_here(), mp_context=fork, initializer=careless) as pool:
+        found = list(pool.map(attempt, commands, chunksize=4, timeout=HANGS + 0.5 * len(commands)))
+    wrong = [f"podusv {' '.join(one.words)}\n{told}" for one in found if (told := fault(one))]
+    assert not wrong, "\n\n".join(wrong[:20])
+    assert {one.code for one in found} >= {0, 2, 4}
