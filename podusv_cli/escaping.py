@@ -51,6 +51,12 @@ def latex(text: str) -> str:
     return visible(text).translate(LATEX)
 
 
+def figure(text: str) -> str:
+    """Text of a figure: $ begins no formula, and _ ahead hides it from no legend."""
+    shown = visible(text).replace("$", r"\$")
+    return f" {shown}" if shown.startswith("_") else shown
+
+
 def html(text: str) -> str:
     """Text of an element, or of an attribute in quotes."""
     return markup.escape("\n".join(map(visible, text.split("\n"))))

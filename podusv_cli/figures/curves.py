@@ -53,7 +53,7 @@ def draw_signal(
     having = [run for run in runs if run.has(name)]
     fitted = scaling(having, span)
     for run in having:
-        look = {**run.look, **THIN, "label": f"_{run.label}, {name}"} if beside else run.look
+        look = {**run.look, **THIN, "label": f"_{run.name}, {name}"} if beside else run.look
         if not beside or differ(run, name, beside):
             draw_curve(axes, run.during(name, span), fitted=run in fitted, **look)
 

@@ -36,7 +36,7 @@ def pods(runs: Sequence[Shown], columns: int) -> Figure:
 
 def _draw(axes: Axes, run: Shown, names: tuple[str, str], pod: int, *, fitted: bool) -> None:
     actual, asked = names
-    thin: dict[str, Any] = {**THIN, "label": f"_{run.label}, {asked}"}
+    thin: dict[str, Any] = {**THIN, "label": f"_{run.name}, {asked}"}
     for name, look in ((asked, thin), (actual, {})):
         if name and run.has(name) and pod < run.recording[name].shape[1]:
             curve = run.recording["time"], run.recording[name][:, pod]

@@ -84,7 +84,7 @@ def _ultimate(axes: Axes, runs: Sequence[Shown]) -> None:
                 top = max(top, bound)
             else:
                 size = f"{bound:.2g}, not drawn" if math.isfinite(bound) else "none"
-                told.append(f"bound of {run.label} from {start:g} s on: {size}")
+                told.append(f"bound of {run.name} from {start:g} s on: {size}")
     axes.set_ylim(top=2.0 * top)
     axes.plot([], [], color="#444444", linewidth=THIN, label=r"thin: bound $\Delta/2\lambda$")
     if told:
@@ -159,7 +159,7 @@ def _shares(axes: Axes, run: Shown) -> list[PolyCollection]:
     parts = np.divide(terms, total, out=np.zeros_like(terms), where=total > 0.0)
     layers = axes.stackplot(_means(time), parts, colors=LAYERS.values(), linewidth=0.0)
     axes.set_ylim(0.0, 1.0)
-    axes.set_ylabel(f"parts of $V$ [1]\n{run.label}")
+    axes.set_ylabel(f"parts of $V$ [1]\n{run.name}")
     return layers
 
 

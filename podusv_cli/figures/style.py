@@ -18,7 +18,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 from matplotlib.ticker import ScalarFormatter
 
-from podusv_cli import derived
+from podusv_cli import derived, escaping
 from podusv_cli.config.scenario import Scenario
 from podusv_cli.kernels import Vector
 from podusv_cli.recording import Recording
@@ -57,6 +57,11 @@ class Shown:
     linestyle: Any
 
     @property
+    def name(self) -> str:
+        """The label as every text of a figure has to have it."""
+        return escaping.figure(self.label)
+
+    @property
     def length(self) -> float:
         """Of the vessel [m]."""
         return self.scenario.vessel.length
@@ -79,7 +84,7 @@ class Shown:
     @property
     def look(self) -> dict[str, Any]:
         """Keyword arguments of `Axes.plot`."""
-        return {"color": self.color, "linestyle": self.linestyle, "label": self.label}
+        return {"color": self.color, "linestyle": self.linestyle, "label": self.name}
 
     @property
     def whole(self) -> bool:

@@ -57,7 +57,7 @@ def _target(group: Sequence[Shown], *, only: bool) -> Target:
     longest = max(group, key=lambda run: run.end).recording
     if only:
         return Target(group, {**TARGET_LOOK, "label": "target"}, longest)
-    label = f"target of {', '.join(run.label for run in group)}"
+    label = f"target of {', '.join(run.name for run in group)}"
     look = {**TARGET_LOOK, "linestyle": group[0].linestyle, "label": label}
     return Target(group, look, longest)
 
