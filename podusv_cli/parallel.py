@@ -15,7 +15,7 @@ from multiprocessing.process import BaseProcess
 from pickle import PicklingError, UnpicklingError
 from typing import Any
 
-from podusv_cli.errors import PodusvError
+from podusv_cli.errors import PodusvError, StorageError
 from podusv_cli.interrupts import Interrupts, interrupts_caught, interrupts_heard, interrupts_held
 
 Progress = Callable[[float], None]
@@ -146,6 +146,8 @@ def _outcome(job: Job, progress: Progress, interrupts: Interrupts) -> Outcome:
         raise
     except PodusvError as error:
         return Outcome(failure=str(error), code=error.exit_code)
+    except OSError as error:  # as the command line tells it
+        return Outcome(failure=str(error), code=StorageError.exit_code)
     except KeyboardInterrupt:
         return Outcome(failure=INTERRUPTED)
     except Exception:  # machine code may turn an interrupt into another exception

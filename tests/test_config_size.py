@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_left
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -14,6 +15,7 @@ from podusv_cli.config import size, source
 from podusv_cli.config.loading import load_resolved, resolved_yaml
 from podusv_cli.config.scenario import Scenario
 from podusv_cli.errors import StorageError
+from podusv_cli.logbook import jsonfile, manifest
 
 NODES, CHARACTERS = 500, 5000  # instead of the real limits, which take seconds to reach
 
@@ -80,6 +82,25 @@ def test_each_run_of_a_comparison_has_to_be_readable_not_all_together() -> None:
     assert [key for key, _ in refused(changed(controllers=several | {"more": dsc(150)}))] == [
         "controllers.more.network.centers"
     ]
+
+
+def test_runs_are_refused_whose_manifest_could_not_be_read_back(tmp_path: Path) -> None:
+    law = example(kinds("controllers")["pid"])
+    laws = {f"a_rather_long_name_of_law_{i:04}": law for i in range(size.MOST_RUNS + 1)}
+    scenario = changed(controllers=laws)
+    ((key, text),) = size.limits(read_back=True)(scenario)
+    assert (key, text.split(";")[0]) == (
+        "controllers",
+        "has 1,001 runs, more than the 1,000 that podusv reads back as one comparison",
+    )
+    entry = manifest.Entry(sha256="a" * 64, bytes=10**9)
+    names = ("scenario.yaml", "resolved.yaml", "log.h5", "metrics.json", "metrics.csv",
+             "theory.json", "figures/controls.png", "provenance.json", "manifest.json",
+             "missing.json")  # fmt: skip
+    files = {f"{label}/{name}": entry for label in laws for name in names}
+    whole = manifest.Manifest(podusv_format=1, status="finished", files=files)
+    (tmp_path / "manifest.json").write_bytes(jsonfile.encode(whole.model_dump()))
+    assert len(manifest.read(tmp_path).files) == len(files)
 
 
 def test_too_much_is_told_at_the_largest_value_with_what_to_do() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+import resource
 import sys
 import traceback
 from collections.abc import Callable
@@ -21,6 +22,8 @@ Given = ParamSpec("Given")
 INTERRUPTED = 130
 PIPE_CLOSED = 141  # what a shell reports for a program that SIGPIPE ended
 BUG = 1
+# At once: a run has up to 18 open, and a comparison two more for each run that it makes at a time.
+LEAST_OPEN_FILES, OPEN_FILES = 64, 1024
 PLEASE_REPORT = "This is a bug in podusv. Please report it with the lines above."
 
 
@@ -41,6 +44,7 @@ def guarded(command: Callable[Given, None]) -> Callable[Given, None]:
 
 def _code_of(command: Callable[[], None], interrupts: Interrupts) -> int:
     try:
+        _open_enough()
         command()
     except (typer.Abort, typer.BadParameter):
         raise
@@ -53,6 +57,22 @@ def _code_of(command: Callable[[], None], interrupts: Interrupts) -> int:
             return INTERRUPTED
         return told(error)
     return 0
+
+
+def _open_enough() -> None:
+    """Allow as many open files as commands need; StorageError where the system does not.
+
+    A run that finds out in the end would lack figures, or be lost.
+    """
+    allowed, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if allowed != resource.RLIM_INFINITY and allowed < OPEN_FILES:
+        if most != resource.RLIM_INFINITY and most < LEAST_OPEN_FILES:
+            raise StorageError(
+                f"at most {most} files may be open at once, podusv needs {LEAST_OPEN_FILES}; "
+                f"allow more with `ulimit -n {OPEN_FILES}`"
+            )
+        wanted = OPEN_FILES if most == resource.RLIM_INFINITY else min(most, OPEN_FILES)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, most))
 
 
 def told(error: BaseException) -> int:

@@ -18,6 +18,8 @@ from podusv_cli.paths.base import TARGET
 
 MOST_STEPS = 10**8
 MOST_CONTENT = 4 * 10**9  # bytes; what podusv reads back
+MOST_RUNS = 1000  # of a comparison; the manifest of 1 300 with long names would be refused
+ESCAPED, LINE = 10, 60  # characters that one may become in resolved.yaml; of a key, at the most
 HELD = 256 * 2**20  # bytes of a log that is held in memory; a larger one goes to the disk in pieces
 MONITORED = 15  # numbers that the stability monitor adds to a row, whatever the law
 UNLOGGED = 11  # more, which it needs until the run is made
@@ -110,6 +112,8 @@ def limits(
     def look(scenario: Scenario) -> list[tuple[str, str]]:
         if scenario.misfits():
             return []
+        if read_back and len(scenario.controllers) > MOST_RUNS:
+            return [("controllers", _too_many(len(scenario.controllers)))]
         if unreadable := _unreadable(scenario):
             return [unreadable]
         size = largest(scenario)
@@ -137,9 +141,12 @@ def _unreadable(scenario: Scenario) -> tuple[str, str] | None:
 
 def _too_much(scenario: Scenario) -> tuple[str, str] | None:
     leaves, nodes = values(scenario), _nodes(scenario.model_dump())
+    letters = sum(len(str(leaf)) for leaf in leaves.values())
     if nodes > MAX_NODES:
         key = max(leaves, key=lambda key: _nodes(leaves[key]))
         return key, _beyond(f"{nodes:,} values", MAX_NODES, "give fewer here")
+    if ESCAPED * letters + LINE * nodes < MAX_CHARACTERS:
+        return None  # surely; to write it out takes as long as to load it
     if (length := len(resolved_yaml(scenario))) > MAX_CHARACTERS:
         key = max(leaves, key=lambda key: len(str(leaves[key])))
         return key, _beyond(f"{length:,} characters", MAX_CHARACTERS, "shorten this")
@@ -156,6 +163,13 @@ def _nodes(content: Any) -> int:
 def _beyond(amount: str, most: int, remedy: str) -> str:
     text = f"with every default written out the scenario has {amount}, more than the {most:,} that "
     return f"{text}podusv reads back; {remedy}"
+
+
+def _too_many(runs: int) -> str:
+    text = (
+        f"has {runs:,} runs, more than the {MOST_RUNS:,} that podusv reads back as one comparison"
+    )
+    return f"{text}; make several scenarios of it"
 
 
 def _too_thin(steps: int) -> str:

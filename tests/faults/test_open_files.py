@@ -1,0 +1,74 @@
+"""`ulimit -n`: few open files are told before anything is computed, and cost no result."""
+
+from __future__ import annotations
+
+import os
+import resource
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+from command_samples import ROOT, TWO, write
+from counts import count
+
+from podusv_cli.cli.guard import LEAST_OPEN_FILES
+from podusv_cli.logbook import manifest
+from podusv_cli.parallel import run_all
+
+CONFIG = TWO.replace("duration: 1.0", "duration: 0.1, compiled: false")
+COMMANDS = [("run", "two.yaml", "--out", "x"), ("compare", "two.yaml", "--out", "x")]
+
+
+def podusv(
+    words: Sequence[str], limit: int, most: int, folder: Path
+) -> subprocess.CompletedProcess[str]:
+    """A command that may have so many files open; `most` is what it may ask for."""
+    return subprocess.run(
+        [sys.executable, "-m", "podusv_cli", *words],
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (limit, most)),
+        env={**os.environ, "PYTHONPATH": str(ROOT)}, cwd=folder, capture_output=True, text=True,
+    )  # fmt: skip
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    write("two.yaml", CONFIG)
+    return tmp_path
+
+
+@pytest.mark.parametrize("limit", [8, 16, LEAST_OPEN_FILES - 1])
+@pytest.mark.parametrize("words", COMMANDS, ids=lambda words: words[0])
+def test_too_few_open_files_are_told_before_anything_is_computed(
+    folder: Path, words: Sequence[str], limit: int
+) -> None:
+    done = podusv(words, limit, limit, folder)
+    assert done.returncode == 5
+    assert done.stderr == (
+        f"at most {limit} files may be open at once, podusv needs {LEAST_OPEN_FILES}; "
+        "allow more with `ulimit -n 1024`\n"
+    )
+    assert [path.name for path in folder.iterdir()] == ["two.yaml"]
+
+
+@pytest.mark.parametrize(
+    ("limit", "most"), [(16, 4096), (LEAST_OPEN_FILES, LEAST_OPEN_FILES)], ids=str
+)
+@pytest.mark.parametrize("words", COMMANDS, ids=lambda words: words[0])
+def test_enough_open_files_or_leave_to_have_them_make_a_whole_result(
+    folder: Path, words: Sequence[str], limit: int, most: int
+) -> None:
+    more = () if count(0, 1) else ("--no-figures",)
+    done = podusv([*words, *more], limit, most, folder)
+    assert (done.returncode, "could not be made" in done.stderr) == (0, False), done.stderr
+    assert manifest.check(folder / "x").status == "finished"
+
+
+def test_an_error_of_the_system_in_a_job_is_a_line() -> None:
+    def job(_: object) -> None:
+        raise OSError(24, "Too many open files")
+
+    (outcome,) = run_all([job])
+    assert (outcome.failure, outcome.code) == ("[Errno 24] Too many open files", 5)
