@@ -13,6 +13,7 @@ from pathlib import Path
 from podusv_cli.comparing import Part
 from podusv_cli.config.words import unknown
 from podusv_cli.errors import StorageError, UsageError
+from podusv_cli.escaping import visible
 from podusv_cli.figures.drawing import FIGURES
 from podusv_cli.figures.style import FORMATS, Shown
 from podusv_cli.logbook import atomic, manifest
@@ -52,7 +53,7 @@ def empty(parts: Sequence[Part], shown: Sequence[Shown]) -> dict[str, str]:
     endings = {
         part.label: part.run.recording.message or "has a single row"
         for part in parts
-        if part.run and part.label not in drawable
+        if part.run and visible(part.label) not in drawable
     }
     if not shown:
         told = "; ".join(f"{label}: {ending}" for label, ending in endings.items())

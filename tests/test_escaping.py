@@ -9,6 +9,7 @@ import json
 import sys
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import pytest
 from command_samples import BASE, Command, commanded, write
@@ -188,6 +189,14 @@ def test_no_command_lets_a_folders_name_through(podusv: Command) -> None:
     for name in texts:
         assert not nasty(Path("x", name).read_text()), name
     assert podusv("run", "a.yaml", f"--out={one}").err.count("\n") == 1
+
+
+def test_a_figure_with_such_a_name_is_one_that_browsers_read(podusv: Command) -> None:
+    names = made(podusv, (f"a{COLOUR}{TURNED}", "b"))
+    said = podusv("plot", *names, "--figure", "trajectory", "--format", "svg", "--out", "x")
+    assert (said.code, said.err) == (0, "")
+    ElementTree.parse("x/trajectory.svg")
+    assert not nasty(Path("x/trajectory.svg").read_text())
 
 
 def test_whatever_prints_lines_prints_text(capsys: pytest.CaptureFixture[str]) -> None:

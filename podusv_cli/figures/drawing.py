@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 
 from podusv_cli.config.scenario import Scenario
+from podusv_cli.escaping import visible
 from podusv_cli.extras import Extras, Missing
 from podusv_cli.figures.controls import controls
 from podusv_cli.figures.filters import filters
@@ -101,7 +102,7 @@ FIGURES: dict[str, Sheet] = {
 def dressed(runs: Sequence[tuple[str, Recording, Scenario]]) -> list[Shown]:
     """Labelled recordings with their looks, in order; without those too short to draw."""
     return [
-        Shown(label, recording, scenario, *look(i))
+        Shown(visible(label), recording, scenario, *look(i))
         for i, (label, recording, scenario) in enumerate(runs)
         if len(recording["time"]) > 1
     ]
