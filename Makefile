@@ -4,7 +4,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt
-PODUSV := $(BIN)/podusv
+STEP := PODUSV=$(BIN)/podusv results/step.sh
 # A file to a core; what its tests share is made once.
 PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/pytest --numprocesses auto --dist loadfile
 OURS := podusv_cli tests benchmarks
@@ -22,21 +22,18 @@ help: ## what can be made
 
 # Exit code 4: diverged, as it must. Exit code 3: some of the runs diverged; in figures_compare they must.
 reproduce: $(VENV)/run.done ## the paper, claim by claim, into results/paper/
-	@echo "printed_from_zero has to diverge:"
-	@$(PODUSV) run configs/paper/printed_from_zero.yaml --out results/paper/printed_from_zero --force -q; \
-	    test $$? -eq 4 || { echo "it did not" >&2; exit 1; }
+	@echo "$(words printed_from_zero $(COMPARISONS)) steps:"
+	@rm -f results/paper.log
+	@$(STEP) run paper printed_from_zero 4
 	@for name in $(COMPARISONS); do \
-	    wanted=0; \
-	    if test $$name = figures_compare; then wanted=3; echo "li and pid have to diverge:"; fi; \
-	    $(PODUSV) compare configs/paper/$$name.yaml --out results/paper/$$name --force -q; code=$$?; \
-	    test $$code -eq $$wanted || { echo "exit code $$code, not $$wanted" >&2; exit 1; }; \
+	    $(STEP) compare paper $$name $$(case $$name in figures_compare) echo 3;; *) echo 0;; esac) || exit 1; \
 	done
 	@echo "what was found: results/README.md; every table, claim and figure: results/paper/*/report.html"
 
 pod: $(VENV)/run.done ## the laws behind a pod, into results/pod/
-	@for name in $(PODS); do \
-	    $(PODUSV) compare configs/pod/$$name.yaml --out results/pod/$$name --force -q || exit $$?; \
-	done
+	@echo "$(words $(PODS)) steps:"
+	@rm -f results/pod.log
+	@for name in $(PODS); do $(STEP) compare pod $$name 0 || exit 1; done
 	@echo "what was found: results/pod.md; every table and figure: results/pod/*/report.html"
 
 test: lint types contracts ## lint, types, import contracts, all tests but the slow ones

@@ -29,16 +29,18 @@ from podusv_cli.logbook import jsonfile, manifest, soundness
 from podusv_cli.logbook.folder import LOG, THEORY, Run, RunWriter, open_run
 from podusv_cli.logbook.regular import read_text
 from podusv_cli.metrics.cost import law_costs
+from podusv_cli.metrics.table import CLOCKED
 from podusv_cli.parallel import Outcome, run_all
 from podusv_cli.running import Finished, Task, execute, warm_up
 
 TABLE = "comparison.csv"
+TIMING = "timing.json"
 # What a comparison has of its own: in its folder, or as a column of its table.
 RESERVED = (
     TABLE, "comparison.md", "comparison.tex", "claims.json", "claims.md", "figures",
-    "manifest.json", "metric", "missing.json", "provenance.json", "report.html", "unit",
+    "manifest.json", "metric", "missing.json", "provenance.json", "report.html", TIMING, "unit",
 )  # fmt: skip
-UNMEASURED = dict.fromkeys(("law_ns", "law_ns_low", "law_ns_high"), math.nan)
+UNMEASURED = dict.fromkeys(CLOCKED, math.nan)
 
 
 @dataclass(frozen=True)
@@ -236,17 +238,33 @@ def _with_costs(entries: list[Entry], extras: Extras) -> list[Entry]:
 
 def write(writer: RunWriter, result: Result, extras: Extras) -> None:
     """Table and verdicts, in every form, into the comparison's folder."""
+    for name, form in _forms(result).items():
+        add_made(writer, extras, name, form)
+
+
+def _forms(result: Result) -> dict[str, Callable[[], bytes]]:
+    """What makes each file of a comparison, by its name.
+
+    What a clock read has a file of its own: all others come out the same every time.
+    """
+    clocked = result.table.index.isin(CLOCKED)
+    lasting, times = result.table[~clocked], table.numbers(result.table[clocked])
+    judged = [verdict for verdict in result.verdicts if not verdict.timed]
+    timed = [verdict for verdict in result.verdicts if verdict.timed]
     forms: dict[str, Callable[[], bytes]] = {
-        TABLE: lambda: table.as_csv(result.table).encode(),
-        "comparison.md": lambda: table.as_markdown(result.table, result.endings).encode(),
-        "comparison.tex": lambda: table.as_latex(result.table).encode(),
+        TABLE: lambda: table.as_csv(lasting).encode(),
+        "comparison.md": lambda: table.as_markdown(lasting, result.endings).encode(),
+        "comparison.tex": lambda: table.as_latex(lasting).encode(),
+        TIMING: lambda: jsonfile.encode({**_claims(timed), "metrics": times}),
     }
     if result.verdicts:
-        verdicts = [verdict.as_json() for verdict in result.verdicts]
-        forms["claims.md"] = lambda: claims.as_markdown(result.verdicts).encode()
-        forms["claims.json"] = lambda: jsonfile.encode({"format": 1, "claims": verdicts})
-    for name, form in forms.items():
-        add_made(writer, extras, name, form)
+        forms["claims.md"] = lambda: claims.as_markdown(judged, timed, TIMING).encode()
+        forms["claims.json"] = lambda: jsonfile.encode(_claims(judged))
+    return forms
+
+
+def _claims(verdicts: Iterable[claims.Verdict]) -> dict[str, Any]:
+    return {"format": 1, "claims": [verdict.as_json() for verdict in verdicts]}
 
 
 def add_made(writer: RunWriter, extras: Extras, name: str, form: Callable[[], bytes]) -> None:

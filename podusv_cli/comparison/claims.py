@@ -12,6 +12,7 @@ from podusv_cli.comparison.expressions import Sources
 from podusv_cli.comparison.parsing import ExpressionError, parse, renamed
 from podusv_cli.config.scenario import Claim, Scenario
 from podusv_cli.escaping import markdown, markdown_cell, markdown_code
+from podusv_cli.metrics.table import CLOCKED
 
 Answer = Literal["reproduced", "not reproduced", "cannot tell"]
 ANSWERS: dict[bool | None, Answer] = {
@@ -45,6 +46,11 @@ class Verdict:
     answer: Answer
     numbers: dict[str, float]
     reason: str = ""
+
+    @property
+    def timed(self) -> bool:
+        """Whether it rests on a clock's readings, which are others the next time."""
+        return any(f".{name}" in self.claim.expect for name in CLOCKED)
 
     def shown(self) -> str:
         """The numbers in a line, and what is missing."""
@@ -91,8 +97,8 @@ def _verdict(said: Stated, runs: Sources) -> Verdict:
     return Verdict(said.name, put, ANSWERS[holds], found.numbers, reason)
 
 
-def as_markdown(verdicts: Sequence[Verdict]) -> str:
-    """The verdicts as a table, choices and remarks below it."""
+def as_markdown(verdicts: Sequence[Verdict], timed: Sequence[Verdict] = (), place: str = "") -> str:
+    """The verdicts as a table, choices and remarks below it; those `timed` are in `place`."""
     rows = [
         f"| {markdown_cell(v.name)} | "
         f"{markdown_cell(v.claim.says)} ({markdown_cell(v.claim.source)}) | "
@@ -102,6 +108,9 @@ def as_markdown(verdicts: Sequence[Verdict]) -> str:
     ]
     remarks = [
         f"- {markdown(v.name)}: {markdown(v.claim.remark)}" for v in verdicts if v.claim.remark
+    ]
+    remarks += [
+        f"- {markdown(v.name)}: judged by times, which never repeat; see {place}" for v in timed
     ]
     head = ["| | claim | verdict | put as | numbers |", "|---|---|---|---|---|"]
     return "\n".join([*head, *rows, *(["", *remarks] if remarks else []), ""])

@@ -42,3 +42,4 @@ _ROWS = (
 )
 
 METRICS: dict[str, Metric] = {row.name: row for row in _ROWS}
+CLOCKED = ("law_ns", "law_ns_low", "law_ns_high")  # a clock's readings; they never repeat

@@ -9,11 +9,10 @@ from typing import Any
 
 from podusv_cli.logbook import manifest, reading
 from podusv_cli.logbook.folder import LOG, Run
-from podusv_cli.metrics.table import METRICS
+from podusv_cli.metrics.table import CLOCKED, METRICS
 from podusv_cli.repetition.causes import Change, scenario_changes, version_changes
 from podusv_cli.repetition.logs import Logs, compare
 
-CLOCKED = ("law_ns", "law_ns_low", "law_ns_high")  # a clock's readings; they never repeat
 Numbers = tuple[float | None, float | None]
 
 

@@ -1,0 +1,100 @@
+"""`make reproduce` and `make pod`: a line a step, and a checkout that stays as it was committed."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from command_samples import ROOT, TWO, Command, commanded, write
+
+SAYS = """
+claims:
+  near: {says: Soft tracks worse., source: nobody, expect: soft.iae > stiff.iae}
+  cheap: {says: Soft is cheap., source: nobody, expect: soft.law_ns < 1e9}
+"""
+# In place of podusv: writes what a comparison leaves, talks much, and ends as the name says.
+STUB = """#!/bin/sh
+echo "walls of 2.118e+93" >&2
+test "$1 $5" = "compare --force" || exit 9
+mkdir -p "$4" && echo new > "$4/comparison.md" && echo {} > "$4/manifest.json"
+case $2 in *figures*) exit 3;; esac
+exit 0
+"""
+
+
+def kept(path: str) -> bool:
+    """Whether git would keep a file of that path in this checkout."""
+    told = subprocess.run(["git", "check-ignore", "--quiet", "--no-index", path], cwd=ROOT)
+    return told.returncode == 1
+
+
+@pytest.mark.parametrize("place", ["results/paper/x_compare", "results/pod/x"])
+def test_what_is_committed_of_a_comparison_comes_out_the_same_every_time(
+    place: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    podusv: Command = commanded(monkeypatch, capsys)
+    write("two.yaml", TWO + SAYS)
+    for folder in ("first", "second"):
+        assert podusv("compare", "two.yaml", "--out", folder).code == 0
+    names = [str(p.relative_to("first")) for p in Path("first").rglob("*") if p.is_file()]
+    committed = {name for name in names if kept(f"{place}/{name}")}
+    assert {"comparison.csv", "comparison.md", "comparison.tex"} <= committed
+    moved = {n for n in names if Path("first", n).read_bytes() != Path("second", n).read_bytes()}
+    assert {"timing.json", "manifest.json"} <= moved
+    assert not committed & moved
+
+
+def test_git_tracks_nothing_that_it_would_not_keep() -> None:
+    listed = ["git", "ls-files", "--cached", "--ignored", "--exclude-standard"]
+    told = subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=True)
+    assert told.stdout == ""
+
+
+@pytest.fixture
+def checkout(tmp_path: Path) -> Path:
+    """A checkout with a committed result and a stub of podusv."""
+    (tmp_path / "results/paper/one").mkdir(parents=True)
+    (tmp_path / "results/paper/one/comparison.md").write_text("old\n")
+    shutil.copy(ROOT / "results/step.sh", tmp_path / "results/step.sh")
+    (tmp_path / "podusv").write_text(STUB)
+    (tmp_path / "podusv").chmod(0o755)
+    return tmp_path
+
+
+def step(checkout: Path, name: str, code: int) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        ["results/step.sh", "compare", "paper", name, str(code)], cwd=checkout, text=True,
+        capture_output=True, env={**os.environ, "PODUSV": "./podusv"},
+    )  # fmt: skip
+
+
+def test_a_step_is_a_line_with_its_time_and_the_rest_is_in_a_file(checkout: Path) -> None:
+    done = step(checkout, "one", 0)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert re.fullmatch(r"  one +\d+ s  done\n", done.stdout)
+    assert "2.118e+93" in (checkout / "results/paper.log").read_text()
+    diverged = step(checkout, "figures", 3)
+    assert re.fullmatch(r"  figures +\d+ s  done, some runs .* as expected\n", diverged.stdout)
+
+
+def test_a_step_that_ends_otherwise_stops_and_shows_why(checkout: Path) -> None:
+    done = step(checkout, "figures", 0)
+    assert done.returncode == 1
+    assert "exit code 3 in place of 0" in done.stdout
+    assert "2.118e+93" in done.stdout
+    assert (checkout / "results/paper/one/comparison.md").read_text() == "old\n"
+
+
+def test_a_step_replaces_committed_files_and_leaves_others(checkout: Path) -> None:
+    own = checkout / "results/paper/one/mine.txt"
+    own.write_text("mine\n")
+    for _ in range(2):  # over committed files alone, then over a whole result
+        assert step(checkout, "one", 0).returncode == 0
+        assert (checkout / "results/paper/one/comparison.md").read_text() == "new\n"
+        assert own.read_text() == "mine\n"
+    assert not list((checkout / "results/.new").rglob("*.md"))
