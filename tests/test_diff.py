@@ -123,6 +123,20 @@ def test_the_first_difference_is_the_earliest_and_the_largest_the_widest() -> No
     }
 
 
+def test_logs_of_one_length_are_compared_at_the_times_that_both_have() -> None:
+    """More than half of the times differ: two grids, not one that is damaged."""
+    base = recording()
+    t, rows = base["time"], len(base["time"])
+    twice = changed(time=2.0 * t)
+    found = compare(base, twice)
+    assert found.rows == (rows, rows, rows // 2)
+    assert "time" not in {d.signal for d in found.largest}
+    for apart, shared in ((rows // 2, rows), (rows // 2 + 1, rows // 2 - 1)):
+        moved = np.array(t)
+        moved[rows - apart :] += 0.5 * t[1]
+        assert compare(base, changed(time=moved)).rows == (rows, rows, shared)
+
+
 def test_what_does_not_run_over_time_comes_first() -> None:
     base = recording()
     centres = np.array(base["rbf_center"])

@@ -52,6 +52,24 @@ def test_the_load_is_bounded_as_assumption_1_wants() -> None:
     np.testing.assert_allclose(loads.mean(axis=0), 0.5, atol=0.02)
 
 
+@pytest.mark.parametrize(
+    ("axis", "bound"),
+    [
+        (Harmonic(mean=-0.5, sin=0.1, sin_rate=0.2, cos=0.3, cos_rate=0.5), 0.9),
+        (Harmonic(mean=0.5, sin=-0.1, sin_rate=0.2, cos=-0.3, cos_rate=0.5), 0.9),
+        (Harmonic(mean=0.5, sin=3.0, cos=-4.0), 5.5),  # one rate, one wave
+        (Harmonic(mean=-1.0, sin=3.0, sin_rate=0.0, cos=0.25, cos_rate=0.3), 1.25),
+        (Harmonic(mean=-1.0, sin=0.5, sin_rate=0.3, cos=0.25, cos_rate=0.0), 1.25),
+        (Harmonic(mean=-1.0, sin=0.5, sin_rate=0.0, cos=0.25, cos_rate=0.0), 0.75),
+    ],
+)
+def test_a_bound_is_never_exceeded_and_nearly_reached(axis: Harmonic, bound: float) -> None:
+    sea = HarmonicDisturbance(b_u=axis, b_v=axis, b_r=axis, scale=2.0)
+    assert sea.bounds() == pytest.approx((2.0 * bound,) * 3)
+    loads = np.abs([load_at(sea, t)[0] for t in np.linspace(0.0, 1000.0, 5001)])
+    assert 0.99 * 2.0 * bound < loads.max() <= 2.0 * bound * (1 + 1e-15)
+
+
 @pytest.mark.parametrize("kind", [k for k in kinds("disturbances").values() if k.of_time])
 def test_what_claims_to_depend_on_time_alone_does(kind: Any) -> None:
     sea, random = example(kind), np.random.default_rng(1)

@@ -28,17 +28,19 @@ from podusv_cli.controllers.dsc import DynamicSurface
 from podusv_cli.controllers.network import activation
 from podusv_cli.controllers.pid import Pid
 from podusv_cli.controllers.polar_backstepping import PolarBackstepping
+from podusv_cli.disturbances.harmonic import HarmonicDisturbance
 from podusv_cli.engine.closed_loop import Plan
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.replay import rates_replay
-from podusv_cli.engine.simulate import ClosedLoop, by_name, names
-from podusv_cli.kernels import Vector, kernel
+from podusv_cli.engine.simulate import STATE, ClosedLoop, by_name, names
+from podusv_cli.kernels import Vector, bundle, kernel
 from podusv_cli.paths.circle import Circle
 from podusv_cli.paths.line import Line
 from podusv_cli.recording import Recording
-from podusv_cli.theory.ideal import node_outputs
+from podusv_cli.theory.ideal import node_outputs, unloaded_accelerations
 from podusv_cli.theory.monitor import TERMS, Monitored, monitored
 from podusv_cli.theory.rates import error_rates
+from podusv_cli.vessels.plant import plant
 
 GAINS: dict[str, Any] = {"Gamma_u": 1.0, "Gamma_r": 1.0, "gamma_u": 10.0, "gamma_r": 10.0}
 LAWS: list[PolarBackstepping] = [GENTLE, DynamicSurface(**GAINS), Backstepping(**GAINS)]
@@ -88,6 +90,23 @@ def test_rate_integrates_to_the_change_of_V_behind_pods_too(
     assert log["rate_limited"].any()
     change, travel = log["V"][-1] - log["V"][0], simpson(np.abs(log["V_dot"]), 0.005)
     assert change == pytest.approx(simpson(log["V_dot"], 0.005), abs=1e-5 * travel)
+
+
+@pytest.mark.parametrize("name", ["paper", "cybership2"])
+def test_unloaded_accelerations_are_those_of_the_hull_left_alone(name: str) -> None:
+    """Also where inertia couples sway and yaw, and the actuator makes a sway force."""
+    hull = VESSELS[name]
+    actuator = Pods(pods=tuple(Pod(**POD | {"y": y}) for y in (-0.078, 0.078)))
+    sea = HarmonicDisturbance(scale=3.0)
+    loop = smooth(GENTLE, vessel=hull, actuator=actuator, disturbance=sea)
+    log = run(loop, 3.0)
+    now = rates_replay(loop, TimeGrid(0.01, 300))(log)
+    f_u, f_r = unloaded_accelerations(loop, now)
+    assert np.median(np.abs(now.signals["tau_v"] + now.signals["b_v"])) > 0.3
+    rate, nothing, k = np.zeros(6), np.zeros(3), bundle(hull.constants())
+    for i in range(0, 301, 20):
+        plant(np.array([log[state][i] for state in STATE]), nothing, nothing, k, rate)
+        assert (f_u[i], f_r[i]) == pytest.approx((rate[3], rate[5]), rel=1e-9, abs=1e-12)
 
 
 FOLDS = [

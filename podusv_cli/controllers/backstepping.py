@@ -1,8 +1,8 @@
 """Full backstepping: the same law with analytic derivatives of the virtual control.
 
 Stands for the comparison law of the paper's reference [25], whose text podusv does not have; it is
-therefore called Li-type. Derivatives use the nominal vessel as in (12): no disturbance, no inertia
-coupling between sway and yaw.
+therefore called Li-type. Derivatives use the nominal vessel with m23 r^2 and all its damping, of
+which (12) has less, but without disturbance, sway force and inertia coupling between sway and yaw.
 """
 
 from __future__ import annotations

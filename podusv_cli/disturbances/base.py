@@ -24,5 +24,8 @@ class Disturbance(Component):
         raise NotImplementedError
 
     def bounds(self) -> tuple[float, float, float] | None:
-        """Largest |b_u| [N], |b_v| [N], |b_r| [N m] at any time and state; None where unknown."""
+        """What |b_u| [N], |b_v| [N], |b_r| [N m] never exceed, at any time and state.
+
+        None where that is unknown. The load need not reach its bounds.
+        """
         return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -20,6 +21,18 @@ class Harmonic(Component):
     sin_rate: float = value(0.2, "rad/s", "angular frequency of the sine", ge=0)
     cos: float = value(0.0, "N or N m", "amplitude of the cosine")
     cos_rate: float = value(0.2, "rad/s", "angular frequency of the cosine", ge=0)
+
+    def bound(self) -> float:
+        """What its magnitude never exceeds.
+
+        A wave of rate 0 is constant, and waves of one rate are one wave. Of two rates it is the sum
+        of the amplitudes, which the load reaches only where the rates have no common period.
+        """
+        sin = self.sin if self.sin_rate > 0.0 else 0.0
+        mean, cos = (self.mean, self.cos) if self.cos_rate > 0.0 else (self.mean + self.cos, 0.0)
+        if self.sin_rate == self.cos_rate:
+            return abs(mean) + math.hypot(sin, cos)
+        return abs(mean) + abs(sin) + abs(cos)
 
 
 class HarmonicDisturbance(Disturbance):
@@ -52,11 +65,8 @@ class HarmonicDisturbance(Disturbance):
         return rows.ravel()
 
     def bounds(self) -> tuple[float, float, float]:
-        """The sum of all amplitudes, axis by axis."""
-        u, v, r = (
-            self.scale * (abs(axis.mean) + abs(axis.sin) + abs(axis.cos))
-            for axis in (self.b_u, self.b_v, self.b_r)
-        )
+        """The bound of every axis, scaled."""
+        u, v, r = (self.scale * axis.bound() for axis in (self.b_u, self.b_v, self.b_r))
         return u, v, r
 
     @staticmethod

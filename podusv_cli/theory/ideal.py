@@ -32,7 +32,7 @@ class Ideal:
 
 
 def unloaded_accelerations(loop: ClosedLoop, now: Replayed) -> tuple[Vector, Vector]:
-    """f_u and f_r of (12): accelerations less what forces and disturbance cause, any vessel."""
+    """f_u and f_r: accelerations less what forces and disturbance cause, for any vessel."""
     m, s, d = loop.vessel, now.signals, now.rates
     sway, yaw = s["tau_v"] + s["b_v"], s["tau_r"] + s["b_r"]
     loaded = (m.m22 * yaw - m.m32 * sway) / (m.m22 * m.m33 - m.m23 * m.m32)
