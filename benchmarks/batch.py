@@ -14,7 +14,7 @@ from podusv_cli.engine.batch import simulate_many
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import ClosedLoop, Observer, simulate
 from podusv_cli.engine.variants import variants
-from podusv_cli.parallel import workers_here
+from podusv_cli.process.workers import workers_here
 
 CASE = Case("adaptive_neural", "27 grid")
 STEPS = (31_000, 1_000)

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.cases import NETWORKS, Case, grid, metrics_observer
+from podusv_cli.core.kernel import Vector
 from podusv_cli.engine.simulate import STATE, simulate
-from podusv_cli.kernels import Vector
-from podusv_cli.metrics.watching import summarise
+from podusv_cli.metrics.accumulators import summarise
 
 SOURCE = Path(__file__).with_name("closed_loop.c")
 FLAGS = {"O3": ("-O3", "-march=native"), "Ofast": ("-Ofast", "-march=native")}

@@ -7,14 +7,14 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from podusv_cli.config.loading import load
-from podusv_cli.config.scenario import Scenario
 from podusv_cli.controllers.base import Controller
 from podusv_cli.controllers.network import Network
+from podusv_cli.core.component import catalogue
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import ClosedLoop, Observer
-from podusv_cli.metrics.watching import observer
-from podusv_cli.registry import catalogue
+from podusv_cli.metrics.accumulators import observer
+from podusv_cli.scenario.load import load
+from podusv_cli.scenario.model import Scenario
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENARIO = ROOT / "configs" / "paper" / "corrected.yaml"

@@ -12,13 +12,13 @@ from typing import Any
 from benchmarks.c_program import agreement, timer
 from benchmarks.cases import CASES, LAWS, ROOT, SCENARIO, Case, grid, metrics_observer
 from benchmarks.timing import Timer, in_turns, quartiles, ratio, timed
-from podusv_cli.config.loading import load
-from podusv_cli.config.size import estimate
 from podusv_cli.controllers.base import Controller
 from podusv_cli.controllers.network import Network
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.replay import replayer
 from podusv_cli.engine.simulate import ClosedLoop, simulate
+from podusv_cli.scenario.limits import estimate
+from podusv_cli.scenario.load import load
 
 ROUNDS = 7
 STEPS = (1_000, 3_100, 10_000, 31_000, 100_000)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.c_program import FLAGS, compiler
-from podusv_cli.kernels import Vector
+from podusv_cli.core.kernel import Vector
 
 Timer = Callable[[], float]
 LIBRARIES = ("podusv", "numpy", "scipy", "numba", "llvmlite", "h5py", "matplotlib")

@@ -7,9 +7,9 @@ import numpy as np
 from podusv_cli.comparison import claims, table
 from podusv_cli.comparison.claims import Stated
 from podusv_cli.comparison.entries import Absent, Entry
-from podusv_cli.config.loading import load_text
-from podusv_cli.config.scenario import Claim
-from podusv_cli.recording import Recording
+from podusv_cli.core.recording import Recording
+from podusv_cli.scenario.load import load_text
+from podusv_cli.scenario.model import Claim
 
 SCENARIO = """
 name: planted

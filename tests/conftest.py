@@ -22,18 +22,18 @@ from podusv_cli.actuators.base import Actuator
 from podusv_cli.actuators.ideal import Ideal
 from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
 from podusv_cli.controllers.base import Controller, Slots
+from podusv_cli.core.component import Component, catalogue, value
+from podusv_cli.core.kernel import Vector, bundle, kernel
+from podusv_cli.core.recording import Recording
 from podusv_cli.disturbances.base import Disturbance
 from podusv_cli.disturbances.calm import Calm
 from podusv_cli.disturbances.harmonic import HarmonicDisturbance
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import STATE, ClosedLoop, simulate
-from podusv_cli.interrupts import SIGNALS
-from podusv_cli.kernels import Vector, bundle, kernel
 from podusv_cli.paths.base import TARGET, Path
 from podusv_cli.paths.line import Line
 from podusv_cli.paths.line_circle import LineCircle
-from podusv_cli.recording import Recording
-from podusv_cli.registry import Component, catalogue, value
+from podusv_cli.process.interrupts import SIGNALS
 from podusv_cli.vessels.vessel import Vessel
 
 PACKAGE = File(podusv_cli.__file__).parent
@@ -209,7 +209,7 @@ def podusv(
     tmp_path: File, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> Command:
     """The command line, in a folder of its own with one sound scenario."""
-    from config_samples import SOUND  # which has this module's vessels
+    from scenario_samples import SOUND  # which has this module's vessels
 
     monkeypatch.chdir(tmp_path)
     write("a.yaml", SOUND)

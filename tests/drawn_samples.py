@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from podusv_cli.config.loading import load_text
+from podusv_cli.core.recording import Recording
 from podusv_cli.figures.drawing import FIGURES, dressed
 from podusv_cli.figures.style import house_style
-from podusv_cli.recording import Recording
+from podusv_cli.scenario.load import load_text
 
 TEXT = """
 name: {name}

@@ -7,13 +7,13 @@ from functools import cache
 import numpy as np
 from conftest import PACKAGE
 
-from podusv_cli import running
-from podusv_cli.config.loading import load
-from podusv_cli.config.scenario import Scenario
+from podusv_cli.core.kernel import Vector
+from podusv_cli.core.recording import Recording
 from podusv_cli.findings.finding import Finding
 from podusv_cli.findings.preflight import preflight
-from podusv_cli.kernels import Vector
-from podusv_cli.recording import Recording
+from podusv_cli.scenario.load import load
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.workflows import execute
 
 CONFIGS = PACKAGE.parent / "configs" / "paper"
 PLAIN = ("path={kind: line}", "actuator={kind: ideal}", "simulation.duration=20")
@@ -43,8 +43,8 @@ def finding(code: str, *overrides: str) -> Finding:
 def simulated(*overrides: str) -> tuple[Recording, dict[str, float]]:
     """The run of that scenario, and its metrics."""
     scenario = scene(*overrides).alone()
-    recording = running.simulated(scenario, running.Stopwatch())
-    return recording, running.summary(scenario, recording)
+    recording = execute.simulated(scenario, execute.Stopwatch())
+    return recording, execute.summary(scenario, recording)
 
 
 def log(*overrides: str) -> Recording:

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 from command_samples import BASE, TWO, Command, Said, commanded, one_line, write
-from logbook_samples import files
+from storage_samples import files
 
 from podusv_cli.figures import drawing
-from podusv_cli.logbook import manifest
+from podusv_cli.storage import manifest
 
 SET = ("--set", "controller.K_Pu=50.0", "--no-figures", "-q")
 # What is made or replaced, and the command that does it; the last leaves nothing.

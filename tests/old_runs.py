@@ -17,10 +17,10 @@ from pathlib import Path
 from typing import Any
 
 import h5py
-from logbook_samples import files
-from repetition_samples import copied, made
+from rerun_samples import copied, made
+from storage_samples import files
 
-from podusv_cli.logbook import jsonfile, layout, manifest
+from podusv_cli.storage import json_files, log_layout, manifest
 
 BASE = """
 vessel: {preset: paper_nonlinear}
@@ -47,7 +47,7 @@ ORIGIN = {
 
 
 def _anonymous(content: bytes) -> bytes:
-    return jsonfile.encode(json.loads(content) | ORIGIN)
+    return json_files.encode(json.loads(content) | ORIGIN)
 
 
 def _packed(folder: Path) -> bytes:
@@ -73,7 +73,7 @@ def _numbers(folder: Path) -> dict[str, Any]:
 
 def main() -> None:
     """Make what is missing."""
-    place = Path(__file__).with_name("fixtures") / f"format_{layout.FORMAT}"
+    place = Path(__file__).with_name("fixtures") / f"format_{log_layout.FORMAT}"
     place.mkdir(parents=True, exist_ok=True)
     for name, text in SCENARIOS.items():
         if (place / f"{name}.tar.gz").exists():

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from podusv_cli.actuators.base import Actuator
 from podusv_cli.actuators.ideal import Ideal
 from podusv_cli.actuators.saturated import Saturated
-from podusv_cli.kernels import Vector, bundle, kernel
+from podusv_cli.core.kernel import Vector, bundle, kernel
 
 every_kind = pytest.mark.parametrize("kind", kinds("actuators").values(), ids=kinds("actuators"))
 

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from scipy.optimize import lsq_linear, minimize
 
 from podusv_cli.actuators.allocation import EFFORT, PREFERENCE, allocate
-from podusv_cli.actuators.one_pod import one_pod
+from podusv_cli.actuators.allocation_single import one_pod
 from podusv_cli.actuators.pod import Pod, Pods
-from podusv_cli.kernels import Vector, bundle
+from podusv_cli.core.kernel import Vector, bundle
 
 LIMIT = math.radians(35.0)
 AHEAD, ASTERN = 8.0, 5.0

@@ -20,15 +20,15 @@ from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
 from podusv_cli.controllers.dsc import DynamicSurface
 from podusv_cli.controllers.network import Network
 from podusv_cli.controllers.pid import Pid
+from podusv_cli.core.component import value
+from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.engine import signatures
 from podusv_cli.engine.batch import Batch, simulate_many
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import STATE, ClosedLoop, simulate
 from podusv_cli.engine.variants import variants
-from podusv_cli.kernels import Vector, kernel
-from podusv_cli.metrics.watching import observer, summarise, summarise_many
+from podusv_cli.metrics.accumulators import observer, summarise, summarise_many
 from podusv_cli.paths.waypoints import Waypoints
-from podusv_cli.registry import value
 
 ROOT = Path(__file__).resolve().parent.parent
 GRID = TimeGrid(0.01, 2000)

@@ -21,10 +21,10 @@ import pytest
 from conftest import PACKAGE, Constant, adrift, run
 from numba import njit
 
-from podusv_cli.engine import code_folder, compiling, machine_code
-from podusv_cli.kernels import Vector, kernel, specialise
-from podusv_cli.kinematics import wrap
-from podusv_cli.parts import part_name
+from podusv_cli.core.kernel import Vector, kernel, specialise
+from podusv_cli.core.kinematics import wrap
+from podusv_cli.engine import code_folder, compile, object_cache
+from podusv_cli.process.temporary_names import part_name
 
 SCRIPT = """
 import json, sys
@@ -55,7 +55,7 @@ class Copy:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self.kinematics = folder / "podusv_cli/kinematics.py"
+        self.kinematics = folder / "podusv_cli/core/kinematics.py"
         self.cache = folder / "cache"
         shutil.copytree(
             PACKAGE, folder / "podusv_cli", ignore=shutil.ignore_patterns("__pycache__")
@@ -226,7 +226,7 @@ def test_a_folder_that_cannot_be_written_is_passed_over_and_that_is_told(
 
 
 def test_machine_code_is_what_the_kernel_computes() -> None:
-    code = compiling.compiled(wrap, CFUNCTYPE(c_double, c_double))
+    code = compile.compiled(wrap, CFUNCTYPE(c_double, c_double))
     for angle in np.random.default_rng(1).uniform(-50, 50, 100):
         assert code(angle) == wrap(angle)
 
@@ -314,7 +314,7 @@ Fast = Enum("Slow", {"PACE": 2}, module=__name__)
     ids=["module", "numba", "float32", "complex", "tuple", "enumeration", "inside"],
 )  # fmt: skip
 def test_whatever_a_kernel_reads_is_in_the_fingerprint(variants: list[Any]) -> None:
-    marks = {machine_code.fingerprint(variant) for variant in variants}
+    marks = {object_cache.fingerprint(variant) for variant in variants}
     assert len(marks) == len(variants)
 
 
@@ -323,7 +323,7 @@ def test_a_changed_number_of_a_module_is_noticed(
 ) -> None:
     monkeypatch.setenv("PODUSV_CACHE", str(tmp_path))
     for gain in (2.0, 3.0):
-        code = compiling.compiled(tuned_by(gain=gain), CFUNCTYPE(c_double, c_double))
+        code = compile.compiled(tuned_by(gain=gain), CFUNCTYPE(c_double, c_double))
         assert code(10.0) == gain * 10.0 + 1.0
 
 
@@ -340,10 +340,10 @@ def test_what_a_name_stands_for_is_in_the_fingerprint() -> None:
         specialise(ready, "ready", FORCE=1.0),
         specialise(ready, "ready", FORCE=2.0),
     ]
-    marks = [machine_code.fingerprint(variant) for variant in variants]
+    marks = [object_cache.fingerprint(variant) for variant in variants]
     assert len(set(marks)) == len(variants)
     again = specialise(one_after_the_other, "one_after_the_other", ready=halved)
-    assert machine_code.fingerprint(again) == marks[2]
+    assert object_cache.fingerprint(again) == marks[2]
 
 
 ONE_TO_ONE = CFUNCTYPE(c_double, c_double)
@@ -353,29 +353,29 @@ def test_a_damaged_piece_is_made_anew(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code_kept: Any
 ) -> None:
     monkeypatch.setenv("PODUSV_CACHE", str(tmp_path))
-    assert compiling.compiled(ready, ONE_TO_ONE)(2.5) == 2.5
+    assert compile.compiled(ready, ONE_TO_ONE)(2.5) == 2.5
     (path,) = tmp_path.rglob("ready_*")
     whole = path.read_bytes()
     middle = len(whole) // 2
     flipped = whole[:middle] + bytes([whole[middle] ^ 1]) + whole[middle + 1 :]
     for damaged in (b"", whole[:-1], whole[:300], flipped, whole + b"."):
         path.write_bytes(damaged)
-        assert compiling.compiled(ready, ONE_TO_ONE)(2.5) == 2.5
-        assert machine_code._read(path) is not None
+        assert compile.compiled(ready, ONE_TO_ONE)(2.5) == 2.5
+        assert object_cache._read(path) is not None
 
 
 def test_pieces_are_whole_when_several_processes_write_them(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code_kept: Any
 ) -> None:
     monkeypatch.setenv("PODUSV_CACHE", str(tmp_path))
-    code = machine_code.Code("symbol", bytes(range(256)) * 4000)
+    code = object_cache.Code("symbol", bytes(range(256)) * 4000)
     path = tmp_path / "piece"
     torn = []
 
     def write() -> None:
         for _ in range(20):
-            machine_code._write(path, code)
-            torn.append(machine_code._read(path) != code)
+            object_cache._write(path, code)
+            torn.append(object_cache._read(path) != code)
 
     threads = [Thread(target=write) for _ in range(4)]
     for thread in threads:
@@ -394,19 +394,19 @@ def test_a_full_disk_costs_time_only(
         raise OSError("no space left on device")
 
     monkeypatch.setenv("PODUSV_CACHE", str(tmp_path))
-    assert code_folder.code_folder(machine_code.source_digest())
+    assert code_folder.code_folder(object_cache.source_digest())
     monkeypatch.setattr(os, "replace", full)
-    assert compiling.compiled(ready, ONE_TO_ONE)(2.5) == 2.5
+    assert compile.compiled(ready, ONE_TO_ONE)(2.5) == 2.5
     assert [path.name for path in tmp_path.rglob("*.*")] == [code_folder.MARK]
 
 
 def test_another_processor_or_version_gets_a_piece_of_its_own(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    here = machine_code.fingerprint(ready)
-    assert machine_code.fingerprint(ready) == here
-    monkeypatch.setattr(machine_code, "_circumstances", lambda: ("another processor",))
-    assert machine_code.fingerprint(ready) != here
+    here = object_cache.fingerprint(ready)
+    assert object_cache.fingerprint(ready) == here
+    monkeypatch.setattr(object_cache, "_circumstances", lambda: ("another processor",))
+    assert object_cache.fingerprint(ready) != here
 
 
 def test_a_kernel_that_allocates_is_refused_and_not_left_to_end_the_process() -> None:
@@ -417,11 +417,11 @@ def test_a_kernel_that_allocates_is_refused_and_not_left_to_end_the_process() ->
         return float(room[0])
 
     with pytest.raises(TypeError, match=r"allocating needs \w+, which is no function"):
-        compiling.compiled(allocating, ONE_TO_ONE)
+        compile.compiled(allocating, ONE_TO_ONE)
 
 
 def test_rooms_whose_source_is_left_out_of_the_digest_hold_no_kernel() -> None:
-    for room in machine_code.APART:
+    for room in object_cache.APART:
         apart = PACKAGE / room
         assert apart.exists()
         for path in apart.rglob("*.py") if apart.is_dir() else [apart]:

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 from command_samples import BASE, TWO, Command, Said, commanded, write
 
-from podusv_cli import comparing
 from podusv_cli.figures import drawing
-from podusv_cli.logbook import manifest
-from podusv_cli.parallel import Outcome
+from podusv_cli.process.workers import Outcome
+from podusv_cli.storage import manifest
+from podusv_cli.workflows import comparing
 
 
 @pytest.fixture
@@ -264,7 +264,7 @@ def test_five_runs_are_tables_below_each_other_on_a_narrow_terminal(
     whole = podusv(config, "--out", "x").out.splitlines()
     assert whole[0].split() == ["metric", "unit", "one", "another", "third", "the_fourth", "last"]
     monkeypatch.setenv("COLUMNS", "80")
-    monkeypatch.setattr("podusv_cli.cli.layout.sys.stdout.isatty", lambda: True, raising=False)
+    monkeypatch.setattr("podusv_cli.cli.terminal.sys.stdout.isatty", lambda: True, raising=False)
     out = podusv(config, "--out", "y").out
     assert max(map(len, out.splitlines())) <= 80
     first, second = (part.splitlines() for part in out.split("\n\n"))

@@ -13,15 +13,15 @@ from pathlib import Path
 import pytest
 import typer
 from command_samples import Command
-from config_samples import SOUND, write
+from scenario_samples import SOUND, write
 
 import podusv_cli
 from podusv_cli import cli
-from podusv_cli.cli.guard import PLEASE_REPORT, guarded
-from podusv_cli.config.references import pod_text, vessel_names, vessel_text
-from podusv_cli.config.scenario import Scenario
-from podusv_cli.config.schema import schema_text
-from podusv_cli.errors import Finding, ScenarioError, StorageError
+from podusv_cli.cli.exit_codes import PLEASE_REPORT, guarded
+from podusv_cli.core.errors import Finding, ScenarioError, StorageError
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.presets import pod_text, vessel_names, vessel_text
+from podusv_cli.scenario.schema import schema_text
 
 HEAVY = {
     "numpy", "scipy", "numba", "llvmlite", "pandas", "matplotlib", "h5py", "pydantic", "yaml",

@@ -12,9 +12,9 @@ from scipy.integrate import solve_ivp
 
 from podusv_cli.actuators.saturated import Saturated
 from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
+from podusv_cli.core.kernel import Vector
 from podusv_cli.disturbances.harmonic import Harmonic, HarmonicDisturbance
 from podusv_cli.engine.simulate import STATE, ClosedLoop
-from podusv_cli.kernels import Vector
 from podusv_cli.paths.circle import Circle
 from podusv_cli.paths.line import Line
 from podusv_cli.paths.line_circle import LineCircle

@@ -4,10 +4,10 @@ import re
 
 from comparison_samples import FRAME, Folder, scenario, verdicts
 
-from podusv_cli import comparing
 from podusv_cli.comparison import report
 from podusv_cli.comparison.entries import Entry
 from podusv_cli.findings.finding import Finding
+from podusv_cli.workflows import comparing
 
 
 def page(**parts):

@@ -4,12 +4,12 @@ import numpy as np
 import pandas as pd
 from comparison_samples import Folder, scenario
 
-from podusv_cli import comparing
 from podusv_cli.cli.progress import progress_bars
 from podusv_cli.comparison.entries import Entry
-from podusv_cli.extras import Extras
+from podusv_cli.core.recording import Recording
 from podusv_cli.metrics import cost
-from podusv_cli.recording import Recording
+from podusv_cli.process.extras import Extras
+from podusv_cli.workflows import comparing
 
 
 def test_costs_are_median_and_quartiles(monkeypatch):

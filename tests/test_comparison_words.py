@@ -10,7 +10,7 @@ from test_reproduction import rerun
 from podusv_cli.comparison import expressions
 from podusv_cli.comparison.conditions import Evidence
 from podusv_cli.comparison.parsing import ExpressionError, parse, renamed
-from podusv_cli.config.loading import load
+from podusv_cli.scenario.load import load
 
 CORRECTED = Path(__file__).parent.parent / "configs/paper/corrected.yaml"
 

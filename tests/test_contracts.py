@@ -13,10 +13,10 @@ from conftest import NONLINEAR, PACKAGE, ROOMS, VESSELS, corrected, example, kin
 from pydantic import BaseModel, ValidationError
 
 from podusv_cli.controllers.base import Controller
+from podusv_cli.core.component import Component, catalogue, unit_of
+from podusv_cli.core.kernel import Vector, bundle, is_kernel
+from podusv_cli.core.signal import SIGNALS
 from podusv_cli.engine.simulate import names
-from podusv_cli.kernels import Vector, bundle, is_kernel
-from podusv_cli.registry import Component, catalogue, unit_of
-from podusv_cli.signals import SIGNALS
 from podusv_cli.vessels.vessel import COEFFICIENTS, Vessel
 
 EVERY = [(room, name, kind) for room in ROOMS for name, kind in kinds(room).items()]

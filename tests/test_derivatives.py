@@ -15,7 +15,7 @@ from mpmath import mp
 
 from podusv_cli.controllers.backstepping import Backstepping, alpha_r_rate, alpha_u_rate
 from podusv_cli.controllers.tracking import track
-from podusv_cli.kernels import Vector, bundle
+from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.vessels.plant import plant, surge_force, yaw_moment
 from podusv_cli.vessels.vessel import Vessel
 

@@ -14,8 +14,7 @@ import pytest
 from command_samples import Command, commanded
 from hypothesis import given
 from hypothesis import strategies as st
-from logbook_samples import recording
-from repetition_samples import (
+from rerun_samples import (
     copied,
     flip,
     made,
@@ -23,13 +22,14 @@ from repetition_samples import (
     replaced,
     told_otherwise,
 )  # fmt: skip
+from storage_samples import recording
 
-from podusv_cli.errors import StorageError
-from podusv_cli.logbook import jsonfile, manifest
-from podusv_cli.recording import Recording
-from podusv_cli.repetition.causes import scenario_changes, version_changes
-from podusv_cli.repetition.logs import compare
-from podusv_cli.repetition.numbers import Deviation, differing
+from podusv_cli.comparison.bit_difference import Deviation, differing
+from podusv_cli.comparison.causes import scenario_changes, version_changes
+from podusv_cli.comparison.log_difference import compare
+from podusv_cli.core.errors import StorageError
+from podusv_cli.core.recording import Recording
+from podusv_cli.storage import json_files, manifest
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 
@@ -240,7 +240,7 @@ def test_metrics_count_but_for_what_a_clock_measured(
     def change(content: bytes) -> bytes:
         told = json.loads(content)
         told["metrics"][name] = 12.5
-        return jsonfile.encode(told)
+        return json_files.encode(told)
 
     said = podusv("diff", run, copied(run, tmp_path / "copy", metrics_json=change))
     assert said.code == code
@@ -302,7 +302,7 @@ def test_narrow_terminals_get_narrow_lines(
 ) -> None:
     other = made(tmp_path / "other", "controller.K_Pu=900")
     monkeypatch.setenv("COLUMNS", "40")
-    monkeypatch.setattr("podusv_cli.cli.layout.sys.stdout.isatty", lambda: True, raising=False)
+    monkeypatch.setattr("podusv_cli.cli.terminal.sys.stdout.isatty", lambda: True, raising=False)
     said = podusv("diff", run, other)
     assert said.code == 3
     assert max(map(len, said.out.splitlines())) <= 40

@@ -12,16 +12,16 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from numba import njit
 
+from podusv_cli.core.elementary import cos_sin, exponential
+from podusv_cli.core.kernel import Vector
 from podusv_cli.disturbances.harmonic import Harmonic, HarmonicDisturbance
-from podusv_cli.elementary import cos_sin, exponential
-from podusv_cli.engine import translating
-from podusv_cli.kernels import Vector
+from podusv_cli.engine import compile_numba
 
 EPSILON = np.finfo(float).eps
 
 
 def compiled(function: Any, numbers: Vector) -> Vector:
-    inner = translating.machine(function)
+    inner = compile_numba.machine(function)
     code = njit(lambda x: inner(x))
     return np.array([code(x) for x in numbers])
 

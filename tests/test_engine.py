@@ -35,15 +35,15 @@ from podusv_cli.actuators.saturated import Saturated
 from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
 from podusv_cli.controllers.backstepping import Backstepping
 from podusv_cli.controllers.pid import Pid
+from podusv_cli.core.kernel import Vector, kernel
+from podusv_cli.core.recording import Recording
 from podusv_cli.disturbances.calm import Calm
 from podusv_cli.disturbances.harmonic import HarmonicDisturbance
-from podusv_cli.engine import blocks
-from podusv_cli.engine.blocks import Aside
+from podusv_cli.engine import march
 from podusv_cli.engine.grid import TimeGrid, whole_steps
+from podusv_cli.engine.march import Aside
 from podusv_cli.engine.simulate import STATE, ClosedLoop, Observer, simulate
-from podusv_cli.kernels import Vector, kernel
 from podusv_cli.paths.line_circle import LineCircle
-from podusv_cli.recording import Recording
 
 PARTS = [
     pytest.param({room[:-1]: example(kind)}, id=f"{room}-{name}")
@@ -97,7 +97,7 @@ def test_a_slow_display_does_not_slow_the_march(monkeypatch: pytest.MonkeyPatch)
     """Blocks grow by what the march took: here nothing, while a display takes a minute."""
     clock, calls = SimpleNamespace(**vars(time)), []
     clock.perf_counter = lambda: 60.0 * len(calls)
-    monkeypatch.setattr(blocks, "time", clock)
+    monkeypatch.setattr(march, "time", clock)
     assert run(corrected(), 310.0, progress=calls.append).status == "finished"
     assert len(calls) == 4  # 1, 100, 10 000 steps and the rest
 

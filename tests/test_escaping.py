@@ -16,10 +16,10 @@ from command_samples import BASE, Command, commanded, write
 from comparison_samples import FRAME, verdicts
 from test_comparison_page import page
 
-from podusv_cli import escaping
-from podusv_cli.cli import layout, progress
+from podusv_cli.cli import progress, terminal
 from podusv_cli.comparison import claims, table
-from podusv_cli.logbook import jsonfile
+from podusv_cli.core import escaping
+from podusv_cli.storage import json_files
 
 TURNED, COLOUR = "\u202e", "\x1b[31m"  # letters from right to left from here on; red from here on
 EVIL = f"=cmd|'/C x'!A0{COLOUR}{TURNED}\x9b1m\n# <script>[a](b)`*_\u200b"
@@ -83,7 +83,7 @@ def test_html_is_text() -> None:
 
 def test_json_says_the_same_without_the_letters() -> None:
     content = {"a": "".join(NASTY) + "\U000e0041\u8239", "b": [1, "\ud800"]}
-    text = jsonfile.encode(content).decode()
+    text = json_files.encode(content).decode()
     assert not nasty(text)
     assert "\u8239" in text
     assert json.loads(text) == content
@@ -200,12 +200,12 @@ def test_a_figure_with_such_a_name_is_one_that_browsers_read(podusv: Command) ->
 
 
 def test_whatever_prints_lines_prints_text(capsys: pytest.CaptureFixture[str]) -> None:
-    layout.echo(EVIL, EVIL, err=True)
-    layout.echo_line(EVIL)
-    layout.echo_entry(EVIL, EVIL, facts=EVIL)
-    layout.echo_table([EVIL, EVIL, EVIL], [[EVIL, EVIL, EVIL]])
-    layout.warn_of({EVIL: {EVIL: EVIL, "b": EVIL}})
-    layout.Warned()(EVIL)
+    terminal.echo(EVIL, EVIL, err=True)
+    terminal.echo_line(EVIL)
+    terminal.echo_entry(EVIL, EVIL, facts=EVIL)
+    terminal.echo_table([EVIL, EVIL, EVIL], [[EVIL, EVIL, EVIL]])
+    terminal.warn_of({EVIL: {EVIL: EVIL, "b": EVIL}})
+    terminal.Warned()(EVIL)
     for shown in capsys.readouterr():
         assert escaping.visible(EVIL)[:8] in shown
         assert not nasty(shown)

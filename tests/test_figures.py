@@ -7,10 +7,10 @@ import pytest
 from drawn_samples import CENTER, WIDTH, drawn, line, panels, recording, shown
 from PIL import Image
 
+from podusv_cli.core.signal import SIGNALS
 from podusv_cli.figures.curves import thinned
 from podusv_cli.figures.drawing import FIGURES, draw
 from podusv_cli.figures.style import LOOKS, WIDTHS, axis_label, look
-from podusv_cli.signals import SIGNALS
 
 
 @pytest.fixture(scope="module")

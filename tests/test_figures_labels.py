@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import pytest
-from config_samples import SOUND
 from matplotlib.cbook import is_math_text
-from repetition_samples import made
+from rerun_samples import made
+from scenario_samples import SOUND
 
-from podusv_cli import escaping
-from podusv_cli.comparing import from_folder
+from podusv_cli.core import escaping
 from podusv_cli.figures.animation import stage
 from podusv_cli.figures.drawing import FIGURES, dressed
 from podusv_cli.figures.style import Shown, house_style, image, new_figure
+from podusv_cli.workflows.comparing import from_folder
 
 # An odd and an even number of $, what they would enclose, and what a legend would leave out.
 ODD = ["_a$x^{2$b \\frac{ 3$", "$\\undefined$\udcff\x1b[31m\n"]

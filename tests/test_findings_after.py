@@ -15,14 +15,14 @@ from command_samples import Said
 from conftest import PACKAGE, VESSELS, example, kinds
 from findings_samples import CONFIGS, PLAIN, log, scene
 
-from podusv_cli.codes import CODES
-from podusv_cli.config.loading import load
-from podusv_cli.config.scenario import Scenario
+from podusv_cli.core.finding_codes import CODES
+from podusv_cli.core.recording import Recording
 from podusv_cli.findings.after import LOOKS, aftermath
 from podusv_cli.findings.finding import Finding
 from podusv_cli.findings.preflight import CHECKS, preflight, together
 from podusv_cli.findings.underactuation import argument, input_rank
-from podusv_cli.recording import Recording
+from podusv_cli.scenario.load import load
+from podusv_cli.scenario.model import Scenario
 
 
 def told(code: str, *overrides: str) -> list[str]:
@@ -225,7 +225,7 @@ def transcripts() -> list[tuple[str, list[str]]]:
 
 
 def test_docs_show_what_a_terminal_shows(podusv: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("podusv_cli.cli.layout.sys.stdout.isatty", lambda: True, raising=False)
+    monkeypatch.setattr("podusv_cli.cli.terminal.sys.stdout.isatty", lambda: True, raising=False)
     monkeypatch.setenv("COLUMNS", "100")
     monkeypatch.chdir(PACKAGE.parent)
     assert len(transcripts()) == 2
@@ -246,7 +246,7 @@ def test_findings_are_wrapped_on_a_terminal_and_whole_in_a_pipe(
     assert len(whole) == 2
     for stream in ("stdout", "stderr"):
         monkeypatch.setattr(
-            f"podusv_cli.cli.layout.sys.{stream}.isatty", lambda: True, raising=False
+            f"podusv_cli.cli.terminal.sys.{stream}.isatty", lambda: True, raising=False
         )
     err = podusv(*run, "--no-figures", "--out", "b").err
     for shown in (podusv(*validate).out.splitlines()[2:], err.splitlines()):

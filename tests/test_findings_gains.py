@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from podusv_cli.config.loading import load
 from podusv_cli.findings.gains import conditions
+from podusv_cli.scenario.load import load
 
 CONFIGS = Path(__file__).parent.parent / "configs/paper"
 

@@ -9,10 +9,10 @@ import pytest
 from conftest import VESSELS
 from findings_samples import codes, finding, late, log, scene
 
+from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.findings.finding import Case
 from podusv_cli.findings.reference import drift, reference
 from podusv_cli.findings.task import sliding_distance
-from podusv_cli.kernels import Vector, bundle
 from podusv_cli.vessels.plant import plant
 
 LONG = "simulation.duration=300"

@@ -18,7 +18,7 @@ from podusv_cli.controllers.network import activation
 from podusv_cli.controllers.pid import Pid
 from podusv_cli.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.controllers.tracking import Tracking, track
-from podusv_cli.kernels import Vector, bundle
+from podusv_cli.core.kernel import Vector, bundle
 
 POLAR = (AdaptiveNeural, DynamicSurface, Backstepping)
 UNEQUAL = {

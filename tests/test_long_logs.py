@@ -15,22 +15,22 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from config_samples import loaded
 from conftest import Constant, adrift, corrected, kinds
-from logbook_samples import ENVIRONMENT, PYTHON, assert_same, files, log, recording, write_log
+from scenario_samples import loaded
+from storage_samples import ENVIRONMENT, PYTHON, assert_same, files, log, recording, write_log
 
 from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
 from podusv_cli.controllers.base import Controller
 from podusv_cli.controllers.pid import Pid
+from podusv_cli.core.errors import StorageError
+from podusv_cli.core.kernel import Vector
+from podusv_cli.core.recording import InMemory
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import ClosedLoop, simulate
-from podusv_cli.errors import StorageError
-from podusv_cli.interrupts import interrupts_caught
-from podusv_cli.kernels import Vector
-from podusv_cli.logbook.columns import ColumnFiles
-from podusv_cli.logbook.stream import Stream
-from podusv_cli.recording import InMemory
-from podusv_cli.running import Room, Task, execute
+from podusv_cli.process.interrupts import interrupts_caught
+from podusv_cli.storage.columns import ColumnFiles
+from podusv_cli.storage.stream import Stream
+from podusv_cli.workflows.execute import Room, Task, execute
 
 STEPS = 60
 LAWS = {f"{kind} {period}": (kind, period) for kind in kinds("controllers") for period in (0, 0.05)}
@@ -246,10 +246,10 @@ def test_hdf5_survives_a_disk_that_is_full_from_any_write_on() -> None:
 LIMITED = """
 import resource, sys
 from pathlib import Path
-from podusv_cli.cli.guard import told
-from podusv_cli.config.loading import load_text
-from podusv_cli.errors import StorageError
-from podusv_cli.running import Room, Task, execute, warm_up
+from podusv_cli.cli.exit_codes import told
+from podusv_cli.scenario.load import load_text
+from podusv_cli.core.errors import StorageError
+from podusv_cli.workflows.execute import Room, Task, execute, warm_up
 text, limit, log, piece, kind = sys.argv[1], *map(int, sys.argv[2:5]), sys.argv[5]
 scenario = load_text(text, "a.yaml").scenario
 warm_up(scenario)

@@ -11,14 +11,14 @@ from podusv_cli.actuators.pod import Pod, Pods
 from podusv_cli.actuators.saturated import Saturated
 from podusv_cli.controllers.backstepping import Backstepping
 from podusv_cli.controllers.pid import Pid
+from podusv_cli.core.component import value
+from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import simulate
-from podusv_cli.kernels import Vector, kernel
-from podusv_cli.metrics import watching
+from podusv_cli.metrics import accumulators
+from podusv_cli.metrics.accumulators import observer, summarise
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.table import METRICS
-from podusv_cli.metrics.watching import observer, summarise
-from podusv_cli.registry import value
 
 
 def gathered(
@@ -193,12 +193,12 @@ def test_settled_from_the_start_is_zero():
 
 
 def test_settling_in_the_last_instant_counts_whatever_the_rounding():
-    seen, step = np.zeros(watching.SIZE), 0.01
+    seen, step = np.zeros(accumulators.SIZE), 0.01
     for last in range(2, 200):
-        seen[watching.NOW], seen[watching.OUTSIDE] = last * step, (last - 1) * step
-        seen[watching.LAST + watching.TIME] = 0.5 * step
+        seen[accumulators.NOW], seen[accumulators.OUTSIDE] = last * step, (last - 1) * step
+        seen[accumulators.LAST + accumulators.TIME] = 0.5 * step
         assert summarise(seen, step)["settling_time"] == pytest.approx(last * step)
-        seen[watching.OUTSIDE] = last * step
+        seen[accumulators.OUTSIDE] = last * step
         assert np.isnan(summarise(seen, step)["settling_time"])
 
 

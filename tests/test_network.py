@@ -13,7 +13,7 @@ from pydantic import ValidationError
 
 from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
 from podusv_cli.controllers.network import Network, activate, activation, adapt, weigh
-from podusv_cli.kernels import Vector, bundle
+from podusv_cli.core.kernel import Vector, bundle
 
 LISTED = ((0.0, 0.0, 0.0), (1.0, -0.5, 0.2), (2.0, 0.5, -0.7), (-1.0, 0.1, 0.9))
 WIDTHS = (0.9, 0.4, 0.6)

@@ -19,9 +19,9 @@ import pytest
 from command_samples import Command
 from numpy.testing import assert_array_equal
 
-from podusv_cli.errors import StorageError
-from podusv_cli.logbook import layout, manifest, reading
-from podusv_cli.logbook.folder import open_run
+from podusv_cli.core.errors import StorageError
+from podusv_cli.storage import log_layout, log_reader, manifest
+from podusv_cli.storage.run_folder import open_run
 
 FIXTURES = Path(__file__).with_name("fixtures")
 ARCHIVES = sorted(FIXTURES.glob("format_*/*.tar.gz"))
@@ -52,12 +52,13 @@ def told(archive: Path) -> Any:
 
 
 def test_there_are_runs_of_every_format() -> None:
-    wanted = {f"format_{number}-{kind}" for number in range(1, layout.FORMAT + 1) for kind in KINDS}
+    formats = range(1, log_layout.FORMAT + 1)
+    wanted = {f"format_{number}-{kind}" for number in formats for kind in KINDS}
     assert wanted <= set(NAMES), "python tests/old_runs.py makes those of this format"
 
 
 def test_every_number_is_read(run: Path, told: Any) -> None:
-    log = reading.read_log(run / "log.h5")
+    log = log_reader.read_log(run / "log.h5")
     assert {*log.signals, *log.fixed} == set(told["arrays"])
     for name, numbers in told["arrays"].items():
         assert_array_equal(log[name], np.array(numbers), err_msg=name)
@@ -70,7 +71,7 @@ def test_the_folder_is_opened(run: Path, told: Any) -> None:
     assert opened.status == told["status"]
     assert opened.metrics == told["metrics"]
     assert bool(opened.theory) == ("V" in told["arrays"])
-    assert opened.resolved_yaml == reading.resolved_yaml(run / "log.h5")
+    assert opened.resolved_yaml == log_reader.resolved_yaml(run / "log.h5")
 
 
 @pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4"])
@@ -84,7 +85,7 @@ def test_xarray_reads_every_number(run: Path, told: Any, engine: str) -> None:
         assert log["time"].dims == ("time",)
 
 
-@pytest.fixture(params=range(1, layout.FORMAT + 1))
+@pytest.fixture(params=range(1, log_layout.FORMAT + 1))
 def folders(request: pytest.FixtureRequest, tmp_path: Path) -> dict[Path, Any]:
     """All runs of a format, and what is told of them."""
     place = FIXTURES / f"format_{request.param}"
@@ -122,20 +123,20 @@ def test_it_differs_in_nothing_from_itself(run: Path, podusv: Command) -> None:
 
 
 def test_a_log_of_a_later_format_is_refused_in_a_sentence(run: Path) -> None:
-    later = layout.FORMAT + 1
+    later = log_layout.FORMAT + 1
     content = io.BytesIO((run / "log.h5").read_bytes())
     with h5py.File(content, "r+") as file:
         file.attrs.modify("podusv_format", np.int32(later))
     (run / "log.h5").write_bytes(content.getvalue())
-    words = f"written in format {later}; this podusv reads format {layout.FORMAT}$"
+    words = f"written in format {later}; this podusv reads format {log_layout.FORMAT}$"
     with pytest.raises(StorageError, match=words):
-        reading.read_log(run / "log.h5")
+        log_reader.read_log(run / "log.h5")
 
 
 def test_a_folder_of_a_later_format_is_refused_in_a_sentence(run: Path, podusv: Command) -> None:
-    later = layout.FORMAT + 1
+    later = log_layout.FORMAT + 1
     stated = json.loads((run / manifest.NAME).read_text())
     (run / manifest.NAME).write_text(json.dumps(stated | {"podusv_format": later}))
-    words = f"written in format {later}; this podusv reads {layout.FORMAT}"
+    words = f"written in format {later}; this podusv reads {log_layout.FORMAT}"
     for command in ("plot", "compare", "rerun"):
         assert podusv(command, run) == (5, "", f"{run / manifest.NAME}: {words}\n")

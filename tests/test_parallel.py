@@ -8,13 +8,13 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from logbook_samples import deadline
+from storage_samples import deadline
 
-from podusv_cli.errors import StorageError
-from podusv_cli.extras import Extras
+from podusv_cli.core.errors import StorageError
 from podusv_cli.figures import drawing
-from podusv_cli.interrupts import Interrupts, interrupts_heard, interrupts_held
-from podusv_cli.parallel import INTERRUPTED, Outcome, run_all
+from podusv_cli.process.extras import Extras
+from podusv_cli.process.interrupts import Interrupts, interrupts_heard, interrupts_held
+from podusv_cli.process.workers import INTERRUPTED, Outcome, run_all
 
 
 def square(number, progress):

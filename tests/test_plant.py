@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 from scipy.optimize import root
 
+from podusv_cli.core.kernel import bundle
+from podusv_cli.core.kinematics import earth_velocity, wrap
 from podusv_cli.disturbances.harmonic import Harmonic, HarmonicDisturbance
-from podusv_cli.kernels import bundle
-from podusv_cli.kinematics import earth_velocity, wrap
 from podusv_cli.vessels.plant import plant
 from podusv_cli.vessels.vessel import Vessel
 

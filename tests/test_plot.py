@@ -6,15 +6,16 @@ import sys
 
 import pytest
 from drawn_samples import recording, scenario
-from logbook_samples import log as encode
+from storage_samples import log as encode
 
-from podusv_cli import __version__, workflows
-from podusv_cli.config.loading import resolved_yaml
-from podusv_cli.errors import UsageError
+from podusv_cli import __version__
+from podusv_cli.core.errors import UsageError
+from podusv_cli.core.recording import Recording
 from podusv_cli.figures import animation
 from podusv_cli.figures.drawing import FIGURES
-from podusv_cli.logbook import folder
-from podusv_cli.recording import Recording
+from podusv_cli.scenario.load import resolved_yaml
+from podusv_cli.storage import run_folder
+from podusv_cli.workflows import commands
 
 LAWLESS = ("W_hat_u", "W_hat_r", "b_hat_u", "b_hat_r", "f_hat_u", "f_hat_r", "rbf_center")
 
@@ -24,7 +25,7 @@ def keep(target, log, plan=None):
     plan = plan or scenario()
     text = resolved_yaml(plan)
     encoded = encode(log, resolved_yaml=text, title="", source="", version=__version__)
-    with folder.RunWriter(target) as writer:
+    with run_folder.RunWriter(target) as writer:
         writer.add("log.h5", encoded)
         writer.add("resolved.yaml", text.encode())
         writer.add("figures/errors.png", b"as it was")
@@ -62,7 +63,7 @@ def stillborn(place):
 
 
 def plot(*runs, out, figures=("velocities",), formats=("svg",), animate=False):
-    return workflows.plot(runs, workflows.Drawing(figures, formats, 1, animate, out))
+    return commands.plot(runs, commands.Drawing(figures, formats, 1, animate, out))
 
 
 def words(path):
@@ -156,7 +157,7 @@ def test_files_of_a_finished_run_are_never_replaced(one, tmp_path):
 def test_files_that_a_finished_run_does_not_know_may_stand_in_its_folder(place, tmp_path):
     run = keep(place / "fourth", pid())
     plot(run, out=run / "figures", figures=("velocities",))
-    assert folder.open_run(run).status == "finished"
+    assert run_folder.open_run(run).status == "finished"
 
 
 def test_differences_beyond_the_controller_are_told(one, place, tmp_path):

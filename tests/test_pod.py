@@ -16,13 +16,13 @@ from test_actuators import drive
 from test_closed_loop import order
 from test_metrics import gathered
 
-from podusv_cli.actuators import several_pods
+from podusv_cli.actuators import allocation_qp
 from podusv_cli.actuators.allocation import allocate
 from podusv_cli.actuators.pod import Pod, Pods
 from podusv_cli.actuators.propeller import speed_for, speed_gain, thrust
 from podusv_cli.controllers.pid import Pid
+from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.figures.drawing import FIGURES
-from podusv_cli.kernels import Vector, bundle
 from podusv_cli.paths.line import Line
 
 DRAG = 0.72 * 0.5 + 1.32742 * 0.25 + 5.86643 * 0.125  # the paper's vessel at 0.5 m/s [N]
@@ -278,8 +278,8 @@ def test_what_is_no_number_is_no_allocation_and_none_is_searched_for(
         tried.append(1)
         solved(*arguments)
 
-    solved = several_pods.pull
-    monkeypatch.setattr(several_pods, "pull", pull)
+    solved = allocation_qp.pull
+    monkeypatch.setattr(allocation_qp, "pull", pull)
     pair = pods(*TWIN)
     T, delta, k = np.zeros(2), np.zeros(2), bundle(pair.constants())
     gains = np.full(2, gain)

@@ -14,9 +14,9 @@ from test_pod import pods
 
 from podusv_cli.actuators.pod import Pods
 from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
+from podusv_cli.core.recording import Recording
 from podusv_cli.disturbances.harmonic import Harmonic, HarmonicDisturbance
 from podusv_cli.paths.line import Line
-from podusv_cli.recording import Recording
 
 X_P, U = -0.499, 0.5
 RESULTS = " ".join((Path(__file__).parent.parent / "results/pod.md").read_text().split())

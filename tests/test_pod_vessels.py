@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from podusv_cli.actuators.pod import Pods
-from podusv_cli.config.loading import load
-from podusv_cli.config.references import pod_names, pod_text, vessel_names
 from podusv_cli.engine.simulate import simulate
 from podusv_cli.findings.preflight import preflight
+from podusv_cli.scenario.load import load
+from podusv_cli.scenario.presets import pod_names, pod_text, vessel_names
 
 CONFIGS = Path(__file__).parent.parent / "configs/pod/vessels"
 SCENARIOS = sorted(CONFIGS.glob("*.yaml"))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from command_samples import ROOT, Command, commanded, write
 
-from podusv_cli.logbook.folder import open_run
+from podusv_cli.storage.run_folder import open_run
 
 MOST = 10.0  # N m; four times what the actuator of both scenarios has
 

@@ -8,12 +8,12 @@ from types import SimpleNamespace
 import pandas as pd
 import pytest
 
-from podusv_cli import workflows
 from podusv_cli.comparison.claims import Stated, judge
 from podusv_cli.comparison.entries import Entry
-from podusv_cli.config.loading import load
 from podusv_cli.engine.simulate import simulate
-from podusv_cli.metrics.watching import observer, summarise
+from podusv_cli.metrics.accumulators import observer, summarise
+from podusv_cli.scenario.load import load
+from podusv_cli.workflows import commands
 
 ROOT = Path(__file__).parent.parent
 NAMES = ("printed_compare", "figures_compare", "figures_compare_standoff", "corrected_compare")
@@ -28,7 +28,7 @@ CHAOTIC = {"figures_compare": "dsc"}
 def made(request, tmp_path_factory):
     target = tmp_path_factory.mktemp("reproduced") / request.param
     config = ROOT / f"configs/paper/{request.param}.yaml"
-    done = workflows.compare([config], workflows.Request(out=target, figures=False))
+    done = commands.compare([config], commands.Request(out=target, figures=False))
     return request.param, done.folder
 
 

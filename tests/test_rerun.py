@@ -14,8 +14,7 @@ from typing import Any
 
 import pytest
 from command_samples import Command, commanded
-from logbook_samples import ENVIRONMENT, beside, files
-from repetition_samples import (
+from rerun_samples import (
     SCENARIO,
     copied,
     flip,
@@ -24,10 +23,11 @@ from repetition_samples import (
     replaced,
     told_otherwise,
 )  # fmt: skip
+from storage_samples import ENVIRONMENT, beside, files
 
-from podusv_cli import repeating, workflows
-from podusv_cli.logbook import manifest
-from podusv_cli.logbook.folder import open_run
+from podusv_cli.storage import manifest
+from podusv_cli.storage.run_folder import open_run
+from podusv_cli.workflows import commands, rerun
 
 
 @pytest.fixture(scope="module")
@@ -194,8 +194,8 @@ def test_a_key_that_this_podusv_does_not_know(run: Path, tmp_path: Path, podusv:
 def compared(tmp_path: Path) -> Path:
     config = tmp_path / "two.yaml"
     config.write_text(SCENARIO + "controllers: {soft: {K_Pu: 500.0}, hard: {K_Pu: 1500.0}}\n")
-    request = workflows.Request(out=tmp_path / "two", figures=False)
-    return workflows.compare([config], request).folder
+    request = commands.Request(out=tmp_path / "two", figures=False)
+    return commands.compare([config], request).folder
 
 
 def test_every_run_of_a_comparison_is_repeated(
@@ -213,14 +213,14 @@ def test_every_run_of_a_comparison_is_repeated(
 def test_a_run_that_cannot_be_repeated_takes_no_other_with_it(
     compared: Path, podusv: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    real = repeating.execute
+    real = rerun.execute
 
     def execute(task: Any, progress: Any = None) -> Any:
         if task.scenario.controller.K_Pu == 500.0:
             raise RuntimeError("planted")
         return real(task, progress)
 
-    monkeypatch.setattr(repeating, "execute", execute)
+    monkeypatch.setattr(rerun, "execute", execute)
     said = podusv("rerun", compared)
     assert said.code == 3
     assert said.out.startswith("hard  identical")

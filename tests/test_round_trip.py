@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 from command_samples import ROOT, Command
 from conftest import ROOMS, example, kinds
-from logbook_samples import files
+from storage_samples import files
 
-from podusv_cli.config.loading import load, load_resolved, resolved_yaml
-from podusv_cli.config.references import pod_names, vessel_names
+from podusv_cli.scenario.load import load, load_resolved, resolved_yaml
+from podusv_cli.scenario.presets import pod_names, vessel_names
 
 SECTIONS = {room: room.removesuffix("s") for room in ROOMS}
 CSV = "0, 0\n10, 1\n18, 6\n"

@@ -19,7 +19,7 @@ from podusv_cli.controllers.adaptive_neural import AdaptiveNeural, shunting_rate
 from podusv_cli.controllers.network import activation
 from podusv_cli.controllers.polar_backstepping import B_HAT_R, B_HAT_U, WEIGHTS, lemma
 from podusv_cli.controllers.tracking import track
-from podusv_cli.kernels import Vector, bundle, kernel
+from podusv_cli.core.kernel import Vector, bundle, kernel
 from podusv_cli.vessels.plant import plant
 
 # Errors, estimates' errors, and what is unknown.

@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 
-from podusv_cli.config.loading import load
 from podusv_cli.controllers.network import Network
-from podusv_cli.derived import DERIVED
+from podusv_cli.core.derived import DERIVED
+from podusv_cli.core.recording import Recording
 from podusv_cli.figures.drawing import FIGURES, draw, dressed
 from podusv_cli.figures.stability import FAR, POINTS, THIN
-from podusv_cli.logbook.reading import read_log
-from podusv_cli.recording import Recording
-from podusv_cli.theory.ideal import exponents, node_distance
+from podusv_cli.scenario.load import load
+from podusv_cli.storage.log_reader import read_log
+from podusv_cli.theory.ideal_weights import exponents, node_distance
 from podusv_cli.theory.monitor import ERRORS, NETWORKS, TERMS, WINDOWS
-from podusv_cli.workflows import Request, run
+from podusv_cli.workflows.commands import Request, run
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 SHORT = ("simulation.duration=20",)

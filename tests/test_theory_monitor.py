@@ -28,16 +28,16 @@ from podusv_cli.controllers.dsc import DynamicSurface
 from podusv_cli.controllers.network import activation
 from podusv_cli.controllers.pid import Pid
 from podusv_cli.controllers.polar_backstepping import PolarBackstepping
+from podusv_cli.core.kernel import Vector, bundle, kernel
+from podusv_cli.core.recording import Recording
 from podusv_cli.disturbances.harmonic import HarmonicDisturbance
 from podusv_cli.engine.closed_loop import Plan
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.replay import rates_replay
 from podusv_cli.engine.simulate import STATE, ClosedLoop, by_name, names
-from podusv_cli.kernels import Vector, bundle, kernel
 from podusv_cli.paths.circle import Circle
 from podusv_cli.paths.line import Line
-from podusv_cli.recording import Recording
-from podusv_cli.theory.ideal import node_outputs, unloaded_accelerations
+from podusv_cli.theory.ideal_weights import node_outputs, unloaded_accelerations
 from podusv_cli.theory.monitor import TERMS, Monitored, monitored
 from podusv_cli.theory.rates import error_rates
 from podusv_cli.vessels.plant import plant

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
 from podusv_cli.controllers.tracking import PSI_D_HELD, PSI_D_RATE_HELD, Tracking, track
-from podusv_cli.kernels import Vector, bundle
-from podusv_cli.kinematics import direction
+from podusv_cli.core.kernel import Vector, bundle
+from podusv_cli.core.kinematics import direction
 from podusv_cli.paths.line import Line
 
 DIFFERENCE = {"rate": "difference", "difference_step": 0.01}

@@ -12,17 +12,17 @@ import pytest
 from conftest import corrected, run
 from findings_samples import CONFIGS, scene
 
-from podusv_cli import verifying
 from podusv_cli.cli.verify import _in_order
-from podusv_cli.config.loading import load
-from podusv_cli.config.scenario import Scenario
 from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
 from podusv_cli.engine.continuous import continuous
-from podusv_cli.verification.convergence import estimate, estimate_position
-from podusv_cli.verification.independent import integrate, left_out
+from podusv_cli.scenario.load import load
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.verification.dop853 import integrate, left_out
 from podusv_cli.verification.ranking import ranking
-from podusv_cli.verification.refining import refined, run_level
+from podusv_cli.verification.richardson import estimate, estimate_position
+from podusv_cli.verification.step_halving import refined, run_level
 from podusv_cli.verification.verify import POSITION, Checked, check, verify
+from podusv_cli.workflows import verify as verifying
 
 # Behind the target, facing it and moving; a step at which the adaptation is well resolved.
 SMOOTH = (

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from podusv_cli.actuators.pod import Pods
-from podusv_cli.config.loading import load
-from podusv_cli.config.scenario import Scenario
-from podusv_cli.kernels import bundle
+from podusv_cli.core.kernel import bundle
+from podusv_cli.scenario.load import load
+from podusv_cli.scenario.model import Scenario
 from podusv_cli.vessels.plant import yaw_moment
 
 CONFIGS = Path(__file__).parent.parent / "configs/pod/vessels"

@@ -15,8 +15,8 @@ from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
 from podusv_cli.controllers.backstepping import Backstepping
 from podusv_cli.controllers.base import Controller
 from podusv_cli.controllers.pid import Pid
-from podusv_cli.kernels import bundle, is_kernel
-from podusv_cli.recording import Recording
+from podusv_cli.core.kernel import bundle, is_kernel
+from podusv_cli.core.recording import Recording
 
 every_law = pytest.mark.parametrize("kind", kinds("controllers").values(), ids=kinds("controllers"))
 BOTH: Any = ("none", "auxiliary")

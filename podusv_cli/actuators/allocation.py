@@ -5,20 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from podusv_cli.actuators.one_pod import YAW, one_pod, within
-from podusv_cli.actuators.propeller import (
-    ANGLE,
-    DELTA_RATE,
-    N_AHEAD,
-    N_ASTERN,
-    N_RATE,
-    WIDTH,
-    X,
-    Y,
-    speed_for,
-    thrust,
-)
-from podusv_cli.actuators.several_pods import (
+from podusv_cli.actuators.allocation_qp import (
     AXES,
     COLUMNS,
     FIXED,
@@ -34,8 +21,21 @@ from podusv_cli.actuators.several_pods import (
     SECTORS,
     several_pods,
 )
-from podusv_cli.kernels import Vector, kernel, scratch, tail
-from podusv_cli.kinematics import direction
+from podusv_cli.actuators.allocation_single import YAW, one_pod, within
+from podusv_cli.actuators.propeller import (
+    ANGLE,
+    DELTA_RATE,
+    N_AHEAD,
+    N_ASTERN,
+    N_RATE,
+    WIDTH,
+    X,
+    Y,
+    speed_for,
+    thrust,
+)
+from podusv_cli.core.kernel import Vector, kernel, scratch, tail
+from podusv_cli.core.kinematics import direction
 
 PREFERENCE = 1e4  # how much more the preferred axis counts in the squares
 EFFORT = 1e-6  # what the squared parts of full thrust count

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from podusv_cli.kernels import Vector, bundle
-from podusv_cli.registry import Component
+from podusv_cli.core.component import Component
+from podusv_cli.core.kernel import Vector, bundle
 
 
 class Actuator(Component):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, Literal
 
 from podusv_cli.actuators.base import Actuator
-from podusv_cli.kernels import Vector, kernel
+from podusv_cli.core.kernel import Vector, kernel
 
 
 class Ideal(Actuator):

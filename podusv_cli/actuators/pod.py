@@ -9,8 +9,9 @@ import numpy as np
 from pydantic import model_validator
 
 from podusv_cli.actuators.allocation import allocate, speeds
+from podusv_cli.actuators.allocation_qp import MOST_PODS
+from podusv_cli.actuators.allocation_single import within
 from podusv_cli.actuators.base import Actuator
-from podusv_cli.actuators.one_pod import within
 from podusv_cli.actuators.propeller import (
     ANGLE,
     DELTA_LAG,
@@ -26,9 +27,8 @@ from podusv_cli.actuators.propeller import (
     speed_gain,
     thrust,
 )
-from podusv_cli.actuators.several_pods import MOST_PODS
-from podusv_cli.kernels import Vector, bundle, kernel, scratch, tail
-from podusv_cli.registry import Component, value
+from podusv_cli.core.component import Component, value
+from podusv_cli.core.kernel import Vector, bundle, kernel, scratch, tail
 
 SATURATED, SPEED_LIMITED, ANGLE_LIMITED, RATE_LIMITED, FLAGS = range(5)
 NEARLY = 1.0 - 1e-9

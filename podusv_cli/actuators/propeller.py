@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from podusv_cli.kernels import Vector, kernel
+from podusv_cli.core.kernel import Vector, kernel
 
 PHYSICAL = 0.0
 

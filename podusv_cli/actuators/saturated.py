@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any, Literal
 
 from podusv_cli.actuators.base import Actuator
-from podusv_cli.kernels import Vector, kernel
-from podusv_cli.registry import value
+from podusv_cli.core.component import value
+from podusv_cli.core.kernel import Vector, kernel
 
 
 class Saturated(Actuator):

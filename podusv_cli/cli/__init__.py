@@ -14,7 +14,7 @@ from typing import Annotated
 import typer
 
 from podusv_cli import __version__
-from podusv_cli.cli.guard import flushed, guarded, open_streams, told
+from podusv_cli.cli.exit_codes import flushed, guarded, open_streams, told
 
 # NAME is the function NAME of cli/NAME.py
 COMMANDS = (

@@ -8,16 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from podusv_cli.cli.guard import INTERRUPTED
-from podusv_cli.cli.layout import (
-    Warned,
-    echo,
-    echo_entry,
-    echo_line,
-    echo_path,
-    echo_table,
-    warn_of,
-)
+from podusv_cli.cli.exit_codes import INTERRUPTED
 from podusv_cli.cli.options import (
     AllowLarge,
     AsJson,
@@ -29,9 +20,18 @@ from podusv_cli.cli.options import (
     Verbose,
 )
 from podusv_cli.cli.run import TRACED
+from podusv_cli.cli.terminal import (
+    Warned,
+    echo,
+    echo_entry,
+    echo_line,
+    echo_path,
+    echo_table,
+    warn_of,
+)
 
 if TYPE_CHECKING:
-    from podusv_cli.workflows import Compared
+    from podusv_cli.workflows.commands import Compared
 
 SOME_FAILED = 3
 
@@ -55,16 +55,16 @@ def compare(
     One scenario with `controllers`, several scenarios, finished runs, or any mixture. Exit code 3
     when a run failed or diverged; the others are compared all the same.
     """
-    from podusv_cli import workflows  # heavy imports only when they are needed
     from podusv_cli.cli.progress import progress_bars
-    from podusv_cli.logbook.jsonfile import encode
+    from podusv_cli.storage.json_files import encode
+    from podusv_cli.workflows import commands  # heavy imports only when they are needed
 
     warned = Warned(quiet)
-    request = workflows.Request(
+    request = commands.Request(
         tuple(assign or ()), out, force, figures, tuple(sys.argv), warned, allow_large
     )
     with progress_bars(wanted=not (quiet or as_json)) as progress:
-        done = workflows.compare([Path(item) for item in items], request, progress)
+        done = commands.compare([Path(item) for item in items], request, progress)
     if as_json:
         typer.echo(encode(done.as_json()), nl=False)
     elif quiet:

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from podusv_cli.cli.layout import echo, echo_entry, echo_table
+from podusv_cli.cli.difference_text import DIFFERENT
 from podusv_cli.cli.options import AsJson
-from podusv_cli.cli.parting import DIFFERENT
+from podusv_cli.cli.terminal import echo, echo_entry, echo_table
 
 if TYPE_CHECKING:
-    from podusv_cli.repetition.causes import Change
-    from podusv_cli.repetition.difference import Difference
-    from podusv_cli.repetition.logs import Logs
+    from podusv_cli.comparison.causes import Change
+    from podusv_cli.comparison.log_difference import Logs
+    from podusv_cli.comparison.run_difference import Difference
 
 
 def diff(
@@ -29,12 +29,12 @@ def diff(
     versions and the measured time of a law do not count. Of two comparisons, runs of the same name
     are held against each other.
     """
-    from podusv_cli import repeating  # heavy imports only when they are needed
-    from podusv_cli.logbook import jsonfile
+    from podusv_cli.storage import json_files
+    from podusv_cli.workflows import rerun  # heavy imports only when they are needed
 
-    found = repeating.diff(Path(one), Path(other))
+    found = rerun.diff(Path(one), Path(other))
     if as_json:
-        typer.echo(jsonfile.encode(found.as_json()).decode(), nl=False)
+        typer.echo(json_files.encode(found.as_json()).decode(), nl=False)
     else:
         for label, (_, _, difference) in found.pairs.items():
             _report(label, difference)
@@ -57,15 +57,15 @@ def _report(label: str, found: Difference) -> None:
 
 
 def _show_changes(what: str, changes: Mapping[str, Change]) -> None:
-    from podusv_cli.cli.parting import change_in_words
+    from podusv_cli.cli.difference_text import change_in_words
 
     if changes:
         echo_entry(what, *(change_in_words(key, change) for key, change in changes.items()))
 
 
 def _show_metrics(found: Difference) -> None:
+    from podusv_cli.comparison.run_difference import relative
     from podusv_cli.metrics.table import METRICS
-    from podusv_cli.repetition.difference import relative
 
     rows = [
         [name, METRICS[name].unit, _number(a), _number(b), _signed(relative(a, b))]
@@ -77,7 +77,7 @@ def _show_metrics(found: Difference) -> None:
 
 
 def _show_log(log: Logs) -> None:
-    from podusv_cli.cli.parting import log_in_words, unit
+    from podusv_cli.cli.difference_text import log_in_words, unit
 
     rows = [
         [d.signal, unit(d), _number(d.gap), _number(d.of_peak), _time(d.time)] for d in log.largest

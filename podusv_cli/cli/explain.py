@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from podusv_cli.cli.layout import echo_entry
+from podusv_cli.cli.terminal import echo_entry
 
 if TYPE_CHECKING:
-    from podusv_cli.config.explain import Row
+    from podusv_cli.scenario.explain import Row
 
 
 def explain(
@@ -27,8 +27,8 @@ def explain(
 
     Without a key: the sections of a scenario.
     """
-    from podusv_cli.config.explain import explain as rows
     from podusv_cli.metrics.table import METRICS
+    from podusv_cli.scenario.explain import explain as rows
 
     if key in METRICS:
         echo_entry(key, METRICS[key].meaning, facts=f"metric [{METRICS[key].unit}]")

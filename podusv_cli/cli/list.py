@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from podusv_cli.cli.layout import echo, echo_entry
+from podusv_cli.cli.terminal import echo, echo_entry
 
 
 def list() -> None:
@@ -10,10 +10,10 @@ def list() -> None:
 
     `podusv explain NAME` tells more about each.
     """
-    from podusv_cli.codes import CODES
-    from podusv_cli.config.explain import first_sentence, kinds
-    from podusv_cli.config.references import pod_names, pod_text, vessel_names, vessel_text
+    from podusv_cli.core.finding_codes import CODES
     from podusv_cli.metrics.table import METRICS
+    from podusv_cli.scenario.explain import first_sentence, kinds
+    from podusv_cli.scenario.presets import pod_names, pod_text, vessel_names, vessel_text
 
     for section, summaries in kinds().items():
         echo(f"{section}:")

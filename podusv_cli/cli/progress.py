@@ -9,8 +9,8 @@ from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from typing import TYPE_CHECKING
 
-from podusv_cli.cli.layout import takes_codes
-from podusv_cli.escaping import visible
+from podusv_cli.cli.terminal import takes_codes
+from podusv_cli.core.escaping import visible
 
 if TYPE_CHECKING:
     from rich.progress import Progress

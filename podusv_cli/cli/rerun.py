@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from podusv_cli.cli.guard import INTERRUPTED
-from podusv_cli.cli.layout import echo, echo_entry
+from podusv_cli.cli.difference_text import DIFFERENT
+from podusv_cli.cli.exit_codes import INTERRUPTED
 from podusv_cli.cli.options import AllowLarge, AsJson, Force
-from podusv_cli.cli.parting import DIFFERENT
+from podusv_cli.cli.terminal import echo, echo_entry
 
 if TYPE_CHECKING:
-    from podusv_cli.repeating import Repeated, Repetition
+    from podusv_cli.workflows.rerun import Repeated, Repetition
 
 DIVERGED = 4
 
@@ -34,8 +34,8 @@ def rerun(
     Exit code 0 when every number of the log is the same to the last bit, 3 when not, 4 when the
     run diverges and had not. Nothing is left behind without `--out`.
     """
-    from podusv_cli import repeating  # heavy imports only when they are needed
     from podusv_cli.cli.progress import progress_bars
+    from podusv_cli.workflows import rerun as repeating  # heavy imports only when they are needed
 
     request = repeating.Request(out, force, tuple(sys.argv), allow_large)
     with progress_bars(wanted=not as_json) as progress:
@@ -60,14 +60,14 @@ def _exit_code(done: Repetition) -> int:
 
 
 def _print_json(done: Repetition, folder: Path | None) -> None:
-    from podusv_cli.logbook import jsonfile
+    from podusv_cli.storage import json_files
 
     runs = [{"label": label, **run.as_json()} for label, run in done.runs.items()]
     content = {
         "format": 1, "identical": done.identical, "folder": folder and str(folder),
         "runs": runs, "failed": done.failures,
     }  # fmt: skip
-    typer.echo(jsonfile.encode(content).decode(), nl=False)
+    typer.echo(json_files.encode(content).decode(), nl=False)
 
 
 def _report(done: Repetition) -> None:
@@ -84,7 +84,7 @@ def _verdict(run: Repeated) -> str:
 
 
 def _lines(run: Repeated) -> Iterator[str]:
-    from podusv_cli.cli.parting import changes_in_words, deviation_in_words, log_in_words
+    from podusv_cli.cli.difference_text import changes_in_words, deviation_in_words, log_in_words
 
     found = run.found
     yield from log_in_words(found.log)

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from podusv_cli.cli.layout import Warned, echo, echo_path
 from podusv_cli.cli.options import (
     AllowLarge,
     AsJson,
@@ -21,9 +20,10 @@ from podusv_cli.cli.options import (
     Quiet,
     Verbose,
 )
+from podusv_cli.cli.terminal import Warned, echo, echo_path
 
 if TYPE_CHECKING:
-    from podusv_cli.running import Finished
+    from podusv_cli.workflows.execute import Finished
 
 TRACED = "missing.json in the folder has the traceback"
 EXIT_CODES = {"finished": 0, "diverged": 4, "interrupted": 130}
@@ -44,16 +44,16 @@ def run(
 
     Draws trajectory, errors and controls; `podusv plot RUN` draws all that the run has signals for.
     """
-    from podusv_cli import workflows  # heavy imports only when they are needed
     from podusv_cli.cli.progress import progress_bar
-    from podusv_cli.logbook.jsonfile import encode
+    from podusv_cli.storage.json_files import encode
+    from podusv_cli.workflows import commands  # heavy imports only when they are needed
 
     warned = Warned(quiet)
-    request = workflows.Request(
+    request = commands.Request(
         tuple(assign or ()), out, force, figures, tuple(sys.argv), warned, allow_large
     )
     with progress_bar(str(config), wanted=not (quiet or as_json)) as progress:
-        done = workflows.run(Path(config), request, progress)
+        done = commands.run(Path(config), request, progress)
     if as_json:
         typer.echo(encode(done.as_json()), nl=False)
     elif quiet:

@@ -7,6 +7,6 @@ import typer
 
 def schema() -> None:
     """Print the JSON schema of scenarios, for editors."""
-    from podusv_cli.config.schema import schema_text
+    from podusv_cli.scenario.schema import schema_text
 
     typer.echo(schema_text(), nl=False)

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from podusv_cli.cli.layout import echo, echo_line
 from podusv_cli.cli.options import AllowLarge, Assignments, Config
+from podusv_cli.cli.terminal import echo, echo_line
 
 if TYPE_CHECKING:
-    from podusv_cli.config.loading import Loaded
+    from podusv_cli.scenario.load import Loaded
 
 
 def validate(
@@ -32,10 +32,10 @@ def validate(
     Exit code 0, with a line for each finding; or 2 with a line for each fault.
     """
     from podusv_cli.comparison.claims import misfits
-    from podusv_cli.config.loading import load
-    from podusv_cli.config.size import largest, limits
     from podusv_cli.findings.finding import heard
     from podusv_cli.findings.preflight import preflight
+    from podusv_cli.scenario.limits import largest, limits
+    from podusv_cli.scenario.load import load
 
     loaded = load(config, assign or (), checks=(misfits, limits(allow_large)))
     scenario = loaded.scenario
@@ -49,10 +49,10 @@ def validate(
 
 
 def _explain(loaded: Loaded) -> None:
-    from podusv_cli.config.loading import values
-    from podusv_cli.config.words import as_written
     from podusv_cli.findings.gains import conditions
     from podusv_cli.findings.underactuation import argument
+    from podusv_cli.scenario.load import values
+    from podusv_cli.scenario.words import as_written
 
     echo_line(argument(loaded.scenario))
     for line in conditions(loaded.scenario):

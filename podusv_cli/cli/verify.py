@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from podusv_cli.cli.layout import echo, echo_entry, echo_table
 from podusv_cli.cli.options import AsJson, Assignments, Config
+from podusv_cli.cli.terminal import echo, echo_entry, echo_table
 
 if TYPE_CHECKING:
-    from podusv_cli.verification.convergence import Estimate
     from podusv_cli.verification.ranking import Ranking
+    from podusv_cli.verification.richardson import Estimate
     from podusv_cli.verification.verify import Checked, Verified
 
 NOT_CONVERGED = 3
@@ -43,9 +43,9 @@ def verify(
     Shows order and error of every metric, and in a comparison whether the ranking is the same.
     Exit code 3 when something is not converged.
     """
-    from podusv_cli import verifying  # heavy imports only when they are needed
     from podusv_cli.cli.progress import progress_bars
-    from podusv_cli.logbook.jsonfile import encode
+    from podusv_cli.storage.json_files import encode
+    from podusv_cli.workflows import verify as verifying  # heavy imports only when they are needed
 
     with progress_bars(wanted=not (quiet or as_json)) as progress:
         done = verifying.verify(Path(config), assign or (), tolerance, out, progress, force=force)

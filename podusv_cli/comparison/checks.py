@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from podusv_cli.config.scenario import Scenario
+from podusv_cli.core.recording import Status
 from podusv_cli.findings.underactuation import input_rank
-from podusv_cli.recording import Status
+from podusv_cli.scenario.model import Scenario
 
 # By name: whether a run of this scenario that ended so has the property; None where it cannot be
 # told. The status is None for a run that left nothing behind.

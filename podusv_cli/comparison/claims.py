@@ -10,9 +10,9 @@ from typing import Literal
 from podusv_cli.comparison.conditions import Evidence
 from podusv_cli.comparison.expressions import Sources
 from podusv_cli.comparison.parsing import ExpressionError, parse, renamed
-from podusv_cli.config.scenario import Claim, Scenario
-from podusv_cli.escaping import markdown, markdown_cell, markdown_code
+from podusv_cli.core.escaping import markdown, markdown_cell, markdown_code
 from podusv_cli.metrics.table import CLOCKED
+from podusv_cli.scenario.model import Claim, Scenario
 
 Answer = Literal["reproduced", "not reproduced", "cannot tell"]
 ANSWERS: dict[bool | None, Answer] = {

@@ -9,12 +9,12 @@ from functools import cached_property
 
 import numpy as np
 
-from podusv_cli import derived
 from podusv_cli.comparison.checks import CHECKS
-from podusv_cli.config.scenario import Scenario
-from podusv_cli.kernels import Vector
-from podusv_cli.logbook.folder import Run
-from podusv_cli.recording import Recording
+from podusv_cli.core import derived
+from podusv_cli.core.kernel import Vector
+from podusv_cli.core.recording import Recording
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.storage.run_folder import Run
 
 
 @dataclass(frozen=True)

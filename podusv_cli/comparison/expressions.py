@@ -18,7 +18,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from podusv_cli.kernels import Vector
+from podusv_cli.core.kernel import Vector
 from podusv_cli.metrics.table import METRICS
 
 NEAR = 1e-9  # s; times closer than this are the same

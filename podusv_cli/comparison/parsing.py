@@ -22,11 +22,11 @@ from podusv_cli.comparison.expressions import (
     SignalOf,
     Term,
 )  # fmt: skip
-from podusv_cli.config.words import unknown
-from podusv_cli.derived import DERIVED
-from podusv_cli.logbook.layout import FIXED_AXES
+from podusv_cli.core.derived import DERIVED
+from podusv_cli.core.signal import SIGNALS
 from podusv_cli.metrics.table import METRICS
-from podusv_cli.signals import SIGNALS
+from podusv_cli.scenario.words import unknown
+from podusv_cli.storage.log_layout import FIXED_AXES
 
 LONGEST = 500  # characters of an expression
 LARGEST = 1e300  # of numbers written down

@@ -17,10 +17,10 @@ from podusv_cli.comparison import stability
 from podusv_cli.comparison.claims import Verdict
 from podusv_cli.comparison.differences import flat, in_short, in_words
 from podusv_cli.comparison.table import cells
-from podusv_cli.config.scenario import Scenario
-from podusv_cli.escaping import html
+from podusv_cli.core.component import Component
+from podusv_cli.core.escaping import html
 from podusv_cli.findings.finding import Finding
-from podusv_cli.registry import Component
+from podusv_cli.scenario.model import Scenario
 
 STYLE = """
 body { font: 15px/1.45 system-ui, sans-serif; max-width: 62rem; margin: 2rem auto; padding: 0 1rem;

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from podusv_cli.errors import StorageError
+from podusv_cli.core.errors import StorageError
 
 HEAD = (
     "run", "part", "lambda [1/s]", "bound of V", "printed form's", "largest V",

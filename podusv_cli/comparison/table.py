@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import pandas as pd
 
-from podusv_cli import escaping
+from podusv_cli.core import escaping
 from podusv_cli.metrics.table import METRICS
 
 METRIC = "metric"

@@ -8,8 +8,8 @@ from typing import Any, ClassVar, Literal
 
 from podusv_cli.controllers.polar_backstepping import FilteredBackstepping, polar_backstepping
 from podusv_cli.controllers.tracking import Tracking
-from podusv_cli.kernels import Vector, kernel, specialise
-from podusv_cli.registry import Positive, value
+from podusv_cli.core.component import Positive, value
+from podusv_cli.core.kernel import Vector, kernel, specialise
 
 
 @kernel

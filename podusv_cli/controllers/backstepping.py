@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Literal
 
 from podusv_cli.controllers.polar_backstepping import PolarBackstepping, polar_backstepping
 from podusv_cli.controllers.tracking import Tracking
-from podusv_cli.kernels import Vector, kernel, specialise
+from podusv_cli.core.kernel import Vector, kernel, specialise
 from podusv_cli.vessels.plant import surge_force, sway_force
 
 

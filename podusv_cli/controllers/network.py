@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import model_validator
 
-from podusv_cli.elementary import exponential
-from podusv_cli.kernels import Vector, kernel, tail, whole_lanes
-from podusv_cli.registry import Component, value
+from podusv_cli.core.component import Component, value
+from podusv_cli.core.elementary import exponential
+from podusv_cli.core.kernel import Vector, kernel, tail, whole_lanes
 
 MOST_NODES = 10_000
 Triple = tuple[float, float, float]

@@ -9,8 +9,8 @@ from pydantic import model_validator
 
 from podusv_cli.controllers.base import Slots
 from podusv_cli.controllers.tracking import HELD, TrackingController, track
-from podusv_cli.kernels import Vector, bundle, kernel
-from podusv_cli.registry import value
+from podusv_cli.core.component import value
+from podusv_cli.core.kernel import Vector, bundle, kernel
 from podusv_cli.vessels.vessel import Vessel
 
 INTEGRAL_U, INTEGRAL_R, LAG_U, LAG_R = 2, 3, 4, 5

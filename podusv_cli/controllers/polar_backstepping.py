@@ -13,8 +13,8 @@ import numpy as np
 from podusv_cli.controllers.base import Slots
 from podusv_cli.controllers.network import Network, activate, adapt, weigh
 from podusv_cli.controllers.tracking import HELD, Tracking, TrackingController, track
-from podusv_cli.kernels import Vector, bundle, kernel, tail
-from podusv_cli.registry import value
+from podusv_cli.core.component import value
+from podusv_cli.core.kernel import Vector, bundle, kernel, tail
 from podusv_cli.vessels.vessel import Vessel
 
 B_HAT_U, B_HAT_R, WEIGHTS = 2, 3, 4

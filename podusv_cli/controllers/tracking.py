@@ -11,10 +11,10 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from podusv_cli.controllers.base import Controller
-from podusv_cli.elementary import cos_sin
-from podusv_cli.kernels import Vector, kernel
-from podusv_cli.kinematics import direction, wrap
-from podusv_cli.registry import value
+from podusv_cli.core.component import value
+from podusv_cli.core.elementary import cos_sin
+from podusv_cli.core.kernel import Vector, kernel
+from podusv_cli.core.kinematics import direction, wrap
 
 ANALYTIC, DIFFERENCE = 0.0, 1.0
 PRINTED, JOINT, NONE = 0.0, 1.0, 2.0

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from podusv_cli.kernels import Vector
-from podusv_cli.registry import Component
+from podusv_cli.core.component import Component
+from podusv_cli.core.kernel import Vector
 
 
 class Disturbance(Component):

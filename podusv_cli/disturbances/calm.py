@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any, ClassVar, Literal
 
+from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.disturbances.base import Disturbance
-from podusv_cli.kernels import Vector, kernel
 
 
 class Calm(Disturbance):

@@ -7,10 +7,10 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
+from podusv_cli.core.component import Component, value
+from podusv_cli.core.elementary import cos_sin
+from podusv_cli.core.kernel import LANES, Vector, kernel, scratch, whole_lanes
 from podusv_cli.disturbances.base import Disturbance
-from podusv_cli.elementary import cos_sin
-from podusv_cli.kernels import LANES, Vector, kernel, scratch, whole_lanes
-from podusv_cli.registry import Component, value
 
 
 class Harmonic(Component):

@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from podusv_cli.engine.blocks import Pace, in_blocks
+from podusv_cli.core.kernel import LANES, Vector, whole_lanes
 from podusv_cli.engine.closed_loop import Plan, Wires
 from podusv_cli.engine.grid import TimeGrid
+from podusv_cli.engine.march import Pace, in_blocks
 from podusv_cli.engine.simulate import (
     STATE,
     ClosedLoop,
@@ -26,8 +27,7 @@ from podusv_cli.engine.simulate import (
     marcher,
     wire,
 )
-from podusv_cli.kernels import LANES, Vector, whole_lanes
-from podusv_cli.parallel import workers_here
+from podusv_cli.process.workers import workers_here
 
 NUMBER = 8  # bytes; LANES numbers are a cache line
 

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from podusv_cli.kernels import Vector, kernel, tail, unpacker
+from podusv_cli.core.kernel import Vector, kernel, tail, unpacker
 from podusv_cli.vessels.plant import plant
 from podusv_cli.vessels.vessel import COEFFICIENTS
 

@@ -18,8 +18,8 @@ from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 
-from podusv_cli.escaping import visible
-from podusv_cli.parts import forget_files, is_part, part_name
+from podusv_cli.core.escaping import visible
+from podusv_cli.process.temporary_names import forget_files, is_part, part_name
 
 KEPT = 8  # folders of this many other states of the source stay on disk
 DIGEST = re.compile(r"[0-9a-f]{16}")

@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from podusv_cli.core.kernel import Vector
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import ClosedLoop, Observer, marcher, wire
-from podusv_cli.kernels import Vector
 
 Slope = Callable[[float, Vector], Vector]
 

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from podusv_cli.core.kernel import Vector, bundle
+from podusv_cli.core.recording import Recording
 from podusv_cli.engine import closed_loop, signatures
 from podusv_cli.engine.closed_loop import Plan, Wires
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import STATE, ClosedLoop, Observer, by_name, entries, names, wire
-from podusv_cli.kernels import Vector, bundle
 from podusv_cli.paths.base import TARGET
-from podusv_cli.recording import Recording
 
 
 def _rows(loop: ClosedLoop, recording: Recording, most: int) -> Vector:
@@ -36,7 +36,7 @@ def replayer(
 
     A replay goes over at most `most` logged rows until it has `evaluations`, in machine code.
     """
-    from podusv_cli.engine import compiling  # a loop in plain Python needs no compiler
+    from podusv_cli.engine import compile  # a loop in plain Python needs no compiler
 
     rows = _rows(loop, recording, most)
     count, width = rows.shape
@@ -46,8 +46,8 @@ def replayer(
     p = np.array(list(informed.values()))
     buffers = (rows.ravel(), p, loop.controller.table(), np.zeros(2), np.zeros(room))
     vectors = [signatures.pointer(buffer) for buffer in buffers]
-    replay: Callable[..., None] = compiling.replay()
-    law = compiling.entry(signatures.law_entry, loop.controller.law, tuple(informed))
+    replay: Callable[..., None] = compile.replay()
+    law = compile.entry(signatures.law_entry, loop.controller.law, tuple(informed))
 
     def timed() -> float:
         began = time.thread_time_ns()  # of the processor: what else it does is not the law's
@@ -101,10 +101,10 @@ def _rates_runner(loop: ClosedLoop, compiled: bool) -> Callable[..., None]:
     if not compiled:
         doors = [signatures.bind(*part) for part in chosen]
         return lambda *rest: closed_loop.rates_along(*doors, *rest)
-    from podusv_cli.engine import compiling  # a loop in plain Python needs no compiler
+    from podusv_cli.engine import compile  # a loop in plain Python needs no compiler
 
-    doors = [compiling.entry(*part) for part in chosen]
-    run = compiling.rates_replay()
+    doors = [compile.entry(*part) for part in chosen]
+    run = compile.rates_replay()
 
     def compiled_run(count: int, logged: Vector, out: Vector, wires: Wires, plan: Plan) -> None:
         vectors, sizes = signatures.pointers(wires), signatures.whole_numbers(plan)

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from podusv_cli.kernels import Vector, unpacker, with_globals
+from podusv_cli.core.kernel import Vector, unpacker, with_globals
 
 
 def kernel(*arguments: Any) -> None:

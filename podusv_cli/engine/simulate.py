@@ -10,17 +10,17 @@ import numpy as np
 
 from podusv_cli.actuators.base import Actuator
 from podusv_cli.controllers.base import Controller
+from podusv_cli.core.kernel import Vector, bundle, kernel
+from podusv_cli.core.recording import Columns, Recording
+from podusv_cli.core.signal import SIGNALS
 from podusv_cli.disturbances.base import Disturbance
 from podusv_cli.engine import closed_loop, signatures
-from podusv_cli.engine.blocks import Ending, in_blocks
 from podusv_cli.engine.closed_loop import Plan, Wires
 from podusv_cli.engine.grid import TimeGrid, whole_steps
-from podusv_cli.engine.pieces import PIECE, Pieces, rows_held
-from podusv_cli.interrupts import interrupts_held
-from podusv_cli.kernels import Vector, bundle, kernel
+from podusv_cli.engine.march import Ending, in_blocks
+from podusv_cli.engine.row_table import PIECE, Pieces, rows_held
 from podusv_cli.paths.base import TARGET, Path
-from podusv_cli.recording import Columns, Recording
-from podusv_cli.signals import SIGNALS
+from podusv_cli.process.interrupts import interrupts_held
 from podusv_cli.vessels.vessel import Vessel
 
 STATE = ("x", "y", "psi", "u", "v", "r")
@@ -158,10 +158,10 @@ def marcher(loop: ClosedLoop, observer: Observer, compiled: bool) -> Callable[..
     if not compiled:
         doors = [signatures.bind(*part) for part in entries(loop, observer)]
         return lambda *rest: closed_loop.advance_plainly(*doors, *rest)
-    from podusv_cli.engine import compiling  # a loop in plain Python needs no compiler
+    from podusv_cli.engine import compile  # a loop in plain Python needs no compiler
 
-    doors = [compiling.entry(*part) for part in entries(loop, observer)]
-    march = compiling.march()
+    doors = [compile.entry(*part) for part in entries(loop, observer)]
+    march = compile.march()
 
     def compiled_march(first: int, last: int, h: float, wires: Wires, plan: Plan) -> int:
         vectors, sizes = signatures.pointers(wires), signatures.whole_numbers(plan)

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from podusv_cli.core.component import Component
+from podusv_cli.core.kernel import Vector
 from podusv_cli.engine.simulate import STATE, ClosedLoop
-from podusv_cli.kernels import Vector
-from podusv_cli.registry import Component
 
 
 def variants(

@@ -10,9 +10,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
+from podusv_cli.core.kernel import Vector
+from podusv_cli.core.recording import largest
 from podusv_cli.figures.style import Shown
-from podusv_cli.kernels import Vector
-from podusv_cli.recording import largest
 
 THIN: dict[str, Any] = {"linewidth": 0.5, "alpha": 0.6}
 TALL = 20.0  # a peak this many times the usual values gets a logarithmic axis

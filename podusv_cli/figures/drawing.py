@@ -9,9 +9,8 @@ from functools import partial
 
 import numpy as np
 
-from podusv_cli.config.scenario import Scenario
-from podusv_cli.escaping import visible
-from podusv_cli.extras import Extras, Missing
+from podusv_cli.core.escaping import visible
+from podusv_cli.core.recording import Recording
 from podusv_cli.figures.controls import controls
 from podusv_cli.figures.filters import filters
 from podusv_cli.figures.loads import loads
@@ -21,9 +20,10 @@ from podusv_cli.figures.stability import stability
 from podusv_cli.figures.style import Shown, house_style, image, look
 from podusv_cli.figures.trajectory import trajectory
 from podusv_cli.figures.validity import validity
-from podusv_cli.interrupts import interrupts_heard
-from podusv_cli.parallel import run_all
-from podusv_cli.recording import Recording
+from podusv_cli.process.extras import Extras, Missing
+from podusv_cli.process.interrupts import interrupts_heard
+from podusv_cli.process.workers import run_all
+from podusv_cli.scenario.model import Scenario
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
+from podusv_cli.core.signal import SIGNALS
 from podusv_cli.figures.curves import compress, draw_curve, draw_signal, scaling
 from podusv_cli.figures.panels import grid
 from podusv_cli.figures.style import Shown, axis_label, legend, unit
-from podusv_cli.signals import SIGNALS
 
 PAIRS = (("alpha_u", "beta_u"), ("alpha_r", "beta_r"))
 ERRORS = ("y_u", "y_r")

@@ -8,10 +8,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from podusv_cli.core.kernel import Vector
 from podusv_cli.figures.curves import draw_curve, draw_signal
 from podusv_cli.figures.panels import grid
 from podusv_cli.figures.style import Shown, axis_label, legend
-from podusv_cli.kernels import Vector
 
 SEA = ("b_u", "b_v", "b_r")
 COMMON: dict[str, str] = {"color": "#444444", "linestyle": "-", "label": "all runs"}

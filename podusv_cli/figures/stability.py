@@ -12,10 +12,10 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import Locator
 
+from podusv_cli.core.kernel import Vector
 from podusv_cli.figures.curves import thinned
 from podusv_cli.figures.panels import TIME
 from podusv_cli.figures.style import Shown, axis_label, legend, new_figure
-from podusv_cli.kernels import Vector
 from podusv_cli.theory.monitor import TERMS
 
 POINTS = 600  # of a stack; every column is a mean, so that no extreme stands for its surroundings

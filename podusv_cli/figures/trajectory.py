@@ -11,10 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon, Rectangle
 
+from podusv_cli.core.kernel import Vector
+from podusv_cli.core.recording import Recording
 from podusv_cli.figures.curves import Span, scaling
 from podusv_cli.figures.style import TARGET_LOOK, Shown, legend, new_figure
-from podusv_cli.kernels import Vector
-from podusv_cli.recording import Recording
 
 HULL = np.array([(0.5, 0.0), (0.25, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.25, -0.5)])
 SILHOUETTES = 9

@@ -7,13 +7,13 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import numpy.typing as npt
 
-from podusv_cli.config.scenario import Scenario
 from podusv_cli.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.controllers.tracking import TrackingController
+from podusv_cli.core.kernel import Vector
+from podusv_cli.core.recording import Recording, blocks
 from podusv_cli.findings.finding import Finding, found
 from podusv_cli.findings.law import FAR, nearest
-from podusv_cli.kernels import Vector
-from podusv_cli.recording import Recording, blocks
+from podusv_cli.scenario.model import Scenario
 
 NEAR = 0.05  # hull lengths
 CROSSWISE = 0.05  # |cos psi_e|; the virtual surge velocity is magnified twentyfold

@@ -8,11 +8,11 @@ from functools import cached_property
 
 import numpy as np
 
-from podusv_cli.codes import CODES
-from podusv_cli.config.scenario import Scenario
+from podusv_cli.core.finding_codes import CODES
+from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.findings.reference import Reference, reference
-from podusv_cli.kernels import Vector, bundle
 from podusv_cli.paths.base import TARGET
+from podusv_cli.scenario.model import Scenario
 
 
 @dataclass(frozen=True)

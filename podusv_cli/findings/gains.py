@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from podusv_cli.config.scenario import Scenario
 from podusv_cli.controllers.polar_backstepping import PolarBackstepping
+from podusv_cli.scenario.model import Scenario
 from podusv_cli.theory.bounds import Condition, ultimate_bound
 
 

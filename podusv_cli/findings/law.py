@@ -11,6 +11,7 @@ from podusv_cli.controllers.network import Network
 from podusv_cli.controllers.pid import Pid
 from podusv_cli.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.controllers.tracking import TrackingController
+from podusv_cli.core.kernel import Vector
 from podusv_cli.findings.finding import Case, Finding, found
 from podusv_cli.findings.stability import (
     Bound,
@@ -20,7 +21,6 @@ from podusv_cli.findings.stability import (
     rk4_growth,
     sampled_growth,
 )
-from podusv_cli.kernels import Vector
 
 FAR = 2.0  # widths; a node further away answers with less than exp(-2)
 KICK = 1.0  # rad/s; beyond what a hull turns at

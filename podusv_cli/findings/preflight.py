@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from podusv_cli.config.scenario import Scenario
 from podusv_cli.findings import law, task, values
 from podusv_cli.findings.finding import Case, Finding
+from podusv_cli.scenario.model import Scenario
 
 Check = Callable[[Case], Iterator[Finding]]
 

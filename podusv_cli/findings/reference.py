@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from podusv_cli.config.scenario import Scenario
-from podusv_cli.kernels import Vector, bundle
+from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.paths.base import TARGET
+from podusv_cli.scenario.model import Scenario
 from podusv_cli.vessels.plant import surge_force, sway_force, yaw_moment
 
 SAMPLES = 60

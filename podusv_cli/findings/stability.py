@@ -15,12 +15,12 @@ from functools import singledispatch
 
 import numpy as np
 
-from podusv_cli.config.scenario import Scenario
 from podusv_cli.controllers.base import Controller
 from podusv_cli.controllers.network import activation
 from podusv_cli.controllers.pid import Pid
 from podusv_cli.controllers.polar_backstepping import PolarBackstepping
-from podusv_cli.kernels import Vector, bundle
+from podusv_cli.core.kernel import Vector, bundle
+from podusv_cli.scenario.model import Scenario
 from podusv_cli.vessels.plant import surge_force, yaw_moment
 
 BURST = 20  # steps within which a start that is too stiff shows

@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from podusv_cli.controllers.tracking import TrackingController
+from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.findings.finding import Case, Finding, found
 from podusv_cli.findings.reference import FASTEST, drift, median
-from podusv_cli.kernels import Vector, bundle
 from podusv_cli.paths.base import TARGET
 from podusv_cli.vessels.plant import sway_force
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from podusv_cli.actuators.base import Actuator
-from podusv_cli.config.scenario import Scenario
+from podusv_cli.scenario.model import Scenario
 
 
 def input_rank(actuator: Actuator) -> int:

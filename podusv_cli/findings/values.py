@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from podusv_cli.core.component import unit_of
 from podusv_cli.findings.finding import Case, Finding, found
-from podusv_cli.registry import unit_of
 from podusv_cli.vessels.vessel import Vessel
 
 BRAKES = ("X_uu", "X_uuu", "Y_vv", "N_rr")  # the linear ones cannot be positive at all

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from podusv_cli.core.recording import Recording
 from podusv_cli.engine.replay import replayer
 from podusv_cli.engine.simulate import ClosedLoop
-from podusv_cli.recording import Recording
 
 REPLAYS = 25
 QUARTILES = [REPLAYS * quarter // 4 for quarter in (1, 2, 3)]  # of the times in order

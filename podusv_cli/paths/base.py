@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from podusv_cli.kernels import Vector
-from podusv_cli.registry import Component
+from podusv_cli.core.component import Component
+from podusv_cli.core.kernel import Vector
 
 TARGET = ("x_d", "y_d", "x_d_dot", "y_d_dot", "x_d_ddot", "y_d_ddot")
 

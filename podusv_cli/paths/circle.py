@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from podusv_cli.elementary import cos_sin
-from podusv_cli.kernels import Vector, kernel
+from podusv_cli.core.component import value
+from podusv_cli.core.elementary import cos_sin
+from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.paths.base import Path
-from podusv_cli.registry import value
 
 
 @kernel

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any, Literal
 
-from podusv_cli.kernels import Vector, kernel
+from podusv_cli.core.component import value
+from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.paths.base import Path
-from podusv_cli.registry import value
 
 
 class Line(Path):

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any, Literal
 
-from podusv_cli.kernels import Vector, kernel
+from podusv_cli.core.component import value
+from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.paths.base import Break, Path
 from podusv_cli.paths.circle import on_circle
-from podusv_cli.registry import value
 
 LITERAL, VELOCITY, SINE = range(3)
 

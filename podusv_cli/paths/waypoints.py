@@ -7,9 +7,9 @@ from typing import Any, Literal, Self
 import numpy as np
 from pydantic import model_validator
 
-from podusv_cli.kernels import Vector, kernel
+from podusv_cli.core.component import value
+from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.paths.base import Path
-from podusv_cli.registry import value
 
 Point = tuple[float, float]
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from podusv_cli.controllers.polar_backstepping import PolarBackstepping
-from podusv_cli.kernels import Vector
+from podusv_cli.core.kernel import Vector
 from podusv_cli.vessels.vessel import Vessel
 
 TRIES = 400  # values of lambda among which the one with the lowest bound is taken

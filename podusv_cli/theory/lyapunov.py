@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from podusv_cli.controllers.polar_backstepping import PolarBackstepping
+from podusv_cli.core.kernel import Vector
+from podusv_cli.core.recording import Recording
 from podusv_cli.engine.replay import Replayed
 from podusv_cli.engine.simulate import ClosedLoop
-from podusv_cli.kernels import Vector
-from podusv_cli.recording import Recording
 from podusv_cli.theory.bounds import Pair
-from podusv_cli.theory.ideal import Ideal
+from podusv_cli.theory.ideal_weights import Ideal
 from podusv_cli.theory.rates import Errors
 
 

@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from podusv_cli.controllers.polar_backstepping import PolarBackstepping
+from podusv_cli.core.kernel import Vector
+from podusv_cli.core.recording import Columns, InMemory, Recording, blocks, largest
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.replay import Replayed, rates_replay
 from podusv_cli.engine.simulate import ClosedLoop
-from podusv_cli.kernels import Vector
-from podusv_cli.recording import Columns, InMemory, Recording, blocks, largest
 from podusv_cli.theory.bounds import Bound, Observed, Pair, UltimateBound, ultimate_bound
-from podusv_cli.theory.ideal import (
+from podusv_cli.theory.ideal_weights import (
     Ideal,
     exponents,
     ideal_weights,

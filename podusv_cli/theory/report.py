@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from podusv_cli.controllers.polar_backstepping import PolarBackstepping
+from podusv_cli.core.recording import largest
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import ClosedLoop
-from podusv_cli.recording import largest
 from podusv_cli.theory.bounds import Bound, Condition
 from podusv_cli.theory.monitor import Monitored, Window
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from podusv_cli.core.kernel import Vector
+from podusv_cli.core.recording import Recording
 from podusv_cli.engine.replay import Replayed
-from podusv_cli.kernels import Vector
-from podusv_cli.recording import Recording
 from podusv_cli.vessels.vessel import Vessel
 
 

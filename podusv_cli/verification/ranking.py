@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 
-from podusv_cli.verification.convergence import Estimate
+from podusv_cli.verification.richardson import Estimate
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from podusv_cli.config.scenario import Scenario
 from podusv_cli.metrics.table import METRICS
-from podusv_cli.verification.convergence import Estimate, estimate, estimate_position
-from podusv_cli.verification.independent import Independent, integrate, left_out
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.verification.dop853 import Independent, integrate, left_out
 from podusv_cli.verification.ranking import Ranking, ranking
-from podusv_cli.verification.refining import Level, run_level
+from podusv_cli.verification.richardson import Estimate, estimate, estimate_position
+from podusv_cli.verification.step_halving import Level, run_level
 
 LEVELS = 3
 POSITION = "end_position"  # a number of its own beside the metrics

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from podusv_cli.kernels import Vector, kernel
-from podusv_cli.kinematics import earth_velocity
+from podusv_cli.core.kernel import Vector, kernel
+from podusv_cli.core.kinematics import earth_velocity
 
 
 @kernel

@@ -6,7 +6,7 @@ from typing import Any, Self
 
 from pydantic import model_validator
 
-from podusv_cli.registry import Component, value
+from podusv_cli.core.component import Component, value
 
 INERTIA = ("m11", "m22", "m23", "m32", "m33")
 

@@ -16,7 +16,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from podusv_cli.logbook.packing import fletcher32
+from podusv_cli.storage.packing import fletcher32
 
 Damage = Callable[[Path, str], None]
 Change = Callable[[h5py.File], object]

@@ -23,9 +23,9 @@ from typing import Any
 from counting import counted
 from damages import DAMAGES
 
-from podusv_cli import comparing
-from podusv_cli.errors import PodusvError
-from podusv_cli.logbook import reading
+from podusv_cli.core.errors import PodusvError
+from podusv_cli.storage import log_reader
+from podusv_cli.workflows import comparing
 
 HOLE = 2**40  # bytes, none of them on the disk
 MEBIBYTE = 1024 if sys.platform == "linux" else 1024**2  # in units of ru_maxrss
@@ -54,7 +54,7 @@ def opened(folder: Path) -> tuple[Any, ...]:
     assert part.run
     log = part.run.recording
     numbers = {name: array.tobytes() for name, array in {**log.signals, **log.fixed}.items()}
-    text = reading.resolved_yaml(folder / "log.h5")
+    text = log_reader.resolved_yaml(folder / "log.h5")
     return numbers, log.status, log.controller, log.message, text, part.run.metrics, part.scenario
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from podusv_cli.controllers.pid import Pid
-from podusv_cli.kernels import Vector, kernel
+from podusv_cli.core.kernel import Vector, kernel
 
 BEGIN, END = 0.4999, 0.5001
 MANY = 100_000_000

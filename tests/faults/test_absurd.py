@@ -11,14 +11,14 @@ from typing import Any
 
 import pytest
 from command_samples import BASE, Command, write
-from config_samples import loaded
 from counting import counted
-from logbook_samples import deadline
+from scenario_samples import loaded
+from storage_samples import deadline
 
-from podusv_cli import comparing, running
-from podusv_cli.config import size
-from podusv_cli.config.loading import load
-from podusv_cli.config.size import estimate
+from podusv_cli.scenario import limits
+from podusv_cli.scenario.limits import estimate
+from podusv_cli.scenario.load import load
+from podusv_cli.workflows import comparing, execute
 
 LAW = BASE.replace("{kind: pid, K_Pu: 100.0}", "{kind: adaptive_neural}")
 pytestmark = pytest.mark.usefixtures("tidy")
@@ -77,7 +77,7 @@ def begun(podusv: Command) -> None:
 @pytest.fixture
 def idle(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing is simulated, whatever is not refused."""
-    for module in (comparing, running):
+    for module in (comparing, execute):
         monkeypatch.setattr(module, "warm_up", lambda _: pytest.fail("begun"))
 
 
@@ -141,8 +141,8 @@ def test_validate_shows_what_a_large_run_takes(podusv: Command) -> None:
 @pytest.fixture
 def modest(podusv: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     """A hundred steps are many, and so are a thousand bytes."""
-    monkeypatch.setattr(size, "MOST_STEPS", 99)
-    monkeypatch.setattr(size, "MOST_CONTENT", 1000)
+    monkeypatch.setattr(limits, "MOST_STEPS", 99)
+    monkeypatch.setattr(limits, "MOST_CONTENT", 1000)
 
 
 @pytest.mark.usefixtures("modest")
@@ -191,8 +191,8 @@ control: {{period: {shape["period"]}}}
 log: {{every: {shape["every"]}, monitor: {shape["monitor"]}}}
 """
     scenario = loaded(text).scenario
-    recording = running.simulated(scenario, running.Stopwatch())
-    recording, _ = running.monitored(scenario, recording)
+    recording = execute.simulated(scenario, execute.Stopwatch())
+    recording, _ = execute.monitored(scenario, recording)
     expected = estimate(scenario)
     assert expected.steps == 10
     assert expected.rows == len(recording["time"])

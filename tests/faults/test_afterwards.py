@@ -11,13 +11,13 @@ from typing import Any, NoReturn
 import pytest
 from command_samples import BASE, Command, write
 
-from podusv_cli import comparing, running
 from podusv_cli.comparison import claims, report, table
-from podusv_cli.errors import StorageError
+from podusv_cli.core.errors import StorageError
 from podusv_cli.figures.drawing import FIGURES
-from podusv_cli.logbook import manifest
-from podusv_cli.logbook.folder import open_run
+from podusv_cli.storage import manifest
+from podusv_cli.storage.run_folder import open_run
 from podusv_cli.theory import monitor
+from podusv_cli.workflows import comparing, execute
 
 ADAPTIVE = BASE.replace("{kind: pid, K_Pu: 100.0}", "{kind: adaptive_neural}")
 TWO = ADAPTIVE + "controllers: {one: {}, other: {k_ue: 5.0}}\n"
@@ -33,11 +33,11 @@ def broken(*given: Any, **more: Any) -> NoReturn:
 
 BUG = "could not be made: ArithmeticError: planted here (test_afterwards.py, line "
 AFTER_A_RUN = {
-    "the metrics": (running, "summarise"),
-    "law_ns": (running, "law_costs"),
-    "warnings": (running, "aftermath"),
+    "the metrics": (execute, "summarise"),
+    "law_ns": (execute, "law_costs"),
+    "warnings": (execute, "aftermath"),
     "theory.json with the stability monitor's signals": (monitor, "ideal_weights"),
-    "figures": (running, "_drawn"),
+    "figures": (execute, "_drawn"),
 }
 AFTER_RUNS = {
     "law_ns": (comparing, "law_costs"),
@@ -97,7 +97,7 @@ def test_json_and_a_complete_run_say_what_is_missing(
     words = ("run", write("a.yaml", ADAPTIVE), "--json", "--no-figures", "--out")
     assert json.loads(podusv(*words, "x").out)["missing"] == []
     assert not Path("x/missing.json").exists()
-    monkeypatch.setattr(running, "summarise", broken)
+    monkeypatch.setattr(execute, "summarise", broken)
     (told,) = json.loads(podusv(*words, "y").out)["missing"]
     assert told.startswith(f"the metrics {BUG}")
 

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 from command_samples import BASE, ROOT, write
 
-from podusv_cli.engine import code_folder, machine_code
+from podusv_cli.engine import code_folder, object_cache
 
 FRESH = code_folder.code_folder
 NAME = "0123456789abcdef"
@@ -77,7 +77,7 @@ def test_damage_races_and_missing_places_change_no_byte(folder: Path) -> None:
     pieces[0].unlink()
     pieces[0].mkdir()  # where the piece should be: no reading, no replacing
     assert log(begun("d", PODUSV_CACHE=str(cache))) == first
-    assert all(machine_code._read(path) for path in pieces[1:])  # mended on the way
+    assert all(object_cache._read(path) for path in pieces[1:])  # mended on the way
 
 
 def test_pieces_swapped_are_not_taken_for_each_other(folder: Path) -> None:
@@ -189,24 +189,24 @@ def test_no_piece_is_read_that_is_a_link_a_pipe_or_anothers(
     monkeypatch.setenv("PODUSV_CACHE", str(folder / "cache"))
     place = FRESH(NAME)
     assert place is not None
-    code = machine_code.Code("symbol", b"code")
+    code = object_cache.Code("symbol", b"code")
     piece, link, pipe = (place / f"{name}.code" for name in ("piece", "link", "pipe"))
-    machine_code._write(piece, code)
-    machine_code._write(link, code)
-    assert (machine_code._read(piece), machine_code._read(link)) == (code, code)
+    object_cache._write(piece, code)
+    object_cache._write(link, code)
+    assert (object_cache._read(piece), object_cache._read(link)) == (code, code)
     link.rename(folder / "elsewhere")
     link.symlink_to(folder / "elsewhere")
     os.mkfifo(pipe, 0o600)
-    assert machine_code._read(link) is None
-    assert machine_code._read(pipe) is None
+    assert object_cache._read(link) is None
+    assert object_cache._read(pipe) is None
     for mode in (0o606, 0o660):
         piece.chmod(mode)
-        assert machine_code._read(piece) is None
+        assert object_cache._read(piece) is None
     piece.chmod(0o600)
     with monkeypatch.context() as other:
         other.setattr(os, "getuid", lambda: 12345)
-        assert machine_code._read(piece) is None
+        assert object_cache._read(piece) is None
     place.chmod(0o777)
-    assert machine_code._read(piece) is None
+    assert object_cache._read(piece) is None
     place.chmod(0o700)
-    assert machine_code._read(piece) == code
+    assert object_cache._read(piece) == code

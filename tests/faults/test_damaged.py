@@ -18,12 +18,12 @@ from counts import count
 from damages import FOREIGN, HDF5, INDEX, OTHERS, PIPE, TEXTS, YAML
 from damaging import __file__ as DAMAGING
 from damaging import damaged
-from logbook_samples import ENVIRONMENT, deadline, files
-from repetition_samples import copied, made, relogged
+from rerun_samples import copied, made, relogged
+from storage_samples import ENVIRONMENT, deadline, files
 
-from podusv_cli import comparing
-from podusv_cli.errors import StorageError, UsageError
-from podusv_cli.logbook import manifest
+from podusv_cli.core.errors import StorageError, UsageError
+from podusv_cli.storage import manifest
+from podusv_cli.workflows import comparing
 
 SCENARIO = """
 name: whole

@@ -18,20 +18,20 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from config_samples import SOUND
 from conftest import ROOMS, corrected, example, kinds
+from scenario_samples import SOUND
 
 from podusv_cli.actuators.saturated import Saturated
-from podusv_cli.config.loading import load, load_text
+from podusv_cli.comparison.log_difference import compare
+from podusv_cli.comparison.run_difference import CLOCKED
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import ClosedLoop, simulate
-from podusv_cli.logbook.reading import read_log
-from podusv_cli.logbook.regular import fingerprint
-from podusv_cli.metrics.watching import observer
-from podusv_cli.parallel import run_all
-from podusv_cli.repetition.difference import CLOCKED
-from podusv_cli.repetition.logs import compare
-from podusv_cli.running import Task, execute
+from podusv_cli.metrics.accumulators import observer
+from podusv_cli.process.workers import run_all
+from podusv_cli.scenario.load import load, load_text
+from podusv_cli.storage.log_reader import read_log
+from podusv_cli.storage.regular import fingerprint
+from podusv_cli.workflows.execute import Task, execute
 
 ROOT = Path(__file__).parents[2]
 CORRECTED = str(ROOT / "configs/paper/corrected.yaml")

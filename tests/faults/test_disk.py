@@ -15,7 +15,6 @@ import pytest
 from children import in_a_child, needs_mount, small_disk
 from command_samples import BASE, ROOT, Command, Said, one_line, write
 from counts import count
-from logbook_samples import deadline, files
 from old_results import (
     COMMANDS,
     SUCCESS,
@@ -24,10 +23,11 @@ from old_results import (
     bring_back,
     left_over,
 )
+from storage_samples import deadline, files
 
-from podusv_cli.engine import code_folder, machine_code
-from podusv_cli.engine.machine_code import Code
-from podusv_cli.logbook import manifest
+from podusv_cli.engine import code_folder, object_cache
+from podusv_cli.engine.object_cache import Code
+from podusv_cli.storage import manifest
 
 FULL = Path("/dev/full")
 needs_full = pytest.mark.skipif(not FULL.exists(), reason="there is no /dev/full")
@@ -105,8 +105,8 @@ def test_a_full_disk_for_compiled_code_costs_time_and_nothing_else(
         folder = code_folder.code_folder.__wrapped__("0123456789abcdef")
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(code_folder, "code_folder", lambda name: folder)
-            patch.setattr(machine_code, "_loaded", lambda prototype, code: code)
-            made = machine_code.stored(None, "law", lambda: law)
+            patch.setattr(object_cache, "_loaded", lambda prototype, code: code)
+            made = object_cache.stored(None, "law", lambda: law)
         return {path.name for path in folder.iterdir()}, made == law
 
     assert in_a_child(on_a_small_disk) == ({code_folder.MARK}, True)

@@ -12,13 +12,13 @@ import pytest
 from command_samples import BASE, Command, commanded, write
 from conftest import Constant, adrift, corrected, run
 
-from podusv_cli.engine import blocks
-from podusv_cli.engine.asking import check_law
+from podusv_cli.core.errors import LawError
+from podusv_cli.engine import march
 from podusv_cli.engine.batch import simulate_many
+from podusv_cli.engine.check import check_law
 from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.errors import LawError
-from podusv_cli.logbook import manifest
-from podusv_cli.logbook.folder import open_run
+from podusv_cli.storage import manifest
+from podusv_cli.storage.run_folder import open_run
 
 QUICK = 0.4  # s of computing; what a law may take in these tests
 
@@ -28,7 +28,7 @@ def podusv(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> Command:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(blocks, "PATIENCE", QUICK)
+    monkeypatch.setattr(march, "PATIENCE", QUICK)
     return commanded(monkeypatch, capsys)
 
 
@@ -117,7 +117,7 @@ def test_in_a_batch_one_law_that_does_not_return_costs_no_other_run(
     class Stubborn(Constant):
         law = staticmethod(faulty_laws.slow_when_told)
 
-    monkeypatch.setattr(blocks, "PATIENCE", QUICK)
+    monkeypatch.setattr(march, "PATIENCE", QUICK)
     loops = [adrift(controller=Stubborn(surge=surge)) for surge in (1.0, 2.0, 3.0)]
     batch = simulate_many(loops, TimeGrid(0.01, 100), workers=2)
     assert batch.status.tolist() == ["finished", "diverged", "finished"]
@@ -135,7 +135,7 @@ def test_computing_counts_and_not_the_clock(monkeypatch: pytest.MonkeyPatch) -> 
                 time.sleep(1.0)
             tau[:] = 0.0
 
-    monkeypatch.setattr(blocks, "PATIENCE", 0.3)
+    monkeypatch.setattr(march, "PATIENCE", 0.3)
     assert run(adrift(controller=Waiting()), 0.1, compiled=False).status == "finished"
 
 

@@ -10,10 +10,10 @@ import pytest
 from children import give_up_rights, in_a_child
 from command_samples import LONG, TWO, Command, Said, one_line, write
 from counts import count
-from logbook_samples import deadline
+from storage_samples import deadline
 
-from podusv_cli import comparing, repeating, running
 from podusv_cli.figures import drawing
+from podusv_cli.workflows import comparing, execute, rerun
 
 MINUTES = LONG + TWO.splitlines()[-1] + "\n"
 RUN, COMPARE = ("run", "long.yaml", "--no-figures"), ("compare", "long.yaml", "--no-figures")
@@ -56,8 +56,8 @@ ITSELF = [(*words, "--out", "place") for words in (RUN, COMPARE, *RERUNS, ("plot
 def podusv(beside_old_results: Command, monkeypatch: pytest.MonkeyPatch) -> Command:
     write("long.yaml", MINUTES)
     Path().chmod(0o755)
-    monkeypatch.setattr(running, "simulate", begun)
-    for room in (comparing, repeating):  # whose runs are made in processes of their own
+    monkeypatch.setattr(execute, "simulate", begun)
+    for room in (comparing, rerun):  # whose runs are made in processes of their own
         monkeypatch.setattr(room, "run_all", begun)
         monkeypatch.setattr(room, "warm_up", begun)
     monkeypatch.setattr(drawing, "draw_in_parallel", begun)

@@ -27,12 +27,12 @@ from command_samples import (
     wait_for,
     write,
 )  # fmt: skip
-from logbook_samples import files
+from storage_samples import files
 
-from podusv_cli import comparing, running
-from podusv_cli.logbook import manifest
-from podusv_cli.logbook.folder import open_run
-from podusv_cli.parallel import INTERRUPTED, Outcome
+from podusv_cli.process.workers import INTERRUPTED, Outcome
+from podusv_cli.storage import manifest
+from podusv_cli.storage.run_folder import open_run
+from podusv_cli.workflows import comparing, execute
 
 
 @pytest.fixture
@@ -106,7 +106,7 @@ def soon(number: signal.Signals, work: Callable[..., object]) -> Callable[..., o
 def test_an_interrupted_run_is_kept(
     podusv: Command, number: signal.Signals, code: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(running, "simulate", soon(number, running.simulate))
+    monkeypatch.setattr(execute, "simulate", soon(number, execute.simulate))
     said = podusv("run", write("long.yaml", LONG), "--out", "x")
     assert said.code == code
     assert said.err.startswith("long.yaml: interrupted after t = ")
@@ -119,7 +119,7 @@ def test_an_interrupted_run_takes_no_finished_ones_place(
 ) -> None:
     assert podusv("run", write("short.yaml", BASE), "--out", "x", "--no-figures").code == 0
     old = files(Path("x"))
-    monkeypatch.setattr(running, "simulate", soon(signal.SIGINT, running.simulate))
+    monkeypatch.setattr(execute, "simulate", soon(signal.SIGINT, execute.simulate))
     said = podusv("run", write("long.yaml", LONG), "--out", "x", "--force")
     assert (said.code, said.out) == (130, "pid interrupted: x-2\n")
     assert files(Path("x")) == old
@@ -132,8 +132,8 @@ def test_a_fault_after_an_interrupt_is_told(
     def faulty(*args: object) -> None:
         raise TypeError("no such thing")
 
-    monkeypatch.setattr(running, "simulate", soon(signal.SIGINT, running.simulate))
-    monkeypatch.setattr(running, "_beyond", faulty)
+    monkeypatch.setattr(execute, "simulate", soon(signal.SIGINT, execute.simulate))
+    monkeypatch.setattr(execute, "_beyond", faulty)
     said = podusv("run", write("long.yaml", LONG), "--out", "x")
     assert said == (130, "", "podusv: interrupted, and then TypeError: no such thing\n")
     assert not Path("x").exists()
@@ -144,7 +144,7 @@ def test_a_fault_after_an_interrupt_is_told(
 def test_a_run_that_is_interrupted_after_its_simulation_is_whole(
     podusv: Command, number: signal.Signals, code: int, stage: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(running, stage, soon(number, lambda *given: time.sleep(60)))
+    monkeypatch.setattr(execute, stage, soon(number, lambda *given: time.sleep(60)))
     said = podusv("run", write("short.yaml", BASE), "--out", "x")
     assert said.code == code
     assert said.err.startswith("short.yaml: interrupted after the simulation; the log is whole")

@@ -17,7 +17,6 @@ import pytest
 from children import Died, begun, in_a_child
 from command_samples import Command
 from counts import count
-from logbook_samples import Saboteur, files, until_nothing_breaks
 from old_results import (
     COMMANDS,
     SUCCESS,
@@ -25,9 +24,10 @@ from old_results import (
     bring_back,
     left_over,
 )
+from storage_samples import Saboteur, files, until_nothing_breaks
 
-from podusv_cli.engine import code_folder, machine_code
-from podusv_cli.parts import part_name
+from podusv_cli.engine import code_folder, object_cache
+from podusv_cli.process.temporary_names import part_name
 
 CALLS = ("mkdir", "open", "write", "fsync", "replace", "rename", "unlink", "rmdir")
 
@@ -95,14 +95,14 @@ def test_no_piece_of_code_is_left_half_written(
 ) -> None:
     monkeypatch.setenv("PODUSV_CACHE", str(tmp_path))
     found = partial(code_folder.code_folder.__wrapped__, "0123456789abcdef")
-    path, piece = found() / "law.code", machine_code.Code("law", b"\x90" * 1000)
+    path, piece = found() / "law.code", object_cache.Code("law", b"\x90" * 1000)
 
     def attempt(saboteur: Saboteur) -> None:
         path.unlink(missing_ok=True)
 
         def keep() -> int:
             saboteur.watch(pytest.MonkeyPatch(), *CALLS)
-            machine_code._write(path, piece)
+            object_cache._write(path, piece)
             return saboteur.left
 
         try:
@@ -114,9 +114,9 @@ def test_no_piece_of_code_is_left_half_written(
     for _ in until_nothing_breaks(attempt, kill):
         found()  # as the next process does
         assert {each.name for each in path.parent.iterdir()} <= {path.name, code_folder.MARK}
-        seen.append(machine_code._read(path))
+        seen.append(object_cache._read(path))
     assert set(seen) == {None}
-    assert machine_code._read(path) == piece
+    assert object_cache._read(path) == piece
 
 
 def test_what_others_may_be_making_is_left_alone(podusv: Command) -> None:

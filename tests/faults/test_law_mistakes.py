@@ -15,12 +15,12 @@ from conftest import Constant, adrift
 
 from podusv_cli.controllers.base import Controller
 from podusv_cli.controllers.pid import Pid
-from podusv_cli.engine.asking import check_law
+from podusv_cli.core.component import catalogue
+from podusv_cli.core.errors import LawError
+from podusv_cli.core.kernel import Vector, kernel
+from podusv_cli.engine.check import check_law
 from podusv_cli.engine.simulate import ClosedLoop, Observer, marcher
-from podusv_cli.errors import LawError
-from podusv_cli.kernels import Vector, kernel
-from podusv_cli.logbook.soundness import check_declared
-from podusv_cli.registry import catalogue
+from podusv_cli.storage.log_check import check_declared
 from podusv_cli.vessels.vessel import Vessel
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from command_samples import BASE, Command, commanded, write
 
-from podusv_cli.logbook import manifest
+from podusv_cli.storage import manifest
 
 
 @pytest.fixture

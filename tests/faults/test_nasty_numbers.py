@@ -23,11 +23,11 @@ from command_samples import ROOT
 from counts import count
 
 from podusv_cli import cli
-from podusv_cli.config.loading import load, resolved_yaml
-from podusv_cli.logbook import provenance
 from podusv_cli.metrics import cost
-from podusv_cli.parallel import workers_here
-from podusv_cli.running import warm_up
+from podusv_cli.process.workers import workers_here
+from podusv_cli.scenario.load import load, resolved_yaml
+from podusv_cli.storage import provenance
+from podusv_cli.workflows.execute import warm_up
 
 VALUES = (
     "0", "-0.0", "5e-324", "1e-300", "1e-9", "-1.0", "1e9", "1e30", "1e150", "1e200", "1.7e308",

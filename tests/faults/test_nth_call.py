@@ -12,26 +12,28 @@ from typing import Any
 import pytest
 from command_samples import Command, Said
 from counts import count
-from logbook_samples import Saboteur, fails, files
 from old_results import COMMANDS, SUCCESS, assert_nothing_lost, bring_back
+from storage_samples import Saboteur, fails, files
 
-from podusv_cli import comparing, parallel, repeating
-from podusv_cli.interrupts import Interrupts
-from podusv_cli.logbook import atomic, provenance
+from podusv_cli.process import workers
+from podusv_cli.process.interrupts import Interrupts
+from podusv_cli.storage import files as atomic
+from podusv_cli.storage import provenance
+from podusv_cli.workflows import comparing, rerun
 
 NAMING = ("replace", "rename")
 FILLING = ("write", "fsync")
 
 
-def one_by_one(jobs: Sequence[parallel.Job], *more: object) -> list[parallel.Outcome]:
+def one_by_one(jobs: Sequence[workers.Job], *more: object) -> list[workers.Outcome]:
     """The jobs of a comparison in this process, where their calls are counted."""
-    return [parallel._outcome(job, lambda fraction: None, Interrupts()) for job in jobs]
+    return [workers._outcome(job, lambda fraction: None, Interrupts()) for job in jobs]
 
 
 @pytest.fixture
 def podusv(beside_old_results: Command, monkeypatch: pytest.MonkeyPatch) -> Command:
     monkeypatch.setattr(provenance, "collect", lambda *of_a_run: {})  # which takes its time
-    for room in (comparing, repeating):
+    for room in (comparing, rerun):
         monkeypatch.setattr(room, "run_all", one_by_one)
     return beside_old_results
 

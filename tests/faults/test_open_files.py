@@ -13,9 +13,9 @@ import pytest
 from command_samples import ROOT, TWO, write
 from counts import count
 
-from podusv_cli.cli.guard import LEAST_OPEN_FILES
-from podusv_cli.logbook import manifest
-from podusv_cli.parallel import run_all
+from podusv_cli.cli.exit_codes import LEAST_OPEN_FILES
+from podusv_cli.process.workers import run_all
+from podusv_cli.storage import manifest
 
 CONFIG = TWO.replace("duration: 1.0", "duration: 0.1, compiled: false")
 COMMANDS = [("run", "two.yaml", "--out", "x"), ("compare", "two.yaml", "--out", "x")]

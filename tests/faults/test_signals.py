@@ -28,8 +28,8 @@ from command_samples import (
     write,
 )  # fmt: skip
 
-from podusv_cli.logbook import manifest
-from podusv_cli.logbook.folder import open_run
+from podusv_cli.storage import manifest
+from podusv_cli.storage.run_folder import open_run
 
 INTERRUPTS = pytest.mark.parametrize(("number", "code"), SIGNALS)
 SLOW_MODULE = """

@@ -11,10 +11,10 @@ import pytest
 from children import FORK, begun
 from command_samples import Command, Said, one_line
 from counts import count
-from logbook_samples import files
 from old_results import bring_back, left_over
+from storage_samples import files
 
-from podusv_cli.logbook import folder, manifest
+from podusv_cli.storage import manifest, run_folder
 
 RUN = ("run", "a.yaml", "--no-figures")
 COMPARE = ("compare", "two.yaml", "--no-figures")
@@ -48,7 +48,7 @@ def test_without_a_name_each_gets_a_folder_of_its_own(
     podusv: Command, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...]
 ) -> None:
     """Also in the same second."""
-    monkeypatch.setattr(folder, "datetime", Clock)
+    monkeypatch.setattr(run_folder, "datetime", Clock)
     said = at_once(podusv, *[(*words, "-q")] * 4)
     assert [each.code for each in said] == [0] * 4
     assert {Path(each.out.strip()) for each in said} == set(Path("results").glob("*/*"))

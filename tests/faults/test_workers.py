@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 from command_samples import BASE, LONG, PATIENCE, gone, under_way, wait_for, write
 
-from podusv_cli.logbook import manifest
-from podusv_cli.parallel import run_all
+from podusv_cli.process.workers import run_all
+from podusv_cli.storage import manifest
 
 PROC = Path("/proc")
 pytestmark = pytest.mark.skipif(not PROC.is_dir(), reason="looks for workers in /proc")

@@ -15,12 +15,12 @@ from pathlib import Path
 import pytest
 from counting import counted
 from counts import count
-from logbook_samples import deadline
+from storage_samples import deadline
 
 import podusv_cli
 from podusv_cli.comparison.claims import misfits
-from podusv_cli.config.loading import load
-from podusv_cli.errors import ScenarioError
+from podusv_cli.core.errors import ScenarioError
+from podusv_cli.scenario.load import load
 
 CONFIGS = Path(podusv_cli.__file__).parents[1] / "configs"
 MEBIBYTE = 1024 if sys.platform == "linux" else 1024**2  # in units of ru_maxrss

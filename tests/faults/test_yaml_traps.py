@@ -8,7 +8,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 import pytest
-from config_samples import SOUND, loaded, told
+from scenario_samples import SOUND, loaded, told
 
 BOMB = "".join(f"{c}: &{c} [{', '.join([f'*{b}'] * 9)}]\n" for b, c in pairwise("abcdefghi"))
 TRAPS = {

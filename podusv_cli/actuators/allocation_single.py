@@ -1,0 +1,60 @@
+"""Allocation for one pod on the centre line, in closed form."""
+
+from __future__ import annotations
+
+import math
+
+from podusv_cli.core.kernel import Vector, kernel
+from podusv_cli.core.kinematics import direction
+
+YAW = 0.0
+
+
+@kernel
+def within(number: float, low: float, high: float) -> float:
+    """The nearest number between low and high."""
+    return min(max(number, low), high)
+
+
+@kernel
+def one_pod(
+    X: float, Y: float, low: float, high: float, most_astern: float, most_ahead: float,
+    priority: float, out: Vector,
+) -> None:  # fmt: skip
+    """Thrust [N] and angle [rad] for the force (X, Y) [N] at the pod, into `out`.
+
+    Angles reach from `low` to `high`, inside a right angle to either side; thrust from
+    -`most_astern` to `most_ahead`. X < 0 is done by thrust astern, not by turning the pod round.
+    Out of reach, `priority` says which of Y (the yaw moment) and X is met as far as can be; the
+    other comes as near as that leaves it.
+    """
+    side = 1.0 if X >= 0.0 else -1.0
+    most = most_ahead if X >= 0.0 else most_astern
+    along, across = side * X, side * Y
+    if priority == YAW:
+        across = within(across, min(0.0, most * math.sin(low)), max(0.0, most * math.sin(high)))
+        along = _along_beside(along, across, low, high, most)
+    else:
+        along = min(along, most * math.cos(within(0.0, low, high)))
+        room = math.sqrt(max(0.0, most * most - along * along))
+        least = max(along * math.tan(low), -room)
+        across = within(across, least, min(along * math.tan(high), room))
+    out[0] = side * math.sqrt(along * along + across * across)
+    out[1] = within(direction(along, across), low, high)
+
+
+@kernel
+def _along_beside(along: float, across: float, low: float, high: float, most: float) -> float:
+    """The nearest force along that the sector allows beside this force across."""
+    least, largest = 0.0, math.sqrt(max(0.0, most * most - across * across))
+    if across > 0.0:
+        least = across / math.tan(high)
+        if low > 0.0:
+            largest = min(largest, across / math.tan(low))
+    if across < 0.0:
+        least = across / math.tan(low)
+        if high < 0.0:
+            largest = min(largest, across / math.tan(high))
+    if across == 0.0 and (low > 0.0 or high < 0.0):
+        largest = 0.0
+    return within(along, least, max(least, largest))

@@ -1,0 +1,133 @@
+"""Plain text in the terminal's width, the same in a pipe."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+import textwrap
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, TextIO
+
+import typer
+
+from podusv_cli.core.escaping import visible
+
+WIDEST = 100
+SPACE = "  "  # between the columns of a table
+
+
+def echo(*lines: object, err: bool = False) -> None:
+    """Lines, on stderr where `err`; what users wrote moves no cursor and adds no line."""
+    typer.echo("\n".join(map(visible, lines)), err=err)
+
+
+def echo_path(path: Path) -> None:
+    """A path alone, for scripts; byte for byte in a pipe, as `ls` does it."""
+    shown = visible(path).encode() if sys.stdout.isatty() else os.fsencode(path)
+    typer.echo(shown + b"\n", nl=False)
+
+
+def echo_entry(name: str, *lines: str, facts: str = "") -> None:
+    """An entry: its name (bold on a terminal) and facts, then lines below, indented and wrapped."""
+    width = _width()
+    name, facts, lines = visible(name), visible(facts), tuple(map(visible, lines))
+
+    def wrapped(text: str, indent: str) -> str:
+        return textwrap.fill(
+            text, width, initial_indent=indent, subsequent_indent="    ", break_on_hyphens=False
+        )
+
+    head = wrapped(f"{name}  {facts}".rstrip(), "")
+    typer.echo(
+        head.replace(name, typer.style(name, bold=True), 1) if takes_codes(sys.stdout) else head
+    )
+    for line in filter(None, lines):
+        typer.echo(wrapped(line, "    "))
+
+
+def takes_codes(stream: TextIO) -> bool:
+    """Whether this is a terminal that takes codes, and nobody asked for plain text (NO_COLOR)."""
+    wanted = os.environ.get("TERM", "") not in ("", "dumb") and not os.environ.get("NO_COLOR")
+    return wanted and stream.isatty()
+
+
+def echo_table(head: list[str], rows: list[list[str]]) -> None:
+    """A table in columns, whole in a pipe.
+
+    Where the terminal is too narrow for it, it is cut into tables below each other, each with the
+    first two columns; where it is too narrow even for one further column, a block for each row.
+    """
+    head, rows = [*map(visible, head)], [[*map(visible, row)] for row in rows]
+    widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
+    room = shutil.get_terminal_size().columns if sys.stdout.isatty() else sys.maxsize
+    if sum(widths[:2]) + max(widths[2:]) + 2 * len(SPACE) > room:
+        _echo_blocks(head, rows)
+        return
+    for place, part in enumerate(_parts(widths, room)):
+        if place:
+            typer.echo("")
+        for row in (head, *rows):
+            typer.echo(SPACE.join(row[i].ljust(widths[i]) for i in part).rstrip())
+
+
+def _parts(widths: list[int], room: int) -> Iterator[list[int]]:
+    """The columns of each table, as many as there is room for, after the first two."""
+    part = [0, 1]
+    for i in range(2, len(widths)):
+        if sum(widths[j] for j in (*part, i)) + len(SPACE) * len(part) > room:
+            yield part
+            part = [0, 1]
+        part.append(i)
+    yield part
+
+
+def _echo_blocks(head: list[str], rows: list[list[str]]) -> None:
+    for row in rows:
+        cells = [f"{title} {cell}" for title, cell in zip(head[2:], row[2:], strict=True)]
+        echo_entry(row[0], ", ".join(cells), facts=f"[{row[1]}]")
+
+
+def echo_line(text: str, *, err: bool = False) -> None:
+    """One line, on stderr where `err`; wrapped and indented on a terminal, whole in a pipe."""
+    text = visible(text)
+    if (sys.stderr if err else sys.stdout).isatty():
+        text = folded(text, _width())
+    typer.echo(text, err=err)
+
+
+def folded(text: str, width: int) -> str:
+    """A line wrapped at words, the rest of it indented by two."""
+    return textwrap.fill(text, width, subsequent_indent="  ", break_on_hyphens=False)
+
+
+def _width() -> int:
+    return max(20, min(WIDEST, shutil.get_terminal_size().columns))
+
+
+def warn_of(differences: Mapping[str, Mapping[str, Any]]) -> None:
+    """Show on stderr what compared runs differ in besides the controller."""
+    from podusv_cli.comparison.differences import in_words
+
+    if differences:
+        echo("warning: the runs differ in more than the controller:", err=True)
+    for key, values in in_words(differences).items():
+        shown = ", ".join(f"{label} {value}" for label, value in values.items())
+        echo(f"  {key}: {shown}", err=True)
+
+
+class Warned:
+    """Shows warnings on stderr, each once; none where `quiet`."""
+
+    def __init__(self, quiet: bool = False) -> None:
+        """Nothing has been shown yet."""
+        self._quiet = quiet
+        self._shown: set[str] = set()
+
+    def __call__(self, finding: object) -> None:
+        """Show one."""
+        line = str(finding)
+        if line not in self._shown and not self._quiet:
+            echo_line(line, err=True)
+        self._shown.add(line)

@@ -1,0 +1,88 @@
+"""Everything that two finished runs differ in."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from podusv_cli.comparison.causes import Change, scenario_changes, version_changes
+from podusv_cli.comparison.log_difference import Logs, compare
+from podusv_cli.metrics.table import CLOCKED, METRICS
+from podusv_cli.storage import log_reader, manifest
+from podusv_cli.storage.run_folder import LOG, Run
+
+Numbers = tuple[float | None, float | None]
+
+
+@dataclass(frozen=True)
+class Difference:
+    """What two runs differ in; `digests` are SHA-256 of their logs, `sizes` their bytes.
+
+    `metrics` has the numbers of both by name, None where a run has none.
+    """
+
+    log: Logs
+    digests: tuple[str, str]
+    sizes: tuple[int, int]
+    scenario: Mapping[str, Change]
+    versions: Mapping[str, Change]
+    metrics: Mapping[str, Numbers]
+
+    @property
+    def same_bytes(self) -> bool:
+        """Whether the log files are the same, byte for byte."""
+        return self.digests[0] == self.digests[1]
+
+    @property
+    def moved(self) -> list[str]:
+        """Metrics that differ, less those that a clock measured."""
+        return [k for k, (a, b) in self.metrics.items() if k not in CLOCKED and a != b]
+
+    @property
+    def nothing(self) -> bool:
+        """Whether scenario, every number of the log and the metrics are the same."""
+        return self.log.same and not self.scenario and not self.moved
+
+    def as_json(self) -> dict[str, Any]:
+        """The same as plain data."""
+        return {
+            "same_numbers": self.log.same,
+            "same_bytes": self.same_bytes,
+            "sha256": list(self.digests),
+            "scenario": {key: list(change) for key, change in self.scenario.items()},
+            "versions": {key: list(change) for key, change in self.versions.items()},
+            "metrics": {
+                name: {"values": list(pair), "relative": relative(*pair)}
+                for name, pair in self.metrics.items()
+            },
+            "log": self.log.as_json(),
+        }
+
+
+def relative(one: float | None, other: float | None) -> float | None:
+    """(other - one) / |one|; None where there is no such number."""
+    if one is None or other is None or (one == 0 and other != 0):
+        return None
+    return (other - one) / abs(one) if one else 0.0
+
+
+def difference(one: Run, other: Run) -> Difference:
+    """Compare two run folders that were opened. Raises StorageError."""
+    entries = [manifest.read(run.folder).files[LOG] for run in (one, other)]
+    texts = [log_reader.resolved_yaml(run.folder / LOG) for run in (one, other)]
+    names = [name for name in METRICS if name in one.metrics or name in other.metrics]
+    return Difference(
+        log=compare(one.recording, other.recording),
+        digests=(entries[0].sha256, entries[1].sha256),
+        sizes=(entries[0].bytes, entries[1].bytes),
+        scenario=scenario_changes(*texts),
+        versions=version_changes(one.provenance, other.provenance),
+        metrics={name: (_number(one, name), _number(other, name)) for name in names},
+    )
+
+
+def _number(run: Run, name: str) -> float | None:
+    number = run.metrics.get(name)
+    return number if number is None or math.isfinite(number) else None

@@ -1,0 +1,1 @@
+"""The ground floor: kernels, components, signals, recordings, errors."""

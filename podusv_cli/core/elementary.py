@@ -1,0 +1,72 @@
+"""Exponential, cosine and sine in plain arithmetic.
+
+The library's functions are calls, one number at a time. These are merged into the loops that use
+them, which then work on several numbers at once, and they give the same bits on every machine and
+in plain Python.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from podusv_cli.core.kernel import kernel
+
+ROUND = 1.5 * 2.0**52  # added and taken away again it leaves the nearest whole number
+SMALLEST = -708.0  # below, e^x is no normal number any more
+LARGEST_ANGLE = 1e15  # rad; beyond, neighbouring numbers are too far apart to be directions
+LOG2_E = 1.0 / math.log(2.0)
+# Long constants in parts, all but the last so short that a whole number times it is exact.
+LN2 = (float.fromhex("0x1.62e42feep-1"), float.fromhex("0x1.a39ef35793c76p-33"))
+QUARTER = (
+    float.fromhex("0x1.921fb544p+0"),
+    float.fromhex("0x1.0b4611a6p-34"),
+    float.fromhex("0x1.3198a2e037073p-69"),
+)
+E = tuple(1.0 / math.factorial(n) for n in range(18))  # coefficients of all three series
+
+
+@kernel
+def _cubic(x: float, x2: float, a: float, b: float, c: float, d: float) -> float:
+    return (a + x * b) + x2 * (c + x * d)
+
+
+@kernel
+def exponential(x: float) -> float:
+    """e^x for x <= 0, to one unit in the last place; 0 where that is no normal number."""
+    bound = SMALLEST if x < SMALLEST else x
+    z = bound * LOG2_E + ROUND
+    n = z - ROUND
+    r = (bound - n * LN2[0]) - n * LN2[1]
+    r2 = r * r
+    r4 = r2 * r2
+    low = _cubic(r, r2, E[2], E[3], E[4], E[5])
+    middle = _cubic(r, r2, E[6], E[7], E[8], E[9])
+    high = _cubic(r, r2, E[10], E[11], E[12], E[13])
+    series = 1.0 + (r + r2 * (low + r4 * (middle + r4 * high)))
+    # The last bits of z are n; in the place of the exponent they make 2^n.
+    power = np.int64((np.float64(z).view(np.int64) + 1023) << 52).view(np.float64)
+    return 0.0 if x < SMALLEST else series * power
+
+
+@kernel
+def cos_sin(angle: float) -> tuple[float, float]:
+    """Cosine and sine of `angle` [rad], to one unit in the last place.
+
+    Beyond 1e6 rad the angle itself is off by up to its last place; beyond 1e15 rad there are none.
+    """
+    angle = angle if abs(angle) <= LARGEST_ANGLE else math.nan
+    z = angle * (2.0 / math.pi) + ROUND
+    n = z - ROUND
+    r = ((angle - n * QUARTER[0]) - n * QUARTER[1]) - n * QUARTER[2]
+    q = -r * r
+    q2 = q * q
+    q4 = q2 * q2
+    even = _cubic(q, q2, E[2], E[4], E[6], E[8]) + q4 * _cubic(q, q2, E[10], E[12], E[14], E[16])
+    odd = _cubic(q, q2, E[3], E[5], E[7], E[9]) + q4 * _cubic(q, q2, E[11], E[13], E[15], E[17])
+    cosine, sine = 1.0 + q * even, r + r * q * odd
+    quarters = np.float64(z).view(np.int64)  # its last two bits count quarter turns
+    if quarters & 1:
+        cosine, sine = -sine, cosine
+    return (-cosine, -sine) if quarters & 2 else (cosine, sine)

@@ -1,0 +1,80 @@
+"""What comes out of a simulation: named arrays over time, and how it ended."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Literal, Protocol, Self
+
+import numpy as np
+
+from podusv_cli.core.kernel import Vector
+
+Status = Literal["finished", "diverged", "interrupted"]
+BLOCK = 2**16  # rows that are looked at together; a long run's columns may be longer than memory
+
+
+class Columns(Protocol):
+    """Arrays by name that grow by rows."""
+
+    def append(self, rows: Mapping[str, Vector]) -> None:
+        """More rows, the same names and as many of each; theirs again once this returns."""
+
+    def whole(self) -> dict[str, Vector]:
+        """Everything that was appended."""
+
+
+class InMemory:
+    """Columns in memory, for rows that nobody writes to afterwards."""
+
+    def __init__(self) -> None:
+        """Nothing so far."""
+        self._parts: dict[str, list[Vector]] = {}
+
+    def append(self, rows: Mapping[str, Vector]) -> None:
+        """More rows."""
+        for name, array in rows.items():
+            self._parts.setdefault(name, []).append(array)
+
+    def whole(self) -> dict[str, Vector]:
+        """All rows."""
+        return {name: np.concatenate(parts) for name, parts in self._parts.items()}
+
+
+def blocks(rows: int, size: int = BLOCK) -> Iterator[slice]:
+    """The rows in parts of `size`, the last one shorter."""
+    return (slice(first, min(first + size, rows)) for first in range(0, rows, size))
+
+
+def largest(rows: int, of: Callable[[slice], Vector]) -> float:
+    """The largest |.| of what `of` gives for every block of the rows; NaN without any."""
+    return float(np.max([np.max(np.abs(of(part))) for part in blocks(rows)] or [np.nan]))
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Signals by name, each of shape (rows,) or (rows, ...), with `time` [s] along the rows.
+
+    `fixed` holds arrays that do not run over time, such as network centres. `seen` is what the
+    observer gathered at every step, thinned log or not. `message` says how a run ended that did
+    not finish.
+    """
+
+    status: Status
+    controller: str
+    signals: Mapping[str, Vector]
+    fixed: Mapping[str, Vector] = field(default_factory=dict)
+    seen: Vector | None = None
+    message: str = ""
+
+    def __getitem__(self, name: str) -> Vector:
+        """A signal or fixed array; KeyError where there is none."""
+        return self.signals[name] if name in self.signals else self.fixed[name]
+
+    def part(self, rows: slice | Vector) -> Self:
+        """Some of the rows, with everything else."""
+        return replace(self, signals={n: a[rows] for n, a in self.signals.items()})
+
+    def __contains__(self, name: str) -> bool:
+        """Whether there is a signal or fixed array of this name."""
+        return name in self.signals or name in self.fixed

@@ -1,0 +1,139 @@
+"""Is a law what it says it is? Asked once, in plain Python, before it becomes machine code.
+
+There its vectors are bare pointers, and what it writes past their ends is somebody else's number.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections import Counter
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from functools import partial
+from numbers import Real
+from pathlib import Path
+
+import numpy as np
+
+from podusv_cli.controllers.base import Controller
+from podusv_cli.core.component import Component
+from podusv_cli.core.errors import LawError
+from podusv_cli.core.kernel import Vector, bundle
+from podusv_cli.core.signal import SIGNALS
+from podusv_cli.engine.march import Aside, Failed, never_returns
+from podusv_cli.engine.simulate import ClosedLoop, names
+
+UNWRITTEN = -1.234567890123e-290  # no law writes just this
+# What a law's arithmetic may raise: the run tells it, as divergence.
+OF_NUMBERS = (ArithmeticError, ValueError)
+
+
+def check_law(loop: ClosedLoop) -> None:
+    """Ask the loop's law at the start of a run, with vectors of the declared sizes.
+
+    Raises LawError for signals that are in no table or named twice, a memory, table or outputs of
+    another size, an output left unwritten, an exception, and for a law that does not return. No
+    number at all is left for the run to tell.
+    """
+    with np.errstate(all="ignore"), Aside() as aside:  # which takes it along
+        _asked(aside, loop, _check_declared, ())
+        _asked(aside, loop, _ask, OF_NUMBERS)
+
+
+def _asked(
+    aside: Aside, loop: ClosedLoop, ask: Callable[[ClosedLoop], int],
+    left: tuple[type[Exception], ...],
+) -> None:  # fmt: skip
+    """Ask, and raise LawError for any exception but those that are `left` for the run to tell."""
+    law = loop.controller
+    try:
+        aside.finish(partial(ask, loop))
+    except TimeoutError:
+        raise LawError(f"law {law.label}: asked at the start, {never_returns()}") from None
+    except Failed as failed:
+        error = failed.__cause__
+        if isinstance(error, LawError):
+            raise error from None
+        if not isinstance(error, left):
+            raise LawError(f"law {law.label}: asked at the start, {failed.told()}") from error
+
+
+def _check_declared(loop: ClosedLoop) -> int:
+    law = loop.controller
+    _check_names(loop)
+    memory, declared = _first_memory(loop), (sum(size for _, size in law.slots()),)
+    if np.shape(memory) != declared:
+        shapes = f"it starts with a memory of shape {np.shape(memory)}, its slots are {declared}"
+        raise LawError(f"{called(law)}: {shapes}")
+    table = law.table()
+    if not (isinstance(table, np.ndarray) and table.dtype == np.float64 and table.ndim == 1):
+        raise LawError(f"{called(law)}: its table is no vector of float64; write np.array([1.0])")
+    for name, number in law.informed(loop.nominal).items():
+        if not (name.isidentifier() and isinstance(number, Real)):
+            raise LawError(f"{called(law)}: its constant {name} = {number!r} is no named number")
+    return 0
+
+
+def _first_memory(loop: ClosedLoop) -> Vector:
+    return loop.controller.start(np.array(loop.start), loop.first_target(), loop.nominal)
+
+
+def _ask(loop: ClosedLoop) -> int:
+    law, memory, target = loop.controller, _first_memory(loop), loop.first_target()
+    x, k, table = np.array(loop.start), bundle(law.informed(loop.nominal)), law.table()
+    slots = [name for name, size in law.slots() for _ in range(size)]
+    tau, rate, signals = (np.full(size, UNWRITTEN) for size in (2, len(slots), len(law.signals)))
+    if law.sample_period() > 0:
+        law.sample(0.0, x, memory, target, k, table)
+    law.law(
+        0.0, x, memory, target, k, table, tau, rate, signals, np.zeros(law.workspace())
+    )  # fmt: skip
+    outputs = [*zip(("tau_u_cmd", "tau_r_cmd"), tau, strict=True)]
+    outputs += [*zip(law.signals, signals, strict=True)]
+    outputs += [(f"the rate of {name}", number) for name, number in zip(slots, rate, strict=True)]
+    left = next((name for name, number in outputs if number == UNWRITTEN), "")
+    if left:
+        raise LawError(f"{called(law)}: it leaves {left} unwritten")
+    if law.settles():
+        law.settle(0.0, memory, tau, np.zeros(3), k, table, rate)
+    return 0
+
+
+def _check_names(loop: ClosedLoop) -> None:
+    """LawError for what the log could not take, or would mix up."""
+    law, actuator, logged = loop.controller, loop.actuator, Counter(names(loop))
+    if isinstance(law.signals, str):
+        raise LawError(f'{called(law)}: its signals are no tuple; write ("{law.signals}",)')
+    _check_known(law, [*dict(law.slots()), *law.signals, *law.fixed_signals()])
+    _check_known(actuator, [*actuator.states, *actuator.signals])
+    own = Counter([*actuator.states, *actuator.signals]) + Counter(dict(law.slots()))
+    for name, size in own.items():
+        if size > 1 and not SIGNALS[name].axes:
+            raise LawError(
+                f"{called(law)}: {name} has {size} numbers and no axis in podusv_cli/signals.py "
+                "that tells them apart; give each of them a name of its own"
+            )
+    for name in (*dict(law.slots()), *law.signals):
+        if logged[name] > own.get(name, 1):
+            raise LawError(
+                f"{called(law)}: it declares {name}, which the run logs already; take another name"
+            )
+
+
+def _check_known(owner: Component, declared: Iterable[str]) -> None:
+    for name in declared:
+        if name not in SIGNALS:
+            raise LawError(
+                f"{called(owner)}: it declares {name}, which is in no table of signals; add a row "
+                f'Signal("{name}", symbol, unit, meaning) to podusv_cli/signals.py'
+            )
+
+
+def called(owner: Component) -> str:
+    """`law mine (mine.py, line 12)`: a component's kind, and where its class is written."""
+    kind, place = type(owner), ""
+    with suppress(OSError, TypeError):  # made where there is no source
+        name = Path(inspect.getsourcefile(kind) or "").name
+        place = f" ({name}, line {inspect.getsourcelines(kind)[1]})"
+    what = "law" if isinstance(owner, Controller) else "actuator"
+    return f"{what} {kind.model_fields['kind'].default}{place}"

@@ -1,0 +1,109 @@
+"""Kernels to object code by numba, once for each; later processes find it on disk."""
+
+from __future__ import annotations
+
+import ctypes
+import dis
+import re
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import llvmlite.binding as llvm
+from numba import cfunc, njit, types
+from numba.core import cgutils
+from numba.core.errors import NumbaError
+from numba.core.typing.ctypes_utils import from_ctypes
+from numba.extending import intrinsic
+
+from podusv_cli.core import kernel
+from podusv_cli.engine.object_cache import Code, target
+
+# Kernels are merged into their caller: to hand on a law's constants costs as much as the law.
+OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": False, "forceinline": True}
+INNER = OPTIONS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # nobody else calls them
+NUMBER = types.float64
+VECTOR: Any = types.CPointer(NUMBER)  # type: ignore[no-untyped-call]
+
+
+@intrinsic
+def _tail(typing: Any, vector: Any, start: Any) -> Any:
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.gep(arguments[0], [arguments[1]])
+
+    return vector(vector, types.int64), code
+
+
+@intrinsic(prefer_literal=True)
+def _scratch(typing: Any, count: Any) -> Any:
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        number = context.get_value_type(NUMBER)
+        return cgutils.alloca_once(builder, number, count.literal_value)  # type: ignore[no-untyped-call]
+
+    return VECTOR(count), code
+
+
+PRIMITIVES = {kernel.tail: _tail, kernel.scratch: _scratch}
+
+
+def translate(function: Any, prototype: Any) -> Code:
+    """Object code of a kernel and all kernels it calls, as a function of C's calling convention.
+
+    Raises TypeError for a kernel that needs more than arithmetic and the mathematical library.
+    """
+    try:
+        compiled = cfunc(_signature(prototype), **OPTIONS)(_with_machine_code(function))
+    except NumbaError as error:
+        raise TypeError(_in_short(str(error))) from error
+    module = llvm.parse_assembly(compiled.inspect_llvm())
+    _check_calls(module, function.__qualname__)
+    return Code(compiled.native_name, target().emit_object(module))
+
+
+@cache
+def machine(function: Any) -> Any:
+    """The kernel and all kernels it names, ready to be compiled into their caller."""
+    if function in PRIMITIVES:
+        return PRIMITIVES[function]
+    return njit(**INNER)(_with_machine_code(function))
+
+
+def _in_short(told: str) -> str:
+    """What numba says of the innermost place, and where that is."""
+    words = told.split("\n\nFile")[0].split("\nThere are")[0].split("\nDuring")[0]
+    kept = [line for line in words.splitlines() if not line.startswith("Failed in nopython mode")]
+    place = re.search(r'^File "([^"]+)", line (\d+):\n(?:.*\n)*?(.*)\n +\^', told, re.MULTILINE)
+    where = f" ({Path(place[1]).name}, line {place[2]}: {place[3].strip()})" if place else ""
+    return f"{' '.join(' '.join(kept).split())}{where}"
+
+
+def _with_machine_code(function: Any) -> Any:
+    seen = function.__globals__
+    named = {i.argval for i in dis.get_instructions(function) if i.opname == "LOAD_GLOBAL"}
+    called = {name for name in named if kernel.is_kernel(seen.get(name))}
+    inner = {name: machine(seen[name]) for name in called}
+    return kernel.with_globals(function, function.__qualname__, **inner)
+
+
+def _signature(prototype: Any) -> Any:
+    arguments = [_type(kind) for kind in prototype._argtypes_]
+    return _type(prototype._restype_)(*arguments)
+
+
+def _type(kind: Any) -> Any:
+    if kind and issubclass(kind, ctypes._CFuncPtr):  # type: ignore[attr-defined]
+        # The way from a Python object to its address is asked for, although none comes in here.
+        return types.ExternalFunctionPointer(_signature(kind), ctypes.addressof)
+    return from_ctypes(kind)  # type: ignore[no-untyped-call]
+
+
+def _check_calls(module: Any, name: str) -> None:
+    # A function that the loader does not find ends the process without a word.
+    process = ctypes.CDLL(None)
+    declared = [f.name for f in module.functions if f.is_declaration]
+    for wanted in declared:
+        if not wanted.startswith("llvm.") and not hasattr(process, wanted):
+            raise TypeError(
+                f"{name} needs {wanted}, which is no function of the mathematical library: it "
+                "allocates, prints or raises"
+            )

@@ -1,0 +1,1 @@
+"""Interrupts, worker processes, names of temporary files."""

@@ -1,1 +1,0 @@
-"""What two recordings of the same, or nearly the same, run differ in, and why they may."""

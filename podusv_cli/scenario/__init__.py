@@ -1,0 +1,1 @@
+"""Scenario files: text in, one validated scenario out."""

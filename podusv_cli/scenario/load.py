@@ -1,0 +1,156 @@
+"""Scenario files in, one validated scenario out, and the way back to a file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import yaml
+
+from podusv_cli.core.errors import Finding, ScenarioError, StorageError
+from podusv_cli.scenario.layers import composed
+from podusv_cli.scenario.messages import Check, check
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.presets import complete
+from podusv_cli.scenario.words import found
+from podusv_cli.scenario.yaml_text import read, read_text, resolve
+from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, Route, dotted, find, printable
+
+REFERENCES: tuple[Route, ...] = (("extends",), ("path", "file"))  # to other files
+HEADING = "# A complete scenario, every value written out; it runs again to the same log.\n"
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """A scenario with where its values came from.
+
+    `origins` maps every dotted key to "configs/a.yaml:12:5", "--set a.b=v", "vessel file
+    paper.yaml" or "default"; `text` is the scenario file as given.
+    """
+
+    scenario: Scenario
+    origins: Mapping[str, str]
+    text: str
+
+
+def load(
+    path: str | os.PathLike[str], overrides: Sequence[str] = (), checks: Sequence[Check] = ()
+) -> Loaded:
+    """The scenario of a file, with overrides such as `vessel.m=24`.
+
+    `checks` look for what this room cannot know to be wrong. Raises ScenarioError with everything
+    that is wrong, also where the file cannot be read.
+    """
+    faults: list[Fault] = []
+    source = os.fspath(path)
+    text = read_text(source, Mark(source), "", faults)
+    if text is None:
+        raise ScenarioError(_findings(faults, source))
+    return load_text(text, source, overrides, checks)
+
+
+def load_text(
+    text: str, source: str, overrides: Sequence[str] = (), checks: Sequence[Check] = ()
+) -> Loaded:
+    """The scenario of a text; `source` names it in messages and is where its file names start.
+
+    Raises ScenarioError with everything that is wrong.
+    """
+    faults: list[Fault] = []
+    return _checked(composed(text, source, overrides, faults), text, source, faults, checks)
+
+
+def _checked(
+    root: Node | None, text: str, source: str, faults: list[Fault], checks: Sequence[Check] = ()
+) -> Loaded:
+    root = root and complete(root, faults)
+    scenario = check(root, faults, checks) if root else None
+    if scenario is None or root is None or faults:
+        raise ScenarioError(_findings(faults, source))
+    return Loaded(scenario, _origins(scenario, root), text)
+
+
+def load_resolved(text: str, source: str, checks: Sequence[Check] = ()) -> Scenario:
+    """The scenario of a finished run, which refers to no other file.
+
+    Raises StorageError where it does or is no YAML mapping at all, ScenarioError where it is one
+    that this podusv does not know.
+    """
+    faults: list[Fault] = []
+    root = read(text, source, faults)
+    faults += [
+        Fault(node.mark, dotted(route), "refers to another file, which no finished run does")
+        for route in REFERENCES
+        if root and (node := find(root, route)) and node.content is not None
+    ]
+    if root and not isinstance(root.content, dict):
+        faults.append(Fault(root.mark, "", f"is {found(root.content, root.text)}, no scenario"))
+    if faults or not root:
+        (first, *_) = _findings(faults, source)
+        raise StorageError(f"{first} (damaged: not as podusv wrote it)")
+    return _checked(replace(root, mark=Mark(source)), text, source, faults, checks).scenario
+
+
+def _findings(faults: list[Fault], first: str) -> list[Finding]:
+    """Findings file by file, the file called `first` ahead, in the order of lines."""
+    sources = list(dict.fromkeys([first, *(fault.mark.source for fault in faults)]))
+    ordered = sorted(
+        faults, key=lambda f: (sources.index(f.mark.source), f.mark.line, f.mark.column)
+    )
+    return [Finding(str(fault.mark), printable(fault.key), fault.text) for fault in ordered]
+
+
+def values(scenario: Scenario) -> dict[str, Any]:
+    """Every value of a scenario by its dotted key, in the order of the fields."""
+    return {dotted(route): content for route, content in _leaves(scenario.model_dump(), ())}
+
+
+def _leaves(data: dict[str, Any], above: Route) -> Iterator[tuple[Route, Any]]:
+    for name, content in data.items():
+        if isinstance(content, dict) and content:
+            yield from _leaves(content, (*above, name))
+        else:
+            yield (*above, name), content
+
+
+def _origins(scenario: Scenario, root: Node) -> dict[str, str]:
+    nodes = {route: find(root, route) for route, _ in _leaves(scenario.model_dump(), ())}
+    return {dotted(route): str(node.mark) if node else "default" for route, node in nodes.items()}
+
+
+def resolved_yaml(scenario: Scenario) -> str:
+    """The scenario as a file with every value in it; loading it gives an equal scenario."""
+    body = yaml.dump(
+        scenario.model_dump(), Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=1 << 30
+    )
+    return HEADING + body
+
+
+class _Dumper(yaml.SafeDumper):
+    """Blocks for mappings, brackets for lists of scalars, quotes around all text but words."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+
+def _text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
+    is_word = text.replace("_", "").isalnum() and isinstance(resolve(text), str) and text.isascii()
+    style = None if is_word else '"'
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
+
+
+def _list(dumper: yaml.SafeDumper, items: tuple[Any, ...]) -> yaml.SequenceNode:
+    flat = not any(isinstance(part, tuple) for part in items)
+    return dumper.represent_sequence("tag:yaml.org,2002:seq", items, flow_style=flat)
+
+
+def _kind_first(dumper: yaml.SafeDumper, data: dict[str, Any]) -> yaml.MappingNode:
+    ordered = sorted(data.items(), key=lambda entry: entry[0] != "kind")
+    return dumper.represent_mapping("tag:yaml.org,2002:map", ordered, flow_style=False)
+
+
+_Dumper.add_representer(str, _text)
+_Dumper.add_representer(tuple, _list)
+_Dumper.add_representer(dict, _kind_first)

@@ -1,0 +1,237 @@
+"""The scenario: everything that a run depends on, as one frozen value."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Literal
+
+from podusv_cli.actuators.base import Actuator
+from podusv_cli.controllers.base import Controller
+from podusv_cli.core.component import Component, any_of, value
+from podusv_cli.core.finding_codes import CODES
+from podusv_cli.disturbances.base import Disturbance
+from podusv_cli.engine.grid import TimeGrid, whole_steps
+from podusv_cli.engine.simulate import ClosedLoop
+from podusv_cli.paths.base import Path
+from podusv_cli.vessels.vessel import Vessel
+
+if TYPE_CHECKING:
+    AnyActuator = Actuator
+    AnyController = Controller
+    AnyDisturbance = Disturbance
+    AnyPath = Path
+    AnyCode = str
+else:
+    AnyActuator = any_of("podusv_cli.actuators", Actuator)
+    AnyController = any_of("podusv_cli.controllers", Controller)
+    AnyDisturbance = any_of("podusv_cli.disturbances", Disturbance)
+    AnyPath = any_of("podusv_cli.paths", Path)
+    AnyCode = Literal.__getitem__(tuple(CODES))
+
+
+Misfits = Iterator[tuple[str, str]]  # keys, and what is wrong with them
+MOST_INSTANTS = 2**53  # that can be told apart
+LABEL = re.compile(r"[a-z][a-z0-9_]{0,29}")  # usable as a name in claims and as a folder
+LABEL_IN_WORDS = "a name here is at most 30 of a-z, 0-9 and _, starting with a letter"
+CLAIM = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,29}")
+CLAIM_IN_WORDS = (
+    "a claim's name is at most 30 of letters, digits, '_' and '-', starting with a letter"
+)
+
+
+class Start(Component):
+    """The vessel's state at t = 0."""
+
+    x: float = value(0.0, "m", "north")
+    y: float = value(0.0, "m", "east")
+    psi: float = value(0.0, "rad", "heading, from north towards east")
+    u: float = value(0.0, "m/s", "surge velocity")
+    v: float = value(0.0, "m/s", "sway velocity")
+    r: float = value(0.0, "rad/s", "yaw rate")
+
+
+class Simulation(Component):
+    """How the closed loop is integrated."""
+
+    step: float = value(0.01, "s", "step of the classical Runge-Kutta method", gt=0)
+    duration: float = value(310.0, "s", "simulated time, a whole number of steps", gt=0)
+    compiled: bool = value(True, "", "machine code, or (slowly, same result) plain Python")
+
+    @property
+    def outlier(self) -> str:
+        """The key, of step and duration, that is further from the usual."""
+        usual = Simulation()
+        longer, finer = self.duration / usual.duration, usual.step / self.step
+        return "simulation.duration" if longer > finer else "simulation.step"
+
+
+class Control(Component):
+    """When the law acts."""
+
+    period: float = value(
+        0.0, "s", "0: continuously; else the law is evaluated once a period, a whole number of "
+        "steps, and its output held", ge=0,
+    )  # fmt: skip
+
+
+class Log(Component):
+    """What is written to log.h5."""
+
+    every: int = value(
+        1,
+        "steps",
+        "every n-th step is logged; metrics always see every step, claims about signals need 1",
+        ge=1,
+    )
+    monitor: bool = value(
+        True,
+        "",
+        "whether the Lyapunov function of the adaptive laws, its rate and its bounds are logged",
+    )
+
+
+class MetricSettings(Component):
+    """Windows and thresholds of the metrics."""
+
+    steady_fraction: float = value(
+        0.2, "", "the last part of the run that counts as settled", gt=0, le=1
+    )
+    settling_radius: float = value(
+        1.0, "m", "settled when the distance to the target stays below this", gt=0
+    )
+
+
+class Claim(Component):
+    """A published sentence, and how the runs are to decide on it."""
+
+    says: str = value(..., "", "the claim, in a sentence of your own")
+    source: str = value(..., "", "where it was published: section, figure, equation")
+    expect: str = value(..., "", "the claim as an expression over runs; see docs/claims.md")
+    tolerance: float = value(
+        0.05, "", "relative: how near `==` is, and how clear `<` and `>` have to be", ge=0, lt=1
+    )
+    remark: str = value("", "", "choices made where the source is silent")
+
+
+class Scenario(Component):
+    """A vessel, its surroundings, its task, its controller, and how the run is done."""
+
+    name: str = value(
+        ..., "", "what the results are filed under", pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,79}$"
+    )
+    description: str = value("", "", "what the scenario is for, in a sentence")
+    vessel: Vessel = value(..., "", "the vessel that is simulated")
+    nominal: Vessel = value(
+        ..., "", "the vessel that the controller is told about; the same by default"
+    )
+    start: Start = value(Start(), "", "state at t = 0")
+    path: AnyPath = value(..., "", "how the target moves")
+    disturbance: AnyDisturbance = value(..., "", "what the sea does")
+    actuator: AnyActuator = value(..., "", "from the law's demand to the load on the hull")
+    controller: AnyController = value(..., "", "the law")
+    controllers: dict[str, AnyController] = value(
+        {},
+        "",
+        "laws to compare, by name; each starts from those keys of `controller` that it has too",
+    )
+    claims: dict[str, Claim] = value({}, "", "what `podusv compare` is to judge, by name")
+    simulation: Simulation = value(Simulation(), "", "integration")
+    control: Control = value(Control(), "", "sampling of the law")
+    log: Log = value(Log(), "", "logging")
+    metrics: MetricSettings = value(MetricSettings(), "", "windows and thresholds of the metrics")
+    silence: tuple[AnyCode, ...] = value(
+        (), "", "codes of findings that are not to be shown; see docs/findings.md", strict=False
+    )
+
+    def labels(self) -> tuple[str, ...]:
+        """The names of the runs that a comparison of this scenario has."""
+        return tuple(self.controllers) or (self.controller.label,)
+
+    def alone(self) -> Scenario:
+        """The scenario of one run: with `controller`, without anything to compare it to."""
+        return self.model_copy(update={"controllers": {}, "claims": {}})
+
+    def singles(self) -> dict[str, Scenario]:
+        """A scenario for each run of a comparison, by label, without controllers and claims."""
+        laws = self.controllers or {self.controller.label: self.controller}
+        return {
+            label: self.alone().model_copy(update={"controller": law})
+            for label, law in laws.items()
+        }
+
+    def closed_loop(self) -> ClosedLoop:
+        """The parts that move."""
+        start = self.start
+        return ClosedLoop(
+            vessel=self.vessel, nominal=self.nominal, path=self.path, disturbance=self.disturbance,
+            actuator=self.actuator, controller=self.controller,
+            start=(start.x, start.y, start.psi, start.u, start.v, start.r),
+        )  # fmt: skip
+
+    def time_grid(self) -> TimeGrid:
+        """The instants of the run; call `misfits` first."""
+        step = self.simulation.step
+        steps = whole_steps(self.simulation.duration, step) or 0
+        # Beyond the last step only the first is logged; machine code knows no larger numbers.
+        every = min(self.log.every, steps + 1)
+        return TimeGrid(step, steps, every, whole_steps(self.control.period, step) or 0)
+
+    def steady_from(self) -> float:
+        """When the part of the run begins that counts as settled [s]."""
+        return self.time_grid().last_part(self.metrics.steady_fraction)
+
+    def misfits(self) -> list[tuple[str, str]]:
+        """Key and sentence for every pair of values that cannot go together."""
+        return [*self._times(), *self._samples(), *self._names()]
+
+    def _laws(self) -> dict[str, Controller]:
+        several = {f"controllers.{label}": law for label, law in self.controllers.items()}
+        return {"controller": self.controller} | several
+
+    def _times(self) -> Misfits:
+        step = self.simulation.step
+        times = {
+            "simulation.duration": self.simulation.duration,
+            "control.period": self.control.period,
+            **{f"{key}.difference_step": law.sample_period() for key, law in self._laws().items()},
+        }
+        if max(times.values()) / step > MOST_INSTANTS:
+            key, time = max(times.items(), key=lambda item: item[1])
+            key = self.simulation.outlier if key == "simulation.duration" else key
+            count = f"{time:g} s in steps of {step:g} s are {time / step:.3g} steps"
+            yield key, f"{count}; no more than {MOST_INSTANTS:.2g} have times of their own"
+            return
+        for key, time in times.items():
+            if time and not whole_steps(time, step):
+                yield (
+                    key,
+                    f"{time:g} s is no whole number of steps of {step:g} s{_near(time, step)}",
+                )
+
+    def _samples(self) -> Misfits:
+        period = self.control.period
+        for key, law in self._laws().items():
+            sample = law.sample_period()
+            if period and sample and not whole_steps(sample, period):
+                text = f"{sample:g} s is no whole number of control periods of {period:g} s"
+                yield f"{key}.difference_step", text + _near(sample, period)
+
+    def _names(self) -> Misfits:
+        for label in self.controllers:
+            if not LABEL.fullmatch(label):
+                yield f"controllers.{label}", LABEL_IN_WORDS
+            if label == "figures":
+                yield (
+                    f"controllers.{label}",
+                    "is where figures go; take another name",
+                )
+        for name in self.claims:
+            if not CLAIM.fullmatch(name):
+                yield f"claims.{name}", CLAIM_IN_WORDS
+
+
+def _near(time: float, step: float) -> str:
+    """The next smaller time that fits, as a hint, where it can be told."""
+    count = time / step
+    return f"; try {max(1, int(count)) * step:.10g}" if count < 1e12 else ""

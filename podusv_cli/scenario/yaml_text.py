@@ -1,0 +1,255 @@
+"""From YAML text to a tree with places, without constructors, aliases or tags.
+
+PyYAML's own loading turns `no` into False and `017` into 15, lets NaN and duplicate keys pass,
+and forgets where things stood. Here its parser's events are walked instead. Plain scalars follow
+YAML 1.2: true, false, null, decimal numbers; everything else is text.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+import stat
+import unicodedata
+from dataclasses import replace
+from typing import Any
+
+import yaml
+
+from podusv_cli.scenario.words import found, quoted
+from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, Route, dotted
+
+MAX_BYTES = MAX_CHARACTERS = 1_000_000
+MAX_DEPTH = 32
+MAX_NODES = 20_000
+
+WORDS = {
+    word: meaning
+    for meaning, spellings in (
+        (None, ("", "~", "null", "Null", "NULL")),
+        (True, ("true", "True", "TRUE")),
+        (False, ("false", "False", "FALSE")),
+    )
+    for word in spellings
+}
+INTEGER = re.compile(r"[-+]?(0|[1-9][0-9]{0,299})")
+NUMBER = re.compile(r"[-+]?(\.[0-9]+|(0|[1-9][0-9]*)(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
+NOT_FINITE = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
+
+# What PyYAML says, and what it means to someone who writes a scenario.
+SYNTAX = {
+    r"'\t' that cannot start": "a tab; use spaces",
+    "that cannot start any token": "{problem}; put the value in quotes",
+    "mapping values are not allowed": "a colon where no key can be; check the indentation, the "
+    "space after every colon, and quote text with a colon in it",
+    "unexpected end of stream": "the text in quotes that starts here never ends",
+    "but got '<stream end>'": "the bracket opened here is never closed",
+    "but found '<stream end>'": "the file ends in the middle of a list or mapping",
+    "but found ':'": "a colon without a key before it",
+    "<block end>, but found": "does not line up with the lines above; check the indentation",
+    "expected '<document start>'": "text after the end of the document",
+}
+OPENING = ("unexpected end of stream", "but got '<stream end>'")
+
+
+def read_text(path: str, mark: Mark, key: str, faults: list[Fault]) -> str | None:
+    """The file's text, or None and a fault at `mark` or at the byte that is no UTF-8."""
+    named = "" if mark == Mark(path) else f"{quoted(path)} "
+    try:
+        with open(path, "rb", opener=_at_once) as file:
+            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+                raise ValueError("a pipe or device; save it as a file first")
+            data = file.read(MAX_BYTES + 1)
+    except (OSError, ValueError) as error:
+        reason = str((isinstance(error, OSError) and error.strerror) or error)
+        faults.append(Fault(mark, key, f"{named}cannot be read: {reason[:1].lower()}{reason[1:]}"))
+        return None
+    if len(data) > MAX_BYTES:
+        faults.append(Fault(mark, key, f"{named}is larger than {MAX_BYTES:,} bytes"))
+        return None
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        place = _place(path, data[: error.start].decode("utf-8"))
+        text = f"byte 0x{data[error.start]:02x} is no UTF-8; save the file as UTF-8"
+        faults.append(Fault(place, "", text))
+        return None
+
+
+def _at_once(path: str, flags: int) -> int:
+    """Open without waiting for somebody who writes into a pipe."""
+    return os.open(path, flags | os.O_NONBLOCK | os.O_CLOEXEC)
+
+
+def _place(source: str, before: str) -> Mark:
+    """The place that comes after the text `before`."""
+    last_line = before.rpartition("\n")[2]
+    return Mark(source, before.count("\n") + 1, len(last_line) + 1)
+
+
+def resolve(text: str) -> bool | int | float | str | None:
+    """What a plain scalar means; a number that is too large becomes infinite."""
+    if text in WORDS:
+        return WORDS[text]
+    if INTEGER.fullmatch(text):
+        return int(text)
+    return float(text) if NUMBER.fullmatch(text) else text
+
+
+def scalar(text: str, mark: Mark, key: str, faults: list[Fault]) -> Node:
+    """The value of a plain scalar; what is no finite number becomes a fault."""
+    content = resolve(text)
+    if NOT_FINITE.fullmatch(text):
+        faults.append(Fault(mark, key, f"{text} is not a finite number"))
+    elif isinstance(content, float) and not math.isfinite(content):
+        faults.append(Fault(mark, key, f"{text:.40} is too large; numbers must be finite"))
+    else:
+        return written(content, mark, key, faults, text=text)
+    return Node(None, mark, faulty=True)
+
+
+def written(content: Any, mark: Mark, key: str, faults: list[Fault], *, text: str = "") -> Node:
+    """The node of a scalar; characters that no file or terminal can take become a fault."""
+    unfit = [c for c in str(content) if unicodedata.category(c) in ("Cc", "Cs") and c not in "\t\n"]
+    if unfit:
+        faults.append(Fault(mark, key, f"character U+{ord(unfit[0]):04X} cannot stand in text"))
+    return Node(None if unfit else content, mark, text=text, faulty=bool(unfit))
+
+
+def read(text: str, source: str, faults: list[Fault], *, placed: bool = True) -> Node | None:
+    """The tree of a single YAML document, None where reading had to stop.
+
+    Every fault found on the way is appended to `faults`. Marks have lines only where `placed`.
+    """
+    if len(text) > MAX_CHARACTERS:
+        text = f"is longer than {MAX_CHARACTERS:,} characters"
+        faults.append(Fault(Mark(source), "", text))
+        return None
+    reader = _Reader(text, source, faults, placed)
+    try:
+        return reader.document()
+    except _Stop as stop:
+        faults.append(stop.fault)
+        return None
+
+
+class _Stop(Exception):
+    """Reading cannot go on."""
+
+    def __init__(self, mark: Mark, text: str) -> None:
+        self.fault = Fault(mark, "", text)
+
+
+class _Reader:
+    """One walk along the parser's events."""
+
+    def __init__(self, text: str, source: str, faults: list[Fault], placed: bool) -> None:
+        self._text, self._source, self._placed = text, source, placed
+        self._events = yaml.parse(text, Loader=yaml.SafeLoader)
+        self._faults = faults
+        self._nodes = 0
+        self._last = Mark(source)
+
+    def document(self) -> Node:
+        if self._text.startswith("\ufeff"):
+            raise _Stop(
+                self._mark(0, 0), "starts with a byte order mark; save as UTF-8 without BOM"
+            )
+        self._next()
+        if isinstance(self._next(), yaml.StreamEndEvent):
+            raise _Stop(Mark(self._source), "is empty")
+        node = self._node(self._next(), ())
+        self._next()
+        after = self._next()
+        if not isinstance(after, yaml.StreamEndEvent):
+            raise _Stop(self._start(after), "a second document starts here; write one a file")
+        return node
+
+    def _next(self) -> Any:
+        try:
+            event: Any = next(self._events)
+        except yaml.MarkedYAMLError as error:
+            raise self._syntax_error(error) from None
+        except yaml.reader.ReaderError as error:
+            place = _place(self._source, self._text[: error.position])
+            code = ord(self._text[error.position])
+            place = place if self._placed else Mark(self._source)
+            raise _Stop(place, f"character U+{code:04X} cannot stand in YAML") from None
+        except (ValueError, IndexError, AttributeError, OverflowError, TypeError):
+            # PyYAML lets these escape for impossible escapes, versions and code points.
+            raise _Stop(self._last, "what follows is not valid YAML") from None
+        self._last = self._mark(event.end_mark.line, event.end_mark.column)
+        return event
+
+    def _syntax_error(self, error: yaml.MarkedYAMLError) -> _Stop:
+        problem = error.problem or "unreadable"
+        known = [text for part, text in SYNTAX.items() if part in problem]
+        opened = any(part in problem for part in OPENING)
+        mark = error.context_mark if opened else error.problem_mark
+        text = known[0] if known else "not valid YAML: {problem}"
+        place = self._mark(mark.line, mark.column) if mark else self._last
+        return _Stop(place, text.format(problem=problem))
+
+    def _mark(self, line: int, column: int) -> Mark:
+        return Mark(self._source, line + 1, column + 1) if self._placed else Mark(self._source)
+
+    def _start(self, event: Any) -> Mark:
+        return self._mark(event.start_mark.line, event.start_mark.column)
+
+    def _fault(self, event: Any, route: Route, text: str) -> None:
+        self._faults.append(Fault(self._start(event), dotted(route), text))
+
+    def _node(self, event: Any, route: Route) -> Node:
+        self._nodes += 1
+        if self._nodes > MAX_NODES:
+            raise _Stop(self._start(event), f"more than {MAX_NODES:,} values")
+        if len(route) > MAX_DEPTH:
+            raise _Stop(self._start(event), f"nested deeper than {MAX_DEPTH} levels")
+        if isinstance(event, yaml.AliasEvent):
+            self._fault(event, route, f"alias *{event.anchor}; write the value out, or use extends")
+            return Node(None, self._start(event), faulty=True)
+        if event.anchor:
+            self._fault(event, route, f"anchor &{event.anchor}; scenarios have no anchors")
+        if event.tag:
+            self._fault(event, route, f"tag {quoted(event.tag)}; scenarios have no tags")
+        if isinstance(event, yaml.ScalarEvent):
+            return self._scalar(event, route)
+        is_list = isinstance(event, yaml.SequenceStartEvent)
+        return self._list(event, route) if is_list else self._mapping(event, route)
+
+    def _scalar(self, event: Any, route: Route) -> Node:
+        mark = self._start(event)
+        take = scalar if event.style is None else written
+        node = take(event.value, mark, dotted(route), self._faults)
+        return replace(node, faulty=node.faulty or bool(event.tag))
+
+    def _list(self, event: Any, route: Route) -> Node:
+        items: list[Node] = []
+        while not isinstance(item := self._next(), yaml.SequenceEndEvent):
+            items.append(self._node(item, (*route, len(items))))
+        faulty = any(item.faulty for item in items)
+        return Node(() if faulty else tuple(items), self._start(event), faulty=faulty)
+
+    def _mapping(self, event: Any, route: Route) -> Node:
+        entries: dict[str, Node] = {}
+        while not isinstance(head := self._next(), yaml.MappingEndEvent):
+            key = self._key(head, route)
+            entry = self._node(self._next(), (*route, key or "?"))
+            if key in entries:
+                first = entries[key].key_mark
+                there = f"; first on line {first.line}" if first and first.line else ""
+                self._fault(head, (*route, key), f"given twice{there}")
+            elif key is not None:
+                entries[key] = replace(entry, key_mark=self._start(head))
+        return Node(entries, self._start(event))
+
+    def _key(self, event: Any, route: Route) -> str | None:
+        """The key, or None after a fault."""
+        is_word = isinstance(event, yaml.ScalarEvent)
+        node = self._node(event, route if is_word else (*route, "?"))
+        if is_word and isinstance(node.content, str):
+            return node.content
+        if not node.faulty:
+            self._fault(event, route, f"keys are words, found {found(node.content, node.text)}")
+        return None

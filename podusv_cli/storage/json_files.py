@@ -1,0 +1,85 @@
+"""JSON as podusv writes it: two spaces, keys as given, null for what is no finite number."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections import Counter
+from collections.abc import Mapping
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from podusv_cli.core import escaping
+from podusv_cli.core.errors import StorageError
+from podusv_cli.storage.regular import read_text
+
+LARGEST = 2 * 2**20  # bytes
+DEEPEST = 32  # levels
+LONGEST = 300  # digits that surely are a finite float
+
+
+def encode(content: Mapping[str, Any]) -> bytes:
+    """UTF-8 text with a final newline. TypeError for values that JSON does not know."""
+    text = json.dumps(_plain(content), indent=2, ensure_ascii=False, allow_nan=False)
+    return f"{escaping.json(text)}\n".encode()
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _plain(inner) for key, inner in value.items()}
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return [_plain(inner) for inner in value]
+    if isinstance(value, np.generic):
+        return _plain(value.item())
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def read(path: Path) -> dict[str, Any]:
+    """A JSON object as podusv writes it; raises StorageError where the file holds anything else."""
+    try:
+        content = json.loads(
+            read_text(path, LARGEST), object_pairs_hook=_object,
+            parse_float=_finite, parse_int=_whole, parse_constant=_finite,
+        )  # fmt: skip
+        _check_depth(content)
+    except (ValueError, RecursionError) as error:
+        reason = " ".join(str(error).split())
+        raise StorageError(f"cannot read {path}: no JSON of podusv ({reason})") from error
+    if not isinstance(content, dict):
+        raise StorageError(f"cannot read {path}: no JSON object")
+    return content
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    entries = dict(pairs)
+    if len(entries) != len(pairs):
+        ((twice, _),) = Counter(key for key, _ in pairs).most_common(1)
+        raise ValueError(f"{twice[:60]!r} is given twice")
+    if not all(map(str.isprintable, entries)):
+        raise ValueError("a key holds characters that do not show")
+    return entries
+
+
+def _finite(digits: str) -> float:
+    number = float(digits)
+    if not math.isfinite(number):
+        raise ValueError(f"{digits:.40} is no finite number")
+    return number
+
+
+def _whole(digits: str) -> int:
+    # Whatever reads the number may want it as a float.
+    return int(digits) if len(digits) < LONGEST else int(_finite(digits))
+
+
+def _check_depth(content: Any) -> None:
+    level = [content]
+    for _ in range(DEEPEST):
+        lists = (thing for thing in level if isinstance(thing, list))
+        mappings = (thing.values() for thing in level if isinstance(thing, dict))
+        level = [*chain.from_iterable(chain(lists, mappings))]
+    if level:
+        raise ValueError(f"nested deeper than {DEEPEST} levels")

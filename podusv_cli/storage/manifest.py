@@ -1,0 +1,122 @@
+"""manifest.json: what a finished folder holds; "finished" means that it is there and true."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path, PurePosixPath
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from podusv_cli.core.errors import StorageError, UsageError
+from podusv_cli.core.recording import Status
+from podusv_cli.storage import files as atomic
+from podusv_cli.storage import json_files
+from podusv_cli.storage.log_layout import FORMAT
+from podusv_cli.storage.regular import ELSEWHERE, LARGEST_FILE, fingerprint
+
+NAME = "manifest.json"
+
+
+class Entry(BaseModel):
+    """A file as it was when the folder was finished."""
+
+    model_config = ConfigDict(frozen=True, strict=True, extra="forbid")
+
+    sha256: str = Field(pattern="^[0-9a-f]{64}$")
+    bytes: int = Field(ge=0)
+
+
+class Manifest(BaseModel):
+    """Every file of a folder by its relative path, `/` between the parts, and how the run ended."""
+
+    model_config = ConfigDict(frozen=True, strict=True, extra="forbid")
+
+    podusv_format: int
+    status: Status
+    files: dict[str, Entry]
+
+
+def write(folder: Path, status: Status) -> Manifest:
+    """List all that is in `folder` now. Raises StorageError, also for links and other oddities."""
+    names = sorted(name for name in _names(folder) if name != NAME)
+    manifest = Manifest(
+        podusv_format=FORMAT, status=status, files={name: _entry(folder / name) for name in names}
+    )
+    atomic.write_bytes(folder / NAME, json_files.encode(manifest.model_dump()))
+    return manifest
+
+
+def demand(folder: Path) -> None:
+    """UsageError where a folder has no manifest: it is no run's and no comparison's."""
+    if not os.path.lexists(folder / NAME):
+        why = f"it has no {NAME}" if os.path.lexists(folder) else "nothing has that name"
+        raise UsageError(f"{folder} is no run folder: {why}")
+
+
+def read(folder: Path) -> Manifest:
+    """The manifest of a folder, its claims not yet checked. Raises StorageError."""
+    path = folder / NAME
+    content = json_files.read(path)
+    found = content.get("podusv_format")
+    if found != FORMAT:
+        raise StorageError(f"{path}: written in format {found!r}; this podusv reads {FORMAT}")
+    try:
+        manifest = Manifest.model_validate(content)
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(str(part) for part in first["loc"])
+        raise StorageError(f"{path}: damaged: {key}: {first['msg']}") from error
+    for name in manifest.files:
+        place(folder, name)
+    return manifest
+
+
+def check(folder: Path) -> Manifest:
+    """The manifest of a finished folder, every file of it present and unaltered.
+
+    Raises StorageError naming the first file for which that does not hold. Files that the manifest
+    does not know are allowed; `foreign` tells them.
+    """
+    manifest = read(folder)
+    for name, entry in sorted(manifest.files.items()):
+        path = place(folder, name)
+        if not os.path.lexists(path):
+            raise StorageError(f"{folder} is not a finished folder: {name} is missing")
+        if entry.bytes > LARGEST_FILE:  # it might be a hole of any size
+            claim = f"{entry.bytes} bytes, at most {LARGEST_FILE} allowed"
+            raise StorageError(f"cannot read {path}: {claim}{ELSEWHERE}")
+        if os.lstat(path).st_size != entry.bytes or _entry(path) != entry:
+            raise StorageError(f"{folder} is not a finished folder: {name} was altered")
+    return manifest
+
+
+def foreign(folder: Path, manifest: Manifest) -> list[str]:
+    """Files in `folder` that the manifest does not know, sorted."""
+    return sorted(set(_names(folder)) - set(manifest.files) - {NAME})
+
+
+def _entry(path: Path) -> Entry:
+    digest, size = fingerprint(path)
+    return Entry(sha256=digest, bytes=size)
+
+
+def _names(folder: Path, above: str = "") -> Iterator[str]:
+    with atomic.explained(f"cannot list {folder}"), os.scandir(folder) as entries:
+        for entry in entries:
+            if entry.is_dir(follow_symlinks=False):
+                yield from _names(Path(entry.path), f"{above}{entry.name}/")
+            else:
+                yield f"{above}{entry.name}"
+
+
+def place(folder: Path, name: str) -> Path:
+    """Where a listed file lies; StorageError where that is not inside the folder."""
+    relative = PurePosixPath(name)
+    plain = str(relative) == name and name.isprintable() and name not in (".", NAME)
+    if not plain or relative.is_absolute() or ".." in relative.parts:
+        raise StorageError(f"{folder / NAME}: damaged: {name!r} is no file of this folder")
+    path = folder / relative
+    if path.parent.resolve() != folder.resolve() / relative.parent:
+        raise StorageError(f"{folder / NAME}: damaged: {name!r} leads through a link")
+    return path

@@ -1,0 +1,232 @@
+"""Run folders: named, filled, finished, opened again."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from functools import cached_property
+from itertools import count, islice
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from podusv_cli.core.errors import StorageError
+from podusv_cli.core.quantities import bytes_in_words
+from podusv_cli.core.recording import Recording, Status
+from podusv_cli.process.extras import Extras
+from podusv_cli.storage import files, json_files, manifest
+from podusv_cli.storage.regular import read_text
+from podusv_cli.storage.staging import Staging, Taken, sweep
+from podusv_cli.storage.stream import Stream, growing
+
+LOG, THEORY, MISSING = "log.h5", "theory.json", "missing.json"
+NEEDED = (LOG, "metrics.json", "provenance.json", "resolved.yaml")
+
+
+def default_folder(root: Path, name: str, resolved_yaml: str) -> Path:
+    """`<root>/<name>/<UTC time>-<first 8 hex digits of the resolved scenario's SHA-256>`.
+
+    A number is appended where a run of the same scenario in the same second has that name.
+    """
+    stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
+    digest = hashlib.sha256(resolved_yaml.encode()).hexdigest()[:8]
+    folder = root / name / f"{stamp}-{digest}"
+    return next(path for path in _numbered(folder) if not os.path.lexists(path))
+
+
+def _numbered(folder: Path) -> Iterator[Path]:
+    yield folder
+    for number in count(2):
+        yield folder.with_name(f"{folder.name}-{number}")
+
+
+class RunWriter:
+    """Fills a folder that appears under its final name only when `finish` is called.
+
+    Made before the simulation, so that a place that cannot be written to is known at once; leaving
+    the `with` block without `finish` leaves nothing behind. A run folder that exists is replaced,
+    whole, only with `force`; anything else, except an empty folder, never is. A run folder is one
+    with a readable manifest, damaged files or not, and nothing else but hidden files. Every method
+    raises StorageError.
+
+    Where somebody else takes the name in the meantime, a number is appended to it. That is an error
+    where somebody asked for just this name (`named`), and as good otherwise.
+    """
+
+    def __init__(
+        self, final: Path, *, force: bool = False, named: bool = True, needed: float = 0.0
+    ) -> None:
+        """Check that `final` can be made and `needed` bytes are free; make the hidden folder."""
+        self.final, self._force, self._named = final, force and named, named
+        sweep(final.parent)  # may put back a run folder that a killed run was replacing
+        _refuse(final, force)
+        self._staging = Staging(final)
+        try:
+            _require(final, needed)
+        except StorageError:
+            self._staging.discard()
+            raise
+
+    @property
+    def folder(self) -> Path:
+        """Where the files are until `finish`; a RunWriter for a folder in here nests a run."""
+        return self._staging.folder
+
+    @property
+    def scratch(self) -> Path:
+        """Where a folder can be made for what is needed until this is over, and not kept."""
+        return self._staging.scratch
+
+    def add(self, name: str, content: bytes) -> None:
+        """Write a new file; `name` is relative, with `/` for a file in a folder inside."""
+        files.create(self._place(name), content)
+
+    @contextmanager
+    def growing(self, name: str) -> Iterator[Stream]:
+        """A new file to be written to in the block."""
+        with growing(self._place(name)) as stream:
+            yield stream
+
+    def add_json(self, name: str, content: Mapping[str, Any]) -> None:
+        """Write a new JSON file, null for numbers that are not finite."""
+        self.add(name, json_files.encode(content))
+
+    def add_missing(self, extras: Extras) -> None:
+        """Write missing.json where something could not be made."""
+        if extras.missing:
+            self.add_json(MISSING, extras.as_json())
+
+    def finish(self, status: Status, missing: str = "") -> Path:
+        """Write the manifest and give the folder its name, which is returned.
+
+        What was interrupted replaces nothing; it gets a number appended to its name. What lacks
+        something, for the reason `missing`, replaces nothing either. After an error that says where
+        the folder is instead, it is there, whole.
+        """
+        whole = status != "interrupted"
+        sweep(self.folder)  # of runs nested in here whose process was killed
+        manifest.write(self.folder, status)
+        for inner, _, _ in os.walk(self.folder):
+            files.sync_folder(Path(inner))
+        try:
+            _refuse(self.final, self._force)
+            self._staging.publish(replace=self._force and whole and not missing)
+        except Taken as error:
+            other = self._publish_beside()
+            if self._named and whole:
+                texts = (missing, str(error), f"this one is in {other} instead")
+                raise StorageError("; ".join(filter(None, texts))) from error
+        return self._staging.final
+
+    def _publish_beside(self) -> Path:
+        for path in islice(_numbered(self.final), 1, None):
+            with suppress(Taken):
+                _refuse(path, force=False)
+                self._staging.final = path
+                self._staging.publish(replace=False)
+                return path
+        raise AssertionError("there is always another number")
+
+    def _place(self, name: str) -> Path:
+        path = manifest.place(self.folder, name)
+        files.make_folder(path.parent)
+        return path
+
+    def __enter__(self) -> Self:
+        """The writer itself."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Remove what was not finished."""
+        self._staging.discard()
+
+
+def _refuse(final: Path, force: bool) -> None:
+    """StorageError where `final` is something that must not be replaced."""
+    if final.name in ("", ".."):
+        raise StorageError(f"cannot make {final}: a folder's own name is needed")
+    with files.explained(f"cannot make {final}"):
+        if not os.path.lexists(final):
+            return
+        if final.is_symlink() or not final.is_dir():
+            raise Taken(f"{final} exists and is not a folder")
+        if not any(final.iterdir()):
+            return
+    try:
+        found = manifest.read(final)
+    except StorageError as error:
+        raise Taken(f"{final} exists and is not a finished run folder") from error
+    if not force:
+        raise Taken(f"{final} exists already; --force replaces it")
+    shown = (name for name in manifest.foreign(final, found) if not Path(name).name.startswith("."))
+    if other := next(shown, ""):
+        raise Taken(f"{final} holds {other}, which is not the run's; --force would remove it")
+
+
+def _require(final: Path, needed: float) -> None:
+    """StorageError where so many bytes are not free on the disk of `final`."""
+    with files.explained(f"cannot make {final}"):
+        free = shutil.disk_usage(final.parent).free
+    if needed > free:
+        raise StorageError(
+            f"cannot make {final}: it takes {bytes_in_words(needed)} of disk or more, and "
+            f"{bytes_in_words(free)} are free; log less often (log.every), or elsewhere (--out)"
+        )
+
+
+@dataclass(frozen=True)
+class Run:
+    """A finished run folder. `metrics` has None where a number was not finite."""
+
+    folder: Path
+    status: Status
+    metrics: dict[str, float | None]
+    provenance: dict[str, Any]
+    resolved_yaml: str
+    theory: dict[str, Any] = field(default_factory=dict)  # empty without a Lyapunov function
+
+    @cached_property
+    def recording(self) -> Recording:
+        """What log.h5 holds, read when first asked for. Raises StorageError."""
+        from podusv_cli.storage import log_reader  # h5py is slow to import
+
+        return log_reader.read_log(self.folder / LOG)
+
+
+def open_run(folder: Path) -> Run:
+    """A run folder, all of whose files are as they were when it was finished.
+
+    Raises StorageError for anything else, naming the first fault.
+    """
+    found = manifest.check(folder)
+    missing = [name for name in NEEDED if name not in found.files]
+    if missing:
+        raise StorageError(f"{folder} is not the folder of a run: it has no {missing[0]}")
+    return Run(
+        folder=folder,
+        status=found.status,
+        metrics=_metrics(folder / "metrics.json"),
+        provenance=json_files.read(folder / "provenance.json"),
+        resolved_yaml=read_text(folder / "resolved.yaml"),
+        theory=json_files.read(folder / THEORY) if THEORY in found.files else {},
+    )
+
+
+def _metrics(path: Path) -> dict[str, float | None]:
+    metrics = json_files.read(path).get("metrics")
+    if not isinstance(metrics, dict):
+        raise StorageError(f"{path} holds no metrics")
+    for name, number in metrics.items():
+        if type(number) not in (int, float, type(None)):
+            raise StorageError(f"{path}: damaged: {name} is no number")
+    return metrics

@@ -1,0 +1,110 @@
+"""Ideal weights of the two networks (13), (25), (34): nobody has them, so they are fitted to a run.
+
+They minimise the mean of (m epsilon)^2 over the visited states plus sigma |W - W(0)|^2, that is
+what the network contributes to Delta in (48) on average; nothing is left to choose.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from podusv_cli.controllers.network import Network
+from podusv_cli.controllers.polar_backstepping import PolarBackstepping
+from podusv_cli.core.kernel import Vector
+from podusv_cli.core.recording import Recording
+from podusv_cli.engine.replay import Replayed
+from podusv_cli.engine.simulate import ClosedLoop
+
+MOST_ROWS = 2000  # of a run that the fit uses, evenly spread
+MOST_NUMBERS = 2_000_000  # rows times nodes of the fit
+SINGULAR = 1e-12  # relative; damps, without leakage, what no visited state tells apart
+
+
+@dataclass(frozen=True)
+class Ideal:
+    """Weights W*, shape (nodes,), surge [m/s2] and yaw [rad/s2]."""
+
+    W_u: Vector
+    W_r: Vector
+
+
+def unloaded_accelerations(loop: ClosedLoop, now: Replayed) -> tuple[Vector, Vector]:
+    """f_u and f_r: accelerations less what forces and disturbance cause, for any vessel."""
+    m, s, d = loop.vessel, now.signals, now.rates
+    sway, yaw = s["tau_v"] + s["b_v"], s["tau_r"] + s["b_r"]
+    loaded = (m.m22 * yaw - m.m32 * sway) / (m.m22 * m.m33 - m.m23 * m.m32)
+    return d["u"] - (s["tau_u"] + s["b_u"]) / m.m11, d["r"] - loaded
+
+
+def node_outputs(network: Network, log: Recording) -> Vector:
+    """Phi (14) at every logged row, shape (rows, nodes), in factors as the law has them."""
+    return outputs(network, exponents(network, log))
+
+
+def exponents(network: Network, log: Recording) -> Vector:
+    """Half the squared distance in widths in every factor of a node, shape (rows, factors)."""
+    along, plane = network.factors
+    centers, steep = network.table().reshape(2, 3, -1)[..., : along + plane]
+    nu = np.column_stack([log["u"], log["v"], log["r"]])
+    squares = np.zeros((len(nu), along + plane))
+    for axis in range(3):
+        squares += steep[axis] * (nu[:, axis, None] - centers[axis]) ** 2
+    return np.nan_to_num(squares, nan=np.inf)  # velocities may have left all numbers
+
+
+def outputs(network: Network, factors: Vector) -> Vector:
+    """Phi (14), shape (rows, nodes), of what `exponents` gives."""
+    plane, bells = network.factors[1], np.exp(-factors)
+    return (bells[:, plane:, None] * bells[:, None, :plane]).reshape(len(bells), -1)
+
+
+def node_distance(network: Network, factors: Vector) -> Vector:
+    """Distance of (u, v, r) to the nearest centre in widths, of what `exponents` gives."""
+    plane = network.factors[1]
+    nearest = factors[:, plane:].min(axis=1) + factors[:, :plane].min(axis=1)
+    return np.asarray(np.sqrt(2.0 * nearest))
+
+
+def network_output(phi: Vector, weights: Vector) -> Vector:
+    """W . Phi (15) at every row; without threads, which wait for each other on a busy machine."""
+    return np.asarray(np.einsum("ij,j->i", phi, weights))
+
+
+def ideal_weights(loop: ClosedLoop, law: PolarBackstepping, log: Recording, now: Replayed) -> Ideal:
+    """The fit described above, over what the law's nominal inertia makes of f_u and f_r."""
+    f_u, f_r = unloaded_accelerations(loop, now)
+    usable = (np.abs(f_u) < 1e100) & (np.abs(f_r) < 1e100)  # of a run that leaves all numbers
+    phi = node_outputs(law.network, log)[usable]
+    start, inverse, weights = law.network.initial_weight, _gram(phi), []
+    for f, mass, told, sigma in (
+        (f_u, loop.vessel.m11, loop.nominal.m11, law.sigma_u),
+        (f_r, loop.vessel.m33, loop.nominal.m33, law.sigma_r),
+    ):
+        aim = f[usable] * (mass / told) - start * phi.sum(axis=1)
+        damping = np.float64(sigma * len(phi)) / (told * told)  # a float would raise beyond numbers
+        weights.append(start + inverse(aim, float(damping)))
+    return Ideal(*weights)
+
+
+def _gram(phi: Vector) -> Callable[[Vector, float], Vector]:
+    """W(f, c) that minimises |f - Phi W|^2 + c |W|^2, by the smaller of Phi^T Phi and Phi Phi^T."""
+    tall = phi.shape[0] >= phi.shape[1]
+    short = phi if tall else phi.T
+    square = np.einsum("ki,kj->ij", short, short)
+    least = SINGULAR * float(np.trace(square)) or 1.0
+
+    def weights(f: Vector, c: float) -> Vector:
+        right = network_output(phi.T, f) if tall else f
+        solved = np.linalg.solve(square + max(c, least) * np.eye(len(square)), right)
+        return np.asarray(solved if tall else network_output(phi.T, solved))
+
+    return weights
+
+
+def rows_to_fit(rows: int, nodes: int) -> Vector:
+    """Indices of the rows that the fit uses."""
+    most = max(1, min(MOST_ROWS, MOST_NUMBERS // nodes, rows))
+    return np.linspace(0, rows - 1, most).astype(int)

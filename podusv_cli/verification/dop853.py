@@ -1,0 +1,105 @@
+"""A scenario integrated once more, by scipy's DOP853 with its own choice of steps.
+
+An adaptive method of order eight, started anew wherever the path is not smooth. What is not an
+ordinary differential equation with a smooth right-hand side is left out, and why is said.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from podusv_cli.core.kernel import Vector, bundle
+from podusv_cli.engine.continuous import Slope, continuous
+from podusv_cli.paths.base import TARGET
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.verification.step_halving import Level, Progress
+
+TOLERANCE = 1e-10  # relative and absolute, of every state
+UPDATES = 100  # of the progress, for a display is slower than a step
+MOST_EVALUATIONS = 500_000
+
+
+@dataclass(frozen=True)
+class Independent:
+    """What DOP853 says: where the hull ended [m], the IAE [m s]; or why there is no answer."""
+
+    position: Vector
+    iae: float
+    evaluations: int
+    left_out: str = ""
+
+
+def left_out(scenario: Scenario, levels: list[Level]) -> str:
+    """Why a scenario is not for an adaptive integrator; "" where it is."""
+    return next((text for applies, text in REASONS if applies(scenario, levels)), "")
+
+
+REASONS: tuple[tuple[Callable[[Scenario, list[Level]], bool], str], ...] = (
+    (lambda scenario, _: scenario.control.period > 0, "the law's output is held (control.period)"),
+    (
+        lambda scenario, _: scenario.controller.sample_period() > 0,
+        "the law takes samples (a difference quotient, or a held direction)",
+    ),
+    (
+        lambda _, levels: any(level.status != "finished" for level in levels),
+        "the run does not reach its end",
+    ),
+    (
+        lambda _, levels: any(level.metrics.get("saturated_fraction", 0.0) > 0 for level in levels),
+        "the actuator limits the law, which puts kinks into the right-hand side",
+    ),
+)
+
+
+def integrate(scenario: Scenario, progress: Progress | None = None) -> Independent:
+    """Integrate a scenario that nothing speaks against; the IAE is one more state."""
+    from scipy.integrate import DOP853  # slow to import
+
+    slope, start = continuous(scenario.closed_loop(), compiled=scenario.simulation.compiled)
+    f, s, evaluations, shown = _with_iae(scenario, slope), np.append(start, 0.0), 0, 0.0
+    duration = scenario.time_grid().steps * scenario.simulation.step
+    for begin, end in _pieces(scenario, duration):
+        solver = DOP853(f, begin, s, end, rtol=TOLERANCE, atol=TOLERANCE)
+        while solver.status == "running":
+            trouble = _step(solver)
+            if trouble or evaluations + solver.nfev > MOST_EVALUATIONS:
+                why = trouble or f"gave up after {MOST_EVALUATIONS} evaluations"
+                text = f"{why} at t = {solver.t:.6g} s"
+                return Independent(np.full(2, np.nan), math.nan, evaluations + solver.nfev, text)
+            if progress and solver.t > shown:
+                progress(solver.t / duration)
+                shown = solver.t + duration / UPDATES
+        s, evaluations = solver.y, evaluations + solver.nfev
+    return Independent(s[:2], float(s[-1]), evaluations)
+
+
+def _step(solver: object) -> str:
+    """One step; what went wrong, if anything did."""
+    try:
+        message: str | None = solver.step()  # type: ignore[attr-defined]
+    except ArithmeticError as error:
+        return str(error)
+    return message or ""
+
+
+def _pieces(scenario: Scenario, duration: float) -> Iterator[tuple[float, float]]:
+    """Stretches of time between the path's breaks, each after the first beginning just after."""
+    inner = [at.time for at in scenario.path.breaks() if 0.0 < at.time < duration]
+    for begin, end in pairwise([0.0, *inner, duration]):
+        yield (float(np.nextafter(begin, math.inf)) if begin else 0.0), end
+
+
+def _with_iae(scenario: Scenario, slope: Slope) -> Slope:
+    path, target = scenario.path, np.zeros(len(TARGET))
+    k, table = bundle(path.constants()), path.table()
+
+    def f(t: float, s: Vector) -> Vector:
+        path.evaluate(t, k, table, target)
+        return np.append(slope(t, s[:-1]), math.hypot(target[0] - s[0], target[1] - s[1]))
+
+    return f

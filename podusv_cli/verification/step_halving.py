@@ -1,0 +1,56 @@
+"""A scenario run again at a finer step, with everything that is given in seconds left as it is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from podusv_cli.core.kernel import Vector
+from podusv_cli.core.recording import Status
+from podusv_cli.engine.grid import TimeGrid
+from podusv_cli.engine.simulate import simulate
+from podusv_cli.metrics.accumulators import observer, summarise
+from podusv_cli.scenario.model import Scenario
+
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class Level:
+    """A run at one step: its metrics (none that did not finish), and where the hull ended."""
+
+    step: float
+    status: Status
+    message: str
+    metrics: dict[str, float]
+    position: Vector  # (x, y) at the end [m]
+
+
+def refined(scenario: Scenario, halvings: int) -> TimeGrid:
+    """The scenario's grid with its step halved so often; only start and end are logged.
+
+    Control periods are counted in steps, so their count doubles; a difference quotient's Delta t
+    and the path's times are in seconds and stay.
+    """
+    grid, finer = scenario.time_grid(), 2**halvings
+    steps = grid.steps * finer
+    return TimeGrid(grid.step / finer, steps, max(steps, 1), grid.hold_every * finer)
+
+
+def run_level(scenario: Scenario, halvings: int, progress: Progress | None = None) -> Level:
+    """Run a scenario of one law with its step halved so often."""
+    loop, grid, settings = scenario.closed_loop(), refined(scenario, halvings), scenario.metrics
+    seeing = observer(
+        loop, grid, steady_fraction=settings.steady_fraction,
+        settling_radius=settings.settling_radius,
+    )  # fmt: skip
+    compiled = scenario.simulation.compiled
+    out = simulate(loop, grid, observer=seeing, compiled=compiled, progress=progress)
+    if out.status == "interrupted":
+        raise KeyboardInterrupt
+    whole = out.status == "finished" and out.seen is not None
+    metrics = summarise(out.seen, grid.step) if whole and out.seen is not None else {}
+    position = np.array([out["x"][-1], out["y"][-1]]) if whole else np.full(2, np.nan)
+    return Level(grid.step, out.status, out.message, metrics, position)

@@ -1,0 +1,1 @@
+"""The commands as pipelines: scenarios or folders in, finished folders out."""

@@ -1,0 +1,301 @@
+"""One scenario simulated, measured, written and drawn into one finished folder."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from importlib import import_module
+from pathlib import Path
+from threading import Thread
+from typing import TYPE_CHECKING, Any
+
+from podusv_cli import __version__
+from podusv_cli.core.errors import StorageError
+from podusv_cli.core.kernel import Vector
+from podusv_cli.core.recording import Columns, Recording, Status
+from podusv_cli.engine.check import check_law
+from podusv_cli.engine.row_table import PIECE
+from podusv_cli.engine.simulate import Observer, marcher, simulate
+from podusv_cli.findings.after import aftermath
+from podusv_cli.findings.finding import Finding, heard
+from podusv_cli.metrics.accumulators import observer, summarise
+from podusv_cli.metrics.cost import law_costs
+from podusv_cli.metrics.table import METRICS
+from podusv_cli.process.extras import Extras, Missing
+from podusv_cli.process.interrupts import interrupts_heard, interrupts_held
+from podusv_cli.process.workers import Outcome
+from podusv_cli.scenario.limits import HELD, estimate
+from podusv_cli.scenario.load import resolved_yaml
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.storage import provenance
+from podusv_cli.storage import run_folder as folder
+from podusv_cli.storage.columns import ColumnFiles
+from podusv_cli.storage.log_check import check_declared
+from podusv_cli.theory import monitor
+from podusv_cli.theory.report import as_json as theory_report
+
+if TYPE_CHECKING:
+    from podusv_cli.storage.log_writer import Log
+
+Progress = Callable[[float], None]
+UNDRAWN = (
+    "interrupted after the simulation; the log is whole, what was still to be made of it is missing"
+)
+
+
+@dataclass
+class Stopwatch:
+    """Seconds spent in each part of a pipeline."""
+
+    seconds: dict[str, float] = field(default_factory=dict)
+    began: float = field(default_factory=time.perf_counter)
+
+    @contextmanager
+    def part(self, name: str) -> Iterator[None]:
+        """Add what happens inside to `<name>_s`."""
+        start = time.perf_counter()
+        try:
+            yield
+        finally:
+            key = f"{name}_s"
+            self.seconds[key] = self.seconds.get(key, 0.0) + time.perf_counter() - start
+
+    def total(self) -> dict[str, float]:
+        """All parts and the time since the start."""
+        return self.seconds | {"total_s": time.perf_counter() - self.began}
+
+
+@dataclass(frozen=True)
+class Room:
+    """How large a log is held in memory, and how much of one that is not [bytes]."""
+
+    log: int = HELD
+    piece: int = PIECE
+
+
+@dataclass(frozen=True)
+class Task:
+    """A scenario, its file's text, where its run folder goes, how it is called and drawn.
+
+    `named`: the user asked for this folder. `noticed` is what was found before the run.
+    """
+
+    scenario: Scenario
+    text: str
+    target: Path
+    force: bool = False
+    named: bool = True
+    figures: Sequence[str] = ()
+    argv: Sequence[str] = ()
+    label: str = ""  # in figures; the law's kind by default
+    noticed: Sequence[Finding] = ()
+    room: Room = Room()
+
+
+@dataclass(frozen=True)
+class Finished:
+    """A run that is over: where it lies, how it ended, its numbers."""
+
+    folder: Path
+    controller: str
+    status: Status
+    message: str
+    metrics: dict[str, float]
+    timing: dict[str, float]
+    others: tuple[str, ...] = ()  # runs of a comparison that the scenario also has
+    warnings: tuple[Finding, ...] = ()
+    missing: tuple[Missing, ...] = ()
+
+    def as_json(self) -> dict[str, Any]:
+        """What `--json` prints of a run."""
+        return {
+            "format": 1,
+            "status": self.status,
+            "run": str(self.folder),
+            "controller": self.controller,
+            "metrics": self.metrics,
+            "timing": self.timing,
+            "warnings": [finding.as_json() for finding in self.warnings],
+            "missing": [str(part) for part in self.missing],
+        }
+
+
+def execute(
+    task: Task, progress: Progress | None = None, watch: Stopwatch | None = None
+) -> Finished:
+    """Simulate, measure, write, draw; `target` is there only when all of it is.
+
+    A run that diverges or is interrupted is written like any other; its status tells. An interrupt
+    after the simulation costs the figures or the law's cost, nothing else; what fails after it is
+    left out, and missing.json says why. Raises StorageError.
+    """
+    started, watch, size = datetime.now(UTC), watch or Stopwatch(), estimate(task.scenario)
+    with (
+        interrupts_held(),
+        folder.RunWriter(
+            task.target, force=task.force, named=task.named, needed=size.needed
+        ) as writer,
+    ):
+
+        def columns(name: str) -> Columns | None:
+            return ColumnFiles(writer.scratch / name) if size.content > task.room.log else None
+
+        recording = simulated(
+            task.scenario, watch, progress, columns=columns("log"), piece=task.room.piece
+        )
+        extras = Extras(recording.status == "interrupted")
+        with watch.part("metrics"):
+            metrics = extras.made("the metrics", lambda: summary(task.scenario, recording)) or {}
+            metrics |= extras.attempt("law_ns", lambda: _cost(task.scenario, recording)) or {}
+        with _log(writer, task.scenario, recording) as log:
+            log.add(recording.signals)  # written while the run is looked at
+            with watch.part("metrics"):
+                noticed = extras.made("warnings", lambda: _noticed(task.scenario, recording))
+            with watch.part("theory"):
+                whole, theory = extras.made(
+                    "theory.json with the stability monitor's signals",
+                    lambda: monitored(task.scenario, recording, columns("theory")),
+                ) or (recording, {})
+            with watch.part("write"):
+                log.add(_beyond(whole, recording))
+                log.done()
+        warnings = (*task.noticed, *(noticed or ()))
+        with watch.part("write"):
+            _write(writer, task, whole, metrics, warnings)
+            if theory:
+                writer.add_json("theory.json", theory)
+        with watch.part("figures"):
+            figures = extras.attempt("figures", lambda: _drawn(task, whole, extras)) or {}
+            for name, content in figures.items():
+                writer.add(f"figures/{name}", content)
+        status = "interrupted" if extras.interrupted else recording.status
+        with watch.part("write"):
+            origin = provenance.collect(list(task.argv), started, datetime.now(UTC))
+            writer.add_json("provenance.json", origin)
+            writer.add_missing(extras)
+            final = writer.finish(status)
+    message = recording.message or ("" if status == "finished" else UNDRAWN)
+    return Finished(
+        final, recording.controller, status, message, metrics, watch.total(),
+        warnings=warnings, missing=tuple(extras.missing),
+    )  # fmt: skip
+
+
+def _noticed(scenario: Scenario, recording: Recording) -> list[Finding]:
+    return heard(aftermath(scenario, recording), scenario)
+
+
+def unwritten(outcomes: Iterable[Outcome]) -> str:
+    """Why a run could not be written, "" where none failed for that.
+
+    A result without such a run is not worth an older one's place. Raises StorageError where there
+    is no run at all.
+    """
+    outcomes = tuple(outcomes)
+    causes = [o.failure for o in outcomes if o.code == StorageError.exit_code]
+    if causes and not any(outcome.result for outcome in outcomes):
+        raise StorageError(causes[0])
+    return next(iter(causes), "")
+
+
+def warm_up(scenario: Scenario) -> None:
+    """Have all code of this scenario's loop compiled and loaded. Raises LawError."""
+    loop, compiled = scenario.closed_loop(), scenario.simulation.compiled
+    check_law(loop)
+    check_declared(loop)
+    marcher(loop, _observer(scenario), compiled)
+    if scenario.log.monitor:
+        monitor.prepare(loop, scenario.time_grid(), compiled)
+
+
+def _observer(scenario: Scenario) -> Observer:
+    settings = scenario.metrics
+    return observer(
+        scenario.closed_loop(), scenario.time_grid(),
+        steady_fraction=settings.steady_fraction, settling_radius=settings.settling_radius,
+    )  # fmt: skip
+
+
+def simulated(
+    scenario: Scenario, watch: Stopwatch, progress: Progress | None = None,
+    *, columns: Columns | None = None, piece: int = PIECE,
+) -> Recording:  # fmt: skip
+    """Simulate a scenario, observed for its metrics; `columns` and `piece` as `simulate` has it."""
+    loop, grid, seeing = scenario.closed_loop(), scenario.time_grid(), _observer(scenario)
+    compiled = scenario.simulation.compiled
+    with watch.part("compile"), interrupts_heard():
+        warm_up(scenario)
+    with watch.part("engine"):
+        # The march leaves the interpreter alone; what writes its log is imported in the meantime.
+        Thread(target=import_module, args=("podusv_cli.storage.log_writer",), daemon=True).start()
+        return simulate(
+            loop, grid, observer=seeing, compiled=compiled, progress=progress,
+            columns=columns, piece=piece,
+        )  # fmt: skip
+
+
+def summary(scenario: Scenario, recording: Recording) -> dict[str, float]:
+    """The metrics of a run that was observed."""
+    seen = recording.seen
+    return summarise(seen, scenario.time_grid().step) if seen is not None else {}
+
+
+def _cost(scenario: Scenario, recording: Recording) -> dict[str, float]:
+    timed = scenario.simulation.compiled and len(recording["time"])
+    return law_costs([(scenario.closed_loop(), recording)])[0] if timed else {}
+
+
+def monitored(
+    scenario: Scenario, recording: Recording, columns: Columns | None = None
+) -> tuple[Recording, dict[str, Any]]:
+    """The recording with what the stability monitor adds, and its findings; none without V."""
+    loop, grid = scenario.closed_loop(), scenario.time_grid()
+    found = scenario.log.monitor and monitor.monitored(
+        loop, grid, recording,
+        steady_fraction=scenario.metrics.steady_fraction, compiled=scenario.simulation.compiled,
+        columns=columns,
+    )  # fmt: skip
+    return (found.recording, theory_report(loop, grid, found)) if found else (recording, {})
+
+
+@contextmanager
+def _log(writer: folder.RunWriter, scenario: Scenario, recording: Recording) -> Iterator[Log]:
+    from podusv_cli.storage import log_writer  # `simulated` has begun with that
+
+    texts = {
+        "resolved_yaml": resolved_yaml(scenario), "version": __version__,
+        "title": scenario.description or scenario.name, "source": scenario.vessel.source,
+    }  # fmt: skip
+    with writer.growing(folder.LOG) as stream, log_writer.opened(stream, recording, **texts) as log:
+        yield log
+
+
+def _beyond(whole: Recording, recording: Recording) -> dict[str, Vector]:
+    """What the whole recording has beside the first one's signals."""
+    arrays = {**whole.signals, **whole.fixed}
+    return {name: array for name, array in arrays.items() if name not in recording.signals}
+
+
+def _write(
+    writer: folder.RunWriter, task: Task, recording: Recording, metrics: dict[str, float],
+    warnings: Sequence[Finding],
+) -> None:  # fmt: skip
+    writer.add("scenario.yaml", task.text.encode())
+    writer.add("resolved.yaml", resolved_yaml(task.scenario).encode())
+    status = {"status": recording.status, "controller": recording.controller}
+    told = [finding.as_json() for finding in warnings]
+    writer.add_json("metrics.json", {**status, "metrics": metrics, "warnings": told})
+    rows = [f"{name},{metrics[name]!r},{METRICS[name].unit}" for name in METRICS if name in metrics]
+    writer.add("metrics.csv", "\n".join(["metric,value,unit", *rows, ""]).encode())
+
+
+def _drawn(task: Task, recording: Recording, extras: Extras) -> dict[str, bytes]:
+    if not task.figures:
+        return {}
+    from podusv_cli.figures.drawing import draw_in_parallel, dressed  # matplotlib is slow to import
+
+    shown = dressed([(task.label or recording.controller, recording, task.scenario)])
+    return draw_in_parallel(shown, task.figures, ("png",), extras)

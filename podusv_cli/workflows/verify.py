@@ -1,0 +1,57 @@
+"""A scenario's numbers verified, and kept in a file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from pathlib import Path
+
+from podusv_cli.core.errors import StorageError, UsageError
+from podusv_cli.engine.check import check_law
+from podusv_cli.scenario.limits import limits
+from podusv_cli.scenario.load import load
+from podusv_cli.storage import files, json_files
+from podusv_cli.verification import verify as verification
+from podusv_cli.verification.verify import Verified
+
+RESULT = {"format", "tolerance", "steps", "runs", "converged"}  # keys of what `keep` writes
+
+
+def verify(
+    config: Path, overrides: Sequence[str], tolerance: float, out: Path | None = None,
+    progress: Callable[[str, float], None] | None = None, *, force: bool = False,
+) -> Verified:  # fmt: skip
+    """Verify a scenario's numbers, which `keep` can write to the file `out`.
+
+    Raises UsageError for a run folder, ScenarioError, LawError, and StorageError where `out` is no
+    place for a file, or is another file and not replaced by `force`, before anything is computed.
+    """
+    if (config / "resolved.yaml").is_file():
+        raise UsageError(f"{config} is a run folder; verify its resolved.yaml")
+    scenario = load(config, overrides, checks=(limits(insist=""),)).scenario
+    if out:
+        files.check_places([out])
+        _spare(out, force)
+    for single in scenario.singles().values():
+        check_law(single.closed_loop())
+    return verification.verify(scenario, tolerance, progress)
+
+
+def keep(done: Verified, out: Path, *, force: bool = False) -> None:
+    """Write a verification as JSON to the file `out`. Raises StorageError, as `verify`."""
+    _spare(out, force)
+    files.make_folder(out.parent)
+    files.write_bytes(out, json_files.encode(done.as_json()))
+
+
+def _spare(out: Path, force: bool) -> None:
+    """StorageError where `out` holds anything but an earlier verification."""
+    if force or not out.exists() or not out.stat().st_size:
+        return
+    with suppress(StorageError):
+        if json_files.read(out).keys() >= RESULT:
+            return
+    raise StorageError(
+        f"{out} exists and is not a result of podusv verify; --force replaces it, or name another "
+        "file"
+    )

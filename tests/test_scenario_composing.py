@@ -1,0 +1,288 @@
+"""One scenario from several sources: `extends` below, `--set` on top."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from scenario_samples import SOUND, VESSEL_NAMES, findings, loaded, told, write
+
+from podusv_cli.scenario import layers
+from podusv_cli.scenario.load import load
+
+
+@pytest.fixture(autouse=True)
+def _in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Messages show file names as a user gives them."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "sub").mkdir()
+
+
+def test_a_child_changes_single_keys_of_its_base() -> None:
+    write("base.yaml", SOUND + "start: {x: 1, y: 2}\nsimulation: {step: 0.02}\n")
+    write("sub/child.yaml", "extends: ../base.yaml\nstart: {y: 5}\ncontroller: {k_ze: 0.3}\n")
+    got = load("sub/child.yaml")
+    assert (got.scenario.start.x, got.scenario.start.y) == (1, 5)
+    assert got.scenario.controller.kind == "pid"
+    assert got.scenario.controller.k_ze == 0.3
+    assert got.origins["start.x"] == "sub/../base.yaml:6:12"
+    assert got.origins["start.y"] == "sub/child.yaml:2:12"
+    assert got.origins["start.psi"] == "default"
+    assert got.text == Path("sub/child.yaml").read_text()
+
+
+def test_several_levels_and_lists_are_replaced_whole() -> None:
+    law = "controller: {kind: dsc, network: {nodes: [5, 5, 5], low: [-2, -2, -2]}}\n"
+    write("a.yaml", SOUND.replace("controller: {kind: pid}\n", law))
+    write("b.yaml", "extends: a.yaml\ncontroller: {network: {nodes: [4, 3, 2]}}\n")
+    write("c.yaml", "extends: b.yaml\ncontroller: {network: {high: [3, 3, 3]}}\n")
+    network = load("c.yaml").scenario.controller.network
+    assert (network.nodes, network.low, network.high) == ((4, 3, 2), (-2, -2, -2), (3, 3, 3))
+
+
+def test_another_kind_replaces_the_section_and_the_same_kind_does_not() -> None:
+    write("base.yaml", SOUND.replace("{kind: pid}", "{kind: dsc, k_ze: 0.4, T_u: 0.5}"))
+    write("other.yaml", "extends: base.yaml\ncontroller: {kind: pid}\n")
+    write("same.yaml", "extends: base.yaml\ncontroller: {kind: dsc, T_r: 0.7}\n")
+    assert load("other.yaml").scenario.controller.k_ze == 0.1
+    same = load("same.yaml").scenario.controller
+    assert (same.k_ze, same.T_u, same.T_r) == (0.4, 0.5, 0.7)
+
+
+def test_another_preset_replaces_the_vessel_with_its_changes() -> None:
+    write("base.yaml", SOUND.replace("{preset: paper}", "{preset: paper, m: 30}"))
+    write("other.yaml", "extends: base.yaml\nvessel: {preset: cybership2, beam: 0.3}\n")
+    vessel = load("other.yaml").scenario.vessel
+    assert (vessel.m, vessel.beam, vessel.N_vv) == (23.8, 0.3, 3.95645)
+
+
+def test_null_is_a_value_and_does_not_fall_back_to_the_base() -> None:
+    write("base.yaml", SOUND.replace("{kind: pid}", "{kind: dsc, network: {widths: [1, 1, 1]}}"))
+    write("none.yaml", "extends: base.yaml\ncontroller: {network: {widths: null}}\n")
+    assert load("none.yaml").scenario.controller.network.widths is None
+    write("bad.yaml", "extends: base.yaml\ncontroller: {k_ze: null}\n")
+    assert findings("bad.yaml") == [
+        "bad.yaml:2:20: controller.k_ze: must be a number not below 0 [1/s], found null"
+    ]
+
+
+def test_a_fault_of_the_base_is_told_at_the_base() -> None:
+    write("sub/base.yaml", SOUND + "log: {every: 0}\n")
+    write("child.yaml", "extends: sub/base.yaml\nlgo: {}\n")
+    lines = findings("child.yaml")
+    assert [line.split(": ")[0] for line in lines] == ["child.yaml:2:1", "sub/base.yaml:6:14"]
+
+
+def test_a_missing_base_is_told_at_the_key_and_alone() -> None:
+    write("child.yaml", "description: x\nextends: nope.yaml\nlog: {evry: 1}\n")
+    assert findings("child.yaml") == [
+        "child.yaml:2:10: extends: 'nope.yaml' cannot be read: no such file or directory",
+        "child.yaml:3:7: log.evry: unknown key; did you mean 'every'? (allowed: every, monitor)",
+    ]
+
+
+def test_a_base_that_is_no_yaml_is_told_once() -> None:
+    write("base.yaml", "a: [1\n")
+    write("child.yaml", "extends: base.yaml\n")
+    assert findings("child.yaml") == ["base.yaml:1:4: the bracket opened here is never closed"]
+
+
+def test_a_circle_is_told_at_the_key_that_closes_it() -> None:
+    write("a.yaml", "extends: sub/b.yaml\n")
+    write("sub/b.yaml", "extends: ../a.yaml\n")
+    assert findings("a.yaml") == [
+        "sub/b.yaml:1:10: extends: goes round in a circle: a.yaml -> sub/b.yaml -> sub/../a.yaml"
+    ]
+    write("self.yaml", "extends: self.yaml\n")
+    assert findings("self.yaml") == [
+        "self.yaml:1:10: extends: goes round in a circle: self.yaml -> self.yaml"
+    ]
+
+
+def test_of_several_bases_the_later_goes_over_the_earlier() -> None:
+    write("first.yaml", SOUND + "description: first\nname: first\n")
+    write("second.yaml", "description: second\nstart: {x: 7.0}\n")
+    write("a.yaml", "extends: [first.yaml, second.yaml]\nstart: {y: 8.0}\n")
+    scenario = load("a.yaml").scenario
+    assert (scenario.name, scenario.description) == ("first", "second")
+    assert (scenario.start.x, scenario.start.y) == (7.0, 8.0)
+
+
+def test_each_of_several_bases_is_a_file_name() -> None:
+    write("a.yaml", "extends: [none.yaml, 3]\n")
+    assert findings("a.yaml") == [
+        "a.yaml:1:11: extends: 'none.yaml' cannot be read: no such file or directory",
+        "a.yaml:1:22: extends: must be a file name, found 3",
+    ]
+
+
+def test_null_takes_out_an_inherited_run_or_claim() -> None:
+    runs = "controllers: {a: {kind: pid}, b: {kind: dsc}}\n"
+    claims = "claims: {c: {says: x, source: y, expect: a.iae < b.iae}}\n"
+    write("base.yaml", SOUND + runs + claims)
+    write("a.yaml", "extends: base.yaml\ncontrollers: {b: null}\nclaims: {c: null}\n")
+    scenario = load("a.yaml").scenario
+    assert list(scenario.controllers) == ["a"]
+    assert not scenario.claims
+
+
+def test_an_override_wins_and_is_told_as_origin() -> None:
+    got = loaded(SOUND, ["start.x=1e-3", "controller.k_ze=2"])
+    assert (got.scenario.start.x, got.scenario.controller.k_ze) == (1e-3, 2.0)
+    assert got.origins["start.x"] == "--set start.x=1e-3"
+    assert got.text == SOUND
+
+
+def test_overrides_take_text_lists_and_mappings() -> None:
+    got = loaded(
+        SOUND,
+        [
+            "description=Why: a test #3, with *marks*",
+            "controller={kind: dsc, network: {nodes: [4, 4, 4]}}",
+            "controller.network.low=[-2, -2, -2]",
+            "name='1e3'",
+        ],
+    ).scenario
+    assert got.description == "Why: a test #3, with *marks*"
+    assert got.name == "1e3"
+    assert got.controller.network.nodes == (4, 4, 4)
+    assert got.controller.network.low == (-2, -2, -2)
+
+
+@pytest.mark.parametrize("turn", [1, -1])
+def test_the_order_of_kind_and_gain_on_the_command_line_does_not_matter(turn: int) -> None:
+    law = loaded(SOUND, ["controller.kind=dsc", "controller.k_ze=0.7"][::turn]).scenario.controller
+    assert (law.kind, law.k_ze) == ("dsc", 0.7)
+
+
+def test_the_last_of_two_equal_keys_wins() -> None:
+    assert loaded(SOUND, ["start.x=1", "start.x=2"]).scenario.start.x == 2
+
+
+@pytest.mark.parametrize(
+    ("override", "says"),
+    [
+        ("vessel.m", "write it as --set section.key=value"),
+        ("=3", "write it as --set section.key=value"),
+        ("vessel..m=3", "write it as --set section.key=value"),
+        ("", "write it as --set section.key=value"),
+        ("start.z=1", "start.z: unknown key (allowed: x, y, psi, u, v, r)"),
+        ("start.x=far", "start.x: must be a number [m], found 'far'"),
+        ("start.x=", "start.x: must be a number [m], found nothing"),
+        ("start.x=.nan", "start.x: .nan is not a finite number"),
+        ("start.x.y=1", "start.x: must be a number [m], found a mapping of keys"),
+        ("start.x=[1", "the bracket opened here is never closed"),
+        ("log.every=0", "log.every: must be a whole number not below 1 [steps], found 0"),
+        (
+            "controller=dsc",
+            "controller: must be a mapping of keys with kind adaptive_neural, backstepping, dsc or "
+            "pid, found 'dsc'; write {kind: dsc}",
+        ),
+        (
+            "vessel.preset=cybership",
+            "vessel.preset: unknown vessel 'cybership'; did you mean 'cybership2'? "
+            "(allowed: " + VESSEL_NAMES + ")",
+        ),
+        (
+            "simulation.duration=1e-9",
+            "simulation.duration: 1e-09 s is no whole number of steps of 0.01 s; try 0.01",
+        ),
+    ],
+)  # fmt: skip
+def test_a_wrong_override_is_told_as_given(override: str, says: str) -> None:
+    assert told(SOUND, [override]) == [f"--set {override}: {says}"]
+
+
+def test_a_wrong_override_does_not_hide_the_others() -> None:
+    assert len(told(SOUND, ["a", "start.z=1", "start.x=.inf", "start.y=x"])) == 4
+
+
+def test_an_override_is_always_on_one_line() -> None:
+    assert told(SOUND, ["start.x=a\nb"]) == [
+        r"--set 'start.x=a\nb': start.x: must be a number [m], found 'a\nb'"
+    ]
+
+
+PODS = SOUND.replace("{kind: ideal}", "{kind: pod, preset: cybership2_pod}")
+
+
+def test_an_item_of_a_list_can_be_set_by_its_place_also_where_a_preset_brings_the_list() -> None:
+    sets = ("actuator.pods.1.n_lag=0.5", "actuator.pods.0={angle_lag: 0.2, n_lag: 0.3}")
+    one, two = loaded(PODS, sets).scenario.actuator.pods
+    assert (one.n_lag, one.angle_lag, one.T_nn) == (0.3, 0.2, 3.65034e-3)
+    assert (two.n_lag, two.angle_lag, two.y) == (0.5, 0.1, 0.078)
+    assert told(PODS, ["actuator.pods.1.T_nn=-1"]) == [
+        "--set actuator.pods.1.T_nn=-1: actuator.pods[1].T_nn: must be a number above 0 [N s2], "
+        "found -1"
+    ]
+
+
+def test_a_place_that_a_list_does_not_have_is_no_item() -> None:
+    (line,) = told(PODS, ["actuator.pods.2.n_lag=0.5"])
+    assert "actuator.pods: must be a list" in line
+
+
+def test_another_preset_of_pods_keeps_the_kind_and_nothing_else() -> None:
+    text = PODS.replace("kind: pod,", "kind: pod, priority: surge,")
+    write("base.yaml", text)
+    actuator = load("base.yaml", ["actuator.preset=revolt"]).scenario.actuator
+    assert (actuator.kind, actuator.priority, len(actuator.pods)) == ("pod", "yaw", 3)
+    (line,) = told(text, ["actuator.preset=revol"])
+    assert "unknown set of pods 'revol'; did you mean 'revolt'?" in line
+
+
+def test_lists_of_lists_of_bases_are_refused_beyond_a_hundred_files(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    write("3.yaml", SOUND)
+    for depth in range(3):
+        names = ", ".join([f"{depth + 1}.yaml"] * 10)
+        write(f"{depth}.yaml", f"extends: [{names}]\n")
+    read, opened = layers.read_text, list[str]()
+    monkeypatch.setattr(
+        layers, "read_text", lambda path, *more: (opened.append(path), read(path, *more))[1]
+    )
+    (said,) = findings("0.yaml")
+    assert said.startswith("2.yaml:1:")
+    assert said.endswith(
+        "extends: this scenario and all that it extends are more than 100 files; extend fewer files"
+    )
+    assert len(opened) == 99
+
+
+def test_a_chain_of_bases_is_refused_beyond_a_hundred_files() -> None:
+    for i in range(1200):
+        write(f"{i}.yaml", f"extends: {i + 1}.yaml\n")
+    write("1200.yaml", SOUND)
+    assert len(findings("0.yaml")) == 1
+    assert findings("0.yaml")[0].startswith("99.yaml:1:10: extends: this scenario and all that")
+    assert findings("1101.yaml") == []
+    assert len(findings("1100.yaml")) == 1
+
+
+@pytest.mark.parametrize(
+    ("more", "what"),
+    [
+        (f"description: '{'a' * 900}'\n", "2,000 characters"),
+        (f"silence: [{', '.join('a' * 90)}]\n", "300 values"),
+    ],
+)
+def test_bases_are_refused_beyond_a_total(
+    monkeypatch: pytest.MonkeyPatch, more: str, what: str
+) -> None:
+    monkeypatch.setattr(layers, "MOST", {"files": 9, "characters": 2000, "values": 300})
+    write("base.yaml", more)
+    write("a.yaml", f"extends: [{', '.join(['base.yaml'] * 5)}]\n")
+    assert f"are more than {what}; extend fewer files" in "".join(findings("a.yaml"))
+
+
+def test_a_setting_is_nested_no_deeper_than_a_file() -> None:
+    deep = ".".join(["a"] * 5000)
+    assert told(SOUND, [f"{deep}=1"]) == [f"--set {deep}=1: nested deeper than 32 levels"]
+
+
+def test_a_setting_may_name_a_place_that_no_list_has() -> None:
+    digits = "1" * 5000
+    for key in (f"controller.{digits}", f"silence.{digits}", f"{digits}.{digits}"):
+        (said,) = told(SOUND + "silence: [saturated]\n", [f"{key}=1"])
+        assert said.startswith(f"--set {key}=1: ")

@@ -1,0 +1,203 @@
+"""Explanations: of every key, generated from the models."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from annotated_types import Ge, Gt, Le, Lt
+from pydantic.types import Strict
+
+from podusv_cli.core.component import Component
+from podusv_cli.core.signal import SIGNALS
+from podusv_cli.scenario.annotations import members, sections
+from podusv_cli.scenario.explain import Row, UnknownKeyError, explain, first_sentence, kinds
+from podusv_cli.scenario.fields import BOUNDS, PATTERNS_IN_WORDS, limits
+from podusv_cli.scenario.model import Scenario
+
+
+def models(model: type[Component] = Scenario) -> Iterator[type[Component]]:
+    """Every class that a scenario is made of, found without the code under test."""
+    yield model
+    for field in model.model_fields.values():
+        for part in _classes(field.annotation):
+            yield from models(part)
+
+
+def _classes(annotation: object) -> Iterator[type[Component]]:
+    if isinstance(annotation, type) and issubclass(annotation, Component):
+        yield annotation
+    for inner in getattr(annotation, "__args__", ()):
+        yield from _classes(inner)
+
+
+MODELS = list(dict.fromkeys(models()))
+FIELDS = [(model, name) for model in MODELS for name in model.model_fields]
+SECTIONS = {
+    name: sections(field.annotation)
+    for name, field in Scenario.model_fields.items()
+    if sections(field.annotation)
+}
+KEYS = [
+    (f"{section}.{kind}.{name}" if kind else f"{section}.{name}", f"{section}.{name}")
+    for section, parts in SECTIONS.items()
+    for kind, part in parts.items()
+    for name in part.model_fields
+]
+
+
+def test_the_models_are_all_found() -> None:
+    assert len(MODELS) > 20
+    assert {"Network", "Harmonic", "Claim", "Pid"} <= {model.__name__ for model in MODELS}
+
+
+@pytest.mark.parametrize(
+    ("model", "name"), FIELDS, ids=lambda part: getattr(part, "__name__", part)
+)
+def test_every_field_has_a_meaning_and_every_number_a_unit(
+    model: type[Component], name: str
+) -> None:
+    field = model.model_fields[name]
+    assert name == "kind" or (field.description or "").strip()
+    assert not (field.description or "").endswith("."), "meanings are phrases"
+    if {int, float} & set(members(field.annotation)):
+        assert isinstance(field.json_schema_extra, dict)
+        assert isinstance(field.json_schema_extra["unit"], str)
+
+
+@pytest.mark.parametrize(
+    ("model", "name"), FIELDS, ids=lambda part: getattr(part, "__name__", part)
+)
+def test_every_limit_of_a_field_can_be_put_in_words(model: type[Component], name: str) -> None:
+    field = model.model_fields[name]
+    said = limits(field)
+    for data in field.metadata:
+        known = isinstance(data, (Gt, Ge, Lt, Le, Strict)) or hasattr(data, "pattern")
+        assert known, f"{data} is in no message, explanation or range"
+    assert set(said) <= {*BOUNDS, "pattern"}
+    assert said.get("pattern") in {None, *PATTERNS_IN_WORDS}
+
+
+@pytest.mark.parametrize(("route", "path"), KEYS)
+def test_every_key_is_explained_by_its_path_and_by_its_route(route: str, path: str) -> None:
+    for row in (explain(route)[0], *(row for row in explain(path) if row.key == path)):
+        assert row.key == path
+        assert row.meaning
+        assert row.type
+        assert row.default or row.type in ("keys", "kinds")
+    assert any(row.key == path for row in explain(path.rpartition(".")[2]))
+
+
+def test_without_a_key_the_sections_are_explained() -> None:
+    assert [row.key for row in explain()] == ["extends", *Scenario.model_fields]
+    law = next(row for row in explain() if row.key == "controller")
+    assert (law.type, law.choices) == ("kinds", ("adaptive_neural", "backstepping", "dsc", "pid"))
+
+
+def test_a_section_with_kinds_is_explained_kind_by_kind() -> None:
+    head, *rest = explain("controller")
+    assert head.key == "controller"
+    assert [row.key for row in rest] == [f"controller.{kind}" for kind in head.choices]
+    assert all("k_ze" in row.choices and row.meaning for row in rest)
+
+
+def test_a_kind_is_explained_key_by_key() -> None:
+    head, *rest = explain("path.circle")
+    assert head.meaning == "About (x, y), from `angle` on, to starboard where `turn` is starboard."
+    assert [row.key for row in rest] == [
+        "path.kind", "path.x", "path.y", "path.radius", "path.speed", "path.angle", "path.turn",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("asked", ["actuator.pod", "actuator.pods", "actuator.pod.pods", "pods"])
+def test_keys_of_a_lists_items_are_explained_with_the_list(asked: str) -> None:
+    rows = {row.key: row for row in explain(asked)}
+    pod = sections(Scenario.model_fields["actuator"].annotation)["pod"].model_fields["pods"]
+    (one,) = _classes(pod.annotation)
+    found = [key.removeprefix("actuator.pods.NUMBER.") for key in rows if "NUMBER" in key]
+    assert found == list(one.model_fields)
+    row = rows["actuator.pods.NUMBER.angle_rate"]
+    assert (row.unit, row.range, row.default) == ("rad/s", "> 0", "required")
+    assert row.meaning == "fastest change of the angle"
+
+
+def test_a_kind_is_explained_by_its_name_alone() -> None:
+    assert explain("pid") == explain("controller.pid")
+    heads = [row.key for row in explain("none") if row.type == "keys"]
+    assert heads == ["disturbance.none"]
+
+
+def test_a_key_says_everything_that_its_field_says() -> None:
+    assert explain("controller.pid.T_d") == [
+        Row(
+            "controller.T_d",
+            "time constant of the derivative's lag",
+            "a number",
+            unit="s",
+            range="> 0",
+            default="0.1",
+            kinds=("pid",),
+        )
+    ]
+    (fold,) = explain("controller.fold")
+    assert fold.choices == ("printed", "joint", "none")
+    assert fold.type == "printed, joint or none"
+    assert fold.default == "joint"
+    (fraction,) = explain("metrics.steady_fraction")
+    assert fraction.range == "> 0, <= 1"
+    (kind,) = explain("controller.kind")
+    assert (kind.default, kind.choices) == ("required", fold.kinds)
+
+
+def test_kinds_in_which_a_key_is_the_same_share_a_row() -> None:
+    rows = explain("path.speed")
+    assert [row.kinds for row in rows] == [("circle", "line"), ("line_circle",), ("waypoints",)]
+
+
+def test_a_default_is_what_the_section_has_when_it_is_left_out() -> None:
+    assert [row.default for row in explain("disturbance.b_u.sin")] == ["0.1"]
+    assert [row.default for row in explain("disturbance.b_v.sin")] == ["0.2"]
+    assert [row.default for row in explain("vessel.X_uu")] == ["the preset's"]
+    assert [row.default for row in explain("nominal.X_uu")] == ["the vessel's"]
+
+
+@pytest.mark.parametrize("name", SIGNALS)
+def test_every_signal_is_explained(name: str) -> None:
+    signal = SIGNALS[name]
+    assert Row(name, signal.meaning, "signal", signal.unit) in explain(name)
+
+
+def test_a_word_that_is_a_signal_and_a_key_is_explained_as_both() -> None:
+    assert [row.key for row in explain("psi")] == ["psi", "start.psi"]
+
+
+@pytest.mark.parametrize(
+    ("key", "hint"),
+    [
+        ("contoller", "; did you mean 'controller'?"),
+        ("controller.pidd", "; did you mean 'controller.pid'?"),
+        ("controller.k_z", "; did you mean 'controller.k_ze'?"),
+        ("Kiu", "; did you mean 'K_Iu'?"),
+        ("Z_E", "; did you mean 'z_e'?"),
+        ("Oter", "; did you mean 'otter'?"),
+        ("near_target", "; did you mean 'near-target'?"),
+        ("qqq", ""),
+        ("", ""),
+    ],
+)
+def test_an_unknown_key_is_told_with_what_was_probably_meant(key: str, hint: str) -> None:
+    with pytest.raises(UnknownKeyError) as raised:
+        explain(key)
+    assert str(raised.value) == f"{key}: no such name{hint}"
+    assert raised.value.exit_code == 2
+
+
+def test_every_kind_has_a_summary() -> None:
+    assert set(kinds()) == {"path", "disturbance", "actuator", "controller"}
+    for summaries in kinds().values():
+        assert all(len(summary) > 8 and summary.endswith(".") for summary in summaries.values())
+
+
+def test_a_first_sentence_ends_at_the_first_full_stop_before_a_space() -> None:
+    assert first_sentence("Up to 0.5 m/s.\n  And more. Yes.") == "Up to 0.5 m/s."
+    assert first_sentence("One paragraph\n\nand another") == "One paragraph."

@@ -1,0 +1,93 @@
+"""Files in, scenarios out: origins, laws to compare, claims, further checks, how much work."""
+
+from __future__ import annotations
+
+import pytest
+from counting import counted
+from scenario_samples import SOUND, findings, loaded, told
+
+from podusv_cli.controllers.pid import Pid
+from podusv_cli.core.errors import ScenarioError
+from podusv_cli.scenario.load import load_text, values
+from podusv_cli.scenario.model import Scenario
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("nope.yaml", "nope.yaml: cannot be read: no such file or directory"),
+        (".", ".: cannot be read: is a directory"),
+    ],
+)
+def test_a_file_that_cannot_be_read_is_a_finding(name: str, says: str) -> None:
+    assert findings(name) == [says]
+
+
+def test_every_value_has_an_origin() -> None:
+    got = loaded()
+    assert list(got.origins) == list(values(got.scenario))
+    assert got.origins["name"] == "a.yaml"
+    assert got.origins["controller.kind"] == "a.yaml:5:20"
+
+
+def test_loading_a_scenario_is_little_work() -> None:
+    loaded()  # tables are made once
+    _, calls = counted(loaded)
+    assert calls < 40_000  # 18 136; some 10 ms
+
+
+SEVERAL = SOUND.replace("{kind: pid}", "{kind: dsc, k_ze: 0.4, T_u: 0.5, network: {spread: 2}}")
+
+
+def test_laws_to_compare_start_from_the_keys_that_they_share_with_the_controller() -> None:
+    text = SEVERAL + "controllers: {slow: {kind: pid, K_Pu: 5}, fast: {k_ze: 2}}\n"
+    got = loaded(text)
+    slow, fast = got.scenario.controllers["slow"], got.scenario.controllers["fast"]
+    assert (slow.kind, slow.k_ze, slow.K_Pu) == ("pid", 0.4, 5.0)
+    assert (fast.kind, fast.k_ze, fast.T_u, fast.network.spread) == ("dsc", 2.0, 0.5, 2.0)
+    assert got.origins["controllers.slow.k_ze"] == "a.yaml:5:31"
+    assert got.origins["controllers.fast.k_ze"] == "a.yaml:6:56"
+
+
+def test_a_fault_of_a_law_to_compare_is_told_without_its_kind() -> None:
+    text = (
+        SEVERAL + "controllers: {slow: {kind: pid, T_u: x, K_Pu: -1}, fast: {T_u: x}, other: 3}\n"
+    )
+    assert told(text) == [
+        "a.yaml:6:33: controllers.slow.T_u: unknown key; T_u belongs to kind dsc "
+        f"(allowed: {', '.join(Pid.model_fields)})",
+        "a.yaml:6:47: controllers.slow.K_Pu: must be a number not below 0 [kg/s], found -1",
+        "a.yaml:6:64: controllers.fast.T_u: must be a number above 0 [s], found 'x'",
+        "a.yaml:6:75: controllers.other: must be a mapping of keys with kind adaptive_neural, "
+        "backstepping, dsc or pid, found 3",
+    ]
+
+
+def test_a_fault_of_the_controller_is_told_once_however_many_laws_take_it_over() -> None:
+    text = SEVERAL.replace("0.4", "-1") + "controllers: {a: {kind: pid}, b: {}, c: {}}\n"
+    assert told(text) == [
+        "a.yaml:5:31: controller.k_ze: must be a number not below 0 [1/s], found -1"
+    ]
+
+
+def test_faults_of_claims_are_told_at_their_name() -> None:
+    sound = "claims:\n C1: {says: s, source: p, expect: e}\n"
+    assert told(SOUND + sound + " C2: {sayz: s, source: 2, tolerance: 1}\n") == [
+        "a.yaml:8:6: claims.C2.says: missing; must be text",
+        "a.yaml:8:6: claims.C2.expect: missing; must be text",
+        "a.yaml:8:7: claims.C2.sayz: unknown key; did you mean 'says'? "
+        "(allowed: says, source, expect, tolerance, remark)",
+        "a.yaml:8:24: claims.C2.source: must be text, found 2",
+        "a.yaml:8:38: claims.C2.tolerance: must be a number not below 0 and below 1, found 1",
+    ]
+
+
+def test_further_checks_are_told_at_the_place_of_the_key() -> None:
+    claims = "claims:\n  C1: {says: s, source: p, expect: e}\n"
+
+    def look(scenario: Scenario) -> list[tuple[str, str]]:
+        return [(f"claims.{name}.expect", "no such run") for name in scenario.claims]
+
+    with pytest.raises(ScenarioError) as raised:
+        load_text(SOUND + claims, "a.yaml", checks=[look])
+    assert str(raised.value) == "a.yaml:7:36: claims.C1.expect: no such run"

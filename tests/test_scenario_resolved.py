@@ -1,0 +1,196 @@
+"""A resolved scenario is complete, and reads back to the same bits."""
+
+from __future__ import annotations
+
+from typing import Any, Literal, get_args, get_origin
+
+import pytest
+import yaml
+from hypothesis import given, reject, settings
+from hypothesis import strategies as st
+from pydantic import ValidationError
+from scenario_samples import SOUND, loaded, told
+
+from podusv_cli.core.component import Component
+from podusv_cli.scenario.annotations import inside, members, sections
+from podusv_cli.scenario.fields import limits
+from podusv_cli.scenario.load import HEADING, load_resolved, load_text, resolved_yaml, values
+from podusv_cli.scenario.model import LABEL, Scenario
+from podusv_cli.scenario.yaml_text import read
+
+LARGEST = 1e6  # inertia of more than this overflows where two are multiplied
+TEXT = st.text(st.characters(exclude_categories=("Cs", "Cc"), include_characters="\t\n"))
+
+
+def numbers(found: dict[str, Any]) -> st.SearchStrategy[float]:
+    return st.floats(
+        found.get("gt", found.get("ge", -LARGEST)), found.get("lt", found.get("le", LARGEST)),
+        exclude_min="gt" in found, exclude_max="lt" in found,
+    )  # fmt: skip
+
+
+def contents(annotation: Any, found: dict[str, Any]) -> st.SearchStrategy[Any]:
+    """Anything that a type allows within the field's limits."""
+    if sections(annotation):
+        return st.one_of(*(components(part) for part in sections(annotation).values()))
+    simple = {
+        float: numbers(found),
+        int: st.integers(int(found.get("ge", 1)), 5),
+        bool: st.booleans(),
+        str: st.from_regex(found["pattern"], fullmatch=True) if "pattern" in found else TEXT,
+        type(None): st.none(),
+    }
+    kinds = [one for one in members(annotation) if one in simple]
+    several = [simple[one] for one in kinds]
+    several += [
+        st.sampled_from(get_args(one)) for one in members(annotation) if get_origin(one) is Literal
+    ]
+    several += [lists(one, found) for one in members(annotation) if get_origin(one) is tuple]
+    several += [
+        st.dictionaries(
+            st.from_regex(LABEL, fullmatch=True), contents(get_args(one)[1], {}), max_size=2
+        )
+        for one in members(annotation)
+        if get_origin(one) is dict
+    ]
+    return st.one_of(*several)
+
+
+def lists(annotation: Any, found: dict[str, Any]) -> st.SearchStrategy[Any]:
+    parts = get_args(annotation)
+    if parts[-1] is Ellipsis:
+        return st.lists(contents(inside(annotation, 0), found), max_size=4).map(tuple)
+    return st.tuples(*(contents(part, found) for part in parts))
+
+
+def components(model: type[Component], **chosen: Any) -> st.SearchStrategy[dict[str, Any]]:
+    """Values for all fields of a model, as plain data."""
+    fields = {
+        name: contents(field.annotation, limits(field))
+        for name, field in model.model_fields.items()
+    }
+    return st.fixed_dictionaries(fields | chosen)
+
+
+SCENARIOS = components(
+    Scenario,
+    simulation=st.builds(
+        lambda step, steps, compiled: {
+            "step": step, "duration": steps * step, "compiled": compiled,
+        },
+        st.sampled_from([0.01, 0.001, 1 / 3]), st.integers(1, 10**6), st.booleans(),
+    ),
+    control=st.just({"period": 0.0}),
+)  # fmt: skip
+
+
+def possible(data: dict[str, Any]) -> Scenario:
+    """The scenario of the data, with what excludes each other put right."""
+    for vessel in (data["vessel"], data["nominal"]):
+        vessel.update(preset="paper", x_g=0.0, Y_rdot=0.0, N_vdot=0.0, X_udot=-1.0, Y_vdot=-1.0)
+        vessel.update(N_rdot=-1.0)
+    if data["path"]["kind"] == "waypoints":
+        points = ((0.0, 0.0), (1.0, 0.5), *data["path"]["points"])
+        data["path"].update(file=None, speed=0.5, points=tuple(dict.fromkeys(points)))
+    if data["actuator"]["kind"] == "pod":
+        data["actuator"].update(preset="otter")
+    for law in (data["controller"], *data["controllers"].values()):
+        law.update(rate="analytic", hold_below=0.0)
+        if "network" in law:
+            low, high, widths = (-1.0, -1.0, -1.0), (1.0, 2.0, 0.5), (1.0, 2.0, 3.0)
+            law["network"].update(low=low, high=high, widths=widths)
+    try:
+        return Scenario.model_validate(data)
+    except ValidationError:
+        return reject()
+
+
+@settings(max_examples=40, deadline=None)
+@given(SCENARIOS)
+def test_a_resolved_scenario_reads_back_to_the_same_bits(data: dict[str, Any]) -> None:
+    scenario = possible(data)
+    again = load_resolved(resolved_yaml(scenario), "resolved.yaml")
+    assert again == scenario
+    assert repr(again) == repr(scenario), "-0.0 equals 0.0, but is not the same number"
+
+
+def test_every_value_is_written_out_and_none_is_a_default_any_more() -> None:
+    first = loaded(SOUND)
+    again = load_text(resolved_yaml(first.scenario), "resolved.yaml")
+    assert list(again.origins) == list(first.origins)
+    assert all(origin.startswith("resolved.yaml:") for origin in again.origins.values())
+
+
+def test_the_same_scenario_gives_the_same_text_and_another_one_another() -> None:
+    text = resolved_yaml(loaded(SOUND).scenario)
+    assert text == resolved_yaml(loaded(SOUND).scenario)
+    assert resolved_yaml(load_text(text, "b.yaml").scenario) == text
+    assert resolved_yaml(loaded(SOUND, ["start.x=1e-300"]).scenario) != text
+
+
+def test_keys_stand_in_the_order_of_the_fields_behind_the_kind() -> None:
+    text = resolved_yaml(loaded(SOUND).scenario)
+    assert text.startswith(HEADING)
+    assert HEADING.startswith("#")
+    assert HEADING.count("\n") == 1
+    node = read(text, "a.yaml", [])
+    assert node is not None
+    assert list(node.mapping) == list(Scenario.model_fields)
+    law = list(node.mapping["controller"].mapping)
+    assert law[:3] == ["kind", "k_ze", "k_psie"]
+
+
+@pytest.mark.parametrize(
+    "number", [1e-5, 1e16, 1e22, 5e-324, 1.7976931348623157e308, 0.1 + 0.2, -0.0]
+)
+def test_a_float_reads_back_whatever_its_notation(number: float) -> None:
+    scenario = loaded(SOUND, [f"start.x={number!r}"]).scenario
+    again = load_text(resolved_yaml(scenario), "a.yaml").scenario
+    assert repr(again.start.x) == repr(number)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["no", "null", "017", "1e-3", "1:30", "~", "# x", "a: b", "'", '"', " x ", "x\n\ny\t",
+     "\u2028", "💥", "é\u0301", "- a", "[1]", "true", "0x1F", "2026-11-20", "<<", "=", "\ufeffa"],
+)  # fmt: skip
+def test_a_text_reads_back_whatever_it_looks_like(text: str) -> None:
+    scenario = loaded(SOUND).scenario.model_copy(update={"description": text})
+    assert load_text(resolved_yaml(scenario), "a.yaml").scenario == scenario
+
+
+def test_other_readers_of_yaml_find_the_same_values() -> None:
+    scenario = loaded(SOUND).scenario
+    found = yaml.safe_load(resolved_yaml(scenario))
+    assert found["controller"] == scenario.controller.model_dump()
+    assert found["vessel"] == scenario.vessel.model_dump()
+
+
+def test_values_are_all_leaves_by_their_dotted_keys() -> None:
+    scenario = loaded(SOUND).scenario
+    found = values(scenario)
+    assert found["vessel.m"] == scenario.vessel.m
+    assert found["path.kind"] == "line"
+    assert found["controllers"] == {}
+    assert not any(content for content in found.values() if isinstance(content, dict))
+
+
+ODDITIES = [
+    *("1e999", "9" * 400, ".nan", "~", "no", "017", "1:30", "*a", "&a x", "!!python/object:x y"),
+    *("[", "{", "]", "- 1", "? x", "|", ">", "'", "@", "%", "\t", "a: b", "---", "...", "\x00"),
+    *("{kind: pid}", "{kind: [1]}", "{kind: waypoints, file: a.csv}", "{preset: {a: 1}}"),
+    *("[[1, 2], [3]]", "<<: {a: 1}", "{? [a] : 1}", '"\\U99999999"', '"\\ud800"'),
+]
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.data())
+def test_whatever_is_done_to_a_file_ends_in_a_scenario_or_in_findings(data: st.DataObject) -> None:
+    lines = resolved_yaml(loaded(SOUND).scenario).splitlines()
+    for _ in range(data.draw(st.integers(1, 3))):
+        at = data.draw(st.integers(0, len(lines) - 1))
+        before = data.draw(
+            st.sampled_from([lines[at].partition(":")[0] + ": ", lines[at], "", " "])
+        )
+        lines[at] = before + data.draw(st.sampled_from(ODDITIES) | TEXT)
+    assert all(line.isprintable() for line in told("\n".join(lines)))

@@ -1,0 +1,272 @@
+"""Run folders appear whole, replace only what they may, and open again."""
+
+from __future__ import annotations
+
+import errno
+import re
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+from command_samples import Command
+from storage_samples import (
+    NEW,
+    OLD,
+    YAML,
+    Saboteur,
+    assert_same,
+    beside,
+    content,
+    durable_steps,
+    fails,
+    files,
+    log,
+    recording,
+    write,
+)
+
+from podusv_cli.core.errors import StorageError
+from podusv_cli.storage import manifest
+from podusv_cli.storage.run_folder import RunWriter, default_folder, open_run
+
+
+@pytest.fixture
+def final(tmp_path: Path) -> Path:
+    return tmp_path / "results" / "run"
+
+
+def run_to(final: Path, **how: bool) -> Path:
+    """A complete run folder."""
+    with RunWriter(final, **how) as writer:
+        writer.add("scenario.yaml", b"name: a\n")
+        writer.add("resolved.yaml", YAML.encode())
+        writer.add("log.h5", log())
+        writer.add_json(
+            "metrics.json", {"status": "finished", "metrics": {"iae": 1.5, "ise": None}}
+        )
+        writer.add_json("provenance.json", {"podusv": "1.2.3"})
+        return writer.finish("finished")
+
+
+def test_a_folder_appears_only_when_it_is_finished(final: Path) -> None:
+    with RunWriter(final) as writer:
+        for name, part in NEW.items():
+            writer.add(name, part)
+        assert not final.exists()
+        assert all(name.startswith(".") for name in beside(final))
+        assert writer.finish("finished") == final
+    assert content(final) == NEW
+    assert beside(final) == set()
+    assert manifest.read(final).status == "finished"
+
+
+def test_everything_in_it_lasts_before_it_has_its_name(
+    final: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    steps = durable_steps(monkeypatch)
+    with RunWriter(final) as writer:
+        for name, part in NEW.items():
+            writer.add(name, part)
+        making = writer.folder
+        writer.finish("finished")
+    named = steps.index(("name", str(final)))
+    before = {path for step, path in steps[:named] if step == "sync"}
+    assert {str(making), str(making / "figures"), *(str(making / name) for name in NEW)} <= before
+    assert ("sync", str(final.parent)) in steps[named:]
+
+
+def test_every_file_of_a_run_is_synced_before_the_run_has_its_name(
+    podusv: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The log, too, which is written in another way than the other files."""
+    steps = durable_steps(monkeypatch)
+    assert podusv("run", "a.yaml", "--out", "x", "-q").code == 0
+    named = [Path(path).name if step == "name" else "" for step, path in steps].index("x")
+    synced = {Path(path).name for step, path in steps[:named] if step == "sync"}
+    made = {path.name for path in Path("x").rglob("*") if path.is_file()}
+    assert {"log.h5", "metrics.json", "errors.png"} <= made
+    assert made - synced == {"manifest.json"}  # which is synced under a hidden name
+
+
+def test_without_finish_nothing_is_left(final: Path) -> None:
+    with RunWriter(final) as writer:
+        writer.add("log.h5", b"new log")
+    assert list(final.parent.iterdir()) == []
+
+
+def test_a_file_is_written_once_and_only_inside(final: Path) -> None:
+    with RunWriter(final) as writer:
+        writer.add("figures/a.png", b"a")
+        for name in ("../a", "/tmp/a", "a/../../a", "", ".", "manifest.json", "a\0b", "figures/"):
+            with pytest.raises(StorageError, match="is no file of this folder"):
+                writer.add(name, b"b")
+        with pytest.raises(StorageError, match="exists"):
+            writer.add("figures/a.png", b"b")
+        assert files(writer.folder) == {"figures/a.png": b"a"}
+
+
+def test_a_finished_folder_needs_force(final: Path) -> None:
+    write(final, OLD)
+    with pytest.raises(StorageError, match="exists already; --force replaces it"):
+        RunWriter(final)
+    assert content(final) == OLD
+    write(final, NEW, force=True)
+    assert content(final) == NEW
+    assert beside(final) == set()
+
+
+def test_a_damaged_run_folder_can_be_replaced_too(final: Path) -> None:
+    write(final, OLD)
+    (final / "log.h5").write_bytes(b"rotten")
+    write(final, NEW, force=True)
+    assert content(final) == NEW
+
+
+@pytest.mark.parametrize("name", ["notes.txt", "figures/mine.png"])
+def test_files_that_others_put_into_a_run_folder_are_not_removed(final: Path, name: str) -> None:
+    write(final, OLD)
+    (final / ".DS_Store").touch()  # of a system that shows folders
+    write(final, OLD, force=True)
+    (final / name).write_text("mine")
+    before = files(final)
+    says = f"run holds {name}, which is not the run's; --force would remove it"
+    with pytest.raises(StorageError, match=re.escape(says)):
+        RunWriter(final, force=True)
+    assert files(final) == before
+
+
+@pytest.mark.parametrize("force", [False, True])
+def test_what_is_no_run_folder_is_never_replaced(final: Path, force: bool) -> None:
+    final.mkdir(parents=True)
+    (final / "thesis.tex").write_text("ten years")
+    with pytest.raises(StorageError, match="not a finished run folder"):
+        RunWriter(final, force=force)
+    (final / "manifest.json").write_text('{"files": {}}')  # of some other program
+    with pytest.raises(StorageError, match="not a finished run folder"):
+        RunWriter(final, force=force)
+    assert beside(final) == set()
+    assert (final / "thesis.tex").read_text() == "ten years"
+
+
+@pytest.mark.parametrize("force", [False, True])
+def test_what_became_no_run_folder_meanwhile_is_not_replaced(final: Path, force: bool) -> None:
+    with RunWriter(final, force=force) as writer:
+        writer.add("log.h5", b"new log")
+        final.mkdir()
+        (final / "thesis.tex").write_text("ten years")
+        with pytest.raises(StorageError, match="not a finished run folder"):
+            writer.finish("finished")
+    assert files(final) == {"thesis.tex": b"ten years"}
+    assert content(final.with_name("run-2")) == {"log.h5": b"new log"}
+    assert beside(final) == {"run-2"}
+
+
+@pytest.mark.parametrize("force", [False, True])
+def test_an_empty_folder_may_be_filled(final: Path, force: bool) -> None:
+    final.mkdir(parents=True)
+    write(final, NEW, force=force)
+    assert content(final) == NEW
+
+
+@pytest.mark.parametrize("force", [False, True])
+def test_files_and_links_are_not_replaced(final: Path, force: bool) -> None:
+    final.parent.mkdir()
+    final.write_text("precious")
+    link = final.with_name("latest")
+    link.symlink_to(write(final.with_name("real"), OLD))
+    for place in (final, link, final.parent / "..", Path("/")):
+        with pytest.raises(StorageError, match=r"is not a folder|own name is needed"):
+            RunWriter(place, force=force)
+    assert final.read_text() == "precious"
+    assert content(link.resolve()) == OLD
+
+
+def test_a_place_that_cannot_be_written_to_is_known_at_once(
+    final: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    final.parent.write_text("a file")
+    with pytest.raises(StorageError, match=r"is a file, not a folder|exists"):
+        RunWriter(final)
+    Saboteur(fails(errno.EACCES), 1).watch(monkeypatch, "mkdir")
+    with pytest.raises(StorageError, match="not permitted"):
+        RunWriter(final.parent.with_name("elsewhere") / "run")
+
+
+def test_a_name_that_is_too_long(final: Path) -> None:
+    with pytest.raises(StorageError, match="the name is too long"):
+        RunWriter(final.with_name("n" * 250))
+
+
+def test_runs_can_be_made_inside_a_folder_in_the_making(final: Path) -> None:
+    with RunWriter(final) as several:
+        for name in ("pid", "shunting"):
+            run_to(several.folder / name)
+        several.add("comparison.csv", b"controller,iae\n")
+        several.finish("finished")
+    assert beside(final) == set()
+    names = set(manifest.check(final).files)
+    assert {"comparison.csv", "pid/manifest.json", "shunting/log.h5"} <= names
+    assert open_run(final / "pid").status == "finished"
+
+
+def test_a_finished_run_opens_with_all_that_plots_and_comparisons_need(final: Path) -> None:
+    run = open_run(run_to(final))
+    assert run.folder == final
+    assert run.status == "finished"
+    assert run.metrics == {"iae": 1.5, "ise": None}
+    assert run.provenance == {"podusv": "1.2.3"}
+    assert run.resolved_yaml == YAML
+    assert_same(recording(), run.recording)
+    assert run.recording is run.recording
+
+
+def test_only_finished_runs_open(final: Path, tmp_path: Path) -> None:
+    with pytest.raises(StorageError, match="no such file"):
+        open_run(tmp_path / "nowhere")
+    with pytest.raises(StorageError, match="no such file"):
+        open_run(tmp_path)
+    write(final, OLD)
+    with pytest.raises(StorageError, match=r"not the folder of a run: it has no metrics\.json"):
+        open_run(final)
+    run_to(final, force=True)
+    (final / "resolved.yaml").unlink()
+    with pytest.raises(StorageError, match=r"resolved\.yaml is missing"):
+        open_run(final)
+
+
+@pytest.mark.parametrize("metrics", [{}, {"metrics": [1.0]}])
+def test_metrics_of_another_shape_do_not_open(final: Path, metrics: dict[str, object]) -> None:
+    with RunWriter(final) as writer:
+        for name in ("resolved.yaml", "log.h5", "provenance.json"):
+            writer.add(name, b"{}")
+        writer.add_json("metrics.json", metrics)
+        writer.finish("finished")
+    with pytest.raises(StorageError, match="holds no metrics"):
+        open_run(final)
+
+
+def test_the_default_folder_tells_time_and_scenario(tmp_path: Path) -> None:
+    before = datetime.now(UTC).replace(microsecond=0)
+    folder = default_folder(tmp_path, "ferry", YAML)
+    assert folder.parent == tmp_path / "ferry"
+    stamp, digest = folder.name.split("-")
+    when = datetime.strptime(stamp, "%Y%m%dT%H%M%SZ").replace(tzinfo=UTC)
+    assert before <= when <= datetime.now(UTC)
+    assert re.fullmatch("[0-9a-f]{8}", digest)
+    assert digest == default_folder(tmp_path, "tug", YAML).name.split("-")[1]
+    assert digest != default_folder(tmp_path, "tug", YAML + " ").name.split("-")[1]
+
+
+def test_a_second_run_in_the_same_second_has_a_name_of_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Clock(datetime):
+        @classmethod
+        def now(cls, tz: object = None) -> Clock:
+            return cls(2026, 1, 1, 12, tzinfo=UTC)
+
+    monkeypatch.setattr("podusv_cli.storage.run_folder.datetime", Clock)
+    for ending in ("", "-2", "-3"):
+        folder = default_folder(tmp_path, "ferry", YAML)
+        assert folder.name == f"20260101T120000Z-{folder.name[17:25]}{ending}"
+        folder.mkdir(parents=True)

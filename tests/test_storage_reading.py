@@ -1,0 +1,316 @@
+"""Reading logs back: whole ones exactly, damaged and hostile ones with one sentence."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from storage_samples import YAML, assert_same, deadline, log, recording, rewritten
+
+from podusv_cli.core.errors import StorageError
+from podusv_cli.core.recording import Recording
+from podusv_cli.storage import log_reader
+
+TINY = recording(rows=20, nodes=4)
+
+
+@pytest.fixture(autouse=True)
+def never_hangs() -> Iterator[None]:
+    with deadline():
+        yield
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "log.h5"
+
+
+def read(path: Path, content: bytes) -> Recording:
+    path.write_bytes(content)
+    return log_reader.read_log(path)
+
+
+@pytest.mark.parametrize(
+    "recorded",
+    [
+        recording(),
+        recording(rows=1),
+        recording(rows=0),
+        recording(fixed={}),
+        recording(rows=300, nodes=2000),  # five chunks
+        recording(status="diverged", message="diverged at t = 0.5 s: ψ is not finite"),
+        recording(signals={"time": np.array([0.0, 1.0]), "x": np.array([np.nan, -np.inf])}),
+        recording(signals={"time": np.array([0.0, 1.0]), "z_e": np.array([-0.0, 5e-324])}),
+    ],
+)
+def test_what_was_written_is_read(path: Path, recorded: Recording) -> None:
+    assert_same(recorded, read(path, log(recorded)))
+    assert log_reader.resolved_yaml(path) == YAML
+
+
+def test_the_order_of_signals_is_kept(path: Path) -> None:
+    signals = recording().signals
+    turned = recording(signals={name: signals[name] for name in reversed(signals)})
+    found = read(path, log(turned))
+    assert [name for name in found.signals if name != "time"] == [
+        "z_e",
+        "W_hat_u",
+        "tau_u_cmd",
+        "x",
+    ]
+
+
+@pytest.mark.parametrize("text", ["", "a: 1\n", "# Schräglage ψ\n" * 20_000])
+def test_the_scenario_comes_back_whatever_its_length(path: Path, text: str) -> None:
+    path.write_bytes(log(resolved_yaml=text))
+    assert log_reader.resolved_yaml(path) == text
+
+
+def outcome(path: Path, content: bytes, recorded: Recording) -> str:
+    """'refused', or 'read' where nothing of the recording and its scenario changed."""
+    path.write_bytes(content)
+    try:
+        found, text = log_reader.read_log(path), log_reader.resolved_yaml(path)
+    except StorageError:
+        return "refused"
+    assert_same(recorded, found)
+    assert text == YAML
+    return "read"
+
+
+def test_truncated_logs_are_refused(path: Path) -> None:
+    content = log(TINY)
+    for length in [*range(0, 400, 7), *range(400, len(content), 211), len(content) - 1]:
+        assert outcome(path, content[:length], TINY) == "refused", length
+
+
+def test_a_flipped_bit_is_refused_or_harmless(path: Path) -> None:
+    content, random = log(TINY), np.random.default_rng(17)
+    outcomes = set()
+    for bit in random.integers(8 * len(content), size=500):
+        damaged = bytearray(content)
+        damaged[bit >> 3] ^= 1 << (bit & 7)
+        outcomes.add(outcome(path, bytes(damaged), TINY))
+    assert outcomes == {"refused", "read"}  # some bytes of the file mean nothing
+
+
+def test_a_flipped_bit_in_the_index_of_chunks_is_refused_or_harmless(path: Path) -> None:
+    # This index has no checksum, and HDF5 takes a chunk that it cannot find there for zeros.
+    content = log(TINY)
+    last = content.rindex(b"TREE")
+    for bit in range(8 * last, 8 * (last + 96)):
+        damaged = bytearray(content)
+        damaged[bit >> 3] ^= 1 << (bit & 7)
+        outcome(path, bytes(damaged), TINY)
+
+
+@pytest.mark.parametrize("size", range(5))
+def test_a_chunk_too_short_for_its_checksum_is_refused(path: Path, size: int) -> None:
+    # Handed to HDF5 it would end the process.
+    damaged = bytearray(log(TINY))
+    entry = damaged.rindex(b"TREE") + 24
+    assert damaged[entry : entry + 4] != bytes(4)
+    damaged[entry : entry + 4] = size.to_bytes(4, "little")
+    with pytest.raises(StorageError, match="does not fit its checksum"):
+        read(path, bytes(damaged))
+
+
+def test_bursts_of_rubbish_are_refused(path: Path) -> None:
+    content, random = log(TINY), np.random.default_rng(23)
+    for _ in range(150):
+        damaged = bytearray(content)
+        start = random.integers(len(content) - 64)
+        damaged[start : start + 64] = random.bytes(64)
+        outcome(path, bytes(damaged), TINY)
+
+
+def replaced(name: str, **how: object) -> Callable[[h5py.File], None]:
+    """A change that puts a dataset made with `how` in place of `name`."""
+
+    def change(file: h5py.File) -> None:
+        del file[name]
+        file.create_dataset(name, **how)
+
+    return change
+
+
+def linked(
+    name: str, link: h5py.SoftLink | h5py.ExternalLink | np.dtype
+) -> Callable[[h5py.File], None]:
+    def change(file: h5py.File) -> None:
+        del file[name]
+        file[name] = link
+
+    return change
+
+
+def described(name: str, content: object, kind: object = None) -> Callable[[h5py.File], None]:
+    return lambda file: file.attrs.create(name, content, dtype=kind)
+
+
+def virtual(source: str) -> Callable[[h5py.File], None]:
+    def change(file: h5py.File) -> None:
+        del file["x"]
+        virtual_layout = h5py.VirtualLayout(shape=(50,), dtype="<f8")
+        virtual_layout[:] = h5py.VirtualSource(source, "x", shape=(50,))
+        file.create_virtual_dataset("x", virtual_layout)
+
+    return change
+
+
+def only_time(count: int) -> Callable[[h5py.File], None]:
+    def change(file: h5py.File) -> None:
+        for name in set(file) - {"provenance"}:
+            del file[name]
+        file.create_dataset("time", shape=(count,), dtype="<f8", chunks=(4096,))
+
+    return change
+
+
+def no_nodes(file: h5py.File) -> None:
+    for name, shape in (("W_hat_u", (50, 0)), ("rbf_center", (0, 3))):
+        del file[name]
+        file.create_dataset(name, shape=shape, dtype="<f8")
+
+
+PACKED = {"compression": "gzip", "shuffle": True, "fletcher32": True}
+FIFTY = np.zeros(50)
+HOSTILE = {
+    "soft link": (linked("x", h5py.SoftLink("/z_e")), "link to elsewhere"),
+    "soft link to nothing": (linked("x", h5py.SoftLink("/nowhere")), "link to elsewhere"),
+    "object": (replaced("x", shape=(50,), dtype=h5py.string_dtype()), "no 64-bit numbers"),
+    "reference": (replaced("x", shape=(50,), dtype=h5py.ref_dtype), "no 64-bit numbers"),
+    "ragged": (replaced("x", shape=(50,), dtype=h5py.vlen_dtype(float)), "no 64-bit numbers"),
+    "compound": (replaced("x", shape=(50,), dtype=[("a", "<f8")]), "no 64-bit numbers"),
+    "single precision": (replaced("x", shape=(50,), dtype="<f4"), "no 64-bit numbers"),
+    "big endian": (replaced("x", shape=(50,), dtype=">f8"), "no 64-bit numbers"),
+    "no shape": (replaced("x", data=h5py.Empty("<f8")), "x is empty"),
+    "matrix": (replaced("x", shape=(50, 2), dtype="<f8"), "2 dimensions"),
+    "too short": (replaced("x", data=FIFTY[1:], **PACKED), "49 values along time"),
+    "other nodes": (replaced("rbf_width", data=FIFTY[:4], **PACKED), "4 values along input"),
+    "no checksum": (replaced("x", data=FIFTY, compression="gzip"), "no checksums"),
+    "no chunks": (replaced("x", data=FIFTY), "no checksums"),
+    "unknown filter": (replaced("x", data=FIFTY, compression="lzf"), "packed in an unknown way"),
+    "nothing stored": (replaced("x", shape=(50,), dtype="<f8", **PACKED), "chunk is missing"),
+    "giant": (replaced("x", shape=(2**40,), dtype="<f8", chunks=(4096,)), "along time"),
+    "giant in all": (only_time(2**40), "claims 8796093022208 bytes.*; read it with h5py or xarray"),
+    "large without data": (only_time(2**28), "no checksums"),
+    "unbounded chunk": (
+        replaced("x", data=FIFTY, chunks=(2**20,), maxshape=(None,), **PACKED), "unknown way",
+    ),
+    "group": (lambda file: (file.pop("x"), file.create_group("x")), "damaged"),
+    "named type": (linked("x", np.dtype("<f8")), "damaged"),
+    "no time": (lambda file: file.pop("time"), "no time"),
+    "unknown signal": (lambda file: file.create_dataset("tau_w", data=FIFTY), "'tau_w' is no"),
+    "unknown bytes": (lambda file: file.create_dataset(b"\xff\xfe", data=FIFTY), "is no signal"),
+    "other format": (described("podusv_format", np.int32(2)), "format 2; this .* reads format 1"),
+    "format in words": (described("podusv_format", "1"), "podusv_format is no number"),
+    "formats": (described("podusv_format", [1, 1], "<i4"), "podusv_format is no number"),
+    "no format": (lambda file: file.attrs.pop("podusv_format"), "damaged"),
+    "no status": (lambda file: file.attrs.pop("status"), "damaged"),
+    "unknown status": (described("status", np.bytes_("asleep")), "unknown status 'asleep'"),
+    "endless status": (described("status", "finished"), "no single string of fixed length"),
+    "statuses": (described("status", [b"finished"], "S8"), "no single string of fixed length"),
+    "empty status": (described("status", h5py.Empty("S8")), "no single string|unknown status"),
+    "no nodes": (no_nodes, "W_hat_u has no values along node"),
+    "escape": (described("controller", np.bytes_(b"pid\x1b[2J")), "characters that are no text"),
+    "no text": (described("controller", np.bytes_(b"\xff")), "utf-8"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", HOSTILE)
+def test_a_log_that_is_not_as_podusv_writes_it_is_refused(path: Path, case: str) -> None:
+    change, words = HOSTILE[case]
+    with pytest.raises(StorageError, match=words) as caught:
+        read(path, rewritten(change))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_log_behind_something_else_is_refused(path: Path) -> None:
+    # HDF5 would find it there, and count all places in the file from there.
+    with pytest.raises(StorageError, match="no HDF5 file of the kind that podusv writes"):
+        read(path, bytes(512) + log())
+
+
+def test_the_tree_of_a_long_signal_goes_round_in_no_circle(path: Path) -> None:
+    long = recording(rows=66, nodes=2**17)  # 66 chunks, more than a node of the tree holds
+    content = log(long)
+    assert b"TREE\x01\x01" in content
+    assert_same(long, read(path, content))
+
+
+def test_a_scenario_altered_in_its_place_is_refused(path: Path) -> None:
+    path.write_bytes(log().replace(b"x: -10.0", b"x: -90.0"))
+    with pytest.raises(StorageError, match="does not fit its checksum"):
+        log_reader.resolved_yaml(path)
+
+
+@pytest.fixture
+def secret(tmp_path: Path) -> Path:
+    """Another log, and plain numbers, that a hostile log would like to have read."""
+    other = tmp_path / "secret.h5"
+    other.write_bytes(log())
+    np.full(50, 7.0).tofile(tmp_path / "secret.bin")
+    return other
+
+
+def test_data_in_other_files_are_refused(path: Path, secret: Path) -> None:
+    outside = [(str(secret.with_suffix(".bin")), 0, 400)]
+    link = linked("x", h5py.ExternalLink(str(secret), "/x"))
+    with pytest.raises(StorageError, match="link to elsewhere"):
+        read(path, rewritten(link))
+    with pytest.raises(StorageError, match="keeps its data in another file"):
+        read(path, rewritten(replaced("x", shape=(50,), dtype="<f8", external=outside)))
+    with pytest.raises(StorageError, match="keeps its data in another file"):
+        read(path, rewritten(virtual(str(secret))))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (linked("provenance", h5py.SoftLink("/")), "link to elsewhere"),
+        (linked("provenance/resolved_yaml", h5py.SoftLink("/x")), "link to elsewhere"),
+        (replaced("provenance", data=1.0), "damaged"),
+        (replaced("provenance/resolved_yaml", data="a: 1\n"), "no single string"),
+        (replaced("provenance/resolved_yaml", data=np.bytes_("a: 1\n")), "damaged"),
+        (replaced("provenance/resolved_yaml", data=np.zeros((), "S20000000")), "20000000 bytes"),
+        (lambda file: file.pop("provenance"), "damaged"),
+    ],
+)
+def test_a_scenario_that_is_not_as_podusv_writes_it_is_refused(
+    path: Path, change: Callable[[h5py.File], object], words: str
+) -> None:
+    path.write_bytes(rewritten(change))
+    with pytest.raises(StorageError, match=words):
+        log_reader.resolved_yaml(path)
+
+
+def test_only_regular_files_are_read(tmp_path: Path, path: Path) -> None:
+    path.write_bytes(log())
+    link, pipe, empty = tmp_path / "link", tmp_path / "pipe", tmp_path / "empty"
+    link.symlink_to(path)
+    os.mkfifo(pipe)
+    empty.touch()
+    faults = {
+        link: "symbolic link",
+        pipe: "not a regular file",
+        tmp_path: "not a regular file",
+        Path("/dev/zero"): "not a regular file",
+        empty: "damaged, or not a log",
+        tmp_path / "nothing": "no such file",
+    }
+    for place, words in faults.items():
+        with pytest.raises(StorageError, match=words) as caught:
+            log_reader.read_log(place)
+        assert str(place) in str(caught.value)
+
+
+def test_a_file_beyond_all_measure_is_not_even_opened(path: Path) -> None:
+    path.touch()
+    os.truncate(path, log_reader.LARGEST_FILE + 1)  # a hole: takes no room on the disk
+    with pytest.raises(StorageError, match=r"at most .* read it with h5py or xarray"):
+        log_reader.read_log(path)
