@@ -9,7 +9,7 @@ from typing import Any
 
 from podusv_cli.controllers.base import Controller
 from podusv_cli.controllers.network import Network
-from podusv_cli.core.component import catalogue
+from podusv_cli.core.registry import kinds
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import ClosedLoop, Observer
 from podusv_cli.metrics.accumulators import observer
@@ -52,7 +52,7 @@ class Case:
 
     def controller(self) -> Controller:
         """The law with those of the scenario's values that it shares."""
-        kind = catalogue("podusv_cli.controllers", Controller)[self.law]
+        kind = kinds("podusv_cli.controllers", Controller)[self.law]
         given = _scenario().controller.model_dump(exclude={"kind"})
         fields: dict[str, Any] = {name: given[name] for name in kind.model_fields.keys() & given}
         if self.network:

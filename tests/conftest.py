@@ -22,7 +22,8 @@ from podusv_cli.actuators.base import Actuator
 from podusv_cli.actuators.ideal import Ideal
 from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
 from podusv_cli.controllers.base import Controller, Slots
-from podusv_cli.core.component import Component, catalogue, value
+from podusv_cli.core import registry
+from podusv_cli.core.component import Component, value
 from podusv_cli.core.kernel import Vector, bundle, kernel
 from podusv_cli.core.recording import Recording
 from podusv_cli.disturbances.base import Disturbance
@@ -77,7 +78,7 @@ PAPER, NONLINEAR = VESSELS["paper"], VESSELS["paper_nonlinear"]
 
 def kinds(room: str) -> dict[str, type[Component]]:
     """Everything registered in a room, by kind."""
-    return catalogue(f"podusv_cli.{room}", ROOMS[room])
+    return registry.kinds(f"podusv_cli.{room}", ROOMS[room])
 
 
 def example(kind: type[Component], **fields: Any) -> Any:

@@ -13,7 +13,8 @@ from conftest import NONLINEAR, PACKAGE, ROOMS, VESSELS, corrected, example, kin
 from pydantic import BaseModel, ValidationError
 
 from podusv_cli.controllers.base import Controller
-from podusv_cli.core.component import Component, catalogue, unit_of
+from podusv_cli.core import registry
+from podusv_cli.core.component import Component, unit_of
 from podusv_cli.core.kernel import Vector, bundle, is_kernel
 from podusv_cli.core.signal import SIGNALS
 from podusv_cli.engine.simulate import names
@@ -233,9 +234,9 @@ def test_every_vessel_has_the_same_constants_in_the_same_order() -> None:
         assert Vessel.model_validate(vessel.model_dump()) == vessel
 
 
-def test_the_catalogue_is_sorted_and_leaves_out_what_has_no_kind() -> None:
+def test_the_registry_is_sorted_and_leaves_out_what_has_no_kind() -> None:
     for room, base in ROOMS.items():
-        found = catalogue(f"podusv_cli.{room}", base)
+        found = registry.kinds(f"podusv_cli.{room}", base)
         assert list(found) == sorted(found)
         assert base not in found.values()
         assert all(kind.model_fields["kind"].default == name for name, kind in found.items())

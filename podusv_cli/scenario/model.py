@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Literal
 
 from podusv_cli.actuators.base import Actuator
 from podusv_cli.controllers.base import Controller
-from podusv_cli.core.component import Component, any_of, value
+from podusv_cli.core.component import Component, value
 from podusv_cli.core.finding_codes import CODES
+from podusv_cli.core.registry import any_of
 from podusv_cli.disturbances.base import Disturbance
 from podusv_cli.engine.grid import TimeGrid, whole_steps
 from podusv_cli.engine.simulate import ClosedLoop
