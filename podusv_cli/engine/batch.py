@@ -1,15 +1,15 @@
-"""Many runs at once: one thread a core, each taking run after run through the compiled march.
+"""Many runs at once, each in a thread, as many at a time as there are cores.
 
-The march gives up the interpreter's lock, so threads are all it takes; the machine code is that of
-`simulate`. No log is kept: what is wanted of a run is what its observer gathers.
+The compiled march releases the interpreter's lock, so threads are enough. The compiled code is that
+of `simulate`. No log is kept; a run's observer gathers what is wanted of it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from threading import Event
+from functools import partial
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -18,15 +18,9 @@ import numpy.typing as npt
 from podusv_cli.core.kernel import LANES, Vector, whole_lanes
 from podusv_cli.engine.closed_loop import Plan, Wires
 from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.march import Pace, in_blocks
-from podusv_cli.engine.simulate import (
-    STATE,
-    ClosedLoop,
-    Observer,
-    entries,
-    marcher,
-    wire,
-)
+from podusv_cli.engine.march import Bell, Ending, Work
+from podusv_cli.engine.simulate import STATE, ClosedLoop, Observer, entries, marcher, wire
+from podusv_cli.process.interrupts import interrupts_heard, interrupts_held
 from podusv_cli.process.workers import workers_here
 
 NUMBER = 8  # bytes; LANES numbers are a cache line
@@ -45,6 +39,21 @@ class Batch:
     state: Vector  # (N, 6), the vessel's state where the march ended
     seen: Vector  # (N, observer.size)
 
+    def note(self, run: Run, ending: Ending) -> None:
+        """Enter how a run ended."""
+        i, wires = run.position, run.wires
+        self.reached[i], self.status[i], _ = ending
+        self.state[i], self.seen[i] = wires.s[: len(STATE)], wires.seen
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One run of a batch."""
+
+    position: int
+    wires: Wires
+    work: Work
+
 
 def simulate_many(
     loops: Sequence[ClosedLoop],
@@ -58,8 +67,8 @@ def simulate_many(
 
     Every run gives the bits that `simulate` gives, whatever the number of workers; one that
     diverges ends by itself. `progress` is called with the fraction of runs done. KeyboardInterrupt
-    stops all within a block of the march and keeps what is done. Raises ValueError for loops of
-    different structure: other kinds, other sizes of memory, other sampling.
+    stops all runs at once and keeps what is done. Raises ValueError for loops of different
+    structure: other kinds, other sizes of memory, other sampling.
     """
     observer = observer or Observer()
     grid = replace(grid, log_every=grid.steps + 1)  # one row, for the first instant
@@ -67,42 +76,49 @@ def simulate_many(
     batch = _blank(len(loops), observer)
     if plan is None:
         return batch
-    march, stop, pace = marcher(loops[0], observer, True), Event(), Pace()
+    advance, last, bell = marcher(loops[0], observer, True), grid.steps + 1, Bell()
 
-    def go_on(fraction: float) -> None:
-        if fraction < 1.0 and stop.is_set():
-            raise KeyboardInterrupt
-
-    def run(i: int) -> None:
-        go_on(0.0)
+    def run(i: int) -> Run:
         wires = _apart(wire(loops[i], plan, observer))
-        batch.reached[i], batch.status[i], _ = in_blocks(
-            lambda a, b: march(a, b, grid.step, wires, plan), plan, wires.under_way, go_on,
-            pace=pace,
-        )  # fmt: skip
-        batch.state[i], batch.seen[i] = wires.s[: len(STATE)], wires.seen
+        function = partial(advance, 0, last, grid.step, wires, plan)
+        return Run(i, wires, Work(function, wires.under_way, bell))
 
-    _shared_out(run, len(loops), workers or workers_here(), stop, progress)
+    def tell(done: int) -> None:
+        if progress:
+            progress(done / len(loops))
+
+    with interrupts_held():
+        _march_all(map(run, range(len(loops))), last, workers or workers_here(), batch, tell)
     return batch
 
 
-def _shared_out(
-    run: Callable[[int], None], count: int, workers: int, stop: Event,
-    progress: Callable[[float], None] | None,
-) -> None:  # fmt: skip
-    """All runs through a pool of threads; an interrupt or an error in one stops the others."""
-    with ThreadPoolExecutor(workers) as pool:
-        try:
-            jobs = [pool.submit(run, i) for i in range(count)]
-            for done, job in enumerate(as_completed(jobs), 1):
-                job.result()
-                if progress:
-                    progress(done / count)
-        except KeyboardInterrupt:
-            pass
-        finally:
-            stop.set()
-            pool.shutdown(cancel_futures=True)
+def _march_all(
+    runs: Iterator[Run], last: int, workers: int, batch: Batch, progress: Callable[[int], None]
+) -> None:
+    """March over all runs; an interrupt or an error stops those that are under way."""
+    busy: list[Run] = []
+    done = 0
+    try:
+        while True:
+            for run in islice(runs, workers - len(busy)):
+                run.work.start()
+                busy.append(run)
+            if not busy:
+                break
+            with interrupts_heard():
+                busy[0].work.wait()  # any of them rings the bell
+            for run in [run for run in busy if run.work.over or run.work.hangs()]:
+                busy.remove(run)
+                batch.note(run, run.work.ending(last))
+                done += 1
+                progress(done)
+    except KeyboardInterrupt:
+        pass
+    finally:
+        for run in busy:
+            run.work.stop()
+        for run in busy:
+            batch.note(run, Ending(run.work.stopped(), "interrupted"))
 
 
 def _blank(count: int, observer: Observer) -> Batch:

@@ -20,7 +20,7 @@ from podusv_cli.core.component import Component
 from podusv_cli.core.errors import LawError
 from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.core.signal import SIGNALS
-from podusv_cli.engine.march import Aside, Failed, never_returns
+from podusv_cli.engine.march import Work
 from podusv_cli.engine.simulate import ClosedLoop, names
 
 UNWRITTEN = -1.234567890123e-290  # no law writes just this
@@ -35,27 +35,22 @@ def check_law(loop: ClosedLoop) -> None:
     another size, an output left unwritten, an exception, and for a law that does not return. No
     number at all is left for the run to tell.
     """
-    with np.errstate(all="ignore"), Aside() as aside:  # which takes it along
-        _asked(aside, loop, _check_declared, ())
-        _asked(aside, loop, _ask, OF_NUMBERS)
+    with np.errstate(all="ignore"):
+        _asked(loop, _check_declared, ())
+        _asked(loop, _ask, OF_NUMBERS)
 
 
 def _asked(
-    aside: Aside, loop: ClosedLoop, ask: Callable[[ClosedLoop], int],
-    left: tuple[type[Exception], ...],
-) -> None:  # fmt: skip
+    loop: ClosedLoop, ask: Callable[[ClosedLoop], int], left: tuple[type[Exception], ...]
+) -> None:
     """Ask, and raise LawError for any exception but those that are `left` for the run to tell."""
-    law = loop.controller
-    try:
-        aside.finish(partial(ask, loop))
-    except TimeoutError:
-        raise LawError(f"law {law.label}: asked at the start, {never_returns()}") from None
-    except Failed as failed:
-        error = failed.__cause__
-        if isinstance(error, LawError):
-            raise error from None
-        if not isinstance(error, left):
-            raise LawError(f"law {law.label}: asked at the start, {failed.told()}") from error
+    work = Work(partial(ask, loop))
+    work.finish()
+    if isinstance(work.error, LawError):
+        raise work.error
+    if work.result is None and not isinstance(work.error, left):
+        message = f"law {loop.controller.label}: asked at the start, {work.fault()}"
+        raise LawError(message) from work.error
 
 
 def _check_declared(loop: ClosedLoop) -> int:

@@ -62,11 +62,12 @@ class Wires(NamedTuple):
     held: Vector  # t, x, target of the last sample; demand and signals that nobody reads
     work: Vector
     seen: Vector  # the observer's
-    under_way: Vector  # which instant, or the step from it
+    under_way: Vector  # the instant that is under way; then 1 if the march has to stop
     log: Vector  # rows of t, s, row
 
 
 HELD_X, HELD_TARGET, HELD_DEMAND, HELD_SIGNALS = 1, 7, 13, 15
+STOP = 1  # in `under_way`
 
 
 # Vector to named coefficients of the vessel; the plant is the one part that never varies.
@@ -207,9 +208,14 @@ def advance(
     path: Function, disturbance: Function, law: Function, sample: Function, actuator: Function,
     settle: Function, observe: Function, first: int, last: int, h: float, wires: Any, plan: Any,
 ) -> int:  # fmt: skip
-    """March over the instants first .. last - 1; gives the first that is not finite, or `last`."""
+    """March over the instants first .. last - 1.
+
+    Returns the first instant that is not finite, or that was not begun, or `last`.
+    """
     c, n = named_wires(wires), named_plan(plan)
     for k in range(first, last):
+        if c.under_way[STOP] != 0.0:
+            return k
         if not instant(
             k, first, h, path, disturbance, law, sample, actuator, settle, observe, c, n
         ):
@@ -226,7 +232,7 @@ def advance_plainly(
     """`advance` as plain Python, whose `math` raises where machine code gives no number."""
     for k in range(first, last):
         try:
-            if not instant(
+            if c.under_way[STOP] != 0.0 or not instant(
                 k, first, h, path, disturbance, law, sample, actuator, settle, observe, c, n
             ):
                 return k

@@ -1,159 +1,150 @@
-"""The march in blocks, in a thread of its own, while the caller stays awake.
+"""The march in a thread of its own, watched by the thread that started it.
 
-Machine code hears no signal and a law may never return. So one thread computes and the other waits:
-for the block, for an interrupt, or until the block has taken more computing than any block should.
+Compiled code sees no signal, and a law may never return. The watching thread reports progress, sets
+the march's stop flag on an interrupt, and abandons a march that hangs.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from contextvars import copy_context
+from functools import partial
 from queue import Empty, SimpleQueue
-from threading import Thread
+from threading import Thread, get_ident
 from typing import NamedTuple
+
+import numpy as np
 
 from podusv_cli.core.errors import in_a_line
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Status
-from podusv_cli.engine.closed_loop import Plan
-from podusv_cli.engine.row_table import Pieces
-from podusv_cli.process.interrupts import interrupts_heard, interrupts_held
+from podusv_cli.engine.closed_loop import STOP
+from podusv_cli.process.interrupts import interrupts_heard
 
-FIRST_BLOCK = 1  # steps
-LONGEST_BLOCK = 0.05  # s; a progress bar waits no longer
-PATIENCE = 10.0  # s of computing, not of the clock on the wall, that a block may take
-LOOKS = 0.25  # s between two looks at how much it has taken
-LAST_CHANCE = 1.0  # s for a block to end after an interrupt
+Advance = Callable[[int, int], int]
+Bell = SimpleQueue[None]
+GLANCE = 0.05  # s between two looks at a march
+PATIENCE = 10.0  # s of processor time that a step may take
+LAST_CHANCE = 1.0  # s for a march to end after its stop flag is set
 
 
 class Ending(NamedTuple):
-    """How many instants are good, how the march ended, and why if it was by an error."""
+    """How many instants are good, how the march ended, and the error that ended it, if any."""
 
     reached: int
     status: Status
     cause: str = ""
 
 
-class Pace:
-    """How many steps a block may have, by what the one before took; alike marches can share it."""
+class Work:
+    """A function that runs in a thread of its own; `result` or `error` is set when it is over.
 
-    def __init__(self) -> None:
-        """Nothing is known yet."""
-        self.steps = FIRST_BLOCK
-
-    def learn(self, steps: int, seconds: float) -> None:
-        """So many steps took so long."""
-        growth = min(100.0, 0.7 * LONGEST_BLOCK / max(seconds, 1e-9))
-        self.steps = max(1, int(steps * growth))
-
-
-def in_blocks(
-    march: Callable[[int, int], int], plan: Plan, under_way: Vector,
-    progress: Callable[[float], None] | None, pieces: Pieces | None = None,
-    pace: Pace | None = None,
-) -> Ending:  # fmt: skip
-    """March until the end or trouble; `under_way` is where the march notes its instant.
-
-    A block that never ends is left behind with its thread; what is before that instant is good.
-    A block ends where the table of `pieces` is full, and the next begins when it is handed on.
+    `under_way` is the vector of that name in `Wires`. The thread rings `bell` when it ends.
     """
-    end, done, pace = plan.steps + 1, 0, pace or Pace()
-    with Aside() as aside:
+
+    def __init__(
+        self, function: Callable[[], int], under_way: Vector | None = None, bell: Bell | None = None
+    ) -> None:
+        """Nothing runs before `start`."""
+        self.started = self.over = False
+        self.result: int | None = None
+        self.error: BaseException | None = None
+        self._function, self._bell = function, bell or SimpleQueue()
+        self._under_way = np.zeros(1 + STOP) if under_way is None else under_way
+        self._clock: Callable[[], float] = lambda: 0.0  # the thread's processor time
+        self._last_change = (-1.0, 0.0)  # the instant under way, and the time when it was new
+
+    def start(self) -> None:
+        """Start the thread. It ignores the floating-point errors that this thread ignores."""
+        self.started = True
+        Thread(target=copy_context().run, args=(self._run,), daemon=True).start()
+
+    def wait(self, seconds: float = GLANCE) -> None:
+        """Wait until the bell rings, but not longer than this."""
+        with suppress(Empty):
+            self._bell.get(timeout=seconds)
+
+    def hangs(self) -> bool:
+        """Whether it has computed for `PATIENCE` at one instant. To be called again and again."""
+        instant, used = float(self._under_way[0]), 0.0
+        with suppress(OSError):  # the thread has ended
+            used = self._clock()
+        if instant != self._last_change[0]:
+            self._last_change = (instant, used)
+        return not self.over and used - self._last_change[1] > PATIENCE
+
+    def finish(self, progress: Callable[[int], None] | None = None) -> None:
+        """Start, and wait until it is over or hangs."""
+        self.start()
+        while not (self.over or self.hangs()):
+            self.wait()
+            if progress:
+                progress(self.reached)
+
+    def stop(self) -> None:
+        """Tell the march to stop at the next instant."""
+        self._under_way[STOP] = 1.0
+
+    def stopped(self) -> int:
+        """Stop the march, wait a moment until it has, and count the good instants."""
+        self.stop()
+        end = time.monotonic() + LAST_CHANCE
+        while self.started and not self.over and time.monotonic() < end:
+            self.wait()
+        return self.reached
+
+    @property
+    def reached(self) -> int:
+        """The number of good instants: all before the one that is under way."""
+        return int(self._under_way[0]) if self.result is None else self.result
+
+    def ending(self, last: int) -> Ending:
+        """How a march up to this instant ended; one that hangs is abandoned."""
+        if self.result is None:
+            self.stop()  # should the law return one day
+            return Ending(self.reached, "diverged", self.fault())
+        return Ending(self.result, "finished" if self.result == last else "diverged")
+
+    def fault(self) -> str:
+        """What is wrong with a function that has no result."""
+        if not self.error:
+            return f"it is not over after {PATIENCE:g} s of computing"
+        return in_a_line(self.error)
+
+    def _run(self) -> None:
+        # Looked up by the thread itself, since the system crashes if the thread has ended.
+        look_up = getattr(time, "pthread_getcpuclockid", None)
+        if look_up:
+            self._clock = partial(time.clock_gettime, look_up(get_ident()))
+        else:
+            self._clock = time.process_time
+        try:
+            self.result = self._function()
+        except BaseException as error:  # a law may raise anything
+            self.error = error
+        self.over = True
+        self._bell.put(None)
+
+
+def march(
+    advance: Advance, ranges: Iterable[tuple[int, int]], under_way: Vector,
+    progress: Callable[[int], None] | None = None,
+) -> Ending:  # fmt: skip
+    """March over these ranges of instants, each from its first up to its second number.
+
+    The iterator gets on when a range is done. To be called while interrupts are held.
+    """
+    ending = Ending(0, "finished")
+    for first, last in ranges:
+        work = Work(partial(advance, first, last), under_way)
         try:
             with interrupts_heard():
-                while done < end:
-                    if pieces and done == pieces.border:
-                        with interrupts_held():
-                            pieces.hand_on(done)
-                    goal = min(done + pace.steps, end, pieces.border if pieces else end)
-                    began = time.perf_counter()
-                    reached = aside.finish(lambda a=done, b=goal: march(a, b))  # type: ignore[misc]
-                    if reached < goal:
-                        return Ending(reached, "diverged")
-                    pace.learn(goal - done, time.perf_counter() - began)
-                    done = goal
-                    if progress:
-                        progress(done / end)
+                work.finish(progress)
+            ending = work.ending(last)
         except KeyboardInterrupt:
-            return Ending(max(done, aside.last_word()), "interrupted")
-        except TimeoutError:
-            return Ending(int(under_way[0]), "diverged", never_returns())
-        except Failed as failed:
-            return Ending(int(under_way[0]), "diverged", failed.told())
-    return Ending(done, "finished")
-
-
-def never_returns() -> str:
-    """What is told of a block or a law that was left behind."""
-    return f"it is not over after {PATIENCE:g} s of computing"
-
-
-class Failed(Exception):
-    """What was done aside raised something, its cause."""
-
-    def told(self) -> str:
-        """What was raised, where."""
-        return in_a_line(self.__cause__ or self)
-
-
-class Aside:
-    """A thread that works while the one that asks waits, awake for interrupts."""
-
-    def __init__(self) -> None:
-        """Start the thread; it ends with the block that this is used in."""
-        self._orders: SimpleQueue[Callable[[], int] | None] = SimpleQueue()
-        self._answers: SimpleQueue[int | BaseException] = SimpleQueue()
-        self._busy = False
-        # Its own copy: what numpy is told to ignore here it has to ignore there.
-        context = copy_context()
-        self._thread = Thread(target=context.run, args=(self._work,), daemon=True)
-        self._thread.start()
-
-    def __enter__(self) -> Aside:
-        """Nothing more to do."""
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        """Let the thread end once its work is done."""
-        self._orders.put(None)
-
-    def finish(self, work: Callable[[], int]) -> int:
-        """The work's result. Raises Failed, or TimeoutError where it takes all too long."""
-        self._busy = True
-        before = self._computed()
-        self._orders.put(work)
-        while True:
-            with suppress(Empty):
-                return self._taken(LOOKS)
-            if self._computed() - before > PATIENCE:
-                raise TimeoutError
-
-    def last_word(self) -> int:
-        """The result of what it is at, or 0 where that does not come."""
-        with suppress(Empty, Failed):
-            return self._taken(LAST_CHANCE) if self._busy else 0
-        return 0
-
-    def _taken(self, patience: float) -> int:
-        answer = self._answers.get(timeout=patience)
-        self._busy = False
-        if isinstance(answer, BaseException):
-            raise Failed from answer
-        return answer
-
-    def _computed(self) -> float:
-        """Processor time of the thread, or, where the system does not tell, of the process."""
-        clock = getattr(time, "pthread_getcpuclockid", None)
-        return time.clock_gettime(clock(self._thread.ident)) if clock else time.process_time()
-
-    def _work(self) -> None:
-        while order := self._orders.get():
-            answer: int | BaseException
-            try:
-                answer = order()
-            except BaseException as error:  # whatever a law raises, its thread has to answer
-                answer = error
-            order = None  # or what was worked on, a log perhaps, would live until this thread ends
-            self._answers.put(answer)
+            ending = Ending(max(first, work.stopped()), "interrupted")
+        if ending.status != "finished":
+            break
+    return ending

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Columns
@@ -38,10 +38,15 @@ class Pieces:
         """The layout with the row that the table begins with."""
         return self._plan._replace(first_row=self._handed)
 
-    @property
-    def border(self) -> int:
-        """The first instant whose row does not fit into the table any more."""
-        return (self._handed + len(self._table)) * self._plan.log_every
+    def ranges(self) -> Iterator[tuple[int, int]]:
+        """Ranges of instants whose rows fit into the table; between two they are handed on."""
+        first, end = 0, self._plan.steps + 1
+        while first < end:
+            border = (self._handed + len(self._table)) * self._plan.log_every
+            yield first, min(border, end)
+            if border < end:
+                self.hand_on(border)
+            first = border
 
     def hand_on(self, reached: int) -> None:
         """Append the rows of the instants before `reached` to the columns."""

@@ -1,4 +1,4 @@
-"""From components to a recording: lay out the loop, march in blocks, name the columns."""
+"""From components to a recording: lay out the loop, march, name the columns."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from podusv_cli.disturbances.base import Disturbance
 from podusv_cli.engine import closed_loop, signatures
 from podusv_cli.engine.closed_loop import Plan, Wires
 from podusv_cli.engine.grid import TimeGrid, whole_steps
-from podusv_cli.engine.march import Ending, in_blocks
+from podusv_cli.engine.march import Ending, march
 from podusv_cli.engine.row_table import PIECE, Pieces, rows_held
 from podusv_cli.paths.base import TARGET, Path
 from podusv_cli.process.interrupts import interrupts_held
@@ -119,21 +119,21 @@ def simulate(
 ) -> Recording:
     """Integrate the closed loop over the grid.
 
-    `progress` is called between blocks with the fraction done. An interrupt ends the march and
-    keeps what was logged; `compiled=False` runs the same kernels as plain Python. The log is held
-    in memory, or with `columns` goes there in pieces of about `piece` bytes, and the recording's
-    signals are what the columns give. What they raise ends the march.
+    `progress` is called with the fraction done, about 20 times a second. An interrupt ends the
+    march and keeps what was logged. `compiled=False` runs the same kernels as plain Python. The log
+    is held in memory, or with `columns` goes there in pieces of about `piece` bytes, and the
+    recording's signals are what the columns give. What they raise ends the march.
     """
     observer = observer or Observer()
     plan = loop.layout(grid)
     rows = grid.rows if columns is None else rows_held(plan, grid, piece)
     wires = wire(loop, plan, observer, rows)
     pieces = Pieces(plan, wires.log, columns, lambda table: _logged(loop, grid, table))
-    march = marcher(loop, observer, compiled)
+    advance = marcher(loop, observer, compiled)
     with np.errstate(all="ignore"), interrupts_held():
-        ending = in_blocks(
-            lambda a, b: march(a, b, grid.step, wires, pieces.plan), plan, wires.under_way,
-            progress, pieces,
+        ending = march(
+            lambda a, b: advance(a, b, grid.step, wires, pieces.plan), pieces.ranges(),
+            wires.under_way, progress and (lambda reached: progress(reached / (plan.steps + 1))),
         )  # fmt: skip
         return _record(loop, grid, wires, pieces, ending)
 
@@ -186,7 +186,7 @@ def wire(loop: ClosedLoop, plan: Plan, observer: Observer, rows: int = 1) -> Wir
         s=np.concatenate([loop.start, actuator.rest(), loop.first_memory()]),
         row=np.zeros(plan.columns), stages=np.zeros(5 * plan.states),
         held=np.zeros(closed_loop.HELD_SIGNALS + len(law.signals)),
-        work=np.zeros(law.workspace()), seen=np.zeros(observer.size), under_way=np.zeros(1),
+        work=np.zeros(law.workspace()), seen=np.zeros(observer.size), under_way=np.zeros(2),
         log=np.empty(rows * plan.width),
     )  # fmt: skip
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -122,6 +123,30 @@ def test_in_a_batch_one_law_that_does_not_return_costs_no_other_run(
     batch = simulate_many(loops, TimeGrid(0.01, 100), workers=2)
     assert batch.status.tolist() == ["finished", "diverged", "finished"]
     assert batch.reached.tolist() == [101, 49, 101]
+
+
+def test_a_law_that_returns_after_it_was_abandoned_goes_no_step_further(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    released, times = threading.Event(), []
+
+    class Late(Constant):
+        @staticmethod
+        def law(t, x, memory, target, k, table, tau, rate, signals, work):  # type: ignore[no-untyped-def, override]
+            times.append(t)
+            while t == 0.05 and not released.is_set():
+                pass
+            tau[:] = 0.0
+
+    monkeypatch.setattr(march, "PATIENCE", QUICK)
+    before = set(threading.enumerate())
+    out = run(adrift(controller=Late()), 1000.0, compiled=False)
+    assert out.message.startswith("diverged at t = 0.04 s: it is not over after 0.4 s")
+    released.set()
+    for thread in set(threading.enumerate()) - before:
+        thread.join(10.0)
+        assert not thread.is_alive()
+    assert max(times) <= 0.06
 
 
 def test_computing_counts_and_not_the_clock(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,9 +15,9 @@ from conftest import Constant, adrift
 
 from podusv_cli.controllers.base import Controller
 from podusv_cli.controllers.pid import Pid
-from podusv_cli.core.component import catalogue
 from podusv_cli.core.errors import LawError
 from podusv_cli.core.kernel import Vector, kernel
+from podusv_cli.core.registry import kinds
 from podusv_cli.engine.check import check_law
 from podusv_cli.engine.simulate import ClosedLoop, Observer, marcher
 from podusv_cli.storage.log_check import check_declared
@@ -248,5 +248,5 @@ def test_a_file_that_cannot_be_imported_is_named(
     for name in ("own_laws", "own_laws.mine"):
         monkeypatch.delitem(sys.modules, name, raising=False)
     with pytest.raises(LawError) as found:
-        catalogue("own_laws", Controller)
+        kinds("own_laws", Controller)
     assert str(found.value) == IMPORTED[text]

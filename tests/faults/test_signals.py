@@ -42,7 +42,9 @@ time.sleep(600)
 PATCHED = """
 import sys, time
 from pathlib import Path
-from podusv_cli import cli, interrupts, running, workflows, parallel
+from podusv_cli import cli
+from podusv_cli.process import interrupts
+from podusv_cli.workflows import execute
 
 def patch(room, name, instead):
     old = getattr(room, name)
@@ -64,7 +66,7 @@ def told(old, *given, progress=None, **more):
         if progress:
             progress(fraction)
     return old(*given, progress=tell, **more)
-patch(running, "simulate", told)
+patch(execute, "simulate", told)
 """
 
 
@@ -150,7 +152,7 @@ def test_a_lost_terminal_ends_a_comparison_and_keeps_it() -> None:
 
 @pytest.mark.parametrize(("ignored", "code"), [(False, 129), (True, 0)])
 def test_a_hangup_ends_it_but_not_under_nohup(ignored: bool, code: int) -> None:
-    patches = 'patch(running, "simulate", lambda old, *given, **more: old(*given, **more))'
+    patches = 'patch(execute, "simulate", lambda old, *given, **more: old(*given, **more))'
     if ignored:
         patches = f"import signal; signal.signal(signal.SIGHUP, signal.SIG_IGN); {patches}"
     config = write("a.yaml", LONG.replace("1e5", "1e3") if ignored else LONG)
@@ -164,7 +166,7 @@ def test_a_hangup_ends_it_but_not_under_nohup(ignored: bool, code: int) -> None:
 
 @INTERRUPTS
 def test_while_writing(number: signal.Signals, code: int) -> None:
-    patches = 'patch(running, "_write", lambda old, *given: (time.sleep(1.0), old(*given)))'
+    patches = 'patch(execute, "_write", lambda old, *given: (time.sleep(1.0), old(*given)))'
     script = PATCHED.format(patches=patches)
     with under_way("run", write("a.yaml", BASE), "--out", "x", script=script) as process:
         wait_for("reached")
@@ -177,7 +179,7 @@ def test_while_writing(number: signal.Signals, code: int) -> None:
 
 @INTERRUPTS
 def test_while_a_run_is_drawn(number: signal.Signals, code: int) -> None:
-    patches = 'interrupts.ECHO = 600; patch(running, "_drawn", lambda old, *given: time.sleep(600))'
+    patches = 'interrupts.ECHO = 600; patch(execute, "_drawn", lambda old, *given: time.sleep(600))'
     script = PATCHED.format(patches=patches)
     with under_way("run", write("a.yaml", BASE), "--out", "x", script=script) as process:
         wait_for("reached")
@@ -197,7 +199,7 @@ def deaf(old, *given):
         time.sleep(0.1)
         if signal.getsignal(signal.SIGINT).number:
             Path("heard").touch()
-patch(running, "_write", deaf)
+patch(execute, "_write", deaf)
 """
     script = PATCHED.format(patches=patches)
     with under_way("run", write("a.yaml", BASE), "--out", "x", script=script) as process:
