@@ -21,7 +21,7 @@ EPSILON = np.finfo(float).eps
 
 
 def compiled(function: Any, numbers: Vector) -> Vector:
-    inner = compile_numba.machine(function)
+    inner = compile_numba.inlined(function)
     code = njit(lambda x: inner(x))
     return np.array([code(x) for x in numbers])
 

@@ -1,9 +1,9 @@
 """The convention for code that runs inside the compiled loop.
 
 A kernel is a plain Python function on floats and vectors. It can be called as it is (tests and
-the uncompiled engine do), and `engine.compiling` turns it, with every kernel it calls, into
-machine code. Inside compiled code a vector is a bare pointer: index it, pass `tail(v, n)` for the
-part from n on, and never ask for its length.
+the uncompiled engine do), and `engine.compile` compiles it with every kernel that it calls. In
+compiled code a vector is a bare pointer: index it, pass `tail(v, n)` for the part from n on, and
+never ask for its length.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Kernels as machine code: the parts of a loop, the march, the replay.
+"""Compiled code of kernels, loaded from the disk or compiled by numba.
 
-numba, which is slow to import, is needed only for what is not on disk yet.
+numba is slow to import, so it is imported only for code that is not on the disk yet.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from typing import Any
 
 from podusv_cli.core.errors import LawError
 from podusv_cli.engine import object_cache, signatures
-from podusv_cli.engine.closed_loop import advance, evaluate_all, rates_along
 from podusv_cli.process.interrupts import interrupts_held
 
 RULES = (
@@ -24,9 +23,10 @@ RULES = (
 
 @cache
 def entry(door: Any, inner: Any, names: tuple[str, ...]) -> Any:
-    """Machine code of a component's kernel behind its door, callable by the loop.
+    """The compiled kernel `inner` of a component, callable by the loop through this door.
 
-    Raises LawError for a kernel that cannot become machine code.
+    `names` are those of the component's constants. Raises LawError for a kernel that cannot be
+    compiled.
     """
     label = f"{door.__name__}_{inner.__module__}_{inner.__qualname__}"
     bound = signatures.bind(door, inner, names)
@@ -40,35 +40,23 @@ def entry(door: Any, inner: Any, names: tuple[str, ...]) -> Any:
 
 
 @cache
-def march() -> Any:
-    """Machine code of `closed_loop.advance`."""
-    return compiled(advance, signatures.ADVANCE)
-
-
-@cache
-def replay() -> Any:
-    """Machine code of `closed_loop.evaluate_all`."""
-    return compiled(evaluate_all, signatures.EVALUATE_ALL)
-
-
-@cache
-def rates_replay() -> Any:
-    """Machine code of `closed_loop.rates_along`."""
-    return compiled(rates_along, signatures.RATES_ALONG)
+def routine(function: Any, prototype: Any) -> Any:
+    """A compiled kernel of the engine itself."""
+    return compiled(function, prototype)
 
 
 def compiled(function: Any, prototype: Any, label: str = "") -> Any:
-    """Machine code of a kernel as a function of C's calling convention, of this ctypes prototype.
+    """The kernel as a compiled C function with this ctypes prototype.
 
     Raises TypeError for a kernel that needs more than arithmetic and the mathematical library.
     """
     name = f"{label or function.__qualname__}_{object_cache.fingerprint(function)}"
 
-    def translate() -> object_cache.Code:
+    def compile_now() -> object_cache.Code:
         from podusv_cli.engine import compile_numba
 
-        # An interrupt inside the compiler would be swallowed there, so it waits a second or two.
+        # The compiler would swallow an interrupt, so interrupts wait for it, a second or two.
         with interrupts_held():
-            return compile_numba.translate(function, prototype)
+            return compile_numba.object_code(function, prototype)
 
-    return object_cache.stored(prototype, re.sub(r"\W", "_", name), translate)
+    return object_cache.stored(prototype, re.sub(r"\W", "_", name), compile_now)

@@ -1,4 +1,4 @@
-"""Kernels to object code by numba, once for each; later processes find it on disk."""
+"""Object code of kernels by numba. `object_cache` keeps it on the disk for later processes."""
 
 from __future__ import annotations
 
@@ -19,13 +19,14 @@ from numba.extending import intrinsic
 from podusv_cli.core import kernel
 from podusv_cli.engine.object_cache import Code, target
 
-# Kernels are merged into their caller: to hand on a law's constants costs as much as the law.
+# Kernels are inlined: to pass a law's constants to another function takes as long as the law.
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": False, "forceinline": True}
-INNER = OPTIONS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # nobody else calls them
+INNER = OPTIONS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # called by kernels only
 NUMBER = types.float64
 VECTOR: Any = types.CPointer(NUMBER)  # type: ignore[no-untyped-call]
 
 
+# An intrinsic gives numba the signature of `kernel.tail` or `kernel.scratch`, and its LLVM code.
 @intrinsic
 def _tail(typing: Any, vector: Any, start: Any) -> Any:
     def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -46,13 +47,13 @@ def _scratch(typing: Any, count: Any) -> Any:
 PRIMITIVES = {kernel.tail: _tail, kernel.scratch: _scratch}
 
 
-def translate(function: Any, prototype: Any) -> Code:
-    """Object code of a kernel and all kernels it calls, as a function of C's calling convention.
+def object_code(function: Any, prototype: Any) -> Code:
+    """Object code of a kernel and all kernels it calls, as a C function with this prototype.
 
     Raises TypeError for a kernel that needs more than arithmetic and the mathematical library.
     """
     try:
-        compiled = cfunc(_signature(prototype), **OPTIONS)(_with_machine_code(function))
+        compiled = cfunc(_signature(prototype), **OPTIONS)(_with_inlined(function))
     except NumbaError as error:
         raise TypeError(_in_short(str(error))) from error
     module = llvm.parse_assembly(compiled.inspect_llvm())
@@ -61,11 +62,11 @@ def translate(function: Any, prototype: Any) -> Code:
 
 
 @cache
-def machine(function: Any) -> Any:
-    """The kernel and all kernels it names, ready to be compiled into their caller."""
+def inlined(function: Any) -> Any:
+    """The kernel and all kernels it calls, as a numba function to be compiled into its caller."""
     if function in PRIMITIVES:
         return PRIMITIVES[function]
-    return njit(**INNER)(_with_machine_code(function))
+    return njit(**INNER)(_with_inlined(function))
 
 
 def _in_short(told: str) -> str:
@@ -77,11 +78,12 @@ def _in_short(told: str) -> str:
     return f"{' '.join(' '.join(kept).split())}{where}"
 
 
-def _with_machine_code(function: Any) -> Any:
-    seen = function.__globals__
+def _with_inlined(function: Any) -> Any:
+    """A copy of the kernel whose globals have numba functions in place of other kernels."""
+    outer = function.__globals__
     named = {i.argval for i in dis.get_instructions(function) if i.opname == "LOAD_GLOBAL"}
-    called = {name for name in named if kernel.is_kernel(seen.get(name))}
-    inner = {name: machine(seen[name]) for name in called}
+    called = {name for name in named if kernel.is_kernel(outer.get(name))}
+    inner = {name: inlined(outer[name]) for name in called}
     return kernel.with_globals(function, function.__qualname__, **inner)
 
 
@@ -92,13 +94,13 @@ def _signature(prototype: Any) -> Any:
 
 def _type(kind: Any) -> Any:
     if kind and issubclass(kind, ctypes._CFuncPtr):  # type: ignore[attr-defined]
-        # The way from a Python object to its address is asked for, although none comes in here.
+        # numba wants a function from a Python object to its address, but never calls it here.
         return types.ExternalFunctionPointer(_signature(kind), ctypes.addressof)
     return from_ctypes(kind)  # type: ignore[no-untyped-call]
 
 
 def _check_calls(module: Any, name: str) -> None:
-    # A function that the loader does not find ends the process without a word.
+    """Refuse code that calls an unknown function: loading it would end the process silently."""
     process = ctypes.CDLL(None)
     declared = [f.name for f in module.functions if f.is_declaration]
     for wanted in declared:

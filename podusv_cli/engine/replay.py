@@ -46,7 +46,7 @@ def replayer(
     p = np.array(list(informed.values()))
     buffers = (rows.ravel(), p, loop.controller.table(), np.zeros(2), np.zeros(room))
     vectors = [signatures.pointer(buffer) for buffer in buffers]
-    replay: Callable[..., None] = compile.replay()
+    replay: Callable[..., None] = compile.routine(closed_loop.evaluate_all, signatures.EVALUATE_ALL)
     law = compile.entry(signatures.law_entry, loop.controller.law, tuple(informed))
 
     def timed() -> float:
@@ -104,7 +104,7 @@ def _rates_runner(loop: ClosedLoop, compiled: bool) -> Callable[..., None]:
     from podusv_cli.engine import compile  # a loop in plain Python needs no compiler
 
     doors = [compile.entry(*part) for part in chosen]
-    run = compile.rates_replay()
+    run = compile.routine(closed_loop.rates_along, signatures.RATES_ALONG)
 
     def compiled_run(count: int, logged: Vector, out: Vector, wires: Wires, plan: Plan) -> None:
         vectors, sizes = signatures.pointers(wires), signatures.whole_numbers(plan)

@@ -161,7 +161,7 @@ def marcher(loop: ClosedLoop, observer: Observer, compiled: bool) -> Callable[..
     from podusv_cli.engine import compile  # a loop in plain Python needs no compiler
 
     doors = [compile.entry(*part) for part in entries(loop, observer)]
-    march = compile.march()
+    march = compile.routine(closed_loop.advance, signatures.ADVANCE)
 
     def compiled_march(first: int, last: int, h: float, wires: Wires, plan: Plan) -> int:
         vectors, sizes = signatures.pointers(wires), signatures.whole_numbers(plan)

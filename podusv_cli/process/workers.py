@@ -1,4 +1,4 @@
-"""Jobs in processes of their own: one that dies takes no other with it."""
+"""Jobs in processes of their own: a job that kills its process affects no other job."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import multiprocessing
 import os
 import time
 import traceback
-from collections import deque
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field, replace
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from pickle import PicklingError, UnpicklingError
@@ -25,42 +25,24 @@ from podusv_cli.process.interrupts import (
 
 Progress = Callable[[float], None]
 Job = Callable[[Progress], Any]
-GRACE = 1.5  # s for workers to bring home what they have when the user interrupts
+Report = Callable[[int, float], None]
+GRACE = 1.5  # s for jobs to return what they have after an interrupt
 INTERRUPTED = "interrupted"
-TRIES = 2  # a worker that was killed is replaced once
+FORK = multiprocessing.get_context("fork")  # which inherits what is imported and compiled
+TRIES = 2  # a job whose process is killed runs once more
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a job: its result, or in `failure` the reason why there is none.
+    """A job's result, or in `failure` the reason why there is none.
 
-    `cut`: it was not over when an interrupt came. `code`: the exit code that its error stands for.
+    `cut`: an interrupt came before the job was over. `code`: the exit code of its error.
     """
 
     result: Any = None
     failure: str = ""
     cut: bool = False
     code: int = 0
-
-
-@dataclass
-class _Worker:
-    """A running job."""
-
-    position: int
-    process: BaseProcess
-    channel: Connection
-
-
-@dataclass
-class _Shift:
-    """Jobs waiting, at work and done."""
-
-    jobs: Sequence[Job]
-    waiting: deque[int]
-    busy: list[_Worker] = field(default_factory=list)
-    outcomes: dict[int, Outcome] = field(default_factory=dict)
-    tries: dict[int, int] = field(default_factory=dict)
 
 
 def workers_here() -> int:
@@ -72,76 +54,102 @@ def workers_here() -> int:
 
 
 def run_all(
-    jobs: Sequence[Job], progress: Callable[[int, float], None] | None = None, workers: int = 0
+    jobs: Sequence[Job], progress: Report = lambda position, fraction: None, workers: int = 0
 ) -> list[Outcome]:
-    """Run every job, at most `workers` at a time (0: one a core); outcomes in order.
+    """Run every job, at most `workers` at a time (0: one a core); the outcomes in order.
 
     `progress` is called with a job's position and the fraction that it reports. A job's PodusvError
     becomes its failure; any other exception too, with its traceback. An interrupt is passed on to
-    the jobs, which begin with interrupts held: those that hear them have a moment to bring home
-    what they have, the others are ended.
+    the jobs, which begin with interrupts held; those that hear it have a moment to return what they
+    have, then all are killed.
     """
-    shift = _Shift(jobs, deque(range(len(jobs))))
-    with interrupts_held(), _cleared(shift):
+    pool = _Pool(jobs, progress)
+    with interrupts_held():
         try:
-            while shift.waiting or shift.busy:
-                while shift.waiting and len(shift.busy) < (workers or workers_here()):
-                    shift.busy.append(_started(shift, shift.waiting.popleft()))
+            while pool.waiting or pool.busy:
+                pool.start(workers or workers_here())
                 with interrupts_heard():
-                    ready = wait([worker.channel for worker in shift.busy])
-                _listen_to_all(shift, ready, progress)
+                    ready = wait(pool.busy)
+                pool.receive(ready)
         except KeyboardInterrupt:
-            _call_home(shift)
+            pool.interrupt()
+        finally:
+            pool.kill()
     missing = Outcome(failure=INTERRUPTED, cut=True)
-    return [shift.outcomes.get(position, missing) for position in range(len(jobs))]
+    return [pool.outcomes.get(position, missing) for position in range(len(jobs))]
 
 
-def _call_home(shift: _Shift) -> None:
-    """Interrupt all workers and wait a moment for what they have."""
-    shift.tries = dict.fromkeys(range(len(shift.jobs)), TRIES)
-    for worker in shift.busy:
-        worker.process.terminate()
-    over, end = set(shift.outcomes), time.monotonic() + GRACE
-    while shift.busy and time.monotonic() < end:
-        left = max(0.0, end - time.monotonic())
-        _listen_to_all(shift, wait([worker.channel for worker in shift.busy], left), None)
-    for position in shift.outcomes.keys() - over:
-        shift.outcomes[position] = replace(shift.outcomes[position], cut=True)
+class _Pool:
+    """Jobs that wait, by position; processes at work, by the pipe that they write to; outcomes."""
+
+    def __init__(self, jobs: Sequence[Job], progress: Report) -> None:
+        self._jobs, self._progress, self._tries = jobs, progress, Counter[int]()
+        self.waiting = list(range(len(jobs)))
+        self.busy: dict[Connection, tuple[int, BaseProcess]] = {}
+        self.outcomes: dict[int, Outcome] = {}
+
+    def start(self, most: int) -> None:
+        """Start jobs until this many are at work."""
+        while self.waiting and len(self.busy) < most:
+            position = self.waiting.pop(0)
+            ours, theirs = FORK.Pipe(duplex=False)
+            # A process notices that its parent has ended only if no other holds the pipe's end.
+            inherited = [ours, *self.busy]
+            process = FORK.Process(target=_work, args=(self._jobs[position], theirs, inherited))
+            process.start()
+            theirs.close()
+            self._tries[position] += 1
+            self.busy[ours] = position, process
+
+    def receive(self, ready: Iterable[Any]) -> None:
+        """Read one message from each of these pipes: a fraction, an outcome, or the end."""
+        for pipe in ready:
+            position, process = self.busy[pipe]
+            try:
+                message = pipe.recv()
+            except (EOFError, OSError, UnpicklingError):  # killed, perhaps within a message
+                message = None
+            if isinstance(message, float):
+                self._progress(position, message)
+                continue
+            del self.busy[pipe]
+            pipe.close()
+            process.join()
+            if message is None and self._tries[position] < TRIES:
+                self.waiting.append(position)
+            else:
+                killed = f"its process ended with exit code {process.exitcode}, {TRIES} times"
+                self.outcomes[position] = message or Outcome(failure=killed)
+
+    def interrupt(self) -> None:
+        """Interrupt all processes and take what they return within the time of grace."""
+        self._progress = lambda position, fraction: None
+        done, end = set(self.outcomes), time.monotonic() + GRACE
+        for _, process in self.busy.values():
+            process.terminate()
+        while self.busy and (left := end - time.monotonic()) > 0:
+            self.receive(wait(self.busy, left))
+        for position in self.outcomes.keys() - done:
+            self.outcomes[position] = replace(self.outcomes[position], cut=True)
+
+    def kill(self) -> None:
+        """Leave no process behind."""
+        for pipe, (_, process) in self.busy.items():
+            process.kill()
+            process.join()
+            pipe.close()
 
 
-def _listen_to_all(
-    shift: _Shift, ready: Sequence[object], progress: Callable[[int, float], None] | None
-) -> None:
-    for worker in [worker for worker in shift.busy if worker.channel in ready]:
-        _listen(shift, worker, progress)
-
-
-def _started(shift: _Shift, position: int) -> _Worker:
-    # Forked workers have all that this process has imported and compiled; where there is no fork
-    # they start from nothing, and jobs must be picklable.
-    forks = "fork" in multiprocessing.get_all_start_methods()
-    context: Any = multiprocessing.get_context("fork" if forks else "spawn")
-    ours, theirs = context.Pipe(duplex=False)
-    # A pipe is closed only when nobody holds its end: without that a worker would not notice that
-    # this process was killed.
-    inherited = [ours, *(worker.channel for worker in shift.busy)] if forks else []
-    process = context.Process(target=_work, args=(shift.jobs[position], theirs, inherited))
-    process.start()
-    theirs.close()
-    shift.tries[position] = shift.tries.get(position, 0) + 1
-    return _Worker(position, process, ours)
-
-
-def _work(job: Job, channel: Connection, inherited: Sequence[Connection]) -> None:
+def _work(job: Job, pipe: Connection, inherited: Iterable[Connection]) -> None:
     for end in inherited:
         end.close()
-    # Where nobody listens any more there is nobody to tell.
+    # A broken pipe means that the parent has ended.
     with interrupts_caught() as interrupts, interrupts_held(), suppress(BrokenPipeError):
-        outcome = _outcome(job, channel.send, interrupts)
+        outcome = _outcome(job, pipe.send, interrupts)
         try:
-            channel.send(outcome)
+            pipe.send(outcome)
         except (AttributeError, TypeError, PicklingError) as error:
-            channel.send(Outcome(failure=f"its result cannot be sent: {error}"))
+            pipe.send(Outcome(failure=f"its result cannot be sent: {error}"))
 
 
 def _outcome(job: Job, progress: Progress, interrupts: Interrupts) -> Outcome:
@@ -155,44 +163,5 @@ def _outcome(job: Job, progress: Progress, interrupts: Interrupts) -> Outcome:
         return Outcome(failure=str(error), code=StorageError.exit_code)
     except KeyboardInterrupt:
         return Outcome(failure=INTERRUPTED)
-    except Exception:  # machine code may turn an interrupt into another exception
+    except Exception:  # compiled code may turn an interrupt into another exception
         return Outcome(failure=INTERRUPTED if interrupts.number else traceback.format_exc())
-
-
-def _listen(shift: _Shift, worker: _Worker, progress: Callable[[int, float], None] | None) -> None:
-    try:
-        said = worker.channel.recv()
-    except (EOFError, OSError, UnpicklingError):  # it died, perhaps in the middle of a message
-        said = _buried(shift, worker)
-    if isinstance(said, float):
-        if progress:
-            progress(worker.position, said)
-        return
-    worker.process.join()
-    worker.channel.close()
-    shift.busy.remove(worker)
-    if said is None:
-        shift.waiting.append(worker.position)
-    else:
-        shift.outcomes[worker.position] = said
-
-
-def _buried(shift: _Shift, worker: _Worker) -> Outcome | None:
-    """The failure of a worker that died without a word, or None where it is to be tried again."""
-    worker.process.join()
-    if shift.tries[worker.position] < TRIES:
-        return None
-    code = worker.process.exitcode
-    return Outcome(failure=f"its process ended with exit code {code}, {TRIES} times")
-
-
-@contextmanager
-def _cleared(shift: _Shift) -> Iterator[None]:
-    """Leave no process behind, however the block ends."""
-    try:
-        yield
-    finally:
-        for worker in shift.busy:
-            worker.process.kill()
-            worker.process.join()
-            worker.channel.close()
