@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+from known_signals import ABOUT
 
 from podusv_cli.comparison import claims, table
 from podusv_cli.comparison.claims import Stated
@@ -43,7 +44,7 @@ class Folder:
         self.theory = {}
         t = np.linspace(0.0, 3.0, 4)
         signals = {"time": t, "x": 2 * t, "x_d": 3 * t, "u": t}
-        self.recording = Recording(status, "pid", signals, message=message)
+        self.recording = Recording(status, "pid", signals, message=message, about=ABOUT)
 
 
 def verdicts():

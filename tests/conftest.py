@@ -118,9 +118,9 @@ def ask(law: Controller, x: Vector, memory: Vector, target: Vector, nominal: Ves
     """Evaluate a law once, as plain Python; what it does not write stays NaN."""
     tau, rate = np.full(2, np.nan), np.full(len(memory), np.nan)
     signals, work = np.full(len(law.signals), np.nan), np.full(law.workspace(), np.nan)
-    k = bundle(law.informed(nominal))
+    k = bundle(law.constants_with(nominal))
     law.law(1.0, x, memory, target, k, law.table(), tau, rate, signals, work)
-    return Answer(tau, rate, dict(zip(law.signals, signals, strict=True)))
+    return Answer(tau, rate, dict(zip((s.name for s in law.signals), signals, strict=True)))
 
 
 class Situation(NamedTuple):
@@ -166,7 +166,7 @@ def run(loop: ClosedLoop, duration: float, step: float = 0.01, **options: Any) -
 
 def last_state(recording: Recording, loop: ClosedLoop) -> Vector:
     """Vessel's state and law's memory in the last row."""
-    names = [*STATE, *dict.fromkeys(name for name, _ in loop.controller.slots())]
+    names = [*STATE, *dict.fromkeys(part.name for part, _ in loop.controller.slots())]
     return np.concatenate([np.ravel(recording[name][-1]) for name in names])
 
 

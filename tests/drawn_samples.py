@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from known_signals import ABOUT
 
 from podusv_cli.core.recording import Recording
 from podusv_cli.figures.drawing import FIGURES, dressed
@@ -44,7 +45,7 @@ def recording(end=100.0, period=0.1, status="finished", shift=0.0, without=(), *
     signals |= {name: values(t) if callable(values) else values for name, values in given.items()}
     kept = {n: np.asarray(s, dtype=float) for n, s in signals.items() if n not in without}
     fixed = {"rbf_center": CENTER, "rbf_width": WIDTH}
-    return Recording(status, "pid", {"time": t} | kept, fixed)
+    return Recording(status, "pid", {"time": t} | kept, fixed, about=ABOUT)
 
 
 def shown(*runs):

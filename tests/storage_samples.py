@@ -16,6 +16,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from known_signals import ABOUT
 from numpy.testing import assert_array_equal
 
 import podusv_cli
@@ -46,13 +47,13 @@ def recording(rows: int = 50, nodes: int = 8, **changes: Any) -> Recording:
     }
     fixed = {"rbf_center": random.normal(size=(nodes, 3)), "rbf_width": np.array([0.7, 0.5, 0.25])}
     parts = {"status": "finished", "controller": "pid", "signals": signals, "fixed": fixed}
-    return Recording(**parts | changes)
+    return Recording(**parts | {"about": ABOUT} | changes)
 
 
 def write_log(stream: Stream, recorded: Recording, **texts: str) -> None:
     """A recording's whole log file."""
     with log_writer.opened(stream, recorded, **TEXTS | texts) as log:
-        log.add({**recorded.signals, **recorded.fixed})
+        log.add({**recorded.signals, **recorded.fixed}, recorded.about)
 
 
 def log(recorded: Recording | None = None, **texts: str) -> bytes:
@@ -79,6 +80,7 @@ def assert_same(one: Recording, other: Recording) -> None:
     for name, array in {**one.signals, **one.fixed}.items():
         assert other[name].dtype == np.float64
         assert_array_equal(other[name], array, err_msg=name)
+        assert other.about[name] == one.about[name]
         assert other[name].tobytes() == array.tobytes(), f"{name}: the sign of a zero or a NaN"
 
 

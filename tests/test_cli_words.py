@@ -19,9 +19,11 @@ import podusv_cli
 from podusv_cli import cli
 from podusv_cli.cli.exit_codes import PLEASE_REPORT, guarded
 from podusv_cli.core.errors import Finding, ScenarioError, StorageError
+from podusv_cli.findings.finding import notices
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.presets import pod_text, vessel_names, vessel_text
+from podusv_cli.scenario.presets import preset_names, preset_text, with_presets
 from podusv_cli.scenario.schema import schema_text
+from podusv_cli.vessels.vessel import VESSELS as SHIPPED
 
 HEAVY = {
     "numpy", "scipy", "numba", "llvmlite", "pandas", "matplotlib", "h5py", "pydantic", "yaml",
@@ -140,7 +142,7 @@ def test_nothing_but_plain_text_goes_into_a_pipe(podusv: Command) -> None:
 
 def test_list_names_every_kind_and_every_vessel(podusv: Command) -> None:
     out = podusv("list").out
-    for kind in ("line_circle", "harmonic", "saturated", "adaptive_neural", *vessel_names()):
+    for kind in ("line_circle", "harmonic", "saturated", "adaptive_neural", *preset_names(SHIPPED)):
         assert f"\n  {kind}\n" in out
     assert "CyberShip II" in out
 
@@ -158,14 +160,14 @@ def test_every_name_that_is_listed_is_explained(podusv: Command) -> None:
 def test_a_preset_is_explained_with_its_source_and_what_it_holds_for(podusv: Command) -> None:
     vessel, pods = podusv("explain", "otter").out.split("otter  ")[1:]
     assert vessel.startswith("vessel (vessel.preset)\n")
-    assert pods.startswith("set of pods (actuator.preset)\n")
-    for text, section in ((vessel, vessel_text), (pods, pod_text)):
+    assert pods.startswith("set of pods (actuator.pod.preset)\n")
+    for text, (_, presets) in zip((vessel, pods), with_presets().values(), strict=True):
         for key in ("source", "validity"):
-            assert section("otter", key) in " ".join(text.split())
+            assert preset_text(presets, "otter", key) in " ".join(text.split())
 
 
 def test_schema_prints_the_schema(podusv: Command) -> None:
-    assert podusv("schema") == (0, schema_text(), "")
+    assert podusv("schema") == (0, schema_text(tuple(notices())), "")
 
 
 # --- help and usage

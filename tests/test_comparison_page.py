@@ -6,7 +6,7 @@ from comparison_samples import FRAME, Folder, scenario, verdicts
 
 from podusv_cli.comparison import report
 from podusv_cli.comparison.entries import Entry
-from podusv_cli.findings.finding import Finding
+from podusv_cli.core.finding import Finding
 from podusv_cli.workflows import comparing
 
 

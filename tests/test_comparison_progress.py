@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 from comparison_samples import Folder, scenario
+from known_signals import ABOUT
 
 from podusv_cli.cli.progress import progress_bars
 from podusv_cli.comparison.entries import Entry
@@ -30,7 +31,7 @@ def test_drawing_is_progress_too(monkeypatch):
     t = np.linspace(0, 1, 5)
     signals = dict.fromkeys(("time", "x", "y", "x_d", "y_d", "psi", "u", "v", "r"), t)
     run = Folder({})
-    run.recording = Recording("finished", "pid", signals)
+    run.recording = Recording("finished", "pid", signals, about=ABOUT)
     entry = Entry("a", run, scenario())
     result = comparing.Result([], [entry], {}, {}, pd.DataFrame(), [], {}, {})
     monkeypatch.setattr("podusv_cli.figures.style.FORMATS", {"png": None})

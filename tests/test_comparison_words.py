@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from known_signals import ABOUT
 from test_reproduction import rerun
 
 from podusv_cli.comparison import expressions
@@ -52,7 +53,7 @@ RUNS = {
 
 def judged(text: str, tolerance: float = 0.05) -> tuple[bool | None, Evidence]:
     found = Evidence()
-    return parse(text, RUNS).holds(RUNS, tolerance, found), found
+    return parse(text, RUNS, ABOUT).holds(RUNS, tolerance, found), found
 
 
 def verdict(text: str, tolerance: float = 0.05):
@@ -144,7 +145,9 @@ def test_no_verdict_flips_with_the_log_s_interval():
     for every in (1, 5000):
         keys = ("simulation.duration=60", f"log.every={every}")
         runs = {"law": rerun(load(CORRECTED, keys).scenario)}
-        answers.append(parse("max(abs(law.tau_u_cmd)) < 200", runs).holds(runs, 0.0, Evidence()))
+        answers.append(
+            parse("max(abs(law.tau_u_cmd)) < 200", runs, ABOUT).holds(runs, 0.0, Evidence())
+        )
         peaks.append(runs["law"].metric("peak_tau_u"))
     assert answers == [False, None]
     assert peaks[0] == peaks[1] > 25_000
@@ -191,7 +194,7 @@ def test_an_integral_knows_its_time():
 def test_names_of_a_scenario_stand_for_other_runs():
     text, called = "a.iae < b.iae and max(a.z_e, 0, 1) > 1 and finished(a)", {"a": "b", "b": "a"}
     found = Evidence()
-    assert parse(text, RUNS, called).holds(RUNS, 0.0, found) is False
+    assert parse(text, RUNS, ABOUT, called).holds(RUNS, 0.0, found) is False
     assert list(found.numbers) == ["b.iae", "a.iae", "max(b.z_e, 0, 1)", "finished(b)"]
     assert renamed(text, called) == "b.iae < a.iae and max(b.z_e, 0, 1) > 1 and finished(b)"
     assert renamed(text, {"a": "a"}) == text
@@ -250,7 +253,7 @@ def test_the_numbers_are_shown_by_their_text():
 )
 def test_what_means_nothing_gets_a_sentence(text, says):
     with pytest.raises(ExpressionError) as error:
-        parse(text, RUNS)
+        parse(text, RUNS, ABOUT)
     assert says in str(error.value)
 
 

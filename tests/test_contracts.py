@@ -16,8 +16,9 @@ from podusv_cli.controllers.base import Controller
 from podusv_cli.core import registry
 from podusv_cli.core.component import Component, unit_of
 from podusv_cli.core.kernel import Vector, bundle, is_kernel
-from podusv_cli.core.signal import SIGNALS
 from podusv_cli.engine.simulate import names
+from podusv_cli.paths.base import TARGET
+from podusv_cli.scenario.explain import signals
 from podusv_cli.vessels.vessel import COEFFICIENTS, Vessel
 
 EVERY = [(room, name, kind) for room in ROOMS for name, kind in kinds(room).items()]
@@ -68,7 +69,7 @@ class Call:
             state = component.rest() + random.normal(0, 0.1, count)
             reads = [at.x, state, random.normal(0, 5, 2), k, table]
             return reads, [3, count, len(component.signals)]
-        k = bundle(component.informed(NONLINEAR))
+        k = bundle(component.constants_with(NONLINEAR))
         reads = [at.x, at.memory, at.target, k, table]
         return reads, [2, len(at.memory), len(component.signals), component.workspace()]
 
@@ -196,7 +197,7 @@ def test_kinds_and_class_names_are_unique() -> None:
 def test_a_law_s_own_constants_do_not_hide_the_vessel_s(kind: type[Controller]) -> None:
     law = example(kind)
     assert not set(law.constants()) & set(NONLINEAR.constants())
-    assert law.informed(NONLINEAR) == NONLINEAR.constants() | law.constants()
+    assert law.constants_with(NONLINEAR) == NONLINEAR.constants() | law.constants()
 
 
 @pytest.mark.parametrize("kind", kinds("controllers").values(), ids=kinds("controllers"))
@@ -216,14 +217,14 @@ def test_a_law_s_memory_has_the_declared_size_and_is_made_anew(kind: type[Contro
 def test_every_logged_column_has_one_meaning(room: str, kind: type[Component]) -> None:
     loop = corrected(**{room[:-1]: example(kind)})
     own = Counter([*loop.actuator.states, *loop.actuator.signals])
-    wide = dict(loop.controller.slots()) | own
+    wide = {part.name: size for part, size in (dict(loop.controller.slots()) | own).items()}
+    about = loop.about()
     for name, count in Counter(names(loop)).items():
         assert count == wide.get(name, 1), f"{name} is logged twice"
-        if name not in ("x_d_dot", "y_d_dot", "x_d_ddot", "y_d_ddot"):
-            assert name in SIGNALS, f"{name} is in no table of signals"
+        if name not in TARGET[2:]:
             vector = name.startswith("W_hat") or name in POD_VECTORS
-            assert bool(SIGNALS[name].axes) == vector
-    assert all(name in SIGNALS for name in loop.controller.fixed_signals())
+            assert bool(about[name].axes) == vector
+            assert about[name] in signals(), f"`explain {name}` does not find it"
 
 
 def test_every_vessel_has_the_same_constants_in_the_same_order() -> None:

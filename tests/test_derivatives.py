@@ -58,7 +58,7 @@ def reference(preset: str) -> Callable[..., tuple[Any, Any]]:
 
 def both(law: Backstepping, p: Vessel, at: Situation, tau_u: float) -> tuple[Any, Any, float]:
     """The kernels' rates, sympy's, and the half turn of the folding."""
-    k = bundle(law.informed(p))
+    k = bundle(law.constants_with(p))
     e = track(at.x, at.memory, at.target, k)
     found = (alpha_u_rate(e, at.x, at.target, k), alpha_r_rate(e, at.x, at.target, k, tau_u))
     side = -1 if law.fold == "joint" and e.half_turn else 1
@@ -92,7 +92,7 @@ def test_the_yaw_rate_feels_the_surge_force_that_was_just_asked_for() -> None:
 
 def candidate(law: Backstepping, x: Vector, target: Vector) -> float:
     """The part of (46) that does not adapt, with beta = alpha."""
-    e = track(x, np.zeros(60), target, bundle(law.informed(NONLINEAR)))
+    e = track(x, np.zeros(60), target, bundle(law.constants_with(NONLINEAR)))
     u_e, r_e = x[3] - e.alpha_u, x[5] - e.alpha_r
     kinetic = NONLINEAR.m11 * u_e**2 + NONLINEAR.m33 * r_e**2
     return float(0.5 * (e.z_e**2 + e.psi_e**2 + kinetic))
@@ -104,7 +104,7 @@ def test_the_cross_terms_of_the_lyapunov_function_cancel_or_double(
 ) -> None:
     # V' along the plant's own flow, by differences: nothing of the law's derivatives is used here.
     law, h = Backstepping(coupling=coupling, **GAINS), 1e-5
-    k = bundle(law.informed(NONLINEAR))
+    k = bundle(law.constants_with(NONLINEAR))
     for at in situations(law, 100):
         said, e = ask(law, *at, NONLINEAR), track(at.x, at.memory, at.target, k)
         if abs(math.cos(e.psi_e)) < 0.2:

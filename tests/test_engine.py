@@ -145,11 +145,11 @@ def test_every_row_is_one_instant() -> None:
         assert [out[name][i] for name in ("b_u", "b_v", "b_r")] == load_at(
             loop.disturbance, t
         ).tolist()
-        memory = np.concatenate([np.ravel(out[name][i]) for name, _ in law.slots()])
+        memory = np.concatenate([np.ravel(out[part.name][i]) for part, _ in law.slots()])
         # The law knows the nominal vessel only: another one than is simulated here.
         said = ask(law, x, memory, target, told)
         assert [out["tau_u_cmd"][i], out["tau_r_cmd"][i]] == said.tau.tolist()
-        assert {name: out[name][i] for name in law.signals} == said.signals
+        assert {part.name: out[part.name][i] for part in law.signals} == said.signals
         assert out["tau_u"][i] == np.clip(said.tau[0], -8, 8)
         assert not np.array_equal(said.tau, ask(law, x, memory, target, NONLINEAR).tau)
 
@@ -188,7 +188,7 @@ def test_sampled_control_is_the_law_at_samples_held_in_between() -> None:
         assert all(len(set(out[name][k : k + 20])) == 1 for k in range(0, 100, 20))
     for i in range(0, 101, 20):
         x = np.array([out[name][i] for name in STATE])
-        memory = np.concatenate([np.ravel(out[name][i]) for name, _ in law.slots()])
+        memory = np.concatenate([np.ravel(out[part.name][i]) for part, _ in law.slots()])
         said = ask(law, x, memory, target_at(loop.path, out["time"][i]), NONLINEAR)
         assert [out["tau_u_cmd"][i], out["tau_r_cmd"][i]] == pytest.approx(said.tau, rel=1e-12)
     # The memory goes on between samples, with the measurement held: beta' = decay (alpha - beta).

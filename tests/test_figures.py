@@ -5,9 +5,10 @@ import io
 import numpy as np
 import pytest
 from drawn_samples import CENTER, WIDTH, drawn, line, panels, recording, shown
+from known_signals import ABOUT
 from PIL import Image
 
-from podusv_cli.core.signal import SIGNALS
+from podusv_cli.figures import style
 from podusv_cli.figures.curves import thinned
 from podusv_cli.figures.drawing import FIGURES, draw
 from podusv_cli.figures.style import LOOKS, WIDTHS, axis_label, look
@@ -146,11 +147,11 @@ def test_thinning_keeps_the_extremes_of_every_bin_in_order():
 
 
 def test_every_signal_has_a_label_with_its_unit():
-    for name, signal in SIGNALS.items():
-        symbol, unit = axis_label(name).removesuffix("]").split(" [")
+    for signal in ABOUT.values():
+        symbol, unit = style.label(signal).removesuffix("]").split(" [")
         assert symbol == f"${signal.symbol}$"
         assert unit.replace("$", "").replace("^", "") == signal.unit
-    assert axis_label("f_hat_u") == r"$\hat f_u$ [m/s$^2$]"
+    assert axis_label(shown(("a", recording())), "f_hat_u") == r"$\hat f_u$ [m/s$^2$]"
 
 
 @pytest.mark.parametrize("columns", [1, 2])

@@ -15,11 +15,11 @@ from command_samples import Said
 from conftest import PACKAGE, VESSELS, example, kinds
 from findings_samples import CONFIGS, PLAIN, log, scene
 
-from podusv_cli.core.finding_codes import CODES
+from podusv_cli.core.finding import Finding
 from podusv_cli.core.recording import Recording
-from podusv_cli.findings.after import LOOKS, aftermath
-from podusv_cli.findings.finding import Finding
-from podusv_cli.findings.preflight import CHECKS, preflight, together
+from podusv_cli.findings.after import aftermath
+from podusv_cli.findings.finding import notices
+from podusv_cli.findings.preflight import preflight, together
 from podusv_cli.findings.underactuation import argument, input_rank
 from podusv_cli.scenario.load import load
 from podusv_cli.scenario.model import Scenario
@@ -38,20 +38,19 @@ def changed(out: Recording, **signals: Any) -> Recording:
 # --- the table
 
 
-def test_every_code_has_one_check_and_every_check_a_code() -> None:
-    assert [c.name for c in CODES.values() if c.when == "before"] == list(CHECKS)
-    assert [c.name for c in CODES.values() if c.when == "after"] == list(LOOKS)
-
-
-def test_every_code_points_to_a_key_of_a_scenario() -> None:
-    for code in CODES.values():
-        assert code.key.split(".")[0] in Scenario.model_fields
+def test_findings_come_in_the_order_of_the_scenario_s_sections() -> None:
+    sections = [
+        list(Scenario.model_fields).index(n.about.split(".")[0]) for n in notices().values()
+    ]
+    assert sections == sorted(sections)
+    assert {notice.when for notice in notices().values()} == {"before", "after"}
+    assert len(notices()) == 25
 
 
 def test_every_code_is_documented_with_its_meaning() -> None:
     text = (PACKAGE.parent / "docs" / "findings.md").read_text()
-    for code in CODES.values():
-        assert f"| `{code.name}` | `{code.key}` | {code.meaning}" in text
+    for code in notices().values():
+        assert f"| `{code.name}` | `{code.about}` | {code.meaning}" in text
 
 
 # --- each look, on a run where it is so and on one where it is not

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from findings_samples import BARE, codes, finding, late, log, scene, simulated
 
+from podusv_cli.controllers.velocity_loop import Loop
 from podusv_cli.engine.continuous import continuous
-from podusv_cli.findings.stability import Loop, loops, rk4_growth, sampled_growth
+from podusv_cli.findings.stability import loops, rk4_growth, sampled_growth
 
 LONG = "simulation.duration=120"
 PRINTED = "controller.coupling=printed"
@@ -115,7 +116,7 @@ def test_the_linearised_loops_are_those_of_the_whole_closed_loop(law: tuple[str,
         shift[i] = 1e-6
         columns.append((slope(0.0, s + shift) - slope(0.0, s - shift)) / 2e-6)
     whole = np.linalg.eigvals(np.array(columns).T)
-    for loop in loops(scenario.controller, scenario, s[3:6]):
+    for loop in loops(scenario, s[3:6]):
         # A loop's fast mode: within 10 % of one of the whole system's.
         fastest = max(np.linalg.eigvals(loop.matrix), key=abs)
         assert min(abs(whole - fastest)) < 0.1 * abs(fastest), loop.axis

@@ -125,7 +125,7 @@ def test_a_hull_slides_from_beyond_the_distance_that_is_told_and_not_from_within
 ) -> None:
     law = (*CALM, f"controller.k_ze={k_ze}")
     case = Case(scene(*law))
-    distance = sliding_distance(case, 0.8896)
+    distance = sliding_distance(case, case.scenario.controller.approach(), 0.8896)
     assert distance == pytest.approx(
         (0.5 * 8.0 + 25.8 * k_ze * 0.5) / (25.8 * k_ze - 0.8896)  # m22 - m11 = 8 kg
     )
@@ -153,7 +153,7 @@ def test_the_distance_is_where_the_plants_sway_starts_to_grow(standoff: float) -
         columns = [(rates(*d, D) - rates(*-d, D)) / (2.0 * h) for d in h * np.eye(2)]
         return float(np.linalg.eigvals(np.column_stack(columns)).real.max())
 
-    distance = sliding_distance(case, 0.8896)
+    distance = sliding_distance(case, case.scenario.controller.approach(), 0.8896)
     assert growth(0.99 * distance) < 0.0 < growth(1.01 * distance)
 
 

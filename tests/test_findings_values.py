@@ -16,7 +16,8 @@ CALM = ("disturbance={kind: none}", "simulation.duration=60")
 
 @pytest.mark.parametrize("name", ["X_uu", "X_uuu", "Y_vv", "N_rr"])
 def test_damping_that_drives_is_told_at_its_key_once(name: str) -> None:
-    (told,) = damping_sign(Case(scene(f"vessel.{name}=1.32")))
+    case = Case(scene(f"vessel.{name}=1.32"))
+    (told,) = damping_sign.findings(case.scenario.controller, case)
     assert (told.code, told.where) == ("damping-sign", f"vessel.{name}")
     assert "-1.32?" in told.text
 

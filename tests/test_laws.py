@@ -36,7 +36,7 @@ def changed(kind: Any) -> Any:
 
 
 def evaluate(law: Any, at: Situation) -> tuple[Answer, Tracking]:
-    e = track(at.x, at.memory, at.target, bundle(law.informed(NONLINEAR)))
+    e = track(at.x, at.memory, at.target, bundle(law.constants_with(NONLINEAR)))
     return ask(law, *at, NONLINEAR), e
 
 
@@ -83,7 +83,7 @@ def filtered(law: Any, at: Situation, e: Tracking) -> tuple[Vector, Vector]:
         return beta, (np.array([law.A_u, law.A_r]) + abs(alpha)) * (alpha - beta)
     if isinstance(law, DynamicSurface):
         return beta, (alpha - beta) / [law.T_u, law.T_r]
-    k = bundle(law.informed(NONLINEAR))
+    k = bundle(law.constants_with(NONLINEAR))
     surge = ask(law, *at, NONLINEAR).tau[0]
     rates = [alpha_u_rate(e, at.x, at.target, k), alpha_r_rate(e, at.x, at.target, k, surge)]
     return alpha, np.array(rates)
@@ -201,7 +201,7 @@ def test_while_held_the_full_law_s_derivatives_are_those_of_a_fixed_direction() 
     law = Backstepping(hold_below=2.0, k_psie=0.7)
     x, target = np.array([0, 0, 0.1, 0.3, 0.1, 0.2]), np.array([0.9, 0.3, 0.5, 0.1, 0, 0])
     memory = law.start(x, target, NONLINEAR)
-    k = bundle(law.informed(NONLINEAR))
+    k = bundle(law.constants_with(NONLINEAR))
     e = track(x, memory, target, k)
     # alpha_r = k_psie (psi_d - psi) with psi_d at rest.
     assert e.alpha_r == pytest.approx(0.7 * e.psi_e)

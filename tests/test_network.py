@@ -33,7 +33,11 @@ def outputs(network: Network, nu: Any) -> Vector:
     law = AdaptiveNeural(network=network)
     phi, work = np.full(network.count, np.nan), np.full(law.workspace(), np.nan)
     activate(
-        np.concatenate([np.zeros(3), nu]), bundle(law.informed(NONLINEAR)), law.table(), phi, work
+        np.concatenate([np.zeros(3), nu]),
+        bundle(law.constants_with(NONLINEAR)),
+        law.table(),
+        phi,
+        work,
     )
     return phi
 

@@ -36,7 +36,7 @@ def keep(target, log, plan=None):
 
 def pid(**options):
     log = recording(without=LAWLESS, **options)
-    return Recording(log.status, "pid", log.signals, {}, message=log.message)
+    return Recording(log.status, "pid", log.signals, {}, message=log.message, about=log.about)
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +59,10 @@ def stillborn(place):
     whole = pid()
     signals = {name: values[:0] for name, values in whole.signals.items()}
     message = "diverged at t = 0 s: tau_u_cmd is not finite"
-    return keep(place / "stillborn", Recording("diverged", "pid", signals, {}, message=message))
+    return keep(
+        place / "stillborn",
+        Recording("diverged", "pid", signals, {}, message=message, about=whole.about),
+    )
 
 
 def plot(*runs, out, figures=("velocities",), formats=("svg",), animate=False):

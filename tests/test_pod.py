@@ -48,7 +48,7 @@ def loads(actuator: Pods, state: Vector, x: Vector, demand: tuple[float, float] 
     k, table = bundle(actuator.constants()), actuator.table()
     actuator.drive(0.0, x, state, np.array(demand, float), k, table, tau, rate, signals)
     assert np.isfinite(np.concatenate([tau, rate, signals])).all()
-    return tau, rate, dict(zip(actuator.signals, signals, strict=True))
+    return tau, rate, dict(zip((s.name for s in actuator.signals), signals, strict=True))
 
 
 @given(

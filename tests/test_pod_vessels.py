@@ -11,14 +11,16 @@ from podusv_cli.actuators.pod import Pods
 from podusv_cli.engine.simulate import simulate
 from podusv_cli.findings.preflight import preflight
 from podusv_cli.scenario.load import load
-from podusv_cli.scenario.presets import pod_names, pod_text, vessel_names
+from podusv_cli.scenario.presets import preset_names, preset_text
+from podusv_cli.vessels.vessel import VESSELS
 
+PODS = Pods.presets
 CONFIGS = Path(__file__).parent.parent / "configs/pod/vessels"
 SCENARIOS = sorted(CONFIGS.glob("*.yaml"))
 
 
 def test_every_vessel_with_pods_has_a_scenario() -> None:
-    both = set(pod_names()) & set(vessel_names())
+    both = set(preset_names(PODS)) & set(preset_names(VESSELS))
     assert {path.stem for path in SCENARIOS} == both == {"milliampere", "otter", "revolt", "wamv"}
 
 
@@ -50,8 +52,8 @@ def test_it_follows_the_line_and_keeps_its_distance(path: Path) -> None:
 def test_every_set_of_pods_says_where_its_numbers_come_from_and_what_they_hold_for(
     name: str,
 ) -> None:
-    assert len(pod_text(name, "source")) > 60
-    assert len(pod_text(name, "validity")) > 30
+    assert len(preset_text(PODS, name, "source")) > 60
+    assert len(preset_text(PODS, name, "validity")) > 30
 
 
 ASTERN = ("actuator.pods.0.n_max_astern=0", "actuator.pods.1.n_max_astern=0")

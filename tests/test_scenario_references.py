@@ -13,9 +13,9 @@ from scenario_samples import SOUND, VESSEL_NAMES, findings, loaded, told, write
 from podusv_cli.actuators.pod import Pods
 from podusv_cli.core.errors import ScenarioError
 from podusv_cli.scenario.load import load, load_text, resolved_yaml
-from podusv_cli.scenario.presets import MAX_POINTS, pod_names, vessel_file, vessel_names
+from podusv_cli.scenario.presets import MAX_POINTS, preset_file, preset_names
 from podusv_cli.scenario.yaml_tree import plain
-from podusv_cli.vessels.vessel import Vessel
+from podusv_cli.vessels.vessel import VESSELS, Vessel
 
 
 @pytest.fixture(autouse=True)
@@ -25,10 +25,10 @@ def _in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "sub").mkdir()
 
 
-@pytest.mark.parametrize("name", vessel_names())
+@pytest.mark.parametrize("name", preset_names(VESSELS))
 def test_a_preset_is_its_file(name: str) -> None:
     faults: list[object] = []
-    node = vessel_file(name, faults)
+    node = preset_file(VESSELS, name, faults)
     assert node is not None
     assert faults == []
     vessel = loaded(SOUND.replace("preset: paper", f"preset: {name}")).scenario.vessel
@@ -225,7 +225,7 @@ def test_pods_come_from_their_file_and_what_is_given_goes_over_it() -> None:
 
 
 def test_every_set_of_pods_that_podusv_brings_is_sound_and_says_where_it_comes_from() -> None:
-    for name in pod_names():
+    for name in preset_names(Pods.presets):
         actuator = loaded(POD_SOUND.replace("otter", name)).scenario.actuator
         assert isinstance(actuator, Pods)
         assert actuator.source
@@ -235,7 +235,7 @@ def test_every_set_of_pods_that_podusv_brings_is_sound_and_says_where_it_comes_f
 def test_what_is_wrong_with_pods_is_one_sentence_at_its_place() -> None:
     assert told(POD_SOUND.replace("otter", "oter")) == [
         "a.yaml:4:31: actuator.preset: unknown set of pods 'oter'; did you mean 'otter'? "
-        f"(allowed: {', '.join(pod_names())})"
+        f"(allowed: {', '.join(preset_names(Pods.presets))})"
     ]
     one = "{x: 0, T_nn: 1, T_nn_astern: 1, n_max: 1, n_max_astern: 1, n_rate: 1, n_lag: 1, "
     one += "angle_rate: 1, angle_lag: 1}"

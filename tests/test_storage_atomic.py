@@ -154,7 +154,8 @@ def test_past_the_file_size_limit_nothing_is_lost(path: Path) -> None:
     # In a process of its own: the limit cannot be raised again.
     code = (
         "import resource, sys; from pathlib import Path\n"
-        "from podusv_cli.core.errors import StorageError; from podusv_cli.storage import atomic\n"
+        "from podusv_cli.core.errors import StorageError\n"
+        "from podusv_cli.storage import files as atomic\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))\n"
         "try: atomic.write_bytes(Path(sys.argv[1]), b'n' * 6000)\n"
         "except StorageError as error: sys.exit(str(error))\n"

@@ -15,7 +15,6 @@ from conftest import corrected, run
 from numpy.testing import assert_array_equal
 from storage_samples import ENVIRONMENT, PYTHON, TEXTS, YAML, assert_same, log, recording
 
-from podusv_cli.core.signal import SIGNALS
 from podusv_cli.storage import log_layout, log_reader, log_writer
 from podusv_cli.storage.packing import LEVEL
 from podusv_cli.storage.stream import Stream
@@ -51,8 +50,9 @@ def test_xarray_reads_every_signal_with_its_axes_and_units(path: Path, engine: s
         assert dict(found.sizes) == {"time": 50, "node": 8, "input": 3}
         for name, array in {**recorded.signals, **recorded.fixed}.items():
             assert_array_equal(found[name].to_numpy(), array, err_msg=name)
-            signal = SIGNALS[name]
-            expected = {"units": signal.unit, "long_name": signal.meaning, "symbol": signal.symbol}
+            signal = recorded.about[name]
+            expected = {"units": signal.unit, "long_name": signal.meaning, "symbol": signal.symbol,
+                        "axes": " ".join(found[name].dims)}  # fmt: skip
             assert found[name].attrs == expected
         assert "time" in found.x.coords
         assert_array_equal(found.node, np.arange(8))
@@ -183,10 +183,11 @@ def test_a_simulated_run_comes_back_as_it_was(tmp_path: Path) -> None:
 def test_arrays_may_come_little_by_little(tmp_path: Path) -> None:
     recorded, content = recording(), io.BytesIO()
     with log_writer.opened(Stream(content), recorded, **TEXTS) as file:
-        file.add({name: recorded[name] for name in ("x", "time")})
+        file.add({name: recorded[name] for name in ("x", "time")}, recorded.about)
         file.done()
-        file.add({"W_hat_u": recorded["W_hat_u"]})
-        file.add({"z_e": recorded["z_e"], "tau_u_cmd": recorded["tau_u_cmd"], **recorded.fixed})
+        file.add({"W_hat_u": recorded["W_hat_u"]}, {})
+        rest = {name: recorded[name] for name in ("z_e", "tau_u_cmd")}
+        file.add({**rest, **recorded.fixed}, {})
     path = tmp_path / "log.h5"
     path.write_bytes(content.getvalue())
     found = log_reader.read_log(path)
@@ -206,5 +207,5 @@ def test_what_does_not_fit_what_is_there_is_refused(late: dict, error: str) -> N
     recorded = recording()
     with pytest.raises(ValueError, match=error):  # noqa: PT012, SIM117
         with log_writer.opened(Stream(io.BytesIO()), recorded, **TEXTS) as file:
-            file.add(recorded.signals)
-            file.add(late)
+            file.add(recorded.signals, recorded.about)
+            file.add(late, {})

@@ -14,6 +14,7 @@ from storage_samples import YAML, assert_same, deadline, log, recording, rewritt
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.recording import Recording
 from podusv_cli.storage import log_reader
+from podusv_cli.storage.log_reader import WORDS
 
 TINY = recording(rows=20, nodes=4)
 
@@ -131,11 +132,16 @@ def test_bursts_of_rubbish_are_refused(path: Path) -> None:
 def replaced(name: str, **how: object) -> Callable[[h5py.File], None]:
     """A change that puts a dataset made with `how` in place of `name`."""
 
-    def change(file: h5py.File) -> None:
-        del file[name]
-        file.create_dataset(name, **how)
+    return lambda file: remake(file, name, **how)
 
-    return change
+
+def remake(file: h5py.File, name: str, **how: object) -> None:
+    """Another dataset under this name, which says of its signal what the one before did."""
+    words = {key: file[name].attrs[key] for key in WORDS if key in file[name].attrs}
+    del file[name]
+    made = file.create_dataset(name, **how)
+    for key, text in words.items():
+        made.attrs.create(key, np.bytes_(text.encode() if isinstance(text, str) else text))
 
 
 def linked(
@@ -164,17 +170,16 @@ def virtual(source: str) -> Callable[[h5py.File], None]:
 
 def only_time(count: int) -> Callable[[h5py.File], None]:
     def change(file: h5py.File) -> None:
-        for name in set(file) - {"provenance"}:
+        for name in set(file) - {"provenance", "time"}:
             del file[name]
-        file.create_dataset("time", shape=(count,), dtype="<f8", chunks=(4096,))
+        remake(file, "time", shape=(count,), dtype="<f8", chunks=(4096,))
 
     return change
 
 
 def no_nodes(file: h5py.File) -> None:
     for name, shape in (("W_hat_u", (50, 0)), ("rbf_center", (0, 3))):
-        del file[name]
-        file.create_dataset(name, shape=shape, dtype="<f8")
+        remake(file, name, shape=shape, dtype="<f8")
 
 
 PACKED = {"compression": "gzip", "shuffle": True, "fletcher32": True}
@@ -205,7 +210,7 @@ HOSTILE = {
     "group": (lambda file: (file.pop("x"), file.create_group("x")), "damaged"),
     "named type": (linked("x", np.dtype("<f8")), "damaged"),
     "no time": (lambda file: file.pop("time"), "no time"),
-    "unknown signal": (lambda file: file.create_dataset("tau_w", data=FIFTY), "'tau_w' is no"),
+    "unknown signal": (lambda file: file.create_dataset("tau_w", data=FIFTY), "'tau_w' is neither"),
     "unknown bytes": (lambda file: file.create_dataset(b"\xff\xfe", data=FIFTY), "is no signal"),
     "other format": (described("podusv_format", np.int32(2)), "format 2; this .* reads format 1"),
     "format in words": (described("podusv_format", "1"), "podusv_format is no number"),

@@ -131,7 +131,7 @@ def flipped(law: AdaptiveNeural, sign: str) -> AdaptiveNeural:
 
 def rate_from_kernels(law: AdaptiveNeural, at: Situation, weights: Vector) -> dict[Any, float]:
     """Numbers for the symbols, with V' of the implementation under the key "V_dot"."""
-    k, n = bundle(law.informed(PAPER)), law.network.count
+    k, n = bundle(law.constants_with(PAPER)), law.network.count
     said, ds = ask(law, at.x, at.memory, at.target, PAPER), np.zeros(6)
     e, b = track(at.x, at.memory, at.target, k), np.array([0.4, 0.0, -0.3])
     loads = np.array([said.tau[0], 0.0, said.tau[1]])

@@ -38,7 +38,8 @@ from podusv_cli.engine.simulate import STATE, ClosedLoop, by_name, names
 from podusv_cli.paths.circle import Circle
 from podusv_cli.paths.line import Line
 from podusv_cli.theory.ideal_weights import node_outputs, unloaded_accelerations
-from podusv_cli.theory.monitor import TERMS, Monitored, monitored
+from podusv_cli.theory.lyapunov import TERMS
+from podusv_cli.theory.monitor import Monitored, monitored
 from podusv_cli.theory.rates import error_rates
 from podusv_cli.vessels.plant import plant
 
@@ -147,7 +148,7 @@ def moving(loop: ClosedLoop, law: PolarBackstepping, x: Vector, memory: Vector) 
     t, s = 20.0, np.concatenate([target_at(loop.path, 20.0)[:2] + x[:2] * 0.5, x[2:], memory])
 
     def recorded(rows: Vector) -> Recording:
-        return Recording("finished", law.label, by_name(labels, np.atleast_2d(rows)))
+        return Recording("finished", law.label, by_name(labels, np.atleast_2d(rows), loop.about()))
 
     here = recorded(np.concatenate([[t], s]))
     rates = rates_replay(loop, TimeGrid(0.01, 1), compiled=False)(here).rates
@@ -231,7 +232,7 @@ def test_printed_sign_leaves_the_doubled_cross_terms() -> None:
 def test_V_is_the_sum_of_its_terms_and_stays_below_its_bound(law: PolarBackstepping) -> None:
     found = watched(smooth(law, vessel=NONLINEAR), 200.0)
     log = found.recording
-    np.testing.assert_allclose(log["V"], sum(log[name] for name in TERMS), rtol=1e-13)
+    np.testing.assert_allclose(log["V"], sum(log[term.name] for term in TERMS), rtol=1e-13)
     for window in found.windows.values():
         bound = window.bound.corrected
         assert window.kept == 1.0  # V' <= -2 lambda V + Delta in every row
@@ -318,7 +319,7 @@ def test_plain_and_compiled_monitor_agree() -> None:
     one, other = (monitored(loop, grid, recording, compiled=c) for c in (True, False))
     assert one
     assert other
-    for name in ("V", "V_dot", *TERMS):
+    for name in ("V", "V_dot", *(term.name for term in TERMS)):
         np.testing.assert_allclose(one.recording[name], other.recording[name], rtol=1e-9, atol=1e-9)
 
 

@@ -39,9 +39,9 @@ def test_where_everything_asked_for_acts_it_changes_nothing(kind: type[Controlle
 @every_law
 def test_a_law_that_does_not_ask_is_not_told(kind: type[Controller]) -> None:
     loop = corrected(controller=kind())
-    assert loop.controller.settles() is False
-    assert not {"xi_u", "xi_r"} & {name for name, _ in loop.controller.slots()}
-    assert is_kernel(kind.settle)
+    assert loop.controller.wants_loads() is False
+    assert not {"xi_u", "xi_r"} & {part.name for part, _ in loop.controller.slots()}
+    assert is_kernel(kind.after_saturation)
 
 
 @every_law
@@ -91,7 +91,7 @@ def test_the_auxiliary_state_obeys_its_equation() -> None:
 def test_compensated_errors_obey_the_equations_without_limits() -> None:
     """The rates of bounds and weights see u_e - xi_u where those without see u_e."""
     law, plain = AdaptiveNeural(anti_windup="auxiliary"), AdaptiveNeural()
-    k, k_plain = (bundle(one.informed(NONLINEAR)) for one in (law, plain))
+    k, k_plain = (bundle(one.constants_with(NONLINEAR)) for one in (law, plain))
     for at in situations(law, 20):
         xi = at.memory[-2:].copy()
         rates = []
@@ -102,7 +102,7 @@ def test_compensated_errors_obey_the_equations_without_limits() -> None:
             tau, signals, work = np.zeros(2), np.zeros(len(one.signals)), np.zeros(one.workspace())
             rate = np.zeros(len(at.memory))
             one.law(0.0, x, at.memory, at.target, numbers, one.table(), tau, rate, signals, work)
-            rates.append((rate[2], signals[5], at.memory[2]))
+            rates.append((rate[2], signals[4], at.memory[2]))
         (told, u_e, b_hat), _ = rates
         u_c = u_e - xi[0]
         expected = law.gamma_u * (u_c * u_c / (4 * law.partial) - law.sigma_bu * b_hat)

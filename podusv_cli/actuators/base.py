@@ -9,6 +9,11 @@ import numpy as np
 
 from podusv_cli.core.component import Component
 from podusv_cli.core.kernel import Vector, bundle
+from podusv_cli.core.signal import Signal
+
+SMALL = 1e-3  # of a demand or a state, for finite differences
+ROUNDS = 20  # of Newton's method
+SATURATION = Signal("saturated", "1", "1 while the actuator limits what the law asked for", "sat")
 
 
 class Actuator(Component):
@@ -17,19 +22,20 @@ class Actuator(Component):
     `drive(t, x, state, demand, k, table, tau, rate, signals)` is a kernel: from the vessel's state
     x, the actuator's own `state` and the `demand` (tau_u [N], tau_r [N m]) it writes the loads
     (tau_u, tau_v, tau_r) into `tau`, the rate of its state into `rate`, and one number for each
-    name in `signals`. Limits act here, inside the right-hand side.
+    of its `signals`. Limits act here, inside the right-hand side.
 
-    `states` and `signals` name every number; the numbers of one vector bear the same name.
+    `states` and `signals` declare every number; the numbers of one vector have the same signal,
+    which has an axis.
     """
 
     @property
-    def states(self) -> tuple[str, ...]:
-        """Names of the actuator's own states."""
+    def states(self) -> tuple[Signal, ...]:
+        """The actuator's own states."""
         return ()
 
     @property
-    def signals(self) -> tuple[str, ...]:
-        """Names of what `drive` writes into `signals`."""
+    def signals(self) -> tuple[Signal, ...]:
+        """What `drive` writes into `signals`."""
         return ()
 
     @staticmethod
@@ -51,27 +57,34 @@ class Actuator(Component):
     def settled(self, x: Vector, demand: Vector) -> Vector:
         """Loads (tau_u, tau_v, tau_r) once the actuator has followed a constant demand.
 
-        `x` is the vessel's state, which is held; `demand` is (tau_u [N], tau_r [N m]).
+        `x` is the vessel's state, which is held; `demand` is (tau_u [N], tau_r [N m]). By Newton's
+        method from rest, for the state that does not change any more.
         """
-        tau, rate, signals = np.zeros(3), np.zeros(0), np.zeros(len(self.signals))
-        k, table = bundle(self.constants()), self.table()
-        self.drive(0.0, x, self.rest(), demand, k, table, tau, rate, signals)
+        state = self.rest()
+        for _ in range(ROUNDS):
+            tau, rate = self._driven(x, state, demand)
+            if np.allclose(rate, 0.0):
+                break
+            shifts = SMALL * np.eye(len(state))
+            slopes = [(self._driven(x, state + d, demand)[1] - rate) / SMALL for d in shifts]
+            state = state - np.linalg.lstsq(np.array(slopes).T, rate, rcond=None)[0]
         return tau
+
+    def _driven(self, x: Vector, state: Vector, demand: Vector) -> tuple[Vector, Vector]:
+        """Loads and rate of the state."""
+        tau, rate, signals = np.zeros(3), np.zeros(len(state)), np.zeros(len(self.signals))
+        k, table = bundle(self.constants()), self.table()
+        self.drive(0.0, x, state, demand, k, table, tau, rate, signals)
+        return tau, rate
 
     def input_matrix(self) -> Vector:
         """How loads (tau_u, tau_v, tau_r) follow small demands at rest, shape (3, 2).
 
-        By central differences. A rank below 3 is what the paper's section 2 calls underactuated.
+        By central differences, of what has settled. A rank below 3 is what the paper's section 2
+        calls underactuated.
         """
-        small, k, table = 1e-3, bundle(self.constants()), self.table()
-        loads = np.zeros((2, 2, 3))
-        for axis in range(2):
-            for side, sign in enumerate((1.0, -1.0)):
-                demand = np.zeros(2)
-                demand[axis] = sign * small
-                rate, signals = np.zeros(len(self.states)), np.zeros(len(self.signals))
-                self.drive(
-                    0.0, np.zeros(6), self.rest(), demand, k, table,
-                    loads[axis, side], rate, signals,
-                )  # fmt: skip
-        return np.asarray(((loads[:, 0] - loads[:, 1]) / (2.0 * small)).T)
+        columns = [
+            (self.settled(np.zeros(6), demand) - self.settled(np.zeros(6), -demand)) / (2.0 * SMALL)
+            for demand in SMALL * np.eye(2)
+        ]
+        return np.array(columns).T

@@ -11,24 +11,31 @@ from pydantic import model_validator
 from podusv_cli.actuators.allocation import allocate, speeds
 from podusv_cli.actuators.allocation_qp import MOST_PODS
 from podusv_cli.actuators.allocation_single import within
-from podusv_cli.actuators.base import Actuator
+from podusv_cli.actuators.base import SATURATION, Actuator
 from podusv_cli.actuators.propeller import (
     ANGLE,
+    DELTA,
+    DELTA_CMD,
     DELTA_LAG,
     DELTA_RATE,
+    LIMITED,
     N_AHEAD,
     N_ASTERN,
     N_LAG,
     N_RATE,
     POWER,
+    POWER_TAKEN,
+    SPEEDS,
+    THRUST,
     WIDTH,
     X,
     Y,
     speed_gain,
     thrust,
 )
-from podusv_cli.core.component import Component, value
+from podusv_cli.core.component import Component, Presets, value
 from podusv_cli.core.kernel import Vector, bundle, kernel, scratch, tail
+from podusv_cli.core.signal import Signal
 
 SATURATED, SPEED_LIMITED, ANGLE_LIMITED, RATE_LIMITED, FLAGS = range(5)
 NEARLY = 1.0 - 1e-9
@@ -122,6 +129,7 @@ class Pods(Actuator):
     """
 
     kind: Literal["pod"] = "pod"
+    presets = Presets("podusv_cli.actuators", "set of pods", "pod file")
     preset: str = value("", "", "name of the file that brings the pods along; none where empty")
     source: str = value("", "", "where the pods' numbers come from")
     validity: str = value("", "", "what they hold for")
@@ -187,24 +195,17 @@ class Pods(Actuator):
         return self
 
     @property
-    def states(self) -> tuple[str, ...]:
+    def states(self) -> tuple[Signal, ...]:
         """Speed and angle of every pod."""
         count = len(self.pods)
-        return (self.speed,) * count + ("delta",) * count
+        return (SPEEDS[self.counts][0],) * count + (DELTA,) * count
 
     @property
-    def speed(self) -> str:
-        """The propellers' speed, as the log names it."""
-        return "n" if self.counts == "turns" else "n_part"
-
-    @property
-    def signals(self) -> tuple[str, ...]:
+    def signals(self) -> tuple[Signal, ...]:
         """Commands, thrust and, where every pod's is known, power; flags of what is at a limit."""
-        count = len(self.pods)
         known = all(pod.power_nnn is not None for pod in self.pods)
-        vectors = (f"{self.speed}_cmd", "delta_cmd", "thrust", *(("power",) if known else ()))
-        flags = ("saturated", "speed_limited", "angle_limited", "rate_limited")
-        return (*flags, *(name for name in vectors for _ in range(count)))
+        vectors = (SPEEDS[self.counts][1], DELTA_CMD, THRUST, *((POWER_TAKEN,) if known else ()))
+        return (SATURATION, *LIMITED, *(signal for signal in vectors for _ in self.pods))
 
     def constants(self) -> dict[str, float]:
         """The options, and how many pods there are."""

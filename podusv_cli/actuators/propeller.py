@@ -6,6 +6,33 @@ import math
 from typing import Any
 
 from podusv_cli.core.kernel import Vector, kernel
+from podusv_cli.core.signal import Signal
+
+POD = ("pod",)
+SPEEDS = {  # by what n counts: actual and asked for
+    "turns": (
+        Signal("n", "1/s", "propeller speed", axes=POD),
+        Signal("n_cmd", "1/s", "propeller speed that was asked for", r"n_\mathrm{cmd}", POD),
+    ),
+    "parts": (
+        Signal("n_part", "1", "propeller speed, in parts of full speed", "n", POD),
+        Signal(
+            "n_part_cmd", "1", "propeller speed that was asked for, in parts of full speed",
+            r"n_\mathrm{cmd}", POD,
+        ),
+    ),
+}  # fmt: skip
+DELTA = Signal("delta", "rad", "propulsion angle", r"\delta", POD)
+DELTA_CMD = Signal(
+    "delta_cmd", "rad", "propulsion angle that was asked for", r"\delta_\mathrm{cmd}", POD
+)
+THRUST = Signal("thrust", "N", "thrust of the propeller (8)", "T", POD)
+POWER_TAKEN = Signal("power", "W", "power that the propeller takes", "P", POD)
+LIMITED = (
+    Signal("speed_limited", "1", "1 while a propeller is asked for its largest speed", "n lim"),
+    Signal("angle_limited", "1", "1 while a pod is asked for its largest angle", r"\delta lim"),
+    Signal("rate_limited", "1", "1 while a speed or an angle changes at its limit", "rate lim"),
+)
 
 PHYSICAL = 0.0
 

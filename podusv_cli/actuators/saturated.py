@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from podusv_cli.actuators.base import Actuator
+from podusv_cli.actuators.base import SATURATION, Actuator
 from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, kernel
+from podusv_cli.core.signal import Signal
 
 
 class Saturated(Actuator):
@@ -17,9 +18,9 @@ class Saturated(Actuator):
     yaw_limit: float = value(2.5, "N m", "largest yaw moment, both ways", gt=0)
 
     @property
-    def signals(self) -> tuple[str, ...]:
+    def signals(self) -> tuple[Signal, ...]:
         """The flag."""
-        return ("saturated",)
+        return (SATURATION,)
 
     @staticmethod
     @kernel

@@ -77,10 +77,10 @@ def _show_metrics(found: Difference) -> None:
 
 
 def _show_log(log: Logs) -> None:
-    from podusv_cli.cli.difference_text import log_in_words, unit
+    from podusv_cli.cli.difference_text import log_in_words
 
     rows = [
-        [d.signal, unit(d), _number(d.gap), _number(d.of_peak), _time(d.time)] for d in log.largest
+        [d.signal, d.unit, _number(d.gap), _number(d.of_peak), _time(d.time)] for d in log.largest
     ]
     if rows:
         echo_table(["signal", "unit", "largest difference", "of its peak", "at t [s]"], rows)

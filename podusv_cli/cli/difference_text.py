@@ -18,14 +18,7 @@ COUNTABLE = 1000  # ulps; beyond, only the relative difference says something
 def deviation_in_words(d: Deviation) -> str:
     """`psi_e at t = 0.3 s: 0.1 -> 0.2 rad (relative difference 0.5)`."""
     when = "" if d.time is None else f" at t = {d.time!r} s"
-    return f"{d.signal}{when}: {d.one!r} -> {d.other!r} {unit(d)} ({size(d)})"
-
-
-def unit(d: Deviation) -> str:
-    """The signal's unit."""
-    from podusv_cli.core.signal import SIGNALS
-
-    return SIGNALS[d.signal.partition("[")[0]].unit
+    return f"{d.signal}{when}: {d.one!r} -> {d.other!r} {d.unit} ({size(d)})"
 
 
 def size(d: Deviation) -> str:

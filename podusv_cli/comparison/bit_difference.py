@@ -40,8 +40,9 @@ def gaps(one: Vector, other: Vector, *, period: float = math.inf) -> Vector:
 class Deviation:
     """A number of a signal and what stands in its place in the other recording.
 
-    `signal` has an index for one of several nodes; `time` [s] is None for what does not run over
-    time. `peak` is the signal's largest finite magnitude; `period` that of a wrapped angle.
+    `signal` has an index for one of several nodes, and `unit` is its unit. `time` [s] is None for
+    what does not run over time. `peak` is the signal's largest finite magnitude; `period` that of a
+    wrapped angle.
     """
 
     signal: str
@@ -50,6 +51,7 @@ class Deviation:
     other: float
     peak: float
     period: float = math.inf
+    unit: str = ""
 
     @property
     def gap(self) -> float:

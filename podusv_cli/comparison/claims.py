@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -11,7 +11,9 @@ from podusv_cli.comparison.conditions import Evidence
 from podusv_cli.comparison.expressions import Sources
 from podusv_cli.comparison.parsing import ExpressionError, parse, renamed
 from podusv_cli.core.escaping import markdown, markdown_cell, markdown_code
+from podusv_cli.core.signal import Signal
 from podusv_cli.metrics.table import CLOCKED
+from podusv_cli.scenario.explain import signals as registered
 from podusv_cli.scenario.model import Claim, Scenario
 
 Answer = Literal["reproduced", "not reproduced", "cannot tell"]
@@ -75,10 +77,10 @@ class Verdict:
 
 def misfits(scenario: Scenario) -> list[tuple[str, str]]:
     """Key and sentence for every claim whose expression cannot be understood."""
-    found = []
+    found, signals = [], _signals(single.about() for single in scenario.singles().values())
     for name, claim in scenario.claims.items():
         try:
-            parse(claim.expect, scenario.labels())
+            parse(claim.expect, scenario.labels(), signals)
         except ExpressionError as error:
             found.append((f"claims.{name}.expect", str(error)))
     return found
@@ -86,12 +88,20 @@ def misfits(scenario: Scenario) -> list[tuple[str, str]]:
 
 def judge(stated: Sequence[Stated], runs: Sources) -> list[Verdict]:
     """A verdict on every claim; in it, the claim is put with the runs' labels."""
-    return [_verdict(said, runs) for said in stated]
+    signals = _signals(run.about for run in runs.values())
+    return [_verdict(said, runs, signals) for said in stated]
 
 
-def _verdict(said: Stated, runs: Sources) -> Verdict:
+def _signals(runs: Iterable[Mapping[str, Signal]]) -> dict[str, Signal]:
+    """What claims can be about: everything that podusv can log, and what these runs log."""
+    return {signal.name: signal for signal in registered()} | {
+        name: signal for about in runs for name, signal in about.items()
+    }
+
+
+def _verdict(said: Stated, runs: Sources, signals: Mapping[str, Signal]) -> Verdict:
     claim, found = said.claim, Evidence()
-    holds = parse(claim.expect, runs, said.called).holds(runs, claim.tolerance, found)
+    holds = parse(claim.expect, runs, signals, said.called).holds(runs, claim.tolerance, found)
     reason = "; ".join(dict.fromkeys(found.doubts)) if holds is None else ""
     put = claim.model_copy(update={"expect": renamed(claim.expect, said.called)})
     return Verdict(said.name, put, ANSWERS[holds], found.numbers, reason)

@@ -19,6 +19,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from podusv_cli.core.kernel import Vector
+from podusv_cli.core.signal import Signal
 from podusv_cli.metrics.table import METRICS
 
 NEAR = 1e-9  # s; times closer than this are the same
@@ -38,6 +39,10 @@ class Source(Protocol):
     @property
     def ending(self) -> str:
         """Why the run did not reach its end, as `diverged at t = 2 s`; empty where it did."""
+
+    @property
+    def about(self) -> Mapping[str, Signal]:
+        """What the run logs."""
 
     def metric(self, name: str) -> float:
         """A metric; NaN where the run has none of this name."""

@@ -12,7 +12,7 @@ import numpy as np
 from podusv_cli.comparison.bit_difference import Deviation, differing, gaps
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
-from podusv_cli.core.signal import SIGNALS
+from podusv_cli.core.signal import Signal
 
 Place = tuple[int, ...]
 ENDINGS = ("status", "controller", "message")
@@ -72,12 +72,12 @@ class _Row:
     one: Vector
     other: Vector
     times: Vector | None
+    about: Signal
 
     @property
     def period(self) -> float:
         """2 pi for an angle that is wrapped."""
-        known = SIGNALS.get(self.name)
-        return 2.0 * math.pi if known and known.wrapped else math.inf
+        return 2.0 * math.pi if self.about.wrapped else math.inf
 
 
 def compare(one: Recording, other: Recording) -> Logs:
@@ -111,13 +111,13 @@ def _endings(one: Recording, other: Recording) -> dict[str, tuple[str, str]]:
 def _paired(one: Recording, other: Recording) -> Iterator[_Row]:
     """Time, then the other signals that both have, then what is fixed."""
     times, at_one, at_other = _shared_times(one["time"], other["time"])
-    yield _Row("time", times, other["time"][at_other], times)
+    yield _Row("time", times, other["time"][at_other], times, one.about["time"])
     for name in one.signals:
         if name in other.signals and name != "time":
-            yield _Row(name, one[name][at_one], other[name][at_other], times)
+            yield _Row(name, one[name][at_one], other[name][at_other], times, one.about[name])
     for name in one.fixed:
         if name in other.fixed:
-            yield _Row(name, one[name], other[name], None)
+            yield _Row(name, one[name], other[name], None, one.about[name])
 
 
 def _shared_times(one: Vector, other: Vector) -> tuple[Vector, Any, Any]:
@@ -164,4 +164,5 @@ def _deviation(row: _Row, place: Place) -> Deviation:
         time=None if row.times is None else float(row.times[place[0]]),
         one=float(row.one[place]), other=float(row.other[place]),
         peak=float(both[np.isfinite(both)].max(initial=0.0)), period=row.period,
+        unit=row.about.unit,
     )  # fmt: skip

@@ -23,10 +23,9 @@ from podusv_cli.comparison.expressions import (
     Term,
 )  # fmt: skip
 from podusv_cli.core.derived import DERIVED
-from podusv_cli.core.signal import SIGNALS
+from podusv_cli.core.signal import Signal
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.scenario.words import unknown
-from podusv_cli.storage.log_layout import FIXED_AXES
 
 LONGEST = 500  # characters of an expression
 LARGEST = 1e300  # of numbers written down
@@ -45,13 +44,17 @@ class ExpressionError(ValueError):
     """An expression that means nothing; the text says what would."""
 
 
-def parse(text: str, runs: Collection[str], called: Mapping[str, str] | None = None) -> Condition:
+def parse(
+    text: str, runs: Collection[str], signals: Mapping[str, Signal],
+    called: Mapping[str, str] | None = None,
+) -> Condition:  # fmt: skip
     """The condition that `text` puts about these runs.
 
-    `called` has the runs' labels by the names that the text has for them, where these differ.
+    `signals` are those that a run may have, by name. `called` has the runs' labels by the names
+    that the text has for them, where these differ.
     Raises ExpressionError.
     """
-    return _Reader(runs).condition(_tree(text, called or {}))
+    return _Reader(runs, signals).condition(_tree(text, called or {}))
 
 
 def renamed(text: str, called: Mapping[str, str]) -> str:
@@ -99,8 +102,8 @@ def _known(name: str, names: Collection[str], what: str) -> str:
 class _Reader:
     """Turns Python's syntax tree into conditions and terms; refuses what has no meaning here."""
 
-    def __init__(self, runs: Collection[str]) -> None:
-        self.runs = runs
+    def __init__(self, runs: Collection[str], signals: Mapping[str, Signal]) -> None:
+        self.runs, self.signals = runs, signals
 
     @singledispatchmethod
     def condition(self, node: ast.AST) -> Condition:
@@ -199,9 +202,9 @@ class _Reader:
         """The name of a signal with one value at each time."""
         if name in NORMS:
             raise ExpressionError(f"{name!r} has a value for every node; take {NORMS[name]}")
-        if name in FIXED_AXES:
+        if name in self.signals and self.signals[name].fixed:
             raise ExpressionError(f"{name!r} does not run over time")
-        return _known(name, [*SIGNALS, *METRICS], "signal or metric")
+        return _known(name, [*self.signals, *METRICS], "signal or metric")
 
     def _curve(self, node: ast.AST) -> Term:
         term = self.term(node)

@@ -19,7 +19,7 @@ from podusv_cli.comparison.differences import flat, in_short, in_words
 from podusv_cli.comparison.table import cells
 from podusv_cli.core.component import Component
 from podusv_cli.core.escaping import html
-from podusv_cli.findings.finding import Finding
+from podusv_cli.core.finding import Finding
 from podusv_cli.scenario.model import Scenario
 
 STYLE = """

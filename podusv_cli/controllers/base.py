@@ -2,13 +2,27 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
+from podusv_cli.controllers.velocity_loop import Axis, Loop
 from podusv_cli.core.component import Component
 from podusv_cli.core.kernel import Vector
+from podusv_cli.core.signal import Signal
 from podusv_cli.vessels.vessel import Vessel
 
-Slots = tuple[tuple[str, int], ...]
+Slots = tuple[tuple[Signal, int], ...]
+
+
+def each(signals: tuple[Signal, ...], count: int = 1) -> Slots:
+    """A part of the memory of `count` numbers for each of these signals."""
+    return tuple((signal, count) for signal in signals)
+
+
+class Approach(NamedTuple):
+    """The surge velocity that a law wants grows by `gain` [1/s] with the distance beyond this."""
+
+    gain: float
+    standoff: float  # m
 
 
 class Controller(Component):
@@ -18,17 +32,20 @@ class Controller(Component):
     t [s], the state x = (x, y, psi, u, v, r), its own `memory`, the `target` (see
     `paths.base.TARGET`) and its constants `k`, which hold its fields and the *nominal* vessel's
     coefficients. It writes the demand into `tau`, the rate of its memory into `rate`, and one
-    number for each name in `signals`; `work` is scratch of `workspace()` numbers.
+    number for each of its `signals`; `work` is scratch of `workspace()` numbers.
 
     `sample(t, x, memory, target, k, table)` is a kernel that may change `memory`; it is called at
     every multiple of `sample_period()`, before anything else sees that instant.
 
-    `settle(t, memory, demand, tau, k, table, rate)` is a kernel that may change the `rate` that
-    `law` wrote, once the actuator has made loads `tau` of the `demand`; it is called where
-    `settles()`.
+    `after_saturation(t, memory, demand, tau, k, table, rate)` is a kernel that may change the
+    `rate` that `law` wrote, once the actuator has made loads `tau` of the `demand`; it is called
+    where `wants_loads()`.
+
+    A law declares what it logs: `signals`, the parts of its memory in `slots()`, and
+    `fixed_signals()`. `explain` finds a signal that is in `signals` or a constant of the module.
     """
 
-    signals: ClassVar[tuple[str, ...]] = ()
+    signals: ClassVar[tuple[Signal, ...]] = ()
 
     @property
     def label(self) -> str:
@@ -49,13 +66,13 @@ class Controller(Component):
         raise NotImplementedError
 
     @staticmethod
-    def settle(
+    def after_saturation(
         t: float, memory: Vector, demand: Vector, tau: Vector, k: Any, table: Vector, rate: Vector
     ) -> None:
         """Change the memory's rate in the light of the loads (tau_u, tau_v, tau_r) that act."""
         raise NotImplementedError
 
-    def settles(self) -> bool:
+    def wants_loads(self) -> bool:
         """Whether the law has to know the loads that act."""
         return False
 
@@ -64,8 +81,23 @@ class Controller(Component):
         return 0.0
 
     def slots(self) -> Slots:
-        """Name and length of every part of the memory, in order."""
+        """Signal and length of every part of the memory, in order."""
         return ()
+
+    def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
+        """Its fast loops, linearised about the velocity nu = (u, v, r); `axes` are surge and yaw.
+
+        From them findings tell whether the step or the sampling period is too long.
+        """
+        return []
+
+    def approach(self) -> Approach | None:
+        """How a law that points at the target drives towards it; None for any other law."""
+        return None
+
+    def lyapunov(self) -> Any:
+        """The law itself where (46) is its Lyapunov function, see `theory.monitor`; else None."""
+        return None
 
     def workspace(self) -> int:
         """How many numbers of scratch the law needs."""
@@ -75,10 +107,14 @@ class Controller(Component):
         """The memory at t = 0 for the state x and the target there."""
         raise NotImplementedError
 
-    def fixed_signals(self) -> dict[str, Vector]:
+    def fixed_signals(self) -> dict[Signal, Vector]:
         """Arrays worth logging that do not change during a run."""
         return {}
 
-    def informed(self, nominal: Vessel) -> dict[str, float]:
+    def declared(self) -> tuple[Signal, ...]:
+        """Everything that the law adds to a log."""
+        return (*self.signals, *(signal for signal, _ in self.slots()), *self.fixed_signals())
+
+    def constants_with(self, nominal: Vessel) -> dict[str, float]:
         """The law's constants together with those of the vessel it is told about."""
         return nominal.constants() | self.constants()

@@ -12,8 +12,17 @@ from pydantic import model_validator
 from podusv_cli.core.component import Component, value
 from podusv_cli.core.elementary import exponential
 from podusv_cli.core.kernel import Vector, kernel, tail, whole_lanes
+from podusv_cli.core.signal import Signal
 
 MOST_NODES = 10_000
+CENTER = Signal(
+    "rbf_center", "1", "network centres in (u, v, r) [m/s, m/s, rad/s]", "c",
+    axes=("node", "input"), fixed=True,
+)  # fmt: skip
+WIDTH = Signal(
+    "rbf_width", "1", "Gaussian widths in (u, v, r) [m/s, m/s, rad/s]", r"\sigma",
+    axes=("input",), fixed=True,
+)  # fmt: skip
 Triple = tuple[float, float, float]
 
 
@@ -165,6 +174,17 @@ def adapt(
     """Weights' rate Gamma (drive Phi - sigma (W - W0)), drive u_e m11 or r_e m33; (27), (36)."""
     for i in range(count):
         rate[i] = Gamma * (drive * phi[i] - sigma * (weights[i] - initial))
+
+
+def nearest(network: Network, nu: Vector) -> Vector:
+    """Distance from velocities (n, 3) to the nearest node, in widths."""
+    widths = network.width_array()
+    if network.centers:
+        gaps = [((row - network.center_array()) / widths) ** 2 for row in nu]
+        return np.sqrt([gap.sum(axis=1).min() for gap in gaps])
+    axes = zip(nu.T, network.axes(), widths, strict=True)
+    gaps = [(((v[:, None] - axis) / width) ** 2).min(axis=1) for v, axis, width in axes]
+    return np.asarray(np.sqrt(np.sum(gaps, axis=0)))
 
 
 def activation(network: Network, nu: npt.NDArray[np.float64]) -> Vector:

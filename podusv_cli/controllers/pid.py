@@ -7,13 +7,21 @@ from typing import Any, ClassVar, Literal, Self
 import numpy as np
 from pydantic import model_validator
 
-from podusv_cli.controllers.base import Slots
-from podusv_cli.controllers.tracking import HELD, TrackingController, track
+from podusv_cli.controllers.base import Slots, each
+from podusv_cli.controllers.tracking import HELD, TRACKED, TrackingController, track
+from podusv_cli.controllers.velocity_loop import Axis, Loop
 from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, bundle, kernel
+from podusv_cli.core.signal import Signal
 from podusv_cli.vessels.vessel import Vessel
 
 INTEGRAL_U, INTEGRAL_R, LAG_U, LAG_R = 2, 3, 4, 5
+MEMORY = (
+    Signal("integral_u", "m", "integral of the surge velocity error (PID)", r"\int u_p"),
+    Signal("integral_r", "rad", "integral of the yaw rate error (PID)", r"\int r_p"),
+    Signal("lag_u", "m/s", "lagged surge velocity error (PID derivative)", "u_{p,f}"),
+    Signal("lag_r", "rad/s", "lagged yaw rate error (PID derivative)", "r_{p,f}"),
+)
 
 
 class Pid(TrackingController):
@@ -25,9 +33,7 @@ class Pid(TrackingController):
     """
 
     kind: Literal["pid"] = "pid"
-    signals: ClassVar[tuple[str, ...]] = (
-        "z_e", "psi_d", "psi_e", "alpha_u", "alpha_r", "u_e", "r_e",
-    )  # fmt: skip
+    signals: ClassVar[tuple[Signal, ...]] = TRACKED
     K_Pu: float = value(1100.0, "kg/s", "proportional gain in surge", ge=0)
     K_Iu: float = value(10.0, "kg/s2", "integral gain in surge", ge=0)
     K_Du: float = value(90.0, "kg", "derivative gain in surge", ge=0)
@@ -41,7 +47,7 @@ class Pid(TrackingController):
 
     @model_validator(mode="after")
     def _tracks(self) -> Self:
-        if self.settles() and min(self.K_Pu, self.K_Pr) <= 0:
+        if self.wants_loads() and min(self.K_Pu, self.K_Pr) <= 0:
             raise ValueError(
                 "anti_windup: auxiliary feeds the shortfall back over K_Pu and K_Pr, which have to "
                 "be above 0"
@@ -50,22 +56,38 @@ class Pid(TrackingController):
 
     def slots(self) -> Slots:
         """Held direction, integrals and lagged errors."""
-        names = ("integral_u", "integral_r", "lag_u", "lag_r")
-        return HELD + tuple((name, 1) for name in names)
+        return HELD + each(MEMORY)
 
     def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
         """Integrals at zero, lagged errors at zero or at the error."""
         memory = super().start(x, target, nominal)
         if self.lag_start == "error":
-            k, seen = bundle(self.informed(nominal)), np.array(memory)
+            k, seen = bundle(self.constants_with(nominal)), np.array(memory)
             self.sample(0.0, x, seen, target, k, self.table())
             e = track(x, seen, target, k)
             memory[[LAG_U, LAG_R]] = e.alpha_u - x[3], e.alpha_r - x[5]
         return memory
 
+    def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
+        """With e = -u_p: m e' = -K_P e + K_I i + K_D l', i' = -e, l' = (-e - l)/T_d."""
+        lag = 1.0 / self.T_d
+        gains = (
+            ("K_Du", self.K_Pu, self.K_Iu, self.K_Du),
+            ("K_Dr", self.K_Pr, self.K_Ir, self.K_Dr),
+        )
+        return [
+            Loop(
+                axis.name, key, axis.damping,
+                np.array([-K_P - K_D * lag, K_I, -K_D * lag]) / axis.inertia,
+                np.array([[-1.0, 0.0, 0.0], [-lag, 0.0, -lag]]),
+                cause="derivative", name="PID loop",
+            )
+            for axis, (key, K_P, K_I, K_D) in zip(axes, gains, strict=True)
+        ]  # fmt: skip
+
     @staticmethod
     @kernel
-    def settle(
+    def after_saturation(
         t: float, memory: Vector, demand: Vector, tau: Vector, k: Any, table: Vector, rate: Vector
     ) -> None:
         """Back-calculation with the tracking time K_P/K_I (Astrom and Hagglund; Hanus)."""
@@ -88,6 +110,6 @@ class Pid(TrackingController):
         rate[LAG_R] = (r_p - memory[LAG_R]) / k.T_d
         tau[0] = k.K_Pu * u_p + k.K_Iu * memory[INTEGRAL_U] + k.K_Du * rate[LAG_U]
         tau[1] = k.K_Pr * r_p + k.K_Ir * memory[INTEGRAL_R] + k.K_Dr * rate[LAG_R]
-        signals[0], signals[1], signals[2] = e.distance, e.psi_d, e.psi_e
-        signals[3], signals[4] = e.alpha_u, e.alpha_r
-        signals[5], signals[6] = -u_p, -r_p
+        signals[0], signals[1] = e.psi_d, e.psi_e
+        signals[2], signals[3] = e.alpha_u, e.alpha_r
+        signals[4], signals[5] = -u_p, -r_p

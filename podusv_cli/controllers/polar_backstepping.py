@@ -6,18 +6,54 @@ model, by a first-order filter (DSC), or in full.
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 
-from podusv_cli.controllers.base import Slots
-from podusv_cli.controllers.network import Network, activate, adapt, weigh
-from podusv_cli.controllers.tracking import HELD, Tracking, TrackingController, track
+from podusv_cli.controllers.base import Slots, each
+from podusv_cli.controllers.network import (
+    CENTER,
+    WIDTH,
+    Network,
+    activate,
+    activation,
+    adapt,
+    weigh,
+)
+from podusv_cli.controllers.tracking import (
+    HELD,
+    TRACKED,
+    Tracking,
+    TrackingController,
+    track,
+)
+from podusv_cli.controllers.velocity_loop import Axis, Bound, Loop
 from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, bundle, kernel, tail
+from podusv_cli.core.signal import Signal
 from podusv_cli.vessels.vessel import Vessel
 
 B_HAT_U, B_HAT_R, WEIGHTS = 2, 3, 4
+F_HAT = (
+    Signal("f_hat_u", "m/s2", "network's estimate of f_u (25)", r"\hat f_u"),
+    Signal("f_hat_r", "rad/s2", "network's estimate of f_r (34)", r"\hat f_r"),
+)
+BOUNDS = (
+    Signal("b_hat_u", "N", "estimated bound of b_u (28)", r"\hat b_u"),
+    Signal("b_hat_r", "N m", "estimated bound of b_r (37)", r"\hat b_r"),
+)
+W_HAT = (
+    Signal("W_hat_u", "m/s2", "surge network weights (27)", r"\hat W_u", ("node",)),
+    Signal("W_hat_r", "rad/s2", "yaw network weights (36)", r"\hat W_r", ("node",)),
+)
+FILTERED = (
+    Signal("beta_u", "m/s", "filtered virtual surge velocity (22)", r"\beta_u"),
+    Signal("beta_r", "rad/s", "filtered virtual yaw rate (31)", r"\beta_r"),
+)
+SHORTFALL = (
+    Signal("xi_u", "m/s", "shortfall of surge force as a velocity (anti-windup)", r"\xi_u"),
+    Signal("xi_r", "rad/s", "shortfall of yaw moment as a yaw rate (anti-windup)", r"\xi_r"),
+)
 
 
 def surge(
@@ -47,7 +83,8 @@ def lemma(error: float, k: Any) -> float:
 def compensation(memory: Vector, k: Any, rate: Vector) -> tuple[float, float]:
     """(xi_u, xi_r), what the loads fell short as a velocity; 0 without anti-windup.
 
-    m11 xi_u' = -k_ue xi_u + (tau_u on the hull - tau_u asked for), of which `settle` adds the last.
+    m11 xi_u' = -k_ue xi_u + (tau_u on the hull - tau_u asked for); `after_saturation` adds the last
+    term.
     """
     at = int(k.auxiliary)
     if at <= 0:
@@ -100,18 +137,16 @@ def polar_backstepping(
     adapt(count, W_hat_u, phi, u_c * k.m11, k.Gamma_u, k.sigma_u, W_0, tail(rate, WEIGHTS))
     adapt(count, W_hat_r, phi, r_c * k.m33, k.Gamma_r, k.sigma_r, W_0, tail(rate, WEIGHTS + count))
 
-    signals[0], signals[1], signals[2] = e.distance, e.psi_d, e.psi_e
-    signals[3], signals[4] = e.alpha_u, e.alpha_r
-    signals[5], signals[6] = u_e, r_e
-    signals[7], signals[8] = f_hat_u, f_hat_r
+    signals[0], signals[1] = e.psi_d, e.psi_e
+    signals[2], signals[3] = e.alpha_u, e.alpha_r
+    signals[4], signals[5] = u_e, r_e
+    signals[6], signals[7] = f_hat_u, f_hat_r
 
 
 class PolarBackstepping(TrackingController):
     """Gains and options of the adaptive backstepping laws; gains are the paper's section 6."""
 
-    signals: ClassVar[tuple[str, ...]] = (
-        "z_e", "psi_d", "psi_e", "alpha_u", "alpha_r", "u_e", "r_e", "f_hat_u", "f_hat_r",
-    )  # fmt: skip
+    signals: ClassVar[tuple[Signal, ...]] = (*TRACKED, *F_HAT)
     k_ue: float = value(4.0, "kg/s", "gain of the surge velocity error in (26)", ge=0)
     k_re: float = value(40.0, "kg m2/s", "gain of the yaw rate error in (35)", ge=0)
     Gamma_u: float = value(100.0, "1/(kg s2)", "adaptation gain of the surge network (27)", ge=0)
@@ -137,9 +172,8 @@ class PolarBackstepping(TrackingController):
     def slots(self) -> Slots:
         """Held direction, bounds, weights, the filter's output, and what anti-windup needs."""
         count = self.network.count
-        learnt = (("b_hat_u", 1), ("b_hat_r", 1), ("W_hat_u", count), ("W_hat_r", count))
-        auxiliary = (("xi_u", 1), ("xi_r", 1)) if self.settles() else ()
-        return HELD + learnt + self.filtered() + auxiliary
+        learnt = each(BOUNDS) + each(W_HAT, count)
+        return HELD + learnt + self.filtered() + (each(SHORTFALL) if self.wants_loads() else ())
 
     def filtered(self) -> Slots:
         """The filter's output, where there is a filter."""
@@ -148,11 +182,11 @@ class PolarBackstepping(TrackingController):
     def constants(self) -> dict[str, float]:
         """The fields' numbers, and where xi_u and xi_r are in the memory (0 for nowhere)."""
         end = sum(size for _, size in self.slots())
-        return super().constants() | {"auxiliary": float(end - 2 if self.settles() else 0)}
+        return super().constants() | {"auxiliary": float(end - 2 if self.wants_loads() else 0)}
 
     @staticmethod
     @kernel
-    def settle(
+    def after_saturation(
         t: float, memory: Vector, demand: Vector, tau: Vector, k: Any, table: Vector, rate: Vector
     ) -> None:
         """Add what the loads fall short of the demand."""
@@ -167,6 +201,48 @@ class PolarBackstepping(TrackingController):
         """
         return alpha_u * 0.0 + np.inf, alpha_r * 0.0 + np.inf
 
+    def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
+        """(26), (27) with a = W . Phi at frozen Phi: a' = Gamma (m |Phi|^2 e - sigma a)."""
+        power = float((activation(self.network, nu[None]) ** 2).sum())
+        surge, yaw = axes
+        bounds = (
+            Bound(
+                "u_e",
+                "gamma_u",
+                self.gamma_u,
+                self.sigma_bu,
+                self.b_hat_u0,
+                self.partial,
+                surge.inertia,
+            ),
+            Bound(
+                "r_e",
+                "gamma_r",
+                self.gamma_r,
+                self.sigma_br,
+                self.b_hat_r0,
+                self.partial,
+                yaw.inertia,
+            ),
+        )
+        gains = (
+            ("Gamma_u", self.k_ue, self.Gamma_u, self.sigma_u),
+            ("Gamma_r", self.k_re, self.Gamma_r, self.sigma_r),
+        )
+        return [
+            Loop(
+                axis.name, key, axis.damping,
+                np.array([-k - b.initial / (4.0 * self.partial), -axis.told]) / axis.inertia,
+                np.array([[Gamma * axis.told * power, -Gamma * sigma]]),
+                cause="adaptation", name="adaptation", bound=b,
+            )
+            for axis, b, (key, k, Gamma, sigma) in zip(axes, bounds, gains, strict=True)
+        ]  # fmt: skip
+
+    def lyapunov(self) -> Self:
+        """This law: the paper's proof is about the whole family."""
+        return self
+
     def workspace(self) -> int:
         """The nodes' outputs and their factors."""
         return self.network.count + self.network.bells
@@ -175,10 +251,9 @@ class PolarBackstepping(TrackingController):
         """The network's centres."""
         return self.network.table()
 
-    def fixed_signals(self) -> dict[str, Vector]:
+    def fixed_signals(self) -> dict[Signal, Vector]:
         """Centres, shape (node, 3), and widths, shape (3,), of the networks."""
-        network = self.network
-        return {"rbf_center": network.center_array(), "rbf_width": network.width_array()}
+        return {CENTER: self.network.center_array(), WIDTH: self.network.width_array()}
 
     def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
         """Bounds and weights at what leakage pulls them to."""
@@ -197,13 +272,13 @@ class FilteredBackstepping(PolarBackstepping):
 
     def filtered(self) -> Slots:
         """(beta_u, beta_r)."""
-        return (("beta_u", 1), ("beta_r", 1))
+        return each(FILTERED)
 
     def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
         """The filter at zero or settled on the virtual control."""
         memory = super().start(x, target, nominal)
         if self.filter_start == "alpha":
-            k, seen = bundle(self.informed(nominal)), np.array(memory)
+            k, seen = bundle(self.constants_with(nominal)), np.array(memory)
             self.sample(0.0, x, seen, target, k, self.table())
             e = track(x, seen, target, k)
             at = WEIGHTS + 2 * self.network.count

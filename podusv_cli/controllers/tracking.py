@@ -10,18 +10,38 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from podusv_cli.controllers.base import Controller
+from podusv_cli.controllers.base import Approach, Controller
 from podusv_cli.core.component import value
 from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.kinematics import direction, wrap
+from podusv_cli.core.signal import Signal
 
 ANALYTIC, DIFFERENCE = 0.0, 1.0
 PRINTED, JOINT, NONE = 0.0, 1.0, 2.0
 FROM_ZERO = 0.0
 
+# What a law that steers so logs: direction and heading error, virtual controls, their errors.
+PSI_D = Signal(
+    "psi_d", "rad", "direction of the target (19), in (-pi, pi]", r"\psi_d", wrapped=True
+)
+PSI_E = Signal(
+    "psi_e", "rad", "heading error that the law acts on, after folding", r"\psi_e", wrapped=True
+)
+ALPHA_U = Signal("alpha_u", "m/s", "virtual surge velocity (21)", r"\alpha_u")
+ALPHA_R = Signal("alpha_r", "rad/s", "virtual yaw rate (30)", r"\alpha_r")
+U_E = Signal("u_e", "m/s", "surge velocity error (23)")
+R_E = Signal("r_e", "rad/s", "yaw rate error (32)")
+TRACKED = (PSI_D, PSI_E, ALPHA_U, ALPHA_R, U_E, R_E)
+
 # The first two numbers of the memory of every law that steers so.
-HELD = (("psi_d_held", 1), ("psi_d_rate_held", 1))
+PSI_D_SAMPLE = Signal(
+    "psi_d_held", "rad", "target direction at the law's last sample", r"\psi_d^-", wrapped=True
+)
+PSI_D_RATE_SAMPLE = Signal(
+    "psi_d_rate_held", "rad/s", "difference quotient held by the law", r"\dot\psi_d^-"
+)
+HELD = ((PSI_D_SAMPLE, 1), (PSI_D_RATE_SAMPLE, 1))
 PSI_D_HELD, PSI_D_RATE_HELD = 0, 1
 
 
@@ -153,7 +173,11 @@ class TrackingController(Controller):
         "nothing as printed, or the shortfall is taken out of what it learns from",
     )  # fmt: skip
 
-    def settles(self) -> bool:
+    def approach(self) -> Approach:
+        """k_ze, from the standoff on, see (21)."""
+        return Approach(self.k_ze, self.standoff)
+
+    def wants_loads(self) -> bool:
         """With anti-windup only."""
         return self.anti_windup == "auxiliary"
 

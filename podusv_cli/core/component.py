@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Annotated, Any, Literal, get_args, get_origin
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, get_args, get_origin
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
@@ -13,9 +13,23 @@ from pydantic.fields import FieldInfo
 from podusv_cli.core.kernel import Vector
 
 
-class Component(BaseModel):
-    """A part of a scenario. Fields carry unit, range, default and meaning (see `value`)."""
+class Presets(NamedTuple):
+    """Files of values that a component's `preset` names: YAML files in a package."""
 
+    package: str
+    noun: str  # what one of them holds
+    file: str  # what messages call one
+
+
+class Component(BaseModel):
+    """A part of a scenario. Fields carry unit, range, default and meaning (see `value`).
+
+    `presets` are what its field `preset` chooses from. `rows_of` has the fields that may name a
+    CSV file of pairs, each with the field that takes the file's rows.
+    """
+
+    presets: ClassVar[Presets | None] = None
+    rows_of: ClassVar[dict[str, str]] = {}
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
 
     def constants(self) -> dict[str, float]:

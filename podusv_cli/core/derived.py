@@ -9,12 +9,14 @@ import numpy as np
 
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
+from podusv_cli.core.signal import Signal
 
 
 @dataclass(frozen=True)
 class Derived:
     """A signal computed from logged ones."""
 
+    signal: Signal
     needs: tuple[str, ...]
     compute: Callable[[Recording], Vector]
 
@@ -50,14 +52,43 @@ def signal(log: Recording, name: str) -> Vector:
     return log[name] if name in log else DERIVED[name].compute(log)
 
 
-DERIVED: dict[str, Derived] = {
-    "x_e": Derived(("x_d", "x"), lambda log: log["x_d"] - log["x"]),
-    "y_e": Derived(("y_d", "y"), lambda log: log["y_d"] - log["y"]),
-    "y_u": Derived(("beta_u", "alpha_u"), lambda log: log["beta_u"] - log["alpha_u"]),
-    "y_r": Derived(("beta_r", "alpha_r"), lambda log: log["beta_r"] - log["alpha_r"]),
-    "W_norm_u": Derived(("W_hat_u",), lambda log: np.linalg.norm(log["W_hat_u"], axis=1)),
-    "W_norm_r": Derived(("W_hat_r",), lambda log: np.linalg.norm(log["W_hat_r"], axis=1)),
-    "V_dot_bound": Derived(("V_dot", "V_Delta"), _v_dot_bound),
-    "node_distance": Derived(("rbf_center", "rbf_width", "u", "v", "r"), _node_distance),
-    "activation": Derived(("rbf_center", "rbf_width", "u", "v", "r"), _activation),
-}
+def about(log: Recording, name: str) -> Signal:
+    """What a signal that the log has, or gives, is."""
+    return log.about[name] if name in log else DERIVED[name].signal
+
+
+def _difference(signal: Signal, minuend: str, subtrahend: str) -> Derived:
+    return Derived(signal, (minuend, subtrahend), lambda log: log[minuend] - log[subtrahend])
+
+
+def _norm(signal: Signal, weights: str) -> Derived:
+    return Derived(signal, (weights,), lambda log: np.linalg.norm(log[weights], axis=1))
+
+
+X_E = Signal("x_e", "m", "target ahead of the vessel, north (18); derived, not logged")
+Y_E = Signal("y_e", "m", "target ahead of the vessel, east (18); derived, not logged")
+Y_U = Signal("y_u", "m/s", "error of the surge filter, beta_u - alpha_u")
+Y_R = Signal("y_r", "rad/s", "error of the yaw filter, beta_r - alpha_r")
+W_NORM_U = Signal("W_norm_u", "m/s2", "norm of the surge network weights", r"|\hat W_u|")
+W_NORM_R = Signal("W_norm_r", "rad/s2", "norm of the yaw network weights", r"|\hat W_r|")
+V_DOT_BOUND = Signal(
+    "V_dot_bound", "1/s", "what V_dot should stay below (49), corrected; derived, not logged",
+    r"-2\lambda V+\Delta",
+)  # fmt: skip
+NODE_DISTANCE = Signal(
+    "node_distance", "1", "distance of (u, v, r) to the nearest network centre, in widths", "d"
+)
+ACTIVATION = Signal("activation", "1", "largest output of a network node (14)", r"\max\Phi")
+NETWORK = ("rbf_center", "rbf_width", "u", "v", "r")
+_ROWS = (
+    _difference(X_E, "x_d", "x"),
+    _difference(Y_E, "y_d", "y"),
+    _difference(Y_U, "beta_u", "alpha_u"),
+    _difference(Y_R, "beta_r", "alpha_r"),
+    _norm(W_NORM_U, "W_hat_u"),
+    _norm(W_NORM_R, "W_hat_r"),
+    Derived(V_DOT_BOUND, ("V_dot", "V_Delta"), _v_dot_bound),
+    Derived(NODE_DISTANCE, NETWORK, _node_distance),
+    Derived(ACTIVATION, NETWORK, _activation),
+)
+DERIVED: dict[str, Derived] = {row.signal.name: row for row in _ROWS}

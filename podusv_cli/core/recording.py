@@ -9,6 +9,7 @@ from typing import Literal, Protocol, Self
 import numpy as np
 
 from podusv_cli.core.kernel import Vector
+from podusv_cli.core.signal import Signal
 
 Status = Literal["finished", "diverged", "interrupted"]
 BLOCK = 2**16  # rows that are looked at together; a long run's columns may be longer than memory
@@ -55,9 +56,9 @@ def largest(rows: int, of: Callable[[slice], Vector]) -> float:
 class Recording:
     """Signals by name, each of shape (rows,) or (rows, ...), with `time` [s] along the rows.
 
-    `fixed` holds arrays that do not run over time, such as network centres. `seen` is what the
-    observer gathered at every step, thinned log or not. `message` says how a run ended that did
-    not finish.
+    `fixed` holds arrays that do not run over time, such as network centres, and `about` says what
+    every array is. `seen` is what the observer gathered at every step, thinned log or not.
+    `message` says how a run ended that did not finish.
     """
 
     status: Status
@@ -66,6 +67,7 @@ class Recording:
     fixed: Mapping[str, Vector] = field(default_factory=dict)
     seen: Vector | None = None
     message: str = ""
+    about: Mapping[str, Signal] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Vector:
         """A signal or fixed array; KeyError where there is none."""

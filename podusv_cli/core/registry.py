@@ -15,6 +15,7 @@ from pydantic import Field
 
 from podusv_cli.core.component import Component
 from podusv_cli.core.errors import LawError, in_a_line
+from podusv_cli.core.signal import Signal
 
 Kind = TypeVar("Kind", bound=Component)
 Named = TypeVar("Named")
@@ -63,9 +64,34 @@ def named(package: str, kind: type[Named]) -> dict[str, Named]:
     return {thing.name: thing for thing in found}  # type: ignore[attr-defined]
 
 
+def signals(*packages: str) -> list[Signal]:
+    """Every signal that is a constant of these packages' modules or in the `signals` of a class.
+
+    One that several modules have comes once; a name may come with several meanings.
+    """
+    found = (
+        part for package in packages for thing in _members(package) for part in _signals(thing)
+    )
+    return list(dict.fromkeys(found))
+
+
+def _signals(thing: Any) -> Iterator[Signal]:
+    inside = getattr(thing, "signal", None)
+    if isinstance(thing, Signal):
+        yield thing
+    elif isinstance(inside, Signal):
+        yield inside
+    elif isinstance(thing, type):
+        yield from _signals(vars(thing).get("signals"))
+    elif isinstance(thing, (tuple, dict)):
+        parts = thing.values() if isinstance(thing, dict) else thing
+        yield from (signal for part in parts for signal in _signals(part))
+
+
 def _members(package: str) -> Iterator[Any]:
     for module in iter_modules(import_module(package).__path__, f"{package}."):
-        yield from vars(_imported(module.name)).values()
+        members = vars(_imported(module.name)).items()
+        yield from (thing for name, thing in members if not name.startswith("__"))
 
 
 def _imported(module: str) -> Any:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import inspect
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import partial
 from numbers import Real
@@ -19,9 +19,9 @@ from podusv_cli.controllers.base import Controller
 from podusv_cli.core.component import Component
 from podusv_cli.core.errors import LawError
 from podusv_cli.core.kernel import Vector, bundle
-from podusv_cli.core.signal import SIGNALS
+from podusv_cli.core.signal import Signal
 from podusv_cli.engine.march import Work
-from podusv_cli.engine.simulate import ClosedLoop, names
+from podusv_cli.engine.simulate import ClosedLoop
 
 UNWRITTEN = -1.234567890123e-290  # no law writes just this
 # What a law's arithmetic may raise: the run tells it, as divergence.
@@ -31,7 +31,7 @@ OF_NUMBERS = (ArithmeticError, ValueError)
 def check_law(loop: ClosedLoop) -> None:
     """Ask the loop's law at the start of a run, with vectors of the declared sizes.
 
-    Raises LawError for signals that are in no table or named twice, a memory, table or outputs of
+    Raises LawError for signals that are undeclared or declared twice, a memory, table or outputs of
     another size, an output left unwritten, an exception, and for a law that does not return. No
     number at all is left for the run to tell.
     """
@@ -55,7 +55,7 @@ def _asked(
 
 def _check_declared(loop: ClosedLoop) -> int:
     law = loop.controller
-    _check_names(loop)
+    _check_signals(loop)
     memory, declared = _first_memory(loop), (sum(size for _, size in law.slots()),)
     if np.shape(memory) != declared:
         shapes = f"it starts with a memory of shape {np.shape(memory)}, its slots are {declared}"
@@ -63,7 +63,7 @@ def _check_declared(loop: ClosedLoop) -> int:
     table = law.table()
     if not (isinstance(table, np.ndarray) and table.dtype == np.float64 and table.ndim == 1):
         raise LawError(f"{called(law)}: its table is no vector of float64; write np.array([1.0])")
-    for name, number in law.informed(loop.nominal).items():
+    for name, number in law.constants_with(loop.nominal).items():
         if not (name.isidentifier() and isinstance(number, Real)):
             raise LawError(f"{called(law)}: its constant {name} = {number!r} is no named number")
     return 0
@@ -75,8 +75,8 @@ def _first_memory(loop: ClosedLoop) -> Vector:
 
 def _ask(loop: ClosedLoop) -> int:
     law, memory, target = loop.controller, _first_memory(loop), loop.first_target()
-    x, k, table = np.array(loop.start), bundle(law.informed(loop.nominal)), law.table()
-    slots = [name for name, size in law.slots() for _ in range(size)]
+    x, k, table = np.array(loop.start), bundle(law.constants_with(loop.nominal)), law.table()
+    slots = [part.name for part, size in law.slots() for _ in range(size)]
     tau, rate, signals = (np.full(size, UNWRITTEN) for size in (2, len(slots), len(law.signals)))
     if law.sample_period() > 0:
         law.sample(0.0, x, memory, target, k, table)
@@ -84,44 +84,62 @@ def _ask(loop: ClosedLoop) -> int:
         0.0, x, memory, target, k, table, tau, rate, signals, np.zeros(law.workspace())
     )  # fmt: skip
     outputs = [*zip(("tau_u_cmd", "tau_r_cmd"), tau, strict=True)]
-    outputs += [*zip(law.signals, signals, strict=True)]
+    outputs += [*zip((part.name for part in law.signals), signals, strict=True)]
     outputs += [(f"the rate of {name}", number) for name, number in zip(slots, rate, strict=True)]
     left = next((name for name, number in outputs if number == UNWRITTEN), "")
     if left:
         raise LawError(f"{called(law)}: it leaves {left} unwritten")
-    if law.settles():
-        law.settle(0.0, memory, tau, np.zeros(3), k, table, rate)
+    if law.wants_loads():
+        law.after_saturation(0.0, memory, tau, np.zeros(3), k, table, rate)
     return 0
 
 
-def _check_names(loop: ClosedLoop) -> None:
+def _check_signals(loop: ClosedLoop) -> None:
     """LawError for what the log could not take, or would mix up."""
-    law, actuator, logged = loop.controller, loop.actuator, Counter(names(loop))
+    law, actuator = loop.controller, loop.actuator
     if isinstance(law.signals, str):
-        raise LawError(f'{called(law)}: its signals are no tuple; write ("{law.signals}",)')
-    _check_known(law, [*dict(law.slots()), *law.signals, *law.fixed_signals()])
-    _check_known(actuator, [*actuator.states, *actuator.signals])
-    own = Counter([*actuator.states, *actuator.signals]) + Counter(dict(law.slots()))
-    for name, size in own.items():
-        if size > 1 and not SIGNALS[name].axes:
-            raise LawError(
-                f"{called(law)}: {name} has {size} numbers and no axis in podusv_cli/signals.py "
-                "that tells them apart; give each of them a name of its own"
-            )
-    for name in (*dict(law.slots()), *law.signals):
-        if logged[name] > own.get(name, 1):
-            raise LawError(
-                f"{called(law)}: it declares {name}, which the run logs already; take another name"
-            )
+        raise LawError(f"{called(law)}: its signals are no tuple; write (Signal(...),)")
+    for owner, declared in (
+        (law, (*dict(law.slots()), *law.signals, *law.fixed_signals())),
+        (actuator, (*actuator.states, *actuator.signals)),
+    ):
+        for part in declared:
+            if not isinstance(part, Signal):
+                raise LawError(
+                    f"{called(owner)}: it declares {part!r}, which is no Signal; write "
+                    f'(Signal("{part}", unit, meaning),)'
+                )
+    try:
+        loop.about()
+        _check_axes(loop)
+    except LawError as error:
+        raise LawError(f"{called(law)}: {error}") from error
 
 
-def _check_known(owner: Component, declared: Iterable[str]) -> None:
-    for name in declared:
-        if name not in SIGNALS:
+def _check_axes(loop: ClosedLoop) -> None:
+    """Every logged array has as many values along each of its axes as all others have."""
+    lengths: dict[str, tuple[int, str]] = {}
+    for part, shape in _shapes(loop):
+        if len(shape) != len(part.axes):
             raise LawError(
-                f"{called(owner)}: it declares {name}, which is in no table of signals; add a row "
-                f'Signal("{name}", symbol, unit, meaning) to podusv_cli/signals.py'
+                f"signal {part.name}: its values have the shape {shape} at an instant and its axes "
+                f"are {part.axes}; name one axis for each dimension"
             )
+        for axis, size in zip(part.axes, shape, strict=True):
+            known, other = lengths.setdefault(axis, (size, part.name))
+            if known != size:
+                raise LawError(
+                    f"signal {part.name}: it has {size} values along {axis!r}, and {other} has "
+                    f"{known}; name their axes differently"
+                )
+
+
+def _shapes(loop: ClosedLoop) -> Iterator[tuple[Signal, tuple[int, ...]]]:
+    """The signals that may be vectors, each with its shape at an instant."""
+    law, actuator = loop.controller, loop.actuator
+    for part, count in (*law.slots(), *Counter((*actuator.states, *actuator.signals)).items()):
+        yield part, (count,) if part.axes or count > 1 else ()
+    yield from ((part, array.shape) for part, array in law.fixed_signals().items())
 
 
 def called(owner: Component) -> str:

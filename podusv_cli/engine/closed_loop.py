@@ -1,7 +1,8 @@
 """The closed loop as kernels: right-hand side, RK4 step, and the march along the time grid.
 
 State s: the vessel's (x, y, psi, u, v, r), then the actuator's states, then the law's memory.
-Row: target, law's signals, demand, tau, b, actuator's signals; offsets are in `Plan`.
+Row: target, distance to it, law's signals, demand, tau, b, actuator's signals; offsets are in
+`Plan`.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ class Plan(NamedTuple):
     hold_every: int  # 0: the law acts continuously
     sample_every: int  # 0: the law takes no samples
     load_of_time: int  # 1: the disturbance depends on time alone
-    settles: int  # 1: the law is told which loads really act
+    wants_loads: int  # 1: the law is told which loads really act
     first_row: int = 0  # the row that the log begins with
 
     @property
@@ -66,6 +67,7 @@ class Wires(NamedTuple):
     log: Vector  # rows of t, s, row
 
 
+DISTANCE = 6  # where the row has z_e (18), behind the target
 HELD_X, HELD_TARGET, HELD_DEMAND, HELD_SIGNALS = 1, 7, 13, 15
 STOP = 1  # in `under_way`
 
@@ -79,7 +81,7 @@ named_wires, named_plan = unpacker(Wires._fields), unpacker(Plan._fields)
 @kernel
 def rates(
     t: float, s: Vector, ds: Vector,
-    path: Function, disturbance: Function, law: Function, actuator: Function, settle: Function,
+    path: Function, disturbance: Function, law: Function, actuator: Function, after: Function,
     c: Wires, n: Plan, again: bool,
 ) -> None:  # fmt: skip
     """Right-hand side of the closed loop at time t; leaves all signals in the row.
@@ -106,9 +108,16 @@ def rates(
         t, s, tail(s, 6), demand, c.actuator, c.actuator_table,
         tau, tail(ds, 6), tail(row, n.flags),
     )  # fmt: skip
-    if n.settles > 0:
-        settle(t, memory, demand, tau, p, table, memory_rate)
+    if n.wants_loads > 0:
+        after(t, memory, demand, tau, p, table, memory_rate)
     plant(s, tau, b, coefficients(c.vessel), ds)
+
+
+@kernel
+def measure(s: Vector, row: Vector) -> None:
+    """The distance to the target (18)."""
+    x_e, y_e = row[0] - s[0], row[1] - s[1]
+    row[DISTANCE] = math.sqrt(x_e * x_e + y_e * y_e)
 
 
 @kernel
@@ -143,7 +152,7 @@ def shifted(count: int, s: Vector, h: float, ds: Vector, out: Vector) -> None:
 @kernel
 def step(
     t: float, h: float,
-    path: Function, disturbance: Function, law: Function, actuator: Function, settle: Function,
+    path: Function, disturbance: Function, law: Function, actuator: Function, after: Function,
     c: Wires, n: Plan,
 ) -> None:  # fmt: skip
     """Classical RK4 from t to t + h; the first stage has been evaluated already."""
@@ -152,11 +161,11 @@ def step(
     k2, k3, k4 = tail(k1, count), tail(k1, 2 * count), tail(k1, 3 * count)
     y = tail(k1, 4 * count)
     shifted(count, s, 0.5 * h, k1, y)
-    rates(t + 0.5 * h, y, k2, path, disturbance, law, actuator, settle, c, n, False)
+    rates(t + 0.5 * h, y, k2, path, disturbance, law, actuator, after, c, n, False)
     shifted(count, s, 0.5 * h, k2, y)
-    rates(t + 0.5 * h, y, k3, path, disturbance, law, actuator, settle, c, n, True)
+    rates(t + 0.5 * h, y, k3, path, disturbance, law, actuator, after, c, n, True)
     shifted(count, s, h, k3, y)
-    rates(t + h, y, k4, path, disturbance, law, actuator, settle, c, n, False)
+    rates(t + h, y, k4, path, disturbance, law, actuator, after, c, n, False)
     for i in range(count):
         s[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
 
@@ -185,7 +194,7 @@ def write_row(k: int, t: float, c: Wires, n: Plan) -> None:
 @kernel
 def instant(
     k: int, first: int, h: float, path: Function, disturbance: Function, law: Function,
-    sample: Function, actuator: Function, settle: Function, observe: Function, c: Wires, n: Plan,
+    sample: Function, actuator: Function, after: Function, observe: Function, c: Wires, n: Plan,
 ) -> bool:  # fmt: skip
     """Sample, evaluate, observe and log instant k; whether all its numbers are finite."""
     t = k * h
@@ -193,7 +202,8 @@ def instant(
     again = k > first and t == (k - 1) * h + h  # where the last stage of the step before was
     if n.sample_every > 0 or n.hold_every > 0:
         sample_and_hold(k, t, path, law, sample, c, n)
-    rates(t, c.s, c.stages, path, disturbance, law, actuator, settle, c, n, again)
+    rates(t, c.s, c.stages, path, disturbance, law, actuator, after, c, n, again)
+    measure(c.s, c.row)
     if not (finite(n.states, c.s) and finite(n.columns, c.row)):
         return False
     weight = 0.5 * h if k == 0 or k == n.steps else h
@@ -206,7 +216,7 @@ def instant(
 @kernel
 def advance(
     path: Function, disturbance: Function, law: Function, sample: Function, actuator: Function,
-    settle: Function, observe: Function, first: int, last: int, h: float, wires: Any, plan: Any,
+    after: Function, observe: Function, first: int, last: int, h: float, wires: Any, plan: Any,
 ) -> int:  # fmt: skip
     """March over the instants first .. last - 1.
 
@@ -216,31 +226,29 @@ def advance(
     for k in range(first, last):
         if c.under_way[STOP] != 0.0:
             return k
-        if not instant(
-            k, first, h, path, disturbance, law, sample, actuator, settle, observe, c, n
-        ):
+        if not instant(k, first, h, path, disturbance, law, sample, actuator, after, observe, c, n):
             return k
         if k < n.steps:
-            step(k * h, h, path, disturbance, law, actuator, settle, c, n)
+            step(k * h, h, path, disturbance, law, actuator, after, c, n)
     return last
 
 
 def advance_plainly(
     path: Function, disturbance: Function, law: Function, sample: Function, actuator: Function,
-    settle: Function, observe: Function, first: int, last: int, h: float, c: Wires, n: Plan,
+    after: Function, observe: Function, first: int, last: int, h: float, c: Wires, n: Plan,
 ) -> int:  # fmt: skip
     """`advance` as plain Python, whose `math` raises where machine code gives no number."""
     for k in range(first, last):
         try:
             if c.under_way[STOP] != 0.0 or not instant(
-                k, first, h, path, disturbance, law, sample, actuator, settle, observe, c, n
+                k, first, h, path, disturbance, law, sample, actuator, after, observe, c, n
             ):
                 return k
         except (ArithmeticError, ValueError):
             return k
         try:
             if k < n.steps:
-                step(k * h, h, path, disturbance, law, actuator, settle, c, n)
+                step(k * h, h, path, disturbance, law, actuator, after, c, n)
         except (ArithmeticError, ValueError):
             c.s[:] = math.nan
     return last
@@ -266,7 +274,7 @@ def evaluate_all(
 
 @kernel
 def rates_along(
-    path: Function, disturbance: Function, law: Function, actuator: Function, settle: Function,
+    path: Function, disturbance: Function, law: Function, actuator: Function, after: Function,
     count: int, logged: Vector, out: Vector, wires: Any, plan: Any,
 ) -> None:  # fmt: skip
     """For each of `count` logged rows of t, s: the rates of s, then the row, into `out`."""
@@ -274,6 +282,19 @@ def rates_along(
     for i in range(count):
         here = tail(logged, i * (1 + n.states))
         there = tail(out, i * (n.states + n.columns))
-        rates(here[0], tail(here, 1), there, path, disturbance, law, actuator, settle, c, n, False)
+        rates(
+            here[0],
+            tail(here, 1),
+            there,
+            path,
+            disturbance,
+            law,
+            actuator,
+            after,
+            c,
+            n,
+            False,
+        )
+        measure(tail(here, 1), c.row)
         for j in range(n.columns):
             there[n.states + j] = c.row[j]

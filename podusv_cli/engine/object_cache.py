@@ -25,10 +25,9 @@ import numpy as np
 
 from podusv_cli.engine import code_folder
 
-# Rooms and files that hold no kernel: what is edited there leaves machine code as it is.
-APART = (
-    "cli", "comparison", "figures", "findings", "scenario", "storage", "verification", "workflows",
-)  # fmt: skip
+# What a source file that makes kernels has in it; what is edited elsewhere leaves machine code as
+# it is, but for constants, which the digest of a piece has in it.
+MARKS = (b"@kernel", b"specialise(", b"with_globals(")
 
 
 class Code(NamedTuple):
@@ -183,9 +182,9 @@ def _(thing: Any, names: Iterable[str], told: dict[Any, int]) -> Iterator[str]:
 def source_digest() -> str:
     """Digest of every source file that can hold a kernel or turns kernels into machine code."""
     digest = hashlib.sha256()
-    package = Path(__file__).resolve().parent.parent
-    for path in sorted(package.rglob("*.py")):
-        name = path.relative_to(package)
-        if name.parts[0] not in APART:
-            digest.update(name.as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
+    engine = Path(__file__).resolve().parent
+    for path in sorted(engine.parent.rglob("*.py")):
+        content, name = path.read_bytes(), path.relative_to(engine.parent).as_posix()
+        if path.parent == engine or any(mark in content for mark in MARKS):
+            digest.update(name.encode() + b"\0" + content + b"\0")
     return digest.hexdigest()[:16]

@@ -20,7 +20,7 @@ from podusv_cli.paths.base import TARGET
 def _rows(loop: ClosedLoop, recording: Recording, most: int) -> Vector:
     times = recording["time"]
     chosen = np.linspace(0, len(times) - 1, min(most, len(times))).astype(int)
-    names = [*STATE, *(name for name, _ in loop.controller.slots())]
+    names = [*STATE, *(part.name for part, _ in loop.controller.slots())]
     logged = np.column_stack([recording[name][chosen] for name in names])
     k, table = bundle(loop.path.constants()), loop.path.table()
     targets = np.zeros((len(chosen), len(TARGET)))
@@ -42,12 +42,12 @@ def replayer(
     count, width = rows.shape
     rounds = -(-evaluations // count)
     room = max(width, len(loop.controller.signals)) * 2 + loop.controller.workspace()
-    informed = loop.controller.informed(loop.nominal)
-    p = np.array(list(informed.values()))
+    constants = loop.controller.constants_with(loop.nominal)
+    p = np.array(list(constants.values()))
     buffers = (rows.ravel(), p, loop.controller.table(), np.zeros(2), np.zeros(room))
     vectors = [signatures.pointer(buffer) for buffer in buffers]
     replay: Callable[..., None] = compile.routine(closed_loop.evaluate_all, signatures.EVALUATE_ALL)
-    law = compile.entry(signatures.law_entry, loop.controller.law, tuple(informed))
+    law = compile.entry(signatures.law_entry, loop.controller.law, tuple(constants))
 
     def timed() -> float:
         began = time.thread_time_ns()  # of the processor: what else it does is not the law's
@@ -77,7 +77,7 @@ def rates_replay(
     Control is taken as continuous, also where the run's was sampled.
     """
     plan = loop.layout(grid)._replace(hold_every=0)
-    labels, split = names(loop), 1 + plan.states
+    labels, split, about = names(loop), 1 + plan.states, loop.about()
     state = list(dict.fromkeys(labels[:split]))
     wires = wire(loop, plan, Observer())
     run = _rates_runner(loop, compiled)
@@ -87,8 +87,8 @@ def rates_replay(
         out = np.empty((len(logged), plan.states + plan.columns))
         run(len(logged), logged.ravel(), out.reshape(-1), wires, plan)
         return Replayed(
-            by_name(labels[1:split], out[:, : plan.states]),
-            by_name(labels[split:], out[:, plan.states :]),
+            by_name(labels[1:split], out[:, : plan.states], about),
+            by_name(labels[split:], out[:, plan.states :], about),
         )
 
     return replayed

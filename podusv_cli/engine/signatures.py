@@ -61,7 +61,7 @@ def actuator_entry(
     kernel(t, x, state, demand, named(p), table, tau, rate, signals)
 
 
-def settle_entry(
+def after_saturation_entry(
     t: float, memory: Vector, demand: Vector, tau: Vector, p: Vector, table: Vector, rate: Vector
 ) -> None:
     """The door of a law that learns which loads really act."""
@@ -88,14 +88,14 @@ PROTOTYPES: dict[Any, Any] = {
     law_entry: CFUNCTYPE(None, NUMBER, *[VECTOR] * 9),
     sample_entry: CFUNCTYPE(None, NUMBER, *[VECTOR] * 5),
     actuator_entry: CFUNCTYPE(None, NUMBER, *[VECTOR] * 8),
-    settle_entry: CFUNCTYPE(None, NUMBER, *[VECTOR] * 6),
+    after_saturation_entry: CFUNCTYPE(None, NUMBER, *[VECTOR] * 6),
     observer_entry: CFUNCTYPE(None, NUMBER, NUMBER, *[VECTOR] * 4),
 }
 LOOP = (
-    path_entry, disturbance_entry, law_entry, sample_entry, actuator_entry, settle_entry,
+    path_entry, disturbance_entry, law_entry, sample_entry, actuator_entry, after_saturation_entry,
     observer_entry,
 )  # fmt: skip
-RIGHT_HAND_SIDE = (path_entry, disturbance_entry, law_entry, actuator_entry, settle_entry)
+RIGHT_HAND_SIDE = (path_entry, disturbance_entry, law_entry, actuator_entry, after_saturation_entry)
 _PARTS = [PROTOTYPES[door] for door in LOOP]
 ADVANCE = CFUNCTYPE(WHOLE, *_PARTS, WHOLE, WHOLE, NUMBER, POINTER(VECTOR), POINTER(WHOLE))
 RATES_ALONG = CFUNCTYPE(

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from podusv_cli.actuators.base import Actuator
 from podusv_cli.controllers.base import Controller
+from podusv_cli.core import signal
 from podusv_cli.core.kernel import Vector, bundle, kernel
 from podusv_cli.core.recording import Columns, Recording
-from podusv_cli.core.signal import SIGNALS
+from podusv_cli.core.signal import LOOP, Signal
 from podusv_cli.disturbances.base import Disturbance
 from podusv_cli.engine import closed_loop, signatures
 from podusv_cli.engine.closed_loop import Plan, Wires
@@ -23,7 +24,7 @@ from podusv_cli.paths.base import TARGET, Path
 from podusv_cli.process.interrupts import interrupts_held
 from podusv_cli.vessels.vessel import Vessel
 
-STATE = ("x", "y", "psi", "u", "v", "r")
+STATE = tuple(state.name for state in signal.STATE)
 DEMAND = ("tau_u_cmd", "tau_r_cmd")
 LOADS = ("tau_u", "tau_v", "tau_r", "b_u", "b_v", "b_r")
 
@@ -39,7 +40,7 @@ def _no_sample(t: float, x: Vector, memory: Vector, target: Vector, k: Any, tabl
 
 
 @kernel
-def _settle_nothing(
+def _ignore_loads(
     t: float, memory: Vector, demand: Vector, tau: Vector, k: Any, table: Vector, rate: Vector
 ) -> None:
     pass
@@ -77,18 +78,25 @@ class ClosedLoop:
         self.path.evaluate(0.0, bundle(self.path.constants()), self.path.table(), target)
         return target
 
+    def about(self) -> dict[str, Signal]:
+        """Every signal that the loop logs, by name. Raises LawError where two have one name."""
+        law, actuator = self.controller, self.actuator
+        own = (f"actuator {type(actuator).__name__}", (*actuator.states, *actuator.signals))
+        parts = (("the closed loop", LOOP), (f"law {law.label}", law.declared()), own)
+        return signal.by_name(parts)
+
     def layout(self, grid: TimeGrid) -> Plan:
         """Sizes and offsets of the loop on this grid."""
         law, actuator = self.controller, self.actuator
         memory = 6 + len(actuator.states)
-        sizes = [len(TARGET), len(law.signals), len(DEMAND), 3, 3, len(actuator.signals)]
+        sizes = [len(TARGET) + 1, len(law.signals), len(DEMAND), 3, 3, len(actuator.signals)]
         signals, demand, tau, b, flags, columns = np.cumsum(sizes).tolist()
         return Plan(
             states=memory + sum(size for _, size in law.slots()), memory=memory,
             signals=signals, demand=demand, tau=tau, b=b, flags=flags, columns=columns,
             steps=grid.steps, log_every=grid.log_every, hold_every=grid.hold_every,
             sample_every=_sample_steps(law.sample_period(), grid),
-            load_of_time=int(self.disturbance.of_time), settles=int(law.settles()),
+            load_of_time=int(self.disturbance.of_time), wants_loads=int(law.wants_loads()),
         )  # fmt: skip
 
 
@@ -124,32 +132,32 @@ def simulate(
     is held in memory, or with `columns` goes there in pieces of about `piece` bytes, and the
     recording's signals are what the columns give. What they raise ends the march.
     """
-    observer = observer or Observer()
+    observer, about = observer or Observer(), loop.about()
     plan = loop.layout(grid)
     rows = grid.rows if columns is None else rows_held(plan, grid, piece)
     wires = wire(loop, plan, observer, rows)
-    pieces = Pieces(plan, wires.log, columns, lambda table: _logged(loop, grid, table))
+    pieces = Pieces(plan, wires.log, columns, lambda table: _logged(loop, table))
     advance = marcher(loop, observer, compiled)
     with np.errstate(all="ignore"), interrupts_held():
         ending = march(
             lambda a, b: advance(a, b, grid.step, wires, pieces.plan), pieces.ranges(),
             wires.under_way, progress and (lambda reached: progress(reached / (plan.steps + 1))),
         )  # fmt: skip
-        return _record(loop, grid, wires, pieces, ending)
+        return replace(_record(loop, grid, wires, pieces, ending), about=about)
 
 
 def entries(loop: ClosedLoop, observer: Observer) -> Iterator[tuple[Any, Any, tuple[str, ...]]]:
     """Door, kernel and constants' names of every part, in the order the loop takes them."""
     law, path, disturbance, actuator = loop.controller, loop.path, loop.disturbance, loop.actuator
-    informed = tuple(law.informed(loop.nominal))
+    constants = tuple(law.constants_with(loop.nominal))
     sample = law.sample if law.sample_period() > 0 else _no_sample
-    settle = law.settle if law.settles() else _settle_nothing
+    after_saturation = law.after_saturation if law.wants_loads() else _ignore_loads
     yield signatures.path_entry, path.evaluate, tuple(path.constants())
     yield signatures.disturbance_entry, disturbance.evaluate, tuple(disturbance.constants())
-    yield signatures.law_entry, law.law, informed
-    yield signatures.sample_entry, sample, informed
+    yield signatures.law_entry, law.law, constants
+    yield signatures.sample_entry, sample, constants
     yield signatures.actuator_entry, actuator.drive, tuple(actuator.constants())
-    yield signatures.settle_entry, settle, informed
+    yield signatures.after_saturation_entry, after_saturation, constants
     yield signatures.observer_entry, observer.watch, tuple(observer.constants)
 
 
@@ -180,7 +188,7 @@ def wire(loop: ClosedLoop, plan: Plan, observer: Observer, rows: int = 1) -> Wir
     return Wires(
         path=numbers(path.constants()), path_table=path.table(),
         disturbance=numbers(disturbance.constants()), disturbance_table=disturbance.table(),
-        law=numbers(law.informed(loop.nominal)), law_table=law.table(),
+        law=numbers(law.constants_with(loop.nominal)), law_table=law.table(),
         actuator=numbers(actuator.constants()), actuator_table=actuator.table(),
         vessel=numbers(loop.vessel.constants()), observer=numbers(observer.constants),
         s=np.concatenate([loop.start, actuator.rest(), loop.first_memory()]),
@@ -193,14 +201,16 @@ def wire(loop: ClosedLoop, plan: Plan, observer: Observer, rows: int = 1) -> Wir
 
 def names(loop: ClosedLoop) -> list[str]:
     """Names of a logged row's columns: time, state, row; a slot of size n has n columns."""
-    slots = [name for name, size in loop.controller.slots() for _ in range(size)]
-    signals = [*TARGET, *loop.controller.signals, *DEMAND, *LOADS, *loop.actuator.signals]
-    return ["time", *STATE, *loop.actuator.states, *slots, *signals]
+    law, actuator = loop.controller, loop.actuator
+    slots = [part for part, size in law.slots() for _ in range(size)]
+    states = [part.name for part in (*actuator.states, *slots)]
+    own, others = ([part.name for part in owner.signals] for owner in (law, actuator))
+    return ["time", *STATE, *states, *TARGET, "z_e", *own, *DEMAND, *LOADS, *others]
 
 
-def by_name(labels: list[str], table: Vector) -> dict[str, Vector]:
+def by_name(labels: list[str], table: Vector, about: Mapping[str, Signal]) -> dict[str, Vector]:
     """A table's columns by name; those of a vector together, shape (rows, size)."""
-    vectors = {name for name in labels if name in SIGNALS and SIGNALS[name].axes}
+    vectors = {name for name, part in about.items() if part.axes}
     columns: dict[str, list[int]] = {}
     for column, name in enumerate(labels):
         columns.setdefault(name, []).append(column)
@@ -210,14 +220,10 @@ def by_name(labels: list[str], table: Vector) -> dict[str, Vector]:
     }
 
 
-def _logged(loop: ClosedLoop, grid: TimeGrid, table: Vector) -> dict[str, Vector]:
+def _logged(loop: ClosedLoop, table: Vector) -> dict[str, Vector]:
     """The signals of a recording in some logged rows."""
-    named = by_name(names(loop), table)
-    signals = {name: column for name, column in named.items() if name not in TARGET[2:]}
-    if grid.hold_every and "z_e" in signals:  # the law's own goes back to its last sample
-        x_e, y_e = (signals[f"{axis}_d"] - signals[axis] for axis in "xy")
-        signals["z_e"] = np.sqrt(x_e * x_e + y_e * y_e)
-    return signals
+    named = by_name(names(loop), table, loop.about())
+    return {name: column for name, column in named.items() if name not in TARGET[2:]}
 
 
 def _record(
@@ -230,7 +236,7 @@ def _record(
     if status == "diverged":
         cause = cause or _culprit(wires, names(loop), reached * grid.step)
         message = f"diverged at t = {reached * grid.step:.6g} s: {cause}; {_last_words(signals)}"
-    fixed = loop.controller.fixed_signals()
+    fixed = {part.name: array for part, array in loop.controller.fixed_signals().items()}
     return Recording(status, loop.controller.label, signals, fixed, wires.seen, message)
 
 

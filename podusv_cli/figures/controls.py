@@ -8,7 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from podusv_cli.figures.curves import Span, compress, differ, draw_signal
-from podusv_cli.figures.panels import TIME
+from podusv_cli.figures.panels import PEAKS, TIME
+from podusv_cli.figures.sheet import figure
 from podusv_cli.figures.style import Shown, axis_label, legend, new_figure
 
 EARLY = 0.005  # of the run: where the peaks are
@@ -16,6 +17,11 @@ EARLY_ROWS = 20  # at least
 LOADS = (("tau_u", "tau_u_cmd"), ("tau_r", "tau_r_cmd"))
 
 
+@figure(
+    "controls", place=3, signals=("tau_u", "tau_r"),
+    caption="surge force and yaw moment on the hull, thin what the law asked for: the first "
+    "moments, the whole run, the settled part" + PEAKS,
+)  # fmt: skip
 def controls(runs: Sequence[Shown], columns: int) -> Figure:
     """Surge force and yaw moment: what acts on the hull, and thin what the law asked for."""
     wide = columns == 2
@@ -28,11 +34,11 @@ def controls(runs: Sequence[Shown], columns: int) -> Figure:
         for axes, (part, span) in zip(loads, spans.items(), strict=True):
             _panel(axes, runs, names, span)
             if not wide:
-                axes.set_title(f"{axis_label(names[0])}, {part}")
+                axes.set_title(f"{axis_label(runs, names[0])}, {part}")
             elif place == 0:
                 axes.set_title(part)
         if wide:
-            loads[0].set_ylabel(axis_label(names[0]))
+            loads[0].set_ylabel(axis_label(runs, names[0]))
     for axes in panels[-1]:
         axes.set_xlabel(TIME)
     limited = any(differ(run, *names) for run in runs for names in LOADS)

@@ -6,15 +6,20 @@ from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
-from podusv_cli.core.signal import SIGNALS
 from podusv_cli.figures.curves import compress, draw_curve, draw_signal, scaling
-from podusv_cli.figures.panels import grid
-from podusv_cli.figures.style import Shown, axis_label, legend, unit
+from podusv_cli.figures.panels import PEAKS, grid
+from podusv_cli.figures.sheet import figure
+from podusv_cli.figures.style import Shown, about, axis_label, legend, unit
 
 PAIRS = (("alpha_u", "beta_u"), ("alpha_r", "beta_r"))
 ERRORS = ("y_u", "y_r")
 
 
+@figure(
+    "filters", place=4, signals=("alpha_u", "alpha_r"),
+    caption="virtual controls (21), (30), thin, with what the filter makes of them (22), (31), and "
+    "the filter's error y = beta - alpha" + PEAKS,
+)  # fmt: skip
 def filters(runs: Sequence[Shown], columns: int) -> Figure:
     """Virtual control thin behind the filter's output; below or beside, what lies between them.
 
@@ -27,12 +32,13 @@ def filters(runs: Sequence[Shown], columns: int) -> Figure:
         for run in (run for run in runs if run.has(alpha)):
             used = run.during(beta if run.has(beta) else alpha, None)
             draw_curve(axes, used, fitted=run in scaling(runs), **run.look)
-        symbols = [SIGNALS[name].symbol for name in ((alpha, beta) if filtered else (alpha,))]
-        axes.set_ylabel(f"${', '.join(symbols)}$ [{unit(alpha)}]")
+        names = [name for name in (alpha, beta) if any(run.has(name) for run in runs)]
+        symbols = [about(runs, name).symbol for name in names]
+        axes.set_ylabel(f"${', '.join(symbols)}$ [{unit(about(runs, alpha))}]")
         compress(axes, runs, alpha)
     for axes, error in zip(panels[len(PAIRS) :], ERRORS, strict=False):
         draw_signal(axes, runs, error)
-        axes.set_ylabel(axis_label(error))
+        axes.set_ylabel(axis_label(runs, error))
         compress(axes, runs, error)
     legend(figure, columns, "virtual control before the filter" if filtered else "")
     return figure

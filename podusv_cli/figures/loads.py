@@ -11,12 +11,17 @@ from matplotlib.figure import Figure
 from podusv_cli.core.kernel import Vector
 from podusv_cli.figures.curves import draw_curve, draw_signal
 from podusv_cli.figures.panels import grid
+from podusv_cli.figures.sheet import figure
 from podusv_cli.figures.style import Shown, axis_label, legend
 
 SEA = ("b_u", "b_v", "b_r")
 COMMON: dict[str, str] = {"color": "#444444", "linestyle": "-", "label": "all runs"}
 
 
+@figure(
+    "loads", place=7, signals=("b_u", "b_v", "b_r", "saturated"),
+    caption="disturbance, and when the actuator limits the law",
+)  # fmt: skip
 def loads(runs: Sequence[Shown], columns: int) -> Figure:
     """The disturbance over time, once where all runs have the same; below, who is limited when."""
     sea = [name for name in SEA if any(run.has(name) for run in runs)]
@@ -24,7 +29,7 @@ def loads(runs: Sequence[Shown], columns: int) -> Figure:
     figure, panels = grid(len(sea) + bool(limited), columns)
     for axes, name in zip(panels, sea, strict=False):
         _disturbance(axes, runs, name)
-        axes.set_ylabel(axis_label(name))
+        axes.set_ylabel(axis_label(runs, name))
     if limited:
         _limits(panels[-1], limited)
     legend(figure, columns)

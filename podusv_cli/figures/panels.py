@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from podusv_cli.figures.curves import compress, draw_signal
+from podusv_cli.figures.sheet import Family
 from podusv_cli.figures.style import Shown, axis_label, legend, new_figure
 
 PANEL_HEIGHT = 1.35  # inches
 TIME = "time [s]"
 
-Family = Callable[[Sequence[Shown], int], Figure]
+PEAKS = "; where peaks dwarf the settled values the axis is logarithmic beyond these"
 
 
 def signals_over_time(
@@ -30,7 +31,7 @@ def signals_over_time(
         figure, panels = grid(len(shown), columns)
         for axes, name in zip(panels, shown, strict=True):
             draw_signal(axes, runs, name)
-            axes.set_ylabel(axis_label(name))
+            axes.set_ylabel(axis_label(runs, name))
             if name in logarithmic:
                 axes.set_yscale("log")
             if compressed:

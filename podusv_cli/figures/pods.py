@@ -9,12 +9,17 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from podusv_cli.figures.curves import THIN, draw_curve, scaling
+from podusv_cli.figures.sheet import figure
 from podusv_cli.figures.style import Shown, axis_label, legend, new_figure
 
 ROWS = (("n", "n_cmd"), ("n_part", "n_part_cmd"), ("delta", "delta_cmd"), ("power", ""))
 PANEL_HEIGHT = 1.5  # inches
 
 
+@figure(
+    "pods", place=10, signals=("n", "delta", "power"),
+    caption="propeller speeds, propulsion angles and power of every pod, thin what was asked for",
+)  # fmt: skip
 def pods(runs: Sequence[Shown], columns: int) -> Figure:
     """A row for each of speed, angle and power, a column for each pod; actual over commanded."""
     having = [run for run in runs if run.has("delta")]
@@ -23,7 +28,7 @@ def pods(runs: Sequence[Shown], columns: int) -> Figure:
     figure = new_figure(columns, 0.7 + PANEL_HEIGHT * len(rows))
     panels = figure.subplots(len(rows), count, sharex=True, sharey="row", squeeze=False)
     for line, names in zip(panels, rows, strict=True):
-        line[0].set_ylabel(axis_label(names[0]))
+        line[0].set_ylabel(axis_label(runs, names[0]))
         for pod, axes in enumerate(line):
             for run in having:
                 _draw(axes, run, names, pod, fitted=run in scaling(having))

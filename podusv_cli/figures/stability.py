@@ -15,8 +15,9 @@ from matplotlib.ticker import Locator
 from podusv_cli.core.kernel import Vector
 from podusv_cli.figures.curves import thinned
 from podusv_cli.figures.panels import TIME
-from podusv_cli.figures.style import Shown, axis_label, legend, new_figure
-from podusv_cli.theory.monitor import TERMS
+from podusv_cli.figures.sheet import figure
+from podusv_cli.figures.style import Shown, label, legend, new_figure
+from podusv_cli.theory.lyapunov import TERMS, V_DOT, V
 
 POINTS = 600  # of a stack; every column is a mean, so that no extreme stands for its surroundings
 FAR = 100.0  # a bound this many times above all of V is left out of the picture and told in words
@@ -30,6 +31,11 @@ OUTLINE: dict[str, Any] = {"color": "black", "linewidth": 0.9}
 SIDE_TICKS = 4  # at most, on either side of 0
 
 
+@figure(
+    "stability", place=8, signals=("V",),
+    caption="Lyapunov function (46) with its ultimate bound, its rate with what it should stay "
+    "below (49), and its terms, stacked, as parts of it; of a single run V itself is stacked, too",
+)  # fmt: skip
 def stability(runs: Sequence[Shown], columns: int) -> Figure:
     """V with its ultimate bound, V' with what it should stay below, and V's terms, run by run.
 
@@ -56,7 +62,7 @@ def stability(runs: Sequence[Shown], columns: int) -> Figure:
 
 def _curves(axes: Axes, runs: Sequence[Shown]) -> None:
     axes.set_yscale("log")
-    axes.set_ylabel(axis_label("V"))
+    axes.set_ylabel(label(V))
     for run in runs:
         axes.plot(*thinned(run.recording["time"], run.signal("V")), **run.look)
 
@@ -64,13 +70,13 @@ def _curves(axes: Axes, runs: Sequence[Shown]) -> None:
 def _stack(axes: Axes, runs: Sequence[Shown]) -> None:
     """V's terms on top of each other; the axis is logarithmic beyond the settled values."""
     (run,) = runs
-    terms = [_means(run.signal(name)) for name in TERMS]
+    terms = [_means(run.signal(term.name)) for term in TERMS]
     axes.stackplot(_means(run.recording["time"]), terms, colors=LAYERS.values(), linewidth=0.0)
-    V = run.signal("V")
-    axes.plot(*thinned(run.recording["time"], V), **OUTLINE, label="$V$")
-    _compress(axes, _settled(run, "V") or float(np.max(V)))
+    value = run.signal("V")
+    axes.plot(*thinned(run.recording["time"], value), **OUTLINE, label="$V$")
+    _compress(axes, _settled(run, "V") or float(np.max(value)))
     axes.set_ylim(bottom=0.0)
-    axes.set_ylabel(axis_label("V") + ", stacked")
+    axes.set_ylabel(label(V) + ", stacked")
 
 
 def _ultimate(axes: Axes, runs: Sequence[Shown]) -> None:
@@ -105,7 +111,7 @@ def _bounds(run: Shown) -> Iterator[tuple[float, float, float]]:
 
 
 def _rate(axes: Axes, runs: Sequence[Shown]) -> None:
-    axes.set_ylabel(axis_label("V_dot"))
+    axes.set_ylabel(label(V_DOT))
     runs = [run for run in runs if run.has("V_dot")]
     for run in runs:
         axes.plot(*thinned(run.recording["time"], run.signal("V_dot")), **run.look)
@@ -154,7 +160,7 @@ def _settled(run: Shown, name: str) -> float:
 def _shares(axes: Axes, run: Shown) -> list[PolyCollection]:
     """V's terms, stacked, each as its part of V; the layers."""
     time = run.recording["time"]
-    terms = np.stack([_means(run.signal(name)) for name in TERMS])
+    terms = np.stack([_means(run.signal(term.name)) for term in TERMS])
     total = terms.sum(axis=0)
     parts = np.divide(terms, total, out=np.zeros_like(terms), where=total > 0.0)
     layers = axes.stackplot(_means(time), parts, colors=LAYERS.values(), linewidth=0.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,7 +21,7 @@ from matplotlib.ticker import ScalarFormatter
 from podusv_cli.core import derived, escaping
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
-from podusv_cli.core.signal import SIGNALS
+from podusv_cli.core.signal import Signal
 from podusv_cli.scenario.model import Scenario
 
 FORMATS = ("png", "pdf", "svg")
@@ -142,15 +142,25 @@ def new_figure(columns: int, height: float) -> Figure:
     return figure
 
 
-def axis_label(name: str) -> str:
+def about(runs: Sequence[Shown], name: str) -> Signal:
+    """What a signal is, by the first of the runs that have it, else as podusv derives it."""
+    having = [run for run in runs if run.has(name)]
+    return derived.about(having[0].recording, name) if having else derived.DERIVED[name].signal
+
+
+def axis_label(runs: Sequence[Shown], name: str) -> str:
     """Symbol and unit of a signal as an axis shows them."""
-    signal = SIGNALS[name]
-    return f"${signal.symbol}$ [{unit(name)}]"
+    return label(about(runs, name))
 
 
-def unit(name: str) -> str:
+def label(signal: Signal) -> str:
+    """Symbol and unit of a signal."""
+    return f"${signal.symbol}$ [{unit(signal)}]"
+
+
+def unit(signal: Signal) -> str:
     """Unit of a signal with its powers raised."""
-    return re.sub(r"(?<=[a-z])(\d)", r"$^\1$", SIGNALS[name].unit)
+    return re.sub(r"(?<=[a-z])(\d)", r"$^\1$", signal.unit)
 
 
 def legend(figure: Figure, columns: int, thin: str = "") -> None:

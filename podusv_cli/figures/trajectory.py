@@ -14,6 +14,7 @@ from matplotlib.patches import Polygon, Rectangle
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
 from podusv_cli.figures.curves import Span, scaling
+from podusv_cli.figures.sheet import figure
 from podusv_cli.figures.style import TARGET_LOOK, Shown, legend, new_figure
 
 HULL = np.array([(0.5, 0.0), (0.25, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.25, -0.5)])
@@ -102,6 +103,10 @@ def hull_of(run: Shown, t: float, scale: float) -> Vector:
     return hull(x, y, psi, length=scale * run.length, beam=scale * run.beam)
 
 
+@figure(
+    "trajectory", place=1, signals=("x", "y"),
+    caption="tracks and target on a map; aside, the end of the run close up, framed on the map",
+)  # fmt: skip
 def trajectory(runs: Sequence[Shown], columns: int) -> Figure:
     """Tracks and target on a map, hulls enlarged to show the heading; the end of the run aside."""
     east, north = bounds(runs)

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from podusv_cli.figures.curves import draw_signal
 from podusv_cli.figures.panels import TIME
+from podusv_cli.figures.sheet import figure
 from podusv_cli.figures.style import Shown, axis_label, legend, new_figure
 
 THIN = 0.6  # points: bounds, each in its run's line style
@@ -18,6 +19,11 @@ LABELS = {"node_distance": "nearest node [widths]"}
 PANELS = ("node_distance", "activation", "y_u", "y_r")
 
 
+@figure(
+    "validity", place=9, signals=("V",),
+    caption="distance to the nearest network centre in widths, largest node output, filter errors, "
+    "and the sway speed with its bound (51)",
+)  # fmt: skip
 def validity(runs: Sequence[Shown], columns: int) -> Figure:
     """Distance to the nearest node, largest node output, filter errors, sway with its bound."""
     runs = [run for run in runs if run.has("V")]
@@ -27,7 +33,7 @@ def validity(runs: Sequence[Shown], columns: int) -> Figure:
     for place, name in enumerate(PANELS):
         axes = figure.add_subplot(cells[divmod(place, columns)])
         draw_signal(axes, runs, name)
-        axes.set_ylabel(LABELS.get(name) or axis_label(name))
+        axes.set_ylabel(LABELS.get(name) or axis_label(runs, name))
         if name == "node_distance":
             axes.axhline(REACH, color="#444444", linewidth=0.6)
     _sway(figure.add_subplot(cells[rows, :]), runs)
@@ -50,5 +56,5 @@ def _sway(axes: Axes, runs: Sequence[Shown]) -> None:
                     axes.plot([start, end], [side, side], color=run.color,
                               linewidth=THIN, linestyle=run.linestyle)  # fmt: skip
     axes.plot([], [], color="#444444", linewidth=THIN, label="thin: bound of $|v|$")
-    axes.set_ylabel(axis_label("v"))
+    axes.set_ylabel(axis_label(runs, "v"))
     axes.set_xlabel(TIME)

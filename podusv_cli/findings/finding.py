@@ -4,46 +4,41 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 
-from podusv_cli.core.finding_codes import CODES
+from podusv_cli.core import registry
+from podusv_cli.core.finding import Finding, Notice
 from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.findings.reference import Reference, reference
 from podusv_cli.paths.base import TARGET
 from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.words import unknown
+
+# A finding may stand beside the component that it is about.
+ROOMS = ("findings", "paths", "disturbances", "actuators", "controllers")
 
 
-@dataclass(frozen=True)
-class Finding:
-    """Something that a user should know: a code of `codes.CODES`, a scenario key, a sentence.
-
-    `runs` are labels of the runs that it is about, where the comparison has others as well.
-    """
-
-    code: str
-    where: str
-    text: str
-    runs: tuple[str, ...] = ()
-
-    def __str__(self) -> str:
-        """One line, as a command shows it."""
-        return f"warning[{self.code}]: {self.place}: {self.text}"
-
-    @property
-    def place(self) -> str:
-        """Runs and key: `dsc, pid: actuator`; the key alone where no run is named."""
-        return ": ".join(filter(None, (", ".join(self.runs), self.where)))
-
-    def as_json(self) -> dict[str, str]:
-        """What `--json` prints of a run and metrics.json holds."""
-        return {"code": self.code, "where": self.where, "text": self.text}
+@cache
+def notices() -> dict[str, Notice]:
+    """Every kind of finding by its code, in the order of the scenario's sections."""
+    found: dict[str, Notice] = {}
+    for room in ROOMS:
+        found |= registry.named(f"podusv_cli.{room}", Notice)
+    sections = list(Scenario.model_fields)
+    ordered = sorted(found.values(), key=lambda n: sections.index(n.about.partition(".")[0]))
+    return {notice.name: notice for notice in ordered}
 
 
-def found(code: str, text: str, where: str = "") -> Finding:
-    """A finding at its code's key, or at a key below or beside it."""
-    return Finding(code, where or CODES[code].key, text)
+def unknown_codes(scenario: Scenario) -> list[tuple[str, str]]:
+    """Key and sentence for every code in `silence` that no finding has; a check for `load`."""
+    codes = tuple(notices())
+    return [
+        (f"silence[{place}]", unknown(f"finding {code!r}", code, codes))
+        for place, code in enumerate(scenario.silence)
+        if code not in codes
+    ]
 
 
 def heard(findings: Iterable[Finding], scenario: Scenario) -> list[Finding]:
@@ -75,7 +70,7 @@ class Case:
         law, memory = loop.controller, loop.first_memory()
         x, target = np.array(loop.start), np.zeros(len(TARGET))
         loop.path.evaluate(0.0, bundle(loop.path.constants()), loop.path.table(), target)
-        k, table = bundle(law.informed(loop.nominal)), law.table()
+        k, table = bundle(law.constants_with(loop.nominal)), law.table()
         signals, rate = np.zeros(len(law.signals)), np.zeros(len(memory))
         work = np.zeros(law.workspace())
         try:
@@ -86,4 +81,4 @@ class Case:
             Exception
         ):  # plain Python's; a law's mistakes are told when it is asked, before the run
             signals[:] = np.nan
-        return dict(zip(law.signals, signals.tolist(), strict=True))
+        return dict(zip((part.name for part in law.signals), signals.tolist(), strict=True))

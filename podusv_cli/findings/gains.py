@@ -12,8 +12,8 @@ from podusv_cli.theory.bounds import Condition, ultimate_bound
 def conditions(scenario: Scenario) -> Iterator[str]:
     """A line for each law that the proof is about: lambda of (49), and which conditions fail."""
     for label, single in scenario.singles().items():
-        law = single.controller
-        if isinstance(law, PolarBackstepping):
+        law = single.controller.lyapunov()
+        if law is not None:
             yield f"{label}, conditions of the stability proof: {_said(law, single)}"
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import numpy as np
 
-from podusv_cli.controllers.tracking import TrackingController
+from podusv_cli.controllers.base import Approach
+from podusv_cli.core.finding import Sentences, before
 from podusv_cli.core.kernel import Vector, bundle
-from podusv_cli.findings.finding import Case, Finding, found
+from podusv_cli.findings.finding import Case
 from podusv_cli.findings.reference import FASTEST, drift, median
 from podusv_cli.paths.base import TARGET
 from podusv_cli.vessels.plant import sway_force
@@ -18,10 +19,10 @@ BESIDE = 1e-9  # s; how far from a break the target is looked at on both sides
 STABLE = 2.785  # step over time constant up to which RK4 decays
 AHEAD = 0.5  # of the largest surge force needed
 DELIVERED = 0.999  # of what is needed counts as all of it
-BREAKS = {  # what jumps: code, offset in TARGET, unit
-    "position": ("path-jump", 0, "m"),
-    "velocity": ("path-corner", 2, "m/s"),
-    "acceleration": ("path-bend", 4, "m/s2"),
+BREAKS = {  # what jumps: offset in TARGET, unit
+    "position": (0, "m"),
+    "velocity": (2, "m/s"),
+    "acceleration": (4, "m/s2"),
 }
 CONSEQUENCES: dict[str, Callable[[float, Case], str]] = {
     "position": lambda size, case: (
@@ -39,16 +40,14 @@ CONSEQUENCES: dict[str, Callable[[float, Case], str]] = {
 }
 
 
-def path_breaks(case: Case, what: str) -> Iterator[Finding]:
+def path_breaks(case: Case, what: str) -> Sentences:
     """Where the target's position, velocity or acceleration jumps within the run."""
-    code, offset, unit = BREAKS[what]
+    offset, unit = BREAKS[what]
     for at in case.scenario.path.breaks():
         if at.what == what and at.time < case.scenario.simulation.duration:
             size = float(np.hypot(*_jump(case, at.time)[offset : offset + 2]))
             meaning = CONSEQUENCES[what](size, case)
-            yield found(
-                code, f"the target's {what} jumps by {size:.3g} {unit} at {at.time:g} s; {meaning}"
-            )
+            yield f"the target's {what} jumps by {size:.3g} {unit} at {at.time:g} s; {meaning}"
 
 
 def _jump(case: Case, time: float) -> Vector:
@@ -59,22 +58,26 @@ def _jump(case: Case, time: float) -> Vector:
     return np.asarray(sides[1] - sides[0])
 
 
-def path_jump(case: Case) -> Iterator[Finding]:
+@before("path-jump", about="path", meaning="the target's position jumps")
+def path_jump(case: Case) -> Sentences:
     """A jump in position."""
     return path_breaks(case, "position")
 
 
-def path_corner(case: Case) -> Iterator[Finding]:
+@before("path-corner", about="path", meaning="the target's velocity jumps")
+def path_corner(case: Case) -> Sentences:
     """A jump in velocity."""
     return path_breaks(case, "velocity")
 
 
-def path_bend(case: Case) -> Iterator[Finding]:
+@before("path-bend", about="path", meaning="the target's acceleration jumps")
+def path_bend(case: Case) -> Sentences:
     """A jump in acceleration."""
     return path_breaks(case, "acceleration")
 
 
-def sway_drift(case: Case) -> Iterator[Finding]:
+@before("sway-drift", about="path", meaning="the sway load drifts the hull faster than the target")
+def sway_drift(case: Case) -> Sentences:
     """The mean sway load pushes the hull sideways faster than the target moves."""
     seen = case.reference
     lost = np.isnan(seen.nu[:, 1])
@@ -83,38 +86,38 @@ def sway_drift(case: Case) -> Iterator[Finding]:
         speed = abs(drift(case.scenario, load))
         shown = f"at {speed:.2g} m/s" if np.isfinite(speed) else "without limit"
         fastest = float(seen.speed[lost].max())
-        yield found(
-            "sway-drift",
+        yield (
             f"the mean sway load of {load:.2g} N pushes the hull sideways {shown}, and during "
             f"{lost.mean():.0%} of the run (target at up to {fastest:.2g} m/s) no heading makes up "
-            "for that: it cannot be followed; check the sway damping, the load and the speed",
+            "for that: it cannot be followed; check the sway damping, the load and the speed"
         )
 
 
-def sway_unstable(case: Case) -> Iterator[Finding]:
+@before("sway-unstable", about="controller.k_ze", meaning="pointing at the target makes sway grow")
+def sway_unstable(case: Case) -> Sentences:
     """A hull that points at the target slides away sideways.
 
     With d the sway damping at the steady sway, growing sway is held by nonlinear damping where that
     catches up with m11 k_ze; it grows further away than `sliding_distance`.
     """
-    law, vessel = case.scenario.controller, case.scenario.vessel
-    if not isinstance(law, TrackingController):
+    approach, vessel = case.scenario.controller.approach(), case.scenario.vessel
+    if approach is None:
         return
-    damping, limit = _damping(case, vessel.m11 * law.k_ze)
+    drive = vessel.m11 * approach.gain
+    damping, limit = _damping(case, drive)
     speed = median(case.reference.speed)
-    if vessel.m11 * law.k_ze > damping and limit > RUNAWAY * speed:
+    if drive > damping and limit > RUNAWAY * speed:
         reach = f"up to {limit:.2g} m/s" if limit < FASTEST else "without limit"
-        yield found(
-            "sway-unstable",
-            f"m11 k_ze = {vessel.m11 * law.k_ze:.3g} kg/s exceeds the sway damping "
-            f"{damping:.3g} kg/s: further than {sliding_distance(case, damping):.2g} m from the "
-            f"target, sway of a hull that points at it grows, {reach}, against the target's "
-            f"{speed:.2g} m/s; take k_ze below {damping / vessel.m11:.2g} 1/s, or a hull with more "
-            "sway damping",
+        distance = sliding_distance(case, approach, damping)
+        yield (
+            f"m11 k_ze = {drive:.3g} kg/s exceeds the sway damping {damping:.3g} kg/s: further "
+            f"than {distance:.2g} m from the target, sway of a hull that points at it grows, "
+            f"{reach}, against the target's {speed:.2g} m/s; take k_ze below "
+            f"{damping / vessel.m11:.2g} 1/s, or a hull with more sway damping"
         )
 
 
-def sliding_distance(case: Case, damping: float) -> float:
+def sliding_distance(case: Case, approach: Approach, damping: float) -> float:
     """Distance [m] from the target beyond which sway grows; `damping` d [kg/s] is below m11 k_ze.
 
     For a hull that points at a target of speed U from the distance D, psi_e = 0 and u = alpha_u of
@@ -126,12 +129,9 @@ def sliding_distance(case: Case, damping: float) -> float:
     About theta = v = 0 the determinant U d/(m22 D) is positive and the trace is that of growth for
     D > (U (m22 - m11) + m11 k_ze standoff)/(m11 k_ze - d).
     """
-    law, vessel = case.scenario.controller, case.scenario.vessel
-    if not isinstance(law, TrackingController):
-        return np.inf
-    speed = median(case.reference.speed)
-    drive = vessel.m11 * law.k_ze
-    free = speed * (vessel.m22 - vessel.m11) + drive * law.standoff
+    vessel, speed = case.scenario.vessel, median(case.reference.speed)
+    drive = vessel.m11 * approach.gain
+    free = speed * (vessel.m22 - vessel.m11) + drive * approach.standoff
     return max(0.0, free / (drive - damping))
 
 
@@ -152,7 +152,8 @@ def _damping(case: Case, drive: float) -> tuple[float, float]:
     return damping, float(growths[held.index(True)]) if any(held) else FASTEST
 
 
-def thrust_short(case: Case) -> Iterator[Finding]:
+@before("thrust-short", about="actuator", meaning="keeping up takes more than the actuator gives")
+def thrust_short(case: Case) -> Sentences:
     """Keeping up takes more surge force or yaw moment than the actuator delivers."""
     seen = case.reference
     worst = np.abs(seen.demand).argmax(axis=0)
@@ -163,37 +164,35 @@ def thrust_short(case: Case) -> Iterator[Finding]:
         needed, got = float(demand[axis]), float(actuator.settled(x, demand)[2 * axis])
         if got * np.sign(needed) < DELIVERED * abs(needed):
             mean = float(seen.demand[:, axis].mean())
-            yield found(
-                "thrust-short",
+            yield (
                 f"keeping up takes a {what} of {needed:.3g} {unit} at "
                 f"t = {seen.time[worst[axis]]:.0f} s ({mean:.3g} on average) and the actuator "
-                f"gives {got:.3g} {unit}; raise its limit or slow the target down",
+                f"gives {got:.3g} {unit}; raise its limit or slow the target down"
             )
     yield from _driven_ahead(case, int(worst[1]))
 
 
-def _driven_ahead(case: Case, row: int) -> Iterator[Finding]:
+def _driven_ahead(case: Case, row: int) -> Sentences:
     """The largest yaw moment comes with more surge force than keeps up."""
     seen = case.reference
     x = np.concatenate([np.zeros(3), np.nan_to_num(seen.nu[row])])
     needed, moment = seen.demand[row].tolist()
     got = float(case.scenario.actuator.settled(x, seen.demand[row])[0])
     if got - needed > AHEAD * float(np.abs(seen.demand[:, 0]).max()):
-        yield found(
-            "thrust-short",
+        yield (
             f"the yaw moment of {moment:.3g} N m at t = {seen.time[row]:.0f} s comes with a surge "
             f"force of {got:.3g} N where {needed:.3g} N keeps up, and the hull runs ahead; let the "
-            "pods turn further, or take priority: surge",
+            "pods turn further, or take priority: surge"
         )
 
 
-def stiff_actuator(case: Case) -> Iterator[Finding]:
+@before("stiff-actuator", about="simulation.step", meaning="a pod's lag too short for RK4's step")
+def stiff_actuator(case: Case) -> Sentences:
     """A lag of the actuator is too short for RK4, whose steps of -x/lag grow beyond 2.78 lags."""
     lag, step = case.scenario.actuator.shortest_lag(), case.scenario.simulation.step
     if step > STABLE * lag:
-        yield found(
-            "stiff-actuator",
+        yield (
             f"the actuator's lag of {lag:g} s is too short for RK4 with {step:g} s: it would "
             f"not settle on what is commanded; take a step below {STABLE * lag:.2g} s, or a "
-            "longer lag",
+            "longer lag"
         )

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 from podusv_cli.core.component import unit_of
-from podusv_cli.findings.finding import Case, Finding, found
+from podusv_cli.core.finding import At, Sentences, before
+from podusv_cli.findings.finding import Case
 from podusv_cli.vessels.vessel import Vessel
 
 BRAKES = ("X_uu", "X_uuu", "Y_vv", "N_rr")  # the linear ones cannot be positive at all
 TURN = 2.0 * math.pi
 
 
-def damping_sign(case: Case) -> Iterator[Finding]:
+@before("damping-sign", about="vessel", meaning="nonlinear damping drives the motion")
+def damping_sign(case: Case) -> Sentences:
     """Nonlinear damping on the diagonal that drives what it should brake."""
     vessels = {"vessel": case.scenario.vessel, "nominal": case.scenario.nominal}
     told = set[tuple[str, float]]()
@@ -23,23 +24,22 @@ def damping_sign(case: Case) -> Iterator[Finding]:
             if number > 0.0 and (name, number) not in told:
                 told.add((name, number))
                 unit = unit_of(Vessel.model_fields[name])
-                yield found(
-                    "damping-sign",
+                yield At(
+                    f"{section}.{name}",
                     f"{number:g} {unit} drives the motion that it should brake, the more the "
                     f"faster it is; damping is negative here: {-number:g}?",
-                    f"{section}.{name}",
                 )
 
 
-def large_angle(case: Case) -> Iterator[Finding]:
+@before("large-angle", about="start.psi", meaning="an angle is beyond a whole turn")
+def large_angle(case: Case) -> Sentences:
     """An angle of the start or the path beyond a whole turn."""
     for section, part in (("start", case.scenario.start), ("path", case.scenario.path)):
         for name, field in type(part).model_fields.items():
             if unit_of(field) == "rad" and abs(getattr(part, name)) > TURN:
                 angle = getattr(part, name)
-                yield found(
-                    "large-angle",
+                yield At(
+                    f"{section}.{name}",
                     f"{angle:g} rad is more than a whole turn; angles are in radians, and "
                     f"{angle:g} deg is {math.radians(angle):.4g}",
-                    f"{section}.{name}",
                 )

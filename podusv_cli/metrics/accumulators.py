@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from podusv_cli.actuators.propeller import DELTA
 from podusv_cli.core.kernel import Vector, kernel, tail
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import ClosedLoop, Observer
@@ -102,7 +103,10 @@ def observer(
 ) -> Observer:
     """An observer for `engine.simulate` that gathers what `summarise` needs."""
     plan = loop.layout(grid)
-    columns = {name: plan.flags + i for i, name in reversed([*enumerate(loop.actuator.signals)])}
+    columns = {
+        name: plan.flags + i
+        for i, name in reversed([*enumerate(part.name for part in loop.actuator.signals)])
+    }
     constants = {
         "steady_from": grid.last_part(steady_fraction),
         "settling_radius": settling_radius,
@@ -110,7 +114,7 @@ def observer(
         "tau": float(plan.tau),
         "saturated": float(columns.get("saturated", -1)),
     }
-    pods = loop.actuator.states.count("delta")
+    pods = loop.actuator.states.count(DELTA)
     if not pods:
         return Observer(watch, constants, SIZE)
     constants |= {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import model_validator
@@ -36,6 +36,7 @@ class Waypoints(Path):
     """
 
     kind: Literal["waypoints"] = "waypoints"
+    rows_of: ClassVar[dict[str, str]] = {"file": "points"}
     file: str | None = value(
         None, "", "CSV file with one `x,y` [m] a line, beside the scenario; read into `points`"
     )

@@ -7,14 +7,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cache
 
+from podusv_cli.core import registry
 from podusv_cli.core.component import Component, unit_of
 from podusv_cli.core.errors import PodusvError
-from podusv_cli.core.finding_codes import CODES
-from podusv_cli.core.signal import SIGNALS
+from podusv_cli.core.signal import Signal
 from podusv_cli.scenario.annotations import choices, joined, sections
 from podusv_cli.scenario.fields import MISSING, NAME, NUMBER, Key, keys, range_of, type_of
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.presets import pod_names, pod_text, vessel_names, vessel_text
+from podusv_cli.scenario.presets import preset_names, preset_text, with_presets
 from podusv_cli.scenario.words import as_written, did_you_mean
 
 # What a file may leave out although the model has no default for it, and where it comes from.
@@ -51,21 +51,22 @@ EXTENDS = Row(
 )
 
 
-def explain(key: str | None = None) -> list[Row]:
-    """Rows for a key, a kind, a section, a signal, a preset, a finding or, with None, all sections.
+def explain(key: str | None = None, others: Iterable[str] = ()) -> list[Row]:
+    """Rows for a key, a kind, a section, a signal, a preset or, with None, all sections.
 
     `controller` gives its kinds, `controller.pid` that kind's keys, `controller.k_ze` or just
-    `k_ze` one key, and `pid` alone the kind. Raises UnknownKeyError, with what was probably meant.
+    `k_ze` one key, and `pid` alone the kind. Raises UnknownKeyError, with what was probably meant;
+    `others` are names that are explained elsewhere.
     """
     if key is None:
         return [EXTENDS, *_together(entry for entry in _keys() if len(entry.path) == 1)]
     if key == EXTENDS.key:
         return [EXTENDS]
     place = tuple(NUMBER if step.isdecimal() else step for step in key.split("."))
-    parts = (_signal, _named, _kinds_named, _presets, _finding)
+    parts = (_signal, _named, _kinds_named, _presets)
     found = _at(place) or [row for look in parts for row in look(key)]
     if not found:
-        raise UnknownKeyError(f"{key}: no such name{did_you_mean(key, _names())}")
+        raise UnknownKeyError(f"{key}: no such name{did_you_mean(key, [*_names(), *others])}")
     return found
 
 
@@ -101,7 +102,8 @@ def _names() -> list[str]:
         (e.path, e.route, e.path[-1:], (*e.path[:1], e.kind)[: 1 + bool(e.kind)]) for e in _keys()
     ]
     keyed = [".".join(name) for names in asked for name in names]
-    return list(dict.fromkeys([*keyed, *SIGNALS, *vessel_names(), *pod_names(), *CODES]))
+    presets = [name for _, given in with_presets().values() for name in preset_names(given)]
+    return list(dict.fromkeys([*keyed, *(signal.name for signal in signals()), *presets]))
 
 
 def _at(place: tuple[str, ...]) -> list[Row]:
@@ -153,28 +155,30 @@ def _items(place: tuple[str, ...]) -> tuple[tuple[str, ...], ...]:
     return (*place, NAME), (*place, NUMBER)
 
 
+@cache
+def signals() -> tuple[Signal, ...]:
+    """Every signal that a run of podusv can log or give; a name may have several meanings."""
+    rooms = ("core", "controllers", "actuators", "theory")
+    return tuple(registry.signals(*(f"podusv_cli.{room}" for room in rooms)))
+
+
 def _signal(name: str) -> list[Row]:
-    signal = SIGNALS.get(name)
-    return [Row(name, signal.meaning, "signal", signal.unit)] if signal else []
+    found = [signal for signal in signals() if signal.name == name]
+    return [Row(name, signal.meaning, "signal", signal.unit) for signal in found]
 
 
 def _presets(name: str) -> list[Row]:
-    """The vessel and the set of pods of this name: where the numbers come from, what they are for.
-
-    Their keys are those of `vessel` and of `actuator.pod`.
-    """
-    found = [(vessel_text, "vessel (vessel.preset)")] * (name in vessel_names())
-    found += [(pod_text, "set of pods (actuator.preset)")] * (name in pod_names())
+    """Every preset of this name: where its numbers come from, and what they hold for."""
     return [
-        Row(name, f"{text(name, 'source')} Validity: {text(name, 'validity')}", what)
-        for text, what in found
+        Row(
+            name,
+            f"{preset_text(presets, name, 'source')} "
+            f"Validity: {preset_text(presets, name, 'validity')}",
+            f"{presets.noun} ({key}.preset)",
+        )
+        for key, (_, presets) in with_presets().items()
+        if name in preset_names(presets)
     ]
-
-
-def _finding(name: str) -> list[Row]:
-    code = CODES.get(name)
-    what = f"finding about {code.key}, told {code.when} a run" if code else ""
-    return [Row(name, code.meaning, what)] if code else []
 
 
 def _together(entries: Iterable[Key]) -> list[Row]:
@@ -204,7 +208,9 @@ def _row(entry: Key) -> Row:
 def _choices(entry: Key) -> tuple[str, ...]:
     """The words that a value may be; of a kind, all that its section has."""
     if entry.path[-1] == "preset":
-        return pod_names() if entry.path[0] == "actuator" else vessel_names()
+        section = entry.path[0].replace("nominal", "vessel")
+        _, presets = with_presets()[".".join(filter(None, (section, entry.kind)))]
+        return preset_names(presets)
     if entry.path[-1] == "kind":
         above = (other for other in _keys() if other.path == entry.path[:-1])
         return tuple(kind for other in above for kind in sections(other.field.annotation))

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from podusv_cli.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.core.quantities import bytes_in_words, time_in_words
 from podusv_cli.engine.row_table import NUMBER, PIECE
 from podusv_cli.engine.simulate import names
@@ -15,14 +14,13 @@ from podusv_cli.scenario.load import resolved_yaml, values
 from podusv_cli.scenario.messages import Check
 from podusv_cli.scenario.model import Scenario, Simulation
 from podusv_cli.scenario.yaml_text import MAX_CHARACTERS, MAX_NODES
+from podusv_cli.theory import monitor
 
 MOST_STEPS = 10**8
 MOST_CONTENT = 4 * 10**9  # bytes; what podusv reads back
 MOST_RUNS = 1000  # of a comparison; the manifest of 1 300 with long names would be refused
 ESCAPED, LINE = 10, 60  # characters that one may become in resolved.yaml; of a key, at the most
 HELD = 256 * 2**20  # bytes of a log that is held in memory; a larger one goes to the disk in pieces
-MONITORED = 15  # numbers that the stability monitor adds to a row, whatever the law
-UNLOGGED = 11  # more, which it needs until the run is made
 # Rough costs on one core, see benchmarks/results.md: a step, a step's part for each number of the
 # law's memory, both with machine code and in plain Python; and what a byte of log takes to be
 # watched, packed and written.
@@ -72,12 +70,14 @@ class Size:
 def estimate(scenario: Scenario) -> Size:
     """The size of one run, with `controller`; nothing is allocated that grows with it."""
     grid, law = scenario.time_grid(), scenario.controller
-    columns = len(names(scenario.closed_loop())) - len(TARGET[2:]) + _monitored(scenario)
+    loop, sampled = scenario.closed_loop(), scenario.control.period > 0
+    monitored = len(monitor.signals(loop, sampled=sampled)) if scenario.log.monitor else 0
+    columns = len(names(loop)) - len(TARGET[2:]) + monitored
     content = grid.rows * columns * NUMBER
     step = STEP + MEMORY * sum(size for _, size in law.slots())
     pace = 1.0 if scenario.simulation.compiled else PLAIN
     seconds = START + grid.steps * step * pace + content * BYTE
-    unlogged = grid.rows * UNLOGGED * NUMBER if _monitored(scenario) else 0
+    unlogged = grid.rows * len(monitor.UNLOGGED) * NUMBER if monitored else 0
     scratch = content + unlogged if content > HELD else 0
     return Size(grid.steps, grid.rows, content, seconds, scratch)
 
@@ -91,13 +91,6 @@ def needed(sizes: Sequence[Size], at_once: int) -> float:
 def largest(scenario: Scenario) -> Size:
     """Of the runs of a comparison the one with the largest log."""
     return max(map(estimate, scenario.singles().values()), key=lambda size: size.content)
-
-
-def _monitored(scenario: Scenario) -> int:
-    if not (scenario.log.monitor and isinstance(scenario.controller, PolarBackstepping)):
-        return 0
-    filtered = 2 * ("beta_u" in names(scenario.closed_loop()))
-    return MONITORED + filtered + (scenario.control.period == 0.0)
 
 
 def limits(

@@ -23,7 +23,7 @@ from podusv_cli.scenario.annotations import (
 )
 from podusv_cli.scenario.fields import NAME, NUMBER, keys, wanted
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.yaml_tree import Fault, Node, Route, dotted, follow, plain
+from podusv_cli.scenario.yaml_tree import Fault, Node, Route, dotted, follow, plain, route
 
 MOST_PLACES = 4  # of a key, in a message
 
@@ -56,7 +56,7 @@ def check(root: Node, faults: list[Fault], more: Sequence[Check] = ()) -> Scenar
         faults.extend(dict.fromkeys(_faults(root, error)))
         return None
     for key, text in chain(scenario.misfits(), *(look(scenario) for look in more)):
-        faults.append(Fault(follow(root, tuple(key.split(".")))[-1].mark, key, text))
+        faults.append(Fault(follow(root, route(key))[-1].mark, key, text))
     return scenario
 
 

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from podusv_cli.actuators.base import Actuator
 from podusv_cli.controllers.base import Controller
 from podusv_cli.core.component import Component, value
-from podusv_cli.core.finding_codes import CODES
+from podusv_cli.core.errors import LawError
 from podusv_cli.core.registry import any_of
+from podusv_cli.core.signal import Signal
 from podusv_cli.disturbances.base import Disturbance
 from podusv_cli.engine.grid import TimeGrid, whole_steps
 from podusv_cli.engine.simulate import ClosedLoop
 from podusv_cli.paths.base import Path
+from podusv_cli.theory import monitor
 from podusv_cli.vessels.vessel import Vessel
 
 if TYPE_CHECKING:
@@ -22,13 +24,11 @@ if TYPE_CHECKING:
     AnyController = Controller
     AnyDisturbance = Disturbance
     AnyPath = Path
-    AnyCode = str
 else:
     AnyActuator = any_of("podusv_cli.actuators", Actuator)
     AnyController = any_of("podusv_cli.controllers", Controller)
     AnyDisturbance = any_of("podusv_cli.disturbances", Disturbance)
     AnyPath = any_of("podusv_cli.paths", Path)
-    AnyCode = Literal.__getitem__(tuple(CODES))
 
 
 Misfits = Iterator[tuple[str, str]]  # keys, and what is wrong with them
@@ -141,7 +141,7 @@ class Scenario(Component):
     control: Control = value(Control(), "", "sampling of the law")
     log: Log = value(Log(), "", "logging")
     metrics: MetricSettings = value(MetricSettings(), "", "windows and thresholds of the metrics")
-    silence: tuple[AnyCode, ...] = value(
+    silence: tuple[str, ...] = value(
         (), "", "codes of findings that are not to be shown; see docs/findings.md", strict=False
     )
 
@@ -184,7 +184,7 @@ class Scenario(Component):
 
     def misfits(self) -> list[tuple[str, str]]:
         """Key and sentence for every pair of values that cannot go together."""
-        return [*self._times(), *self._samples(), *self._names()]
+        return [*self._times(), *self._samples(), *self._names(), *self._signals()]
 
     def _laws(self) -> dict[str, Controller]:
         several = {f"controllers.{label}": law for label, law in self.controllers.items()}
@@ -217,6 +217,19 @@ class Scenario(Component):
             if period and sample and not whole_steps(sample, period):
                 text = f"{sample:g} s is no whole number of control periods of {period:g} s"
                 yield f"{key}.difference_step", text + _near(sample, period)
+
+    def about(self) -> dict[str, Signal]:
+        """Every signal of the run's log by name. Raises LawError where two have one name."""
+        loop, sampled = self.closed_loop(), self.control.period > 0
+        return monitor.about(loop, sampled=sampled) if self.log.monitor else loop.about()
+
+    def _signals(self) -> Misfits:
+        several = {f"controllers.{label}": law for label, law in self.controllers.items()}
+        for key, law in (several or {"controller": self.controller}).items():
+            try:
+                self.model_copy(update={"controller": law}).about()
+            except LawError as error:
+                yield key, str(error)
 
     def _names(self) -> Misfits:
         for label in self.controllers:

@@ -8,69 +8,70 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import cache
 from importlib.resources import files
-from importlib.resources.abc import Traversable
 from pathlib import Path
 
-from podusv_cli.core.component import Component
+from podusv_cli.core.component import Component, Presets
 from podusv_cli.scenario.annotations import sections
 from podusv_cli.scenario.fields import PATTERNS_IN_WORDS, limits
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.words import found, quoted, unknown
 from podusv_cli.scenario.yaml_text import MAX_NODES, read, read_text, resolve
 from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, merge, overlay
-from podusv_cli.vessels.vessel import COEFFICIENTS, Vessel
+from podusv_cli.vessels.vessel import COEFFICIENTS, VESSELS, Vessel
 
 MAX_POINTS = MAX_NODES // 4  # a point is three values, and the resolved scenario has to be readable
 MOST_FAULTS = 10  # in one file of points
 HEADER = re.compile(r'\s*"?(?!nan|inf)[a-z]', re.IGNORECASE)
-VESSELS, ACTUATORS = files("podusv_cli.vessels"), files("podusv_cli.actuators")
 
 
-def _names_in(folder: Traversable) -> tuple[str, ...]:
-    names = (Path(entry.name) for entry in folder.iterdir())
+@cache
+def preset_names(presets: Presets) -> tuple[str, ...]:
+    """Names of the files that podusv brings along, sorted."""
+    names = (Path(entry.name) for entry in files(presets.package).iterdir())
     return tuple(sorted(name.stem for name in names if name.suffix == ".yaml"))
 
 
-@cache
-def vessel_names() -> tuple[str, ...]:
-    """Names of the vessels that podusv brings along, sorted."""
-    return _names_in(VESSELS)
+def preset_file(presets: Presets, name: str, faults: list[Fault]) -> Node | None:
+    """The values of a preset by its name, one of `preset_names`."""
+    text = files(presets.package).joinpath(f"{name}.yaml").read_text("utf-8")
+    return read(text, f"{presets.file} {name}.yaml", faults, placed=False)
 
 
-@cache
-def pod_names() -> tuple[str, ...]:
-    """Names of the sets of pods that podusv brings along, sorted."""
-    return _names_in(ACTUATORS)
-
-
-def vessel_file(name: str, faults: list[Fault]) -> Node | None:
-    """The parameters of a vessel by its name, one of `vessel_names()`."""
-    text = VESSELS.joinpath(f"{name}.yaml").read_text("utf-8")
-    return read(text, f"vessel file {name}.yaml", faults, placed=False)
-
-
-def vessel_text(name: str, key: str) -> str:
-    """A text, such as `source`, from a vessel's file."""
-    node = vessel_file(name, [])
+def preset_text(presets: Presets, name: str, key: str) -> str:
+    """A text, such as `source`, from a preset's file."""
+    node = preset_file(presets, name, [])
     return str(node.get(key)) if node else ""
 
 
-def pod_file(name: str, faults: list[Fault]) -> Node | None:
-    """A set of pods by its name, one of `pod_names()`."""
-    text = ACTUATORS.joinpath(f"{name}.yaml").read_text("utf-8")
-    return read(text, f"pod file {name}.yaml", faults, placed=False)
-
-
-def pod_text(name: str, key: str) -> str:
-    """A text, such as `source`, from the file of a set of pods."""
-    node = pod_file(name, [])
-    return str(node.get(key)) if node else ""
+def with_presets() -> dict[str, tuple[type[Component], Presets]]:
+    """Every class of components that has presets, and these, by `section.kind`."""
+    parts = {name: sections(field.annotation) for name, field in Scenario.model_fields.items()}
+    return {
+        ".".join(filter(None, (name, kind))): (model, model.presets)
+        for name, models in parts.items()
+        for kind, model in models.items()
+        if model.presets and name != "nominal"
+    }
 
 
 def complete(root: Node, faults: list[Fault]) -> Node:
     """The tree with everything filled in that it takes from elsewhere."""
-    for fill in (_without_removed, _name, _vessel, _nominal, _pods, _points, _controllers):
+    for fill in (_without_removed, _name, _vessel, _nominal, _sections, _controllers):
         root = fill(root, faults)
+    return root
+
+
+def _sections(root: Node, faults: list[Fault]) -> Node:
+    """Every section with kinds, with what its kind takes from presets and from files of rows."""
+    for name, field in Scenario.model_fields.items():
+        given = root.mapping.get(name)
+        model = sections(field.annotation).get(str(given.get("kind"))) if given else None
+        if given and model and given.mapping:
+            if model.presets:
+                given = _over_preset(given, name, model.presets, faults)
+            for file, rows in model.rows_of.items():
+                given = _rows_in(given, name, (file, rows), faults)
+            root = root.with_entry(name, given)
     return root
 
 
@@ -126,13 +127,13 @@ def _from_preset(given: Node, key: str, faults: list[Fault]) -> Node:
     preset = given.mapping.get("preset")
     if preset is None or preset.content == "":
         return _whole(given, key, faults)
-    if preset.content in vessel_names():
-        base = vessel_file(str(preset.content), faults)
+    if preset.content in preset_names(VESSELS):
+        base = preset_file(VESSELS, str(preset.content), faults)
         assert base
         return _sourced(merge(base, given))
     if not preset.faulty:
         what = f"vessel {found(preset.content, preset.text)}"
-        text = unknown(what, str(preset.content), vessel_names())
+        text = unknown(what, str(preset.content), preset_names(VESSELS))
         faults.append(Fault(preset.mark, f"{key}.preset", text))
         given = given.with_entry("preset", replace(preset, content=None, faulty=True))
     return replace(given, faulty=True)
@@ -144,7 +145,7 @@ def _whole(given: Node, key: str, faults: list[Fault]) -> Node:
     lacking = [name for name, field in fields if field.is_required() and name not in given.mapping]
     if not lacking or given.faulty:
         return given
-    text = f"missing (allowed: {', '.join(vessel_names())}); a vessel without one needs "
+    text = f"missing (allowed: {', '.join(preset_names(VESSELS))}); a vessel without one needs "
     faults.append(Fault(given.mark, f"{key}.preset", text + ", ".join(lacking)))
     return replace(given, faulty=True)
 
@@ -154,8 +155,8 @@ def _sourced(vessel: Node) -> Node:
 
     A source that is not the preset's own is left as it is.
     """
-    preset, source = vessel.get("preset"), vessel.mapping.get("source")
-    base = vessel_file(preset, []) if preset in vessel_names() else None
+    name, source = vessel.get("preset"), vessel.mapping.get("source")
+    base = preset_file(VESSELS, name, []) if name in preset_names(VESSELS) else None
     if not base or not source or not str(source.content).startswith(_stem(base)):
         return vessel
     numbers = [name for name in COEFFICIENTS if name in Vessel.model_fields]
@@ -174,42 +175,36 @@ def _differs(vessel: Node, base: Node, name: str) -> bool:
     return bool(here != (Vessel.model_fields[name].default if there is None else there))
 
 
-def _pods(root: Node, faults: list[Fault]) -> Node:
-    """The pods of `actuator.preset`, where there is one, below what is given."""
-    given = root.mapping.get("actuator")
-    preset = given.mapping.get("preset") if given else None
-    if not given or not preset or given.get("kind") != "pod" or preset.content == "":
-        return root
-    if preset.content not in pod_names():
-        if preset.faulty:
-            return root
-        what = f"set of pods {found(preset.content, preset.text)}"
-        faults.append(
-            Fault(preset.mark, "actuator.preset", unknown(what, str(preset.content), pod_names()))
-        )
-        wrong = given.with_entry("preset", replace(preset, content=None, faulty=True))
-        return root.with_entry("actuator", replace(wrong, faulty=True))
-    base = pod_file(preset.content, faults)
-    return root.with_entry("actuator", merge(base, given)) if base else root
+def _over_preset(given: Node, key: str, presets: Presets, faults: list[Fault]) -> Node:
+    """What is given over the values of its preset, where it names one."""
+    preset, names = given.mapping.get("preset"), preset_names(presets)
+    if preset is None or preset.content == "" or preset.faulty:
+        return given
+    if preset.content in names:
+        base = preset_file(presets, str(preset.content), faults)
+        return merge(base, given) if base else given
+    what = f"{presets.noun} {found(preset.content, preset.text)}"
+    faults.append(Fault(preset.mark, f"{key}.preset", unknown(what, str(preset.content), names)))
+    wrong = given.with_entry("preset", replace(preset, content=None, faulty=True))
+    return replace(wrong, faulty=True)
 
 
-def _points(root: Node, faults: list[Fault]) -> Node:
-    """Waypoints from the CSV file that `path.file` names, in place of the name."""
-    path = root.mapping.get("path")
-    file = path.mapping.get("file") if path else None
-    if not path or not file or path.get("kind") != "waypoints" or not isinstance(file.content, str):
-        return root
-    if path.get("points"):
-        faults.append(Fault(file.mark, "path.file", "give either file or points, not both"))
-        return root
+def _rows_in(given: Node, section: str, keys: tuple[str, str], faults: list[Fault]) -> Node:
+    """The rows of the CSV file that one key names, under the other key in place of the name."""
+    key, rows_key = keys
+    file = given.mapping.get(key)
+    if not file or not isinstance(file.content, str):
+        return given
+    if given.get(rows_key):
+        text = f"give either {key} or {rows_key}, not both"
+        faults.append(Fault(file.mark, f"{section}.{key}", text))
+        return given
     name = os.path.join(os.path.dirname(file.mark.source) if file.mark.line else "", file.content)
     before = len(faults)
-    text = read_text(name, file.mark, "path.file", faults)
-    rows = list(_rows(text or "", name, faults))
-    points = Node(tuple(rows), Mark(name), faulty=len(faults) > before)
-    rest = {key: entry for key, entry in path.mapping.items() if key != "file"}
-    filled = replace(path, content=rest | {"points": points}, faulty=path.faulty or points.faulty)
-    return root.with_entry("path", filled)
+    text = read_text(name, file.mark, f"{section}.{key}", faults) or ""
+    rows = Node(tuple(_rows(text, name, faults)), Mark(name), faulty=len(faults) > before)
+    rest = {name: entry for name, entry in given.mapping.items() if name != key}
+    return replace(given, content=rest | {rows_key: rows}, faulty=given.faulty or rows.faulty)
 
 
 def _controllers(root: Node, faults: list[Fault]) -> Node:

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from typing import Any
 
 from podusv_cli.core.component import Component
 from podusv_cli.scenario.explain import EXTENDS
 from podusv_cli.scenario.fields import keys
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.presets import pod_names, vessel_names
+from podusv_cli.scenario.presets import preset_names, with_presets
 
 DIALECT = "http://json-schema.org/draft-07/schema#"
 # Words of newer dialects, of OpenAPI, and what a file that extends another one may leave out.
 DROPPED = ("title", "discriminator", "required", "unit", "$defs")
 
 
-def json_schema() -> dict[str, Any]:
-    """A draft-07 schema of what may stand in one file.
+def json_schema(codes: Sequence[str]) -> dict[str, Any]:
+    """A draft-07 schema of what may stand in one file; `codes` are what `silence` may name.
 
     No key is required, since any may come from the file that this one extends, and defaults are
     given where they do not depend on anything else.
@@ -27,9 +28,11 @@ def json_schema() -> dict[str, Any]:
     for name in _filled_from_outside():
         for part in definitions[name]["properties"].values():
             part.pop("default", None)
-    definitions["Vessel"]["properties"]["preset"]["enum"] = ["", *vessel_names()]
-    definitions["Pods"]["properties"]["preset"]["enum"] = ["", *pod_names()]
+    for model, presets in with_presets().values():
+        allowed = ["", *preset_names(presets)]
+        definitions[model.__name__]["properties"]["preset"]["enum"] = allowed
     scenario = _converted(made)
+    scenario["properties"]["silence"]["items"]["enum"] = list(codes)
     names = {"type": "array", "items": {"type": "string"}}
     extends = {"anyOf": [{"type": "string"}, names], "description": EXTENDS.meaning}
     scenario["properties"] = {"extends": extends} | scenario["properties"]
@@ -38,9 +41,9 @@ def json_schema() -> dict[str, Any]:
     )
 
 
-def schema_text() -> str:
-    """The schema as a file, ending with a newline."""
-    return json.dumps(json_schema(), indent=2) + "\n"
+def schema_text(codes: Sequence[str]) -> str:
+    """The schema as a file, ending with a newline; `codes` as for `json_schema`."""
+    return json.dumps(json_schema(codes), indent=2) + "\n"
 
 
 def _filled_from_outside() -> set[str]:

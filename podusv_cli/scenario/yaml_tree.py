@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -65,6 +66,12 @@ def dotted(route: Route) -> str:
     """`network.nodes[0]` for ("network", "nodes", 0)."""
     parts = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in route)
     return printable(parts).removeprefix(".")
+
+
+def route(key: str) -> Route:
+    """("network", "nodes", 0) for `network.nodes[0]`."""
+    steps = re.findall(r"\[(\d+)\]|([^.\[\]]+)", key)
+    return tuple(int(place) if place else name for place, name in steps)
 
 
 def printable(text: str) -> str:

@@ -4,12 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from podusv_cli.core.errors import LawError
 from podusv_cli.core.recording import Recording
-from podusv_cli.engine.check import called
-from podusv_cli.engine.simulate import ClosedLoop, by_name, names
-from podusv_cli.paths.base import TARGET
-from podusv_cli.storage.log_layout import misfit
 
 NEEDED = (
     "time", "x", "y", "psi", "u", "v", "r", "x_d", "y_d", "tau_u_cmd", "tau_r_cmd", "tau_u",
@@ -26,15 +21,6 @@ BESIDE = {
     "power": ("delta",),
 }
 LARGEST = 1e300  # the engine takes anything beyond for divergence and does not log it
-
-
-def check_declared(loop: ClosedLoop) -> None:
-    """LawError where the arrays that a loop will log do not fit each other."""
-    columns = names(loop)
-    row = by_name(columns, np.zeros((1, len(columns))))
-    logged = {name: array for name, array in row.items() if name not in TARGET[2:]}
-    if wrong := misfit(logged | loop.controller.fixed_signals()):
-        raise LawError(f"{called(loop.controller)}: its log cannot be written: {wrong}")
 
 
 def fault(log: Recording) -> str:

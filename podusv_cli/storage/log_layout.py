@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from podusv_cli.core.kernel import Vector
-from podusv_cli.core.signal import SIGNALS
+from podusv_cli.core.signal import Signal
 
 FORMAT = 1
 CONVENTIONS = "CF-1.11"
 PROVENANCE, RESOLVED = "provenance", "resolved_yaml"
 CHUNK_BYTES = 2**20  # HDF5's default chunk cache
 
-# Axes besides time, each a dataset of the integers 0, 1, ..., with what they count.
+# Axes besides time that podusv brings along, with what they count; each is a dataset of the
+# integers 0, 1, ...
 AXES = {
     "node": "network node",
     "input": "network input: u, v, r",
@@ -21,36 +21,39 @@ AXES = {
     "pod": "pod, in the scenario's order",
 }
 
-# Arrays that do not run over time, and their axes.
-FIXED_AXES = {
-    "rbf_center": ("node", "input"),
-    "rbf_width": ("input",),
-    "W_star_u": ("node",),
-    "W_star_r": ("node",),
-    "window_start": ("window",),
-    "V_lambda": ("window",),
-    "V_Delta": ("window",),
-    "V_bound": ("window",),
-    "v_bound": ("window",),
-}
+# What logs written before signals were described in them have beside time, and which are wrapped.
+OLD_AXES = {
+    "rbf_center": "node input", "rbf_width": "input", "W_star_u": "node", "W_star_r": "node",
+    "window_start": "window", "V_lambda": "window", "V_Delta": "window", "V_bound": "window",
+    "v_bound": "window", "W_hat_u": "time node", "W_hat_r": "time node",
+    **dict.fromkeys(
+        ("n", "n_part", "delta", "n_cmd", "n_part_cmd", "delta_cmd", "thrust", "power"), "time pod"
+    ),
+}  # fmt: skip
+OLD_WRAPPED = ("psi_d", "psi_e", "psi_d_held")
 
 
-def axes(name: str) -> tuple[str, ...]:
-    """Names of a signal's axes, `time` first where it has one. KeyError for an unknown signal."""
-    return FIXED_AXES.get(name, ("time", *SIGNALS[name].axes))
+def meaning_of_axis(axis: str) -> str:
+    """What an axis counts; of one that a law brings, its name."""
+    return AXES.get(axis, axis)
 
 
-def misfit(arrays: Mapping[str, Vector]) -> str:
-    """Why arrays of these names and shapes make no log; empty where they do."""
-    lengths: dict[str, int] = {}
-    for name, array in arrays.items():
-        wanted = axes(name)
-        if array.ndim != len(wanted):
-            return f"{name} has the shape {array.shape}, and its axes are {', '.join(wanted)}"
-        for axis, size in zip(wanted, array.shape, strict=True):
-            if lengths.setdefault(axis, size) != size:
-                return f"{name} has {size} values along {axis}, where others have {lengths[axis]}"
-    return ""
+def description(signal: Signal) -> dict[str, str]:
+    """What a log's variable says of its signal."""
+    words = {"units": signal.unit, "long_name": signal.meaning, "symbol": signal.symbol}
+    wrapped = {"wrapped": "modulo 2 pi"} if signal.wrapped else {}
+    return words | {"axes": " ".join(signal.dimensions)} | wrapped
+
+
+def described(name: str, words: Mapping[str, str]) -> Signal:
+    """The signal that a log's variable says it is. ValueError for what no signal can be called."""
+    axes = words.get("axes", OLD_AXES.get(name, "time")).split()
+    over_time = axes[:1] == ["time"]
+    return Signal(
+        name, words["units"], words["long_name"], words["symbol"], tuple(axes[over_time:]),
+        wrapped="wrapped" in words or ("axes" not in words and name in OLD_WRAPPED),
+        fixed=not over_time,
+    )  # fmt: skip
 
 
 def chunk(shape: tuple[int, ...]) -> tuple[int, ...]:

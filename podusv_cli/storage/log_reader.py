@@ -10,7 +10,7 @@ import hashlib
 import io
 import math
 import unicodedata
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from itertools import product, repeat
 from pathlib import Path
@@ -22,12 +22,14 @@ import numpy as np
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording, Status
-from podusv_cli.core.signal import SIGNALS
+from podusv_cli.core.signal import NAME, Signal
 from podusv_cli.storage import log_layout, trees
 from podusv_cli.storage.packing import unpacked
 from podusv_cli.storage.regular import ELSEWHERE, LARGEST_FILE, LARGEST_TEXT, read_bytes
 
 LARGEST_CONTENT = LARGEST_FILE  # bytes, unpacked; packed, no log is larger
+MOST_MEMBERS = 1000
+WORDS = ("units", "long_name", "symbol", "axes", "wrapped")  # attributes of a variable
 _FILTERS = [h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_FLETCHER32]
 # What h5py raises on damaged files; ValueError includes text that is not UTF-8.
 _DAMAGE = (OSError, RuntimeError, ValueError, KeyError, TypeError, MemoryError, OverflowError)
@@ -36,13 +38,15 @@ _DAMAGE = (OSError, RuntimeError, ValueError, KeyError, TypeError, MemoryError, 
 def read_log(path: Path) -> Recording:
     """The recording in a log file; `seen` is not logged and stays None. Raises StorageError."""
     with _opened(path) as (file, image):
-        arrays = _arrays(file, image, path)
+        about = _about(file)
+        arrays = _arrays(file, about, image, path)
         return Recording(
             status=_status(file),
             controller=_words(file, "controller"),
-            signals={k: v for k, v in arrays.items() if k not in log_layout.FIXED_AXES},
-            fixed={k: v for k, v in arrays.items() if k in log_layout.FIXED_AXES},
+            signals={k: v for k, v in arrays.items() if not about[k].fixed},
+            fixed={k: v for k, v in arrays.items() if about[k].fixed},
             message=_message(file),
+            about=about,
         )
 
 
@@ -143,12 +147,14 @@ def _filters(made: h5py.h5p.PropDCID) -> list[int]:
     return [made.get_filter(i)[0] for i in range(made.get_nfilters())]
 
 
-def _arrays(file: h5py.File, image: bytes, path: Path) -> dict[str, Vector]:
+def _arrays(
+    file: h5py.File, about: Mapping[str, Signal], image: bytes, path: Path
+) -> dict[str, Vector]:
     """All signals, in the order in which they were written."""
-    datasets = {name: _dataset(file.id, name) for name in _names(file)}
+    datasets = {name: _dataset(file.id, name) for name in about}
     lengths = {"time": math.prod(datasets["time"].shape)}
     for name, dataset in datasets.items():
-        _check_numbers(name, dataset, lengths)
+        _check_numbers(about[name], dataset, lengths)
     total = sum(8 * math.prod(dataset.shape) for dataset in datasets.values())
     if total > LARGEST_CONTENT:
         claim = f"claims {total} bytes of data, at most {LARGEST_CONTENT} allowed"
@@ -156,23 +162,35 @@ def _arrays(file: h5py.File, image: bytes, path: Path) -> dict[str, Vector]:
     return {name: _unpacked(name, dataset, image) for name, dataset in datasets.items()}
 
 
-def _names(file: h5py.File) -> list[str]:
-    if len(file) > len(SIGNALS) + len(log_layout.AXES) + 1:
-        raise ValueError(f"it has {len(file)} members, more than podusv knows")
-    names = [name for name in file if name not in log_layout.AXES and name != log_layout.PROVENANCE]
-    unknown = [name for name in names if name not in SIGNALS]
+def _about(file: h5py.File) -> dict[str, Signal]:
+    """What the file says of each of its variables but the axes'."""
+    if len(file) > MOST_MEMBERS:
+        raise ValueError(f"it has {len(file)} members, more than {MOST_MEMBERS}")
+    unfit = [name for name in file if not (isinstance(name, str) and NAME.fullmatch(name))]
+    if unfit:
+        raise ValueError(f"{unfit[0]!r} is no signal's name")
+    words = {name: _said_of(file, name) for name in file if name != log_layout.PROVENANCE}
+    about = {n: log_layout.described(n, said) for n, said in words.items() if "symbol" in said}
+    axes = {axis for signal in about.values() for axis in signal.dimensions}
+    unknown = [name for name in words if name not in about and name not in axes]
     if unknown:
-        raise ValueError(f"{unknown[0]!r} is no signal that this podusv knows")
-    if "time" not in names:
+        raise ValueError(f"{unknown[0]!r} is neither a signal nor an axis of one")
+    if "time" not in about:
         raise ValueError("it has no time")
-    return names
+    return about
 
 
-def _check_numbers(name: str, dataset: h5py.h5d.DatasetID, lengths: dict[str, int]) -> None:
+def _said_of(file: h5py.File, name: str) -> dict[str, str]:
+    dataset = _dataset(file.id, name)
+    held = [word for word in WORDS if h5py.h5a.exists(dataset, word.encode())]
+    return {word: _text(h5py.h5a.open(dataset, word.encode())).decode() for word in held}
+
+
+def _check_numbers(signal: Signal, dataset: h5py.h5d.DatasetID, lengths: dict[str, int]) -> None:
     """Doubles, as long along every axis as all others; `lengths` learns from the first."""
+    name, axes = signal.name, signal.dimensions
     if dataset.get_type() != h5py.h5t.IEEE_F64LE:
         raise ValueError(f"{name} holds no 64-bit numbers")
-    axes = log_layout.axes(name)
     if len(dataset.shape) != len(axes):
         raise ValueError(f"{name} has {len(dataset.shape)} dimensions instead of {len(axes)}")
     for axis, size in zip(axes, dataset.shape, strict=True):

@@ -13,7 +13,7 @@ import numpy as np
 
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
-from podusv_cli.core.signal import SIGNALS
+from podusv_cli.core.signal import Signal
 from podusv_cli.storage import log_layout
 from podusv_cli.storage.packing import LEVEL, packed
 from podusv_cli.storage.stream import Stream
@@ -31,11 +31,16 @@ class Log:
     def __init__(self, file: h5py.File, stream: Stream, thread: Executor) -> None:
         """`thread` is an executor with one worker; only that touches the file."""
         self._file, self._stream, self._thread = file, stream, thread
+        self._about: dict[str, Signal] = {}
         self._scales: dict[str, h5py.Dataset] = {}
         self._under_way: list[Future[None]] = []
 
-    def add(self, arrays: Mapping[str, Vector]) -> None:
-        """Have more arrays written, which stay as they are; `time` with the first ones."""
+    def add(self, arrays: Mapping[str, Vector], about: Mapping[str, Signal]) -> None:
+        """Have more arrays written, which stay as they are; `time` with the first ones.
+
+        `about` says what each of them is.
+        """
+        self._about |= about
         steps = [partial(self._make_axes, arrays)]
         steps += [partial(self._write, n, arrays[n]) for n in sorted(arrays, key="time".__ne__)]
         self._under_way += map(self._thread.submit, steps)
@@ -43,8 +48,8 @@ class Log:
     def done(self) -> None:
         """Wait until all is written.
 
-        KeyError for a signal that is not in SIGNALS, ValueError for one whose shape does not fit
-        its axes or what is there already, OSError for what the stream ran into.
+        KeyError for an array without a signal, ValueError for one whose shape does not fit its axes
+        or what is there already, OSError for what the stream ran into.
         """
         while self._under_way:
             self._under_way.pop(0).result()
@@ -55,19 +60,19 @@ class Log:
                 self._scales[axis] = _scale(self._file, axis, size)
 
     def _write(self, name: str, array: Vector) -> None:
-        dataset = _write(self._file, name, array, self._stream)
+        dataset = _write(self._file, self._about[name], array, self._stream)
         if name == "time":
             dataset.make_scale(name)
             self._scales[name] = dataset
             return
-        for position, axis in enumerate(log_layout.axes(name)):
+        for position, axis in enumerate(self._about[name].dimensions):
             dataset.dims[position].attach_scale(self._scales[axis])
 
     def _new_axes(self, arrays: Mapping[str, Vector]) -> dict[str, int]:
         """How long every axis is that has no scale yet, in the order in which they come up."""
         lengths = {axis: len(scale) for axis, scale in self._scales.items()}
         for name, array in arrays.items():
-            for axis, size in zip(log_layout.axes(name), array.shape, strict=True):
+            for axis, size in zip(self._about[name].dimensions, array.shape, strict=True):
                 if lengths.setdefault(axis, size) != size:
                     raise ValueError(f"{name}: {size} values along {axis}, not {lengths[axis]}")
         return {axis: size for axis, size in lengths.items() if axis not in self._scales}
@@ -122,19 +127,18 @@ def _describe(thing: h5py.HLObject, facts: Mapping[str, str]) -> None:
 def _scale(file: h5py.File, axis: str, size: int) -> h5py.Dataset:
     scale = file.create_dataset(axis, data=np.arange(size, dtype=np.int32))
     scale.make_scale(axis)
-    _describe(scale, {"units": "1", "long_name": log_layout.AXES[axis]})
+    _describe(scale, {"units": "1", "long_name": log_layout.meaning_of_axis(axis)})
     return scale
 
 
-def _write(file: h5py.File, name: str, array: Vector, stream: Stream) -> h5py.Dataset:
+def _write(file: h5py.File, signal: Signal, array: Vector, stream: Stream) -> h5py.Dataset:
     # HDF5 has no chunks, hence no filters, for an array without any value.
     packing = {"chunks": log_layout.chunk(array.shape), **_FILTERS} if array.size else {}
-    dataset = file.create_dataset(name, array.shape, dtype="<f8", **packing)
+    dataset = file.create_dataset(signal.name, array.shape, dtype="<f8", **packing)
     for first in range(0, len(array), dataset.chunks[0]) if array.size else ():
         _write_chunk(dataset, array, first)
         stream.check()
-    signal = SIGNALS[name]
-    _describe(dataset, {"units": signal.unit, "long_name": signal.meaning, "symbol": signal.symbol})
+    _describe(dataset, log_layout.description(signal))
     return dataset
 
 

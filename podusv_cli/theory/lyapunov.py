@@ -9,11 +9,27 @@ import numpy as np
 from podusv_cli.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
+from podusv_cli.core.signal import Signal
 from podusv_cli.engine.replay import Replayed
 from podusv_cli.engine.simulate import ClosedLoop
 from podusv_cli.theory.bounds import Pair
 from podusv_cli.theory.ideal_weights import Ideal
 from podusv_cli.theory.rates import Errors
+
+V = Signal("V", "1", "Lyapunov function (46), the sum of its ten terms")
+V_DOT = Signal("V_dot", "1/s", "rate of V along the closed loop, by the chain rule", r"\dot V")
+TERMS = (
+    Signal("V_z_e", "m2", "z_e^2/2, term of V; z_e less the standoff", "V_{z_e}"),
+    Signal("V_psi_e", "rad2", "psi_e^2/2, term of V", r"V_{\psi_e}"),
+    Signal("V_u_e", "J", "m11 u_e^2/2, term of V", "V_{u_e}"),
+    Signal("V_r_e", "J", "m33 r_e^2/2, term of V", "V_{r_e}"),
+    Signal("V_y_u", "m2/s2", "y_u^2/2, term of V", "V_{y_u}"),
+    Signal("V_y_r", "rad2/s2", "y_r^2/2, term of V", "V_{y_r}"),
+    Signal("V_W_u", "J", "|W_hat_u - W_star_u|^2/(2 Gamma_u), term of V", "V_{W_u}"),
+    Signal("V_W_r", "J", "|W_hat_r - W_star_r|^2/(2 Gamma_r), term of V", "V_{W_r}"),
+    Signal("V_b_u", "J", "(b_hat_u - b_u max)^2/(2 gamma_u), term of V", "V_{b_u}"),
+    Signal("V_b_r", "J", "(b_hat_r - b_r max)^2/(2 gamma_r), term of V", "V_{b_r}"),
+)
 
 
 @dataclass(frozen=True)

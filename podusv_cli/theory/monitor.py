@@ -7,8 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from podusv_cli.controllers.polar_backstepping import PolarBackstepping
+from podusv_cli.core.derived import ACTIVATION, NODE_DISTANCE, W_NORM_R, W_NORM_U, Y_R, Y_U
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Columns, InMemory, Recording, blocks, largest
+from podusv_cli.core.signal import Signal, by_name
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.replay import Replayed, rates_replay
 from podusv_cli.engine.simulate import ClosedLoop
@@ -23,19 +25,51 @@ from podusv_cli.theory.ideal_weights import (
     rows_to_fit,
     unloaded_accelerations,
 )
-from podusv_cli.theory.lyapunov import estimates, lyapunov, norms, remainders
+from podusv_cli.theory.lyapunov import (
+    TERMS,
+    V_DOT,
+    V,
+    estimates,
+    lyapunov,
+    norms,
+    remainders,
+)
 from podusv_cli.theory.rates import error_rates
 from podusv_cli.theory.sway import SwayBound, sway_bound, sway_push
 
 WINDOWS = ("whole", "settled")
 BLOCK = 4096  # rows that are worked on together, so that they stay in the cache
 MOST_NUMBERS = 2**22  # in a block, with a number for every node in every row
-TERMS = (
-    "V_z_e", "V_psi_e", "V_u_e", "V_r_e", "V_y_u", "V_y_r", "V_W_u", "V_W_r", "V_b_u", "V_b_r",
-)  # fmt: skip
+ERRORS = (Y_U, Y_R)  # of the filters; a law without them has none
+NETWORKS = (W_NORM_U, W_NORM_R, ACTIVATION, NODE_DISTANCE)
 
-ERRORS = ("y_u", "y_r")  # of the filters; a law without them has none
-NETWORKS = ("W_norm_u", "W_norm_r", "activation", "node_distance")
+
+def _of_windows(name: str, unit: str, meaning: str, symbol: str) -> Signal:
+    return Signal(name, unit, meaning, symbol, ("window",), fixed=True)
+
+
+def _of_nodes(name: str, unit: str, meaning: str, symbol: str) -> Signal:
+    return Signal(name, unit, meaning, symbol, ("node",), fixed=True)
+
+
+FIXED = (
+    _of_nodes("W_star_u", "m/s2", "ideal weights of the surge network, fitted to the run", "W_u^*"),
+    _of_nodes("W_star_r", "rad/s2", "ideal weights of the yaw network, fitted to the run", "W_r^*"),
+    _of_windows(
+        "window_start", "s", "start of the part of the run whose extremes enter V_Delta", "t_0"
+    ),
+    _of_windows("V_lambda", "1/s", "rate lambda of (49), corrected", r"\lambda"),
+    _of_windows(
+        "V_Delta", "1/s", "Delta of (49), corrected, from extremes of that part", r"\Delta"
+    ),
+    _of_windows("V_bound", "1", "ultimate bound of V, corrected", r"\Delta/2\lambda"),
+    _of_windows("v_bound", "m/s", "bound of the sway speed (51), with all damping", r"|v|_{\max}"),
+)
+# What the bounds are made of, at every row, and is not logged.
+UNLOGGED = (
+    "alpha_u_dot", "alpha_r_dot", "drift_u", "drift_r", "epsilon_u", "epsilon_r", "rest_u",
+    "rest_r", "push", "printed_push", "turn",
+)  # fmt: skip
 
 Traces = dict[str, Vector]
 
@@ -69,14 +103,25 @@ class Monitored:
     traces: Traces
 
 
-def watches(loop: ClosedLoop) -> bool:
-    """Whether the loop's law has a Lyapunov function to monitor."""
-    return isinstance(loop.controller, PolarBackstepping)
+def signals(loop: ClosedLoop, *, sampled: bool) -> tuple[Signal, ...]:
+    """What the monitor adds to every row of a log; nothing for a law without V."""
+    law = loop.controller.lyapunov()
+    if law is None:
+        return ()
+    rate = () if sampled else (V_DOT,)
+    return (V, *rate, *TERMS, *(ERRORS if law.filtered() else ()), *NETWORKS)
+
+
+def about(loop: ClosedLoop, *, sampled: bool) -> dict[str, Signal]:
+    """Every signal of the loop's log, the monitor's included. Raises LawError as `loop.about`."""
+    added = signals(loop, sampled=sampled)
+    added += FIXED if added else ()
+    return by_name((("the loop", loop.about().values()), ("the stability monitor", added)))
 
 
 def prepare(loop: ClosedLoop, grid: TimeGrid, compiled: bool) -> None:
     """Have what the monitor needs compiled and loaded."""
-    if watches(loop):
+    if loop.controller.lyapunov() is not None:
         rates_replay(loop, grid, compiled=compiled)
 
 
@@ -90,8 +135,9 @@ def monitored(
     With sampled control V' and the bound of V are left out: the law acts on old measurements. What
     is added is held in memory, or goes to `columns`.
     """
-    law, count, columns = loop.controller, len(recording["time"]), columns or InMemory()
-    if not isinstance(law, PolarBackstepping) or not count:
+    law, count = loop.controller.lyapunov(), len(recording["time"])
+    columns = columns or InMemory()
+    if law is None or not count:
         return None
     with np.errstate(all="ignore"):  # a run that diverges leaves all numbers
         replayed = rates_replay(loop, grid, compiled=compiled)
@@ -105,7 +151,15 @@ def monitored(
         observed = _Observer(loop, law, recording, traces, ideal, b, grid.hold_every == 0)
         starts = (0.0, grid.last_part(steady_fraction))
         windows = dict(zip(WINDOWS, map(observed.window, starts), strict=True))
-    return Monitored(_extended(recording, traces, windows, ideal, grid), windows, traces)
+    sampled = grid.hold_every > 0
+    logged = [signal.name for signal in signals(loop, sampled=sampled)]
+    extended = replace(
+        recording,
+        signals={**recording.signals, **{name: traces[name] for name in logged}},
+        fixed={**recording.fixed, **_fixed(windows, ideal)},
+        about=about(loop, sampled=sampled),
+    )
+    return Monitored(extended, windows, traces)
 
 
 def _disturbance_bound(loop: ClosedLoop, log: Recording) -> Pair:
@@ -169,14 +223,14 @@ class _Observer:
     def window(self, since: float) -> Window:
         """The part of the run from a time [s] on."""
         rows = slice(int(np.searchsorted(self.log["time"], since - 1e-9)), None)
-        V, rate = self.traces["V"][rows], self.traces["V_dot"][rows]
-        observed = self._observed(rows) if self.continuous and len(V) else None
+        value, rate = self.traces["V"][rows], self.traces["V_dot"][rows]
+        observed = self._observed(rows) if self.continuous and len(value) else None
         bound = ultimate_bound(self.law, self.loop.vessel, observed)
-        kept = _kept(bound.corrected, V, rate)
+        kept = _kept(bound.corrected, value, rate)
         pushes = [_largest(self.traces[name][rows]) for name in ("push", "printed_push")]
         sway = sway_bound(self.loop.vessel, *pushes)
         largest_v = _largest(self.log["v"][rows])
-        return Window(since, observed, bound, sway, _largest(V), largest_v, kept)
+        return Window(since, observed, bound, sway, _largest(value), largest_v, kept)
 
     def _observed(self, rows: slice) -> Observed:
         start, ideal = self.law.network.initial_weight, self.ideal
@@ -202,10 +256,8 @@ def _kept(bound: Bound, V: Vector, rate: Vector) -> float:
     return sum(int(np.count_nonzero(part)) for part in keeps) / len(V)
 
 
-def _extended(
-    recording: Recording, traces: Traces, windows: dict[str, Window], ideal: Ideal, grid: TimeGrid
-) -> Recording:
-    """The recording with what the monitor logs."""
+def _fixed(windows: dict[str, Window], ideal: Ideal) -> dict[str, Vector]:
+    """What the monitor logs that does not run over time."""
     parts = windows.values()
     numbers = {
         "window_start": [part.since for part in parts],
@@ -215,12 +267,4 @@ def _extended(
         "v_bound": [part.sway.value for part in parts],
     }
     fixed = {"W_star_u": ideal.W_u, "W_star_r": ideal.W_r}
-    fixed |= {name: np.array(values) for name, values in numbers.items()}
-    rate = ("V_dot",) if grid.hold_every == 0 else ()
-    errors = ERRORS if "beta_u" in recording else ()
-    names = ("V", *rate, *TERMS, *errors, *NETWORKS)
-    return replace(
-        recording,
-        signals={**recording.signals, **{name: traces[name] for name in names}},
-        fixed={**recording.fixed, **fixed},
-    )
+    return fixed | {name: np.array(values) for name, values in numbers.items()}

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from podusv_cli.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.core.recording import largest
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import ClosedLoop
@@ -35,8 +34,7 @@ def _condition(condition: Condition) -> dict[str, Any]:
 
 def _assumptions(loop: ClosedLoop, grid: TimeGrid, found: Monitored) -> Iterator[dict[str, Any]]:
     """What V' <= -2 lambda V + Delta rests on, whether it was so, and the number that tells."""
-    law, log, turn = loop.controller, found.recording, found.traces["turn"]
-    assert isinstance(law, PolarBackstepping)
+    law, log, turn = loop.controller.lyapunov(), found.recording, found.traces["turn"]
     asked = max(_gap(found, "u"), _gap(found, "r"))
     turned = int(np.count_nonzero(turn[1:] != turn[:-1]))
     alone = law.fold == "printed" and bool(np.any(turn < 0.0))
@@ -47,7 +45,7 @@ def _assumptions(loop: ClosedLoop, grid: TimeGrid, found: Monitored) -> Iterator
     yield _says("psi_e is never folded or unfolded on the way", turned == 0, turned)
     yield _says("psi_e is not folded alone, which turns the sign of z_e'", not alone)
     yield _says("distance [m] stays above hold_below", distance > law.hold_below, distance)
-    yield _says("weights and bounds learn from u_e and r_e", not law.settles())
+    yield _says("weights and bounds learn from u_e and r_e", not law.wants_loads())
     yield _says("actuator gives what the law asks for [N, N m]", asked == 0.0, asked)
 
 

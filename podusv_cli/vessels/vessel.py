@@ -6,8 +6,9 @@ from typing import Any, Self
 
 from pydantic import model_validator
 
-from podusv_cli.core.component import Component, value
+from podusv_cli.core.component import Component, Presets, value
 
+VESSELS = Presets("podusv_cli.vessels", "vessel", "vessel file")
 INERTIA = ("m11", "m22", "m23", "m32", "m33")
 
 
@@ -22,6 +23,7 @@ class Vessel(Component):
     damping on the diagonal would drive the motion.
     """
 
+    presets = VESSELS
     preset: str = value(
         "", "", "name of the parameter file that the other values come from; none where empty"
     )

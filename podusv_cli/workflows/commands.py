@@ -12,8 +12,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from podusv_cli.core.errors import UsageError
+from podusv_cli.core.finding import Finding
 from podusv_cli.core.recording import Status
-from podusv_cli.findings.finding import Finding, heard
+from podusv_cli.findings.finding import heard, unknown_codes
 from podusv_cli.findings.preflight import preflight, together
 from podusv_cli.process.extras import Extras, Missing
 from podusv_cli.process.interrupts import interrupts_held
@@ -52,7 +53,9 @@ def run(config: Path, request: Request, progress: Progress | None = None) -> Fin
     """Load a scenario and execute it. Raises ScenarioError and StorageError."""
     watch = Stopwatch()
     with watch.part("load"):
-        loaded = load(config, request.overrides, checks=(limits(request.allow_large),))
+        loaded = load(
+            config, request.overrides, checks=(unknown_codes, limits(request.allow_large))
+        )
         scenario = loaded.scenario.alone()
         resolved = resolved_yaml(scenario)
     target = request.out or folder.default_folder(RESULTS, scenario.name, resolved)
@@ -222,7 +225,7 @@ def _opened(path: Path, request: Request, *, alone: bool) -> _Item:
         parts = comparing.comparable(path)
         return _Item(path.resolve().name, parts, [part.label for part in parts])
     fits = limits(request.allow_large, read_back=True)
-    loaded = load(path, request.overrides, checks=(misfits, fits))
+    loaded = load(path, request.overrides, checks=(unknown_codes, misfits, fits))
     scenario, singles = loaded.scenario, loaded.scenario.singles()
     by_law = alone or scenario.controllers
     labels = list(singles) if by_law else [scenario.name]

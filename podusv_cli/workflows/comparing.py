@@ -18,7 +18,7 @@ from podusv_cli.comparison.differences import differences
 from podusv_cli.comparison.entries import Absent, Entry
 from podusv_cli.comparison.expressions import Source
 from podusv_cli.core.errors import StorageError
-from podusv_cli.findings.finding import Finding
+from podusv_cli.core.finding import Finding
 from podusv_cli.findings.preflight import together
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.table import CLOCKED
@@ -126,7 +126,8 @@ def comparable(path: Path) -> list[Part]:
 
 def _check_memory(run: Run, scenario: Scenario) -> None:
     log = run.recording
-    for name, size in scenario.closed_loop().controller.slots():
+    slots = {part.name: size for part, size in scenario.closed_loop().controller.slots()}
+    for name, size in slots.items():
         if name not in log or math.prod(log[name].shape[1:]) != size:
             raise StorageError(
                 f"{run.folder / LOG}: damaged, or not of the scenario beside it: "

@@ -14,13 +14,14 @@ from typing import TYPE_CHECKING, Any
 
 from podusv_cli import __version__
 from podusv_cli.core.errors import StorageError
+from podusv_cli.core.finding import Finding
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Columns, Recording, Status
 from podusv_cli.engine.check import check_law
 from podusv_cli.engine.row_table import PIECE
 from podusv_cli.engine.simulate import Observer, marcher, simulate
 from podusv_cli.findings.after import aftermath
-from podusv_cli.findings.finding import Finding, heard
+from podusv_cli.findings.finding import heard
 from podusv_cli.metrics.accumulators import observer, summarise
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.table import METRICS
@@ -33,7 +34,6 @@ from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage import provenance
 from podusv_cli.storage import run_folder as folder
 from podusv_cli.storage.columns import ColumnFiles
-from podusv_cli.storage.log_check import check_declared
 from podusv_cli.theory import monitor
 from podusv_cli.theory.report import as_json as theory_report
 
@@ -151,7 +151,7 @@ def execute(
             metrics = extras.made("the metrics", lambda: summary(task.scenario, recording)) or {}
             metrics |= extras.attempt("law_ns", lambda: _cost(task.scenario, recording)) or {}
         with _log(writer, task.scenario, recording) as log:
-            log.add(recording.signals)  # written while the run is looked at
+            log.add(recording.signals, recording.about)  # written while the run is looked at
             with watch.part("metrics"):
                 noticed = extras.made("warnings", lambda: _noticed(task.scenario, recording))
             with watch.part("theory"):
@@ -160,7 +160,7 @@ def execute(
                     lambda: monitored(task.scenario, recording, columns("theory")),
                 ) or (recording, {})
             with watch.part("write"):
-                log.add(_beyond(whole, recording))
+                log.add(_beyond(whole, recording), whole.about)
                 log.done()
         warnings = (*task.noticed, *(noticed or ()))
         with watch.part("write"):
@@ -205,7 +205,6 @@ def warm_up(scenario: Scenario) -> None:
     """Have all code of this scenario's loop compiled and loaded. Raises LawError."""
     loop, compiled = scenario.closed_loop(), scenario.simulation.compiled
     check_law(loop)
-    check_declared(loop)
     marcher(loop, _observer(scenario), compiled)
     if scenario.log.monitor:
         monitor.prepare(loop, scenario.time_grid(), compiled)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.engine.check import check_law
+from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import load
 from podusv_cli.storage import files, json_files
@@ -28,7 +29,14 @@ def verify(
     """
     if (config / "resolved.yaml").is_file():
         raise UsageError(f"{config} is a run folder; verify its resolved.yaml")
-    scenario = load(config, overrides, checks=(limits(insist=""),)).scenario
+    scenario = load(
+        config,
+        overrides,
+        checks=(
+            unknown_codes,
+            limits(insist=""),
+        ),
+    ).scenario
     if out:
         files.check_places([out])
         _spare(out, force)

@@ -13,7 +13,9 @@ import pytest
 from command_samples import BASE, Command, commanded, write
 from conftest import Constant, adrift, corrected, run
 
+from podusv_cli.controllers.base import Slots
 from podusv_cli.core.errors import LawError
+from podusv_cli.core.signal import Signal
 from podusv_cli.engine import march
 from podusv_cli.engine.batch import simulate_many
 from podusv_cli.engine.check import check_law
@@ -94,8 +96,8 @@ def test_a_law_that_is_not_what_it_says_is_refused_before_the_run(
 
 def test_a_memory_of_another_size_is_refused() -> None:
     class Forgetful(Constant):
-        def slots(self) -> tuple[tuple[str, int], ...]:
-            return (("W_hat_u", 2),)
+        def slots(self) -> Slots:
+            return ((Signal("integrals", "m", "two integrals", axes=("axis",)), 2),)
 
     with pytest.raises(LawError, match=r"memory of shape \(0,\), its slots are \(2,\)"):
         check_law(adrift(controller=Forgetful()))

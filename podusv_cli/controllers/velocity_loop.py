@@ -1,0 +1,75 @@
+"""A law's fast part: the loop of one velocity, linearised, for what a step or a period can carry.
+
+A loop has the states (e, m): the velocity error e of one axis, and the parts m of the law's memory
+that feed back into it. With the plant's own damping d,
+
+    e' = -d e + g . (e, m),   m' = F (e, m).
+
+The rest of the closed loop is slower and left out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from podusv_cli.core.kernel import Vector
+
+Cause = Literal["adaptation", "derivative", "loop"]
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One axis of the hull: true inertia, what the law takes it for, damping at a velocity."""
+
+    name: str
+    inertia: float
+    told: float
+    damping: float  # d [1/s]
+
+
+@dataclass(frozen=True)
+class Bound:
+    """The adaptation (28) of a bound: gains, b_hat at the start, the true inertia.
+
+    `error` names the signal that it learns from, `key` the gain that makes it fast.
+    """
+
+    error: str
+    key: str
+    gamma: float
+    sigma: float
+    initial: float
+    partial: float
+    inertia: float
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A linearised velocity loop; `key` is the gain that makes it fast, and `cause` why it is.
+
+    `name` is what messages call it, `bound` an adapted bound that acts on it.
+    """
+
+    axis: str
+    key: str
+    damping: float  # d [1/s]
+    feedback: Vector  # g, shape (1 + n,)
+    memory: Vector  # F, shape (n, 1 + n)
+    cause: Cause = "loop"
+    name: str = "velocity loop"
+    bound: Bound | None = None
+
+    @property
+    def matrix(self) -> Vector:
+        """Rates of (e, m), shape (1 + n, 1 + n)."""
+        rows = np.vstack([self.feedback, self.memory])
+        rows[0, 0] -= self.damping
+        return rows
+
+    @property
+    def fastest(self) -> float:
+        """Largest eigenvalue's magnitude [1/s]."""
+        return float(np.abs(np.linalg.eigvals(self.matrix)).max())

@@ -1,0 +1,40 @@
+"""A figure is one decorated function of runs and width, in a module of this package."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from matplotlib.figure import Figure
+
+from podusv_cli.figures.style import Shown
+
+Family = Callable[[Sequence[Shown], int], Figure]
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """A figure that podusv can draw: its name, what it shows, in words and in signals, its place.
+
+    `family` draws it for some runs, so many columns of a page wide.
+    """
+
+    name: str
+    caption: str
+    signals: tuple[str, ...]
+    place: int
+    family: Family
+
+    def fits(self, runs: Sequence[Shown]) -> bool:
+        """Whether any run has anything to show here."""
+        return any(run.has(name) for run in runs for name in self.signals)
+
+
+def figure(
+    name: str, *, caption: str, signals: tuple[str, ...], place: int = 100
+) -> Callable[[Family], Sheet]:
+    """Register a function that draws runs which have one of these signals.
+
+    Figures are shown in the order of their places, those of one place by name.
+    """
+    return lambda family: Sheet(name, caption, signals, place, family)

@@ -1,0 +1,212 @@
+"""Adding a law, path, disturbance, actuator, vessel, figure or finding is one file.
+
+Each is written into a copy of the package; no other file is touched. All commands know it then.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import h5py
+import pytest
+import yaml
+from conftest import PACKAGE
+
+HEAD = """
+from typing import Any, ClassVar, Literal
+import numpy as np
+from podusv_cli.core.component import value
+from podusv_cli.core.kernel import Vector, kernel
+from podusv_cli.core.signal import Signal
+"""
+FILES = {
+    # It has neither psi_e nor z_e, a memory with an axis of its own, and tells of a fast loop.
+    "controllers/cross_track.py": """
+from podusv_cli.controllers.base import Controller
+from podusv_cli.controllers.velocity_loop import Loop
+
+E_CT = Signal("e_ct", "m", "cross-track error")
+MODES = Signal("modes", "m", "amplitudes of the modes", axes=("mode",))
+WIDTHS = Signal("widths", "m", "widths of the modes", axes=("mode",), fixed=True)
+
+
+class CrossTrack(Controller):
+    \"\"\"Holds the target's course.\"\"\"
+
+    kind: Literal["cross_track"] = "cross_track"
+    gain: float = value(1.0, "N/m", "gain of the cross-track error")
+    signals: ClassVar[tuple[Signal, ...]] = (E_CT,)
+
+    def slots(self):
+        return ((MODES, 3),)
+
+    def fixed_signals(self):
+        return {WIDTHS: np.ones(3)}
+
+    def start(self, x, target, nominal):
+        return np.zeros(3)
+
+    def velocity_loops(self, axes, nu):
+        return [Loop("surge", "gain", 0.0, np.array([-self.gain]), np.zeros((0, 1)))]
+
+    @staticmethod
+    @kernel
+    def law(t, x, memory, target, k, table, tau, rate, signals, work):
+        signals[0] = target[1] - x[1]
+        tau[0], tau[1] = 1.0, k.gain * signals[0]
+        for i in range(3):
+            rate[i] = signals[0]
+""",
+    "paths/still.py": """
+from podusv_cli.paths.base import Path
+
+
+class Still(Path):
+    \"\"\"A buoy.\"\"\"
+
+    kind: Literal["still"] = "still"
+    north: float = value(3.0, "m", "where it floats, north")
+
+    @staticmethod
+    @kernel
+    def evaluate(t, k, table, target):
+        for i in range(6):
+            target[i] = 0.0
+        target[0] = k.north
+""",
+    "disturbances/steady.py": """
+from podusv_cli.disturbances.base import Disturbance
+
+
+class Steady(Disturbance):
+    \"\"\"A current that pushes.\"\"\"
+
+    kind: Literal["steady"] = "steady"
+    push: float = value(0.1, "N", "force in surge")
+
+    @staticmethod
+    @kernel
+    def evaluate(t, x, k, table, b):
+        b[0], b[1], b[2] = k.push, 0.0, 0.0
+""",
+    "actuators/lagging.py": """
+from podusv_cli.actuators.base import Actuator
+
+BEHIND = Signal("behind", "N", "what the force lags behind the demand")
+FORCE = Signal("force", "N", "surge force of the lagging actuator")
+
+
+class Lagging(Actuator):
+    \"\"\"A force that follows with a lag.\"\"\"
+
+    kind: Literal["lagging"] = "lagging"
+    lag: float = value(0.5, "s", "time constant", gt=0)
+    states = property(lambda self: (FORCE,))
+    signals = property(lambda self: (BEHIND,))
+
+    @staticmethod
+    @kernel
+    def drive(t, x, state, demand, k, table, tau, rate, signals):
+        tau[0], tau[1], tau[2] = state[0], 0.0, demand[1]
+        signals[0] = demand[0] - state[0]
+        rate[0] = signals[0] / k.lag
+""",
+    "figures/cross.py": """
+from podusv_cli.figures.panels import signals_over_time
+from podusv_cli.figures.sheet import figure
+
+cross = figure("cross", caption="cross-track error", signals=("e_ct",))(signals_over_time("e_ct"))
+""",
+    "findings/lazy.py": """
+from podusv_cli.core.finding import after, before
+
+
+@before("lazy-law", about="controller", meaning="the gain is small")
+def lazy(case):
+    if getattr(case.scenario.controller, "gain", 9.0) < 2.0:
+        yield "the gain is small"
+
+
+@after("far-off", about="path", meaning="the cross-track error is large")
+def far_off(scenario, log):
+    if "e_ct" in log and abs(log["e_ct"]).max() > 0.5:
+        yield f"e_ct reaches {abs(log['e_ct']).max():.2g} {log.about['e_ct'].unit}"
+""",
+}
+SCENARIO = """
+vessel: {preset: barge}
+path: {kind: still}
+disturbance: {kind: steady}
+actuator: {kind: lagging}
+controller: {kind: cross_track}
+controllers: {one: {gain: 1.0}, other: {gain: 3.0}, pid: {kind: pid}}
+start: {y: 1.0}
+simulation: {duration: 0.5, compiled: false}
+claims:
+  C1: {says: it drifts, source: here, expect: max(abs(one.e_ct)) > 0.5, tolerance: 0.0}
+"""
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A folder with a copy of the package that has one file more of each kind."""
+    folder = tmp_path_factory.mktemp("extended")
+    copy = folder / "podusv_cli"
+    shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    for name, text in FILES.items():
+        assert not (copy / name).exists()
+        (copy / name).write_text(HEAD + text)
+    barge = yaml.safe_load((copy / "vessels/paper_nonlinear.yaml").read_text()) | {"m": 40.0}
+    (copy / "vessels/barge.yaml").write_text(yaml.safe_dump(barge))
+    (folder / "a.yaml").write_text(SCENARIO)
+    return folder
+
+
+def podusv(place: Path, *words: str, code: int = 0) -> str:
+    """What a command of the extended package prints."""
+    done = subprocess.run(
+        [sys.executable, "-m", "podusv_cli", *words], cwd=place, capture_output=True, text=True,
+        env={**os.environ, "PYTHONPATH": str(place), "COLUMNS": "100"}, timeout=300,
+    )  # fmt: skip
+    assert done.returncode == code, done.stderr
+    return done.stdout + done.stderr
+
+
+def test_every_command_knows_what_one_file_brings(place: Path) -> None:
+    said = podusv(place, "validate", "a.yaml")
+    assert "a.yaml: ok (a, one, other, pid" in said
+    assert "warning[lazy-law]: one: controller: the gain is small" in said
+
+    said = podusv(place, "run", "a.yaml", "--json", "--out", "r", "-q")
+    run, _ = json.JSONDecoder().raw_decode(said)
+    codes = {finding["code"] for finding in run["warnings"]}
+    assert {"lazy-law", "far-off"} <= codes
+    with h5py.File(place / "r/log.h5") as log:
+        assert log["modes"].shape == (51, 3)
+        assert log["widths"].shape == (3,)
+        assert (log["e_ct"].attrs["units"], log["e_ct"].attrs["symbol"]) == (b"m", b"e_{ct}")
+        assert log["z_e"].shape == log["behind"].shape == log["force"].shape == (51,)
+        assert "psi_e" not in log
+
+    said = podusv(place, "compare", "a.yaml", "--out", "c", "--no-figures")
+    assert "reproduced" in said
+    podusv(place, "plot", "c", "--figure", "cross", "--format", "svg", "--out", "p")
+    assert (place / "p/cross.svg").exists()
+    podusv(place, "diff", "c/one", "c/other", code=3)
+
+
+def test_everything_is_listed_and_explained(place: Path) -> None:
+    listed = podusv(place, "list")
+    for name in ("cross_track", "still", "steady", "lagging", "barge", "lazy-law", "far-off"):
+        assert f"  {name}" in listed
+    assert "cross-track error" in podusv(place, "explain", "e_ct")
+    assert "signal [N]" in podusv(place, "explain", "force")
+    assert "the gain is small" in podusv(place, "explain", "lazy-law")
+    assert "lazy-law" in podusv(place, "schema")
+    assert "Holds the target's course" in podusv(place, "explain", "cross_track")

@@ -1,0 +1,117 @@
+"""Signals: a law declares its own, whatever they are called; nobody else has a table of them."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+import pytest
+from conftest import Constant, corrected, run
+
+from podusv_cli.controllers.base import Slots
+from podusv_cli.controllers.pid import Pid
+from podusv_cli.core.errors import LawError
+from podusv_cli.core.kernel import Vector, kernel
+from podusv_cli.core.signal import Signal, by_name
+from podusv_cli.engine.check import check_law
+
+E_CT = Signal("e_ct", "m", "cross-track error")
+MODES = Signal("modes", "m", "amplitudes of the modes", axes=("mode",))
+
+
+class CrossTrack(Constant):
+    """A law with an error of its own and neither psi_e nor z_e."""
+
+    kind: Literal["cross_track"] = "cross_track"  # type: ignore[assignment]
+    signals: ClassVar[tuple[Signal, ...]] = (E_CT,)
+
+    def slots(self) -> Slots:
+        return ((MODES, 3),)
+
+    def start(self, x: Vector, target: Vector, nominal: Any) -> Vector:
+        return np.zeros(3)
+
+    @staticmethod
+    @kernel
+    def law(
+        t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
+        tau: Vector, rate: Vector, signals: Vector, work: Vector,
+    ) -> None:  # fmt: skip
+        tau[0], tau[1] = 1.0, 0.0
+        for i in range(3):
+            rate[i] = 1.0 + i
+        signals[0] = target[1] - x[1]
+
+
+def test_a_signal_has_a_symbol_of_its_name_and_needs_a_name_that_a_claim_can_use() -> None:
+    assert [Signal(name, "m", "").symbol for name in ("e", "e_c", "e_ct", "e_c_t")] == [
+        "e", "e_c", "e_{ct}", "e_{c,t}",
+    ]  # fmt: skip
+    with pytest.raises(ValueError, match="letters, digits and '_', not 'e ct'"):
+        Signal("e ct", "m", "")
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_a_law_without_psi_e_runs_and_its_recording_says_what_it_logged(compiled: bool) -> None:
+    loop = corrected(controller=CrossTrack())
+    check_law(loop)
+    out = run(loop, 0.3, compiled=compiled)
+    assert "psi_e" not in out
+    assert out.about["e_ct"] is E_CT
+    assert {*out.signals, *out.fixed} == set(out.about)
+    np.testing.assert_array_equal(out["e_ct"], out["y_d"] - out["y"])
+    np.testing.assert_allclose(out["modes"], np.outer(out["time"], [1.0, 2.0, 3.0]), atol=1e-12)
+
+
+def test_z_e_is_the_distance_to_the_target_whatever_the_law() -> None:
+    for law in (CrossTrack(), Pid(standoff=2.0)):
+        out = run(corrected(controller=law), 0.5, hold_every=5)
+        x_e, y_e = out["x_d"] - out["x"], out["y_d"] - out["y"]
+        np.testing.assert_array_equal(out["z_e"], np.sqrt(x_e * x_e + y_e * y_e))
+
+
+class Clashing(CrossTrack):
+    """A law that calls something else z_e."""
+
+    kind: Literal["clashing"] = "clashing"  # type: ignore[assignment]
+    signals: ClassVar[tuple[Signal, ...]] = (Signal("z_e", "m", "distance less the standoff"),)
+
+
+def test_two_parts_with_one_name_are_refused_with_a_sentence() -> None:
+    words = r"law clashing logs 'z_e', distance less the standoff \[m\], and the closed loop logs"
+    for deed in (check_law, lambda loop: run(loop, 0.1)):
+        with pytest.raises(LawError, match=words):
+            deed(corrected(controller=Clashing()))
+    assert by_name([("pods", (MODES, MODES))]) == {"modes": MODES}
+
+
+class Unnamed(CrossTrack):
+    """A law with a bare name for its memory."""
+
+    kind: Literal["unnamed"] = "unnamed"  # type: ignore[assignment]
+
+    def slots(self) -> Slots:
+        return (("modes", 3),)  # type: ignore[return-value]
+
+
+def test_a_bare_name_is_no_signal() -> None:
+    with pytest.raises(LawError, match="law unnamed declares 'modes', which is no Signal"):
+        check_law(corrected(controller=Unnamed()))
+
+
+class Shapeless(CrossTrack):
+    """A law with two parts of other lengths along one axis, or a part without any."""
+
+    kind: Literal["shapeless"] = "shapeless"  # type: ignore[assignment]
+    axes: Literal["none", "one"] = "one"
+
+    def slots(self) -> Slots:
+        named = ("mode",) if self.axes == "one" else ()
+        return ((MODES, 3), (Signal("more", "1", "more modes", axes=named), 2))
+
+
+def test_arrays_that_no_log_can_hold_are_refused_before_the_run() -> None:
+    with pytest.raises(LawError, match="more: it has 2 values along 'mode', and modes has 3"):
+        check_law(corrected(controller=Shapeless()))
+    with pytest.raises(LawError, match=r"more: its values have the shape \(2,\)"):
+        check_law(corrected(controller=Shapeless(axes="none")))
