@@ -20,7 +20,7 @@ import h5py
 from rerun_samples import copied, made
 from storage_samples import files
 
-from podusv_cli.storage import json_files, log_layout, manifest
+from podusv_cli.storage import json_files, manifest
 
 BASE = """
 vessel: {preset: paper_nonlinear}
@@ -73,7 +73,7 @@ def _numbers(folder: Path) -> dict[str, Any]:
 
 def main() -> None:
     """Make what is missing."""
-    place = Path(__file__).with_name("fixtures") / f"format_{log_layout.FORMAT}"
+    place = Path(__file__).with_name("fixtures") / f"format_{manifest.FORMAT}"
     place.mkdir(parents=True, exist_ok=True)
     for name, text in SCENARIOS.items():
         if (place / f"{name}.tar.gz").exists():

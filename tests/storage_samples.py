@@ -7,6 +7,7 @@ import itertools
 import os
 import signal
 import sys
+import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,9 +22,9 @@ from numpy.testing import assert_array_equal
 
 import podusv_cli
 from podusv_cli.core.recording import Recording
-from podusv_cli.storage import log_writer, manifest
+from podusv_cli.storage import log as log_file
+from podusv_cli.storage import manifest
 from podusv_cli.storage.run_folder import RunWriter
-from podusv_cli.storage.stream import Stream
 
 YAML = "name: kleine Fähre\nstart: {x: -10.0}\n"
 TEXTS = {"resolved_yaml": YAML, "title": "Größe ψ_e", "source": "a towing tank", "version": "1.2.3"}
@@ -50,17 +51,13 @@ def recording(rows: int = 50, nodes: int = 8, **changes: Any) -> Recording:
     return Recording(**parts | {"about": ABOUT} | changes)
 
 
-def write_log(stream: Stream, recorded: Recording, **texts: str) -> None:
-    """A recording's whole log file."""
-    with log_writer.opened(stream, recorded, **TEXTS | texts) as log:
-        log.add({**recorded.signals, **recorded.fixed}, recorded.about)
-
-
-def log(recorded: Recording | None = None, **texts: str) -> bytes:
+def log(recorded: Recording | None = None, *, compress: bool = False, **texts: str) -> bytes:
     """log.h5 of a recording, the small one if none is given."""
-    content = io.BytesIO()
-    write_log(Stream(content), recorded or recording(), **texts)
-    return content.getvalue()
+    with tempfile.TemporaryDirectory() as place:
+        path = Path(place) / "log.h5"
+        told = log_file.Texts(**TEXTS | texts)
+        log_file.write(path, recorded or recording(), told, compress=compress)
+        return path.read_bytes()
 
 
 def rewritten(change: Callable[[h5py.File], object]) -> bytes:

@@ -54,7 +54,7 @@ def podusv_process(*words: str, stdout: int = subprocess.PIPE) -> subprocess.Com
 
 def test_a_sound_scenario_is_a_line_and_what_it_takes(podusv: Command) -> None:
     said = podusv("validate", "a.yaml", "--set", "controller.k_ze=0.03")
-    takes = "a run takes about 0.63 s, 160 MB of memory and 6 MB of disk"
+    takes = "a run takes about 0.63 s, 160 MB of memory and 7.4 MB of disk"
     assert said == (0, f"a.yaml: ok (a, pid, 31000 steps)\n{takes}\n", "")
 
 

@@ -1,7 +1,7 @@
 """Results of every podusv there was are read by this one, number by number.
 
 For each format there are small finished runs in tests/fixtures, kept as they were written, and the
-numbers in them in plain text beside. Whoever raises `layout.FORMAT` reads the old ones on, and
+numbers in them in plain text beside. Whoever raises `manifest.FORMAT` reads the old ones on, and
 makes new ones with `python tests/old_runs.py`.
 """
 
@@ -20,7 +20,7 @@ from command_samples import Command
 from numpy.testing import assert_array_equal
 
 from podusv_cli.core.errors import StorageError
-from podusv_cli.storage import log_layout, log_reader, manifest
+from podusv_cli.storage import log_reader, manifest
 from podusv_cli.storage.run_folder import open_run
 
 FIXTURES = Path(__file__).with_name("fixtures")
@@ -52,7 +52,7 @@ def told(archive: Path) -> Any:
 
 
 def test_there_are_runs_of_every_format() -> None:
-    formats = range(1, log_layout.FORMAT + 1)
+    formats = range(1, manifest.FORMAT + 1)
     wanted = {f"format_{number}-{kind}" for number in formats for kind in KINDS}
     assert wanted <= set(NAMES), "python tests/old_runs.py makes those of this format"
 
@@ -85,7 +85,7 @@ def test_xarray_reads_every_number(run: Path, told: Any, engine: str) -> None:
         assert log["time"].dims == ("time",)
 
 
-@pytest.fixture(params=range(1, log_layout.FORMAT + 1))
+@pytest.fixture(params=range(1, manifest.FORMAT + 1))
 def folders(request: pytest.FixtureRequest, tmp_path: Path) -> dict[Path, Any]:
     """All runs of a format, and what is told of them."""
     place = FIXTURES / f"format_{request.param}"
@@ -123,20 +123,20 @@ def test_it_differs_in_nothing_from_itself(run: Path, podusv: Command) -> None:
 
 
 def test_a_log_of_a_later_format_is_refused_in_a_sentence(run: Path) -> None:
-    later = log_layout.FORMAT + 1
+    later = manifest.FORMAT + 1
     content = io.BytesIO((run / "log.h5").read_bytes())
     with h5py.File(content, "r+") as file:
         file.attrs.modify("podusv_format", np.int32(later))
     (run / "log.h5").write_bytes(content.getvalue())
-    words = f"written in format {later}; this podusv reads format {log_layout.FORMAT}$"
+    words = f"written in format {later}; this podusv reads formats 1 to {manifest.FORMAT}$"
     with pytest.raises(StorageError, match=words):
         log_reader.read_log(run / "log.h5")
 
 
 def test_a_folder_of_a_later_format_is_refused_in_a_sentence(run: Path, podusv: Command) -> None:
-    later = log_layout.FORMAT + 1
+    later = manifest.FORMAT + 1
     stated = json.loads((run / manifest.NAME).read_text())
     (run / manifest.NAME).write_text(json.dumps(stated | {"podusv_format": later}))
-    words = f"written in format {later}; this podusv reads {log_layout.FORMAT}"
+    words = f"written in format {later}; this podusv reads formats 1 to {manifest.FORMAT}"
     for command in ("plot", "compare", "rerun"):
         assert podusv(command, run) == (5, "", f"{run / manifest.NAME}: {words}\n")

@@ -15,9 +15,9 @@ from conftest import corrected, run
 from numpy.testing import assert_array_equal
 from storage_samples import ENVIRONMENT, PYTHON, TEXTS, YAML, assert_same, log, recording
 
-from podusv_cli.storage import log_layout, log_reader, log_writer
-from podusv_cli.storage.packing import LEVEL
-from podusv_cli.storage.stream import Stream
+from podusv_cli.core.signal import Signal
+from podusv_cli.storage import log_reader
+from podusv_cli.storage.log import Layout
 
 DIMENSIONS = {
     "time": ("time",), "x": ("time",), "tau_u_cmd": ("time",), "z_e": ("time",),
@@ -51,9 +51,10 @@ def test_xarray_reads_every_signal_with_its_axes_and_units(path: Path, engine: s
         for name, array in {**recorded.signals, **recorded.fixed}.items():
             assert_array_equal(found[name].to_numpy(), array, err_msg=name)
             signal = recorded.about[name]
-            expected = {"units": signal.unit, "long_name": signal.meaning, "symbol": signal.symbol,
-                        "axes": " ".join(found[name].dims)}  # fmt: skip
-            assert found[name].attrs == expected
+            assert found[name].attrs == {
+                "units": signal.unit, "long_name": signal.meaning, "symbol": signal.symbol,
+                "axes": " ".join(DIMENSIONS[name]),
+            }  # fmt: skip
         assert "time" in found.x.coords
         assert_array_equal(found.node, np.arange(8))
 
@@ -69,7 +70,7 @@ def test_every_axis_has_its_scale_by_name() -> None:
 def test_attributes_of_the_file(path: Path, engine: str) -> None:
     with xr.open_dataset(path, engine=engine) as found:
         assert found.attrs == {
-            "podusv_format": 1, "podusv_version": "1.2.3", "Conventions": "CF-1.11",
+            "podusv_format": 2, "podusv_version": "1.2.3", "Conventions": "CF-1.11",
             "title": TEXTS["title"], "source": TEXTS["source"], "status": "finished",
             "controller": "pid",
         }  # fmt: skip
@@ -123,23 +124,26 @@ def test_nothing_in_a_log_is_of_variable_length() -> None:
             assert text is None or (text.encoding == "utf-8" and text.length), (name, key)
 
 
-def test_every_signal_is_packed_and_has_a_checksum() -> None:
+def test_every_array_lies_in_one_piece_where_a_map_can_use_it() -> None:
     datasets = objects(log())
     for name in (*recording().signals, *recording().fixed):
         found = datasets[name]
-        assert (found.compression, found.compression_opts) == ("gzip", LEVEL), name
-        assert found.shuffle, name
-        assert found.fletcher32, name
+        assert found.chunks is None
+        assert found.id.get_offset() % 8 == 0
+
+
+def test_compressed_arrays_are_the_same_and_smaller(tmp_path: Path) -> None:
+    recorded = recording(rows=20_000)
+    plain, packed = log(recorded), log(recorded, compress=True)
+    found = objects(packed)["W_hat_u"]
+    assert (found.compression, found.shuffle) == ("gzip", True)
+    assert len(packed) < 0.98 * len(plain)
+    (tmp_path / "log.h5").write_bytes(packed)
+    assert_same(recorded, log_reader.read_log(tmp_path / "log.h5"))
 
 
 def test_hdf5_1_8_and_so_every_matlab_can_read_it() -> None:
     assert log()[8] == 2, "version of the superblock"
-
-
-def test_chunks_stay_below_a_megabyte_and_cover_long_signals_whole() -> None:
-    assert log_layout.chunk((31_000,)) == (31_000,)
-    assert log_layout.chunk((31_000, 27)) == (4429, 27)  # seven, all but full
-    assert log_layout.chunk((3, 1_000_000)) == (1, 1_000_000)
 
 
 def test_a_signal_without_a_meaning_is_a_bug() -> None:
@@ -177,35 +181,50 @@ def test_a_simulated_run_comes_back_as_it_was(tmp_path: Path) -> None:
         assert set(found.data_vars) | {"time"} == {*recorded.signals, *recorded.fixed}
 
 
-# --- written little by little
+# --- signals of laws that podusv does not know
 
 
-def test_arrays_may_come_little_by_little(tmp_path: Path) -> None:
-    recorded, content = recording(), io.BytesIO()
-    with log_writer.opened(Stream(content), recorded, **TEXTS) as file:
-        file.add({name: recorded[name] for name in ("x", "time")}, recorded.about)
-        file.done()
-        file.add({"W_hat_u": recorded["W_hat_u"]}, {})
-        rest = {name: recorded[name] for name in ("z_e", "tau_u_cmd")}
-        file.add({**rest, **recorded.fixed}, {})
+SPEED = Signal("speed_2", "m/s", "a law's own speed", r"\nu_2", ("layer",), wrapped=True)
+GAINS = Signal("gains", "1", "a law's own gains", "K", ("layer",), fixed=True)
+
+
+def test_signals_of_others_bring_their_description(tmp_path: Path) -> None:
+    base = recording()
+    recorded = recording(
+        signals={**base.signals, "speed_2": np.ones((50, 3))},
+        fixed={**base.fixed, "gains": np.arange(3.0)},
+        about={**base.about, "speed_2": SPEED, "gains": GAINS},
+    )
     path = tmp_path / "log.h5"
-    path.write_bytes(content.getvalue())
+    path.write_bytes(log(recorded))
     found = log_reader.read_log(path)
-    assert list(found.signals) == ["time", "x", "W_hat_u", "z_e", "tau_u_cmd"]
-    for name in {**recorded.signals, **recorded.fixed}:
-        assert_array_equal(found[name], recorded[name], err_msg=name)
+    assert_same(recorded, found)
+    assert found.about == {name: recorded.about[name] for name in found.about}
+    assert {"speed_2", "gains", "W_hat_u"} <= set(found.about)
+    with xr.open_dataset(path, engine="h5netcdf") as seen:
+        assert seen.speed_2.dims == ("time", "layer")
+        assert seen.gains.dims == ("layer",)
 
 
-@pytest.mark.parametrize(
-    ("late", "error"),
-    [
-        ({"u": np.zeros(49)}, "u: 49 values along time, not 50"),
-        ({"W_hat_r": np.zeros((50, 7))}, "W_hat_r: 7 values along node, not 8"),
-    ],
-)
-def test_what_does_not_fit_what_is_there_is_refused(late: dict, error: str) -> None:
-    recorded = recording()
-    with pytest.raises(ValueError, match=error):  # noqa: PT012, SIM117
-        with log_writer.opened(Stream(io.BytesIO()), recorded, **TEXTS) as file:
-            file.add(recorded.signals, recorded.about)
-            file.add(late, {})
+# --- the file in memory in which HDF5 lays the log out
+
+
+def test_a_layout_is_a_file_whose_empty_parts_take_no_room(tmp_path: Path) -> None:
+    layout, plain = Layout(), io.BytesIO()
+    random = np.random.default_rng(3)
+    for _ in range(200):
+        place, content = int(random.integers(40_000)), random.bytes(int(random.integers(1, 9000)))
+        for file in (layout, plain):
+            file.seek(place)
+            assert file.write(content) == len(content)
+            assert file.tell() == place + len(content)
+        place = int(random.integers(40_000))
+        plain.seek(place)
+        layout.seek(place)
+        known = plain.read(5000)
+        assert layout.read(5000)[: len(known)] == known
+    with (tmp_path / "file").open("wb", buffering=0) as out:
+        layout.write_to(out)
+    assert (tmp_path / "file").read_bytes() == plain.getvalue()
+    layout.truncate(2**50)
+    assert (layout.seek(0, io.SEEK_END), layout.size) == (2**50, 2**50)

@@ -16,7 +16,7 @@ from storage_samples import deadline
 
 from podusv_cli.core.errors import StorageError
 from podusv_cli.storage import json_files, manifest
-from podusv_cli.storage.regular import LARGEST_FILE
+from podusv_cli.storage.files import LARGEST_FILE
 
 FILES = {"log.h5": b"numbers", "figures/path.png": b"picture", "metrics.csv": b""}
 
@@ -41,7 +41,7 @@ def rewrite(folder: Path, change: Callable[[dict[str, Any]], object]) -> None:
 
 def test_it_lists_every_file_in_order(folder: Path) -> None:
     assert json.loads((folder / "manifest.json").read_text()) == {
-        "podusv_format": 1,
+        "podusv_format": 2,
         "status": "diverged",
         "files": {
             name: {"sha256": hashlib.sha256(content).hexdigest(), "bytes": len(content)}
@@ -148,8 +148,11 @@ def test_a_pipe_in_place_of_a_file_is_not_waited_for(folder: Path) -> None:
 
 ENTRY = {"sha256": "0" * 64, "bytes": 1}
 BROKEN = {
-    "other format": (lambda it: it.update(podusv_format=2), "format 2; this podusv reads 1"),
-    "no format": (lambda it: it.pop("podusv_format"), "format None; this podusv reads 1"),
+    "other format": (
+        lambda it: it.update(podusv_format=3),
+        "format 3; this podusv reads formats 1 to 2",
+    ),
+    "no format": (lambda it: it.pop("podusv_format"), "format None; this podusv reads"),
     "no status": (lambda it: it.pop("status"), "status: Field required"),
     "unknown status": (lambda it: it.update(status="asleep"), "status"),
     "no files": (lambda it: it.pop("files"), "files: Field required"),

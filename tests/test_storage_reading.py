@@ -42,7 +42,7 @@ def read(path: Path, content: bytes) -> Recording:
         recording(rows=1),
         recording(rows=0),
         recording(fixed={}),
-        recording(rows=300, nodes=2000),  # five chunks
+        recording(rows=9000, nodes=5),  # written in three parts
         recording(status="diverged", message="diverged at t = 0.5 s: ψ is not finite"),
         recording(signals={"time": np.array([0.0, 1.0]), "x": np.array([np.nan, -np.inf])}),
         recording(signals={"time": np.array([0.0, 1.0]), "z_e": np.array([-0.0, 5e-324])}),
@@ -71,62 +71,36 @@ def test_the_scenario_comes_back_whatever_its_length(path: Path, text: str) -> N
     assert log_reader.resolved_yaml(path) == text
 
 
-def outcome(path: Path, content: bytes, recorded: Recording) -> str:
-    """'refused', or 'read' where nothing of the recording and its scenario changed."""
+def outcome(path: Path, content: bytes) -> str:
+    """'refused' or 'read'; an altered number is for the manifest to tell."""
     path.write_bytes(content)
     try:
-        found, text = log_reader.read_log(path), log_reader.resolved_yaml(path)
+        log_reader.read_log(path)
+        log_reader.resolved_yaml(path)
     except StorageError:
         return "refused"
-    assert_same(recorded, found)
-    assert text == YAML
     return "read"
 
 
 def test_truncated_logs_are_refused(path: Path) -> None:
     content = log(TINY)
     for length in [*range(0, 400, 7), *range(400, len(content), 211), len(content) - 1]:
-        assert outcome(path, content[:length], TINY) == "refused", length
+        assert outcome(path, content[:length]) == "refused", length
 
 
-def test_a_flipped_bit_is_refused_or_harmless(path: Path) -> None:
+def test_a_flipped_bit_or_a_burst_of_rubbish_ends_nothing(path: Path) -> None:
     content, random = log(TINY), np.random.default_rng(17)
     outcomes = set()
-    for bit in random.integers(8 * len(content), size=500):
+    for size in [0] * 500 + [64] * 150:
         damaged = bytearray(content)
-        damaged[bit >> 3] ^= 1 << (bit & 7)
-        outcomes.add(outcome(path, bytes(damaged), TINY))
-    assert outcomes == {"refused", "read"}  # some bytes of the file mean nothing
+        start = int(random.integers(len(content) - 64))
+        damaged[start : start + size] = random.bytes(size)
+        damaged[start] ^= 1 << int(random.integers(8))
+        outcomes.add(outcome(path, bytes(damaged)))
+    assert outcomes == {"refused", "read"}
 
 
-def test_a_flipped_bit_in_the_index_of_chunks_is_refused_or_harmless(path: Path) -> None:
-    # This index has no checksum, and HDF5 takes a chunk that it cannot find there for zeros.
-    content = log(TINY)
-    last = content.rindex(b"TREE")
-    for bit in range(8 * last, 8 * (last + 96)):
-        damaged = bytearray(content)
-        damaged[bit >> 3] ^= 1 << (bit & 7)
-        outcome(path, bytes(damaged), TINY)
-
-
-@pytest.mark.parametrize("size", range(5))
-def test_a_chunk_too_short_for_its_checksum_is_refused(path: Path, size: int) -> None:
-    # Handed to HDF5 it would end the process.
-    damaged = bytearray(log(TINY))
-    entry = damaged.rindex(b"TREE") + 24
-    assert damaged[entry : entry + 4] != bytes(4)
-    damaged[entry : entry + 4] = size.to_bytes(4, "little")
-    with pytest.raises(StorageError, match="does not fit its checksum"):
-        read(path, bytes(damaged))
-
-
-def test_bursts_of_rubbish_are_refused(path: Path) -> None:
-    content, random = log(TINY), np.random.default_rng(23)
-    for _ in range(150):
-        damaged = bytearray(content)
-        start = random.integers(len(content) - 64)
-        damaged[start : start + 64] = random.bytes(64)
-        outcome(path, bytes(damaged), TINY)
+PACKED = {"compression": "gzip", "shuffle": True, "fletcher32": True}
 
 
 def replaced(name: str, **how: object) -> Callable[[h5py.File], None]:
@@ -177,12 +151,34 @@ def only_time(count: int) -> Callable[[h5py.File], None]:
     return change
 
 
+def compact(file: h5py.File) -> None:
+    del file["x"]
+    made = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    made.set_layout(h5py.h5d.COMPACT)
+    h5py.h5d.create(file.id, b"x", h5py.h5t.IEEE_F64LE, h5py.h5s.create_simple((50,)), made)
+
+
+def bomb(file: h5py.File) -> None:
+    """A chunk that is larger than the numbers in it."""
+    del file["x"]
+    dataset = file.create_dataset("x", (50,), dtype="<f8", chunks=(50,), **PACKED)
+    dataset.id.write_direct_chunk((0,), bytes(100_000))
+
+
+def many(file: h5py.File) -> None:
+    for number in range(1000):
+        file[f"x{number}"] = file["x"]
+
+
+def about(name: str, content: object) -> Callable[[h5py.File], None]:
+    return lambda file: file["x"].attrs.create(name, content)
+
+
 def no_nodes(file: h5py.File) -> None:
     for name, shape in (("W_hat_u", (50, 0)), ("rbf_center", (0, 3))):
         remake(file, name, shape=shape, dtype="<f8")
 
 
-PACKED = {"compression": "gzip", "shuffle": True, "fletcher32": True}
 FIFTY = np.zeros(50)
 HOSTILE = {
     "soft link": (linked("x", h5py.SoftLink("/z_e")), "link to elsewhere"),
@@ -197,22 +193,30 @@ HOSTILE = {
     "matrix": (replaced("x", shape=(50, 2), dtype="<f8"), "2 dimensions"),
     "too short": (replaced("x", data=FIFTY[1:], **PACKED), "49 values along time"),
     "other nodes": (replaced("rbf_width", data=FIFTY[:4], **PACKED), "4 values along input"),
-    "no checksum": (replaced("x", data=FIFTY, compression="gzip"), "no checksums"),
-    "no chunks": (replaced("x", data=FIFTY), "no checksums"),
+    "not in the file": (replaced("x", shape=(50,), dtype="<f8"), "x has no numbers in this file"),
+    "compact": (compact, "x has no numbers in this file"),
+    "bomb": (bomb, "packed in an unknown way"),
     "unknown filter": (replaced("x", data=FIFTY, compression="lzf"), "packed in an unknown way"),
     "nothing stored": (replaced("x", shape=(50,), dtype="<f8", **PACKED), "chunk is missing"),
     "giant": (replaced("x", shape=(2**40,), dtype="<f8", chunks=(4096,)), "along time"),
     "giant in all": (only_time(2**40), "claims 8796093022208 bytes.*; read it with h5py or xarray"),
-    "large without data": (only_time(2**28), "no checksums"),
+    "large without data": (only_time(2**28), "chunk is missing"),
     "unbounded chunk": (
         replaced("x", data=FIFTY, chunks=(2**20,), maxshape=(None,), **PACKED), "unknown way",
     ),
     "group": (lambda file: (file.pop("x"), file.create_group("x")), "damaged"),
     "named type": (linked("x", np.dtype("<f8")), "damaged"),
     "no time": (lambda file: file.pop("time"), "no time"),
-    "unknown signal": (lambda file: file.create_dataset("tau_w", data=FIFTY), "'tau_w' is neither"),
-    "unknown bytes": (lambda file: file.create_dataset(b"\xff\xfe", data=FIFTY), "is no signal"),
-    "other format": (described("podusv_format", np.int32(2)), "format 2; this .* reads format 1"),
+    "unknown signal": (lambda file: file.create_dataset("tau_w", data=FIFTY), "'tau_w' does not"),
+    "unknown bytes": (lambda file: file.create_dataset(b"\xff\xfe", data=FIFTY), "no name of a"),
+    "no identifier": (lambda file: file.create_dataset("tau w", data=FIFTY), "'tau w' is no name"),
+    "long name": (lambda file: file.create_dataset("a" * 65, data=FIFTY), "a' is no name of a"),
+    "many": (many, "it has 1010 members, more than 1000"),
+    "other format": (described("podusv_format", np.int32(3)), "format 3; this .* formats 1 to 2"),
+    "format 0": (described("podusv_format", np.int32(0)), "format 0; this .* formats 1 to 2"),
+    "endless axes": (about("axes", "time"), "no single string of fixed length"),
+    "other axes": (about("axes", np.bytes_("node")), "8 values along node instead of 50"),
+    "long symbol": (about("symbol", np.bytes_("\x1b[2J")), "symbol holds characters that are no"),
     "format in words": (described("podusv_format", "1"), "podusv_format is no number"),
     "formats": (described("podusv_format", [1, 1], "<i4"), "podusv_format is no number"),
     "no format": (lambda file: file.attrs.pop("podusv_format"), "damaged"),
@@ -239,19 +243,6 @@ def test_a_log_behind_something_else_is_refused(path: Path) -> None:
     # HDF5 would find it there, and count all places in the file from there.
     with pytest.raises(StorageError, match="no HDF5 file of the kind that podusv writes"):
         read(path, bytes(512) + log())
-
-
-def test_the_tree_of_a_long_signal_goes_round_in_no_circle(path: Path) -> None:
-    long = recording(rows=66, nodes=2**17)  # 66 chunks, more than a node of the tree holds
-    content = log(long)
-    assert b"TREE\x01\x01" in content
-    assert_same(long, read(path, content))
-
-
-def test_a_scenario_altered_in_its_place_is_refused(path: Path) -> None:
-    path.write_bytes(log().replace(b"x: -10.0", b"x: -90.0"))
-    with pytest.raises(StorageError, match="does not fit its checksum"):
-        log_reader.resolved_yaml(path)
 
 
 @pytest.fixture
@@ -281,7 +272,6 @@ def test_data_in_other_files_are_refused(path: Path, secret: Path) -> None:
         (linked("provenance/resolved_yaml", h5py.SoftLink("/x")), "link to elsewhere"),
         (replaced("provenance", data=1.0), "damaged"),
         (replaced("provenance/resolved_yaml", data="a: 1\n"), "no single string"),
-        (replaced("provenance/resolved_yaml", data=np.bytes_("a: 1\n")), "damaged"),
         (replaced("provenance/resolved_yaml", data=np.zeros((), "S20000000")), "20000000 bytes"),
         (lambda file: file.pop("provenance"), "damaged"),
     ],

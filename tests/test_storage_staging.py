@@ -31,7 +31,7 @@ from storage_samples import (
 )
 
 from podusv_cli.core.errors import StorageError
-from podusv_cli.storage import files as atomic
+from podusv_cli.storage import staging
 from podusv_cli.storage.run_folder import RunWriter
 from podusv_cli.storage.staging import Staging, Taken
 
@@ -89,7 +89,7 @@ def test_a_lesser_one_takes_no_place(final: Path) -> None:
 def exchanging(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> bool:
     """Whether the file system lets two names trade places."""
     if not request.param:
-        monkeypatch.setattr(atomic, "exchange", lambda one, other: fails(errno.EINVAL)())
+        monkeypatch.setattr(staging, "exchange", lambda one, other: fails(errno.EINVAL)())
     return bool(request.param)
 
 

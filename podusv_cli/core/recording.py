@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Literal, Protocol, Self
+from typing import Literal, Self
 
 import numpy as np
 
@@ -12,34 +12,9 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.core.signal import Signal
 
 Status = Literal["finished", "diverged", "interrupted"]
+# Room for so many numbers: in memory, or on the disk for what memory does not hold.
+Allocate = Callable[[int], Vector]
 BLOCK = 2**16  # rows that are looked at together; a long run's columns may be longer than memory
-
-
-class Columns(Protocol):
-    """Arrays by name that grow by rows."""
-
-    def append(self, rows: Mapping[str, Vector]) -> None:
-        """More rows, the same names and as many of each; theirs again once this returns."""
-
-    def whole(self) -> dict[str, Vector]:
-        """Everything that was appended."""
-
-
-class InMemory:
-    """Columns in memory, for rows that nobody writes to afterwards."""
-
-    def __init__(self) -> None:
-        """Nothing so far."""
-        self._parts: dict[str, list[Vector]] = {}
-
-    def append(self, rows: Mapping[str, Vector]) -> None:
-        """More rows."""
-        for name, array in rows.items():
-            self._parts.setdefault(name, []).append(array)
-
-    def whole(self) -> dict[str, Vector]:
-        """All rows."""
-        return {name: np.concatenate(parts) for name, parts in self._parts.items()}
 
 
 def blocks(rows: int, size: int = BLOCK) -> Iterator[slice]:

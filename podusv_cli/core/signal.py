@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from podusv_cli.core.errors import LawError
 
-NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,59}")  # usable as a variable in logs and claims
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")  # usable as a variable in logs and claims
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,6 @@ class Plan(NamedTuple):
     sample_every: int  # 0: the law takes no samples
     load_of_time: int  # 1: the disturbance depends on time alone
     wants_loads: int  # 1: the law is told which loads really act
-    first_row: int = 0  # the row that the log begins with
 
     @property
     def width(self) -> int:
@@ -183,7 +182,7 @@ def finite(count: int, vector: Vector) -> bool:
 def write_row(k: int, t: float, c: Wires, n: Plan) -> None:
     """Log t, s and the row."""
     s, row = c.s, c.row
-    out = tail(c.log, (k // n.log_every - n.first_row) * (1 + n.states + n.columns))
+    out = tail(c.log, k // n.log_every * (1 + n.states + n.columns))
     out[0] = t
     for i in range(n.states):
         out[1 + i] = s[i]

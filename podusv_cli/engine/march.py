@@ -7,7 +7,7 @@ the march's stop flag on an interrupt, and abandons a march that hangs.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from contextlib import suppress
 from contextvars import copy_context
 from functools import partial
@@ -23,7 +23,6 @@ from podusv_cli.core.recording import Status
 from podusv_cli.engine.closed_loop import STOP
 from podusv_cli.process.interrupts import interrupts_heard
 
-Advance = Callable[[int, int], int]
 Bell = SimpleQueue[None]
 GLANCE = 0.05  # s between two looks at a march
 PATIENCE = 10.0  # s of processor time that a step may take
@@ -129,22 +128,14 @@ class Work:
 
 
 def march(
-    advance: Advance, ranges: Iterable[tuple[int, int]], under_way: Vector,
+    advance: Callable[[], int], last: int, under_way: Vector,
     progress: Callable[[int], None] | None = None,
 ) -> Ending:  # fmt: skip
-    """March over these ranges of instants, each from its first up to its second number.
-
-    The iterator gets on when a range is done. To be called while interrupts are held.
-    """
-    ending = Ending(0, "finished")
-    for first, last in ranges:
-        work = Work(partial(advance, first, last), under_way)
-        try:
-            with interrupts_heard():
-                work.finish(progress)
-            ending = work.ending(last)
-        except KeyboardInterrupt:
-            ending = Ending(max(first, work.stopped()), "interrupted")
-        if ending.status != "finished":
-            break
-    return ending
+    """March up to the instant `last`, excluded. To be called while interrupts are held."""
+    work = Work(advance, under_way)
+    try:
+        with interrupts_heard():
+            work.finish(progress)
+        return work.ending(last)
+    except KeyboardInterrupt:
+        return Ending(work.stopped(), "interrupted")

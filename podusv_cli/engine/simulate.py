@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,14 +13,13 @@ from podusv_cli.actuators.base import Actuator
 from podusv_cli.controllers.base import Controller
 from podusv_cli.core import signal
 from podusv_cli.core.kernel import Vector, bundle, kernel
-from podusv_cli.core.recording import Columns, Recording
+from podusv_cli.core.recording import Allocate, Recording
 from podusv_cli.core.signal import LOOP, Signal
 from podusv_cli.disturbances.base import Disturbance
 from podusv_cli.engine import closed_loop, signatures
 from podusv_cli.engine.closed_loop import Plan, Wires
 from podusv_cli.engine.grid import TimeGrid, whole_steps
 from podusv_cli.engine.march import Ending, march
-from podusv_cli.engine.row_table import PIECE, Pieces, rows_held
 from podusv_cli.paths.base import TARGET, Path
 from podusv_cli.process.interrupts import interrupts_held
 from podusv_cli.vessels.vessel import Vessel
@@ -122,28 +122,24 @@ def simulate(
     observer: Observer | None = None,
     compiled: bool = True,
     progress: Callable[[float], None] | None = None,
-    columns: Columns | None = None,
-    piece: int = PIECE,
+    allocate: Allocate = np.empty,
 ) -> Recording:
     """Integrate the closed loop over the grid.
 
     `progress` is called with the fraction done, about 20 times a second. An interrupt ends the
-    march and keeps what was logged. `compiled=False` runs the same kernels as plain Python. The log
-    is held in memory, or with `columns` goes there in pieces of about `piece` bytes, and the
-    recording's signals are what the columns give. What they raise ends the march.
+    march and keeps what was logged. `compiled=False` runs the same kernels as plain Python.
+    `allocate` gives the room for the logged rows; the recording's signals are views of it.
     """
     observer, about = observer or Observer(), loop.about()
     plan = loop.layout(grid)
-    rows = grid.rows if columns is None else rows_held(plan, grid, piece)
-    wires = wire(loop, plan, observer, rows)
-    pieces = Pieces(plan, wires.log, columns, lambda table: _logged(loop, table))
-    advance = marcher(loop, observer, compiled)
+    wires, last = wire(loop, plan, observer, grid.rows, allocate), plan.steps + 1
+    advance = partial(marcher(loop, observer, compiled), 0, last, grid.step, wires, plan)
     with np.errstate(all="ignore"), interrupts_held():
         ending = march(
-            lambda a, b: advance(a, b, grid.step, wires, pieces.plan), pieces.ranges(),
-            wires.under_way, progress and (lambda reached: progress(reached / (plan.steps + 1))),
+            advance, last, wires.under_way,
+            progress and (lambda reached: progress(reached / last)),
         )  # fmt: skip
-        return replace(_record(loop, grid, wires, pieces, ending), about=about)
+        return replace(_record(loop, grid, wires, plan, ending), about=about)
 
 
 def entries(loop: ClosedLoop, observer: Observer) -> Iterator[tuple[Any, Any, tuple[str, ...]]]:
@@ -178,7 +174,9 @@ def marcher(loop: ClosedLoop, observer: Observer, compiled: bool) -> Callable[..
     return compiled_march
 
 
-def wire(loop: ClosedLoop, plan: Plan, observer: Observer, rows: int = 1) -> Wires:
+def wire(
+    loop: ClosedLoop, plan: Plan, observer: Observer, rows: int = 1, allocate: Allocate = np.empty
+) -> Wires:
     """The loop's vectors, ready for the march to begin, with room for this many logged rows."""
 
     def numbers(constants: dict[str, float]) -> Vector:
@@ -195,7 +193,7 @@ def wire(loop: ClosedLoop, plan: Plan, observer: Observer, rows: int = 1) -> Wir
         row=np.zeros(plan.columns), stages=np.zeros(5 * plan.states),
         held=np.zeros(closed_loop.HELD_SIGNALS + len(law.signals)),
         work=np.zeros(law.workspace()), seen=np.zeros(observer.size), under_way=np.zeros(2),
-        log=np.empty(rows * plan.width),
+        log=allocate(rows * plan.width),
     )  # fmt: skip
 
 
@@ -221,16 +219,17 @@ def by_name(labels: list[str], table: Vector, about: Mapping[str, Signal]) -> di
 
 
 def _logged(loop: ClosedLoop, table: Vector) -> dict[str, Vector]:
-    """The signals of a recording in some logged rows."""
+    """The signals of a recording in a table of logged rows."""
     named = by_name(names(loop), table, loop.about())
     return {name: column for name, column in named.items() if name not in TARGET[2:]}
 
 
 def _record(
-    loop: ClosedLoop, grid: TimeGrid, wires: Wires, pieces: Pieces, ending: Ending
+    loop: ClosedLoop, grid: TimeGrid, wires: Wires, plan: Plan, ending: Ending
 ) -> Recording:
     reached, status, cause = ending
-    signals, message = pieces.signals(reached), ""
+    rows = -(-reached // plan.log_every)
+    signals, message = _logged(loop, wires.log.reshape(-1, plan.width)[:rows]), ""
     if status == "interrupted":
         message = f"interrupted after t = {max(reached - 1, 0) * grid.step:.6g} s"
     if status == "diverged":

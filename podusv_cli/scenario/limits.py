@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from podusv_cli.core.quantities import bytes_in_words, time_in_words
-from podusv_cli.engine.row_table import NUMBER, PIECE
 from podusv_cli.engine.simulate import names
 from podusv_cli.paths.base import TARGET
 from podusv_cli.scenario.load import resolved_yaml, values
@@ -16,19 +15,21 @@ from podusv_cli.scenario.model import Scenario, Simulation
 from podusv_cli.scenario.yaml_text import MAX_CHARACTERS, MAX_NODES
 from podusv_cli.theory import monitor
 
+NUMBER = 8  # bytes
 MOST_STEPS = 10**8
 MOST_CONTENT = 4 * 10**9  # bytes; what podusv reads back
 MOST_RUNS = 1000  # of a comparison; the manifest of 1 300 with long names would be refused
 ESCAPED, LINE = 10, 60  # characters that one may become in resolved.yaml; of a key, at the most
-HELD = 256 * 2**20  # bytes of a log that is held in memory; a larger one goes to the disk in pieces
+HELD = 256 * 2**20  # bytes of a log that is held in memory; a larger one is made on the disk
+WORKED = 64 * 2**20  # bytes of a larger one that are worked on at a time
 # Rough costs on one core, see benchmarks/results.md: a step, a step's part for each number of the
 # law's memory, both with machine code and in plain Python; and what a byte of log takes to be
-# watched, packed and written.
+# watched and written.
 STEP, MEMORY, PLAIN, BYTE = 1e-6, 6e-9, 5.0e2, 13e-9  # s, s, times, s
 START = 0.5  # s, of a run of no steps
 PROCESS = 150 * 10**6  # bytes of memory without any log
-PACKED = 0.8  # of its content is what a log takes on the disk
-LEAST_PACKED = 0.2  # what even a dull one takes
+COMPRESSED = 0.7  # of its content is what a compressed log takes on the disk
+LEAST_COMPRESSED = 0.2  # what even a dull one takes
 
 
 @dataclass(frozen=True)
@@ -36,8 +37,7 @@ class Size:
     """What a run of a scenario amounts to; but for `steps`, `rows` and `content` rough guesses.
 
     `content` is what the log's numbers take, `disk` its file [bytes]; `scratch` is what lies on the
-    disk until the run is made, where memory does not hold it, and `needed` what has to be free at
-    the very least.
+    disk until the run is made, where memory does not hold it.
     """
 
     steps: int
@@ -45,16 +45,22 @@ class Size:
     content: int
     seconds: float
     scratch: int
+    compressed: bool
 
     @property
     def disk(self) -> float:
         """Of the finished log."""
-        return PACKED * self.content
+        return self.content * (COMPRESSED if self.compressed else 1.0)
+
+    @property
+    def least(self) -> float:
+        """Of the finished log at the very least."""
+        return self.content * (LEAST_COMPRESSED if self.compressed else 1.0)
 
     @property
     def memory(self) -> float:
         """Of the process at its peak."""
-        return PROCESS + (self.content if self.content <= HELD else 2 * PIECE)
+        return PROCESS + (WORKED if self.scratch else self.content)
 
     @property
     def needed(self) -> float:
@@ -77,15 +83,16 @@ def estimate(scenario: Scenario) -> Size:
     step = STEP + MEMORY * sum(size for _, size in law.slots())
     pace = 1.0 if scenario.simulation.compiled else PLAIN
     seconds = START + grid.steps * step * pace + content * BYTE
-    unlogged = grid.rows * len(monitor.UNLOGGED) * NUMBER if monitored else 0
-    scratch = content + unlogged if content > HELD else 0
-    return Size(grid.steps, grid.rows, content, seconds, scratch)
+    beside = len(TARGET[2:]) + (len(monitor.UNLOGGED) if monitored else 0)
+    compress = scenario.log.compress
+    scratch = content + grid.rows * beside * NUMBER if content > HELD and not compress else 0
+    return Size(grid.steps, grid.rows, content, seconds, scratch, compress)
 
 
 def needed(sizes: Sequence[Size], at_once: int) -> float:
     """Bytes that have to be free on the disk for some runs, so many of them made at once."""
     scratch = sorted(size.scratch for size in sizes)[-at_once:]
-    return LEAST_PACKED * sum(size.content for size in sizes) + sum(scratch)
+    return sum(size.least for size in sizes) + sum(scratch)
 
 
 def largest(scenario: Scenario) -> Size:
@@ -116,6 +123,8 @@ def limits(
             return [_too_long(scenario.simulation, size, insist)]
         if size.content > MOST_CONTENT and (read_back or not allow_large):
             return [_too_full(scenario.log.every, size, "" if read_back else insist)]
+        if size.content > HELD and scenario.log.compress:
+            return [("log.compress", _too_large_to_compress(scenario.log.every, size))]
         return []
 
     return look
@@ -182,6 +191,12 @@ def _too_full(every: int, size: Size, insist: str) -> tuple[str, str]:
     fitting = every * -(-size.content // MOST_CONTENT)
     remedy = f"log less often (every: {fitting}){_or_insist(insist)}"
     return "log.every", f"{text}podusv reads back: {size}; {remedy}"
+
+
+def _too_large_to_compress(every: int, size: Size) -> str:
+    content, most = bytes_in_words(size.content), bytes_in_words(HELD)
+    remedy = f"leave it uncompressed or log less often (every: {every * -(-size.content // HELD)})"
+    return f"the log would hold {content}, more than the {most} that can be compressed; {remedy}"
 
 
 def _or_insist(insist: str) -> str:

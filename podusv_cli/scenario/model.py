@@ -90,6 +90,9 @@ class Log(Component):
         "",
         "whether the Lyapunov function of the adaptive laws, its rate and its bounds are logged",
     )
+    compress: bool = value(
+        False, "", "whether the log's arrays are compressed (gzip), which takes longer"
+    )
 
 
 class MetricSettings(Component):

@@ -1,18 +1,32 @@
-"""Files that are there whole or not at all, and failures told in one sentence."""
+"""Whole files: written so that they are there entirely or not at all, and read without surprises.
+
+Reading takes only regular files, never through a link, never more than a limit. Every failure is
+one sentence.
+"""
 
 from __future__ import annotations
 
-import ctypes
 import errno
+import hashlib
 import os
+import stat
+import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from io import BufferedReader
 from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
 
 from podusv_cli.core.errors import StorageError
+from podusv_cli.core.kernel import Vector
 from podusv_cli.process.temporary_names import forget_files, part_name
 
-CREATE = os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
+LARGEST_TEXT = 16 * 2**20  # bytes
+LARGEST_FILE = 4 * 2**30  # bytes
+ELSEWHERE = "; read it with h5py or xarray, or log less often (log.every)"
+_CREATE = os.O_CREAT | os.O_EXCL | os.O_CLOEXEC | os.O_WRONLY
 CAUSES = {
     errno.ENOSPC: "the disk is full",
     errno.EDQUOT: "the disk quota is used up",
@@ -94,17 +108,6 @@ def _refuse_odd(path: Path) -> None:
         raise StorageError(f"cannot write {path}: it is there already and is not a file")
 
 
-def exchange(one: Path, other: Path) -> None:
-    """Two names trade places at one instant. OSError, ENOSYS where the system has no such call."""
-    rename = getattr(ctypes.CDLL(None, use_errno=True), "renameat2", None)
-    if rename is None:
-        raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
-    here, swapping = -100, 2  # AT_FDCWD, RENAME_EXCHANGE
-    if rename(here, os.fsencode(one), here, os.fsencode(other), swapping) != 0:
-        number = ctypes.get_errno()
-        raise OSError(number, os.strerror(number))
-
-
 def create(path: Path, content: bytes) -> None:
     """Write a new file through to the disk. Raises StorageError, also where `path` exists.
 
@@ -112,6 +115,31 @@ def create(path: Path, content: bytes) -> None:
     """
     with explained(f"cannot write {path} ({len(content)} bytes)"):
         _create(path, content)
+
+
+@contextmanager
+def growing(path: Path, size: int) -> Iterator[BinaryIO]:
+    """A new file to be filled with `size` bytes inside the block, and on the disk after it.
+
+    Raises StorageError where `create` would, and for every OSError inside.
+    """
+    with explained(f"cannot write {path} ({size} bytes)"):
+        descriptor = os.open(path, _CREATE, 0o666)
+        with os.fdopen(descriptor, "wb", buffering=0) as file:
+            yield file
+            os.fsync(descriptor)
+
+
+def mapped(folder: Path, size: int) -> Vector:
+    """Room for `size` numbers in a nameless file of the folder, for what memory does not hold.
+
+    Its disk space is reserved here, so that a full disk is a StorageError now and not a signal when
+    a number is stored.
+    """
+    doing = f"cannot keep the log in {folder} ({8 * size} bytes)"
+    with explained(doing), tempfile.TemporaryFile(dir=folder) as file:
+        os.posix_fallocate(file.fileno(), 0, 8 * size)
+        return np.memmap(file, np.float64, "r+", shape=size).view(np.ndarray)
 
 
 def make_folder(path: Path) -> None:
@@ -126,17 +154,11 @@ def sync_folder(folder: Path) -> None:
         _sync_folder(folder)
 
 
-def write_out(descriptor: int, content: bytes | memoryview) -> None:
-    """Write all of the content to an open file. Raises OSError."""
-    rest = memoryview(content)
-    while rest:
-        rest = rest[os.write(descriptor, rest) :]
-
-
 def _create(path: Path, content: bytes) -> None:
-    descriptor = os.open(path, CREATE | os.O_WRONLY, 0o666)
+    descriptor, rest = os.open(path, _CREATE, 0o666), memoryview(content)
     try:
-        write_out(descriptor, content)
+        while rest:
+            rest = rest[os.write(descriptor, rest) :]
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
@@ -152,3 +174,46 @@ def _sync_folder(folder: Path) -> None:
             raise
     finally:
         os.close(descriptor)
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[BufferedReader]:
+    """The regular file `path`; raises StorageError for anything else, and never waits."""
+    # Opening a named pipe waits for its writer, unless O_NONBLOCK says not to.
+    flags = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
+    with explained(f"cannot read {path}"):
+        descriptor = os.open(path, flags)
+        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+            os.close(descriptor)
+            raise StorageError(f"cannot read {path}: not a regular file")
+        with open(descriptor, "rb") as file:
+            yield file
+
+
+def file_size(file: BufferedReader) -> int:
+    """Bytes of an open file."""
+    return os.fstat(file.fileno()).st_size
+
+
+def read_bytes(path: Path, limit: int, remedy: str = "") -> bytes:
+    """The whole file; StorageError, with a remedy, where it holds more than `limit` bytes."""
+    with opened(path) as file:
+        size = file_size(file)
+        if size > limit:
+            raise StorageError(f"cannot read {path}: {size} bytes, at most {limit} allowed{remedy}")
+        return file.read(size)
+
+
+def read_text(path: Path, limit: int = LARGEST_TEXT) -> str:
+    """A UTF-8 text of at most `limit` bytes; raises StorageError."""
+    try:
+        return read_bytes(path, limit).decode()
+    except UnicodeDecodeError as error:
+        raise StorageError(f"cannot read {path}: not UTF-8 text ({error})") from error
+
+
+def fingerprint(path: Path) -> tuple[str, int]:
+    """SHA-256 in hex, and size in bytes; raises StorageError."""
+    with opened(path) as file:
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+        return digest, file.tell()

@@ -14,7 +14,7 @@ import numpy as np
 
 from podusv_cli.core import escaping
 from podusv_cli.core.errors import StorageError
-from podusv_cli.storage.regular import read_text
+from podusv_cli.storage.files import read_text
 
 LARGEST = 2 * 2**20  # bytes
 DEEPEST = 32  # levels

@@ -1,20 +1,19 @@
-"""Reading log.h5 from anywhere: nothing in the file is believed before it has been checked.
+"""Reading log.h5, formats 1 and 2, from anywhere: nothing in it is believed before it is checked.
 
-A log could name other files to read from, claim any size, or be damaged. So it is read into memory
-first, only known names are looked at, and sizes are added up before the first array is made.
+A log could name other files to read from, claim any size, or be damaged. So sizes are added up
+before the first array is made, and what cannot be in a log is refused. Whether a log is still as it
+was written, the manifest tells.
 """
 
 from __future__ import annotations
 
-import hashlib
-import io
 import math
 import unicodedata
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
-from itertools import product, repeat
+from io import BufferedReader
 from pathlib import Path
-from typing import get_args
+from typing import NamedTuple, get_args
 
 import h5py
 import numpy as np
@@ -23,29 +22,58 @@ from podusv_cli.core.errors import StorageError
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording, Status
 from podusv_cli.core.signal import NAME, Signal
-from podusv_cli.storage import log_layout, trees
-from podusv_cli.storage.packing import unpacked
-from podusv_cli.storage.regular import ELSEWHERE, LARGEST_FILE, LARGEST_TEXT, read_bytes
+from podusv_cli.storage.files import ELSEWHERE, LARGEST_FILE, LARGEST_TEXT, file_size, opened
+from podusv_cli.storage.log import PROVENANCE, RESOLVED
+from podusv_cli.storage.manifest import other_format
 
-LARGEST_CONTENT = LARGEST_FILE  # bytes, unpacked; packed, no log is larger
+LARGEST_CONTENT = LARGEST_FILE  # bytes of numbers
 MOST_MEMBERS = 1000
-WORDS = ("units", "long_name", "symbol", "axes", "wrapped")  # attributes of a variable
-_FILTERS = [h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_FLETCHER32]
+_FILTERS = {h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_FLETCHER32}
+_AXIS, _NUMBERS = h5py.h5t.STD_I32LE, h5py.h5t.IEEE_F64LE  # types of what is in a log
+# The axes of arrays in logs of format 1 that do not tell them, and the wrapped angles.
+OLD_AXES = {
+    "rbf_center": "node input", "rbf_width": "input", "W_star_u": "node", "W_star_r": "node",
+    "window_start": "window", "V_lambda": "window", "V_Delta": "window", "V_bound": "window",
+    "v_bound": "window", "W_hat_u": "time node", "W_hat_r": "time node",
+    **dict.fromkeys(
+        ("n", "n_part", "delta", "n_cmd", "n_part_cmd", "delta_cmd", "thrust", "power"), "time pod"
+    ),
+}  # fmt: skip
+OLD_WRAPPED = ("psi_d", "psi_e", "psi_d_held")
 # What h5py raises on damaged files; ValueError includes text that is not UTF-8.
 _DAMAGE = (OSError, RuntimeError, ValueError, KeyError, TypeError, MemoryError, OverflowError)
 
 
+class _Member(NamedTuple):
+    """An array of the file."""
+
+    dataset: h5py.h5d.DatasetID
+    signal: Signal
+
+    @property
+    def bytes(self) -> int:
+        return 8 * int(math.prod(self.dataset.shape))
+
+
 def read_log(path: Path) -> Recording:
-    """The recording in a log file; `seen` is not logged and stays None. Raises StorageError."""
-    with _opened(path) as (file, image):
-        about = _about(file)
-        arrays = _arrays(file, about, image, path)
+    """The recording in a log file, its arrays mapped from the file where they lie in one piece.
+
+    `seen` is not logged and stays None. Raises StorageError.
+    """
+    with _opened(path) as (file, raw):
+        members = _members(file)
+        total = sum(member.bytes for member in members)
+        if total > LARGEST_CONTENT:
+            claim = f"claims {total} bytes of data, at most {LARGEST_CONTENT} allowed"
+            raise StorageError(f"cannot read {path}: {claim}{ELSEWHERE}")
+        arrays = {member.signal.name: _array(member, raw) for member in members}
+        about = {member.signal.name: member.signal for member in members}
         return Recording(
             status=_status(file),
-            controller=_words(file, "controller"),
-            signals={k: v for k, v in arrays.items() if not about[k].fixed},
-            fixed={k: v for k, v in arrays.items() if about[k].fixed},
-            message=_message(file),
+            controller=_words(file.id, "controller"),
+            signals={name: array for name, array in arrays.items() if not about[name].fixed},
+            fixed={name: array for name, array in arrays.items() if about[name].fixed},
+            message=_optional(file.id, "message"),
             about=about,
         )
 
@@ -53,59 +81,57 @@ def read_log(path: Path) -> Recording:
 def resolved_yaml(path: Path) -> str:
     """The scenario, every value explicit, that a log file was made from. Raises StorageError."""
     with _opened(path) as (file, _):
-        _check_hard_link(file.id, log_layout.PROVENANCE)
-        group = h5py.h5g.open(file.id, log_layout.PROVENANCE.encode())
-        dataset = _dataset(group, log_layout.RESOLVED)
-        content = _text(dataset)
-        digest = _text(h5py.h5a.open(dataset, b"sha256")).decode()
-        if hashlib.sha256(content or b"\0").hexdigest() != digest:
-            raise ValueError("the scenario in it does not fit its checksum")
-        return content.decode()
+        _check_hard_link(file.id, PROVENANCE)
+        group = h5py.h5g.open(file.id, PROVENANCE.encode())
+        return _text(_dataset(group, RESOLVED)).decode()
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[tuple[h5py.File, bytes]]:
-    """The log in memory, its format checked, and its bytes; faults inside become a StorageError."""
-    image = read_bytes(path, LARGEST_FILE, ELSEWHERE)
-    try:
-        trees.check(image)
-        with h5py.File(io.BytesIO(image)) as file:
-            _check_format(file)
-            yield file, image
-    except _DAMAGE as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise StorageError(f"{path}: damaged, or not a log of podusv: {reason}") from error
+def _opened(path: Path) -> Iterator[tuple[h5py.File, BufferedReader]]:
+    """A log whose format was checked, and its bytes; faults inside become a StorageError."""
+    with opened(path) as raw:
+        if file_size(raw) > LARGEST_FILE:
+            found = f"{file_size(raw)} bytes, at most {LARGEST_FILE} allowed"
+            raise StorageError(f"cannot read {path}: {found}{ELSEWHERE}")
+        try:
+            with h5py.File(raw) as file:
+                _check_format(file)
+                yield file, raw
+        except _DAMAGE as error:
+            reason = " ".join(str(error).split()) or type(error).__name__
+            raise StorageError(f"{path}: damaged, or not a log of podusv: {reason}") from error
 
 
 def _check_format(file: h5py.File) -> None:
+    if file.userblock_size:
+        raise ValueError("no HDF5 file of the kind that podusv writes")
     attribute = h5py.h5a.open(file.id, b"podusv_format")
     if attribute.get_type() != h5py.h5t.STD_I32LE or attribute.shape != ():
         raise ValueError("podusv_format is no number")
     found = np.zeros((), dtype="<i4")
     attribute.read(found)
-    if found != log_layout.FORMAT:
-        raise ValueError(f"written in format {found}; this podusv reads format {log_layout.FORMAT}")
+    if misfit := other_format(int(found)):
+        raise ValueError(misfit)
 
 
 def _status(file: h5py.File) -> Status:
-    found = _words(file, "status")
+    found = _words(file.id, "status")
     for status in get_args(Status):
         if found == status:
             return status  # type: ignore[no-any-return]
     raise ValueError(f"unknown status {found!r}")
 
 
-def _message(file: h5py.File) -> str:
-    if not h5py.h5a.exists(file.id, b"message"):
-        return ""
-    return _words(file, "message")
-
-
-def _words(file: h5py.File, name: str) -> str:
-    words = _text(h5py.h5a.open(file.id, name.encode())).decode()
+def _words(thing: h5py.h5g.GroupID | h5py.h5d.DatasetID, name: str) -> str:
+    words = _text(h5py.h5a.open(thing, name.encode())).decode()
     if any(unicodedata.category(c) == "Cc" and c not in "\t\n\r" for c in words):
         raise ValueError(f"{name} holds characters that are no text")
     return words
+
+
+def _optional(thing: h5py.h5g.GroupID | h5py.h5d.DatasetID, name: str) -> str:
+    """An attribute's words, none where there is no such attribute."""
+    return _words(thing, name) if h5py.h5a.exists(thing, name.encode()) else ""
 
 
 def _text(holder: h5py.h5a.AttrID | h5py.h5d.DatasetID) -> bytes:
@@ -132,105 +158,88 @@ def _dataset(group: h5py.h5g.GroupID, name: str) -> h5py.h5d.DatasetID:
     """A dataset all of whose data are in this file, behind no filter but the expected ones."""
     _check_hard_link(group, name)
     dataset = h5py.h5d.open(group, name.encode())
-    # Asked before anything else: the mere shape of a virtual dataset can open other files.
+    # Checked before anything else: the mere shape of a virtual dataset can open other files.
     made = dataset.get_create_plist()
     if made.get_layout() == h5py.h5d.VIRTUAL or made.get_external_count():
         raise ValueError(f"{name} keeps its data in another file")
-    if not set(_filters(made)) <= set(_FILTERS):
+    if not {made.get_filter(i)[0] for i in range(made.get_nfilters())} <= _FILTERS:
         raise ValueError(f"{name} is packed in an unknown way")
     if dataset.shape is None:
         raise ValueError(f"{name} is empty")
     return dataset
 
 
-def _filters(made: h5py.h5p.PropDCID) -> list[int]:
-    return [made.get_filter(i)[0] for i in range(made.get_nfilters())]
-
-
-def _arrays(
-    file: h5py.File, about: Mapping[str, Signal], image: bytes, path: Path
-) -> dict[str, Vector]:
-    """All signals, in the order in which they were written."""
-    datasets = {name: _dataset(file.id, name) for name in about}
-    lengths = {"time": math.prod(datasets["time"].shape)}
-    for name, dataset in datasets.items():
-        _check_numbers(about[name], dataset, lengths)
-    total = sum(8 * math.prod(dataset.shape) for dataset in datasets.values())
-    if total > LARGEST_CONTENT:
-        claim = f"claims {total} bytes of data, at most {LARGEST_CONTENT} allowed"
-        raise StorageError(f"cannot read {path}: {claim}{ELSEWHERE}")
-    return {name: _unpacked(name, dataset, image) for name, dataset in datasets.items()}
-
-
-def _about(file: h5py.File) -> dict[str, Signal]:
-    """What the file says of each of its variables but the axes'."""
+def _members(file: h5py.File) -> list[_Member]:
+    """All arrays, in the order in which they were written, as long along an axis as each other."""
     if len(file) > MOST_MEMBERS:
         raise ValueError(f"it has {len(file)} members, more than {MOST_MEMBERS}")
-    unfit = [name for name in file if not (isinstance(name, str) and NAME.fullmatch(name))]
-    if unfit:
-        raise ValueError(f"{unfit[0]!r} is no signal's name")
-    words = {name: _said_of(file, name) for name in file if name != log_layout.PROVENANCE}
-    about = {n: log_layout.described(n, said) for n, said in words.items() if "symbol" in said}
-    axes = {axis for signal in about.values() for axis in signal.dimensions}
-    unknown = [name for name in words if name not in about and name not in axes]
-    if unknown:
-        raise ValueError(f"{unknown[0]!r} is neither a signal nor an axis of one")
-    if "time" not in about:
+    for name in file:
+        if not NAME.fullmatch(str(name)):  # bytes where it is no UTF-8
+            raise ValueError(f"{name!r} is no name of a signal")
+    datasets = {name: _dataset(file.id, name) for name in file if name != PROVENANCE}
+    members = [
+        _member(n, dataset) for n, dataset in datasets.items() if dataset.get_type() != _AXIS
+    ]
+    if not any(member.signal.name == "time" for member in members):
         raise ValueError("it has no time")
-    return about
+    lengths: dict[str, int] = {}
+    for member in members:
+        _check_shape(member, lengths)
+    return members
 
 
-def _said_of(file: h5py.File, name: str) -> dict[str, str]:
-    dataset = _dataset(file.id, name)
-    held = [word for word in WORDS if h5py.h5a.exists(dataset, word.encode())]
-    return {word: _text(h5py.h5a.open(dataset, word.encode())).decode() for word in held}
-
-
-def _check_numbers(signal: Signal, dataset: h5py.h5d.DatasetID, lengths: dict[str, int]) -> None:
-    """Doubles, as long along every axis as all others; `lengths` learns from the first."""
-    name, axes = signal.name, signal.dimensions
-    if dataset.get_type() != h5py.h5t.IEEE_F64LE:
+def _member(name: str, dataset: h5py.h5d.DatasetID) -> _Member:
+    if dataset.get_type() != _NUMBERS:
         raise ValueError(f"{name} holds no 64-bit numbers")
+    if not h5py.h5a.exists(dataset, b"symbol"):
+        raise ValueError(f"{name!r} does not say what signal it is")
+    unit, meaning, symbol = (_words(dataset, fact) for fact in ("units", "long_name", "symbol"))
+    told = _optional(dataset, "axes")
+    axes = (told or OLD_AXES.get(name, "time")).split()
+    over_time = axes[:1] == ["time"]
+    wrapped = bool(_optional(dataset, "wrapped")) or (not told and name in OLD_WRAPPED)
+    beside = tuple(axes[over_time:])
+    return _Member(dataset, Signal(name, unit, meaning, symbol, beside, wrapped, not over_time))
+
+
+def _check_shape(member: _Member, lengths: dict[str, int]) -> None:
+    """Whether an array is as long along every axis as all others; `lengths` learns from it."""
+    dataset, signal, axes = *member, member.signal.dimensions
     if len(dataset.shape) != len(axes):
-        raise ValueError(f"{name} has {len(dataset.shape)} dimensions instead of {len(axes)}")
+        raise ValueError(
+            f"{signal.name} has {len(dataset.shape)} dimensions instead of {len(axes)}"
+        )
     for axis, size in zip(axes, dataset.shape, strict=True):
         if lengths.setdefault(axis, size) != size:
-            raise ValueError(f"{name} has {size} values along {axis} instead of {lengths[axis]}")
+            found = f"{size} values along {axis} instead of {lengths[axis]}"
+            raise ValueError(f"{signal.name} has {found}")
         if not size and axis != "time":
-            raise ValueError(f"{name} has no values along {axis}")
+            raise ValueError(f"{signal.name} has no values along {axis}")
 
 
-def _unpacked(name: str, dataset: h5py.h5d.DatasetID, image: bytes) -> Vector:
-    """The numbers of a dataset, chunk by chunk, each behind its checksum.
-
-    The index of chunks has no checksum. Where an entry is damaged, HDF5 itself would quietly fill
-    in zeros, or end the process for a chunk that is shorter than its own checksum.
-    """
-    shape, made = dataset.shape, dataset.get_create_plist()
-    numbers = np.empty(shape)
-    if not numbers.size:
+def _array(member: _Member, raw: BufferedReader) -> Vector:
+    dataset, name = member.dataset, member.signal.name
+    layout = dataset.get_create_plist().get_layout()
+    if not member.bytes:
+        return np.empty(dataset.shape)
+    if layout == h5py.h5d.CHUNKED:
+        _check_chunks(name, dataset, member.bytes)
+        numbers = np.empty(dataset.shape)
+        dataset.read(h5py.h5s.ALL, h5py.h5s.ALL, numbers)
         return numbers
-    if _filters(made) != _FILTERS:
-        raise ValueError(f"{name} has no checksums")
-    part = made.get_chunk()
-    # A chunk larger than the array would only cost memory.
-    if any(side > size for side, size in zip(part, shape, strict=True)):
+    place = dataset.get_offset()
+    if place is None or place + member.bytes > file_size(raw):
+        raise ValueError(f"{name} has no numbers in this file")
+    return np.memmap(raw, np.float64, "r", place, dataset.shape).view(np.ndarray)
+
+
+def _check_chunks(name: str, dataset: h5py.h5d.DatasetID, size: int) -> None:
+    """Refuse what HDF5 would fill up with zeros, and what would unpack to far more than `size`."""
+    part = dataset.get_create_plist().get_chunk()
+    if any(side > most for side, most in zip(part, dataset.shape, strict=True)):
         raise ValueError(f"{name} is packed in an unknown way")
-    for corner in product(*map(range, repeat(0), shape, part)):
-        place = numbers[tuple(slice(at, at + side) for at, side in zip(corner, part, strict=True))]
-        try:
-            chunk = unpacked(_stored(dataset, corner, image), part)
-        except ValueError as error:
-            raise ValueError(f"{name} is damaged: {error}") from error
-        place[...] = chunk[tuple(map(slice, place.shape))]
-    return numbers
-
-
-def _stored(dataset: h5py.h5d.DatasetID, corner: tuple[int, ...], image: bytes) -> bytes:
-    """The bytes of a chunk as they lie in the file."""
-    found = dataset.get_chunk_info_by_coord(corner)
-    if found.byte_offset is None or found.byte_offset + found.size > len(image):
-        raise ValueError("a chunk is missing")
-    if found.filter_mask:
-        raise ValueError("a chunk is packed in an unknown way")
-    return image[found.byte_offset : found.byte_offset + found.size]
+    sides = zip(dataset.shape, part, strict=True)
+    if dataset.get_num_chunks() != math.prod(-(-most // side) for most, side in sides):
+        raise ValueError(f"{name} is damaged: a chunk is missing")
+    if dataset.get_storage_size() > 2 * size + 4096:
+        raise ValueError(f"{name} is packed in an unknown way")

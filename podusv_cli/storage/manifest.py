@@ -12,10 +12,10 @@ from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.core.recording import Status
 from podusv_cli.storage import files as atomic
 from podusv_cli.storage import json_files
-from podusv_cli.storage.log_layout import FORMAT
-from podusv_cli.storage.regular import ELSEWHERE, LARGEST_FILE, fingerprint
+from podusv_cli.storage.files import ELSEWHERE, LARGEST_FILE, fingerprint
 
 NAME = "manifest.json"
+FORMAT = 2  # of run folder and log, as written; all formats from 1 on are read
 
 
 class Entry(BaseModel):
@@ -58,9 +58,8 @@ def read(folder: Path) -> Manifest:
     """The manifest of a folder, its claims not yet checked. Raises StorageError."""
     path = folder / NAME
     content = json_files.read(path)
-    found = content.get("podusv_format")
-    if found != FORMAT:
-        raise StorageError(f"{path}: written in format {found!r}; this podusv reads {FORMAT}")
+    if misfit := other_format(content.get("podusv_format")):
+        raise StorageError(f"{path}: {misfit}")
     try:
         manifest = Manifest.model_validate(content)
     except ValidationError as error:
@@ -70,6 +69,13 @@ def read(folder: Path) -> Manifest:
     for name in manifest.files:
         place(folder, name)
     return manifest
+
+
+def other_format(found: object) -> str:
+    """Why podusv does not read this format, in words; empty where it does."""
+    if type(found) is int and 1 <= found <= FORMAT:
+        return ""
+    return f"written in format {found!r}; this podusv reads formats 1 to {FORMAT}"
 
 
 def check(folder: Path) -> Manifest:

@@ -6,7 +6,7 @@ import hashlib
 import os
 import shutil
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import cached_property
@@ -20,9 +20,8 @@ from podusv_cli.core.quantities import bytes_in_words
 from podusv_cli.core.recording import Recording, Status
 from podusv_cli.process.extras import Extras
 from podusv_cli.storage import files, json_files, manifest
-from podusv_cli.storage.regular import read_text
+from podusv_cli.storage.files import read_text
 from podusv_cli.storage.staging import Staging, Taken, sweep
-from podusv_cli.storage.stream import Stream, growing
 
 LOG, THEORY, MISSING = "log.h5", "theory.json", "missing.json"
 NEEDED = (LOG, "metrics.json", "provenance.json", "resolved.yaml")
@@ -77,20 +76,9 @@ class RunWriter:
         """Where the files are until `finish`; a RunWriter for a folder in here nests a run."""
         return self._staging.folder
 
-    @property
-    def scratch(self) -> Path:
-        """Where a folder can be made for what is needed until this is over, and not kept."""
-        return self._staging.scratch
-
     def add(self, name: str, content: bytes) -> None:
         """Write a new file; `name` is relative, with `/` for a file in a folder inside."""
         files.create(self._place(name), content)
-
-    @contextmanager
-    def growing(self, name: str) -> Iterator[Stream]:
-        """A new file to be written to in the block."""
-        with growing(self._place(name)) as stream:
-            yield stream
 
     def add_json(self, name: str, content: Mapping[str, Any]) -> None:
         """Write a new JSON file, null for numbers that are not finite."""

@@ -7,6 +7,7 @@ it for a moment as `old`.
 
 from __future__ import annotations
 
+import ctypes
 import errno
 import os
 import shutil
@@ -47,11 +48,6 @@ class Staging:
         """The folder in the making."""
         return self._box / "new"
 
-    @property
-    def scratch(self) -> Path:
-        """Where a folder can be made that is gone when the staging is over."""
-        return self._box / "scratch"
-
     def publish(self, *, replace: bool) -> None:
         """Rename the folder to its final name, with `replace` in place of what is there.
 
@@ -89,12 +85,23 @@ class Staging:
 
     def _exchanged(self) -> bool:
         try:
-            files.exchange(self.folder, self.final)
+            exchange(self.folder, self.final)
         except OSError as error:
             if error.errno not in _NO_EXCHANGE:
                 raise
             return False
         return True
+
+
+def exchange(one: Path, other: Path) -> None:
+    """Two names trade places at one instant. OSError, ENOSYS where the system has no such call."""
+    rename = getattr(ctypes.CDLL(None, use_errno=True), "renameat2", None)
+    if rename is None:
+        raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
+    here, swapping = -100, 2  # AT_FDCWD, RENAME_EXCHANGE
+    if rename(here, os.fsencode(one), here, os.fsencode(other), swapping) != 0:
+        number = ctypes.get_errno()
+        raise OSError(number, os.strerror(number))
 
 
 def sweep(parent: Path) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from podusv_cli.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.core.derived import ACTIVATION, NODE_DISTANCE, W_NORM_R, W_NORM_U, Y_R, Y_U
 from podusv_cli.core.kernel import Vector
-from podusv_cli.core.recording import Columns, InMemory, Recording, blocks, largest
+from podusv_cli.core.recording import Allocate, Recording, blocks, largest
 from podusv_cli.core.signal import Signal, by_name
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.replay import Replayed, rates_replay
@@ -127,16 +127,15 @@ def prepare(loop: ClosedLoop, grid: TimeGrid, compiled: bool) -> None:
 
 def monitored(
     loop: ClosedLoop, grid: TimeGrid, recording: Recording,
-    *, steady_fraction: float = 0.2, compiled: bool = True, columns: Columns | None = None,
+    *, steady_fraction: float = 0.2, compiled: bool = True, allocate: Allocate = np.empty,
 ) -> Monitored | None:  # fmt: skip
     """Add V, its terms, V' and its bounds to a fresh recording; None for a law without V.
 
     V takes the true bound of the disturbance, and weights fitted to this run (`theory.ideal`).
-    With sampled control V' and the bound of V are left out: the law acts on old measurements. What
-    is added is held in memory, or goes to `columns`.
+    With sampled control V' and the bound of V are left out: the law acts on old measurements.
+    `allocate` gives the room for what is added.
     """
     law, count = loop.controller.lyapunov(), len(recording["time"])
-    columns = columns or InMemory()
     if law is None or not count:
         return None
     with np.errstate(all="ignore"):  # a run that diverges leaves all numbers
@@ -144,10 +143,13 @@ def monitored(
         chosen = recording.part(rows_to_fit(count, law.network.count))
         ideal = ideal_weights(loop, law, chosen, replayed(chosen))
         b = _disturbance_bound(loop, recording)
+        traces: Traces = {}
         for rows in blocks(count, min(BLOCK, max(1, MOST_NUMBERS // law.network.count))):
             log = recording.part(rows)
-            columns.append(_traces(loop, law, log, replayed(log), (ideal, b)))
-        traces = columns.whole()
+            for name, part in _traces(loop, law, log, replayed(log), (ideal, b)).items():
+                if name not in traces:
+                    traces[name] = allocate(count)
+                traces[name][rows] = part
         observed = _Observer(loop, law, recording, traces, ideal, b, grid.hold_every == 0)
         starts = (0.0, grid.last_part(steady_fraction))
         windows = dict(zip(WINDOWS, map(observed.window, starts), strict=True))

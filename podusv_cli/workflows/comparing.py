@@ -29,7 +29,7 @@ from podusv_cli.scenario.load import load_resolved
 from podusv_cli.scenario.messages import Check
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage import json_files, log_check, manifest
-from podusv_cli.storage.regular import read_text
+from podusv_cli.storage.files import read_text
 from podusv_cli.storage.run_folder import LOG, THEORY, Run, RunWriter, open_run
 from podusv_cli.workflows.execute import Finished, Task, execute, warm_up
 

@@ -5,20 +5,19 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
-from importlib import import_module
+from functools import partial
 from pathlib import Path
-from threading import Thread
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from podusv_cli import __version__
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.finding import Finding
-from podusv_cli.core.kernel import Vector
-from podusv_cli.core.recording import Columns, Recording, Status
+from podusv_cli.core.recording import Allocate, Recording, Status
 from podusv_cli.engine.check import check_law
-from podusv_cli.engine.row_table import PIECE
 from podusv_cli.engine.simulate import Observer, marcher, simulate
 from podusv_cli.findings.after import aftermath
 from podusv_cli.findings.finding import heard
@@ -31,14 +30,10 @@ from podusv_cli.process.workers import Outcome
 from podusv_cli.scenario.limits import HELD, estimate
 from podusv_cli.scenario.load import resolved_yaml
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.storage import provenance
+from podusv_cli.storage import files, provenance
 from podusv_cli.storage import run_folder as folder
-from podusv_cli.storage.columns import ColumnFiles
 from podusv_cli.theory import monitor
 from podusv_cli.theory.report import as_json as theory_report
-
-if TYPE_CHECKING:
-    from podusv_cli.storage.log_writer import Log
 
 Progress = Callable[[float], None]
 UNDRAWN = (
@@ -69,18 +64,11 @@ class Stopwatch:
 
 
 @dataclass(frozen=True)
-class Room:
-    """How large a log is held in memory, and how much of one that is not [bytes]."""
-
-    log: int = HELD
-    piece: int = PIECE
-
-
-@dataclass(frozen=True)
 class Task:
     """A scenario, its file's text, where its run folder goes, how it is called and drawn.
 
-    `named`: the user asked for this folder. `noticed` is what was found before the run.
+    `named`: the user asked for this folder. `noticed` is what was found before the run. A log of
+    more than `held` bytes is not held in memory.
     """
 
     scenario: Scenario
@@ -92,7 +80,7 @@ class Task:
     argv: Sequence[str] = ()
     label: str = ""  # in figures; the law's kind by default
     noticed: Sequence[Finding] = ()
-    room: Room = Room()
+    held: int = HELD
 
 
 @dataclass(frozen=True)
@@ -139,29 +127,22 @@ def execute(
             task.target, force=task.force, named=task.named, needed=size.needed
         ) as writer,
     ):
-
-        def columns(name: str) -> Columns | None:
-            return ColumnFiles(writer.scratch / name) if size.content > task.room.log else None
-
-        recording = simulated(
-            task.scenario, watch, progress, columns=columns("log"), piece=task.room.piece
-        )
+        long = size.content > task.held and not task.scenario.log.compress
+        allocate = partial(files.mapped, writer.folder) if long else np.empty
+        recording = simulated(task.scenario, watch, progress, allocate)
         extras = Extras(recording.status == "interrupted")
         with watch.part("metrics"):
             metrics = extras.made("the metrics", lambda: summary(task.scenario, recording)) or {}
             metrics |= extras.attempt("law_ns", lambda: _cost(task.scenario, recording)) or {}
-        with _log(writer, task.scenario, recording) as log:
-            log.add(recording.signals, recording.about)  # written while the run is looked at
-            with watch.part("metrics"):
-                noticed = extras.made("warnings", lambda: _noticed(task.scenario, recording))
-            with watch.part("theory"):
-                whole, theory = extras.made(
-                    "theory.json with the stability monitor's signals",
-                    lambda: monitored(task.scenario, recording, columns("theory")),
-                ) or (recording, {})
-            with watch.part("write"):
-                log.add(_beyond(whole, recording), whole.about)
-                log.done()
+        with watch.part("theory"):
+            whole, theory = extras.made(
+                "theory.json with the stability monitor's signals",
+                lambda: monitored(task.scenario, recording, allocate),
+            ) or (recording, {})
+        with watch.part("write"):
+            whole = _logged(writer, task.scenario, whole, again=long)
+        with watch.part("metrics"):
+            noticed = extras.made("warnings", lambda: _noticed(task.scenario, whole))
         warnings = (*task.noticed, *(noticed or ()))
         with watch.part("write"):
             _write(writer, task, whole, metrics, warnings)
@@ -220,20 +201,17 @@ def _observer(scenario: Scenario) -> Observer:
 
 def simulated(
     scenario: Scenario, watch: Stopwatch, progress: Progress | None = None,
-    *, columns: Columns | None = None, piece: int = PIECE,
+    allocate: Allocate = np.empty,
 ) -> Recording:  # fmt: skip
-    """Simulate a scenario, observed for its metrics; `columns` and `piece` as `simulate` has it."""
+    """Simulate a scenario, observed for its metrics; `allocate` as `simulate` has it."""
     loop, grid, seeing = scenario.closed_loop(), scenario.time_grid(), _observer(scenario)
     compiled = scenario.simulation.compiled
     with watch.part("compile"), interrupts_heard():
         warm_up(scenario)
     with watch.part("engine"):
-        # The march leaves the interpreter alone; what writes its log is imported in the meantime.
-        Thread(target=import_module, args=("podusv_cli.storage.log_writer",), daemon=True).start()
         return simulate(
-            loop, grid, observer=seeing, compiled=compiled, progress=progress,
-            columns=columns, piece=piece,
-        )  # fmt: skip
+            loop, grid, observer=seeing, compiled=compiled, progress=progress, allocate=allocate
+        )
 
 
 def summary(scenario: Scenario, recording: Recording) -> dict[str, float]:
@@ -248,34 +226,33 @@ def _cost(scenario: Scenario, recording: Recording) -> dict[str, float]:
 
 
 def monitored(
-    scenario: Scenario, recording: Recording, columns: Columns | None = None
+    scenario: Scenario, recording: Recording, allocate: Allocate = np.empty
 ) -> tuple[Recording, dict[str, Any]]:
     """The recording with what the stability monitor adds, and its findings; none without V."""
     loop, grid = scenario.closed_loop(), scenario.time_grid()
     found = scenario.log.monitor and monitor.monitored(
         loop, grid, recording,
         steady_fraction=scenario.metrics.steady_fraction, compiled=scenario.simulation.compiled,
-        columns=columns,
+        allocate=allocate,
     )  # fmt: skip
     return (found.recording, theory_report(loop, grid, found)) if found else (recording, {})
 
 
-@contextmanager
-def _log(writer: folder.RunWriter, scenario: Scenario, recording: Recording) -> Iterator[Log]:
-    from podusv_cli.storage import log_writer  # `simulated` has begun with that
+def _logged(
+    writer: folder.RunWriter, scenario: Scenario, recording: Recording, *, again: bool
+) -> Recording:
+    """Write the log; the recording, `again` with its signals as they lie in the log.
 
-    texts = {
-        "resolved_yaml": resolved_yaml(scenario), "version": __version__,
-        "title": scenario.description or scenario.name, "source": scenario.vessel.source,
-    }  # fmt: skip
-    with writer.growing(folder.LOG) as stream, log_writer.opened(stream, recording, **texts) as log:
-        yield log
+    There each signal is in one piece. The march leaves them row by row, so that whoever looks at
+    one signal of a long log there reads all others from the disk, too.
+    """
+    from podusv_cli.storage import log, log_reader  # h5py is slow to import
 
-
-def _beyond(whole: Recording, recording: Recording) -> dict[str, Vector]:
-    """What the whole recording has beside the first one's signals."""
-    arrays = {**whole.signals, **whole.fixed}
-    return {name: array for name, array in arrays.items() if name not in recording.signals}
+    path, title = writer.folder / folder.LOG, scenario.description or scenario.name
+    texts = log.Texts(resolved_yaml(scenario), title, scenario.vessel.source, __version__)
+    log.write(path, recording, texts, compress=scenario.log.compress)
+    signals = log_reader.read_log(path).signals if again else recording.signals
+    return replace(recording, signals=signals)
 
 
 def _write(

@@ -7,7 +7,6 @@ import json
 import os
 import random
 import socket
-import struct
 import zlib
 from collections.abc import Callable
 from pathlib import Path
@@ -15,8 +14,6 @@ from typing import Any
 
 import h5py
 import numpy as np
-
-from podusv_cli.storage.packing import fletcher32
 
 Damage = Callable[[Path, str], None]
 Change = Callable[[h5py.File], object]
@@ -148,30 +145,16 @@ def _replaced(name: str, **how: Any) -> Callable[[h5py.File, Path], object]:
 PACKED = {"compression": "gzip", "shuffle": True, "fletcher32": True}
 
 
-def _bomb(size: int, *, rows: int = 0) -> Callable[[h5py.File, Path], object]:
+def _bomb(size: int) -> Callable[[h5py.File, Path], object]:
     """`u` in a single chunk that unpacks to `size` bytes whatever its shape says."""
 
     def change(file: h5py.File, pipe: Path) -> None:
-        shape = (rows or len(file["u"]),)
+        shape = (len(file["u"]),)
         del file["u"]
-        dataset = file.create_dataset("u", shape, dtype="<f8", chunks=shape, **PACKED)
-        stream = _zeros(size)
-        chunk = stream + fletcher32(stream).to_bytes(4, "little")
-        dataset.id.write_direct_chunk((0,), chunk)
+        dataset = file.create_dataset("u", shape, dtype="<f8", chunks=shape, compression="gzip")
+        dataset.id.write_direct_chunk((0,), zlib.compress(bytes(size), 9))
 
     return change
-
-
-def _zeros(size: int) -> bytes:
-    """A zlib stream of so many zeros."""
-    packer, block = zlib.compressobj(9, wbits=-15), bytes(2**20)
-    piece, count = packer.compress(block) + packer.flush(zlib.Z_FULL_FLUSH), size >> 20
-    rest = bytes(size & 2**20 - 1)
-    total = zlib.adler32(rest)
-    for _ in range(count):
-        total = zlib.adler32(block, total)
-    last = packer.compress(rest) + packer.flush()
-    return b"\x78\xda" + count * piece + last + total.to_bytes(4, "big")
 
 
 def _linked(name: str, link: Callable[[Path], object]) -> Callable[[h5py.File, Path], object]:
@@ -246,8 +229,7 @@ def _giant(file: h5py.File, pipe: Path) -> None:
 
 
 HDF5: dict[str, Callable[[h5py.File, Path], object]] = {
-    "bomb": _bomb(2**30), "short": _bomb(16), "byte_more": _bomb(8 * 11 + 1),
-    "byte_less": _bomb(8 * 11 - 1),
+    "bomb": _bomb(2**30), "no_numbers": _replaced("u", shape=(11,), dtype="<f8"),
     "giant": _giant,
     "declared": _replaced("u", shape=(2**47,), dtype="<f8", chunks=(2**17,), **PACKED),
     "wide_chunk": _replaced("u", shape=(11,), dtype="<f8", chunks=(2**28,), maxshape=(None,)),
@@ -301,37 +283,6 @@ FOREIGN: dict[str, Callable[[Path], object]] = {
 }  # fmt: skip
 
 
-def index(folder: Path, argument: str) -> None:
-    """`what`: the index of the last signal's chunks, which no checksum guards."""
-    data = bytearray((folder / LOG).read_bytes())
-    tree = data.rindex(b"TREE")
-    INDEX[argument](data, tree)
-    (folder / LOG).write_bytes(data)
-
-
-def _set(data: bytearray, at: int, form: str, number: int) -> None:
-    struct.pack_into(form, data, at, number)
-
-
-CHILD = 24 + 8 + 16  # of a vector's first entry: head; size and mask; two offsets
-
-
-def _circle(data: bytearray, tree: int) -> None:
-    _set(data, tree + 5, "<B", 1)  # it has children
-    _set(data, tree + CHILD, "<Q", tree)
-
-
-INDEX: dict[str, Callable[[bytearray, int], None]] = {
-    "circle": _circle,
-    "sibling": lambda data, tree: _set(data, tree + 16, "<Q", tree),
-    "many": lambda data, tree: _set(data, tree + 6, "<H", 60_000),
-    "none": lambda data, tree: _set(data, tree + 6, "<H", 0),
-    "high": lambda data, tree: _set(data, tree + 5, "<B", 255),
-    "size": lambda data, tree: _set(data, tree + 24, "<I", 2**32 - 1),
-    "far": lambda data, tree: _set(data, tree + CHILD, "<Q", 2**62),
-    "undefined": lambda data, tree: _set(data, tree + CHILD, "<Q", 2**64 - 1),
-    "masked": lambda data, tree: _set(data, tree + 28, "<I", 7),
-}  # fmt: skip
 DAMAGES: dict[str, Damage] = {
-    f.__name__: f for f in (flip, cut, become, text, entry, yaml, hdf5, foreign, index)
+    f.__name__: f for f in (flip, cut, become, text, entry, yaml, hdf5, foreign)
 }

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import h5py
 import pytest
 from command_samples import BASE, Command, write
 from counting import counted
@@ -48,6 +49,8 @@ WRONG = {
     "logged; must be at most 100",
     f"log.every={HUGE}": "log.every: the run has 100 steps, so that its first instant alone would "
     "be logged; must be at most 100",
+    "log.compress=true simulation.duration=5e3": "log.compress: the log would hold 420 MB, more "
+    "than the 270 MB that can be compressed; leave it uncompressed or log less often (every: 2)",
     "controller.network.nodes=[100,100,100]": "controller.network: has 1,000,000 nodes, at most "
     "10,000 are possible",
 }
@@ -56,13 +59,13 @@ ROWS = ", more than the 4 GB that podusv reads back: about "
 INSIST = ", or insist with --allow-large"
 LARGE = {
     "simulation.duration=1e12": "simulation.duration: 1e+12 s in steps of 0.01 s are 1e+14 steps, "
-    f"more than 1e+08: about 39 years, 220 MB of memory and 67 PB of disk; {STEPS}",
+    f"more than 1e+08: about 39 years, 220 MB of memory and 84 PB of disk; {STEPS}",
     "simulation.step=1e-9": "simulation.step: 1 s in steps of 1e-09 s are 1e+09 steps, more than "
-    f"1e+08: about 3.4 h, 220 MB of memory and 670 GB of disk; {STEPS}",
+    f"1e+08: about 3.4 h, 220 MB of memory and 840 GB of disk; {STEPS}",
     "simulation.duration=1e5": f"log.every: the log would hold 8.4 GB in 1e+07 rows{ROWS}2.1 min, "
-    "220 MB of memory and 6.7 GB of disk; log less often (every: 3)",
+    "220 MB of memory and 8.4 GB of disk; log less often (every: 3)",
     "controller.network.nodes=[30,30,11] simulation.duration=270": "log.every: the log would hold "
-    f"4.3 GB in 2.7e+04 rows{ROWS}59 s, 220 MB of memory and 3.4 GB of disk; log less often "
+    f"4.3 GB in 2.7e+04 rows{ROWS}59 s, 220 MB of memory and 4.3 GB of disk; log less often "
     "(every: 2)",
 }
 
@@ -135,7 +138,7 @@ def test_verify_has_nothing_to_insist_with(podusv: Command) -> None:
 def test_validate_shows_what_a_large_run_takes(podusv: Command) -> None:
     said = podusv("validate", "a.yaml", *given("simulation.duration=1e5"), "--allow-large")
     assert (said.code, said.err) == (0, "")
-    assert "a run takes about 2.1 min, 220 MB of memory and 6.7 GB of disk\n" in said.out
+    assert "a run takes about 2.1 min, 220 MB of memory and 8.4 GB of disk\n" in said.out
 
 
 @pytest.fixture
@@ -220,14 +223,18 @@ def test_what_the_disk_has_no_room_for_is_not_begun(
     said = podusv(command, "a.yaml", *given("simulation.duration=2e4"), "--out", "x")
     assert said.code == 5
     assert said.err == (
-        "cannot make x: it takes 2.2 GB of disk or more, and 2 GB are free; log less often "
+        "cannot make x: it takes 3.6 GB of disk or more, and 2 GB are free; log less often "
         "(log.every), or elsewhere (--out)\n"
     )
     assert {path.name for path in Path().iterdir()} == {"a.yaml"}
 
 
 def test_a_disk_that_may_do_is_tried(podusv: Command, crowded: Callable[[float], None]) -> None:
+    """How small a log gets when it is compressed, nobody knows before."""
+    write("a.yaml", f"{LAW}log: {{compress: true}}\n")
     scenario = load("a.yaml").scenario
     crowded(estimate(scenario).needed)
     assert estimate(scenario).needed < estimate(scenario).disk
     assert podusv("run", "a.yaml", "-q", "--no-figures", "--out", "x").code == 0
+    with h5py.File("x/log.h5") as log:
+        assert log["x"].compression == "gzip"

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from command_samples import Command
 from counts import count
-from damages import FOREIGN, HDF5, INDEX, OTHERS, PIPE, TEXTS, YAML
+from damages import FOREIGN, HDF5, OTHERS, PIPE, TEXTS, YAML
 from damaging import __file__ as DAMAGING
 from damaging import damaged
 from rerun_samples import copied, made, relogged
@@ -133,14 +133,18 @@ def test_a_flipped_bit_is_told_by_the_manifest(opened: Opener) -> None:
             check(way, opened(way), "refused")
 
 
-def test_a_flipped_bit_that_the_manifest_does_not_tell_leaves_all_numbers(opened: Opener) -> None:
+def test_a_flipped_bit_that_the_manifest_does_not_tell_ends_nothing(opened: Opener) -> None:
+    """Only the manifest knows the numbers of a log; whoever alters both can write any number."""
     words = set()
     for seed in range(count(50, 2000)):
         way = f"!flip log.h5 {seed}"
         found = opened(way)
-        check(way, found, "refused", "same")
         words.add(found.word)
-    assert words == {"refused", "same"}  # some bytes of the file mean nothing
+        assert found.word in ("refused", "same", "WRONG"), (way, found)
+        assert found.code in (0, 5), (way, found)
+        assert found.seconds < SECONDS, (way, found)
+        assert found.mebibytes < MEMORY, (way, found)
+    assert {"refused", "same"} <= words  # some bytes of the file mean nothing
 
 
 @pytest.mark.parametrize("what", OTHERS)
@@ -188,11 +192,10 @@ def test_a_scenario_that_podusv_does_not_write(opened: Opener, which: str) -> No
     [
         *(f"hdf5 {which}" for which in HDF5 if count(which not in FULL, True)),
         *(f"foreign {which}" for which in FOREIGN),
-        *(f"index {which}" for which in INDEX),
     ],
 )
 def test_a_log_of_another_program(opened: Opener, way: str) -> None:
-    harmless = way.removeprefix("hdf5 ") in HARMLESS or way == "index sibling"
+    harmless = way.removeprefix("hdf5 ") in HARMLESS
     found = opened(f"!{way}", patience=600)  # for making it
     check(way, found, "same" if harmless else "refused")
 

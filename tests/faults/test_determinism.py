@@ -29,8 +29,8 @@ from podusv_cli.engine.simulate import ClosedLoop, simulate
 from podusv_cli.metrics.accumulators import observer
 from podusv_cli.process.workers import run_all
 from podusv_cli.scenario.load import load, load_text
+from podusv_cli.storage.files import fingerprint
 from podusv_cli.storage.log_reader import read_log
-from podusv_cli.storage.regular import fingerprint
 from podusv_cli.workflows.execute import Task, execute
 
 ROOT = Path(__file__).parents[2]

@@ -34,7 +34,7 @@ needs_full = pytest.mark.skipif(not FULL.exists(), reason="there is no /dev/full
 WRITING = [(made, words) for made, words in COMMANDS if made]
 LIMITS = [(made, words, limit) for made, words in WRITING for limit in (1000, 0)[: count(1, 2)]]
 # The log alone is larger than this, and what compares the runs is not.
-LIMITS += [(made, words, 50_000) for made, words in WRITING if words[0] not in ("plot", "verify")]
+LIMITS += [(made, words, 40_000) for made, words in WRITING if words[0] not in ("plot", "verify")]
 
 
 @pytest.fixture

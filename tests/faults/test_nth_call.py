@@ -17,8 +17,7 @@ from storage_samples import Saboteur, fails, files
 
 from podusv_cli.process import workers
 from podusv_cli.process.interrupts import Interrupts
-from podusv_cli.storage import files as atomic
-from podusv_cli.storage import provenance
+from podusv_cli.storage import provenance, staging
 from podusv_cli.workflows import comparing, rerun
 
 NAMING = ("replace", "rename")
@@ -56,7 +55,7 @@ def sabotaged(
     with pytest.MonkeyPatch.context() as patch:
         saboteur.watch(patch, *FILLING, *(() if lasting else NAMING))
         if not lasting:
-            patch.setattr(atomic, "exchange", saboteur._instead_of(atomic.exchange))
+            patch.setattr(staging, "exchange", saboteur._instead_of(staging.exchange))
         watch_where(patch, saboteur, "open", to_write)
         watch_where(patch, saboteur, "mkdir", lambda path, *mode: not os.path.isdir(path))
         said = work()

@@ -1,0 +1,222 @@
+"""Writing log.h5, format 2: every array in one piece, described where it stands.
+
+HDF5 itself never writes to the disk: on a full disk it ends the process. It lays the file out in
+memory, where the arrays take no room, and podusv writes that layout and the arrays.
+"""
+
+from __future__ import annotations
+
+import io
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, BinaryIO, NamedTuple
+
+import h5py
+import numpy as np
+
+from podusv_cli.core.kernel import Vector
+from podusv_cli.core.recording import Recording, blocks
+from podusv_cli.core.signal import Signal
+from podusv_cli.storage.files import growing
+from podusv_cli.storage.manifest import FORMAT
+
+CONVENTIONS = "CF-1.11"
+PROVENANCE, RESOLVED = "provenance", "resolved_yaml"
+# Axes besides time that podusv brings along, with what they count; each is a dataset of the
+# integers 0, 1, ...
+AXES = {
+    "node": "network node",
+    "input": "network input: u, v, r",
+    "window": "part of the run: the whole, its settled end",
+    "pod": "pod, in the scenario's order",
+}
+ROWS = 4096  # of all arrays written together, since the engine has a row's numbers side by side
+# The newest format that HDF5 1.8 reads, and so does any MATLAB. Every array begins at a multiple of
+# 8 bytes, so that it can be used where it lies when the file is mapped into memory.
+_FILE: dict[str, Any] = {
+    "libver": ("v108", "v108"), "alignment_threshold": 1, "alignment_interval": 8,
+}  # fmt: skip
+_UNDATED = {"track_order": True, "track_times": False}
+_COMPRESSED = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
+
+
+class Texts(NamedTuple):
+    """What a log tells of its run in words; `source` is where the vessel's data come from."""
+
+    resolved_yaml: str
+    title: str
+    source: str
+    version: str
+
+
+def write(path: Path, recording: Recording, texts: Texts, *, compress: bool = False) -> None:
+    """Write the log of a recording into a new file; the same recording gives the same bytes.
+
+    A compressed log is made in memory. Raises StorageError; a piece of the file may then be there.
+    """
+    layout = Layout()
+    with h5py.File(layout, "w", **_FILE, **_UNDATED) as file:
+        places = _fill(file, recording, texts, compress)
+    with growing(path, layout.size) as out:
+        layout.write_to(out)
+        for rows in blocks(max((len(array) for _, array in places), default=0), ROWS):
+            for place, array in places:
+                _write_rows(out, place, array, rows)
+
+
+class Layout(io.RawIOBase):
+    """A file in memory; what was never written to takes no room and reads as zeros."""
+
+    PAGE = 2**12
+
+    def __init__(self) -> None:
+        """An empty file."""
+        self.size = self._place = 0
+        self._pages: dict[int, bytearray] = defaultdict(lambda: bytearray(self.PAGE))
+
+    def write_to(self, out: BinaryIO) -> None:
+        """Make a file of the same size and content on the disk. Raises OSError."""
+        out.truncate(self.size)
+        for page, content in sorted(self._pages.items()):
+            start = page * self.PAGE
+            _write_at(out, start, memoryview(content)[: max(0, self.size - start)])
+
+    def write(self, content: Any) -> int:
+        """All of the content, at the present place."""
+        given = memoryview(content).cast("B")
+        for part, room in self._parts(len(given)):
+            room[:] = given[part]
+        self.size = max(self.size, self._place)
+        return len(given)
+
+    def readinto(self, room: Any) -> int:
+        """Fill the room from the present place on."""
+        wanted = memoryview(room).cast("B")
+        for part, content in self._parts(len(wanted)):
+            wanted[part] = content
+        return len(wanted)
+
+    def _parts(self, count: int) -> Iterator[tuple[slice, memoryview]]:
+        """The next bytes page by page: where they are among `count`, and where in the page."""
+        done = 0
+        while done < count:
+            page, at = divmod(self._place, self.PAGE)
+            size = min(count - done, self.PAGE - at)
+            yield slice(done, done + size), memoryview(self._pages[page])[at : at + size]
+            done += size
+            self._place += size
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
+        """Go to a place."""
+        base = {io.SEEK_SET: 0, io.SEEK_CUR: self._place, io.SEEK_END: self.size}[whence]
+        self._place = base + offset
+        return self._place
+
+    def tell(self) -> int:
+        """The present place."""
+        return self._place
+
+    def truncate(self, size: int | None = None) -> int:
+        """Make the file that long."""
+        self.size = self._place if size is None else size
+        return self.size
+
+
+def _fill(
+    file: h5py.File, recording: Recording, texts: Texts, compress: bool
+) -> list[tuple[int, Vector]]:
+    """Describe the recording in the file; which arrays still belong where in it."""
+    file.attrs.create("podusv_format", np.int32(FORMAT))
+    _describe(file, _facts(recording, texts))
+    group = file.create_group(PROVENANCE, **_UNDATED)
+    group.create_dataset(RESOLVED, data=_text(texts.resolved_yaml))
+    arrays = {**recording.signals, **recording.fixed}
+    names = sorted(arrays, key="time".__ne__)  # the scale of the time axis first
+    places = []
+    scales = _scales(file, arrays, recording.about)
+    for name in names:
+        dataset = _dataset(file, name, arrays[name], compress)
+        _describe(dataset, _description(recording.about[name]))
+        if name == "time":
+            dataset.make_scale(name)
+            scales[name] = dataset
+        else:
+            for position, axis in enumerate(recording.about[name].dimensions):
+                dataset.dims[position].attach_scale(scales[axis])
+        if not compress and arrays[name].size:
+            places.append((dataset.id.get_offset(), arrays[name]))
+    return places
+
+
+def _facts(recording: Recording, texts: Texts) -> dict[str, str]:
+    facts = {
+        "Conventions": CONVENTIONS,
+        "title": texts.title,
+        "source": texts.source,
+        "podusv_version": texts.version,
+        "status": recording.status,
+        "controller": recording.controller,
+    }
+    return facts | ({"message": recording.message} if recording.message else {})
+
+
+def _scales(
+    file: h5py.File, arrays: Mapping[str, Vector], about: Mapping[str, Signal]
+) -> dict[str, h5py.Dataset]:
+    """A dataset for every axis but time. ValueError where arrays do not fit each other."""
+    lengths: dict[str, int] = {}
+    for name, array in arrays.items():
+        for axis, size in zip(about[name].dimensions, array.shape, strict=True):
+            if lengths.setdefault(axis, size) != size:
+                raise ValueError(f"{name}: {size} values along {axis}, not {lengths[axis]}")
+    return {axis: _scale(file, axis, size) for axis, size in lengths.items() if axis != "time"}
+
+
+def _scale(file: h5py.File, axis: str, size: int) -> h5py.Dataset:
+    scale = file.create_dataset(axis, data=np.arange(size, dtype=np.int32))
+    scale.make_scale(axis)
+    _describe(scale, {"units": "1", "long_name": AXES.get(axis, axis)})
+    return scale
+
+
+def _dataset(file: h5py.File, name: str, array: Vector, compress: bool) -> h5py.Dataset:
+    if compress and array.size:
+        return file.create_dataset(name, data=array, dtype="<f8", **_COMPRESSED)
+    made = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    made.set_obj_track_times(False)
+    made.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+    made.set_fill_time(h5py.h5d.FILL_TIME_NEVER)  # podusv writes the numbers
+    space = h5py.h5s.create_simple(array.shape)
+    return h5py.Dataset(h5py.h5d.create(file.id, name.encode(), h5py.h5t.IEEE_F64LE, space, made))
+
+
+def _description(signal: Signal) -> dict[str, str]:
+    facts = {"units": signal.unit, "long_name": signal.meaning, "symbol": signal.symbol}
+    # The same as the dimension scales. Those refer to other objects, and no reader should follow
+    # references in a file that it does not trust.
+    facts["axes"] = " ".join(signal.dimensions)
+    return facts | ({"wrapped": "modulo 2 pi"} if signal.wrapped else {})
+
+
+def _describe(thing: h5py.HLObject, facts: Mapping[str, str]) -> None:
+    for name, words in facts.items():
+        thing.attrs.create(name, _text(words))
+
+
+def _text(words: str) -> np.ndarray[tuple[()], np.dtype[np.bytes_]]:
+    # Of fixed length: variable-length strings make readers of damaged files hang.
+    content = words.encode("utf-8", "backslashreplace")
+    return np.array(content, dtype=h5py.string_dtype("utf-8", max(1, len(content))))
+
+
+def _write_rows(out: BinaryIO, place: int, array: Vector, rows: slice) -> None:
+    part = np.ascontiguousarray(array[rows], dtype="<f8")
+    if part.size:
+        _write_at(out, place + rows.start * part[0].nbytes, part.reshape(-1).data.cast("B"))
+
+
+def _write_at(out: BinaryIO, place: int, content: memoryview) -> None:
+    out.seek(place)
+    while content:
+        content = content[out.write(content) :]
