@@ -14,6 +14,7 @@ import pytest
 from command_samples import Command, commanded
 from hypothesis import given
 from hypothesis import strategies as st
+from known_signals import ABOUT
 from rerun_samples import (
     copied,
     flip,
@@ -24,11 +25,13 @@ from rerun_samples import (
 )  # fmt: skip
 from storage_samples import recording
 
+from podusv_cli.cli.difference_text import deviation_in_words
 from podusv_cli.comparison.bit_difference import Deviation, differing
 from podusv_cli.comparison.causes import scenario_changes, version_changes
 from podusv_cli.comparison.log_difference import compare
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.recording import Recording
+from podusv_cli.core.signal import Signal
 from podusv_cli.storage import json_files, manifest
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
@@ -90,6 +93,15 @@ def bumped(name: str, place: Any, by: float) -> Any:
     array = np.array(recording()[name])
     array[place] += by
     return array
+
+
+def test_signals_of_others_have_their_own_unit_and_period() -> None:
+    about = {"bearing_2": Signal("bearing_2", "deg", "a law's own", wrapped=True)}
+    one, other = np.full(50, 3.13), np.full(50, -3.12)
+    pair = (replace(changed(bearing_2=array), about=ABOUT | about) for array in (one, other))
+    (largest,) = compare(*pair).largest
+    assert largest.gap == pytest.approx(2.0 * math.pi - 6.25)
+    assert "-> -3.12 deg (" in deviation_in_words(largest)
 
 
 def test_a_recording_is_the_same_as_itself() -> None:

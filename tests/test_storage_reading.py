@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -309,3 +310,10 @@ def test_a_file_beyond_all_measure_is_not_even_opened(path: Path) -> None:
     os.truncate(path, log_reader.LARGEST_FILE + 1)  # a hole: takes no room on the disk
     with pytest.raises(StorageError, match=r"at most .* read it with h5py or xarray"):
         log_reader.read_log(path)
+
+
+def test_the_size_that_is_allowed_is_for_the_caller_to_say(path: Path) -> None:
+    path.write_bytes(log())
+    with pytest.raises(StorageError, match="at most 1000 allowed"):
+        log_reader.read_log(path, 1000)
+    assert_same(recording(), log_reader.read_log(path, math.inf))

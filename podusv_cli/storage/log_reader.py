@@ -55,16 +55,17 @@ class _Member(NamedTuple):
         return 8 * int(math.prod(self.dataset.shape))
 
 
-def read_log(path: Path) -> Recording:
+def read_log(path: Path, largest: float = LARGEST_CONTENT) -> Recording:
     """The recording in a log file, its arrays mapped from the file where they lie in one piece.
 
-    `seen` is not logged and stays None. Raises StorageError.
+    `seen` is not logged and stays None. Raises StorageError, also for a log whose file or whose
+    numbers take more than `largest` bytes.
     """
-    with _opened(path) as (file, raw):
+    with _opened(path, largest) as (file, raw):
         members = _members(file)
         total = sum(member.bytes for member in members)
-        if total > LARGEST_CONTENT:
-            claim = f"claims {total} bytes of data, at most {LARGEST_CONTENT} allowed"
+        if total > largest:
+            claim = f"claims {total} bytes of data, at most {largest} allowed"
             raise StorageError(f"cannot read {path}: {claim}{ELSEWHERE}")
         arrays = {member.signal.name: _array(member, raw) for member in members}
         about = {member.signal.name: member.signal for member in members}
@@ -87,11 +88,13 @@ def resolved_yaml(path: Path) -> str:
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[tuple[h5py.File, BufferedReader]]:
+def _opened(
+    path: Path, largest: float = LARGEST_FILE
+) -> Iterator[tuple[h5py.File, BufferedReader]]:
     """A log whose format was checked, and its bytes; faults inside become a StorageError."""
     with opened(path) as raw:
-        if file_size(raw) > LARGEST_FILE:
-            found = f"{file_size(raw)} bytes, at most {LARGEST_FILE} allowed"
+        if file_size(raw) > largest:
+            found = f"{file_size(raw)} bytes, at most {largest} allowed"
             raise StorageError(f"cannot read {path}: {found}{ELSEWHERE}")
         try:
             with h5py.File(raw) as file:

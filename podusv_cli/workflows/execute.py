@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -251,7 +252,7 @@ def _logged(
     path, title = writer.folder / folder.LOG, scenario.description or scenario.name
     texts = log.Texts(resolved_yaml(scenario), title, scenario.vessel.source, __version__)
     log.write(path, recording, texts, compress=scenario.log.compress)
-    signals = log_reader.read_log(path).signals if again else recording.signals
+    signals = log_reader.read_log(path, math.inf).signals if again else recording.signals
     return replace(recording, signals=signals)
 
 

@@ -133,7 +133,7 @@ def test_a_fault_after_an_interrupt_is_told(
         raise TypeError("no such thing")
 
     monkeypatch.setattr(execute, "simulate", soon(signal.SIGINT, execute.simulate))
-    monkeypatch.setattr(execute, "_beyond", faulty)
+    monkeypatch.setattr(execute, "_write", faulty)
     said = podusv("run", write("long.yaml", LONG), "--out", "x")
     assert said == (130, "", "podusv: interrupted, and then TypeError: no such thing\n")
     assert not Path("x").exists()
