@@ -15,9 +15,9 @@ from storage_samples import YAML, assert_same, deadline, log, recording, rewritt
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.recording import Recording
 from podusv_cli.storage import log_reader
-from podusv_cli.storage.log_reader import WORDS
 
 TINY = recording(rows=20, nodes=4)
+WORDS = ("units", "long_name", "symbol", "axes", "wrapped")  # attributes of a variable
 
 
 @pytest.fixture(autouse=True)
@@ -153,17 +153,19 @@ def only_time(count: int) -> Callable[[h5py.File], None]:
 
 
 def compact(file: h5py.File) -> None:
-    del file["x"]
     made = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
     made.set_layout(h5py.h5d.COMPACT)
-    h5py.h5d.create(file.id, b"x", h5py.h5t.IEEE_F64LE, h5py.h5s.create_simple((50,)), made)
+    space = h5py.h5s.create_simple((50,))
+    new = h5py.h5d.create(file.id, b"y_compact", h5py.h5t.IEEE_F64LE, space, made)
+    h5py.Dataset(new).attrs.create("units", np.bytes_("m"))
+    for key in ("long_name", "symbol"):
+        h5py.Dataset(new).attrs.create(key, np.bytes_("y"))
 
 
 def bomb(file: h5py.File) -> None:
     """A chunk that is larger than the numbers in it."""
-    del file["x"]
-    dataset = file.create_dataset("x", (50,), dtype="<f8", chunks=(50,), **PACKED)
-    dataset.id.write_direct_chunk((0,), bytes(100_000))
+    remake(file, "x", shape=(50,), dtype="<f8", chunks=(50,), **PACKED)
+    file["x"].id.write_direct_chunk((0,), bytes(100_000))
 
 
 def many(file: h5py.File) -> None:
@@ -195,7 +197,7 @@ HOSTILE = {
     "too short": (replaced("x", data=FIFTY[1:], **PACKED), "49 values along time"),
     "other nodes": (replaced("rbf_width", data=FIFTY[:4], **PACKED), "4 values along input"),
     "not in the file": (replaced("x", shape=(50,), dtype="<f8"), "x has no numbers in this file"),
-    "compact": (compact, "x has no numbers in this file"),
+    "compact": (compact, "y_compact has no numbers in this file"),
     "bomb": (bomb, "packed in an unknown way"),
     "unknown filter": (replaced("x", data=FIFTY, compression="lzf"), "packed in an unknown way"),
     "nothing stored": (replaced("x", shape=(50,), dtype="<f8", **PACKED), "chunk is missing"),
