@@ -14,7 +14,6 @@ import numpy as np
 from benchmarks.cases import NETWORKS, Case, grid, metrics_observer
 from podusv_cli.core.kernel import Vector
 from podusv_cli.engine.simulate import STATE, simulate
-from podusv_cli.metrics.accumulators import summarise
 
 SOURCE = Path(__file__).with_name("closed_loop.c")
 FLAGS = {"O3": ("-O3", "-march=native"), "Ofast": ("-Ofast", "-march=native")}
@@ -64,12 +63,14 @@ def run(program: Path, case: Case, *, repeats: int = 1, steps: int | None = None
 def podusv_outcome(case: Case, steps: int | None = None) -> Outcome:
     """The same numbers from podusv."""
     loop, over = case.loop(), grid(steps)
-    recording = simulate(loop, over, observer=metrics_observer(loop, over))
+    watching = metrics_observer(loop, over)
+    recording = simulate(loop, over, observer=watching)
     if recording.status != "finished" or recording.seen is None:
         raise ValueError(f"{case.label}: {recording.message or recording.status}")
-    slots = [name for name, _ in loop.controller.slots() if not name.startswith("psi_d")]
+    slots = [part.name for part, _ in loop.controller.slots()]
+    slots = [name for name in slots if not name.startswith("psi_d")]
     state = np.concatenate([np.ravel(recording[name][-1]) for name in (*STATE, *slots)])
-    return Outcome(summarise(recording.seen, over.step)["iae"], state)
+    return Outcome(watching.summary(recording.seen)["iae"], state)
 
 
 def difference(a: Outcome, b: Outcome) -> float:

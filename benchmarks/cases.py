@@ -11,8 +11,8 @@ from podusv_cli.controllers.base import Controller
 from podusv_cli.controllers.network import Network
 from podusv_cli.core.registry import kinds
 from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.simulate import ClosedLoop, Observer
-from podusv_cli.metrics.accumulators import observer
+from podusv_cli.engine.simulate import ClosedLoop
+from podusv_cli.metrics.table import Metrics, observer
 from podusv_cli.scenario.load import load
 from podusv_cli.scenario.model import Scenario
 
@@ -71,7 +71,7 @@ def grid(steps: int | None = None, log_every: int = 1) -> TimeGrid:
     return TimeGrid(whole.step, whole.steps if steps is None else steps, log_every)
 
 
-def metrics_observer(loop: ClosedLoop, over: TimeGrid) -> Observer:
+def metrics_observer(loop: ClosedLoop, over: TimeGrid) -> Metrics:
     """The observer of `podusv run`, which gathers all metrics."""
     settings = _scenario().metrics
     return observer(

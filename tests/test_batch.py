@@ -27,7 +27,7 @@ from podusv_cli.engine.batch import Batch, simulate_many
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import STATE, ClosedLoop, simulate
 from podusv_cli.engine.variants import variants
-from podusv_cli.metrics.accumulators import observer, summarise, summarise_many
+from podusv_cli.metrics.table import observer
 from podusv_cli.paths.waypoints import Waypoints
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -66,14 +66,14 @@ def test_every_run_has_the_bits_and_metrics_of_a_run_alone(law: Any, workers: in
     loops = spread_out(controller=law)
     watching = observer(loops[0], GRID, **SETTINGS)
     batch = simulate_many(loops, GRID, observer=watching, workers=workers)
-    metrics = summarise_many(batch.seen, GRID.step)
+    metrics = watching.summaries(batch.seen)
     for i, loop in enumerate(loops):
         alone = simulate(loop, GRID, observer=observer(loop, GRID, **SETTINGS))
         assert (batch.status[i], batch.reached[i]) == (alone.status, GRID.steps + 1)
         np.testing.assert_array_equal(batch.state[i], [alone[name][-1] for name in STATE])
         np.testing.assert_array_equal(batch.seen[i], alone.seen)
         assert alone.seen is not None
-        expected = summarise(alone.seen, GRID.step)
+        expected = watching.summary(alone.seen)
         np.testing.assert_array_equal([metrics[name][i] for name in expected], [*expected.values()])
     assert len(set(metrics["iae"])) == COUNT  # the runs do differ
 
@@ -145,11 +145,12 @@ def interrupted(loops: list[ClosedLoop], grid: TimeGrid) -> Batch:
 
 def test_an_interrupt_keeps_the_runs_that_are_done() -> None:
     loops = [corrected()] * 40
+    watching = observer(loops[0], TimeGrid(0.01, 100_000), **SETTINGS)
     batch = interrupted(loops, TimeGrid(0.01, 100_000))
     done = batch.status == "finished"
     assert 2 <= done.sum() < 40
     assert set(batch.status) == {"finished", "interrupted"}
-    iae = summarise_many(batch.seen, 0.01)["iae"]
+    iae = watching.summaries(batch.seen)["iae"]
     assert len(set(iae[done])) == 1
     never = batch.reached == 0
     assert never.any()
@@ -176,7 +177,7 @@ def test_another_structure_is_refused(other: ClosedLoop) -> None:
 def test_no_runs_are_an_empty_batch() -> None:
     batch = simulate_many([], GRID)
     assert (len(batch.status), batch.seen.shape) == (0, (0, 1))
-    assert summarise_many(np.zeros((0, 19)), 0.01)["iae"].shape == (0,)
+    assert observer(corrected(), GRID, **SETTINGS).summaries(batch.seen)["iae"].shape == (0,)
 
 
 def test_a_fault_in_one_run_is_raised() -> None:

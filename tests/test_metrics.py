@@ -15,10 +15,9 @@ from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import simulate
-from podusv_cli.metrics import accumulators
-from podusv_cli.metrics.accumulators import observer, summarise
+from podusv_cli.metrics import distance
 from podusv_cli.metrics.cost import law_costs
-from podusv_cli.metrics.table import METRICS
+from podusv_cli.metrics.table import METRICS, observer
 
 
 def gathered(
@@ -27,7 +26,7 @@ def gathered(
     grid = TimeGrid(0.01, steps, log_every)
     seeing = observer(loop, grid, steady_fraction=steady_fraction, settling_radius=radius)
     recording = simulate(loop, grid, observer=seeing, compiled=compiled, **options)
-    return recording, summarise(recording.seen, grid.step)
+    return recording, seeing.summary(recording.seen)
 
 
 @pytest.fixture(scope="module")
@@ -193,13 +192,12 @@ def test_settled_from_the_start_is_zero():
 
 
 def test_settling_in_the_last_instant_counts_whatever_the_rounding():
-    seen, step = np.zeros(accumulators.SIZE), 0.01
+    seen, step = np.zeros(distance.SIZE), 0.01
     for last in range(2, 200):
-        seen[accumulators.NOW], seen[accumulators.OUTSIDE] = last * step, (last - 1) * step
-        seen[accumulators.LAST + accumulators.TIME] = 0.5 * step
-        assert summarise(seen, step)["settling_time"] == pytest.approx(last * step)
-        seen[accumulators.OUTSIDE] = last * step
-        assert np.isnan(summarise(seen, step)["settling_time"])
+        seen[distance.NOW], seen[distance.OUTSIDE] = last * step, (last - 1) * step
+        assert METRICS["settling_time"].result(seen, step) == pytest.approx(last * step)
+        seen[distance.OUTSIDE] = last * step
+        assert np.isnan(METRICS["settling_time"].result(seen, step))
 
 
 def test_every_metric_is_computed_and_documented(limited):

@@ -1,4 +1,4 @@
-"""Adding a law, path, disturbance, actuator, vessel, figure or finding is one file.
+"""Adding a law, path, disturbance, actuator, vessel, metric, figure or finding is one file.
 
 Each is written into a copy of the package; no other file is touched. All commands know it then.
 """
@@ -117,6 +117,20 @@ class Lagging(Actuator):
         signals[0] = demand[0] - state[0]
         rate[0] = signals[0] / k.lag
 """,
+    "metrics/reach.py": """
+from podusv_cli.metrics.metric import Accumulator, Metric, entry
+
+
+@kernel
+def watch(t, weight, s, row, k, seen):
+    seen[0] = max(seen[0], abs(s[1]))
+    seen[1] += weight * k.reach_scale
+
+
+OF = Accumulator(watch, lambda layout: 2, lambda layout: {"reach_scale": 2.0})
+reach = Metric("reach", "m", "largest distance east", OF, entry(0))
+twice = Metric("twice", "s", "twice the run", OF, entry(1))
+""",
     "figures/cross.py": """
 from podusv_cli.figures.panels import signals_over_time
 from podusv_cli.figures.sheet import figure
@@ -149,7 +163,11 @@ controllers: {one: {gain: 1.0}, other: {gain: 3.0}, pid: {kind: pid}}
 start: {y: 1.0}
 simulation: {duration: 0.5, compiled: false}
 claims:
-  C1: {says: it drifts, source: here, expect: max(abs(one.e_ct)) > 0.5, tolerance: 0.0}
+  C1:
+    says: it drifts
+    source: here
+    expect: max(abs(one.e_ct)) > 0.5 and one.reach > 0.5
+    tolerance: 0.0
 """
 
 
@@ -188,6 +206,8 @@ def test_every_command_knows_what_one_file_brings(place: Path) -> None:
     codes = {finding["code"] for finding in run["warnings"]}
     assert {"lazy-law", "far-off"} <= codes
     with h5py.File(place / "r/log.h5") as log:
+        assert run["metrics"]["reach"] == abs(log["y"][...]).max()
+        assert run["metrics"]["twice"] == pytest.approx(1.0)
         assert log["modes"].shape == (51, 3)
         assert log["widths"].shape == (3,)
         assert (log["e_ct"].attrs["units"], log["e_ct"].attrs["symbol"]) == (b"m", b"e_{ct}")
@@ -203,10 +223,20 @@ def test_every_command_knows_what_one_file_brings(place: Path) -> None:
 
 def test_everything_is_listed_and_explained(place: Path) -> None:
     listed = podusv(place, "list")
-    for name in ("cross_track", "still", "steady", "lagging", "barge", "lazy-law", "far-off"):
+    for name in (
+        "cross_track",
+        "still",
+        "steady",
+        "lagging",
+        "barge",
+        "lazy-law",
+        "far-off",
+        "reach",
+    ):
         assert f"  {name}" in listed
     assert "cross-track error" in podusv(place, "explain", "e_ct")
     assert "signal [N]" in podusv(place, "explain", "force")
     assert "the gain is small" in podusv(place, "explain", "lazy-law")
     assert "lazy-law" in podusv(place, "schema")
+    assert "largest distance east" in podusv(place, "explain", "reach")
     assert "Holds the target's course" in podusv(place, "explain", "cross_track")

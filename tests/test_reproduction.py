@@ -11,7 +11,7 @@ import pytest
 from podusv_cli.comparison.claims import Stated, judge
 from podusv_cli.comparison.entries import Entry
 from podusv_cli.engine.simulate import simulate
-from podusv_cli.metrics.accumulators import observer, summarise
+from podusv_cli.metrics.table import observer
 from podusv_cli.scenario.load import load
 from podusv_cli.workflows import commands
 
@@ -70,7 +70,7 @@ def rerun(scenario):
         settling_radius=settings.settling_radius,
     )  # fmt: skip
     recording = simulate(loop, grid, observer=seeing)
-    run = SimpleNamespace(recording=recording, metrics=summarise(recording.seen, grid.step))
+    run = SimpleNamespace(recording=recording, metrics=seeing.summary(recording.seen))
     return Entry("", run, scenario)
 
 

@@ -9,8 +9,15 @@ import numpy as np
 from podusv_cli.core.recording import Recording
 from podusv_cli.engine.replay import replayer
 from podusv_cli.engine.simulate import ClosedLoop
+from podusv_cli.metrics.metric import Metric
 
 REPLAYS = 25
+law_ns = Metric(
+    "law_ns", "ns", "median processor time of one evaluation of the law over its logged states",
+    place=200,
+)  # fmt: skip
+low = Metric("law_ns_low", "ns", "lower quartile of that time over the replays", place=200)
+high = Metric("law_ns_high", "ns", "upper quartile of that time over the replays", place=200)
 QUARTILES = [REPLAYS * quarter // 4 for quarter in (1, 2, 3)]  # of the times in order
 
 

@@ -11,7 +11,7 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Status
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import simulate
-from podusv_cli.metrics.accumulators import observer, summarise
+from podusv_cli.metrics.table import observer
 from podusv_cli.scenario.model import Scenario
 
 Progress = Callable[[float], None]
@@ -51,6 +51,6 @@ def run_level(scenario: Scenario, halvings: int, progress: Progress | None = Non
     if out.status == "interrupted":
         raise KeyboardInterrupt
     whole = out.status == "finished" and out.seen is not None
-    metrics = summarise(out.seen, grid.step) if whole and out.seen is not None else {}
+    metrics = seeing.summary(out.seen) if whole and out.seen is not None else {}
     position = np.array([out["x"][-1], out["y"][-1]]) if whole else np.full(2, np.nan)
     return Level(grid.step, out.status, out.message, metrics, position)

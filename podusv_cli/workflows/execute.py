@@ -19,12 +19,11 @@ from podusv_cli.core.errors import StorageError
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.recording import Allocate, Recording, Status
 from podusv_cli.engine.check import check_law
-from podusv_cli.engine.simulate import Observer, marcher, simulate
+from podusv_cli.engine.simulate import marcher, simulate
 from podusv_cli.findings.after import aftermath
 from podusv_cli.findings.finding import heard
-from podusv_cli.metrics.accumulators import observer, summarise
 from podusv_cli.metrics.cost import law_costs
-from podusv_cli.metrics.table import METRICS
+from podusv_cli.metrics.table import METRICS, Metrics, observer
 from podusv_cli.process.extras import Extras, Missing
 from podusv_cli.process.interrupts import interrupts_heard, interrupts_held
 from podusv_cli.process.workers import Outcome
@@ -192,7 +191,7 @@ def warm_up(scenario: Scenario) -> None:
         monitor.prepare(loop, scenario.time_grid(), compiled)
 
 
-def _observer(scenario: Scenario) -> Observer:
+def _observer(scenario: Scenario) -> Metrics:
     settings = scenario.metrics
     return observer(
         scenario.closed_loop(), scenario.time_grid(),
@@ -218,7 +217,7 @@ def simulated(
 def summary(scenario: Scenario, recording: Recording) -> dict[str, float]:
     """The metrics of a run that was observed."""
     seen = recording.seen
-    return summarise(seen, scenario.time_grid().step) if seen is not None else {}
+    return _observer(scenario).summary(seen) if seen is not None else {}
 
 
 def _cost(scenario: Scenario, recording: Recording) -> dict[str, float]:

@@ -33,7 +33,7 @@ def broken(*given: Any, **more: Any) -> NoReturn:
 
 BUG = "could not be made: ArithmeticError: planted here (test_afterwards.py, line "
 AFTER_A_RUN = {
-    "the metrics": (execute, "summarise"),
+    "the metrics": (execute, "summary"),
     "law_ns": (execute, "law_costs"),
     "warnings": (execute, "aftermath"),
     "theory.json with the stability monitor's signals": (monitor, "ideal_weights"),
@@ -97,7 +97,7 @@ def test_json_and_a_complete_run_say_what_is_missing(
     words = ("run", write("a.yaml", ADAPTIVE), "--json", "--no-figures", "--out")
     assert json.loads(podusv(*words, "x").out)["missing"] == []
     assert not Path("x/missing.json").exists()
-    monkeypatch.setattr(execute, "summarise", broken)
+    monkeypatch.setattr(execute, "summary", broken)
     (told,) = json.loads(podusv(*words, "y").out)["missing"]
     assert told.startswith(f"the metrics {BUG}")
 

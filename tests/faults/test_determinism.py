@@ -26,7 +26,7 @@ from podusv_cli.comparison.log_difference import compare
 from podusv_cli.comparison.run_difference import CLOCKED
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import ClosedLoop, simulate
-from podusv_cli.metrics.accumulators import observer
+from podusv_cli.metrics.table import observer
 from podusv_cli.process.workers import run_all
 from podusv_cli.scenario.load import load, load_text
 from podusv_cli.storage.files import fingerprint

@@ -1,0 +1,48 @@
+"""What the law asked for: peaks, and how much it moves in the steady window."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from podusv_cli.core.kernel import Vector, kernel
+from podusv_cli.metrics.metric import Accumulator, Layout, Metric, Result, entry
+
+PEAK_U, PEAK_R, TV_U, TV_R, LAST_U, LAST_R, SETTLED, SIZE = range(8)
+
+
+@kernel
+def watch(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
+    """Largest demands, and the sum of their changes."""
+    u, r = row[int(k.demand)], row[int(k.demand) + 1]
+    seen[PEAK_U] = max(seen[PEAK_U], abs(u))
+    seen[PEAK_R] = max(seen[PEAK_R], abs(r))
+    if t >= k.steady_from:
+        seen[SETTLED] += 1.0
+    if t > k.steady_from:
+        seen[TV_U] += abs(u - seen[LAST_U])
+        seen[TV_R] += abs(r - seen[LAST_R])
+    seen[LAST_U] = u
+    seen[LAST_R] = r
+
+
+def _variation(position: int) -> Result:
+    """A total variation; NaN where fewer than two instants lie in the steady window."""
+    return lambda seen, step: float(seen[position]) if seen[SETTLED] > 1.0 else math.nan
+
+
+def _constants(layout: Layout) -> dict[str, float]:
+    return {"demand": float(layout.plan.demand), "steady_from": layout.steady_from}
+
+
+OF = Accumulator(watch, lambda layout: SIZE, _constants)
+peak_u = Metric("peak_tau_u", "N", "largest |tau_u| that the law asked for", OF, entry(PEAK_U), 2)
+peak_r = Metric("peak_tau_r", "N m", "largest |tau_r| that the law asked for", OF, entry(PEAK_R), 2)
+tv_u = Metric(
+    "tv_tau_u", "N", "total variation of the demanded tau_u in the steady window", OF,
+    _variation(TV_U), 4,
+)  # fmt: skip
+tv_r = Metric(
+    "tv_tau_r", "N m", "total variation of the demanded tau_r in the steady window", OF,
+    _variation(TV_R), 4,
+)  # fmt: skip

@@ -1,0 +1,38 @@
+"""What the loads on the hull amount to, and how long the actuator limits them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from podusv_cli.core.kernel import Vector, kernel
+from podusv_cli.metrics.metric import Accumulator, Layout, Metric, add, entry, part
+
+TIME, EFFORT_U, EFFORT_R, ENERGY, SATURATED, INTEGRALS = range(6)
+
+
+@kernel
+def watch(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
+    """Squared loads, their work, and the time at the actuator's limits."""
+    tau = int(k.tau)
+    add(seen, INTEGRALS, TIME, weight)
+    add(seen, INTEGRALS, EFFORT_U, weight * row[tau] * row[tau])
+    add(seen, INTEGRALS, EFFORT_R, weight * row[tau + 2] * row[tau + 2])
+    add(seen, INTEGRALS, ENERGY, weight * (abs(row[tau] * s[3]) + abs(row[tau + 2] * s[5])))
+    if k.saturated >= 0.0:
+        add(seen, INTEGRALS, SATURATED, weight * row[int(k.saturated)])
+
+
+def _constants(layout: Layout) -> dict[str, float]:
+    return {"tau": float(layout.plan.tau), "saturated": float(layout.column("saturated"))}
+
+
+OF = Accumulator(watch, lambda layout: 2 * INTEGRALS, _constants, INTEGRALS)
+effort_u = Metric("effort_u", "N2 s", "integral of tau_u^2 on the hull", OF, entry(EFFORT_U), 3)
+effort_r = Metric("effort_r", "N2 m2 s", "integral of tau_r^2 on the hull", OF, entry(EFFORT_R), 3)
+energy = Metric(
+    "energy", "J", "integral of |tau_u u| + |tau_r r|, tau on the hull", OF, entry(ENERGY), 3
+)
+saturated_fraction = Metric(
+    "saturated_fraction", "1", "part of the time in which the actuator limits the law", OF,
+    part(SATURATED, TIME), 5,
+)  # fmt: skip

@@ -1,0 +1,66 @@
+"""What pods take and do; the vessel's state is followed by their speeds and angles."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from podusv_cli.actuators.propeller import DELTA, LIMITED
+from podusv_cli.core.kernel import Vector, kernel, tail
+from podusv_cli.metrics.metric import Accumulator, Layout, Metric, add, entry, part
+
+TIME, ENERGY, SPEED, ANGLE, RATE, INTEGRALS = range(6)
+TRAVEL, LAST_DELTA = 2 * INTEGRALS, 2 * INTEGRALS + 1  # the last angle of every pod
+
+
+@kernel
+def watch(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
+    """Energy, the way of the angles, the time at each limit."""
+    count, flags = int(k.pods), tail(row, int(k.limits))
+    add(seen, INTEGRALS, TIME, weight)
+    for i in range(3):
+        add(seen, INTEGRALS, SPEED + i, weight * flags[i])
+    seen[INTEGRALS + ENERGY] = 0.0
+    for i in range(count):
+        delta = s[6 + count + i]
+        if t > 0.0:
+            seen[TRAVEL] += abs(delta - seen[LAST_DELTA + i])
+        seen[LAST_DELTA + i] = delta
+        share = weight * row[int(k.power) + i] if k.power >= 0.0 else math.nan
+        seen[ENERGY] += share
+        seen[INTEGRALS + ENERGY] += share
+
+
+def _count(layout: Layout) -> int:
+    return layout.loop.actuator.states.count(DELTA)
+
+
+def _size(layout: Layout) -> int:
+    return LAST_DELTA + _count(layout) if _count(layout) else 0
+
+
+def _constants(layout: Layout) -> dict[str, float]:
+    limits, power = layout.column(LIMITED[0].name), layout.column("power")
+    return {"pods": float(_count(layout)), "limits": float(limits), "power": float(power)}
+
+
+OF = Accumulator(watch, _size, _constants, INTEGRALS)
+at_speed_limit = Metric(
+    "at_speed_limit", "1", "part of the time with a propeller asked for its most", OF,
+    part(SPEED, TIME), 6,
+)  # fmt: skip
+at_angle_limit = Metric(
+    "at_angle_limit", "1", "part of the time with a pod asked for its largest angle", OF,
+    part(ANGLE, TIME), 6,
+)  # fmt: skip
+at_rate_limit = Metric(
+    "at_rate_limit", "1", "part of the time with a pod changing as fast as it can", OF,
+    part(RATE, TIME), 6,
+)  # fmt: skip
+energy = Metric(
+    "energy_pod", "J", "integral of the propellers' power, where that is known", OF,
+    entry(ENERGY), 6,
+)  # fmt: skip
+travel = Metric(
+    "angle_travel", "rad", "way that all propulsion angles go, steering wear", OF, entry(TRAVEL), 6
+)
