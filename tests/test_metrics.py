@@ -103,7 +103,10 @@ SHORT = {
 @pytest.mark.parametrize("status", SHORT)
 def test_the_last_instant_of_a_run_cut_short_counts_half_as_that_of_every_run(status):
     loop, interrupted = SHORT[status]
-    log, got = gathered(loop, steady_fraction=1.0, progress=cut() if interrupted else None)
+    cut_short = (
+        {"progress": cut(), "compiled": False} if interrupted else {}
+    )  # plain Python is slow
+    log, got = gathered(loop, steady_fraction=1.0, **cut_short)
     assert log.status == status
     assert 1 < len(log["time"]) < 4001
     expected = by_definition(log, slice(None))
@@ -112,7 +115,7 @@ def test_the_last_instant_of_a_run_cut_short_counts_half_as_that_of_every_run(st
 
 def test_what_pods_take_in_a_run_cut_short_is_that_of_its_log():
     pods = example(Pods, pods=tuple(Pod(**POD, y=y, power_nnn=0.01) for y in (-0.1, 0.1)))
-    log, got = gathered(corrected(actuator=pods), progress=cut())
+    log, got = gathered(corrected(actuator=pods), steps=100_000, progress=cut())
     t = log["time"]
     assert got["energy_pod"] == pytest.approx(np.trapezoid(log["power"].sum(axis=1), t))
     for name in ("speed", "angle", "rate"):
@@ -121,7 +124,7 @@ def test_what_pods_take_in_a_run_cut_short_is_that_of_its_log():
 
 
 def test_a_settled_part_that_a_run_did_not_reach_has_no_numbers():
-    _, got = gathered(corrected(), steady_fraction=0.2, progress=cut())
+    _, got = gathered(corrected(), steady_fraction=0.2, progress=cut(), compiled=False)
     for name in ("z_e_steady", "tv_tau_u", "tv_tau_r"):
         assert np.isnan(got[name])
 
