@@ -12,7 +12,7 @@ from conftest import ROOMS, example, kinds
 from storage_samples import files
 
 from podusv_cli.scenario.load import load, load_resolved, resolved_yaml
-from podusv_cli.scenario.presets import pod_names, vessel_names
+from podusv_cli.scenario.presets import preset_names, with_presets
 
 SECTIONS = {room: room.removesuffix("s") for room in ROOMS}
 CSV = "0, 0\n10, 1\n18, 6\n"
@@ -25,8 +25,9 @@ def registered() -> dict[str, list[dict[str, Any]]]:
         for room, section in SECTIONS.items()
     }
     found["path"].append({"kind": "waypoints", "file": "points.csv"})
-    found["actuator"] += [{"kind": "pod", "preset": name} for name in pod_names()]
-    found["vessel"] = [{"preset": name} for name in vessel_names()]
+    pods, vessels = (with_presets()[key][1] for key in ("actuator.pod", "vessel"))
+    found["actuator"] += [{"kind": "pod", "preset": name} for name in preset_names(pods)]
+    found["vessel"] = [{"preset": name} for name in preset_names(vessels)]
     return found
 
 

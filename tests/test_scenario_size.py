@@ -128,6 +128,6 @@ def test_commands_refuse_it_before_anything_is_computed(podusv: Any, command: st
 
 @pytest.mark.parametrize(("at_once", "largest"), [(1, 1000), (2, 1100), (3, 1110), (9, 1110)])
 def test_runs_made_at_once_may_be_those_that_need_the_most_disk(at_once: int, largest: int) -> None:
-    sizes = [limits.Size(1, 1, 50, 0.0, scratch) for scratch in (100, 10, 1000)]
-    packed = limits.LEAST_PACKED * 150
+    sizes = [limits.Size(1, 1, 50, 0.0, scratch, compressed=True) for scratch in (100, 10, 1000)]
+    packed = limits.LEAST_COMPRESSED * 150
     assert limits.needed(sizes, at_once) == pytest.approx(packed + largest)

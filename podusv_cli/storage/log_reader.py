@@ -17,6 +17,7 @@ from typing import NamedTuple, get_args
 
 import h5py
 import numpy as np
+import numpy.typing as npt
 
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.kernel import Vector
@@ -67,7 +68,8 @@ def read_log(path: Path, largest: float = LARGEST_CONTENT) -> Recording:
         if total > largest:
             claim = f"claims {total} bytes of data, at most {largest} allowed"
             raise StorageError(f"cannot read {path}: {claim}{ELSEWHERE}")
-        arrays = {member.signal.name: _array(member, raw) for member in members}
+        content = np.memmap(raw, np.uint8, "r")  # one map: each would keep a file open
+        arrays = {member.signal.name: _array(member, content) for member in members}
         about = {member.signal.name: member.signal for member in members}
         return Recording(
             status=_status(file),
@@ -220,7 +222,7 @@ def _check_shape(member: _Member, lengths: dict[str, int]) -> None:
             raise ValueError(f"{signal.name} has no values along {axis}")
 
 
-def _array(member: _Member, raw: BufferedReader) -> Vector:
+def _array(member: _Member, content: npt.NDArray[np.uint8]) -> Vector:
     dataset, name = member.dataset, member.signal.name
     layout = dataset.get_create_plist().get_layout()
     if not member.bytes:
@@ -231,9 +233,10 @@ def _array(member: _Member, raw: BufferedReader) -> Vector:
         dataset.read(h5py.h5s.ALL, h5py.h5s.ALL, numbers)
         return numbers
     place = dataset.get_offset()
-    if place is None or place + member.bytes > file_size(raw):
+    if place is None or place + member.bytes > len(content):
         raise ValueError(f"{name} has no numbers in this file")
-    return np.memmap(raw, np.float64, "r", place, dataset.shape).view(np.ndarray)
+    numbers = np.ndarray(dataset.shape, np.float64, content.data, place)
+    return numbers if numbers.flags.aligned else numbers.copy()
 
 
 def _check_chunks(name: str, dataset: h5py.h5d.DatasetID, size: int) -> None:

@@ -95,7 +95,7 @@ class Unnamed(CrossTrack):
 
 
 def test_a_bare_name_is_no_signal() -> None:
-    with pytest.raises(LawError, match="law unnamed declares 'modes', which is no Signal"):
+    with pytest.raises(LawError, match="it declares 'modes', which is no Signal"):
         check_law(corrected(controller=Unnamed()))
 
 
