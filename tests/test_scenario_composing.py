@@ -77,7 +77,8 @@ def test_a_missing_base_is_told_at_the_key_and_alone() -> None:
     write("child.yaml", "description: x\nextends: nope.yaml\nlog: {evry: 1}\n")
     assert findings("child.yaml") == [
         "child.yaml:2:10: extends: 'nope.yaml' cannot be read: no such file or directory",
-        "child.yaml:3:7: log.evry: unknown key; did you mean 'every'? (allowed: every, monitor, compress)",
+        "child.yaml:3:7: log.evry: unknown key; did you mean 'every'? "
+        "(allowed: every, monitor, compress)",
     ]
 
 

@@ -14,6 +14,7 @@ from typing import Any
 from podusv_cli.comparison.run_difference import Difference, difference
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.recording import Status
+from podusv_cli.process.extras import Missing
 from podusv_cli.process.workers import INTERRUPTED, Outcome, run_all, workers_here
 from podusv_cli.scenario.limits import estimate, limits, needed
 from podusv_cli.scenario.messages import Check
@@ -44,6 +45,7 @@ class Repeated:
     was: Status
     status: Status
     found: Difference
+    missing: Sequence[Missing] = ()  # from the repeated run
 
     @property
     def identical(self) -> bool:
@@ -56,6 +58,7 @@ class Repeated:
             "original": str(self.original),
             "identical": self.identical,
             "status": [self.was, self.status],
+            "missing": [str(part) for part in self.missing],
             **self.found.as_json(),
         }
 
@@ -170,7 +173,7 @@ def _repeat(
     task = Task(part.scenario, original.resolved_yaml, target, request.force, argv=request.argv)
     done = execute(task, progress)
     found = difference(original, run_folder.open_run(done.folder))
-    return Repeated(original.folder, original.status, done.status, found)
+    return Repeated(original.folder, original.status, done.status, found, done.missing)
 
 
 @dataclass(frozen=True)
