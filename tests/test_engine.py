@@ -295,3 +295,12 @@ def test_a_run_leaves_its_loop_as_it_was() -> None:
     run(loop, 1.0)
     assert isinstance(loop, ClosedLoop)
     np.testing.assert_array_equal(loop.first_memory(), before)
+
+
+def test_an_interrupt_after_the_last_step_does_not_cut_a_run_short() -> None:
+    def press(fraction: float) -> None:
+        if fraction == 1.0:
+            raise KeyboardInterrupt
+
+    out = run(corrected(), 1.0, progress=press)
+    assert (out.status, len(out["time"])) == ("finished", 101)

@@ -17,6 +17,7 @@ from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import simulate
 from podusv_cli.metrics import distance
 from podusv_cli.metrics.cost import law_costs
+from podusv_cli.metrics.metric import closed
 from podusv_cli.metrics.table import METRICS, observer
 
 
@@ -116,6 +117,7 @@ def test_the_last_instant_of_a_run_cut_short_counts_half_as_that_of_every_run(st
 def test_what_pods_take_in_a_run_cut_short_is_that_of_its_log():
     pods = example(Pods, pods=tuple(Pod(**POD, y=y, power_nnn=0.01) for y in (-0.1, 0.1)))
     log, got = gathered(corrected(actuator=pods), steps=100_000, progress=cut())
+    assert log.status == "interrupted"
     t = log["time"]
     assert got["energy_pod"] == pytest.approx(np.trapezoid(log["power"].sum(axis=1), t))
     for name in ("speed", "angle", "rate"):
@@ -218,3 +220,8 @@ def test_full_derivatives_cost_more_than_pid():
     dear, cheap = corrected(controller=Backstepping()), corrected(controller=Pid())
     costs = law_costs([(loop, gathered(loop, steps=500)[0]) for loop in (dear, cheap)])
     assert costs[0]["law_ns"] > 1.3 * costs[1]["law_ns"] > 0
+
+
+def test_an_integral_that_left_the_finite_numbers_stays_infinite():
+    seen = np.array([0.05, np.inf, 0.01, np.inf])
+    assert closed(seen, 2, 0.01).tolist() == pytest.approx([0.045, np.inf, 0.01, np.inf])

@@ -6,6 +6,8 @@ import traceback
 from dataclasses import dataclass
 from pathlib import Path
 
+from podusv_cli.core.escaping import visible
+
 
 class PodusvError(Exception):
     """A failure that podusv explains in one line; anything else is a bug (exit code 1)."""
@@ -67,4 +69,4 @@ def in_a_line(error: BaseException) -> str:
     """What was raised, in what words and where: `KeyError: 'gain' (pid.py, line 60)`."""
     frames = traceback.extract_tb(error.__traceback__)
     where = f" ({Path(frames[-1].filename).name}, line {frames[-1].lineno})" if frames else ""
-    return f"{type(error).__name__}: {' '.join(str(error).split())}{where}"
+    return visible(f"{type(error).__name__}: {' '.join(str(error).split())}{where}")

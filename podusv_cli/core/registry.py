@@ -58,10 +58,16 @@ def any_of(package: str, base: type[Kind]) -> Any:
 def named(package: str, kind: type[Named]) -> dict[str, Named]:
     """Every object of class `kind` in the modules of `package`, by its `name`.
 
-    Modules come in alphabetical order, objects in the order of their definition.
+    Modules come in alphabetical order, objects in the order of their definition. Raises LawError
+    for two objects of one name.
     """
-    found = (thing for thing in _members(package) if isinstance(thing, kind))
-    return {thing.name: thing for thing in found}  # type: ignore[attr-defined]
+    found: dict[str, Named] = {}
+    for thing in _members(package):
+        if isinstance(thing, kind):
+            name = thing.name  # type: ignore[attr-defined]
+            if found.setdefault(name, thing) is not thing:
+                raise LawError(f"{package} has two of the name {name!r}; take another name")
+    return found
 
 
 def signals(*packages: str) -> list[Signal]:

@@ -36,6 +36,9 @@ class Signal:
         """Check the name; make a symbol of it where none is given: `e_ct` becomes `e_{ct}`."""
         if not NAME.fullmatch(self.name):
             raise ValueError(f"a signal's name is letters, digits and '_', not {self.name!r}")
+        for text in (self.unit, self.meaning, self.symbol):
+            if not text.isprintable():
+                raise ValueError(f"{self.name}: {text!r} has a character that no log can hold")
         head, *rest = self.name.split("_")
         below = ",".join(rest)
         written = f"{head}_{{{below}}}" if len(below) > 1 else self.name

@@ -118,7 +118,7 @@ def _march_all(
         for run in busy:
             run.work.stop()
         for run in busy:
-            batch.note(run, Ending(run.work.stopped(), "interrupted"))
+            batch.note(run, run.work.interrupted(last))
 
 
 def _blank(count: int, observer: Observer) -> Batch:

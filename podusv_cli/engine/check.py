@@ -19,10 +19,11 @@ from podusv_cli.controllers.base import Controller
 from podusv_cli.core.component import Component
 from podusv_cli.core.errors import LawError
 from podusv_cli.core.kernel import Vector, bundle
-from podusv_cli.core.signal import Signal
+from podusv_cli.core.signal import NAME, Signal
 from podusv_cli.engine.march import Work
 from podusv_cli.engine.simulate import ClosedLoop
 
+PROVENANCE = "provenance"  # is a group in every log
 UNWRITTEN = -1.234567890123e-290  # no law writes just this
 # What a law's arithmetic may raise: the run tells it, as divergence.
 OF_NUMBERS = (ArithmeticError, ValueError)
@@ -119,7 +120,14 @@ def _check_signals(loop: ClosedLoop) -> None:
 def _check_axes(loop: ClosedLoop) -> None:
     """Every logged array has as many values along each of its axes as all others have."""
     lengths: dict[str, tuple[int, str]] = {}
+    names = {*loop.about(), PROVENANCE}
     for part, shape in _shapes(loop):
+        if part.fixed and not part.axes:
+            raise LawError(f"signal {part.name}: it is fixed and has no axis; name one")
+        taken = [axis for axis in part.axes if axis in names or not NAME.fullmatch(axis)]
+        if taken or part.name == PROVENANCE or 0 in shape:
+            what = f"its axis {taken[0]!r}" if taken else f"its name or its shape {shape}"
+            raise LawError(f"signal {part.name}: {what} cannot stand in a log; choose another")
         if len(shape) != len(part.axes):
             raise LawError(
                 f"signal {part.name}: its values have the shape {shape} at an instant and its axes "

@@ -106,6 +106,10 @@ class Work:
             return Ending(self.reached, "diverged", self.fault())
         return Ending(self.result, "finished" if self.result == last else "diverged")
 
+    def interrupted(self, last: int) -> Ending:
+        """How a march ended that an interrupt is to stop: by itself where it is over already."""
+        return self.ending(last) if self.over else Ending(self.stopped(), "interrupted")
+
     def fault(self) -> str:
         """What is wrong with a function that has no result."""
         if not self.error:
@@ -138,4 +142,7 @@ def march(
             work.finish(progress)
         return work.ending(last)
     except KeyboardInterrupt:
-        return Ending(work.stopped(), "interrupted")
+        return work.interrupted(last)
+    except BaseException:  # of `progress`; nobody will use what the march goes on to compute
+        work.stop()
+        raise

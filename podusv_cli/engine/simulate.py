@@ -236,7 +236,7 @@ def _record(
         cause = cause or _culprit(wires, names(loop), reached * grid.step)
         message = f"diverged at t = {reached * grid.step:.6g} s: {cause}; {_last_words(signals)}"
     fixed = {part.name: array for part, array in loop.controller.fixed_signals().items()}
-    return Recording(status, loop.controller.label, signals, fixed, wires.seen, message)
+    return Recording(status, loop.controller.label, signals, fixed, wires.seen.copy(), message)
 
 
 def _culprit(wires: Wires, labels: list[str], at: float) -> str:

@@ -48,7 +48,8 @@ def closed(seen: Vector, integrals: int, step: float) -> Vector:
     if not integrals or whole[0] > added[0] == 0.5 * step:
         return whole
     with np.errstate(all="ignore"):  # nothing was added, or a run that diverges
-        whole[:integrals] -= 0.5 * step / added[0] * added
+        less = whole[:integrals] - 0.5 * step / added[0] * added
+        whole[:integrals] = np.where(np.isinf(whole[:integrals]), np.inf, less)
     return whole
 
 

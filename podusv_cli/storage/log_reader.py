@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import unicodedata
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from io import BufferedReader
@@ -167,7 +168,8 @@ def _dataset(group: h5py.h5g.GroupID, name: str) -> h5py.h5d.DatasetID:
     made = dataset.get_create_plist()
     if made.get_layout() == h5py.h5d.VIRTUAL or made.get_external_count():
         raise ValueError(f"{name} keeps its data in another file")
-    if not {made.get_filter(i)[0] for i in range(made.get_nfilters())} <= _FILTERS:
+    filters = _filters(made)
+    if not set(filters) <= _FILTERS or len(set(filters)) < len(filters):
         raise ValueError(f"{name} is packed in an unknown way")
     if dataset.shape is None:
         raise ValueError(f"{name} is empty")
@@ -239,6 +241,10 @@ def _array(member: _Member, content: npt.NDArray[np.uint8]) -> Vector:
     return numbers if numbers.flags.aligned else numbers.copy()
 
 
+def _filters(made: h5py.h5p.PropDCID) -> list[int]:
+    return [made.get_filter(i)[0] for i in range(made.get_nfilters())]
+
+
 def _check_chunks(name: str, dataset: h5py.h5d.DatasetID, size: int) -> None:
     """Refuse what HDF5 would fill up with zeros, and what would unpack to far more than `size`."""
     part = dataset.get_create_plist().get_chunk()
@@ -248,4 +254,19 @@ def _check_chunks(name: str, dataset: h5py.h5d.DatasetID, size: int) -> None:
     if dataset.get_num_chunks() != math.prod(-(-most // side) for most, side in sides):
         raise ValueError(f"{name} is damaged: a chunk is missing")
     if dataset.get_storage_size() > 2 * size + 4096:
+        raise ValueError(f"{name} is packed in an unknown way")
+    for number in range(dataset.get_num_chunks()):
+        stored = dataset.get_chunk_info(number)
+        _, packed = dataset.read_direct_chunk(stored.chunk_offset)
+        if h5py.h5z.FILTER_DEFLATE in _filters(dataset.get_create_plist()):
+            _check_inflated(name, packed, 8 * math.prod(part))
+
+
+def _check_inflated(name: str, packed: bytes, size: int) -> None:
+    """Refuse a chunk that unpacks to more than `size` bytes; HDF5 would make room for all of it."""
+    try:
+        content = zlib.decompressobj().decompress(packed, size + 1)
+    except zlib.error as error:
+        raise ValueError(f"{name} is damaged: {error}") from error
+    if len(content) > size:
         raise ValueError(f"{name} is packed in an unknown way")

@@ -1,6 +1,7 @@
 """What YAML and its readers are known to make of innocent text, in a whole scenario.
 
-Single values and syntax: tests/test_config_source.py, single keys: tests/test_config_checking.py.
+Single values and syntax: tests/test_scenario_source.py; single keys:
+tests/test_scenario_checking.py.
 """
 
 from __future__ import annotations
