@@ -119,5 +119,5 @@ def _in_order(rank: Ranking) -> str:
         return f"{order}; equal at all steps, no ranking"
     if rank.close:
         pairs = "; ".join(" and ".join(pair) for pair in rank.close)
-        return f"{order}; closer than their errors: {pairs}"
+        return f"{order}; cannot be ranked, they differ by less than the numerical error: {pairs}"
     return f"{order}; the same at all steps, beyond the errors"

@@ -21,10 +21,10 @@ def saturated(scenario: Scenario, log: Recording) -> Sentences:
     part = float(limited.mean())
     if part > LONG:
         learnt = (
-            "anti_windup keeps it out of what the law learns"
+            "anti_windup is on: saturation does not wind up the law's adaptation or integrators"
             if scenario.controller.wants_loads()
-            else "what the law adapts and integrates meanwhile is not what it was designed for; "
-            "see anti_windup"
+            else "while saturated, the law's adaptation and integrators wind up; consider "
+            "anti_windup: auxiliary"
         )
         yield (
             f"the actuator limits the law during {part:.1%} of the run, {times_of(log, limited)}; "

@@ -149,9 +149,7 @@ def compare(
         extras = Extras(interrupted=any(outcome.cut for outcome in outcomes.values()))
         result = comparing.collect(parts, outcomes, gathered.stated, extras)
         if extras.interrupted and not result.entries:
-            raise KeyboardInterrupt(
-                "interrupted before a run could be brought home; nothing is kept"
-            )
+            raise KeyboardInterrupt("stopped before any run finished; nothing was saved")
         origin = provenance.collect(argv, started, datetime.now(UTC))
         comparing.write(writer, result, extras)
         if request.figures:

@@ -37,7 +37,7 @@ from podusv_cli.theory.report import as_json as theory_report
 
 Progress = Callable[[float], None]
 UNDRAWN = (
-    "interrupted after the simulation; the log is whole, what was still to be made of it is missing"
+    "interrupted after the simulation; log.h5 is complete, what was still to be made is missing"
 )
 
 

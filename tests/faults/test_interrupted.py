@@ -47,7 +47,7 @@ def test_nothing_finished_leaves_nothing(podusv: Command, monkeypatch: pytest.Mo
     lost = Outcome(failure=INTERRUPTED, cut=True)
     monkeypatch.setattr(comparing, "run_all", lambda jobs, *rest: [lost] * len(jobs))
     said = podusv("compare", "--no-figures", write("two.yaml", TWO), "--out", "x")
-    assert said == (130, "", "interrupted before a run could be brought home; nothing is kept\n")
+    assert said == (130, "", "stopped before any run finished; nothing was saved\n")
     assert [path.name for path in Path().iterdir()] == ["two.yaml"]
 
 

@@ -89,7 +89,7 @@ def ended(process: object, number: signal.Signals, times: int = 1) -> tuple[int,
 @pytest.mark.parametrize("module", ["typer", "numpy", "h5py", "pandas"])
 def test_while_importing(folder: Path, module: str, number: signal.Signals, code: int) -> None:
     """typer before there is a command, h5py by each worker, the others by the command."""
-    says = "interrupted before a run could be brought home; nothing is kept\n"
+    says = "stopped before any run finished; nothing was saved\n"
     (folder / "first").mkdir()
     (folder / "first" / f"{module}.py").write_text(SLOW_MODULE)
     config = write("two.yaml", TWO)
