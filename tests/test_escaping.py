@@ -40,12 +40,10 @@ def nasty(text: str) -> set[str]:
     return {*text} & {*NASTY} - {"\n"}
 
 
-@pytest.mark.parametrize("letter", [*NASTY, "\ud800", "\U000e0041"], ids=ascii)
-@pytest.mark.parametrize(
-    "form", [escaping.visible, escaping.csv, escaping.latex, escaping.markdown], ids=str
-)
-def test_no_format_has_a_letter_that_does_not_show(form: Any, letter: str) -> None:
-    assert form(f"a{letter}b").isprintable()
+@pytest.mark.parametrize("form", ["visible", "csv", "latex", "markdown"])
+def test_no_format_has_a_letter_that_does_not_show(form: str) -> None:
+    for letter in [*NASTY, "\ud800", "\U000e0041"]:
+        assert getattr(escaping, form)(f"a{letter}b").isprintable(), ascii(letter)
 
 
 def test_text_of_any_language_is_left_as_it_is() -> None:
