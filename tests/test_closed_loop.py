@@ -177,5 +177,5 @@ def test_the_printed_first_difference_blows_up_within_a_second() -> None:
     assert out.status == "diverged"
     assert 0 < out["time"][-1] < 1.0
     assert f"t = {out['time'][-1] + 0.01:.6g} s" in out.message
-    assert "x is not finite" in out.message
+    assert "alpha_u is not finite" in out.message
     assert all(np.isfinite(signal).all() for signal in out.signals.values())
