@@ -25,7 +25,6 @@ from counts import count
 from podusv_cli import cli
 from podusv_cli.config.loading import load, resolved_yaml
 from podusv_cli.logbook import provenance
-from podusv_cli.metrics import cost
 from podusv_cli.parallel import workers_here
 from podusv_cli.running import warm_up
 
@@ -95,22 +94,23 @@ def words(number: int, one: Try) -> tuple[str, ...]:
 
 
 def careless() -> None:
-    """For processes whose results are thrown away: sync nothing, ask nobody, time little."""
+    """For processes whose results are thrown away: sync nothing, ask nobody."""
     os.fsync = lambda _: None
     provenance.collect = lambda *_: {}
-    cost.REPLAYS = 4
 
 
 def attempt(given: tuple[str, ...]) -> Found:
     """Run a command in this process."""
-    out, err, code, began = io.StringIO(), io.StringIO(), None, time.process_time()
+    out, err = (io.TextIOWrapper(io.BytesIO(), "utf-8") for _ in range(2))
+    code, began = None, time.process_time()
     sys.argv = ["podusv", *given, f"out-{os.getpid()}"]
     with redirect_stdout(out), redirect_stderr(err):
         try:
             cli.main()
         except SystemExit as ended:
             code = ended.code
-    return Found(given, code, err.getvalue(), time.process_time() - began)
+    err.seek(0)
+    return Found(given, code, err.read(), time.process_time() - began)
 
 
 def fault(found: Found) -> str:
@@ -119,6 +119,9 @@ def fault(found: Found) -> str:
         return f"{found.code}: {found.err[-1500:]}"
     if not found.err and found.code:
         return f"{found.code} without a word"
+    lacks = [line for line in found.err.splitlines() if "could not be made" in line]
+    if lost := [line for line in lacks if "figure " not in line]:  # no axis is as long as a float
+        return lost[0]
     return f"{found.seconds:.1f} s" if found.seconds > SECONDS else ""
 
 
