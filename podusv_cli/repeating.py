@@ -16,6 +16,7 @@ from podusv_cli.comparing import Part
 from podusv_cli.config.checking import Check
 from podusv_cli.config.size import estimate, limits, needed
 from podusv_cli.errors import UsageError
+from podusv_cli.extras import Missing
 from podusv_cli.logbook import folder, manifest, provenance
 from podusv_cli.logbook.staging import Staging, sweep
 from podusv_cli.parallel import INTERRUPTED, Outcome, run_all, workers_here
@@ -44,6 +45,7 @@ class Repeated:
     was: Status
     status: Status
     found: Difference
+    missing: Sequence[Missing] = ()  # from the repeated run
 
     @property
     def identical(self) -> bool:
@@ -56,6 +58,7 @@ class Repeated:
             "original": str(self.original),
             "identical": self.identical,
             "status": [self.was, self.status],
+            "missing": [str(part) for part in self.missing],
             **self.found.as_json(),
         }
 
@@ -170,7 +173,7 @@ def _repeat(
     task = Task(part.scenario, original.resolved_yaml, target, request.force, argv=request.argv)
     done = execute(task, progress)
     found = difference(original, folder.open_run(done.folder))
-    return Repeated(original.folder, original.status, done.status, found)
+    return Repeated(original.folder, original.status, done.status, found, done.missing)
 
 
 @dataclass(frozen=True)

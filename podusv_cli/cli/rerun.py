@@ -46,6 +46,9 @@ def rerun(
         _report(done)
         if out:
             echo(f"repeated: {out}")
+    for label, repeated in done.runs.items():
+        for part in repeated.missing:
+            echo(f"{label}: {part}", err=True)
     for label, failure in done.failures.items():
         echo(*f"{label}: {failure}".splitlines(), err=True)
     raise typer.Exit(_exit_code(done))

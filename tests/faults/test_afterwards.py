@@ -131,6 +131,18 @@ def test_what_a_run_of_a_comparison_lacks_is_told_of_the_run(
     assert [part["what"].partition(":")[0] for part in missing("x")] == ["one", "other"]
 
 
+def test_rerun_tells_what_the_repeated_run_lacks(
+    podusv: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write("a.yaml", ADAPTIVE)
+    assert podusv("run", "a.yaml", "--out", "x", "-q", "--no-figures").code == 0
+    monkeypatch.setattr(monitor, "ideal_weights", broken)
+    said = podusv("rerun", "x")
+    assert said.code == 3
+    assert said.err.startswith(f"x: theory.json with the stability monitor's signals {BUG}")
+    assert podusv("rerun", "x", "--json").err == said.err
+
+
 def test_what_cannot_be_stored_stays_an_error(
     podusv: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
