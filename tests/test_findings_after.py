@@ -108,7 +108,7 @@ def test_long_saturation_is_told_with_its_times() -> None:
     (text,) = told("saturated", tight)
     limited = log(tight)["saturated"] > 0.5
     assert f"{limited.mean():.1%} of the run" in text
-    assert "see anti_windup" in text
+    assert "consider anti_windup: auxiliary" in text
     (text,) = told("saturated", tight, "controller.anti_windup=auxiliary")
     assert "anti_windup is on" in text
     assert told("saturated", "actuator={kind: saturated, surge_limit: 1e6, yaw_limit: 1e6}") == []

@@ -147,7 +147,7 @@ def test_a_run_that_is_interrupted_after_its_simulation_is_whole(
     monkeypatch.setattr(execute, stage, soon(number, lambda *given: time.sleep(60)))
     said = podusv("run", write("short.yaml", BASE), "--out", "x")
     assert said.code == code
-    assert said.err.startswith("short.yaml: interrupted after the simulation; the log is whole")
+    assert said.err.startswith("short.yaml: interrupted after the simulation; log.h5 is complete")
     assert manifest.check(Path("x")).status == "interrupted"
     assert open_run(Path("x")).recording.status == "finished"
     assert not Path("x/figures").exists()

@@ -172,7 +172,7 @@ def test_while_writing(number: signal.Signals, code: int) -> None:
         wait_for("reached")
         got, out, err = ended(process, number)
     assert (got, out) == (code, "pid interrupted: x\n")
-    assert err.startswith("a.yaml: interrupted after the simulation; the log is whole")
+    assert err.startswith("a.yaml: interrupted after the simulation; log.h5 is complete")
     assert open_run(Path("x")).recording.status == "finished"
     assert not Path("x/figures").exists()
 
