@@ -16,7 +16,7 @@ import podusv_cli
 from podusv_cli.core.recording import Recording, Status
 from podusv_cli.storage import json_files, log_reader
 from podusv_cli.storage.run_folder import RunWriter
-from podusv_cli.workflows import commands
+from podusv_cli.workflows import run
 
 SCENARIO = SOUND + "name: sample\nsimulation: {step: 0.01, duration: 0.5, compiled: false}\n"
 
@@ -25,7 +25,7 @@ def made(folder: Path, *overrides: str, text: str = SCENARIO) -> Path:
     """The run folder of this scenario."""
     config = folder.with_suffix(".yaml")
     config.write_text(text)
-    return commands.run(config, commands.Request(overrides, folder, figures=False)).folder
+    return run.run(config, run.Request(overrides, folder, figures=False)).folder
 
 
 def copied(

@@ -12,7 +12,7 @@ from command_samples import BASE, TWO, Command, Said, commanded, write
 from podusv_cli.figures import drawing
 from podusv_cli.process.workers import Outcome
 from podusv_cli.storage import manifest
-from podusv_cli.workflows import comparing
+from podusv_cli.workflows import compare
 
 
 @pytest.fixture
@@ -198,8 +198,7 @@ def test_set_without_a_scenario_is_refused(podusv: Command) -> None:
     said = podusv("x/soft", "x/stiff", "--set", "start.x=1", "--out", "y")
     assert said.code == 2
     assert said.err == (
-        "--set start.x=1: finished runs are as they are; --set changes scenarios, and none is "
-        "given\n"
+        "--set start.x=1: --set changes scenarios, and only finished runs are given\n"
     )
     assert not Path("y").exists()
 
@@ -237,7 +236,7 @@ def test_claims_have_plain_names(podusv: Command, name: str) -> None:
 
 def test_runs_that_all_die_are_reported(podusv: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     lost = Outcome(failure="its process ended with exit code -9, 2 times")
-    monkeypatch.setattr(comparing, "run_all", lambda jobs, *rest: [lost] * len(jobs))
+    monkeypatch.setattr(compare, "run_all", lambda jobs, *rest: [lost] * len(jobs))
     config = write("two.yaml", TWO + claim("C1", "soft.iae < stiff.iae"))
     said = podusv(config, "--out", "x")
     assert said.code == 3

@@ -16,7 +16,7 @@ from podusv_cli.figures.drawing import FIGURES, dressed
 from podusv_cli.figures.style import FORMATS
 from podusv_cli.process.extras import Extras
 from podusv_cli.scenario.load import load
-from podusv_cli.workflows import commands, comparing
+from podusv_cli.workflows import compare, members, run
 
 SCENARIO = """
 vessel: {preset: paper_nonlinear}
@@ -47,11 +47,11 @@ def config(tmp_path_factory):
 @pytest.fixture(scope="module")
 def done(config, tmp_path_factory):
     target = tmp_path_factory.mktemp("compared") / "all"
-    return commands.compare([config], commands.Request(out=target))
+    return compare.compare([config], run.Request(out=target))
 
 
 def quick(*overrides, out):
-    return commands.Request(overrides, out, figures=False)
+    return run.Request(overrides, out, figures=False)
 
 
 def test_every_controller_is_run_from_the_shared_keys(done):
@@ -61,7 +61,7 @@ def test_every_controller_is_run_from_the_shared_keys(done):
 
 
 def test_run_takes_the_one_controller_and_says_what_it_left(config, tmp_path):
-    done = commands.run(config, quick("simulation.duration=1", out=tmp_path / "x"))
+    done = run.run(config, quick("simulation.duration=1", out=tmp_path / "x"))
     assert done.controller == "adaptive_neural"
     assert done.others == ("fast", "slow", "pid")
     alone = load(done.folder / "resolved.yaml").scenario
@@ -70,7 +70,7 @@ def test_run_takes_the_one_controller_and_says_what_it_left(config, tmp_path):
 
 
 def test_runs_of_a_comparison_keep_their_order(done):
-    parts = comparing.from_folder(done.folder)
+    parts = members.from_folder(done.folder)
     assert [part.label for part in parts] == ["fast", "slow", "pid"]
 
 
@@ -85,7 +85,7 @@ def test_planted_claims_get_their_verdicts_with_numbers(done):
 
 def test_the_verdict_changes_with_the_data(config, tmp_path):
     swapped = quick("controllers.fast.k_ze=0.01", "controllers.slow.k_ze=0.3", out=tmp_path / "x")
-    verdicts = commands.compare([config], swapped).result.verdicts
+    verdicts = compare.compare([config], swapped).result.verdicts
     assert [v.answer for v in verdicts] == ["not reproduced", "reproduced"]
 
 
@@ -106,15 +106,15 @@ def test_the_table_is_the_same_in_every_form(done):
 
 def test_one_diverging_run_hides_no_other(config, tmp_path):
     request = quick("controllers.pid.T_d=1e-5", out=tmp_path / "x")
-    result = commands.compare([config], request).result
+    result = compare.compare([config], request).result
     assert result.endings["pid"].startswith("diverged at t = ")
     assert np.isnan(result.table.loc["iae", "pid"])
     assert not result.table.loc["iae", ["fast", "slow"]].isna().any()
 
 
 def test_runs_that_all_diverge_are_still_reported(config, tmp_path):
-    request = commands.Request(("start.u=1e300",), tmp_path / "x")
-    done = commands.compare([config], request)
+    request = run.Request(("start.u=1e300",), tmp_path / "x")
+    done = compare.compare([config], request)
     assert all(ending.startswith("diverged at t = 0 s") for ending in done.result.endings.values())
     assert {verdict.answer for verdict in done.result.verdicts} == {"cannot tell"}
     assert (done.folder / "report.html").is_file()
@@ -123,12 +123,12 @@ def test_runs_that_all_diverge_are_still_reported(config, tmp_path):
 def test_a_run_cannot_take_the_place_of_the_figures(config, tmp_path):
     request = quick("controllers.figures.kind=pid", out=tmp_path / "x")
     with pytest.raises(ScenarioError, match="is where figures go"):
-        commands.compare([config], request)
+        compare.compare([config], request)
 
 
 def test_finished_runs_and_scenarios_mix(config, done, tmp_path):
     items = [done.folder / "slow", config]
-    result = commands.compare(items, quick(out=tmp_path / "mix")).result
+    result = compare.compare(items, quick(out=tmp_path / "mix")).result
     assert [entry.label for entry in result.entries] == ["slow", "fast", "slow_2", "pid"]
     assert result.table.loc["iae", "slow"] == result.table.loc["iae", "slow_2"]
 
@@ -138,13 +138,13 @@ def test_several_scenarios_are_named_by_themselves(config, tmp_path):
         text = SCENARIO[: SCENARIO.index("controllers:")]
         (tmp_path / f"{name}.yaml").write_text(text)
     items = [tmp_path / "one.yaml", tmp_path / "two.yaml"]
-    result = commands.compare(items, quick("simulation.duration=2", out=tmp_path / "x")).result
+    result = compare.compare(items, quick("simulation.duration=2", out=tmp_path / "x")).result
     assert list(result.table.columns) == ["one", "two"]
 
 
 def test_other_differences_are_named(done, config, tmp_path):
     limits = quick("actuator.surge_limit=4", out=tmp_path / "x")
-    other = commands.compare([config, done.folder / "fast"], limits).result
+    other = compare.compare([config, done.folder / "fast"], limits).result
     assert other.differences == {
         "actuator.surge_limit": {"fast": 4.0, "slow": 4.0, "pid": 4.0, "fast_2": 8.0}
     }
@@ -164,8 +164,8 @@ def test_costs_are_measured_side_by_side(done, monkeypatch):
     def costs(runs):
         return [{"law_ns": float(place)} for place, _ in enumerate(runs)]
 
-    monkeypatch.setattr(comparing, "law_costs", costs)
-    entries = comparing._with_costs(list(done.result.entries), Extras())
+    monkeypatch.setattr(compare, "law_costs", costs)
+    entries = compare._with_costs(list(done.result.entries), Extras())
     assert [entry.metric("law_ns") for entry in entries] == [0.0, 1.0, 2.0]
 
 
@@ -173,7 +173,7 @@ def test_a_wrong_expression_is_an_error_at_its_line(tmp_path):
     path = tmp_path / "wrong.yaml"
     path.write_text(SCENARIO.replace("fast.iae < slow.iae", "fast.iea < slow.iae"))
     with pytest.raises(ScenarioError) as error:
-        commands.compare([path], quick(out=tmp_path / "x"))
+        compare.compare([path], quick(out=tmp_path / "x"))
     line = SCENARIO.splitlines().index(
         "  planted_true: {says: Fast is faster., source: here, expect: fast.iae < slow.iae}"
     )
@@ -183,7 +183,7 @@ def test_a_wrong_expression_is_an_error_at_its_line(tmp_path):
 
 def test_something_that_is_no_run_is_refused(tmp_path):
     with pytest.raises(UsageError, match="is no run folder"):
-        commands.compare([tmp_path], quick(out=tmp_path / "x"))
+        compare.compare([tmp_path], quick(out=tmp_path / "x"))
 
 
 class Links(HTMLParser):

@@ -4,10 +4,9 @@ import re
 
 from comparison_samples import FRAME, Folder, scenario, verdicts
 
-from podusv_cli.comparison import report
+from podusv_cli.comparison import outputs, report
 from podusv_cli.comparison.entries import Entry
 from podusv_cli.core.finding import Finding
-from podusv_cli.workflows import comparing
 
 
 def page(**parts):
@@ -80,11 +79,12 @@ def test_the_report_has_what_was_noticed_escaped():
 
 def test_the_report_of_a_comparison_has_its_warnings():
     saturated = Finding("saturated", "actuator", "long <b>")
-    parts = [comparing.Part(label, scenario()) for label in ("a", "b")]
     entries = [Entry(label, Folder({}), scenario()) for label in ("a", "b")]
     told = {"a": [saturated], "b": []}
-    result = comparing.Result(parts, entries, {}, {}, FRAME, [], {}, told)
-    text = comparing.as_report(result, "title", {}, {})
+    result = outputs.Result(
+        {"a": scenario(), "b": scenario()}, entries, {}, {}, FRAME, [], {}, told
+    )
+    text = outputs.as_report(result, "title", {}, {})
     assert "<td>a: actuator</td><td>long &lt;b&gt;</td>" in text
 
 

@@ -6,11 +6,12 @@ from comparison_samples import Folder, scenario
 from known_signals import ABOUT
 
 from podusv_cli.cli.progress import progress_bars
+from podusv_cli.comparison import outputs
 from podusv_cli.comparison.entries import Entry
 from podusv_cli.core.recording import Recording
 from podusv_cli.metrics import cost
 from podusv_cli.process.extras import Extras
-from podusv_cli.workflows import comparing
+from podusv_cli.workflows import members
 
 
 def test_costs_are_median_and_quartiles(monkeypatch):
@@ -22,8 +23,8 @@ def test_costs_are_median_and_quartiles(monkeypatch):
 
 
 def test_names_are_told_apart():
-    assert comparing.told_apart(["a", "a", "a_2", "b", "a"]) == ["a", "a_2", "a_2_2", "b", "a_3"]
-    assert comparing.told_apart(["figures", "unit"], comparing.RESERVED) == ["figures_2", "unit_2"]
+    assert members.numbered(["a", "a", "a_2", "b", "a"]) == ["a", "a_2", "a_2_2", "b", "a_3"]
+    assert members.numbered(["figures", "unit"], outputs.RESERVED) == ["figures_2", "unit_2"]
 
 
 def test_drawing_is_progress_too(monkeypatch):
@@ -33,9 +34,9 @@ def test_drawing_is_progress_too(monkeypatch):
     run = Folder({})
     run.recording = Recording("finished", "pid", signals, about=ABOUT)
     entry = Entry("a", run, scenario())
-    result = comparing.Result([], [entry], {}, {}, pd.DataFrame(), [], {}, {})
+    result = outputs.Result({}, [entry], {}, {}, pd.DataFrame(), [], {}, {})
     monkeypatch.setattr("podusv_cli.figures.style.FORMATS", {"png": None})
-    drawn = comparing.drawn(result, Extras(), lambda name, fraction: seen.append((name, fraction)))
+    drawn = outputs.drawn(result, Extras(), lambda name, fraction: seen.append((name, fraction)))
     assert "velocities.png" in drawn
     assert {name for name, _ in seen} == {"drawing figures"}
     fractions = [fraction for _, fraction in seen]

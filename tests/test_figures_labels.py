@@ -11,7 +11,7 @@ from podusv_cli.core import escaping
 from podusv_cli.figures.animation import stage
 from podusv_cli.figures.drawing import FIGURES, dressed
 from podusv_cli.figures.style import Shown, house_style, image, new_figure
-from podusv_cli.workflows.comparing import from_folder
+from podusv_cli.workflows.members import from_folder
 
 # An odd and an even number of $, what they would enclose, and what a legend would leave out.
 ODD = ["_a$x^{2$b \\frac{ 3$", "$\\undefined$\udcff\x1b[31m\n"]

@@ -9,7 +9,7 @@ import xarray as xr
 
 from podusv_cli.scenario.load import load, load_text
 from podusv_cli.storage.run_folder import open_run
-from podusv_cli.workflows import commands
+from podusv_cli.workflows import run as running
 
 CONFIGS = Path(__file__).parent.parent / "configs"
 PRESETS = ("printed", "printed_from_zero", "figures", "corrected")
@@ -18,8 +18,8 @@ PRESETS = ("printed", "printed_from_zero", "figures", "corrected")
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory):
     root = tmp_path_factory.mktemp("runs")
-    request = {name: commands.Request(out=root / name, figures=False) for name in PRESETS}
-    return {name: commands.run(CONFIGS / f"paper/{name}.yaml", request[name]) for name in PRESETS}
+    request = {name: running.Request(out=root / name, figures=False) for name in PRESETS}
+    return {name: running.run(CONFIGS / f"paper/{name}.yaml", request[name]) for name in PRESETS}
 
 
 def test_figures_recovers_the_papers_peaks(runs):
@@ -67,8 +67,8 @@ def test_printed_from_zero_diverges_at_once_and_is_kept(runs):
 
 def test_the_printed_bound_does_not_recover_the_peaks(tmp_path):
     adaptive = ("controller.B_u=adaptive", "controller.B_r=adaptive", "simulation.duration=1")
-    request = commands.Request(adaptive, tmp_path / "run", figures=False)
-    assert commands.run(CONFIGS / "paper/figures.yaml", request).status == "diverged"
+    request = running.Request(adaptive, tmp_path / "run", figures=False)
+    assert running.run(CONFIGS / "paper/figures.yaml", request).status == "diverged"
 
 
 @pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4"])
@@ -81,23 +81,23 @@ def test_the_log_opens_in_xarray_with_units(runs, engine):
 
 
 def test_the_same_scenario_gives_the_same_bytes(runs, tmp_path):
-    request = commands.Request(out=tmp_path / "again", figures=False)
-    again = commands.run(CONFIGS / "paper/corrected.yaml", request)
+    request = running.Request(out=tmp_path / "again", figures=False)
+    again = running.run(CONFIGS / "paper/corrected.yaml", request)
     first, second = (d.folder / "log.h5" for d in (runs["corrected"], again))
     assert first.read_bytes() == second.read_bytes()
 
 
 def test_a_resolved_scenario_runs_again_to_the_same_log(runs, tmp_path):
     resolved = runs["figures"].folder / "resolved.yaml"
-    again = commands.run(resolved, commands.Request(out=tmp_path / "again", figures=False))
+    again = running.run(resolved, running.Request(out=tmp_path / "again", figures=False))
     assert (again.folder / "log.h5").read_bytes() == (
         runs["figures"].folder / "log.h5"
     ).read_bytes()
 
 
 def test_a_thinned_log_is_every_nth_row_and_changes_no_metric(runs, tmp_path):
-    request = commands.Request(("log.every=100",), tmp_path / "thin", figures=False)
-    thin = commands.run(CONFIGS / "paper/corrected.yaml", request)
+    request = running.Request(("log.every=100",), tmp_path / "thin", figures=False)
+    thin = running.run(CONFIGS / "paper/corrected.yaml", request)
     full, every = (open_run(d.folder).recording for d in (runs["corrected"], thin))
     assert np.array_equal(every["z_e"], full["z_e"][::100])
     timed = {"law_ns", "law_ns_low", "law_ns_high"}
@@ -140,8 +140,8 @@ def test_every_config_says_what_it_is_for_and_is_sound(path):
 
 
 def test_a_vessel_of_ones_own_settles_where_its_thrust_is_its_drag(tmp_path):
-    request = commands.Request(out=tmp_path / "own", figures=False)
-    done = commands.run(CONFIGS / "own_vessel.yaml", request)
+    request = running.Request(out=tmp_path / "own", figures=False)
+    done = running.run(CONFIGS / "own_vessel.yaml", request)
     run = open_run(done.folder)
     assert 'preset: ""' in run.resolved_yaml
     assert run.recording["u"][-1] == pytest.approx(0.8, rel=1e-3)

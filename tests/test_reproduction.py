@@ -13,7 +13,7 @@ from podusv_cli.comparison.entries import Entry
 from podusv_cli.engine.simulate import simulate
 from podusv_cli.metrics.table import observer
 from podusv_cli.scenario.load import load
-from podusv_cli.workflows import commands
+from podusv_cli.workflows import compare, run
 
 ROOT = Path(__file__).parent.parent
 NAMES = ("printed_compare", "figures_compare", "figures_compare_standoff", "corrected_compare")
@@ -28,7 +28,7 @@ CHAOTIC = {"figures_compare": "dsc"}
 def made(request, tmp_path_factory):
     target = tmp_path_factory.mktemp("reproduced") / request.param
     config = ROOT / f"configs/paper/{request.param}.yaml"
-    done = commands.compare([config], commands.Request(out=target, figures=False))
+    done = compare.compare([config], run.Request(out=target, figures=False))
     return request.param, done.folder
 
 

@@ -11,7 +11,7 @@ import pytest
 from test_reproduction import rerun
 
 from podusv_cli.scenario.load import load
-from podusv_cli.workflows import commands
+from podusv_cli.workflows import compare, run
 
 ROOT = Path(__file__).parent.parent
 NAMES = ("ideal", "kept", "dropped", "single", "no_anti_windup")
@@ -32,8 +32,8 @@ def committed(name: str, folder: Path = ROOT / "results/pod") -> Any:
     "name", [pytest.param(n, marks=[pytest.mark.slow] * (n not in SOON)) for n in NAMES]
 )
 def test_the_committed_table_is_what_comes_out(name: str, tmp_path: Path) -> None:
-    request = commands.Request(out=tmp_path / name, figures=False)
-    commands.compare([ROOT / f"configs/pod/{name}.yaml"], request)
+    request = run.Request(out=tmp_path / name, figures=False)
+    compare.compare([ROOT / f"configs/pod/{name}.yaml"], request)
     pd.testing.assert_frame_equal(committed(name, tmp_path), committed(name), rtol=1e-6)
 
 

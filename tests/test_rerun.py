@@ -27,7 +27,8 @@ from storage_samples import ENVIRONMENT, beside, files
 
 from podusv_cli.storage import manifest
 from podusv_cli.storage.run_folder import open_run
-from podusv_cli.workflows import commands, rerun
+from podusv_cli.workflows import compare, rerun
+from podusv_cli.workflows import run as running
 
 
 @pytest.fixture(scope="module")
@@ -194,8 +195,8 @@ def test_a_key_that_this_podusv_does_not_know(run: Path, tmp_path: Path, podusv:
 def compared(tmp_path: Path) -> Path:
     config = tmp_path / "two.yaml"
     config.write_text(SCENARIO + "controllers: {soft: {K_Pu: 500.0}, hard: {K_Pu: 1500.0}}\n")
-    request = commands.Request(out=tmp_path / "two", figures=False)
-    return commands.compare([config], request).folder
+    request = running.Request(out=tmp_path / "two", figures=False)
+    return compare.compare([config], request).folder
 
 
 def test_every_run_of_a_comparison_is_repeated(

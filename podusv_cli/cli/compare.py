@@ -31,7 +31,7 @@ from podusv_cli.cli.terminal import (
 )
 
 if TYPE_CHECKING:
-    from podusv_cli.workflows.commands import Compared
+    from podusv_cli.workflows.compare import Compared
 
 SOME_FAILED = 3
 
@@ -57,14 +57,15 @@ def compare(
     """
     from podusv_cli.cli.progress import progress_bars
     from podusv_cli.storage.json_files import encode
-    from podusv_cli.workflows import commands  # heavy imports only when they are needed
+    from podusv_cli.workflows import compare as workflow  # heavy imports only when needed
+    from podusv_cli.workflows.run import Request
 
     warned = Warned(quiet)
-    request = commands.Request(
+    request = Request(
         tuple(assign or ()), out, force, figures, tuple(sys.argv), warned, allow_large
     )
     with progress_bars(wanted=not (quiet or as_json)) as progress:
-        done = commands.compare([Path(item) for item in items], request, progress)
+        done = workflow.compare([Path(item) for item in items], request, progress)
     if as_json:
         typer.echo(encode(done.as_json()), nl=False)
     elif quiet:

@@ -30,9 +30,9 @@ def diff(
     are held against each other.
     """
     from podusv_cli.storage import json_files
-    from podusv_cli.workflows import rerun  # heavy imports only when they are needed
+    from podusv_cli.workflows import diff as workflow  # heavy imports only when they are needed
 
-    found = rerun.diff(Path(one), Path(other))
+    found = workflow.diff(Path(one), Path(other))
     if as_json:
         typer.echo(json_files.encode(found.as_json()).decode(), nl=False)
     else:

@@ -10,7 +10,7 @@ import typer
 from podusv_cli.cli.terminal import echo, echo_path, warn_of
 
 if TYPE_CHECKING:
-    from podusv_cli.workflows.commands import Drawn
+    from podusv_cli.workflows.plot import Drawn
 
 SOME_FAILED = 3
 
@@ -33,11 +33,11 @@ def plot(
 
     Prints every file that it wrote. Files that belong to a finished run are never replaced.
     """
-    from podusv_cli.workflows import commands  # heavy imports only when they are needed
+    from podusv_cli.workflows import plot as workflow  # heavy imports only when needed
 
     formats = tuple(name.strip() for name in form.split(","))
-    drawing = commands.Drawing(tuple(figure or ()), formats, columns, animate, out)
-    drawn = commands.plot([Path(run) for run in runs], drawing)
+    drawing = workflow.Drawing(tuple(figure or ()), formats, columns, animate, out)
+    drawn = workflow.plot([Path(run) for run in runs], drawing)
     for path in drawn.files:
         echo_path(path)
     _warn(drawn)

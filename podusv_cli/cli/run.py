@@ -46,14 +46,14 @@ def run(
     """
     from podusv_cli.cli.progress import progress_bar
     from podusv_cli.storage.json_files import encode
-    from podusv_cli.workflows import commands  # heavy imports only when they are needed
+    from podusv_cli.workflows import run as workflow  # heavy imports only when they are needed
 
     warned = Warned(quiet)
-    request = commands.Request(
+    request = workflow.Request(
         tuple(assign or ()), out, force, figures, tuple(sys.argv), warned, allow_large
     )
     with progress_bar(str(config), wanted=not (quiet or as_json)) as progress:
-        done = commands.run(Path(config), request, progress)
+        done = workflow.run(Path(config), request, progress)
     if as_json:
         typer.echo(encode(done.as_json()), nl=False)
     elif quiet:

@@ -63,6 +63,10 @@ class Entry:
         whole = self.recording.status == "finished"
         return float(number) if number is not None and whole else math.nan
 
+    def metrics(self) -> dict[str, float]:
+        """Every metric of the run by name, NaN where it is undefined."""
+        return {name: self.metric(name) for name in dict.fromkeys([*self.run.metrics, *self.cost])}
+
     def signal(self, name: str) -> Vector:
         """A logged or derived signal; empty where the run has none of this name."""
         has = derived.has(self.recording, name)

@@ -1,4 +1,4 @@
-"""Finished runs made once more, or held against others, and what became different."""
+"""`podusv rerun`: finished runs simulated once more, and how the new logs differ."""
 
 from __future__ import annotations
 
@@ -20,9 +20,8 @@ from podusv_cli.scenario.limits import estimate, limits, needed
 from podusv_cli.scenario.messages import Check
 from podusv_cli.storage import manifest, provenance, run_folder
 from podusv_cli.storage.staging import Staging, sweep
-from podusv_cli.workflows import comparing
-from podusv_cli.workflows.comparing import Part
 from podusv_cli.workflows.execute import Task, execute, unwritten, warm_up
+from podusv_cli.workflows.members import Member, from_folder
 
 Progress = Callable[[str, float], None]
 
@@ -58,7 +57,7 @@ class Repeated:
             "original": str(self.original),
             "identical": self.identical,
             "status": [self.was, self.status],
-            "missing": [str(part) for part in self.missing],
+            "missing": [str(lack) for lack in self.missing],
             **self.found.as_json(),
         }
 
@@ -94,55 +93,55 @@ def rerun(path: Path, request: Request, progress: Progress | None = None) -> Rep
     Raises UsageError where `path` is no run folder or a run was interrupted, ScenarioError where
     this podusv does not know a key any more or the run is too large, and StorageError.
     """
-    parts = _parts(path, (limits(request.allow_large, read_back=True),))
-    for part in parts:
-        if part.run and part.run.status == "interrupted":
-            text = f"{part.run.folder} was interrupted; there is no whole run to repeat"
+    members = _parts(path, (limits(request.allow_large, read_back=True),))
+    for member in members:
+        if member.run and member.run.status == "interrupted":
+            text = f"{member.run.folder} was interrupted; there is no whole run to repeat"
             raise UsageError(text)
-    if len(parts) == 1:
-        return _one(parts[0], request, progress)
-    return _several(parts, request, progress)
+    if len(members) == 1:
+        return _one(members[0], request, progress)
+    return _several(members, request, progress)
 
 
-def _parts(path: Path, checks: Sequence[Check] = ()) -> list[Part]:
+def _parts(path: Path, checks: Sequence[Check] = ()) -> list[Member]:
     """The finished runs of a folder; UsageError where it is none."""
     manifest.demand(path)
-    return comparing.from_folder(path, checks)
+    return from_folder(path, checks)
 
 
-def _one(part: Part, request: Request, progress: Progress | None) -> Repetition:
-    label = part.label or str(part.run and part.run.folder)
+def _one(member: Member, request: Request, progress: Progress | None) -> Repetition:
+    label = member.label or str(member.run and member.run.folder)
     advance = partial(progress, label) if progress else None
     with _passing(request) as place:
         target = request.out or place / "again"
-        return Repetition({label: _repeat(part, target, request, advance)}, {})
+        return Repetition({label: _repeat(member, target, request, advance)}, {})
 
 
-def _several(parts: Sequence[Part], request: Request, progress: Progress | None) -> Repetition:
+def _several(members: Sequence[Member], request: Request, progress: Progress | None) -> Repetition:
     started = datetime.now(UTC)
 
     def tell(position: int, fraction: float) -> None:
         if progress:
-            progress(parts[position].label, fraction)
+            progress(members[position].label, fraction)
 
     with _passing(request) as place:
         target = request.out or place / "again"
-        room = needed([estimate(part.scenario) for part in parts], workers_here())
+        room = needed([estimate(member.scenario) for member in members], workers_here())
         with run_folder.RunWriter(target, force=request.force, needed=room) as writer:
-            for part in parts:
-                warm_up(part.scenario)
-            jobs = [partial(_repeat, p, writer.folder / p.label, request) for p in parts]
+            for member in members:
+                warm_up(member.scenario)
+            jobs = [partial(_repeat, p, writer.folder / p.label, request) for p in members]
             outcomes = run_all(jobs, tell)
             missing = unwritten(outcomes)
-            done = _repetition(parts, outcomes)
+            done = _repetition(members, outcomes)
             origin = provenance.collect(request.argv, started, datetime.now(UTC))
             writer.add_json("provenance.json", origin)
             writer.finish("interrupted" if done.interrupted else "finished", missing)
         return done
 
 
-def _repetition(parts: Sequence[Part], outcomes: Sequence[Outcome]) -> Repetition:
-    pairs = [(part.label, outcome) for part, outcome in zip(parts, outcomes, strict=True)]
+def _repetition(members: Sequence[Member], outcomes: Sequence[Outcome]) -> Repetition:
+    pairs = [(member.label, outcome) for member, outcome in zip(members, outcomes, strict=True)]
     runs = {label: outcome.result for label, outcome in pairs if outcome.result}
     failures = {label: outcome.failure for label, outcome in pairs if not outcome.result}
     return Repetition(runs, failures)
@@ -164,60 +163,13 @@ def _passing(request: Request) -> Iterator[Path]:
 
 
 def _repeat(
-    part: Part, target: Path, request: Request, progress: Callable[[float], None] | None = None
+    member: Member, target: Path, request: Request, progress: Callable[[float], None] | None = None
 ) -> Repeated:
     """Run the scenario into `target` and hold it against the original."""
-    original = part.run
+    original = member.run
     if original is None:
-        raise ValueError(f"{part.label} has not been run")
-    task = Task(part.scenario, original.resolved_yaml, target, request.force, argv=request.argv)
+        raise ValueError(f"{member.label} has not been run")
+    task = Task(member.scenario, original.resolved_yaml, target, request.force, argv=request.argv)
     done = execute(task, progress)
     found = difference(original, run_folder.open_run(done.folder))
     return Repeated(original.folder, original.status, done.status, found, done.missing)
-
-
-@dataclass(frozen=True)
-class Differences:
-    """Pairs of runs that were held against each other, by label, and the runs without a partner."""
-
-    pairs: Mapping[str, tuple[Path, Path, Difference]]
-    only_one: Sequence[str] = ()
-    only_other: Sequence[str] = ()
-
-    @property
-    def nothing(self) -> bool:
-        """Whether all are the same in scenario, signals and metrics."""
-        alone = self.only_one or self.only_other
-        return not alone and all(found.nothing for _, _, found in self.pairs.values())
-
-    def as_json(self) -> dict[str, Any]:
-        """What `--json` prints of them."""
-        return {
-            "format": 1,
-            "identical": self.nothing,
-            "only": [list(self.only_one), list(self.only_other)],
-            "pairs": [
-                {"label": label, "runs": [str(one), str(other)], **found.as_json()}
-                for label, (one, other, found) in self.pairs.items()
-            ],
-        }
-
-
-def diff(one: Path, other: Path) -> Differences:
-    """Hold a run against another, or the runs of a comparison against those of the same name.
-
-    Raises UsageError where one is no run folder, and StorageError.
-    """
-    sides = [[part.run for part in _parts(path) if part.run] for path in (one, other)]
-    if all(len(runs) == 1 for runs in sides):
-        return Differences({"": _pair(sides[0][0], sides[1][0])})
-    ours, theirs = ({run.folder.name: run for run in runs} for runs in sides)
-    return Differences(
-        {label: _pair(run, theirs[label]) for label, run in ours.items() if label in theirs},
-        [label for label in ours if label not in theirs],
-        [label for label in theirs if label not in ours],
-    )
-
-
-def _pair(one: run_folder.Run, other: run_folder.Run) -> tuple[Path, Path, Difference]:
-    return one.folder, other.folder, difference(one, other)

@@ -25,7 +25,7 @@ from damages import DAMAGES
 
 from podusv_cli.core.errors import PodusvError
 from podusv_cli.storage import log_reader
-from podusv_cli.workflows import comparing
+from podusv_cli.workflows import members
 
 HOLE = 2**40  # bytes, none of them on the disk
 MEBIBYTE = 1024 if sys.platform == "linux" else 1024**2  # in units of ru_maxrss
@@ -50,7 +50,7 @@ def _entry(path: Path) -> dict[str, Any]:
 
 def opened(folder: Path) -> tuple[Any, ...]:
     """All that plot, compare, rerun and diff take from a run folder."""
-    (part,) = comparing.comparable(folder)
+    (part,) = members.comparable(folder)
     assert part.run
     log = part.run.recording
     numbers = {name: array.tobytes() for name, array in {**log.signals, **log.fixed}.items()}

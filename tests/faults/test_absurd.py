@@ -19,7 +19,7 @@ from storage_samples import deadline
 from podusv_cli.scenario import limits
 from podusv_cli.scenario.limits import estimate
 from podusv_cli.scenario.load import load
-from podusv_cli.workflows import comparing, execute
+from podusv_cli.workflows import compare, execute
 
 LAW = BASE.replace("{kind: pid, K_Pu: 100.0}", "{kind: adaptive_neural}")
 pytestmark = pytest.mark.usefixtures("tidy")
@@ -80,7 +80,7 @@ def begun(podusv: Command) -> None:
 @pytest.fixture
 def idle(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing is simulated, whatever is not refused."""
-    for module in (comparing, execute):
+    for module in (compare, execute):
         monkeypatch.setattr(module, "warm_up", lambda _: pytest.fail("begun"))
 
 

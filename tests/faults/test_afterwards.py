@@ -11,13 +11,13 @@ from typing import Any, NoReturn
 import pytest
 from command_samples import BASE, Command, write
 
-from podusv_cli.comparison import claims, report, table
+from podusv_cli.comparison import claims, outputs, report, table
 from podusv_cli.core.errors import StorageError
 from podusv_cli.figures.drawing import FIGURES
 from podusv_cli.storage import manifest
 from podusv_cli.storage.run_folder import open_run
 from podusv_cli.theory import monitor
-from podusv_cli.workflows import comparing, execute
+from podusv_cli.workflows import compare, execute
 
 ADAPTIVE = BASE.replace("{kind: pid, K_Pu: 100.0}", "{kind: adaptive_neural}")
 TWO = ADAPTIVE + "controllers: {one: {}, other: {k_ue: 5.0}}\n"
@@ -40,13 +40,13 @@ AFTER_A_RUN = {
     "figures": (execute, "_drawn"),
 }
 AFTER_RUNS = {
-    "law_ns": (comparing, "law_costs"),
+    "law_ns": (compare, "law_costs"),
     "the claims' verdicts": (claims, "judge"),
     "comparison.csv": (table, "as_csv"),
     "comparison.md": (table, "as_markdown"),
     "comparison.tex": (table, "as_latex"),
     "claims.md": (claims, "as_markdown"),
-    "figures": (comparing, "drawn"),
+    "figures": (outputs, "drawn"),
     "report.html": (report, "page"),
 }
 
@@ -106,7 +106,7 @@ def test_json_and_a_complete_run_say_what_is_missing(
 def test_a_comparison_keeps_its_runs(
     podusv: Command, monkeypatch: pytest.MonkeyPatch, what: str
 ) -> None:
-    monkeypatch.setattr(comparing, "drawn", lambda *given: {})  # which takes its time
+    monkeypatch.setattr(outputs, "drawn", lambda *given: {})  # which takes its time
     monkeypatch.setattr(*AFTER_RUNS[what], broken)
     said = podusv("compare", write("a.yaml", TWO + CLAIM), "--out", "x", "-q")
     assert (said.code, said.out) == (0, "x\n")

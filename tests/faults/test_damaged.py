@@ -23,7 +23,7 @@ from storage_samples import ENVIRONMENT, deadline, files
 
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.storage import manifest
-from podusv_cli.workflows import comparing
+from podusv_cli.workflows import members
 
 SCENARIO = """
 name: whole
@@ -232,7 +232,7 @@ def test_a_log_that_lacks_what_every_run_has(run: Path, tmp_path: Path, case: st
     change, words = UNSOUND[case]
     other = copied(run, tmp_path / "other", log_h5=relogged(run, change))
     with pytest.raises(StorageError, match=words):
-        comparing.from_folder(other)
+        members.from_folder(other)
 
 
 def test_a_law_is_not_timed_with_the_memory_of_another(run: Path, tmp_path: Path) -> None:
@@ -242,9 +242,9 @@ def test_a_law_is_not_timed_with_the_memory_of_another(run: Path, tmp_path: Path
             del signals[name]
 
     other = copied(run, tmp_path / "other", log_h5=relogged(run, shorter))
-    assert comparing.from_folder(other)  # it can be drawn
+    assert members.from_folder(other)  # it can be drawn
     with pytest.raises(StorageError, match="W_hat_u does not have 27 values in a row"):
-        comparing.comparable(other)
+        members.comparable(other)
 
 
 # --- comparisons
@@ -260,7 +260,7 @@ def comparison(run: Path, tmp_path: Path) -> Path:
 
 
 def labels(folder: Path) -> list[str]:
-    return [part.label for part in comparing.from_folder(folder)]
+    return [part.label for part in members.from_folder(folder)]
 
 
 def test_runs_of_a_comparison_stand_as_in_its_table(comparison: Path) -> None:
@@ -273,7 +273,7 @@ def test_a_damaged_table_of_a_comparison(comparison: Path, what: str) -> None:
     table.unlink()
     OTHERS[what](table)
     with deadline(), pytest.raises(StorageError, match=r"comparison\.csv"):
-        comparing.from_folder(comparison)
+        members.from_folder(comparison)
 
 
 @pytest.mark.parametrize("content", [b"\xff", b"a" * 200_000, b"a" * 20_000_000])
@@ -281,13 +281,13 @@ def test_a_table_of_another_program(comparison: Path, content: bytes) -> None:
     (comparison / "comparison.csv").write_bytes(content)
     manifest.write(comparison, "finished")
     with pytest.raises(StorageError, match=r"comparison\.csv"):
-        comparing.from_folder(comparison)
+        members.from_folder(comparison)
 
 
 def test_a_run_that_a_comparison_has_lost_is_missed(comparison: Path) -> None:
     (comparison / "a/log.h5").unlink()
     with pytest.raises(StorageError, match=r"a/log\.h5 is missing"):
-        comparing.from_folder(comparison)
+        members.from_folder(comparison)
 
 
 def test_links_among_runs_do_not_count(run: Path, comparison: Path) -> None:
@@ -302,7 +302,7 @@ def test_a_log_that_is_no_file_is_no_reason_to_overlook_its_run(comparison: Path
     (comparison / "a/log.h5").unlink()
     os.mkfifo(comparison / "a/log.h5")
     with pytest.raises(StorageError, match=r"log\.h5"):
-        comparing.from_folder(comparison)
+        members.from_folder(comparison)
 
 
 # --- commands
@@ -347,4 +347,4 @@ def test_a_folder_without_a_manifest_is_no_run_folder(run: Path) -> None:
     damaged(run, folder, "become manifest.json nothing")
     (folder / "log.h5").unlink()
     with pytest.raises(UsageError, match=r"no run folder: it has no manifest\.json"):
-        comparing.from_folder(folder)
+        members.from_folder(folder)

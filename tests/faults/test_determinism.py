@@ -55,8 +55,8 @@ if processor != "-":
     import llvmlite.binding as llvm
     llvm.get_host_cpu_name = lambda: asked.append(processor) or processor
     llvm.get_host_cpu_features = llvm.FeatureMap
-from podusv_cli.workflows import commands as workflows
-workflows.run(Path(config), workflows.Request(overrides, Path(folder), figures=False))
+from podusv_cli.workflows.run import Request, run
+run(Path(config), Request(overrides, Path(folder), figures=False))
 assert asked or processor == "-", "the compiler did not ask what it compiles for"
 """
 

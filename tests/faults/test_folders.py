@@ -13,7 +13,7 @@ from counts import count
 from storage_samples import deadline
 
 from podusv_cli.figures import drawing
-from podusv_cli.workflows import comparing, execute, rerun
+from podusv_cli.workflows import compare, execute, rerun
 
 MINUTES = LONG + TWO.splitlines()[-1] + "\n"
 RUN, COMPARE = ("run", "long.yaml", "--no-figures"), ("compare", "long.yaml", "--no-figures")
@@ -57,7 +57,7 @@ def podusv(beside_old_results: Command, monkeypatch: pytest.MonkeyPatch) -> Comm
     write("long.yaml", MINUTES)
     Path().chmod(0o755)
     monkeypatch.setattr(execute, "simulate", begun)
-    for room in (comparing, rerun):  # whose runs are made in processes of their own
+    for room in (compare, rerun):  # whose runs are made in processes of their own
         monkeypatch.setattr(room, "run_all", begun)
         monkeypatch.setattr(room, "warm_up", begun)
     monkeypatch.setattr(drawing, "draw_in_parallel", begun)

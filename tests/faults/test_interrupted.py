@@ -32,7 +32,7 @@ from storage_samples import files
 from podusv_cli.process.workers import INTERRUPTED, Outcome
 from podusv_cli.storage import manifest
 from podusv_cli.storage.run_folder import open_run
-from podusv_cli.workflows import comparing, execute
+from podusv_cli.workflows import compare, execute
 
 
 @pytest.fixture
@@ -45,7 +45,7 @@ def podusv(
 
 def test_nothing_finished_leaves_nothing(podusv: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     lost = Outcome(failure=INTERRUPTED, cut=True)
-    monkeypatch.setattr(comparing, "run_all", lambda jobs, *rest: [lost] * len(jobs))
+    monkeypatch.setattr(compare, "run_all", lambda jobs, *rest: [lost] * len(jobs))
     said = podusv("compare", "--no-figures", write("two.yaml", TWO), "--out", "x")
     assert said == (130, "", "stopped before any run finished; nothing was saved\n")
     assert [path.name for path in Path().iterdir()] == ["two.yaml"]

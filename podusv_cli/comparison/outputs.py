@@ -1,0 +1,125 @@
+"""What a comparison found, and the files of its folder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import pandas as pd
+
+from podusv_cli.comparison import claims, report, table
+from podusv_cli.comparison.entries import Entry
+from podusv_cli.core.finding import Finding
+from podusv_cli.findings.preflight import together
+from podusv_cli.metrics.table import CLOCKED
+from podusv_cli.process.extras import Extras
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.storage import json_files
+from podusv_cli.storage.run_folder import RunWriter
+
+TABLE = "comparison.csv"
+TIMING = "timing.json"
+# Names that no run may have: files of the comparison's folder and columns of its table.
+RESERVED = (
+    TABLE, "comparison.md", "comparison.tex", "claims.json", "claims.md", "figures",
+    "manifest.json", "metric", "missing.json", "provenance.json", "report.html", TIMING, "unit",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a comparison found.
+
+    All but `entries`, the runs that have a log, are by label. An ending says why a run did not
+    finish, "" if it did. Warnings and timings are those of the runs made for this comparison.
+    """
+
+    scenarios: Mapping[str, Scenario]
+    entries: Sequence[Entry]
+    endings: Mapping[str, str]
+    differences: Mapping[str, Mapping[str, Any]]
+    table: pd.DataFrame
+    verdicts: Sequence[claims.Verdict]
+    timings: Mapping[str, Mapping[str, float]]
+    warnings: Mapping[str, Sequence[Finding]]
+
+
+def write(writer: RunWriter, result: Result, extras: Extras) -> None:
+    """Write table and verdicts in every form into the comparison's folder."""
+    for name, form in _forms(result).items():
+        add_made(writer, extras, name, form)
+
+
+def _forms(result: Result) -> dict[str, Callable[[], bytes]]:
+    """What makes each file, by its name.
+
+    Clock readings have a file of their own, so that all others come out the same every time.
+    """
+    clocked = result.table.index.isin(CLOCKED)
+    lasting, times = result.table[~clocked], table.numbers(result.table[clocked])
+    judged = [verdict for verdict in result.verdicts if not verdict.timed]
+    timed = [verdict for verdict in result.verdicts if verdict.timed]
+    forms: dict[str, Callable[[], bytes]] = {
+        TABLE: lambda: table.as_csv(lasting).encode(),
+        "comparison.md": lambda: table.as_markdown(lasting, result.endings).encode(),
+        "comparison.tex": lambda: table.as_latex(lasting).encode(),
+        TIMING: lambda: json_files.encode({**_claims(timed), "metrics": times}),
+    }
+    if result.verdicts:
+        forms["claims.md"] = lambda: claims.as_markdown(judged, timed, TIMING).encode()
+        forms["claims.json"] = lambda: json_files.encode(_claims(judged))
+    return forms
+
+
+def _claims(verdicts: Iterable[claims.Verdict]) -> dict[str, Any]:
+    return {"format": 1, "claims": [verdict.as_json() for verdict in verdicts]}
+
+
+def add_made(writer: RunWriter, extras: Extras, name: str, form: Callable[[], bytes]) -> None:
+    """Write what `form` returns into a file of the folder; if it fails, `extras` notes it."""
+    content = extras.made(name, form)
+    if content is not None:
+        writer.add(name, content)
+
+
+def drawn(
+    result: Result, extras: Extras, progress: Callable[[str, float], None] | None = None
+) -> dict[str, bytes]:
+    """The figures of all runs together, in every format, by file name."""
+    # matplotlib is slow to import
+    from podusv_cli.figures.drawing import FIGURES, draw_in_parallel, dressed
+    from podusv_cli.figures.style import FORMATS
+
+    tell = progress and partial(progress, "drawing figures")
+    if tell:
+        tell(0.0)
+    shown = dressed([(e.label, e.recording, e.scenario) for e in result.entries])
+    return draw_in_parallel(shown, FIGURES, FORMATS, extras, progress=tell)
+
+
+def as_report(
+    result: Result, title: str, figures: Mapping[str, bytes], provenance: Mapping[str, Any],
+    missing: Iterable[object] = (),
+) -> str:  # fmt: skip
+    """The HTML report; `figures` as `drawn` gives them."""
+    pictures: list[tuple[str, str, bytes]] = []
+    if figures:
+        from podusv_cli.figures.drawing import FIGURES  # matplotlib is slow to import
+
+        pictures = [
+            (name, sheet.caption, figures[f"{name}.svg"])
+            for name, sheet in FIGURES.items()
+            if f"{name}.svg" in figures
+        ]
+    story = report.Story(
+        title=title, scenario=next(iter(result.scenarios.values())),
+        controllers={label: one.controller for label, one in result.scenarios.items()},
+        endings=result.endings, missing=[str(part) for part in missing],
+        differences=result.differences,
+        noticed=together(result.warnings), table=result.table, verdicts=result.verdicts,
+        theories={entry.label: entry.run.theory for entry in result.entries if entry.run.theory},
+        figures=pictures, provenance=provenance,
+    )  # fmt: skip
+    return report.page(story)

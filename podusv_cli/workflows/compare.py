@@ -1,0 +1,224 @@
+"""`podusv compare`: scenarios and finished runs in, one finished comparison folder out."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from podusv_cli.comparison import claims, outputs, table
+from podusv_cli.comparison.differences import differences
+from podusv_cli.comparison.entries import Absent, Entry
+from podusv_cli.comparison.expressions import Source
+from podusv_cli.core.errors import UsageError
+from podusv_cli.core.finding import Finding
+from podusv_cli.core.recording import Status
+from podusv_cli.findings.preflight import together
+from podusv_cli.metrics.cost import law_costs
+from podusv_cli.metrics.table import CLOCKED
+from podusv_cli.process.extras import Extras, Missing
+from podusv_cli.process.interrupts import interrupts_heard, interrupts_held
+from podusv_cli.process.workers import Outcome, run_all, workers_here
+from podusv_cli.scenario.limits import estimate, needed
+from podusv_cli.scenario.load import resolved_yaml
+from podusv_cli.storage import provenance
+from podusv_cli.storage.run_folder import RunWriter, default_folder, open_run
+from podusv_cli.workflows.execute import Task, execute, unwritten, warm_up
+from podusv_cli.workflows.gather import gather
+from podusv_cli.workflows.members import Member
+from podusv_cli.workflows.run import RESULTS, Request
+
+Progress = Callable[[str, float], None]
+UNMEASURED = dict.fromkeys(CLOCKED, math.nan)
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A finished or interrupted comparison."""
+
+    folder: Path
+    result: outputs.Result
+    status: Status  # "interrupted" where a run or the figures were, else "finished"
+    missing: tuple[Missing, ...] = ()  # in the comparison and its runs
+
+    def as_json(self) -> dict[str, Any]:
+        """What `--json` prints of a comparison."""
+        result = self.result
+        return {
+            "format": 1,
+            "status": self.status,
+            "folder": str(self.folder),
+            "runs": [self._run_as_json(entry) for entry in result.entries],
+            "comparison": table.numbers(result.table),
+            "failed": {label: text for label, text in result.endings.items() if text},
+            "differences": result.differences,
+            "claims": [verdict.as_json() for verdict in result.verdicts],
+            "missing": [str(part) for part in self.missing],
+        }
+
+    def warnings(self) -> list[Finding]:
+        """The findings about the runs made for this comparison, before and after them."""
+        return together(self.result.warnings)
+
+    def _run_as_json(self, entry: Entry) -> dict[str, Any]:
+        """As `podusv run --json`, without what is missing; timing only of runs made now."""
+        here = entry.label in self.result.timings
+        return {
+            "format": 1,
+            "status": entry.recording.status,
+            "run": str(self.folder / entry.label if here else entry.run.folder),
+            "controller": entry.recording.controller,
+            "metrics": dict(entry.run.metrics),
+            "timing": dict(self.result.timings.get(entry.label, {})),
+            "warnings": [f.as_json() for f in self.result.warnings[entry.label]],
+        }
+
+
+def compare(items: Sequence[Path], request: Request, progress: Progress | None = None) -> Compared:
+    """Simulate what is not simulated yet, and compare all runs.
+
+    Each item is a scenario (all its `controllers`, or its one controller), a run folder or the
+    folder of a comparison. The claims are those of the scenarios. After an interrupt the finished
+    runs are compared, without figures; KeyboardInterrupt if there are none. Raises UsageError,
+    ScenarioError, StorageError.
+    """
+    started, argv = datetime.now(UTC), list(request.argv)
+    given = gather(items, request)
+    for finding in together({member.label: member.noticed for member in given.members}):
+        request.warn(finding)
+    target = request.out or _default_folder(given.title, given.members)
+    _keep_apart(items, target)
+    with interrupts_held(), _writer(target, given.members, request) as writer:
+        outcomes = make_runs(given.members, writer.folder, request, progress)
+        lost = unwritten(outcomes.values())
+        extras = Extras(interrupted=any(outcome.cut for outcome in outcomes.values()))
+        result = collect(given.members, outcomes, given.stated, extras)
+        if extras.interrupted and not result.entries:
+            raise KeyboardInterrupt("stopped before any run finished; nothing was saved")
+        origin = provenance.collect(argv, started, datetime.now(UTC))
+        outputs.write(writer, result, extras)
+        if request.figures:
+            _add_figures(writer, result, given.title, origin, extras, progress)
+        writer.add_json("provenance.json", origin)
+        writer.add_missing(extras)
+        status: Status = "interrupted" if extras.interrupted else "finished"
+        return Compared(writer.finish(status, lost), result, status, tuple(extras.missing))
+
+
+def _default_folder(title: str, members: Sequence[Member]) -> Path:
+    text = "".join(f"{member.label}\n{resolved_yaml(member.scenario)}" for member in members)
+    return default_folder(RESULTS, title, text)
+
+
+def _keep_apart(items: Sequence[Path], target: Path) -> None:
+    """UsageError where writing the comparison would touch a run that it compares."""
+    there = Path(os.path.realpath(target))
+    for item in items:
+        here = Path(os.path.realpath(item))
+        within = there.is_relative_to(here) and (here / "manifest.json").exists()
+        if here.is_relative_to(there) or within:
+            raise UsageError(
+                f"--out {target}: {item} is to be compared and would be overwritten or written "
+                "into; name another folder"
+            )
+
+
+def _writer(target: Path, members: Sequence[Member], request: Request) -> RunWriter:
+    sizes = [estimate(member.scenario) for member in members if member.run is None]
+    space = needed(sizes, workers_here())
+    return RunWriter(target, force=request.force, named=request.out is not None, needed=space)
+
+
+def make_runs(
+    members: Sequence[Member], folder: Path, request: Request, progress: Progress | None = None
+) -> dict[str, Outcome]:
+    """Execute the members that have no run yet, in parallel, each into a folder in `folder`."""
+    wanted = [member for member in members if member.run is None]
+    with interrupts_heard():
+        for member in wanted:
+            warm_up(member.scenario)
+    tasks = [
+        Task(
+            member.scenario, member.text, folder / member.label,
+            figures=("controls",) if request.figures else (),
+            argv=request.argv, label=member.label, noticed=member.noticed,
+        )
+        for member in wanted
+    ]  # fmt: skip
+
+    def advance(position: int, fraction: float) -> None:
+        if progress:
+            progress(wanted[position].label, fraction)
+
+    outcomes = run_all([partial(execute, task) for task in tasks], advance)
+    return {member.label: outcome for member, outcome in zip(wanted, outcomes, strict=True)}
+
+
+def collect(
+    members: Sequence[Member], outcomes: Mapping[str, Outcome],
+    stated: Sequence[claims.Stated], extras: Extras,
+) -> outputs.Result:  # fmt: skip
+    """Open the runs and compare them; a law's cost or a verdict that fails is noted in `extras`.
+
+    What the runs lack is missing in the comparison, too.
+    """
+    finished = {label: o.result for label, o in outcomes.items() if o.result is not None}
+    runs = {m.label: m.run for m in members if m.run}
+    runs |= {label: open_run(done.folder) for label, done in finished.items()}
+    endings = {
+        m.label: outcomes.get(m.label, Outcome()).failure
+        or (runs[m.label].recording.message if m.label in runs else "")
+        for m in members
+    }
+    for label, done in finished.items():
+        extras.missing += (replace(lack, what=f"{label}: {lack.what}") for lack in done.missing)
+    entries = _with_costs(
+        [Entry(m.label, runs[m.label], m.scenario) for m in members if m.label in runs], extras
+    )
+    sources: dict[str, Source] = {m.label: Absent(m.scenario, endings[m.label]) for m in members}
+    sources |= {entry.label: entry for entry in entries}
+    numbers: dict[str, dict[str, float]] = {m.label: {} for m in members}
+    numbers |= {entry.label: entry.metrics() for entry in entries}
+    scenarios = {m.label: m.scenario for m in members}
+    return outputs.Result(
+        scenarios=scenarios,
+        entries=entries,
+        endings=endings,
+        differences=differences({label: one.model_dump() for label, one in scenarios.items()}),
+        table=table.table(numbers),
+        verdicts=extras.made("the claims' verdicts", lambda: claims.judge(stated, sources)) or [],
+        timings={label: done.timing for label, done in finished.items()},
+        warnings={m.label: getattr(finished.get(m.label), "warnings", m.noticed) for m in members},
+    )
+
+
+def _with_costs(entries: Sequence[Entry], extras: Extras) -> list[Entry]:
+    """The entries with the laws' cost measured here and now, side by side.
+
+    The cost in a run's own metrics was measured at another time, perhaps on another machine, so it
+    is never compared.
+    """
+    timed = [e for e in entries if e.scenario.simulation.compiled and len(e.recording["time"])]
+    loops = [(entry.scenario.closed_loop(), entry.recording) for entry in timed]
+    costs = extras.attempt("law_ns", lambda: law_costs(loops)) or [UNMEASURED] * len(timed)
+    by_label = {entry.label: cost for entry, cost in zip(timed, costs, strict=True)}
+    return [replace(entry, cost=by_label.get(entry.label, UNMEASURED)) for entry in entries]
+
+
+def _add_figures(
+    writer: RunWriter, result: outputs.Result, title: str, origin: Mapping[str, Any],
+    extras: Extras, progress: Progress | None,
+) -> None:  # fmt: skip
+    """Draw the figures and write the report, which shows them."""
+    draw = partial(outputs.drawn, result, extras, progress)
+    figures = extras.attempt("figures", draw) or {}
+    for name, content in figures.items():
+        writer.add(f"figures/{name}", content)
+    heading = f"{title} (interrupted)" if extras.interrupted else title
+    page = partial(outputs.as_report, result, heading, figures, origin, extras.missing)
+    outputs.add_made(writer, extras, "report.html", lambda: page().encode())

@@ -1,0 +1,65 @@
+"""`podusv diff`: finished runs compared with others, to the last bit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from podusv_cli.comparison.run_difference import Difference, difference
+from podusv_cli.storage import manifest
+from podusv_cli.storage.run_folder import Run
+from podusv_cli.workflows.members import from_folder
+
+
+@dataclass(frozen=True)
+class Differences:
+    """Pairs of compared runs by label, and the labels that only one side has."""
+
+    pairs: Mapping[str, tuple[Path, Path, Difference]]
+    only_one: Sequence[str] = ()
+    only_other: Sequence[str] = ()
+
+    @property
+    def nothing(self) -> bool:
+        """Whether all are the same in scenario, signals and metrics."""
+        alone = self.only_one or self.only_other
+        return not alone and all(found.nothing for _, _, found in self.pairs.values())
+
+    def as_json(self) -> dict[str, Any]:
+        """What `--json` prints of them."""
+        return {
+            "format": 1,
+            "identical": self.nothing,
+            "only": [list(self.only_one), list(self.only_other)],
+            "pairs": [
+                {"label": label, "runs": [str(one), str(other)], **found.as_json()}
+                for label, (one, other, found) in self.pairs.items()
+            ],
+        }
+
+
+def diff(one: Path, other: Path) -> Differences:
+    """Compare a run with another, or the runs of a comparison with those of the same name.
+
+    Raises UsageError where one is no run folder, and StorageError.
+    """
+    sides = [_runs(path) for path in (one, other)]
+    if all(len(runs) == 1 for runs in sides):
+        return Differences({"": _pair(sides[0][0], sides[1][0])})
+    ours, theirs = ({run.folder.name: run for run in runs} for runs in sides)
+    return Differences(
+        {label: _pair(run, theirs[label]) for label, run in ours.items() if label in theirs},
+        [label for label in ours if label not in theirs],
+        [label for label in theirs if label not in ours],
+    )
+
+
+def _runs(path: Path) -> list[Run]:
+    manifest.demand(path)
+    return [member.run for member in from_folder(path) if member.run]
+
+
+def _pair(one: Run, other: Run) -> tuple[Path, Path, Difference]:
+    return one.folder, other.folder, difference(one, other)

@@ -1,0 +1,119 @@
+"""The runs that `compare`, `plot`, `rerun` and `diff` are given: scenarios and finished folders."""
+
+from __future__ import annotations
+
+import csv
+import math
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from podusv_cli.comparison import stability
+from podusv_cli.comparison.outputs import RESERVED, TABLE
+from podusv_cli.core.errors import StorageError
+from podusv_cli.core.finding import Finding
+from podusv_cli.scenario.load import load_resolved
+from podusv_cli.scenario.messages import Check
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.storage import log_check, manifest
+from podusv_cli.storage.files import read_text
+from podusv_cli.storage.run_folder import LOG, THEORY, Run, open_run
+
+
+@dataclass(frozen=True)
+class Member:
+    """One run of several: a scenario, and its finished `run` where there is one."""
+
+    label: str
+    scenario: Scenario
+    text: str = ""  # the scenario's file
+    run: Run | None = None
+    noticed: Sequence[Finding] = ()  # before the run
+
+
+def from_folder(path: Path, checks: Sequence[Check] = ()) -> list[Member]:
+    """The finished runs of a folder: one run, or all those of a comparison.
+
+    `checks` as `load` has them. Raises UsageError for a folder without finished runs, StorageError
+    for a damaged one.
+    """
+    inner = _listed(path) if os.path.lexists(path / manifest.NAME) else _unlisted(path)
+    if not inner:
+        manifest.demand(path)
+    return [_from_run(child, checks) for child in (inner or [path])]
+
+
+def _unlisted(path: Path) -> list[Path]:
+    """Run folders inside a folder that has no manifest; links are not followed."""
+    children = sorted(path.iterdir()) if path.is_dir() else ()
+    return [c for c in children if not c.is_symlink() and os.path.lexists(c / LOG)]
+
+
+def _listed(path: Path) -> list[Path]:
+    """The runs of a finished comparison in its table's order, else by name; none in a run."""
+    files = manifest.check(path).files
+    runs = sorted(name.removesuffix(f"/{LOG}") for name in files if name.endswith(f"/{LOG}"))
+    head = _first_row(path / TABLE) if TABLE in files else []
+    runs.sort(key=lambda run: head.index(run) if run in head else len(head))
+    return [path / run for run in runs]
+
+
+def _first_row(path: Path) -> list[str]:
+    try:
+        return next(csv.reader(read_text(path).splitlines()[:1]), [])
+    except csv.Error as error:
+        raise StorageError(f"cannot read {path}: no CSV ({error})") from error
+
+
+def _from_run(path: Path, checks: Sequence[Check]) -> Member:
+    """A finished run whose log and theory.json were checked. StorageError, ScenarioError."""
+    run = open_run(path)
+    scenario = load_resolved(run.resolved_yaml, str(path / "resolved.yaml"), checks)
+    if wrong := log_check.fault(run.recording):
+        raise StorageError(f"{path / LOG}: damaged, or not a log of a run: {wrong}")
+    stability.check(run.theory, run.folder / THEORY)
+    return Member(path.name, scenario, run=run)
+
+
+def comparable(path: Path) -> list[Member]:
+    """As `from_folder`; also checks that the logs hold the memory with which laws are timed."""
+    members = from_folder(path)
+    for member in members:
+        if member.run:
+            _check_memory(member.run, member.scenario)
+    return members
+
+
+def _check_memory(run: Run, scenario: Scenario) -> None:
+    log = run.recording
+    slots = {signal.name: size for signal, size in scenario.closed_loop().controller.slots()}
+    for name, size in slots.items():
+        if name not in log or math.prod(log[name].shape[1:]) != size:
+            raise StorageError(
+                f"{run.folder / LOG}: damaged, or not of the scenario beside it: "
+                f"{name} does not have {size} values in a row"
+            )
+
+
+def distinct(members: Iterable[Member]) -> list[Member]:
+    """The members, in order, each with a label of its own."""
+    members = list(members)
+    labels = numbered([member.label for member in members], taken=RESERVED)
+    return [replace(member, label=label) for member, label in zip(members, labels, strict=True)]
+
+
+def numbered(names: Iterable[str], taken: Iterable[str] = ()) -> list[str]:
+    """The names; repeated ones and those `taken` get a number: pid, pid_2, ...
+
+    Some file systems do not tell upper from lower case, so neither does this.
+    """
+    found, used = list[str](), {name.casefold() for name in taken}
+    for name in names:
+        label, count = name, 1
+        while label.casefold() in used:
+            count += 1
+            label = f"{name}_{count}"
+        used.add(label.casefold())
+        found.append(label)
+    return found

@@ -1,0 +1,178 @@
+"""`podusv plot`: figures of finished runs, overlaid."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from podusv_cli.comparison.differences import differences
+from podusv_cli.core.errors import StorageError, UsageError
+from podusv_cli.core.escaping import visible
+from podusv_cli.figures.animation import FILE, animate
+from podusv_cli.figures.drawing import FIGURES, draw_in_parallel, dressed
+from podusv_cli.figures.style import FORMATS, Shown
+from podusv_cli.process.extras import Extras, Missing
+from podusv_cli.scenario.words import unknown
+from podusv_cli.storage import files, manifest
+from podusv_cli.workflows.members import Member, from_folder
+
+STAMP = re.compile(r"\d{8}T\d{6}Z-[0-9a-f]{8}(-\d+)?")  # a run folder that nobody named
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """Which figures to draw, in which formats, into which folder."""
+
+    figures: Sequence[str]
+    formats: Sequence[str]
+    columns: int
+    animate: bool
+    out: Path
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """The files that were drawn, and what the user has to know about them."""
+
+    files: Sequence[Path]
+    replaced: Sequence[Path]  # of `files`, those that existed with other content
+    empty: Mapping[str, str]  # runs with nothing to draw, and how they ended
+    missing: Sequence[Missing]  # figures that could not be drawn
+    differences: Mapping[str, Mapping[str, Any]]  # between the runs, besides the controller
+
+
+def plot(runs: Sequence[Path], drawing: Drawing) -> Drawn:
+    """Draw finished runs, overlaid; files of the same names in the folder are replaced.
+
+    Raises UsageError for an unknown figure or format, for a figure that the runs lack the signals
+    of, and for a file that belongs to a finished folder; StorageError.
+    """
+    _check_names(drawing.figures, drawing.formats)
+    members = _labelled(member for path in runs for member in from_folder(path))
+    shown = dressed([(m.label, m.run.recording, m.scenario) for m in members if m.run])
+    empty = _empty(members, shown)
+    names = _chosen(drawing.figures, shown)
+    planned = [f"{name}.{form}" for name in names for form in drawing.formats]
+    planned += [FILE] * drawing.animate
+    _check_not_finished(drawing.out, planned)
+    files.check_places(drawing.out / name for name in planned)
+    extras = Extras()
+    drawn = draw_in_parallel(shown, names, drawing.formats, extras, drawing.columns)
+    if drawing.animate:
+        drawn |= extras.attempt(FILE, lambda: {FILE: animate(shown)}) or {}
+    if extras.interrupted:
+        raise KeyboardInterrupt
+    replaced = _put(drawing.out, drawn)
+    differing = differences({m.label: m.scenario.model_dump() for m in members})
+    return Drawn([drawing.out / n for n in drawn], replaced, empty, extras.missing, differing)
+
+
+def _labelled(members: Iterable[Member]) -> list[Member]:
+    """Each run folder once, with a label that tells it apart from the others.
+
+    The folder's name, or the scenario's where the folder has none of its own; where several have
+    the same, with their scenario's name, else with the folder around them, else with all of it.
+    """
+    kept = list({_folder(member).resolve(): member for member in members}.values())
+    labels = [_short(member) for member in kept]
+    for longer in LONGER_NAMES:
+        count = Counter(labels)
+        labels = [
+            longer(member) if count[label] > 1 else label
+            for member, label in zip(kept, labels, strict=True)
+        ]
+    return [replace(member, label=label) for member, label in zip(kept, labels, strict=True)]
+
+
+def _folder(member: Member) -> Path:
+    return member.run.folder if member.run else Path(member.label)
+
+
+def _short(member: Member) -> str:
+    name = _folder(member).resolve().name
+    return member.scenario.name if STAMP.fullmatch(name) else name
+
+
+def _empty(members: Sequence[Member], shown: Sequence[Shown]) -> dict[str, str]:
+    """Runs of which nothing can be drawn, and how they ended; UsageError where those are all."""
+    drawable = {run.label for run in shown}
+    endings = {
+        member.label: member.run.recording.message or "has a single row"
+        for member in members
+        if member.run and visible(member.label) not in drawable
+    }
+    if not shown:
+        told = "; ".join(f"{label}: {ending}" for label, ending in endings.items())
+        raise UsageError(f"there is nothing to draw: {told}")
+    return endings
+
+
+LONGER_NAMES: tuple[Callable[[Member], str], ...] = (
+    lambda member: f"{_short(member)} ({member.scenario.name})",
+    lambda member: f"{_folder(member).parent.name}/{_folder(member).name}",
+    lambda member: str(_folder(member)),
+)
+
+
+def _chosen(asked: Sequence[str], shown: Sequence[Shown]) -> tuple[str, ...]:
+    """The figures to draw: those that are asked for, or all that the runs have signals for.
+
+    Raises UsageError for one that they have no signals for.
+    """
+    fitting = tuple(name for name, sheet in FIGURES.items() if sheet.fits(shown))
+    for name in asked:
+        if name not in fitting:
+            raise UsageError(
+                f"figure {name!r} shows {', '.join(FIGURES[name].signals)}, and "
+                f"{', '.join(run.label for run in shown)} logged none of these "
+                f"(figures there are: {', '.join(fitting)})"
+            )
+    return tuple(dict.fromkeys(asked)) or fitting
+
+
+def _check_names(figures: Sequence[str], formats: Sequence[str]) -> None:
+    """UsageError for a figure or format that there is not."""
+    for what, names, known in (("figure", figures, tuple(FIGURES)), ("format", formats, FORMATS)):
+        for name in names:
+            if name not in known:
+                raise UsageError(unknown(f"{what} {name!r}", name, known))
+
+
+def _check_not_finished(out: Path, names: Iterable[str]) -> None:
+    """UsageError where a file to be written belongs to a finished folder, by its manifest."""
+    place = Path(os.path.realpath(out))
+    for folder in (place, *place.parents):
+        listed = _listed(folder)
+        for name in names:
+            inside = (place / name).relative_to(folder).as_posix()
+            if inside in listed or inside == manifest.NAME:
+                raise UsageError(
+                    f"--out {out}: {inside} belongs to the finished folder {folder}, whose files "
+                    "stay as they were written; name another folder"
+                )
+
+
+def _listed(folder: Path) -> frozenset[str]:
+    with suppress(StorageError):
+        return frozenset(manifest.read(folder).files)
+    return frozenset()
+
+
+def _put(out: Path, contents: Mapping[str, bytes]) -> list[Path]:
+    """Write files into a folder; those that were there with another content. StorageError."""
+    files.make_folder(out)
+    places = {out / name: content for name, content in contents.items()}
+    replaced = [path for path, content in places.items() if _differs(path, content)]
+    files.write_all(places)
+    return replaced
+
+
+def _differs(path: Path, content: bytes) -> bool:
+    with files.explained(f"cannot read {path}"):
+        return path.is_file() and path.read_bytes() != content
