@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
-from podusv_cli.workflows.run import Request, run
 
 from podusv_cli.controllers.network import Network
 from podusv_cli.core.derived import DERIVED
@@ -21,6 +20,7 @@ from podusv_cli.storage.log_reader import read_log
 from podusv_cli.theory.ideal_weights import exponents, node_distance
 from podusv_cli.theory.lyapunov import TERMS
 from podusv_cli.theory.monitor import ERRORS, NETWORKS, WINDOWS
+from podusv_cli.workflows.run import Request, run
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 SHORT = ("simulation.duration=20",)
