@@ -27,6 +27,7 @@ from podusv_cli.vessels.vessel import VESSELS as SHIPPED
 
 HEAVY = {
     "numpy", "scipy", "numba", "llvmlite", "pandas", "matplotlib", "h5py", "pydantic", "yaml",
+    "jinja2",
 }  # fmt: skip
 ROOT = Path(podusv_cli.__file__).parents[1]
 

@@ -5,7 +5,6 @@ Folder names, descriptions, claims and arguments may hold anything. One function
 
 from __future__ import annotations
 
-import html as markup
 import re
 import unicodedata
 
@@ -57,9 +56,9 @@ def figure(text: str) -> str:
     return f" {shown}" if shown.startswith("_") else shown
 
 
-def html(text: str) -> str:
-    """Text of an element, or of an attribute in quotes."""
-    return markup.escape("\n".join(map(visible, text.split("\n"))))
+def lines(text: object) -> str:
+    """Text with its line breaks, before a template engine escapes markup."""
+    return "\n".join(map(visible, str(text).split("\n")))
 
 
 def json(encoded: str) -> str:
