@@ -11,12 +11,12 @@ import pytest
 from matplotlib.axes import Axes
 
 from podusv_cli.controllers.network import Network
-from podusv_cli.core.derived import DERIVED
 from podusv_cli.core.recording import Recording
 from podusv_cli.figures.drawing import FIGURES, draw, dressed
 from podusv_cli.figures.stability import FAR, POINTS, THIN
 from podusv_cli.scenario.load import load
 from podusv_cli.storage.log_reader import read_log
+from podusv_cli.theory.derived import DERIVED
 from podusv_cli.theory.ideal_weights import exponents, node_distance
 from podusv_cli.theory.lyapunov import TERMS
 from podusv_cli.theory.monitor import ERRORS, NETWORKS, WINDOWS

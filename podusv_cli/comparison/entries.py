@@ -10,12 +10,12 @@ from functools import cached_property
 import numpy as np
 
 from podusv_cli.comparison.checks import CHECKS
-from podusv_cli.core import derived
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import Signal
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage.run_folder import Run
+from podusv_cli.theory import derived
 
 
 @dataclass(frozen=True)

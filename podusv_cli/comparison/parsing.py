@@ -22,10 +22,10 @@ from podusv_cli.comparison.expressions import (
     SignalOf,
     Term,
 )  # fmt: skip
-from podusv_cli.core.derived import DERIVED
 from podusv_cli.core.signal import Signal
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.scenario.words import unknown
+from podusv_cli.theory.derived import DERIVED
 
 LONGEST = 500  # characters of an expression
 LARGEST = 1e300  # of numbers written down

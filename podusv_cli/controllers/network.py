@@ -10,8 +10,10 @@ import numpy.typing as npt
 from pydantic import model_validator
 
 from podusv_cli.core.component import Component, value
+from podusv_cli.core.derived import Derived, norm
 from podusv_cli.core.elementary import exponential
 from podusv_cli.core.kernel import Vector, kernel, tail, whole_lanes
+from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import Signal
 
 MOST_NODES = 10_000
@@ -24,6 +26,12 @@ WIDTH = Signal(
     axes=("input",), fixed=True,
 )  # fmt: skip
 Triple = tuple[float, float, float]
+W_NORM_U = Signal("W_norm_u", "m/s2", "norm of the surge network weights", r"|\hat W_u|")
+W_NORM_R = Signal("W_norm_r", "rad/s2", "norm of the yaw network weights", r"|\hat W_r|")
+NODE_DISTANCE = Signal(
+    "node_distance", "1", "distance of (u, v, r) to the nearest network centre, in widths", "d"
+)
+ACTIVATION = Signal("activation", "1", "largest output of a network node (14)", r"\max\Phi")
 
 
 class Network(Component):
@@ -191,3 +199,21 @@ def activation(network: Network, nu: npt.NDArray[np.float64]) -> Vector:
     """Node outputs (14) for velocities of shape (n, 3): shape (n, q), by the direct sum."""
     scaled = (nu[:, None, :] - network.center_array()) / network.width_array()
     return np.asarray(np.exp(-0.5 * np.sum(scaled**2, axis=2)))
+
+
+def _node_distance(log: Recording) -> Vector:
+    nu = np.stack([log[name] for name in "uvr"], axis=1)
+    nearest = np.full(len(nu), np.inf)
+    for center in log["rbf_center"]:  # one by one: a long log times all nodes is too large
+        nearest = np.minimum(nearest, np.sum(((nu - center) / log["rbf_width"]) ** 2, axis=1))
+    return np.asarray(np.sqrt(nearest))
+
+
+def _activation(log: Recording) -> Vector:
+    return np.asarray(np.exp(-0.5 * _node_distance(log) ** 2))
+
+
+_NEEDED = ("rbf_center", "rbf_width", "u", "v", "r")
+norm_u, norm_r = norm(W_NORM_U, "W_hat_u"), norm(W_NORM_R, "W_hat_r")
+node_distance = Derived(NODE_DISTANCE, _NEEDED, _node_distance)
+largest_activation = Derived(ACTIVATION, _NEEDED, _activation)

@@ -29,6 +29,7 @@ from podusv_cli.controllers.tracking import (
 )
 from podusv_cli.controllers.velocity_loop import Axis, Bound, Loop
 from podusv_cli.core.component import value
+from podusv_cli.core.derived import difference
 from podusv_cli.core.kernel import Vector, bundle, kernel, tail
 from podusv_cli.core.signal import Signal
 from podusv_cli.vessels.vessel import Vessel
@@ -49,6 +50,12 @@ W_HAT = (
 FILTERED = (
     Signal("beta_u", "m/s", "filtered virtual surge velocity (22)", r"\beta_u"),
     Signal("beta_r", "rad/s", "filtered virtual yaw rate (31)", r"\beta_r"),
+)
+Y_U = Signal("y_u", "m/s", "error of the surge filter, beta_u - alpha_u")
+Y_R = Signal("y_r", "rad/s", "error of the yaw filter, beta_r - alpha_r")
+filter_error_u, filter_error_r = (
+    difference(Y_U, "beta_u", "alpha_u"),
+    difference(Y_R, "beta_r", "alpha_r"),
 )
 SHORTFALL = (
     Signal("xi_u", "m/s", "shortfall of surge force as a velocity (anti-windup)", r"\xi_u"),

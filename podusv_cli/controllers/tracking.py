@@ -12,6 +12,7 @@ import numpy as np
 
 from podusv_cli.controllers.base import Approach, Controller
 from podusv_cli.core.component import value
+from podusv_cli.core.derived import difference
 from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.kinematics import direction, wrap
@@ -33,6 +34,9 @@ ALPHA_R = Signal("alpha_r", "rad/s", "virtual yaw rate (30)", r"\alpha_r")
 U_E = Signal("u_e", "m/s", "surge velocity error (23)")
 R_E = Signal("r_e", "rad/s", "yaw rate error (32)")
 TRACKED = (PSI_D, PSI_E, ALPHA_U, ALPHA_R, U_E, R_E)
+X_E = Signal("x_e", "m", "target ahead of the vessel, north (18); derived, not logged")
+Y_E = Signal("y_e", "m", "target ahead of the vessel, east (18); derived, not logged")
+ahead_north, ahead_east = difference(X_E, "x_d", "x"), difference(Y_E, "y_d", "y")
 
 # The first two numbers of the memory of every law that steers so.
 PSI_D_SAMPLE = Signal(

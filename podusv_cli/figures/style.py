@@ -18,11 +18,12 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 from matplotlib.ticker import ScalarFormatter
 
-from podusv_cli.core import derived, escaping
+from podusv_cli.core import escaping
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import Signal
 from podusv_cli.scenario.model import Scenario
+from podusv_cli.theory import derived
 
 FORMATS = ("png", "pdf", "svg")
 WIDTHS = {1: 3.46, 2: 7.09}  # inches: one column and two columns of a journal page

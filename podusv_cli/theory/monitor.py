@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from podusv_cli.controllers.polar_backstepping import PolarBackstepping
-from podusv_cli.core.derived import ACTIVATION, NODE_DISTANCE, W_NORM_R, W_NORM_U, Y_R, Y_U
+from podusv_cli.controllers.network import ACTIVATION, NODE_DISTANCE, W_NORM_R, W_NORM_U
+from podusv_cli.controllers.polar_backstepping import Y_R, Y_U, PolarBackstepping
+from podusv_cli.core.derived import Derived
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Allocate, Recording, blocks, largest
 from podusv_cli.core.signal import Signal, by_name
@@ -65,6 +66,10 @@ FIXED = (
     _of_windows("V_bound", "1", "ultimate bound of V, corrected", r"\Delta/2\lambda"),
     _of_windows("v_bound", "m/s", "bound of the sway speed (51), with all damping", r"|v|_{\max}"),
 )
+V_DOT_BOUND = Signal(
+    "V_dot_bound", "1/s", "what V_dot should stay below (49), corrected; derived, not logged",
+    r"-2\lambda V+\Delta",
+)  # fmt: skip
 # What the bounds are made of, at every row, and is not logged.
 UNLOGGED = (
     "alpha_u_dot", "alpha_r_dot", "drift_u", "drift_r", "epsilon_u", "epsilon_r", "rest_u",
@@ -270,3 +275,11 @@ def _fixed(windows: dict[str, Window], ideal: Ideal) -> dict[str, Vector]:
     }
     fixed = {"W_star_u": ideal.W_u, "W_star_r": ideal.W_r}
     return fixed | {name: np.array(values) for name, values in numbers.items()}
+
+
+def _v_dot_bound(log: Recording) -> Vector:
+    window = np.searchsorted(log["window_start"], log["time"], side="right") - 1
+    return np.asarray(-2.0 * log["V_lambda"][window] * log["V"] + log["V_Delta"][window])
+
+
+v_dot_bound = Derived(V_DOT_BOUND, ("V_dot", "V_Delta"), _v_dot_bound)
