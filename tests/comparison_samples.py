@@ -6,8 +6,9 @@ import numpy as np
 from known_signals import ABOUT
 
 from podusv_cli.comparison import claims, table
-from podusv_cli.comparison.claims import Stated
+from podusv_cli.comparison.claims import ParsedClaim
 from podusv_cli.comparison.entries import Absent, Entry
+from podusv_cli.comparison.expressions import parse
 from podusv_cli.core.recording import Recording
 from podusv_cli.scenario.load import load_text
 from podusv_cli.scenario.model import Claim
@@ -55,12 +56,12 @@ def verdicts():
     texts = {
         "C1": "x.iae == 3", "C2": "x.iae > 4", "C3": "lost.iae < x.iae", "C4": "1 / 3 < 0 * x.iae",
     }  # fmt: skip
-    stated = [
-        Stated(
+    parsed = [
+        ParsedClaim(
             name,
             Claim(says="a | <b>", source="here", expect=text, remark="Not <stated>."),
-            {"x": "a", "lost": "lost"},
-        )
+            parse(text, ("x", "lost"), ABOUT),
+        ).with_labels({"x": "a", "lost": "lost"})
         for name, text in texts.items()
     ]
-    return claims.judge(stated, runs)
+    return claims.judge(parsed, runs)

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pandas as pd
 import pytest
 
-from podusv_cli.comparison.claims import Stated, judge
+from podusv_cli.comparison.claims import judge, parse_claims
 from podusv_cli.comparison.entries import Entry
 from podusv_cli.engine.simulate import simulate
 from podusv_cli.metrics.table import observer
@@ -76,14 +76,13 @@ def rerun(scenario):
 
 def signs(letter, sets, laws=("proposed", "li", "pid")):
     """Claim and sign of a comparison with some keys set anew."""
-    scenario = load(ROOT / f"configs/paper/{LETTERS[letter]}.yaml", sets).scenario
-    entries = {name: rerun(scenario.singles()[name]) for name in laws}
-    called = {law: law for law in laws}
+    loaded = load(ROOT / f"configs/paper/{LETTERS[letter]}.yaml", sets)
+    entries = {name: rerun(loaded.scenario.singles()[name]) for name in laws}
     told = [
-        Stated(name, claim, called)
-        for name, claim in scenario.claims.items()
-        if name != "C14"
-        and not any(f"{law}." in claim.expect for law in ("li", "pid") if law not in laws)
+        parsed
+        for parsed in parse_claims(loaded)
+        if parsed.name != "C14"
+        and not any(f"{law}." in parsed.claim.expect for law in ("li", "pid") if law not in laws)
     ]
     return {v.name: SIGNS[v.answer] for v in judge(told, entries)}
 

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+import ast
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, Self
 
-from podusv_cli.comparison.conditions import Evidence
-from podusv_cli.comparison.expressions import Sources
-from podusv_cli.comparison.parsing import ExpressionError, parse, renamed
+from podusv_cli.comparison.curves import Source
+from podusv_cli.comparison.expressions import Evaluation, ExpressionError, parse, with_labels
+from podusv_cli.core.errors import Finding, ScenarioError
 from podusv_cli.core.escaping import markdown, markdown_cell, markdown_code
-from podusv_cli.core.signal import Signal
 from podusv_cli.metrics.table import CLOCKED
-from podusv_cli.scenario.explain import signals as registered
-from podusv_cli.scenario.model import Claim, Scenario
+from podusv_cli.scenario import explain
+from podusv_cli.scenario.load import Loaded
+from podusv_cli.scenario.model import Claim
 
 Answer = Literal["reproduced", "not reproduced", "cannot tell"]
 ANSWERS: dict[bool | None, Answer] = {
@@ -25,14 +26,20 @@ ANSWERS: dict[bool | None, Answer] = {
 
 
 @dataclass(frozen=True)
-class Stated:
-    """A claim of one scenario: `called` has the labels of its runs in the comparison by the names
-    that the scenario has for them.
-    """
+class ParsedClaim:
+    """A claim with the syntax tree of its expression."""
 
     name: str
     claim: Claim
-    called: Mapping[str, str]
+    tree: ast.expr
+
+    def with_labels(self, labels: Mapping[str, str]) -> Self:
+        """The claim with labels in place of its own names for runs."""
+        if all(name == label for name, label in labels.items()):
+            return self
+        tree = with_labels(self.tree, labels)
+        claim = self.claim.model_copy(update={"expect": ast.unparse(tree)})
+        return replace(self, claim=claim, tree=tree)
 
 
 @dataclass(frozen=True)
@@ -75,36 +82,34 @@ class Verdict:
         }
 
 
-def misfits(scenario: Scenario) -> list[tuple[str, str]]:
-    """Key and sentence for every claim whose expression cannot be understood."""
-    found, signals = [], _signals(single.about() for single in scenario.singles().values())
+def parse_claims(loaded: Loaded) -> list[ParsedClaim]:
+    """The claims of a scenario. Raises ScenarioError with all that cannot be understood."""
+    scenario, claims, faults = loaded.scenario, [], []
+    signals = {signal.name: signal for signal in explain.signals()}
+    for single in scenario.singles().values():
+        signals |= single.about()
     for name, claim in scenario.claims.items():
+        key = f"claims.{name}.expect"
         try:
-            parse(claim.expect, scenario.labels(), signals)
+            tree = parse(claim.expect, scenario.labels(), signals)
+            claims.append(ParsedClaim(name, claim, tree))
         except ExpressionError as error:
-            found.append((f"claims.{name}.expect", str(error)))
-    return found
+            faults.append(Finding(loaded.origins[key], key, str(error)))
+    if faults:
+        raise ScenarioError(faults)
+    return claims
 
 
-def judge(stated: Sequence[Stated], runs: Sources) -> list[Verdict]:
-    """A verdict on every claim; in it, the claim is put with the runs' labels."""
-    signals = _signals(run.about for run in runs.values())
-    return [_verdict(said, runs, signals) for said in stated]
+def judge(claims: Sequence[ParsedClaim], runs: Mapping[str, Source]) -> list[Verdict]:
+    """A verdict on every claim; `runs` by label."""
+    return [_verdict(parsed, runs) for parsed in claims]
 
 
-def _signals(runs: Iterable[Mapping[str, Signal]]) -> dict[str, Signal]:
-    """What claims can be about: everything that podusv can log, and what these runs log."""
-    return {signal.name: signal for signal in registered()} | {
-        name: signal for about in runs for name, signal in about.items()
-    }
-
-
-def _verdict(said: Stated, runs: Sources, signals: Mapping[str, Signal]) -> Verdict:
-    claim, found = said.claim, Evidence()
-    holds = parse(claim.expect, runs, signals, said.called).holds(runs, claim.tolerance, found)
-    reason = "; ".join(dict.fromkeys(found.doubts)) if holds is None else ""
-    put = claim.model_copy(update={"expect": renamed(claim.expect, said.called)})
-    return Verdict(said.name, put, ANSWERS[holds], found.numbers, reason)
+def _verdict(parsed: ParsedClaim, runs: Mapping[str, Source]) -> Verdict:
+    evaluation = Evaluation(runs, parsed.claim.tolerance)
+    answer = evaluation.holds(parsed.tree)
+    reason = "; ".join(dict.fromkeys(evaluation.doubts)) if answer is None else ""
+    return Verdict(parsed.name, parsed.claim, ANSWERS[answer], evaluation.numbers, reason)
 
 
 def as_markdown(verdicts: Sequence[Verdict], timed: Sequence[Verdict] = (), place: str = "") -> str:

@@ -12,7 +12,6 @@ import numpy as np
 from podusv_cli.comparison.checks import CHECKS
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
-from podusv_cli.core.signal import Signal
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage.run_folder import Run
 from podusv_cli.theory import derived
@@ -20,7 +19,7 @@ from podusv_cli.theory import derived
 
 @dataclass(frozen=True)
 class Entry:
-    """A run in a comparison; what `expressions.Source` asks for.
+    """A run in a comparison; see `curves.Source`.
 
     `cost` holds metrics that were measured for this comparison and replace the run's own.
     """
@@ -51,11 +50,6 @@ class Entry:
     def ending(self) -> str:
         """The first words of what the run says about its end, empty where it finished."""
         return self.recording.message.partition(":")[0]
-
-    @property
-    def about(self) -> Mapping[str, Signal]:
-        """What the log says of its signals."""
-        return self.recording.about
 
     def metric(self, name: str) -> float:
         """A metric; NaN where it is undefined, and for any run that did not reach its end."""
@@ -90,11 +84,6 @@ class Absent:
     def ending(self) -> str:
         """The last line of the failure: of a traceback, what went wrong."""
         return f"has no log: {self.failure.strip().splitlines()[-1]}"
-
-    @property
-    def about(self) -> Mapping[str, Signal]:
-        """What the run would have logged."""
-        return self.scenario.about()
 
     def metric(self, name: str) -> float:
         """NaN."""

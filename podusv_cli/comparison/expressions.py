@@ -1,264 +1,292 @@
-"""The small language in which a claim is put: parsed, checked, computed; never run as Python.
+"""The expressions of claims: parsed once, checked and evaluated by one walk, never run as Python.
 
     max(abs(proposed.tau_u)) == 300
     proposed.iae < li.iae < pid.iae
     mean(proposed.z_e, 200, 310) / mean(pid.z_e, 200, 310) < 0.5
     finished(proposed) and not finished(pid)
 
-`run.metric` is a metric, `run.signal` a logged signal. `abs`, `rate` and `hypot` turn signals into
-signals; `max`, `min`, `mean`, `final`, `variation` and `integral` turn a signal into a number,
-over the whole run or between two times [s]. `==` means near, within the claim's tolerance.
+docs/claims.md describes the language.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Any, Protocol
+import ast
+import math
+import operator
+from collections.abc import Callable, Collection, Mapping
+from copy import deepcopy
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import NoReturn
 
 import numpy as np
 
+from podusv_cli.comparison import curves
+from podusv_cli.comparison.checks import CHECKS
+from podusv_cli.comparison.curves import REDUCERS, CannotTell, Curve, Quantity, Source
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.signal import Signal
 from podusv_cli.metrics.table import METRICS
+from podusv_cli.scenario.words import unknown
+from podusv_cli.theory.derived import DERIVED
 
-NEAR = 1e-9  # s; times closer than this are the same
+LONGEST = 500  # characters of an expression
+LARGEST = 1e300  # of numbers written down
+DEEPEST = 60  # nested brackets, signs and operations
+# norms of the weights, which have one value for every node of a network
+NORMS = {derived.needs[0]: name for name, derived in DERIVED.items() if len(derived.needs) == 1}
 
 
-class Source(Protocol):
-    """What an expression can ask of a run."""
+class ExpressionError(ValueError):
+    """An expression that has no meaning; the text says what to write instead."""
 
-    @property
-    def until(self) -> float:
-        """The time up to which the run was simulated [s]."""
 
-    @property
-    def every(self) -> int:
-        """How many steps a logged instant is after the one before; 1 where each is logged."""
+def parse(text: str, runs: Collection[str], signals: Mapping[str, Signal]) -> ast.expr:
+    """The syntax tree of an expression about these runs; `signals` are those that a run may log.
 
-    @property
-    def ending(self) -> str:
-        """Why the run did not reach its end, as `diverged at t = 2 s`; empty where it did."""
+    It is checked by evaluating it for runs that have all of these. Raises ExpressionError.
+    """
+    if len(text) > LONGEST:
+        raise ExpressionError(f"is longer than {LONGEST} characters")
+    try:
+        tree = ast.parse(text.strip(), mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        raise ExpressionError(f"cannot read {text!r}; example: a.iae < b.iae") from error
+    level: list[ast.AST] = [tree]
+    for _ in range(DEEPEST):
+        level = [child for node in level for child in ast.iter_child_nodes(node)]
+    if level:
+        raise ExpressionError(f"is nested more than {DEEPEST} deep")
+    Evaluation(dict.fromkeys(runs, _Example(signals))).holds(tree)
+    return tree
 
-    @property
-    def about(self) -> Mapping[str, Signal]:
-        """What the run logs."""
+
+@dataclass(frozen=True)
+class _Example:
+    """A run that has every metric and signal; to check an expression before there are runs."""
+
+    signals: Mapping[str, Signal]
+    until = math.inf
+    every = 1
+    ending = ""
 
     def metric(self, name: str) -> float:
-        """A metric; NaN where the run has none of this name."""
+        return 1.0
+
+    def check(self, name: str) -> bool:
+        return True
 
     def signal(self, name: str) -> Vector:
-        """A logged signal; empty where the run has none of this name."""
-
-    def check(self, name: str) -> bool | None:
-        """Whether a named property of the run holds; None where that cannot be told."""
-
-
-Sources = Mapping[str, Source]
-
-
-class Untold(Exception):
-    """A number that the runs do not give; the text says which one, and why."""
+        """Two samples. Raises ExpressionError unless the signal is one number over time."""
+        _known(name, [*self.signals, *METRICS], "signal or metric")
+        axes, norm = self.signals[name].axes, NORMS.get(name)
+        if self.signals[name].fixed:
+            raise ExpressionError(f"{name!r} does not run over time")
+        if axes:
+            hint = f"; take {norm}" if norm else ", and a claim needs a signal with one value"
+            raise ExpressionError(f"{name!r} has a value for every {' and '.join(axes)}{hint}")
+        return np.array([0.0, 1.0])
 
 
-@dataclass(frozen=True)
-class Reach:
-    """How far a run goes, and how much of it is logged; see `Source`."""
+@dataclass
+class Evaluation:
+    """One evaluation of an expression, with the evidence that it collects.
 
-    run: str
-    until: float
-    ending: str
-    every: int
+    `numbers` are those that were compared, by their text, NaN where missing; `doubts` say why.
+    """
 
-    def thinned(self, text: str) -> Untold:
-        """The doubt about what this text asks of a log that leaves steps out."""
-        return Untold(
-            f"{text}: {self.run} logs one step in {self.every} only, and nobody knows what was in "
-            "between; log each (log.every: 1), or use a metric, which sees every step"
-        )
+    runs: Mapping[str, Source]
+    tolerance: float = 0.0
+    numbers: dict[str, float] = field(default_factory=dict)
+    doubts: list[str] = field(default_factory=list)
 
+    def holds(self, node: ast.expr) -> bool | None:
+        """Whether a condition holds; None where that is unknown.
 
-@dataclass(frozen=True)
-class Curve:
-    """A signal over time, made from the signals of these runs."""
+        Every part is evaluated, so that all numbers are shown and all mistakes found.
+        """
+        match node:
+            case ast.Compare():
+                return self._comparison(node)
+            case ast.Call():
+                return self._check(node)
+            case ast.UnaryOp(op=ast.Not(), operand=part):
+                answer = self.holds(part)
+                return None if answer is None else not answer
+            case ast.BoolOp(op=ast.And(), values=parts):
+                return _all([self.holds(part) for part in parts])
+            case ast.BoolOp():
+                _refuse(node, "join conditions with `and` only")
+        _refuse(node, f"not a condition; compare numbers, or use one of {', '.join(CHECKS)}")
 
-    time: Vector
-    values: Vector
-    reaches: tuple[Reach, ...]
+    def _comparison(self, node: ast.Compare) -> bool | None:
+        """All links of a < b <= c."""
+        if any(type(sign) not in SIGNS for sign in node.ops):
+            _refuse(node, "compare with <, <=, >, >=, ==")
+        sides = [(side, self._number(side)) for side in (node.left, *node.comparators)]
+        links = zip(node.ops, pairwise(sides), strict=True)
+        return _all([self._link(sign, *left, *right) for sign, (left, right) in links])
 
+    def _link(
+        self, sign: ast.cmpop, left: ast.expr, a: float, right: ast.expr, b: float
+    ) -> bool | None:
+        if not (math.isfinite(a) and math.isfinite(b)):
+            return None
+        answer = SIGNS[type(sign)](a, b, self.tolerance)
+        if answer is None:
+            within = f"differ by no more than the tolerance of {self.tolerance:g}"
+            self.doubts.append(f"{ast.unparse(left)} and {ast.unparse(right)} {within}")
+        return answer
 
-Quantity = float | Curve
-
-
-class Term(Protocol):
-    """A part of an expression that has a value."""
-
-    @property
-    def curve(self) -> bool:
-        """Whether the value is a curve."""
-
-    def value(self, runs: Sources) -> Quantity:
-        """A number, or a curve where `curve` says so. Raises Untold."""
-
-
-@dataclass(frozen=True)
-class Number:
-    """A number written down."""
-
-    number: float
-    curve = False
-
-    def value(self, runs: Sources) -> Quantity:
-        """The number."""
-        return self.number
-
-
-@dataclass(frozen=True)
-class MetricOf:
-    """run.metric."""
-
-    run: str
-    name: str
-    curve = False
-
-    def value(self, runs: Sources) -> Quantity:
-        """The metric."""
-        run = runs[self.run]
-        number = run.metric(self.name)
-        if np.isnan(number):
-            meaning = f"this run has none ({METRICS[self.name].meaning})"
-            why = f"{self.run} {run.ending}" if run.ending else meaning
-            raise Untold(f"{self.run}.{self.name}: {why}")
+    def _number(self, node: ast.expr) -> float:
+        """One side of a comparison, kept as evidence; NaN where it is unknown."""
+        doubts, number, text = len(self.doubts), self.value(node), ast.unparse(node)
+        if isinstance(number, Curve):
+            _refuse(
+                node, f"a signal over time; reduce it to a number with one of {', '.join(REDUCERS)}"
+            )
+        if not math.isfinite(number) and len(self.doubts) == doubts:
+            self.doubts.append(f"{text} is not a finite number")
+        if not isinstance(node, ast.Constant):
+            self.numbers[text] = number
         return number
 
+    def _check(self, node: ast.Call) -> bool | None:
+        name = _known(_function(node), CHECKS, "check")
+        if len(node.args) != 1 or not isinstance(node.args[0], ast.Name):
+            _refuse(node, "a check takes the name of one run")
+        label = node.args[0].id
+        run, text = self._run(label), ast.unparse(node)
+        answer = run.check(name)
+        self.numbers[text] = math.nan if answer is None else float(answer)
+        if answer is None:
+            self.doubts.append(f"{text}: {label} {run.ending}")
+        return answer
 
-@dataclass(frozen=True)
-class SignalOf:
-    """run.signal."""
+    def value(self, node: ast.expr) -> Quantity:
+        """A number, NaN where it is unknown, or a curve. Raises CannotTell for an unknown curve."""
+        match node:
+            case ast.Constant():
+                return _literal(node)
+            case ast.Attribute(value=ast.Name(id=label), attr=name):
+                run = self._run(label)
+                if name in METRICS:
+                    return self._or_doubt(lambda: curves.metric(label, run, name))
+                return curves.signal(label, run, name)
+            case ast.UnaryOp(op=ast.USub(), operand=part):
+                return curves.pointwise(operator.neg, [self.value(part)])
+            case ast.BinOp(left=left, right=right, op=sign) if type(sign) in ARITHMETIC:
+                parts = [self.value(left), self.value(right)]
+                return curves.pointwise(ARITHMETIC[type(sign)], parts)
+            case ast.BinOp():
+                _refuse(node, "calculate with + - * / only")
+            case ast.Call():
+                return self._call(node)
+        _refuse(node, "no meaning here; write run.metric or run.signal")
 
-    run: str
-    name: str
-    curve = True
+    def _call(self, node: ast.Call) -> Quantity:
+        name = _known(_function(node), [*REDUCERS, *OPERATIONS, "rate"], "function")
+        if name in REDUCERS:
+            return self._or_doubt(lambda: self._reduced(name, node))
+        count, operation = OPERATIONS.get(name, (1, None))
+        if len(node.args) != count:
+            _refuse(node, f"{name} takes {count} argument(s)")
+        if operation:
+            return curves.pointwise(operation, [self.value(part) for part in node.args])
+        return curves.rate(self._curve(node.args[0]))
 
-    def value(self, runs: Sources) -> Quantity:
-        """The signal over the run's time."""
-        run = runs[self.run]
-        values = run.signal(self.name)
-        if not len(values):
-            raise Untold(f"{self.run}.{self.name}: {self.run} {run.ending or 'does not log it'}")
-        reach = Reach(self.run, run.until, run.ending, run.every)
-        return Curve(run.signal("time")[: len(values)], values, (reach,))
+    def _curve(self, node: ast.expr) -> Curve:
+        curve = self.value(node)
+        if not isinstance(curve, Curve):
+            _refuse(node, "a number where a signal is needed")
+        return curve
 
+    def _reduced(self, name: str, node: ast.Call) -> float:
+        if len(node.args) not in (1, 3):
+            _refuse(node, f"{name} takes a signal, or a signal and two times")
+        if not all(isinstance(end, ast.Constant) for end in node.args[1:]):
+            _refuse(node, "the two times must be plain numbers in s")
+        curve, window = self._curve(node.args[0]), [_literal(end) for end in node.args[1:]]
+        if window and not 0 <= window[0] < window[1]:
+            _refuse(node, "the first time must lie before the second")
+        return curves.reduced(name, ast.unparse(node), curve, window)
 
-@dataclass(frozen=True)
-class Applied:
-    """An operation on numbers and curves, point by point."""
+    def _or_doubt(self, number: Callable[[], float]) -> float:
+        """The number, or NaN and a doubt."""
+        try:
+            return number()
+        except CannotTell as doubt:
+            self.doubts.append(str(doubt))
+            return math.nan
 
-    operation: Callable[..., Any]
-    parts: tuple[Term, ...]
-
-    @property
-    def curve(self) -> bool:
-        """Whether any part is a curve."""
-        return any(part.curve for part in self.parts)
-
-    def value(self, runs: Sources) -> Quantity:
-        """The operation's result, on the time of the curves."""
-        got = [part.value(runs) for part in self.parts]
-        curves = [part for part in got if isinstance(part, Curve)]
-        times = _shared(curves)
-        plain = [_at(part, times) if isinstance(part, Curve) else np.float64(part) for part in got]
-        with np.errstate(all="ignore"):
-            result = self.operation(*plain)
-        if not curves:
-            return float(result)
-        reaches = tuple(dict.fromkeys(reach for curve in curves for reach in curve.reaches))
-        return Curve(times, np.asarray(result), reaches)
-
-
-def _shared(curves: list[Curve]) -> Vector:
-    """The first curve's times, as far as all curves go."""
-    if not curves or not all(len(curve.time) for curve in curves):
-        return np.zeros(0)
-    times: Vector = curves[0].time
-    return np.asarray(times[times <= min(curve.time[-1] for curve in curves)])
-
-
-def _at(curve: Curve, times: Vector) -> Vector:
-    """The curve at these times; logs of other intervals are interpolated."""
-    if np.array_equal(curve.time[: len(times)], times):
-        return curve.values[: len(times)]
-    return np.asarray(np.interp(times, curve.time, curve.values))
-
-
-@dataclass(frozen=True)
-class Rate:
-    """The rate of a curve, by differences."""
-
-    part: Term
-    curve = True
-
-    def value(self, runs: Sources) -> Quantity:
-        """Central differences, one-sided at the ends; NaN for a single sample."""
-        got = self.part.value(runs)
-        assert isinstance(got, Curve)
-        for reach in got.reaches:
-            if reach.every > 1:
-                raise reach.thinned("rate")
-        if len(got.values) < 2:
-            return Curve(got.time, got.values * np.nan, got.reaches)
-        return Curve(got.time, np.gradient(got.values, got.time), got.reaches)
+    def _run(self, label: str) -> Source:
+        return self.runs[_known(label, self.runs, "run")]
 
 
-@dataclass(frozen=True)
-class Reduced:
-    """A curve summed up in a number, over the run or a part of it."""
-
-    reducer: Callable[[Vector, Vector], float]
-    part: Term
-    window: tuple[float, float] | None
-    text: str
-    curve = False
-
-    def value(self, runs: Sources) -> Quantity:
-        """The number; Untold where a run does not cover the window, or did not reach its end.
-
-        Of a thinned log only the end of the run is known, where that is logged.
-        """
-        got = self.part.value(runs)
-        assert isinstance(got, Curve)
-        for reach in got.reaches:
-            self._demand(reach)
-            at_end = self.reducer is final and not self.window
-            if reach.every > 1 and not (at_end and abs(got.time[-1] - reach.until) <= NEAR):
-                raise reach.thinned(self.text)
-        t, y = got.time, got.values
-        if self.window:
-            inside = (t >= self.window[0] - NEAR) & (t <= self.window[1] + NEAR)
-            t, y = t[inside], y[inside]
-        if not len(y):
-            raise Untold(f"{self.text}: nothing is logged in this window")
-        return self.reducer(t, y)
-
-    def _demand(self, reach: Reach) -> None:
-        """What is not there must not be summed up as if it were nothing."""
-        short = reach.until < self.window[1] - NEAR if self.window else bool(reach.ending)
-        if short:
-            why = reach.ending or f"ends at {reach.until:g} s"
-            raise Untold(f"{self.text}: {reach.run} {why}")
+def with_labels(tree: ast.expr, labels: Mapping[str, str]) -> ast.expr:
+    """The expression with labels in place of its own names for runs."""
+    tree = deepcopy(tree)
+    for node in ast.walk(tree):
+        # of `run.metric` and `check(run)`; a function may have the name of a run
+        for name in (*getattr(node, "args", ()), getattr(node, "value", None)):
+            if isinstance(name, ast.Name):
+                name.id = labels[name.id]
+    return tree
 
 
-def final(t: Vector, y: Vector) -> float:
-    """The last value."""
-    return float(y[-1])
+def _refuse(node: ast.AST, why: str) -> NoReturn:
+    raise ExpressionError(f"{ast.unparse(node)!r}: {why}")
 
 
-REDUCERS: dict[str, Callable[[Vector, Vector], float]] = {
-    "max": lambda t, y: float(np.max(y)),
-    "min": lambda t, y: float(np.min(y)),
-    "mean": lambda t, y: float(np.trapezoid(y, t) / (t[-1] - t[0])) if len(t) > 1 else float(y[0]),
-    "final": final,
-    "variation": lambda t, y: float(np.sum(np.abs(np.diff(y)))) if len(t) > 1 else float("nan"),
-    "integral": lambda t, y: float(np.trapezoid(y, t)) if len(t) > 1 else float("nan"),
+def _known(name: str, names: Collection[str], what: str) -> str:
+    if name in names:
+        return name
+    raise ExpressionError(unknown(f"{what} {name!r}", name, sorted(names)))
+
+
+def _function(node: ast.Call) -> str:
+    if not isinstance(node.func, ast.Name) or node.keywords:
+        _refuse(node, "functions are called by name, without keywords")
+    return node.func.id
+
+
+def _literal(node: ast.expr) -> float:
+    number = getattr(node, "value", None)
+    if isinstance(number, bool) or not isinstance(number, (int, float)):
+        _refuse(node, "not a plain number")
+    if abs(number) > LARGEST:
+        raise ExpressionError(f"a number is too large, the largest is {LARGEST:g}")
+    return float(number)
+
+
+def _all(answers: Collection[bool | None]) -> bool | None:
+    """False where one is False, else None where one is None, else True."""
+    if any(answer is False for answer in answers):
+        return False
+    return None if None in answers else True
+
+
+def _less(a: float, b: float, tolerance: float) -> bool | None:
+    """True where a is less by more than the tolerance, False where b is, else None."""
+    margin = tolerance * max(abs(a), abs(b))
+    if abs(a - b) <= margin:
+        return None if margin else False
+    return a < b
+
+
+def _at_most(a: float, b: float, tolerance: float) -> bool:
+    return a <= b + tolerance * abs(b)
+
+
+# of two numbers, with the claim's relative tolerance
+SIGNS: dict[type[ast.cmpop], Callable[[float, float, float], bool | None]] = {
+    ast.Lt: _less,
+    ast.LtE: _at_most,
+    ast.Gt: lambda a, b, tolerance: _less(b, a, tolerance),
+    ast.GtE: lambda a, b, tolerance: _at_most(-a, -b, tolerance),
+    ast.Eq: lambda a, b, tolerance: abs(a - b) <= tolerance * abs(b),
 }
-MAPPERS: dict[str, tuple[int, Callable[..., Any]]] = {"abs": (1, np.abs), "hypot": (2, np.hypot)}
+ARITHMETIC: dict[type[ast.operator], Callable[..., object]] = {
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: np.divide,
+}  # fmt: skip
+OPERATIONS = {"abs": (1, np.abs), "hypot": (2, np.hypot)}  # with their number of arguments

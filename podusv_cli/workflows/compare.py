@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from podusv_cli.comparison import claims, outputs, table
+from podusv_cli.comparison.curves import Source
 from podusv_cli.comparison.differences import differences
 from podusv_cli.comparison.entries import Absent, Entry
-from podusv_cli.comparison.expressions import Source
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.recording import Status
@@ -97,7 +97,7 @@ def compare(items: Sequence[Path], request: Request, progress: Progress | None =
         outcomes = make_runs(given.members, writer.folder, request, progress)
         lost = unwritten(outcomes.values())
         extras = Extras(interrupted=any(outcome.cut for outcome in outcomes.values()))
-        result = collect(given.members, outcomes, given.stated, extras)
+        result = collect(given.members, outcomes, given.claims, extras)
         if extras.interrupted and not result.entries:
             raise KeyboardInterrupt("stopped before any run finished; nothing was saved")
         origin = provenance.collect(argv, started, datetime.now(UTC))
@@ -161,7 +161,7 @@ def make_runs(
 
 def collect(
     members: Sequence[Member], outcomes: Mapping[str, Outcome],
-    stated: Sequence[claims.Stated], extras: Extras,
+    parsed: Sequence[claims.ParsedClaim], extras: Extras,
 ) -> outputs.Result:  # fmt: skip
     """Open the runs and compare them; a law's cost or a verdict that fails is noted in `extras`.
 
@@ -191,7 +191,7 @@ def collect(
         endings=endings,
         differences=differences({label: one.model_dump() for label, one in scenarios.items()}),
         table=table.table(numbers),
-        verdicts=extras.made("the claims' verdicts", lambda: claims.judge(stated, sources)) or [],
+        verdicts=extras.made("the claims' verdicts", lambda: claims.judge(parsed, sources)) or [],
         timings={label: done.timing for label, done in finished.items()},
         warnings={m.label: getattr(finished.get(m.label), "warnings", m.noticed) for m in members},
     )

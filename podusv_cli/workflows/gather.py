@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from podusv_cli.comparison.claims import Stated, misfits
+from podusv_cli.comparison.claims import ParsedClaim, parse_claims
 from podusv_cli.core.errors import UsageError
 from podusv_cli.findings.finding import heard, unknown_codes
 from podusv_cli.findings.preflight import preflight
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import load
-from podusv_cli.scenario.model import Claim
 from podusv_cli.workflows.members import Member, comparable, distinct, numbered
 from podusv_cli.workflows.run import Request
 
@@ -23,7 +22,7 @@ class Gathered:
     """The runs to compare, the claims about them, and a title for the comparison."""
 
     members: Sequence[Member]
-    stated: Sequence[Stated]
+    claims: Sequence[ParsedClaim]
     title: str
 
 
@@ -34,7 +33,7 @@ class _Item:
     name: str
     members: Sequence[Member]
     names: Sequence[str] = ()
-    claims: Mapping[str, Claim] = field(default_factory=dict)
+    claims: Sequence[ParsedClaim] = ()
 
 
 def gather(items: Sequence[Path], request: Request) -> Gathered:
@@ -49,7 +48,7 @@ def gather(items: Sequence[Path], request: Request) -> Gathered:
     labels = iter(member.label for member in members)
     called = [dict(zip(item.names, labels, strict=False)) for item in found]
     title = "-".join(dict.fromkeys(item.name for item in found))[:80]
-    return Gathered(members, _stated(found, called), title)
+    return Gathered(members, _labelled(found, called), title)
 
 
 def _opened(path: Path, request: Request, *, alone: bool) -> _Item:
@@ -57,23 +56,25 @@ def _opened(path: Path, request: Request, *, alone: bool) -> _Item:
         members = comparable(path)
         return _Item(path.resolve().name, members, [member.label for member in members])
     fits = limits(request.allow_large, read_back=True)
-    loaded = load(path, request.overrides, checks=(unknown_codes, misfits, fits))
+    loaded = load(path, request.overrides, checks=(unknown_codes, fits))
     scenario, singles = loaded.scenario, loaded.scenario.singles()
     labels = list(singles) if alone or scenario.controllers else [scenario.name]
     members = [
         Member(label, single, loaded.text, noticed=heard(preflight(single), single))
         for label, single in zip(labels, singles.values(), strict=True)
     ]
-    return _Item(scenario.name, members, list(singles), scenario.claims)
+    return _Item(scenario.name, members, list(singles), parse_claims(loaded))
 
 
-def _stated(found: Sequence[_Item], called: Sequence[Mapping[str, str]]) -> list[Stated]:
+def _labelled(found: Sequence[_Item], called: Sequence[Mapping[str, str]]) -> list[ParsedClaim]:
     """All claims; names that several scenarios use are preceded by the scenario's name."""
-    counts = Counter(name for item in found for name in item.claims)
-    stated = [
-        Stated(f"{item.name}.{name}" if counts[name] > 1 else name, claim, labels)
+    counts = Counter(claim.name for item in found for claim in item.claims)
+    claims = [
+        replace(claim.with_labels(labels), name=f"{item.name}.{claim.name}")
+        if counts[claim.name] > 1
+        else claim.with_labels(labels)
         for item, labels in zip(found, called, strict=True)
-        for name, claim in item.claims.items()
+        for claim in item.claims
     ]
-    names = numbered(claim.name for claim in stated)
-    return [replace(claim, name=name) for claim, name in zip(stated, names, strict=True)]
+    names = numbered(claim.name for claim in claims)
+    return [replace(claim, name=name) for claim, name in zip(claims, names, strict=True)]

@@ -18,7 +18,7 @@ from counts import count
 from storage_samples import deadline
 
 import podusv_cli
-from podusv_cli.comparison.claims import misfits
+from podusv_cli.comparison.claims import parse_claims
 from podusv_cli.core.errors import ScenarioError
 from podusv_cli.scenario.load import load
 
@@ -146,7 +146,7 @@ def spoilt(seed: int) -> Iterator[tuple[Path, bytes]]:
 def verdict(path: Path) -> str:
     """`ok`, or the lines that every command would print instead of running it."""
     try:
-        load(path, checks=(misfits,))
+        parse_claims(load(path))
     except ScenarioError as error:
         return str(error)
     return "ok"

@@ -1,0 +1,148 @@
+"""Numbers and signals of runs, as claims compute with them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from podusv_cli.core.kernel import Vector
+from podusv_cli.metrics.table import METRICS
+
+NEAR = 1e-9  # s; times closer than this are the same
+
+
+class Source(Protocol):
+    """A run, as far as claims can be about it."""
+
+    @property
+    def until(self) -> float:
+        """The time up to which the run was simulated [s]."""
+
+    @property
+    def every(self) -> int:
+        """Steps from one logged instant to the next; 1 where every step is logged."""
+
+    @property
+    def ending(self) -> str:
+        """Why the run did not reach its end, as `diverged at t = 2 s`; empty where it did."""
+
+    def metric(self, name: str) -> float:
+        """A metric; NaN where the run has none of this name."""
+
+    def signal(self, name: str) -> Vector:
+        """A logged signal; empty where the run has none of this name."""
+
+    def check(self, name: str) -> bool | None:
+        """Whether a named property of the run holds; None where that is unknown."""
+
+
+class CannotTell(Exception):
+    """The runs do not give a number; the text says which one, and why."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A quantity over time, computed from signals of these runs (by label)."""
+
+    time: Vector
+    values: Vector
+    runs: Mapping[str, Source]
+
+    def at(self, times: Vector) -> Vector:
+        """The values at these times, interpolated where the log has others."""
+        if np.array_equal(self.time[: len(times)], times):
+            return self.values[: len(times)]
+        return np.asarray(np.interp(times, self.time, self.values))
+
+
+Quantity = float | Curve
+
+
+def metric(label: str, run: Source, name: str) -> float:
+    """A metric of a run. Raises CannotTell."""
+    number = run.metric(name)
+    if np.isnan(number):
+        undefined = f"this run has none ({METRICS[name].meaning})"
+        raise CannotTell(f"{label}.{name}: {f'{label} {run.ending}' if run.ending else undefined}")
+    return number
+
+
+def signal(label: str, run: Source, name: str) -> Curve:
+    """A signal of a run. Raises CannotTell."""
+    values = run.signal(name)
+    if not len(values):
+        raise CannotTell(f"{label}.{name}: {label} {run.ending or 'does not log it'}")
+    return Curve(run.signal("time")[: len(values)], values, {label: run})
+
+
+@np.errstate(all="ignore")
+def pointwise(operation: Callable[..., Any], parts: Sequence[Quantity]) -> Quantity:
+    """An operation on numbers and curves, at the times that all curves cover."""
+    curves = [part for part in parts if isinstance(part, Curve)]
+    times = common_times(curves)
+    plain = [part.at(times) if isinstance(part, Curve) else np.float64(part) for part in parts]
+    result = operation(*plain)
+    runs = {label: run for curve in curves for label, run in curve.runs.items()}
+    return Curve(times, np.asarray(result), runs) if curves else float(result)
+
+
+def common_times(curves: Sequence[Curve]) -> Vector:
+    """The first curve's times, as far as all curves go."""
+    if not curves or not all(len(curve.time) for curve in curves):
+        return np.zeros(0)
+    times: Vector = curves[0].time
+    return np.asarray(times[times <= min(curve.time[-1] for curve in curves)])
+
+
+@np.errstate(all="ignore")
+def rate(curve: Curve) -> Curve:
+    """The derivative: central differences, one-sided at the ends. Raises CannotTell."""
+    for label, run in curve.runs.items():
+        if run.every > 1:
+            raise _thinned("rate", label, run)
+    several = len(curve.values) > 1
+    rates = np.gradient(curve.values, curve.time) if several else curve.values * np.nan
+    return Curve(curve.time, rates, curve.runs)
+
+
+@np.errstate(all="ignore")
+def reduced(name: str, text: str, curve: Curve, window: Sequence[float] = ()) -> float:
+    """One number for a curve, over the whole run or a window (start and end [s]).
+
+    `text` names it in messages. Raises CannotTell where a run does not cover the window or did not
+    reach its end. Of a thinned log, only the last value is known, if it is logged.
+    """
+    t, y = curve.time, curve.values
+    for label, run in curve.runs.items():
+        if run.until < window[1] - NEAR if window else run.ending:
+            raise CannotTell(f"{text}: {label} {run.ending or f'ends at {run.until:g} s'}")
+        last = name == "final" and not window and abs(t[-1] - run.until) <= NEAR
+        if run.every > 1 and not last:
+            raise _thinned(text, label, run)
+    if window:
+        inside = (t >= window[0] - NEAR) & (t <= window[1] + NEAR)
+        t, y = t[inside], y[inside]
+    if not len(y):
+        raise CannotTell(f"{text}: nothing is logged in this window")
+    return float(REDUCERS[name](t, y))
+
+
+def _thinned(text: str, label: str, run: Source) -> CannotTell:
+    return CannotTell(
+        f"{text}: {label} logs only one step in {run.every}, and the signal is unknown in between; "
+        "log every step (log.every: 1), or use a metric, which sees every step"
+    )
+
+
+# of times [s] and values; a single sample has no variation and no integral
+REDUCERS: dict[str, Callable[[Vector, Vector], Any]] = {
+    "max": lambda t, y: np.max(y),
+    "min": lambda t, y: np.min(y),
+    "mean": lambda t, y: np.trapezoid(y, t) / (t[-1] - t[0]) if len(t) > 1 else y[0],
+    "final": lambda t, y: y[-1],
+    "variation": lambda t, y: np.sum(np.abs(np.diff(y))) if len(t) > 1 else np.nan,
+    "integral": lambda t, y: np.trapezoid(y, t) if len(t) > 1 else np.nan,
+}
