@@ -10,10 +10,9 @@ from known_signals import ABOUT
 from pydantic.types import Strict
 
 from podusv_cli.core.component import Component
-from podusv_cli.scenario.annotations import members, sections
 from podusv_cli.scenario.explain import Row, UnknownKeyError, explain, first_sentence, kinds
-from podusv_cli.scenario.fields import BOUNDS, PATTERNS_IN_WORDS, limits
-from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.keys import BOUNDS, PATTERNS_IN_WORDS, limits, members, sections
+from podusv_cli.scenario.model import Claim, Scenario
 
 
 def models(model: type[Component] = Scenario) -> Iterator[type[Component]]:
@@ -119,6 +118,18 @@ def test_keys_of_a_lists_items_are_explained_with_the_list(asked: str) -> None:
     row = rows["actuator.pods.NUMBER.angle_rate"]
     assert (row.unit, row.range, row.default) == ("rad/s", "> 0", "required")
     assert row.meaning == "fastest change of the angle"
+
+
+@pytest.mark.parametrize("place", ["claims.NAME", "claims.C1"])
+def test_an_entry_of_a_mapping_is_explained_with_its_keys(place: str) -> None:
+    head, *rest = explain(place)
+    assert (head.key, head.meaning) == (place, "one of `claims`")
+    assert [row.key for row in rest] == [f"{place}.{name}" for name in Claim.model_fields]
+
+
+def test_a_key_of_an_item_is_found_by_the_place_that_messages_name() -> None:
+    assert explain("actuator.pods[0].x") == explain("actuator.pods.NUMBER.x")
+    assert explain("controllers.slow.K_Pu")[0].kinds == ("pid",)
 
 
 def test_a_kind_is_explained_by_its_name_alone() -> None:

@@ -12,8 +12,7 @@ from pydantic import ValidationError
 from scenario_samples import SOUND, loaded, told
 
 from podusv_cli.core.component import Component
-from podusv_cli.scenario.annotations import inside, members, sections
-from podusv_cli.scenario.fields import limits
+from podusv_cli.scenario.keys import limits, members, sections
 from podusv_cli.scenario.load import HEADING, load_resolved, load_text, resolved_yaml, values
 from podusv_cli.scenario.model import LABEL, Scenario
 from podusv_cli.scenario.yaml_text import read
@@ -59,7 +58,7 @@ def contents(annotation: Any, found: dict[str, Any]) -> st.SearchStrategy[Any]:
 def lists(annotation: Any, found: dict[str, Any]) -> st.SearchStrategy[Any]:
     parts = get_args(annotation)
     if parts[-1] is Ellipsis:
-        return st.lists(contents(inside(annotation, 0), found), max_size=4).map(tuple)
+        return st.lists(contents(parts[0], found), max_size=4).map(tuple)
     return st.tuples(*(contents(part, found) for part in parts))
 
 

@@ -39,7 +39,7 @@ def changes_in_words(changes: Mapping[str, Change]) -> str:
 
 def change_in_words(key: str, change: Change) -> str:
     """`a 1 -> 2`, with - for no value."""
-    from podusv_cli.scenario.words import as_written
+    from podusv_cli.scenario.phrases import as_written
 
     one, other = ("-" if value is None else as_written(value) for value in change)
     return f"{key} {one} -> {other}"

@@ -53,7 +53,7 @@ def _explain(loaded: Loaded) -> None:
     from podusv_cli.findings.gains import conditions
     from podusv_cli.findings.underactuation import argument
     from podusv_cli.scenario.load import values
-    from podusv_cli.scenario.words import as_written
+    from podusv_cli.scenario.phrases import as_written
 
     echo_line(argument(loaded.scenario))
     for line in conditions(loaded.scenario):

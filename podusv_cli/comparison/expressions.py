@@ -27,7 +27,7 @@ from podusv_cli.comparison.curves import REDUCERS, CannotTell, Curve, Quantity, 
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.signal import Signal
 from podusv_cli.metrics.table import METRICS
-from podusv_cli.scenario.words import unknown
+from podusv_cli.scenario.phrases import unknown
 from podusv_cli.theory.derived import DERIVED
 
 LONGEST = 500  # characters of an expression

@@ -14,7 +14,7 @@ from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.findings.reference import Reference, reference
 from podusv_cli.paths.base import TARGET
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.words import unknown
+from podusv_cli.scenario.phrases import unknown
 
 # A finding may stand beside the component that it is about.
 ROOMS = ("findings", "paths", "disturbances", "actuators", "controllers")

@@ -1,4 +1,4 @@
-"""What every key of a scenario means, read from the models, and what every signal means."""
+"""What every key, kind, signal and preset means, in words."""
 
 from __future__ import annotations
 
@@ -8,14 +8,13 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 from podusv_cli.core import registry
-from podusv_cli.core.component import Component, unit_of
+from podusv_cli.core.component import Component
 from podusv_cli.core.errors import PodusvError
 from podusv_cli.core.signal import Signal
-from podusv_cli.scenario.annotations import choices, joined, sections
-from podusv_cli.scenario.fields import MISSING, NAME, NUMBER, Key, keys, range_of, type_of
-from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.keys import MISSING, NUMBER, SCENARIO, Key, joined
+from podusv_cli.scenario.phrases import as_written, did_you_mean
 from podusv_cli.scenario.presets import preset_names, preset_text, with_presets
-from podusv_cli.scenario.words import as_written, did_you_mean
+from podusv_cli.scenario.yaml_tree import dotted, route
 
 # What a file may leave out although the model has no default for it, and where it comes from.
 FILLED_IN = {("name",): "the file's name", ("nominal",): "the vessel"}
@@ -51,32 +50,32 @@ EXTENDS = Row(
 )
 
 
-def explain(key: str | None = None, others: Iterable[str] = ()) -> list[Row]:
+def explain(name: str | None = None, others: Iterable[str] = ()) -> list[Row]:
     """Rows for a key, a kind, a section, a signal, a preset or, with None, all sections.
 
     `controller` gives its kinds, `controller.pid` that kind's keys, `controller.k_ze` or just
     `k_ze` one key, and `pid` alone the kind. Raises UnknownKeyError, with what was probably meant;
     `others` are names that are explained elsewhere.
     """
-    if key is None:
-        return [EXTENDS, *_together(entry for entry in _keys() if len(entry.path) == 1)]
-    if key == EXTENDS.key:
+    if name is None:
+        return [EXTENDS, *_rows(SCENARIO.keys.values())]
+    if name == EXTENDS.key:
         return [EXTENDS]
-    place = tuple(NUMBER if step.isdecimal() else step for step in key.split("."))
-    parts = (_signal, _named, _kinds_named, _presets)
-    found = _at(place) or [row for look in parts for row in look(key)]
+    place = tuple(NUMBER if str(step).isdecimal() else step for step in route(name))
+    keys = SCENARIO.follow(place) if place else []
+    named = [key for key in SCENARIO.all() if key.name == name]
+    found = _with_contents(keys) or [*_signals(name), *_with_contents(named), *_presets(name)]
     if not found:
-        raise UnknownKeyError(f"{key}: no such name{did_you_mean(key, [*_names(), *others])}")
+        raise UnknownKeyError(f"{name}: no such name{did_you_mean(name, [*_names(), *others])}")
     return found
 
 
 def kinds() -> dict[str, dict[str, str]]:
     """For every section that has kinds, what each kind is, in a sentence."""
-    parts = {name: sections(field.annotation) for name, field in Scenario.model_fields.items()}
     return {
-        name: {kind: summary(model) for kind, model in found.items()}
-        for name, found in parts.items()
-        if found and "" not in found
+        name: {kind: summary(inner.model) for kind, inner in key.kinds.items()}
+        for name, key in SCENARIO.keys.items()
+        if key.kinds
     }
 
 
@@ -91,78 +90,33 @@ def first_sentence(text: str) -> str:
     return paragraph.partition(". ")[0].removesuffix(".") + "."
 
 
-@cache
-def _keys() -> tuple[Key, ...]:
-    return tuple(keys(Scenario))
-
-
 def _names() -> list[str]:
-    """Everything that can be asked for."""
-    asked = [
-        (e.path, e.route, e.path[-1:], (*e.path[:1], e.kind)[: 1 + bool(e.kind)]) for e in _keys()
-    ]
-    keyed = [".".join(name) for names in asked for name in names]
+    """Every name that can be explained."""
+    places = [place for key in SCENARIO.all() for place in (key.path, key.route, key.route[-1:])]
     presets = [name for _, given in with_presets().values() for name in preset_names(given)]
-    return list(dict.fromkeys([*keyed, *(signal.name for signal in signals()), *presets]))
+    return [*map(dotted, places), *(signal.name for signal in signals()), *presets]
 
 
-def _at(place: tuple[str, ...]) -> list[Row]:
-    """The section, kind or key at a place, and what is in it."""
-    entries = [entry for entry in _keys() if place in (entry.path, entry.route)]
-    kinds = [
-        (kind, part) for e in entries for kind, part in sections(e.field.annotation).items() if kind
-    ]
-    if kinds:
-        rows = {kind: _kind_row((*place, kind), part) for kind, part in kinds}
-        return [*_together(entries), *rows.values()]
-    if not entries:
-        return _of_kind(place)
-    inside = [e for e in _keys() if {e.path[:-1], e.route[:-1]} & {place, *_items(place)}]
-    heads = (replace(row, choices=() if inside else row.choices) for row in _together(entries))
-    return [*heads, *_together(inside)]
-
-
-def _of_kind(place: tuple[str, ...]) -> list[Row]:
-    """One kind of a section and its keys."""
-    own = [entry.route for entry in _keys() if place == entry.route[:-1]]
-    places = {place, *(item for route in own for item in _items(route))}
-    inside = [entry for entry in _keys() if entry.route[:-1] in places]
-    above = [entry for entry in _keys() if place[:-1] in (entry.path, entry.route)]
-    heads = [
-        _kind_row(place, sections(entry.field.annotation)[place[-1]]) for entry in above if inside
-    ]
-    return [
-        *(replace(head, choices=()) for head in heads),
-        *(replace(row, kinds=()) for row in _together(inside)),
-    ]
-
-
-def _named(name: str) -> list[Row]:
-    """Every key whose last word this is, and what is in the items of one that has several."""
-    own = {entry.route for entry in _keys() if entry.path[-1] == name}
-    items = {item for route in own for item in _items(route)}
-    return _together(e for e in _keys() if e.route in own or e.route[:-1] in items)
-
-
-def _kinds_named(name: str) -> list[Row]:
-    """Every kind of this name, and its keys."""
-    parts = {entry.path: sections(entry.field.annotation) for entry in _keys()}
-    return [row for path, kinds in parts.items() if name in kinds for row in _at((*path, name))]
-
-
-def _items(place: tuple[str, ...]) -> tuple[tuple[str, ...], ...]:
-    """Where the keys of a mapping's or a list's items are."""
-    return (*place, NAME), (*place, NUMBER)
+def _with_contents(keys: list[Key]) -> list[Row]:
+    """Keys and kinds, then the keys in them."""
+    inside = [inner for key in keys for inner in (*key.keys.values(), *key.item_keys)]
+    rows = _rows(row for key in inside for row in (key, *key.item_keys))
+    if any(key.is_kind for key in keys):
+        rows = [replace(row, kinds=()) for row in rows]
+    heads = _rows(keys)
+    if rows:  # they follow, so that the heads need not list them
+        heads = [head if head.type == "kinds" else replace(head, choices=()) for head in heads]
+    return [*heads, *rows]
 
 
 @cache
 def signals() -> tuple[Signal, ...]:
     """Every signal that a run of podusv can log or give; a name may have several meanings."""
-    rooms = ("core", "controllers", "actuators", "theory")
-    return tuple(registry.signals(*(f"podusv_cli.{room}" for room in rooms)))
+    packages = ("core", "controllers", "actuators", "theory")
+    return tuple(registry.signals(*(f"podusv_cli.{package}" for package in packages)))
 
 
-def _signal(name: str) -> list[Row]:
+def _signals(name: str) -> list[Row]:
     found = [signal for signal in signals() if signal.name == name]
     return [Row(name, signal.meaning, "signal", signal.unit) for signal in found]
 
@@ -181,48 +135,46 @@ def _presets(name: str) -> list[Row]:
     ]
 
 
-def _together(entries: Iterable[Key]) -> list[Row]:
+def _rows(keys: Iterable[Key]) -> list[Row]:
     """A row for each key, one for all kinds in which it is the same."""
     kinds: dict[Row, list[str]] = {}
-    for entry in entries:
-        kinds.setdefault(_row(entry), []).append(entry.kind)
+    for key in keys:
+        kinds.setdefault(_row(key), []).append("" if key.is_kind else key.kind)
     return [replace(row, kinds=tuple(filter(None, found))) for row, found in kinds.items()]
 
 
-def _kind_row(place: tuple[str, ...], model: type[Component]) -> Row:
-    return Row(".".join(place), summary(model), "keys", choices=tuple(model.model_fields))
+def _row(key: Key) -> Row:
+    if key.is_kind:
+        return Row(dotted(key.route), summary(key.model), "keys", choices=tuple(key.keys))
+    path, meaning = dotted(key.path), _meaning(key)
+    if key.keys:
+        return Row(path, meaning, "kinds" if key.kinds else "keys", choices=tuple(key.keys))
+    choices = _choices(key)
+    kind = joined(choices) if key.name in ("preset", "kind") else key.type_in_words
+    return Row(path, meaning, kind, key.unit, key.range, _default(key), choices)
 
 
-def _row(entry: Key) -> Row:
-    field, name = entry.field, entry.path[-1]
-    key, meaning = ".".join(entry.path), field.description or f"which {entry.path[-2]} it is"
-    parts = sections(field.annotation)
-    if parts:
-        inside = tuple(parts[""].model_fields) if "" in parts else tuple(parts)
-        return Row(key, meaning, "keys" if "" in parts else "kinds", choices=inside)
-    words = _choices(entry)
-    kind = joined(words) if name in ("preset", "kind") else type_of(field)
-    return Row(key, meaning, kind, unit_of(field), range_of(field), _default(entry), words)
+def _meaning(key: Key) -> str:
+    if key.field is None:
+        return f"one of `{dotted(key.path[:-1])}`"
+    return key.field.description or f"which {key.path[-2]} it is"
 
 
-def _choices(entry: Key) -> tuple[str, ...]:
+def _choices(key: Key) -> tuple[str, ...]:
     """The words that a value may be; of a kind, all that its section has."""
-    if entry.path[-1] == "preset":
-        section = entry.path[0].replace("nominal", "vessel")
-        _, presets = with_presets()[".".join(filter(None, (section, entry.kind)))]
-        return preset_names(presets)
-    if entry.path[-1] == "kind":
-        above = (other for other in _keys() if other.path == entry.path[:-1])
-        return tuple(kind for other in above for kind in sections(other.field.annotation))
-    return choices(entry.field.annotation)
+    if key.name == "preset" and key.model.presets:
+        return preset_names(key.model.presets)
+    if key.name == "kind":
+        return tuple(SCENARIO.follow(key.path[:-1])[0].kinds)
+    return key.choices
 
 
-def _default(entry: Key) -> str:
+def _default(key: Key) -> str:
     """What the value is when it is left out, as it would be written."""
-    if entry.path in FILLED_IN:
-        return FILLED_IN[entry.path]
-    if entry.path[0] in FROM_PRESET and entry.path != ("vessel", "preset"):
-        return FROM_PRESET[entry.path[0]]
-    if entry.default is MISSING or entry.path[-1] == "kind":
+    if key.path in FILLED_IN:
+        return FILLED_IN[key.path]
+    if key.path[0] in FROM_PRESET and key.path != ("vessel", "preset"):
+        return FROM_PRESET[str(key.path[0])]
+    if key.default is MISSING or key.name == "kind":
         return "required"
-    return as_written(entry.default)
+    return as_written(key.default)

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import reduce
 
-from podusv_cli.scenario.words import found
+from podusv_cli.scenario.phrases import found
 from podusv_cli.scenario.yaml_text import (
     MAX_CHARACTERS,
     MAX_DEPTH,

@@ -13,8 +13,8 @@ from podusv_cli.core.errors import Finding, ScenarioError, StorageError
 from podusv_cli.scenario.layers import composed
 from podusv_cli.scenario.messages import Check, check
 from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.phrases import found
 from podusv_cli.scenario.presets import complete
-from podusv_cli.scenario.words import found
 from podusv_cli.scenario.yaml_text import read, read_text, resolve
 from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, Route, dotted, find, printable
 

@@ -3,47 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from itertools import chain
-from typing import Any, get_origin
+from typing import Any
 
 from pydantic import ValidationError
-from pydantic.fields import FieldInfo
 
-from podusv_cli.core.component import Component
-from podusv_cli.scenario import words
-from podusv_cli.scenario.annotations import (
-    choices,
-    inside,
-    is_component,
-    joined,
-    members,
-    noun,
-    sections,
-)
-from podusv_cli.scenario.fields import NAME, NUMBER, keys, wanted
+from podusv_cli.scenario.keys import NAME, NUMBER, SCENARIO, Key, joined
 from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.phrases import did_you_mean, folded, found, hint, unknown
 from podusv_cli.scenario.yaml_tree import Fault, Node, Route, dotted, follow, plain, route
 
 MOST_PLACES = 4  # of a key, in a message
-
-
-@dataclass(frozen=True)
-class Spot:
-    """Where a complaint points: the route without kinds and union members, and the type there.
-
-    `field` is the one at the end of the route, None at the item of a list or an unknown key.
-    """
-
-    route: Route
-    annotation: Any
-    field: FieldInfo | None = None
-
-    @property
-    def must_be(self) -> str:
-        """What is wanted there."""
-        return wanted(self.field) if self.field else noun(self.annotation)
-
 
 Check = Callable[[Scenario], list[tuple[str, str]]]  # keys, and what is wrong with them
 
@@ -51,7 +21,7 @@ Check = Callable[[Scenario], list[tuple[str, str]]]  # keys, and what is wrong w
 def check(root: Node, faults: list[Fault], more: Sequence[Check] = ()) -> Scenario | None:
     """The scenario of a complete tree, or None with every fault appended to `faults`."""
     try:
-        scenario = Scenario.model_validate(filled(Scenario, plain(root)))
+        scenario = Scenario.model_validate(with_defaults(SCENARIO, plain(root)))
     except ValidationError as error:
         faults.extend(dict.fromkeys(_faults(root, error)))
         return None
@@ -60,36 +30,27 @@ def check(root: Node, faults: list[Fault], more: Sequence[Check] = ()) -> Scenar
     return scenario
 
 
-def filled(annotation: Any, data: Any, whole: Any = None) -> Any:
-    """The data over the values of `whole`, which is what a section is when it is left out.
+def with_defaults(key: Key | None, data: Any) -> Any:
+    """The data over the default of its section.
 
     Otherwise one key given under `disturbance.b_u` would silently set the others to zero.
     """
     if isinstance(data, tuple):
-        return tuple(filled(inside(annotation, i), item) for i, item in enumerate(data))
-    if not isinstance(data, dict):
+        return tuple(with_defaults(key and key.item(i), item) for i, item in enumerate(data))
+    if not isinstance(data, dict) or key is None:
         return data
-    parts = {"": annotation} if is_component(annotation) else sections(annotation)
-    part = parts.get("") or parts.get(str(data.get("kind")))
-    if not part:
-        return {name: filled(inside(annotation, name), entry) for name, entry in data.items()}
-    under = whole if isinstance(whole, part) else None
-    fields = part.model_fields
-    return dict(under or {}) | {
-        name: filled(
-            fields[name].annotation, entry, getattr(under, name) if under else fields[name].default
-        )
-        if name in fields
-        else entry
-        for name, entry in data.items()
-    }
+    section = key.kinds.get(str(data.get("kind")), key)
+    if not section.section:
+        return {name: with_defaults(key.item(name), entry) for name, entry in data.items()}
+    given = {n: with_defaults(section.keys.get(n), entry) for n, entry in data.items()}
+    return dict(key.default) | given if isinstance(key.default, section.section) else given
 
 
 def _faults(root: Node, error: ValidationError) -> Iterator[Fault]:
     for complaint in error.errors(include_url=False):
-        spot = _spot(complaint["loc"])
-        if not _copied(root, spot.route):
-            yield from SENTENCES.get(complaint["type"], _wrong)(root, spot, complaint)
+        key = _key(complaint["loc"])
+        if not _copied(root, key.path):
+            yield from SENTENCES.get(complaint["type"], _wrong)(root, key, complaint)
 
 
 def _copied(root: Node, route: Route) -> bool:
@@ -100,116 +61,92 @@ def _copied(root: Node, route: Route) -> bool:
     return follow(root, route)[-1] is follow(root, source)[-1]
 
 
-def _model(annotation: Any, kind: object = None) -> type[Component] | None:
-    """The class whose keys a mapping has; of several, the one that `kind` tells."""
-    if is_component(annotation):
-        return annotation
-    return sections(annotation).get("" if kind is None else str(kind))
-
-
-def _spot(location: tuple[int | str, ...]) -> Spot:
-    """Follow pydantic's location through the models; kinds and union members do not count."""
-    spot = Spot((), Scenario)
+def _key(location: Route) -> Key:
+    """The key at pydantic's location, as far as it is known; members of unions do not count."""
+    key = SCENARIO
     for step in location:
-        model = _model(spot.annotation)
-        inner = inside(spot.annotation, step)
-        if model:
-            field = model.model_fields.get(str(step))
-            spot = Spot((*spot.route, step), field and field.annotation, field)
-        elif kind := _model(spot.annotation, step):
-            spot = Spot(spot.route, kind, spot.field)
-        elif inner is not None:
-            spot = Spot((*spot.route, step), inner)
-    return spot
+        key = next(iter(key.inside(step)), key)
+    return key
 
 
-def _told(root: Node, route: Route) -> bool:
-    """Whether a fault that was told before explains that something is missing here."""
+def _explained(root: Node, route: Route) -> bool:
+    """Whether an earlier fault explains that something is missing here."""
     return any(node.faulty for node in follow(root, route))
 
 
-def _unknown_key(root: Node, spot: Spot, complaint: Any) -> Iterator[Fault]:
-    *above, key = complaint["loc"]
-    model = _model(_spot(tuple(above)).annotation)
-    node, known = follow(root, spot.route)[-1], tuple(model.model_fields if model else ())
-    hint = _elsewhere(spot.route, str(key)) or words.did_you_mean(str(key), known)
-    text = f"unknown key{hint} (allowed: {', '.join(known)})"
-    yield Fault(node.key_mark or node.mark, dotted(spot.route), text)
+def _unknown_key(root: Node, section: Key, complaint: Any) -> Iterator[Fault]:
+    name = str(complaint["loc"][-1])
+    route = (*section.path, name)
+    node = follow(root, route)[-1]
+    hint = _elsewhere(section, name) or did_you_mean(name, section.keys)
+    text = f"unknown key{hint} (allowed: {', '.join(section.keys)})"
+    yield Fault(node.key_mark or node.mark, dotted(route), text)
 
 
-def _elsewhere(route: Route, key: str) -> str:
+def _elsewhere(section: Key, name: str) -> str:
     """`; K_Pu belongs to kind pid`, or at the top `; did you mean 'controller.K_Pu'?`."""
-    if len(route) > 1:
-        above = _spot(tuple(route[:-1]))
-        return _home(key, sections(above.annotation)) if above.route == route[:-1] else ""
-    alike = (k.path for k in keys(Scenario) if words.folded(k.path[-1]) == words.folded(key))
-    places = dict.fromkeys(".".join(path) for path in alike if {NAME, NUMBER}.isdisjoint(path))
+    if section.path:
+        return _home(name, SCENARIO.follow(section.path)[0].kinds)
+    alike = (key.path for key in SCENARIO.all() if folded(str(key.path[-1])) == folded(name))
+    places = dict.fromkeys(dotted(path) for path in alike if {NAME, NUMBER}.isdisjoint(path))
     return f"; did you mean {joined([repr(p) for p in places][:MOST_PLACES])}?" if places else ""
 
 
-def _home(key: str, parts: dict[str, type[Component]]) -> str:
+def _home(name: str, kinds: dict[str, Key]) -> str:
     """Which kinds of a section have a key that not all of them have."""
-    kinds = [kind for kind, part in parts.items() if kind and key in part.model_fields]
-    return f"; {key} belongs to kind {joined(kinds)}" if 0 < len(kinds) < len(parts) else ""
+    homes = [kind for kind, section in kinds.items() if name in section.keys]
+    return f"; {name} belongs to kind {joined(homes)}" if 0 < len(homes) < len(kinds) else ""
 
 
-def _missing(root: Node, spot: Spot, complaint: Any) -> Iterator[Fault]:
-    if isinstance(spot.route[-1], int):
-        yield from _wrong(root, _spot(complaint["loc"][:-1]), complaint)
-    elif not _told(root, spot.route):
-        mark = follow(root, spot.route)[-1].mark
-        yield Fault(mark, dotted(spot.route), f"missing; must be {spot.must_be}")
+def _missing(root: Node, key: Key, complaint: Any) -> Iterator[Fault]:
+    if isinstance(key.path[-1], int):
+        yield from _wrong(root, _key(complaint["loc"][:-1]), complaint)
+    elif not _explained(root, key.path):
+        mark = follow(root, key.path)[-1].mark
+        yield Fault(mark, dotted(key.path), f"missing; must be {key.wanted}")
 
 
-def _no_kind(root: Node, spot: Spot, complaint: Any) -> Iterator[Fault]:
-    route = (*spot.route, "kind")
-    if not _told(root, route):
-        kinds = ", ".join(sections(spot.annotation))
-        node, parts = follow(root, spot.route)[-1], sections(spot.annotation)
-        homes = filter(None, (_home(key, parts) for key in node.mapping))
-        yield Fault(node.mark, dotted(route), f"missing (allowed: {kinds}){next(homes, '')}")
+def _no_kind(root: Node, section: Key, complaint: Any) -> Iterator[Fault]:
+    route = (*section.path, "kind")
+    if not _explained(root, route):
+        node = follow(root, section.path)[-1]
+        homes = filter(None, (_home(name, section.kinds) for name in node.mapping))
+        text = f"missing (allowed: {', '.join(section.kinds)}){next(homes, '')}"
+        yield Fault(node.mark, dotted(route), text)
 
 
-def _unknown_kind(root: Node, spot: Spot, complaint: Any) -> Iterator[Fault]:
-    route = (*spot.route, "kind")
+def _unknown_kind(root: Node, section: Key, complaint: Any) -> Iterator[Fault]:
+    route = (*section.path, "kind")
     node = follow(root, route)[-1]
-    what = f"kind {words.found(node.content, node.text)}"
-    text = words.unknown(what, str(node.content), sections(spot.annotation))
-    yield Fault(node.mark, dotted(route), text)
+    what = f"kind {found(node.content, node.text)}"
+    yield Fault(node.mark, dotted(route), unknown(what, str(node.content), section.kinds))
 
 
-def _impossible(root: Node, spot: Spot, complaint: Any) -> Iterator[Fault]:
-    if not _told(root, spot.route):
-        mark = follow(root, spot.route)[-1].mark
-        yield Fault(mark, dotted(spot.route), str(complaint["ctx"]["error"]))
+def _impossible(root: Node, key: Key, complaint: Any) -> Iterator[Fault]:
+    if not _explained(root, key.path):
+        mark = follow(root, key.path)[-1].mark
+        yield Fault(mark, dotted(key.path), str(complaint["ctx"]["error"]))
 
 
-def _wrong(root: Node, spot: Spot, complaint: Any) -> Iterator[Fault]:
-    node = follow(root, spot.route)[-1]
-    what = words.found(node.content, node.text)
-    text = f"must be {spot.must_be}, found {what}{_hint(node, spot.annotation)}"
-    yield Fault(node.mark, dotted(spot.route), text)
+def _wrong(root: Node, key: Key, complaint: Any) -> Iterator[Fault]:
+    node = follow(root, key.path)[-1]
+    what = found(node.content, node.text)
+    yield Fault(
+        node.mark, dotted(key.path), f"must be {key.wanted}, found {what}{_hint(node, key)}"
+    )
 
 
-def _hint(node: Node, annotation: Any) -> str:
+def _hint(node: Node, key: Key) -> str:
     """How the value should have been written, where its looks tell."""
-    types = [get_origin(member) or member for member in members(annotation)]
-    if isinstance(node.content, float) and node.content % 1 == 0 and int in types:
+    if isinstance(node.content, float) and node.content % 1 == 0 and int in key.types:
         return f"; write {int(node.content)}"
     if not isinstance(node.content, str):
-        return words.hint(node.text, words.TRUTH_HINTS) if bool in types else ""
-    if node.content and node.content in sections(annotation):
+        return hint(node.text, (bool,) if bool in key.types else ())
+    if node.content and node.content in key.kinds:
         return f"; write {{kind: {node.content}}}"
-    said = (words.hint(node.content, hints) for kind, hints in HINTS.items() if kind in types)
-    return next(filter(None, said), "") or words.did_you_mean(node.content, choices(annotation))
+    return hint(node.content, key.types) or did_you_mean(node.content, key.choices)
 
 
-HINTS = {
-    float: words.NUMBER_HINTS,
-    int: words.NUMBER_HINTS,
-    bool: words.TRUTH_HINTS,
-    tuple: words.LIST_HINTS,
-}
 SENTENCES = {
     "extra_forbidden": _unknown_key,
     "missing": _missing,

@@ -33,6 +33,10 @@ else:
 
 Misfits = Iterator[tuple[str, str]]  # keys, and what is wrong with them
 MOST_INSTANTS = 2**53  # that can be told apart
+NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,79}$"
+NAME_IN_WORDS = (
+    "of letters, digits, '_', '.' and '-', starting with a letter or digit, at most 80 long"
+)
 LABEL = re.compile(r"[a-z][a-z0-9_]{0,29}")  # usable as a name in claims and as a folder
 LABEL_IN_WORDS = "a name here is at most 30 of a-z, 0-9 and _, starting with a letter"
 CLAIM = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,29}")
@@ -121,9 +125,7 @@ class Claim(Component):
 class Scenario(Component):
     """A vessel, its surroundings, its task, its controller, and how the run is done."""
 
-    name: str = value(
-        ..., "", "what the results are filed under", pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,79}$"
-    )
+    name: str = value(..., "", "what the results are filed under", pattern=NAME)
     description: str = value("", "", "what the scenario is for, in a sentence")
     vessel: Vessel = value(..., "", "the vessel that is simulated")
     nominal: Vessel = value(

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
 from podusv_cli.core.component import Component, Presets
-from podusv_cli.scenario.annotations import sections
-from podusv_cli.scenario.fields import PATTERNS_IN_WORDS, limits
-from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.words import found, quoted, unknown
+from podusv_cli.scenario.keys import SCENARIO
+from podusv_cli.scenario.model import NAME, NAME_IN_WORDS
+from podusv_cli.scenario.phrases import found, quoted, unknown
 from podusv_cli.scenario.yaml_text import MAX_NODES, read, read_text, resolve
-from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, merge, overlay
+from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, dotted, merge, overlay
 from podusv_cli.vessels.vessel import COEFFICIENTS, VESSELS, Vessel
 
 MAX_POINTS = MAX_NODES // 4  # a point is three values, and the resolved scenario has to be readable
@@ -45,12 +44,11 @@ def preset_text(presets: Presets, name: str, key: str) -> str:
 
 def with_presets() -> dict[str, tuple[type[Component], Presets]]:
     """Every class of components that has presets, and these, by `section.kind`."""
-    parts = {name: sections(field.annotation) for name, field in Scenario.model_fields.items()}
+    sections = [inner for key in SCENARIO.keys.values() for inner in (key, *key.kinds.values())]
     return {
-        ".".join(filter(None, (name, kind))): (model, model.presets)
-        for name, models in parts.items()
-        for kind, model in models.items()
-        if model.presets and name != "nominal"
+        dotted(key.route): (key.section, key.section.presets)
+        for key in sections
+        if key.section and key.section.presets and key.path != ("nominal",)
     }
 
 
@@ -63,13 +61,13 @@ def complete(root: Node, faults: list[Fault]) -> Node:
 
 def _sections(root: Node, faults: list[Fault]) -> Node:
     """Every section with kinds, with what its kind takes from presets and from files of rows."""
-    for name, field in Scenario.model_fields.items():
+    for name, key in SCENARIO.keys.items():
         given = root.mapping.get(name)
-        model = sections(field.annotation).get(str(given.get("kind"))) if given else None
-        if given and model and given.mapping:
-            if model.presets:
-                given = _over_preset(given, name, model.presets, faults)
-            for file, rows in model.rows_of.items():
+        kind = key.kinds.get(str(given.get("kind"))) if given else None
+        if given and kind and given.mapping:
+            if kind.model.presets:
+                given = _over_preset(given, name, kind.model.presets, faults)
+            for file, rows in kind.model.rows_of.items():
                 given = _rows_in(given, name, (file, rows), faults)
             root = root.with_entry(name, given)
     return root
@@ -90,10 +88,9 @@ def _name(root: Node, faults: list[Fault]) -> Node:
     if "name" in root.mapping:
         return root
     stem = Path(root.mark.source).stem
-    pattern = limits(Scenario.model_fields["name"])["pattern"]
-    usable = re.fullmatch(pattern, stem)
+    usable = re.fullmatch(NAME, stem)
     if not usable:
-        text = f"cannot be the file's name {quoted(stem)}; give one {PATTERNS_IN_WORDS[pattern]}"
+        text = f"cannot be the file's name {quoted(stem)}; give one {NAME_IN_WORDS}"
         faults.append(Fault(root.mark, "name", text))
     return root.with_entry("name", Node(stem if usable else None, root.mark, faulty=not usable))
 
@@ -127,16 +124,8 @@ def _from_preset(given: Node, key: str, faults: list[Fault]) -> Node:
     preset = given.mapping.get("preset")
     if preset is None or preset.content == "":
         return _whole(given, key, faults)
-    if preset.content in preset_names(VESSELS):
-        base = preset_file(VESSELS, str(preset.content), faults)
-        assert base
-        return _sourced(merge(base, given))
-    if not preset.faulty:
-        what = f"vessel {found(preset.content, preset.text)}"
-        text = unknown(what, str(preset.content), preset_names(VESSELS))
-        faults.append(Fault(preset.mark, f"{key}.preset", text))
-        given = given.with_entry("preset", replace(preset, content=None, faulty=True))
-    return replace(given, faulty=True)
+    vessel = _over_preset(given, key, VESSELS, faults)
+    return replace(vessel, faulty=True) if preset.faulty else _sourced(vessel)
 
 
 def _whole(given: Node, key: str, faults: list[Fault]) -> Node:
@@ -212,16 +201,15 @@ def _controllers(root: Node, faults: list[Fault]) -> Node:
     base, several = root.mapping.get("controller"), root.mapping.get("controllers")
     if not base or not several:
         return root
-    models = sections(Scenario.model_fields["controller"].annotation)
-    filled = {name: _like(base, own, models) for name, own in several.mapping.items()}
+    filled = {name: _like(base, own) for name, own in several.mapping.items()}
     return root.with_entry("controllers", replace(several, content=filled))
 
 
-def _like(base: Node, own: Node, models: Mapping[str, type[Component]]) -> Node:
-    model = models.get(str(own.get("kind") or base.get("kind")))
-    if not model or not isinstance(own.content, dict):
+def _like(base: Node, own: Node) -> Node:
+    law = SCENARIO.keys["controller"].kinds.get(str(own.get("kind") or base.get("kind")))
+    if not law or not isinstance(own.content, dict):
         return own
-    shared = {key: part for key, part in base.mapping.items() if key in model.model_fields}
+    shared = {key: part for key, part in base.mapping.items() if key in law.keys}
     return overlay(replace(base, content=shared), own, lambda *_: False)
 
 

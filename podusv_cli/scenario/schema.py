@@ -8,7 +8,7 @@ from typing import Any
 
 from podusv_cli.core.component import Component
 from podusv_cli.scenario.explain import EXTENDS
-from podusv_cli.scenario.fields import keys
+from podusv_cli.scenario.keys import SCENARIO
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.presets import preset_names, with_presets
 
@@ -48,13 +48,8 @@ def schema_text(codes: Sequence[str]) -> str:
 
 def _filled_from_outside() -> set[str]:
     """Classes whose fields take their values from a preset or differ with where they are used."""
-    used = [(entry, entry.default) for entry in keys(Scenario)]
-    varied = {type(whole).__name__ for _, whole in used if _differs(whole)}
-    return {"Vessel"} | varied
-
-
-def _differs(whole: Any) -> bool:
-    return isinstance(whole, Component) and whole != type(whole)()
+    wholes = [key.default for key in SCENARIO.all() if isinstance(key.default, Component)]
+    return {"Vessel"} | {type(whole).__name__ for whole in wholes if whole != type(whole)()}
 
 
 def _converted(schema: dict[str, Any]) -> dict[str, Any]:

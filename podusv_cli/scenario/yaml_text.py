@@ -17,7 +17,7 @@ from typing import Any
 
 import yaml
 
-from podusv_cli.scenario.words import found, quoted
+from podusv_cli.scenario.phrases import found, quoted
 from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, Route, dotted
 
 MAX_BYTES = MAX_CHARACTERS = 1_000_000

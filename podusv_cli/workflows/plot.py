@@ -18,7 +18,7 @@ from podusv_cli.figures.animation import FILE, animate
 from podusv_cli.figures.drawing import FIGURES, draw_in_parallel, dressed
 from podusv_cli.figures.style import FORMATS, Shown
 from podusv_cli.process.extras import Extras, Missing
-from podusv_cli.scenario.words import unknown
+from podusv_cli.scenario.phrases import unknown
 from podusv_cli.storage import files, manifest
 from podusv_cli.workflows.members import Member, from_folder
 

@@ -1,4 +1,4 @@
-"""Words for messages: what was found, what was probably meant, how to write it instead."""
+"""Parts of messages: what was found, what was probably meant, how to write it instead."""
 
 from __future__ import annotations
 
@@ -61,15 +61,17 @@ NUMBER_HINTS = (
     (r"[-+]?\.?(nan|inf|infinity)", "numbers must be finite"),
     (r"[-+]?\d\S*\s*[a-zA-Z°%][\w/^°%]*", "convert it to that unit and leave the unit out"),
 )
-TRUTH_HINTS = (
-    (r"yes|on|y|true|1", "write true"),
-    (r"no|off|n|false|0", "write false"),
-)
-LIST_HINTS = ((r"[^,]+(,[^,]+)+", "write a list as [1, 2, 3]"),)
+HINTS: dict[type, tuple[tuple[str, str], ...]] = {
+    float: NUMBER_HINTS,
+    int: NUMBER_HINTS,
+    bool: (("yes|on|y|true|1", "write true"), ("no|off|n|false|0", "write false")),
+    tuple: (("[^,]+(,[^,]+)+", "write a list as [1, 2, 3]"),),
+}
 
 
-def hint(text: str, hints: tuple[tuple[str, str], ...]) -> str:
-    """`; leave out the unit`, or nothing where no hint fits."""
-    fitting = (said for form, said in hints if re.fullmatch(form, text.strip(), re.IGNORECASE))
-    said = next(fitting, "")
-    return f"; {said}" if said else ""
+def hint(text: str, types: Iterable[type]) -> str:
+    """`; leave out the quotes`, or nothing where the text looks like none of the types."""
+    hints = (hint for kind, hints in HINTS.items() if kind in types for hint in hints)
+    fitting = (advice for form, advice in hints if re.fullmatch(form, text.strip(), re.IGNORECASE))
+    advice = next(fitting, "")
+    return f"; {advice}" if advice else ""

@@ -1,0 +1,236 @@
+"""The keys of a scenario as its models describe them: type, unit, range, default, meaning.
+
+Messages, `explain`, the JSON schema and the filling of presets all read the models here.
+"""
+
+from __future__ import annotations
+
+import types
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Annotated, Any, Literal, TypeGuard, Union, get_args, get_origin
+
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
+
+from podusv_cli.core.component import Component, unit_of
+from podusv_cli.scenario import model
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.yaml_tree import Route
+
+NAME, NUMBER = "NAME", "NUMBER"  # stand for the names in a mapping, the positions in a list
+MISSING = PydanticUndefined  # the default of a field that has none
+BOUNDS = {
+    "gt": (">", "above"), "ge": (">=", "not below"), "lt": ("<", "below"), "le": ("<=", "not above")
+}  # fmt: skip
+PATTERNS_IN_WORDS = {model.NAME: model.NAME_IN_WORDS}
+NOUNS: dict[Any, tuple[str, str]] = {
+    float: ("a number", "numbers"),
+    int: ("a whole number", "whole numbers"),
+    bool: ("true or false", "true or false"),
+    str: ("text", "texts"),
+    type(None): ("null", "null"),
+}
+SHOWN_KEYS = 6
+
+
+@dataclass(frozen=True)
+class Key:
+    """A key of a scenario, a kind of a section, an item of a list or an entry of a mapping.
+
+    `path` is written as in files; `route` also has the kinds of the sections on the way, the
+    innermost of which is `kind`. A kind, an item and an entry have no `field`. `default` is that
+    of the section in which the key stands. `model` is the class that has the key.
+    """
+
+    path: Route
+    annotation: Any
+    field: FieldInfo | None = None
+    default: Any = MISSING
+    route: Route = ()
+    kind: str = ""
+    model: type[Component] = Scenario
+
+    @property
+    def name(self) -> str:
+        """The last word of the route."""
+        return str(self.route[-1])
+
+    @property
+    def is_kind(self) -> bool:
+        """Whether this is a kind of a section, and no key."""
+        return self.field is None and bool(self.kind) and self.name == self.kind
+
+    @property
+    def unit(self) -> str:
+        """The unit of the value, "" where it has none."""
+        return unit_of(self.field) if self.field and not self.keys else ""
+
+    @property
+    def range(self) -> str:
+        """The range in symbols: `> 0, <= 1`."""
+        return ", ".join(f"{symbol} {limit:g}" for symbol, _, limit in self._bounds)
+
+    @property
+    def type_in_words(self) -> str:
+        """What the value is: `a list of 3 numbers`."""
+        pattern = PATTERNS_IN_WORDS.get(limits(self.field).get("pattern", ""), "")
+        return f"{noun(self.annotation)} {pattern}".rstrip()
+
+    @property
+    def wanted(self) -> str:
+        """What the value must be, with range and unit: `a number above 0 [s]`."""
+        ranges = " and ".join(f"{words} {limit:g}" for _, words, limit in self._bounds)
+        unit = f"[{self.unit}]" if self.unit else ""
+        return " ".join(filter(None, (self.type_in_words, ranges, unit)))
+
+    @property
+    def _bounds(self) -> list[tuple[str, str, float]]:
+        found = limits(self.field)
+        return [(*BOUNDS[name], found[name]) for name in BOUNDS if name in found]
+
+    @property
+    def types(self) -> tuple[Any, ...]:
+        """The types that the value may have: float, tuple, ..."""
+        return tuple(get_origin(member) or member for member in members(self.annotation))
+
+    @property
+    def choices(self) -> tuple[str, ...]:
+        """The words that the value may be."""
+        literals = [one for one in members(self.annotation) if get_origin(one) is Literal]
+        return tuple(str(word) for literal in literals for word in get_args(literal))
+
+    @property
+    def section(self) -> type[Component] | None:
+        """The class of this section; None where its kind is open, and for a plain value."""
+        parts = sections(self.annotation)
+        return parts.get("") or (self.annotation if _is_component(self.annotation) else None)
+
+    @cached_property
+    def kinds(self) -> dict[str, Key]:
+        """The kinds of this section."""
+        parts = {} if self.section else sections(self.annotation)
+        return {
+            kind: replace(
+                self, annotation=part, field=None, route=(*self.route, kind), kind=kind, model=part
+            )
+            for kind, part in parts.items()
+        }
+
+    @cached_property
+    def keys(self) -> dict[str, Key]:
+        """What is in this section: its keys, or its kinds."""
+        fields = self.section.model_fields.items() if self.section else ()
+        return {name: self._key(name, field) for name, field in fields} or self.kinds
+
+    def _key(self, name: str, field: FieldInfo) -> Key:
+        model = self.section or self.model
+        # A section that is left out is its default, whatever its own class would start with.
+        given = isinstance(self.default, model)
+        default = getattr(self.default, name) if given else field.default
+        path, route = (*self.path, name), (*self.route, name)
+        return Key(path, field.annotation, field, default, route, self.kind, model)
+
+    def item(self, step: str | int) -> Key | None:
+        """The item of a list at a position, or the entry of a mapping of names."""
+        is_position = isinstance(step, int) or step == NUMBER
+        for member in members(self.annotation):
+            parts, types = get_args(member), None
+            if get_origin(member) is tuple and is_position:
+                types = parts[:1] if parts[-1] is Ellipsis or step == NUMBER else parts[int(step) :]
+            if get_origin(member) is dict and not is_position:
+                types = parts[1:]
+            if types:
+                path, route = (*self.path, step), (*self.route, step)
+                return Key(path, types[0], route=route, kind=self.kind, model=self.model)
+        return None
+
+    @property
+    def item_keys(self) -> list[Key]:
+        """The keys that all items of a list, or all entries of a mapping, have in common."""
+        items = [self.item(step) for step in (NAME, NUMBER)]
+        return [key for item in items if item and item.section for key in item.keys.values()]
+
+    def follow(self, steps: Route) -> list[Key]:
+        """Where the steps lead; a kind may be left out, and then all that fit are found."""
+        found = [self]
+        for step in steps:
+            found = [inner for key in found for inner in key.inside(step)]
+        return found
+
+    def inside(self, step: str | int) -> list[Key]:
+        """The kind, the item, or the keys (of several kinds) that a step leads to."""
+        inner = (self, *self.kinds.values())
+        found = [key.keys.get(str(step)) or key.item(step) for key in inner]
+        return [key for key in found if key]
+
+    def all(self) -> Iterator[Key]:
+        """Every key and kind below this one, sections before what is in them."""
+        for key in (*self.keys.values(), *self.item_keys):
+            yield key
+            yield from key.all()
+
+
+def members(annotation: Any) -> tuple[Any, ...]:
+    """The members of a union; of any other type, itself."""
+    if get_origin(annotation) is Annotated:
+        return members(get_args(annotation)[0])
+    if get_origin(annotation) in (Union, types.UnionType):
+        return tuple(member for part in get_args(annotation) for member in members(part))
+    return (annotation,)
+
+
+def limits(field: FieldInfo | None) -> dict[str, Any]:
+    """The field's limits by pydantic's names: gt, ge, lt, le, pattern."""
+    names, metadata = (*BOUNDS, "pattern"), field.metadata if field else ()
+    found = ((name, getattr(data, name, None)) for data in metadata for name in names)
+    return {name: limit for name, limit in found if limit is not None}
+
+
+def sections(annotation: Any) -> dict[str, type[Component]]:
+    """The component classes that a value may be of, by kind; "" is a class without kinds."""
+    return {_kind(member): member for member in members(annotation) if _is_component(member)}
+
+
+def _is_component(annotation: Any) -> TypeGuard[type[Component]]:
+    return isinstance(annotation, type) and issubclass(annotation, Component)
+
+
+def _kind(model: type[Component]) -> str:
+    return str(model.model_fields["kind"].default) if "kind" in model.model_fields else ""
+
+
+def joined(words: tuple[str, ...] | list[str]) -> str:
+    """`a, b or c`."""
+    return " or ".join(part for part in (", ".join(words[:-1]), words[-1]) if part)
+
+
+def noun(annotation: Any, *, plural: bool = False) -> str:
+    """What a value is: `a list of 3 numbers`."""
+    parts = sections(annotation)
+    others = [_one(member, plural) for member in members(annotation) if not _is_component(member)]
+    return joined([*([_mapping(parts, plural)] if parts else []), *others])
+
+
+def _mapping(parts: dict[str, type[Component]], plural: bool) -> str:
+    mapping = "mappings of keys" if plural else "a mapping of keys"
+    if "" not in parts:
+        return f"{mapping} with kind {joined(list(parts))}"
+    names = list(parts[""].model_fields)
+    return f"{mapping}: " + ", ".join(names[:SHOWN_KEYS] + ["..."] * (len(names) > SHOWN_KEYS))
+
+
+def _one(annotation: Any, plural: bool) -> str:
+    parts = get_args(annotation)
+    if get_origin(annotation) is Literal:
+        return joined([str(word) for word in parts])
+    if get_origin(annotation) is tuple:
+        count = "" if parts[-1] is Ellipsis else f"{len(parts)} "
+        return f"{'lists' if plural else 'a list'} of {count}{noun(parts[0], plural=True)}"
+    if get_origin(annotation) is dict:
+        return f"a mapping of names to {noun(parts[1], plural=True)}"
+    return NOUNS[annotation][plural]
+
+
+SCENARIO = Key((), Scenario)
