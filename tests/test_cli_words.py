@@ -19,7 +19,7 @@ import podusv_cli
 from podusv_cli import cli
 from podusv_cli.cli.exit_codes import PLEASE_REPORT, guarded
 from podusv_cli.core.errors import Finding, ScenarioError, StorageError
-from podusv_cli.findings.finding import notices
+from podusv_cli.findings.finding import finding_kinds
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.presets import preset_names, preset_text, with_presets
 from podusv_cli.scenario.schema import schema_text
@@ -168,7 +168,7 @@ def test_a_preset_is_explained_with_its_source_and_what_it_holds_for(podusv: Com
 
 
 def test_schema_prints_the_schema(podusv: Command) -> None:
-    assert podusv("schema") == (0, schema_text(tuple(notices())), "")
+    assert podusv("schema") == (0, schema_text(tuple(finding_kinds())), "")
 
 
 # --- help and usage

@@ -17,9 +17,9 @@ from findings_samples import CONFIGS, PLAIN, log, scene
 
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.recording import Recording
-from podusv_cli.findings.after import aftermath
-from podusv_cli.findings.finding import notices
-from podusv_cli.findings.preflight import preflight, together
+from podusv_cli.findings.after import postflight
+from podusv_cli.findings.finding import finding_kinds
+from podusv_cli.findings.preflight import merged, preflight
 from podusv_cli.findings.underactuation import argument, input_rank
 from podusv_cli.scenario.load import load
 from podusv_cli.scenario.model import Scenario
@@ -27,7 +27,7 @@ from podusv_cli.scenario.model import Scenario
 
 def told(code: str, *overrides: str) -> list[str]:
     """Texts of that code about the run of a scenario."""
-    found = aftermath(scene(*overrides).alone(), log(*overrides))
+    found = postflight(scene(*overrides).alone(), log(*overrides))
     return [finding.text for finding in found if finding.code == code]
 
 
@@ -40,16 +40,16 @@ def changed(out: Recording, **signals: Any) -> Recording:
 
 def test_findings_come_in_the_order_of_the_scenario_s_sections() -> None:
     sections = [
-        list(Scenario.model_fields).index(n.about.split(".")[0]) for n in notices().values()
+        list(Scenario.model_fields).index(n.about.split(".")[0]) for n in finding_kinds().values()
     ]
     assert sections == sorted(sections)
-    assert {notice.when for notice in notices().values()} == {"before", "after"}
-    assert len(notices()) == 25
+    assert {kind.when for kind in finding_kinds().values()} == {"before", "after"}
+    assert len(finding_kinds()) == 25
 
 
 def test_every_code_is_documented_with_its_meaning() -> None:
     text = (PACKAGE.parent / "docs" / "findings.md").read_text()
-    for code in notices().values():
+    for code in finding_kinds().values():
         assert f"| `{code.name}` | `{code.about}` | {code.meaning}" in text
 
 
@@ -65,7 +65,7 @@ def test_a_run_that_touches_the_singularity_is_told_with_the_time() -> None:
     assert "take a standoff" in text
     assert told("near-target", "controller={kind: pid}", "simulation.duration=60") == []
     held = scene(*touching, "controller.hold_below=0.1").alone()
-    assert "near-target" not in {f.code for f in aftermath(held, out)}
+    assert "near-target" not in {f.code for f in postflight(held, out)}
 
 
 def test_a_heading_across_the_line_of_sight_is_told_with_the_time() -> None:
@@ -73,7 +73,7 @@ def test_a_heading_across_the_line_of_sight_is_told_with_the_time() -> None:
     assert told("crosswise") == []
     psi_e = np.array(quiet["psi_e"])
     psi_e[700:703] = math.pi / 2 - 0.01
-    across = aftermath(scene(), changed(quiet, psi_e=psi_e))
+    across = postflight(scene(), changed(quiet, psi_e=psi_e))
     assert [f.text for f in across if f.code == "crosswise"] == [
         "|cos psi_e| falls below 0.05 from 7 s to 7.02 s; the virtual surge velocity (21) divides "
         "by it"
@@ -116,7 +116,7 @@ def test_long_saturation_is_told_with_its_times() -> None:
 
 def test_nothing_is_told_about_a_run_without_rows() -> None:
     empty = {name: values[:0] for name, values in log().signals.items()}
-    assert aftermath(scene(), Recording("interrupted", "adaptive_neural", empty)) == []
+    assert postflight(scene(), Recording("interrupted", "adaptive_neural", empty)) == []
 
 
 # --- no false alarms
@@ -208,12 +208,12 @@ def test_a_comparison_warns_once_for_all_laws_it_holds_for(podusv: Any) -> None:
 
 def test_findings_that_not_all_runs_share_name_their_runs() -> None:
     shared, some, own = (Finding(code, "actuator", code) for code in ("a", "b", "c"))
-    found = together({"x": [shared, some], "y": [some, shared, own], "z": [shared, own, own]})
+    found = merged({"x": [shared, some], "y": [some, shared, own], "z": [shared, own, own]})
     assert [str(finding) for finding in found] == [
         "warning[a]: actuator: a", "warning[b]: x, y: actuator: b", "warning[c]: y, z: actuator: c",
     ]  # fmt: skip
-    assert together({"x": [shared], "there already": []})[0].runs == ("x",)
-    assert together({"x": [shared]}) == [shared]
+    assert merged({"x": [shared], "there already": []})[0].runs == ("x",)
+    assert merged({"x": [shared]}) == [shared]
 
 
 def transcripts() -> list[tuple[str, list[str]]]:

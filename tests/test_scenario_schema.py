@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 import podusv_cli
-from podusv_cli.findings.finding import notices
+from podusv_cli.findings.finding import finding_kinds
 from podusv_cli.scenario.keys import NAME, NUMBER, SCENARIO, Key, sections
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.presets import preset_names
@@ -17,7 +17,7 @@ from podusv_cli.scenario.schema import json_schema, schema_text
 from podusv_cli.scenario.yaml_tree import dotted
 from podusv_cli.vessels.vessel import VESSELS as SHIPPED
 
-SCHEMA = json_schema(tuple(notices()))
+SCHEMA = json_schema(tuple(finding_kinds()))
 COPY = Path(podusv_cli.__file__).parents[1] / "docs" / "schema.json"
 KEYS = [key for key in SCENARIO.all() if not key.is_kind]
 # Every word of draft-07 that the models need; a new one wants a look at how it is converted.
@@ -127,6 +127,6 @@ def test_defaults_are_there_but_where_they_depend_on_the_place() -> None:
 
 
 def test_the_copy_in_the_documentation_is_up_to_date() -> None:
-    assert COPY.read_text("utf-8") == schema_text(tuple(notices())), (
+    assert COPY.read_text("utf-8") == schema_text(tuple(finding_kinds())), (
         "write it anew: podusv schema > docs/schema.json"
     )

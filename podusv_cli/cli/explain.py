@@ -27,18 +27,18 @@ def explain(
 
     Without a key: the sections of a scenario.
     """
-    from podusv_cli.findings.finding import notices
+    from podusv_cli.findings.finding import finding_kinds
     from podusv_cli.metrics.table import METRICS
     from podusv_cli.scenario.explain import explain as rows
 
-    if key in notices():
-        notice = notices()[key]
-        echo_entry(key, notice.meaning, facts=f"finding {notice.when} a run, {notice.about}")
+    if key in finding_kinds():
+        kind = finding_kinds()[key]
+        echo_entry(key, kind.meaning, facts=f"finding {kind.when} a run, {kind.about}")
         return
     if key in METRICS:
         echo_entry(key, METRICS[key].meaning, facts=f"metric [{METRICS[key].unit}]")
         return
-    for row in rows(key, (*notices(), *METRICS)):
+    for row in rows(key, (*finding_kinds(), *METRICS)):
         _echo(row)
 
 

@@ -10,7 +10,7 @@ def list() -> None:
 
     `podusv explain NAME` tells more about each.
     """
-    from podusv_cli.findings.finding import notices
+    from podusv_cli.findings.finding import finding_kinds
     from podusv_cli.metrics.table import METRICS
     from podusv_cli.scenario.explain import first_sentence, kinds
     from podusv_cli.scenario.presets import preset_names, preset_text, with_presets
@@ -27,5 +27,5 @@ def list() -> None:
     for name, metric in METRICS.items():
         echo_entry(f"  {name}", metric.meaning, facts=f"[{metric.unit}]")
     echo("findings (silence):")
-    for name, notice in notices().items():
-        echo_entry(f"  {name}", notice.meaning, facts=f"{notice.when} a run, {notice.about}")
+    for name, finding in finding_kinds().items():
+        echo_entry(f"  {name}", finding.meaning, facts=f"{finding.when} a run, {finding.about}")

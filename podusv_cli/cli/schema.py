@@ -7,7 +7,7 @@ import typer
 
 def schema() -> None:
     """Print the JSON schema of scenarios, for editors."""
-    from podusv_cli.findings.finding import notices
+    from podusv_cli.findings.finding import finding_kinds
     from podusv_cli.scenario.schema import schema_text
 
-    typer.echo(schema_text(tuple(notices())), nl=False)
+    typer.echo(schema_text(tuple(finding_kinds())), nl=False)

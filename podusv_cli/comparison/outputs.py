@@ -12,7 +12,7 @@ import pandas as pd
 from podusv_cli.comparison import claims, report, table
 from podusv_cli.comparison.entries import Entry
 from podusv_cli.core.finding import Finding
-from podusv_cli.findings.preflight import together
+from podusv_cli.findings.preflight import merged
 from podusv_cli.metrics.table import CLOCKED
 from podusv_cli.process.extras import Extras
 from podusv_cli.scenario.model import Scenario
@@ -118,7 +118,7 @@ def as_report(
         controllers={label: one.controller for label, one in result.scenarios.items()},
         endings=result.endings, missing=[str(part) for part in missing],
         differences=result.differences,
-        noticed=together(result.warnings), table=result.table, verdicts=result.verdicts,
+        noticed=merged(result.warnings), table=result.table, verdicts=result.verdicts,
         theories={entry.label: entry.run.theory for entry in result.entries if entry.run.theory},
         figures=pictures, provenance=provenance,
     )  # fmt: skip

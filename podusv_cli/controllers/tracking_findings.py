@@ -25,7 +25,7 @@ def start_astern(case: Any) -> Sentences:
     law, start = case.scenario.controller, case.scenario.start
     if law.fold == "joint":
         return
-    psi_e = math.remainder(case.first.get("psi_d", math.nan) - start.psi, 2.0 * math.pi)
+    psi_e = math.remainder(case.first_signals.get("psi_d", math.nan) - start.psi, 2.0 * math.pi)
     if abs(psi_e) >= 0.5 * math.pi:
         yield (
             f"the target lies {math.degrees(psi_e):.0f} degrees off the bow at the start, beyond "
@@ -43,7 +43,7 @@ def start_kick(case: Any) -> Sentences:
     law = case.scenario.controller
     if law.rate != "difference" or law.first_difference != "from_zero":
         return
-    psi_d = case.first.get("psi_d", math.nan)
+    psi_d = case.first_signals.get("psi_d", math.nan)
     kick = math.remainder(psi_d, 2.0 * math.pi) / law.difference_step
     if abs(kick) > KICK:
         yield (

@@ -1,7 +1,7 @@
-"""Findings: what is noticed about a scenario before a run, and about a run after it.
+"""Findings: warnings about a scenario before a run, or about the run afterwards.
 
-A finding is one function, decorated with `before` or `after`, in a module of `findings` or in the
-file of the component that it is about. It yields a sentence for each case that it finds.
+Each kind of finding is one function, decorated with `before` or `after`, in a module of `findings`
+or in the file of the component that it is about. It yields one sentence per finding.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ Mask = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Finding:
-    """Something that a user should know: a code, a scenario key, a sentence.
+    """One warning: the code of its kind, the scenario key that it is about, and a sentence.
 
-    `runs` are labels of the runs that it is about, where the comparison has others as well.
+    `runs` are labels of the runs that it is about; empty for all runs of a comparison.
     """
 
     code: str
@@ -36,11 +36,11 @@ class Finding:
 
     @property
     def place(self) -> str:
-        """Runs and key: `dsc, pid: actuator`; the key alone where no run is named."""
+        """Runs and key, as `dsc, pid: actuator`; the key alone without `runs`."""
         return ": ".join(filter(None, (", ".join(self.runs), self.where)))
 
     def as_json(self) -> dict[str, str]:
-        """What `--json` prints of a run and metrics.json holds."""
+        """As in metrics.json and in the output of `--json`."""
         return {"code": self.code, "where": self.where, "text": self.text}
 
 
@@ -55,41 +55,41 @@ Sentences = Iterator[str | At]
 
 
 @dataclass(frozen=True)
-class Notice:
-    """A kind of finding: its code, the key that it is about, what it means, when it can be told.
+class FindingKind:
+    """A kind of finding: its code, the key that it is about, what it means, before or after a run.
 
-    `look` is asked about runs whose law is a `law`.
+    `search` yields the sentences. It is called for laws of the class `law` only.
     """
 
     name: str
     about: str
     meaning: str
     when: Literal["before", "after"]
-    look: Callable[..., Sentences]
+    search: Callable[..., Sentences]
     law: type[Any]
 
     def findings(self, controller: object, *seen: object) -> Iterator[Finding]:
-        """What there is to tell of a run with this law."""
-        for told in self.look(*seen) if isinstance(controller, self.law) else ():
-            said = told if isinstance(told, At) else At(self.about, told)
-            yield Finding(self.name, said.where, said.text)
+        """All findings of this kind; the arguments `seen` are passed on to `search`."""
+        for sentence in self.search(*seen) if isinstance(controller, self.law) else ():
+            at = sentence if isinstance(sentence, At) else At(self.about, sentence)
+            yield Finding(self.name, at.where, at.text)
 
 
-Decorator = Callable[[Callable[..., Sentences]], Notice]
+Decorator = Callable[[Callable[..., Sentences]], FindingKind]
 
 
 def before(name: str, *, about: str, meaning: str, law: type[Any] = object) -> Decorator:
-    """Register a function of a `findings.Case`, which tells of a scenario before it runs."""
-    return lambda look: Notice(name, about, meaning, "before", look, law)
+    """Make a kind of finding of a function that takes a `Case` (a scenario before its run)."""
+    return lambda search: FindingKind(name, about, meaning, "before", search, law)
 
 
 def after(name: str, *, about: str, meaning: str, law: type[Any] = object) -> Decorator:
-    """Register a function of a scenario and its recording, which tells of a run that is over."""
-    return lambda look: Notice(name, about, meaning, "after", look, law)
+    """Make a kind of finding of a function that takes a scenario and its recording."""
+    return lambda search: FindingKind(name, about, meaning, "after", search, law)
 
 
 def rows_where(log: Recording, test: Callable[[Recording], Mask]) -> Mask:
-    """In which rows a test comes true; it is asked of some of them at a time."""
+    """The rows that pass a test; it is applied block by block, as logs may exceed memory."""
     return np.concatenate([test(log.part(rows)) for rows in blocks(len(log["time"]))])
 
 

@@ -1,1 +1,1 @@
-"""What podusv notices about a scenario before a run, and about a run after it."""
+"""Warnings about a scenario before a run, and about the run afterwards."""

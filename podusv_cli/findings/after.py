@@ -1,4 +1,4 @@
-"""What a finished run shows that a user should know, with times; from its logged rows."""
+"""Findings about a finished run, from its logged rows."""
 
 from __future__ import annotations
 
@@ -6,38 +6,40 @@ import numpy as np
 
 from podusv_cli.core.finding import Finding, Sentences, after, rows_where, times_of
 from podusv_cli.core.recording import Recording
-from podusv_cli.findings.finding import notices
+from podusv_cli.findings.finding import finding_kinds
 from podusv_cli.scenario.model import Scenario
 
-LONG = 0.02  # of the run; a limit in force for less is not told
+LONG = 0.02  # fraction of the run; shorter saturation is no finding
 
 
 @after("saturated", about="actuator", meaning="the actuator limited the law for long")
 def saturated(scenario: Scenario, log: Recording) -> Sentences:
-    """The actuator limits the law for long."""
+    """The actuator limits the law during a considerable part of the run."""
     if "saturated" not in log:
         return
     limited = rows_where(log, lambda part: part["saturated"] > 0.5)
-    part = float(limited.mean())
-    if part > LONG:
-        learnt = (
+    fraction = float(limited.mean())
+    if fraction > LONG:
+        consequence = (
             "anti_windup is on: saturation does not wind up the law's adaptation or integrators"
             if scenario.controller.wants_loads()
             else "while saturated, the law's adaptation and integrators wind up; consider "
             "anti_windup: auxiliary"
         )
         yield (
-            f"the actuator limits the law during {part:.1%} of the run, {times_of(log, limited)}; "
-            f"{learnt}"
+            f"the actuator limits the law during {fraction:.1%} of the run, "
+            f"{times_of(log, limited)}; {consequence}"
         )
 
 
-def aftermath(scenario: Scenario, log: Recording) -> list[Finding]:
-    """What is worth knowing about a run of this scenario, silenced findings included."""
+def postflight(scenario: Scenario, log: Recording) -> list[Finding]:
+    """All findings about a run of this scenario, silenced ones included."""
     if not len(log["time"]):
         return []
-    looks = [notice for notice in notices().values() if notice.when == "after"]
+    kinds = [kind for kind in finding_kinds().values() if kind.when == "after"]
     with np.errstate(all="ignore"):
         return [
-            told for notice in looks for told in notice.findings(scenario.controller, scenario, log)
+            finding
+            for kind in kinds
+            for finding in kind.findings(scenario.controller, scenario, log)
         ]

@@ -1,4 +1,4 @@
-"""A finding, and the scenario as the checks see it."""
+"""All kinds of findings, and the `Case` that those before a run are given."""
 
 from __future__ import annotations
 
@@ -9,31 +9,31 @@ from functools import cache, cached_property
 import numpy as np
 
 from podusv_cli.core import registry
-from podusv_cli.core.finding import Finding, Notice
+from podusv_cli.core.finding import Finding, FindingKind
 from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.findings.reference import Reference, reference
 from podusv_cli.paths.base import TARGET
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import unknown
 
-# A finding may stand beside the component that it is about.
-ROOMS = ("findings", "paths", "disturbances", "actuators", "controllers")
+# A kind of finding may be in the file of the component that it is about.
+PACKAGES = ("findings", "paths", "disturbances", "actuators", "controllers")
 
 
 @cache
-def notices() -> dict[str, Notice]:
-    """Every kind of finding by its code, in the order of the scenario's sections."""
-    found: dict[str, Notice] = {}
-    for room in ROOMS:
-        found |= registry.named(f"podusv_cli.{room}", Notice)
+def finding_kinds() -> dict[str, FindingKind]:
+    """Every kind of finding by code, in the order of the scenario's sections."""
+    found: dict[str, FindingKind] = {}
+    for package in PACKAGES:
+        found |= registry.named(f"podusv_cli.{package}", FindingKind)
     sections = list(Scenario.model_fields)
     ordered = sorted(found.values(), key=lambda n: sections.index(n.about.partition(".")[0]))
-    return {notice.name: notice for notice in ordered}
+    return {kind.name: kind for kind in ordered}
 
 
 def unknown_codes(scenario: Scenario) -> list[tuple[str, str]]:
-    """Key and sentence for every code in `silence` that no finding has; a check for `load`."""
-    codes = tuple(notices())
+    """Key and sentence for every unknown code in `silence`; a check for `load`."""
+    codes = tuple(finding_kinds())
     return [
         (f"silence[{place}]", unknown(f"finding {code!r}", code, codes))
         for place, code in enumerate(scenario.silence)
@@ -41,20 +41,20 @@ def unknown_codes(scenario: Scenario) -> list[tuple[str, str]]:
     ]
 
 
-def heard(findings: Iterable[Finding], scenario: Scenario) -> list[Finding]:
+def not_silenced(findings: Iterable[Finding], scenario: Scenario) -> list[Finding]:
     """The findings that the scenario does not silence."""
     return [finding for finding in findings if finding.code not in scenario.silence]
 
 
 @dataclass(frozen=True)
 class Case:
-    """A scenario of one law, with what several checks need of it, computed once."""
+    """A scenario with one law, and what several findings need of it, computed once."""
 
     scenario: Scenario
 
     @cached_property
     def reference(self) -> Reference:
-        """What following the target means for this vessel."""
+        """The steady motion that follows the target."""
         return reference(self.scenario)
 
     @property
@@ -64,8 +64,8 @@ class Case:
         return np.array([start.u, start.v, start.r])
 
     @cached_property
-    def first(self) -> dict[str, float]:
-        """The law's signals at t = 0; NaN where it has no numbers, as right on the target."""
+    def first_signals(self) -> dict[str, float]:
+        """The law's signals at t = 0; NaN where undefined, as on top of the target."""
         loop = self.scenario.closed_loop()
         law, memory = loop.controller, loop.first_memory()
         x, target = np.array(loop.start), np.zeros(len(TARGET))
@@ -77,8 +77,6 @@ class Case:
             if law.sample_period() > 0:
                 law.sample(0.0, x, memory, target, k, table)
             law.law(0.0, x, memory, target, k, table, np.zeros(2), rate, signals, work)
-        except (
-            Exception
-        ):  # plain Python's; a law's mistakes are told when it is asked, before the run
+        except Exception:  # `check_law` reports a faulty law before the run
             signals[:] = np.nan
         return dict(zip((part.name for part in law.signals), signals.tolist(), strict=True))

@@ -10,23 +10,23 @@ from podusv_cli.theory.bounds import Condition, ultimate_bound
 
 
 def conditions(scenario: Scenario) -> Iterator[str]:
-    """A line for each law that the proof is about: lambda of (49), and which conditions fail."""
+    """A line for each law that the proof covers: lambda of (49), and which conditions fail."""
     for label, single in scenario.singles().items():
         law = single.controller.lyapunov()
         if law is not None:
-            yield f"{label}, conditions of the stability proof: {_said(law, single)}"
+            yield f"{label}, conditions of the stability proof: {_summary(law, single)}"
 
 
-def _said(law: PolarBackstepping, scenario: Scenario) -> str:
-    found = ultimate_bound(law, scenario.vessel)
-    failed = [_short(condition) for condition in found.conditions if not condition.holds]
-    printed = [condition.name for condition in found.conditions if not condition.holds_printed]
+def _summary(law: PolarBackstepping, scenario: Scenario) -> str:
+    bound = ultimate_bound(law, scenario.vessel)
+    failed = [_short(condition) for condition in bound.conditions if not condition.holds]
+    printed = [condition.name for condition in bound.conditions if not condition.holds_printed]
     return (
-        f"{'; '.join(failed) or 'all hold'}; lambda at most {found.corrected.lambda_:.3g} 1/s "
+        f"{'; '.join(failed) or 'all hold'}; lambda at most {bound.corrected.lambda_:.3g} 1/s "
         f"(as printed: {', '.join(printed) + ' fail' if printed else 'all hold'}, "
-        f"{found.printed.lambda_:.3g} 1/s)"
+        f"{bound.printed.lambda_:.3g} 1/s)"
     )
 
 
 def _short(condition: Condition) -> str:
-    return f"{condition.name} = {condition.value:g} fails, it has to exceed {condition.limit:.3g}"
+    return f"{condition.name} = {condition.value:g} fails: it must exceed {condition.limit:.3g}"

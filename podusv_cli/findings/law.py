@@ -1,4 +1,4 @@
-"""Findings about how fast a law's velocity loops are, for the step and for the sampling."""
+"""Findings about velocity loops that are too fast for the step or for the control period."""
 
 from __future__ import annotations
 
@@ -15,37 +15,37 @@ UNSTABLE = 1.0 + 1e-6
 
 @before("stiff-adaptation", about="simulation.step", meaning="adaptation too fast for RK4's step")
 def stiff_adaptation(case: Case) -> Sentences:
-    """The network's adaptation turns faster than RK4 follows at this step."""
+    """RK4 is unstable at this step because of the network's adaptation."""
     return _too_fast(case, "adaptation")
 
 
 @before("stiff-derivative", about="simulation.step", meaning="PID's loop too fast for RK4's step")
 def stiff_derivative(case: Case) -> Sentences:
-    """PID's proportional and derivative action is faster than RK4 follows at this step."""
+    """RK4 is unstable at this step because of PID's proportional and derivative action."""
     return _too_fast(case, "derivative")
 
 
 @before("stiff-loop", about="simulation.step", meaning="a velocity loop too fast for RK4's step")
 def stiff_loop(case: Case) -> Sentences:
-    """The same of any other law."""
+    """RK4 is unstable at this step because of a velocity loop of another law."""
     return _too_fast(case, "loop")
 
 
 def _too_fast(case: Case, cause: Cause) -> Sentences:
     grid = case.scenario.time_grid()
-    told: set[str] = set()
+    reported: set[str] = set()
     for nu in () if grid.hold_every else (case.first_velocity, case.reference.working):
         for loop in loops(case.scenario, nu, cause):
-            if loop.axis not in told and rk4_growth(loop, grid.step) > UNSTABLE:
-                told.add(loop.axis)
+            if loop.axis not in reported and rk4_growth(loop, grid.step) > UNSTABLE:
+                reported.add(loop.axis)
                 yield (
                     f"the {loop.axis} {loop.name} turns at {loop.fastest:.3g} 1/s, too fast for "
-                    f"RK4 with {grid.step:g} s; take a step below {_largest(loop):.2g} s, or a "
-                    f"smaller {loop.key}"
+                    f"RK4 with {grid.step:g} s; take a step below {_largest_step(loop):.2g} s, "
+                    f"or a smaller {loop.key}"
                 )
 
 
-def _largest(loop: Loop) -> float:
+def _largest_step(loop: Loop) -> float:
     """The largest step [s] up to which RK4 is stable, by bisection."""
     low, high = 0.0, 4.0 / loop.fastest
     for _ in range(40):
@@ -57,19 +57,19 @@ def _largest(loop: Loop) -> float:
 
 @before("sampled-adaptation", about="control.period", meaning="adaptation too fast for the period")
 def sampled_adaptation(case: Case) -> Sentences:
-    """The network's adaptation is unstable when the law acts once a period."""
+    """The network's adaptation is unstable when the law is evaluated once per period."""
     return _sampled_too_fast(case, "adaptation")
 
 
 @before("sampled-derivative", about="control.period", meaning="PID's loop too fast for the period")
 def sampled_derivative(case: Case) -> Sentences:
-    """PID is unstable when it acts once a period."""
+    """PID is unstable when it is evaluated once per period."""
     return _sampled_too_fast(case, "derivative")
 
 
 @before("sampled-loop", about="control.period", meaning="a velocity loop too fast for the period")
 def sampled_loop(case: Case) -> Sentences:
-    """The same of any other law."""
+    """A velocity loop of another law is unstable when it is evaluated once per period."""
     return _sampled_too_fast(case, "loop")
 
 
@@ -88,20 +88,20 @@ def _sampled_too_fast(case: Case, cause: Cause) -> Sentences:
 
 @before("stiff-start", about="simulation.step", meaning="start error makes the bound too stiff")
 def stiff_start(case: Case) -> Sentences:
-    """The velocity error at the start drives the bound so high that its loop outruns the step.
+    """The start error drives the estimated bound so high that RK4 becomes unstable.
 
-    Without leakage b_hat rises to sqrt(gamma m) |e(0)| while e decays, and then e' = -e b_hat/
-    (4 partial m). Where an actuator cuts the demand off, that loop is open and nothing is said.
+    Without leakage b_hat rises to sqrt(gamma m) |e(0)| while e decays, and then
+    e' = -e b_hat/(4 partial m). A saturating actuator opens that loop, so there is no finding.
     """
     scenario, step = case.scenario, case.scenario.simulation.step
     if SATURATION in scenario.actuator.signals or scenario.control.period:
         return
     for loop in loops(scenario, case.first_velocity):
-        error = case.first[loop.bound.error] if loop.bound else math.nan
-        told_already = rk4_growth(loop, step) > UNSTABLE
-        if loop.bound and math.isfinite(error) and not told_already:
-            if not bursts(loop, loop.bound, error, step):
-                continue
+        error = case.first_signals[loop.bound.error] if loop.bound else math.nan
+        stiff_anyway = rk4_growth(loop, step) > UNSTABLE  # a finding of its own
+        if not loop.bound or not math.isfinite(error) or stiff_anyway:
+            continue
+        if bursts(loop, loop.bound, error, step):
             yield (
                 f"{loop.bound.error} = {error:.3g} at the start drives the estimated bound so high "
                 f"that the {loop.axis} loop outruns RK4 with {step:g} s and the error grows "

@@ -1,4 +1,4 @@
-"""All findings about a scenario that can be told before it runs."""
+"""All findings about a scenario before it runs."""
 
 from __future__ import annotations
 
@@ -8,25 +8,25 @@ from dataclasses import replace
 import numpy as np
 
 from podusv_cli.core.finding import Finding
-from podusv_cli.findings.finding import Case, notices
+from podusv_cli.findings.finding import Case, finding_kinds
 from podusv_cli.scenario.model import Scenario
 
 
 def preflight(scenario: Scenario) -> list[Finding]:
-    """What is worth knowing about a scenario before it runs, silenced findings included.
+    """All findings about a scenario before it runs, silenced ones included.
 
-    With `controllers` it is asked of each law; what they share is told once.
+    With `controllers` these are the findings for each law, merged.
     """
     if scenario.controllers:
-        return together({name: preflight(one) for name, one in scenario.singles().items()})
+        return merged({name: preflight(one) for name, one in scenario.singles().items()})
     case = Case(scenario)
-    looks = [notice for notice in notices().values() if notice.when == "before"]
+    kinds = [kind for kind in finding_kinds().values() if kind.when == "before"]
     with np.errstate(all="ignore"):
-        return [told for notice in looks for told in notice.findings(scenario.controller, case)]
+        return [found for kind in kinds for found in kind.findings(scenario.controller, case)]
 
 
-def together(findings: Mapping[str, Sequence[Finding]]) -> list[Finding]:
-    """Findings about several runs, by label: the same told once, with its runs unless it is all."""
+def merged(findings: Mapping[str, Sequence[Finding]]) -> list[Finding]:
+    """Findings of several runs (by label), each once, with its runs unless all runs have it."""
     alike: dict[Finding, list[str]] = {}
     for label, several in findings.items():
         for finding in dict.fromkeys(several):

@@ -1,8 +1,8 @@
-"""What it takes to follow the target: speeds, sway and forces along the path.
+"""The steady motion that follows the target: velocities and loads along the path.
 
-A steady hull keeps up with the target at the target's speed over ground U. Its sway v is where
-sway force and mean load balance: Y(u, v, r) + b_v + tau_v = 0 with u^2 + v^2 = U^2, r the rate at
-which the target's course turns, tau_v what the actuator puts on sway along with the yaw moment.
+A hull that follows moves at the target's speed over ground U. Its sway v balances the sway forces:
+Y(u, v, r) + b_v + tau_v = 0 with u^2 + v^2 = U^2. r is the turn rate of the target's course, b_v
+the mean load, and tau_v the sway force that the actuator produces with the yaw moment.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from podusv_cli.scenario.model import Scenario
 from podusv_cli.vessels.plant import surge_force, sway_force, yaw_moment
 
 SAMPLES = 60
-FASTEST = 100.0  # m/s; no sway beyond is looked for
+FASTEST = 100.0  # m/s; larger sway is not searched for
 STANDING = 1e-6  # m/s; a slower target has no course
 
 
 @dataclass(frozen=True)
 class Reference:
-    """At sampled times of a run: what the target does and what the hull has to do.
+    """The steady motion that follows the target, at sampled times of a run.
 
-    `nu` (n, 3) is the steady velocity that keeps up, with NaN for surge and sway where no heading
-    does; `load` (n, 3) the disturbance; `demand` (n, 2) the surge force [N] and yaw moment [N m]
-    that keep this velocity.
+    `nu` (n, 3) is the hull's velocity, with NaN for surge and sway where no heading can follow;
+    `load` (n, 3) the disturbance; `demand` (n, 2) the surge force [N] and yaw moment [N m] that
+    keep this velocity.
     """
 
     time: Vector
@@ -43,7 +43,7 @@ class Reference:
 
     @property
     def working(self) -> Vector:
-        """Median velocity (u, v, r) that keeps up; the target's speed straight on where none is."""
+        """Median of `nu`; (target's speed, 0, 0) where no heading can follow."""
         known = self.nu[np.isfinite(self.nu).all(axis=1)]
         if not len(known):
             return np.array([median(self.speed), 0.0, 0.0])
@@ -51,18 +51,18 @@ class Reference:
 
     @property
     def steady_sway(self) -> float:
-        """Median sway velocity that keeps up [m/s]; 0 where nothing does."""
+        """Median sway velocity of `nu` [m/s]; 0 where no heading can follow."""
         known = self.nu[:, 1][np.isfinite(self.nu[:, 1])]
         return median(known) if len(known) else 0.0
 
 
 def median(values: Vector) -> float:
-    """The middle of some values; numpy's own would import numpy.ma, 9 ms of every run."""
+    """The median; numpy's own imports numpy.ma, which would cost 9 ms of every run."""
     return float(statistics.median(values.tolist()))
 
 
 def reference(scenario: Scenario) -> Reference:
-    """Sample a scenario's target and loads, and balance the hull at each sample."""
+    """Sample a scenario's target and loads, and balance the hull's loads at each sample."""
     time = np.linspace(0.0, scenario.simulation.duration, SAMPLES)
     target = _targets(scenario, time)
     speed, turn, along = _motion(target)
@@ -96,7 +96,7 @@ def _motion(target: Vector) -> tuple[Vector, Vector, Vector]:
 
 
 def _loads(scenario: Scenario, time: Vector, target: Vector, turn: Vector) -> Vector:
-    """The disturbance on a hull that rides on the target."""
+    """The disturbance on a hull at the target's position and velocity."""
     sea, load = scenario.disturbance, np.zeros((len(time), 3))
     k, table = bundle(sea.constants()), sea.table()
     course = np.arctan2(target[:, 3] + 0.0, target[:, 2] + 0.0)  # -0.0 is no half turn
@@ -108,7 +108,7 @@ def _loads(scenario: Scenario, time: Vector, target: Vector, turn: Vector) -> Ve
 
 
 def _balance(scenario: Scenario, b_v: float) -> Callable[[float, float], tuple[float, float]]:
-    """From speed U and turn rate r to the surge and sway that keep up; NaN where none do."""
+    """A function from speed U and turn rate r to steady surge and sway; NaN where none exist."""
     k, share = bundle(scenario.vessel.constants()), sway_share(scenario)
 
     @cache  # a line and a circle have one speed and one turn rate each
@@ -130,7 +130,7 @@ def sway_share(scenario: Scenario) -> float:
 
 
 def root(function: Callable[[float], float], low: float, high: float) -> float:
-    """Where a function that falls from `low` to `high` passes zero; NaN where it does not."""
+    """The zero of a function that falls from `low` to `high`; NaN where it has none."""
     if not function(low) >= 0.0 >= function(high):
         return math.nan
     for _ in range(50):
@@ -140,7 +140,7 @@ def root(function: Callable[[float], float], low: float, high: float) -> float:
 
 
 def drift(scenario: Scenario, b_v: float) -> float:
-    """Sway velocity [m/s] at which damping alone holds the load b_v [N]; infinite without any."""
+    """Sway velocity [m/s] at which damping balances the load b_v [N]; infinite without damping."""
     k = bundle(scenario.vessel.constants())
     v = root(lambda v: sway_force(0.0, v, 0.0, k) + b_v, -FASTEST, FASTEST)
     return math.copysign(math.inf, b_v) if math.isnan(v) else v

@@ -1,4 +1,4 @@
-"""Is a law's velocity loop carried stably by RK4's step and by the sampling?"""
+"""Numerical stability of a law's velocity loops: under RK4's step, and under sampling."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.vessels.plant import surge_force, yaw_moment
 
-BURST = 20  # steps within which a start that is too stiff shows
-MUCH = 2.0  # times the error at the start
+BURST_STEPS = 20  # steps within which the error of a start that is too stiff grows
+BURST = 2.0  # growth of the error that counts
 
 
 def rk4_growth(loop: Loop, step: float) -> float:
-    """By how much one step of RK4 multiplies the loop's worst mode; 1 where the loop itself grows.
+    """Spectral radius of one RK4 step of the loop; 1 where the loop itself is unstable.
 
-    Above 1 the integrator is unstable though the loop is not.
+    Above 1 the integrator is unstable although the loop is stable.
     """
     if not np.isfinite(loop.matrix).all() or np.linalg.eigvals(loop.matrix).real.max() > 0.0:
         return 1.0
@@ -24,7 +24,7 @@ def rk4_growth(loop: Loop, step: float) -> float:
 
 
 def sampled_growth(loop: Loop, step: float, count: int) -> float:
-    """The same for one period of `count` steps with the law's output and measurement held.
+    """Spectral radius of one period of `count` RK4 steps, with output and measurement held.
 
     During a period (e, c, e_held, m): e' = -d e + c with c = g . (e, m) at the sample, and
     m' = F (e_held, m).
@@ -57,23 +57,23 @@ def axes(scenario: Scenario, nu: Vector) -> tuple[Axis, Axis]:
     k, (u, v, r), small = bundle(scenario.vessel.constants()), nu.tolist(), 1e-4
     surge = surge_force(u - small, v, r, k) - surge_force(u + small, v, r, k)
     yaw = yaw_moment(u, v, r - small, k) - yaw_moment(u, v, r + small, k)
-    vessel, told = scenario.vessel, scenario.nominal
+    vessel, nominal = scenario.vessel, scenario.nominal
     return (
-        Axis("surge", vessel.m11, told.m11, surge / (2 * small * vessel.m11)),
-        Axis("yaw", vessel.m33, told.m33, yaw / (2 * small * vessel.m33)),
+        Axis("surge", vessel.m11, nominal.m11, surge / (2 * small * vessel.m11)),
+        Axis("yaw", vessel.m33, nominal.m33, yaw / (2 * small * vessel.m33)),
     )
 
 
 def loops(scenario: Scenario, nu: Vector, cause: Cause | None = None) -> list[Loop]:
-    """The velocity loops of the scenario's law at a velocity, all or those of one cause."""
+    """The velocity loops of the scenario's law at a velocity; all, or those of one cause."""
     found = scenario.controller.velocity_loops(axes(scenario, nu), nu)
     return [loop for loop in found if cause in (None, loop.cause)]
 
 
 def bursts(loop: Loop, bound: Bound, error: float, step: float) -> bool:
-    """Whether RK4 with this step lets a velocity error grow that the bound's adaptation quells.
+    """Whether a velocity error grows under RK4 although the bound's adaptation should reduce it.
 
-    The loop with e' = ... - b_hat phi(e)/m and (28), marched from e(0) = error.
+    Integrates the loop with e' = ... - b_hat phi(e)/m and (28) from e(0) = error.
     """
     matrix, count = loop.matrix, len(loop.memory) + 1
 
@@ -86,11 +86,11 @@ def bursts(loop: Loop, bound: Bound, error: float, step: float) -> bool:
 
     s = np.zeros(count + 1)
     s[0], s[-1] = error, bound.initial
-    for _ in range(BURST):
+    for _ in range(BURST_STEPS):
         k1 = rates(s)
         k2 = rates(s + 0.5 * step * k1)
         k3 = rates(s + 0.5 * step * k2)
         s = s + step / 6.0 * (k1 + 2.0 * (k2 + k3) + rates(s + step * k3))
-        if not abs(s[0]) <= MUCH * abs(error):
+        if not abs(s[0]) <= BURST * abs(error):
             return True
     return False

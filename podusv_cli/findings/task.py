@@ -1,4 +1,4 @@
-"""Findings about the task: the path, and whether this hull with this actuator can follow it."""
+"""Findings about the path, and about whether this hull and actuator can follow it."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from podusv_cli.findings.reference import FASTEST, drift, median
 from podusv_cli.paths.base import TARGET
 from podusv_cli.vessels.plant import sway_force
 
-RUNAWAY = 1.0  # target speeds; with faster sway a hull can circle the target instead of following
-BESIDE = 1e-9  # s; how far from a break the target is looked at on both sides
-STABLE = 2.785  # step over time constant up to which RK4 decays
-AHEAD = 0.5  # of the largest surge force needed
-DELIVERED = 0.999  # of what is needed counts as all of it
+RUNAWAY = 1.0  # in target speeds; with faster sway a hull may circle the target
+BESIDE = 1e-9  # s; distance from a break at which the target is evaluated on either side
+STABLE = 2.785  # step over time constant up to which RK4 is stable
+AHEAD = 0.5  # excess surge force, as a fraction of the largest one needed
+DELIVERED = 0.999  # fraction of the demand that counts as all of it
 BREAKS = {  # what jumps: offset in TARGET, unit
     "position": (0, "m"),
     "velocity": (2, "m/s"),
@@ -60,19 +60,19 @@ def _jump(case: Case, time: float) -> Vector:
 
 @before("path-jump", about="path", meaning="the target's position jumps")
 def path_jump(case: Case) -> Sentences:
-    """A jump in position."""
+    """The target's position jumps."""
     return path_breaks(case, "position")
 
 
 @before("path-corner", about="path", meaning="the target's velocity jumps")
 def path_corner(case: Case) -> Sentences:
-    """A jump in velocity."""
+    """The target's velocity jumps."""
     return path_breaks(case, "velocity")
 
 
 @before("path-bend", about="path", meaning="the target's acceleration jumps")
 def path_bend(case: Case) -> Sentences:
-    """A jump in acceleration."""
+    """The target's acceleration jumps."""
     return path_breaks(case, "acceleration")
 
 
@@ -95,10 +95,9 @@ def sway_drift(case: Case) -> Sentences:
 
 @before("sway-unstable", about="controller.k_ze", meaning="pointing at the target makes sway grow")
 def sway_unstable(case: Case) -> Sentences:
-    """A hull that points at the target slides away sideways.
+    """The sway of a hull that points at the target grows: m11 k_ze > d, the linear sway damping.
 
-    With d the sway damping at the steady sway, growing sway is held by nonlinear damping where that
-    catches up with m11 k_ze; it grows further away than `sliding_distance`.
+    It grows beyond `sliding_distance` from the target, until nonlinear damping balances m11 k_ze.
     """
     approach, vessel = case.scenario.controller.approach(), case.scenario.vessel
     if approach is None:
@@ -118,16 +117,16 @@ def sway_unstable(case: Case) -> Sentences:
 
 
 def sliding_distance(case: Case, approach: Approach, damping: float) -> float:
-    """Distance [m] from the target beyond which sway grows; `damping` d [kg/s] is below m11 k_ze.
+    """Distance [m] from the target beyond which sway grows, for `damping` d [kg/s] < m11 k_ze.
 
-    For a hull that points at a target of speed U from the distance D, psi_e = 0 and u = alpha_u of
-    (21), with theta from the line of sight to the target's course and D held,
+    A hull points at a target of speed U from the constant distance D: psi_e = 0 and u = alpha_u of
+    (21). With theta from the line of sight to the target's course,
 
         theta' = -(U sin theta - v)/D,
         m22 v' = -m11 (k_ze (D - standoff) + U cos theta) (U sin theta - v)/D - d v.
 
-    About theta = v = 0 the determinant U d/(m22 D) is positive and the trace is that of growth for
-    D > (U (m22 - m11) + m11 k_ze standoff)/(m11 k_ze - d).
+    Linearised at theta = v = 0 the determinant U d/(m22 D) is positive, and the trace is positive
+    (growth) for D > (U (m22 - m11) + m11 k_ze standoff)/(m11 k_ze - d).
     """
     vessel, speed = case.scenario.vessel, median(case.reference.speed)
     drive = vessel.m11 * approach.gain
@@ -136,7 +135,7 @@ def sliding_distance(case: Case, approach: Approach, damping: float) -> float:
 
 
 def _damping(case: Case, drive: float) -> tuple[float, float]:
-    """Sway damping [kg/s] at the steady sway, and where growing at `drive` [kg/s] it stops."""
+    """Sway damping [kg/s] at the steady sway, and the sway [m/s] where growth by `drive` stops."""
     k, sway = bundle(case.scenario.vessel.constants()), case.reference.steady_sway
     u = median(case.reference.speed)
     at_rest, small = sway_force(u, sway, 0.0, k), 1e-4
@@ -154,7 +153,7 @@ def _damping(case: Case, drive: float) -> tuple[float, float]:
 
 @before("thrust-short", about="actuator", meaning="keeping up takes more than the actuator gives")
 def thrust_short(case: Case) -> Sentences:
-    """Keeping up takes more surge force or yaw moment than the actuator delivers."""
+    """Following takes more surge force or yaw moment than the actuator delivers."""
     seen = case.reference
     worst = np.abs(seen.demand).argmax(axis=0)
     actuator = case.scenario.actuator
@@ -173,7 +172,7 @@ def thrust_short(case: Case) -> Sentences:
 
 
 def _driven_ahead(case: Case, row: int) -> Sentences:
-    """The largest yaw moment comes with more surge force than keeps up."""
+    """The largest yaw moment comes with more surge force than following takes."""
     seen = case.reference
     x = np.concatenate([np.zeros(3), np.nan_to_num(seen.nu[row])])
     needed, moment = seen.demand[row].tolist()
@@ -188,7 +187,7 @@ def _driven_ahead(case: Case, row: int) -> Sentences:
 
 @before("stiff-actuator", about="simulation.step", meaning="a pod's lag too short for RK4's step")
 def stiff_actuator(case: Case) -> Sentences:
-    """A lag of the actuator is too short for RK4, whose steps of -x/lag grow beyond 2.78 lags."""
+    """An actuator's lag is too short for RK4, which is unstable for steps above 2.78 lags."""
     lag, step = case.scenario.actuator.shortest_lag(), case.scenario.simulation.step
     if step > STABLE * lag:
         yield (

@@ -1,4 +1,4 @@
-"""The paper's title claim as a check: two inputs cannot make all three loads."""
+"""Whether a vessel is underactuated: its actuator cannot make all three loads independently."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from podusv_cli.scenario.model import Scenario
 
 
 def input_rank(actuator: Actuator) -> int:
-    """Rank of the map from small demands to loads (tau_u, tau_v, tau_r), at rest.
+    """Rank of the map from small demands to loads (tau_u, tau_v, tau_r) at rest.
 
-    By central differences of the actuator's kernel; below 3 the vessel is underactuated.
+    Below 3 the vessel is underactuated. The map comes from central differences of the kernel.
     """
     return int(np.linalg.matrix_rank(actuator.input_matrix()))
 
 
 def argument(scenario: Scenario) -> str:
-    """The rank argument in words, for the scenario's vessel and actuator.
+    """The rank argument for the scenario's vessel and actuator, as a sentence.
 
-    Accelerations follow from loads by M^-1, which is regular, so their rank is that of the loads.
+    Accelerations are M^-1 times the loads and M is regular, so both have the same rank.
     """
     matrix = scenario.actuator.input_matrix()
     rank = input_rank(scenario.actuator)
@@ -28,7 +28,7 @@ def argument(scenario: Scenario) -> str:
     verdict = "underactuated" if rank < len(matrix) else "fully actuated"
     kind = type(scenario.actuator).model_fields["kind"].default
     return (
-        f"{verdict}: from (tau_u, tau_r) asked for to (tau_u, tau_v, tau_r) on the hull, "
+        f"{verdict}: the map from demands (tau_u, tau_r) to loads (tau_u, tau_v, tau_r) of "
         f"{kind} on {scenario.vessel.preset or 'the vessel'} is [{rows}], "
         f"rank {rank} of {len(matrix)}; {sway}"
     )

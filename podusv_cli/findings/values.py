@@ -1,4 +1,4 @@
-"""Findings about numbers that are allowed but look like a wrong sign or a wrong unit."""
+"""Findings about values with a probably wrong sign or unit."""
 
 from __future__ import annotations
 
@@ -9,31 +9,31 @@ from podusv_cli.core.finding import At, Sentences, before
 from podusv_cli.findings.finding import Case
 from podusv_cli.vessels.vessel import Vessel
 
-BRAKES = ("X_uu", "X_uuu", "Y_vv", "N_rr")  # the linear ones cannot be positive at all
+DAMPING = ("X_uu", "X_uuu", "Y_vv", "N_rr")  # a positive linear one is refused by the model
 TURN = 2.0 * math.pi
 
 
 @before("damping-sign", about="vessel", meaning="nonlinear damping drives the motion")
 def damping_sign(case: Case) -> Sentences:
-    """Nonlinear damping on the diagonal that drives what it should brake."""
+    """A nonlinear damping coefficient is positive, so it accelerates the motion."""
     vessels = {"vessel": case.scenario.vessel, "nominal": case.scenario.nominal}
-    told = set[tuple[str, float]]()
+    reported = set[tuple[str, float]]()
     for section, vessel in vessels.items():
-        for name in BRAKES:
+        for name in DAMPING:
             number = getattr(vessel, name)
-            if number > 0.0 and (name, number) not in told:
-                told.add((name, number))
+            if number > 0.0 and (name, number) not in reported:
+                reported.add((name, number))
                 unit = unit_of(Vessel.model_fields[name])
                 yield At(
                     f"{section}.{name}",
-                    f"{number:g} {unit} drives the motion that it should brake, the more the "
-                    f"faster it is; damping is negative here: {-number:g}?",
+                    f"{number:g} {unit} accelerates the motion that it should damp; damping "
+                    f"coefficients are negative: {-number:g}?",
                 )
 
 
 @before("large-angle", about="start.psi", meaning="an angle is beyond a whole turn")
 def large_angle(case: Case) -> Sentences:
-    """An angle of the start or the path beyond a whole turn."""
+    """An angle of the start or of the path exceeds a whole turn."""
     for section, part in (("start", case.scenario.start), ("path", case.scenario.path)):
         for name, field in type(part).model_fields.items():
             if unit_of(field) == "rad" and abs(getattr(part, name)) > TURN:

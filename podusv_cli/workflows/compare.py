@@ -18,7 +18,7 @@ from podusv_cli.comparison.entries import Absent, Entry
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.recording import Status
-from podusv_cli.findings.preflight import together
+from podusv_cli.findings.preflight import merged
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.table import CLOCKED
 from podusv_cli.process.extras import Extras, Missing
@@ -63,7 +63,7 @@ class Compared:
 
     def warnings(self) -> list[Finding]:
         """The findings about the runs made for this comparison, before and after them."""
-        return together(self.result.warnings)
+        return merged(self.result.warnings)
 
     def _run_as_json(self, entry: Entry) -> dict[str, Any]:
         """As `podusv run --json`, without what is missing; timing only of runs made now."""
@@ -89,7 +89,7 @@ def compare(items: Sequence[Path], request: Request, progress: Progress | None =
     """
     started, argv = datetime.now(UTC), list(request.argv)
     given = gather(items, request)
-    for finding in together({member.label: member.noticed for member in given.members}):
+    for finding in merged({member.label: member.noticed for member in given.members}):
         request.warn(finding)
     target = request.out or _default_folder(given.title, given.members)
     _keep_apart(items, target)

@@ -20,8 +20,8 @@ from podusv_cli.core.finding import Finding
 from podusv_cli.core.recording import Allocate, Recording, Status
 from podusv_cli.engine.check import check_law
 from podusv_cli.engine.simulate import marcher, simulate
-from podusv_cli.findings.after import aftermath
-from podusv_cli.findings.finding import heard
+from podusv_cli.findings.after import postflight
+from podusv_cli.findings.finding import not_silenced
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.table import METRICS, Metrics, observer
 from podusv_cli.process.extras import Extras, Missing
@@ -166,7 +166,7 @@ def execute(
 
 
 def _noticed(scenario: Scenario, recording: Recording) -> list[Finding]:
-    return heard(aftermath(scenario, recording), scenario)
+    return not_silenced(postflight(scenario, recording), scenario)
 
 
 def unwritten(outcomes: Iterable[Outcome]) -> str:

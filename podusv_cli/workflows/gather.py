@@ -9,7 +9,7 @@ from pathlib import Path
 
 from podusv_cli.comparison.claims import ParsedClaim, parse_claims
 from podusv_cli.core.errors import UsageError
-from podusv_cli.findings.finding import heard, unknown_codes
+from podusv_cli.findings.finding import not_silenced, unknown_codes
 from podusv_cli.findings.preflight import preflight
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import load
@@ -60,7 +60,7 @@ def _opened(path: Path, request: Request, *, alone: bool) -> _Item:
     scenario, singles = loaded.scenario, loaded.scenario.singles()
     labels = list(singles) if alone or scenario.controllers else [scenario.name]
     members = [
-        Member(label, single, loaded.text, noticed=heard(preflight(single), single))
+        Member(label, single, loaded.text, noticed=not_silenced(preflight(single), single))
         for label, single in zip(labels, singles.values(), strict=True)
     ]
     return _Item(scenario.name, members, list(singles), parse_claims(loaded))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from podusv_cli.core.finding import Finding
-from podusv_cli.findings.finding import heard, unknown_codes
+from podusv_cli.findings.finding import not_silenced, unknown_codes
 from podusv_cli.findings.preflight import preflight
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import load, resolved_yaml
@@ -40,7 +40,7 @@ def run(config: Path, request: Request, progress: Progress | None = None) -> Fin
         scenario = loaded.scenario.alone()
         target = request.out or default_folder(RESULTS, scenario.name, resolved_yaml(scenario))
     with watch.part("preflight"):
-        noticed = heard(preflight(scenario), scenario)
+        noticed = not_silenced(preflight(scenario), scenario)
     for finding in noticed:
         request.warn(finding)
     task = Task(

@@ -35,7 +35,7 @@ BUG = "could not be made: ArithmeticError: planted here (test_afterwards.py, lin
 AFTER_A_RUN = {
     "the metrics": (execute, "summary"),
     "law_ns": (execute, "law_costs"),
-    "warnings": (execute, "aftermath"),
+    "warnings": (execute, "postflight"),
     "theory.json with the stability monitor's signals": (monitor, "ideal_weights"),
     "figures": (execute, "_drawn"),
 }
@@ -116,7 +116,7 @@ def test_a_comparison_keeps_its_runs(
     assert manifest.check(Path("x")).status == "finished"
     assert [open_run(Path("x") / name).status for name in ("one", "other")] == ["finished"] * 2
     if what != "report.html":
-        assert f"{html.escape(what)} {BUG}" in Path("x/report.html").read_text()
+        assert f"{what} {BUG}" in html.unescape(Path("x/report.html").read_text())
 
 
 def test_what_a_run_of_a_comparison_lacks_is_told_of_the_run(
