@@ -17,11 +17,11 @@ from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
 from podusv_cli.engine.continuous import continuous
 from podusv_cli.scenario.load import load
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.verification.dop853 import integrate, left_out
+from podusv_cli.verification.dop853 import integrate, why_skipped
 from podusv_cli.verification.ranking import ranking
 from podusv_cli.verification.richardson import estimate, estimate_position
 from podusv_cli.verification.step_halving import refined, run_level
-from podusv_cli.verification.verify import POSITION, Checked, check, verify
+from podusv_cli.verification.verify import POSITION, RunVerification, check, verify
 from podusv_cli.workflows import verify as verifying
 
 # Behind the target, facing it and moving; a step at which the adaptation is well resolved.
@@ -96,19 +96,19 @@ def test_the_first_level_is_the_run_itself() -> None:
 
 
 @pytest.fixture(scope="module")
-def smooth() -> Checked:
+def smooth() -> RunVerification:
     return check(scene(*SMOOTH))
 
 
-def test_a_smooth_scenario_is_of_fourth_order_and_converged(smooth: Checked) -> None:
+def test_a_smooth_scenario_is_of_fourth_order_and_converged(smooth: RunVerification) -> None:
     assert smooth.estimates[POSITION].order == pytest.approx(4.0, abs=0.4)
-    assert smooth.doubtful(0.01) == []
+    assert smooth.unconverged(0.01) == []
 
 
-def test_the_error_that_is_estimated_is_the_error_that_there_is(smooth: Checked) -> None:
+def test_the_error_that_is_estimated_is_the_error_that_there_is(smooth: RunVerification) -> None:
     """Against DOP853, which knows nothing of the three runs."""
-    assert smooth.independent is not None
-    true = math.dist(smooth.levels[0].position, smooth.independent.position)
+    assert not smooth.dop853.skipped
+    true = math.dist(smooth.levels[0].position, smooth.dop853.position)
     assert smooth.estimates[POSITION].error == pytest.approx(true, rel=0.2)
     assert true > 1e-9  # or there would be nothing to estimate
     assert smooth.distances()["iae"] < 1e-6
@@ -123,7 +123,7 @@ def test_dop853_starts_anew_where_the_path_jumps() -> None:
         for switch in (3.005, 50)
     )  # fmt: skip
     other = integrate(jumping)
-    assert other.left_out == ""
+    assert other.skipped == ""
     # The engine's step across the jump has its first stage before it: order one, and no more.
     gaps = [math.dist(run_level(jumping, n).position, other.position) for n in (1, 3)]
     assert gaps[0] / gaps[1] == pytest.approx(4.0, rel=0.1)
@@ -140,9 +140,9 @@ def test_dop853_starts_anew_where_the_path_jumps() -> None:
         (("controller.Gamma_r=4000",), "does not reach its end"),
     ],
 )
-def test_dop853_is_left_out_with_a_reason(overrides: tuple[str, ...], reason: str) -> None:
+def test_dop853_is_skipped_with_a_reason(overrides: tuple[str, ...], reason: str) -> None:
     scenario = scene(*overrides, "simulation.duration=3")
-    assert reason in left_out(scenario, [run_level(scenario, 0)])
+    assert reason in why_skipped(scenario, [run_level(scenario, 0)])
 
 
 def test_the_continuous_loop_is_the_engines() -> None:
@@ -163,16 +163,16 @@ def test_the_continuous_loop_is_the_engines() -> None:
 def test_a_held_difference_leaves_chattering_unconverged() -> None:
     """What results/README.md warns of: finer steps see more of the sawtooth."""
     printed = load(CONFIGS / "printed.yaml", ["simulation={step: 0.0025, duration: 40}"]).scenario
-    doubts = check(printed.alone()).doubtful(0.01)
-    assert "tv_tau_r" in doubts
-    assert "iae" not in doubts
+    names = check(printed.alone()).unconverged(0.01)
+    assert "tv_tau_r" in names
+    assert "iae" not in names
 
 
 def test_a_step_that_is_too_coarse_is_found_out() -> None:
     coarse = scene("simulation={step: 0.04, duration: 20}")
-    assert "status" in check(coarse).doubtful(0.01)
+    assert "status" in check(coarse).unconverged(0.01)
     hardly = scene("simulation={step: 0.02, duration: 20}", "start={u: 0.5, psi: 0.5}")
-    assert "peak_tau_u" in check(hardly).doubtful(0.01)
+    assert "peak_tau_u" in check(hardly).unconverged(0.01)
 
 
 # --- rankings
@@ -326,7 +326,7 @@ def test_what_is_not_converged_ends_with_3_and_is_named(podusv: Any) -> None:
     assert "\nquick: status\n" in end
     strict = podusv("verify", "two.yaml", "--tolerance", "1e-9")
     assert strict.code == 3
-    assert verify(two(), 1e-9).doubts.keys() == {"quick", "slow"}
+    assert verify(two(), 1e-9).unconverged.keys() == {"quick", "slow"}
 
 
 def test_a_wrong_scenario_is_told_as_everywhere(podusv: Any) -> None:

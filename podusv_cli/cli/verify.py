@@ -15,7 +15,7 @@ from podusv_cli.cli.terminal import echo, echo_entry, echo_table
 if TYPE_CHECKING:
     from podusv_cli.verification.ranking import Ranking
     from podusv_cli.verification.richardson import Estimate
-    from podusv_cli.verification.verify import Checked, Verified
+    from podusv_cli.verification.verify import RunVerification, Verification
 
 NOT_CONVERGED = 3
 
@@ -57,21 +57,21 @@ def verify(
             typer.echo(encode(done.as_json()), nl=False)
         elif not quiet:
             _report(done)
-    raise typer.Exit(NOT_CONVERGED if done.doubts else 0)
+    raise typer.Exit(NOT_CONVERGED if done.unconverged else 0)
 
 
-def _report(done: Verified) -> None:
+def _report(done: Verification) -> None:
     for label, run in done.runs.items():
         _show_run(label, run, done.tolerance)
     if done.rankings:
         _show_rankings(done.rankings)
-    doubts = [f"{label}: {', '.join(names)}" for label, names in done.doubts.items()]
-    heading = "not converged" if doubts else "converged"
+    failed = [f"{label}: {', '.join(names)}" for label, names in done.unconverged.items()]
+    heading = "not converged" if failed else "converged"
     echo("end_position: distance from where the run with the smallest step ends")
-    echo(f"{heading} within {done.tolerance:.3g} relative", *doubts)
+    echo(f"{heading} within {done.tolerance:.3g} relative", *failed)
 
 
-def _show_run(label: str, run: Checked, tolerance: float) -> None:
+def _show_run(label: str, run: RunVerification, tolerance: float) -> None:
     from podusv_cli.metrics.table import METRICS
 
     units = {name: metric.unit for name, metric in METRICS.items()}
@@ -84,7 +84,7 @@ def _show_run(label: str, run: Checked, tolerance: float) -> None:
     for level in run.levels:
         if level.message:
             echo(f"at {level.step:.6g} s: {level.message}")
-    echo(_independent(run), "")
+    echo(_dop853(run), "")
 
 
 def _cells(e: Estimate, tolerance: float) -> list[str]:
@@ -94,12 +94,11 @@ def _cells(e: Estimate, tolerance: float) -> list[str]:
     return [*values, order, error, "converged" if e.converged(tolerance) else "not converged"]
 
 
-def _independent(run: Checked) -> str:
-    reason = run.left_out or (run.independent.left_out if run.independent else "")
-    if reason or run.independent is None:
-        return f"DOP853 left out: {reason}"
+def _dop853(run: RunVerification) -> str:
+    if run.dop853.skipped:
+        return f"DOP853 skipped: {run.dop853.skipped}"
     gaps = ", ".join(f"{name} {gap:.1e}" for name, gap in run.distances().items())
-    return f"relative difference to DOP853: {gaps} ({run.independent.evaluations} evaluations)"
+    return f"relative difference to DOP853: {gaps} ({run.dop853.evaluations} evaluations)"
 
 
 def _show_rankings(rankings: dict[str, Ranking]) -> None:

@@ -1,14 +1,14 @@
-"""A scenario integrated once more, by scipy's DOP853 with its own choice of steps.
+"""An independent solution of a scenario with scipy's DOP853, adaptive and of order eight.
 
-An adaptive method of order eight, started anew wherever the path is not smooth. What is not an
-ordinary differential equation with a smooth right-hand side is left out, and why is said.
+The integrator restarts wherever the path is not smooth. Scenarios whose right-hand side is not
+smooth otherwise are skipped, with the reason.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
@@ -20,22 +20,22 @@ from podusv_cli.scenario.model import Scenario
 from podusv_cli.verification.step_halving import Level, Progress
 
 TOLERANCE = 1e-10  # relative and absolute, of every state
-UPDATES = 100  # of the progress, for a display is slower than a step
+UPDATES = 100  # of the progress display; updating it at every step would be slow
 MOST_EVALUATIONS = 500_000
 
 
 @dataclass(frozen=True)
-class Independent:
-    """What DOP853 says: where the hull ended [m], the IAE [m s]; or why there is no answer."""
+class Dop853Result:
+    """End position [m] and IAE [m s] by DOP853; NaN where it was `skipped`, with the reason."""
 
-    position: Vector
-    iae: float
-    evaluations: int
-    left_out: str = ""
+    position: Vector = field(default_factory=lambda: np.full(2, np.nan))
+    iae: float = math.nan
+    evaluations: int = 0
+    skipped: str = ""
 
 
-def left_out(scenario: Scenario, levels: list[Level]) -> str:
-    """Why a scenario is not for an adaptive integrator; "" where it is."""
+def why_skipped(scenario: Scenario, levels: list[Level]) -> str:
+    """Why an adaptive integrator does not fit the scenario; "" where it does."""
     return next((text for applies, text in REASONS if applies(scenario, levels)), "")
 
 
@@ -56,8 +56,8 @@ REASONS: tuple[tuple[Callable[[Scenario, list[Level]], bool], str], ...] = (
 )
 
 
-def integrate(scenario: Scenario, progress: Progress | None = None) -> Independent:
-    """Integrate a scenario that nothing speaks against; the IAE is one more state."""
+def integrate(scenario: Scenario, progress: Progress | None = None) -> Dop853Result:
+    """Integrate a scenario for which `why_skipped` has no reason; the IAE is one more state."""
     from scipy.integrate import DOP853  # slow to import
 
     slope, start = continuous(scenario.closed_loop(), compiled=scenario.simulation.compiled)
@@ -69,17 +69,16 @@ def integrate(scenario: Scenario, progress: Progress | None = None) -> Independe
             trouble = _step(solver)
             if trouble or evaluations + solver.nfev > MOST_EVALUATIONS:
                 why = trouble or f"gave up after {MOST_EVALUATIONS} evaluations"
-                text = f"{why} at t = {solver.t:.6g} s"
-                return Independent(np.full(2, np.nan), math.nan, evaluations + solver.nfev, text)
+                return Dop853Result(skipped=f"{why} at t = {solver.t:.6g} s")
             if progress and solver.t > shown:
                 progress(solver.t / duration)
                 shown = solver.t + duration / UPDATES
         s, evaluations = solver.y, evaluations + solver.nfev
-    return Independent(s[:2], float(s[-1]), evaluations)
+    return Dop853Result(s[:2], float(s[-1]), evaluations)
 
 
 def _step(solver: object) -> str:
-    """One step; what went wrong, if anything did."""
+    """Make one step; return an error message, "" without an error."""
     try:
         message: str | None = solver.step()  # type: ignore[attr-defined]
     except ArithmeticError as error:
@@ -88,7 +87,7 @@ def _step(solver: object) -> str:
 
 
 def _pieces(scenario: Scenario, duration: float) -> Iterator[tuple[float, float]]:
-    """Stretches of time between the path's breaks, each after the first beginning just after."""
+    """Intervals between the path's breaks; each but the first starts just after its break."""
     inner = [at.time for at in scenario.path.breaks() if 0.0 < at.time < duration]
     for begin, end in pairwise([0.0, *inner, duration]):
         yield (float(np.nextafter(begin, math.inf)) if begin else 0.0), end

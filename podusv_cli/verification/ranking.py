@@ -1,4 +1,4 @@
-"""Does a comparison rank its runs the same at every step, and by more than the errors?"""
+"""Whether the ranking of runs by a metric is independent of the step and exceeds the errors."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from podusv_cli.verification.richardson import Estimate
 
 @dataclass(frozen=True)
 class Ranking:
-    """Labels from the smallest number on, at each of the three steps.
+    """Labels sorted by a metric, smallest first, at each of the three steps.
 
-    `equal` are neighbours with the same numbers at all steps; `close` are others that lie closer
-    together than their errors.
+    `equal` are neighbours with the same numbers at all steps; `close` are neighbours that differ by
+    less than the sum of their errors.
     """
 
     orders: tuple[tuple[str, ...], ...]
@@ -29,12 +29,12 @@ class Ranking:
 
     @property
     def converged(self) -> bool:
-        """Whether the order can be relied on."""
+        """Whether the order is the same at all steps, and beyond the errors."""
         return self.same and not self.close
 
 
 def ranking(estimates: Mapping[str, Estimate]) -> Ranking | None:
-    """Of one metric, by run; None where fewer than two runs have it at all."""
+    """The ranking by one metric; None where fewer than two runs have it."""
     known = {label: e for label, e in estimates.items() if not e.undefined}
     if len(known) < 2:
         return None
@@ -48,7 +48,7 @@ def ranking(estimates: Mapping[str, Estimate]) -> Ranking | None:
 
 
 def _order(values: Mapping[str, float]) -> tuple[str, ...]:
-    """Smallest first, those without a number last; equal ones as they come."""
+    """Smallest first, NaN last; equal numbers in the order given."""
     return tuple(sorted(values, key=lambda label: (math.isnan(values[label]), values[label])))
 
 

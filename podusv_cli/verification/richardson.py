@@ -2,9 +2,9 @@
 
 If a number has an error C h^p, its values differ by a - b = C h^p (1 - 2^-p) and b - c = 2^-p of
 that, so p = log2(|a - b|/|b - c|), and the error at the first step is (a - b)/(1 - 2^-p)
-(Richardson). Where the differences do not shrink so, no order is claimed and the error is taken to
-be four times the largest difference. Where they shrink faster than the integrator can make them, as
-a peak between two instants may, no order is claimed either, and their sum is the error.
+(Richardson). Where the differences do not shrink like this, no order is given and the error is four
+times the largest difference. Where they shrink faster than the integrator's order allows, as for a
+peak between two instants, no order is given either, and the error is their sum.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-LEAST_ORDER = 0.5  # below which differences hardly shrink
-MOST_ORDER = 5.0  # RK4 has order 4
-ROUNDING = 1e-12  # relative to the scale; smaller differences have no order
-DOUBT = 4.0  # times the largest difference, where there is no order
+LEAST_ORDER = 0.5  # below this the differences hardly shrink
+LARGEST_ORDER = 5.0  # RK4 has order 4
+ROUNDING = 1e-12  # relative to the scale; smaller differences are rounding errors
+SAFETY = 4.0  # error over the largest difference, where there is no order
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """A number at three steps, the order at which it converges (NaN: none), its error at the first.
+    """A number at three steps, its order of convergence (NaN: none), and its error at the first.
 
-    `scale` is what the error is relative to: the number itself, or a length for a position.
+    `scale` is the reference of the relative error: the number itself, or a length for a position.
     """
 
     values: tuple[float, float, float]
@@ -35,23 +35,23 @@ class Estimate:
 
     @property
     def relative(self) -> float:
-        """The error over the scale; 0 where the number does not change at all."""
+        """The error over the scale; 0 where the number does not change with the step."""
         if self.error == 0.0:
             return 0.0
         return self.error / self.scale if self.scale else math.inf
 
     def converged(self, tolerance: float) -> bool:
-        """Whether the relative error is within the tolerance; false where it is not known."""
+        """Whether the relative error is within the tolerance; false where it is unknown."""
         return self.relative <= tolerance
 
     @property
     def undefined(self) -> bool:
-        """Whether the number does not exist at any of the steps, such as a time never reached."""
+        """Whether the number is NaN at all steps, as a settling time never reached."""
         return all(math.isnan(value) for value in self.values)
 
 
 def estimate(values: Sequence[float]) -> Estimate:
-    """Of a number, from its values at the three steps; NaN at all three is a value like another."""
+    """Order and error of a number from its values at the three steps; all may be NaN."""
     a, b, c = values
     if all(math.isnan(value) for value in values):
         return Estimate((a, b, c), math.nan, 0.0, 0.0)
@@ -59,7 +59,7 @@ def estimate(values: Sequence[float]) -> Estimate:
 
 
 def estimate_position(positions: Sequence[np.ndarray], length: float) -> Estimate:
-    """Of a point in the plane; its values are the distances [m] to where the finest run ends."""
+    """Order and error of a point; `values` are distances [m] to the point of the finest run."""
     a, b, c = positions
     coarse, fine = math.dist(a, b), math.dist(b, c)
     return _estimate((math.dist(a, c), fine, math.dist(c, c)), coarse, fine, length)
@@ -75,7 +75,7 @@ def _estimate(
         return Estimate(values, math.nan, max(coarse, fine), scale)
     order = math.log2(max(coarse, negligible) / max(fine, negligible))
     if order < LEAST_ORDER:
-        return Estimate(values, math.nan, DOUBT * max(coarse, fine), scale)
-    if order > MOST_ORDER:
+        return Estimate(values, math.nan, SAFETY * max(coarse, fine), scale)
+    if order > LARGEST_ORDER:
         return Estimate(values, math.nan, coarse + fine, scale)
     return Estimate(values, order, coarse / (1.0 - 2.0**-order), scale)

@@ -1,4 +1,4 @@
-"""A scenario run again at a finer step, with everything that is given in seconds left as it is."""
+"""A scenario run at a finer step, with all times in seconds unchanged."""
 
 from __future__ import annotations
 
@@ -19,20 +19,19 @@ Progress = Callable[[float], None]
 
 @dataclass(frozen=True)
 class Level:
-    """A run at one step: its metrics (none that did not finish), and where the hull ended."""
+    """A run at one step: its metrics (empty unless it finished) and the hull's end position."""
 
     step: float
     status: Status
     message: str
     metrics: dict[str, float]
-    position: Vector  # (x, y) at the end [m]
+    position: Vector  # (x, y) [m]
 
 
 def refined(scenario: Scenario, halvings: int) -> TimeGrid:
-    """The scenario's grid with its step halved so often; only start and end are logged.
+    """The scenario's grid with the step halved `halvings` times; only start and end are logged.
 
-    Control periods are counted in steps, so their count doubles; a difference quotient's Delta t
-    and the path's times are in seconds and stay.
+    The grid counts control periods in steps, so this count doubles with each halving.
     """
     grid, finer = scenario.time_grid(), 2**halvings
     steps = grid.steps * finer
@@ -40,7 +39,7 @@ def refined(scenario: Scenario, halvings: int) -> TimeGrid:
 
 
 def run_level(scenario: Scenario, halvings: int, progress: Progress | None = None) -> Level:
-    """Run a scenario of one law with its step halved so often."""
+    """Run a scenario of one law with its step halved `halvings` times."""
     loop, grid, settings = scenario.closed_loop(), refined(scenario, halvings), scenario.metrics
     seeing = observer(
         loop, grid, steady_fraction=settings.steady_fraction,

@@ -1,4 +1,4 @@
-"""A scenario's numbers at three steps and by another integrator, and what to make of them."""
+"""Verification of a scenario's numbers: step halving, Richardson's error, DOP853, rankings."""
 
 from __future__ import annotations
 
@@ -10,38 +10,36 @@ from typing import Any
 
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.verification.dop853 import Independent, integrate, left_out
+from podusv_cli.verification.dop853 import Dop853Result, integrate, why_skipped
 from podusv_cli.verification.ranking import Ranking, ranking
 from podusv_cli.verification.richardson import Estimate, estimate, estimate_position
-from podusv_cli.verification.step_halving import Level, run_level
+from podusv_cli.verification.step_halving import Level, Progress, run_level
 
 LEVELS = 3
-POSITION = "end_position"  # a number of its own beside the metrics
-Told = Callable[[str, float], None]
+POSITION = "end_position"  # verified like a metric
 
 
 @dataclass(frozen=True)
-class Checked:
-    """One run's verification. `length` is the hull's, the scale of positions."""
+class RunVerification:
+    """The verification of one run; `length` [m] of the hull is the scale of positions."""
 
     levels: list[Level]
     estimates: dict[str, Estimate]
-    independent: Independent | None
-    left_out: str
+    dop853: Dop853Result
     length: float
 
     def distances(self) -> dict[str, float]:
-        """How far the run at the scenario's step is from DOP853, relative to length and IAE."""
-        if self.independent is None or self.independent.left_out:
+        """Differences to DOP853 at the scenario's step, relative to length and IAE."""
+        first, other = self.levels[0], self.dop853
+        if other.skipped:
             return {}
-        first, other = self.levels[0], self.independent
         return {
             POSITION: math.dist(first.position, other.position) / self.length,
             "iae": abs(first.metrics["iae"] - other.iae) / other.iae if other.iae else 0.0,
         }
 
-    def doubtful(self, tolerance: float) -> list[str]:
-        """Names of numbers that are not converged; `status` alone where a run did not finish."""
+    def unconverged(self, tolerance: float) -> list[str]:
+        """Names of numbers that are not converged; only `status` where a run did not finish."""
         if any(level.status != "finished" for level in self.levels):
             return ["status"]
         names = [n for n, e in self.estimates.items() if not e.converged(tolerance)]
@@ -49,7 +47,7 @@ class Checked:
         return names + apart
 
     def as_json(self, tolerance: float) -> dict[str, Any]:
-        """Plain data; NaN or infinity where there is no number."""
+        """The verification as plain data, with NaN and infinity."""
         numbers = {
             name: {
                 "values": list(e.values),
@@ -60,8 +58,7 @@ class Checked:
             }
             for name, e in self.estimates.items()
         }
-        gaps = self.distances()
-        reason = self.left_out or (self.independent.left_out if self.independent else "")
+        gaps, reason = self.distances(), self.dop853.skipped
         return {
             "status": [level.status for level in self.levels],
             "numbers": numbers,
@@ -70,22 +67,22 @@ class Checked:
 
 
 @dataclass(frozen=True)
-class Verified:
-    """All runs of a scenario verified, and the rankings of a comparison."""
+class Verification:
+    """The verification of all runs of a scenario, and of their rankings by metric."""
 
-    runs: dict[str, Checked]
+    runs: dict[str, RunVerification]
     rankings: dict[str, Ranking]
     tolerance: float
 
     @property
-    def doubts(self) -> dict[str, list[str]]:
-        """What is not converged: by run, and `ranking` of metrics."""
-        found = {label: run.doubtful(self.tolerance) for label, run in self.runs.items()}
+    def unconverged(self) -> dict[str, list[str]]:
+        """Names of numbers that are not converged, by run, and of metrics under `ranking`."""
+        found = {label: run.unconverged(self.tolerance) for label, run in self.runs.items()}
         found["ranking"] = [name for name, rank in self.rankings.items() if not rank.converged]
         return {label: names for label, names in found.items() if names}
 
     def as_json(self) -> dict[str, Any]:
-        """What `--json` prints."""
+        """The output of `--json`."""
         first = next(iter(self.runs.values()))
         return {
             "format": 1,
@@ -101,11 +98,13 @@ class Verified:
                 }
                 for name, rank in self.rankings.items()
             },
-            "converged": not self.doubts,
+            "converged": not self.unconverged,
         }
 
 
-def verify(scenario: Scenario, tolerance: float, progress: Told | None = None) -> Verified:
+def verify(
+    scenario: Scenario, tolerance: float, progress: Callable[[str, float], None] | None = None
+) -> Verification:
     """Verify every run of a scenario: its one law, or all of `controllers`."""
     runs = {
         label: check(one, progress and partial(progress, label))
@@ -117,27 +116,26 @@ def verify(scenario: Scenario, tolerance: float, progress: Told | None = None) -
         rank = ranking(of_runs)
         if rank:
             rankings[name] = rank
-    return Verified(runs, rankings, tolerance)
+    return Verification(runs, rankings, tolerance)
 
 
-def check(scenario: Scenario, progress: Callable[[float], None] | None = None) -> Checked:
+def check(scenario: Scenario, progress: Progress | None = None) -> RunVerification:
     """Verify one run."""
     work = [2.0**n for n in range(LEVELS)]  # a halved step costs twice as much
     levels = [
         run_level(scenario, n, _part(progress, sum(work[:n]), work[n], 2 * sum(work)))
         for n in range(LEVELS)
     ]
-    length, reason = scenario.vessel.length, left_out(scenario, levels)
-    other = None if reason else integrate(scenario, _part(progress, 1.0, 1.0, 2.0))
+    reason, length = why_skipped(scenario, levels), scenario.vessel.length
+    tick = _part(progress, 1.0, 1.0, 2.0)
+    other = Dop853Result(skipped=reason) if reason else integrate(scenario, tick)
     estimates = {POSITION: estimate_position([level.position for level in levels], length)}
     names = dict.fromkeys(name for level in levels for name in level.metrics)
     for name in names:
         estimates[name] = estimate([level.metrics.get(name, math.nan) for level in levels])
-    return Checked(levels, estimates, other, reason, length)
+    return RunVerification(levels, estimates, other, length)
 
 
-def _part(
-    progress: Callable[[float], None] | None, begin: float, size: float, whole: float
-) -> Callable[[float], None] | None:
-    """Progress of one part as progress of the whole."""
+def _part(progress: Progress | None, begin: float, size: float, whole: float) -> Progress | None:
+    """A callback for the progress of one part of the work, which reports that of the whole."""
     return progress and (lambda fraction: progress((begin + fraction * size) / whole))

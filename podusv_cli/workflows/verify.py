@@ -13,7 +13,7 @@ from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import load
 from podusv_cli.storage import files, json_files
 from podusv_cli.verification import verify as verification
-from podusv_cli.verification.verify import Verified
+from podusv_cli.verification.verify import Verification
 
 RESULT = {"format", "tolerance", "steps", "runs", "converged"}  # keys of what `keep` writes
 
@@ -21,7 +21,7 @@ RESULT = {"format", "tolerance", "steps", "runs", "converged"}  # keys of what `
 def verify(
     config: Path, overrides: Sequence[str], tolerance: float, out: Path | None = None,
     progress: Callable[[str, float], None] | None = None, *, force: bool = False,
-) -> Verified:  # fmt: skip
+) -> Verification:  # fmt: skip
     """Verify a scenario's numbers, which `keep` can write to the file `out`.
 
     Raises UsageError for a run folder, ScenarioError, LawError, and StorageError where `out` is no
@@ -45,7 +45,7 @@ def verify(
     return verification.verify(scenario, tolerance, progress)
 
 
-def keep(done: Verified, out: Path, *, force: bool = False) -> None:
+def keep(done: Verification, out: Path, *, force: bool = False) -> None:
     """Write a verification as JSON to the file `out`. Raises StorageError, as `verify`."""
     _spare(out, force)
     files.make_folder(out.parent)
