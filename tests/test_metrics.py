@@ -17,7 +17,7 @@ from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import simulate
 from podusv_cli.metrics import distance
 from podusv_cli.metrics.cost import law_costs
-from podusv_cli.metrics.metric import closed
+from podusv_cli.metrics.metric import close_integrals
 from podusv_cli.metrics.table import METRICS, observer
 
 
@@ -224,4 +224,4 @@ def test_full_derivatives_cost_more_than_pid():
 
 def test_an_integral_that_left_the_finite_numbers_stays_infinite():
     seen = np.array([0.05, np.inf, 0.01, np.inf])
-    assert closed(seen, 2, 0.01).tolist() == pytest.approx([0.045, np.inf, 0.01, np.inf])
+    assert close_integrals(seen, 2, 0.01).tolist() == pytest.approx([0.045, np.inf, 0.01, np.inf])

@@ -118,7 +118,7 @@ class Lagging(Actuator):
         rate[0] = signals[0] / k.lag
 """,
     "metrics/reach.py": """
-from podusv_cli.metrics.metric import Accumulator, Metric, entry
+from podusv_cli.metrics.metric import Accumulator, Metric, gathered
 
 
 @kernel
@@ -128,8 +128,8 @@ def watch(t, weight, s, row, k, seen):
 
 
 OF = Accumulator(watch, lambda layout: 2, lambda layout: {"reach_scale": 2.0})
-reach = Metric("reach", "m", "largest distance east", OF, entry(0))
-twice = Metric("twice", "s", "twice the run", OF, entry(1))
+reach = Metric("reach", "m", "largest distance east", OF, gathered(0))
+twice = Metric("twice", "s", "twice the run", OF, gathered(1))
 """,
     "figures/cross.py": """
 from podusv_cli.figures.panels import signals_over_time

@@ -1,1 +1,1 @@
-"""Numbers that sum up a run."""
+"""Metrics: numbers that characterise a run."""

@@ -1,4 +1,4 @@
-"""What a law costs to compute."""
+"""The processor time that a law takes."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ law_ns = Metric(
 )  # fmt: skip
 low = Metric("law_ns_low", "ns", "lower quartile of that time over the replays", place=200)
 high = Metric("law_ns_high", "ns", "upper quartile of that time over the replays", place=200)
-QUARTILES = [REPLAYS * quarter // 4 for quarter in (1, 2, 3)]  # of the times in order
+QUARTILES = [REPLAYS * quarter // 4 for quarter in (1, 2, 3)]  # positions in the sorted times
 
 
 def law_costs(runs: Sequence[tuple[ClosedLoop, Recording]]) -> list[dict[str, float]]:
-    """Median time of one evaluation of each law [ns], and its quartiles over repeated replays.
+    """Median time of one evaluation of each law [ns], and its quartiles, over repeated replays.
 
-    The laws take turns, so that a machine whose speed drifts treats them alike.
+    The laws are timed in turn, so that changes of the machine's speed affect all alike.
     """
     replays = [replayer(loop, recording) for loop, recording in runs]
     times = np.array([[replay() for replay in replays] for _ in range(REPLAYS)])

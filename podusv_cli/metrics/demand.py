@@ -1,4 +1,4 @@
-"""What the law asked for: peaks, and how much it moves in the steady window."""
+"""Metrics of the law's demand: peaks, and total variation in the steady window."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import math
 from typing import Any
 
 from podusv_cli.core.kernel import Vector, kernel
-from podusv_cli.metrics.metric import Accumulator, Layout, Metric, Result, entry
+from podusv_cli.metrics.metric import Accumulator, Layout, Metric, Result, gathered
 
 PEAK_U, PEAK_R, TV_U, TV_R, LAST_U, LAST_R, SETTLED, SIZE = range(8)
 
 
 @kernel
 def watch(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
-    """Largest demands, and the sum of their changes."""
+    """Gather the largest demands, and the sum of their changes."""
     u, r = row[int(k.demand)], row[int(k.demand) + 1]
     seen[PEAK_U] = max(seen[PEAK_U], abs(u))
     seen[PEAK_R] = max(seen[PEAK_R], abs(r))
@@ -27,7 +27,7 @@ def watch(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector)
 
 
 def _variation(position: int) -> Result:
-    """A total variation; NaN where fewer than two instants lie in the steady window."""
+    """A total variation; NaN with fewer than two instants in the steady window."""
     return lambda seen, step: float(seen[position]) if seen[SETTLED] > 1.0 else math.nan
 
 
@@ -36,8 +36,10 @@ def _constants(layout: Layout) -> dict[str, float]:
 
 
 OF = Accumulator(watch, lambda layout: SIZE, _constants)
-peak_u = Metric("peak_tau_u", "N", "largest |tau_u| that the law asked for", OF, entry(PEAK_U), 2)
-peak_r = Metric("peak_tau_r", "N m", "largest |tau_r| that the law asked for", OF, entry(PEAK_R), 2)
+peak_u = Metric("peak_tau_u", "N", "largest |tau_u| that the law demanded", OF, gathered(PEAK_U), 2)
+peak_r = Metric(
+    "peak_tau_r", "N m", "largest |tau_r| that the law demanded", OF, gathered(PEAK_R), 2
+)
 tv_u = Metric(
     "tv_tau_u", "N", "total variation of the demanded tau_u in the steady window", OF,
     _variation(TV_U), 4,

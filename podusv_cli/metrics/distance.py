@@ -1,4 +1,4 @@
-"""How well the target is followed: metrics of the distance z_e to it."""
+"""Metrics of the distance z_e to the target."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from typing import Any
 
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.engine.closed_loop import DISTANCE
-from podusv_cli.metrics.metric import Accumulator, Layout, Metric, add, entry, part
+from podusv_cli.metrics.metric import Accumulator, Layout, Metric, add, gathered, ratio
 
-# What is gathered, by position.
+# Positions of the gathered numbers.
 TIME, ABSOLUTE, SQUARE, TIMED, INTEGRALS = range(5)
 OUTSIDE, NOW, SIZE = range(2 * INTEGRALS, 2 * INTEGRALS + 3)
 SETTLED = 2  # integrals over the steady window: TIME, ABSOLUTE
@@ -17,10 +17,10 @@ SETTLED = 2  # integrals over the steady window: TIME, ABSOLUTE
 
 @kernel
 def watch(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
-    """Integrals of z_e, and when it was outside the settling radius last."""
+    """Gather integrals of z_e, and when it was last outside the settling radius."""
     z_e = row[DISTANCE]
     if t == 0.0:
-        seen[OUTSIDE] = -1.0  # nowhere outside so far
+        seen[OUTSIDE] = -1.0  # not outside so far
     add(seen, INTEGRALS, TIME, weight)
     add(seen, INTEGRALS, ABSOLUTE, weight * z_e)
     add(seen, INTEGRALS, SQUARE, weight * z_e * z_e)
@@ -32,7 +32,7 @@ def watch(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector)
 
 @kernel
 def watch_settled(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
-    """Integral of z_e over the steady window, which begins with half a weight."""
+    """Gather the integral of z_e over the steady window, whose first instant has half a weight."""
     if t >= k.steady_from:
         opens = seen[TIME] == 0.0 and t > 0.0
         share = 0.5 * weight if opens else weight
@@ -55,13 +55,18 @@ def _settling_time(seen: Vector, step: float) -> float:
 
 OF = Accumulator(watch, lambda layout: SIZE, _constants, INTEGRALS)
 OF_SETTLED = Accumulator(watch_settled, lambda layout: 2 * SETTLED, _constants, SETTLED)
-iae = Metric("iae", "m s", "integral of z_e", OF, entry(ABSOLUTE), 1)
-ise = Metric("ise", "m2 s", "integral of z_e^2", OF, entry(SQUARE), 1)
-itae = Metric("itae", "m s2", "integral of t z_e", OF, entry(TIMED), 1)
+iae = Metric("iae", "m s", "integral of z_e", OF, gathered(ABSOLUTE), 1)
+ise = Metric("ise", "m2 s", "integral of z_e^2", OF, gathered(SQUARE), 1)
+itae = Metric("itae", "m s2", "integral of t z_e", OF, gathered(TIMED), 1)
 rmse = Metric("rmse", "m", "root of the mean of z_e^2", OF, _rmse, 1)
 z_e_steady = Metric(
-    "z_e_steady", "m", "mean of z_e over the steady window", OF_SETTLED, part(ABSOLUTE, TIME), 1
+    "z_e_steady", "m", "mean of z_e over the steady window", OF_SETTLED, ratio(ABSOLUTE, TIME), 1
 )
 settling_time = Metric(
-    "settling_time", "s", "when z_e comes within the settling radius to stay", OF, _settling_time, 1
+    "settling_time",
+    "s",
+    "time from which z_e stays within the settling radius",
+    OF,
+    _settling_time,
+    1,
 )

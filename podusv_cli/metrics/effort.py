@@ -1,18 +1,18 @@
-"""What the loads on the hull amount to, and how long the actuator limits them."""
+"""Metrics of the loads on the hull, and of the actuator's saturation."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from podusv_cli.core.kernel import Vector, kernel
-from podusv_cli.metrics.metric import Accumulator, Layout, Metric, add, entry, part
+from podusv_cli.metrics.metric import Accumulator, Layout, Metric, add, gathered, ratio
 
 TIME, EFFORT_U, EFFORT_R, ENERGY, SATURATED, INTEGRALS = range(6)
 
 
 @kernel
 def watch(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
-    """Squared loads, their work, and the time at the actuator's limits."""
+    """Gather squared loads, their work, and the time in saturation."""
     tau = int(k.tau)
     add(seen, INTEGRALS, TIME, weight)
     add(seen, INTEGRALS, EFFORT_U, weight * row[tau] * row[tau])
@@ -27,12 +27,14 @@ def _constants(layout: Layout) -> dict[str, float]:
 
 
 OF = Accumulator(watch, lambda layout: 2 * INTEGRALS, _constants, INTEGRALS)
-effort_u = Metric("effort_u", "N2 s", "integral of tau_u^2 on the hull", OF, entry(EFFORT_U), 3)
-effort_r = Metric("effort_r", "N2 m2 s", "integral of tau_r^2 on the hull", OF, entry(EFFORT_R), 3)
+effort_u = Metric("effort_u", "N2 s", "integral of tau_u^2 on the hull", OF, gathered(EFFORT_U), 3)
+effort_r = Metric(
+    "effort_r", "N2 m2 s", "integral of tau_r^2 on the hull", OF, gathered(EFFORT_R), 3
+)
 energy = Metric(
-    "energy", "J", "integral of |tau_u u| + |tau_r r|, tau on the hull", OF, entry(ENERGY), 3
+    "energy", "J", "integral of |tau_u u| + |tau_r r|, tau on the hull", OF, gathered(ENERGY), 3
 )
 saturated_fraction = Metric(
     "saturated_fraction", "1", "part of the time in which the actuator limits the law", OF,
-    part(SATURATED, TIME), 5,
+    ratio(SATURATED, TIME), 5,
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""A metric in one place: what is gathered for it at every step, result, unit and meaning."""
+"""Metrics: name, unit and meaning, what is gathered at every step, and the result."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from podusv_cli.engine.simulate import ClosedLoop
 
 @dataclass(frozen=True)
 class Layout:
-    """A loop, where its row has what, and what the scenario says about metrics."""
+    """A loop, the columns of its rows, and the scenario's settings of metrics."""
 
     loop: ClosedLoop
     plan: Plan
@@ -23,7 +23,7 @@ class Layout:
     settling_radius: float  # m
 
     def column(self, signal: str) -> int:
-        """Where the row has an actuator's signal, of a vector its first number; -1 for nowhere."""
+        """Column of an actuator's signal, of a vector its first number; -1 if there is none."""
         names = [part.name for part in self.loop.actuator.signals]
         return self.plan.flags + names.index(signal) if signal in names else -1
 
@@ -33,21 +33,20 @@ Result = Callable[[Vector, float], float]
 
 @kernel
 def add(seen: Vector, integrals: int, position: int, amount: float) -> None:
-    """Add to an integral, and note what the last instant added to it."""
+    """Add to an integral, and store the amount as that of the last instant."""
     seen[position] += amount
     seen[integrals + position] = amount
 
 
-def closed(seen: Vector, integrals: int, step: float) -> Vector:
-    """The gathered numbers with integrals up to the last instant, which counts half.
+def close_integrals(seen: Vector, integrals: int, step: float) -> Vector:
+    """The gathered numbers, with half a weight for the last instant of a run that was cut short.
 
-    The engine gives half a weight at the end of the grid only, so where a run was cut short the
-    other half of what its last instant added is taken out again.
+    The engine gives half a weight only to the last instant of the grid.
     """
     whole, added = seen.copy(), seen[integrals : 2 * integrals]
     if not integrals or whole[0] > added[0] == 0.5 * step:
         return whole
-    with np.errstate(all="ignore"):  # nothing was added, or a run that diverges
+    with np.errstate(all="ignore"):  # nothing was added, or the run diverged
         less = whole[:integrals] - 0.5 * step / added[0] * added
         whole[:integrals] = np.where(np.isinf(whole[:integrals]), np.inf, less)
     return whole
@@ -55,14 +54,14 @@ def closed(seen: Vector, integrals: int, step: float) -> Vector:
 
 @dataclass(frozen=True)
 class Accumulator:
-    """What one or several metrics are read from, gathered at every step whatever the log keeps.
+    """Numbers gathered at every step, logged or not, from which metrics are computed.
 
-    `watch(t, weight, s, row, k, seen)` is a kernel like an observer's, see `engine.simulate`. Its
-    `seen` are `size` numbers of its own, 0 at first; where the size is 0 the loop has nothing for
-    it. `constants` are what it reads from `k`; names that several use have to mean the same.
+    The kernel `watch(t, weight, s, row, k, seen)` is called like an observer's, see
+    `engine.simulate`. Its `seen` are `size` numbers, 0 at first; with size 0 it is left out. It
+    reads `constants` from `k`; a name used by several accumulators must have one value.
 
-    The first `integrals` numbers are integrals over time, made with `add`; the first of them is the
-    time itself. They are trapezoidal on the grid of steps: `weight` [s] is that of the instant.
+    The first `integrals` numbers are integrals over time, made with `add`; the very first is the
+    time itself. They are trapezoidal sums over the steps: `weight` [s] is that of the instant.
     """
 
     watch: Callable[..., None]
@@ -73,30 +72,26 @@ class Accumulator:
 
 @dataclass(frozen=True)
 class Metric:
-    """A number that sums up a run; smaller is better for all of them.
+    """A number that characterises a run; smaller is better for all metrics.
 
-    `result` takes what `of` has gathered and the step [s]; NaN where a run ended before the metric
-    is defined. A metric without `of` comes from elsewhere. `place` orders tables.
+    `result` takes the accumulator's numbers and the step [s], and is NaN for a run that ended
+    before the metric is defined. A metric without an accumulator is measured after the run.
+    `place` orders tables.
     """
 
     name: str
     unit: str
     meaning: str
-    of: Accumulator | None = None
+    accumulator: Accumulator | None = None
     result: Result = lambda seen, step: math.nan
     place: int = 100
 
 
-def ratio(number: float, whole: float) -> float:
-    """number/whole, NaN for nothing at all."""
-    return float(number / whole) if whole else math.nan
-
-
-def entry(position: int) -> Result:
-    """The gathered number at this position as it is."""
+def gathered(position: int) -> Result:
+    """The gathered number at this position."""
     return lambda seen, step: float(seen[position])
 
 
-def part(position: int, whole: int) -> Result:
-    """One gathered number in parts of another."""
-    return lambda seen, step: ratio(seen[position], seen[whole])
+def ratio(position: int, whole: int) -> Result:
+    """One gathered number over another; NaN over 0."""
+    return lambda seen, step: float(seen[position] / seen[whole]) if seen[whole] else math.nan

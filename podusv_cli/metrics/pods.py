@@ -1,4 +1,4 @@
-"""What pods take and do; the vessel's state is followed by their speeds and angles."""
+"""Metrics of pods; their speeds and angles follow the vessel's state."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 from podusv_cli.actuators.propeller import DELTA, LIMITED
 from podusv_cli.core.kernel import Vector, kernel, tail
-from podusv_cli.metrics.metric import Accumulator, Layout, Metric, add, entry, part
+from podusv_cli.metrics.metric import Accumulator, Layout, Metric, add, gathered, ratio
 
 TIME, ENERGY, SPEED, ANGLE, RATE, INTEGRALS = range(6)
 TRAVEL, LAST_DELTA = 2 * INTEGRALS, 2 * INTEGRALS + 1  # the last angle of every pod
@@ -15,7 +15,7 @@ TRAVEL, LAST_DELTA = 2 * INTEGRALS, 2 * INTEGRALS + 1  # the last angle of every
 
 @kernel
 def watch(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
-    """Energy, the way of the angles, the time at each limit."""
+    """Gather energy, the travel of the angles, and the time at each limit."""
     count, flags = int(k.pods), tail(row, int(k.limits))
     add(seen, INTEGRALS, TIME, weight)
     for i in range(3):
@@ -46,21 +46,26 @@ def _constants(layout: Layout) -> dict[str, float]:
 
 OF = Accumulator(watch, _size, _constants, INTEGRALS)
 at_speed_limit = Metric(
-    "at_speed_limit", "1", "part of the time with a propeller asked for its most", OF,
-    part(SPEED, TIME), 6,
+    "at_speed_limit", "1", "part of the time with a propeller commanded to its speed limit", OF,
+    ratio(SPEED, TIME), 6,
 )  # fmt: skip
 at_angle_limit = Metric(
-    "at_angle_limit", "1", "part of the time with a pod asked for its largest angle", OF,
-    part(ANGLE, TIME), 6,
+    "at_angle_limit", "1", "part of the time with a pod commanded to its angle limit", OF,
+    ratio(ANGLE, TIME), 6,
 )  # fmt: skip
 at_rate_limit = Metric(
-    "at_rate_limit", "1", "part of the time with a pod changing as fast as it can", OF,
-    part(RATE, TIME), 6,
+    "at_rate_limit", "1", "part of the time with a pod's angle at its rate limit", OF,
+    ratio(RATE, TIME), 6,
 )  # fmt: skip
 energy = Metric(
-    "energy_pod", "J", "integral of the propellers' power, where that is known", OF,
-    entry(ENERGY), 6,
+    "energy_pod", "J", "integral of the propellers' power, where it is known", OF,
+    gathered(ENERGY), 6,
 )  # fmt: skip
 travel = Metric(
-    "angle_travel", "rad", "way that all propulsion angles go, steering wear", OF, entry(TRAVEL), 6
+    "angle_travel",
+    "rad",
+    "total travel of all pods' angles, a measure of steering wear",
+    OF,
+    gathered(TRAVEL),
+    6,
 )
