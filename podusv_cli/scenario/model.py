@@ -191,7 +191,8 @@ class Scenario(Component):
         """Key and sentence for every pair of values that cannot go together."""
         return [*self._times(), *self._samples(), *self._names(), *self._signals()]
 
-    def _laws(self) -> dict[str, Controller]:
+    def laws(self) -> dict[str, Controller]:
+        """`controller` and all `controllers`, by their keys."""
         several = {f"controllers.{label}": law for label, law in self.controllers.items()}
         return {"controller": self.controller} | several
 
@@ -200,7 +201,7 @@ class Scenario(Component):
         times = {
             "simulation.duration": self.simulation.duration,
             "control.period": self.control.period,
-            **{f"{key}.difference_step": law.sample_period() for key, law in self._laws().items()},
+            **{f"{key}.difference_step": law.sample_period() for key, law in self.laws().items()},
         }
         if max(times.values()) / step > MOST_INSTANTS:
             key, time = max(times.items(), key=lambda item: item[1])
@@ -217,7 +218,7 @@ class Scenario(Component):
 
     def _samples(self) -> Misfits:
         period = self.control.period
-        for key, law in self._laws().items():
+        for key, law in self.laws().items():
             sample = law.sample_period()
             if period and sample and not whole_steps(sample, period):
                 text = f"{sample:g} s is no whole number of control periods of {period:g} s"
