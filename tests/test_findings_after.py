@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from command_samples import Said
+from command_samples import Command, Said
 from conftest import PACKAGE, VESSELS, example, kinds
 from findings_samples import CONFIGS, PLAIN, log, scene
 
@@ -51,6 +51,14 @@ def test_every_code_is_documented_with_its_meaning() -> None:
     text = (PACKAGE.parent / "docs" / "findings.md").read_text()
     for code in finding_kinds().values():
         assert f"| `{code.name}` | `{code.about}` | {code.meaning}" in text
+
+
+@pytest.mark.parametrize("code", finding_kinds())
+def test_explain_shows_when_a_finding_comes_true_and_what_to_do(code: str, podusv: Command) -> None:
+    notice, out = finding_kinds()[code], " ".join(podusv("explain", code).out.split())
+    assert f"condition: {notice.condition} remedy: {notice.remedy}" in out
+    assert len(notice.condition) > 10
+    assert len(notice.remedy) > 10
 
 
 # --- each look, on a run where it is so and on one where it is not

@@ -9,6 +9,7 @@ import typer
 from podusv_cli.cli.terminal import echo_entry
 
 if TYPE_CHECKING:
+    from podusv_cli.core.finding import FindingKind
     from podusv_cli.scenario.explain import Row
 
 
@@ -32,14 +33,20 @@ def explain(
     from podusv_cli.scenario.explain import explain as rows
 
     if key in finding_kinds():
-        kind = finding_kinds()[key]
-        echo_entry(key, kind.meaning, facts=f"finding {kind.when} a run, {kind.about}")
+        _echo_finding(finding_kinds()[key])
         return
     if key in METRICS:
         echo_entry(key, METRICS[key].meaning, facts=f"metric [{METRICS[key].unit}]")
         return
     for row in rows(key, (*finding_kinds(), *METRICS)):
         _echo(row)
+
+
+def _echo_finding(kind: FindingKind) -> None:
+    condition = f"condition: {kind.condition}" if kind.condition else ""
+    remedy = f"remedy: {kind.remedy}" if kind.remedy else ""
+    facts = f"finding {kind.when} a run, {kind.about}"
+    echo_entry(kind.name, kind.meaning, condition, remedy, facts=facts)
 
 
 def _echo(row: Row) -> None:

@@ -17,9 +17,13 @@ GROWN = 0.01  # by which it may grow there
 
 
 @before(
-    "coupling-saddle", about="controller.coupling", meaning="the printed sign makes a saddle",
+    "coupling-saddle",
+    about="controller.coupling",
+    meaning="the printed sign makes a saddle",
+    condition="k_ze k_ue < 1 or k_psie k_re < 1 with the printed sign",
+    remedy="take coupling: corrected, or larger gains",
     law=PolarBackstepping,
-)  # fmt: skip
+)
 def coupling_saddle(case: Any) -> Sentences:
     """With the printed sign, z_e' = -k_ze z_e - u_e and m11 u_e' = -k_ue u_e - z_e; yaw alike.
 
@@ -42,9 +46,13 @@ def coupling_saddle(case: Any) -> Sentences:
 
 
 @before(
-    "network-range", about="controller.network", meaning="no node near the speeds needed",
+    "network-range",
+    about="controller.network",
+    meaning="no node near the speeds needed",
+    condition=f"a steady (u, v, r) along the path is more than {FAR:g} widths from every node",
+    remedy="move low and high, or widen spread",
     law=PolarBackstepping,
-)  # fmt: skip
+)
 def network_range(case: Any) -> Sentences:
     """No node of the network within two widths of the velocities that keep up with the target."""
     nu = case.reference.nu[np.isfinite(case.reference.nu).all(axis=1)]
@@ -62,9 +70,13 @@ def network_range(case: Any) -> Sentences:
 
 
 @after(
-    "off-network", about="controller.network", meaning="no node within two widths",
+    "off-network",
+    about="controller.network",
+    meaning="no node within two widths",
+    condition=f"no node within {FAR:g} widths of (u, v, r)",
+    remedy="move low and high, or widen spread",
     law=PolarBackstepping,
-)  # fmt: skip
+)
 def off_network(scenario: Any, log: Recording) -> Sentences:
     """No node of the network within two widths of (u, v, r)."""
     network = scenario.controller.network
@@ -81,9 +93,13 @@ def off_network(scenario: Any, log: Recording) -> Sentences:
 
 
 @after(
-    "bound-growing", about="controller", meaning="an estimated bound still grew at the end",
+    "bound-growing",
+    about="controller",
+    meaning="an estimated bound still grew at the end",
+    condition=f"growth above {GROWN:.0%} over the last {LAST:.0%} of the run, to a new maximum",
+    remedy="simulate longer, or take more leakage",
     law=PolarBackstepping,
-)  # fmt: skip
+)
 def bound_growing(scenario: Any, log: Recording) -> Sentences:
     """An estimated bound still grows at the end."""
     time = log["time"]

@@ -17,9 +17,13 @@ CROSSWISE = 0.05  # |cos psi_e|; the virtual surge velocity is magnified twentyf
 
 
 @before(
-    "start-astern", about="start", meaning="the start lies outside the folding range",
+    "start-astern",
+    about="start",
+    meaning="the start lies outside the folding range",
+    condition="the target is more than a right angle off the bow, and fold is not joint",
+    remedy="turn start.psi, or take fold: joint",
     law=TrackingController,
-)  # fmt: skip
+)
 def start_astern(case: Any) -> Sentences:
     """The target lies abaft the beam at t = 0 and the law does not fold line of sight and error."""
     law, start = case.scenario.controller, case.scenario.start
@@ -35,9 +39,13 @@ def start_astern(case: Any) -> Sentences:
 
 
 @before(
-    "start-kick", about="controller.first_difference", meaning="the first difference is a kick",
+    "start-kick",
+    about="controller.first_difference",
+    meaning="the first difference is a kick",
+    condition=f"|psi_d(0)|/difference_step above {KICK:g} rad/s",
+    remedy="take first_difference: from_start",
     law=TrackingController,
-)  # fmt: skip
+)
 def start_kick(case: Any) -> Sentences:
     """Remark 5's difference, started from psi_d = 0, is a kick of psi_d(0)/Delta t for a sample."""
     law = case.scenario.controller
@@ -53,9 +61,13 @@ def start_kick(case: Any) -> Sentences:
 
 
 @after(
-    "near-target", about="controller.standoff", meaning="z_e came close to its singularity",
+    "near-target",
+    about="controller.standoff",
+    meaning="z_e came close to its singularity",
+    condition=f"z_e below {NEAR:g} hull lengths, and hold_below is smaller than that",
+    remedy="take a standoff, or hold_below",
     law=TrackingController,
-)  # fmt: skip
+)
 def near_target(scenario: Any, log: Recording) -> Sentences:
     """z_e comes near 0, where psi_d is not defined and w = psi_d' grows as 1/z_e."""
     law, near = scenario.controller, NEAR * scenario.vessel.length
@@ -72,9 +84,13 @@ def near_target(scenario: Any, log: Recording) -> Sentences:
 
 
 @after(
-    "crosswise", about="controller", meaning="cos psi_e came close to zero",
+    "crosswise",
+    about="controller",
+    meaning="cos psi_e came close to zero",
+    condition=f"|cos psi_e| below {CROSSWISE:g}",
+    remedy="start with a heading nearer to the line of sight",
     law=TrackingController,
-)  # fmt: skip
+)
 def crosswise(scenario: Any, log: Recording) -> Sentences:
     """cos psi_e comes near 0, by which (21) divides."""
     if "psi_e" not in log:

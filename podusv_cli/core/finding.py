@@ -58,7 +58,8 @@ Sentences = Iterator[str | At]
 class FindingKind:
     """A kind of finding: its code, the key that it is about, what it means, before or after a run.
 
-    `search` yields the sentences. It is called for laws of the class `law` only.
+    `search` yields the sentences. It is called for laws of the class `law` only. `condition` is
+    the threshold in words, `remedy` what the user can change.
     """
 
     name: str
@@ -67,6 +68,8 @@ class FindingKind:
     when: Literal["before", "after"]
     search: Callable[..., Sentences]
     law: type[Any]
+    condition: str = ""
+    remedy: str = ""
 
     def findings(self, controller: object, *seen: object) -> Iterator[Finding]:
         """All findings of this kind; the arguments `seen` are passed on to `search`."""
@@ -78,14 +81,24 @@ class FindingKind:
 Decorator = Callable[[Callable[..., Sentences]], FindingKind]
 
 
-def before(name: str, *, about: str, meaning: str, law: type[Any] = object) -> Decorator:
+def before(
+    name: str, *, about: str, meaning: str, condition: str = "", remedy: str = "",
+    law: type[Any] = object,
+) -> Decorator:  # fmt: skip
     """Make a kind of finding of a function that takes a `Case` (a scenario before its run)."""
-    return lambda search: FindingKind(name, about, meaning, "before", search, law)
+    return lambda search: FindingKind(
+        name, about, meaning, "before", search, law, condition, remedy
+    )
 
 
-def after(name: str, *, about: str, meaning: str, law: type[Any] = object) -> Decorator:
+def after(
+    name: str, *, about: str, meaning: str, condition: str = "", remedy: str = "",
+    law: type[Any] = object,
+) -> Decorator:  # fmt: skip
     """Make a kind of finding of a function that takes a scenario and its recording."""
-    return lambda search: FindingKind(name, about, meaning, "after", search, law)
+    return lambda search: FindingKind(
+        name, about, meaning, "after", search, law, condition, remedy
+    )
 
 
 def rows_where(log: Recording, test: Callable[[Recording], Mask]) -> Mask:

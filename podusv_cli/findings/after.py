@@ -12,7 +12,13 @@ from podusv_cli.scenario.model import Scenario
 LONG = 0.02  # fraction of the run; shorter saturation is no finding
 
 
-@after("saturated", about="actuator", meaning="the actuator limited the law for long")
+@after(
+    "saturated",
+    about="actuator",
+    meaning="the actuator limited the law for long",
+    condition=f"limited during more than {LONG:.0%} of the run",
+    remedy="take anti_windup: auxiliary, smaller gains, or a stronger actuator",
+)
 def saturated(scenario: Scenario, log: Recording) -> Sentences:
     """The actuator limits the law during a considerable part of the run."""
     if "saturated" not in log:

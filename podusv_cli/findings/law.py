@@ -13,19 +13,37 @@ from podusv_cli.findings.stability import bursts, loops, rk4_growth, sampled_gro
 UNSTABLE = 1.0 + 1e-6
 
 
-@before("stiff-adaptation", about="simulation.step", meaning="adaptation too fast for RK4's step")
+@before(
+    "stiff-adaptation",
+    about="simulation.step",
+    meaning="adaptation too fast for RK4's step",
+    condition="RK4 makes the linearised loop of error and adaptation grow",
+    remedy="take a shorter step, or smaller adaptation gains",
+)
 def stiff_adaptation(case: Case) -> Sentences:
     """RK4 is unstable at this step because of the network's adaptation."""
     return _too_fast(case, "adaptation")
 
 
-@before("stiff-derivative", about="simulation.step", meaning="PID's loop too fast for RK4's step")
+@before(
+    "stiff-derivative",
+    about="simulation.step",
+    meaning="PID's loop too fast for RK4's step",
+    condition="RK4 makes the loop of error, integral and lag grow",
+    remedy="take a shorter step, or smaller gains",
+)
 def stiff_derivative(case: Case) -> Sentences:
     """RK4 is unstable at this step because of PID's proportional and derivative action."""
     return _too_fast(case, "derivative")
 
 
-@before("stiff-loop", about="simulation.step", meaning="a velocity loop too fast for RK4's step")
+@before(
+    "stiff-loop",
+    about="simulation.step",
+    meaning="a velocity loop too fast for RK4's step",
+    condition="RK4 makes a velocity loop of the law grow",
+    remedy="take a shorter step, or smaller gains",
+)
 def stiff_loop(case: Case) -> Sentences:
     """RK4 is unstable at this step because of a velocity loop of another law."""
     return _too_fast(case, "loop")
@@ -55,19 +73,37 @@ def _largest_step(loop: Loop) -> float:
     return low
 
 
-@before("sampled-adaptation", about="control.period", meaning="adaptation too fast for the period")
+@before(
+    "sampled-adaptation",
+    about="control.period",
+    meaning="adaptation too fast for the period",
+    condition="the linearised loop of error and adaptation grows over one period",
+    remedy="take a shorter period, or smaller adaptation gains",
+)
 def sampled_adaptation(case: Case) -> Sentences:
     """The network's adaptation is unstable when the law is evaluated once per period."""
     return _sampled_too_fast(case, "adaptation")
 
 
-@before("sampled-derivative", about="control.period", meaning="PID's loop too fast for the period")
+@before(
+    "sampled-derivative",
+    about="control.period",
+    meaning="PID's loop too fast for the period",
+    condition="the loop of error, integral and lag grows over one period",
+    remedy="take a shorter period, or smaller gains",
+)
 def sampled_derivative(case: Case) -> Sentences:
     """PID is unstable when it is evaluated once per period."""
     return _sampled_too_fast(case, "derivative")
 
 
-@before("sampled-loop", about="control.period", meaning="a velocity loop too fast for the period")
+@before(
+    "sampled-loop",
+    about="control.period",
+    meaning="a velocity loop too fast for the period",
+    condition="a velocity loop of the law grows over one period",
+    remedy="take a shorter period, or smaller gains",
+)
 def sampled_loop(case: Case) -> Sentences:
     """A velocity loop of another law is unstable when it is evaluated once per period."""
     return _sampled_too_fast(case, "loop")
@@ -86,7 +122,13 @@ def _sampled_too_fast(case: Case, cause: Cause) -> Sentences:
             )
 
 
-@before("stiff-start", about="simulation.step", meaning="start error makes the bound too stiff")
+@before(
+    "stiff-start",
+    about="simulation.step",
+    meaning="start error makes the bound too stiff",
+    condition="RK4 makes the error, marched from t = 0 with its bound, grow",
+    remedy="take a shorter step, a smaller bound gain, or a start nearer to the target's velocity",
+)
 def stiff_start(case: Case) -> Sentences:
     """The start error drives the estimated bound so high that RK4 becomes unstable.
 

@@ -58,25 +58,49 @@ def _jump(case: Case, time: float) -> Vector:
     return np.asarray(sides[1] - sides[0])
 
 
-@before("path-jump", about="path", meaning="the target's position jumps")
+@before(
+    "path-jump",
+    about="path",
+    meaning="the target's position jumps",
+    condition="the position differs before and after a break of the path",
+    remedy="let the parts of the path meet",
+)
 def path_jump(case: Case) -> Sentences:
     """The target's position jumps."""
     return path_breaks(case, "position")
 
 
-@before("path-corner", about="path", meaning="the target's velocity jumps")
+@before(
+    "path-corner",
+    about="path",
+    meaning="the target's velocity jumps",
+    condition="the velocity differs before and after a break of the path",
+    remedy="round the corner",
+)
 def path_corner(case: Case) -> Sentences:
     """The target's velocity jumps."""
     return path_breaks(case, "velocity")
 
 
-@before("path-bend", about="path", meaning="the target's acceleration jumps")
+@before(
+    "path-bend",
+    about="path",
+    meaning="the target's acceleration jumps",
+    condition="the acceleration differs before and after a break of the path",
+    remedy="none needed: Assumption 3 holds; a smooth path avoids the step",
+)
 def path_bend(case: Case) -> Sentences:
     """The target's acceleration jumps."""
     return path_breaks(case, "acceleration")
 
 
-@before("sway-drift", about="path", meaning="the sway load drifts the hull faster than the target")
+@before(
+    "sway-drift",
+    about="path",
+    meaning="the sway load drifts the hull faster than the target",
+    condition="no heading balances sway damping and mean load at the target's speed",
+    remedy="check the sway damping, the load and the speed",
+)
 def sway_drift(case: Case) -> Sentences:
     """The mean sway load pushes the hull sideways faster than the target moves."""
     seen = case.reference
@@ -93,7 +117,13 @@ def sway_drift(case: Case) -> Sentences:
         )
 
 
-@before("sway-unstable", about="controller.k_ze", meaning="pointing at the target makes sway grow")
+@before(
+    "sway-unstable",
+    about="controller.k_ze",
+    meaning="pointing at the target makes sway grow",
+    condition=f"m11 k_ze exceeds the sway damping, and sway grows beyond {RUNAWAY:g} target speed",
+    remedy="take a smaller k_ze, or a hull with more sway damping",
+)
 def sway_unstable(case: Case) -> Sentences:
     """The sway of a hull that points at the target grows: m11 k_ze > d, the linear sway damping.
 
@@ -151,7 +181,13 @@ def _damping(case: Case, drive: float) -> tuple[float, float]:
     return damping, float(growths[held.index(True)]) if any(held) else FASTEST
 
 
-@before("thrust-short", about="actuator", meaning="keeping up takes more than the actuator gives")
+@before(
+    "thrust-short",
+    about="actuator",
+    meaning="keeping up takes more than the actuator gives",
+    condition=f"less than {DELIVERED:.1%} of the force or moment along the path is delivered",
+    remedy="raise the actuator's limit, or slow the target down",
+)
 def thrust_short(case: Case) -> Sentences:
     """Following takes more surge force or yaw moment than the actuator delivers."""
     seen = case.reference
@@ -185,7 +221,13 @@ def _driven_ahead(case: Case, row: int) -> Sentences:
         )
 
 
-@before("stiff-actuator", about="simulation.step", meaning="a pod's lag too short for RK4's step")
+@before(
+    "stiff-actuator",
+    about="simulation.step",
+    meaning="a pod's lag too short for RK4's step",
+    condition=f"the step exceeds {STABLE:g} times the shortest lag",
+    remedy="take a shorter step, or a longer lag",
+)
 def stiff_actuator(case: Case) -> Sentences:
     """An actuator's lag is too short for RK4, which is unstable for steps above 2.78 lags."""
     lag, step = case.scenario.actuator.shortest_lag(), case.scenario.simulation.step
