@@ -56,8 +56,9 @@ def test_runs_that_differ_in_more_are_warned_of_by_key(podusv: Command) -> None:
     assert said.code == 0
     assert said.err == (
         "warning: the runs differ in more than the controller:\n  start.y: a -2, b -3\n"
+        "the numbers may not have converged; check them: podusv verify a.yaml\n"
     )
-    assert podusv(write("two.yaml", TWO), "--out", "y").err == ""
+    assert "warning" not in podusv(write("two.yaml", TWO), "--out", "y").err
 
 
 def test_json_has_the_documented_shape(podusv: Command) -> None:
@@ -284,3 +285,14 @@ def test_the_report_is_named_last(podusv: Command, monkeypatch: pytest.MonkeyPat
     assert Path("x/report.html").exists()
     assert "report" not in podusv(config, "--out", "y").out
     assert podusv(config, "--out", "z", "--figures", "-q").out == "z\n"
+
+
+def test_the_last_line_tells_how_to_check_that_numbers_have_converged(podusv: Command) -> None:
+    config = write("one.yaml", BASE)
+    said = podusv(config, "--out", "x", "--set", "description=two words")
+    assert said.out.splitlines()[-1] == "compared 1 run: x"
+    assert said.err.splitlines()[-1] == (
+        "the numbers may not have converged; check them: "
+        "podusv verify one.yaml --set 'description=two words'"
+    )
+    assert podusv("x", "--out", "y").err.endswith(": podusv verify SCENARIO\n")

@@ -235,9 +235,10 @@ def test_a_foreseen_failure_is_its_message_and_exit_code(
     )
 
 
-def test_an_interrupt_is_130_and_silent(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_interrupt_is_130_and_a_line(capsys: pytest.CaptureFixture[str]) -> None:
     assert outcome(KeyboardInterrupt()) == 130
-    assert capsys.readouterr() == ("", "")
+    assert outcome(KeyboardInterrupt("interrupted; nothing was written")) == 130
+    assert capsys.readouterr() == ("", "interrupted\ninterrupted; nothing was written\n")
 
 
 def test_a_bug_shows_its_trace_and_asks_for_a_report(capsys: pytest.CaptureFixture[str]) -> None:

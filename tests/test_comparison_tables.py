@@ -26,13 +26,18 @@ def test_cells_have_number_mark_and_ratio():
     assert table.cells(FRAME) == [
         ["iae", "m s", "4", "2* (0.5)", "8 (2)", "-"],
         ["energy", "J", "0*", "3", "1", "-"],
-        ["law_ns", "ns", "10", "-", "5* (0.5)", "-"],
+        ["law_ns", "ns", "10", "-", "5 (0.5)", "-"],
     ]
 
 
 def test_numbers_that_read_the_same_are_marked_the_same():
     frame = table.table({"a": {"iae": 0.500653}, "b": {"iae": 0.500649}, "c": {"iae": 0.50066}})
     assert table.cells(frame) == [["iae", "m s", "0.50065*", "0.50065* (1)", "0.50066 (1)"]]
+
+
+def test_a_measured_time_is_never_marked_as_the_best():
+    frame = table.table({"a": {"law_ns": 90.0}, "b": {"law_ns": 80.0}})
+    assert table.cells(frame) == [["law_ns", "ns", "90", "80 (0.889)"]]
 
 
 def test_csv_has_units_first_and_ratios_last():

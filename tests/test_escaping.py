@@ -185,7 +185,7 @@ def test_a_figure_with_such_a_name_is_one_that_browsers_read(podusv: Command) ->
 
 def test_whatever_prints_lines_prints_text(capsys: pytest.CaptureFixture[str]) -> None:
     terminal.echo(EVIL, EVIL, err=True)
-    terminal.echo_line(EVIL)
+    terminal.echo(EVIL)
     terminal.echo_entry(EVIL, EVIL, facts=EVIL)
     terminal.echo_table([EVIL, EVIL, EVIL], [[EVIL, EVIL, EVIL]])
     terminal.warn_of({EVIL: {EVIL: EVIL, "b": EVIL}})

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -24,7 +26,6 @@ from podusv_cli.cli.terminal import (
     Warned,
     echo,
     echo_entry,
-    echo_line,
     echo_path,
     echo_table,
     warn_of,
@@ -80,8 +81,10 @@ def compare(
     if not (as_json or quiet):
         _name_report(done.folder / "report.html")
     if done.status == "interrupted":
-        echo("interrupted; what was done by then is compared, without figures", err=True)
+        echo("interrupted; the runs made so far are compared, without figures", err=True)
         raise typer.Exit(INTERRUPTED)
+    if done.result.entries and not quiet:
+        echo(_advice(items, assign or ()), err=True)
     raise typer.Exit(SOME_FAILED if any(done.result.endings.values()) else 0)
 
 
@@ -90,14 +93,23 @@ def _report(done: Compared, verbose: bool) -> None:
 
     result = done.result
     echo_table(["metric", "unit", *map(str, result.table.columns)], cells(result.table))
-    echo_line(NOTE)
+    echo(NOTE)
     for v in result.verdicts:
         echo_entry(v.name, v.claim.says, v.shown(), facts=v.answer)
     if verbose:
         for label, timing in result.timings.items():
             shown = ", ".join(f"{name} {seconds:.3f}" for name, seconds in timing.items())
             echo(f"{label}: {shown}")
-    echo(f"compared {len(result.entries)} runs: {done.folder}")
+    count = len(result.entries)
+    echo(f"compared {count} {'run' if count == 1 else 'runs'}: {done.folder}")
+
+
+def _advice(items: Sequence[str], assign: Sequence[str]) -> str:
+    """How to find out whether the numbers have converged."""
+    scenario = next((item for item in items if Path(item).is_file()), "SCENARIO")
+    changes = [word for change in assign for word in ("--set", change)]
+    command = shlex.join(["podusv", "verify", scenario, *changes])
+    return f"the numbers may not have converged; check them: {command}"
 
 
 def _name_report(page: Path) -> None:

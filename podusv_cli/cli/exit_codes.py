@@ -14,8 +14,8 @@ from typing import ParamSpec, TextIO
 
 import typer
 
+from podusv_cli.cli.terminal import echo
 from podusv_cli.core.errors import PodusvError, StorageError
-from podusv_cli.core.escaping import visible
 from podusv_cli.process.interrupts import SIGNALLED, STDERR, Interrupts, interrupts_caught
 
 Given = ParamSpec("Given")
@@ -78,8 +78,7 @@ def _open_enough() -> None:
 def told(error: BaseException) -> int:
     """Tell about an error; the exit code it stands for."""
     if isinstance(error, KeyboardInterrupt):
-        if str(error):
-            _say(str(error))
+        _say(str(error) or "interrupted")
         return INTERRUPTED
     if isinstance(error, BrokenPipeError):
         _silence(sys.stdout)
@@ -96,7 +95,7 @@ def told(error: BaseException) -> int:
 
 def _say(*lines: str) -> None:
     with suppress(OSError):  # nobody is left to tell that stderr cannot be written to
-        typer.echo("\n".join(map(visible, lines)), err=True)
+        echo(*lines, err=True)
 
 
 def open_streams() -> None:

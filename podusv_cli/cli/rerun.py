@@ -47,6 +47,8 @@ def rerun(
         if out:
             echo(f"repeated: {out}")
     for label, repeated in done.runs.items():
+        if repeated.status == "interrupted":
+            echo(f"{label}: {repeated.message}", err=True)
         for part in repeated.missing:
             echo(f"{label}: {part}", err=True)
     for label, failure in done.failures.items():

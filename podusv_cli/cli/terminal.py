@@ -19,8 +19,14 @@ SPACE = "  "  # between the columns of a table
 
 
 def echo(*lines: object, err: bool = False) -> None:
-    """Lines, on stderr where `err`; what users wrote moves no cursor and adds no line."""
-    typer.echo("\n".join(map(visible, lines)), err=err)
+    """Lines, on stderr where `err`; wrapped and indented on a terminal, whole in a pipe.
+
+    What users wrote moves no cursor and adds no line.
+    """
+    shown = [visible(line) for line in lines]
+    if (sys.stderr if err else sys.stdout).isatty():
+        shown = [folded(line, _width()) for line in shown]
+    typer.echo("\n".join(shown), err=err)
 
 
 def echo_path(path: Path) -> None:
@@ -89,17 +95,11 @@ def _echo_blocks(head: list[str], rows: list[list[str]]) -> None:
         echo_entry(row[0], ", ".join(cells), facts=f"[{row[1]}]")
 
 
-def echo_line(text: str, *, err: bool = False) -> None:
-    """One line, on stderr where `err`; wrapped and indented on a terminal, whole in a pipe."""
-    text = visible(text)
-    if (sys.stderr if err else sys.stdout).isatty():
-        text = folded(text, _width())
-    typer.echo(text, err=err)
-
-
 def folded(text: str, width: int) -> str:
-    """A line wrapped at words, the rest of it indented by two."""
-    return textwrap.fill(text, width, subsequent_indent="  ", break_on_hyphens=False)
+    """A line wrapped at spaces, the rest of it indented by two; paths are not broken."""
+    return textwrap.fill(
+        text, width, subsequent_indent="  ", break_on_hyphens=False, break_long_words=False
+    )
 
 
 def _width() -> int:
@@ -129,5 +129,5 @@ class Warned:
         """Show one."""
         line = str(finding)
         if line not in self._shown and not self._quiet:
-            echo_line(line, err=True)
+            echo(line, err=True)
         self._shown.add(line)

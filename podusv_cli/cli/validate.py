@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from podusv_cli.cli.options import AllowLarge, Assignments, Config
-from podusv_cli.cli.terminal import echo, echo_line
+from podusv_cli.cli.terminal import echo
 
 if TYPE_CHECKING:
     from podusv_cli.scenario.load import Loaded
@@ -44,7 +44,7 @@ def validate(
     echo(f"{config}: ok ({scenario.name}, {laws}, {steps} steps)")
     echo(f"a run takes {largest(scenario)}")
     for finding in not_silenced(preflight(scenario), scenario):
-        echo_line(str(finding))
+        echo(str(finding))
     if verbose:
         _explain(loaded)
 
@@ -55,8 +55,8 @@ def _explain(loaded: Loaded) -> None:
     from podusv_cli.scenario.load import values
     from podusv_cli.scenario.phrases import as_written
 
-    echo_line(argument(loaded.scenario))
+    echo(argument(loaded.scenario))
     for line in conditions(loaded.scenario):
-        echo_line(line)
+        echo(line)
     for key, content in values(loaded.scenario).items():
         echo(f"{key}: {as_written(content)}  # {loaded.origins[key]}")

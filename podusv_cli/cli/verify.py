@@ -48,7 +48,13 @@ def verify(
     from podusv_cli.workflows import verify as verifying  # heavy imports only when they are needed
 
     with progress_bars(wanted=not (quiet or as_json)) as progress:
-        done = verifying.verify(Path(config), assign or (), tolerance, out, progress, force=force)
+        try:
+            done = verifying.verify(
+                Path(config), assign or (), tolerance, out, progress, force=force
+            )
+        except KeyboardInterrupt:
+            text = f"{config}: interrupted before all steps were simulated; nothing was written"
+            raise KeyboardInterrupt(text) from None
     try:
         if out:
             verifying.keep(done, out, force=force)

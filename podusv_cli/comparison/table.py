@@ -8,12 +8,12 @@ from collections.abc import Mapping
 import pandas as pd
 
 from podusv_cli.core import escaping
-from podusv_cli.metrics.table import METRICS
+from podusv_cli.metrics.table import CLOCKED, METRICS
 
 METRIC = "metric"
 NOTE = (
-    "* smallest of its row; in brackets the ratio to the first run; - not defined, or the run did "
-    "not finish"
+    "* smallest of its row, but for measured times; in brackets the ratio to the first run; - not "
+    "defined, or the run did not finish"
 )
 
 
@@ -53,7 +53,8 @@ def cells(frame: pd.DataFrame) -> list[list[str]]:
     """Rows of text: metric, unit, then number and ratio to the first run; best marked with *."""
     rows = []
     for name, numbers in frame.iterrows():
-        best, first = numbers.min(), numbers.iloc[0]
+        best = math.nan if name in CLOCKED else numbers.min()  # times vary from run to run
+        first = numbers.iloc[0]
         texts = [_cell(number, first, best, i) for i, number in enumerate(numbers)]
         rows.append([str(name), METRICS[str(name)].unit, *texts])
     return rows

@@ -96,9 +96,7 @@ def after(
     law: type[Any] = object,
 ) -> Decorator:  # fmt: skip
     """Make a kind of finding of a function that takes a scenario and its recording."""
-    return lambda search: FindingKind(
-        name, about, meaning, "after", search, law, condition, remedy
-    )
+    return lambda search: FindingKind(name, about, meaning, "after", search, law, condition, remedy)
 
 
 def rows_where(log: Recording, test: Callable[[Recording], Mask]) -> Mask:

@@ -99,7 +99,7 @@ def compare(items: Sequence[Path], request: Request, progress: Progress | None =
         extras = Extras(interrupted=any(outcome.cut for outcome in outcomes.values()))
         result = collect(given.members, outcomes, given.claims, extras)
         if extras.interrupted and not result.entries:
-            raise KeyboardInterrupt("stopped before any run finished; nothing was saved")
+            raise KeyboardInterrupt("interrupted before any run finished; nothing was written")
         origin = provenance.collect(argv, started, datetime.now(UTC))
         outputs.write(writer, result, extras)
         if request.figures:

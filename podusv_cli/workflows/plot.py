@@ -67,7 +67,7 @@ def plot(runs: Sequence[Path], drawing: Drawing) -> Drawn:
     if drawing.animate:
         drawn |= extras.attempt(FILE, lambda: {FILE: animate(shown)}) or {}
     if extras.interrupted:
-        raise KeyboardInterrupt
+        raise KeyboardInterrupt("interrupted; no figure was written")
     replaced = _put(drawing.out, drawn)
     differing = differences({m.label: m.scenario.model_dump() for m in members})
     return Drawn([drawing.out / n for n in drawn], replaced, empty, extras.missing, differing)

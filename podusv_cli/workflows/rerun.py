@@ -45,6 +45,7 @@ class Repeated:
     status: Status
     found: Difference
     missing: Sequence[Missing] = ()  # from the repeated run
+    message: str = ""  # why the repeated run did not finish
 
     @property
     def identical(self) -> bool:
@@ -172,4 +173,6 @@ def _repeat(
     task = Task(member.scenario, original.resolved_yaml, target, request.force, argv=request.argv)
     done = execute(task, progress)
     found = difference(original, run_folder.open_run(done.folder))
-    return Repeated(original.folder, original.status, done.status, found, done.missing)
+    return Repeated(
+        original.folder, original.status, done.status, found, done.missing, done.message
+    )

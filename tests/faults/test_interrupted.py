@@ -32,6 +32,7 @@ from storage_samples import files
 from podusv_cli.process.workers import INTERRUPTED, Outcome
 from podusv_cli.storage import manifest
 from podusv_cli.storage.run_folder import open_run
+from podusv_cli.verification import step_halving
 from podusv_cli.workflows import compare, execute
 
 
@@ -47,7 +48,7 @@ def test_nothing_finished_leaves_nothing(podusv: Command, monkeypatch: pytest.Mo
     lost = Outcome(failure=INTERRUPTED, cut=True)
     monkeypatch.setattr(compare, "run_all", lambda jobs, *rest: [lost] * len(jobs))
     said = podusv("compare", "--no-figures", write("two.yaml", TWO), "--out", "x")
-    assert said == (130, "", "stopped before any run finished; nothing was saved\n")
+    assert said == (130, "", "interrupted before any run finished; nothing was written\n")
     assert [path.name for path in Path().iterdir()] == ["two.yaml"]
 
 
@@ -85,7 +86,7 @@ def test_an_interrupt_while_drawing_costs_the_figures_only(
         assert process.returncode == code, err
         assert gone(process)
     assert "compared 2 runs: x" in out
-    assert err == "interrupted; what was done by then is compared, without figures\n"
+    assert err == "interrupted; the runs made so far are compared, without figures\n"
     assert manifest.check(Path("x")).status == "interrupted"
     assert manifest.check(Path("x/soft")).status == "finished"
     assert "two (interrupted)</h1>" in Path("x/report.html").read_text()
@@ -151,6 +152,34 @@ def test_a_run_that_is_interrupted_after_its_simulation_is_whole(
     assert manifest.check(Path("x")).status == "interrupted"
     assert open_run(Path("x")).recording.status == "finished"
     assert not Path("x/figures").exists()
+
+
+def test_an_interrupted_verification_says_that_nothing_was_written(
+    podusv: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(step_halving, "simulate", soon(signal.SIGINT, step_halving.simulate))
+    said = podusv("verify", write("long.yaml", LONG), "--out", "x.json")
+    text = "long.yaml: interrupted before all steps were simulated; nothing was written\n"
+    assert said == (130, "", text)
+    assert not Path("x.json").exists()
+
+
+def test_run_and_rerun_tell_an_interruption_in_the_same_words(
+    podusv: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    simulate = execute.simulate
+
+    def interrupted(*args: object, **options: object) -> object:
+        os.kill(os.getpid(), signal.SIGINT)
+        return simulate(*args, **options)
+
+    assert podusv("run", write("short.yaml", BASE), "--out", "x", "--no-figures").code == 0
+    monkeypatch.setattr(execute, "simulate", interrupted)
+    run = podusv("run", "short.yaml", "--out", "y", "--no-figures")
+    rerun = podusv("rerun", "x")
+    assert (run.code, rerun.code) == (130, 130)
+    assert run.err.startswith("short.yaml: interrupted after t = ")
+    assert rerun.err == run.err.replace("short.yaml", "x")
 
 
 def test_these_tests_end_where_signals_are_ignored() -> None:
