@@ -32,8 +32,8 @@ def theory(bound, holds):
 
 def test_the_report_has_the_bounds_of_every_run_with_a_theory():
     rows = tree(page(theories={"a": theory(2.5, True), "<b>": theory(None, False)})).rows()
-    assert ["a", "settled", "0.05", "2.5", "2.5", "0.25", "nothing"] in rows
-    missing = "k_ze = 0.1 has to exceed 0.05; gives what is asked (off by 3)"
+    assert ["a", "settled", "0.05", "2.5", "2.5", "0.25", "none"] in rows
+    missing = "k_ze = 0.1 must exceed 0.05; not true: gives what is asked (3)"
     assert ["<b>", "settled", "0.05", "none", "none", "0.25", missing] in rows
     assert "Stability" not in page(theories={})
 

@@ -7,7 +7,7 @@ from comparison_samples import FRAME, Folder, scenario, verdicts
 
 from podusv_cli.comparison import claims, table
 from podusv_cli.comparison.checks import CHECKS
-from podusv_cli.comparison.differences import differences, in_words
+from podusv_cli.comparison.differences import as_text, differences
 from podusv_cli.comparison.entries import Absent, Entry
 
 # A key of every section that a run has besides its law, and another value.
@@ -112,20 +112,20 @@ def test_a_sections_keys_stand_together():
 def test_where_kinds_differ_only_the_kind_and_what_both_have_is_shown():
     calm, rough = scenario("disturbance.kind=none"), scenario("disturbance.scale=2")
     trees = {"a": scenario().model_dump(), "b": calm.model_dump()}
-    assert in_words(differences(trees)) == {"disturbance.kind": {"a": "harmonic", "b": "none"}}
-    third = in_words(differences({**trees, "c": rough.model_dump()}))
+    assert as_text(differences(trees)) == {"disturbance.kind": {"a": "harmonic", "b": "none"}}
+    third = as_text(differences({**trees, "c": rough.model_dump()}))
     assert list(third) == ["disturbance.kind", "disturbance.scale"]
     assert third["disturbance.scale"] == {"a": "1", "b": "-", "c": "2"}
 
 
 def test_a_key_that_is_lacking_under_the_same_kind_is_shown():
     trees = {"a": {"path": {"kind": "line", "speed": 0.5}}, "b": {"path": {"kind": "line"}}}
-    assert in_words(differences(trees)) == {"path.speed": {"a": "0.5", "b": "-"}}
+    assert as_text(differences(trees)) == {"path.speed": {"a": "0.5", "b": "-"}}
 
 
 def test_different_numbers_never_look_the_same():
     trees = {"a": {"path": {"speed": 0.5}}, "b": {"path": {"speed": 0.5 + 1e-9}}}
-    assert in_words(differences(trees)) == {"path.speed": {"a": "0.5", "b": "0.500000001"}}
+    assert as_text(differences(trees)) == {"path.speed": {"a": "0.5", "b": "0.500000001"}}
 
 
 # --- entries
@@ -178,7 +178,7 @@ def test_verdicts_have_numbers_reasons_and_the_labels_of_the_comparison():
     assert found["C1"]["reason"] == ""
     assert found["C3"]["numbers"] == {"lost.iae": None, "a.iae": 3.0}
     assert found["C3"]["reason"] == "lost.iae: lost has no log: killed"
-    assert verdicts()[2].shown() == "a.iae = 3; lost.iae: lost has no log: killed"
+    assert verdicts()[2].evidence() == "a.iae = 3; lost.iae: lost has no log: killed"
 
 
 def test_claims_in_markdown_stay_in_their_cells():

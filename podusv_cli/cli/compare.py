@@ -95,7 +95,7 @@ def _report(done: Compared, verbose: bool) -> None:
     echo_table(["metric", "unit", *map(str, result.table.columns)], cells(result.table))
     echo(NOTE)
     for v in result.verdicts:
-        echo_entry(v.name, v.claim.says, v.shown(), facts=v.answer)
+        echo_entry(v.name, v.claim.says, v.evidence(), facts=v.answer)
     if verbose:
         for label, timing in result.timings.items():
             shown = ", ".join(f"{name} {seconds:.3f}" for name, seconds in timing.items())

@@ -14,8 +14,8 @@ from podusv_cli.cli.terminal import echo, echo_entry, echo_table
 
 if TYPE_CHECKING:
     from podusv_cli.comparison.causes import Change
-    from podusv_cli.comparison.log_difference import Logs
-    from podusv_cli.comparison.run_difference import Difference
+    from podusv_cli.comparison.log_difference import LogDifference
+    from podusv_cli.comparison.run_difference import RunDifference
 
 
 def diff(
@@ -41,13 +41,13 @@ def diff(
         for path, names in ((one, found.only_one), (other, found.only_other)):
             if names:
                 echo(f"only in {path}: {', '.join(names)}")
-    raise typer.Exit(0 if found.nothing else DIFFERENT)
+    raise typer.Exit(0 if found.same else DIFFERENT)
 
 
-def _report(label: str, found: Difference) -> None:
+def _report(label: str, found: RunDifference) -> None:
     if label:
         echo_entry(label)
-    if found.nothing:
+    if found.same:
         log = "log.h5 byte for byte" if found.same_bytes else "every number of log.h5"
         echo(f"identical: scenario, metrics, {log}")
     _show_changes("scenario", found.scenario)
@@ -63,7 +63,7 @@ def _show_changes(what: str, changes: Mapping[str, Change]) -> None:
         echo_entry(what, *(change_in_words(key, change) for key, change in changes.items()))
 
 
-def _show_metrics(found: Difference) -> None:
+def _show_metrics(found: RunDifference) -> None:
     from podusv_cli.comparison.run_difference import relative
     from podusv_cli.metrics.table import METRICS
 
@@ -76,11 +76,12 @@ def _show_metrics(found: Difference) -> None:
         echo_table(["metric", "unit", "first", "second", "relative"], rows)
 
 
-def _show_log(log: Logs) -> None:
+def _show_log(log: LogDifference) -> None:
     from podusv_cli.cli.difference_text import log_in_words
 
     rows = [
-        [d.signal, d.unit, _number(d.gap), _number(d.of_peak), _time(d.time)] for d in log.largest
+        [d.signal, d.unit, _number(d.gap), _number(d.relative_to_peak), _time(d.time)]
+        for d in log.largest
     ]
     if rows:
         echo_table(["signal", "unit", "largest difference", "of its peak", "at t [s]"], rows)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from podusv_cli.comparison.bit_difference import Deviation
     from podusv_cli.comparison.causes import Change
-    from podusv_cli.comparison.log_difference import Logs
+    from podusv_cli.comparison.log_difference import LogDifference
 
 DIFFERENT = 3  # exit code
 COUNTABLE = 1000  # ulps; beyond, only the relative difference says something
@@ -45,7 +45,7 @@ def change_in_words(key: str, change: Change) -> str:
     return f"{key} {one} -> {other}"
 
 
-def log_in_words(log: Logs) -> Iterator[str]:
+def log_in_words(log: LogDifference) -> Iterator[str]:
     """Sentences about everything in which two logs differ but the signals' largest differences."""
     if log.first:
         yield f"first difference: {deviation_in_words(log.first)}"

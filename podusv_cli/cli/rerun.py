@@ -94,8 +94,8 @@ def _lines(run: Repeated) -> Iterator[str]:
     found = run.found
     yield from log_in_words(found.log)
     if found.log.largest:
-        widest = max(found.log.largest, key=lambda deviation: deviation.of_peak)
-        share = f"{widest.of_peak:.2g} of its peak"
+        widest = max(found.log.largest, key=lambda deviation: deviation.relative_to_peak)
+        share = f"{widest.relative_to_peak:.2g} of its peak"
         yield f"largest difference, {share}: {deviation_in_words(widest)}"
     if found.scenario:
         yield f"changed in the scenario: {changes_in_words(found.scenario)}"

@@ -108,11 +108,11 @@ def _width() -> int:
 
 def warn_of(differences: Mapping[str, Mapping[str, Any]]) -> None:
     """Show on stderr what compared runs differ in besides the controller."""
-    from podusv_cli.comparison.differences import in_words
+    from podusv_cli.comparison.differences import as_text
 
     if differences:
         echo("warning: the runs differ in more than the controller:", err=True)
-    for key, values in in_words(differences).items():
+    for key, values in as_text(differences).items():
         shown = ", ".join(f"{label} {value}" for label, value in values.items())
         echo(f"  {key}: {shown}", err=True)
 

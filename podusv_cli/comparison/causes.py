@@ -1,4 +1,4 @@
-"""Why two runs may differ: the scenario, and the versions of what computed them."""
+"""Possible causes of different results: changes of the scenario, and of versions."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from podusv_cli.scenario.yaml_text import read
 from podusv_cli.scenario.yaml_tree import Fault, plain
 
 Change = tuple[Any, Any]
-# What provenance.json has besides versions: told apart by being new every time.
-OF_THE_MOMENT = ("argv", "started", "finished", "duration_s")
+# Keys of provenance.json that are different for every run
+OF_EACH_RUN = ("argv", "started", "finished", "duration_s")
 
 
 def scenario_changes(one: str, other: str) -> dict[str, Change]:
-    """Keys with different values in two resolved scenarios, None where one has no such key.
+    """Keys with different values in two resolved scenarios; None for a missing key.
 
-    Raises StorageError where one of the texts is no scenario.
+    Raises StorageError where a text is no scenario.
     """
     trees = {"one": _tree(one), "other": _tree(other)}
     found = differences(trees, ignored=(), prose=())
@@ -36,7 +36,7 @@ def _tree(resolved: str) -> dict[str, Any]:
 
 
 def version_changes(one: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Change]:
-    """Facts in two provenance.json that differ; what only one of them knows is no change."""
+    """Entries that differ between two provenance.json; those in only one of them do not count."""
     before, now = _facts(one), _facts(other)
     return {
         key: (before[key], now[key]) for key in before if key in now and before[key] != now[key]
@@ -44,4 +44,4 @@ def version_changes(one: Mapping[str, Any], other: Mapping[str, Any]) -> dict[st
 
 
 def _facts(provenance: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: v for key, v in flat(provenance) if key not in OF_THE_MOMENT and v is not None}
+    return {key: v for key, v in flat(provenance) if key not in OF_EACH_RUN and v is not None}

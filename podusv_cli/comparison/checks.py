@@ -1,4 +1,4 @@
-"""Properties of a run that a claim can state by name."""
+"""Properties of a run that a claim can check by name."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from podusv_cli.core.recording import Status
 from podusv_cli.findings.underactuation import input_rank
 from podusv_cli.scenario.model import Scenario
 
-# By name: whether a run of this scenario that ended so has the property; None where it cannot be
-# told. The status is None for a run that left nothing behind.
+# Arguments: the scenario, and how its run ended (None without a log). None means unknown.
 CHECKS: dict[str, Callable[[Scenario, Status | None], bool | None]] = {
     "finished": lambda scenario, status: (
         status == "finished" if status in ("finished", "diverged") else None

@@ -1,4 +1,4 @@
-"""Verdicts on the claims of a scenario, always with the numbers."""
+"""Claims of a scenario: parsed, judged, and written as JSON and Markdown."""
 
 from __future__ import annotations
 
@@ -44,10 +44,10 @@ class ParsedClaim:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the runs say of a claim.
+    """The verdict on a claim.
 
-    `numbers` holds every quantity that was compared, NaN where there is none; `reason` says why
-    nothing can be told, "" where something can.
+    `numbers` are those that were compared, by their text, NaN where missing; `reason` says why the
+    answer is "cannot tell", else it is empty.
     """
 
     name: str
@@ -58,11 +58,11 @@ class Verdict:
 
     @property
     def timed(self) -> bool:
-        """Whether it rests on a clock's readings, which are others the next time."""
+        """Whether the claim is about measured times, which are different in every comparison."""
         return any(f".{name}" in self.claim.expect for name in CLOCKED)
 
-    def shown(self) -> str:
-        """The numbers in a line, and what is missing."""
+    def evidence(self) -> str:
+        """The numbers and the reason, in one line."""
         numbers = (
             f"{text} = {number:.4g}"
             for text, number in self.numbers.items()
@@ -83,7 +83,7 @@ class Verdict:
 
 
 def parse_claims(loaded: Loaded) -> list[ParsedClaim]:
-    """The claims of a scenario. Raises ScenarioError with all that cannot be understood."""
+    """The claims of a scenario. Raises ScenarioError with a line for each invalid one."""
     scenario, claims, faults = loaded.scenario, [], []
     signals = {signal.name: signal for signal in explain.signals()}
     for single in scenario.singles().values():
@@ -113,12 +113,12 @@ def _verdict(parsed: ParsedClaim, runs: Mapping[str, Source]) -> Verdict:
 
 
 def as_markdown(verdicts: Sequence[Verdict], timed: Sequence[Verdict] = (), place: str = "") -> str:
-    """The verdicts as a table, choices and remarks below it; those `timed` are in `place`."""
+    """The verdicts as a table, followed by remarks; verdicts on `timed` claims are in `place`."""
     rows = [
         f"| {markdown_cell(v.name)} | "
         f"{markdown_cell(v.claim.says)} ({markdown_cell(v.claim.source)}) | "
         f"**{v.answer}** | {markdown_code(v.claim.expect)}, tolerance {v.claim.tolerance:g} | "
-        f"{markdown_cell(v.shown())} |"
+        f"{markdown_cell(v.evidence())} |"
         for v in verdicts
     ]
     remarks = [

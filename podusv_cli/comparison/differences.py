@@ -1,4 +1,4 @@
-"""What compared runs differ in besides the controller."""
+"""Differences between the scenarios of compared runs."""
 
 from __future__ import annotations
 
@@ -22,11 +22,10 @@ def differences(
     scenarios: Mapping[str, Mapping[str, Any]], *,
     ignored: Sequence[str] = IGNORED, prose: tuple[str, ...] = PROSE,
 ) -> dict[str, dict[str, Any]]:  # fmt: skip
-    """Keys outside the controller whose values differ, with the value of every run.
+    """Keys whose values differ, with the value of every run; None for a missing key.
 
-    `scenarios` are resolved scenarios by the runs' labels. A key that a run lacks counts as None.
-    `ignored` sections and keys that end as `prose` does are left out. A section's keys stand
-    together.
+    `scenarios` are resolved scenarios by label. Sections in `ignored` and keys with an ending in
+    `prose` are left out. The keys of one section are adjacent.
     """
     flattened = {
         label: dict(flat({key: part for key, part in tree.items() if key not in ignored}))
@@ -42,22 +41,19 @@ def differences(
     }
 
 
-def in_words(found: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, str]]:
-    """Differences as they are shown: a dash where a run lacks a key.
-
-    Where kinds differ, keys that only one of them has follow from that and are left out.
-    """
+def as_text(found: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, str]]:
+    """Differences as text, without the keys that only exist because kinds differ."""
     return {
-        key: {label: in_short(value) for label, value in values.items()}
+        key: {label: value_text(value) for label, value in values.items()}
         for key, values in found.items()
-        if not _follows(key, values, found)
+        if not _follows_from_kind(key, values, found)
     }
 
 
-def in_short(value: Any) -> str:
-    """A value of a scenario as a cell of a table, no digit lost; a dash for None."""
+def value_text(value: Any) -> str:
+    """A value of a scenario as text, with all digits; a dash for None."""
     if isinstance(value, (list, tuple)):
-        return " ".join(map(in_short, value))
+        return " ".join(map(value_text, value))
     if value is None:
         return "-"
     text = f"{value:g}" if isinstance(value, float) else str(value)
@@ -68,10 +64,10 @@ def _section(key: str) -> str:
     return key.partition(".")[0]
 
 
-def _follows(
+def _follows_from_kind(
     key: str, values: Mapping[str, Any], found: Mapping[str, Mapping[str, Any]]
 ) -> bool:  # fmt: skip
-    """Whether runs that have the key agree on it, and those that lack it are of another kind."""
+    """Whether the key has one value, and is missing only in runs of another kind."""
     above = (key[:at] for at, letter in enumerate(key) if letter == ".")
     known = {repr(value) for value in values.values() if value is not None}
     lacking = None in values.values() and len(known) == 1

@@ -1,4 +1,4 @@
-"""Finished runs as comparison sees them: a label, a folder, a scenario, numbers and signals."""
+"""The runs of a comparison: metrics, signals and checks, for tables and claims."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from podusv_cli.theory import derived
 
 @dataclass(frozen=True)
 class Entry:
-    """A run in a comparison; see `curves.Source`.
+    """A run with a log; a `curves.Source`.
 
-    `cost` holds metrics that were measured for this comparison and replace the run's own.
+    `cost` are metrics measured for this comparison; they replace the run's own.
     """
 
     label: str
@@ -36,26 +36,26 @@ class Entry:
 
     @property
     def until(self) -> float:
-        """Where the run ends, else the last instant that was logged [s]."""
+        """The end of the run, or of its log where it did not finish [s]."""
         if self.recording.status == "finished":
             return self.scenario.simulation.duration
         return float(self.recording["time"][-1]) if len(self.recording["time"]) else 0.0
 
     @property
     def every(self) -> int:
-        """How many steps are between two logged instants."""
+        """Steps from one logged instant to the next."""
         return self.scenario.time_grid().log_every
 
     @property
     def ending(self) -> str:
-        """The first words of what the run says about its end, empty where it finished."""
+        """How the run ended that did not finish, up to the colon of its message; else empty."""
         return self.recording.message.partition(":")[0]
 
     def metric(self, name: str) -> float:
-        """A metric; NaN where it is undefined, and for any run that did not reach its end."""
+        """A metric; NaN where it is undefined, and for a run that did not finish."""
         number = self.cost.get(name, self.run.metrics.get(name))
-        whole = self.recording.status == "finished"
-        return float(number) if number is not None and whole else math.nan
+        finished = self.recording.status == "finished"
+        return float(number) if number is not None and finished else math.nan
 
     def metrics(self) -> dict[str, float]:
         """Every metric of the run by name, NaN where it is undefined."""
@@ -73,7 +73,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class Absent:
-    """A run that failed before it left anything; `failure` says how."""
+    """A run without a log; `failure` is the error message. A `curves.Source`."""
 
     scenario: Scenario
     failure: str
@@ -82,17 +82,17 @@ class Absent:
 
     @property
     def ending(self) -> str:
-        """The last line of the failure: of a traceback, what went wrong."""
+        """The last line of the error message."""
         return f"has no log: {self.failure.strip().splitlines()[-1]}"
 
     def metric(self, name: str) -> float:
-        """NaN."""
+        """NaN, as there are no metrics."""
         return math.nan
 
     def signal(self, name: str) -> Vector:
-        """Empty."""
+        """Empty, as there is no log."""
         return np.empty(0)
 
     def check(self, name: str) -> bool | None:
-        """Whether a property holds that the scenario alone decides."""
+        """Whether a property holds that depends on the scenario alone; else None."""
         return CHECKS[name](self.scenario, None)

@@ -1,15 +1,15 @@
-"""Two recordings side by side: where they part, and how far."""
+"""Comparison of two recordings: which signals differ, where, and how far."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from podusv_cli.comparison.bit_difference import Deviation, differing, gaps
+from podusv_cli.comparison.bit_difference import Deviation, differing, distances
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import Signal
@@ -19,13 +19,13 @@ ENDINGS = ("status", "controller", "message")
 
 
 @dataclass(frozen=True)
-class Logs:
+class LogDifference:
     """What two recordings differ in.
 
-    `first` is the earliest deviation, `largest` has one for every signal that differs, in the order
-    of the log. `rows` counts the rows of both and those of the same time, which are the ones
-    compared. `reshaped` names signals of another size, `only_one` and `only_other` those that one
-    recording alone has; `endings` has what differs of status, controller and message.
+    `first` is the earliest deviation; `largest` has the largest of every signal that differs, in
+    the order of the log. `rows` counts the rows of each recording, and the rows with a common time,
+    which are compared. `reshaped` names signals of different size, `only_one` and `only_other`
+    those of one recording only. `endings` are differences of status, controller and message.
     """
 
     first: Deviation | None
@@ -39,12 +39,12 @@ class Logs:
 
     @property
     def same(self) -> bool:
-        """Whether both hold the same signals, each the same to the last bit, and ended alike."""
-        unlike = (self.largest, self.reshaped, self.only_one, self.only_other, self.endings)
-        return not any(unlike) and len(set(self.rows)) == 1
+        """Whether signals (to the last bit) and endings are the same."""
+        parts = (self.largest, self.reshaped, self.only_one, self.only_other, self.endings)
+        return not any(parts) and len(set(self.rows)) == 1
 
     def as_json(self) -> dict[str, Any]:
-        """The same as plain data."""
+        """The difference as plain data."""
         return {
             "same": self.same,
             "rows": list(self.rows),
@@ -60,13 +60,13 @@ class Logs:
 def _as_json(d: Deviation) -> dict[str, Any]:
     return {
         "signal": d.signal, "time": d.time, "values": [d.one, d.other], "difference": d.gap,
-        "ulps": d.ulps, "relative": d.relative, "relative_to_peak": d.of_peak,
+        "ulps": d.ulps, "relative": d.relative, "relative_to_peak": d.relative_to_peak,
     }  # fmt: skip
 
 
 @dataclass(frozen=True)
-class _Row:
-    """A signal over the rows that both recordings have, and when they are; None: at no time."""
+class _Pair:
+    """A signal in both recordings, at common `times`; None for a signal constant in time."""
 
     name: str
     one: Vector
@@ -76,23 +76,23 @@ class _Row:
 
     @property
     def period(self) -> float:
-        """2 pi for an angle that is wrapped."""
+        """2 pi for a wrapped angle, else infinite."""
         return 2.0 * math.pi if self.about.wrapped else math.inf
 
 
-def compare(one: Recording, other: Recording) -> Logs:
-    """Compare what two recordings have in common, at the times that they have in common."""
-    rows = list(_paired(one, other))
-    alike = [row for row in rows if row.one.shape == row.other.shape]
-    apart = [row for row in alike if differing(row.one, row.other).any()]
+def compare(one: Recording, other: Recording) -> LogDifference:
+    """Compare the signals of two recordings at their common times."""
+    pairs = list(_paired(one, other))
+    alike = [pair for pair in pairs if pair.one.shape == pair.other.shape]
+    unequal = [pair for pair in alike if differing(pair.one, pair.other).any()]
     names, others = _names(one), _names(other)
-    shared = len(rows[0].one)
-    return Logs(
-        first=_first(apart),
-        largest=tuple(_deviation(row, _place_of_largest(row)) for row in apart),
-        compared=tuple(row.name for row in alike),
+    shared = len(pairs[0].one)
+    return LogDifference(
+        first=_first(unequal),
+        largest=tuple(_deviation(pair, _place_of_largest(pair)) for pair in unequal),
+        compared=tuple(pair.name for pair in alike),
         rows=(len(one["time"]), len(other["time"]), shared),
-        reshaped=tuple(row.name for row in rows if row.one.shape != row.other.shape),
+        reshaped=tuple(pair.name for pair in pairs if pair.one.shape != pair.other.shape),
         only_one=tuple(name for name in names if name not in others),
         only_other=tuple(name for name in others if name not in names),
         endings=_endings(one, other),
@@ -108,22 +108,23 @@ def _endings(one: Recording, other: Recording) -> dict[str, tuple[str, str]]:
     return {name: pair for name, pair in pairs.items() if pair[0] != pair[1]}
 
 
-def _paired(one: Recording, other: Recording) -> Iterator[_Row]:
-    """Time, then the other signals that both have, then what is fixed."""
+def _paired(one: Recording, other: Recording) -> Iterator[_Pair]:
+    """Time, then the other signals that both have, then the arrays constant in time."""
     times, at_one, at_other = _shared_times(one["time"], other["time"])
-    yield _Row("time", times, other["time"][at_other], times, one.about["time"])
+    yield _Pair("time", times, other["time"][at_other], times, one.about["time"])
     for name in one.signals:
         if name in other.signals and name != "time":
-            yield _Row(name, one[name][at_one], other[name][at_other], times, one.about[name])
+            yield _Pair(name, one[name][at_one], other[name][at_other], times, one.about[name])
     for name in one.fixed:
         if name in other.fixed:
-            yield _Row(name, one[name], other[name], None, one.about[name])
+            yield _Pair(name, one[name], other[name], None, one.about[name])
 
 
 def _shared_times(one: Vector, other: Vector) -> tuple[Vector, Any, Any]:
-    """The times that both have, and which rows those are.
+    """The common times, and their rows in each recording.
 
-    Logs of one length that differ in a few times only are one grid, damaged: row goes with row.
+    Where logs of one length differ in less than half of their times, these are damaged values on
+    one grid, and the logs are compared row by row.
     """
     if len(one) == len(other) and 2 * np.count_nonzero(differing(one, other)) <= len(one):
         return one, slice(None), slice(None)
@@ -131,38 +132,37 @@ def _shared_times(one: Vector, other: Vector) -> tuple[Vector, Any, Any]:
     return one[at_one], at_one, at_other
 
 
-def _first(apart: list[_Row]) -> Deviation | None:
-    """The earliest deviation; of those at the same time the one that the log has first."""
-    found = [(row, _place_of_first(row)) for row in apart]
+def _first(unequal: list[_Pair]) -> Deviation | None:
+    """The earliest deviation; at equal times that of the first signal in the log."""
+    found = [(pair, _place_of_first(pair)) for pair in unequal]
     if not found:
         return None
-    row, place = min(found, key=lambda item: -1 if item[0].times is None else item[1][0])
-    return _deviation(row, place)
+    pair, place = min(found, key=lambda item: -1 if item[0].times is None else item[1][0])
+    return _deviation(pair, place)
 
 
-def _place_of_first(row: _Row) -> Place:
-    return _place(row, differing(row.one, row.other), np.argmax)
+def _place_of_first(pair: _Pair) -> Place:
+    return _place_of_maximum(differing(pair.one, pair.other))
 
 
-def _place_of_largest(row: _Row) -> Place:
-    # Zeros of different sign are no distance apart, but they differ.
-    apart = differing(row.one, row.other)
-    distances = gaps(row.one, row.other, period=row.period)
-    return _place(row, np.where(apart, distances, -1.0), np.argmax)
+def _place_of_largest(pair: _Pair) -> Place:
+    # Zeros of different sign differ at a distance of 0.
+    distance = distances(pair.one, pair.other, period=pair.period)
+    return _place_of_maximum(np.where(differing(pair.one, pair.other), distance, -1.0))
 
 
-def _place(row: _Row, of: Any, choose: Callable[[Any], Any]) -> Place:
-    return tuple(int(i) for i in np.unravel_index(choose(of), row.one.shape))
+def _place_of_maximum(array: Any) -> Place:
+    return tuple(int(i) for i in np.unravel_index(np.argmax(array), array.shape))
 
 
-def _deviation(row: _Row, place: Place) -> Deviation:
-    inner = place if row.times is None else place[1:]
+def _deviation(pair: _Pair, place: Place) -> Deviation:
+    inner = place if pair.times is None else place[1:]
     index = f"[{','.join(map(str, inner))}]" if inner else ""
-    both = np.abs(np.concatenate([row.one.ravel(), row.other.ravel()]))
+    both = np.abs(np.concatenate([pair.one.ravel(), pair.other.ravel()]))
     return Deviation(
-        signal=f"{row.name}{index}",
-        time=None if row.times is None else float(row.times[place[0]]),
-        one=float(row.one[place]), other=float(row.other[place]),
-        peak=float(both[np.isfinite(both)].max(initial=0.0)), period=row.period,
-        unit=row.about.unit,
+        signal=f"{pair.name}{index}",
+        time=None if pair.times is None else float(pair.times[place[0]]),
+        one=float(pair.one[place]), other=float(pair.other[place]),
+        peak=float(both[np.isfinite(both)].max(initial=0.0)), period=pair.period,
+        unit=pair.about.unit,
     )  # fmt: skip

@@ -12,7 +12,7 @@ import pandas as pd
 
 from podusv_cli.comparison import stability
 from podusv_cli.comparison.claims import Verdict
-from podusv_cli.comparison.differences import flat, in_short, in_words
+from podusv_cli.comparison.differences import as_text, flat, value_text
 from podusv_cli.comparison.table import cells
 from podusv_cli.core.component import Component
 from podusv_cli.core.escaping import lines
@@ -51,12 +51,12 @@ def page(story: Story) -> str:
         .render(
             story=story,
             bad={label: ending for label, ending in story.endings.items() if ending},
-            differing=in_words(story.differences),
+            differing=as_text(story.differences),
             cells=cells(story.table),
             stability=(stability.HEAD, [*stability.rows(story.theories)]),
             figures=[_figure(*figure) for figure in story.figures],
             scenario=_scenario(story),
-            provenance=[(key, in_short(value)) for key, value in flat(story.provenance)],
+            provenance=[(key, value_text(value)) for key, value in flat(story.provenance)],
         )
     )
 
@@ -94,4 +94,4 @@ def _said(part: Component) -> list[str]:
 
 
 def _values(part: Component) -> str:
-    return ", ".join(f"{key} {in_short(value)}" for key, value in flat(part.model_dump()))
+    return ", ".join(f"{key} {value_text(value)}" for key, value in flat(part.model_dump()))

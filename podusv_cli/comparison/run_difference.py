@@ -1,4 +1,4 @@
-"""Everything that two finished runs differ in."""
+"""All differences between two finished runs."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from podusv_cli.comparison.causes import Change, scenario_changes, version_changes
-from podusv_cli.comparison.log_difference import Logs, compare
+from podusv_cli.comparison.log_difference import LogDifference, compare
 from podusv_cli.metrics.table import CLOCKED, METRICS
 from podusv_cli.storage import log_reader, manifest
 from podusv_cli.storage.run_folder import LOG, Run
@@ -17,13 +17,14 @@ Numbers = tuple[float | None, float | None]
 
 
 @dataclass(frozen=True)
-class Difference:
-    """What two runs differ in; `digests` are SHA-256 of their logs, `sizes` their bytes.
+class RunDifference:
+    """The differences between two runs.
 
-    `metrics` has the numbers of both by name, None where a run has none.
+    `digests` are the SHA-256 of their logs, `sizes` the logs' bytes. `metrics` has the numbers of
+    both runs by name, None where a run has none.
     """
 
-    log: Logs
+    log: LogDifference
     digests: tuple[str, str]
     sizes: tuple[int, int]
     scenario: Mapping[str, Change]
@@ -36,17 +37,17 @@ class Difference:
         return self.digests[0] == self.digests[1]
 
     @property
-    def moved(self) -> list[str]:
-        """Metrics that differ, less those that a clock measured."""
+    def changed_metrics(self) -> list[str]:
+        """Names of metrics that differ, measured times excepted."""
         return [k for k, (a, b) in self.metrics.items() if k not in CLOCKED and a != b]
 
     @property
-    def nothing(self) -> bool:
-        """Whether scenario, every number of the log and the metrics are the same."""
-        return self.log.same and not self.scenario and not self.moved
+    def same(self) -> bool:
+        """Whether scenario, metrics and every number of the log are the same."""
+        return self.log.same and not self.scenario and not self.changed_metrics
 
     def as_json(self) -> dict[str, Any]:
-        """The same as plain data."""
+        """The difference as plain data."""
         return {
             "same_numbers": self.log.same,
             "same_bytes": self.same_bytes,
@@ -62,18 +63,18 @@ class Difference:
 
 
 def relative(one: float | None, other: float | None) -> float | None:
-    """(other - one) / |one|; None where there is no such number."""
+    """(other - one) / |one|; None where a number is missing, or only the first is 0."""
     if one is None or other is None or (one == 0 and other != 0):
         return None
     return (other - one) / abs(one) if one else 0.0
 
 
-def difference(one: Run, other: Run) -> Difference:
-    """Compare two run folders that were opened. Raises StorageError."""
+def difference(one: Run, other: Run) -> RunDifference:
+    """Compare two opened run folders. Raises StorageError."""
     entries = [manifest.read(run.folder).files[LOG] for run in (one, other)]
     texts = [log_reader.resolved_yaml(run.folder / LOG) for run in (one, other)]
     names = [name for name in METRICS if name in one.metrics or name in other.metrics]
-    return Difference(
+    return RunDifference(
         log=compare(one.recording, other.recording),
         digests=(entries[0].sha256, entries[1].sha256),
         sizes=(entries[0].bytes, entries[1].bytes),

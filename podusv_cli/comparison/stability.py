@@ -1,4 +1,4 @@
-"""What each run's theory.json says, as rows of a table: the bound of V beside V."""
+"""The contents of the runs' theory.json as a table: the bounds of V beside V."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from typing import Any
 from podusv_cli.core.errors import StorageError
 
 HEAD = (
-    "run", "part", "lambda [1/s]", "bound of V", "printed form's", "largest V",
-    "what the proof needs and this run does not have",
+    "run", "window", "lambda [1/s]", "bound of V", "as printed", "largest V",
+    "conditions of the proof that fail",
 )  # fmt: skip
 
 
 def check(theory: Mapping[str, Any], path: Path) -> None:
-    """StorageError where a run's theory.json is not as podusv writes it."""
+    """Raise StorageError if a run's theory.json is not as podusv writes it."""
     try:
         list(rows({"": theory} if theory else {}))
     except (LookupError, TypeError, ValueError, AttributeError) as error:
@@ -23,26 +23,26 @@ def check(theory: Mapping[str, Any], path: Path) -> None:
 
 
 def rows(theories: Mapping[str, Mapping[str, Any]]) -> Iterator[list[str]]:
-    """A row for each run and window; `theories` are contents of theory.json by run."""
+    """A row for each run and window; `theories` are the contents of theory.json by label."""
     for label, theory in theories.items():
-        missing = "; ".join(_missing(theory)) or "nothing"
+        failing = "; ".join(_failing(theory)) or "none"
         for part, window in theory["windows"].items():
             corrected, printed = window["corrected"], window["printed"]
             numbers = (
                 corrected["lambda"], corrected["bound"], printed["bound"], window["largest_V"]
             )  # fmt: skip
-            yield [label, part, *map(_number, numbers), missing]
+            yield [label, part, *map(_number, numbers), failing]
 
 
-def _missing(theory: Mapping[str, Any]) -> Iterator[str]:
+def _failing(theory: Mapping[str, Any]) -> Iterator[str]:
     for condition in theory["conditions"]:
         if not condition["holds"]:
             value, limit = _number(condition["value"], "g"), _number(condition["limit"])
-            yield f"{condition['name']} = {value} has to exceed {limit}"
-    for said in theory["assumptions"]:
-        if not said["holds"]:
-            off = f" (off by {_number(said['found'])})" if "found" in said else ""
-            yield f"{said['assumption']}{off}"
+            yield f"{condition['name']} = {value} must exceed {limit}"
+    for assumption in theory["assumptions"]:
+        if not assumption["holds"]:
+            number = f" ({_number(assumption['found'])})" if "found" in assumption else ""
+            yield f"not true: {assumption['assumption']}{number}"
 
 
 def _number(number: float | None, form: str = ".3g") -> str:

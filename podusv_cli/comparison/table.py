@@ -18,7 +18,7 @@ NOTE = (
 
 
 def table(metrics: Mapping[str, Mapping[str, float]]) -> pd.DataFrame:
-    """Metrics of runs by label: one row a metric, one column a run."""
+    """Metrics by label as a table: one row per metric, one column per run."""
     known = [name for name in METRICS if any(name in numbers for numbers in metrics.values())]
     rows = {name: [numbers.get(name, math.nan) for numbers in metrics.values()] for name in known}
     frame = pd.DataFrame.from_dict(rows, orient="index", columns=list(metrics), dtype=float)
@@ -26,7 +26,7 @@ def table(metrics: Mapping[str, Mapping[str, float]]) -> pd.DataFrame:
 
 
 def numbers(frame: pd.DataFrame) -> dict[str, dict[str, float | None]]:
-    """The table as plain data: metric, run, number or None."""
+    """The table as plain data: numbers (or None) by metric and run."""
     return {
         str(name): {str(label): None if math.isnan(x) else float(x) for label, x in row.items()}
         for name, row in frame.iterrows()
@@ -44,7 +44,7 @@ def with_ratios(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def as_csv(frame: pd.DataFrame) -> str:
-    """Full precision, ratios last."""
+    """The table as CSV, in full precision, with ratios last."""
     full = with_ratios(frame)
     return full.to_csv(lineterminator="\n", header=[escaping.csv(str(c)) for c in full.columns])
 
@@ -63,15 +63,15 @@ def cells(frame: pd.DataFrame) -> list[list[str]]:
 def _cell(number: float, first: float, best: float, position: int) -> str:
     if math.isnan(number):
         return "-"
-    mark = "*" if f"{number:.5g}" == f"{best:.5g}" else ""  # as readers see them
+    mark = "*" if f"{number:.5g}" == f"{best:.5g}" else ""  # compared as printed
     ratio = f" ({number / first:.3g})" if position and first and not math.isnan(first) else ""
     return f"{number:.5g}{mark}{ratio}"
 
 
 def as_markdown(frame: pd.DataFrame, endings: Mapping[str, str]) -> str:
-    """The table for people, in Markdown, and below it how runs ended that did not finish."""
+    """The table in Markdown, followed by the reasons why runs did not finish."""
     last = {label: ending.strip().splitlines()[-1:] for label, ending in endings.items()}
-    told = [
+    failures = [
         f"- {escaping.markdown(label)}: {escaping.markdown(line)}"
         for label, lines in last.items()
         for line in lines
@@ -81,12 +81,12 @@ def as_markdown(frame: pd.DataFrame, endings: Mapping[str, str]) -> str:
     return (
         "\n".join("| " + " | ".join(line) + " |" for line in lines)
         + f"\n\n{NOTE}\n"
-        + ("\n".join(["", *told, ""]) if told else "")
+        + ("\n".join(["", *failures, ""]) if failures else "")
     )
 
 
 def as_latex(frame: pd.DataFrame) -> str:
-    """The table for a paper, with booktabs; the best in bold face."""
+    """The table in LaTeX (booktabs), with the smallest number of each row in bold."""
     head = ["metric", "unit", *map(str, frame.columns)]
     body = [[escaping.latex(cell) for cell in head]]
     body += [[_marked(cell) for cell in row] for row in cells(frame)]

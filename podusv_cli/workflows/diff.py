@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from podusv_cli.comparison.run_difference import Difference, difference
+from podusv_cli.comparison.run_difference import RunDifference, difference
 from podusv_cli.storage import manifest
 from podusv_cli.storage.run_folder import Run
 from podusv_cli.workflows.members import from_folder
@@ -17,21 +17,21 @@ from podusv_cli.workflows.members import from_folder
 class Differences:
     """Pairs of compared runs by label, and the labels that only one side has."""
 
-    pairs: Mapping[str, tuple[Path, Path, Difference]]
+    pairs: Mapping[str, tuple[Path, Path, RunDifference]]
     only_one: Sequence[str] = ()
     only_other: Sequence[str] = ()
 
     @property
-    def nothing(self) -> bool:
+    def same(self) -> bool:
         """Whether all are the same in scenario, signals and metrics."""
         alone = self.only_one or self.only_other
-        return not alone and all(found.nothing for _, _, found in self.pairs.values())
+        return not alone and all(found.same for _, _, found in self.pairs.values())
 
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints of them."""
         return {
             "format": 1,
-            "identical": self.nothing,
+            "identical": self.same,
             "only": [list(self.only_one), list(self.only_other)],
             "pairs": [
                 {"label": label, "runs": [str(one), str(other)], **found.as_json()}
@@ -61,5 +61,5 @@ def _runs(path: Path) -> list[Run]:
     return [member.run for member in from_folder(path) if member.run]
 
 
-def _pair(one: Run, other: Run) -> tuple[Path, Path, Difference]:
+def _pair(one: Run, other: Run) -> tuple[Path, Path, RunDifference]:
     return one.folder, other.folder, difference(one, other)

@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from podusv_cli.comparison.run_difference import Difference, difference
+from podusv_cli.comparison.run_difference import RunDifference, difference
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.recording import Status
 from podusv_cli.process.extras import Missing
@@ -43,7 +43,7 @@ class Repeated:
     original: Path
     was: Status
     status: Status
-    found: Difference
+    found: RunDifference
     missing: Sequence[Missing] = ()  # from the repeated run
     message: str = ""  # why the repeated run did not finish
 

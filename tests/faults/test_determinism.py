@@ -171,7 +171,7 @@ def test_a_c_library_that_rounds_otherwise_stays_within_the_bound(tmp_path: Path
         logs.append(read_log(folder / "log.h5"))
     found = compare(*logs)
     assert found.first, "the C library made no difference, so nothing was tested"
-    assert max(d.of_peak for d in found.largest) < BOUND
+    assert max(d.relative_to_peak for d in found.largest) < BOUND
     assert not found.endings
 
 
