@@ -117,7 +117,7 @@ def test_without_leakage_there_is_no_bound(name: str) -> None:
 
 def test_before_a_run_only_lambda_and_the_conditions_are_known() -> None:
     before = bound(None)
-    assert before.holds
+    assert all(condition.holds for condition in before.conditions)
     assert before.corrected.lambda_ > bound().corrected.lambda_
     assert math.isnan(before.corrected.value)
 

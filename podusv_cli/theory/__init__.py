@@ -1,1 +1,1 @@
-"""What the paper's stability proof promises, and whether a run keeps it."""
+"""The paper's stability proof, evaluated for a run: Lyapunov function, rate, and bounds."""

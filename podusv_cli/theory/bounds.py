@@ -1,4 +1,4 @@
-"""The ultimate bound of the paper's section 5, (46)-(49), as printed and as it has to read.
+"""The ultimate bound of the paper's section 5, (46)-(49), as printed and corrected.
 
 V' <= -2 lambda V + Delta, so that V ends below Delta / (2 lambda); docs/theory.md derives both.
 """
@@ -14,12 +14,12 @@ from podusv_cli.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.core.kernel import Vector
 from podusv_cli.vessels.vessel import Vessel
 
-TRIES = 400  # values of lambda among which the one with the lowest bound is taken
+TRIES = 400  # values of lambda that are tried for the lowest bound
 
 
 @dataclass(frozen=True)
 class Pair:
-    """A quantity of the surge and of the yaw part."""
+    """A quantity of surge and yaw."""
 
     u: float
     r: float
@@ -27,19 +27,19 @@ class Pair:
 
 @dataclass(frozen=True)
 class Observed:
-    """Largest values, over a part of a run, of what a scenario alone does not tell."""
+    """Largest values over a part of a run, of quantities that depend on the run."""
 
-    b: Pair  # |b_u| [N], |b_r| [N m]: what the disturbance can reach
+    b: Pair  # |b_u| [N], |b_r| [N m]: bounds of the disturbance
     W: Pair  # |W* - W(0)| [m/s2], [rad/s2]
     alpha_dot: Pair  # the paper's X_1 [m/s2] and X_2 [rad/s2]: |alpha'|
-    drift: Pair  # |alpha' + (A + |alpha| - B) alpha|, what really drives the filter errors
-    epsilon: Pair  # |epsilon| [m/s2], [rad/s2]: what the ideal weights leave of f
-    rest: Pair  # [N], [N m]: all that acts on u_e, r_e and is in no other term
+    drift: Pair  # |alpha' + (A + |alpha| - B) alpha|, which drives the filter errors
+    epsilon: Pair  # |epsilon| [m/s2], [rad/s2]: residual of f with the ideal weights
+    rest: Pair  # [N], [N m]: all other loads in the error equations of u_e, r_e
 
 
 @dataclass(frozen=True)
 class Condition:
-    """A gain and what it has to exceed; NaN where that form does not ask for it."""
+    """A gain and the limit that it must exceed; NaN where a form has no such condition."""
 
     name: str
     value: float
@@ -49,21 +49,21 @@ class Condition:
 
     @property
     def holds(self) -> bool:
-        """Whether the gain exceeds its limit; true where there is none."""
+        """Whether the gain exceeds its limit; true without a limit."""
         return not self.value <= self.limit
 
     @property
     def holds_printed(self) -> bool:
-        """The same with the limit that the paper prints."""
+        """Whether the gain exceeds the limit as printed in the paper."""
         return not self.value <= self.printed_limit
 
 
 @dataclass(frozen=True)
 class Bound:
-    """lambda [1/s], Delta, and V's bound Delta / (2 lambda): NaN where nothing was observed.
+    """lambda [1/s], Delta, and V's bound `value` = Delta / (2 lambda); NaN without observations.
 
-    `candidates` are what lambda is the least of [1/s], by the error that each belongs to, and
-    `terms` what Delta is the sum of. The bound is infinite where lambda is not positive.
+    lambda is the least of `candidates` [1/s], named after their errors; Delta is the sum of
+    `terms`. The bound is infinite where lambda is not positive.
     """
 
     lambda_: float
@@ -75,16 +75,11 @@ class Bound:
 
 @dataclass(frozen=True)
 class UltimateBound:
-    """The bound in both forms, and the conditions on the gains in both."""
+    """The bound and the conditions on the gains, corrected and as printed."""
 
     corrected: Bound
     printed: Bound
     conditions: tuple[Condition, ...]
-
-    @property
-    def holds(self) -> bool:
-        """Whether all conditions of the corrected form hold."""
-        return all(condition.holds for condition in self.conditions)
 
 
 @dataclass(frozen=True)
@@ -95,10 +90,10 @@ class _Axis:
     gain: float  # k_ue - 1/2 or k_re - 1/2
     mass: float
     A: float
-    cross: float  # 0, or 1 where the printed sign doubles the cross term
+    cross: float  # 0, or 1 with the printed sign, which doubles the cross term
 
     def slowest(self) -> float:
-        """Largest lambda with which -k e^2 - gain w^2 - A y^2 + |e y| + 2 cross |e w| decays."""
+        """The largest lambda for -k e^2 - gain w^2 - A y^2 + |e y| + 2 cross |e w|."""
         form = np.array([[self.k, self.cross, 0.5], [self.cross, self.gain, 0.0], [0.5, 0.0, 0.0]])
         form[2, 2] = self.A if math.isfinite(self.A) else 0.0
         size = 3 if math.isfinite(self.A) else 2  # without a filter there is no y
@@ -107,12 +102,12 @@ class _Axis:
         return float(np.linalg.eigvalsh(scaled)[0]) if np.isfinite(scaled).all() else math.nan
 
     def limit(self) -> float:
-        """What k has to exceed for that lambda to be positive."""
+        """The value that k must exceed for a positive lambda."""
         from_cross = self.cross**2 / self.gain if self.gain > 0 else math.inf * self.cross
         return 1.0 / (4.0 * self.A) + (from_cross if self.cross else 0.0)
 
     def room(self, rate: Vector) -> Vector:
-        """sigma_y, the part of 2 A that a decay at `rate` leaves for the drift of the filter."""
+        """sigma_y, the part of 2 A that remains for the filter's drift with a decay at `rate`."""
         if math.isinf(self.A):
             return np.full_like(rate, math.inf)
         spare = self.k - rate - self.cross**2 / (self.gain - rate * self.mass)
@@ -124,8 +119,8 @@ def ultimate_bound(
 ) -> UltimateBound:
     """lambda, Delta and the bound of (47)-(49) in both forms; `vessel` gives m11 and m33.
 
-    Without `observed` only lambda and the conditions are known; lambda is then the largest that
-    any choice of sigma_yu, sigma_yr in (47) allows.
+    Without `observed` only lambda and the conditions are known. lambda is then the largest for any
+    choice of sigma_yu, sigma_yr in (47).
     """
     cross = 0.0 if law.coupling == "corrected" else 1.0
     A = law.filter_decay(0.0, 0.0)
@@ -188,7 +183,7 @@ def _unobserved(candidates: dict[str, float]) -> Bound:
 
 
 def _fixed_terms(law: PolarBackstepping, observed: Observed) -> dict[str, float]:
-    """The terms of Delta that are the same in both forms and for every lambda."""
+    """The terms of Delta that are common to both forms and independent of lambda."""
     return {
         "W_u": law.sigma_u * _half_square(observed.W.u),
         "W_r": law.sigma_r * _half_square(observed.W.r),
@@ -202,7 +197,7 @@ def _best(
     candidates: dict[str, float], terms: dict[str, float], rates: Vector,
     rooms: tuple[Vector, Vector], drift: Pair,
 ) -> Bound:  # fmt: skip
-    """The lambda, and with it sigma_yu and sigma_yr of (47), that give the lowest bound."""
+    """The lowest bound over lambda, which fixes sigma_yu and sigma_yr of (47)."""
     largest = _least(candidates)
     if largest <= 0.0:
         return Bound(largest, math.nan, math.inf, candidates, terms)
@@ -220,22 +215,22 @@ def _least(candidates: dict[str, float]) -> float:
 
 
 def _half_square(x: float) -> float:
-    return x * x / 2.0  # infinite where it leaves all numbers; x**2 would raise
+    return x * x / 2.0  # x**2 would raise on overflow
 
 
 def _conditions(law: PolarBackstepping, axes: Axes) -> tuple[Condition, ...]:
     surge, yaw = axes
-    why = "or -z_e y_u cos psi_e and -psi_e y_r, which the paper's V' leaves out, can outweigh it"
+    why = "must outweigh -z_e y_u cos psi_e and -psi_e y_r, which the paper's V' leaves out"
     if surge.cross:
         why += ", and the cross terms that the printed sign doubles"
-    half = "half of it goes to the network's error (47)"
-    leak = "without it nothing pulls the estimate back (48)"
-    pulled = ("Gamma_u", "sigma_u", "Gamma_r", "sigma_r", "gamma_u", "sigma_bu", "gamma_r",
+    half = "1/2 of it compensates the network's error (47)"
+    leak = "without leakage the estimate is not bounded (48)"
+    leakage = ("Gamma_u", "sigma_u", "Gamma_r", "sigma_r", "gamma_u", "sigma_bu", "gamma_r",
               "sigma_br")  # fmt: skip
     return (
         Condition("k_ze", law.k_ze, surge.limit(), 0.0, why),
         Condition("k_psie", law.k_psie, yaw.limit(), 0.0, why),
         Condition("k_ue", law.k_ue, 0.5, 0.5, half),
         Condition("k_re", law.k_re, 0.5, 0.5, half),
-        *(Condition(name, getattr(law, name), 0.0, 0.0, leak) for name in pulled),
+        *(Condition(name, getattr(law, name), 0.0, 0.0, leak) for name in leakage),
     )

@@ -1,4 +1,4 @@
-"""Logged and derived signals of a recording, by name."""
+"""Access to logged and derived signals of a recording, by name."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ DERIVED: dict[str, Derived] = {
 
 
 def has(log: Recording, name: str) -> bool:
-    """Whether the log has the signal, or what it takes to compute it."""
+    """Whether the log has the signal, or those that it is computed from."""
     if name in log:
         return True
     return name in DERIVED and all(part in log for part in DERIVED[name].needs)

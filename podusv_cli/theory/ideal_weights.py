@@ -1,7 +1,7 @@
-"""Ideal weights of the two networks (13), (25), (34): nobody has them, so they are fitted to a run.
+"""Ideal weights of the two networks (13), (25), (34). They are unknown and fitted to a run.
 
-They minimise the mean of (m epsilon)^2 over the visited states plus sigma |W - W(0)|^2, that is
-what the network contributes to Delta in (48) on average; nothing is left to choose.
+The fit minimises the mean of (m epsilon)^2 over the visited states plus sigma |W - W(0)|^2. This is
+the networks' mean contribution to Delta in (48), so there is no free parameter.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from podusv_cli.engine.simulate import ClosedLoop
 
 MOST_ROWS = 2000  # of a run that the fit uses, evenly spread
 MOST_NUMBERS = 2_000_000  # rows times nodes of the fit
-SINGULAR = 1e-12  # relative; damps, without leakage, what no visited state tells apart
+SINGULAR = 1e-12  # relative; least regularisation, for weights that no visited state determines
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Ideal:
 
 
 def unloaded_accelerations(loop: ClosedLoop, now: Replayed) -> tuple[Vector, Vector]:
-    """f_u and f_r: accelerations less what forces and disturbance cause, for any vessel."""
+    """f_u and f_r: accelerations minus those due to actuator and disturbance, for any vessel."""
     m, s, d = loop.vessel, now.signals, now.rates
     sway, yaw = s["tau_v"] + s["b_v"], s["tau_r"] + s["b_r"]
     loaded = (m.m22 * yaw - m.m32 * sway) / (m.m22 * m.m33 - m.m23 * m.m32)
@@ -40,51 +40,53 @@ def unloaded_accelerations(loop: ClosedLoop, now: Replayed) -> tuple[Vector, Vec
 
 
 def node_outputs(network: Network, log: Recording) -> Vector:
-    """Phi (14) at every logged row, shape (rows, nodes), in factors as the law has them."""
+    """Phi (14) at every logged row, shape (rows, nodes)."""
     return outputs(network, exponents(network, log))
 
 
 def exponents(network: Network, log: Recording) -> Vector:
-    """Half the squared distance in widths in every factor of a node, shape (rows, factors)."""
+    """Exponents of the factors of Phi, shape (rows, factors): half squared distances in widths."""
     along, plane = network.factors
     centers, steep = network.table().reshape(2, 3, -1)[..., : along + plane]
     nu = np.column_stack([log["u"], log["v"], log["r"]])
     squares = np.zeros((len(nu), along + plane))
     for axis in range(3):
         squares += steep[axis] * (nu[:, axis, None] - centers[axis]) ** 2
-    return np.nan_to_num(squares, nan=np.inf)  # velocities may have left all numbers
+    return np.nan_to_num(squares, nan=np.inf)  # velocities of a diverged run
 
 
 def outputs(network: Network, factors: Vector) -> Vector:
-    """Phi (14), shape (rows, nodes), of what `exponents` gives."""
+    """Phi (14), shape (rows, nodes), from the `exponents`."""
     plane, bells = network.factors[1], np.exp(-factors)
     return (bells[:, plane:, None] * bells[:, None, :plane]).reshape(len(bells), -1)
 
 
 def node_distance(network: Network, factors: Vector) -> Vector:
-    """Distance of (u, v, r) to the nearest centre in widths, of what `exponents` gives."""
+    """Distance of (u, v, r) to the nearest centre in widths, from the `exponents`."""
     plane = network.factors[1]
     nearest = factors[:, plane:].min(axis=1) + factors[:, :plane].min(axis=1)
     return np.asarray(np.sqrt(2.0 * nearest))
 
 
 def network_output(phi: Vector, weights: Vector) -> Vector:
-    """W . Phi (15) at every row; without threads, which wait for each other on a busy machine."""
+    """W . Phi (15) at every row; einsum, because threads of BLAS are slow on a busy machine."""
     return np.asarray(np.einsum("ij,j->i", phi, weights))
 
 
 def ideal_weights(loop: ClosedLoop, law: PolarBackstepping, log: Recording, now: Replayed) -> Ideal:
-    """The fit described above, over what the law's nominal inertia makes of f_u and f_r."""
+    """The fit described above; f_u and f_r are scaled by true over nominal inertia."""
     f_u, f_r = unloaded_accelerations(loop, now)
-    usable = (np.abs(f_u) < 1e100) & (np.abs(f_r) < 1e100)  # of a run that leaves all numbers
+    usable = (np.abs(f_u) < 1e100) & (np.abs(f_r) < 1e100)  # not those of a diverging run
     phi = node_outputs(law.network, log)[usable]
     start, inverse, weights = law.network.initial_weight, _gram(phi), []
-    for f, mass, told, sigma in (
+    for f, mass, nominal, sigma in (
         (f_u, loop.vessel.m11, loop.nominal.m11, law.sigma_u),
         (f_r, loop.vessel.m33, loop.nominal.m33, law.sigma_r),
     ):
-        aim = f[usable] * (mass / told) - start * phi.sum(axis=1)
-        damping = np.float64(sigma * len(phi)) / (told * told)  # a float would raise beyond numbers
+        aim = f[usable] * (mass / nominal) - start * phi.sum(axis=1)
+        damping = np.float64(sigma * len(phi)) / (
+            nominal * nominal
+        )  # a float would raise on overflow
         weights.append(start + inverse(aim, float(damping)))
     return Ideal(*weights)
 

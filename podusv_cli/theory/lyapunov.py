@@ -1,4 +1,4 @@
-"""The Lyapunov function (46) of the adaptive laws along a run, its rate, and what disturbs it."""
+"""The Lyapunov function (46) of the adaptive laws along a run, and its rate."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Estimates:
 
 
 def estimates(log: Recording, now: Replayed, ideal: Ideal, b: Pair) -> Estimates:
-    """What is between the estimates and the ideal weights and true bounds."""
+    """Errors of the estimated weights and bounds against the ideal weights and true bounds."""
     b_u, b_r = log["b_hat_u"] - b.u, log["b_hat_r"] - b.r
     W_u, W_r = log["W_hat_u"] - ideal.W_u, log["W_hat_r"] - ideal.W_r
     return Estimates(
@@ -67,11 +67,11 @@ def norms(weights: Vector) -> Vector:
 
 
 def lyapunov(
-    loop: ClosedLoop, law: PolarBackstepping, e: Errors, found: Estimates
+    loop: ClosedLoop, law: PolarBackstepping, e: Errors, errors: Estimates
 ) -> dict[str, Vector]:
     """V (46), its terms, and V' by the chain rule, named as in the log; each of shape (rows,).
 
-    A part that does not adapt, its gain being 0, is no part of V.
+    An estimate with adaptation gain 0 has no term in V.
     """
     m11, m33 = loop.vessel.m11, loop.vessel.m33
     parts = {
@@ -81,10 +81,10 @@ def lyapunov(
         "V_r_e": (m33, e.r_e**2, e.r_e * e.r_e_dot),
         "V_y_u": (1.0, e.y_u**2, e.y_u * e.y_u_dot),
         "V_y_r": (1.0, e.y_r**2, e.y_r * e.y_r_dot),
-        "V_W_u": (_inverse(law.Gamma_u), found.W_u, found.W_u_rate),
-        "V_W_r": (_inverse(law.Gamma_r), found.W_r, found.W_r_rate),
-        "V_b_u": (_inverse(law.gamma_u), found.b_u, found.b_u_rate),
-        "V_b_r": (_inverse(law.gamma_r), found.b_r, found.b_r_rate),
+        "V_W_u": (_inverse(law.Gamma_u), errors.W_u, errors.W_u_rate),
+        "V_W_r": (_inverse(law.Gamma_r), errors.W_r, errors.W_r_rate),
+        "V_b_u": (_inverse(law.gamma_u), errors.b_u, errors.b_u_rate),
+        "V_b_r": (_inverse(law.gamma_r), errors.b_r, errors.b_r_rate),
     }
     terms = {name: 0.5 * weight * square for name, (weight, square, _) in parts.items()}
     rate = sum(weight * product for weight, _, product in parts.values())
@@ -98,16 +98,18 @@ def _inverse(gain: float) -> float:
 def remainders(
     loop: ClosedLoop, law: PolarBackstepping, log: Recording, now: Replayed, e: Errors
 ) -> tuple[Vector, Vector]:
-    """All that acts on u_e [N] and r_e [N m] beyond the closed-loop error equations of the proof.
+    """The remainders rho_u [N] and rho_r [N m] in the error equations of u_e and r_e:
 
-    m11 u_e' = -k_ue u_e - m11 What_u . Phi - b_hat_u phi(u_e) + b_u + s z_e cos psi_e + this; yaw
-    alike. For the nominal vessel without limits it is m11 f_u, else also what the actuator
-    withholds, wrong nominal inertia, and derivatives that the law takes wrongly.
+    m11 u_e' = -k_ue u_e - m11 What_u . Phi - b_hat_u phi(u_e) + b_u + s z_e cos psi_e + rho_u,
+    and likewise for yaw. rho_u is m11 f_u for the nominal vessel without limits; saturation, wrong
+    nominal inertia and errors of the law's derivatives add to it.
     """
-    s, m, told = now.signals, loop.vessel, loop.nominal
+    s, m, nominal = now.signals, loop.vessel, loop.nominal
     sign = 1.0 if law.coupling == "corrected" else -1.0
     gain_u = law.k_ue + log["b_hat_u"] / (4.0 * law.partial)
     gain_r = law.k_re + log["b_hat_r"] / (4.0 * law.partial)
-    known_u = s["b_u"] + sign * e.z_e * np.cos(e.psi_e) - gain_u * e.u_e - told.m11 * s["f_hat_u"]
-    known_r = s["b_r"] + sign * e.psi_e - gain_r * e.r_e - told.m33 * s["f_hat_r"]
+    known_u = (
+        s["b_u"] + sign * e.z_e * np.cos(e.psi_e) - gain_u * e.u_e - nominal.m11 * s["f_hat_u"]
+    )
+    known_r = s["b_r"] + sign * e.psi_e - gain_r * e.r_e - nominal.m33 * s["f_hat_r"]
     return m.m11 * e.u_e_dot - known_u, m.m33 * e.r_e_dot - known_r

@@ -1,4 +1,4 @@
-"""The stability monitor: V, its terms and rate along a run, and the bound they should keep."""
+"""The stability monitor: V, its terms and its rate along a run, and the bounds of the proof."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ from podusv_cli.theory.rates import error_rates
 from podusv_cli.theory.sway import SwayBound, sway_bound, sway_push
 
 WINDOWS = ("whole", "settled")
-BLOCK = 4096  # rows that are worked on together, so that they stay in the cache
-MOST_NUMBERS = 2**22  # in a block, with a number for every node in every row
+BLOCK = 4096  # rows computed together, so that they stay in the processor's cache
+LARGEST_BLOCK = 2**22  # numbers in a block, with one for every node in every row
 ERRORS = (Y_U, Y_R)  # of the filters; a law without them has none
 NETWORKS = (W_NORM_U, W_NORM_R, ACTIVATION, NODE_DISTANCE)
 
@@ -67,10 +67,10 @@ FIXED = (
     _of_windows("v_bound", "m/s", "bound of the sway speed (51), with all damping", r"|v|_{\max}"),
 )
 V_DOT_BOUND = Signal(
-    "V_dot_bound", "1/s", "what V_dot should stay below (49), corrected; derived, not logged",
+    "V_dot_bound", "1/s", "bound of V_dot (49), corrected; derived, not logged",
     r"-2\lambda V+\Delta",
 )  # fmt: skip
-# What the bounds are made of, at every row, and is not logged.
+# Quantities at every row from which the bounds are computed; not logged.
 UNLOGGED = (
     "alpha_u_dot", "alpha_r_dot", "drift_u", "drift_r", "epsilon_u", "epsilon_r", "rest_u",
     "rest_r", "push", "printed_push", "turn",
@@ -81,10 +81,10 @@ Traces = dict[str, Vector]
 
 @dataclass(frozen=True)
 class Window:
-    """A part of a run: where it begins [s], what was observed in it, and the bounds there.
+    """A part of a run: its start [s], the largest values in it, and the bounds from these.
 
-    `kept` is the fraction of its rows with V' <= -2 lambda V + Delta, NaN without a bound. With
-    sampled control, and where the run ended before the window, nothing is observed.
+    `kept` is the fraction of its rows with V' <= -2 lambda V + Delta, NaN without a bound.
+    `observed` is None with sampled control, and where the run ended before the window.
     """
 
     since: float
@@ -98,9 +98,9 @@ class Window:
 
 @dataclass(frozen=True)
 class Monitored:
-    """A recording with the monitor's signals, and what they amount to in each window.
+    """A recording with the monitor's signals, and the bounds in each window.
 
-    `traces` has what the signals do not: rates of the virtual controls, what disturbs the errors.
+    `traces` are all quantities at every row, those that are not logged included.
     """
 
     recording: Recording
@@ -109,7 +109,7 @@ class Monitored:
 
 
 def signals(loop: ClosedLoop, *, sampled: bool) -> tuple[Signal, ...]:
-    """What the monitor adds to every row of a log; nothing for a law without V."""
+    """The signals that the monitor adds over time; none for a law without V."""
     law = loop.controller.lyapunov()
     if law is None:
         return ()
@@ -118,14 +118,14 @@ def signals(loop: ClosedLoop, *, sampled: bool) -> tuple[Signal, ...]:
 
 
 def about(loop: ClosedLoop, *, sampled: bool) -> dict[str, Signal]:
-    """Every signal of the loop's log, the monitor's included. Raises LawError as `loop.about`."""
+    """All signals of the log, the monitor's included. Raises LawError as `loop.about`."""
     added = signals(loop, sampled=sampled)
     added += FIXED if added else ()
     return by_name((("the loop", loop.about().values()), ("the stability monitor", added)))
 
 
 def prepare(loop: ClosedLoop, grid: TimeGrid, compiled: bool) -> None:
-    """Have what the monitor needs compiled and loaded."""
+    """Compile and load the code that the monitor needs."""
     if loop.controller.lyapunov() is not None:
         rates_replay(loop, grid, compiled=compiled)
 
@@ -136,20 +136,20 @@ def monitored(
 ) -> Monitored | None:  # fmt: skip
     """Add V, its terms, V' and its bounds to a fresh recording; None for a law without V.
 
-    V takes the true bound of the disturbance, and weights fitted to this run (`theory.ideal`).
-    With sampled control V' and the bound of V are left out: the law acts on old measurements.
-    `allocate` gives the room for what is added.
+    V uses the disturbance's bound, and weights fitted to this run (`theory.ideal_weights`). With
+    sampled control there is no V' and no bound of V, since the law acts on old measurements.
+    `allocate` makes the arrays for the added signals.
     """
     law, count = loop.controller.lyapunov(), len(recording["time"])
     if law is None or not count:
         return None
-    with np.errstate(all="ignore"):  # a run that diverges leaves all numbers
+    with np.errstate(all="ignore"):  # numbers of a diverging run overflow
         replayed = rates_replay(loop, grid, compiled=compiled)
         chosen = recording.part(rows_to_fit(count, law.network.count))
         ideal = ideal_weights(loop, law, chosen, replayed(chosen))
         b = _disturbance_bound(loop, recording)
         traces: Traces = {}
-        for rows in blocks(count, min(BLOCK, max(1, MOST_NUMBERS // law.network.count))):
+        for rows in blocks(count, min(BLOCK, max(1, LARGEST_BLOCK // law.network.count))):
             log = recording.part(rows)
             for name, part in _traces(loop, law, log, replayed(log), (ideal, b)).items():
                 if name not in traces:
@@ -170,7 +170,7 @@ def monitored(
 
 
 def _disturbance_bound(loop: ClosedLoop, log: Recording) -> Pair:
-    """Largest |b_u|, |b_r|: what the disturbance can reach, or where it cannot tell, did reach."""
+    """Largest |b_u|, |b_r| of the disturbance; where it gives no bounds, those in the run."""
     known = loop.disturbance.bounds()
     if known is not None:
         return Pair(known[0], known[2])
@@ -217,7 +217,7 @@ def _traces(
 
 @dataclass(frozen=True)
 class _Observer:
-    """Takes the largest values of a part of a run, and makes bounds of them."""
+    """Computes the bounds of a part of a run from its largest values."""
 
     loop: ClosedLoop
     law: PolarBackstepping
@@ -256,7 +256,7 @@ class _Observer:
 
 
 def _kept(bound: Bound, V: Vector, rate: Vector) -> float:
-    """In what part of the rows V' <= -2 lambda V + Delta; NaN without a bound or rows."""
+    """Fraction of the rows with V' <= -2 lambda V + Delta; NaN without a bound or rows."""
     if not (np.isfinite(bound.Delta) and len(V)):
         return np.nan
     keeps = (rate[rows] <= -2.0 * bound.lambda_ * V[rows] + bound.Delta for rows in blocks(len(V)))
@@ -264,7 +264,7 @@ def _kept(bound: Bound, V: Vector, rate: Vector) -> float:
 
 
 def _fixed(windows: dict[str, Window], ideal: Ideal) -> dict[str, Vector]:
-    """What the monitor logs that does not run over time."""
+    """The arrays of the monitor that are constant in time."""
     parts = windows.values()
     numbers = {
         "window_start": [part.since for part in parts],

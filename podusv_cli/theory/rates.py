@@ -1,4 +1,4 @@
-"""How tracking errors, virtual controls and filters change along a run: the chain rule, exactly."""
+"""Rates of tracking errors, virtual controls and filters along a run, by the chain rule."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from podusv_cli.engine.replay import Replayed
 
 
 @dataclass(frozen=True)
-class Sight:
-    """The line of sight to the target; `turn` is -1 while psi_e is folded, else 1."""
+class LineOfSight:
+    """The line of sight to the target at every row; `turn` is -1 while psi_e is folded, else 1."""
 
     turn: Vector
-    side: Vector  # -1 where folding turned the line of sight as well (`fold: joint`)
+    side: Vector  # -1 where folding also reversed the line of sight (`fold: joint`)
     distance: Vector  # [m]
     distance_rate: Vector
     w: Vector  # psi_d' [rad/s]
     w_rate: Vector
-    P: Vector  # target's velocity along psi_d before folding
+    P: Vector  # target's velocity along psi_d before folding [m/s]
     P_rate: Vector
 
 
 @dataclass(frozen=True)
 class Errors:
-    """Errors of the law and their rates along the closed loop's motion, each of shape (rows,)."""
+    """Errors of the law and their rates along the run, each of shape (rows,)."""
 
     z_e: Vector
     psi_e: Vector
@@ -50,7 +50,7 @@ class Errors:
 def error_rates(log: Recording, now: Replayed, law: PolarBackstepping) -> Errors:
     """The errors of (18), (23), (32), (38), (42) and their rates.
 
-    Between the samples of a held direction or difference: what such a sample adds is a jump.
+    Jumps at the samples of a held direction or difference are not in the rates.
     """
     signals, rates = now.signals, now.rates
     sight = _line_of_sight(log, now, law)
@@ -76,7 +76,7 @@ def error_rates(log: Recording, now: Replayed, law: PolarBackstepping) -> Errors
     )  # fmt: skip
 
 
-def _line_of_sight(log: Recording, now: Replayed, law: PolarBackstepping) -> Sight:
+def _line_of_sight(log: Recording, now: Replayed, law: PolarBackstepping) -> LineOfSight:
     s, d, u, v = now.signals, now.rates, log["u"], log["v"]
     psi_e, psi_d, distance = s["psi_e"], s["psi_d"], s["z_e"]
     turn = np.where(np.cos(psi_e - psi_d + log["psi"]) < 0.0, -1.0, 1.0)
@@ -90,7 +90,7 @@ def _line_of_sight(log: Recording, now: Replayed, law: PolarBackstepping) -> Sig
     w = np.where(held, 0.0, (Q + u * sin_e - v * cos_e) / distance)
     spin = w - log["r"]
     bending = across - P * w + d["u"] * sin_e - d["v"] * cos_e + (u * cos_e + v * sin_e) * spin
-    return Sight(
+    return LineOfSight(
         turn=turn, side=turn if law.fold == "joint" else np.ones_like(turn),
         distance=distance, distance_rate=distance_rate,
         w=w, w_rate=np.where(held, 0.0, (bending - w * distance_rate) / distance),
@@ -99,12 +99,14 @@ def _line_of_sight(log: Recording, now: Replayed, law: PolarBackstepping) -> Sig
 
 
 def _along(psi_d: Vector, x: Vector, y: Vector) -> tuple[Vector, Vector]:
-    """Parts of an earth vector along and across the line of sight."""
+    """Components of an earth-fixed vector along and across the line of sight."""
     cos_d, sin_d = np.cos(psi_d), np.sin(psi_d)
     return x * cos_d + y * sin_d, y * cos_d - x * sin_d
 
 
-def _alpha_u_rate(log: Recording, now: Replayed, law: PolarBackstepping, sight: Sight) -> Vector:
+def _alpha_u_rate(
+    log: Recording, now: Replayed, law: PolarBackstepping, sight: LineOfSight
+) -> Vector:
     """Rate of (21); the paper's X_1 (40) with the true accelerations."""
     psi_e, alpha_u, v = now.signals["psi_e"], now.signals["alpha_u"], log["v"]
     cos_e, sin_e, spin = np.cos(psi_e), np.sin(psi_e), sight.w - log["r"]

@@ -1,4 +1,4 @@
-"""What the monitor found, as theory.json has it."""
+"""The contents of theory.json."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from podusv_cli.theory.bounds import Bound, Condition
 from podusv_cli.theory.monitor import Monitored, Window
 
 
-def as_json(loop: ClosedLoop, grid: TimeGrid, found: Monitored) -> dict[str, Any]:
-    """Gain conditions, what the proof assumes, the visited set, and the bounds by window."""
-    first = next(iter(found.windows.values()))
+def as_json(loop: ClosedLoop, grid: TimeGrid, monitored: Monitored) -> dict[str, Any]:
+    """Gain conditions, assumptions of the proof, visited set, and bounds by window."""
+    first = next(iter(monitored.windows.values()))
     return {
         "format": 1,
         "conditions": [_condition(condition) for condition in first.bound.conditions],
-        "assumptions": list(_assumptions(loop, grid, found)),
-        "visited": _visited(found),
-        "windows": {name: _window(window) for name, window in found.windows.items()},
+        "assumptions": list(_assumptions(loop, grid, monitored)),
+        "visited": _visited(monitored),
+        "windows": {name: _window(window) for name, window in monitored.windows.items()},
     }
 
 
@@ -32,38 +32,43 @@ def _condition(condition: Condition) -> dict[str, Any]:
     return asdict(condition) | forms
 
 
-def _assumptions(loop: ClosedLoop, grid: TimeGrid, found: Monitored) -> Iterator[dict[str, Any]]:
-    """What V' <= -2 lambda V + Delta rests on, whether it was so, and the number that tells."""
-    law, log, turn = loop.controller.lyapunov(), found.recording, found.traces["turn"]
-    asked = max(_gap(found, "u"), _gap(found, "r"))
+def _assumptions(
+    loop: ClosedLoop, grid: TimeGrid, monitored: Monitored
+) -> Iterator[dict[str, Any]]:
+    """Assumptions behind V' <= -2 lambda V + Delta: whether each held, and its number if any."""
+    law, log, turn = loop.controller.lyapunov(), monitored.recording, monitored.traces["turn"]
+    withheld = max(_withheld(monitored, "u"), _withheld(monitored, "r"))
     turned = int(np.count_nonzero(turn[1:] != turn[:-1]))
     alone = law.fold == "printed" and bool(np.any(turn < 0.0))
     distance = float(np.min(log["z_e"]))
-    yield _says("coupling has the sign that cancels the cross terms", law.coupling == "corrected")
-    yield _says("control is continuous", grid.hold_every == 0)
-    yield _says("rate of psi_d is exact, nothing jumps at samples", law.rate == "analytic")
-    yield _says("psi_e is never folded or unfolded on the way", turned == 0, turned)
-    yield _says("psi_e is not folded alone, which turns the sign of z_e'", not alone)
-    yield _says("distance [m] stays above hold_below", distance > law.hold_below, distance)
-    yield _says("weights and bounds learn from u_e and r_e", not law.wants_loads())
-    yield _says("actuator gives what the law asks for [N, N m]", asked == 0.0, asked)
+    yield _assumption(
+        "coupling has the sign that cancels the cross terms", law.coupling == "corrected"
+    )
+    yield _assumption("control is continuous", grid.hold_every == 0)
+    yield _assumption("rate of psi_d is exact, nothing jumps at samples", law.rate == "analytic")
+    yield _assumption("psi_e is never folded or unfolded on the way", turned == 0, turned)
+    yield _assumption("psi_e is not folded alone, which turns the sign of z_e'", not alone)
+    yield _assumption("distance [m] stays above hold_below", distance > law.hold_below, distance)
+    yield _assumption("weights and bounds learn from u_e and r_e", not law.wants_loads())
+    yield _assumption("actuator gives what the law asks for [N, N m]", withheld == 0.0, withheld)
 
 
-def _gap(found: Monitored, axis: str) -> float:
-    log = found.recording
-    acting, asked = log[f"tau_{axis}"], log[f"tau_{axis}_cmd"]
-    return largest(len(acting), lambda rows: acting[rows] - asked[rows])
+def _withheld(monitored: Monitored, axis: str) -> float:
+    """Largest difference between the load on the hull and the demand [N], [N m]."""
+    log = monitored.recording
+    load, demand = log[f"tau_{axis}"], log[f"tau_{axis}_cmd"]
+    return largest(len(load), lambda rows: load[rows] - demand[rows])
 
 
-def _says(assumption: str, holds: bool, found: float | None = None) -> dict[str, Any]:
-    told = {} if found is None else {"found": found}
-    return {"assumption": assumption, "holds": holds} | told
+def _assumption(assumption: str, holds: bool, found: float | None = None) -> dict[str, Any]:
+    number = {} if found is None else {"found": found}
+    return {"assumption": assumption, "holds": holds} | number
 
 
-def _visited(found: Monitored) -> dict[str, list[float]]:
-    """The set that the observed constants speak for: least and largest values over the run."""
+def _visited(monitored: Monitored) -> dict[str, list[float]]:
+    """The set of states for which the observed values hold: their ranges over the run."""
     names = ("u", "v", "r", "z_e", "psi_e", "V")
-    log = found.recording
+    log = monitored.recording
     return {name: [float(np.min(log[name])), float(np.max(log[name]))] for name in names}
 
 

@@ -24,10 +24,10 @@ class SwayBound:
 
 
 def sway_push(vessel: Vessel, log: Recording, now: Replayed) -> tuple[Vector, Vector]:
-    """What pushes the vessel sideways at every row [N]: in all, and m11 |u| |r| + |b_v| of (51).
+    """The sway force at every row [N]: without damping, and m11 |u| |r| + |b_v| of (51).
 
-    In all: m22 v' less the damping (Y_v + Y_vv |v|) v, so whatever the vessel and the actuator do
-    besides (cross terms, sway force) counts. For the paper's vessel it is no more than the latter.
+    The first is |m22 v' - (Y_v + Y_vv |v|) v|, with cross terms and the actuator's sway force. For
+    the paper's vessel it never exceeds the second.
     """
     v = log["v"]
     damping = (vessel.Y_v + vessel.Y_vv * np.abs(v)) * v
@@ -36,7 +36,7 @@ def sway_push(vessel: Vessel, log: Recording, now: Replayed) -> tuple[Vector, Ve
 
 
 def sway_bound(vessel: Vessel, push: float, printed_push: float) -> SwayBound:
-    """The speed at which damping equals the push; infinite where the damping is no brake."""
+    """The sway speed at which damping equals the push; infinite without positive damping."""
     d22, d_vv = -vessel.Y_v, -vessel.Y_vv
     value = math.inf
     if d22 > 0.0 and d_vv >= 0.0:
