@@ -12,10 +12,12 @@ OURS := podusv_cli tests benchmarks
 OLDEST := .venv-oldest
 LOWEST := sed -n '/^dependencies = \[/,/^\]/s/^ *"\(.*\)>=\(.*\)",/\1==\2/p' pyproject.toml
 PODS := kept dropped ideal no_anti_windup single
+ABLATIONS := ablation ablation_figures ablation_standoff
+TABLES := unknown:unknown_dynamics discrete:discrete_signals limits:period_limits learnt:learnt
 COMPARISONS := printed_compare figures_compare figures_compare_standoff corrected_compare
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce pod test test-all test-faults test-oldest bench lint types contracts clean
+.PHONY: help reproduce claim pod test test-all test-faults test-oldest bench lint types contracts clean
 
 help: ## what can be made
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -29,6 +31,20 @@ reproduce: $(VENV)/run.done ## the paper, claim by claim, into results/paper/
 	    $(STEP) compare paper $$name $$(case $$name in figures_compare) echo 3;; *) echo 0;; esac) || exit 1; \
 	done
 	@echo "what was found: results/README.md; every table, claim and figure: results/paper/*/report.html"
+
+# In F and S the law without its network diverges, as it must: exit code 3.
+claim: $(VENV)/run.done ## the paper's central claim: parts off, wrong vessels, sampling; 4 minutes
+	@echo "$(words $(ABLATIONS) $(TABLES)) steps:"
+	@rm -f results/paper.log
+	@for name in $(ABLATIONS); do \
+	    $(STEP) compare paper $$name $$(case $$name in ablation) echo 0;; *) echo 3;; esac) || exit 1; \
+	done
+	@for table in $(TABLES); do \
+	    echo "  $${table#*:}" && \
+	    $(BIN)/python results/claim.py $${table%:*} > results/.table && \
+	    mv results/.table results/paper/$${table#*:}.csv || exit 1; \
+	done
+	@echo "what was found: results/claim.md"
 
 pod: $(VENV)/run.done ## the laws behind a pod, into results/pod/
 	@echo "$(words $(PODS)) steps:"

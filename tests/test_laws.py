@@ -154,6 +154,25 @@ def test_pid_is_three_gains_on_the_velocity_errors() -> None:
         assert (found.signals["u_e"], found.signals["r_e"]) == (-error[0], -error[1])
 
 
+def test_pid_may_follow_the_path_s_own_speed_and_yaw_rate() -> None:
+    law = Pid(reference="path", K_Pu=1.0, K_Iu=0.0, K_Du=0.0, K_Pr=1.0, K_Ir=0.0, K_Dr=0.0)
+    for at in situations(law, 100):
+        speed, course, turn, gain = 0.7, 0.3 + at.x[0], -0.11, 0.05  # u_d, psi_d, r_d, u_d'
+        along, across = (
+            np.array([np.cos(course), np.sin(course)]),
+            np.array([-np.sin(course), np.cos(course)]),
+        )
+        target = np.concatenate(
+            [at.target[:2], speed * along, gain * along + speed * turn * across]
+        )
+        found, _ = evaluate(law, at._replace(target=target))
+        np.testing.assert_allclose(
+            found.tau, [speed - at.x[3], turn - at.x[5]], rtol=1e-9, atol=1e-12
+        )
+    standing = at._replace(target=np.array([5.0, 5.0, 0, 0, 0.1, 0.1]))
+    assert evaluate(law, standing)[0].tau.tolist() == [-at.x[3], -at.x[5]]
+
+
 @pytest.mark.parametrize("kind", [AdaptiveNeural, DynamicSurface])
 def test_the_filter_starts_at_zero_or_settled(kind: Any) -> None:
     for at in situations(kind(), 20):

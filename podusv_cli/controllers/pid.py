@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import model_validator
 
 from podusv_cli.controllers.base import Slots, each
-from podusv_cli.controllers.tracking import HELD, TRACKED, TrackingController, track
+from podusv_cli.controllers.tracking import (
+    HELD,
+    TRACKED,
+    Tracking,
+    TrackingController,
+    track,
+)
 from podusv_cli.controllers.velocity_loop import Axis, Loop
 from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, bundle, kernel
@@ -16,6 +23,7 @@ from podusv_cli.core.signal import Signal
 from podusv_cli.vessels.vessel import Vessel
 
 INTEGRAL_U, INTEGRAL_R, LAG_U, LAG_R = 2, 3, 4, 5
+PATH = 1.0
 MEMORY = (
     Signal("integral_u", "m", "integral of the surge velocity error (PID)", r"\int u_p"),
     Signal("integral_r", "rad", "integral of the yaw rate error (PID)", r"\int r_p"),
@@ -24,11 +32,22 @@ MEMORY = (
 )
 
 
-class Pid(TrackingController):
-    """Two PID loops on u_p = alpha_u - u and r_p = alpha_r - r with a lagged derivative.
+@kernel
+def reference(e: Tracking, target: Vector, k: Any) -> tuple[float, float]:
+    """(u_d, r_d): the virtual controls, or the target's speed and the yaw rate of its path."""
+    if k.reference != PATH:
+        return e.alpha_u, e.alpha_r
+    squared = target[2] * target[2] + target[3] * target[3]
+    if squared == 0.0:
+        return 0.0, 0.0
+    return math.sqrt(squared), (target[2] * target[5] - target[3] * target[4]) / squared
 
-    The paper's u_d and r_d are taken to be the virtual controls; with the path's own speeds no
-    position error would be fed back. A difference quotient of the error is unstable with the
+
+class Pid(TrackingController):
+    """Two PID loops on u_p = u_d - u and r_p = r_d - r with a lagged derivative.
+
+    Section 3.1 defines u_d and r_d as the target's speed and its path's yaw rate. They feed back no
+    position error, so by default they are replaced by the virtual controls. A difference quotient of the error is unstable with the
     printed gains at any step (K_Du/m11, K_Dr/m33 > 1), hence the derivative (e - lag)/T_d.
     """
 
@@ -43,6 +62,10 @@ class Pid(TrackingController):
     T_d: float = value(0.1, "s", "time constant of the derivative's lag", gt=0)
     lag_start: Literal["zero", "error"] = value(
         "error", "", "lagged error at the start: 0 (a kick at once), or the error (none)"
+    )
+
+    reference: Literal["virtual_controls", "path"] = value(
+        "virtual_controls", "", "what u_d and r_d are: (21) and (30), or as in section 3.1"
     )
 
     @model_validator(mode="after")
@@ -65,7 +88,8 @@ class Pid(TrackingController):
             k, seen = bundle(self.constants_with(nominal)), np.array(memory)
             self.sample(0.0, x, seen, target, k, self.table())
             e = track(x, seen, target, k)
-            memory[[LAG_U, LAG_R]] = e.alpha_u - x[3], e.alpha_r - x[5]
+            u_d, r_d = reference(e, target, k)
+            memory[[LAG_U, LAG_R]] = u_d - x[3], r_d - x[5]
         return memory
 
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
@@ -102,8 +126,8 @@ class Pid(TrackingController):
     ) -> None:  # fmt: skip
         """tau = K_P e + K_I integral + K_D (e - lag)/T_d on both axes."""
         e = track(x, memory, target, k)
-        u_p = e.alpha_u - x[3]
-        r_p = e.alpha_r - x[5]
+        u_d, r_d = reference(e, target, k)
+        u_p, r_p = u_d - x[3], r_d - x[5]
         rate[0] = rate[1] = 0.0
         rate[INTEGRAL_U], rate[INTEGRAL_R] = u_p, r_p
         rate[LAG_U] = (u_p - memory[LAG_U]) / k.T_d
