@@ -151,7 +151,7 @@ def test_no_command_lets_a_folders_name_through(podusv: Command) -> None:
     one, other = made(podusv, (f"=a{COLOUR}\n{TURNED}", f"-b\x9b{TURNED}"))
     for words in (
         ("compare", "--out", "x", one, f"./{other}"),
-        ("compare", "--json", "--out", "x", "--force", one, f"./{other}"),
+        ("compare", "--json", "--no-figures", "--out", "y", one, f"./{other}"),
         ("rerun", one),
         ("rerun", one, "--out", f"again{COLOUR}"),
         ("rerun", "--json", one),

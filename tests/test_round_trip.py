@@ -67,7 +67,7 @@ def test_a_run_of_every_component_is_plotted_repeated_and_compared(
 
 
 # What others extend, no scenarios in themselves.
-PARTS = {"paper/base.yaml", "paper/claims.yaml"}
+PARTS = {f"paper/{name}.yaml" for name in ("base", "claims", "ablation_laws")}
 CONFIGS = ROOT / "configs"
 SHIPPED = {path.relative_to(CONFIGS).as_posix(): path for path in CONFIGS.rglob("*.yaml")}
 

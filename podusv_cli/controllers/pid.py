@@ -47,8 +47,9 @@ class Pid(TrackingController):
     """Two PID loops on u_p = u_d - u and r_p = r_d - r with a lagged derivative.
 
     Section 3.1 defines u_d and r_d as the target's speed and its path's yaw rate. They feed back no
-    position error, so by default they are replaced by the virtual controls. A difference quotient of the error is unstable with the
-    printed gains at any step (K_Du/m11, K_Dr/m33 > 1), hence the derivative (e - lag)/T_d.
+    position error, so by default they are replaced by the virtual controls. A difference quotient
+    of the error is unstable with the printed gains at any step (K_Du/m11, K_Dr/m33 > 1), hence the
+    derivative (e - lag)/T_d.
     """
 
     kind: Literal["pid"] = "pid"

@@ -3,8 +3,22 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
+from typing import Any
+
+import pytest
 
 
 def count(few: int, full: int) -> int:
     """`full` where the environment variable PODUSV_FAULTS is `full`, else `few`."""
     return full if os.environ.get("PODUSV_FAULTS") == "full" else few
+
+
+def few(commands: Sequence[tuple[str, tuple[str, ...]]]) -> list[Any]:
+    """All commands; but for the first `run` and the first `compare` they are slow tests."""
+    first = {words[0]: place for place, (_, words) in reversed(list(enumerate(commands)))}
+    quick = {first["run"], first["compare"]}
+    return [
+        pytest.param(*command, marks=() if place in quick else pytest.mark.slow)
+        for place, command in enumerate(commands)
+    ]

@@ -138,8 +138,9 @@ def test_one_worker_and_many_write_the_same_bytes(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("processor", [
     "x86-64",  # vectors of two numbers, nothing fused
-    pytest.param("haswell", marks=pytest.mark.slow),  # of four; could fuse multiply and add
+    "haswell",  # of four; could fuse multiply and add
 ])  # fmt: skip
+@pytest.mark.slow  # compiles everything anew
 @INTEL
 def test_code_for_other_instruction_sets_writes_the_same_bytes(
     processor: str, tmp_path: Path

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import sys
 import threading
 from collections.abc import Callable, Iterator
@@ -14,6 +15,7 @@ from command_samples import BASE, Command, commanded, write
 from conftest import Constant, adrift, corrected, run
 
 from podusv_cli.controllers.base import Slots
+from podusv_cli.controllers.pid import Pid
 from podusv_cli.core.errors import LawError
 from podusv_cli.core.signal import Signal
 from podusv_cli.engine import march
@@ -77,7 +79,7 @@ def test_a_law_that_fails_on_the_way_leaves_its_log(
 REFUSED = {
     "too_long": "law pid: asked at the start, IndexError: index 2 is out of bounds for axis 0 with "
     "size 2 (faulty_laws.py, line ",
-    "too_short": "law pid (pid.py, line 27): it leaves tau_r_cmd unwritten\n",
+    "too_short": "law pid (pid.py, line {line}): it leaves tau_r_cmd unwritten\n",
     "slow_at_once": "law pid: asked at the start, it is not over after 0.4 s of computing\n",
 }
 
@@ -89,7 +91,8 @@ def test_a_law_that_is_not_what_it_says_is_refused_before_the_run(
     law(name)
     said = podusv("run", write("a.yaml", BASE), "--out", "x")
     assert (said.code, said.out) == (2, "")
-    assert said.err.startswith(REFUSED[name])
+    line = inspect.getsourcelines(Pid)[1]
+    assert said.err.startswith(REFUSED[name].replace("{line}", str(line)))
     assert said.err.count("\n") == 1
     assert not Path("x").exists()
 

@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 from children import Died, begun, in_a_child
 from command_samples import Command
-from counts import count
+from counts import count, few
 from old_results import (
     COMMANDS,
     SUCCESS,
@@ -70,7 +70,7 @@ def attempts(work: Callable[[], object], seeds: range) -> list[Callable[[], obje
     return [*at_calls, *at_times]
 
 
-@pytest.mark.parametrize(("made", "words"), COMMANDS, ids=str)
+@pytest.mark.parametrize(("made", "words"), few(COMMANDS), ids=str)
 def test_old_or_new_and_the_next_one_clears_up(
     podusv: Command, before: Path, made: str, words: tuple[str, ...]
 ) -> None:

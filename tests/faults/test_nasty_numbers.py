@@ -33,7 +33,8 @@ VALUES = (
     "-1e308",
 )  # fmt: skip
 SHORT = "simulation.duration=0.5"
-PARTS = [ROOT / "configs/paper" / name for name in ("base.yaml", "claims.yaml")]  # to be extended
+EXTENDED = ("base.yaml", "claims.yaml", "ablation_laws.yaml")  # no scenarios in themselves
+PARTS = [ROOT / "configs/paper" / name for name in EXTENDED]
 MOST = count(24, 10**9)  # commands
 COMPARED, DRAWN = 100, 10  # one command in so many compares, or draws figures as well
 SECONDS = count(10**9, 10)  # of the processor; no test of `make test` takes the time

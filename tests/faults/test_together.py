@@ -18,7 +18,7 @@ from podusv_cli.storage import manifest, run_folder
 
 RUN = ("run", "a.yaml", "--no-figures")
 COMPARE = ("compare", "two.yaml", "--no-figures")
-TIMES = range(count(2, 40))
+TIMES = range(count(1, 40))
 
 
 @pytest.fixture

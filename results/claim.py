@@ -1,0 +1,214 @@
+"""Tables behind results/claim.md: a law that is told a wrong vessel, sampled control, and f_hat.
+
+    python results/claim.py unknown | discrete | limits | learnt
+
+Each prints a CSV table. The scenarios are those of configs/paper; every number comes from a run.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+import pandas as pd
+
+from podusv_cli.core.kernel import Vector
+from podusv_cli.core.recording import Recording
+from podusv_cli.engine.replay import rates_replay
+from podusv_cli.findings.stability import loops, sampled_growth
+from podusv_cli.process.workers import run_all
+from podusv_cli.scenario.load import load
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.theory.ideal_weights import unloaded_accelerations
+from podusv_cli.workflows.execute import Stopwatch, simulated, summary
+
+Case, Value = TypeVar("Case"), TypeVar("Value")
+PAPER = Path(__file__).parents[1] / "configs/paper"
+READINGS = {
+    "F": "figures_compare.yaml",
+    "S": "figures_compare_standoff.yaml",
+    "C": "corrected_compare.yaml",
+}
+# Laws beside the paper's four: the proposed one without its network and bounds.
+OFF = "kind: adaptive_neural, Gamma_u: 0, Gamma_r: 0, gamma_u: 0, gamma_r: 0"
+WITHOUT = {"no_adaptation": f"{{{OFF}}}", "high_gain": f"{{{OFF}, k_ue: 1100, k_re: 80}}"}
+SIDES = {"nominal": "told", "vessel": "true"}
+# Keys of a vessel that are multiplied by the same factor.
+SCALED = {
+    "mass": ("m", "X_udot", "Y_vdot"),
+    "inertia": ("I_z", "N_rdot"),
+    "damping": (
+        "X_u", "X_uu", "X_uuu", "Y_v", "Y_vv", "Y_rv", "Y_r", "Y_vr", "Y_rr",
+        "N_v", "N_vv", "N_rv", "N_r", "N_vr", "N_rr",
+    ),
+}  # fmt: skip
+SCALED["all of it"] = tuple(key for keys in SCALED.values() for key in keys)
+FACTORS = (0.7, 0.85, 1.15, 1.3, 1.5)
+STEP = 0.0005  # s, of the sampled runs
+PERIODS = (2, 4, 10, 20, 40)  # steps: 0.001 to 0.02 s
+DIFFERENCE = 0.01  # s
+LONGEST = 400  # steps of STEP: 0.2 s
+GROWS = 1 + 1e-9
+SETTLED = 0.8  # of the run, from where it counts as settled
+
+
+def laws(config: str, *overrides: str) -> dict[str, Scenario]:
+    """The scenario's laws by label."""
+    return load(PAPER / config, overrides).scenario.singles()
+
+
+def made(scenario: Scenario) -> tuple[dict[str, float], Recording]:
+    """Metrics and log of a run."""
+    recording = simulated(scenario, Stopwatch())
+    return summary(scenario, recording), recording
+
+
+def iae(scenario: Scenario) -> float:
+    """The run's IAE [m s]; NaN where it diverges."""
+    metrics, recording = made(scenario)
+    return metrics["iae"] if recording.status == "finished" else np.nan
+
+
+def parallel(work: Callable[[Case], Value], runs: Sequence[Case]) -> list[Value]:
+    """What the work gives for each run, in as many processes as there are cores."""
+
+    def job(case: Case, progress: object) -> Value:
+        return work(case)
+
+    outcomes = run_all([partial(job, run) for run in runs], lambda *_: None)
+    if failures := [outcome.failure for outcome in outcomes if outcome.failure]:
+        raise RuntimeError(failures[0])
+    return [outcome.result for outcome in outcomes]
+
+
+def mismatched(scenario: Scenario) -> Iterator[tuple[str, Scenario]]:
+    """The scenario as it is, with its law told wrong numbers, and with another true vessel."""
+    yield "as it is", scenario
+    for side in ("nominal", "vessel"):  # what the law is told, and the hull that moves
+        for what, keys in SCALED.items():
+            for factor in FACTORS:
+                numbers = {key: factor * getattr(scenario.vessel, key) for key in keys}
+                other = getattr(scenario, side).model_copy(update=numbers)
+                name = f"{SIDES[side]} {what} {100 * (factor - 1):+.0f} %"
+                yield name, scenario.model_copy(update={side: other})
+
+
+def unknown() -> pd.DataFrame:
+    """IAE [m s] of every law where it is told a wrong vessel, in the corrected reading."""
+    config, extra = READINGS["C"], [f"controllers.{name}={law}" for name, law in WITHOUT.items()]
+    cases = {label: dict(mismatched(one)) for label, one in laws(config, *extra).items()}
+    for told in ("cybership2", "paper_nonlinear"):
+        presets = ("vessel.preset=cybership2", f"nominal.preset={told}")
+        for label, one in laws(config, *extra, *presets).items():
+            cases[label][f"cybership2 told {told}"] = one
+    numbers = iter(parallel(iae, [run for runs in cases.values() for run in runs.values()]))
+    table = {label: {name: next(numbers) for name in runs} for label, runs in cases.items()}
+    return pd.DataFrame(table).rename_axis("case")
+
+
+def sampled(config: str, count: int) -> dict[str, Scenario]:
+    """The laws sampled once in so many steps; 0 for continuous control.
+
+    Remark 5's difference is formed over 0.01 s, rounded up to a whole number of samples.
+    """
+    period = count * STEP
+    difference = math.ceil(DIFFERENCE / period - 1e-9) * period if count else DIFFERENCE
+    return laws(
+        config, f"simulation.step={STEP}", f"control.period={period:.9g}",
+        f"controller.difference_step={difference:.9g}", "log.every=10", "log.monitor=false",
+    )  # fmt: skip
+
+
+def cycle(scenario: Scenario) -> dict[str, float]:
+    """Half the settled surge demand's range [N], energy [J] and IAE [m s]; NaN after divergence."""
+    metrics, log = made(scenario)
+    if log.status != "finished":
+        return dict.fromkeys(("cycle_N", "energy_J", "iae_m_s"), np.nan)
+    demand = log["tau_u_cmd"][int(SETTLED * len(log["time"])) :]
+    return {"cycle_N": np.ptp(demand) / 2, "energy_J": metrics["energy"], "iae_m_s": metrics["iae"]}
+
+
+def predicted(scenario: Scenario) -> float:
+    """The longest period [s] at which the settled run's linearised velocity loops are stable."""
+    _, log = made(scenario)
+    late = slice(int(SETTLED * len(log["time"])), None)
+    found = loops(scenario, np.array([np.mean(log[name][late]) for name in "uvr"]))
+    counts = range(1, LONGEST + 1)
+    unstable = (n for n in counts if any(sampled_growth(one, STEP, n) > GROWS for one in found))
+    return (next(unstable, LONGEST + 1) - 1) * STEP
+
+
+def longest(config: str, label: str) -> float:
+    """The longest stable period [s]: no settled cycle beyond twice that of continuous control."""
+    allowed = 2 * cycle(sampled(config, 0)[label])["cycle_N"]
+    low, high = 0, LONGEST
+    while high - low > 1:
+        middle = (low + high) // 2
+        stable = cycle(sampled(config, middle)[label])["cycle_N"] <= allowed
+        low, high = (middle, high) if stable else (low, middle)
+    return low * STEP
+
+
+def discrete() -> pd.DataFrame:
+    """Settled cycle, energy and IAE of every law and reading over the control period."""
+    cases = {
+        (reading, label, count * STEP): one
+        for reading, config in READINGS.items()
+        for count in (0, *PERIODS)
+        for label, one in sampled(config, count).items()
+    }
+    index = pd.MultiIndex.from_tuples(cases, names=["reading", "law", "period_s"])
+    return pd.DataFrame(parallel(cycle, list(cases.values())), index=index)
+
+
+def limits() -> pd.DataFrame:
+    """The longest stable period [s], found by bisection and predicted by the linearised loops."""
+    cases = [(r, config, label) for r, config in READINGS.items() for label in laws(config)]
+
+    def both(case: tuple[str, str, str]) -> dict[str, float]:
+        _, config, label = case
+        one = sampled(config, 0)[label]
+        return {"predicted_s": predicted(one), "found_s": longest(config, label)}
+
+    index = pd.MultiIndex.from_tuples(
+        [(r, label) for r, _, label in cases], names=["reading", "law"]
+    )
+    return pd.DataFrame(parallel(both, cases), index=index)
+
+
+def learnt() -> pd.DataFrame:
+    """What the networks learn: the settled rms of f_hat less f, and less f + b/m."""
+    rows = {}
+    for reading, config in READINGS.items():
+        one = laws(config)["proposed"]
+        _, log = made(one)
+        loop = one.closed_loop()
+        unloaded = unloaded_accelerations(loop, rates_replay(loop, one.time_grid())(log))
+        for axis, f, m in zip("ur", unloaded, (loop.vessel.m11, loop.vessel.m33), strict=True):
+            f_hat, lump = log[f"f_hat_{axis}"], f + log[f"b_{axis}"] / m
+            found = {
+                "f": f,
+                "f + b/m": lump,
+                "f_hat - f": f_hat - f,
+                "f_hat - (f + b/m)": f_hat - lump,
+            }
+            rows[reading, axis] = {name: settled_rms(signal) for name, signal in found.items()}
+    return pd.DataFrame(rows).T.rename_axis(["reading", "axis"])
+
+
+def settled_rms(signal: Vector) -> float:
+    """Root mean square over the settled part."""
+    return float(np.sqrt(np.mean(signal[int(SETTLED * len(signal)) :] ** 2)))
+
+
+TABLES: Mapping[str, Callable[[], pd.DataFrame]] = {
+    "unknown": unknown, "discrete": discrete, "limits": limits, "learnt": learnt,
+}  # fmt: skip
+
+if __name__ == "__main__":
+    TABLES[sys.argv[1]]().to_csv(sys.stdout, float_format="%.6g", lineterminator="\n")
