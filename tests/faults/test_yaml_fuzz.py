@@ -118,9 +118,9 @@ MUTATIONS: list[Mutation] = [
     *map(_lines, (_give_another_inner_value, _give_another_inner_value, _bring_in_another)),
 ]  # fmt: skip
 # Keys with which something is found to be wrong: soon, and in the long run.
-SOON = ("vessel", "path", "disturbance", "actuator.pods", "start", "simulation", "controller",
-        "controllers", "claims", "extends")  # fmt: skip
-LATE = ("vessel.m", "vessel.X_udot", "vessel.preset", "path.kind", "disturbance.kind",
+SOON = ("vessel", "path", "disturbance", "simulation", "controller", "controllers", "claims",
+        "extends")  # fmt: skip
+LATE = ("start", "actuator.pods", "vessel.m", "vessel.X_udot", "vessel.preset", "path.kind", "disturbance.kind",
         "actuator.preset", "actuator.kind", "actuator.pods[0].x", "actuator.pods[0].T_nn",
         "controller.anti_windup", "controller.network", "metrics", "log")  # fmt: skip
 
