@@ -1,11 +1,20 @@
 """The HTML report, from numbers planted by hand."""
 
+import math
+
+import pandas as pd
+import pytest
 from comparison_samples import FRAME, Folder, scenario, verdicts
+from drawn_samples import recording, shown
 from html_tree import tree
 
-from podusv_cli.comparison import outputs, report
+from podusv_cli.comparison import chase, outputs, report, settings, table
 from podusv_cli.comparison.entries import Entry
+from podusv_cli.comparison.report import Picture
 from podusv_cli.core.finding import Finding
+
+MOVING = chase.chase(shown(("a", recording())))
+ERRORS = Picture("errors", "x_e & y_e, over <time>", b"<svg/>", "the paper's figure 4")
 
 
 def page(**parts):
@@ -14,10 +23,15 @@ def page(**parts):
         "controllers": {"a": scenario().controller}, "endings": {"a": "", "lost": "killed <9>"},
         "differences": {"start.x": {"a": 1.0, "lost": [1.0, 2.5]}}, "table": FRAME,
         "noticed": [Finding("crosswise", "controller", "|x| < 1", ("<a>",))],
-        "verdicts": verdicts(), "theories": {}, "figures": [("errors", "x_e & y_e", b"<svg/>")],
+        "verdicts": verdicts(), "theories": {}, "figures": [ERRORS],
         "provenance": {"git": {"commit": "abc"}},
     }  # fmt: skip
     return report.page(report.Story(**story | parts))
+
+
+def section(name, **parts):
+    (found,) = tree(page(**parts)).all("section", id=name)
+    return found
 
 
 def theory(bound, holds):
@@ -39,8 +53,10 @@ def test_the_report_has_the_bounds_of_every_run_with_a_theory():
 
 
 def test_the_report_tells_how_runs_ended_and_differ():
-    told = tree(page())
-    assert "lost: killed <9>" in [item.text for item in told.all("li")]
+    told = tree(page(endings={"a": "", "lost": "killed <9>", "b": "far; x 1\nlast"}))
+    items = [item.text for item in told.all("li")]
+    assert "lost: killed <9>" in items
+    assert "b: far all that is known far; x 1 last" in items
     assert ["key", "a", "lost"] in told.rows()
     assert ["start.x", "1", "1 2.5"] in told.rows()
     assert "Not all runs finished" not in page(endings={"a": ""})
@@ -49,33 +65,71 @@ def test_the_report_tells_how_runs_ended_and_differ():
 
 def test_the_report_has_the_table_with_numbers_to_the_right():
     told = tree(page())
-    row = next(row for row in told.all("tr") if row.text.startswith("iae"))
+    row = next(row for row in told.all("tr") if row.all("td") and row.text.startswith("iae"))
     assert told.rows()[told.all("tr").index(row)] == ["iae", "m s", "4", "2 (0.5)", "8 (2)", "-"]
     assert [cell.text for cell in row.all(kind="number")] == ["4", "2 (0.5)", "8 (2)", "-"]
     assert [best.text for best in row.all("b")] == ["2 (0.5)"]
 
 
+def test_the_answer_counts_the_claims_and_lists_them_in_words():
+    answer = section("answer")
+    (counts,) = answer.all("div", kind="counts")
+    assert counts.text == "1 reproduced 2 not reproduced 1 cannot tell"
+    lists = {told.attributes["aria-label"]: told.text for told in answer.all("ul", kind="told")}
+    assert lists["reproduced"] == "C1 a | <b>"
+    assert lists["not reproduced"] == "C2 a | <b> C4 a | <b>"
+    targets = [link.attributes["href"] for link in answer.all("a")]
+    claims = section("claims").all("li")
+    assert [f"#{claim.attributes['id']}" for claim in claims] == sorted(targets[:4])
+    assert "claim" not in section("answer", verdicts=[]).text
+
+
+def test_the_answer_says_who_is_best_in_what():
+    answer = section("answer")
+    assert [term.text for term in answer.all("dt")] == ["a smallest in 1", "b smallest in 1"]
+    assert [told.text for told in answer.all("dd")] == ["energy", "iae"]
+    assert answer.all("abbr")[1].attributes["title"] == "integral of z_e [m s]"
+    assert "Nothing to rank" in section("answer", table=FRAME[["a", "lost"]]).text
+
+
+def test_equal_numbers_and_measured_times_are_no_ranking():
+    numbers = {"iae": [1.0, 1.0 + 1e-9], "ise": [2.0, math.nan], "law_ns": [1.0, 2.0]}
+    frame = pd.DataFrame.from_dict(numbers, orient="index", columns=["a", "b"])
+    assert table.leaders(frame) == {"a": [], "b": []}
+    frame.loc["rmse"] = [2.0, 1.0]
+    assert table.leaders(frame) == {"a": [], "b": ["rmse"]}
+
+
+def test_every_metric_is_explained_in_a_legend():
+    told = [pair.text for pair in section("comparison").all("dl")[0].all("div")]
+    assert told[0] == "iae integral of z_e [m s]"
+    assert len(told) == len(FRAME)
+
+
 def test_the_report_has_every_verdict_escaped():
-    told = tree(page())
-    for kind, answer in {
-        "reproduced": "reproduced",
-        "not": "not reproduced",
-        "cannot": "cannot tell",
-    }.items():
-        assert answer in [mark.text for mark in told.all("b", kind=kind)]
-    for text in (
-        "a | <b>", "(here)", "Not <stated>.", "lost.iae < a.iae", "tolerance 0.05",
-        "lost.iae: lost has no log: killed",
-    ):  # fmt: skip
-        assert text in told.text
-    assert not [e for e in told.inside() if e.tag == "stated"]
+    claims = section("claims").all("li")
+    assert [mark.text for claim in claims for mark in claim.all("b", kind="mark")] == [
+        "reproduced", "not reproduced", "cannot tell", "not reproduced",
+    ]  # fmt: skip
+    assert "C3 a | <b> (here)" in claims[2].text
+    assert "Not <stated>." in claims[2].text
+    (folded,) = claims[2].all("details")
+    for text in ("lost.iae < a.iae", "tolerance 0.05", "lost.iae: lost has no log: killed"):
+        assert text in folded.text
+    assert "expect" not in claims[2].attributes
+    assert "open" not in folded.attributes
+    assert not [e for e in tree(page()).inside() if e.tag == "stated"]
     assert "Claims" not in page(verdicts=[])
 
 
 def test_the_report_has_what_was_noticed_escaped():
-    assert ["crosswise", "<a>: controller", "|x| < 1"] in tree(page()).rows()
-    alone = page(noticed=[Finding("crosswise", "controller", "|x| < 1")])
-    assert ["crosswise", "controller", "|x| < 1"] in tree(alone).rows()
+    noticed = section("noticed").all("li")
+    assert noticed[0].all("code")[0].text == "crosswise"
+    assert noticed[1].text == "<a>: controller |x| < 1"
+    alone = [Finding("crosswise", "controller", "|x| < 1")]
+    assert section("noticed", noticed=alone).all("li")[1].text == "controller |x| < 1"
+    answer = section("answer", noticed=[Finding("of one's own", "path", "text")])
+    assert "of one's own all runs" in answer.text
     assert "Noticed" not in page(noticed=[])
 
 
@@ -86,15 +140,74 @@ def test_the_report_of_a_comparison_has_its_warnings():
     result = outputs.Result(
         {"a": scenario(), "b": scenario()}, entries, {}, {}, FRAME, [], {}, told
     )
-    text = outputs.as_report(result, "title", {}, {})
-    assert ["saturated", "a: actuator", "long <b>"] in tree(text).rows()
+    text = tree(outputs.as_report(result, "title", {}, {})).text
+    assert "a: actuator long <b>" in text
 
 
-def test_the_report_has_scenario_figures_and_provenance():
+def test_figures_are_numbered_and_captioned_in_words():
+    others = [Picture(name, f"{name}, of course", b"<svg/>") for name in ("b", "c")]
+    told = tree(page(figures=[ERRORS, *others]))
+    assert [part.text for part in told.all("figcaption")] == [
+        "Figure 1. x_e & y_e, over <time>. (the paper's figure 4)",
+        "Figure 2. B, of course.",
+        "Figure 3. C, of course.",
+    ]
+    (beside,) = told.all("div", kind="beside")
+    assert len(beside.all("img")) == 2
+    linked = [link.attributes["href"] for link in told.all("section", id="figures")[0].all("a")]
+    assert linked == ["#figure-1", "#figure-2", "#figure-3"]
+    assert 'id="figures"' not in page(figures=[])
+
+
+def test_every_link_leads_somewhere():
+    told = tree(page(theories={"a": theory(2.5, True)}, chase=MOVING))
+    ids = [e.attributes["id"] for e in told.inside() if "id" in e.attributes]
+    assert len(ids) == len(set(ids))
+    links = [link.attributes["href"] for link in told.all("a")]
+    assert len(links) > 9
+    assert {link.removeprefix("#") for link in links} <= set(ids)
+
+
+def test_the_report_has_scenario_and_provenance():
     told = tree(page())
     assert "What the <test> is for." in [part.text for part in told.all("p")]
-    assert "errors: x_e & y_e" in [part.text for part in told.all("figcaption")]
     assert ["git.commit", "abc"] in told.rows()
-    assert "controller a" in [part.text for part in told.all("b")]
-    assert "surge_limit 8" in told.text
-    assert "Figures" not in page(figures=[])
+    rows = section("scenario").rows()
+    assert ["simulation.duration", "4", "s", "310", "simulated time, a whole number of steps"] in (
+        rows
+    )
+    assert "actuator.surge_limit" not in [row[0] for row in rows]
+    assert "surge_limit 8" in section("scenario").all("details")[0].text
+
+
+@pytest.mark.parametrize(
+    ("override", "told"),
+    [
+        ("vessel.m=30", {("vessel.m", "30", "23.8")}),
+        ("disturbance.b_u.mean=0.75", {("disturbance.b_u.mean", "0.75", "0.5")}),
+        (
+            "nominal.m=20",
+            {("nominal.m", "20", "23.8"), ("nominal.preset", "paper_nonlinear", "paper_nonlinear")},
+        ),
+        ("controller.K_Pu=7", set()),
+    ],
+)
+def test_what_a_scenario_sets_is_held_against_preset_and_default(override, told):
+    plain, other = (
+        {(one.key, one.value, one.default) for one in settings.changed(some)}
+        for some in (scenario(), scenario(override))
+    )
+    assert other - plain == told
+    assert not plain - other
+
+
+def test_a_law_is_held_against_its_defaults_and_the_other_laws():
+    laws = {"a": scenario("controller.K_Pu=7").controller, "b": scenario().controller}
+    rows = {about.key: [one.value for one in row] for about, row in settings.laws(laws)}
+    assert list(rows) == ["kind", "K_Pu"]
+    assert rows["K_Pu"] == ["7", "1100"]
+    pods = "actuator={kind: pod, preset: cybership2_pod}"
+    kept = {one.key for one in settings.changed(scenario(pods))}
+    assert {key for key in kept if key.startswith("actuator")} == {
+        "actuator.kind", "actuator.preset",
+    }  # fmt: skip

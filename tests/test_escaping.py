@@ -133,7 +133,7 @@ def test_every_text_of_the_report_is_text() -> None:
     text = page(
         title=odd, endings={odd: odd}, differences={odd: {odd: odd}},
         table=FRAME.set_axis([odd, *FRAME.columns[1:]], axis=1),
-        figures=[(odd, odd, b"<svg/>")], provenance={odd: odd},
+        figures=[report.Picture(odd, odd, b"<svg/>", odd)], provenance={odd: odd},
     )  # fmt: skip
     assert not nasty(text)
     assert len(tree(plain).all("script")) == len(tree(text).all("script"))

@@ -9,7 +9,7 @@ from typing import Any
 
 import pandas as pd
 
-from podusv_cli.comparison import claims, report, table
+from podusv_cli.comparison import chase, claims, report, table
 from podusv_cli.comparison.entries import Entry
 from podusv_cli.core.finding import Finding
 from podusv_cli.findings.preflight import merged
@@ -104,15 +104,18 @@ def as_report(
     missing: Iterable[object] = (),
 ) -> str:  # fmt: skip
     """The HTML report; `figures` as `drawn` gives them."""
-    pictures: list[tuple[str, str, bytes]] = []
+    pictures: list[report.Picture] = []
+    moving: dict[str, Any] = {}
     if figures:
-        from podusv_cli.figures.drawing import FIGURES  # matplotlib is slow to import
+        # matplotlib is slow to import
+        from podusv_cli.figures.drawing import FIGURES, dressed
 
         pictures = [
-            (name, sheet.caption, figures[f"{name}.svg"])
+            report.Picture(name, sheet.caption, figures[f"{name}.svg"], sheet.source)
             for name, sheet in FIGURES.items()
             if f"{name}.svg" in figures
         ]
+        moving = chase.chase(dressed([(e.label, e.recording, e.scenario) for e in result.entries]))
     story = report.Story(
         title=title, scenario=next(iter(result.scenarios.values())),
         controllers={label: one.controller for label, one in result.scenarios.items()},
@@ -120,6 +123,6 @@ def as_report(
         differences=result.differences,
         noticed=merged(result.warnings), table=result.table, verdicts=result.verdicts,
         theories={entry.label: entry.run.theory for entry in result.entries if entry.run.theory},
-        figures=pictures, provenance=provenance,
+        figures=pictures, provenance=provenance, chase=moving,
     )  # fmt: skip
     return report.page(story)

@@ -4,25 +4,48 @@ from __future__ import annotations
 
 import base64
 import inspect
+import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import pandas as pd
 
-from podusv_cli.comparison import stability
-from podusv_cli.comparison.claims import Verdict
+from podusv_cli.comparison import chase, settings, stability
+from podusv_cli.comparison.claims import ANSWERS, Verdict
 from podusv_cli.comparison.differences import as_text, flat, value_text
-from podusv_cli.comparison.table import cells
+from podusv_cli.comparison.table import cells, leaders
 from podusv_cli.core.component import Component
 from podusv_cli.core.escaping import lines
 from podusv_cli.core.finding import Finding
+from podusv_cli.findings.finding import finding_kinds
+from podusv_cli.metrics.table import METRICS
 from podusv_cli.scenario.model import Scenario
 
 if TYPE_CHECKING:
     from jinja2 import Environment
 
-SECTIONS = ("vessel", "start", "path", "disturbance", "actuator", "simulation", "control")
+POWERS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
+BESIDE = 2  # figures beside the answer: trajectory and errors
+
+
+class Picture(NamedTuple):
+    """A figure of the report: what it shows, where one of its kind was published, and its SVG."""
+
+    name: str
+    caption: str
+    svg: bytes
+    source: str = ""
+
+    @property
+    def data(self) -> str:
+        """The picture as an address; inline markup of several figures would share its names."""
+        return f"data:image/svg+xml;base64,{base64.b64encode(self.svg).decode()}"
+
+    @property
+    def title(self) -> str:
+        """What it shows, in a few words."""
+        return self.caption.partition(";")[0].partition(":")[0].partition(",")[0]
 
 
 @dataclass(frozen=True)
@@ -38,37 +61,48 @@ class Story:
     table: pd.DataFrame
     verdicts: Sequence[Verdict]
     theories: Mapping[str, Mapping[str, Any]]  # theory.json of the runs that have one
-    figures: Sequence[tuple[str, str, bytes]]  # name, caption, SVG
+    figures: Sequence[Picture]
     provenance: Mapping[str, Any]
     missing: Sequence[str] = ()  # what could not be made, and why
+    chase: Mapping[str, Any] = field(default_factory=dict)  # see `chase.chase`
 
 
 def page(story: Story) -> str:
     """The whole report."""
-    return (
-        environment()
-        .get_template("report.html.j2")
-        .render(
-            story=story,
-            bad={label: ending for label, ending in story.endings.items() if ending},
-            differing=as_text(story.differences),
-            cells=cells(story.table),
-            stability=(stability.HEAD, [*stability.rows(story.theories)]),
-            figures=[_figure(*figure) for figure in story.figures],
-            scenario=_scenario(story),
-            provenance=[(key, value_text(value)) for key, value in flat(story.provenance)],
-        )
-    )
+    from markupsafe import Markup  # with jinja2
+
+    figures = [*enumerate(story.figures, 1)]
+    return environment().get_template("report.html.j2").render(
+        story=story,
+        scenario=story.scenario,
+        bad={label: ending for label, ending in story.endings.items() if ending},
+        differing=as_text(story.differences),
+        answers=_answers(story.verdicts),
+        leaders={label: names for label, names in leaders(story.table).items() if names},
+        noticed=_by_code(story.noticed),
+        metrics={str(name): METRICS[str(name)] for name in story.table.index},
+        cells=cells(story.table),
+        stability=(stability.HEAD, [*stability.rows(story.theories)]),
+        beside=figures[:BESIDE],
+        figures=figures,
+        changed=settings.changed(story.scenario),
+        laws=settings.laws(story.controllers),
+        parts=_parts(story),
+        provenance=[(key, value_text(value)) for key, value in flat(story.provenance)],
+        chase_json=Markup(chase.as_json(dict(story.chase))),
+    )  # fmt: skip
 
 
 def environment() -> Environment:
     """The templates; whatever they show is text, in which every letter shows."""
     from jinja2 import Environment, PackageLoader, StrictUndefined  # slow to import
 
-    return Environment(
+    made = Environment(
         loader=PackageLoader("podusv_cli.comparison"), autoescape=True, finalize=_shown,
         undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
+    made.filters |= {"sentence": _sentence, "raised": _raised}
+    return made
 
 
 def _shown(value: Any) -> Any:
@@ -76,14 +110,39 @@ def _shown(value: Any) -> Any:
     return value if hasattr(value, "__html__") else lines(value)
 
 
-def _figure(name: str, caption: str, svg: bytes) -> tuple[str, str, str]:
-    # As data rather than inline markup: the figures' internal names would collide in one page.
-    return name, caption, base64.b64encode(svg).decode()
+def _sentence(text: str) -> str:
+    """The text with a capital and a full stop; a symbol at the start stays as it is."""
+    first = text.partition(" ")[0].rstrip(",;:")
+    start = text[:1].upper() if first.isalpha() and first.islower() else text[:1]
+    return f"{start}{text[1:]}{'' if text.endswith('.') else '.'}"
 
 
-def _scenario(story: Story) -> list[tuple[str, list[str], str]]:
-    """A row for each part: its name, what it is, its values."""
-    parts: dict[str, Component] = {name: getattr(story.scenario, name) for name in SECTIONS}
+def _raised(unit: str) -> str:
+    """The unit with its powers raised."""
+    return re.sub(r"(?<=[A-Za-z])\d", lambda power: power[0].translate(POWERS), unit)
+
+
+def _answers(verdicts: Sequence[Verdict]) -> dict[str, list[tuple[int, Verdict]]]:
+    """The verdicts with their numbers by answer."""
+    numbered = [*enumerate(verdicts, 1)]
+    return {
+        answer: [(i, verdict) for i, verdict in numbered if verdict.answer == answer]
+        for answer in ANSWERS.values()
+    }
+
+
+def _by_code(findings: Sequence[Finding]) -> dict[str, tuple[str, list[Finding]]]:
+    """The findings of each code, and what the code means."""
+    known, told = finding_kinds(), dict[str, tuple[str, list[Finding]]]()
+    for finding in findings:
+        meaning = getattr(known.get(finding.code), "meaning", "")
+        told.setdefault(finding.code, (meaning, []))[1].append(finding)
+    return told
+
+
+def _parts(story: Story) -> list[tuple[str, list[str], str]]:
+    """A row for each part: its name, what it is, all its values."""
+    parts = settings.parts(story.scenario)
     parts |= {f"controller {label}": part for label, part in story.controllers.items()}
     return [(name, _said(part), _values(part)) for name, part in parts.items()]
 

@@ -60,12 +60,28 @@ def cells(frame: pd.DataFrame) -> list[list[str]]:
     return rows
 
 
+def leaders(frame: pd.DataFrame) -> dict[str, list[str]]:
+    """The metrics in which each run is best; equal numbers and measured times rank nobody."""
+    best: dict[str, list[str]] = {str(label): [] for label in frame.columns}
+    for name, numbers in frame.drop(index=list(CLOCKED), errors="ignore").iterrows():
+        shown = numbers.dropna().map(_shown)
+        if shown.nunique() > 1:
+            for label in shown.index[shown == _shown(numbers.min())]:
+                best[str(label)].append(str(name))
+    return best
+
+
+def _shown(number: float) -> str:
+    """As readers see it; numbers are compared as printed."""
+    return f"{number:.5g}"
+
+
 def _cell(number: float, first: float, best: float, position: int) -> str:
     if math.isnan(number):
         return "-"
-    mark = "*" if f"{number:.5g}" == f"{best:.5g}" else ""  # compared as printed
+    mark = "*" if _shown(number) == _shown(best) else ""
     ratio = f" ({number / first:.3g})" if position and first and not math.isnan(first) else ""
-    return f"{number:.5g}{mark}{ratio}"
+    return f"{_shown(number)}{mark}{ratio}"
 
 
 def as_markdown(frame: pd.DataFrame, endings: Mapping[str, str]) -> str:

@@ -18,7 +18,7 @@ LOADS = (("tau_u", "tau_u_cmd"), ("tau_r", "tau_r_cmd"))
 
 
 @figure(
-    "controls", place=3, signals=("tau_u", "tau_r"),
+    "controls", place=3, signals=("tau_u", "tau_r"), source="the paper's figures 5 to 7",
     caption="surge force and yaw moment on the hull, thin what the law asked for: the first "
     "moments, the whole run, the settled part" + PEAKS,
 )  # fmt: skip

@@ -8,15 +8,15 @@ from podusv_cli.figures.sheet import Sheet, figure
 
 def _grid(
     name: str, place: int, caption: str, *signals: str,
-    logarithmic: tuple[str, ...] = (), compressed: bool = False,
+    logarithmic: tuple[str, ...] = (), compressed: bool = False, source: str = "",
 ) -> Sheet:  # fmt: skip
     family = signals_over_time(*signals, logarithmic=logarithmic, compressed=compressed)
-    return figure(name, caption=caption, signals=signals, place=place)(family)
+    return figure(name, caption=caption, signals=signals, place=place, source=source)(family)
 
 
 errors = _grid(
     "errors", 2, "tracking errors (18) over time, the distance on a logarithmic axis",
-    "x_e", "y_e", "z_e", "psi_e", logarithmic=("z_e",),
+    "x_e", "y_e", "z_e", "psi_e", logarithmic=("z_e",), source="the paper's figure 4",
 )  # fmt: skip
 adaptation = _grid(
     "adaptation", 5,

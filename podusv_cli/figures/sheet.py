@@ -16,7 +16,8 @@ Family = Callable[[Sequence[Shown], int], Figure]
 class Sheet:
     """A figure that podusv can draw: its name, what it shows, in words and in signals, its place.
 
-    `family` draws it for some runs, so many columns of a page wide.
+    `family` draws it for some runs, so many columns of a page wide. `source` says where a figure
+    of this kind was published, "" for nowhere.
     """
 
     name: str
@@ -24,6 +25,7 @@ class Sheet:
     signals: tuple[str, ...]
     place: int
     family: Family
+    source: str = ""
 
     def fits(self, runs: Sequence[Shown]) -> bool:
         """Whether any run has anything to show here."""
@@ -31,10 +33,10 @@ class Sheet:
 
 
 def figure(
-    name: str, *, caption: str, signals: tuple[str, ...], place: int = 100
+    name: str, *, caption: str, signals: tuple[str, ...], place: int = 100, source: str = ""
 ) -> Callable[[Family], Sheet]:
     """Register a function that draws runs which have one of these signals.
 
     Figures are shown in the order of their places, those of one place by name.
     """
-    return lambda family: Sheet(name, caption, signals, place, family)
+    return lambda family: Sheet(name, caption, signals, place, family, source)

@@ -104,7 +104,7 @@ def hull_of(run: Shown, t: float, scale: float) -> Vector:
 
 
 @figure(
-    "trajectory", place=1, signals=("x", "y"),
+    "trajectory", place=1, signals=("x", "y"), source="the paper's figure 3",
     caption="tracks and target on a map; aside, the end of the run close up, framed on the map",
 )  # fmt: skip
 def trajectory(runs: Sequence[Shown], columns: int) -> Figure:

@@ -1,0 +1,71 @@
+"""The runs as the report's animation shows them: positions thinned to some thousand numbers."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from podusv_cli.core.kernel import Vector
+
+if TYPE_CHECKING:
+    from podusv_cli.figures.style import Shown
+
+FRAMES = 1000  # of a run, at most
+WHERE = ("x", "y", "psi")  # without these a run cannot be shown
+DIGITS = {"time": 4, "psi": 4, "z_e": 4}
+MILLIMETRES = 3  # digits of all others
+FAR = 1e9  # m; diverged runs end beyond any map
+
+
+def chase(runs: Sequence[Shown]) -> dict[str, Any]:
+    """Where runs and targets are at up to FRAMES instants; {} where there is nothing to show."""
+    from podusv_cli.figures.trajectory import bounds  # matplotlib is slow to import
+
+    moving = [run for run in runs if all(run.has(name) for name in (*WHERE, "x_d", "y_d"))]
+    if not moving:
+        return {}
+    (west, east), (south, north) = bounds(moving)
+    return {
+        "box": [_rounded(edge) for edge in (west, south, east, north)],
+        "end": _rounded(max(run.end for run in moving), DIGITS["time"]),
+        "runs": [_track(run) for run in moving],
+    }
+
+
+def as_json(content: dict[str, Any]) -> str:
+    """JSON that cannot end the script element that holds it."""
+    return json.dumps(content, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+
+
+def _track(run: Shown) -> dict[str, Any]:
+    count = len(run.recording["time"])
+    rows = np.unique(np.linspace(0, count - 1, min(count, FRAMES)).round().astype(int))
+    names = ("time", *WHERE, "x_d", "y_d", "z_e")
+    approach = run.scenario.controller.approach()
+    return {
+        "label": run.label,
+        "color": run.color,
+        "dash": [] if run.linestyle == "-" else list(run.linestyle[1]),
+        "length": run.length,
+        "beam": run.beam,
+        "standoff": approach.standoff if approach else 0.0,
+        "ending": "" if run.whole else _ending(run),
+        **{name: _column(name, run.signal(name)[rows]) for name in names if run.has(name)},
+    }
+
+
+def _ending(run: Shown) -> str:
+    said = run.recording.message.partition(":")[0]
+    return said or f"{run.recording.status} at t = {run.end:g} s"
+
+
+def _column(name: str, numbers: Vector) -> list[float | None]:
+    return [_rounded(number, DIGITS.get(name, MILLIMETRES)) for number in numbers]
+
+
+def _rounded(number: float, digits: int = MILLIMETRES) -> float | None:
+    """The number in the room that the page has for it; None for none."""
+    return None if np.isnan(number) else round(float(np.clip(number, -FAR, FAR)), digits)

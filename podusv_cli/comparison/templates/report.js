@@ -1,0 +1,172 @@
+"use strict";
+(() => {
+  const { box, end, runs } = JSON.parse(document.getElementById("chase-data").textContent);
+  const stage = document.getElementById("stage");
+  const one = (selector) => stage.querySelector(selector);
+  const map = one(".map"), trace = one(".trace"), slider = one("input[type=range]"), output = one("output");
+  const button = one(".play"), speed = one("select"), near = one("input[type=checkbox]");
+  const HULL = [[0.5, 0], [0.25, 0.5], [-0.5, 0.5], [-0.5, -0.5], [0.25, -0.5]];
+  const LEAST = 22; // pixels of a hull's length
+  const LOW = 1e-3, LEFT = 54, RIGHT = 10, TOP = 8, BASE = 20, TALL = 130; // the trace: metres, pixels
+  let now = 0, playing = false, last = 0, width = 0, height = 0;
+
+  const make = (parent, tag, attributes = {}, text = "") => {
+    const element = document.createElementNS("http://www.w3.org/2000/svg", tag);
+    for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+    element.textContent = text;
+    return parent.appendChild(element);
+  };
+  const set = (element, name, value) => element.setAttribute(name, value);
+  const line = (run, weight) => ({ stroke: run.color, "stroke-width": weight, "stroke-dasharray": run.dash.map((d) => d * weight).join(" ") });
+
+  // The last frame that is not after the time.
+  const row = (run, t) => {
+    let low = 0, high = run.time.length - 1;
+    while (low < high) {
+      const middle = (low + high + 1) >> 1;
+      if (run.time[middle] <= t) low = middle; else high = middle - 1;
+    }
+    return low;
+  };
+  const turn = (a) => Math.atan2(Math.sin(a), Math.cos(a));
+  // Where a run is at a time; between two frames on the straight line.
+  const at = (run, t) => {
+    const i = row(run, t), j = Math.min(i + 1, run.time.length - 1);
+    const part = j > i ? Math.min(1, (t - run.time[i]) / (run.time[j] - run.time[i])) : 0;
+    const mix = (name) => run[name][i] + part * (run[name][j] - run[name][i]);
+    return { i, x: mix("x"), y: mix("y"), psi: run.psi[i] + part * turn(run.psi[j] - run.psi[i]), north: mix("x_d"), east: mix("y_d") };
+  };
+
+  const points = (north, east) => north.map((x, i) => (x === null || east[i] === null ? "" : `${east[i]},${x}`));
+  const world = make(map, "g", { class: "world" }), over = make(map, "g");
+  for (const run of runs) {
+    run.points = points(run.x, run.y);
+    make(world, "polyline", { points: points(run.x_d, run.y_d).join(" "), stroke: "#444", "stroke-width": 0.8 });
+    make(world, "polyline", { points: run.points.join(" "), stroke: run.color, "stroke-width": 1.2, class: "ghost" });
+    run.trail = make(world, "polyline", line(run, 2));
+  }
+  for (const run of runs) {
+    run.ring = make(over, "circle", { fill: "none", stroke: "#444", "stroke-dasharray": "2 2" });
+    run.cross = make(over, "path", { d: "M-5 0H5M0 -5V5", stroke: "#111", "stroke-width": 1.6 });
+    run.hull = make(over, "polygon", { fill: run.color, "fill-opacity": 0.55, stroke: run.color });
+    run.stern = make(over, "line", { stroke: "#111", "stroke-width": 1.5 });
+  }
+  const bar = make(map, "path", { stroke: "#444", fill: "none" }), barText = make(map, "text", { "text-anchor": "middle" });
+  make(make(map, "g", { transform: "translate(14 26)", stroke: "#444", fill: "none" }), "path", { d: "M0 6V-10M-4 -4L0 -10L4 -4" });
+  make(map, "text", { x: 14, y: 46, "text-anchor": "middle" }, "N");
+
+  // From metres to pixels: the whole box, or twelve lengths around the first target.
+  const frame = () => {
+    if (!near.checked) {
+      const k = Math.min(width / (box[2] - box[0]), height / (box[3] - box[1]));
+      return { k, ox: width / 2 - k * (box[0] + box[2]) / 2, oy: height / 2 + k * (box[1] + box[3]) / 2 };
+    }
+    const { north, east } = at(runs[0], now), k = Math.min(width, height) / (12 * Math.max(...runs.map((run) => run.length)));
+    return { k, ox: width / 2 - k * east, oy: height / 2 + k * north };
+  };
+  // The largest of 1, 2, 5, 10, 20, ... that is not above.
+  const round = (most) => {
+    const power = 10 ** Math.floor(Math.log10(most));
+    return +([5, 2, 1].find((n) => n * power <= most) * power).toPrecision(1);
+  };
+  const scaleBar = (k) => {
+    const length = round(width / 5 / k), x = width - 14 - k * length;
+    set(bar, "d", `M${x} ${height - 10}v4h${k * length}v-4`);
+    set(barText, "x", x + k * length / 2);
+    set(barText, "y", height - 13);
+    barText.textContent = `${length} m`;
+  };
+  const draw = () => {
+    const { k, ox, oy } = frame();
+    set(world, "transform", `matrix(${k} 0 0 ${-k} ${ox} ${oy})`);
+    scaleBar(k);
+    runs.forEach((run, place) => {
+      const { i, x, y, psi, north, east } = at(run, now), over = now >= run.time[run.time.length - 1] && run.ending;
+      set(run.trail, "points", run.points.slice(0, i + 1).join(" ") + ` ${y},${x}`);
+      const size = Math.max(1, LEAST / (k * run.length)) * k, c = Math.cos(psi), s = Math.sin(psi);
+      const corners = HULL.map(([a, b]) => [a * run.length * size, b * Math.max(run.beam, run.length / 3.5) * size])
+        .map(([a, b]) => [ox + k * y + a * s + b * c, oy - k * x - a * c + b * s]);
+      set(run.hull, "points", corners.join(" "));
+      [["x1", 2, 0], ["y1", 2, 1], ["x2", 3, 0], ["y2", 3, 1]].forEach(([name, corner, axis]) => set(run.stern, name, corners[corner][axis]));
+      for (const part of [run.hull, run.stern]) set(part, "class", over ? "lost" : "");
+      for (const part of [run.cross, run.ring]) part.style.display = over ? "none" : "";
+      set(run.cross, "transform", `translate(${ox + k * east} ${oy - k * north})`);
+      [["cx", ox + k * east], ["cy", oy - k * north], ["r", k * run.standoff]].forEach(([name, value]) => set(run.ring, name, value));
+      stage.querySelectorAll(".key small")[place].textContent = over ? run.ending : "";
+    });
+    const x = across(now);
+    set(cursor, "d", `M${x} ${TOP}V${TALL - BASE}`);
+    output.textContent = `t = ${now.toFixed(end < 20 ? 2 : 1)} s`;
+    slider.value = now;
+  };
+
+  const traced = runs.filter((run) => run.z_e), settled = traced.filter((run) => !run.ending);
+  const tops = (settled.length ? settled : traced).flatMap((run) => run.z_e).filter((z) => z !== null);
+  const high = Math.ceil(Math.log10(Math.max(10 * LOW, tops.reduce((a, b) => Math.max(a, b), 0))));
+  const low = Math.max(Math.log10(LOW), Math.floor(Math.log10(Math.max(LOW, tops.reduce((a, b) => Math.min(a, Math.abs(b)), Infinity)))));
+  const across = (t) => LEFT + (width - LEFT - RIGHT) * t / end;
+  const up = (z) => TOP + (TALL - TOP - BASE) * (high - Math.log10(Math.min(Math.max(Math.abs(z), LOW), 10 ** (high + 1)))) / (high - low);
+  let cursor;
+  const drawTrace = () => {
+    trace.replaceChildren();
+    set(trace, "viewBox", `0 0 ${width} ${TALL}`);
+    for (let power = low; power <= high; power++) {
+      make(trace, "path", { d: `M${LEFT} ${up(10 ** power)}H${width - RIGHT}`, stroke: "#ddd" });
+      make(trace, "text", { x: LEFT - 6, y: up(10 ** power) + 4, "text-anchor": "end" }, `${+(10 ** power).toFixed(3)} m`);
+    }
+    const clip = make(make(trace, "clipPath", { id: "inside" }), "rect", { x: LEFT, y: TOP, width: Math.max(0, width - LEFT - RIGHT), height: TALL - TOP - BASE });
+    const inside = make(trace, "g", { "clip-path": "url(#inside)", fill: "none" });
+    for (const run of traced) make(inside, "polyline", { ...line(run, 1.4), points: run.z_e.map((z, i) => (z === null ? "" : `${across(run.time[i]).toFixed(1)},${up(z).toFixed(1)}`)).join(" ") });
+    const tick = round(Math.max(end / 5, 110 * end / width));
+    for (let i = 0; i * tick <= end; i++) make(trace, "text", { x: across(i * tick), y: TALL - 5, "text-anchor": across(i * tick) > width - 24 ? "end" : "middle" }, `${+(i * tick).toPrecision(6)} s`);
+    cursor = make(trace, "path", { stroke: "#111" });
+    trace.style.display = traced.length ? "" : "none";
+  };
+  const place = () => {
+    width = Math.max(200, map.clientWidth);
+    height = Math.round(Math.min(Math.max(width * (box[3] - box[1]) / (box[2] - box[0]), 260), 0.8 * width, 560));
+    set(map, "viewBox", `0 0 ${width} ${height}`);
+    drawTrace();
+    draw();
+  };
+
+  const step = (stamp) => {
+    if (!playing) return;
+    now = Math.min(end, now + Math.max(0, stamp - last) / 1000 * speed.value);
+    last = stamp;
+    draw();
+    if (now >= end) toggle(false); else requestAnimationFrame(step);
+  };
+  const toggle = (on = !playing) => {
+    if (on === playing) return;
+    playing = on;
+    button.textContent = on ? "Pause" : "Play";
+    if (on && now >= end) now = 0;
+    if (on) requestAnimationFrame((stamp) => { last = stamp; step(stamp); });
+  };
+  const seek = (t) => { toggle(false); now = Math.min(end, Math.max(0, t)); draw(); };
+
+  for (const factor of [0.1, 0.5, 1, 2, 5, 10, 20, 50, 100]) speed.add(new Option(`${factor}\u00d7`, factor));
+  speed.value = [...speed.options].map((option) => option.value).findLast((factor) => factor <= Math.max(0.1, end / 25));
+  button.addEventListener("click", () => toggle());
+  slider.addEventListener("input", () => seek(slider.valueAsNumber));
+  near.addEventListener("change", draw);
+  stage.addEventListener("keydown", (event) => {
+    const free = !event.target.closest("button, select, input"), stride = event.shiftKey ? end / 20 : end / 200;
+    const jump = { ArrowLeft: now - stride, ArrowRight: now + stride, Home: 0, End: end }[event.key];
+    if (event.key === " " && (free || event.target === slider)) toggle();
+    else if (jump !== undefined && event.target !== speed) seek(jump);
+    else return;
+    event.preventDefault();
+  });
+  addEventListener("resize", place);
+  const asked = () => /^#t=([\d.]+)$/.exec(location.hash);
+  addEventListener("hashchange", () => { if (asked()) { seek(+asked()[1]); stage.scrollIntoView(); } });
+  place();
+  if (asked()) { seek(+asked()[1]); stage.scrollIntoView(); }
+  else if (!matchMedia("(prefers-reduced-motion: reduce)").matches) {
+    new IntersectionObserver((seen, observer) => {
+      if (seen.some((entry) => entry.isIntersecting)) { observer.disconnect(); toggle(true); }
+    }, { threshold: 0.3 }).observe(stage);
+  }
+})();

@@ -1,0 +1,245 @@
+"""The report's animation: what it is given, and in a browser, what it shows."""
+
+import json
+import re
+import shutil
+import subprocess
+from dataclasses import replace
+from html import escape
+
+import numpy as np
+import pytest
+from comparison_samples import FRAME
+from drawn_samples import recording, scenario, shown
+from html_tree import tree
+from test_comparison_page import ERRORS, page, theory
+
+from podusv_cli.comparison import chase
+from podusv_cli.scenario.load import load_text
+
+NO_STANDOFF = """
+vessel: {preset: paper}
+path: {kind: line}
+disturbance: {kind: none}
+actuator: {kind: ideal}
+controller: {kind: pid, standoff: 0.0}
+"""
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
+BROWSER = next(filter(None, map(shutil.which, BROWSERS)), None)
+WIDTHS = (400, 800, 1400)
+# Under virtual time no frames are painted, so a timer has to call for them.
+TICKING = """<script>
+requestAnimationFrame = (draw) => setTimeout(() => draw(performance.now()), 16);
+</script>"""
+QUIET = (
+    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+    "--disable-background-networking", "--disable-component-update", "--disable-sync",
+    "--enable-logging=stderr", "--window-size=1500,14000", "--virtual-time-budget=6000",
+)  # fmt: skip
+
+
+def diverged(end=40.0):
+    """A run whose last second takes it beyond all numbers."""
+    run = recording(end=end, period=0.05, status="diverged")
+    x = run["x"].copy()
+    x[-20:] = np.geomspace(1e2, 1e300, 20)
+    told = f"diverged at t = {end:g} s: x is not finite"
+    return replace(run, signals={**run.signals, "x": x}, message=told)
+
+
+def runs():
+    """A whole run, one with another step that diverges, one of a law that logs little."""
+    bare = recording(end=60.0, without=("z_e", "psi_e", "alpha_u"))
+    return shown(
+        ("whole <b>", recording()),
+        ("lost", diverged()),
+        ("bare", bare),
+        ("apart", recording(shift=1.0), load_text(NO_STANDOFF, "a.yaml").scenario),
+    )
+
+
+def test_positions_are_thinned_and_rounded_to_millimetres():
+    told = chase.chase(shown(("long", recording(end=400.0, period=0.05))))
+    (run,) = told["runs"]
+    assert len(run["time"]) == chase.FRAMES
+    assert (run["time"][0], run["time"][-1], told["end"]) == (0.0, 400.0, 400.0)
+    log = recording(end=400.0, period=0.05)
+    rows = np.searchsorted(log["time"], np.array(run["time"]) - 1e-6)
+    for name in ("x", "y", "x_d", "y_d"):
+        np.testing.assert_allclose(run[name], log[name][rows], atol=5.1e-4, rtol=0)
+        assert all(number == round(number, 3) for number in run[name])
+    short = chase.chase(shown(("short", recording(end=10.0))))["runs"][0]
+    assert len(short["time"]) == 101
+
+
+def test_the_ends_of_runs_are_told():
+    whole, lost, bare, apart = chase.chase(runs())["runs"]
+    assert [run["ending"] for run in (whole, lost, bare)] == ["", "diverged at t = 40 s", ""]
+    assert max(lost["x"]) == chase.FAR
+    assert "z_e" not in bare
+    assert (whole["standoff"], apart["standoff"]) == (0.5, 0.0)
+    cut = replace(recording(end=3.0), status="interrupted")
+    assert chase.chase(shown(("a", cut)))["runs"][0]["ending"] == "interrupted at t = 3 s"
+
+
+def test_what_is_no_number_is_none():
+    gaps = recording(z_e=lambda t: np.where(t < 5, np.nan, np.where(t < 6, np.inf, 1.0)))
+    distances = chase.chase(shown(("a", gaps)))["runs"][0]["z_e"]
+    assert (distances[0], distances[55], distances[-1]) == (None, chase.FAR, 1.0)
+    assert "NaN" not in chase.as_json(chase.chase(shown(("a", gaps))))
+
+
+def test_runs_that_cannot_be_placed_have_no_animation():
+    assert chase.chase([]) == {}
+    assert chase.chase(shown(("a", recording(without=("psi",))))) == {}
+    both = chase.chase(shown(("a", recording(without=("psi",))), ("b", recording())))
+    assert [run["label"] for run in both["runs"]] == ["b"]
+    assert "<script" not in page(chase={})
+
+
+def test_no_text_ends_the_script_that_holds_it():
+    odd = "</script><script>alert(1)</script><!--"
+    told = tree(page(chase=chase.chase(shown((odd, recording())))))
+    data, code = told.all("script")
+    assert json.loads(data.raw)["runs"][0]["label"] == odd
+    assert "use strict" in code.raw
+    assert odd in told.all("ul", kind="key")[0].text
+
+
+# --- in a browser
+
+PROBE = """
+<script>
+const said = {};
+const record = (name, what) => { said[name] = what; };
+const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
+const look = async (frame) => {
+  const page = frame.contentDocument, one = (s) => page.querySelector(s), width = frame.clientWidth;
+  const inside = (e) => e.closest(".wide, details:not([open]), svg");
+  const wide = [...page.querySelectorAll("body *")].filter((e) => !inside(e.parentElement))
+    .filter((e) => e.getBoundingClientRect().right > width + 0.5)
+    .map((e) => e.outerHTML.slice(0, 80));
+  const now = () => parseFloat(one("output").textContent.slice(4));
+  const hull = () => one(".map polygon").getAttribute("points");
+  const told = { wide, width, start: now(), hull: hull() };
+  told.scroll = page.documentElement.scrollWidth;
+  told.images = [...page.images].map((image) => image.naturalWidth);
+  await sleep(600);
+  told.played = now();
+  told.moved = hull();
+  one(".play").click();
+  told.paused = now();
+  await sleep(300);
+  told.rested = now();
+  const slider = one("input[type=range]");
+  slider.value = 50;
+  slider.dispatchEvent(new frame.contentWindow.Event("input"));
+  told.scrubbed = [now(), hull(), one(".map polygon.lost") !== null, one(".key").textContent];
+  const { KeyboardEvent } = frame.contentWindow;
+  const key = (name) => one("#stage").dispatchEvent(new KeyboardEvent("keydown", { key: name }));
+  key("End"); told.end = now(); key("Home"); told.home = now();
+  key("ArrowRight"); told.stepped = now();
+  key(" "); await sleep(300); told.again = now(); told.button = one(".play").textContent;
+  told.traces = page.querySelectorAll(".trace polyline").length;
+  told.bad = /NaN|undefined|Infinity/.test(one(".map").outerHTML + one(".trace").outerHTML);
+  return told;
+};
+addEventListener("load", async () => {
+  for (const frame of document.querySelectorAll("iframe"))
+    record(frame.id, await look(frame).catch((error) => ({ error: `${error}` })));
+  const end = document.createElement("output");
+  end.id = "said";
+  end.textContent = JSON.stringify(said);
+  document.body.append(end);
+});
+</script>
+"""
+
+
+def browsed(tmp_path, html, *options):
+    """What the probe finds at every width, and what the browser's console says."""
+    html = html.replace("<head>", f"<head>{TICKING}")
+    frames = "".join(
+        f'<iframe id="w{width}" width="{width}" height="4600" srcdoc="{escape(html)}"></iframe>'
+        for width in WIDTHS
+    )
+    path = tmp_path / "frames.html"
+    path.write_text(f"<!doctype html><body>{PROBE}{frames}</body>")
+    own = (*options, f"--user-data-dir={tmp_path}/browser", "--dump-dom", path.as_uri())
+    made = subprocess.run(
+        [str(BROWSER), *QUIET, *own],
+        capture_output=True, text=True, timeout=120, check=True,
+    )  # fmt: skip
+    said = re.search(r'<output id="said">(.*?)</output>', made.stdout, re.DOTALL)
+    assert said, made.stderr[-2000:]
+    console = [line for line in made.stderr.splitlines() if "CONSOLE" in line]
+    return json.loads(tree(said[0]).text), console
+
+
+needs_browser = pytest.mark.skipif(
+    BROWSER is None, reason=f"no browser: none of {', '.join(BROWSERS)} is on the path"
+)
+
+
+@pytest.fixture(scope="module")
+def seen(tmp_path_factory):
+    wide = {f"a_long_label_of_a_run_{i}": FRAME["a"] for i in range(8)}
+    html = page(
+        chase=chase.chase(runs()), theories={"a": theory(2.5, True)},
+        table=FRAME.assign(**wide), figures=[ERRORS._replace(svg=SVG)] * 4,
+        provenance={"argv": ["podusv", "x" * 300]}, title="long" * 60,
+        scenario=scenario().model_copy(update={"description": "word/" * 90}),
+    )  # fmt: skip
+    return browsed(tmp_path_factory.mktemp("browser"), html)
+
+
+SVG = b'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 700 300"><path d="M0 0H9"/></svg>'
+
+
+@needs_browser
+@pytest.mark.browser
+def test_the_console_has_nothing_to_say(seen):
+    assert seen[1] == []
+    assert [said.get("error") for said in seen[0].values()] == [None] * len(WIDTHS)
+
+
+@needs_browser
+@pytest.mark.browser
+@pytest.mark.parametrize("width", WIDTHS)
+def test_nothing_is_wider_than_the_window_and_every_image_is_there(seen, width):
+    said = seen[0][f"w{width}"]
+    assert said["width"] == width
+    assert said["wide"] == []
+    assert said["scroll"] <= width
+    assert len(said["images"]) == 4
+    assert min(said["images"]) > 0
+
+
+@needs_browser
+@pytest.mark.browser
+@pytest.mark.parametrize("width", WIDTHS)
+def test_the_animation_moves_pauses_and_scrubs(seen, width):
+    said = seen[0][f"w{width}"]
+    assert said["played"] > said["start"]
+    assert said["moved"] != said["hull"]
+    assert said["paused"] == said["rested"] >= said["played"]
+    t, hull, lost, key = said["scrubbed"]
+    assert t == 50
+    assert hull not in (said["hull"], said["moved"])
+    assert lost
+    assert "diverged at t = 40 s" in key
+    assert (said["end"], said["home"], said["stepped"]) == (100, 0, 0.5)
+    assert said["again"] > said["stepped"]
+    assert said["button"] == "Pause"
+    assert said["traces"] == 3
+    assert not said["bad"]
+
+
+@needs_browser
+@pytest.mark.browser
+def test_who_wants_less_motion_gets_a_paused_animation(tmp_path):
+    said, console = browsed(
+        tmp_path, page(chase=chase.chase(runs())), "--force-prefers-reduced-motion"
+    )
+    assert console == []
+    assert said["w800"]["start"] == said["w800"]["played"] == 0
