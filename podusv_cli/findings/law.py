@@ -3,53 +3,25 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 from podusv_cli.actuators.base import SATURATION
 from podusv_cli.controllers.velocity_loop import Cause, Loop
-from podusv_cli.core.finding import Sentences, before
+from podusv_cli.core.finding import FindingKind, Sentences, before
 from podusv_cli.findings.finding import Case
 from podusv_cli.findings.stability import bursts, loops, rk4_growth, sampled_growth
 
 UNSTABLE = 1.0 + 1e-6
-
-
-@before(
-    "stiff-adaptation",
-    about="simulation.step",
-    meaning="adaptation too fast for RK4's step",
-    condition="RK4 makes the linearised loop of error and adaptation grow",
-    remedy="take a shorter step, or smaller adaptation gains",
-)
-def stiff_adaptation(case: Case) -> Sentences:
-    """RK4 is unstable at this step because of the network's adaptation."""
-    return _too_fast(case, "adaptation")
-
-
-@before(
-    "stiff-derivative",
-    about="simulation.step",
-    meaning="PID's loop too fast for RK4's step",
-    condition="RK4 makes the loop of error, integral and lag grow",
-    remedy="take a shorter step, or smaller gains",
-)
-def stiff_derivative(case: Case) -> Sentences:
-    """RK4 is unstable at this step because of PID's proportional and derivative action."""
-    return _too_fast(case, "derivative")
-
-
-@before(
-    "stiff-loop",
-    about="simulation.step",
-    meaning="a velocity loop too fast for RK4's step",
-    condition="RK4 makes a velocity loop of the law grow",
-    remedy="take a shorter step, or smaller gains",
-)
-def stiff_loop(case: Case) -> Sentences:
-    """RK4 is unstable at this step because of a velocity loop of another law."""
-    return _too_fast(case, "loop")
+# by the cause that a law gives: what is too fast, which loop that is, and what should be smaller
+LOOPS: dict[Cause, tuple[str, str, str]] = {
+    "adaptation": ("adaptation", "the linearised loop of error and adaptation", "adaptation gains"),
+    "derivative": ("PID's loop", "the loop of error, integral and lag", "gains"),
+    "loop": ("a velocity loop", "a velocity loop of the law", "gains"),
+}
 
 
 def _too_fast(case: Case, cause: Cause) -> Sentences:
+    """RK4 is unstable at this step because of a velocity loop with this cause."""
     grid = case.scenario.time_grid()
     reported: set[str] = set()
     for nu in () if grid.hold_every else (case.first_velocity, case.reference.working):
@@ -73,43 +45,8 @@ def _largest_step(loop: Loop) -> float:
     return low
 
 
-@before(
-    "sampled-adaptation",
-    about="control.period",
-    meaning="adaptation too fast for the period",
-    condition="the linearised loop of error and adaptation grows over one period",
-    remedy="take a shorter period, or smaller adaptation gains",
-)
-def sampled_adaptation(case: Case) -> Sentences:
-    """The network's adaptation is unstable when the law is evaluated once per period."""
-    return _sampled_too_fast(case, "adaptation")
-
-
-@before(
-    "sampled-derivative",
-    about="control.period",
-    meaning="PID's loop too fast for the period",
-    condition="the loop of error, integral and lag grows over one period",
-    remedy="take a shorter period, or smaller gains",
-)
-def sampled_derivative(case: Case) -> Sentences:
-    """PID is unstable when it is evaluated once per period."""
-    return _sampled_too_fast(case, "derivative")
-
-
-@before(
-    "sampled-loop",
-    about="control.period",
-    meaning="a velocity loop too fast for the period",
-    condition="a velocity loop of the law grows over one period",
-    remedy="take a shorter period, or smaller gains",
-)
-def sampled_loop(case: Case) -> Sentences:
-    """A velocity loop of another law is unstable when it is evaluated once per period."""
-    return _sampled_too_fast(case, "loop")
-
-
 def _sampled_too_fast(case: Case, cause: Cause) -> Sentences:
+    """A velocity loop with this cause is unstable when the law is evaluated once per period."""
     grid, period = case.scenario.time_grid(), case.scenario.control.period
     if not grid.hold_every:
         return
@@ -120,6 +57,27 @@ def _sampled_too_fast(case: Case, cause: Cause) -> Sentences:
                 f"the {loop.axis} {loop.name}, held for {period:g} s, grows {growth:.3g} times a "
                 f"period; take a shorter period, or a smaller {loop.key}"
             )
+
+
+def _stiff(cause: Cause) -> FindingKind:
+    what, loop, gains = LOOPS[cause]
+    return before(
+        f"stiff-{cause}", about="simulation.step", meaning=f"{what} too fast for RK4's step",
+        condition=f"RK4 makes {loop} grow", remedy=f"take a shorter step, or smaller {gains}",
+    )(partial(_too_fast, cause=cause))  # fmt: skip
+
+
+def _sampled(cause: Cause) -> FindingKind:
+    what, loop, gains = LOOPS[cause]
+    return before(
+        f"sampled-{cause}", about="control.period", meaning=f"{what} too fast for the period",
+        condition=f"{loop} grows over one period",
+        remedy=f"take a shorter period, or smaller {gains}",
+    )(partial(_sampled_too_fast, cause=cause))  # fmt: skip
+
+
+stiff_adaptation, stiff_derivative, stiff_loop = map(_stiff, LOOPS)
+sampled_adaptation, sampled_derivative, sampled_loop = map(_sampled, LOOPS)
 
 
 @before(

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
 from podusv_cli.controllers.base import Approach
-from podusv_cli.core.finding import Sentences, before
+from podusv_cli.core.finding import FindingKind, Sentences, before
 from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.findings.finding import Case
 from podusv_cli.findings.reference import FASTEST, drift, median
@@ -58,40 +59,20 @@ def _jump(case: Case, time: float) -> Vector:
     return np.asarray(sides[1] - sides[0])
 
 
-@before(
-    "path-jump",
-    about="path",
-    meaning="the target's position jumps",
-    condition="the position differs before and after a break of the path",
-    remedy="let the parts of the path meet",
-)
-def path_jump(case: Case) -> Sentences:
-    """The target's position jumps."""
-    return path_breaks(case, "position")
+def _path_break(code: str, what: str, remedy: str) -> FindingKind:
+    return before(
+        code, about="path", meaning=f"the target's {what} jumps",
+        condition=f"the {what} differs before and after a break of the path", remedy=remedy,
+    )(partial(path_breaks, what=what))  # fmt: skip
 
 
-@before(
-    "path-corner",
-    about="path",
-    meaning="the target's velocity jumps",
-    condition="the velocity differs before and after a break of the path",
-    remedy="round the corner",
-)
-def path_corner(case: Case) -> Sentences:
-    """The target's velocity jumps."""
-    return path_breaks(case, "velocity")
-
-
-@before(
+path_jump = _path_break("path-jump", "position", "let the parts of the path meet")
+path_corner = _path_break("path-corner", "velocity", "round the corner")
+path_bend = _path_break(
     "path-bend",
-    about="path",
-    meaning="the target's acceleration jumps",
-    condition="the acceleration differs before and after a break of the path",
-    remedy="none needed: Assumption 3 holds; a smooth path avoids the step",
+    "acceleration",
+    "none needed: Assumption 3 holds; a smooth path avoids the step",
 )
-def path_bend(case: Case) -> Sentences:
-    """The target's acceleration jumps."""
-    return path_breaks(case, "acceleration")
 
 
 @before(

@@ -121,8 +121,9 @@ MUTATIONS: list[Mutation] = [
 SOON = ("vessel", "path", "disturbance", "simulation", "controller", "controllers", "claims",
         "extends")  # fmt: skip
 LATE = ("start", "actuator.pods", "vessel.m", "vessel.X_udot", "vessel.preset", "path.kind",
-        "disturbance.kind", "actuator.preset", "actuator.kind", "actuator.pods[0].x", "actuator.pods[0].T_nn",
-        "controller.anti_windup", "controller.network", "metrics", "log")  # fmt: skip
+        "disturbance.kind", "actuator.preset", "actuator.kind", "actuator.pods[0].x",
+        "actuator.pods[0].T_nn", "controller.anti_windup", "controller.network", "metrics",
+        "log")  # fmt: skip
 
 
 @cache
