@@ -252,6 +252,8 @@ def test_the_numbers_are_shown_by_their_text():
         ("max(a.rbf_width) < 1", "'rbf_width' does not run over time"),
         ("(lambda: 1) < a.iae", "no meaning here"),
         ("max(a.z_e, 2, 2) < 3", "the first time must lie before the second"),
+        ("max(a.z_e, 50, 60) < max(a.nothing) ", "unknown signal or metric 'nothing'"),
+        ("finished(a) and max(abs(a.z_e), 5, 9) < 1 and lost.ia < 1", "'ia'; did you mean"),
     ],
 )
 def test_what_means_nothing_gets_a_sentence(text, says):

@@ -78,13 +78,17 @@ class _Example:
 
     def signal(self, name: str) -> Vector:
         """Two samples. Raises ExpressionError unless the signal is one number over time."""
-        _known(name, [*self.signals, *METRICS], "signal or metric")
-        axes, norm = self.signals[name].axes, NORMS.get(name)
-        if self.signals[name].fixed:
+        about = self.signals.get(name)
+        if about and about.fixed:
             raise ExpressionError(f"{name!r} does not run over time")
-        if axes:
+        if about and about.axes:
+            norm = NORMS.get(name)
             hint = f"; take {norm}" if norm else ", and a claim needs a signal with one value"
-            raise ExpressionError(f"{name!r} has a value for every {' and '.join(axes)}{hint}")
+            raise ExpressionError(
+                f"{name!r} has a value for every {' and '.join(about.axes)}{hint}"
+            )
+        usable = [s.name for s in self.signals.values() if not (s.fixed or s.axes)]
+        _known(name, [*usable, *METRICS], "signal or metric")
         return np.array([0.0, 1.0])
 
 
