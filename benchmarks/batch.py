@@ -14,7 +14,7 @@ from podusv_cli.engine.batch import simulate_many
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import ClosedLoop, Observer, simulate
 from podusv_cli.engine.variants import variants
-from podusv_cli.process.workers import workers_here
+from podusv_cli.process.workers import available_workers
 
 CASE = Case("adaptive_neural", "27 grid")
 STEPS = (31_000, 1_000)
@@ -36,7 +36,7 @@ def batch_costs(rounds: int = 7) -> dict[str, Any]:
 
 
 def _costs(steps: int, rounds: int) -> dict[str, Any]:
-    cores = workers_here()
+    cores = available_workers()
     count = A_CORE * cores
     over = grid(steps, log_every=steps + 1)
     scales = {"disturbance.scale": np.linspace(0.5, 1.5, count)}

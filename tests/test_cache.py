@@ -26,7 +26,7 @@ from numba import njit
 from podusv_cli.core.kernel import Vector, is_kernel, kernel, specialise
 from podusv_cli.core.kinematics import wrap
 from podusv_cli.engine import code_folder, compile, object_cache
-from podusv_cli.process.temporary_names import part_name
+from podusv_cli.process.temporary_names import temporary_name
 
 SCRIPT = """
 import json, sys
@@ -207,7 +207,7 @@ def test_old_caches_are_forgotten(
     for number in range(MANY):
         folder = code_kept(number)
         (folder / "law_entry_1.code").touch()
-        (folder / part_name()).touch()
+        (folder / temporary_name()).touch()
         os.utime(folder, (number, number))
     assert code_kept(MANY - 1) == folder
     left = sorted(int(path.name, 16) for path in tmp_path.iterdir())

@@ -17,7 +17,7 @@ from scenario_samples import SOUND, write
 
 import podusv_cli
 from podusv_cli import cli
-from podusv_cli.cli.exit_codes import PLEASE_REPORT, guarded
+from podusv_cli.cli.exit_codes import PLEASE_REPORT, with_exit_codes
 from podusv_cli.core.errors import Finding, ScenarioError, StorageError
 from podusv_cli.findings.finding import finding_kinds
 from podusv_cli.scenario.model import Scenario
@@ -215,7 +215,7 @@ def outcome(error: BaseException) -> object:
         raise error
 
     with pytest.raises(typer.Exit) as ended:
-        guarded(command)()
+        with_exit_codes(command)()
     return ended.value.exit_code
 
 

@@ -188,8 +188,8 @@ def test_whatever_prints_lines_prints_text(capsys: pytest.CaptureFixture[str]) -
     terminal.echo(EVIL)
     terminal.echo_entry(EVIL, EVIL, facts=EVIL)
     terminal.echo_table([EVIL, EVIL, EVIL], [[EVIL, EVIL, EVIL]])
-    terminal.warn_of({EVIL: {EVIL: EVIL, "b": EVIL}})
-    terminal.Warned()(EVIL)
+    terminal.warn_of_differences({EVIL: {EVIL: EVIL, "b": EVIL}})
+    terminal.Warnings()(EVIL)
     for shown in capsys.readouterr():
         assert escaping.visible(EVIL)[:8] in shown
         assert not nasty(shown)

@@ -13,7 +13,7 @@ from storage_samples import deadline
 from podusv_cli.core.errors import StorageError
 from podusv_cli.figures import drawing
 from podusv_cli.process.extras import Extras
-from podusv_cli.process.interrupts import Interrupts, interrupts_heard, interrupts_held
+from podusv_cli.process.interrupts import Interrupts, interrupts_deferred, interrupts_enabled
 from podusv_cli.process.workers import INTERRUPTED, Outcome, run_all
 
 
@@ -83,13 +83,13 @@ def test_interrupted_jobs_bring_home_what_they_have():
     def salvage(progress):
         try:
             progress(0.1)
-            with interrupts_heard():
+            with interrupts_enabled():
                 time.sleep(60)
         except KeyboardInterrupt:
             return "half of it"
 
     outcome = run_all([salvage], interrupt, workers=1)[0]
-    assert (outcome.result, outcome.cut) == ("half of it", True)
+    assert (outcome.result, outcome.interrupted) == ("half of it", True)
 
 
 def test_an_interrupted_caller_leaves_no_process(tmp_path):
@@ -117,7 +117,7 @@ def test_an_interrupt_while_figures_are_drawn_is_one_and_no_bug(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(
-        drawing, "run_all", lambda jobs, *rest: [Outcome(failure=INTERRUPTED, cut=True)] * 2
+        drawing, "run_all", lambda jobs, *rest: [Outcome(failure=INTERRUPTED, interrupted=True)] * 2
     )
     with pytest.raises(KeyboardInterrupt):
         drawing.draw_in_parallel([], ["errors", "loads"], ["png"], Extras())
@@ -131,7 +131,7 @@ def test_an_interrupt_that_became_another_exception_is_one(tmp_path):
         except KeyboardInterrupt as error:
             raise SystemError("returned a result with an exception set") from error
 
-    with interrupts_held():
+    with interrupts_deferred():
         extras = Extras()
         assert extras.attempt("it", confused) is None
     assert extras.interrupted
@@ -144,7 +144,7 @@ def test_extras_that_fail_are_missing_and_what_cannot_be_stored_is_an_error(way)
     def unstorable():
         raise StorageError("the disk is full")
 
-    with interrupts_held():
+    with interrupts_deferred():
         extras = Extras()
         assert getattr(extras, way)("the quotient", lambda: 1 / 0) is None
         assert getattr(extras, way)("the sum", lambda: 1 + 1) == 2
@@ -158,12 +158,12 @@ def test_extras_that_fail_are_missing_and_what_cannot_be_stored_is_an_error(way)
 
 
 def test_held_interrupts_come_when_they_are_heard():
-    with interrupts_held():
+    with interrupts_deferred():
         os.kill(os.getpid(), signal.SIGTERM)
         os.kill(os.getpid(), signal.SIGINT)  # an echo of the first
         time.sleep(0.01)
-        with pytest.raises(KeyboardInterrupt), interrupts_heard():
+        with pytest.raises(KeyboardInterrupt), interrupts_enabled():
             time.sleep(60)
-        with interrupts_heard():
+        with interrupts_enabled():
             time.sleep(0.01)
     assert not isinstance(signal.getsignal(signal.SIGTERM), Interrupts)

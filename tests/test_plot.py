@@ -184,7 +184,7 @@ def test_a_folder_that_is_no_run_is_refused(tmp_path):
     (tmp_path / "mine.yaml").touch()
     (tmp_path / "folders" / "of" / "runs").mkdir(parents=True)
     for name in ("", "mine.yaml", "folders", "nowhere"):
-        why = "nothing has that name" if name == "nowhere" else "it has no manifest.json"
+        why = "it does not exist" if name == "nowhere" else "it has no manifest.json"
         with pytest.raises(UsageError, match=f" is no run folder: {why}"):
             plot(tmp_path / name, out=tmp_path / "x")
 

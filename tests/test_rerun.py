@@ -176,7 +176,7 @@ def test_ctrl_c_ends_it_and_leaves_nothing(run: Path, tmp_path: Path) -> None:
 
 def test_what_is_no_run_folder(run: Path, tmp_path: Path, podusv: Command) -> None:
     reason = {tmp_path: "it has no manifest.json", run / "log.h5": "it has no manifest.json"}
-    for path, why in (reason | {tmp_path / "nowhere": "nothing has that name"}).items():
+    for path, why in (reason | {tmp_path / "nowhere": "it does not exist"}).items():
         assert podusv("rerun", path) == (2, "", f"{path} is no run folder: {why}\n")
     broken = copied(run, tmp_path / "broken")
     (broken / "resolved.yaml").write_text("name: x\n")

@@ -176,9 +176,9 @@ def test_a_manifest_of_another_shape_is_refused(folder: Path, case: str) -> None
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        (b"", "no JSON"),
-        (b'{"podusv_format": 1', "no JSON"),
-        (b"[" * 100_000, "no JSON"),
+        (b"", "not valid JSON"),
+        (b'{"podusv_format": 1', "not valid JSON"),
+        (b"[" * 100_000, "not valid JSON"),
         (b"[1, 2]", "no JSON object"),
         (b'"\xff"', "not UTF-8"),
     ],

@@ -14,7 +14,7 @@ from typing import Annotated
 import typer
 
 from podusv_cli import __version__
-from podusv_cli.cli.exit_codes import flushed, guarded, open_streams, told
+from podusv_cli.cli.exit_codes import flush_streams, replace_closed_streams, told, with_exit_codes
 
 # NAME is the function NAME of cli/NAME.py
 COMMANDS = (
@@ -30,7 +30,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 for _name in COMMANDS:
-    app.command(_name)(guarded(getattr(import_module(f"podusv_cli.cli.{_name}"), _name)))
+    app.command(_name)(with_exit_codes(getattr(import_module(f"podusv_cli.cli.{_name}"), _name)))
 
 
 def _show_version(wanted: bool) -> None:
@@ -60,7 +60,7 @@ def main() -> None:
     # Nothing here is large enough for threads in linear algebra, and with them the last bits of a
     # sum would depend on the number of cores. To start them costs numpy a tenth of a run.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    open_streams()
+    replace_closed_streams()
     for stream in (sys.stdout, sys.stderr):
         # A file name or text that the terminal's encoding lacks must not end in a traceback.
         getattr(stream, "reconfigure", lambda errors: None)(errors="backslashreplace")
@@ -71,4 +71,4 @@ def main() -> None:
     except OSError as error:  # of help, which is printed outside of any command
         code = told(error)
     gc.freeze()  # or Python looks through everything once more before it ends
-    sys.exit(flushed(code))
+    sys.exit(flush_streams(code))

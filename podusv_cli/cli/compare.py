@@ -23,12 +23,12 @@ from podusv_cli.cli.options import (
 )
 from podusv_cli.cli.run import TRACED
 from podusv_cli.cli.terminal import (
-    Warned,
+    Warnings,
     echo,
     echo_entry,
     echo_path,
     echo_table,
-    warn_of,
+    warn_of_differences,
 )
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def compare(
     from podusv_cli.workflows import compare as workflow  # heavy imports only when needed
     from podusv_cli.workflows.run import Request
 
-    warned = Warned(quiet)
+    warned = Warnings(quiet)
     request = Request(
         tuple(assign or ()), out, force, figures, tuple(sys.argv), warned, allow_large
     )
@@ -119,7 +119,7 @@ def _name_report(page: Path) -> None:
 
 
 def _warn(done: Compared) -> None:
-    warn_of(done.result.differences)
+    warn_of_differences(done.result.differences)
     for label, ending in done.result.endings.items():
         if ending:
             echo(*f"{label}: {ending}".splitlines(), err=True)

@@ -39,9 +39,9 @@ def changes_in_words(changes: Mapping[str, Change]) -> str:
 
 def change_in_words(key: str, change: Change) -> str:
     """`a 1 -> 2`, with - for no value."""
-    from podusv_cli.scenario.phrases import as_written
+    from podusv_cli.scenario.phrases import as_yaml
 
-    one, other = ("-" if value is None else as_written(value) for value in change)
+    one, other = ("-" if value is None else as_yaml(value) for value in change)
     return f"{key} {one} -> {other}"
 
 

@@ -27,7 +27,7 @@ LEAST_OPEN_FILES, OPEN_FILES = 64, 1024
 PLEASE_REPORT = "This is a bug in podusv. Please report it with the lines above."
 
 
-def guarded(command: Callable[Given, None]) -> Callable[Given, None]:
+def with_exit_codes(command: Callable[Given, None]) -> Callable[Given, None]:
     """The command, ending with an exit code and, where one helps, a message on stderr."""
 
     @wraps(command)
@@ -44,7 +44,7 @@ def guarded(command: Callable[Given, None]) -> Callable[Given, None]:
 
 def _code_of(command: Callable[[], None], interrupts: Interrupts) -> int:
     try:
-        _open_enough()
+        _raise_limit_of_open_files()
         command()
     except (typer.Abort, typer.BadParameter):
         raise
@@ -59,7 +59,7 @@ def _code_of(command: Callable[[], None], interrupts: Interrupts) -> int:
     return 0
 
 
-def _open_enough() -> None:
+def _raise_limit_of_open_files() -> None:
     """Allow as many open files as commands need; StorageError where the system does not.
 
     A run that finds out in the end would lack figures, or be lost.
@@ -98,7 +98,7 @@ def _say(*lines: str) -> None:
         echo(*lines, err=True)
 
 
-def open_streams() -> None:
+def replace_closed_streams() -> None:
     """Where the caller closed stdin, stdout or stderr (`>&-`), nothing stands in its place.
 
     Otherwise the next file that is opened would, and messages would go into it.
@@ -122,7 +122,7 @@ def _whole(stream: TextIO) -> TextIO:
     return io.TextIOWrapper(buffered, stream.encoding, stream.errors, line_buffering=True)
 
 
-def flushed(code: str | int | None) -> str | int | None:
+def flush_streams(code: str | int | None) -> str | int | None:
     """The exit code after everything is printed; another one where printing failed."""
     for stream in (sys.stdout, sys.stderr):
         try:

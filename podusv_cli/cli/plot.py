@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from podusv_cli.cli.terminal import echo, echo_path, warn_of
+from podusv_cli.cli.terminal import echo, echo_path, warn_of_differences
 
 if TYPE_CHECKING:
     from podusv_cli.workflows.plot import Drawn
@@ -51,4 +51,4 @@ def _warn(drawn: Drawn) -> None:
         echo(f"replaced what was in {path}", err=True)
     for label, ending in drawn.empty.items():
         echo(f"{label}: nothing to draw: {ending}", err=True)
-    warn_of(drawn.differences)
+    warn_of_differences(drawn.differences)

@@ -9,7 +9,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from typing import TYPE_CHECKING
 
-from podusv_cli.cli.terminal import takes_codes
+from podusv_cli.cli.terminal import supports_colours
 from podusv_cli.core.escaping import visible
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ def progress_bars(*, wanted: bool) -> Iterator[Callable[[str, float], None] | No
 
     None where stderr is no terminal that takes codes. A terminal that is lost costs the bars only.
     """
-    if not (wanted and takes_codes(sys.stderr)):
+    if not (wanted and supports_colours(sys.stderr)):
         yield None
         return
     from rich.console import Console

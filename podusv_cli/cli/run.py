@@ -20,7 +20,7 @@ from podusv_cli.cli.options import (
     Quiet,
     Verbose,
 )
-from podusv_cli.cli.terminal import Warned, echo, echo_path
+from podusv_cli.cli.terminal import Warnings, echo, echo_path
 
 if TYPE_CHECKING:
     from podusv_cli.workflows.execute import Finished
@@ -48,7 +48,7 @@ def run(
     from podusv_cli.storage.json_files import encode
     from podusv_cli.workflows import run as workflow  # heavy imports only when they are needed
 
-    warned = Warned(quiet)
+    warned = Warnings(quiet)
     request = workflow.Request(
         tuple(assign or ()), out, force, figures, tuple(sys.argv), warned, allow_large
     )

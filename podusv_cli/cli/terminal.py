@@ -47,13 +47,15 @@ def echo_entry(name: str, *lines: str, facts: str = "") -> None:
 
     head = wrapped(f"{name}  {facts}".rstrip(), "")
     typer.echo(
-        head.replace(name, typer.style(name, bold=True), 1) if takes_codes(sys.stdout) else head
+        head.replace(name, typer.style(name, bold=True), 1)
+        if supports_colours(sys.stdout)
+        else head
     )
     for line in filter(None, lines):
         typer.echo(wrapped(line, "    "))
 
 
-def takes_codes(stream: TextIO) -> bool:
+def supports_colours(stream: TextIO) -> bool:
     """Whether this is a terminal that takes codes, and nobody asked for plain text (NO_COLOR)."""
     wanted = os.environ.get("TERM", "") not in ("", "dumb") and not os.environ.get("NO_COLOR")
     return wanted and stream.isatty()
@@ -106,7 +108,7 @@ def _width() -> int:
     return max(20, min(WIDEST, shutil.get_terminal_size().columns))
 
 
-def warn_of(differences: Mapping[str, Mapping[str, Any]]) -> None:
+def warn_of_differences(differences: Mapping[str, Mapping[str, Any]]) -> None:
     """Show on stderr what compared runs differ in besides the controller."""
     from podusv_cli.comparison.differences import as_text
 
@@ -117,7 +119,7 @@ def warn_of(differences: Mapping[str, Mapping[str, Any]]) -> None:
         echo(f"  {key}: {shown}", err=True)
 
 
-class Warned:
+class Warnings:
     """Shows warnings on stderr, each once; none where `quiet`."""
 
     def __init__(self, quiet: bool = False) -> None:

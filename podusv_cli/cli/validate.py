@@ -53,10 +53,10 @@ def _explain(loaded: Loaded) -> None:
     from podusv_cli.findings.gains import conditions
     from podusv_cli.findings.underactuation import argument
     from podusv_cli.scenario.load import values
-    from podusv_cli.scenario.phrases import as_written
+    from podusv_cli.scenario.phrases import as_yaml
 
     echo(argument(loaded.scenario))
     for line in conditions(loaded.scenario):
         echo(line)
     for key, content in values(loaded.scenario).items():
-        echo(f"{key}: {as_written(content)}  # {loaded.origins[key]}")
+        echo(f"{key}: {as_yaml(content)}  # {loaded.origins[key]}")

@@ -20,8 +20,8 @@ from podusv_cli.engine.closed_loop import Plan, Wires
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.march import Bell, Ending, Work
 from podusv_cli.engine.simulate import STATE, ClosedLoop, Observer, entries, marcher, wire
-from podusv_cli.process.interrupts import interrupts_heard, interrupts_held
-from podusv_cli.process.workers import workers_here
+from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
+from podusv_cli.process.workers import available_workers
 
 NUMBER = 8  # bytes; LANES numbers are a cache line
 
@@ -87,8 +87,8 @@ def simulate_many(
         if progress:
             progress(done / len(loops))
 
-    with interrupts_held():
-        _march_all(map(run, range(len(loops))), last, workers or workers_here(), batch, tell)
+    with interrupts_deferred():
+        _march_all(map(run, range(len(loops))), last, workers or available_workers(), batch, tell)
     return batch
 
 
@@ -105,7 +105,7 @@ def _march_all(
                 busy.append(run)
             if not busy:
                 break
-            with interrupts_heard():
+            with interrupts_enabled():
                 busy[0].work.wait()  # any of them rings the bell
             for run in [run for run in busy if run.work.over or run.work.hangs()]:
                 busy.remove(run)

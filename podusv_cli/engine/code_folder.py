@@ -19,7 +19,11 @@ from functools import cache
 from pathlib import Path
 
 from podusv_cli.core.escaping import visible
-from podusv_cli.process.temporary_names import forget_files, is_part, part_name
+from podusv_cli.process.temporary_names import (
+    is_temporary_name,
+    remove_abandoned_files,
+    temporary_name,
+)
 
 KEPT = 8  # folders of this many other states of the source stay on disk
 DIGEST = re.compile(r"[0-9a-f]{16}")
@@ -74,7 +78,7 @@ def write(path: Path, content: bytes) -> None:
 
     Raises OSError.
     """
-    part = part_name()
+    part = temporary_name()
     with _opened(path.parent, os.O_DIRECTORY) as folder:
         try:
             with _opened(part, NEW, folder) as file, open(file, "wb", closefd=False) as stream:
@@ -124,7 +128,7 @@ def _made(root: Path, name: str) -> Path:
     if not _is_marked(folder):
         write(folder / MARK, MARKED)
     _forget_old(folder)
-    forget_files(folder)
+    remove_abandoned_files(folder)
     return folder
 
 
@@ -178,7 +182,9 @@ def _forget_old(current: Path) -> None:
 
 def _remove(old: Path, folder: int) -> None:
     names = [entry.name for entry in os.scandir(folder) if entry.is_file(follow_symlinks=False)]
-    own = [name for name in names if name == MARK or PIECE.fullmatch(name) or is_part(name)]
+    own = [
+        name for name in names if name == MARK or PIECE.fullmatch(name) or is_temporary_name(name)
+    ]
     if len(own) < len(os.listdir(folder)):
         return
     for name in own:

@@ -12,7 +12,7 @@ from typing import Any
 
 from podusv_cli.core.errors import LawError
 from podusv_cli.engine import object_cache, signatures
-from podusv_cli.process.interrupts import interrupts_held
+from podusv_cli.process.interrupts import interrupts_deferred
 
 RULES = (
     "a kernel is marked with @kernel, reads and writes numbers of vectors one by one (x[2], "
@@ -56,7 +56,7 @@ def compiled(function: Any, prototype: Any, label: str = "") -> Any:
         from podusv_cli.engine import compile_numba
 
         # The compiler would swallow an interrupt, so interrupts wait for it, a second or two.
-        with interrupts_held():
+        with interrupts_deferred():
             return compile_numba.object_code(function, prototype)
 
     return object_cache.stored(prototype, re.sub(r"\W", "_", name), compile_now)

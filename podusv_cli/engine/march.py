@@ -21,7 +21,7 @@ from podusv_cli.core.errors import in_a_line
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Status
 from podusv_cli.engine.closed_loop import STOP
-from podusv_cli.process.interrupts import interrupts_heard
+from podusv_cli.process.interrupts import interrupts_enabled
 
 Bell = SimpleQueue[None]
 GLANCE = 0.05  # s between two looks at a march
@@ -138,7 +138,7 @@ def march(
     """March up to the instant `last`, excluded. To be called while interrupts are held."""
     work = Work(advance, under_way)
     try:
-        with interrupts_heard():
+        with interrupts_enabled():
             work.finish(progress)
         return work.ending(last)
     except KeyboardInterrupt:

@@ -21,7 +21,7 @@ from podusv_cli.engine.closed_loop import Plan, Wires
 from podusv_cli.engine.grid import TimeGrid, whole_steps
 from podusv_cli.engine.march import Ending, march
 from podusv_cli.paths.base import TARGET, Path
-from podusv_cli.process.interrupts import interrupts_held
+from podusv_cli.process.interrupts import interrupts_deferred
 from podusv_cli.vessels.vessel import Vessel
 
 STATE = tuple(state.name for state in signal.STATE)
@@ -134,7 +134,7 @@ def simulate(
     plan = loop.layout(grid)
     wires, last = wire(loop, plan, observer, grid.rows, allocate), plan.steps + 1
     advance = partial(marcher(loop, observer, compiled), 0, last, grid.step, wires, plan)
-    with np.errstate(all="ignore"), interrupts_held():
+    with np.errstate(all="ignore"), interrupts_deferred():
         ending = march(
             advance, last, wires.under_way,
             progress and (lambda reached: progress(reached / last)),

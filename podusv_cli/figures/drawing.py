@@ -14,7 +14,7 @@ from podusv_cli.core.recording import Recording
 from podusv_cli.figures.sheet import Sheet
 from podusv_cli.figures.style import Shown, house_style, image, look
 from podusv_cli.process.extras import Extras, Missing
-from podusv_cli.process.interrupts import interrupts_heard
+from podusv_cli.process.interrupts import interrupts_enabled
 from podusv_cli.process.workers import run_all
 from podusv_cli.scenario.model import Scenario
 
@@ -64,7 +64,7 @@ def draw_in_parallel(
 
     def job(name: str, tell: Callable[[float], None]) -> tuple[dict[str, bytes], list[Missing]]:
         own = Extras()
-        with interrupts_heard():
+        with interrupts_enabled():
             files = own.made(f"figure {name}", partial(drawn, name))
         tell(1.0)
         return files or {}, own.missing
@@ -77,7 +77,7 @@ def draw_in_parallel(
     if len(names) == 1:
         return extras.attempt(f"figure {names[0]}", partial(drawn, names[0])) or {}
     outcomes = run_all([partial(job, name) for name in names], tell)
-    if any(outcome.cut for outcome in outcomes):
+    if any(outcome.interrupted for outcome in outcomes):
         raise KeyboardInterrupt
     found: dict[str, bytes] = {}
     for name, outcome in zip(names, outcomes, strict=True):

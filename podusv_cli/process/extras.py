@@ -1,4 +1,4 @@
-"""What is made of a finished simulation: none of it is worth the simulation's loss."""
+"""Work after a simulation (metrics, figures, ...), whose failure must not lose its log."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from typing import Any, TypeVar
 
 from podusv_cli.core.errors import StorageError, in_a_line
-from podusv_cli.process.interrupts import interrupts_caught, interrupts_heard
+from podusv_cli.process.interrupts import interrupts_caught, interrupts_enabled
 
 Result = TypeVar("Result")
 
@@ -27,14 +27,14 @@ class Missing:
 
 
 class Extras:
-    """Work on a finished simulation.
+    """Work after a simulation.
 
-    What fails is noted in `missing` and the rest goes on. Only StorageError is raised: what cannot
-    be stored is lost anyway. For use while interrupts are held.
+    A failure is added to `missing`, and the other work goes on. Only StorageError is raised. Use it
+    while interrupts are deferred.
     """
 
     def __init__(self, interrupted: bool = False) -> None:
-        """`interrupted`: leave out everything that an interrupt may leave out."""
+        """With `interrupted`, `attempt` does nothing."""
         self.interrupted = interrupted
         self.missing: list[Missing] = []
 
@@ -47,21 +47,18 @@ class Extras:
         return None
 
     def attempt(self, what: str, work: Callable[[], Result]) -> Result | None:
-        """The same for work that is not worth waiting for: an interrupt ends it or leaves it out.
-
-        None then, too, and nothing is noted.
-        """
+        """The same for work that an interrupt may end: None then, and nothing in `missing`."""
         if self.interrupted:
             return None
         with interrupts_caught() as here:
             try:
-                with interrupts_heard():
+                with interrupts_enabled():
                     return work()
             except KeyboardInterrupt:
                 self.interrupted = True
             except Exception as error:
                 self.interrupted = here.number > 0
-                if not self.interrupted:  # machine code may turn one into another exception
+                if not self.interrupted:  # compiled code may turn an interrupt into any exception
                     self._note(what, error)
         return None
 

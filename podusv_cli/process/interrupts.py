@@ -1,4 +1,4 @@
-"""Ctrl-C (SIGINT), SIGTERM and SIGHUP: heard where work can be cut short, held where it cannot."""
+"""Ctrl-C (SIGINT), SIGTERM and SIGHUP as KeyboardInterrupt, deferred while results are written."""
 
 from __future__ import annotations
 
@@ -12,53 +12,52 @@ from contextlib import contextmanager, suppress
 from types import FrameType
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)  # the last: the terminal is lost
-# s; a terminal interrupts a command and its workers, the command its workers again, and people
-# press twice: what follows this closely on an interrupt is the same interrupt.
-ECHO = 3.0
+# s; signals within this time of the first one count as the same interrupt: a terminal signals a
+# command and its workers, the command signals its workers again, and people press twice.
+SAME_INTERRUPT = 3.0
 SIGNALLED = 128  # and the signal's number: 129 for SIGHUP, 130 for SIGINT, 143 for SIGTERM
 STDERR = 2
-CUT_OFF = b"podusv: interrupted again; what was still being made is lost\n"
+ENDED = b"podusv: interrupted again; unfinished results are lost\n"
 
 
 class Interrupts:
-    """A handler of signals: raises KeyboardInterrupt, at once or when the signals are heard again.
+    """A signal handler that raises KeyboardInterrupt, at once or when `deferred` ends.
 
-    Whoever interrupts a second time gets the end of the process, whatever it is doing. `number` is
-    the signal that came first, 0 as long as there was none. Once `ending` is set the process is
-    about to end, and signals, then and during its shutdown, change nothing any more.
+    A second interrupt ends the process at once. `number` is the first signal, 0 before it. With
+    `ending` the process is about to exit, and further signals are ignored.
     """
 
     def __init__(self) -> None:
-        """Nothing came yet, and nothing is held."""
+        """No signal yet."""
         self.number = 0
-        self.held = False
+        self.deferred = False
         self.ending = False
         self._waiting = False
-        self._last = -ECHO
+        self._last = -SAME_INTERRUPT
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
-        """Take in a signal."""
-        if self.ending or time.monotonic() - self._last < ECHO:
+        """Handle a signal."""
+        if self.ending or time.monotonic() - self._last < SAME_INTERRUPT:
             return
         if self.number:
-            _cut_off(self.number)
+            _end_process(self.number)
         self._last, self.number = time.monotonic(), number
         self._waiting = True
         self.deliver()
 
     def deliver(self) -> None:
-        """Raise KeyboardInterrupt where a signal waits and is not held."""
-        if self._waiting and not self.held:
+        """Raise KeyboardInterrupt if a signal waits and is not deferred."""
+        if self._waiting and not self.deferred:
             self._waiting = False
             raise KeyboardInterrupt
 
 
-def _cut_off(number: int) -> None:
-    """End this process and its workers at once; folders in the making are swept by the next run."""
+def _end_process(number: int) -> None:
+    """End this process and its workers at once; the next run deletes their unfinished folders."""
     import multiprocessing  # which not every command needs
 
     with suppress(OSError):
-        os.write(STDERR, CUT_OFF)
+        os.write(STDERR, ENDED)
     for worker in multiprocessing.active_children():
         worker.kill()
     os._exit(SIGNALLED + number)
@@ -66,7 +65,7 @@ def _cut_off(number: int) -> None:
 
 @contextmanager
 def interrupts_caught() -> Iterator[Interrupts]:
-    """These signals go to one `Interrupts`: to the one that is there, or else to a new one."""
+    """Signals go to the `Interrupts` already installed, or else to a new one."""
     handlers = (signal.getsignal(number) for number in SIGNALS)
     caught = (handler for handler in handlers if isinstance(handler, Interrupts))
     there = next((handler for handler in caught if not handler.ending), None)
@@ -82,13 +81,13 @@ def interrupts_caught() -> Iterator[Interrupts]:
 
 
 def _ignore() -> None:
-    """Python puts back the system's handlers, which end the process, after its exit functions."""
+    """Ignore signals during shutdown, when Python restores handlers that end the process."""
     for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN)
 
 
 def _install(here: Interrupts) -> dict[signal.Signals, signal.Handlers]:
-    """Put the handler in place; what was there. Only a main thread can, only it is interrupted."""
+    """Install the handler and return the previous ones; in the main thread only."""
     if threading.current_thread() is not threading.main_thread():
         return {}
     before = {number: signal.getsignal(number) or signal.SIG_DFL for number in SIGNALS}
@@ -99,26 +98,26 @@ def _install(here: Interrupts) -> dict[signal.Signals, signal.Handlers]:
 
 
 @contextmanager
-def interrupts_held() -> Iterator[None]:
-    """Interrupts wait until the block is over, or for `interrupts_heard` in it."""
-    with _holding(True):
+def interrupts_deferred() -> Iterator[None]:
+    """Interrupts wait for the end of the block, or for `interrupts_enabled` inside it."""
+    with _deferring(True):
         yield
 
 
 @contextmanager
-def interrupts_heard() -> Iterator[None]:
-    """Interrupts, also those that wait, raise KeyboardInterrupt in the block."""
-    with _holding(False):
+def interrupts_enabled() -> Iterator[None]:
+    """Interrupts, also waiting ones, raise KeyboardInterrupt in the block."""
+    with _deferring(False):
         yield
 
 
 @contextmanager
-def _holding(held: bool) -> Iterator[None]:
+def _deferring(deferred: bool) -> Iterator[None]:
     with interrupts_caught() as here:
-        before, here.held = here.held, held
+        before, here.deferred = here.deferred, deferred
         try:
             here.deliver()
             yield
         finally:
-            here.held = before
+            here.deferred = before
             here.deliver()

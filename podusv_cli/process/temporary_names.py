@@ -1,7 +1,6 @@
-"""Hidden names for what is in the making; they say who makes it.
+"""Hidden names of unfinished files and folders, which carry machine and process.
 
-So no instant exists at which such a part belongs to nobody, and what a killed process left can be
-told from what a live one is making.
+The name tells files that a killed process left from files that a running process is writing.
 """
 
 from __future__ import annotations
@@ -21,21 +20,21 @@ _PART = re.compile(
 )
 
 
-def part_name(final: str = "") -> str:
-    """A new name for a part that this process makes; `final` is what it will be called, if told."""
+def temporary_name(final: str = "") -> str:
+    """A new hidden name; `final` is the name that the finished file or folder will have."""
     shown = f".{final}" if final else ""
     return f"{shown}.podusv-{_machine()}-{os.getpid()}-{secrets.token_hex(4)}.part"
 
 
-def is_part(name: str) -> bool:
-    """Whether this is the name of a part, whoever makes it."""
+def is_temporary_name(name: str) -> bool:
+    """Whether this is the name of an unfinished file or folder, of any process."""
     return _PART.fullmatch(name) is not None
 
 
 def abandoned(folder: Path) -> Iterator[tuple[Path, str]]:
-    """Parts in `folder` whose makers are dead, and their final names ("" where not told).
+    """Unfinished files and folders of ended processes, and their final names ("" if unknown).
 
-    Those of other machines are left out: nobody here can tell whether their makers live.
+    Those of other machines are left out, since it is unknown here whether their process runs.
     """
     with suppress(OSError):
         for entry in list(os.scandir(folder)):
@@ -44,8 +43,8 @@ def abandoned(folder: Path) -> Iterator[tuple[Path, str]]:
                 yield Path(entry.path), found["name"] or ""
 
 
-def forget_files(folder: Path) -> None:
-    """Clear away the files that killed processes were writing into `folder`."""
+def remove_abandoned_files(folder: Path) -> None:
+    """Delete the unfinished files that killed processes left in `folder`."""
     for path, final in abandoned(folder):
         if not final:
             with suppress(OSError):
@@ -53,7 +52,7 @@ def forget_files(folder: Path) -> None:
 
 
 def _machine() -> str:
-    """Where process numbers mean what they mean here: a machine, or a container on it."""
+    """The machine, or the container on it, within which process numbers are unique."""
     names = [platform.node()]
     with suppress(OSError):
         names.append(str(os.stat("/proc/self/ns/pid").st_ino))

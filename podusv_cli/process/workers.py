@@ -19,16 +19,16 @@ from podusv_cli.core.errors import PodusvError, StorageError
 from podusv_cli.process.interrupts import (
     Interrupts,
     interrupts_caught,
-    interrupts_heard,
-    interrupts_held,
+    interrupts_deferred,
+    interrupts_enabled,
 )
 
 Progress = Callable[[float], None]
 Job = Callable[[Progress], Any]
 Report = Callable[[int, float], None]
-GRACE = 1.5  # s for jobs to return what they have after an interrupt
+GRACE = 1.5  # s after an interrupt, in which jobs may return a partial result
 INTERRUPTED = "interrupted"
-FORK = multiprocessing.get_context("fork")  # which inherits what is imported and compiled
+FORK = multiprocessing.get_context("fork")  # workers inherit imported and compiled code
 TRIES = 2  # a job whose process is killed runs once more
 
 
@@ -36,17 +36,17 @@ TRIES = 2  # a job whose process is killed runs once more
 class Outcome:
     """A job's result, or in `failure` the reason why there is none.
 
-    `cut`: an interrupt came before the job was over. `code`: the exit code of its error.
+    `interrupted`: an interrupt came before the job ended. `code`: the exit code of its error.
     """
 
     result: Any = None
     failure: str = ""
-    cut: bool = False
+    interrupted: bool = False
     code: int = 0
 
 
-def workers_here() -> int:
-    """How many processes this process may keep busy."""
+def available_workers() -> int:
+    """How many worker processes to use: the cores that this process may run on."""
     try:
         return len(os.sched_getaffinity(0))
     except AttributeError:  # not on every system
@@ -59,52 +59,52 @@ def run_all(
     """Run every job, at most `workers` at a time (0: one a core); the outcomes in order.
 
     `progress` is called with a job's position and the fraction that it reports. A job's PodusvError
-    becomes its failure; any other exception too, with its traceback. An interrupt is passed on to
-    the jobs, which begin with interrupts held; those that hear it have a moment to return what they
-    have, then all are killed.
+    becomes its failure; any other exception too, with its traceback. Jobs start with interrupts
+    deferred. An interrupt is passed on to them; after GRACE seconds those that have not returned
+    are killed.
     """
     pool = _Pool(jobs, progress)
-    with interrupts_held():
+    with interrupts_deferred():
         try:
-            while pool.waiting or pool.busy:
-                pool.start(workers or workers_here())
-                with interrupts_heard():
-                    ready = wait(pool.busy)
+            while pool.waiting or pool.running:
+                pool.start(workers or available_workers())
+                with interrupts_enabled():
+                    ready = wait(pool.running)
                 pool.receive(ready)
         except KeyboardInterrupt:
             pool.interrupt()
         finally:
             pool.kill()
-    missing = Outcome(failure=INTERRUPTED, cut=True)
+    missing = Outcome(failure=INTERRUPTED, interrupted=True)
     return [pool.outcomes.get(position, missing) for position in range(len(jobs))]
 
 
 class _Pool:
-    """Jobs that wait, by position; processes at work, by the pipe that they write to; outcomes."""
+    """Waiting jobs by position, running processes by their pipe, outcomes by position."""
 
     def __init__(self, jobs: Sequence[Job], progress: Report) -> None:
         self._jobs, self._progress, self._tries = jobs, progress, Counter[int]()
         self.waiting = list(range(len(jobs)))
-        self.busy: dict[Connection, tuple[int, BaseProcess]] = {}
+        self.running: dict[Connection, tuple[int, BaseProcess]] = {}
         self.outcomes: dict[int, Outcome] = {}
 
     def start(self, most: int) -> None:
-        """Start jobs until this many are at work."""
-        while self.waiting and len(self.busy) < most:
+        """Start waiting jobs until `most` processes run."""
+        while self.waiting and len(self.running) < most:
             position = self.waiting.pop(0)
             ours, theirs = FORK.Pipe(duplex=False)
             # A process notices that its parent has ended only if no other holds the pipe's end.
-            inherited = [ours, *self.busy]
+            inherited = [ours, *self.running]
             process = FORK.Process(target=_work, args=(self._jobs[position], theirs, inherited))
             process.start()
             theirs.close()
             self._tries[position] += 1
-            self.busy[ours] = position, process
+            self.running[ours] = position, process
 
     def receive(self, ready: Iterable[Any]) -> None:
-        """Read one message from each of these pipes: a fraction, an outcome, or the end."""
+        """Read one message from each pipe: progress, an outcome, or the end of the pipe."""
         for pipe in ready:
-            position, process = self.busy[pipe]
+            position, process = self.running[pipe]
             try:
                 message = pipe.recv()
             except (EOFError, OSError, UnpicklingError):  # killed, perhaps within a message
@@ -112,7 +112,7 @@ class _Pool:
             if isinstance(message, float):
                 self._progress(position, message)
                 continue
-            del self.busy[pipe]
+            del self.running[pipe]
             pipe.close()
             process.join()
             if message is None and self._tries[position] < TRIES:
@@ -122,19 +122,19 @@ class _Pool:
                 self.outcomes[position] = message or Outcome(failure=killed)
 
     def interrupt(self) -> None:
-        """Interrupt all processes and take what they return within the time of grace."""
+        """Interrupt all processes and collect what they return within GRACE seconds."""
         self._progress = lambda position, fraction: None
         done, end = set(self.outcomes), time.monotonic() + GRACE
-        for _, process in self.busy.values():
+        for _, process in self.running.values():
             process.terminate()
-        while self.busy and (left := end - time.monotonic()) > 0:
-            self.receive(wait(self.busy, left))
+        while self.running and (left := end - time.monotonic()) > 0:
+            self.receive(wait(self.running, left))
         for position in self.outcomes.keys() - done:
-            self.outcomes[position] = replace(self.outcomes[position], cut=True)
+            self.outcomes[position] = replace(self.outcomes[position], interrupted=True)
 
     def kill(self) -> None:
-        """Leave no process behind."""
-        for pipe, (_, process) in self.busy.items():
+        """Kill all processes that still run."""
+        for pipe, (_, process) in self.running.items():
             process.kill()
             process.join()
             pipe.close()
@@ -144,7 +144,7 @@ def _work(job: Job, pipe: Connection, inherited: Iterable[Connection]) -> None:
     for end in inherited:
         end.close()
     # A broken pipe means that the parent has ended.
-    with interrupts_caught() as interrupts, interrupts_held(), suppress(BrokenPipeError):
+    with interrupts_caught() as interrupts, interrupts_deferred(), suppress(BrokenPipeError):
         outcome = _outcome(job, pipe.send, interrupts)
         try:
             pipe.send(outcome)

@@ -12,7 +12,7 @@ from podusv_cli.core.component import Component
 from podusv_cli.core.errors import PodusvError
 from podusv_cli.core.signal import Signal
 from podusv_cli.scenario.keys import MISSING, NUMBER, SCENARIO, Key, joined
-from podusv_cli.scenario.phrases import as_written, did_you_mean
+from podusv_cli.scenario.phrases import as_yaml, did_you_mean
 from podusv_cli.scenario.presets import preset_names, preset_text, with_presets
 from podusv_cli.scenario.yaml_tree import dotted, route
 
@@ -177,4 +177,4 @@ def _default(key: Key) -> str:
         return FROM_PRESET[str(key.path[0])]
     if key.default is MISSING or key.name == "kind":
         return "required"
-    return as_written(key.default)
+    return as_yaml(key.default)

@@ -25,7 +25,7 @@ def found(content: Any, text: str) -> str:
     return f"{text:.60}" or "nothing"
 
 
-def as_written(content: Any) -> str:
+def as_yaml(content: Any) -> str:
     """A plain value as it would stand in a scenario, cut where it is long."""
     text = content if isinstance(content, str) and content else json.dumps(content)
     return quoted(text) if len(text) > 60 or not text.isprintable() else text

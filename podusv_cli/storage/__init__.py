@@ -1,1 +1,1 @@
-"""Run folders, logs, manifests: everything that is written to and read from the disk."""
+"""Run folders, logs, manifests: reading and writing."""

@@ -1,7 +1,6 @@
-"""Whole files: written so that they are there entirely or not at all, and read without surprises.
+"""Atomic writing of files, and reading of regular files up to a size limit.
 
-Reading takes only regular files, never through a link, never more than a limit. Every failure is
-one sentence.
+A file is written completely or not at all. Links are not followed. Errors are StorageError.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ import numpy as np
 
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.kernel import Vector
-from podusv_cli.process.temporary_names import forget_files, part_name
+from podusv_cli.process.temporary_names import remove_abandoned_files, temporary_name
 
 LARGEST_TEXT = 16 * 2**20  # bytes
 LARGEST_FILE = 4 * 2**30  # bytes
@@ -43,41 +42,40 @@ CAUSES = {
 
 
 @contextmanager
-def explained(doing: str) -> Iterator[None]:
-    """Turn an OSError inside into a StorageError that says `doing` and the cause."""
+def storage_errors(failure: str) -> Iterator[None]:
+    """Turn an OSError in the block into a StorageError `<failure>: <cause>`."""
     try:
         yield
     except OSError as error:
         cause = CAUSES.get(error.errno or 0) or error.strerror or str(error)
-        raise StorageError(f"{doing}: {cause}") from error
+        raise StorageError(f"{failure}: {cause}") from error
 
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """Put `content` under the name `path`: before and after a failure the file is whole.
+    """Write a file atomically, in place of an older one.
 
-    Raises StorageError naming path, size and cause; the old file, if any, is then untouched, unless
-    only the last step failed, which makes the new name durable.
+    Raises StorageError naming path, size and cause. The older file is then unchanged, unless only
+    the last step failed, which syncs the folder.
     """
     write_all({path: content})
 
 
 def write_all(contents: Mapping[Path, bytes]) -> None:
-    """The same for several files; all are on the disk before the first gets its name.
+    """Write several files; all are on the disk before the first replaces an older one.
 
-    A disk that fills up leaves the old files. StorageError also where something that is no file has
-    the name.
+    Raises StorageError, also where the name belongs to something that is not a file.
     """
-    parts = {path: path.with_name(part_name()) for path in contents}
+    parts = {path: path.with_name(temporary_name()) for path in contents}
     folders = dict.fromkeys(path.parent for path in contents)
     for folder in folders:
-        forget_files(folder)
+        remove_abandoned_files(folder)
     try:
         for path, part in parts.items():
-            with explained(f"cannot write {path} ({len(contents[path])} bytes)"):
-                _refuse_odd(path)
+            with storage_errors(f"cannot write {path} ({len(contents[path])} bytes)"):
+                _check_regular_file(path)
                 _create(part, contents[path])
         for path, part in parts.items():
-            with explained(f"cannot write {path} ({len(contents[path])} bytes)"):
+            with storage_errors(f"cannot write {path} ({len(contents[path])} bytes)"):
                 os.replace(part, path)
     finally:
         for part in parts.values():
@@ -88,69 +86,69 @@ def write_all(contents: Mapping[Path, bytes]) -> None:
 
 
 def check_places(paths: Iterable[Path]) -> None:
-    """Raise the StorageError that writing these files would end with, as far as can be known.
+    """Raise StorageError if these files cannot be written; nothing is left behind.
 
-    Folders need not be there yet. Nothing is left behind.
+    Their folders need not exist yet.
     """
     for path in paths:
-        with explained(f"cannot write {path}"):
-            _refuse_odd(path)
-            probe = next(p for p in path.parents if os.path.lexists(p)) / part_name()
+        with storage_errors(f"cannot write {path}"):
+            _check_regular_file(path)
+            probe = next(p for p in path.parents if os.path.lexists(p)) / temporary_name()
             try:
                 _create(probe, b"")
             finally:
                 probe.unlink(missing_ok=True)
 
 
-def _refuse_odd(path: Path) -> None:
-    """What is no file would be replaced by one, a device too."""
+def _check_regular_file(path: Path) -> None:
+    """StorageError for a link, folder or device, which writing would replace by a file."""
     if path.is_symlink() or (path.exists() and not path.is_file()):
         raise StorageError(f"cannot write {path}: it is there already and is not a file")
 
 
 def create(path: Path, content: bytes) -> None:
-    """Write a new file through to the disk. Raises StorageError, also where `path` exists.
+    """Write a new file and sync it. Raises StorageError, also where `path` exists.
 
-    A failure may leave a piece of the file: only for folders that are not yet visible.
+    A failure may leave a part of the file, so use it only in unfinished folders.
     """
-    with explained(f"cannot write {path} ({len(content)} bytes)"):
+    with storage_errors(f"cannot write {path} ({len(content)} bytes)"):
         _create(path, content)
 
 
 @contextmanager
-def growing(path: Path, size: int) -> Iterator[BinaryIO]:
-    """A new file to be filled with `size` bytes inside the block, and on the disk after it.
+def new_file(path: Path, size: int) -> Iterator[BinaryIO]:
+    """A new file of `size` bytes, open for writing in the block and synced after it.
 
-    Raises StorageError where `create` would, and for every OSError inside.
+    Raises StorageError as `create` does, and for every OSError in the block.
     """
-    with explained(f"cannot write {path} ({size} bytes)"):
+    with storage_errors(f"cannot write {path} ({size} bytes)"):
         descriptor = os.open(path, _CREATE, 0o666)
         with os.fdopen(descriptor, "wb", buffering=0) as file:
             yield file
             os.fsync(descriptor)
 
 
-def mapped(folder: Path, size: int) -> Vector:
-    """Room for `size` numbers in a nameless file of the folder, for what memory does not hold.
+def disk_array(folder: Path, size: int) -> Vector:
+    """An array of `size` numbers in a nameless file of the folder, for logs larger than memory.
 
-    Its disk space is reserved here, so that a full disk is a StorageError now and not a signal when
-    a number is stored.
+    Its disk space is reserved at once, so that a full disk is a StorageError here and not a signal
+    (SIGBUS) when a number is stored.
     """
-    doing = f"cannot keep the log in {folder} ({8 * size} bytes)"
-    with explained(doing), tempfile.TemporaryFile(dir=folder) as file:
+    failure = f"cannot keep the log in {folder} ({8 * size} bytes)"
+    with storage_errors(failure), tempfile.TemporaryFile(dir=folder) as file:
         os.posix_fallocate(file.fileno(), 0, 8 * size)
         return np.memmap(file, np.float64, "r+", shape=size).view(np.ndarray)
 
 
 def make_folder(path: Path) -> None:
-    """Make a folder with all above it, where it is not there yet. Raises StorageError."""
-    with explained(f"cannot make the folder {path}"):
+    """Make a folder and its parents, if missing. Raises StorageError."""
+    with storage_errors(f"cannot make the folder {path}"):
         path.mkdir(parents=True, exist_ok=True)
 
 
 def sync_folder(folder: Path) -> None:
-    """Make the names in `folder` durable. Raises StorageError."""
-    with explained(f"cannot write {folder} to the disk"):
+    """Sync the names in `folder` to the disk. Raises StorageError."""
+    with storage_errors(f"cannot write {folder} to the disk"):
         _sync_folder(folder)
 
 
@@ -169,7 +167,7 @@ def _sync_folder(folder: Path) -> None:
     try:
         os.fsync(descriptor)
     except OSError as error:
-        # Some network file systems know no fsync of folders; there is nothing to wait for then.
+        # Some network file systems have no fsync of folders.
         if error.errno not in (errno.EINVAL, errno.ENOTSUP):
             raise
     finally:
@@ -178,10 +176,10 @@ def _sync_folder(folder: Path) -> None:
 
 @contextmanager
 def opened(path: Path) -> Iterator[BufferedReader]:
-    """The regular file `path`; raises StorageError for anything else, and never waits."""
-    # Opening a named pipe waits for its writer, unless O_NONBLOCK says not to.
+    """A regular file, open for reading; raises StorageError for a link, pipe or device."""
+    # Without O_NONBLOCK, opening a named pipe would wait for its writer.
     flags = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
-    with explained(f"cannot read {path}"):
+    with storage_errors(f"cannot read {path}"):
         descriptor = os.open(path, flags)
         if not stat.S_ISREG(os.fstat(descriptor).st_mode):
             os.close(descriptor)

@@ -1,4 +1,4 @@
-"""JSON as podusv writes it: two spaces, keys as given, null for what is no finite number."""
+"""JSON files: indented by two spaces, with null for numbers that are not finite."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from podusv_cli.storage.files import read_text
 
 LARGEST = 2 * 2**20  # bytes
 DEEPEST = 32  # levels
-LONGEST = 300  # digits that surely are a finite float
+LONGEST = 300  # digits of an integer that is a finite float
 
 
 def encode(content: Mapping[str, Any]) -> bytes:
@@ -38,7 +38,7 @@ def _plain(value: Any) -> Any:
 
 
 def read(path: Path) -> dict[str, Any]:
-    """A JSON object as podusv writes it; raises StorageError where the file holds anything else."""
+    """Read a JSON object; raises StorageError for anything that podusv does not write."""
     try:
         content = json.loads(
             read_text(path, LARGEST), object_pairs_hook=_object,
@@ -47,7 +47,7 @@ def read(path: Path) -> dict[str, Any]:
         _check_depth(content)
     except (ValueError, RecursionError) as error:
         reason = " ".join(str(error).split())
-        raise StorageError(f"cannot read {path}: no JSON of podusv ({reason})") from error
+        raise StorageError(f"cannot read {path}: not valid JSON ({reason})") from error
     if not isinstance(content, dict):
         raise StorageError(f"cannot read {path}: no JSON object")
     return content

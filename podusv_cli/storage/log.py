@@ -1,7 +1,7 @@
-"""Writing log.h5, format 2: every array in one piece, described where it stands.
+"""Writing log.h5, format 2: every array contiguous, with its description in attributes.
 
-HDF5 itself never writes to the disk: on a full disk it ends the process. It lays the file out in
-memory, where the arrays take no room, and podusv writes that layout and the arrays.
+HDF5 never writes to the disk, because a full disk would make it end the process. It lays the file
+out in memory, where the arrays take no room, and podusv writes that layout and the arrays.
 """
 
 from __future__ import annotations
@@ -18,20 +18,19 @@ import numpy as np
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording, blocks
 from podusv_cli.core.signal import Signal
-from podusv_cli.storage.files import growing
+from podusv_cli.storage.files import new_file
 from podusv_cli.storage.manifest import FORMAT
 
 CONVENTIONS = "CF-1.11"
 PROVENANCE, RESOLVED = "provenance", "resolved_yaml"
-# Axes besides time that podusv brings along, with what they count; each is a dataset of the
-# integers 0, 1, ...
+# podusv's axes besides time and what they count; each is a dataset of the integers 0, 1, ...
 AXES = {
     "node": "network node",
     "input": "network input: u, v, r",
     "window": "part of the run: the whole, its settled end",
     "pod": "pod, in the scenario's order",
 }
-ROWS = 4096  # of all arrays written together, since the engine has a row's numbers side by side
+ROWS = 4096  # written of all arrays in turn, since the engine stores a row's numbers side by side
 # The newest format that HDF5 1.8 reads, and so does any MATLAB. Every array begins at a multiple of
 # 8 bytes, so that it can be used where it lies when the file is mapped into memory.
 _FILE: dict[str, Any] = {
@@ -42,7 +41,7 @@ _COMPRESSED = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
 
 
 class Texts(NamedTuple):
-    """What a log tells of its run in words; `source` is where the vessel's data come from."""
+    """The texts of a log; `source` is where the vessel's data come from."""
 
     resolved_yaml: str
     title: str
@@ -51,14 +50,14 @@ class Texts(NamedTuple):
 
 
 def write(path: Path, recording: Recording, texts: Texts, *, compress: bool = False) -> None:
-    """Write the log of a recording into a new file; the same recording gives the same bytes.
+    """Write a recording to a new log file; the same recording gives the same bytes.
 
-    A compressed log is made in memory. Raises StorageError; a piece of the file may then be there.
+    A compressed log is made in memory. Raises StorageError; a part of the file may then exist.
     """
     layout = Layout()
     with h5py.File(layout, "w", **_FILE, **_UNDATED) as file:
         places = _fill(file, recording, texts, compress)
-    with growing(path, layout.size) as out:
+    with new_file(path, layout.size) as out:
         layout.write_to(out)
         for rows in blocks(max((len(array) for _, array in places), default=0), ROWS):
             for place, array in places:
@@ -66,7 +65,7 @@ def write(path: Path, recording: Recording, texts: Texts, *, compress: bool = Fa
 
 
 class Layout(io.RawIOBase):
-    """A file in memory; what was never written to takes no room and reads as zeros."""
+    """A sparse file in memory: pages never written take no room and read as zeros."""
 
     PAGE = 2**12
 
@@ -83,7 +82,7 @@ class Layout(io.RawIOBase):
             _write_at(out, start, memoryview(content)[: max(0, self.size - start)])
 
     def write(self, content: Any) -> int:
-        """All of the content, at the present place."""
+        """Write the content at the current position."""
         given = memoryview(content).cast("B")
         for part, room in self._parts(len(given)):
             room[:] = given[part]
@@ -91,14 +90,14 @@ class Layout(io.RawIOBase):
         return len(given)
 
     def readinto(self, room: Any) -> int:
-        """Fill the room from the present place on."""
+        """Read from the current position until `room` is full."""
         wanted = memoryview(room).cast("B")
         for part, content in self._parts(len(wanted)):
             wanted[part] = content
         return len(wanted)
 
     def _parts(self, count: int) -> Iterator[tuple[slice, memoryview]]:
-        """The next bytes page by page: where they are among `count`, and where in the page."""
+        """The next `count` bytes page by page: a slice of them, and the memory of the page."""
         done = 0
         while done < count:
             page, at = divmod(self._place, self.PAGE)
@@ -108,17 +107,17 @@ class Layout(io.RawIOBase):
             self._place += size
 
     def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
-        """Go to a place."""
+        """Set the position."""
         base = {io.SEEK_SET: 0, io.SEEK_CUR: self._place, io.SEEK_END: self.size}[whence]
         self._place = base + offset
         return self._place
 
     def tell(self) -> int:
-        """The present place."""
+        """The position."""
         return self._place
 
     def truncate(self, size: int | None = None) -> int:
-        """Make the file that long."""
+        """Set the file's length."""
         self.size = self._place if size is None else size
         return self.size
 
@@ -126,7 +125,7 @@ class Layout(io.RawIOBase):
 def _fill(
     file: h5py.File, recording: Recording, texts: Texts, compress: bool
 ) -> list[tuple[int, Vector]]:
-    """Describe the recording in the file; which arrays still belong where in it."""
+    """Create datasets and attributes; returns the arrays yet to be written, with their offsets."""
     file.attrs.create("podusv_format", np.int32(FORMAT))
     _describe(file, _facts(recording, texts))
     group = file.create_group(PROVENANCE, **_UNDATED)
@@ -164,7 +163,7 @@ def _facts(recording: Recording, texts: Texts) -> dict[str, str]:
 def _scales(
     file: h5py.File, arrays: Mapping[str, Vector], about: Mapping[str, Signal]
 ) -> dict[str, h5py.Dataset]:
-    """A dataset for every axis but time. ValueError where arrays do not fit each other."""
+    """A dataset for every axis but time. ValueError if arrays differ in length along an axis."""
     lengths: dict[str, int] = {}
     for name, array in arrays.items():
         for axis, size in zip(about[name].dimensions, array.shape, strict=True):

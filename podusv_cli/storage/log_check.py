@@ -1,4 +1,4 @@
-"""What every log of a run holds, whoever wrote it: without it nothing can be drawn or compared."""
+"""Checks that a log holds the signals that figures and comparisons need."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ NEEDED = (
 )  # fmt: skip
 _TERMS = ("z_e", "psi_e", "u_e", "r_e", "y_u", "y_r", "W_u", "W_r", "b_u", "b_r")
 _BOUNDS = ("V", "window_start", "V_lambda", "V_Delta", "V_bound", "v_bound")
-# What a signal is of no use without.
+# Signals that a signal needs beside it.
 BESIDE = {
     "V": (*(f"V_{term}" for term in _TERMS), *_BOUNDS),
     "V_dot": _BOUNDS,
@@ -20,11 +20,11 @@ BESIDE = {
     "n_part": ("delta",),
     "power": ("delta",),
 }
-LARGEST = 1e300  # the engine takes anything beyond for divergence and does not log it
+LARGEST = 1e300  # beyond it the engine calls a run diverged and logs no row
 
 
 def fault(log: Recording) -> str:
-    """What is wrong with the log of a run, in words; empty where nothing is."""
+    """The first fault of a log, in words; empty if there is none."""
     wanted = [*NEEDED, *(name for one, rest in BESIDE.items() if one in log for name in rest)]
     lacking = [name for name in wanted if name not in log]
     if lacking:

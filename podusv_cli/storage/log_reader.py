@@ -1,8 +1,8 @@
-"""Reading log.h5, formats 1 and 2, from anywhere: nothing in it is believed before it is checked.
+"""Reading log.h5, formats 1 and 2, without trusting the file.
 
-A log could name other files to read from, claim any size, or be damaged. So sizes are added up
-before the first array is made, and what cannot be in a log is refused. Whether a log is still as it
-was written, the manifest tells.
+A log may be damaged, refer to other files, or claim any size. So the sizes are added up before the
+first array is made, and everything that podusv does not write is refused. The manifest's digest
+says whether a log is unchanged.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ LARGEST_CONTENT = LARGEST_FILE  # bytes of numbers
 MOST_MEMBERS = 1000
 _FILTERS = {h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_FLETCHER32}
 _AXIS, _NUMBERS = h5py.h5t.STD_I32LE, h5py.h5t.IEEE_F64LE  # types of what is in a log
-# The axes of arrays in logs of format 1 that do not tell them, and the wrapped angles.
+# Axes and wrapped angles of logs of format 1, which lack these attributes.
 OLD_AXES = {
     "rbf_center": "node input", "rbf_width": "input", "W_star_u": "node", "W_star_r": "node",
     "window_start": "window", "V_lambda": "window", "V_Delta": "window", "V_bound": "window",
@@ -58,10 +58,10 @@ class _Member(NamedTuple):
 
 
 def read_log(path: Path, largest: float = LARGEST_CONTENT) -> Recording:
-    """The recording in a log file, its arrays mapped from the file where they lie in one piece.
+    """The recording in a log file; contiguous arrays are mapped from the file.
 
-    `seen` is not logged and stays None. Raises StorageError, also for a log whose file or whose
-    numbers take more than `largest` bytes.
+    `seen` is not logged and stays None. Raises StorageError, also if the file or its numbers take
+    more than `largest` bytes.
     """
     with _opened(path, largest) as (file, raw):
         members = _members(file)
@@ -74,16 +74,16 @@ def read_log(path: Path, largest: float = LARGEST_CONTENT) -> Recording:
         about = {member.signal.name: member.signal for member in members}
         return Recording(
             status=_status(file),
-            controller=_words(file.id, "controller"),
+            controller=_attribute(file.id, "controller"),
             signals={name: array for name, array in arrays.items() if not about[name].fixed},
             fixed={name: array for name, array in arrays.items() if about[name].fixed},
-            message=_optional(file.id, "message"),
+            message=_optional_attribute(file.id, "message"),
             about=about,
         )
 
 
 def resolved_yaml(path: Path) -> str:
-    """The scenario, every value explicit, that a log file was made from. Raises StorageError."""
+    """The complete scenario of a log file. Raises StorageError."""
     with _opened(path) as (file, _):
         _check_hard_link(file.id, PROVENANCE)
         group = h5py.h5g.open(file.id, PROVENANCE.encode())
@@ -94,7 +94,7 @@ def resolved_yaml(path: Path) -> str:
 def _opened(
     path: Path, largest: float = LARGEST_FILE
 ) -> Iterator[tuple[h5py.File, BufferedReader]]:
-    """A log whose format was checked, and its bytes; faults inside become a StorageError."""
+    """A log with a known format, and its open file; errors in the block become StorageError."""
     with opened(path) as raw:
         if file_size(raw) > largest:
             found = f"{file_size(raw)} bytes, at most {largest} allowed"
@@ -121,23 +121,23 @@ def _check_format(file: h5py.File) -> None:
 
 
 def _status(file: h5py.File) -> Status:
-    found = _words(file.id, "status")
+    found = _attribute(file.id, "status")
     for status in get_args(Status):
         if found == status:
             return status  # type: ignore[no-any-return]
     raise ValueError(f"unknown status {found!r}")
 
 
-def _words(thing: h5py.h5g.GroupID | h5py.h5d.DatasetID, name: str) -> str:
+def _attribute(thing: h5py.h5g.GroupID | h5py.h5d.DatasetID, name: str) -> str:
     words = _text(h5py.h5a.open(thing, name.encode())).decode()
     if any(unicodedata.category(c) == "Cc" and c not in "\t\n\r" for c in words):
         raise ValueError(f"{name} holds characters that are no text")
     return words
 
 
-def _optional(thing: h5py.h5g.GroupID | h5py.h5d.DatasetID, name: str) -> str:
-    """An attribute's words, none where there is no such attribute."""
-    return _words(thing, name) if h5py.h5a.exists(thing, name.encode()) else ""
+def _optional_attribute(thing: h5py.h5g.GroupID | h5py.h5d.DatasetID, name: str) -> str:
+    """An attribute's text, "" if there is no such attribute."""
+    return _attribute(thing, name) if h5py.h5a.exists(thing, name.encode()) else ""
 
 
 def _text(holder: h5py.h5a.AttrID | h5py.h5d.DatasetID) -> bytes:
@@ -161,7 +161,7 @@ def _check_hard_link(group: h5py.h5g.GroupID, name: str) -> None:
 
 
 def _dataset(group: h5py.h5g.GroupID, name: str) -> h5py.h5d.DatasetID:
-    """A dataset all of whose data are in this file, behind no filter but the expected ones."""
+    """A dataset with all its data in this file and only the expected filters."""
     _check_hard_link(group, name)
     dataset = h5py.h5d.open(group, name.encode())
     # Checked before anything else: the mere shape of a virtual dataset can open other files.
@@ -177,7 +177,7 @@ def _dataset(group: h5py.h5g.GroupID, name: str) -> h5py.h5d.DatasetID:
 
 
 def _members(file: h5py.File) -> list[_Member]:
-    """All arrays, in the order in which they were written, as long along an axis as each other."""
+    """All arrays in the order of writing; arrays agree in length along every axis."""
     if len(file) > MOST_MEMBERS:
         raise ValueError(f"it has {len(file)} members, more than {MOST_MEMBERS}")
     for name in file:
@@ -200,17 +200,19 @@ def _member(name: str, dataset: h5py.h5d.DatasetID) -> _Member:
         raise ValueError(f"{name} holds no 64-bit numbers")
     if not h5py.h5a.exists(dataset, b"symbol"):
         raise ValueError(f"{name!r} does not say what signal it is")
-    unit, meaning, symbol = (_words(dataset, fact) for fact in ("units", "long_name", "symbol"))
-    told = _optional(dataset, "axes")
-    axes = (told or OLD_AXES.get(name, "time")).split()
+    unit, meaning, symbol = (_attribute(dataset, fact) for fact in ("units", "long_name", "symbol"))
+    stated_axes = _optional_attribute(dataset, "axes")
+    axes = (stated_axes or OLD_AXES.get(name, "time")).split()
     over_time = axes[:1] == ["time"]
-    wrapped = bool(_optional(dataset, "wrapped")) or (not told and name in OLD_WRAPPED)
+    wrapped = bool(_optional_attribute(dataset, "wrapped")) or (
+        not stated_axes and name in OLD_WRAPPED
+    )
     beside = tuple(axes[over_time:])
     return _Member(dataset, Signal(name, unit, meaning, symbol, beside, wrapped, not over_time))
 
 
 def _check_shape(member: _Member, lengths: dict[str, int]) -> None:
-    """Whether an array is as long along every axis as all others; `lengths` learns from it."""
+    """Check an array's length along every axis; `lengths` holds those of the arrays before it."""
     dataset, signal, axes = *member, member.signal.dimensions
     if len(dataset.shape) != len(axes):
         raise ValueError(
@@ -246,7 +248,7 @@ def _filters(made: h5py.h5p.PropDCID) -> list[int]:
 
 
 def _check_chunks(name: str, dataset: h5py.h5d.DatasetID, size: int) -> None:
-    """Refuse what HDF5 would fill up with zeros, and what would unpack to far more than `size`."""
+    """Refuse missing chunks, which HDF5 fills with zeros, and chunks that unpack beyond `size`."""
     part = dataset.get_create_plist().get_chunk()
     if any(side > most for side, most in zip(part, dataset.shape, strict=True)):
         raise ValueError(f"{name} is packed in an unknown way")
@@ -263,7 +265,7 @@ def _check_chunks(name: str, dataset: h5py.h5d.DatasetID, size: int) -> None:
 
 
 def _check_inflated(name: str, packed: bytes, size: int) -> None:
-    """Refuse a chunk that unpacks to more than `size` bytes; HDF5 would make room for all of it."""
+    """Refuse a chunk that unpacks to more than `size` bytes, which HDF5 would allocate."""
     try:
         content = zlib.decompressobj().decompress(packed, size + 1)
     except zlib.error as error:

@@ -1,4 +1,4 @@
-"""manifest.json: what a finished folder holds; "finished" means that it is there and true."""
+"""manifest.json: the files of a finished folder with their digests; written last."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Manifest(BaseModel):
 
 
 def write(folder: Path, status: Status) -> Manifest:
-    """List all that is in `folder` now. Raises StorageError, also for links and other oddities."""
+    """Write the manifest of `folder`. Raises StorageError, also for links and devices in it."""
     names = sorted(name for name in _names(folder) if name != NAME)
     manifest = Manifest(
         podusv_format=FORMAT, status=status, files={name: _entry(folder / name) for name in names}
@@ -48,14 +48,14 @@ def write(folder: Path, status: Status) -> Manifest:
 
 
 def demand(folder: Path) -> None:
-    """UsageError where a folder has no manifest: it is no run's and no comparison's."""
+    """UsageError if a folder has no manifest, and so is no run folder and no comparison."""
     if not os.path.lexists(folder / NAME):
-        why = f"it has no {NAME}" if os.path.lexists(folder) else "nothing has that name"
+        why = f"it has no {NAME}" if os.path.lexists(folder) else "it does not exist"
         raise UsageError(f"{folder} is no run folder: {why}")
 
 
 def read(folder: Path) -> Manifest:
-    """The manifest of a folder, its claims not yet checked. Raises StorageError."""
+    """The manifest of a folder; the files are not checked. Raises StorageError."""
     path = folder / NAME
     content = json_files.read(path)
     if misfit := other_format(content.get("podusv_format")):
@@ -72,24 +72,24 @@ def read(folder: Path) -> Manifest:
 
 
 def other_format(found: object) -> str:
-    """Why podusv does not read this format, in words; empty where it does."""
+    """Why this podusv cannot read a format; empty if it can."""
     if type(found) is int and 1 <= found <= FORMAT:
         return ""
     return f"written in format {found!r}; this podusv reads formats 1 to {FORMAT}"
 
 
 def check(folder: Path) -> Manifest:
-    """The manifest of a finished folder, every file of it present and unaltered.
+    """The manifest of a folder whose files are all present and unchanged.
 
-    Raises StorageError naming the first file for which that does not hold. Files that the manifest
-    does not know are allowed; `foreign` tells them.
+    Raises StorageError naming the first file that is not. Files that the manifest does not list are
+    allowed; `foreign` lists them.
     """
     manifest = read(folder)
     for name, entry in sorted(manifest.files.items()):
         path = place(folder, name)
         if not os.path.lexists(path):
             raise StorageError(f"{folder} is not a finished folder: {name} is missing")
-        if entry.bytes > LARGEST_FILE:  # it might be a hole of any size
+        if entry.bytes > LARGEST_FILE:  # a sparse file may claim any size
             claim = f"{entry.bytes} bytes, at most {LARGEST_FILE} allowed"
             raise StorageError(f"cannot read {path}: {claim}{ELSEWHERE}")
         if os.lstat(path).st_size != entry.bytes or _entry(path) != entry:
@@ -98,7 +98,7 @@ def check(folder: Path) -> Manifest:
 
 
 def foreign(folder: Path, manifest: Manifest) -> list[str]:
-    """Files in `folder` that the manifest does not know, sorted."""
+    """Files in `folder` that the manifest does not list, sorted."""
     return sorted(set(_names(folder)) - set(manifest.files) - {NAME})
 
 
@@ -108,7 +108,7 @@ def _entry(path: Path) -> Entry:
 
 
 def _names(folder: Path, above: str = "") -> Iterator[str]:
-    with atomic.explained(f"cannot list {folder}"), os.scandir(folder) as entries:
+    with atomic.storage_errors(f"cannot list {folder}"), os.scandir(folder) as entries:
         for entry in entries:
             if entry.is_dir(follow_symlinks=False):
                 yield from _names(Path(entry.path), f"{above}{entry.name}/")
@@ -117,7 +117,7 @@ def _names(folder: Path, above: str = "") -> Iterator[str]:
 
 
 def place(folder: Path, name: str) -> Path:
-    """Where a listed file lies; StorageError where that is not inside the folder."""
+    """The path of a listed file; StorageError if it is not inside the folder."""
     relative = PurePosixPath(name)
     plain = str(relative) == name and name.isprintable() and name not in (".", NAME)
     if not plain or relative.is_absolute() or ".." in relative.parts:

@@ -19,10 +19,10 @@ GIT_PATIENCE = 5.0  # s
 
 
 def collect(argv: Sequence[str], started: datetime, finished: datetime) -> dict[str, Any]:
-    """Facts about a run for provenance.json; times are aware datetimes.
+    """The content of provenance.json; times are aware datetimes.
 
     `git` is None where podusv does not run from a git checkout or git is missing; a version is
-    None where a package is not installed. Processor and C library are told because the library's
+    None where a package is not installed. Processor and C library are noted because the library's
     sine, cosine and arctangent may depend on both in the last bit.
     """
     return {
@@ -49,10 +49,10 @@ def source_tree(package: Path) -> dict[str, Any] | None:
     # A package installed somewhere below an unrelated checkout is not tracked there.
     if _git(package, "ls-files", "--error-unmatch", "__init__.py") is None:
         return None
-    told = _git(
+    status = _git(
         package, "status", "--porcelain=v2", "--branch", "--untracked-files=normal", "--", "."
     )
-    lines = (told or "").splitlines()
+    lines = (status or "").splitlines()
     commit = next((line.split()[-1] for line in lines if line.startswith("# branch.oid ")), None)
     if commit in (None, "(initial)"):
         return None
@@ -74,7 +74,7 @@ def _git(folder: Path, *words: str) -> str | None:
 
 
 def _processor() -> str | None:
-    """The processor's model, None where nobody tells."""
+    """The processor's model, None if unknown."""
     with suppress(OSError), open("/proc/cpuinfo", encoding="utf-8", errors="replace") as file:
         for line in file:
             key, _, model = line.partition(":")

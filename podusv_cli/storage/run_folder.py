@@ -1,4 +1,4 @@
-"""Run folders: named, filled, finished, opened again."""
+"""Run folders: their names, writing and reading."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from podusv_cli.core.recording import Recording, Status
 from podusv_cli.process.extras import Extras
 from podusv_cli.storage import files, json_files, manifest
 from podusv_cli.storage.files import read_text
-from podusv_cli.storage.staging import Staging, Taken, sweep
+from podusv_cli.storage.staging import Staging, Taken, remove_abandoned
 
 LOG, THEORY, MISSING = "log.h5", "theory.json", "missing.json"
 NEEDED = (LOG, "metrics.json", "provenance.json", "resolved.yaml")
@@ -45,16 +45,16 @@ def _numbered(folder: Path) -> Iterator[Path]:
 
 
 class RunWriter:
-    """Fills a folder that appears under its final name only when `finish` is called.
+    """Writes a folder that gets its final name when `finish` is called.
 
-    Made before the simulation, so that a place that cannot be written to is known at once; leaving
-    the `with` block without `finish` leaves nothing behind. A run folder that exists is replaced,
-    whole, only with `force`; anything else, except an empty folder, never is. A run folder is one
-    with a readable manifest, damaged files or not, and nothing else but hidden files. Every method
-    raises StorageError.
+    Make it before the simulation, so that a place that cannot be written to is known at once.
+    Leaving the `with` block without `finish` deletes the unfinished folder. An existing run folder
+    is replaced only with `force`. Anything else is never replaced, except an empty folder. A run
+    folder has a readable manifest and, hidden files aside, no files that the manifest does not
+    know. Every method raises StorageError.
 
-    Where somebody else takes the name in the meantime, a number is appended to it. That is an error
-    where somebody asked for just this name (`named`), and as good otherwise.
+    If another process takes the name during the run, a number is appended. With `named`, which
+    says that the user gave the name, this is an error after the folder is saved.
     """
 
     def __init__(
@@ -62,18 +62,18 @@ class RunWriter:
     ) -> None:
         """Check that `final` can be made and `needed` bytes are free; make the hidden folder."""
         self.final, self._force, self._named = final, force and named, named
-        sweep(final.parent)  # may put back a run folder that a killed run was replacing
-        _refuse(final, force)
+        remove_abandoned(final.parent)  # may put back a run folder that a killed run was replacing
+        _check_replaceable(final, force)
         self._staging = Staging(final)
         try:
-            _require(final, needed)
+            _check_free_space(final, needed)
         except StorageError:
             self._staging.discard()
             raise
 
     @property
     def folder(self) -> Path:
-        """Where the files are until `finish`; a RunWriter for a folder in here nests a run."""
+        """Where the files are until `finish`; a comparison writes its runs into it."""
         return self._staging.folder
 
     def add(self, name: str, content: bytes) -> None:
@@ -90,31 +90,31 @@ class RunWriter:
             self.add_json(MISSING, extras.as_json())
 
     def finish(self, status: Status, missing: str = "") -> Path:
-        """Write the manifest and give the folder its name, which is returned.
+        """Write the manifest and rename the folder to its final path, which is returned.
 
-        What was interrupted replaces nothing; it gets a number appended to its name. What lacks
-        something, for the reason `missing`, replaces nothing either. After an error that says where
-        the folder is instead, it is there, whole.
+        An interrupted result, or an incomplete one (`missing` says why), replaces nothing: a number
+        is appended to its name. The StorageError for a name that is taken says where the complete
+        folder was saved instead.
         """
         whole = status != "interrupted"
-        sweep(self.folder)  # of runs nested in here whose process was killed
+        remove_abandoned(self.folder)  # left by killed processes of a comparison
         manifest.write(self.folder, status)
         for inner, _, _ in os.walk(self.folder):
             files.sync_folder(Path(inner))
         try:
-            _refuse(self.final, self._force)
+            _check_replaceable(self.final, self._force)
             self._staging.publish(replace=self._force and whole and not missing)
         except Taken as error:
             other = self._publish_beside()
             if self._named and whole:
-                texts = (missing, str(error), f"this one is in {other} instead")
+                texts = (missing, str(error), f"this result is in {other} instead")
                 raise StorageError("; ".join(filter(None, texts))) from error
         return self._staging.final
 
     def _publish_beside(self) -> Path:
         for path in islice(_numbered(self.final), 1, None):
             with suppress(Taken):
-                _refuse(path, force=False)
+                _check_replaceable(path, force=False)
                 self._staging.final = path
                 self._staging.publish(replace=False)
                 return path
@@ -135,15 +135,15 @@ class RunWriter:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Remove what was not finished."""
+        """Delete the folder if it was not finished."""
         self._staging.discard()
 
 
-def _refuse(final: Path, force: bool) -> None:
-    """StorageError where `final` is something that must not be replaced."""
+def _check_replaceable(final: Path, force: bool) -> None:
+    """StorageError if `final` exists and must not be replaced."""
     if final.name in ("", ".."):
         raise StorageError(f"cannot make {final}: a folder's own name is needed")
-    with files.explained(f"cannot make {final}"):
+    with files.storage_errors(f"cannot make {final}"):
         if not os.path.lexists(final):
             return
         if final.is_symlink() or not final.is_dir():
@@ -161,9 +161,9 @@ def _refuse(final: Path, force: bool) -> None:
         raise Taken(f"{final} holds {other}, which is not the run's; --force would remove it")
 
 
-def _require(final: Path, needed: float) -> None:
-    """StorageError where so many bytes are not free on the disk of `final`."""
-    with files.explained(f"cannot make {final}"):
+def _check_free_space(final: Path, needed: float) -> None:
+    """StorageError if fewer than `needed` bytes are free on the disk of `final`."""
+    with files.storage_errors(f"cannot make {final}"):
         free = shutil.disk_usage(final.parent).free
     if needed > free:
         raise StorageError(
@@ -185,16 +185,16 @@ class Run:
 
     @cached_property
     def recording(self) -> Recording:
-        """What log.h5 holds, read when first asked for. Raises StorageError."""
+        """The content of log.h5, read on first use. Raises StorageError."""
         from podusv_cli.storage import log_reader  # h5py is slow to import
 
         return log_reader.read_log(self.folder / LOG)
 
 
 def open_run(folder: Path) -> Run:
-    """A run folder, all of whose files are as they were when it was finished.
+    """Open a run folder whose files are unchanged since it was finished.
 
-    Raises StorageError for anything else, naming the first fault.
+    Raises StorageError naming the first fault.
     """
     found = manifest.check(folder)
     missing = [name for name in NEEDED if name not in found.files]

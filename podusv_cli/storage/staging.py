@@ -1,8 +1,7 @@
-"""Folders that appear whole: filled under a hidden name beside their place, then renamed.
+"""Atomic folders: filled under a hidden name beside their final place, then renamed.
 
-A box, whose hidden name says who made it, holds `new`, the folder in the making. A folder that it
-replaces trades places with it at one instant; where the file system cannot do that, the box holds
-it for a moment as `old`.
+The hidden folder `<box>/new` is filled. To replace an older folder the two are exchanged by one
+system call; where the file system has none, the older one is first renamed to `<box>/old`.
 """
 
 from __future__ import annotations
@@ -15,27 +14,27 @@ from contextlib import suppress
 from pathlib import Path
 
 from podusv_cli.core.errors import StorageError
-from podusv_cli.process.temporary_names import abandoned, part_name
+from podusv_cli.process.temporary_names import abandoned, temporary_name
 from podusv_cli.storage import files
 
 _TAKEN = (errno.ENOTEMPTY, errno.EEXIST, errno.ENOTDIR)
-# There is nothing to trade places with, or a system or file system that cannot.
+# Nothing to exchange with, or no exchange on this system or file system.
 _NO_EXCHANGE = (errno.ENOENT, errno.ENOSYS, errno.EINVAL, errno.ENOTSUP)
 
 
 class Taken(StorageError):
-    """Something has that name already, and is not to be replaced."""
+    """The name belongs to something that must not be replaced."""
 
 
 class Staging:
-    """A folder in the making; `folder` is where to fill it, `final` what it will be called."""
+    """An unfinished folder: `folder` is where to fill it, `final` its later path."""
 
     def __init__(self, final: Path) -> None:
-        """Make the box, and the folders above it. Raises StorageError where that is impossible."""
+        """Make the hidden folder and its parents. Raises StorageError."""
         self.final = final
-        self._box = final.with_name(part_name(final.name))
+        self._box = final.with_name(temporary_name(final.name))
         try:
-            with files.explained(f"cannot make {final}"):
+            with files.storage_errors(f"cannot make {final}"):
                 final.parent.mkdir(parents=True, exist_ok=True)
                 self._box.mkdir()
                 self.folder.mkdir()
@@ -45,16 +44,16 @@ class Staging:
 
     @property
     def folder(self) -> Path:
-        """The folder in the making."""
+        """The unfinished folder."""
         return self._box / "new"
 
     def publish(self, *, replace: bool) -> None:
-        """Rename the folder to its final name, with `replace` in place of what is there.
+        """Rename the folder to its final name; with `replace` an older folder is replaced.
 
-        Raises StorageError; `discard` then brings back what was there before. After Taken the
-        folder in the making is whole and may be given another `final` name.
+        Raises StorageError; `discard` then restores the older folder. After Taken the unfinished
+        folder is complete and may be given another `final` path.
         """
-        with files.explained(f"cannot make {self.final}"):
+        with files.storage_errors(f"cannot make {self.final}"):
             try:
                 self._rename()
             except Taken:
@@ -65,8 +64,8 @@ class Staging:
         files.sync_folder(self.final.parent)
 
     def discard(self) -> None:
-        """Leave nothing behind, and what was there before as it was."""
-        _settle(self._box, self.final)
+        """Delete the unfinished folder and restore an older one that was not replaced."""
+        _remove_box(self._box, self.final)
 
     def _rename(self) -> None:
         try:
@@ -94,7 +93,7 @@ class Staging:
 
 
 def exchange(one: Path, other: Path) -> None:
-    """Two names trade places at one instant. OSError, ENOSYS where the system has no such call."""
+    """Exchange two paths by one system call. OSError, with ENOSYS where there is no such call."""
     rename = getattr(ctypes.CDLL(None, use_errno=True), "renameat2", None)
     if rename is None:
         raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
@@ -104,18 +103,18 @@ def exchange(one: Path, other: Path) -> None:
         raise OSError(number, os.strerror(number))
 
 
-def sweep(parent: Path) -> None:
-    """Clear away the boxes in `parent` whose makers are dead, and put back what they replaced."""
+def remove_abandoned(parent: Path) -> None:
+    """Delete unfinished folders of killed processes; restore folders that they were replacing."""
     for box, final in abandoned(parent):
         if final:
-            _settle(box, parent / final)
+            _remove_box(box, parent / final)
 
 
-def _settle(box: Path, final: Path) -> None:
-    """Remove a box; an old folder in it that was not replaced after all comes back."""
+def _remove_box(box: Path, final: Path) -> None:
+    """Delete a box; an old folder in it that was not replaced is restored."""
     with suppress(OSError):
         if _old(box).exists():
-            # Renamed before it is deleted: half of a folder must not come back.
+            # Renamed before it is deleted, so that half of a folder is never restored.
             os.rename(_old(box), box / "replaced" if final.exists() else final)
         shutil.rmtree(box, ignore_errors=True)
 

@@ -22,8 +22,8 @@ from podusv_cli.findings.preflight import merged
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.table import CLOCKED
 from podusv_cli.process.extras import Extras, Missing
-from podusv_cli.process.interrupts import interrupts_heard, interrupts_held
-from podusv_cli.process.workers import Outcome, run_all, workers_here
+from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
+from podusv_cli.process.workers import Outcome, available_workers, run_all
 from podusv_cli.scenario.limits import estimate, needed
 from podusv_cli.scenario.load import resolved_yaml
 from podusv_cli.storage import provenance
@@ -93,10 +93,10 @@ def compare(items: Sequence[Path], request: Request, progress: Progress | None =
         request.warn(finding)
     target = request.out or _default_folder(given.title, given.members)
     _keep_apart(items, target)
-    with interrupts_held(), _writer(target, given.members, request) as writer:
+    with interrupts_deferred(), _writer(target, given.members, request) as writer:
         outcomes = make_runs(given.members, writer.folder, request, progress)
         lost = unwritten(outcomes.values())
-        extras = Extras(interrupted=any(outcome.cut for outcome in outcomes.values()))
+        extras = Extras(interrupted=any(outcome.interrupted for outcome in outcomes.values()))
         result = collect(given.members, outcomes, given.claims, extras)
         if extras.interrupted and not result.entries:
             raise KeyboardInterrupt("interrupted before any run finished; nothing was written")
@@ -130,7 +130,7 @@ def _keep_apart(items: Sequence[Path], target: Path) -> None:
 
 def _writer(target: Path, members: Sequence[Member], request: Request) -> RunWriter:
     sizes = [estimate(member.scenario) for member in members if member.run is None]
-    space = needed(sizes, workers_here())
+    space = needed(sizes, available_workers())
     return RunWriter(target, force=request.force, named=request.out is not None, needed=space)
 
 
@@ -139,7 +139,7 @@ def make_runs(
 ) -> dict[str, Outcome]:
     """Execute the members that have no run yet, in parallel, each into a folder in `folder`."""
     wanted = [member for member in members if member.run is None]
-    with interrupts_heard():
+    with interrupts_enabled():
         for member in wanted:
             warm_up(member.scenario)
     tasks = [

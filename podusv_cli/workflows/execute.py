@@ -25,7 +25,7 @@ from podusv_cli.findings.finding import not_silenced
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.table import METRICS, Metrics, observer
 from podusv_cli.process.extras import Extras, Missing
-from podusv_cli.process.interrupts import interrupts_heard, interrupts_held
+from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.process.workers import Outcome
 from podusv_cli.scenario.limits import HELD, estimate
 from podusv_cli.scenario.load import resolved_yaml
@@ -122,13 +122,13 @@ def execute(
     """
     started, watch, size = datetime.now(UTC), watch or Stopwatch(), estimate(task.scenario)
     with (
-        interrupts_held(),
+        interrupts_deferred(),
         folder.RunWriter(
             task.target, force=task.force, named=task.named, needed=size.needed
         ) as writer,
     ):
         long = size.content > task.held and not task.scenario.log.compress
-        allocate = partial(files.mapped, writer.folder) if long else np.empty
+        allocate = partial(files.disk_array, writer.folder) if long else np.empty
         recording = simulated(task.scenario, watch, progress, allocate)
         extras = Extras(recording.status == "interrupted")
         with watch.part("metrics"):
@@ -206,7 +206,7 @@ def simulated(
     """Simulate a scenario, observed for its metrics; `allocate` as `simulate` has it."""
     loop, grid, seeing = scenario.closed_loop(), scenario.time_grid(), _observer(scenario)
     compiled = scenario.simulation.compiled
-    with watch.part("compile"), interrupts_heard():
+    with watch.part("compile"), interrupts_enabled():
         warm_up(scenario)
     with watch.part("engine"):
         return simulate(

@@ -174,5 +174,5 @@ def _put(out: Path, contents: Mapping[str, bytes]) -> list[Path]:
 
 
 def _differs(path: Path, content: bytes) -> bool:
-    with files.explained(f"cannot read {path}"):
+    with files.storage_errors(f"cannot read {path}"):
         return path.is_file() and path.read_bytes() != content

@@ -15,11 +15,11 @@ from podusv_cli.comparison.run_difference import RunDifference, difference
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.recording import Status
 from podusv_cli.process.extras import Missing
-from podusv_cli.process.workers import INTERRUPTED, Outcome, run_all, workers_here
+from podusv_cli.process.workers import INTERRUPTED, Outcome, available_workers, run_all
 from podusv_cli.scenario.limits import estimate, limits, needed
 from podusv_cli.scenario.messages import Check
 from podusv_cli.storage import manifest, provenance, run_folder
-from podusv_cli.storage.staging import Staging, sweep
+from podusv_cli.storage.staging import Staging, remove_abandoned
 from podusv_cli.workflows.execute import Task, execute, unwritten, warm_up
 from podusv_cli.workflows.members import Member, from_folder
 
@@ -127,7 +127,7 @@ def _several(members: Sequence[Member], request: Request, progress: Progress | N
 
     with _passing(request) as place:
         target = request.out or place / "again"
-        room = needed([estimate(member.scenario) for member in members], workers_here())
+        room = needed([estimate(member.scenario) for member in members], available_workers())
         with run_folder.RunWriter(target, force=request.force, needed=room) as writer:
             for member in members:
                 warm_up(member.scenario)
@@ -155,7 +155,7 @@ def _passing(request: Request) -> Iterator[Path]:
         yield request.out.parent
         return
     place = Path(tempfile.gettempdir())
-    sweep(place)  # what a killed one left
+    remove_abandoned(place)  # what a killed one left
     staging = Staging(place / "podusv-rerun")
     try:
         yield staging.folder

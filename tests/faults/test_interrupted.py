@@ -45,7 +45,7 @@ def podusv(
 
 
 def test_nothing_finished_leaves_nothing(podusv: Command, monkeypatch: pytest.MonkeyPatch) -> None:
-    lost = Outcome(failure=INTERRUPTED, cut=True)
+    lost = Outcome(failure=INTERRUPTED, interrupted=True)
     monkeypatch.setattr(compare, "run_all", lambda jobs, *rest: [lost] * len(jobs))
     said = podusv("compare", "--no-figures", write("two.yaml", TWO), "--out", "x")
     assert said == (130, "", "interrupted before any run finished; nothing was written\n")

@@ -27,7 +27,7 @@ from old_results import (
 from storage_samples import Saboteur, files, until_nothing_breaks
 
 from podusv_cli.engine import code_folder, object_cache
-from podusv_cli.process.temporary_names import part_name
+from podusv_cli.process.temporary_names import temporary_name
 
 CALLS = ("mkdir", "open", "write", "fsync", "replace", "rename", "unlink", "rmdir")
 
@@ -121,8 +121,8 @@ def test_no_piece_of_code_is_left_half_written(
 
 def test_what_others_may_be_making_is_left_alone(podusv: Command) -> None:
     """Parts of a process that lives or of another machine, and names that only look like parts."""
-    mine = part_name()
-    dead = in_a_child(part_name)
+    mine = temporary_name()
+    dead = in_a_child(temporary_name)
     machine = mine.split("-")[1]
     kept = [mine, dead.replace(machine, "0" * 8), ".podusv-notes.part", f"my{dead}"]
     for name in (*kept, dead):

@@ -23,7 +23,7 @@ from command_samples import ROOT
 from counts import count
 
 from podusv_cli import cli
-from podusv_cli.process.workers import workers_here
+from podusv_cli.process.workers import available_workers
 from podusv_cli.scenario.load import load, resolved_yaml
 from podusv_cli.storage import provenance
 from podusv_cli.workflows.execute import warm_up
@@ -134,7 +134,7 @@ def test_no_number_ends_in_a_traceback(tmp_path: Path, monkeypatch: pytest.Monke
         warm_up(load(ROOT / config).scenario.alone())  # here, and not in every process
     commands = [words(number, one) for number, one in enumerate(chosen)]
     fork = get_context("fork")
-    with ProcessPoolExecutor(workers_here(), mp_context=fork, initializer=careless) as pool:
+    with ProcessPoolExecutor(available_workers(), mp_context=fork, initializer=careless) as pool:
         found = list(pool.map(attempt, commands, chunksize=4, timeout=HANGS + 0.5 * len(commands)))
     wrong = [f"podusv {' '.join(one.words)}\n{told}" for one in found if (told := fault(one))]
     assert not wrong, "\n\n".join(wrong[:20])
