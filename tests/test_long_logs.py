@@ -18,7 +18,7 @@ from storage_samples import ENVIRONMENT, PYTHON, TEXTS, files, log, recording
 
 from podusv_cli.core.errors import StorageError
 from podusv_cli.storage import log as log_file
-from podusv_cli.storage.files import mapped
+from podusv_cli.storage.files import disk_array
 from podusv_cli.workflows.execute import HELD, Task, execute
 
 LAWS = {f"{kind} {period}": (kind, period) for kind in kinds("controllers") for period in (0, 0.05)}
@@ -80,7 +80,7 @@ def test_runs_that_diverge_leave_the_same_files(tmp_path: Path, law: str) -> Non
 
 
 def test_room_on_the_disk_has_no_name_and_reads_as_it_was_written(tmp_path: Path) -> None:
-    room = mapped(tmp_path, 10_000)
+    room = disk_array(tmp_path, 10_000)
     room[:] = np.arange(10_000.0)
     assert list(tmp_path.iterdir()) == []
     assert room.sum() == 49_995_000.0

@@ -181,7 +181,10 @@ def test_while_writing(number: signal.Signals, code: int) -> None:
 
 @INTERRUPTS
 def test_while_a_run_is_drawn(number: signal.Signals, code: int) -> None:
-    patches = 'interrupts.SAME_INTERRUPT = 600; patch(execute, "_drawn", lambda old, *given: time.sleep(600))'
+    patches = """
+interrupts.SAME_INTERRUPT = 600
+patch(execute, "_drawn", lambda old, *given: time.sleep(600))
+"""
     script = PATCHED.format(patches=patches)
     with under_way("run", write("a.yaml", BASE), "--out", "x", script=script) as process:
         wait_for("reached")
