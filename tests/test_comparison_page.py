@@ -92,6 +92,15 @@ def test_the_answer_says_who_is_best_in_what():
     assert "Nothing to rank" in section("answer", table=FRAME[["a", "lost"]]).text
 
 
+def test_a_single_run_has_no_rivals():
+    answer = section("answer", table=FRAME[["a"]])
+    assert [pair.text for pair in answer.all("dl")[0].all("div")] == [
+        "iae 4 m s", "energy 0 J", "law_ns 10 ns",
+    ]  # fmt: skip
+    assert "best" not in answer.text
+    assert not section("comparison", table=FRAME[["a"]]).all("b")
+
+
 def test_equal_numbers_and_measured_times_are_no_ranking():
     numbers = {"iae": [1.0, 1.0 + 1e-9], "ise": [2.0, math.nan], "law_ns": [1.0, 2.0]}
     frame = pd.DataFrame.from_dict(numbers, orient="index", columns=["a", "b"])

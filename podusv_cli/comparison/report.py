@@ -81,6 +81,7 @@ def page(story: Story) -> str:
         leaders={label: names for label, names in leaders(story.table).items() if names},
         noticed=_by_code(story.noticed),
         metrics={str(name): METRICS[str(name)] for name in story.table.index},
+        single=len(story.table.columns) == 1,
         cells=cells(story.table),
         stability=(stability.HEAD, [*stability.rows(story.theories)]),
         beside=figures[:BESIDE],
@@ -140,16 +141,16 @@ def _by_code(findings: Sequence[Finding]) -> dict[str, tuple[str, list[Finding]]
     return told
 
 
-def _parts(story: Story) -> list[tuple[str, list[str], str]]:
+def _parts(story: Story) -> list[tuple[str, str, str]]:
     """A row for each part: its name, what it is, all its values."""
     parts = settings.parts(story.scenario)
     parts |= {f"controller {label}": part for label, part in story.controllers.items()}
     return [(name, _said(part), _values(part)) for name, part in parts.items()]
 
 
-def _said(part: Component) -> list[str]:
-    """The first line of what the part says of itself; every second piece is code."""
-    return (inspect.getdoc(type(part)) or "").partition("\n")[0].split("`")
+def _said(part: Component) -> str:
+    """The first line of what the part says of itself."""
+    return (inspect.getdoc(type(part)) or "").partition("\n")[0]
 
 
 def _values(part: Component) -> str:

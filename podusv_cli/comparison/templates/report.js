@@ -7,7 +7,7 @@
   const button = one(".play"), speed = one("select"), near = one("input[type=checkbox]");
   const HULL = [[0.5, 0], [0.25, 0.5], [-0.5, 0.5], [-0.5, -0.5], [0.25, -0.5]];
   const LEAST = 22; // pixels of a hull's length
-  const LOW = 1e-3, LEFT = 54, RIGHT = 10, TOP = 8, BASE = 20, TALL = 130; // the trace: metres, pixels
+  const LOW = 1e-3, LEFT = 54, RIGHT = 20, TOP = 8, BASE = 20, TALL = 130; // the trace: metres, pixels
   let now = 0, playing = false, last = 0, width = 0, height = 0;
 
   const make = (parent, tag, attributes = {}, text = "") => {
@@ -118,7 +118,7 @@
     const inside = make(trace, "g", { "clip-path": "url(#inside)", fill: "none" });
     for (const run of traced) make(inside, "polyline", { ...line(run, 1.4), points: run.z_e.map((z, i) => (z === null ? "" : `${across(run.time[i]).toFixed(1)},${up(z).toFixed(1)}`)).join(" ") });
     const tick = round(Math.max(end / 5, 110 * end / width));
-    for (let i = 0; i * tick <= end; i++) make(trace, "text", { x: across(i * tick), y: TALL - 5, "text-anchor": across(i * tick) > width - 24 ? "end" : "middle" }, `${+(i * tick).toPrecision(6)} s`);
+    for (let i = 0; i * tick <= end; i++) make(trace, "text", { x: across(i * tick), y: TALL - 5, "text-anchor": "middle" }, `${+(i * tick).toPrecision(6)} s`);
     cursor = make(trace, "path", { stroke: "#111" });
     trace.style.display = traced.length ? "" : "none";
   };
