@@ -122,7 +122,7 @@ def test_runs_that_all_diverge_are_still_reported(config, tmp_path):
 
 def test_a_run_cannot_take_the_place_of_the_figures(config, tmp_path):
     request = quick("controllers.figures.kind=pid", out=tmp_path / "x")
-    with pytest.raises(ScenarioError, match="is where figures go"):
+    with pytest.raises(ScenarioError, match="is the folder of the figures"):
         compare.compare([config], request)
 
 

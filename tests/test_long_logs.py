@@ -129,7 +129,7 @@ def test_a_disk_that_is_full_from_any_write_on_is_an_error_in_one_line(
 LIMITED = """
 import resource, sys
 from pathlib import Path
-from podusv_cli.cli.exit_codes import told
+from podusv_cli.cli.exit_codes import report_error
 from podusv_cli.scenario.load import load_text
 from podusv_cli.core.errors import StorageError
 from podusv_cli.workflows.execute import Task, execute, warm_up
@@ -143,7 +143,7 @@ resource.setrlimit(getattr(resource, kind), (limit, limit))
 try:
     execute(Task(scenario, text, Path("run"), held=held))
 except (StorageError, MemoryError) as error:
-    sys.exit(told(error))
+    sys.exit(report_error(error))
 """
 
 

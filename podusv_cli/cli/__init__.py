@@ -14,7 +14,12 @@ from typing import Annotated
 import typer
 
 from podusv_cli import __version__
-from podusv_cli.cli.exit_codes import flush_streams, replace_closed_streams, told, with_exit_codes
+from podusv_cli.cli.exit_codes import (
+    flush_streams,
+    replace_closed_streams,
+    report_error,
+    with_exit_codes,
+)
 
 # NAME is the function NAME of cli/NAME.py
 COMMANDS = (
@@ -53,22 +58,22 @@ def options(
 
 def main() -> None:
     """Run the command line and leave with its exit code."""
-    # What imports make stays; to look through all of it time and again costs a tenth of a run.
+    # Frequent collections would go through all imported objects, a tenth of a run's time.
     gc.set_threshold(OBJECTS_BETWEEN_COLLECTIONS)
     # pydantic would look through every installed package for plugins.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
-    # Nothing here is large enough for threads in linear algebra, and with them the last bits of a
-    # sum would depend on the number of cores. To start them costs numpy a tenth of a run.
+    # Threads in linear algebra would make the last bits of a sum depend on the number of cores,
+    # and starting them takes a tenth of a run. All matrices here are small.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     replace_closed_streams()
     for stream in (sys.stdout, sys.stderr):
-        # A file name or text that the terminal's encoding lacks must not end in a traceback.
+        # Characters that the terminal's encoding lacks are escaped.
         getattr(stream, "reconfigure", lambda errors: None)(errors="backslashreplace")
     try:
         app()
     except SystemExit as end:
         code = end.code
     except OSError as error:  # of help, which is printed outside of any command
-        code = told(error)
-    gc.freeze()  # or Python looks through everything once more before it ends
+        code = report_error(error)
+    gc.freeze()  # skips the last collection of garbage
     sys.exit(flush_streams(code))

@@ -51,7 +51,7 @@ def compare(
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Run what has to be run, and compare: table, claims, figures, report.
+    """Simulate scenarios, and compare them with finished runs: table, claims, figures, report.
 
     One scenario with `controllers`, several scenarios, finished runs, or any mixture. Exit code 3
     when a run failed or diverged; the others are compared all the same.
@@ -113,7 +113,7 @@ def _advice(items: Sequence[str], assign: Sequence[str]) -> str:
 
 
 def _name_report(page: Path) -> None:
-    """Say last where the page is; there is none without figures."""
+    """Print the report's path; without figures there is no report."""
     if page.exists():
         echo(f"report: {page}")
 

@@ -1,4 +1,4 @@
-"""`podusv diff`: two finished runs held against each other."""
+"""`podusv diff`: compare two finished runs number by number."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 
 def diff(
     one: Annotated[str, typer.Argument(metavar="RUN", help="A run folder, or a comparison's.")],
-    other: Annotated[str, typer.Argument(metavar="RUN", help="What to hold against it.")],
+    other: Annotated[str, typer.Argument(metavar="RUN", help="The run to compare it with.")],
     as_json: AsJson = False,
 ) -> None:
-    """Tell what two runs differ in: scenario, versions, metrics, signals.
+    """Show how two runs differ: scenario, versions, metrics, signals.
 
     Exit code 0 when scenario, signals and metrics are the same to the last bit, 3 when not;
     versions and the measured time of a law do not count. Of two comparisons, runs of the same name
-    are held against each other.
+    are compared.
     """
     from podusv_cli.storage import json_files
     from podusv_cli.workflows import diff as workflow  # heavy imports only when they are needed

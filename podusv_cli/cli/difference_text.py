@@ -1,4 +1,4 @@
-"""How two runs differ, in words: what `rerun` and `diff` print alike."""
+"""Differences between two runs in words, for `rerun` and `diff`."""
 
 from __future__ import annotations
 
@@ -56,8 +56,8 @@ def log_in_words(log: LogDifference) -> Iterator[str]:
         yield "rows: {} -> {}, compared at the {} times that both have".format(*log.rows)
     for names, what in (
         (log.reshaped, "of another size"),
-        (log.only_one, "in the first alone"),
-        (log.only_other, "in the second alone"),
+        (log.only_one, "in the first only"),
+        (log.only_other, "in the second only"),
     ):
         if names:
             yield f"{what}: {', '.join(names)}"

@@ -1,4 +1,4 @@
-"""What failures look like: a line for what was foreseen, a trace for what was not."""
+"""Exit codes and error messages: one line for a user's error, a traceback for a bug."""
 
 from __future__ import annotations
 
@@ -22,27 +22,27 @@ Given = ParamSpec("Given")
 INTERRUPTED = 130
 PIPE_CLOSED = 141  # what a shell reports for a program that SIGPIPE ended
 BUG = 1
-# At once: a run has up to 18 open, and a comparison two more for each run that it makes at a time.
+# A run has up to 18 files open at once, a comparison two more for each worker.
 LEAST_OPEN_FILES, OPEN_FILES = 64, 1024
 PLEASE_REPORT = "This is a bug in podusv. Please report it with the lines above."
 
 
 def with_exit_codes(command: Callable[Given, None]) -> Callable[Given, None]:
-    """The command, ending with an exit code and, where one helps, a message on stderr."""
+    """Wrap a command so that its errors become an exit code and a message on stderr."""
 
     @wraps(command)
     def run(*args: Given.args, **kwargs: Given.kwargs) -> None:
         with interrupts_caught() as interrupts:
-            code = _code_of(lambda: command(*args, **kwargs), interrupts)
+            code = _exit_code(lambda: command(*args, **kwargs), interrupts)
             interrupts.ending = interrupts.number > 0
-            # What was interrupted says so in one way; which signal it was, the shell wants to know.
+            # Code inside raises one code for all interrupts; the shell expects the signal's own.
             signalled = code == INTERRUPTED and interrupts.number
             raise typer.Exit(SIGNALLED + interrupts.number if signalled else code)
 
     return run
 
 
-def _code_of(command: Callable[[], None], interrupts: Interrupts) -> int:
+def _exit_code(command: Callable[[], None], interrupts: Interrupts) -> int:
     try:
         _raise_limit_of_open_files()
         command()
@@ -51,18 +51,18 @@ def _code_of(command: Callable[[], None], interrupts: Interrupts) -> int:
     except typer.Exit as end:
         return end.exit_code
     except (Exception, KeyboardInterrupt) as error:
-        unforeseen = not isinstance(error, (PodusvError, OSError, KeyboardInterrupt))
-        if interrupts.number and unforeseen:  # a library may have turned an interrupt into anything
-            _say(f"podusv: interrupted, and then {type(error).__name__}: {error}")
+        is_bug = not isinstance(error, (PodusvError, OSError, KeyboardInterrupt))
+        if interrupts.number and is_bug:  # a library may turn an interrupt into any exception
+            _print_error(f"podusv: interrupted, and then {type(error).__name__}: {error}")
             return INTERRUPTED
-        return told(error)
+        return report_error(error)
     return 0
 
 
 def _raise_limit_of_open_files() -> None:
-    """Allow as many open files as commands need; StorageError where the system does not.
+    """Raise the limit of open files to what commands need; StorageError if that is not allowed.
 
-    A run that finds out in the end would lack figures, or be lost.
+    A run that reached the limit at its end would lack figures or its log.
     """
     allowed, most = resource.getrlimit(resource.RLIMIT_NOFILE)
     if allowed != resource.RLIM_INFINITY and allowed < OPEN_FILES:
@@ -75,45 +75,45 @@ def _raise_limit_of_open_files() -> None:
         resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, most))
 
 
-def told(error: BaseException) -> int:
-    """Tell about an error; the exit code it stands for."""
+def report_error(error: BaseException) -> int:
+    """Print an error and return its exit code."""
     if isinstance(error, KeyboardInterrupt):
-        _say(str(error) or "interrupted")
+        _print_error(str(error) or "interrupted")
         return INTERRUPTED
     if isinstance(error, BrokenPipeError):
-        _silence(sys.stdout)
+        _discard_output(sys.stdout)
         return PIPE_CLOSED
     if isinstance(error, PodusvError):
-        _say(*error.lines())
+        _print_error(*error.lines())
         return error.exit_code
     if isinstance(error, OSError):
-        _say(f"podusv: {error}")
+        _print_error(f"podusv: {error}")
         return StorageError.exit_code
-    _say(*"".join(traceback.format_exception(error)).splitlines(), PLEASE_REPORT)
+    _print_error(*"".join(traceback.format_exception(error)).splitlines(), PLEASE_REPORT)
     return BUG
 
 
-def _say(*lines: str) -> None:
-    with suppress(OSError):  # nobody is left to tell that stderr cannot be written to
+def _print_error(*lines: str) -> None:
+    with suppress(OSError):  # stderr itself cannot be written to
         echo(*lines, err=True)
 
 
 def replace_closed_streams() -> None:
-    """Where the caller closed stdin, stdout or stderr (`>&-`), nothing stands in its place.
+    """Open /dev/null in place of a closed stdin, stdout or stderr (`>&-`).
 
-    Otherwise the next file that is opened would, and messages would go into it.
+    Otherwise the next file that is opened would get its number, and messages would go into it.
     """
-    while (number := os.open(os.devnull, os.O_RDWR)) <= STDERR:  # the lowest that is free
+    while (number := os.open(os.devnull, os.O_RDWR)) <= STDERR:  # the lowest free number
         os.set_inheritable(number, True)
     os.close(number)
-    sys.stdout = _whole(sys.stdout or open(os.devnull, "w"))  # noqa: SIM115
-    sys.stderr = _whole(sys.stderr or open(os.devnull, "w"))  # noqa: SIM115
+    sys.stdout = _buffered(sys.stdout or open(os.devnull, "w"))  # noqa: SIM115
+    sys.stderr = _buffered(sys.stderr or open(os.devnull, "w"))  # noqa: SIM115
 
 
-def _whole(stream: TextIO) -> TextIO:
-    """The stream with a buffer: Python drops, unseen, what a full disk takes no more without one.
+def _buffered(stream: TextIO) -> TextIO:
+    """The stream with a buffer, which PYTHONUNBUFFERED removes.
 
-    There is none where PYTHONUNBUFFERED is set.
+    Without one, Python ignores that a full disk took only a part of the text.
     """
     raw = getattr(stream, "buffer", None)
     if not isinstance(raw, io.RawIOBase):
@@ -123,17 +123,17 @@ def _whole(stream: TextIO) -> TextIO:
 
 
 def flush_streams(code: str | int | None) -> str | int | None:
-    """The exit code after everything is printed; another one where printing failed."""
+    """Flush stdout and stderr; the exit code, or that of a failure to print."""
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()
         except OSError as error:
-            _silence(stream)
-            if code != StorageError.exit_code:  # or it has been told, as far as that was possible
-                code = told(error)
+            _discard_output(stream)
+            if code != StorageError.exit_code:  # else it was reported already
+                code = report_error(error)
     return code
 
 
-def _silence(stream: TextIO) -> None:
-    """Nothing gets out there any more; keep Python from trying and complaining at the very end."""
+def _discard_output(stream: TextIO) -> None:
+    """Send the rest of a stream to /dev/null, so that Python does not fail again at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())

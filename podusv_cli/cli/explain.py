@@ -1,4 +1,4 @@
-"""`podusv explain`: what every name means, in words."""
+"""`podusv explain`: the meaning of keys, signals, metrics, presets and findings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`podusv list`: what there is to choose from."""
+"""`podusv list`: the kinds, presets, metrics and findings."""
 
 from __future__ import annotations
 

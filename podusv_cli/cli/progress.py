@@ -1,4 +1,4 @@
-"""A progress bar on the terminal for what takes long enough to want one."""
+"""Progress bars on the terminal, shown after a short delay."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PATIENCE = 0.7  # s before a bar appears
 def progress_bars(*, wanted: bool) -> Iterator[Callable[[str, float], None] | None]:
     """A function to call with a run's name and the fraction done; a bar a run, on stderr.
 
-    None where stderr is no terminal that takes codes. A terminal that is lost costs the bars only.
+    None if stderr is no terminal with colours. If the terminal is lost, the bars stop.
     """
     if not (wanted and supports_colours(sys.stderr)):
         yield None
@@ -31,7 +31,7 @@ def progress_bars(*, wanted: bool) -> Iterator[Callable[[str, float], None] | No
     from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
     began = time.monotonic()
-    # Drawn from here only: a thread that draws would not survive the forks of a comparison.
+    # No thread refreshes the bars, since threads do not survive the forks of a comparison.
     bars = Progress(
         TextColumn("{task.description}", markup=False), BarColumn(),
         TimeRemainingColumn(elapsed_when_finished=True),

@@ -1,4 +1,4 @@
-"""`podusv rerun`: make a finished run once more and see whether the same comes out."""
+"""`podusv rerun`: repeat a finished run and compare the logs bit by bit."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def _verdict(run: Repeated) -> str:
     if run.found.same_bytes:
         return f"identical: {run.found.sizes[0]} bytes, sha256 {run.found.digests[0]}"
     if run.identical:
-        return "identical in every number; the file log.h5 is packed or described otherwise"
+        return "identical in every number; but log.h5 differs in compression or descriptions"
     return "interrupted" if run.status == "interrupted" else "not identical"
 
 
@@ -102,4 +102,4 @@ def _lines(run: Repeated) -> Iterator[str]:
     if found.versions:
         yield f"changed in versions: {changes_in_words(found.versions)}"
     if not (run.identical or found.scenario or found.versions):
-        yield "nothing that provenance.json and the scenario tell has changed"
+        yield "no change in the scenario or in the versions of provenance.json explains it"

@@ -1,4 +1,4 @@
-"""Plain text in the terminal's width, the same in a pipe."""
+"""Printing: lines and tables wrapped to the terminal's width, and whole in a pipe."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ SPACE = "  "  # between the columns of a table
 
 
 def echo(*lines: object, err: bool = False) -> None:
-    """Lines, on stderr where `err`; wrapped and indented on a terminal, whole in a pipe.
+    """Print lines, on stderr with `err`; wrapped on a terminal, whole in a pipe.
 
-    What users wrote moves no cursor and adds no line.
+    Control characters are escaped.
     """
     shown = [visible(line) for line in lines]
     if (sys.stderr if err else sys.stdout).isatty():
@@ -56,7 +56,7 @@ def echo_entry(name: str, *lines: str, facts: str = "") -> None:
 
 
 def supports_colours(stream: TextIO) -> bool:
-    """Whether this is a terminal that takes codes, and nobody asked for plain text (NO_COLOR)."""
+    """Whether a stream is a terminal with colours; NO_COLOR and TERM=dumb switch them off."""
     wanted = os.environ.get("TERM", "") not in ("", "dumb") and not os.environ.get("NO_COLOR")
     return wanted and stream.isatty()
 
@@ -109,7 +109,7 @@ def _width() -> int:
 
 
 def warn_of_differences(differences: Mapping[str, Mapping[str, Any]]) -> None:
-    """Show on stderr what compared runs differ in besides the controller."""
+    """Print on stderr in which keys, besides the controller, compared runs differ."""
     from podusv_cli.comparison.differences import as_text
 
     if differences:
@@ -120,15 +120,15 @@ def warn_of_differences(differences: Mapping[str, Mapping[str, Any]]) -> None:
 
 
 class Warnings:
-    """Shows warnings on stderr, each once; none where `quiet`."""
+    """Prints warnings on stderr, each once; none with `quiet`."""
 
     def __init__(self, quiet: bool = False) -> None:
-        """Nothing has been shown yet."""
+        """No warning printed yet."""
         self._quiet = quiet
         self._shown: set[str] = set()
 
     def __call__(self, finding: object) -> None:
-        """Show one."""
+        """Print a warning unless it was printed before."""
         line = str(finding)
         if line not in self._shown and not self._quiet:
             echo(line, err=True)

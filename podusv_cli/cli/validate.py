@@ -1,4 +1,4 @@
-"""`podusv validate`: is a scenario sound, what to expect of it, where every value comes from."""
+"""`podusv validate`: check a scenario, estimate its run, show where its values come from."""
 
 from __future__ import annotations
 
@@ -26,8 +26,7 @@ def validate(
     ] = False,
     allow_large: AllowLarge = False,
 ) -> None:
-    """Check a scenario: all faults of keys and values at once, then those of claims; or what to
-    know before it runs.
+    """Check a scenario: keys and values first, then claims; if all are valid, print findings.
 
     Exit code 0, with a line for each finding; or 2 with a line for each fault.
     """

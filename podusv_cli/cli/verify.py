@@ -1,4 +1,4 @@
-"""`podusv verify`: can the numbers of a scenario be trusted."""
+"""`podusv verify`: have the numbers of a scenario converged."""
 
 from __future__ import annotations
 
@@ -30,12 +30,10 @@ def verify(
         Path | None,
         typer.Option(help="File to write the JSON object to as well; replaces an earlier one."),
     ] = None,
-    force: Annotated[
-        bool, typer.Option("--force", help="Replace a file that is no verification, too.")
-    ] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace any other file, too.")] = False,
     as_json: AsJson = False,
     quiet: Annotated[
-        bool, typer.Option("--quiet", "-q", help="Print nothing; the exit code tells.")
+        bool, typer.Option("--quiet", "-q", help="Print nothing; see the exit code.")
     ] = False,
 ) -> None:
     """Repeat a scenario at half and at a quarter of its step, and by another integrator.
@@ -58,7 +56,7 @@ def verify(
     try:
         if out:
             verifying.keep(done, out, force=force)
-    finally:  # what cannot be written can still be read
+    finally:  # print the result even if the file cannot be written
         if as_json:
             typer.echo(encode(done.as_json()), nl=False)
         elif not quiet:

@@ -11,7 +11,7 @@ from podusv_cli.core import registry
 from podusv_cli.core.component import Component
 from podusv_cli.core.errors import PodusvError
 from podusv_cli.core.signal import Signal
-from podusv_cli.scenario.keys import MISSING, NUMBER, SCENARIO, Key, joined
+from podusv_cli.scenario.keys import MISSING, NUMBER, SCENARIO, Key, either
 from podusv_cli.scenario.phrases import as_yaml, did_you_mean
 from podusv_cli.scenario.presets import preset_names, preset_text, with_presets
 from podusv_cli.scenario.yaml_tree import dotted, route
@@ -150,7 +150,7 @@ def _row(key: Key) -> Row:
     if key.keys:
         return Row(path, meaning, "kinds" if key.kinds else "keys", choices=tuple(key.keys))
     choices = _choices(key)
-    kind = joined(choices) if key.name in ("preset", "kind") else key.type_in_words
+    kind = either(choices) if key.name in ("preset", "kind") else key.type_in_words
     return Row(path, meaning, kind, key.unit, key.range, _default(key), choices)
 
 

@@ -201,7 +201,7 @@ def _kind(model: type[Component]) -> str:
     return str(model.model_fields["kind"].default) if "kind" in model.model_fields else ""
 
 
-def joined(words: tuple[str, ...] | list[str]) -> str:
+def either(words: tuple[str, ...] | list[str]) -> str:
     """`a, b or c`."""
     return " or ".join(part for part in (", ".join(words[:-1]), words[-1]) if part)
 
@@ -210,13 +210,13 @@ def noun(annotation: Any, *, plural: bool = False) -> str:
     """What a value is: `a list of 3 numbers`."""
     parts = sections(annotation)
     others = [_one(member, plural) for member in members(annotation) if not _is_component(member)]
-    return joined([*([_mapping(parts, plural)] if parts else []), *others])
+    return either([*([_mapping(parts, plural)] if parts else []), *others])
 
 
 def _mapping(parts: dict[str, type[Component]], plural: bool) -> str:
     mapping = "mappings of keys" if plural else "a mapping of keys"
     if "" not in parts:
-        return f"{mapping} with kind {joined(list(parts))}"
+        return f"{mapping} with kind {either(list(parts))}"
     names = list(parts[""].model_fields)
     return f"{mapping}: " + ", ".join(names[:SHOWN_KEYS] + ["..."] * (len(names) > SHOWN_KEYS))
 
@@ -224,7 +224,7 @@ def _mapping(parts: dict[str, type[Component]], plural: bool) -> str:
 def _one(annotation: Any, plural: bool) -> str:
     parts = get_args(annotation)
     if get_origin(annotation) is Literal:
-        return joined([str(word) for word in parts])
+        return either([str(word) for word in parts])
     if get_origin(annotation) is tuple:
         count = "" if parts[-1] is Ellipsis else f"{len(parts)} "
         return f"{'lists' if plural else 'a list'} of {count}{noun(parts[0], plural=True)}"

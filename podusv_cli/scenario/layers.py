@@ -13,9 +13,9 @@ from podusv_cli.scenario.yaml_text import (
     MAX_CHARACTERS,
     MAX_DEPTH,
     MAX_NODES,
+    plain_node,
     read,
     read_text,
-    scalar,
 )
 from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, count, merge, overlay
 
@@ -27,10 +27,10 @@ FLOW = ("[", "{", "'", '"')  # what lists, mappings and text in quotes start wit
 def composed(text: str, source: str, overrides: Sequence[str], faults: list[Fault]) -> Node | None:
     """The tree of a scenario's text over what it extends, with the overrides on top.
 
-    None where the text cannot be read to its end. File names in `extends` are relative to `source`.
+    None if the text cannot be parsed. File names in `extends` are relative to `source`.
     """
     layers = _layers(text, source, faults)
-    settings = [_setting(override, faults) for override in overrides]
+    settings = [_override_tree(override, faults) for override in overrides]
     if not layers:
         return None
     # All overrides are one layer, so that their order matters only where they give the same key.
@@ -42,65 +42,67 @@ def composed(text: str, source: str, overrides: Sequence[str], faults: list[Faul
 def _layers(text: str, source: str, faults: list[Fault]) -> list[Node]:
     """The tree of the scenario's text, then those of all that it extends, nearest first.
 
-    None of them has the key `extends`; the first one is marked faulty where a file that is extended
-    cannot be had. Of several bases the later one goes over the earlier.
+    The key `extends` is removed; the first tree is faulty if an extended file cannot be read. Of
+    several bases the later one overrides the earlier.
     """
     node = _mapping(text, source, faults)
     if not node:
         return []
-    bases = list(_bases(node, source, _amounts(text, node), faults))
-    own = replace(_own(node), faulty=node.faulty or not all(bases))
+    bases = list(_bases(node, source, _size_of(text, node), faults))
+    own = replace(_without_extends(node), faulty=node.faulty or not all(bases))
     return [own, *filter(None, bases)]
 
 
 def _bases(
-    node: Node, source: str, amounts: Counter[str], faults: list[Fault]
+    node: Node, source: str, totals: Counter[str], faults: list[Fault]
 ) -> Iterator[Node | None]:
-    """The trees of all that a scenario extends, nearest first; None for one that cannot be had."""
-    waiting: list[tuple[Node, tuple[str, ...]]] = [(name, (source,)) for name in _named(node)]
+    """The trees of all extended files, nearest first; None for one that cannot be read."""
+    waiting: list[tuple[Node, tuple[str, ...]]] = [
+        (name, (source,)) for name in _extended_files(node)
+    ]
     while waiting:
         name, sources = waiting.pop()
-        if most := _exceeded(amounts):
+        if most := _limit_reached(totals):
             text = f"this scenario and all that it extends are more than {most}; extend fewer files"
             faults.append(Fault(name.mark, "extends", text))
             yield None
             return
-        base = _base(name, sources, faults)
+        base = _read_base(name, sources, faults)
         tree = _mapping(base[1], base[0], faults) if base else None
-        yield tree and _own(tree)
+        yield tree and _without_extends(tree)
         if base and tree:
-            amounts += _amounts(base[1], tree)
-            waiting += [(further, (*sources, base[0])) for further in _named(tree)]
+            totals += _size_of(base[1], tree)
+            waiting += [(further, (*sources, base[0])) for further in _extended_files(tree)]
 
 
-def _own(node: Node) -> Node:
+def _without_extends(node: Node) -> Node:
     """The tree without `extends`."""
     return replace(node, content={k: e for k, e in node.mapping.items() if k != "extends"})
 
 
-def _named(node: Node) -> tuple[Node, ...]:
-    """The file names that `extends` has."""
+def _extended_files(node: Node) -> tuple[Node, ...]:
+    """The file names in `extends`."""
     above = node.mapping.get("extends")
     if above is None:
         return ()
     return above.content if isinstance(above.content, tuple) else (above,)
 
 
-def _amounts(text: str, node: Node) -> Counter[str]:
-    """What a file adds to the totals that are limited."""
+def _size_of(text: str, node: Node) -> Counter[str]:
+    """What a file adds to the totals limited by MOST."""
     return Counter({"files": 1, "characters": len(text), "values": count(node)})
 
 
-def _exceeded(amounts: Counter[str]) -> str:
-    """A total that allows no further file, in words; empty where there is none."""
-    full = (f"{most:,} {what}" for what, most in MOST.items() if amounts[what] >= most)
+def _limit_reached(totals: Counter[str]) -> str:
+    """The limit in MOST that is reached, in words; empty if none."""
+    full = (f"{most:,} {what}" for what, most in MOST.items() if totals[what] >= most)
     return next(full, "")
 
 
 def _mapping(text: str, source: str, faults: list[Fault]) -> Node | None:
     node = read(text, source, faults)
     if node and not isinstance(node.content, dict):
-        # The file may be none of the user's: its text is not repeated.
+        # The text is not shown: the file may be one that the user may not read.
         what = "text" if isinstance(node.content, str) else found(node.content, node.text)
         faults.append(
             Fault(node.mark, "", f"a scenario is a mapping of keys to values, found {what}")
@@ -109,7 +111,9 @@ def _mapping(text: str, source: str, faults: list[Fault]) -> Node | None:
     return node
 
 
-def _base(above: Node, sources: tuple[str, ...], faults: list[Fault]) -> tuple[str, str] | None:
+def _read_base(
+    above: Node, sources: tuple[str, ...], faults: list[Fault]
+) -> tuple[str, str] | None:
     """Name and text of the file that `extends` names, or None and a fault."""
     if not isinstance(above.content, str):
         if not above.faulty:
@@ -127,7 +131,7 @@ def _base(above: Node, sources: tuple[str, ...], faults: list[Fault]) -> tuple[s
     return None if text is None else (path, text)
 
 
-def _setting(override: str, faults: list[Fault]) -> Node:
+def _override_tree(override: str, faults: list[Fault]) -> Node:
     """The tree that `a.b=v` stands for; v is a scalar, text in quotes, a list or a mapping."""
     name, equals, text = override.partition("=")
     shown = override if override.isprintable() else ascii(override)
@@ -142,7 +146,7 @@ def _setting(override: str, faults: list[Fault]) -> Node:
     elif text.lstrip().startswith(FLOW):
         node = read(text, mark.source, faults, placed=False)
     else:
-        node = scalar(text.strip(), mark, name.strip(), faults)
+        node = plain_node(text.strip(), mark, name.strip(), faults)
     if node is None:
         return Node({}, mark)
     for key in reversed(keys):

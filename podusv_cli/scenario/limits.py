@@ -1,4 +1,4 @@
-"""How large a run will be, and what cannot be meant."""
+"""Estimates of time, memory and disk of a run, and limits on them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from podusv_cli.engine.simulate import names
 from podusv_cli.paths.base import TARGET
 from podusv_cli.scenario.load import resolved_yaml, values
 from podusv_cli.scenario.messages import Check
-from podusv_cli.scenario.model import Misfits, Scenario, Simulation
+from podusv_cli.scenario.model import Conflicts, Scenario, Simulation
 from podusv_cli.scenario.yaml_text import MAX_CHARACTERS, MAX_NODES
 from podusv_cli.theory import monitor
 
@@ -113,12 +113,12 @@ def limits(
 
     def look(scenario: Scenario) -> list[tuple[str, str]]:
         too_large = _too_large(scenario, allow_large, read_back, insist)
-        return [] if scenario.misfits() else list(islice(too_large, 1))
+        return [] if scenario.conflicts() else list(islice(too_large, 1))
 
     return look
 
 
-def _too_large(scenario: Scenario, allow_large: bool, read_back: bool, insist: str) -> Misfits:
+def _too_large(scenario: Scenario, allow_large: bool, read_back: bool, insist: str) -> Conflicts:
     if read_back and (runs := len(scenario.controllers)) > MOST_RUNS:
         most = f"more than the {MOST_RUNS:,} that podusv reads back as one comparison"
         yield "controllers", f"has {runs:,} runs, {most}; make several scenarios of it"
@@ -140,7 +140,7 @@ def _too_large(scenario: Scenario, allow_large: bool, read_back: bool, insist: s
         yield "log.compress", f"the log would hold {bytes_in_words(size.content)}, {most}; {remedy}"
 
 
-def _unreadable(run: Scenario) -> Misfits:
+def _unreadable(run: Scenario) -> Conflicts:
     """The largest value of a scenario whose resolved.yaml podusv would refuse to read."""
     leaves, nodes = values(run), _nodes(run.model_dump())
     letters = sum(len(str(leaf)) for leaf in leaves.values())

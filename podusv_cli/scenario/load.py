@@ -1,4 +1,4 @@
-"""Scenario files in, one validated scenario out, and the way back to a file."""
+"""Loading scenario files, and writing resolved.yaml."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ HEADING = "# A complete scenario, every value written out; it runs again to the 
 
 @dataclass(frozen=True)
 class Loaded:
-    """A scenario with where its values came from.
+    """A scenario and the origins of its values.
 
     `origins` maps every dotted key to "configs/a.yaml:12:5", "--set a.b=v", "vessel file
     paper.yaml" or "default"; `text` is the scenario file as given.
@@ -40,8 +40,8 @@ def load(
 ) -> Loaded:
     """The scenario of a file, with overrides such as `vessel.m=24`.
 
-    `checks` look for what this room cannot know to be wrong. Raises ScenarioError with everything
-    that is wrong, also where the file cannot be read.
+    `checks` are made after the scenario's own. Raises ScenarioError with all faults, also if the
+    file cannot be read.
     """
     faults: list[Fault] = []
     source = os.fspath(path)

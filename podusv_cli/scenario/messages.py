@@ -8,14 +8,14 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from podusv_cli.scenario.keys import NAME, NUMBER, SCENARIO, Key, joined
+from podusv_cli.scenario.keys import NAME, NUMBER, SCENARIO, Key, either
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.phrases import did_you_mean, folded, found, hint, unknown
+from podusv_cli.scenario.phrases import did_you_mean, found, hint, unknown, without_case
 from podusv_cli.scenario.yaml_tree import Fault, Node, Route, dotted, follow, plain, route
 
 MOST_PLACES = 4  # of a key, in a message
 
-Check = Callable[[Scenario], list[tuple[str, str]]]  # keys, and what is wrong with them
+Check = Callable[[Scenario], list[tuple[str, str]]]  # key and message
 
 
 def check(root: Node, faults: list[Fault], more: Sequence[Check] = ()) -> Scenario | None:
@@ -25,7 +25,7 @@ def check(root: Node, faults: list[Fault], more: Sequence[Check] = ()) -> Scenar
     except ValidationError as error:
         faults.extend(dict.fromkeys(_faults(root, error)))
         return None
-    for key, text in chain(scenario.misfits(), *(look(scenario) for look in more)):
+    for key, text in chain(scenario.conflicts(), *(look(scenario) for look in more)):
         faults.append(Fault(follow(root, route(key))[-1].mark, key, text))
     return scenario
 
@@ -54,7 +54,7 @@ def _faults(root: Node, error: ValidationError) -> Iterator[Fault]:
 
 
 def _copied(root: Node, route: Route) -> bool:
-    """Whether a value was taken over from another section, which is complained of already."""
+    """Whether a value was copied from another section, where it has a message already."""
     if route[:1] not in (("nominal",), ("controllers",)):
         return False
     source: Route = ("vessel", *route[1:]) if route[0] == "nominal" else ("controller", *route[2:])
@@ -87,15 +87,17 @@ def _elsewhere(section: Key, name: str) -> str:
     """`; K_Pu belongs to kind pid`, or at the top `; did you mean 'controller.K_Pu'?`."""
     if section.path:
         return _home(name, SCENARIO.follow(section.path)[0].kinds)
-    alike = (key.path for key in SCENARIO.all() if folded(str(key.path[-1])) == folded(name))
+    alike = (
+        key.path for key in SCENARIO.all() if without_case(str(key.path[-1])) == without_case(name)
+    )
     places = dict.fromkeys(dotted(path) for path in alike if {NAME, NUMBER}.isdisjoint(path))
-    return f"; did you mean {joined([repr(p) for p in places][:MOST_PLACES])}?" if places else ""
+    return f"; did you mean {either([repr(p) for p in places][:MOST_PLACES])}?" if places else ""
 
 
 def _home(name: str, kinds: dict[str, Key]) -> str:
     """Which kinds of a section have a key that not all of them have."""
     homes = [kind for kind, section in kinds.items() if name in section.keys]
-    return f"; {name} belongs to kind {joined(homes)}" if 0 < len(homes) < len(kinds) else ""
+    return f"; {name} belongs to kind {either(homes)}" if 0 < len(homes) < len(kinds) else ""
 
 
 def _missing(root: Node, key: Key, complaint: Any) -> Iterator[Fault]:
@@ -137,7 +139,7 @@ def _wrong(root: Node, key: Key, complaint: Any) -> Iterator[Fault]:
 
 
 def _hint(node: Node, key: Key) -> str:
-    """How the value should have been written, where its looks tell."""
+    """How to write the value, if its text shows what was meant."""
     if isinstance(node.content, float) and node.content % 1 == 0 and int in key.types:
         return f"; write {int(node.content)}"
     if not isinstance(node.content, str):

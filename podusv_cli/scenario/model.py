@@ -31,8 +31,8 @@ else:
     AnyPath = any_of("podusv_cli.paths", Path)
 
 
-Misfits = Iterator[tuple[str, str]]  # keys, and what is wrong with them
-MOST_INSTANTS = 2**53  # that can be told apart
+Conflicts = Iterator[tuple[str, str]]  # key and message
+MOST_INSTANTS = 2**53  # that are distinct numbers
 NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,79}$"
 NAME_IN_WORDS = (
     "of letters, digits, '_', '.' and '-', starting with a letter or digit, at most 80 long"
@@ -155,7 +155,7 @@ class Scenario(Component):
         return tuple(self.controllers) or (self.controller.label,)
 
     def alone(self) -> Scenario:
-        """The scenario of one run: with `controller`, without anything to compare it to."""
+        """The scenario of one run: `controller` only, without controllers and claims."""
         return self.model_copy(update={"controllers": {}, "claims": {}})
 
     def singles(self) -> dict[str, Scenario]:
@@ -167,7 +167,7 @@ class Scenario(Component):
         }
 
     def closed_loop(self) -> ClosedLoop:
-        """The parts that move."""
+        """The closed loop of vessel, path, disturbance, actuator and controller."""
         start = self.start
         return ClosedLoop(
             vessel=self.vessel, nominal=self.nominal, path=self.path, disturbance=self.disturbance,
@@ -176,7 +176,7 @@ class Scenario(Component):
         )  # fmt: skip
 
     def time_grid(self) -> TimeGrid:
-        """The instants of the run; call `misfits` first."""
+        """The instants of the run; call `conflicts` first."""
         step = self.simulation.step
         steps = whole_steps(self.simulation.duration, step) or 0
         # Beyond the last step only the first is logged; machine code knows no larger numbers.
@@ -187,8 +187,8 @@ class Scenario(Component):
         """When the part of the run begins that counts as settled [s]."""
         return self.time_grid().last_part(self.metrics.steady_fraction)
 
-    def misfits(self) -> list[tuple[str, str]]:
-        """Key and sentence for every pair of values that cannot go together."""
+    def conflicts(self) -> list[tuple[str, str]]:
+        """Key and message for every pair of values that contradict each other."""
         return [*self._times(), *self._samples(), *self._names(), *self._signals()]
 
     def laws(self) -> dict[str, Controller]:
@@ -196,7 +196,7 @@ class Scenario(Component):
         several = {f"controllers.{label}": law for label, law in self.controllers.items()}
         return {"controller": self.controller} | several
 
-    def _times(self) -> Misfits:
+    def _times(self) -> Conflicts:
         step = self.simulation.step
         times = {
             "simulation.duration": self.simulation.duration,
@@ -216,7 +216,7 @@ class Scenario(Component):
                     f"{time:g} s is no whole number of steps of {step:g} s{_near(time, step)}",
                 )
 
-    def _samples(self) -> Misfits:
+    def _samples(self) -> Conflicts:
         period = self.control.period
         for key, law in self.laws().items():
             sample = law.sample_period()
@@ -229,7 +229,7 @@ class Scenario(Component):
         loop, sampled = self.closed_loop(), self.control.period > 0
         return monitor.about(loop, sampled=sampled) if self.log.monitor else loop.about()
 
-    def _signals(self) -> Misfits:
+    def _signals(self) -> Conflicts:
         several = {f"controllers.{label}": law for label, law in self.controllers.items()}
         for key, law in (several or {"controller": self.controller}).items():
             try:
@@ -237,14 +237,14 @@ class Scenario(Component):
             except LawError as error:
                 yield key, str(error)
 
-    def _names(self) -> Misfits:
+    def _names(self) -> Conflicts:
         for label in self.controllers:
             if not LABEL.fullmatch(label):
                 yield f"controllers.{label}", LABEL_IN_WORDS
             if label == "figures":
                 yield (
                     f"controllers.{label}",
-                    "is where figures go; take another name",
+                    "is the folder of the figures; take another name",
                 )
         for name in self.claims:
             if not CLAIM.fullmatch(name):
@@ -252,6 +252,6 @@ class Scenario(Component):
 
 
 def _near(time: float, step: float) -> str:
-    """The next smaller time that fits, as a hint, where it can be told."""
+    """A hint with the next smaller time that fits."""
     count = time / step
     return f"; try {max(1, int(count)) * step:.10g}" if count < 1e12 else ""

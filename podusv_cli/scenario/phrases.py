@@ -31,7 +31,7 @@ def as_yaml(content: Any) -> str:
     return quoted(text) if len(text) > 60 or not text.isprintable() else text
 
 
-def folded(word: str) -> str:
+def without_case(word: str) -> str:
     """A word without what is easily typed otherwise: case and underscores."""
     return word.casefold().replace("_", "")
 
@@ -39,7 +39,7 @@ def folded(word: str) -> str:
 def did_you_mean(word: str, known: Iterable[str]) -> str:
     """`; did you mean 'length'?`, or nothing where no known word is close."""
     words = list(known)
-    alike = [other for other in words if folded(other) == folded(word)]
+    alike = [other for other in words if without_case(other) == without_case(word)]
     close = alike or get_close_matches(word, words, n=1)
     return f"; did you mean '{close[0]}'?" if close else ""
 

@@ -1,4 +1,4 @@
-"""What a scenario refers to and what it may leave out: vessel files, waypoints, its own name."""
+"""Filling in what a scenario takes from elsewhere: presets, CSV files, its file's name."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ HEADER = re.compile(r'\s*"?(?!nan|inf)[a-z]', re.IGNORECASE)
 
 @cache
 def preset_names(presets: Presets) -> tuple[str, ...]:
-    """Names of the files that podusv brings along, sorted."""
+    """Names of the preset files of podusv, sorted."""
     names = (Path(entry.name) for entry in files(presets.package).iterdir())
     return tuple(sorted(name.stem for name in names if name.suffix == ".yaml"))
 
@@ -53,14 +53,14 @@ def with_presets() -> dict[str, tuple[type[Component], Presets]]:
 
 
 def complete(root: Node, faults: list[Fault]) -> Node:
-    """The tree with everything filled in that it takes from elsewhere."""
+    """The tree with presets, CSV files, `name`, `nominal` and `controllers` filled in."""
     for fill in (_without_removed, _name, _vessel, _nominal, _sections, _controllers):
         root = fill(root, faults)
     return root
 
 
 def _sections(root: Node, faults: list[Fault]) -> Node:
-    """Every section with kinds, with what its kind takes from presets and from files of rows."""
+    """Sections with kinds, completed from presets and CSV files."""
     for name, key in SCENARIO.keys.items():
         given = root.mapping.get(name)
         kind = key.kinds.get(str(given.get("kind"))) if given else None
@@ -74,7 +74,7 @@ def _sections(root: Node, faults: list[Fault]) -> Node:
 
 
 def _without_removed(root: Node, faults: list[Fault]) -> Node:
-    """Entries of `controllers` and `claims` that are null are taken out of what is extended."""
+    """Entries of `controllers` and `claims` that are null are removed."""
     for section in ("controllers", "claims"):
         given = root.mapping.get(section)
         if given and given.mapping:
@@ -114,7 +114,7 @@ def _nominal(root: Node, faults: list[Fault]) -> Node:
         return root
     if "preset" in given.content:
         return root.with_entry("nominal", _from_preset(given, "nominal", faults))
-    whole = _sourced(merge(vessel, given))
+    whole = _with_source(merge(vessel, given))
     lost = not isinstance(vessel.content, dict)
     return root.with_entry("nominal", replace(whole, faulty=whole.faulty or lost))
 
@@ -123,13 +123,13 @@ def _from_preset(given: Node, key: str, faults: list[Fault]) -> Node:
     """The vessel's values over those of its preset, where it has one."""
     preset = given.mapping.get("preset")
     if preset is None or preset.content == "":
-        return _whole(given, key, faults)
+        return _without_preset(given, key, faults)
     vessel = _over_preset(given, key, VESSELS, faults)
-    return replace(vessel, faulty=True) if preset.faulty else _sourced(vessel)
+    return replace(vessel, faulty=True) if preset.faulty else _with_source(vessel)
 
 
-def _whole(given: Node, key: str, faults: list[Fault]) -> Node:
-    """A vessel without preset; a fault where it lacks what no vessel can do without."""
+def _without_preset(given: Node, key: str, faults: list[Fault]) -> Node:
+    """A vessel without preset; a fault if it lacks required keys."""
     fields = Vessel.model_fields.items()
     lacking = [name for name, field in fields if field.is_required() and name not in given.mapping]
     if not lacking or given.faulty:
@@ -139,7 +139,7 @@ def _whole(given: Node, key: str, faults: list[Fault]) -> Node:
     return replace(given, faulty=True)
 
 
-def _sourced(vessel: Node) -> Node:
+def _with_source(vessel: Node) -> Node:
     """The vessel with a `source` that names the numbers that are not its preset's.
 
     A source that is not the preset's own is left as it is.
@@ -151,8 +151,8 @@ def _sourced(vessel: Node) -> Node:
     numbers = [name for name in COEFFICIENTS if name in Vessel.model_fields]
     changed = [name for name in numbers if name in vessel.mapping and _differs(vessel, base, name)]
     text = f"{_stem(base)}; {', '.join(changed)} changed by the scenario."
-    told = text if changed else str(base.get("source"))
-    return vessel.with_entry("source", replace(source, content=told))
+    source_text = text if changed else str(base.get("source"))
+    return vessel.with_entry("source", replace(source, content=source_text))
 
 
 def _stem(base: Node) -> str:
@@ -201,11 +201,11 @@ def _controllers(root: Node, faults: list[Fault]) -> Node:
     base, several = root.mapping.get("controller"), root.mapping.get("controllers")
     if not base or not several:
         return root
-    filled = {name: _like(base, own) for name, own in several.mapping.items()}
+    filled = {name: _over_base(base, own) for name, own in several.mapping.items()}
     return root.with_entry("controllers", replace(several, content=filled))
 
 
-def _like(base: Node, own: Node) -> Node:
+def _over_base(base: Node, own: Node) -> Node:
     law = SCENARIO.keys["controller"].kinds.get(str(own.get("kind") or base.get("kind")))
     if not law or not isinstance(own.content, dict):
         return own
@@ -234,7 +234,7 @@ def _row(line: str, mark: Mark, faults: list[Fault]) -> Node:
     cells = [cell.strip().strip('"') for cell in line.split(",")]
     numbers = [resolve(cell) for cell in cells]
     wrong = [isinstance(n, (str, bool)) or n is None for n in numbers]
-    # What the line holds is not told: the file may be one that only podusv was given to read.
+    # The line is not shown: the file may be one that the user may not read.
     if len(numbers) != 2:
         text = f"must be two numbers x,y [m], found {len(numbers)} between commas"
         faults.append(Fault(mark, "", text))

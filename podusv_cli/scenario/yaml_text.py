@@ -1,8 +1,9 @@
-"""From YAML text to a tree with places, without constructors, aliases or tags.
+"""Parse YAML text into nodes with line and column, without constructors, aliases or tags.
 
-PyYAML's own loading turns `no` into False and `017` into 15, lets NaN and duplicate keys pass,
-and forgets where things stood. Here its parser's events are walked instead. Plain scalars follow
-YAML 1.2: true, false, null, decimal numbers; everything else is text.
+PyYAML's loaders turn `no` into False and `017` into 15, accept NaN and duplicate keys, and keep no
+positions. `yaml.compose` returns nothing if there is a syntax error, so that the errors before it
+would not be reported. So the parser's events are read here. Plain scalars follow YAML 1.2: true,
+false, null and decimal numbers; everything else is text.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ INTEGER = re.compile(r"[-+]?(0|[1-9][0-9]{0,299})")
 NUMBER = re.compile(r"[-+]?(\.[0-9]+|(0|[1-9][0-9]*)(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 NOT_FINITE = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
 
-# What PyYAML says, and what it means to someone who writes a scenario.
+# Parts of PyYAML's messages, and the messages for users.
 SYNTAX = {
     r"'\t' that cannot start": "a tab; use spaces",
     "that cannot start any token": "{problem}; put the value in quotes",
@@ -57,7 +58,7 @@ def read_text(path: str, mark: Mark, key: str, faults: list[Fault]) -> str | Non
     """The file's text, or None and a fault at `mark` or at the byte that is no UTF-8."""
     named = "" if mark == Mark(path) else f"{quoted(path)} "
     try:
-        with open(path, "rb", opener=_at_once) as file:
+        with open(path, "rb", opener=_nonblocking_opener) as file:
             if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
                 raise ValueError("a pipe or device; save it as a file first")
             data = file.read(MAX_BYTES + 1)
@@ -77,8 +78,8 @@ def read_text(path: str, mark: Mark, key: str, faults: list[Fault]) -> str | Non
         return None
 
 
-def _at_once(path: str, flags: int) -> int:
-    """Open without waiting for somebody who writes into a pipe."""
+def _nonblocking_opener(path: str, flags: int) -> int:
+    """Open a file without waiting for the writer of a pipe."""
     return os.open(path, flags | os.O_NONBLOCK | os.O_CLOEXEC)
 
 
@@ -89,7 +90,7 @@ def _place(source: str, before: str) -> Mark:
 
 
 def resolve(text: str) -> bool | int | float | str | None:
-    """What a plain scalar means; a number that is too large becomes infinite."""
+    """The value of a plain scalar; a number that is too large becomes infinite."""
     if text in WORDS:
         return WORDS[text]
     if INTEGER.fullmatch(text):
@@ -97,20 +98,20 @@ def resolve(text: str) -> bool | int | float | str | None:
     return float(text) if NUMBER.fullmatch(text) else text
 
 
-def scalar(text: str, mark: Mark, key: str, faults: list[Fault]) -> Node:
-    """The value of a plain scalar; what is no finite number becomes a fault."""
+def plain_node(text: str, mark: Mark, key: str, faults: list[Fault]) -> Node:
+    """The node of a plain scalar; numbers that are not finite are faults."""
     content = resolve(text)
     if NOT_FINITE.fullmatch(text):
         faults.append(Fault(mark, key, f"{text} is not a finite number"))
     elif isinstance(content, float) and not math.isfinite(content):
         faults.append(Fault(mark, key, f"{text:.40} is too large; numbers must be finite"))
     else:
-        return written(content, mark, key, faults, text=text)
+        return text_node(content, mark, key, faults, text=text)
     return Node(None, mark, faulty=True)
 
 
-def written(content: Any, mark: Mark, key: str, faults: list[Fault], *, text: str = "") -> Node:
-    """The node of a scalar; characters that no file or terminal can take become a fault."""
+def text_node(content: Any, mark: Mark, key: str, faults: list[Fault], *, text: str = "") -> Node:
+    """The node of a scalar; control characters are a fault."""
     unfit = [c for c in str(content) if unicodedata.category(c) in ("Cc", "Cs") and c not in "\t\n"]
     if unfit:
         faults.append(Fault(mark, key, f"character U+{ord(unfit[0]):04X} cannot stand in text"))
@@ -118,9 +119,9 @@ def written(content: Any, mark: Mark, key: str, faults: list[Fault], *, text: st
 
 
 def read(text: str, source: str, faults: list[Fault], *, placed: bool = True) -> Node | None:
-    """The tree of a single YAML document, None where reading had to stop.
+    """The tree of a single YAML document, None if parsing could not continue.
 
-    Every fault found on the way is appended to `faults`. Marks have lines only where `placed`.
+    Every fault is appended to `faults`. Marks have lines only where `placed`.
     """
     if len(text) > MAX_CHARACTERS:
         text = f"is longer than {MAX_CHARACTERS:,} characters"
@@ -129,20 +130,20 @@ def read(text: str, source: str, faults: list[Fault], *, placed: bool = True) ->
     reader = _Reader(text, source, faults, placed)
     try:
         return reader.document()
-    except _Stop as stop:
+    except _CannotContinue as stop:
         faults.append(stop.fault)
         return None
 
 
-class _Stop(Exception):
-    """Reading cannot go on."""
+class _CannotContinue(Exception):
+    """Parsing cannot continue after this fault."""
 
     def __init__(self, mark: Mark, text: str) -> None:
         self.fault = Fault(mark, "", text)
 
 
 class _Reader:
-    """One walk along the parser's events."""
+    """Reads one document from the parser's events."""
 
     def __init__(self, text: str, source: str, faults: list[Fault], placed: bool) -> None:
         self._text, self._source, self._placed = text, source, placed
@@ -153,17 +154,19 @@ class _Reader:
 
     def document(self) -> Node:
         if self._text.startswith("\ufeff"):
-            raise _Stop(
+            raise _CannotContinue(
                 self._mark(0, 0), "starts with a byte order mark; save as UTF-8 without BOM"
             )
         self._next()
         if isinstance(self._next(), yaml.StreamEndEvent):
-            raise _Stop(Mark(self._source), "is empty")
+            raise _CannotContinue(Mark(self._source), "is empty")
         node = self._node(self._next(), ())
         self._next()
         after = self._next()
         if not isinstance(after, yaml.StreamEndEvent):
-            raise _Stop(self._start(after), "a second document starts here; write one a file")
+            raise _CannotContinue(
+                self._start(after), "a second document starts here; write one a file"
+            )
         return node
 
     def _next(self) -> Any:
@@ -175,21 +178,21 @@ class _Reader:
             place = _place(self._source, self._text[: error.position])
             code = ord(self._text[error.position])
             place = place if self._placed else Mark(self._source)
-            raise _Stop(place, f"character U+{code:04X} cannot stand in YAML") from None
+            raise _CannotContinue(place, f"character U+{code:04X} cannot stand in YAML") from None
         except (ValueError, IndexError, AttributeError, OverflowError, TypeError):
-            # PyYAML lets these escape for impossible escapes, versions and code points.
-            raise _Stop(self._last, "what follows is not valid YAML") from None
+            # PyYAML raises these for impossible escapes, versions and code points.
+            raise _CannotContinue(self._last, "what follows is not valid YAML") from None
         self._last = self._mark(event.end_mark.line, event.end_mark.column)
         return event
 
-    def _syntax_error(self, error: yaml.MarkedYAMLError) -> _Stop:
+    def _syntax_error(self, error: yaml.MarkedYAMLError) -> _CannotContinue:
         problem = error.problem or "unreadable"
         known = [text for part, text in SYNTAX.items() if part in problem]
         opened = any(part in problem for part in OPENING)
         mark = error.context_mark if opened else error.problem_mark
         text = known[0] if known else "not valid YAML: {problem}"
         place = self._mark(mark.line, mark.column) if mark else self._last
-        return _Stop(place, text.format(problem=problem))
+        return _CannotContinue(place, text.format(problem=problem))
 
     def _mark(self, line: int, column: int) -> Mark:
         return Mark(self._source, line + 1, column + 1) if self._placed else Mark(self._source)
@@ -203,9 +206,9 @@ class _Reader:
     def _node(self, event: Any, route: Route) -> Node:
         self._nodes += 1
         if self._nodes > MAX_NODES:
-            raise _Stop(self._start(event), f"more than {MAX_NODES:,} values")
+            raise _CannotContinue(self._start(event), f"more than {MAX_NODES:,} values")
         if len(route) > MAX_DEPTH:
-            raise _Stop(self._start(event), f"nested deeper than {MAX_DEPTH} levels")
+            raise _CannotContinue(self._start(event), f"nested deeper than {MAX_DEPTH} levels")
         if isinstance(event, yaml.AliasEvent):
             self._fault(event, route, f"alias *{event.anchor}; write the value out, or use extends")
             return Node(None, self._start(event), faulty=True)
@@ -220,7 +223,7 @@ class _Reader:
 
     def _scalar(self, event: Any, route: Route) -> Node:
         mark = self._start(event)
-        take = scalar if event.style is None else written
+        take = plain_node if event.style is None else text_node
         node = take(event.value, mark, dotted(route), self._faults)
         return replace(node, faulty=node.faulty or bool(event.tag))
 

@@ -1,4 +1,4 @@
-"""Plain data that remembers where every key and value was written."""
+"""Trees of plain data with the position of every key and value."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Route = tuple[str | int, ...]
 
 @dataclass(frozen=True)
 class Mark:
-    """A place: a file with line and column, both from 1, or (line 0) something without lines."""
+    """A position: a source with line and column from 1; line 0 if the source has no lines."""
 
     source: str
     line: int = 0
@@ -26,7 +26,7 @@ class Mark:
 
 @dataclass(frozen=True)
 class Fault:
-    """What is wrong, where, and with which key."""
+    """An error: its position, key and message."""
 
     mark: Mark
     key: str
@@ -37,8 +37,8 @@ class Fault:
 class Node:
     """A value: a scalar, a tuple of nodes, or a mapping from key to node.
 
-    `key_mark` is where the key of this value stands. `text` is a scalar as written. `faulty` says
-    that a fault here was told already: a scalar or list has no content, a mapping may lack keys.
+    `key_mark` is the position of its key. `text` is a scalar as written. `faulty` says that a
+    fault was reported here: a scalar or list has no content, a mapping may lack keys.
     """
 
     content: Any
@@ -49,7 +49,7 @@ class Node:
 
     @property
     def mapping(self) -> dict[str, Node]:
-        """The entries, none where this is no mapping."""
+        """The entries; empty if this is not a mapping."""
         return self.content if isinstance(self.content, dict) else {}
 
     def get(self, key: str) -> Any:
@@ -58,7 +58,7 @@ class Node:
         return entry.content if entry else None
 
     def with_entry(self, key: str, entry: Node) -> Node:
-        """This mapping with an entry put in or replaced."""
+        """This mapping with an entry added or replaced."""
         return replace(self, content={**self.mapping, key: entry})
 
 
@@ -75,7 +75,7 @@ def route(key: str) -> Route:
 
 
 def printable(text: str) -> str:
-    """The text, with escapes where it has characters that do not show or turn others around."""
+    """The text, escaped if it has invisible or direction-changing characters."""
     return text if text.isprintable() else ascii(text)[1:-1]
 
 
@@ -102,7 +102,7 @@ def find(root: Node, route: Route) -> Node | None:
 
 
 def plain(node: Node) -> Any:
-    """Data without marks: dicts, tuples, scalars. Values with a fault are left out."""
+    """Dicts, tuples and scalars without positions. Faulty values are left out."""
     if isinstance(node.content, dict):
         return {
             key: plain(entry)
@@ -122,9 +122,9 @@ def count(node: Node) -> int:
 
 
 def overlay(base: Node, top: Node, replaces: Callable[[Node, Node], bool]) -> Node:
-    """`top` over `base`, mapping by mapping; lists, scalars and what `replaces` says whole.
+    """`top` over `base`: mappings key by key, unless `replaces` holds; other values replaced.
 
-    Of a list that lies under a mapping of places in it, {"0": ...}, only those items change.
+    A mapping of positions {"0": ...} over a list changes those items only.
     """
     if _names_places(base, top):
         items = list(base.content)
@@ -152,14 +152,14 @@ def _names_places(base: Node, top: Node) -> bool:
 
 
 def another_kind(base: Node, top: Node) -> bool:
-    """Whether `top` names another kind or preset than `base`, whose other keys then say nothing."""
+    """Whether `top` has another kind or preset than `base`, whose keys then do not apply."""
     pairs = ((base.get(key), top.get(key)) for key in ("kind", "preset"))
     return any(None not in pair and pair[0] != pair[1] for pair in pairs)
 
 
 def merge(base: Node, top: Node) -> Node:
-    """`top` over `base`; a mapping of another kind or preset replaces the base's whole.
+    """`top` merged over `base`; a section of another kind or preset replaces the base's section.
 
-    The kind stays where only the preset is another.
+    If only the preset differs, the kind is kept.
     """
     return overlay(base, top, another_kind)
