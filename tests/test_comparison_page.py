@@ -168,6 +168,14 @@ def test_figures_are_numbered_and_captioned_in_words():
     assert 'id="figures"' not in page(figures=[])
 
 
+def test_what_only_the_first_run_has_is_not_said_of_all():
+    for text in ("1 run of 4 s: a. Path line,", "the last 20 % of the run"):
+        assert text not in tree(page()).text
+        assert text in tree(page(differences={})).text
+    assert "The scenario of a; the answer lists" in section("scenario").text
+    assert "answer" not in section("scenario", differences={}).text
+
+
 def test_every_link_leads_somewhere():
     told = tree(page(theories={"a": theory(2.5, True)}, chase=MOVING))
     ids = [e.attributes["id"] for e in told.inside() if "id" in e.attributes]
