@@ -27,19 +27,21 @@ ANSWERS: dict[bool | None, Answer] = {
 
 @dataclass(frozen=True)
 class ParsedClaim:
-    """A claim with the syntax tree of its expression."""
+    """A claim with the syntax trees of its expressions; `given` is None where it has no premise."""
 
     name: str
     claim: Claim
-    tree: ast.expr
+    expect: ast.expr
+    given: ast.expr | None = None
 
     def with_labels(self, labels: Mapping[str, str]) -> Self:
         """The claim with labels in place of its own names for runs."""
         if all(name == label for name, label in labels.items()):
             return self
-        tree = with_labels(self.tree, labels)
-        claim = self.claim.model_copy(update={"expect": ast.unparse(tree)})
-        return replace(self, claim=claim, tree=tree)
+        expect = with_labels(self.expect, labels)
+        given = self.given and with_labels(self.given, labels)
+        texts = {"expect": ast.unparse(expect), "given": ast.unparse(given) if given else ""}
+        return replace(self, claim=self.claim.model_copy(update=texts), expect=expect, given=given)
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,7 @@ class Verdict:
     def evidence(self) -> str:
         """The numbers and the reason, in one line."""
         numbers = (
-            f"{text} = {number:.4g}"
+            f"{text} = {number:.4g}" if math.isfinite(number) else f"{text}: never"
             for text, number in self.numbers.items()
             if not math.isnan(number)
         )
@@ -89,12 +91,16 @@ def parse_claims(loaded: Loaded) -> list[ParsedClaim]:
     for single in scenario.singles().values():
         signals |= single.about()
     for name, claim in scenario.claims.items():
-        key = f"claims.{name}.expect"
-        try:
-            tree = parse(claim.expect, scenario.labels(), signals)
-            claims.append(ParsedClaim(name, claim, tree))
-        except ExpressionError as error:
-            faults.append(Finding(loaded.origins[key], key, str(error)))
+        trees: dict[str, ast.expr] = {}
+        for field, text in (("expect", claim.expect), ("given", claim.given)):
+            key = f"claims.{name}.{field}"
+            try:
+                if text or field == "expect":
+                    trees[field] = parse(text, scenario.labels(), signals)
+            except ExpressionError as error:
+                faults.append(Finding(loaded.origins[key], key, str(error)))
+        if "expect" in trees:
+            claims.append(ParsedClaim(name, claim, **trees))
     if faults:
         raise ScenarioError(faults)
     return claims
@@ -107,9 +113,18 @@ def judge(claims: Sequence[ParsedClaim], runs: Mapping[str, Source]) -> list[Ver
 
 def _verdict(parsed: ParsedClaim, runs: Mapping[str, Source]) -> Verdict:
     evaluation = Evaluation(runs, parsed.claim.tolerance)
-    answer = evaluation.holds(parsed.tree)
+    if parsed.given and evaluation.holds(parsed.given) is not True:
+        reason = f"not given: {parsed.claim.given}"
+        return Verdict(parsed.name, parsed.claim, ANSWERS[None], evaluation.numbers, reason)
+    evaluation = Evaluation(runs, parsed.claim.tolerance)
+    answer = evaluation.holds(parsed.expect)
     reason = "; ".join(dict.fromkeys(evaluation.doubts)) if answer is None else ""
     return Verdict(parsed.name, parsed.claim, ANSWERS[answer], evaluation.numbers, reason)
+
+
+def _condition(claim: Claim) -> str:
+    given = f", given {markdown_code(claim.given)}" if claim.given else ""
+    return markdown_code(claim.expect) + given
 
 
 def as_markdown(verdicts: Sequence[Verdict], timed: Sequence[Verdict] = (), place: str = "") -> str:
@@ -117,7 +132,7 @@ def as_markdown(verdicts: Sequence[Verdict], timed: Sequence[Verdict] = (), plac
     rows = [
         f"| {markdown_cell(v.name)} | "
         f"{markdown_cell(v.claim.says)} ({markdown_cell(v.claim.source)}) | "
-        f"**{v.answer}** | {markdown_code(v.claim.expect)}, tolerance {v.claim.tolerance:g} | "
+        f"**{v.answer}** | {_condition(v.claim)}, tolerance {v.claim.tolerance:g} | "
         f"{markdown_cell(v.evidence())} |"
         for v in verdicts
     ]

@@ -62,9 +62,11 @@ Quantity = float | Curve
 
 
 def metric(label: str, run: Source, name: str) -> float:
-    """A metric of a run. Raises CannotTell."""
+    """A metric of a run, infinite where its event never happened. Raises CannotTell."""
     number = run.metric(name)
     if np.isnan(number):
+        if METRICS[name].happens and not run.ending:
+            return np.inf
         undefined = f"this run has none ({METRICS[name].meaning})"
         raise CannotTell(f"{label}.{name}: {f'{label} {run.ending}' if run.ending else undefined}")
     return number

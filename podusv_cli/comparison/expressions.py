@@ -24,6 +24,7 @@ import numpy as np
 from podusv_cli.comparison import curves
 from podusv_cli.comparison.checks import CHECKS
 from podusv_cli.comparison.curves import REDUCERS, CannotTell, Curve, Quantity, Source
+from podusv_cli.comparison.tolerance import SIGNS
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.signal import Signal
 from podusv_cli.metrics.table import METRICS
@@ -134,12 +135,14 @@ class Evaluation:
     def _link(
         self, sign: ast.cmpop, left: ast.expr, a: float, right: ast.expr, b: float
     ) -> bool | None:
-        if not (math.isfinite(a) and math.isfinite(b)):
+        if math.isnan(a) or math.isnan(b):
             return None
-        answer = SIGNS[type(sign)](a, b, self.tolerance)
+        never = a == b == math.inf
+        answer = None if never else SIGNS[type(sign)](a, b, self.tolerance)
         if answer is None:
             within = f"differ by no more than the tolerance of {self.tolerance:g}"
-            self.doubts.append(f"{ast.unparse(left)} and {ast.unparse(right)} {within}")
+            why = "never happen" if never else within
+            self.doubts.append(f"{ast.unparse(left)} and {ast.unparse(right)} {why}")
         return answer
 
     def _number(self, node: ast.expr) -> float:
@@ -149,11 +152,22 @@ class Evaluation:
             _refuse(
                 node, f"a signal over time; reduce it to a number with one of {', '.join(REDUCERS)}"
             )
-        if not math.isfinite(number) and len(self.doubts) == doubts:
-            self.doubts.append(f"{text} is not a finite number")
+        if not (math.isfinite(number) or self._never(node)):
+            if len(self.doubts) == doubts:
+                self.doubts.append(f"{text} is not a finite number")
+            number = math.nan
         if not isinstance(node, ast.Constant):
             self.numbers[text] = number
         return number
+
+    def _never(self, node: ast.expr) -> bool:
+        """Whether this is the time, or a multiple of the time, of an event that never happened."""
+        match node:
+            case ast.BinOp(left=ast.Constant(), right=part, op=ast.Mult()):
+                return self._never(part)
+            case ast.Attribute(attr=name):
+                return name in METRICS and METRICS[name].happens and self.value(node) == math.inf
+        return False
 
     def _check(self, node: ast.Call) -> bool | None:
         name = _known(_function(node), CHECKS, "check")
@@ -270,26 +284,6 @@ def _all(answers: Collection[bool | None]) -> bool | None:
     return None if None in answers else True
 
 
-def _less(a: float, b: float, tolerance: float) -> bool | None:
-    """True where a is less by more than the tolerance, False where b is, else None."""
-    margin = tolerance * max(abs(a), abs(b))
-    if abs(a - b) <= margin:
-        return None if margin else False
-    return a < b
-
-
-def _at_most(a: float, b: float, tolerance: float) -> bool:
-    return a <= b + tolerance * abs(b)
-
-
-# of two numbers, with the claim's relative tolerance
-SIGNS: dict[type[ast.cmpop], Callable[[float, float, float], bool | None]] = {
-    ast.Lt: _less,
-    ast.LtE: _at_most,
-    ast.Gt: lambda a, b, tolerance: _less(b, a, tolerance),
-    ast.GtE: lambda a, b, tolerance: _at_most(-a, -b, tolerance),
-    ast.Eq: lambda a, b, tolerance: abs(a - b) <= tolerance * abs(b),
-}
 ARITHMETIC: dict[type[ast.operator], Callable[..., object]] = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: np.divide,
 }  # fmt: skip

@@ -51,19 +51,33 @@ def as_csv(frame: pd.DataFrame) -> str:
 
 def cells(frame: pd.DataFrame) -> list[list[str]]:
     """Rows of text: metric, unit, then number and ratio to the first run; best marked with *."""
-    rows = []
+    rows, unranked = [], _unranked(frame)
     for name, numbers in frame.iterrows():
-        best = math.nan if name in CLOCKED else numbers.min()  # times vary from run to run
+        best = math.nan if name in unranked else numbers.min()
         first = numbers.iloc[0]
         texts = [_cell(number, first, best, i) for i, number in enumerate(numbers)]
         rows.append([str(name), METRICS[str(name)].unit, *texts])
     return rows
 
 
+def _unranked(frame: pd.DataFrame) -> list[str]:
+    """Metrics in which no run is marked best.
+
+    Measured times vary. Where a law keeps a standoff, being nearer to the target is not better.
+    """
+    known = {"iae", "iae_e"} <= set(frame.index)
+    standoff = known and bool((frame.loc["iae"].gt(frame.loc["iae_e"])).any())
+    return [
+        name
+        for name in frame.index
+        if name in CLOCKED or (standoff and METRICS[name].counts_standoff)
+    ]
+
+
 def leaders(frame: pd.DataFrame) -> dict[str, list[str]]:
     """The metrics in which each run is best; equal numbers and measured times rank nobody."""
     best: dict[str, list[str]] = {str(label): [] for label in frame.columns}
-    for name, numbers in frame.drop(index=list(CLOCKED), errors="ignore").iterrows():
+    for name, numbers in frame.drop(index=_unranked(frame)).iterrows():
         shown = numbers.dropna().map(_shown)
         if shown.nunique() > 1:
             for label in shown.index[shown == _shown(numbers.min())]:

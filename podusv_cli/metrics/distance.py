@@ -55,18 +55,15 @@ def _settling_time(seen: Vector, step: float) -> float:
 
 OF = Accumulator(watch, lambda layout: SIZE, _constants, INTEGRALS)
 OF_SETTLED = Accumulator(watch_settled, lambda layout: 2 * SETTLED, _constants, SETTLED)
-iae = Metric("iae", "m s", "integral of z_e", OF, gathered(ABSOLUTE), 1)
-ise = Metric("ise", "m2 s", "integral of z_e^2", OF, gathered(SQUARE), 1)
-itae = Metric("itae", "m s2", "integral of t z_e", OF, gathered(TIMED), 1)
-rmse = Metric("rmse", "m", "root of the mean of z_e^2", OF, _rmse, 1)
+iae = Metric("iae", "m s", "integral of z_e", OF, gathered(ABSOLUTE), 1, counts_standoff=True)
+ise = Metric("ise", "m2 s", "integral of z_e^2", OF, gathered(SQUARE), 1, counts_standoff=True)
+itae = Metric("itae", "m s2", "integral of t z_e", OF, gathered(TIMED), 1, counts_standoff=True)
+rmse = Metric("rmse", "m", "root of the mean of z_e^2", OF, _rmse, 1, counts_standoff=True)
 z_e_steady = Metric(
-    "z_e_steady", "m", "mean of z_e over the steady window", OF_SETTLED, ratio(ABSOLUTE, TIME), 1
-)
+    "z_e_steady", "m", "mean of z_e over the steady window", OF_SETTLED, ratio(ABSOLUTE, TIME), 1,
+    counts_standoff=True,
+)  # fmt: skip
 settling_time = Metric(
-    "settling_time",
-    "s",
-    "time from which z_e stays within the settling radius",
-    OF,
-    _settling_time,
-    1,
-)
+    "settling_time", "s", "time from which z_e stays within the settling radius", OF,
+    _settling_time, 1, happens=True,
+)  # fmt: skip

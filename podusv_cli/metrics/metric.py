@@ -76,7 +76,9 @@ class Metric:
 
     `result` takes the accumulator's numbers and the step [s], and is NaN for a run that ended
     before the metric is defined. A metric without an accumulator is measured after the run.
-    `place` orders tables.
+    `place` orders tables. `happens`: the metric is the time of an event, and NaN for a whole run
+    means that it never happened. `counts_standoff`: a standoff that a law keeps on purpose makes it
+    worse, so that nobody is marked best where there is one.
     """
 
     name: str
@@ -85,6 +87,8 @@ class Metric:
     accumulator: Accumulator | None = None
     result: Result = lambda seen, step: math.nan
     place: int = 100
+    happens: bool = False
+    counts_standoff: bool = False
 
 
 def gathered(position: int) -> Result:

@@ -116,6 +116,9 @@ class Claim(Component):
     says: str = value(..., "", "the claim, in a sentence of your own")
     source: str = value(..., "", "where it was published: section, figure, equation")
     expect: str = value(..., "", "the claim as an expression over runs; see docs/claims.md")
+    given: str = value(
+        "", "", "a condition without which the claim has no meaning: if it fails, cannot tell"
+    )
     tolerance: float = value(
         0.05, "", "relative: how near `==` is, and how clear `<` and `>` have to be", ge=0, lt=1
     )
