@@ -9,10 +9,12 @@ import pytest
 from known_signals import ABOUT
 from test_reproduction import rerun
 
+from podusv_cli.comparison.claims import ParsedClaim, judge
 from podusv_cli.comparison.curves import Curve, pointwise
 from podusv_cli.comparison.expressions import Evaluation, ExpressionError, parse, with_labels
 from podusv_cli.core.signal import Signal
 from podusv_cli.scenario.load import load
+from podusv_cli.scenario.model import Claim
 
 CORRECTED = Path(__file__).parent.parent / "configs/paper/corrected.yaml"
 
@@ -121,6 +123,37 @@ def test_what_cannot_be_told_and_why(text, why):
     assert answer is None
     assert len(found.doubts) == 1
     assert why in found.doubts[0]
+
+
+@pytest.mark.parametrize(
+    ("text", "answer"),
+    [
+        ("a.settling_time > 2 * b.iae", True),  # no planted run settles: later than any time
+        ("2 * a.settling_time <= b.iae", False),
+        ("a.settling_time == b.iae", False),
+        ("a.settling_time > b.settling_time", None),
+        ("lost.settling_time > a.iae", None),  # diverged: whether it had settled is unknown
+        ("a.settling_time - b.settling_time < a.iae", None),
+    ],
+)
+def test_an_event_that_never_happens_is_later_than_any_other(text, answer):
+    assert verdict(text)[0] is answer
+
+
+@pytest.mark.parametrize(
+    ("given", "expect", "answer"),
+    [
+        ("a.iae < b.iae", "a.iae < b.iae", "reproduced"),
+        ("a.iae > b.iae", "a.iae < b.iae", "cannot tell"),
+        ("lost.iae > b.iae", "a.iae < b.iae", "cannot tell"),
+    ],
+)
+def test_a_claim_whose_premise_fails_cannot_be_told(given, expect, answer):
+    claim = Claim(says="x", source="x", given=given, expect=expect)
+    trees = (parse(text, RUNS, ABOUT) for text in (expect, given))
+    (found,) = judge([ParsedClaim("C", claim, *trees)], RUNS)
+    assert found.answer == answer
+    assert (found.reason == f"not given: {given}") == (answer == "cannot tell")
 
 
 @pytest.mark.parametrize(

@@ -5,10 +5,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import NONLINEAR, POD, SMOOTH_START, Constant, corrected, example
+from conftest import NONLINEAR, POD, SMOOTH_START, Constant, corrected, example, target_at
 
 from podusv_cli.actuators.pod import Pod, Pods
 from podusv_cli.actuators.saturated import Saturated
+from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
 from podusv_cli.controllers.backstepping import Backstepping
 from podusv_cli.controllers.pid import Pid
 from podusv_cli.core.component import value
@@ -19,6 +20,7 @@ from podusv_cli.metrics import distance
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.metric import close_integrals
 from podusv_cli.metrics.table import METRICS, observer
+from podusv_cli.paths.line_circle import LineCircle
 
 
 def gathered(
@@ -35,6 +37,23 @@ def limited():
     return gathered(corrected(actuator=Saturated()))
 
 
+def beyond_the_standoff(log, steady):
+    """The metrics of |z_e - standoff|, and of the position in the frame of the target's course."""
+    standoff = AdaptiveNeural().standoff if log.controller == "adaptive_neural" else 0.0
+    t, e = log["time"], np.abs(log["z_e"] - standoff)
+    vx, vy = np.array([target_at(LineCircle(), now)[2:4] for now in t]).T
+    course = np.arctan2(vy, vx)
+    gap = (log["x"] - log["x_d"]) + 1j * (log["y"] - log["y_d"])
+    along = (gap * np.exp(-1j * course))[steady]
+    span = np.ptp(t[steady])
+    return {
+        "iae_e": np.trapezoid(e, t),
+        "e_steady": np.trapezoid(e[steady], t[steady]) / span,
+        "along_track_rms": np.sqrt(np.trapezoid(along.real**2, t[steady]) / span),
+        "cross_track_rms": np.sqrt(np.trapezoid(along.imag**2, t[steady]) / span),
+    }
+
+
 def by_definition(log, steady):
     """The integrals, means and variations of a log; the settled part has these rows."""
     t, z_e = log["time"], log["z_e"]
@@ -45,6 +64,7 @@ def by_definition(log, steady):
         "itae": np.trapezoid(t * z_e, t),
         "rmse": np.sqrt(np.trapezoid(z_e**2, t) / t[-1]),
         "z_e_steady": np.trapezoid(z_e[steady], t[steady]) / np.ptp(t[steady]),
+        **beyond_the_standoff(log, steady),
         "peak_tau_u": np.abs(log["tau_u_cmd"]).max(),
         "peak_tau_r": np.abs(log["tau_r_cmd"]).max(),
         "effort_u": np.trapezoid(log["tau_u"] ** 2, t),
