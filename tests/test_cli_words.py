@@ -18,7 +18,7 @@ from scenario_samples import SOUND, write
 import podusv_cli
 from podusv_cli import cli
 from podusv_cli.cli.exit_codes import PLEASE_REPORT, with_exit_codes
-from podusv_cli.core.errors import Finding, ScenarioError, StorageError
+from podusv_cli.core.errors import ScenarioError, ScenarioFault, StorageError
 from podusv_cli.findings.finding import finding_kinds
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.presets import preset_names, preset_text, with_presets
@@ -223,7 +223,10 @@ def test_a_foreseen_failure_is_its_message_and_exit_code(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert (
-        outcome(ScenarioError([Finding("a.yaml:1:1", "m", "bad"), Finding("", "", "worse")])) == 2
+        outcome(
+            ScenarioError([ScenarioFault("a.yaml:1:1", "m", "bad"), ScenarioFault("", "", "worse")])
+        )
+        == 2
     )
     assert outcome(StorageError("results: disk full")) == 5
     assert outcome(OSError(28, "No space left on device", "results/log.h5")) == 5

@@ -93,7 +93,7 @@ def test_runs_are_refused_whose_manifest_could_not_be_read_back(tmp_path: Path) 
         "controllers",
         "has 1,001 runs, more than the 1,000 that podusv reads back as one comparison",
     )
-    entry = manifest.Entry(sha256="a" * 64, bytes=10**9)
+    entry = manifest.FileEntry(sha256="a" * 64, bytes=10**9)
     names = ("scenario.yaml", "resolved.yaml", "log.h5", "metrics.json", "metrics.csv",
              "theory.json", "figures/controls.png", "provenance.json", "manifest.json",
              "missing.json")  # fmt: skip

@@ -17,7 +17,7 @@ from storage_samples import ENVIRONMENT, PYTHON, TEXTS, YAML, assert_same, log, 
 
 from podusv_cli.core.signal import Signal
 from podusv_cli.storage import log_reader
-from podusv_cli.storage.log import Layout
+from podusv_cli.storage.log import LogLayout
 
 DIMENSIONS = {
     "time": ("time",), "x": ("time",), "tau_u_cmd": ("time",), "z_e": ("time",),
@@ -210,7 +210,7 @@ def test_signals_of_others_bring_their_description(tmp_path: Path) -> None:
 
 
 def test_a_layout_is_a_file_whose_empty_parts_take_no_room(tmp_path: Path) -> None:
-    layout, plain = Layout(), io.BytesIO()
+    layout, plain = LogLayout(), io.BytesIO()
     random = np.random.default_rng(3)
     for _ in range(200):
         place, content = int(random.integers(40_000)), random.bytes(int(random.integers(1, 9000)))

@@ -37,7 +37,7 @@ def rerun(
     from podusv_cli.cli.progress import progress_bars
     from podusv_cli.workflows import rerun as repeating  # heavy imports only when they are needed
 
-    request = repeating.Request(out, force, tuple(sys.argv), allow_large)
+    request = repeating.RerunRequest(out, force, tuple(sys.argv), allow_large)
     with progress_bars(wanted=not as_json) as progress:
         done = repeating.rerun(Path(run), request, progress)
     if as_json:

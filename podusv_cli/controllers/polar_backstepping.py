@@ -27,7 +27,7 @@ from podusv_cli.controllers.tracking import (
     TrackingController,
     track,
 )
-from podusv_cli.controllers.velocity_loop import Axis, Bound, Loop
+from podusv_cli.controllers.velocity_loop import AdaptedBound, Axis, Loop
 from podusv_cli.core.component import value
 from podusv_cli.core.derived import difference
 from podusv_cli.core.kernel import Vector, bundle, kernel, tail
@@ -213,7 +213,7 @@ class PolarBackstepping(TrackingController):
         power = float((activation(self.network, nu[None]) ** 2).sum())
         surge, yaw = axes
         bounds = (
-            Bound(
+            AdaptedBound(
                 "u_e",
                 "gamma_u",
                 self.gamma_u,
@@ -222,7 +222,7 @@ class PolarBackstepping(TrackingController):
                 self.partial,
                 surge.inertia,
             ),
-            Bound(
+            AdaptedBound(
                 "r_e",
                 "gamma_r",
                 self.gamma_r,

@@ -31,7 +31,7 @@ class Axis:
 
 
 @dataclass(frozen=True)
-class Bound:
+class AdaptedBound:
     """The adaptation (28) of a bound: gains, b_hat at the start, the true inertia.
 
     `error` names the signal that it learns from, `key` the gain that makes it fast.
@@ -60,7 +60,7 @@ class Loop:
     memory: Vector  # F, shape (n, 1 + n)
     cause: Cause = "loop"
     name: str = "velocity loop"
-    bound: Bound | None = None
+    bound: AdaptedBound | None = None
 
     @property
     def matrix(self) -> Vector:

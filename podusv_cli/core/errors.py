@@ -20,7 +20,7 @@ class PodusvError(Exception):
 
 
 @dataclass(frozen=True)
-class Finding:
+class ScenarioFault:
     """One fault of a scenario: where it stands, which key, what is wrong, what would be right."""
 
     where: str  # "configs/a.yaml:12:5", "--set vessel.m=0", or a data file
@@ -37,7 +37,7 @@ class ScenarioError(PodusvError):
 
     exit_code = 2
 
-    def __init__(self, findings: list[Finding]) -> None:
+    def __init__(self, findings: list[ScenarioFault]) -> None:
         """Take the findings; the message has one line each."""
         self.findings = findings
         super().__init__("\n".join(self.lines()))

@@ -39,7 +39,7 @@ class Batch:
     state: Vector  # (N, 6), the vessel's state where the march ended
     seen: Vector  # (N, observer.size)
 
-    def note(self, run: Run, ending: Ending) -> None:
+    def note(self, run: BatchRun, ending: Ending) -> None:
         """Enter how a run ended."""
         i, wires = run.position, run.wires
         self.reached[i], self.status[i], _ = ending
@@ -47,7 +47,7 @@ class Batch:
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class BatchRun:
     """One run of a batch."""
 
     position: int
@@ -78,10 +78,10 @@ def simulate_many(
         return batch
     advance, last, bell = marcher(loops[0], observer, True), grid.steps + 1, Bell()
 
-    def run(i: int) -> Run:
+    def run(i: int) -> BatchRun:
         wires = _apart(wire(loops[i], plan, observer))
         function = partial(advance, 0, last, grid.step, wires, plan)
-        return Run(i, wires, Work(function, wires.under_way, bell))
+        return BatchRun(i, wires, Work(function, wires.under_way, bell))
 
     def tell(done: int) -> None:
         if progress:
@@ -93,10 +93,10 @@ def simulate_many(
 
 
 def _march_all(
-    runs: Iterator[Run], last: int, workers: int, batch: Batch, progress: Callable[[int], None]
+    runs: Iterator[BatchRun], last: int, workers: int, batch: Batch, progress: Callable[[int], None]
 ) -> None:
     """March over all runs; an interrupt or an error stops those that are under way."""
-    busy: list[Run] = []
+    busy: list[BatchRun] = []
     done = 0
     try:
         while True:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from podusv_cli.controllers.velocity_loop import Axis, Bound, Cause, Loop
+from podusv_cli.controllers.velocity_loop import AdaptedBound, Axis, Cause, Loop
 from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.vessels.plant import surge_force, yaw_moment
@@ -70,7 +70,7 @@ def loops(scenario: Scenario, nu: Vector, cause: Cause | None = None) -> list[Lo
     return [loop for loop in found if cause in (None, loop.cause)]
 
 
-def bursts(loop: Loop, bound: Bound, error: float, step: float) -> bool:
+def bursts(loop: Loop, bound: AdaptedBound, error: float, step: float) -> bool:
     """Whether a velocity error grows under RK4 although the bound's adaptation should reduce it.
 
     Integrates the loop with e' = ... - b_hat phi(e)/m and (28) from e(0) = error.

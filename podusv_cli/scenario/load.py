@@ -9,7 +9,7 @@ from typing import Any
 
 import yaml
 
-from podusv_cli.core.errors import Finding, ScenarioError, StorageError
+from podusv_cli.core.errors import ScenarioError, ScenarioFault, StorageError
 from podusv_cli.scenario.layers import composed
 from podusv_cli.scenario.messages import Check, check
 from podusv_cli.scenario.model import Scenario
@@ -93,13 +93,13 @@ def load_resolved(text: str, source: str, checks: Sequence[Check] = ()) -> Scena
     return _checked(replace(root, mark=Mark(source)), text, source, faults, checks).scenario
 
 
-def _findings(faults: list[Fault], first: str) -> list[Finding]:
+def _findings(faults: list[Fault], first: str) -> list[ScenarioFault]:
     """Findings file by file, the file called `first` ahead, in the order of lines."""
     sources = list(dict.fromkeys([first, *(fault.mark.source for fault in faults)]))
     ordered = sorted(
         faults, key=lambda f: (sources.index(f.mark.source), f.mark.line, f.mark.column)
     )
-    return [Finding(str(fault.mark), printable(fault.key), fault.text) for fault in ordered]
+    return [ScenarioFault(str(fault.mark), printable(fault.key), fault.text) for fault in ordered]
 
 
 def values(scenario: Scenario) -> dict[str, Any]:

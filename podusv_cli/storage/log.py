@@ -54,7 +54,7 @@ def write(path: Path, recording: Recording, texts: Texts, *, compress: bool = Fa
 
     A compressed log is made in memory. Raises StorageError; a part of the file may then exist.
     """
-    layout = Layout()
+    layout = LogLayout()
     with h5py.File(layout, "w", **_FILE, **_UNDATED) as file:
         places = _fill(file, recording, texts, compress)
     with new_file(path, layout.size) as out:
@@ -64,7 +64,7 @@ def write(path: Path, recording: Recording, texts: Texts, *, compress: bool = Fa
                 _write_rows(out, place, array, rows)
 
 
-class Layout(io.RawIOBase):
+class LogLayout(io.RawIOBase):
     """A sparse file in memory: pages never written take no room and read as zeros."""
 
     PAGE = 2**12

@@ -18,7 +18,7 @@ NAME = "manifest.json"
 FORMAT = 2  # of run folder and log, as written; all formats from 1 on are read
 
 
-class Entry(BaseModel):
+class FileEntry(BaseModel):
     """A file as it was when the folder was finished."""
 
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid")
@@ -34,7 +34,7 @@ class Manifest(BaseModel):
 
     podusv_format: int
     status: Status
-    files: dict[str, Entry]
+    files: dict[str, FileEntry]
 
 
 def write(folder: Path, status: Status) -> Manifest:
@@ -102,9 +102,9 @@ def foreign(folder: Path, manifest: Manifest) -> list[str]:
     return sorted(set(_names(folder)) - set(manifest.files) - {NAME})
 
 
-def _entry(path: Path) -> Entry:
+def _entry(path: Path) -> FileEntry:
     digest, size = fingerprint(path)
-    return Entry(sha256=digest, bytes=size)
+    return FileEntry(sha256=digest, bytes=size)
 
 
 def _names(folder: Path, above: str = "") -> Iterator[str]:

@@ -24,7 +24,7 @@ SINGULAR = 1e-12  # relative; least regularisation, for weights that no visited 
 
 
 @dataclass(frozen=True)
-class Ideal:
+class IdealWeights:
     """Weights W*, shape (nodes,), surge [m/s2] and yaw [rad/s2]."""
 
     W_u: Vector
@@ -73,7 +73,9 @@ def network_output(phi: Vector, weights: Vector) -> Vector:
     return np.asarray(np.einsum("ij,j->i", phi, weights))
 
 
-def ideal_weights(loop: ClosedLoop, law: PolarBackstepping, log: Recording, now: Replayed) -> Ideal:
+def ideal_weights(
+    loop: ClosedLoop, law: PolarBackstepping, log: Recording, now: Replayed
+) -> IdealWeights:
     """The fit described above; f_u and f_r are scaled by true over nominal inertia."""
     f_u, f_r = unloaded_accelerations(loop, now)
     usable = (np.abs(f_u) < 1e100) & (np.abs(f_r) < 1e100)  # not those of a diverging run
@@ -88,7 +90,7 @@ def ideal_weights(loop: ClosedLoop, law: PolarBackstepping, log: Recording, now:
             nominal * nominal
         )  # a float would raise on overflow
         weights.append(start + inverse(aim, float(damping)))
-    return Ideal(*weights)
+    return IdealWeights(*weights)
 
 
 def _gram(phi: Vector) -> Callable[[Vector, float], Vector]:

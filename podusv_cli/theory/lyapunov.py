@@ -13,7 +13,7 @@ from podusv_cli.core.signal import Signal
 from podusv_cli.engine.replay import Replayed
 from podusv_cli.engine.simulate import ClosedLoop
 from podusv_cli.theory.bounds import Pair
-from podusv_cli.theory.ideal_weights import Ideal
+from podusv_cli.theory.ideal_weights import IdealWeights
 from podusv_cli.theory.rates import Errors
 
 V = Signal("V", "1", "Lyapunov function (46), the sum of its ten terms")
@@ -46,7 +46,7 @@ class Estimates:
     b_r_rate: Vector
 
 
-def estimates(log: Recording, now: Replayed, ideal: Ideal, b: Pair) -> Estimates:
+def estimates(log: Recording, now: Replayed, ideal: IdealWeights, b: Pair) -> Estimates:
     """Errors of the estimated weights and bounds against the ideal weights and true bounds."""
     b_u, b_r = log["b_hat_u"] - b.u, log["b_hat_r"] - b.r
     W_u, W_r = log["W_hat_u"] - ideal.W_u, log["W_hat_r"] - ideal.W_r

@@ -17,7 +17,7 @@ from podusv_cli.engine.replay import Replayed, rates_replay
 from podusv_cli.engine.simulate import ClosedLoop
 from podusv_cli.theory.bounds import Bound, Observed, Pair, UltimateBound, ultimate_bound
 from podusv_cli.theory.ideal_weights import (
-    Ideal,
+    IdealWeights,
     exponents,
     ideal_weights,
     network_output,
@@ -183,7 +183,7 @@ def _largest(values: Vector) -> float:
 
 def _traces(
     loop: ClosedLoop, law: PolarBackstepping, log: Recording, now: Replayed,
-    unknown: tuple[Ideal, Pair],
+    unknown: tuple[IdealWeights, Pair],
 ) -> Traces:  # fmt: skip
     ideal, b = unknown
     e = error_rates(log, now, law)
@@ -223,7 +223,7 @@ class _Observer:
     law: PolarBackstepping
     log: Recording
     traces: Traces
-    ideal: Ideal
+    ideal: IdealWeights
     b: Pair
     continuous: bool
 
@@ -263,7 +263,7 @@ def _kept(bound: Bound, V: Vector, rate: Vector) -> float:
     return sum(int(np.count_nonzero(part)) for part in keeps) / len(V)
 
 
-def _fixed(windows: dict[str, Window], ideal: Ideal) -> dict[str, Vector]:
+def _fixed(windows: dict[str, Window], ideal: IdealWeights) -> dict[str, Vector]:
     """The arrays of the monitor that are constant in time."""
     parts = windows.values()
     numbers = {

@@ -27,7 +27,7 @@ Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)
-class Request:
+class RerunRequest:
     """Where repeated runs go (None: nowhere), whether they may replace what is there, be large."""
 
     out: Path | None = None
@@ -88,7 +88,7 @@ class Repetition:
         return any(run.status == "diverged" and run.was != "diverged" for run in runs)
 
 
-def rerun(path: Path, request: Request, progress: Progress | None = None) -> Repetition:
+def rerun(path: Path, request: RerunRequest, progress: Progress | None = None) -> Repetition:
     """Make a run, or every run of a comparison, once more from what its folder holds.
 
     Raises UsageError where `path` is no run folder or a run was interrupted, ScenarioError where
@@ -110,7 +110,7 @@ def _parts(path: Path, checks: Sequence[Check] = ()) -> list[Member]:
     return from_folder(path, checks)
 
 
-def _one(member: Member, request: Request, progress: Progress | None) -> Repetition:
+def _one(member: Member, request: RerunRequest, progress: Progress | None) -> Repetition:
     label = member.label or str(member.run and member.run.folder)
     advance = partial(progress, label) if progress else None
     with _passing(request) as place:
@@ -118,7 +118,9 @@ def _one(member: Member, request: Request, progress: Progress | None) -> Repetit
         return Repetition({label: _repeat(member, target, request, advance)}, {})
 
 
-def _several(members: Sequence[Member], request: Request, progress: Progress | None) -> Repetition:
+def _several(
+    members: Sequence[Member], request: RerunRequest, progress: Progress | None
+) -> Repetition:
     started = datetime.now(UTC)
 
     def tell(position: int, fraction: float) -> None:
@@ -149,7 +151,7 @@ def _repetition(members: Sequence[Member], outcomes: Sequence[Outcome]) -> Repet
 
 
 @contextmanager
-def _passing(request: Request) -> Iterator[Path]:
+def _passing(request: RerunRequest) -> Iterator[Path]:
     """A folder that is gone afterwards, for runs that are not to be kept."""
     if request.out is not None:
         yield request.out.parent
@@ -164,7 +166,10 @@ def _passing(request: Request) -> Iterator[Path]:
 
 
 def _repeat(
-    member: Member, target: Path, request: Request, progress: Callable[[float], None] | None = None
+    member: Member,
+    target: Path,
+    request: RerunRequest,
+    progress: Callable[[float], None] | None = None,
 ) -> Repeated:
     """Run the scenario into `target` and hold it against the original."""
     original = member.run
