@@ -23,14 +23,24 @@ from podusv_cli.cli.exit_codes import (
 
 # NAME is the function NAME of cli/NAME.py
 COMMANDS = (
-    "run", "compare", "rerun", "diff", "plot", "validate", "verify", "explain", "list", "schema",
+    "init", "run", "compare", "rerun", "diff", "plot", "validate", "verify", "explain", "list",
+    "schema",
 )  # fmt: skip
 
+FIRST_STEPS = """\
+podusv simulates and compares controllers for pod-propelled surface vessels. First steps:
+
+  podusv init                              list the scenarios that come with podusv
+  podusv init paper/corrected              copy one here, to edit
+  podusv run corrected.yaml                simulate it: log, metrics and figures in results/
+  podusv compare podusv:pod/kept.yaml      simulate and compare four laws: table and report
+  podusv explain controller                what the keys of a scenario mean
+  podusv --help                            all commands"""
 OBJECTS_BETWEEN_COLLECTIONS = 100_000
 
 app = typer.Typer(
     name="podusv",
-    no_args_is_help=True,
+    invoke_without_command=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
@@ -46,6 +56,7 @@ def _show_version(wanted: bool) -> None:
 
 @app.callback()
 def options(
+    context: typer.Context,
     version: Annotated[
         bool,
         typer.Option(
@@ -54,6 +65,8 @@ def options(
     ] = False,
 ) -> None:
     """Experiments with controllers for pod-propelled surface vessels."""
+    if context.invoked_subcommand is None:
+        typer.echo(FIRST_STEPS)
 
 
 def main() -> None:

@@ -106,7 +106,7 @@ def _report(done: Compared, verbose: bool) -> None:
 
 def _advice(items: Sequence[str], assign: Sequence[str]) -> str:
     """How to find out whether the numbers have converged."""
-    scenario = next((item for item in items if Path(item).is_file()), "SCENARIO")
+    scenario = next((item for item in items if not Path(item).is_dir()), "SCENARIO")
     changes = [word for change in assign for word in ("--set", change)]
     command = shlex.join(["podusv", "verify", scenario, *changes])
     return f"the numbers may not have converged; check them: {command}"

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from podusv_cli.cli.completion import names
 from podusv_cli.cli.terminal import echo_entry
 
 if TYPE_CHECKING:
@@ -21,6 +22,7 @@ def explain(
             help="A section (controller), a kind (controller.pid), a key (controller.k_ze or k_ze) "
             "a signal (z_e), a metric (iae), a preset (otter) or a finding (near-target).",
             show_default=False,
+            autocompletion=names,
         ),
     ] = None,
 ) -> None:

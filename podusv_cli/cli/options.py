@@ -7,10 +7,19 @@ from typing import Annotated
 
 import typer
 
-Config = Annotated[str, typer.Argument(metavar="CONFIG", help="The scenario, a YAML file.")]
+from podusv_cli.cli import completion
+
+Config = Annotated[
+    str, typer.Argument(metavar="CONFIG", help="The scenario, a YAML file or podusv:NAME.yaml.")
+]
 Assignments = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Replace a value of the scenario; repeatable."),
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Replace a value of the scenario; repeatable.",
+        autocompletion=completion.keys,
+    ),
 ]
 Out = Annotated[
     Path | None,

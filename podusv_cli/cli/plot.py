@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from podusv_cli.cli.completion import figures
 from podusv_cli.cli.terminal import echo, echo_path, warn_of_differences
 
 if TYPE_CHECKING:
@@ -18,7 +19,8 @@ SOME_FAILED = 3
 def plot(
     runs: Annotated[list[str], typer.Argument(metavar="RUN...", help="Finished run folders.")],
     figure: Annotated[
-        list[str] | None, typer.Option(help="What to draw; repeatable, all by default.")
+        list[str] | None,
+        typer.Option(help="What to draw; repeatable, all by default.", autocompletion=figures),
     ] = None,
     form: Annotated[
         str, typer.Option("--format", help="png, pdf, svg; several with commas.")

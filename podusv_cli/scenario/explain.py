@@ -11,11 +11,12 @@ from podusv_cli.core import registry
 from podusv_cli.core.component import Component
 from podusv_cli.core.errors import PodusvError
 from podusv_cli.core.signal import Signal
-from podusv_cli.scenario.keys import MISSING, NUMBER, SCENARIO, Key, either
+from podusv_cli.scenario.keys import MISSING, NAME, NUMBER, SCENARIO, Key, either
 from podusv_cli.scenario.phrases import as_yaml, did_you_mean
 from podusv_cli.scenario.presets import preset_names, preset_text, with_presets
 from podusv_cli.scenario.yaml_tree import dotted, route
 
+BOOLEANS = {"true or false": ("true", "false")}
 # What a file may leave out although the model has no default for it, and where it comes from.
 FILLED_IN = {("name",): "the file's name", ("nominal",): "the vessel"}
 FROM_PRESET = {"vessel": "the preset's", "nominal": "the vessel's"}
@@ -46,7 +47,10 @@ class Row:
 
 
 EXTENDS = Row(
-    "extends", "scenario that this one changes, a file name relative to it, or a list", "text"
+    "extends",
+    "scenario that this one changes: a file name relative to it, podusv:NAME.yaml for one "
+    "that comes with podusv (`podusv init` lists them), or a list of these",
+    "text",
 )
 
 
@@ -66,7 +70,7 @@ def explain(name: str | None = None, others: Iterable[str] = ()) -> list[Row]:
     named = [key for key in SCENARIO.all() if key.name == name]
     found = _with_contents(keys) or [*_signals(name), *_with_contents(named), *_presets(name)]
     if not found:
-        raise UnknownKeyError(f"{name}: no such name{did_you_mean(name, [*_names(), *others])}")
+        raise UnknownKeyError(f"{name}: no such name{did_you_mean(name, [*names(), *others])}")
     return found
 
 
@@ -90,11 +94,22 @@ def first_sentence(text: str) -> str:
     return paragraph.partition(". ")[0].removesuffix(".") + "."
 
 
-def _names() -> list[str]:
+def names() -> list[str]:
     """Every name that can be explained."""
     places = [place for key in SCENARIO.all() for place in (key.path, key.route, key.route[-1:])]
     presets = [name for _, given in with_presets().values() for name in preset_names(given)]
     return [*map(dotted, places), *(signal.name for signal in signals()), *presets]
+
+
+def assignments() -> dict[str, str]:
+    """What `--set` takes, and the key's meaning: `control.period=`, `path.kind=line`, ..."""
+    keys = [key for key in SCENARIO.all() if key.field and not key.keys]
+    own = [key for key in keys if {NAME, NUMBER}.isdisjoint(key.path)]
+    return {
+        f"{dotted(key.path)}={word}": _meaning(key)
+        for key in own
+        for word in _choices(key) or BOOLEANS.get(key.type_in_words, ("",))
+    }
 
 
 def _with_contents(keys: list[Key]) -> list[Row]:

@@ -9,6 +9,7 @@ from dataclasses import replace
 from functools import reduce
 
 from podusv_cli.scenario.phrases import found
+from podusv_cli.scenario.shipped import relative_to
 from podusv_cli.scenario.yaml_text import (
     MAX_CHARACTERS,
     MAX_DEPTH,
@@ -58,7 +59,7 @@ def _bases(
 ) -> Iterator[Node | None]:
     """The trees of all extended files, nearest first; None for one that cannot be read."""
     waiting: list[tuple[Node, tuple[str, ...]]] = [
-        (name, (source,)) for name in _extended_files(node)
+        (name, (source,)) for name in extended_files(node)
     ]
     while waiting:
         name, sources = waiting.pop()
@@ -72,7 +73,7 @@ def _bases(
         yield tree and _without_extends(tree)
         if base and tree:
             totals += _size_of(base[1], tree)
-            waiting += [(further, (*sources, base[0])) for further in _extended_files(tree)]
+            waiting += [(further, (*sources, base[0])) for further in extended_files(tree)]
 
 
 def _without_extends(node: Node) -> Node:
@@ -80,7 +81,7 @@ def _without_extends(node: Node) -> Node:
     return replace(node, content={k: e for k, e in node.mapping.items() if k != "extends"})
 
 
-def _extended_files(node: Node) -> tuple[Node, ...]:
+def extended_files(node: Node) -> tuple[Node, ...]:
     """The file names in `extends`."""
     above = node.mapping.get("extends")
     if above is None:
@@ -120,7 +121,7 @@ def _read_base(
             what = found(above.content, above.text)
             faults.append(Fault(above.mark, "extends", f"must be a file name, found {what}"))
         return None
-    path = os.path.join(os.path.dirname(sources[-1]), above.content)
+    path = relative_to(sources[-1], above.content)
     text = read_text(path, above.mark, "extends", faults)
     if text is not None and os.path.realpath(path) in [
         os.path.realpath(source) for source in sources

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Iterator
 from dataclasses import replace
@@ -14,6 +13,7 @@ from podusv_cli.core.component import Component, Presets
 from podusv_cli.scenario.keys import SCENARIO
 from podusv_cli.scenario.model import NAME, NAME_IN_WORDS
 from podusv_cli.scenario.phrases import found, quoted, unknown
+from podusv_cli.scenario.shipped import relative_to
 from podusv_cli.scenario.yaml_text import MAX_NODES, read, read_text, resolve
 from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, dotted, merge, overlay
 from podusv_cli.vessels.vessel import COEFFICIENTS, VESSELS, Vessel
@@ -188,7 +188,7 @@ def _rows_in(given: Node, section: str, keys: tuple[str, str], faults: list[Faul
         text = f"give either {key} or {rows_key}, not both"
         faults.append(Fault(file.mark, f"{section}.{key}", text))
         return given
-    name = os.path.join(os.path.dirname(file.mark.source) if file.mark.line else "", file.content)
+    name = relative_to(file.mark.source if file.mark.line else "", file.content)
     before = len(faults)
     text = read_text(name, file.mark, f"{section}.{key}", faults) or ""
     rows = Node(tuple(_rows(text, name, faults)), Mark(name), faulty=len(faults) > before)

@@ -12,6 +12,7 @@ from podusv_cli.scenario.keys import SCENARIO
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.presets import preset_names, with_presets
 
+TITLE = "podusv scenario"
 DIALECT = "http://json-schema.org/draft-07/schema#"
 # Words of newer dialects, of OpenAPI, and what a file that extends another one may leave out.
 DROPPED = ("title", "discriminator", "required", "unit", "$defs")
@@ -36,9 +37,7 @@ def json_schema(codes: Sequence[str]) -> dict[str, Any]:
     names = {"type": "array", "items": {"type": "string"}}
     extends = {"anyOf": [{"type": "string"}, names], "description": EXTENDS.meaning}
     scenario["properties"] = {"extends": extends} | scenario["properties"]
-    return (
-        {"$schema": DIALECT, "title": "podusv scenario"} | scenario | {"definitions": definitions}
-    )
+    return {"$schema": DIALECT, "title": TITLE} | scenario | {"definitions": definitions}
 
 
 def schema_text(codes: Sequence[str]) -> str:

@@ -19,6 +19,7 @@ from typing import Any
 import yaml
 
 from podusv_cli.scenario.phrases import found, quoted
+from podusv_cli.scenario.shipped import file_of
 from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, Route, dotted
 
 MAX_BYTES = MAX_CHARACTERS = 1_000_000
@@ -58,7 +59,7 @@ def read_text(path: str, mark: Mark, key: str, faults: list[Fault]) -> str | Non
     """The file's text, or None and a fault at `mark` or at the byte that is no UTF-8."""
     named = "" if mark == Mark(path) else f"{quoted(path)} "
     try:
-        with open(path, "rb", opener=_nonblocking_opener) as file:
+        with open(file_of(path), "rb", opener=_nonblocking_opener) as file:
             if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
                 raise ValueError("a pipe or device; save it as a file first")
             data = file.read(MAX_BYTES + 1)

@@ -1,0 +1,51 @@
+"""The scenarios that come with podusv, by name: `podusv:paper/corrected.yaml`."""
+
+from __future__ import annotations
+
+import os
+from functools import cache
+from importlib.resources import as_file, files
+from pathlib import Path
+
+from podusv_cli.scenario.phrases import did_you_mean
+
+PREFIX = "podusv:"
+FOLDER = "configs"  # a link to the checkout's folder; in an installed package the files themselves
+
+
+@cache
+def folder() -> Path:
+    """Where the shipped scenarios are on this machine."""
+    with as_file(files("podusv_cli") / FOLDER) as path:
+        return path
+
+
+@cache
+def names() -> tuple[str, ...]:
+    """Every shipped file as a scenario names it, sorted: `podusv:paper/base.yaml`."""
+    paths = folder().rglob("*.yaml")
+    return tuple(sorted(PREFIX + path.relative_to(folder()).as_posix() for path in paths))
+
+
+def file_of(name: str) -> str:
+    """The file that a name in a scenario or on the command line stands for.
+
+    Any name but that of a shipped scenario is a file's own. Raises ValueError for a name that
+    starts like a shipped one and is none.
+    """
+    if not name.startswith(PREFIX):
+        return name
+    if name not in names():
+        hint = did_you_mean(name, names())
+        raise ValueError(f"podusv has no scenario of this name{hint} (`podusv init` lists them)")
+    return str(folder() / name.removeprefix(PREFIX))
+
+
+def relative_to(source: str, name: str) -> str:
+    """The file that `source`, a file or a shipped scenario, calls `name`."""
+    if name.startswith(PREFIX):
+        return name
+    if not source.startswith(PREFIX):
+        return os.path.join(os.path.dirname(source), name)
+    beside = os.path.join(os.path.dirname(source.removeprefix(PREFIX)), name)
+    return PREFIX + os.path.normpath(beside)

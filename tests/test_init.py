@@ -1,0 +1,214 @@
+"""Starting from nothing: the shipped scenarios by name, `podusv init`, the wheel."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy
+import pytest
+from command_samples import ROOT, Command, commanded, write
+
+from podusv_cli.cli import FIRST_STEPS
+from podusv_cli.findings.finding import finding_kinds
+from podusv_cli.scenario import shipped
+from podusv_cli.scenario.load import load, values
+from podusv_cli.scenario.schema import schema_text
+from podusv_cli.workflows.init import SCHEMA, starting_points
+
+CONFIGS = ROOT / "configs"
+
+
+@pytest.fixture
+def podusv(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Command:
+    """The command line in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+    return commanded(monkeypatch, capsys)
+
+
+# --- scenarios by name
+
+
+def test_every_file_in_configs_has_a_name() -> None:
+    paths = {f"podusv:{path.relative_to(CONFIGS).as_posix()}" for path in CONFIGS.rglob("*.yaml")}
+    assert set(shipped.names()) == paths
+    assert len(paths) > 20
+
+
+def test_a_scenario_extends_a_shipped_one_from_anywhere(podusv: Command) -> None:
+    write("a.yaml", "extends: podusv:pod/kept.yaml\nname: kept\n")
+    here, there = load("a.yaml"), load(CONFIGS / "pod/kept.yaml")
+    assert here.scenario == there.scenario
+    assert here.origins["controller.k_ze"].startswith("podusv:paper/base.yaml:")
+    assert podusv("validate", "podusv:paper/corrected.yaml").out.startswith(
+        "podusv:paper/corrected.yaml: ok (corrected, adaptive_neural, "
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "hint"),
+    [
+        ("podusv:paper/corected.yaml", "; did you mean 'podusv:paper/corrected.yaml'?"),
+        ("podusv:../pyproject.toml", "; did you mean 'podusv:paper/corrected.yaml'?"),
+        ("podusv:/etc/passwd", ""),
+        ("podusv:", ""),
+    ],
+)
+def test_a_name_that_podusv_does_not_have_is_a_line(podusv: Command, name: str, hint: str) -> None:
+    wrong = f"podusv has no scenario of this name{hint} (`podusv init` lists them)"
+    assert podusv("validate", name) == (2, "", f"{name}: cannot be read: {wrong}\n")
+    write("a.yaml", f'extends: "{name}"\n')
+    place = f"a.yaml:1:10: extends: '{name}'"
+    assert podusv("validate", "a.yaml") == (2, "", f"{place} cannot be read: {wrong}\n")
+
+
+def test_shipped_files_name_each_other_relative_to_themselves() -> None:
+    assert shipped.relative_to("podusv:pod/kept.yaml", "../paper/x.yaml") == "podusv:paper/x.yaml"
+    assert shipped.relative_to("podusv:own.yaml", "x.yaml") == "podusv:x.yaml"
+    assert shipped.relative_to("podusv:own.yaml", "podusv:b/x.yaml") == "podusv:b/x.yaml"
+    assert shipped.relative_to("mine/own.yaml", "x.yaml") == "mine/x.yaml"
+    assert shipped.relative_to("mine/own.yaml", "/x.yaml") == "/x.yaml"
+
+
+def test_the_advice_of_a_comparison_names_a_shipped_scenario(podusv: Command) -> None:
+    said = podusv(
+        "compare", "podusv:theory/sign.yaml", "--no-figures", "--set", "simulation.duration=1",
+        "--out", "x",
+    )  # fmt: skip
+    assert said.code == 0
+    assert "podusv verify podusv:theory/sign.yaml --set simulation.duration=1" in said.err
+
+
+# --- init
+
+
+def test_bare_podusv_says_what_to_do_first_in_about_eight_lines(podusv: Command) -> None:
+    said = podusv()
+    assert said == (0, f"{FIRST_STEPS}\n", "")
+    assert len(said.out.splitlines()) <= 9
+
+
+def test_init_lists_every_scenario_that_is_meant_to_be_run(podusv: Command) -> None:
+    points = starting_points()
+    others = {name[7:-5] for name in shipped.names()} - set(points)
+    assert others == {"paper/base", "paper/claims", "paper/ablation_laws", "theory/base"}
+    out = " ".join(podusv("init").out.split())
+    assert out == " ".join(
+        [*(f"{name} {text}" for name, text in points.items()), "copy one to edit: podusv init NAME"]
+    )
+
+
+@pytest.mark.parametrize("name", starting_points())
+def test_a_copy_anywhere_is_the_same_scenario(podusv: Command, name: str) -> None:
+    said = podusv("init", name, "--out", f"deep/er/{name}.yaml")
+    assert said.code == 0, said.err
+    copy = Path("deep/er") / f"{name}.yaml"
+    assert load(copy).scenario == load(CONFIGS / f"{name}.yaml").scenario
+    text = copy.read_text()
+    assert text.count("\n") == (CONFIGS / f"{name}.yaml").read_text().count("\n")
+    (schema,) = re.findall(r"^# yaml-language-server: \$schema=(.*)$", text, re.MULTILINE)
+    assert (copy.parent / schema).read_text() == schema_text(tuple(finding_kinds()))
+    command = "compare" if load(copy).scenario.controllers else "run"
+    assert said.out.splitlines()[-1] == f"next: podusv {command} {copy}"
+
+
+def test_init_replaces_nothing(podusv: Command) -> None:
+    assert podusv("init", "paper/corrected").code == 0
+    write("corrected.yaml", "mine")
+    said = podusv("init", "podusv:paper/corrected.yaml")
+    assert said == (5, "", "corrected.yaml exists; name another file with --out\n")
+    assert Path("corrected.yaml").read_text() == "mine"
+    assert podusv("init", "paper/printed").code == 0  # beside the schema that is there
+    write(SCHEMA, "{}")
+    said = podusv("init", "paper/figures")
+    assert said == (5, "", f"{SCHEMA} exists and is no schema of podusv; move it, or use --out\n")
+    assert not Path("figures.yaml").exists()
+
+
+def test_an_unknown_starting_point_is_a_line_with_those_that_there_are(podusv: Command) -> None:
+    said = podusv("init", "paper/corected")
+    assert said.code == 2
+    assert said.err.startswith(
+        "unknown starting point 'paper/corected'; did you mean 'paper/corrected'? (allowed: own_ve"
+    )
+    assert said.err.count("\n") == 1
+    assert not list(Path().iterdir())
+
+
+def test_the_copy_is_edited_and_resolved_like_any_scenario(podusv: Command) -> None:
+    podusv("init", "paper/corrected")
+    text = Path("corrected.yaml").read_text()
+    write("corrected.yaml", text.replace("surge_limit: 8.0", "surge_limit: 9.0"))
+    changed, base = (
+        values(load("corrected.yaml").scenario),
+        values(load("podusv:paper/corrected.yaml").scenario),
+    )
+    assert {key for key in base if changed[key] != base[key]} == {"actuator.surge_limit"}
+
+
+# --- the wheel
+
+
+def _built(folder: Path) -> Path:
+    """The wheel of this checkout; made from a copy, so that the checkout stays as it is."""
+    copy = folder / "checkout"
+    copy.mkdir()
+    for name in ("pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy(ROOT / name, copy)
+    for name in ("podusv_cli", "configs"):
+        unwanted = shutil.ignore_patterns("__pycache__")
+        shutil.copytree(ROOT / name, copy / name, symlinks=True, ignore=unwanted)
+    _pip("wheel", "--no-build-isolation", "--no-deps", "--wheel-dir", folder, copy)
+    (wheel,) = folder.glob("*.whl")
+    return wheel
+
+
+def _pip(*words: object) -> None:
+    command = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet", *words]
+    subprocess.run([str(word) for word in command], check=True, capture_output=True, timeout=120)
+
+
+def _installed(wheel: Path, folder: Path) -> Path:
+    """An environment with nothing but the wheel, and what it needs as it is here; its `bin`."""
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", folder], check=True)
+    python = folder / "bin/python"
+    _pip("--python", python, "install", "--no-deps", "--no-index", wheel)
+    (site,) = folder.glob("lib/python*/site-packages")
+    (site / "needed.pth").write_text(f"{Path(numpy.__file__).parents[1]}\n")
+    return folder / "bin"
+
+
+@pytest.mark.slow  # builds a wheel, and an environment compiles anew
+def test_the_wheel_alone_starts_from_an_empty_folder(tmp_path: Path) -> None:
+    pytest.importorskip("setuptools", "77", "building a wheel needs setuptools 77 or newer")
+    bin_folder = _installed(_built(tmp_path), tmp_path / "venv")
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    environment = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
+
+    def said(words: str) -> str:
+        return subprocess.run(
+            [bin_folder / words.split()[0], *shlex.split(words)[1:]], cwd=empty, env=environment,
+            capture_output=True, text=True, check=True, timeout=120,
+        ).stdout  # fmt: skip
+
+    where = said("python -c 'import podusv_cli; print(podusv_cli.__file__)'")
+    assert Path(where).is_relative_to(tmp_path / "venv")
+    shipped_there = said(
+        "python -c 'from podusv_cli.scenario import shipped; print(*shipped.names())'"
+    )
+    assert shipped_there.split() == list(shipped.names())
+    assert said("podusv") == f"{FIRST_STEPS}\n"
+    assert "\npaper/corrected\n" in said("podusv init")
+    assert said("podusv init paper/corrected").endswith("next: podusv run corrected.yaml\n")
+    short = "--set simulation.duration=2"
+    assert "adaptive_neural finished: " in said(f"podusv run corrected.yaml {short}")
+    assert "report: " in said(f"podusv compare podusv:pod/kept.yaml {short}")
+    assert len(list(empty.glob("results/*/*/report.html"))) == 1
