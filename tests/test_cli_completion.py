@@ -38,6 +38,14 @@ def test_completion_is_installed_once_for_the_shell_that_asks(tmp_path: Path) ->
     assert "complete -o default" in script.read_text()
 
 
+def offered_for(typed: str, home: Path, script: str) -> list[str]:
+    """The lines that a shell gets from a script for what is typed."""
+    count = str(typed.count(" "))
+    asked = {"_PODUSV_COMPLETE": "complete_bash", "COMP_WORDS": typed, "COMP_CWORD": count}
+    script = script.replace("import sys", "import sys\nsys.argv = ['podusv']", 1)
+    return said(sys.executable, "-c", script, home=home, **asked).splitlines()
+
+
 @pytest.mark.parametrize(
     ("typed", "offered"),
     [
@@ -50,10 +58,28 @@ def test_completion_is_installed_once_for_the_shell_that_asks(tmp_path: Path) ->
 def test_commands_and_options_are_offered_and_nothing_heavy_is_imported(
     tmp_path: Path, typed: str, offered: set[str]
 ) -> None:
-    count = str(typed.count(" "))
-    asked = {"_PODUSV_COMPLETE": "complete_bash", "COMP_WORDS": typed, "COMP_CWORD": count}
-    script = LOADED.replace("import sys", "import sys\nsys.argv = ['podusv']")
-    *found, modules = said(sys.executable, "-c", script, home=tmp_path, **asked).splitlines()
+    *found, modules = offered_for(typed, tmp_path, LOADED)
     assert set(found) == offered
     # Typer itself takes pydantic to understand what has been typed.
     assert HEAVY & set(ast.literal_eval(modules)) <= {"pydantic"}
+
+
+@pytest.mark.parametrize(
+    ("typed", "offered"),
+    [
+        ("podusv run a.yaml --set control.p", {"control.period="}),
+        ("podusv run a.yaml --set actuator.kind=s", {"actuator.kind=saturated"}),
+        ("podusv verify a.yaml --set vessel.preset=ot", {"vessel.preset=otter"}),
+        ("podusv compare a.yaml --set log.mon", {"log.monitor=true", "log.monitor=false"}),
+        ("podusv plot x --figure sta", {"stability"}),
+        ("podusv explain ia", {"iae", "iae_e"}),
+        ("podusv explain near-t", {"near-target"}),
+        ("podusv explain controller.pid.K_P", {"controller.pid.K_Pu", "controller.pid.K_Pr"}),
+        ("podusv init pod/k", {"pod/kept"}),
+    ],
+)  # fmt: skip
+def test_keys_kinds_figures_and_names_are_offered(
+    tmp_path: Path, typed: str, offered: set[str]
+) -> None:
+    script = "import sys\nfrom podusv_cli import cli\ncli.main()"
+    assert set(offered_for(typed, tmp_path, script)) == offered

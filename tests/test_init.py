@@ -210,5 +210,5 @@ def test_the_wheel_alone_starts_from_an_empty_folder(tmp_path: Path) -> None:
     assert said("podusv init paper/corrected").endswith("next: podusv run corrected.yaml\n")
     short = "--set simulation.duration=2"
     assert "adaptive_neural finished: " in said(f"podusv run corrected.yaml {short}")
-    assert "report: " in said(f"podusv compare podusv:pod/kept.yaml {short}")
+    assert "report: " in said(f"podusv compare podusv:theory/sign.yaml {short}")
     assert len(list(empty.glob("results/*/*/report.html"))) == 1
