@@ -24,17 +24,18 @@ help: ## what can be made
 
 # Exit code 4: diverged, as it must. Exit code 3: some of the runs diverged; in figures_compare they must.
 reproduce: $(VENV)/run.done ## the paper, claim by claim, into results/paper/
-	@echo "$(words printed_from_zero $(COMPARISONS)) steps:"
+	@echo "$(words printed_from_zero $(COMPARISONS)) steps, about two minutes on two cores:"
 	@rm -f results/paper.log
 	@$(STEP) run paper printed_from_zero 4
 	@for name in $(COMPARISONS); do \
 	    $(STEP) compare paper $$name $$(case $$name in figures_compare) echo 3;; *) echo 0;; esac) || exit 1; \
 	done
+	@$(BIN)/python results/verdicts.py
 	@echo "what was found: results/README.md; every table, claim and figure: results/paper/*/report.html"
 
 # In F and S the law without its network diverges, as it must: exit code 3.
-claim: $(VENV)/run.done ## the paper's central claim: parts off, wrong vessels, sampling; 4 minutes
-	@echo "$(words $(ABLATIONS) $(TABLES)) steps:"
+claim: $(VENV)/run.done ## the paper's central claim: parts off, wrong vessels, sampling
+	@echo "$(words $(ABLATIONS) $(TABLES)) steps, about five minutes on two cores:"
 	@rm -f results/paper.log
 	@for name in $(ABLATIONS); do \
 	    $(STEP) compare paper $$name $$(case $$name in ablation_figures|ablation_standoff) echo 3;; *) echo 0;; esac) || exit 1; \
