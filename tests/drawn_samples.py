@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 from known_signals import ABOUT
+from matplotlib.patches import Polygon
 
 from podusv_cli.core.recording import Recording
 from podusv_cli.figures.drawing import FIGURES, dressed
@@ -13,10 +14,10 @@ from podusv_cli.scenario.load import load_text
 TEXT = """
 name: {name}
 vessel: {{preset: paper_nonlinear}}
-path: {{kind: line_circle, rate: {rate}}}
+path: {path}
 disturbance: {{kind: harmonic}}
-actuator: {{kind: saturated}}
-controller: {{kind: pid}}
+actuator: {actuator}
+controller: {law}
 metrics: {{steady_fraction: 0.25}}
 simulation: {{duration: {duration}}}
 """
@@ -28,8 +29,16 @@ CENTER = np.array([[0.0, 0.0, 0.0], [1.0, 0.5, -0.5]])
 WIDTH = np.array([0.5, 1.0, 2.0])
 
 
-def scenario(name="drawn", rate=0.03, duration=100.0):
-    text = TEXT.format(name=name, rate=rate, duration=duration)
+USUAL = {
+    "path": "{kind: line_circle, rate: 0.03}",
+    "actuator": "{kind: saturated}",
+    "law": "{kind: pid}",
+    "duration": 100.0,
+}
+
+
+def scenario(name="drawn", **given):
+    text = TEXT.format(name=name, **USUAL | given)
     return load_text(text, "drawn.yaml").scenario
 
 
@@ -61,8 +70,8 @@ def drawn(name, runs, columns=2):
 
 
 def line(axes, label):
-    """The one line of this label."""
-    (found,) = (line for line in axes.lines if line.get_label() == label)
+    """The one line of this run, or with this label; a legend also tells how a run ended."""
+    (found,) = (line for line in axes.lines if line.get_label().partition(" (")[0] == label)
     return found
 
 
@@ -73,3 +82,33 @@ def panels(figure):
 
 def changed(run, **signals):
     return replace(run, signals={**run.signals, **signals})
+
+
+def title(axes):
+    """On the left, after the panel's letter."""
+    return axes.get_title(loc="left")
+
+
+def hulls(axes):
+    """Bow, middle of the stern and colour of every silhouette."""
+    corners = [(p.get_xy()[:5], p.get_edgecolor()) for p in axes.patches if isinstance(p, Polygon)]
+    return [(xy[0], (xy[2] + xy[3]) / 2.0, color) for xy, color in corners]
+
+
+def expected_hull(log, t, scale):
+    """Bow and stern [east, north] of the vessel at a time, independent of `hull`."""
+    row = np.argmin(np.abs(log["time"] - t))
+    middle = np.array([log["y"][row], log["x"][row]])
+    ahead = (
+        0.5
+        * scale
+        * scenario().vessel.length
+        * np.array([np.sin(log["psi"][row]), np.cos(log["psi"][row])])
+    )
+    return middle + ahead, middle - ahead
+
+
+def different_targets():
+    turned = recording(x_d=lambda t: -0.5 * t, y_d=lambda t: 30.0 + 0.0 * t)
+    other = scenario(path="{kind: line_circle, rate: 0.06}")
+    return shown(("a", recording()), ("b", turned, other), ("c", recording()), ("d", turned, other))

@@ -4,19 +4,20 @@ import io
 
 import numpy as np
 import pytest
-from drawn_samples import CENTER, WIDTH, drawn, line, panels, recording, shown
+from drawn_samples import CENTER, WIDTH, drawn, line, panels, recording, scenario, shown
 from known_signals import ABOUT
 from PIL import Image
 
 from podusv_cli.figures import style
 from podusv_cli.figures.curves import thinned
 from podusv_cli.figures.drawing import FIGURES, draw
-from podusv_cli.figures.style import LOOKS, WIDTHS, axis_label, look
+from podusv_cli.figures.style import FEWEST, LOOKS, WIDTHS, axis_label, look, places
 
 
 @pytest.fixture(scope="module")
 def two():
-    return shown(("a", recording()), ("b", recording(shift=0.7)))
+    at_target = scenario(law="{kind: pid, standoff: 0.0}")
+    return shown(("a", recording(), at_target), ("b", recording(shift=0.7), at_target))
 
 
 def activation(log):
@@ -111,11 +112,92 @@ def test_every_run_has_its_own_look_and_its_name_in_the_legend(two):
     assert colors == ["#0072B2", "#D55E00"]
 
 
-def test_looks_differ_in_colour_and_in_line_style_and_are_not_used_twice():
-    assert len({color for color, _ in LOOKS}) == len(LOOKS)
-    assert len({str(style) for _, style in LOOKS}) == len(LOOKS)
+def test_ten_runs_differ_in_colour_in_line_style_and_in_marker():
+    for parts in zip(*(look(i) for i in range(10)), strict=True):
+        assert len(set(map(str, parts))) == 10
     assert [look(i) for i in range(len(LOOKS))] == list(LOOKS)
-    assert len({str(look(i)) for i in range(36)}) == 36
+    assert len({str(look(i)) for i in range(100)}) == 100
+
+
+@pytest.mark.parametrize("count", [2, 4, 9, 30])
+def test_markers_of_runs_that_coincide_are_all_seen(count):
+    at = np.sort(np.concatenate([places(i, count) for i in range(count)]))
+    assert len(at) >= count * FEWEST
+    assert np.diff(at) == pytest.approx(1.0 / len(at))
+    assert (at[0], at[-1]) == pytest.approx((0.5 / len(at), 1.0 - 0.5 / len(at)))
+
+
+def test_markers_stand_on_the_curve_at_their_times(two):
+    for axes in panels(drawn("velocities", two)).values():
+        for run, curve in zip(two, axes.lines, strict=True):
+            assert curve.get_marker() == run.marker
+            at = curve.get_xdata()[curve.get_markevery()]
+            assert at == pytest.approx(run.places * 100.0, abs=0.1)
+    (alone,) = shown(("a", recording()))
+    assert line(panels(drawn("velocities", [alone]))["$u$ [m/s]"], "a").get_marker() == "None"
+
+
+def test_markers_of_a_long_log_are_drawn_where_an_axis_shows_a_part(two):
+    runs = shown(("a", recording(period=0.01)), ("b", recording(period=0.01)))
+    figure = drawn("controls", runs)
+    style.image(figure, "png")  # matplotlib leaves points beyond the axes out before it counts
+    (early, *_), last = figure.axes, 100.0
+    assert early.get_xlim()[1] < 0.01 * last
+    assert len(line(early, "a").get_markevery()) == len(runs[0].places)
+
+
+def test_panels_have_letters_ahead_of_titles_on_the_left(two):
+    titles = [axes.get_title(loc="left") for axes in drawn("errors", two).axes]
+    assert titles == ["(a)", "(b)", "(c)", "(d)"]
+    assert drawn("trajectory", two).axes[0].get_title(loc="left").startswith("(a) hulls ")
+
+
+def standoffs(*kept):
+    laws = [scenario(law=f"{{kind: pid, standoff: {standoff}}}") for standoff in kept]
+    runs = shown(*((f"run{i}", recording(), law) for i, law in enumerate(laws)))
+    lines = panels(drawn("errors", runs))["$z_e$ [m]"].lines
+    return {curve.get_label(): curve.get_ydata()[0] for curve in lines[len(runs) :]}
+
+
+def test_a_line_is_at_the_standoff():
+    assert standoffs(0.5, 0.0) == {"standoff 0.5 m": 0.5}
+    assert standoffs(0.0) == {}
+    assert standoffs(0.5, 0.8) == {"standoffs": 0.8}  # both have this label
+
+
+@pytest.mark.parametrize(("passage", "lowest"), [(1, 5e-3), (50, 1e-6)])
+def test_the_distance_is_shown_down_to_a_step_s_way_or_where_the_vessel_stays(passage, lowest):
+    near = {"z_e": lambda t: np.where(np.abs(t - 50.0) < 0.05 * passage, 1e-6, 1.0)}
+    runs = shown(("a", recording(u=lambda t: 0.5 + 0.0 * t, **near)))
+    bottom = panels(drawn("errors", runs))["$z_e$ [m]"].get_ylim()[0]
+    assert runs[0].scenario.simulation.step == 0.01
+    assert 0.5 * lowest < bottom <= lowest * 1.0001
+
+
+def test_a_run_that_did_not_finish_is_told_in_the_legend_and_marked_at_its_end():
+    runs = shown(("good", recording()), ("bad", recording(end=60.0, status="diverged")))
+    figure = drawn("velocities", runs)
+    words = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert words == ["good", "bad (diverged at 60 s)"]
+    for axes in figure.axes:
+        (cross,) = (curve for curve in axes.lines if curve.get_marker() == "x")
+        assert list(cross.get_xdata()) == [60.0]
+        assert cross.get_color() == runs[1].color
+
+
+def test_captions_begin_as_a_sentence_would_and_end_open():
+    for sheet in FIGURES.values():
+        assert sheet.caption[0].isalpha()
+        assert sheet.caption[-1] != "."  # the report ends the sentence
+        assert "_" not in sheet.caption
+
+
+def test_a_legend_is_no_wider_than_its_figure():
+    names = ["short", *(f"a law with a long name {i}" for i in range(8))]
+    for columns in (1, 2):
+        figure = drawn("errors", shown(*((name, recording()) for name in names)), columns)
+        style.image(figure, "png")
+        assert figure.legends[0].get_window_extent().width <= figure.bbox.width
 
 
 def test_a_long_log_is_thinned_with_every_extreme_kept():

@@ -1,17 +1,22 @@
-"""The map of the tracks and the animation, by their data: positions, headings, limits, instants."""
-
-import io
-from itertools import pairwise
+"""The map of the tracks, by its data: positions, headings, limits, instants."""
 
 import numpy as np
 import pytest
-from drawn_samples import changed, drawn, line, recording, scenario, shown
+from drawn_samples import (
+    changed,
+    different_targets,
+    drawn,
+    expected_hull,
+    hulls,
+    line,
+    recording,
+    scenario,
+    shown,
+    title,
+)
 from matplotlib.colors import to_rgba
-from matplotlib.figure import Figure
 from matplotlib.patches import Polygon, Rectangle
-from PIL import Image
 
-from podusv_cli.figures import animation
 from podusv_cli.figures.trajectory import bounds, enlargement, hull
 
 LENGTH = scenario().vessel.length
@@ -20,20 +25,6 @@ LENGTH = scenario().vessel.length
 @pytest.fixture(scope="module")
 def two():
     return shown(("a", recording()), ("b", recording(shift=0.7)))
-
-
-def hulls(axes):
-    """Bow, middle of the stern and colour of every silhouette."""
-    corners = [(p.get_xy()[:5], p.get_edgecolor()) for p in axes.patches if isinstance(p, Polygon)]
-    return [(xy[0], (xy[2] + xy[3]) / 2.0, color) for xy, color in corners]
-
-
-def expected_hull(log, t, scale):
-    """Bow and stern [east, north] of the vessel at a time, independent of `hull`."""
-    row = np.argmin(np.abs(log["time"] - t))
-    middle = np.array([log["y"][row], log["x"][row]])
-    ahead = 0.5 * scale * LENGTH * np.array([np.sin(log["psi"][row]), np.cos(log["psi"][row])])
-    return middle + ahead, middle - ahead
 
 
 def test_a_map_shows_tracks_and_target_with_north_up(two):
@@ -66,14 +57,18 @@ def test_silhouettes_stand_where_the_vessels_are_and_point_where_they_head(two):
     whole = drawn("trajectory", two).axes[0]
     scale = enlargement(two)
     found = hulls(whole)
-    assert len(found) == 2 * 9
-    times = np.tile(np.arange(9) * 12.5, 2)
-    for (bow, stern, color), t, run in zip(found, times, np.repeat(two, 9), strict=True):
+    assert len(found) == 2 * 8
+    times = [np.ceil(1000.0 * at) / 10.0 for run in two for at in run.places]  # those logged
+    assert len(set(times)) == 16  # staggered, so that none hides another
+    for (bow, stern, color), t, run in zip(found, times, np.repeat(two, 8), strict=True):
         ahead, behind = expected_hull(run.recording, t, scale)
         assert bow == pytest.approx(ahead)
         assert stern == pytest.approx(behind)
         assert color == to_rgba(run.color)
-    assert whole.get_title() == f"hulls every 12.5 s, {scale:.0f} times as large"
+    assert title(whole) == f"(a) hulls {scale:.0f} times as large"
+    assert not any(patch.get_fill() for patch in whole.patches)
+    styles = [patch.get_linestyle() for patch in whole.patches if isinstance(patch, Polygon)]
+    assert styles == ["-"] * 8 + [two[1].linestyle] * 8
 
 
 def test_hulls_are_enlarged_to_a_twentieth_of_the_target_s_way(two):
@@ -96,13 +91,66 @@ def test_a_hull_has_its_bow_ahead_and_its_beam_across():
     assert east[1][1] < 3.0  # heading east, starboard is south
 
 
-def test_silhouettes_of_a_short_run_stand_at_the_same_instants():
-    runs = shown(("long", recording()), ("short", recording(end=30.0, status="diverged")))
+def test_silhouettes_of_a_run_alone_stand_at_nine_instants_from_start_to_end():
+    runs = shown(("alone", recording()))
     found = hulls(drawn("trajectory", runs).axes[0])
-    assert len(found) == 9 + 3
-    assert found[-1][0] == pytest.approx(
-        expected_hull(runs[1].recording, 25.0, enlargement(runs))[0]
-    )
+    for (bow, _, _), t in zip(found, np.arange(9) * 12.5, strict=True):
+        expected = expected_hull(runs[0].recording, t, enlargement(runs))[0]
+        assert bow == pytest.approx(expected)
+
+
+def test_the_last_place_on_the_map_of_a_run_that_diverged_is_marked():
+    wild = recording(end=60.0, status="diverged", x=lambda t: -10.0 + np.exp(0.2 * t))
+    runs = shown(("good", recording()), ("bad", wild), ("worse", recording(end=30.0, status="x")))
+    whole = drawn("trajectory", runs).axes[0]
+    bad, worse = (curve for curve in whole.lines if curve.get_marker() == "x")
+    (x,) = bad.get_ydata()
+    top = whole.get_ylim()[1]
+    assert x < top < -10.0 + np.exp(0.02) * (x + 10.0)  # a row later it is outside
+    assert worse.get_ydata() == [runs[2].recording["x"][-1]]
+    assert (bad.get_color(), worse.get_color()) == (runs[1].color, runs[2].color)
+
+
+def test_waypoints_are_marked_where_they_are_east_and_north():
+    path = "{kind: waypoints, points: [[0, 0], [20, 5], [35, -3]]}"
+    runs = shown(("a", recording(), scenario(path=path)), ("b", recording(), scenario(path=path)))
+    whole, *_ = drawn("trajectory", runs).axes
+    marks = line(whole, "waypoint")
+    assert list(zip(marks.get_ydata(), marks.get_xdata(), strict=True)) == [
+        (0, 0),
+        (20, 5),
+        (35, -3),
+    ]
+    usual = drawn("trajectory", shown(("a", recording()))).axes[0]
+    assert "waypoint" not in [curve.get_label() for curve in usual.lines]
+
+
+def gap(t, at, width):
+    """1 where a run is apart from the other, falling off to both sides."""
+    return np.exp(-(((t - at) / width) ** 2))
+
+
+def test_a_close_up_shows_where_the_runs_are_farthest_apart():
+    off = {"y": lambda t: np.sin(0.05 * t) + 4.0 * gap(t, 40.0, 5.0)}
+    runs = shown(("a", recording()), ("b", recording(**off)))
+    whole, apart, end = drawn("trajectory", runs).axes
+    assert title(apart).startswith("(b) largest gap, t = 40")
+    assert title(end) == "(c) end, t = 100 s"
+    east, north = (runs[0].recording[name][400] for name in ("y", "x"))
+    assert np.mean(apart.get_xlim()) == pytest.approx(east + 2.0, abs=0.05)
+    assert np.mean(apart.get_ylim()) == pytest.approx(north, abs=0.05)
+    for (bow, _, _), run in zip(hulls(apart), runs, strict=True):
+        assert bow == pytest.approx(expected_hull(run.recording, 40.0, 1.0)[0], abs=0.05)
+    frames = [patch for patch in whole.patches if isinstance(patch, Rectangle)]
+    assert [frame.get_x() for frame in frames] == [apart.get_xlim()[0], end.get_xlim()[0]]
+    assert [text.get_text() for text in whole.texts] == ["b", "c"]
+
+
+@pytest.mark.parametrize(("size", "at"), [(0.01, 40.0), (4.0, 99.0)])
+def test_there_is_no_close_up_of_runs_that_are_nowhere_apart_or_only_at_the_end(size, at):
+    off = {"y": lambda t: np.sin(0.05 * t) + size * gap(t, at, 1.0)}
+    axes = drawn("trajectory", shown(("a", recording()), ("b", recording(**off)))).axes
+    assert [title(panel)[:7] for panel in axes[1:]] == ["(b) end"]
 
 
 def test_the_start_of_every_run_is_marked_once():
@@ -115,7 +163,7 @@ def test_the_start_of_every_run_is_marked_once():
 
 
 def test_the_close_up_shows_the_last_twentieth_to_scale(two):
-    whole, end = drawn("trajectory", two).axes
+    whole, *_, end = drawn("trajectory", two).axes
     for run in two:
         log, curve = run.recording, line(end, run.label)
         assert np.array_equal(curve.get_xdata(), log["y"][950:])
@@ -135,9 +183,9 @@ def test_the_close_up_shows_the_last_twentieth_to_scale(two):
     middle = log["y_d"][-1], log["x_d"][-1]
     assert end.get_xlim() == pytest.approx((middle[0] - reach, middle[0] + reach))
     assert end.get_ylim() == pytest.approx((middle[1] - reach, middle[1] + reach))
-    assert end.get_title() == "last 5 s, hulls to scale at t = 100 s, target +"
+    assert title(end) == "(c) end, t = 100 s"
     assert end.get_aspect() == 1.0
-    (box,) = (patch for patch in whole.patches if isinstance(patch, Rectangle))
+    *_, box = (patch for patch in whole.patches if isinstance(patch, Rectangle))
     assert (box.get_x(), box.get_x() + box.get_width()) == pytest.approx(end.get_xlim())
     assert (box.get_y(), box.get_y() + box.get_height()) == pytest.approx(end.get_ylim())
 
@@ -146,13 +194,13 @@ def test_the_close_up_shows_the_last_twentieth_to_scale(two):
 def test_the_close_up_is_neither_too_close_nor_too_far(away, lengths):
     log = recording()
     off = changed(log, x=log["x_d"] - away, y=log["y_d"])
-    end = drawn("trajectory", shown(("a", off))).axes[1]
+    end = drawn("trajectory", shown(("a", off))).axes[-1]
     assert np.ptp(end.get_xlim()) == pytest.approx(2.0 * lengths * LENGTH)
 
 
 def test_the_close_up_marks_the_target_and_leaves_out_who_diverged():
     runs = shown(("good", recording()), ("bad", recording(end=60.0, status="diverged")))
-    end = drawn("trajectory", runs).axes[1]
+    end = drawn("trajectory", runs).axes[-1]
     (cross,) = (curve for curve in end.lines if curve.get_marker() == "+")
     log = runs[0].recording
     assert (cross.get_xdata()[0], cross.get_ydata()[0]) == (log["y_d"][-1], log["x_d"][-1])
@@ -162,10 +210,10 @@ def test_the_close_up_marks_the_target_and_leaves_out_who_diverged():
 
 def test_the_close_up_of_runs_of_different_length_shows_one_instant():
     runs = shown(("long", recording()), ("short", recording(end=60.0)))
-    end = drawn("trajectory", runs).axes[1]
+    end = drawn("trajectory", runs).axes[-1]
     for (bow, _, _), run in zip(hulls(end), runs, strict=True):
         assert bow == pytest.approx(expected_hull(run.recording, 60.0, 1.0)[0])
-    assert "at t = 60 s" in end.get_title()
+    assert title(end).endswith("end, t = 60 s")
     assert line(end, "long").get_ydata()[-1] == runs[0].recording["x"][600]
 
 
@@ -184,15 +232,9 @@ def test_where_all_diverged_the_map_is_the_target_s():
     assert 30.0 < whole.get_ylim()[1] < 60.0
 
 
-def different_targets():
-    turned = recording(x_d=lambda t: -0.5 * t, y_d=lambda t: 30.0 + 0.0 * t)
-    other = scenario(rate=0.06)
-    return shown(("a", recording()), ("b", turned, other), ("c", recording()), ("d", turned, other))
-
-
 def test_every_differing_target_is_drawn_and_named():
     runs = different_targets()
-    whole, end = drawn("trajectory", runs).axes
+    whole, *_, end = drawn("trajectory", runs).axes
     labels = [curve.get_label() for curve in whole.lines if "target" in curve.get_label()]
     assert labels == ["target of a, c", "target of b, d"]
     second = line(whole, "target of b, d")
@@ -203,7 +245,7 @@ def test_every_differing_target_is_drawn_and_named():
     assert whole.get_xlim()[1] > 30.0
     assert whole.get_ylim()[0] < -50.0
     assert [curve.get_label() for curve in end.lines[:-1]] == ["target of a, c", "a", "c"]
-    assert end.get_title() == "last 5 s, hulls to scale at t = 100 s, target of a, c +"
+    assert end.lines[-1].get_label() == "target of a, c at this time"
 
 
 def test_one_target_is_drawn_as_long_as_any_run_lasts():
@@ -217,78 +259,3 @@ def test_a_long_track_is_drawn_in_even_steps():
     curve = line(drawn("trajectory", [run]).axes[0], "a")
     assert 2500 < len(curve.get_xdata()) <= 4000
     assert np.array_equal(curve.get_ydata(), run.recording["x"][::3])
-
-
-def staged(runs):
-    axes = Figure().add_subplot()
-    return axes, animation.stage(axes, runs)
-
-
-def test_frames_run_evenly_from_the_start_to_the_end_of_the_longest_run():
-    runs = shown(("short", recording(end=30.0)), ("long", recording()))
-    times = animation.frame_times(runs)
-    assert (times[0], times[-1], len(times)) == (0.0, 100.0, 120)
-    assert np.diff(times) == pytest.approx(np.full(119, 100.0 / 119))
-
-
-@pytest.mark.parametrize("t", [0.0, 12.3, 50.0, 100.0])
-def test_a_frame_shows_vessels_tracks_and_target_at_its_instant(two, t):
-    axes, move = staged(two)
-    move(t)
-    row = round(t * 10)
-    scale = enlargement(two)
-    for (bow, stern, _), run in zip(hulls(axes), two, strict=True):
-        ahead, behind = expected_hull(run.recording, t, scale)
-        assert bow == pytest.approx(ahead)
-        assert stern == pytest.approx(behind)
-        track = line(axes, run.label)
-        assert (track.get_xdata()[0], track.get_ydata()[0]) == (
-            run.recording["y"][0],
-            run.recording["x"][0],
-        )
-        assert track.get_xdata()[-1] == run.recording["y"][row]
-        assert track.get_ydata()[-1] == run.recording["x"][row]
-        assert np.isin(track.get_ydata(), run.recording["x"][: row + 1]).all()
-    log = two[0].recording
-    (dot,) = (curve for curve in axes.lines if curve.get_marker() == "o")
-    assert (dot.get_xdata()[0], dot.get_ydata()[0]) == (log["y_d"][row], log["x_d"][row])
-    assert axes.get_title() == f"t = {t:5.1f} s, hulls {scale:.0f} times as large"
-
-
-def test_an_animation_is_a_map_with_every_target():
-    runs = different_targets()
-    axes, move = staged(runs)
-    move(40.0)
-    dots = [curve for curve in axes.lines if curve.get_marker() == "o"]
-    assert [dot.get_ydata()[0] for dot in dots] == pytest.approx([20.0, -20.0])
-    assert np.array_equal(line(axes, "target of b, d").get_ydata(), runs[1].recording["x_d"])
-    assert (axes.get_xlim(), axes.get_ylim()) == tuple(map(pytest.approx, bounds(runs)))
-    assert axes.get_aspect() == 1.0
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("$y$ [m], east", "$x$ [m], north")
-    assert set("abcd") < set(axes.get_legend_handles_labels()[1])
-
-
-def test_a_run_that_has_ended_stays_pale_where_it_was():
-    runs = shown(("short", recording(end=30.0)), ("long", recording()))
-    axes, move = staged(runs)
-    move(80.0)
-    bow, _, _ = hulls(axes)[0]
-    assert bow == pytest.approx(expected_hull(runs[0].recording, 30.0, enlargement(runs))[0])
-    assert axes.patches[0].get_alpha() < 0.5
-    assert axes.patches[1].get_alpha() == 1.0
-    move(10.0)
-    assert axes.patches[0].get_alpha() == 1.0
-
-
-def test_a_film_has_a_picture_for_every_frame_and_the_same_bytes_twice(two, monkeypatch):
-    monkeypatch.setattr(animation, "FRAMES", 4)
-    first, second = animation.animate(two), animation.animate(two)
-    assert first == second
-    with Image.open(io.BytesIO(first)) as film:
-        pictures = []
-        assert (film.n_frames, film.info["duration"], film.info["loop"]) == (4, 80, 0)
-        for number in range(4):
-            film.seek(number)
-            pictures.append(np.asarray(film.convert("L")))
-    assert pictures[0].shape == (440, 440)
-    assert all(np.any(a != b) for a, b in pairwise(pictures))

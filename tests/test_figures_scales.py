@@ -1,5 +1,7 @@
 """Scales of figures: runs that diverge, peaks beside small values; controls, filters, loads."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from drawn_samples import changed, drawn, line, panels, recording, scenario, shown
@@ -64,6 +66,15 @@ def test_a_logarithmic_axis_spans_four_decades_where_nothing_remains():
     assert axes.yaxis.get_transform().linthresh == pytest.approx(0.1)
 
 
+IDEAL = scenario(actuator="{kind: ideal}")
+
+
+def free(log):
+    """The log of an actuator without limits: the hull gets what the law demands."""
+    kept = {name: values for name, values in log.signals.items() if name != "saturated"}
+    return replace(log, signals=kept | {f"tau_{i}_cmd": kept[f"tau_{i}"] for i in "ur"})
+
+
 def controls(*runs, columns=2):
     found = drawn("controls", shown(*runs), columns).axes
     return dict(zip(("early", "whole", "settled"), found, strict=False)), found
@@ -72,21 +83,31 @@ def controls(*runs, columns=2):
 def test_controls_show_the_peak_the_whole_run_and_the_settled_part():
     log = recording(period=0.01)
     _, found = controls(("a", log))
-    limits = [(0.0, 0.5), (0.0, 100.0), (75.0, 100.0)] * 2
-    for axes, span, name in zip(found, limits, ["tau_u"] * 3 + ["tau_r"] * 3, strict=True):
+    names = ["tau_u", "tau_u_cmd", "tau_r", "tau_r_cmd"]
+    limits = [(0.0, 0.5), (0.0, 100.0), (75.0, 100.0)] * 4
+    for axes, span, name in zip(found, limits, np.repeat(names, 3), strict=True):
         assert axes.get_xlim() == pytest.approx(span)
         curve = line(axes, "a")
         rows = np.searchsorted(log["time"], curve.get_xdata())
         assert np.array_equal(curve.get_ydata(), log[name][rows])
         assert curve.get_xdata()[[0, -1]] == pytest.approx(span)
-    assert [axes.get_title() for axes in found] == ["early", "whole run", "settled", "", "", ""]
-    assert found[0].get_ylabel() == r"$\tau_u$ [N]"
-    assert found[3].get_ylabel() == r"$\tau_r$ [N m]"
-    assert [axes.get_xlabel() for axes in found] == [""] * 3 + ["time [s]"] * 3
+    assert [axes.get_title() for axes in found] == ["early", "whole run", "settled"] + [""] * 9
+    assert [axes.get_ylabel() for axes in found[::3]] == [
+        r"$\tau_u$ [N]", r"$\tau_{u,\mathrm{cmd}}$ [N]",
+        r"$\tau_r$ [N m]", r"$\tau_{r,\mathrm{cmd}}$ [N m]",
+    ]  # fmt: skip
+    assert [axes.get_xlabel() for axes in found] == [""] * 9 + ["time [s]"] * 3
 
 
-def test_controls_are_logarithmic_where_the_peak_is_and_linear_where_it_is_over():
-    by, _ = controls(("a", recording(tau_u=lambda t: np.where(t < 1.0, 500.0, 0.5 * np.sin(t)))))
+def test_what_an_actuator_without_limits_passes_on_has_no_panel_of_its_own():
+    _, found = controls(("a", free(recording()), IDEAL))
+    assert [axes.get_ylabel() for axes in found[::3]] == [r"$\tau_u$ [N]", r"$\tau_r$ [N m]"]
+    assert [text.get_text() for text in found[0].figure.legends[0].get_texts()] == ["a"]
+
+
+def test_controls_without_limits_are_logarithmic_where_the_peak_is():
+    peak = {"tau_u": lambda t: np.where(t < 1.0, 500.0, 0.5 * np.sin(t))}
+    by, _ = controls(("a", free(recording(**peak)), IDEAL))
     scales = {part: axes.get_yscale() for part, axes in by.items()}
     assert scales == {"early": "symlog", "whole": "symlog", "settled": "linear"}
     assert by["early"].yaxis.get_transform().linthresh == pytest.approx(1.0)
@@ -94,14 +115,48 @@ def test_controls_are_logarithmic_where_the_peak_is_and_linear_where_it_is_over(
     assert by["whole"].get_ylim()[1] > 700.0  # a margin that can be seen on this axis
 
 
-def test_controls_in_one_column_name_the_load_above_each_panel():
+def saturated(**given):
+    """A run at the limits of 8 N and 2.5 N m for 2 s, of whose law 4000 N are demanded."""
+    early = {
+        "tau_u": lambda t: np.where(t < 2.0, 8.0, 0.1),
+        "tau_r": lambda t: np.where(t < 2.0, -2.5, 0.1),
+        "tau_u_cmd": lambda t: np.where(t < 2.0, 4e3, 0.1),
+    }
+    return recording(**early | given)
+
+
+def test_loads_within_limits_are_on_a_linear_axis_and_what_was_demanded_is_not():
+    _, found = controls(("a", saturated()))
+    force, demand = found[1], found[4]
+    assert (force.get_yscale(), demand.get_yscale()) == ("linear", "symlog")
+    assert inside(force.get_ylim(), [0.0, 8.0])
+    assert force.get_ylim()[1] < 9.0
+    assert inside(demand.get_ylim(), [4e3])
+    assert inside(found[0].get_ylim(), [0.0, 8.0])  # constant there, but no panel of 7.6 to 8.4
+
+
+@pytest.mark.parametrize(
+    ("given", "force", "moment"), [("", 8.0, 2.5), (", surge_limit: 6.0", 6.0, 2.5)]
+)
+def test_the_actuator_s_limits_are_drawn_ahead_and_astern(given, force, moment):
+    actuator = scenario(actuator=f"{{kind: saturated{given}}}")
+    _, found = controls(("a", saturated(), actuator))
+    for place, limit in ((1, force), (7, moment)):
+        lines = [c for c in found[place].lines if c.get_label() == "limit of the actuator"]
+        assert [list(curve.get_ydata()) for curve in lines] == [[limit] * 2, [-limit] * 2]
+        assert all(tuple(curve.get_xdata()) == found[place].get_xlim() for curve in lines)
+    assert all(len(axes.lines) == 1 for axes in (*found[3:6], *found[9:]))  # none at the demand
+    assert found[2].get_ylim()[1] < 0.5 * force  # they do not set the scale
+
+
+def test_controls_in_one_column_stand_above_each_other():
     log = recording()
     _, found = controls(("a", log), columns=1)
-    titles = [axes.get_title() for axes in found]
-    assert titles[:2] == [r"$\tau_u$ [N], early", r"$\tau_r$ [N m], early"]
-    assert titles[4:] == [r"$\tau_u$ [N], settled", r"$\tau_r$ [N m], settled"]
+    assert [axes.get_title() for axes in found[::2]] == ["early", "whole run", "settled"] * 2
+    assert [axes.get_ylabel() for axes in found[:2]] == [r"$\tau_u$ [N]", r"$\tau_r$ [N m]"]
     assert found[3].get_xlim() == pytest.approx((0.0, 100.0))
     assert np.isin(line(found[3], "a").get_ydata(), log["tau_r"]).all()
+    assert [bool(axes.get_xlabel()) for axes in found] == [False] * 10 + [True] * 2
 
 
 def test_the_early_part_of_a_coarse_log_has_rows_enough_to_see():
@@ -109,48 +164,18 @@ def test_the_early_part_of_a_coarse_log_has_rows_enough_to_see():
     assert by["early"].get_xlim() == pytest.approx((0.0, 10.0))
 
 
-def test_controls_draw_what_was_asked_only_where_it_was_not_given():
-    log = recording()
-    given = changed(log, tau_u_cmd=log["tau_u"], tau_r_cmd=log["tau_r"])
-    half = changed(log, tau_r_cmd=log["tau_r"])
-    runs = shown(("limited", log), ("free", given), ("half", half))
-    figure = drawn("controls", runs)
-    asked = [
-        [curve.get_label() for curve in axes.lines if curve.get_label().startswith("_")]
-        for axes in figure.axes
-    ]
-    assert (
-        asked == [["_limited, tau_u_cmd", "_half, tau_u_cmd"]] * 3 + [["_limited, tau_r_cmd"]] * 3
-    )
-    thin = line(figure.axes[1], "_limited, tau_u_cmd")
-    assert np.array_equal(thin.get_ydata(), log["tau_u_cmd"])
-    assert np.array_equal(thin.get_xdata(), log["time"])
-    assert thin.get_linewidth() < line(figure.axes[1], "limited").get_linewidth()
-    words = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert words == ["limited", "free", "half", "asked for by the law"]
-
-
-def test_no_word_of_what_was_asked_where_the_law_got_it():
-    log = recording()
-    runs = shown(("a", changed(log, tau_u_cmd=log["tau_u"], tau_r_cmd=log["tau_r"])))
-    words = [text.get_text() for text in drawn("controls", runs).legends[0].get_texts()]
-    assert words == ["a"]
-
-
 def test_the_early_peak_of_a_run_that_diverges_later_is_not_cut():
     late = recording(end=60.0, status="diverged", tau_u=lambda t: np.where(t < 30.0, 500.0, 1e9))
-    by, _ = controls(("good", recording()), ("bad", late))
+    by, _ = controls(("good", free(recording()), IDEAL), ("bad", free(late), IDEAL))
     assert inside(by["early"].get_ylim(), [500.0])
     assert by["early"].get_ylim()[1] < 1e4
     assert by["whole"].get_ylim()[1] < 1e3
 
 
 def test_what_a_diverging_run_asks_for_does_not_set_the_scale():
-    log = recording()
-    free = changed(log, tau_u_cmd=log["tau_u"])
     wild = recording(end=60.0, status="diverged", tau_u_cmd=lambda t: np.where(t < 50.0, 0.0, 1e9))
-    by, _ = controls(("good", free), ("bad", wild))
-    assert by["whole"].get_ylim()[1] < 1e3
+    _, found = controls(("good", recording()), ("bad", wild))
+    assert found[4].get_ylim()[1] < 1e3
 
 
 def test_filters_show_virtual_control_and_output_together_and_their_difference():

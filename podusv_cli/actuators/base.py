@@ -50,6 +50,10 @@ class Actuator(Component):
         """The state at the start of a run."""
         return np.zeros(len(self.states))
 
+    def limits(self) -> tuple[float, float]:
+        """Largest surge force [N] and yaw moment [N m], both ways; infinite where not constant."""
+        return math.inf, math.inf
+
     def shortest_lag(self) -> float:
         """The smallest time constant of its states [s]; infinite without states."""
         return math.inf

@@ -22,6 +22,10 @@ class Saturated(Actuator):
         """The flag."""
         return (SATURATION,)
 
+    def limits(self) -> tuple[float, float]:
+        """As they are given."""
+        return self.surge_limit, self.yaw_limit
+
     @staticmethod
     @kernel
     def drive(

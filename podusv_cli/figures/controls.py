@@ -2,48 +2,62 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from typing import Any
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
-from podusv_cli.figures.curves import Span, compress, differ, draw_signal
+from podusv_cli.figures.curves import Span, compress, differ, draw_curve, draw_signal
 from podusv_cli.figures.panels import PEAKS, TIME
 from podusv_cli.figures.sheet import figure
 from podusv_cli.figures.style import Shown, axis_label, legend, new_figure
 
 EARLY = 0.005  # of the run: where the peaks are
 EARLY_ROWS = 20  # at least
-LOADS = (("tau_u", "tau_u_cmd"), ("tau_r", "tau_r_cmd"))
+LOADS = (("tau_u", "tau_u_cmd"), ("tau_r", "tau_r_cmd"))  # on the hull, and what the law demands
+LIMIT: dict[str, Any] = {"color": "#444444", "linewidth": 0.8, "linestyle": (0, (6, 2, 1, 2))}
+HEIGHTS = {1: 1.25, 2: 1.4}  # inches of a row of panels, by the width in columns
 
 
 @figure(
     "controls", place=3, signals=("tau_u", "tau_r"), source="the paper's figures 5 to 7",
-    caption="surge force and yaw moment on the hull, thin what the law asked for: the first "
-    "moments, the whole run, the settled part" + PEAKS,
+    caption="surge force and yaw moment: what acts on the hull, with the actuator's limits, and in "
+    "panels of their own what the law demands where the actuator limits it; the first moments, the "
+    "whole run, the settled part" + PEAKS,
 )  # fmt: skip
 def controls(runs: Sequence[Shown], columns: int) -> Figure:
-    """Surge force and yaw moment: what acts on the hull, and thin what the law asked for."""
-    wide = columns == 2
-    figure = new_figure(columns, 3.6 if wide else 4.9)
+    """Surge force and yaw moment on the hull, and what the law demands where this differs."""
     spans = _spans(runs)
-    shape = (len(LOADS), len(spans)) if wide else (len(spans), len(LOADS))
-    panels = figure.subplots(*shape, sharex="col" if wide else "row")
-    for place, names in enumerate(LOADS):
-        loads = panels[place] if wide else panels[:, place]
-        for axes, (part, span) in zip(loads, spans.items(), strict=True):
-            _panel(axes, runs, names, span)
-            if not wide:
-                axes.set_title(f"{axis_label(runs, names[0])}, {part}")
-            elif place == 0:
-                axes.set_title(part)
-        if wide:
-            loads[0].set_ylabel(axis_label(runs, names[0]))
-    for axes in panels[-1]:
+    kinds = 2 if any(differ(run, *names) for run in runs for names in LOADS) else 1
+    rows = kinds * (len(LOADS) if columns == 2 else len(spans))
+    figure = new_figure(columns, 0.7 + HEIGHTS[columns] * rows)
+    cells = _cells(figure, kinds, list(spans), columns)
+    for (load, kind, part), axes in np.ndenumerate(cells):
+        _panel(axes, runs, (load, kind), list(spans.values())[part])
+        if columns == 1 or part == 0:
+            axes.set_ylabel(axis_label(runs, LOADS[load][kind]))
+    for axes in cells[-1, -1] if columns == 2 else cells[:, -1, -1]:
         axes.set_xlabel(TIME)
-    limited = any(differ(run, *names) for run in runs for names in LOADS)
-    legend(figure, columns, "asked for by the law" if limited else "")
+    legend(figure, columns)
     return figure
+
+
+def _cells(figure: Figure, kinds: int, parts: Sequence[str], columns: int) -> NDArray[Any]:
+    """Panels by load, kind and part of the run, the parts side by side or above each other."""
+    loads, count = len(LOADS), len(parts)
+    if columns == 2:
+        cells = figure.subplots(loads * kinds, count, sharex="col").reshape(loads, kinds, count)
+    else:
+        panels = figure.subplots(kinds * count, loads, sharex="row")
+        cells = panels.reshape(kinds, count, loads).transpose(2, 0, 1)
+    for (load, kind, part), axes in np.ndenumerate(cells):
+        if columns == 1 or load == kind == 0:
+            axes.set_title(parts[part])
+    return np.asarray(cells)
 
 
 def _spans(runs: Sequence[Shown]) -> dict[str, Span]:
@@ -58,9 +72,25 @@ def _spans(runs: Sequence[Shown]) -> dict[str, Span]:
     }
 
 
-def _panel(axes: Axes, runs: Sequence[Shown], names: tuple[str, str], span: Span) -> None:
-    applied, asked = names
-    draw_signal(axes, runs, asked, span=span, beside=applied)
-    draw_signal(axes, runs, applied, span=span)
+def _panel(axes: Axes, runs: Sequence[Shown], shown: tuple[int, int], span: Span) -> None:
+    """One load during a part of the run: on the hull (kind 0) or as the law demands it (kind 1)."""
+    load, kind = shown
+    name = LOADS[load][kind]
+    draw_signal(axes, runs, name, span=span)
     axes.set_xlim(*span)
-    compress(axes, runs, applied)
+    bounded = kind == 0 and all(run.has("saturated") for run in runs)
+    if bounded:
+        _limits(axes, runs, load, span)
+    else:
+        compress(axes, runs, name)
+
+
+def _limits(axes: Axes, runs: Sequence[Shown], load: int, span: Span) -> None:
+    """Lines at the actuators' constant limits, seen where the loads come near them."""
+    limits = {run.scenario.actuator.limits()[load] for run in runs}
+    for limit in sorted(limit for limit in limits if math.isfinite(limit)):
+        for side in (limit, -limit):
+            line = np.array(span), np.array([side, side])
+            draw_curve(axes, line, fitted=False, label="limit of the actuator", **LIMIT)
+    axes.update_datalim([(span[0], 0.0)])  # a load that stays at its limit needs a scale
+    axes.autoscale_view(scalex=False)

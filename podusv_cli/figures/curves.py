@@ -15,6 +15,8 @@ from podusv_cli.core.recording import largest
 from podusv_cli.figures.style import Shown
 
 THIN: dict[str, Any] = {"linewidth": 0.5, "alpha": 0.6}
+MARK: dict[str, Any] = {"markersize": 3.2, "markerfacecolor": "white", "markeredgewidth": 0.7}
+CUT: dict[str, Any] = {"marker": "x", "markersize": 5.0, "markeredgewidth": 1.2, "zorder": 5.0}
 TALL = 20.0  # a peak this many times the usual values gets a logarithmic axis
 DECADES = 4  # at most, on the logarithmic axis of runs that finished
 
@@ -53,9 +55,36 @@ def draw_signal(
     having = [run for run in runs if run.has(name)]
     fitted = scaling(having, span)
     for run in having:
-        look = {**run.look, **THIN, "label": f"_{run.name}, {name}"} if beside else run.look
-        if not beside or differ(run, name, beside):
-            draw_curve(axes, run.during(name, span), fitted=run in fitted, **look)
+        curve = run.during(name, span)
+        if not beside:
+            draw_run(axes, run, curve, fitted=run in fitted)
+        elif differ(run, name, beside):
+            thin = {**run.look, **THIN, "label": f"_{run.name}, {name}"}
+            draw_curve(axes, curve, fitted=run in fitted, **thin)
+
+
+def draw_run(axes: Axes, run: Shown, curve: tuple[Vector, Vector], *, fitted: bool) -> None:
+    """Plot a curve over time as the run's own, with its markers.
+
+    A run that did not finish has an x below the instant of its end; the curve may end anywhere.
+    """
+    mark(draw_curve(axes, curve, fitted=fitted, **run.look), run)
+    if not run.whole and len(curve[0]) and curve[0][-1] == run.end:
+        below = axes.get_xaxis_transform()
+        axes.plot([run.end], [0.0], transform=below, clip_on=False, color=run.color, **CUT)
+
+
+def mark(line: Line2D, run: Shown, t: Vector | None = None) -> None:
+    """Put the run's markers on a curve, at their places in time.
+
+    `t` are the instants of the curve's points, where these are not its horizontal positions.
+    """
+    instants = np.asarray(line.get_xdata() if t is None else t)
+    if len(instants) and run.marker:
+        at = instants[0] + run.places * (instants[-1] - instants[0])
+        rows = np.minimum(np.searchsorted(instants, at), len(instants) - 1)
+        line.set(marker=run.marker, markevery=rows.tolist(), **MARK)
+        line.recache(always=True)  # else matplotlib counts from the first point within the axes
 
 
 def differ(run: Shown, name: str, other: str) -> bool:
@@ -64,14 +93,16 @@ def differ(run: Shown, name: str, other: str) -> bool:
     return both and not np.array_equal(run.signal(name), run.signal(other))
 
 
-def draw_curve(axes: Axes, curve: tuple[Vector, Vector], *, fitted: bool, **look: Any) -> None:
+def draw_curve(axes: Axes, curve: tuple[Vector, Vector], *, fitted: bool, **look: Any) -> Line2D:
     """Plot a curve over time, thinned; the vertical scale fits it only where it is `fitted`."""
     t, y = thinned(*curve)
     if fitted:
-        axes.plot(t, y, **look)
-    elif len(t):
-        axes.add_artist(Line2D(t, y, **look))
+        return axes.plot(t, y, **look)[0]
+    line = Line2D(t, y, **look)
+    if len(t):
+        axes.add_artist(line)
         axes.update_datalim(np.column_stack([t, np.zeros(len(t))]), updatey=False)
+    return line
 
 
 def compress(axes: Axes, runs: Sequence[Shown], name: str) -> None:

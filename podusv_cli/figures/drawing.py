@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -12,7 +13,7 @@ from podusv_cli.core import registry
 from podusv_cli.core.escaping import visible
 from podusv_cli.core.recording import Recording
 from podusv_cli.figures.sheet import Sheet
-from podusv_cli.figures.style import Shown, house_style, image, look
+from podusv_cli.figures.style import Shown, house_style, image, look, places
 from podusv_cli.process.extras import Extras, Missing
 from podusv_cli.process.interrupts import interrupts_enabled
 from podusv_cli.process.workers import run_all
@@ -28,12 +29,17 @@ FIGURES: dict[str, Sheet] = {sheet.name: sheet for sheet in sorted(_found, key=_
 
 
 def dressed(runs: Sequence[tuple[str, Recording, Scenario]]) -> list[Shown]:
-    """Labelled recordings with their looks, in order; without those too short to draw."""
-    return [
-        Shown(visible(label), recording, scenario, *look(i))
+    """Labelled recordings with their looks, in order; without those too short to draw.
+
+    A run alone has no markers.
+    """
+    count = len(runs)
+    shown = [
+        Shown(visible(label), recording, scenario, *look(i), places(i, count))
         for i, (label, recording, scenario) in enumerate(runs)
         if len(recording["time"]) > 1
     ]
+    return shown if count > 1 else [replace(run, marker="") for run in shown]
 
 
 def draw(

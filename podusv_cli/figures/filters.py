@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
-from podusv_cli.figures.curves import compress, draw_curve, draw_signal, scaling
+from podusv_cli.figures.curves import compress, draw_run, draw_signal, scaling
 from podusv_cli.figures.panels import PEAKS, grid
 from podusv_cli.figures.sheet import figure
 from podusv_cli.figures.style import Shown, about, axis_label, legend, unit
@@ -17,8 +17,8 @@ ERRORS = ("y_u", "y_r")
 
 @figure(
     "filters", place=4, signals=("alpha_u", "alpha_r"),
-    caption="virtual controls (21), (30), thin, with what the filter makes of them (22), (31), and "
-    "the filter's error y = beta - alpha" + PEAKS,
+    caption="virtual controls and the filter: thin what goes in, alpha of (21) and (30), thick"
+    " what comes out, beta of (22) and (31); below, the filter's error y = beta - alpha" + PEAKS,
 )  # fmt: skip
 def filters(runs: Sequence[Shown], columns: int) -> Figure:
     """Virtual control thin behind the filter's output; below or beside, what lies between them.
@@ -31,7 +31,7 @@ def filters(runs: Sequence[Shown], columns: int) -> Figure:
         draw_signal(axes, runs, alpha, beside=beta)
         for run in (run for run in runs if run.has(alpha)):
             used = run.during(beta if run.has(beta) else alpha, None)
-            draw_curve(axes, used, fitted=run in scaling(runs), **run.look)
+            draw_run(axes, run, used, fitted=run in scaling(runs))
         names = [name for name in (alpha, beta) if any(run.has(name) for run in runs)]
         symbols = [about(runs, name).symbol for name in names]
         axes.set_ylabel(f"${', '.join(symbols)}$ [{unit(about(runs, alpha))}]")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -12,18 +13,21 @@ from podusv_cli.figures.curves import compress, draw_signal
 from podusv_cli.figures.sheet import Family
 from podusv_cli.figures.style import Shown, axis_label, legend, new_figure
 
-PANEL_HEIGHT = 1.35  # inches
+Scale = Callable[[Axes, Sequence[Shown]], None]
+
+PANEL_HEIGHT = 1.45  # inches
 TIME = "time [s]"
 
 PEAKS = "; where peaks dwarf the settled values the axis is logarithmic beyond these"
 
 
 def signals_over_time(
-    *names: str, logarithmic: Collection[str] = (), compressed: bool = False
+    *names: str, scales: Mapping[str, Scale] = MappingProxyType({}), compressed: bool = False
 ) -> Family:
     """A family that shows these signals, one a panel, all runs in each.
 
-    With `compressed`, an axis with tall peaks is logarithmic beyond the settled values.
+    `scales` give a signal's axis a scale of its own, and what belongs to it. With `compressed`, an
+    axis with tall peaks is logarithmic beyond the settled values.
     """
 
     def family(runs: Sequence[Shown], columns: int) -> Figure:
@@ -32,8 +36,8 @@ def signals_over_time(
         for axes, name in zip(panels, shown, strict=True):
             draw_signal(axes, runs, name)
             axes.set_ylabel(axis_label(runs, name))
-            if name in logarithmic:
-                axes.set_yscale("log")
+            if name in scales:
+                scales[name](axes, [run for run in runs if run.has(name)])
             if compressed:
                 compress(axes, runs, name)
         legend(figure, columns)

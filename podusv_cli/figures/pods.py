@@ -8,7 +8,8 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from podusv_cli.figures.curves import THIN, draw_curve, scaling
+from podusv_cli.core.kernel import Vector
+from podusv_cli.figures.curves import THIN, draw_curve, draw_run, scaling
 from podusv_cli.figures.sheet import figure
 from podusv_cli.figures.style import Shown, axis_label, legend, new_figure
 
@@ -18,7 +19,8 @@ PANEL_HEIGHT = 1.5  # inches
 
 @figure(
     "pods", place=10, signals=("n", "delta", "power"),
-    caption="propeller speeds, propulsion angles and power of every pod, thin what was asked for",
+    caption="propeller speeds, propulsion angles and power; a column for each pod, thin what was "
+    "asked of it",
 )  # fmt: skip
 def pods(runs: Sequence[Shown], columns: int) -> Figure:
     """A row for each of speed, angle and power, a column for each pod; actual over commanded."""
@@ -35,14 +37,22 @@ def pods(runs: Sequence[Shown], columns: int) -> Figure:
     for pod, (top, bottom) in enumerate(zip(panels[0], panels[-1], strict=True)):
         top.set_title(f"pod {pod + 1}")
         bottom.set_xlabel("time [s]")
-    legend(figure, columns)
+    legend(figure, columns, "asked for by the allocation")
     return figure
 
 
 def _draw(axes: Axes, run: Shown, names: tuple[str, str], pod: int, *, fitted: bool) -> None:
     actual, asked = names
-    thin: dict[str, Any] = {**THIN, "label": f"_{run.name}, {asked}"}
-    for name, look in ((asked, thin), (actual, {})):
-        if name and run.has(name) and pod < run.recording[name].shape[1]:
-            curve = run.recording["time"], run.recording[name][:, pod]
-            draw_curve(axes, curve, fitted=fitted, **{**run.look, **look})
+    thin: dict[str, Any] = {**run.look, **THIN, "label": f"_{run.name}, {asked}"}
+    if _has(run, asked, pod):
+        draw_curve(axes, _curve(run, asked, pod), fitted=fitted, **thin)
+    if _has(run, actual, pod):
+        draw_run(axes, run, _curve(run, actual, pod), fitted=fitted)
+
+
+def _has(run: Shown, name: str, pod: int) -> bool:
+    return bool(name) and run.has(name) and pod < run.recording[name].shape[1]
+
+
+def _curve(run: Shown, name: str, pod: int) -> tuple[Vector, Vector]:
+    return run.recording["time"], run.recording[name][:, pod]

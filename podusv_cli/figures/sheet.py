@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import wraps
+from itertools import chain, product
+from string import ascii_lowercase
 
 from matplotlib.figure import Figure
 
@@ -39,4 +42,19 @@ def figure(
 
     Figures are shown in the order of their places, those of one place by name.
     """
-    return lambda family: Sheet(name, caption, signals, place, family, source)
+    return lambda family: Sheet(name, caption, signals, place, _lettered(family), source)
+
+
+def _lettered(family: Family) -> Family:
+    """The family with (a), (b), ... above its panels, ahead of titles on the left."""
+
+    @wraps(family)
+    def drawn(runs: Sequence[Shown], columns: int) -> Figure:
+        figure = family(runs, columns)
+        if len(figure.axes) > 1:
+            letters = chain(ascii_lowercase, map("".join, product(ascii_lowercase, repeat=2)))
+            for axes, letter in zip(figure.axes, letters, strict=False):
+                axes.set_title(f"({letter}) {axes.get_title(loc='left')}".rstrip(), loc="left")
+        return figure
+
+    return drawn

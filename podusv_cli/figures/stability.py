@@ -13,10 +13,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import Locator
 
 from podusv_cli.core.kernel import Vector
-from podusv_cli.figures.curves import thinned
+from podusv_cli.figures.curves import draw_run, thinned
 from podusv_cli.figures.panels import TIME
 from podusv_cli.figures.sheet import figure
-from podusv_cli.figures.style import Shown, label, legend, new_figure
+from podusv_cli.figures.style import Shown, legend, new_figure
 from podusv_cli.theory.lyapunov import TERMS, V_DOT, V
 
 POINTS = 600  # of a stack; every column is a mean, so that no extreme stands for its surroundings
@@ -26,6 +26,8 @@ LAYERS = {
     "y_r": "#8FD1BA", r"\tilde W_u": "#CC79A7", r"\tilde W_r": "#E6B8D2", r"\tilde b_u": "#555555",
     r"\tilde b_r": "#AAAAAA",
 }  # fmt: skip
+SUM = r"m$^2$, rad$^2$, J, ..."  # V adds numbers of different units, as (46) has it
+MIXED = f"${V.symbol}$ [{SUM}]"
 THIN = 0.6  # points: bounds, each in its run's line style
 OUTLINE: dict[str, Any] = {"color": "black", "linewidth": 0.9}
 SIDE_TICKS = 4  # at most, on either side of 0
@@ -33,8 +35,9 @@ SIDE_TICKS = 4  # at most, on either side of 0
 
 @figure(
     "stability", place=8, signals=("V",),
-    caption="Lyapunov function (46) with its ultimate bound, its rate with what it should stay "
-    "below (49), and its terms, stacked, as parts of it; of a single run V itself is stacked, too",
+    caption="Lyapunov function (46): its value with the ultimate bound, its rate with what (49) "
+    "says it stays below, and its terms as parts of it, stacked; of a single run the value is "
+    "stacked, too; the terms have different units, and (46) adds their numbers in SI units",
 )  # fmt: skip
 def stability(runs: Sequence[Shown], columns: int) -> Figure:
     """V with its ultimate bound, V' with what it should stay below, and V's terms, run by run.
@@ -62,9 +65,9 @@ def stability(runs: Sequence[Shown], columns: int) -> Figure:
 
 def _curves(axes: Axes, runs: Sequence[Shown]) -> None:
     axes.set_yscale("log")
-    axes.set_ylabel(label(V))
+    axes.set_ylabel(MIXED)
     for run in runs:
-        axes.plot(*thinned(run.recording["time"], run.signal("V")), **run.look)
+        draw_run(axes, run, run.during("V", None), fitted=True)
 
 
 def _stack(axes: Axes, runs: Sequence[Shown]) -> None:
@@ -76,7 +79,7 @@ def _stack(axes: Axes, runs: Sequence[Shown]) -> None:
     axes.plot(*thinned(run.recording["time"], value), **OUTLINE, label="$V$")
     _compress(axes, _settled(run, "V") or float(np.max(value)))
     axes.set_ylim(bottom=0.0)
-    axes.set_ylabel(label(V) + ", stacked")
+    axes.set_ylabel(MIXED + ", stacked")
 
 
 def _ultimate(axes: Axes, runs: Sequence[Shown]) -> None:
@@ -94,7 +97,7 @@ def _ultimate(axes: Axes, runs: Sequence[Shown]) -> None:
     axes.set_ylim(top=2.0 * top)
     axes.plot([], [], color="#444444", linewidth=THIN, label=r"thin: bound $\Delta/2\lambda$")
     if told:
-        axes.set_title("\n".join(told), fontsize="x-small", loc="left")
+        axes.set_title("\n".join(told), fontsize="x-small", loc="right")
 
 
 def _thin(run: Shown) -> dict[str, Any]:
@@ -111,10 +114,10 @@ def _bounds(run: Shown) -> Iterator[tuple[float, float, float]]:
 
 
 def _rate(axes: Axes, runs: Sequence[Shown]) -> None:
-    axes.set_ylabel(label(V_DOT))
+    axes.set_ylabel(rf"${V_DOT.symbol}$ [({SUM})/s]")
     runs = [run for run in runs if run.has("V_dot")]
     for run in runs:
-        axes.plot(*thinned(run.recording["time"], run.signal("V_dot")), **run.look)
+        draw_run(axes, run, run.during("V_dot", None), fitted=True)
     largest = max((float(np.max(np.abs(run.signal("V_dot")))) for run in runs), default=1.0)
     for run in runs:
         limit = run.signal("V_dot_bound")

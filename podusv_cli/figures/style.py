@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -28,17 +29,26 @@ from podusv_cli.theory import derived
 FORMATS = ("png", "pdf", "svg")
 WIDTHS = {1: 3.46, 2: 7.09}  # inches: one column and two columns of a journal page
 
+HANDLE_WIDTH, LETTER_WIDTH = 0.5, 0.06  # inches, in a legend
 OVERHANG = 0.1  # inches at the right, for half a label at an end that got its tick by the layout
 
-# Okabe and Ito's palette, with line styles that tell the curves apart in grey print too.
-LOOKS: tuple[tuple[str, Any], ...] = (
-    ("#0072B2", "-"),
-    ("#D55E00", (0, (5, 1.5))),
-    ("#009E73", (0, (1.2, 1.2))),
-    ("#CC79A7", (0, (6, 1.5, 1.2, 1.5))),
-    ("#56B4E9", (0, (3, 1, 1, 1, 1, 1))),
-    ("#E69F00", (0, (9, 2))),
+# Okabe and Ito's palette and four of Tol's, with line styles and markers that tell the curves apart
+# in grey print too.
+LOOKS: tuple[tuple[str, Any, str], ...] = (
+    ("#0072B2", "-", "o"),
+    ("#D55E00", (0, (5, 1.5)), "s"),
+    ("#009E73", (0, (1.2, 1.2)), "^"),
+    ("#CC79A7", (0, (6, 1.5, 1.2, 1.5)), "D"),
+    ("#56B4E9", (0, (3, 1, 1, 1, 1, 1)), "v"),
+    ("#E69F00", (0, (9, 2)), "P"),
+    ("#332288", (0, (2.5, 1.2)), "<"),
+    ("#882255", (0, (8, 1.2, 3, 1.2)), ">"),
+    ("#999933", (0, (4, 1.2, 1.2, 1.2, 1.2, 1.2, 1.2, 1.2)), "X"),
+    ("#7A4B12", (0, (1.2, 2.4)), "*"),
 )
+MARKS = 24  # on the curves of a panel together
+FEWEST, MOST = 3, 8  # on a curve
+ALONE = 9  # places of a run that is shown alone, both ends among them
 TARGET_LOOK: dict[str, Any] = {"color": "#444444", "linewidth": 0.8, "linestyle": "-"}
 NO_STAMP: dict[str, dict[str, Any]] = {
     "png": {"Software": None},
@@ -49,13 +59,18 @@ NO_STAMP: dict[str, dict[str, Any]] = {
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """A run with the name, colour and line style under which every figure shows it."""
+    """A run with the name, colour, line style and marker under which every figure shows it.
+
+    `places` are fractions of a curve, in time, where its markers stand.
+    """
 
     label: str
     recording: Recording
     scenario: Scenario
     color: str
     linestyle: Any
+    marker: str
+    places: Vector
 
     @property
     def name(self) -> str:
@@ -85,7 +100,13 @@ class Shown:
     @property
     def look(self) -> dict[str, Any]:
         """Keyword arguments of `Axes.plot`."""
-        return {"color": self.color, "linestyle": self.linestyle, "label": self.name}
+        return {"color": self.color, "linestyle": self.linestyle, "label": self.told}
+
+    @property
+    def told(self) -> str:
+        """The name as a legend tells it: how a run ended, and when, where it did not finish."""
+        ending = f" ({self.recording.status} at {self.end:g} s)"
+        return self.name + ("" if self.whole else ending)
 
     @property
     def whole(self) -> bool:
@@ -116,10 +137,21 @@ class Shown:
         return float(self.signal(name)[self.row(t)])
 
 
-def look(place: int) -> tuple[str, Any]:
-    """Colour and line style of the run in this place: a new pair for each of the first 36."""
+def look(place: int) -> tuple[str, Any, str]:
+    """Colour, line style and marker of the run in this place; the first 100 differ."""
     count = len(LOOKS)
-    return LOOKS[place % count][0], LOOKS[(place + place // count) % count][1]
+    return LOOKS[place % count][0], *LOOKS[(place + place // count) % count][1:]
+
+
+def places(place: int, count: int) -> Vector:
+    """Fractions of a curve where the run in this place of so many has its markers.
+
+    Those of one run stand midway between those of others, so that equal curves show all of them.
+    """
+    if count == 1:
+        return np.linspace(0.0, 1.0, ALONE)
+    marks = min(max(MARKS // count, FEWEST), MOST)
+    return np.asarray((np.arange(marks) + (place + 0.5) / count) / marks)
 
 
 @contextmanager
@@ -173,7 +205,10 @@ def legend(figure: Figure, columns: int, thin: str = "") -> None:
     }
     if thin:
         found[thin] = Line2D([], [], color="#444444", linewidth=0.5)
-    figure.legend(list(found.values()), list(found), loc="outside upper center", ncols=3 * columns)
+    width = sum(HANDLE_WIDTH + LETTER_WIDTH * len(label) for label in found)
+    rows = math.ceil(width / WIDTHS[columns])
+    each = math.ceil(len(found) / rows) if found else 1
+    figure.legend(list(found.values()), list(found), loc="outside upper center", ncols=each)
 
 
 def image(figure: Figure, form: str) -> bytes:

@@ -13,16 +13,18 @@ from matplotlib.patches import Polygon, Rectangle
 
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
-from podusv_cli.figures.curves import Span, scaling
+from podusv_cli.figures.curves import CUT, Span, mark, scaling
 from podusv_cli.figures.sheet import figure
 from podusv_cli.figures.style import TARGET_LOOK, Shown, legend, new_figure
 
 HULL = np.array([(0.5, 0.0), (0.25, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.25, -0.5)])
-SILHOUETTES = 9
-LAST_PART = 0.05  # of the run, in the close-up
+LAST_PART = 0.05  # of the run, in the close-up of the end
+INSTANTS = 2000  # at which the runs' distance from each other is looked at
+APART = 0.1  # lengths; nearer runs are nowhere apart
 NEAREST, FARTHEST = 2.0, 20.0  # lengths from the middle of the close-up to its edges
 POINTS = 3000  # of a track, at most about
 MARK: dict[str, Any] = {"color": "#444444", "linestyle": "none"}
+WAYPOINT: dict[str, Any] = {**MARK, "marker": "s", "markersize": 5.0, "markerfacecolor": "none"}
 
 
 def hull(x: float, y: float, psi: float, *, length: float, beam: float) -> Vector:
@@ -105,69 +107,149 @@ def hull_of(run: Shown, t: float, scale: float) -> Vector:
 
 @figure(
     "trajectory", place=1, signals=("x", "y"), source="the paper's figure 3",
-    caption="tracks and target on a map; aside, the end of the run close up, framed on the map",
+    caption="tracks and target: on a map with hulls enlarged, and close up, with hulls to scale, "
+    "where the runs are farthest apart and at the end; x marks where a run ended early",
 )  # fmt: skip
 def trajectory(runs: Sequence[Shown], columns: int) -> Figure:
-    """Tracks and target on a map, hulls enlarged to show the heading; the end of the run aside."""
+    """Tracks and target on a map, hulls enlarged to show the heading; close-ups aside."""
     east, north = bounds(runs)
-    wide = columns == 2
-    shape = float(np.clip(np.ptp(east) / np.ptp(north), 0.6, 1.6))
-    figure = new_figure(columns, 3.7 if wide else 6.0)
-    ratios = {"width_ratios": (shape, 1.0)} if wide else {"height_ratios": (1.0, shape)}
-    rows = 1 if wide else 2
-    whole, end = figure.subplots(rows, 3 - rows, squeeze=False, gridspec_kw=ratios).ravel()
+    views = _views(runs)
+    shape = float(np.ptp(east) / np.ptp(north))
+    figure, whole, asides = _sheet(len(views), columns, shape)
     _whole(whole, runs)
+    _mark_ends(whole, runs, east, north)
     map_axes(whole, east, north)
-    box = _end(end, runs)
-    whole.add_patch(Rectangle(*box, fill=False, edgecolor="#444444", linewidth=0.5))
+    for axes, view, letter in zip(asides, views, "bc", strict=False):
+        (left, low), width = _close_up(axes, view)
+        frame = Rectangle((left, low), width, width, fill=False, edgecolor="#444444", linewidth=0.5)
+        whole.add_patch(frame)
+        whole.annotate(letter, (left + width, low), (1, 0), textcoords="offset points", fontsize=6)
     legend(figure, columns)
     return figure
+
+
+def _sheet(asides: int, columns: int, shape: float) -> tuple[Figure, Axes, list[Axes]]:
+    """A figure with a large panel and some small ones, beside each other or one below the other.
+
+    `shape` is the large panel's width over its height.
+    """
+    if columns == 2:
+        part = 1.6 * float(np.clip(shape, 0.6, 1.2))
+        figure = new_figure(columns, 0.9 + float(np.clip(2.8 / shape, 2.1, 3.0)))
+        cells = figure.add_gridspec(1, 1 + asides, width_ratios=(part, *[1.0] * asides))
+        places = [cells[0, place] for place in range(1 + asides)]
+    else:
+        height = float(np.clip(2.9 / shape, 1.6, 3.6))
+        figure = new_figure(columns, height + 2.8)
+        cells = figure.add_gridspec(2, asides, height_ratios=(height, 1.4))
+        places = [cells[0, :], *(cells[1, place] for place in range(asides))]
+    whole, *others = (figure.add_subplot(place) for place in places)
+    return figure, whole, others
 
 
 def _whole(axes: Axes, runs: Sequence[Shown]) -> None:
     _draw_tracks(axes, targets(runs), runs, (0.0, max(run.end for run in runs)))
     scale = enlargement(runs)
-    times = np.linspace(0.0, max(run.end for run in runs), SILHOUETTES)
     for run in runs:
-        for t in times[times <= run.end]:
-            outline = hull_of(run, float(t), scale)
-            axes.add_patch(Polygon(outline, fill=False, edgecolor=run.color, linewidth=0.6))
+        for t in run.places * run.end:
+            axes.add_patch(Polygon(hull_of(run, float(t), scale), **_outline(run)))
     starts = {(run.recording["y"][0], run.recording["x"][0]) for run in runs}
     axes.plot(*zip(*sorted(starts), strict=True), **MARK, marker="o", markersize=3.5, label="start")
-    axes.set_title(f"hulls every {times[1]:.3g} s, {scale:.0f} times as large")
+    given = {point for run in runs for point in run.scenario.path.waypoints()}
+    if given:
+        north, east = zip(*sorted(given), strict=True)
+        axes.plot(east, north, **WAYPOINT, label="waypoint")
+    words = f"hulls {scale:.0f} times as large" if scale > 1.0 else "hulls to scale"
+    axes.set_title(words, loc="left")
 
 
-def _end(axes: Axes, runs: Sequence[Shown]) -> tuple[tuple[float, float], float, float]:
-    """The last part of the runs that finished, to scale; corner, width and height of what is seen.
+def _outline(run: Shown) -> dict[str, Any]:
+    """How a hull is drawn: not filled, and in the run's line style, so that none hides another."""
+    style = run.linestyle
+    return {"fill": False, "edgecolor": run.color, "linestyle": style, "linewidth": 0.7}
 
-    The last part that all of them have: hulls are shown at one and the same time. Of several
-    targets, the first with its runs.
+
+def _mark_ends(axes: Axes, runs: Sequence[Shown], east: Span, north: Span) -> None:
+    """An x at the last place within the map of every run that did not finish."""
+    for run in (run for run in runs if not run.whole):
+        y, x = run.recording["y"], run.recording["x"]
+        inside = (y > east[0]) & (y < east[1]) & (x > north[0]) & (x < north[1])
+        for row in np.flatnonzero(inside)[-1:]:
+            axes.plot([y[row]], [x[row]], color=run.color, **CUT)
+
+
+@dataclass(frozen=True)
+class View:
+    """A close-up: a time and its name, the runs there, their target, the middle [m] east, north."""
+
+    name: str
+    t: float
+    runs: Sequence[Shown]
+    target: Target
+    middle: Vector
+
+
+def _views(runs: Sequence[Shown]) -> list[View]:
+    """Where runs that finished are farthest apart, if anywhere, and the end that all of them have.
+
+    Hulls are shown at one and the same time. Of several targets, the first with its runs.
     """
     finished = scaling(runs)
     target = next(target for target in targets(runs) if finished[0] in target.runs)
     kept = [run for run in finished if run in target.runs]
     last = min(run.end for run in kept)
-    _draw_tracks(axes, [target], kept, ((1.0 - LAST_PART) * last, last))
-    for run in kept:
-        axes.add_patch(Polygon(hull_of(run, last, 1.0), color=run.color, alpha=0.3))
-    east, north = (kept[0].at(last, name) for name in ("y_d", "x_d"))
-    axes.plot([east], [north], **MARK, marker="+", markersize=7)
-    away = max(np.hypot(run.at(last, "y") - east, run.at(last, "x") - north) for run in kept)
-    length = max(run.length for run in kept)
-    reach = min(max(NEAREST * length, 1.3 * away), FARTHEST * length)
-    map_axes(axes, (east - reach, east + reach), (north - reach, north + reach))
-    part, name = f"last {LAST_PART * last:.3g} s", target.look["label"]
-    axes.set_title(f"{part}, hulls to scale at t = {last:g} s, {name} +")
-    return (east - reach, north - reach), 2.0 * reach, 2.0 * reach
+    apart = _farthest_apart(kept, target, last)
+    aim = np.array([kept[0].at(last, name) for name in ("y_d", "x_d")])
+    return [*apart, View("end", last, kept, target, aim)]
+
+
+def _farthest_apart(runs: Sequence[Shown], target: Target, last: float) -> list[View]:
+    """The view of the runs when they fill the largest box; none where that is in the last part."""
+    times = np.linspace(0.0, last, INSTANTS)
+    logs = [run.recording for run in runs]
+    tracks = np.array(
+        [[np.interp(times, log["time"], log[name]) for name in ("y", "x")] for log in logs]
+    )
+    sizes = np.hypot(*np.ptp(tracks, axis=0))
+    worst = int(np.argmax(sizes))
+    if sizes[worst] < APART * runs[0].length or times[worst] > (1.0 - LAST_PART) * last:
+        return []
+    low, high = tracks[:, :, worst].min(axis=0), tracks[:, :, worst].max(axis=0)
+    return [View("largest gap", float(times[worst]), runs, target, 0.5 * (low + high))]
+
+
+def _close_up(axes: Axes, view: View) -> tuple[tuple[float, float], float]:
+    """Tracks around the time of the view, hulls to scale; corner and width of what is seen."""
+    last = min(run.end for run in view.runs)
+    span = view.t - LAST_PART * last, min(view.t + LAST_PART * last, last)
+    _draw_tracks(axes, [view.target], view.runs, span)
+    for run in view.runs:
+        axes.add_patch(Polygon(hull_of(run, view.t, 1.0), **_outline(run)))
+    aim = [[view.runs[0].at(view.t, name)] for name in ("y_d", "x_d")]
+    label = f"{view.target.look['label']} at this time"
+    axes.plot(*aim, **MARK, marker="+", markersize=7, label=label)
+    at = np.array([[run.at(view.t, name) for name in ("y", "x")] for run in view.runs])
+    length = max(run.length for run in view.runs)
+    away = 1.3 * float(np.max(np.hypot(*(at - view.middle).T)))
+    reach = min(max(NEAREST * length, away), FARTHEST * length)
+    (left, low), (right, high) = view.middle - reach, view.middle + reach
+    map_axes(axes, (left, right), (low, high))
+    axes.set_title(f"{view.name}, t = {view.t:.4g} s", loc="left")
+    return (left, low), 2.0 * reach
 
 
 def _draw_tracks(axes: Axes, ahead: Sequence[Target], runs: Sequence[Shown], span: Span) -> None:
-    """Tracks of targets and runs during a time [s]."""
-    tracks = [(target.recording, "x_d", "y_d", target.look) for target in ahead]
-    tracks += [(run.recording, "x", "y", run.look) for run in runs]
-    for log, x, y, look in tracks:
-        first, last = (int(row) for row in np.searchsorted(log["time"], span))
-        # Thin in steps, not by extremes: a track may run in any direction.
-        stride = max(1, (last + 1 - first) // POINTS)
-        rows = slice(first, last + 1, stride)
-        axes.plot(log[y][rows], log[x][rows], **look)
+    """Tracks of targets, and of runs with their markers, during a time [s]."""
+    for target in ahead:
+        rows = _rows(target.recording, span)
+        axes.plot(target.recording["y_d"][rows], target.recording["x_d"][rows], **target.look)
+    for run in runs:
+        log, rows = run.recording, _rows(run.recording, span)
+        (track,) = axes.plot(log["y"][rows], log["x"][rows], **run.look)
+        mark(track, run, log["time"][rows])
+
+
+def _rows(log: Recording, span: Span) -> slice:
+    """The rows within a time, thinned in steps: by extremes a track would lose its shape."""
+    first, last = (int(row) for row in np.searchsorted(log["time"], span))
+    return slice(first, last + 1, max(1, (last + 1 - first) // POINTS))

@@ -21,7 +21,8 @@ PANELS = ("node_distance", "activation", "y_u", "y_r")
 
 @figure(
     "validity", place=9, signals=("V",),
-    caption="distance to the nearest network centre in widths, largest node output, filter errors, "
+    caption="where the proof's assumptions hold: distance to the nearest network centre (line: 2 "
+    "widths, beyond which the network says next to nothing), largest node output, filter errors, "
     "and the sway speed with its bound (51)",
 )  # fmt: skip
 def validity(runs: Sequence[Shown], columns: int) -> Figure:

@@ -8,6 +8,8 @@ from typing import Any, Literal
 from podusv_cli.core.component import Component
 from podusv_cli.core.kernel import Vector
 
+Point = tuple[float, float]
+
 TARGET = ("x_d", "y_d", "x_d_dot", "y_d_dot", "x_d_ddot", "y_d_ddot")
 
 
@@ -30,6 +32,10 @@ class Path(Component):
     def evaluate(t: float, k: Any, table: Vector, target: Vector) -> None:
         """Write the target at time t; every path has its own."""
         raise NotImplementedError
+
+    def waypoints(self) -> tuple[Point, ...]:
+        """Points [m], north and east, that the path is made from; none for most paths."""
+        return ()
 
     def breaks(self) -> tuple[Break, ...]:
         """Times at which the target is not smooth, in order."""

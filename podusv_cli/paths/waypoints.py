@@ -9,9 +9,7 @@ from pydantic import model_validator
 
 from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, kernel
-from podusv_cli.paths.base import Path
-
-Point = tuple[float, float]
+from podusv_cli.paths.base import Path, Point
 
 
 @kernel
@@ -56,6 +54,10 @@ class Waypoints(Path):
         if np.any(np.diff(knots) <= 0):
             raise ValueError("two neighbouring points are the same")
         return self
+
+    def waypoints(self) -> tuple[Point, ...]:
+        """The points as they are given."""
+        return self.points
 
     def _knots(self) -> Vector:
         """Time [s] at which the target passes each point."""
