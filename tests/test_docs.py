@@ -1,0 +1,125 @@
+"""Links between pages lead somewhere, and commands that pages show exist with their options."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+import yaml
+from command_samples import ROOT, commanded
+
+import podusv_cli
+from podusv_cli.figures.drawing import FIGURES
+from podusv_cli.metrics.table import METRICS
+
+PAGES = [
+    path.relative_to(ROOT).as_posix()
+    for path in sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("results/*.md")])
+]
+Refused = Callable[[str], str]
+
+
+def text_of(page: str) -> str:
+    return (ROOT / page).read_text()
+
+
+def anchors(page: Path) -> set[str]:
+    """What `#...` may name on a page, as GitHub forms it from the headings."""
+    prose = re.sub(r"^```.*?^```", "", page.read_text(), flags=re.M | re.S)
+    titles = re.findall(r"^#+ (.*)$", prose, re.M)
+    return {re.sub(r"[^\w\- ]", "", title.lower()).strip().replace(" ", "-") for title in titles}
+
+
+def links(text: str) -> list[str]:
+    """Targets of links and images, but for addresses in the web."""
+    targets = re.findall(r"\]\(([^)\s]+)\)", text)
+    return [target for target in targets if "://" not in target]
+
+
+def dead_links(page: str) -> Iterator[str]:
+    for target in links(text_of(page)):
+        path, _, anchor = target.partition("#")
+        file = (ROOT / page).parent / path if path else ROOT / page
+        if not file.exists() or (anchor and anchor not in anchors(file)):
+            yield target
+
+
+def commands(text: str) -> list[str]:
+    """Every `podusv ...` of code blocks and inline code."""
+    text = text.replace("\\\n", " ")
+    fenced = "\n".join(re.findall(r"^```\w*\n(.*?)^```", text, re.M | re.S))
+    indented = "\n".join(re.findall(r"^    (.*)$", text, re.M))
+    typed = re.findall(r"^(?:\$ )?(?:\.venv/bin/)?podusv (.*)$", f"{fenced}\n{indented}", re.M)
+    inline = re.findall(r"`podusv ([^`]*)`", text)
+    return [" ".join(one.split()) for one in typed + inline]
+
+
+@pytest.fixture
+def refused(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Refused:
+    """Why the command line does not take these words; empty if it does.
+
+    With `--help` it looks for the command and its options, and no further.
+    """
+    podusv = commanded(monkeypatch, capsys)
+
+    def why(words: str) -> str:
+        typed = shlex.split(words, comments=True)
+        if not typed or typed[0] == "...":  # any command
+            return ""
+        said = podusv(*typed, "--help")
+        return "" if said.code == 0 else said.err
+
+    return why
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_link_leads_somewhere(page: str) -> None:
+    assert list(dead_links(page)) == []
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_command_shown_exists_with_its_options(page: str, refused: Refused) -> None:
+    found = {words: refused(words) for words in commands(text_of(page))}
+    assert {words: why for words, why in found.items() if why} == {}
+
+
+def test_dead_links_and_wrong_commands_are_noticed(refused: Refused) -> None:
+    assert links("see [a](b.md#c) and ![d](e.png), [f](https://g)") == ["b.md#c", "e.png"]
+    text = (
+        "podusv is\n    podusv run a.yaml\n```sh\n$ podusv plot x --figre y\n```\n`podusv verfy z`"
+    )
+    shown = ["plot x --figre y", "run a.yaml", "verfy z"]
+    assert commands(text) == shown
+    assert "No such option" in refused(shown[0])
+    assert refused(shown[1]) == ""
+    assert "No such command" in refused(shown[2])
+
+
+def rows(page: str) -> list[list[str]]:
+    """The cells of every table row whose first cell is code, with `|` in cells unescaped."""
+    lines = re.findall(r"^\| `.*$", text_of(page), re.M)
+    cells = [re.split(r"(?<!\\)\|", line)[1:-1] for line in lines]
+    return [[cell.strip().replace(r"\|", "|") for cell in row] for row in cells]
+
+
+def test_every_metric_is_documented_with_its_unit_and_meaning() -> None:
+    documented = {tuple(row[:3]) for row in rows("docs/metrics.md")}
+    assert documented == {(f"`{m.name}`", m.unit, m.meaning) for m in METRICS.values()}
+    counting = {row[0][1:-1] for row in rows("docs/metrics.md") if "with the standoff" in row[4]}
+    assert counting == {m.name for m in METRICS.values() if m.counts_standoff}
+
+
+def test_every_figure_is_documented_with_the_signals_that_it_needs() -> None:
+    documented = {row[0][1:-1]: row[2] for row in rows("docs/figures.md")}
+    assert list(documented) == list(FIGURES)
+    for name, sheet in FIGURES.items():
+        assert documented[name] == ", ".join(f"`{signal}`" for signal in sheet.signals)
+
+
+def test_the_citation_names_this_version() -> None:
+    citation = yaml.safe_load(text_of("CITATION.cff"))
+    assert citation["version"] == podusv_cli.__version__
+    assert citation["authors"] == [{"name": "podusv contributors"}]
