@@ -18,6 +18,7 @@ from podusv_cli.cli.options import (
     Figures,
     Force,
     Out,
+    Plugins,
     Quiet,
     Verbose,
 )
@@ -50,6 +51,7 @@ def compare(
     allow_large: AllowLarge = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
+    plugin: Plugins = None,
 ) -> None:
     """Simulate scenarios, and compare them with finished runs: table, claims, figures, report.
 
@@ -63,7 +65,14 @@ def compare(
 
     warned = Warnings(quiet)
     request = Request(
-        tuple(assign or ()), out, force, figures, tuple(sys.argv), warned, allow_large
+        tuple(assign or ()),
+        out,
+        force,
+        figures,
+        tuple(sys.argv),
+        warned,
+        allow_large,
+        tuple(plugin or ()),
     )
     with progress_bars(wanted=not (quiet or as_json)) as progress:
         done = workflow.compare([Path(item) for item in items], request, progress)

@@ -21,6 +21,12 @@ Assignments = Annotated[
         autocompletion=completion.keys,
     ),
 ]
+Plugins = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--plugin", metavar="FILE", help="A Python file with components of your own; repeatable."
+    ),
+]
 Out = Annotated[
     Path | None,
     typer.Option(help="Folder for the results.", show_default="results/<name>/<time>-<digest>"),

@@ -17,6 +17,7 @@ from podusv_cli.cli.options import (
     Figures,
     Force,
     Out,
+    Plugins,
     Quiet,
     Verbose,
 )
@@ -39,6 +40,7 @@ def run(
     allow_large: AllowLarge = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
+    plugin: Plugins = None,
 ) -> None:
     """Simulate a scenario and write a run folder: log, metrics, figures.
 
@@ -50,7 +52,14 @@ def run(
 
     warned = Warnings(quiet)
     request = workflow.Request(
-        tuple(assign or ()), out, force, figures, tuple(sys.argv), warned, allow_large
+        tuple(assign or ()),
+        out,
+        force,
+        figures,
+        tuple(sys.argv),
+        warned,
+        allow_large,
+        tuple(plugin or ()),
     )
     with progress_bar(str(config), wanted=not (quiet or as_json)) as progress:
         done = workflow.run(Path(config), request, progress)

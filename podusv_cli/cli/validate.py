@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from podusv_cli.cli.options import AllowLarge, Assignments, Config
+from podusv_cli.cli.options import AllowLarge, Assignments, Config, Plugins
 from podusv_cli.cli.terminal import echo
 
 if TYPE_CHECKING:
@@ -25,6 +25,7 @@ def validate(
         ),
     ] = False,
     allow_large: AllowLarge = False,
+    plugin: Plugins = None,
 ) -> None:
     """Check a scenario: keys and values first, then claims; if all are valid, print findings.
 
@@ -36,7 +37,8 @@ def validate(
     from podusv_cli.scenario.limits import largest, limits
     from podusv_cli.scenario.load import load
 
-    loaded = load(config, assign or (), checks=(unknown_codes, limits(allow_large)))
+    checks = (unknown_codes, limits(allow_large))
+    loaded = load(config, assign or (), checks, plugin or ())
     parse_claims(loaded)
     scenario = loaded.scenario
     laws, steps = ", ".join(scenario.labels()), scenario.time_grid().steps

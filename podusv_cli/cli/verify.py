@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from podusv_cli.cli.options import AsJson, Assignments, Config
+from podusv_cli.cli.options import AsJson, Assignments, Config, Plugins
 from podusv_cli.cli.terminal import echo, echo_entry, echo_table
 
 if TYPE_CHECKING:
@@ -35,6 +35,7 @@ def verify(
     quiet: Annotated[
         bool, typer.Option("--quiet", "-q", help="Print nothing; see the exit code.")
     ] = False,
+    plugin: Plugins = None,
 ) -> None:
     """Repeat a scenario at half and at a quarter of its step, and by another integrator.
 
@@ -48,7 +49,13 @@ def verify(
     with progress_bars(wanted=not (quiet or as_json)) as progress:
         try:
             done = verifying.verify(
-                Path(config), assign or (), tolerance, out, progress, force=force
+                Path(config),
+                assign or (),
+                tolerance,
+                out,
+                progress,
+                force=force,
+                plugins=plugin or (),
             )
         except KeyboardInterrupt:
             text = f"{config}: interrupted before all steps were simulated; nothing was written"

@@ -11,8 +11,8 @@ from podusv_cli.scenario.yaml_text import read
 from podusv_cli.scenario.yaml_tree import Fault, plain
 
 Change = tuple[Any, Any]
-# Keys of provenance.json that are different for every run
-OF_EACH_RUN = ("argv", "started", "finished", "duration_s")
+# Keys of provenance.json that are different for every run, or told by the scenario
+OF_EACH_RUN = ("argv", "started", "finished", "duration_s", "plugins")
 
 
 def scenario_changes(one: str, other: str) -> dict[str, Change]:

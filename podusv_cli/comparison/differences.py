@@ -67,8 +67,13 @@ def _section(key: str) -> str:
 def _follows_from_kind(
     key: str, values: Mapping[str, Any], found: Mapping[str, Mapping[str, Any]]
 ) -> bool:  # fmt: skip
-    """Whether the key has one value, and is missing only in runs of another kind."""
+    """Whether the key has one value, and is missing only in runs of another kind.
+
+    Then the kind may also come from a plug-in that the others do not need.
+    """
     above = (key[:at] for at, letter in enumerate(key) if letter == ".")
     known = {repr(value) for value in values.values() if value is not None}
     lacking = None in values.values() and len(known) == 1
-    return lacking and any(f"{part}.kind" in found for part in above)
+    return lacking and (
+        key.startswith("plugins.") or any(f"{part}.kind" in found for part in above)
+    )

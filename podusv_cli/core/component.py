@@ -25,11 +25,13 @@ class Component(BaseModel):
     """A part of a scenario. Fields carry unit, range, default and meaning (see `value`).
 
     `presets` are what its field `preset` chooses from. `rows_of` has the fields that may name a
-    CSV file of pairs, each with the field that takes the file's rows.
+    CSV file of pairs, each with the field that takes the file's rows. `is_recorded` says that this
+    is `Recorded`.
     """
 
     presets: ClassVar[Presets | None] = None
     rows_of: ClassVar[dict[str, str]] = {}
+    is_recorded: ClassVar[bool] = False
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
 
     def constants(self) -> dict[str, float]:
@@ -43,6 +45,15 @@ class Component(BaseModel):
     def table(self) -> Vector:
         """Numbers whose count depends on the scenario (nodes, waypoints); one zero where none."""
         return np.zeros(1)
+
+
+class Recorded(Component):
+    """A component of a finished run as plain values; its own class, in a plug-in, is not read.
+
+    It can be looked at and cannot be run.
+    """
+
+    is_recorded: ClassVar[bool] = True
 
 
 def _numbers(component: Component) -> Iterator[tuple[str, float]]:

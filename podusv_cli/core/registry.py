@@ -1,13 +1,17 @@
 """The one registry: whatever a package offers is found by being in one of its modules.
 
 Laws, paths, disturbances and actuators are classes with a `kind`; metrics, figures and findings are
-objects with a `name`. A new one is a new file in its package and nothing else.
+objects with a `name`. A new one is a new file in its package and nothing else. Those of plug-ins
+are found where the plug-ins are passed on.
 """
 
 from __future__ import annotations
 
+import inspect
+import sys
 from collections.abc import Iterator
 from importlib import import_module
+from pathlib import Path
 from pkgutil import iter_modules
 from typing import Annotated, Any, Literal, TypeVar, Union, get_origin
 
@@ -15,25 +19,27 @@ from pydantic import Field
 
 from podusv_cli.core.component import Component
 from podusv_cli.core.errors import LawError, in_a_line
+from podusv_cli.core.plugins import MODULES, Plugins
 from podusv_cli.core.signal import Signal
 
 Kind = TypeVar("Kind", bound=Component)
 Named = TypeVar("Named")
 
 
-def kinds(package: str, base: type[Kind]) -> dict[str, type[Kind]]:
-    """Every component class of `package` that derives from `base`, by its `kind`, sorted.
+def kinds(package: str, base: type[Kind], plugins: Plugins = ()) -> dict[str, type[Kind]]:
+    """Every component class of `package` and the plug-ins that derives from `base`, by its `kind`.
 
     Raises LawError for a module that cannot be imported and for a kind that is not unique.
     """
     found: dict[str, type[Kind]] = {}
-    for thing in _members(package):
+    for thing in _members(package, plugins):
         if isinstance(thing, type) and issubclass(thing, base) and "kind" in thing.model_fields:
             kind = _kind(thing)
             if found.setdefault(kind, thing) is not thing:
                 raise LawError(
-                    f"{thing.__module__}.{thing.__name__}: its kind {kind} is that of "
-                    f"{found[kind].__module__}, too; take another name"
+                    f"{_place(thing)}: its kind {kind} is that of "
+                    f"{_place(found[kind]).removesuffix('.' + found[kind].__name__)}, too; "
+                    "take another name"
                 )
     return dict(sorted(found.items()))
 
@@ -42,27 +48,36 @@ def _kind(component: type[Component]) -> str:
     field = component.model_fields["kind"]
     if get_origin(field.annotation) is not Literal:
         raise LawError(
-            f"{component.__module__}.{component.__name__}: its kind is no fixed word; write "
-            'kind: Literal["mine"] = "mine"'
+            f'{_place(component)}: its kind is no fixed word; write kind: Literal["mine"] = "mine"'
         )
     return str(field.default)
 
 
-def any_of(package: str, base: type[Kind]) -> Any:
+def _place(component: type[Component]) -> str:
+    """Where a class is: `podusv_cli.controllers.pid.Pid`, or `my_law.py, line 12, class Mine`."""
+    module = component.__module__
+    if not module.startswith(f"{MODULES}."):
+        return f"{module}.{component.__name__}"
+    file = Path(str(sys.modules[module].__file__))
+    line = inspect.getsourcelines(component)[1]
+    return f"{file.name}, line {line}, class {component.__name__}"
+
+
+def any_of(package: str, base: type[Kind], plugins: Plugins = ()) -> Any:
     """The type of a scenario's field that takes any component of `package`, chosen by `kind`."""
-    choices = tuple(kinds(package, base).values())
+    choices = tuple(kinds(package, base, plugins).values())
     union = Union.__getitem__(choices)  # the members are known at run time only
     return Annotated[union, Field(discriminator="kind")]
 
 
-def named(package: str, kind: type[Named]) -> dict[str, Named]:
-    """Every object of class `kind` in the modules of `package`, by its `name`.
+def named(package: str, kind: type[Named], plugins: Plugins = ()) -> dict[str, Named]:
+    """Every object of class `kind` in the modules of `package` and in the plug-ins, by its `name`.
 
     Modules come in alphabetical order, objects in the order of their definition. Raises LawError
     for two objects of one name.
     """
     found: dict[str, Named] = {}
-    for thing in _members(package):
+    for thing in _members(package, plugins):
         if isinstance(thing, kind):
             name = thing.name  # type: ignore[attr-defined]
             if found.setdefault(name, thing) is not thing:
@@ -70,13 +85,16 @@ def named(package: str, kind: type[Named]) -> dict[str, Named]:
     return found
 
 
-def signals(*packages: str) -> list[Signal]:
-    """Every signal that is a constant of these packages' modules or in the `signals` of a class.
+def signals(*packages: str, plugins: Plugins = ()) -> list[Signal]:
+    """Every signal that is a constant of these modules or in the `signals` of a class.
 
     One that several modules have comes once; a name may come with several meanings.
     """
     found = (
-        part for package in packages for thing in _members(package) for part in _signals(thing)
+        part
+        for package in packages
+        for thing in _members(package, plugins)
+        for part in _signals(thing)
     )
     return list(dict.fromkeys(found))
 
@@ -94,10 +112,12 @@ def _signals(thing: Any) -> Iterator[Signal]:
         yield from (signal for part in parts for signal in _signals(part))
 
 
-def _members(package: str) -> Iterator[Any]:
+def _members(package: str, plugins: Plugins) -> Iterator[Any]:
     for module in iter_modules(import_module(package).__path__, f"{package}."):
         members = vars(_imported(module.name)).items()
         yield from (thing for name, thing in members if not name.startswith("__"))
+    for plugin in plugins:
+        yield from plugin.members(package.rpartition(".")[2])
 
 
 def _imported(module: str) -> Any:

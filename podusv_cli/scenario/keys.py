@@ -8,7 +8,7 @@ from __future__ import annotations
 import types
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Annotated, Any, Literal, TypeGuard, Union, get_args, get_origin
 
 from pydantic.fields import FieldInfo
@@ -41,7 +41,8 @@ class Key:
 
     `path` is written as in files; `route` also has the kinds of the sections on the way, the
     innermost of which is `kind`. A kind, an item and an entry have no `field`. `default` is that
-    of the section in which the key stands. `model` is the class that has the key.
+    of the section in which the key stands. `model` is the class that has the key, `scenario` that
+    of the whole.
     """
 
     path: Route
@@ -51,6 +52,12 @@ class Key:
     route: Route = ()
     kind: str = ""
     model: type[Component] = Scenario
+    scenario: type[Scenario] = Scenario
+
+    @property
+    def top(self) -> Key:
+        """The whole scenario in which this key is."""
+        return keys_of(self.scenario)
 
     @property
     def name(self) -> str:
@@ -130,7 +137,9 @@ class Key:
         given = isinstance(self.default, model)
         default = getattr(self.default, name) if given else field.default
         path, route = (*self.path, name), (*self.route, name)
-        return Key(path, field.annotation, field, default, route, self.kind, model)
+        return Key(
+            path, field.annotation, field, default, route, self.kind, model, self.scenario
+        )  # fmt: skip
 
     def item(self, step: str | int) -> Key | None:
         """The item of a list at a position, or the entry of a mapping of names."""
@@ -143,7 +152,9 @@ class Key:
                 types = parts[1:]
             if types:
                 path, route = (*self.path, step), (*self.route, step)
-                return Key(path, types[0], route=route, kind=self.kind, model=self.model)
+                return replace(
+                    self, path=path, annotation=types[0], field=None, default=MISSING, route=route
+                )
         return None
 
     @property
@@ -233,4 +244,10 @@ def _one(annotation: Any, plural: bool) -> str:
     return NOUNS[annotation][plural]
 
 
-SCENARIO = Key((), Scenario)
+@cache
+def keys_of(scenario: type[Scenario]) -> Key:
+    """The keys of a scenario of this class."""
+    return Key((), scenario, model=scenario, scenario=scenario)
+
+
+SCENARIO = keys_of(Scenario)

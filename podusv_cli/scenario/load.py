@@ -10,9 +10,12 @@ from typing import Any
 import yaml
 
 from podusv_cli.core.errors import ScenarioError, ScenarioFault, StorageError
+from podusv_cli.core.plugins import Plugins
+from podusv_cli.scenario import plugins
+from podusv_cli.scenario.keys import keys_of
 from podusv_cli.scenario.layers import composed
 from podusv_cli.scenario.messages import Check, check
-from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.model import Scenario, scenario_class
 from podusv_cli.scenario.phrases import found
 from podusv_cli.scenario.presets import complete
 from podusv_cli.scenario.yaml_text import read, read_text, resolve
@@ -36,47 +39,67 @@ class Loaded:
 
 
 def load(
-    path: str | os.PathLike[str], overrides: Sequence[str] = (), checks: Sequence[Check] = ()
-) -> Loaded:
+    path: str | os.PathLike[str], overrides: Sequence[str] = (), checks: Sequence[Check] = (),
+    files: Sequence[str] = (),
+) -> Loaded:  # fmt: skip
     """The scenario of a file, with overrides such as `vessel.m=24`.
 
-    `checks` are made after the scenario's own. Raises ScenarioError with all faults, also if the
-    file cannot be read.
+    `checks` are made after the scenario's own; `files` are plug-ins beside the scenario's. Raises
+    ScenarioError with all faults, also if the file cannot be read.
     """
     faults: list[Fault] = []
     source = os.fspath(path)
     text = read_text(source, Mark(source), "", faults)
     if text is None:
         raise ScenarioError(_findings(faults, source))
-    return load_text(text, source, overrides, checks)
+    return load_text(text, source, overrides, checks, files)
 
 
 def load_text(
-    text: str, source: str, overrides: Sequence[str] = (), checks: Sequence[Check] = ()
-) -> Loaded:
+    text: str, source: str, overrides: Sequence[str] = (), checks: Sequence[Check] = (),
+    files: Sequence[str] = (),
+) -> Loaded:  # fmt: skip
     """The scenario of a text; `source` names it in messages and is where its file names start.
 
     Raises ScenarioError with everything that is wrong.
     """
     faults: list[Fault] = []
-    return _checked(composed(text, source, overrides, faults), text, source, faults, checks)
+    root = composed(text, source, overrides, faults)
+    if root is None:
+        raise ScenarioError(_findings(faults, source))
+    root, known = _plugged(plugins.with_given(root, files), source, faults)
+    return Loaded(*_checked(root, known, source, faults, checks), text)
+
+
+def _plugged(root: Node, source: str, faults: list[Fault]) -> tuple[Node, Plugins]:
+    """The tree with its plug-ins. Without one of them, nothing else can be said of the tree."""
+    before = len(faults)
+    root, known = plugins.loaded(root, faults)
+    if len(faults) > before:
+        raise ScenarioError(_findings(faults, source))
+    return root, known
 
 
 def _checked(
-    root: Node | None, text: str, source: str, faults: list[Fault], checks: Sequence[Check] = ()
-) -> Loaded:
-    root = root and complete(root, faults)
-    scenario = check(root, faults, checks) if root else None
-    if scenario is None or root is None or faults:
+    root: Node, known: Plugins, source: str, faults: list[Fault], checks: Sequence[Check]
+) -> tuple[Scenario, dict[str, str]]:
+    """The scenario of a tree, and the origins of its values."""
+    top = keys_of(scenario_class(known))
+    root = complete(root, top, faults)
+    scenario = check(root, top, faults, checks)
+    if scenario is None or faults:
         raise ScenarioError(_findings(faults, source))
-    return Loaded(scenario, _origins(scenario, root), text)
+    return scenario, _origins(scenario, root)
 
 
-def load_resolved(text: str, source: str, checks: Sequence[Check] = ()) -> Scenario:
-    """The scenario of a finished run, which refers to no other file.
+def load_resolved(
+    text: str, source: str, checks: Sequence[Check] = (), *, to_run: bool = False
+) -> Scenario:
+    """The scenario of a finished run, which refers to no file but its plug-ins.
 
-    Raises StorageError where it does or is no YAML mapping at all, ScenarioError where it is one
-    that this podusv does not know.
+    With `to_run` these are loaded; else their components are kept as plain values. Raises
+    StorageError where it does or is no YAML mapping at all, ScenarioError where it is one that this
+    podusv does not know.
     """
     faults: list[Fault] = []
     root = read(text, source, faults)
@@ -90,7 +113,9 @@ def load_resolved(text: str, source: str, checks: Sequence[Check] = ()) -> Scena
     if faults or not root:
         (first, *_) = _findings(faults, source)
         raise StorageError(f"{first} (damaged: not as podusv wrote it)")
-    return _checked(replace(root, mark=Mark(source)), text, source, faults, checks).scenario
+    root = replace(root, mark=Mark(source))
+    root, known = _plugged(root, source, faults) if to_run else (root, plugins.recorded(root))
+    return _checked(root, known, source, faults, checks)[0]
 
 
 def _findings(faults: list[Fault], first: str) -> list[ScenarioFault]:

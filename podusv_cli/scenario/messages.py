@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from podusv_cli.scenario.keys import NAME, NUMBER, SCENARIO, Key, either
+from podusv_cli.scenario.keys import NAME, NUMBER, Key, either
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import did_you_mean, found, hint, unknown, without_case
 from podusv_cli.scenario.yaml_tree import Fault, Node, Route, dotted, follow, plain, route
@@ -18,12 +18,15 @@ MOST_PLACES = 4  # of a key, in a message
 Check = Callable[[Scenario], list[tuple[str, str]]]  # key and message
 
 
-def check(root: Node, faults: list[Fault], more: Sequence[Check] = ()) -> Scenario | None:
-    """The scenario of a complete tree, or None with every fault appended to `faults`."""
+def check(root: Node, top: Key, faults: list[Fault], more: Sequence[Check] = ()) -> Scenario | None:
+    """The scenario of a complete tree, or None with every fault appended to `faults`.
+
+    `top` are the scenario's keys.
+    """
     try:
-        scenario = Scenario.model_validate(with_defaults(SCENARIO, plain(root)))
+        scenario = top.scenario.model_validate(with_defaults(top, plain(root)))
     except ValidationError as error:
-        faults.extend(dict.fromkeys(_faults(root, error)))
+        faults.extend(dict.fromkeys(_faults(root, top, error)))
         return None
     for key, text in chain(scenario.conflicts(), *(look(scenario) for look in more)):
         faults.append(Fault(follow(root, route(key))[-1].mark, key, text))
@@ -46,9 +49,9 @@ def with_defaults(key: Key | None, data: Any) -> Any:
     return dict(key.default) | given if isinstance(key.default, section.section) else given
 
 
-def _faults(root: Node, error: ValidationError) -> Iterator[Fault]:
+def _faults(root: Node, top: Key, error: ValidationError) -> Iterator[Fault]:
     for complaint in error.errors(include_url=False):
-        key = _key(complaint["loc"])
+        key = _key(top, complaint["loc"])
         if not _copied(root, key.path):
             yield from SENTENCES.get(complaint["type"], _wrong)(root, key, complaint)
 
@@ -61,9 +64,9 @@ def _copied(root: Node, route: Route) -> bool:
     return follow(root, route)[-1] is follow(root, source)[-1]
 
 
-def _key(location: Route) -> Key:
+def _key(top: Key, location: Route) -> Key:
     """The key at pydantic's location, as far as it is known; members of unions do not count."""
-    key = SCENARIO
+    key = top
     for step in location:
         key = next(iter(key.inside(step)), key)
     return key
@@ -86,9 +89,11 @@ def _unknown_key(root: Node, section: Key, complaint: Any) -> Iterator[Fault]:
 def _elsewhere(section: Key, name: str) -> str:
     """`; K_Pu belongs to kind pid`, or at the top `; did you mean 'controller.K_Pu'?`."""
     if section.path:
-        return _home(name, SCENARIO.follow(section.path)[0].kinds)
+        return _home(name, section.top.follow(section.path)[0].kinds)
     alike = (
-        key.path for key in SCENARIO.all() if without_case(str(key.path[-1])) == without_case(name)
+        key.path
+        for key in section.top.all()
+        if without_case(str(key.path[-1])) == without_case(name)
     )
     places = dict.fromkeys(dotted(path) for path in alike if {NAME, NUMBER}.isdisjoint(path))
     return f"; did you mean {either([repr(p) for p in places][:MOST_PLACES])}?" if places else ""
@@ -102,7 +107,7 @@ def _home(name: str, kinds: dict[str, Key]) -> str:
 
 def _missing(root: Node, key: Key, complaint: Any) -> Iterator[Fault]:
     if isinstance(key.path[-1], int):
-        yield from _wrong(root, _key(complaint["loc"][:-1]), complaint)
+        yield from _wrong(root, _key(key.top, complaint["loc"][:-1]), complaint)
     elif not _explained(root, key.path):
         mark = follow(root, key.path)[-1].mark
         yield Fault(mark, dotted(key.path), f"missing; must be {key.wanted}")

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from functools import cache
+from types import GenericAlias
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from pydantic import create_model
 
 from podusv_cli.actuators.base import Actuator
 from podusv_cli.controllers.base import Controller
 from podusv_cli.core.component import Component, value
 from podusv_cli.core.errors import LawError
+from podusv_cli.core.plugins import Plugins
 from podusv_cli.core.registry import any_of
 from podusv_cli.core.signal import Signal
 from podusv_cli.disturbances.base import Disturbance
@@ -125,9 +130,20 @@ class Claim(Component):
     remark: str = value("", "", "choices made where the source is silent")
 
 
-class Scenario(Component):
-    """A vessel, its surroundings, its task, its controller, and how the run is done."""
+class Required(Component):
+    """What is required of a plug-in, a Python file or an installed package."""
 
+    version: str = value("", "", "the package's version; any where empty")
+    sha256: str = value("", "", "the digest of its text; any where empty")
+
+
+class Scenario(Component):
+    """A vessel, its surroundings, its task, its controller, and how the run is done.
+
+    `plugged` are the plug-ins that this class has been made with, see `scenario_class`.
+    """
+
+    plugged: ClassVar[Plugins] = ()
     name: str = value(..., "", "what the results are filed under", pattern=NAME)
     description: str = value("", "", "what the scenario is for, in a sentence")
     vessel: Vessel = value(..., "", "the vessel that is simulated")
@@ -152,6 +168,9 @@ class Scenario(Component):
     silence: tuple[str, ...] = value(
         (), "", "codes of findings that are not to be shown; see docs/findings.md", strict=False
     )
+    plugins: dict[str, Required] = value(
+        {}, "", "files with laws and other components of your own; see docs/plugins.md"
+    )
 
     def labels(self) -> tuple[str, ...]:
         """The names of the runs that a comparison of this scenario has."""
@@ -168,6 +187,18 @@ class Scenario(Component):
             label: self.alone().model_copy(update={"controller": law})
             for label, law in laws.items()
         }
+
+    def plugin_files(self) -> dict[str, str]:
+        """The text of each plug-in file, by its name in a run's folder."""
+        texts = {plugin.sha256: plugin.text for plugin in self.plugged}
+        return {
+            name: texts[one.sha256] for name, one in self.plugins.items() if name.endswith(".py")
+        }
+
+    def can_run(self) -> bool:
+        """Whether none of its parts is only values of a finished run."""
+        parts = (self.path, self.disturbance, self.actuator, self.controller)
+        return not any(part.is_recorded for part in parts)
 
     def closed_loop(self) -> ClosedLoop:
         """The closed loop of vessel, path, disturbance, actuator and controller."""
@@ -252,6 +283,30 @@ class Scenario(Component):
         for name in self.claims:
             if not CLAIM.fullmatch(name):
                 yield f"claims.{name}", CLAIM_IN_WORDS
+
+
+@cache
+def scenario_class(plugins: Plugins) -> type[Scenario]:
+    """The class of scenarios that know the components of these plug-ins, too.
+
+    Raises LawError where two components have one kind.
+    """
+    if not plugins:
+        return Scenario
+    law: Any = any_of("podusv_cli.controllers", Controller, plugins)
+    annotations: dict[str, Any] = {
+        "path": any_of("podusv_cli.paths", Path, plugins),
+        "disturbance": any_of("podusv_cli.disturbances", Disturbance, plugins),
+        "actuator": any_of("podusv_cli.actuators", Actuator, plugins),
+        "controller": law,
+        "controllers": GenericAlias(dict, (str, law)),
+    }
+    fields: dict[str, Any] = {
+        name: (annotation, Scenario.model_fields[name]) for name, annotation in annotations.items()
+    }
+    made = create_model("Scenario", __base__=Scenario, __doc__=Scenario.__doc__, **fields)
+    made.plugged = plugins
+    return made
 
 
 def _near(time: float, step: float) -> str:

@@ -10,7 +10,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from podusv_cli.core.component import Component, Presets
-from podusv_cli.scenario.keys import SCENARIO
+from podusv_cli.scenario.keys import SCENARIO, Key
 from podusv_cli.scenario.model import NAME, NAME_IN_WORDS
 from podusv_cli.scenario.phrases import found, quoted, unknown
 from podusv_cli.scenario.shipped import relative_to
@@ -42,9 +42,9 @@ def preset_text(presets: Presets, name: str, key: str) -> str:
     return str(node.get(key)) if node else ""
 
 
-def with_presets() -> dict[str, tuple[type[Component], Presets]]:
+def with_presets(top: Key = SCENARIO) -> dict[str, tuple[type[Component], Presets]]:
     """Every class of components that has presets, and these, by `section.kind`."""
-    sections = [inner for key in SCENARIO.keys.values() for inner in (key, *key.kinds.values())]
+    sections = [inner for key in top.keys.values() for inner in (key, *key.kinds.values())]
     return {
         dotted(key.route): (key.section, key.section.presets)
         for key in sections
@@ -52,16 +52,19 @@ def with_presets() -> dict[str, tuple[type[Component], Presets]]:
     }
 
 
-def complete(root: Node, faults: list[Fault]) -> Node:
-    """The tree with presets, CSV files, `name`, `nominal` and `controllers` filled in."""
-    for fill in (_without_removed, _name, _vessel, _nominal, _sections, _controllers):
+def complete(root: Node, top: Key, faults: list[Fault]) -> Node:
+    """The tree with presets, CSV files, `name`, `nominal` and `controllers` filled in.
+
+    `top` are the scenario's keys.
+    """
+    for fill in (_without_removed, _name, _vessel, _nominal):
         root = fill(root, faults)
-    return root
+    return _controllers(_sections(root, top, faults), top)
 
 
-def _sections(root: Node, faults: list[Fault]) -> Node:
+def _sections(root: Node, top: Key, faults: list[Fault]) -> Node:
     """Sections with kinds, completed from presets and CSV files."""
-    for name, key in SCENARIO.keys.items():
+    for name, key in top.keys.items():
         given = root.mapping.get(name)
         kind = key.kinds.get(str(given.get("kind"))) if given else None
         if given and kind and given.mapping:
@@ -196,17 +199,17 @@ def _rows_in(given: Node, section: str, keys: tuple[str, str], faults: list[Faul
     return replace(given, content=rest | {rows_key: rows}, faulty=given.faulty or rows.faulty)
 
 
-def _controllers(root: Node, faults: list[Fault]) -> Node:
+def _controllers(root: Node, top: Key) -> Node:
     """Each of `controllers` over those keys of `controller` that its kind has too."""
     base, several = root.mapping.get("controller"), root.mapping.get("controllers")
     if not base or not several:
         return root
-    filled = {name: _over_base(base, own) for name, own in several.mapping.items()}
+    filled = {name: _over_base(base, own, top) for name, own in several.mapping.items()}
     return root.with_entry("controllers", replace(several, content=filled))
 
 
-def _over_base(base: Node, own: Node) -> Node:
-    law = SCENARIO.keys["controller"].kinds.get(str(own.get("kind") or base.get("kind")))
+def _over_base(base: Node, own: Node, top: Key) -> Node:
+    law = top.keys["controller"].kinds.get(str(own.get("kind") or base.get("kind")))
     if not law or not isinstance(own.content, dict):
         return own
     shared = {key: part for key, part in base.mapping.items() if key in law.keys}

@@ -35,7 +35,11 @@ def json_schema(codes: Sequence[str]) -> dict[str, Any]:
     scenario = _converted(made)
     scenario["properties"]["silence"]["items"]["enum"] = list(codes)
     names = {"type": "array", "items": {"type": "string"}}
-    extends = {"anyOf": [{"type": "string"}, names], "description": EXTENDS.meaning}
+    either = [{"type": "string"}, names]
+    extends = {"anyOf": either, "description": EXTENDS.meaning}
+    plugins = scenario["properties"]["plugins"]
+    meaning = plugins.pop("description")
+    scenario["properties"]["plugins"] = {"anyOf": [*either, plugins], "description": meaning}
     scenario["properties"] = {"extends": extends} | scenario["properties"]
     return {"$schema": DIALECT, "title": TITLE} | scenario | {"definitions": definitions}
 

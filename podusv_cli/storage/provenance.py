@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import platform
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
@@ -13,12 +13,15 @@ from pathlib import Path
 from typing import Any
 
 import podusv_cli
+from podusv_cli.core.plugins import Plugin
 
 PACKAGES = ("numpy", "scipy", "numba", "h5py", "pydantic")  # those that can move a number
 GIT_PATIENCE = 5.0  # s
 
 
-def collect(argv: Sequence[str], started: datetime, finished: datetime) -> dict[str, Any]:
+def collect(
+    argv: Sequence[str], started: datetime, finished: datetime, plugins: Iterable[Plugin] = ()
+) -> dict[str, Any]:
     """The content of provenance.json; times are aware datetimes.
 
     `git` is None where podusv does not run from a git checkout or git is missing; a version is
@@ -36,6 +39,7 @@ def collect(argv: Sequence[str], started: datetime, finished: datetime) -> dict[
             "processor": _processor(),
             "libc": " ".join(platform.libc_ver()).strip() or None,
         },
+        "plugins": [plugin.as_json() for plugin in plugins],
         "git": source_tree(Path(podusv_cli.__file__).parent),
         "argv": list(argv),
         "started": _utc(started),

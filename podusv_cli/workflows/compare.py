@@ -100,7 +100,8 @@ def compare(items: Sequence[Path], request: Request, progress: Progress | None =
         result = collect(given.members, outcomes, given.claims, extras)
         if extras.interrupted and not result.entries:
             raise KeyboardInterrupt("interrupted before any run finished; nothing was written")
-        origin = provenance.collect(argv, started, datetime.now(UTC))
+        plugins = dict.fromkeys(p for m in given.members for p in m.scenario.plugged)
+        origin = provenance.collect(argv, started, datetime.now(UTC), plugins)
         outputs.write(writer, result, extras)
         if request.figures:
             _add_figures(writer, result, given.title, origin, extras, progress)
@@ -203,7 +204,11 @@ def _with_costs(entries: Sequence[Entry], extras: Extras) -> list[Entry]:
     The cost in a run's own metrics was measured at another time, perhaps on another machine, so it
     is never compared.
     """
-    timed = [e for e in entries if e.scenario.simulation.compiled and len(e.recording["time"])]
+    timed = [
+        e for e in entries
+        if e.scenario.simulation.compiled and len(e.recording["time"])
+        and e.scenario.can_run()
+    ]  # fmt: skip
     loops = [(entry.scenario.closed_loop(), entry.recording) for entry in timed]
     costs = extras.attempt("law_ns", lambda: law_costs(loops)) or [UNMEASURED] * len(timed)
     by_label = {entry.label: cost for entry, cost in zip(timed, costs, strict=True)}

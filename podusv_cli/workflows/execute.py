@@ -154,7 +154,9 @@ def execute(
                 writer.add(f"figures/{name}", content)
         status = "interrupted" if extras.interrupted else recording.status
         with watch.part("write"):
-            origin = provenance.collect(list(task.argv), started, datetime.now(UTC))
+            origin = provenance.collect(
+                task.argv, started, datetime.now(UTC), task.scenario.plugged
+            )
             writer.add_json("provenance.json", origin)
             writer.add_missing(extras)
             final = writer.finish(status)
@@ -261,6 +263,8 @@ def _write(
 ) -> None:  # fmt: skip
     writer.add("scenario.yaml", task.text.encode())
     writer.add("resolved.yaml", resolved_yaml(task.scenario).encode())
+    for name, text in task.scenario.plugin_files().items():
+        writer.add(name, text.encode())
     status = {"status": recording.status, "controller": recording.controller}
     told = [finding.as_json() for finding in warnings]
     writer.add_json("metrics.json", {**status, "metrics": metrics, "warnings": told})

@@ -56,7 +56,7 @@ def _opened(path: Path, request: Request, *, alone: bool) -> _Item:
         members = comparable(path)
         return _Item(path.resolve().name, members, [member.label for member in members])
     fits = limits(request.allow_large, read_back=True)
-    loaded = load(path, request.overrides, checks=(unknown_codes, fits))
+    loaded = load(path, request.overrides, (unknown_codes, fits), request.plugins)
     scenario, singles = loaded.scenario, loaded.scenario.singles()
     labels = list(singles) if alone or scenario.controllers else [scenario.name]
     members = [

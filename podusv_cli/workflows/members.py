@@ -32,16 +32,16 @@ class Member:
     noticed: Sequence[Finding] = ()  # before the run
 
 
-def from_folder(path: Path, checks: Sequence[Check] = ()) -> list[Member]:
+def from_folder(path: Path, checks: Sequence[Check] = (), *, to_run: bool = False) -> list[Member]:
     """The finished runs of a folder: one run, or all those of a comparison.
 
-    `checks` as `load` has them. Raises UsageError for a folder without finished runs, StorageError
-    for a damaged one.
+    `checks` as `load`, `to_run` as `load_resolved` has them. Raises UsageError for a folder without
+    finished runs, StorageError for a damaged one.
     """
     inner = _listed(path) if os.path.lexists(path / manifest.NAME) else _unlisted(path)
     if not inner:
         manifest.demand(path)
-    return [_from_run(child, checks) for child in (inner or [path])]
+    return [_from_run(child, checks, to_run) for child in (inner or [path])]
 
 
 def _unlisted(path: Path) -> list[Path]:
@@ -66,10 +66,11 @@ def _first_row(path: Path) -> list[str]:
         raise StorageError(f"cannot read {path}: no CSV ({error})") from error
 
 
-def _from_run(path: Path, checks: Sequence[Check]) -> Member:
+def _from_run(path: Path, checks: Sequence[Check], to_run: bool) -> Member:
     """A finished run whose log and theory.json were checked. StorageError, ScenarioError."""
     run = open_run(path)
-    scenario = load_resolved(run.resolved_yaml, str(path / "resolved.yaml"), checks)
+    source = str(path / "resolved.yaml")
+    scenario = load_resolved(run.resolved_yaml, source, checks, to_run=to_run)
     if wrong := log_check.fault(run.recording):
         raise StorageError(f"{path / LOG}: damaged, or not a log of a run: {wrong}")
     stability.check(run.theory, run.folder / THEORY)

@@ -107,7 +107,7 @@ def rerun(path: Path, request: RerunRequest, progress: Progress | None = None) -
 def _parts(path: Path, checks: Sequence[Check] = ()) -> list[Member]:
     """The finished runs of a folder; UsageError where it is none."""
     manifest.demand(path)
-    return from_folder(path, checks)
+    return from_folder(path, checks, to_run=True)
 
 
 def _one(member: Member, request: RerunRequest, progress: Progress | None) -> Repetition:

@@ -29,6 +29,7 @@ class Request:
     argv: Sequence[str] = ()
     warn: Callable[[Finding], None] = lambda finding: None  # called before any simulation
     allow_large: bool = False
+    plugins: Sequence[str] = ()  # files beside those that a scenario names
 
 
 def run(config: Path, request: Request, progress: Progress | None = None) -> Finished:
@@ -36,7 +37,7 @@ def run(config: Path, request: Request, progress: Progress | None = None) -> Fin
     watch = Stopwatch()
     with watch.part("load"):
         checks = (unknown_codes, limits(request.allow_large))
-        loaded = load(config, request.overrides, checks=checks)
+        loaded = load(config, request.overrides, checks, request.plugins)
         scenario = loaded.scenario.alone()
         target = request.out or default_folder(RESULTS, scenario.name, resolved_yaml(scenario))
     with watch.part("preflight"):

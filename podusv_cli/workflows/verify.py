@@ -21,6 +21,7 @@ RESULT = {"format", "tolerance", "steps", "runs", "converged"}  # keys of what `
 def verify(
     config: Path, overrides: Sequence[str], tolerance: float, out: Path | None = None,
     progress: Callable[[str, float], None] | None = None, *, force: bool = False,
+    plugins: Sequence[str] = (),
 ) -> Verification:  # fmt: skip
     """Verify a scenario's numbers, which `keep` can write to the file `out`.
 
@@ -29,14 +30,8 @@ def verify(
     """
     if (config / "resolved.yaml").is_file():
         raise UsageError(f"{config} is a run folder; verify its resolved.yaml")
-    scenario = load(
-        config,
-        overrides,
-        checks=(
-            unknown_codes,
-            limits(insist=""),
-        ),
-    ).scenario
+    checks = (unknown_codes, limits(insist=""))
+    scenario = load(config, overrides, checks, plugins).scenario
     if out:
         files.check_places([out])
         _spare(out, force)

@@ -1,0 +1,113 @@
+"""Components, metrics, figures and findings from outside the package: files and installed packages.
+
+A plug-in is a value. Whoever looks something up passes the plug-ins on (`registry.kinds`), so what
+is known never depends on what another scenario in the same process has loaded.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import sys
+import traceback
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from podusv_cli.core.errors import LawError
+from podusv_cli.core.escaping import visible
+
+ROOMS = (
+    "controllers", "paths", "disturbances", "actuators", "vessels", "metrics", "figures", "findings"
+)  # fmt: skip
+MODULES = "podusv_plugins"  # what the modules of files are called: podusv_plugins.my_law_1a2b3c4d
+
+
+@dataclass(frozen=True)
+class Plugin:
+    """What one file or one installed package offers, and which it is.
+
+    `sha256` is the digest of the file, or of the package's modules that entry points name. `text`
+    is the file's own, "" for a package. `offers` are modules and objects, each with its room; a
+    file's module is for all rooms.
+    """
+
+    name: str  # of the file, or of the package
+    sha256: str
+    version: str = ""  # of a package
+    path: str = field(default="", compare=False)  # of a file
+    text: str = field(default="", compare=False)
+    offers: tuple[tuple[str, Any], ...] = field(default=(), compare=False)
+
+    def members(self, room: str) -> Iterator[Any]:
+        """Everything in this plug-in that may belong to a room."""
+        for place, thing in self.offers:
+            if place in ("", room):
+                yield from _inside(thing)
+
+    def as_json(self) -> dict[str, str]:
+        """What provenance.json says of it."""
+        which = {"file": self.path} if self.path else {"package": self.name}
+        return which | ({"version": self.version} if self.version else {}) | {"sha256": self.sha256}
+
+    def __str__(self) -> str:
+        """`my_law.py`, or `my_lab 1.0`."""
+        return f"{self.name} {self.version}".rstrip()
+
+
+Plugins = tuple[Plugin, ...]
+
+
+def _inside(thing: Any) -> Iterator[Any]:
+    if not isinstance(thing, ModuleType):
+        yield thing
+        return
+    yield from (part for name, part in vars(thing).items() if not name.startswith("__"))
+
+
+def digest(text: str) -> str:
+    """The SHA-256 of a file's text."""
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def from_file(path: str, text: str) -> Plugin:
+    """The plug-in that is this file's text. Raises LawError where it cannot be imported.
+
+    Equal texts are one module. So a law has one class and one compiled code, whether it is read
+    from its own place or from the copy in a run folder.
+    """
+    sha256 = digest(text)
+    stem = re.sub(r"\W", "_", Path(path).stem)
+    module = _module(f"{stem}_{sha256[:8]}", path, text)
+    place = str(Path(path).resolve())
+    return Plugin(Path(path).name, sha256, path=place, text=text, offers=(("", module),))
+
+
+def _module(name: str, path: str, text: str) -> ModuleType:
+    """The module that is made of just this text; Python's own import might take an older one."""
+    whole = f"{MODULES}.{name}"
+    if whole in sys.modules:
+        return sys.modules[whole]
+    module = ModuleType(whole)
+    module.__file__ = str(Path(path).resolve())
+    sys.modules[whole] = module  # where pydantic looks up annotations, and inspect the source
+    try:
+        exec(compile(text, module.__file__, "exec", dont_inherit=True), vars(module))  # noqa: S102
+    except BaseException as error:
+        del sys.modules[whole]
+        if not isinstance(error, (Exception, SystemExit)):
+            raise
+        raise LawError(f"cannot be imported: {_fault(error, module.__file__)}") from error
+    return module
+
+
+def _fault(error: BaseException, path: str) -> str:
+    """What was raised, and in which line of the file."""
+    if isinstance(error, SyntaxError):  # which names its place
+        return visible(f"{type(error).__name__}: {error}")
+    lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == path]
+    place = f" ({Path(path).name}, line {lines[-1]})" if lines else ""
+    told = " ".join(str(error).split("\n\nFor further information")[0].split())
+    return visible(f"{type(error).__name__}: {told}{place}")

@@ -1,0 +1,146 @@
+"""The key `plugins`: from what a scenario names to the values that `scenario_class` takes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from functools import cache
+from typing import Any, Literal
+
+from pydantic import create_model
+
+from podusv_cli.actuators.base import Actuator
+from podusv_cli.controllers.base import Controller
+from podusv_cli.core.component import Component, Recorded, value
+from podusv_cli.core.errors import LawError
+from podusv_cli.core.plugins import Plugin, Plugins, digest, from_file
+from podusv_cli.disturbances.base import Disturbance
+from podusv_cli.paths.base import Path
+from podusv_cli.scenario.model import Scenario, scenario_class
+from podusv_cli.scenario.phrases import found
+from podusv_cli.scenario.shipped import relative_to
+from podusv_cli.scenario.yaml_text import read_text
+from podusv_cli.scenario.yaml_tree import Fault, Mark, Node
+
+KEY = "plugins"
+FOLDER = "plugins"  # of a run, where its plug-in files are
+BASES: dict[str, type[Component]] = {
+    "path": Path, "disturbance": Disturbance, "actuator": Actuator, "controller": Controller
+}  # fmt: skip
+
+
+def with_given(root: Node, files: Sequence[str]) -> Node:
+    """The tree with files of the command line (`--plugin`) after those that it names itself."""
+    if not files:
+        return root
+    entries = [Node(file, Mark(f"--plugin {file}"), text=file) for file in files]
+    own = root.mapping.get(KEY)
+    listed = tuple(node for node, _ in _listed(own)) if own else ()
+    return root.with_entry(KEY, Node((*listed, *entries), own.mark if own else entries[0].mark))
+
+
+def _listed(own: Node) -> list[tuple[Node, Node]]:
+    """The name of each plug-in, and what is required of it: a list, a mapping, or one name."""
+    if isinstance(own.content, dict):
+        marks = ((name, node.key_mark or node.mark) for name, node in own.content.items())
+        return [(Node(name, mark, text=name), own.content[name]) for name, mark in marks]
+    several = own.content if isinstance(own.content, tuple) else (own,)
+    return [(node, Node({}, node.mark)) for node in several]
+
+
+def loaded(root: Node, faults: list[Fault]) -> tuple[Node, Plugins]:
+    """The tree with plug-ins as they stand in resolved.yaml, and the plug-ins.
+
+    There a file is named as in the run's folder, with its digest. Where one cannot be loaded, or
+    its components are none, there is a fault.
+    """
+    own = root.mapping.get(KEY)
+    if own is None or own.faulty:
+        return root, ()
+    entries: dict[str, Node] = {}
+    known: dict[str, Plugin] = {}
+    for name, wanted in _listed(own):
+        if plugin := _plugin(name, wanted, faults):
+            place = next(n for n in _names(plugin) if known.setdefault(n, plugin) == plugin)
+            sha256 = Node(plugin.sha256, name.mark, text=plugin.sha256)
+            entries[place] = wanted.with_entry("sha256", sha256)
+    plugins = tuple(known.values())
+    try:
+        scenario_class(plugins)
+    except LawError as error:
+        faults.append(Fault(own.mark, KEY, str(error)))
+    return root.with_entry(KEY, replace(own, content=entries)), plugins
+
+
+def _names(plugin: Plugin) -> tuple[str, str]:
+    """What the file is called in a run's folder, and where another has that name."""
+    return f"{FOLDER}/{plugin.name}", f"{FOLDER}/{plugin.sha256[:8]}_{plugin.name}"
+
+
+def _plugin(name: Node, wanted: Node, faults: list[Fault]) -> Plugin | None:
+    """The plug-in that the scenario names, or None with a fault."""
+    if not isinstance(name.content, str) or not name.content.endswith(".py"):
+        what = found(name.content, name.text)
+        faults.append(
+            Fault(name.mark, KEY, f"must be a list of files like my_law.py, found {what}")
+        )
+        return None
+    path = relative_to(name.mark.source, name.content) if name.mark.line else name.content
+    text = read_text(path, name.mark, KEY, faults)
+    if text is None:
+        return None
+    try:
+        plugin = from_file(path, text)
+    except LawError as error:
+        faults.append(Fault(name.mark, KEY, f"{path} {error}"))
+        return None
+    return plugin if _is_wanted(plugin, wanted, faults) else None
+
+
+def _is_wanted(plugin: Plugin, wanted: Node, faults: list[Fault]) -> bool:
+    sha256 = wanted.mapping.get("sha256")
+    if sha256 is None or sha256.content in ("", plugin.sha256):
+        return True
+    text = f"{plugin.path or plugin} is not the one that was used; without sha256, any is taken"
+    faults.append(Fault(sha256.mark, f"{KEY}.{plugin.name}.sha256", text))
+    return False
+
+
+def recorded(root: Node) -> Plugins:
+    """What stands in for the plug-ins of a finished run: its components as plain values.
+
+    The plug-ins themselves are not read, so that looking at a run runs nobody's code.
+    """
+    if not root.get(KEY):
+        return ()
+    known = scenario_class(())
+    unknown: dict[tuple[str, str], frozenset[str]] = {}
+    for section, node in _components(root):
+        kind = node.get("kind")
+        if isinstance(kind, str) and kind not in _kinds(known, section):
+            names = unknown.get((section, kind), frozenset()) | node.mapping.keys() - {"kind"}
+            unknown[section, kind] = names
+    return tuple(_stand_in(*key, names) for key, names in unknown.items())
+
+
+def _components(root: Node) -> Iterator[tuple[str, Node]]:
+    """Section and node of every component that a scenario has."""
+    yield from ((name, root.mapping[name]) for name in BASES if name in root.mapping)
+    several = root.mapping.get("controllers")
+    yield from (("controller", node) for node in (several.mapping.values() if several else ()))
+
+
+def _kinds(scenario: type[Scenario], section: str) -> Iterable[str]:
+    from podusv_cli.scenario.keys import keys_of
+
+    return keys_of(scenario).keys[section].kinds
+
+
+@cache
+def _stand_in(section: str, kind: str, names: frozenset[str]) -> Plugin:
+    """A component with these fields that holds its values and can do nothing else."""
+    fields: dict[str, Any] = {name: (Any, value(None, "", "")) for name in sorted(names)}
+    fields["kind"] = (Literal[kind], kind)
+    bases = (Recorded, BASES[section])
+    made = create_model(kind, __base__=bases, __doc__=f"Values of a {kind}.", **fields)
+    return Plugin(f"{section} {kind}", digest(repr(sorted(names))), offers=((f"{section}s", made),))

@@ -1,0 +1,187 @@
+"""Components in files outside the package: found, run, recorded; not needed to look at runs."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+from pathlib import Path
+
+import h5py
+import pytest
+import yaml
+from command_samples import BASE, Command, one_line, write
+from plugin_samples import LAW, SCENARIO, TWO, put
+
+from podusv_cli.core.plugins import from_file
+from podusv_cli.scenario.load import load, load_text
+from podusv_cli.scenario.model import Scenario, scenario_class
+
+QUIET = ("--no-figures", "-q")
+DIGEST = hashlib.sha256(LAW.encode()).hexdigest()
+
+
+def digits(place: str) -> str:
+    """The 8 hex digits at the end of a run folder's name."""
+    return place.strip()[-8:]
+
+
+def test_a_file_s_law_runs_compiled_and_its_run_says_which_file(podusv: Command) -> None:
+    assert podusv("run", put(), "--out", "r", *QUIET).code == 0
+    with h5py.File("r/log.h5") as log:
+        assert (log["e_ct"].attrs["units"], log["drift"].attrs["units"]) == (b"m", b"m s")
+        assert set(log["tau_u_cmd"][...]) == {0.5}
+    assert json.loads(Path("r/metrics.json").read_text())["metrics"]["law_ns"] < 1000
+    own = {"file": str(Path("laws/my_law.py").resolve()), "sha256": DIGEST}
+    assert json.loads(Path("r/provenance.json").read_text())["plugins"] == [own]
+    (named,) = yaml.safe_load(Path("r/resolved.yaml").read_text())["plugins"].items()
+    assert named == ("plugins/my_law.py", {"version": "", "sha256": DIGEST})
+    assert Path("r/plugins/my_law.py").read_text() == LAW
+
+
+def test_a_file_is_named_on_the_command_line_too(podusv: Command) -> None:
+    text = SCENARIO.replace("plugins: [laws/my_law.py]\n", "")
+    shutil.move("laws/my_law.py", "own.py") if put(text) else None
+    assert podusv("run", "a.yaml", *QUIET).code == 2
+    for command in ("validate", "run", "compare", "verify"):
+        options = ("--no-figures",) if command in ("run", "compare") else ()
+        assert podusv(command, "a.yaml", "--plugin", "own.py", *options).code in (0, 3), command
+
+
+def test_the_file_is_looked_for_beside_the_scenario(podusv: Command, tmp_path: Path) -> None:
+    put()
+    Path("inner").mkdir()
+    shutil.move("laws", "inner")
+    shutil.move("a.yaml", "inner/a.yaml")
+    assert podusv("validate", "inner/a.yaml").code == 0
+    write("b.yaml", "extends: inner/a.yaml\n")
+    assert podusv("validate", "b.yaml").code == 0
+
+
+def test_workers_of_a_comparison_know_it(podusv: Command) -> None:
+    assert podusv("compare", put(TWO), "--out", "c", *QUIET).code == 0
+    for label, force in (("soft", 0.25), ("stiff", 0.5)):
+        with h5py.File(f"c/{label}/log.h5") as log:
+            assert set(log["tau_u_cmd"][...]) == {force}
+        assert Path(f"c/{label}/plugins/my_law.py").read_text() == LAW
+    (own,) = json.loads(Path("c/provenance.json").read_text())["plugins"]
+    assert own["sha256"] == DIGEST
+
+
+def test_a_run_repeats_itself_without_the_original(podusv: Command) -> None:
+    podusv("run", put(), "--out", "r", *QUIET)
+    shutil.move("r", "moved")
+    shutil.rmtree("laws")
+    assert "identical" in podusv("rerun", "moved").out
+    assert podusv("run", "moved/resolved.yaml", "--out", "again", *QUIET).code == 0
+    assert Path("again/log.h5").read_bytes() == Path("moved/log.h5").read_bytes()
+    assert podusv("diff", "moved", "again").code == 0
+
+
+def test_a_finished_run_is_looked_at_without_reading_its_file(podusv: Command) -> None:
+    podusv("compare", put(TWO), "--out", "c", *QUIET)
+    trap = LAW + '\nfrom pathlib import Path\nPath("touched").touch()\n'
+    for place in Path("c").glob("*/plugins/my_law.py"):
+        place.unlink()
+        manifest = place.parents[1] / "manifest.json"
+        whole = json.loads(manifest.read_text())
+        del whole["files"]["plugins/my_law.py"]
+        manifest.write_text(json.dumps(whole))
+    Path("laws/my_law.py").write_text(trap)
+    assert podusv("plot", "c/soft", "c/pid", "--out", "p", "--format", "svg").code == 0
+    assert Path("p/trajectory.svg").exists()
+    said = podusv("diff", "c/soft", "c/stiff")
+    assert said.code == 3
+    assert "controller.gain 0.25 -> 0.5" in said.out
+    said = podusv("compare", "c/soft", "c/pid", "--out", "d", "--json")
+    assert said.code == 0
+    assert json.loads(said.out)["comparison"]["law_ns"]["soft"] is None
+    assert "0.25" in Path("d/report.html").read_text()
+    assert not Path("touched").exists()
+    assert podusv("rerun", "c/soft").code == 2
+
+
+def test_an_edit_is_noticed_by_the_code_cache_and_in_the_name(podusv: Command) -> None:
+    first = podusv("run", put(), *QUIET)
+    put(law=LAW.replace("PUSH = 1.0", "PUSH = 2.0"))
+    second = podusv("run", "a.yaml", *QUIET)
+    with h5py.File(Path(second.out.strip()) / "log.h5") as log:
+        assert set(log["tau_u_cmd"][...]) == {1.0}
+    assert digits(first.out) != digits(second.out)
+    said = podusv("diff", first.out.strip(), second.out.strip())
+    assert said.code == 3
+    assert "plugins" in said.out
+    assert DIGEST[:30] in said.out
+
+
+def test_a_changed_copy_is_not_run_as_if_it_were_the_same(podusv: Command) -> None:
+    podusv("run", put(), "--out", "r", *QUIET)
+    Path("r/plugins/my_law.py").write_text(LAW + "\n")
+    said = podusv("run", "r/resolved.yaml", *QUIET)
+    assert said.code == 2
+    assert "r/plugins/my_law.py is not the one that was used; without sha256, any is" in said.err
+
+
+def test_scenarios_of_one_process_know_only_their_own_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    own = load(put()).scenario
+    assert own.controller.label == "cross_track"
+    assert load_text(BASE, "b.yaml").scenario.plugged == ()
+    with pytest.raises(Exception, match="unknown kind 'cross_track'"):
+        load_text(SCENARIO.replace("plugins: [laws/my_law.py]\n", ""), "a.yaml")
+    assert type(own) is scenario_class((from_file("elsewhere/my_law.py", LAW),))
+    assert scenario_class(()) is Scenario
+
+
+FAULTY = {
+    "def (": "a.yaml:2:11: plugins: laws/my_law.py cannot be imported: SyntaxError: invalid "
+    "syntax (my_law.py, line 1)",
+    "import no_such_module": "laws/my_law.py cannot be imported: ModuleNotFoundError: No module "
+    "named 'no_such_module' (my_law.py, line 1)",
+    "from podusv_cli.controllers.pid import Pid\nclass Mine(Pid):\n    gain = 1.0\n": "gain = 1.0",
+    "raise SystemExit(0)": "laws/my_law.py cannot be imported: SystemExit: 0 (my_law.py, line 1)",
+    "from podusv_cli.controllers.pid import Pid\n\n\nclass Mine(Pid): pass\n": "a.yaml:2:10: "
+    "plugins: my_law.py, line 4, class Mine: its kind pid is that of podusv_cli.controllers.pid, "
+    "too; take another name",
+    LAW.replace('Literal["cross_track"]', "str"): "class CrossTrack: its kind is no fixed word; "
+    'write kind: Literal["mine"] = "mine"',
+}
+
+
+@pytest.mark.parametrize("law", FAULTY)
+def test_a_file_that_is_no_plug_in_is_refused_in_a_line(podusv: Command, law: str) -> None:
+    for command in ("run", "compare", "validate"):
+        said = podusv(command, put(law=law))
+        assert (said.code, said.out) == (2, "")
+        if "gain = 1.0" in law and "Pid" in law:
+            assert "(my_law.py, line 2)" in one_line(said.err)
+        else:
+            assert FAULTY[law] in one_line(said.err)
+
+
+NAMED = {
+    "plugins: [nothing.py]": "'nothing.py' cannot be read: no such file or directory",
+    "plugins: 5": "plugins: must be a list of files like my_law.py, found 5",
+    "plugins: [{}]": "plugins: must be a list of files like my_law.py, found an empty mapping",
+    "plugins: {laws/my_law.py: {sha: abc}}": "unknown key; did you mean 'sha256'?",
+    "plugins: {laws/my_law.py: {sha256: abc}}": "is not the one that was used; without sha256",
+}
+
+
+@pytest.mark.parametrize("text", NAMED)
+def test_what_plugins_may_name(podusv: Command, text: str) -> None:
+    said = podusv("validate", put(SCENARIO.replace("plugins: [laws/my_law.py]", text)))
+    assert said.code == 2
+    assert NAMED[text] in said.err
+
+
+def test_a_file_may_stand_alone_or_twice(podusv: Command) -> None:
+    for entry in (
+        "laws/my_law.py",
+        "[laws/my_law.py, ./laws/my_law.py]",
+        "{laws/my_law.py: {}}",
+    ):
+        said = podusv("validate", put(SCENARIO.replace("[laws/my_law.py]", entry)))
+        assert said.code == 0, said.err
