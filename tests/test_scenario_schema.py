@@ -58,7 +58,9 @@ def places(schema: dict[str, Any], path: tuple[str, ...]) -> list[dict[str, Any]
     for step in path:
         inside = [target(part) for one in found for part in one.get("anyOf", [one])]
         if step == NAME:
-            found = [target(one["additionalProperties"]) for one in inside]
+            found = [
+                target(one["additionalProperties"]) for one in inside if "additionalProperties" in one
+            ]
             continue
         if step == NUMBER:
             found = [target(one["items"]) for one in inside if "items" in one]
