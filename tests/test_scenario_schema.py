@@ -59,7 +59,9 @@ def places(schema: dict[str, Any], path: tuple[str, ...]) -> list[dict[str, Any]
         inside = [target(part) for one in found for part in one.get("anyOf", [one])]
         if step == NAME:
             found = [
-                target(one["additionalProperties"]) for one in inside if "additionalProperties" in one
+                target(one["additionalProperties"])
+                for one in inside
+                if "additionalProperties" in one
             ]
             continue
         if step == NUMBER:
