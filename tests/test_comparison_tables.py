@@ -4,11 +4,13 @@ import math
 
 import pytest
 from comparison_samples import FRAME, Folder, scenario, verdicts
+from matplotlib.mathtext import MathTextParser
 
 from podusv_cli.comparison import claims, table
 from podusv_cli.comparison.checks import CHECKS
 from podusv_cli.comparison.differences import as_text, differences
 from podusv_cli.comparison.entries import Absent, Entry
+from podusv_cli.metrics.table import METRICS
 
 # A key of every section that a run has besides its law, and another value.
 OTHERWISE = {
@@ -70,7 +72,31 @@ def test_latex_escapes_and_marks():
     lines = table.as_latex(frame).splitlines()
     head = r"a\_b\&\textasciitilde{}\textasciicircum{}\textbackslash{}\{\} & \#\$\% \\"
     assert lines[2].endswith(head)
-    assert lines[4] == r"iae & m s & \textbf{1} & 2 (2) \\"
+    assert lines[4] == r"$\int z_e\,\mathrm{d}t$ & m s & \textbf{1} & 2 (2) \\"
+
+
+def test_latex_has_symbols_units_and_powers_of_ten_as_formulas():
+    numbers = {"effort_r": 1.5e7, "ise": 2e-9, "saturated_fraction": 0.5}
+    frame = table.table({"a": numbers, "b": {"effort_r": 3e12, "ise": 4e-2}})
+    rows = [line.removesuffix(r" \\").split(" & ") for line in table.as_latex(frame).splitlines()]
+    found = {row[0]: row[1:] for row in rows[4:-2]}
+    assert found == {
+        r"$\int z_e^2\,\mathrm{d}t$": [
+            "m$^2$ s", r"\textbf{\boldmath 2$\times10^{-9}$}", r"0.04 (2$\times10^{7}$)",
+        ],
+        r"$\int\tau_r^2\,\mathrm{d}t$": [
+            "N$^2$ m$^2$ s", r"\textbf{\boldmath 1.5$\times10^{7}$}",
+            r"3$\times10^{12}$ (2$\times10^{5}$)",
+        ],
+        r"saturated\_fraction": ["1", r"\textbf{0.5}", "-"],
+    }  # fmt: skip
+
+
+def test_every_symbol_of_a_metric_can_be_set():
+    symbols = [metric.symbol for metric in METRICS.values() if metric.symbol]
+    assert len(symbols) >= 10
+    for symbol in symbols:
+        MathTextParser("path").parse(f"${symbol}$")
 
 
 # --- differences

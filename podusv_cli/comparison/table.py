@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 
 import pandas as pd
 
-from podusv_cli.core import escaping
+from podusv_cli.core import escaping, quantities
 from podusv_cli.metrics.table import CLOCKED, METRICS
 
 METRIC = "metric"
@@ -116,10 +117,11 @@ def as_markdown(frame: pd.DataFrame, endings: Mapping[str, str]) -> str:
 
 
 def as_latex(frame: pd.DataFrame) -> str:
-    """The table in LaTeX (booktabs), with the smallest number of each row in bold."""
+    """The table in LaTeX (booktabs): symbols where metrics have one, the best of a row in bold."""
     head = ["metric", "unit", *map(str, frame.columns)]
     body = [[escaping.latex(cell) for cell in head]]
-    body += [[_marked(cell) for cell in row] for row in cells(frame)]
+    for name, unit, *numbers in cells(frame):
+        body.append([_symbol(name), quantities.raised(unit), *map(_marked, numbers)])
     lines = [" & ".join(row) + r" \\" for row in body]
     columns = "ll" + "r" * len(frame.columns)
     opening = [rf"\begin{{tabular}}{{{columns}}}", r"\toprule", lines[0], r"\midrule"]
@@ -127,5 +129,12 @@ def as_latex(frame: pd.DataFrame) -> str:
 
 
 def _marked(cell: str) -> str:
-    number, marked, ratio = escaping.latex(cell).partition("*")
-    return rf"\textbf{{{number}}}{ratio}" if marked else number
+    """A cell with powers of ten as formulas, which are bold with a number marked as the best."""
+    powers = re.sub(r"e([+-]\d+)", lambda found: rf"$\times10^{{{int(found[1])}}}$", cell)
+    number, marked, ratio = powers.partition("*")
+    bold = r"\boldmath " if "$" in number else ""
+    return rf"\textbf{{{bold}{number}}}{ratio}" if marked else number
+
+
+def _symbol(name: str) -> str:
+    return f"${METRICS[name].symbol}$" if METRICS[name].symbol else escaping.latex(name)

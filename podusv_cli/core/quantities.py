@@ -1,6 +1,8 @@
-"""Amounts of data and time in words."""
+"""Amounts of data and time in words; units as formulas."""
 
 from __future__ import annotations
+
+import re
 
 BYTES = {"bytes": 1.0, "kB": 1e3, "MB": 1e6, "GB": 1e9, "TB": 1e12, "PB": 1e15}
 TIMES = {"s": 1.0, "min": 60.0, "h": 3600.0, "days": 86400.0, "years": 31557600.0}
@@ -14,6 +16,11 @@ def bytes_in_words(count: float) -> str:
 def time_in_words(seconds: float) -> str:
     """Such as `1.4 min`."""
     return _in_words(seconds, TIMES)
+
+
+def raised(unit: str) -> str:
+    """A unit with its powers raised, as LaTeX and matplotlib read it: `m$^2$ s` for `m2 s`."""
+    return re.sub(r"(?<=[A-Za-z])(\d)", r"$^\1$", unit)
 
 
 def _in_words(amount: float, units: dict[str, float]) -> str:

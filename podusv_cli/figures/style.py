@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import math
-import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -19,7 +18,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 from matplotlib.ticker import ScalarFormatter
 
-from podusv_cli.core import escaping
+from podusv_cli.core import escaping, quantities
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import Signal
@@ -193,7 +192,7 @@ def label(signal: Signal) -> str:
 
 def unit(signal: Signal) -> str:
     """Unit of a signal with its powers raised."""
-    return re.sub(r"(?<=[a-z])(\d)", r"$^\1$", signal.unit)
+    return quantities.raised(signal.unit)
 
 
 def legend(figure: Figure, columns: int, thin: str = "") -> None:

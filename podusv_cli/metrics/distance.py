@@ -55,10 +55,22 @@ def _settling_time(seen: Vector, step: float) -> float:
 
 OF = Accumulator(watch, lambda layout: SIZE, _constants, INTEGRALS)
 OF_SETTLED = Accumulator(watch_settled, lambda layout: 2 * SETTLED, _constants, SETTLED)
-iae = Metric("iae", "m s", "integral of z_e", OF, gathered(ABSOLUTE), 1, counts_standoff=True)
-ise = Metric("ise", "m2 s", "integral of z_e^2", OF, gathered(SQUARE), 1, counts_standoff=True)
-itae = Metric("itae", "m s2", "integral of t z_e", OF, gathered(TIMED), 1, counts_standoff=True)
-rmse = Metric("rmse", "m", "root of the mean of z_e^2", OF, _rmse, 1, counts_standoff=True)
+iae = Metric(
+    "iae", "m s", "integral of z_e", OF, gathered(ABSOLUTE), 1, counts_standoff=True,
+    symbol=r"\int z_e\,\mathrm{d}t",
+)  # fmt: skip
+ise = Metric(
+    "ise", "m2 s", "integral of z_e^2", OF, gathered(SQUARE), 1, counts_standoff=True,
+    symbol=r"\int z_e^2\,\mathrm{d}t",
+)  # fmt: skip
+itae = Metric(
+    "itae", "m s2", "integral of t z_e", OF, gathered(TIMED), 1, counts_standoff=True,
+    symbol=r"\int t\,z_e\,\mathrm{d}t",
+)  # fmt: skip
+rmse = Metric(
+    "rmse", "m", "root of the mean of z_e^2", OF, _rmse, 1, counts_standoff=True,
+    symbol=r"\mathrm{rms}(z_e)",
+)  # fmt: skip
 z_e_steady = Metric(
     "z_e_steady", "m", "mean of z_e over the steady window", OF_SETTLED, ratio(ABSOLUTE, TIME), 1,
     counts_standoff=True,

@@ -78,7 +78,8 @@ class Metric:
     before the metric is defined. A metric without an accumulator is measured after the run.
     `place` orders tables. `happens`: the metric is the time of an event, and NaN for a whole run
     means that it never happened. `counts_standoff`: a standoff that a law keeps on purpose makes it
-    worse, so that nobody is marked best where there is one.
+    worse, so that nobody is marked best where there is one. `symbol` is LaTeX for a formula, ""
+    where the name says it better.
     """
 
     name: str
@@ -89,6 +90,7 @@ class Metric:
     place: int = 100
     happens: bool = False
     counts_standoff: bool = False
+    symbol: str = ""
 
 
 def gathered(position: int) -> Result:
