@@ -7,6 +7,7 @@ import shlex
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import pandas as pd
 import pytest
 import yaml
 from command_samples import ROOT, commanded
@@ -123,3 +124,11 @@ def test_the_citation_names_this_version() -> None:
     citation = yaml.safe_load(text_of("CITATION.cff"))
     assert citation["version"] == podusv_cli.__version__
     assert citation["authors"] == [{"name": "podusv contributors"}]
+
+
+def test_the_numbers_of_the_pods_are_the_committed_ones() -> None:
+    for row in rows("docs/pod.md")[:3]:
+        name = row[0].split("`")[1]
+        table = pd.read_csv(ROOT / f"results/pod/{name}/comparison.csv", index_col=0)
+        found = table.loc["iae", ["proposed", "dsc", "li", "pid"]].astype(float)
+        assert row[1:] == [f"{number:.0f}" for number in found]
