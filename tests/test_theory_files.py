@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -127,6 +128,16 @@ def test_a_stack_shows_parts_that_make_up_all_of_V(log: Recording) -> None:
         assert len(tops) == len(TERMS)
         assert tops[-1] == pytest.approx(1.0)
         assert np.all(np.diff(tops) >= 0.0)
+
+
+def test_V_of_a_run_that_diverged_does_not_set_the_scale(log: Recording) -> None:
+    scenario = load(CONFIGS / "theory/monitor.yaml", SHORT).scenario
+    grown = {name: log[name] * np.exp(5.0 * log["time"]) for name in ("V", "V_dot")}
+    wild = replace(log, status="diverged", signals={**log.signals, **grown})
+    alone = FIGURES["stability"].family(dressed([("a", log, scenario), ("b", log, scenario)]), 2)
+    both = FIGURES["stability"].family(dressed([("a", log, scenario), ("b", wild, scenario)]), 2)
+    for expected, found in zip(alone.axes[:2], both.axes[:2], strict=True):
+        assert found.get_ylim() == pytest.approx(expected.get_ylim())
 
 
 def tops_of(stack: Axes) -> list[float]:

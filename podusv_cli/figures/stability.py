@@ -10,10 +10,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.ticker import Locator
 
 from podusv_cli.core.kernel import Vector
-from podusv_cli.figures.curves import draw_run, thinned
+from podusv_cli.figures.curves import draw_run, scaling, thinned
 from podusv_cli.figures.panels import TIME
 from podusv_cli.figures.sheet import figure
 from podusv_cli.figures.style import Shown, legend, new_figure
@@ -67,7 +68,7 @@ def _curves(axes: Axes, runs: Sequence[Shown]) -> None:
     axes.set_yscale("log")
     axes.set_ylabel(MIXED)
     for run in runs:
-        draw_run(axes, run, run.during("V", None), fitted=True)
+        draw_run(axes, run, run.during("V", None), fitted=run in scaling(runs))
 
 
 def _stack(axes: Axes, runs: Sequence[Shown]) -> None:
@@ -84,7 +85,7 @@ def _stack(axes: Axes, runs: Sequence[Shown]) -> None:
 
 def _ultimate(axes: Axes, runs: Sequence[Shown]) -> None:
     """The bound of V in each part of every run, drawn or, where it is far off, told in words."""
-    largest = max(float(np.max(run.signal("V"))) for run in runs)
+    largest = max(float(np.max(run.signal("V"))) for run in scaling(runs))
     told, top = [], largest
     for run in runs:
         for start, end, bound in _bounds(run):
@@ -117,13 +118,15 @@ def _rate(axes: Axes, runs: Sequence[Shown]) -> None:
     axes.set_ylabel(rf"${V_DOT.symbol}$ [({SUM})/s]")
     runs = [run for run in runs if run.has("V_dot")]
     for run in runs:
-        draw_run(axes, run, run.during("V_dot", None), fitted=True)
-    largest = max((float(np.max(np.abs(run.signal("V_dot")))) for run in runs), default=1.0)
+        draw_run(axes, run, run.during("V_dot", None), fitted=run in scaling(runs))
+    kept = scaling(runs)
+    largest = max((float(np.max(np.abs(run.signal("V_dot")))) for run in kept), default=1.0)
     for run in runs:
         limit = run.signal("V_dot_bound")
         near = np.where(np.abs(limit) <= FAR * largest, limit, np.nan)
-        axes.plot(run.recording["time"], near, **_thin(run))
-    _compress(axes, max([*(_settled(run, "V_dot") for run in runs), 1e-9]))
+        add = axes.add_line if run in kept else axes.add_artist  # which leaves the scale as it is
+        add(Line2D(run.recording["time"], near, **_thin(run)))
+    _compress(axes, max([*(_settled(run, "V_dot") for run in kept), 1e-9]))
     axes.axhline(0.0, color="#444444", linewidth=0.5)
     axes.autoscale_view()
 
