@@ -7,29 +7,28 @@ in this order, and `...` stands for what is left out.
 
 from __future__ import annotations
 
-import os
 import re
 import shlex
-import shutil
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
-from command_samples import PATIENCE, ROOT, Command, Said, commanded
-from conftest import PACKAGE
+from command_samples import ROOT, Command, commanded
 
 from podusv_cli.storage.run_folder import open_run
 
-LAW = "docs/write_your_law.md"
+PAGES = ("README.md", "docs/tutorial.md", "docs/write_your_law.md")
 LARGEST = 10.0  # N m; four times the yaw moment that the actuator of README's scenario delivers
+
+
+def text_of(page: str) -> str:
+    return (ROOT / page).read_text()
 
 
 def blocks(page: str) -> list[tuple[str, str]]:
     """Language and text of every fenced block."""
-    return re.findall(r"^```(\w+)\n(.*?)^```", (ROOT / page).read_text(), re.M | re.S)
+    return re.findall(r"^```(\w+)\n(.*?)^```", text_of(page), re.M | re.S)
 
 
 def write_files(page: str) -> None:
@@ -64,43 +63,16 @@ def podusv(
     return commanded(monkeypatch, capsys)
 
 
-@pytest.fixture
-def extended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Command:
-    """The command line of a copy of the package, in the same folder, in a process of its own."""
-    monkeypatch.chdir(tmp_path)
-    shutil.copytree(PACKAGE, "podusv_cli", ignore=shutil.ignore_patterns("__pycache__"))
-
-    def run(*words: str) -> Said:
-        done = subprocess.run(
-            [sys.executable, "-m", "podusv_cli", *words], capture_output=True, text=True,
-            env={**os.environ, "PYTHONPATH": str(tmp_path), "COLUMNS": "100"}, timeout=PATIENCE,
-        )  # fmt: skip
-        return Said(done.returncode, done.stdout, done.stderr)
-
-    return run
-
-
-def check(page: str, podusv: Command) -> None:
-    """Type every command of a page and look for the output that it shows."""
+@pytest.mark.parametrize("page", PAGES)
+def test_commands_of_a_page_print_what_it_shows(page: str, podusv: Command) -> None:
+    write_files(page)
+    assert len(list(dialogues(page))) > 1
     for words, code, shown in dialogues(page):
         plain = ["--no-figures"] * (words[0] in ("run", "compare"))
         said = podusv(*words, *plain)
         printed = " ".join((said.err + said.out).split())
         assert said.code == code, (words, printed)
         assert re.search(pattern(shown), printed), (words, printed)
-
-
-@pytest.mark.parametrize("page", ["README.md", "docs/tutorial.md"])
-def test_commands_of_a_page_print_what_it_shows(page: str, podusv: Command) -> None:
-    write_files(page)
-    assert len(list(dialogues(page))) > 2
-    check(page, podusv)
-
-
-def test_the_law_of_the_page_works_as_it_stands(extended: Command) -> None:
-    write_files(LAW)
-    Path("pursuit.py").rename("podusv_cli/controllers/pursuit.py")
-    check(LAW, extended)
 
 
 def test_the_first_scenario_follows_ahead_and_demands_what_is_available(podusv: Command) -> None:
@@ -111,3 +83,31 @@ def test_the_first_scenario_follows_ahead_and_demands_what_is_available(podusv: 
     assert run.recording["u"][late].min() > 0.4
     assert np.abs(run.recording["z_e"][late] - 0.5).max() < 0.05
     assert run.metrics["peak_tau_r"] < LARGEST
+
+
+MISTAKES = {  # what is replaced in the page's law
+    "a rate or a signal is not written": ("rate[0] = k.K_i * missing", "pass"),
+    "more written than declared": ("signals[0] =", "signals[1] ="),
+    "`start` and `slots` disagree": ("np.zeros(1)", "np.zeros(2)"),
+    "an unknown field": ("k.K_u *", "k.K_w *"),
+    "`@kernel` is missing, or a slice, a list, `print` or `raise` is in the kernel": (
+        "    @kernel\n    def law",
+        "    def law",
+    ),
+    "a `kind` that exists": ('"pursuit"', '"pid"'),
+    "a signal named as one of the closed loop's": ('"heading_error", "rad"', '"psi", "rad"'),
+    "the file cannot be imported": ("tau[0] =", "tau[0] = ="),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_in_a_law_gets_the_message_of_the_page(mistake: str, podusv: Command) -> None:
+    page = "docs/write_your_law.md"
+    write_files(page)
+    law, (right, wrong) = Path("pursuit.py"), MISTAKES[mistake]
+    assert right in law.read_text()
+    law.write_text(law.read_text().replace(right, wrong))
+    said = podusv("compare", "laws.yaml", "--set", "simulation.duration=1", "--no-figures")
+    (message,) = re.findall(rf"^\| {re.escape(mistake)} \| `(.*)` \|$", text_of(page), re.MULTILINE)
+    assert re.search(pattern(message), " ".join((said.err + said.out).split())), said.err
+    assert said.code in (2, 3)
