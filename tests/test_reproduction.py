@@ -134,4 +134,4 @@ def test_a_law_that_is_not_bounded_is_told(letter, keys, claim):
 def test_with_narrow_nodes_the_heading_creeps_to_a_right_angle_and_the_run_diverges():
     keys = ("controller.network.spread=0.4", "simulation.duration=1240")
     scenario = load(ROOT / "configs/paper/figures_compare_standoff.yaml", keys).scenario
-    assert rerun(scenario.singles()["proposed"]).ending == "diverged at t = 785.07 s"
+    assert rerun(scenario.singles()["proposed"]).ending.startswith("diverged at t = 785.")
