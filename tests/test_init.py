@@ -111,12 +111,19 @@ def test_a_copy_anywhere_is_the_same_scenario(podusv: Command, name: str) -> Non
     assert said.code == 0, said.err
     copy = Path("deep/er") / f"{name}.yaml"
     assert load(copy).scenario == load(CONFIGS / f"{name}.yaml").scenario
+    assert load(copy).scenario == load(f"podusv:{name}.yaml").scenario
     text = copy.read_text()
     assert text.count("\n") == (CONFIGS / f"{name}.yaml").read_text().count("\n")
     (schema,) = re.findall(r"^# yaml-language-server: \$schema=(.*)$", text, re.MULTILINE)
     assert (copy.parent / schema).read_text() == schema_text(tuple(finding_kinds()))
     command = "compare" if load(copy).scenario.controllers else "run"
     assert said.out.splitlines()[-1] == f"next: podusv {command} {copy}"
+
+
+@pytest.mark.parametrize("name", ["own_vessel", "paper/printed", "pod/vessels/otter"])
+def test_a_copy_is_called_as_the_file(podusv: Command, name: str) -> None:
+    assert podusv("init", name).code == 0
+    assert {path.name for path in Path().iterdir()} == {f"{name.split('/')[-1]}.yaml", SCHEMA}
 
 
 def test_init_replaces_nothing(podusv: Command) -> None:

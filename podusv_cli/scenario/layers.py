@@ -25,12 +25,14 @@ MOST = {"files": 100, "characters": 2 * MAX_CHARACTERS, "values": 3 * MAX_NODES}
 FLOW = ("[", "{", "'", '"')  # what lists, mappings and text in quotes start with
 
 
-def composed(text: str, source: str, overrides: Sequence[str], faults: list[Fault]) -> Node | None:
+def composed(
+    text: str, source: str, overrides: Sequence[str], faults: list[Fault], *, placed: bool = True
+) -> Node | None:
     """The tree of a scenario's text over what it extends, with the overrides on top.
 
     None if the text cannot be parsed. File names in `extends` are relative to `source`.
     """
-    layers = _layers(text, source, faults)
+    layers = _layers(text, source, faults, placed)
     settings = [_override_tree(override, faults) for override in overrides]
     if not layers:
         return None
@@ -40,13 +42,13 @@ def composed(text: str, source: str, overrides: Sequence[str], faults: list[Faul
     return replace(reduce(merge, [*reversed(layers), top]), mark=Mark(source))
 
 
-def _layers(text: str, source: str, faults: list[Fault]) -> list[Node]:
+def _layers(text: str, source: str, faults: list[Fault], placed: bool) -> list[Node]:
     """The tree of the scenario's text, then those of all that it extends, nearest first.
 
     The key `extends` is removed; the first tree is faulty if an extended file cannot be read. Of
     several bases the later one overrides the earlier.
     """
-    node = _mapping(text, source, faults)
+    node = _mapping(text, source, faults, placed)
     if not node:
         return []
     bases = list(_bases(node, source, _size_of(text, node), faults))
@@ -100,8 +102,8 @@ def _limit_reached(totals: Counter[str]) -> str:
     return next(full, "")
 
 
-def _mapping(text: str, source: str, faults: list[Fault]) -> Node | None:
-    node = read(text, source, faults)
+def _mapping(text: str, source: str, faults: list[Fault], placed: bool = True) -> Node | None:
+    node = read(text, source, faults, placed=placed)
     if node and not isinstance(node.content, dict):
         # The text is not shown: the file may be one that the user may not read.
         what = "text" if isinstance(node.content, str) else found(node.content, node.text)

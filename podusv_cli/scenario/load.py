@@ -57,14 +57,15 @@ def load(
 
 def load_text(
     text: str, source: str, overrides: Sequence[str] = (), checks: Sequence[Check] = (),
-    files: Sequence[str] = (),
+    files: Sequence[str] = (), *, placed: bool = True,
 ) -> Loaded:  # fmt: skip
     """The scenario of a text; `source` names it in messages and is where its file names start.
 
-    Raises ScenarioError with everything that is wrong.
+    Messages give lines of the text only where `placed`. Raises ScenarioError with everything that
+    is wrong.
     """
     faults: list[Fault] = []
-    root = composed(text, source, overrides, faults)
+    root = composed(text, source, overrides, faults, placed=placed)
     if root is None:
         raise ScenarioError(_findings(faults, source))
     root, known = _plugged(plugins.with_given(root, files), source, faults)
@@ -147,10 +148,13 @@ def _origins(scenario: Scenario, root: Node) -> dict[str, str]:
 
 def resolved_yaml(scenario: Scenario) -> str:
     """The scenario as a file with every value in it; loading it gives an equal scenario."""
-    body = yaml.dump(
-        scenario.model_dump(), Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=1 << 30
-    )
-    return HEADING + body
+    return HEADING + yaml_text(scenario.model_dump())
+
+
+def yaml_text(data: Mapping[str, Any]) -> str:
+    """Plain data as YAML that podusv reads back to the same values."""
+    text = yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=1 << 30)
+    return str(text)
 
 
 class _Dumper(yaml.SafeDumper):

@@ -13,7 +13,7 @@ from podusv_cli.core.component import Component, Presets
 from podusv_cli.scenario.keys import SCENARIO, Key
 from podusv_cli.scenario.model import NAME, NAME_IN_WORDS
 from podusv_cli.scenario.phrases import found, quoted, unknown
-from podusv_cli.scenario.shipped import relative_to
+from podusv_cli.scenario.shipped import PREFIX, relative_to
 from podusv_cli.scenario.yaml_text import MAX_NODES, read, read_text, resolve
 from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, dotted, merge, overlay
 from podusv_cli.vessels.vessel import COEFFICIENTS, VESSELS, Vessel
@@ -90,7 +90,7 @@ def _name(root: Node, faults: list[Fault]) -> Node:
     """`name` is the file's name without suffix unless given."""
     if "name" in root.mapping:
         return root
-    stem = Path(root.mark.source).stem
+    stem = Path(root.mark.source.removeprefix(PREFIX)).stem
     usable = re.fullmatch(NAME, stem)
     if not usable:
         text = f"cannot be the file's name {quoted(stem)}; give one {NAME_IN_WORDS}"

@@ -29,7 +29,7 @@ from podusv_cli.scenario.load import resolved_yaml
 from podusv_cli.storage import provenance
 from podusv_cli.storage.run_folder import RunWriter, default_folder, open_run
 from podusv_cli.workflows.execute import Task, execute, unwritten, warm_up
-from podusv_cli.workflows.gather import gather
+from podusv_cli.workflows.gather import Gathered, gather
 from podusv_cli.workflows.members import Member
 from podusv_cli.workflows.run import RESULTS, Request
 
@@ -87,8 +87,14 @@ def compare(items: Sequence[Path], request: Request, progress: Progress | None =
     runs are compared, without figures; KeyboardInterrupt if there are none. Raises UsageError,
     ScenarioError, StorageError.
     """
+    return compare_gathered(gather(items, request), items, request, progress)
+
+
+def compare_gathered(
+    given: Gathered, items: Sequence[Path], request: Request, progress: Progress | None = None
+) -> Compared:
+    """The same for what is gathered already; `items` are the files and folders that it is from."""
     started, argv = datetime.now(UTC), list(request.argv)
-    given = gather(items, request)
     for finding in merged({member.label: member.noticed for member in given.members}):
         request.warn(finding)
     target = request.out or _default_folder(given.title, given.members)

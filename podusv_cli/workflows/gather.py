@@ -12,7 +12,7 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.findings.finding import not_silenced, unknown_codes
 from podusv_cli.findings.preflight import preflight
 from podusv_cli.scenario.limits import limits
-from podusv_cli.scenario.load import load
+from podusv_cli.scenario.load import Loaded, load
 from podusv_cli.workflows.members import Member, comparable, distinct, numbered
 from podusv_cli.workflows.run import Request
 
@@ -27,7 +27,7 @@ class Gathered:
 
 
 @dataclass(frozen=True)
-class _Item:
+class Item:
     """One argument: its runs, what its own claims call them, and these claims."""
 
     name: str
@@ -43,7 +43,11 @@ def gather(items: Sequence[Path], request: Request) -> Gathered:
         raise UsageError(
             f"--set {given}: --set changes scenarios, and only finished runs are given"
         )
-    found = [_opened(item, request, alone=len(items) == 1) for item in items]
+    return gathered([_opened(item, request, alone=len(items) == 1) for item in items])
+
+
+def gathered(found: Sequence[Item]) -> Gathered:
+    """The runs of several items, each with a label of its own, and the claims about them."""
     members = distinct(member for item in found for member in item.members)
     labels = iter(member.label for member in members)
     called = [dict(zip(item.names, labels, strict=False)) for item in found]
@@ -51,22 +55,32 @@ def gather(items: Sequence[Path], request: Request) -> Gathered:
     return Gathered(members, _labelled(found, called), title)
 
 
-def _opened(path: Path, request: Request, *, alone: bool) -> _Item:
+def _opened(path: Path, request: Request, *, alone: bool) -> Item:
     if path.is_dir():
-        members = comparable(path)
-        return _Item(path.resolve().name, members, [member.label for member in members])
+        return from_folder(path)
     fits = limits(request.allow_large, read_back=True)
     loaded = load(path, request.overrides, (unknown_codes, fits), request.plugins)
+    return from_scenario(loaded, alone=alone)
+
+
+def from_folder(path: Path) -> Item:
+    """The finished runs of a folder. Raises UsageError, StorageError."""
+    members = comparable(path)
+    return Item(path.resolve().name, members, [member.label for member in members])
+
+
+def from_scenario(loaded: Loaded, *, alone: bool) -> Item:
+    """The runs of a scenario, and its claims; `alone` says that nothing else is compared."""
     scenario, singles = loaded.scenario, loaded.scenario.singles()
     labels = list(singles) if alone or scenario.controllers else [scenario.name]
     members = [
         Member(label, single, loaded.text, noticed=not_silenced(preflight(single), single))
         for label, single in zip(labels, singles.values(), strict=True)
     ]
-    return _Item(scenario.name, members, list(singles), parse_claims(loaded))
+    return Item(scenario.name, members, list(singles), parse_claims(loaded))
 
 
-def _labelled(found: Sequence[_Item], called: Sequence[Mapping[str, str]]) -> list[ParsedClaim]:
+def _labelled(found: Sequence[Item], called: Sequence[Mapping[str, str]]) -> list[ParsedClaim]:
     """All claims; names that several scenarios use are preceded by the scenario's name."""
     counts = Counter(claim.name for item in found for claim in item.claims)
     claims = [

@@ -49,7 +49,7 @@ def init(name: str, out: Path | None = None) -> Begun:
     if _short(name) not in known:
         raise UsageError(unknown(f"starting point {name!r}", _short(name), known))
     source = f"{shipped.PREFIX}{_short(name)}.yaml"
-    config = out or Path(Path(source).name)
+    config = out or Path(f"{_short(name)}.yaml".rpartition("/")[2])
     schema = config.with_name(SCHEMA)
     files.check_places([config, schema])
     if config.exists():

@@ -10,7 +10,7 @@ from podusv_cli.core.finding import Finding
 from podusv_cli.findings.finding import not_silenced, unknown_codes
 from podusv_cli.findings.preflight import preflight
 from podusv_cli.scenario.limits import limits
-from podusv_cli.scenario.load import load, resolved_yaml
+from podusv_cli.scenario.load import Loaded, load, resolved_yaml
 from podusv_cli.storage.run_folder import default_folder
 from podusv_cli.workflows.execute import Finished, Progress, Stopwatch, Task, execute
 
@@ -38,6 +38,16 @@ def run(config: Path, request: Request, progress: Progress | None = None) -> Fin
     with watch.part("load"):
         checks = (unknown_codes, limits(request.allow_large))
         loaded = load(config, request.overrides, checks, request.plugins)
+    return run_loaded(loaded, request, progress, watch)
+
+
+def run_loaded(
+    loaded: Loaded, request: Request, progress: Progress | None = None,
+    watch: Stopwatch | None = None,
+) -> Finished:  # fmt: skip
+    """Execute a scenario that is loaded and checked. Raises StorageError."""
+    watch = watch or Stopwatch()
+    with watch.part("load"):
         scenario = loaded.scenario.alone()
         target = request.out or default_folder(RESULTS, scenario.name, resolved_yaml(scenario))
     with watch.part("preflight"):

@@ -1,0 +1,235 @@
+"""The commands of podusv as Python functions."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from podusv_cli.core.component import Component
+from podusv_cli.core.errors import UsageError
+from podusv_cli.core.finding import Finding
+from podusv_cli.core.kernel import Vector
+from podusv_cli.engine import batch
+from podusv_cli.engine.check import check_law
+from podusv_cli.engine.variants import variants
+from podusv_cli.findings.after import postflight
+from podusv_cli.findings.finding import not_silenced
+from podusv_cli.findings.preflight import preflight
+from podusv_cli.interface.results import Comparison, Run
+from podusv_cli.interface.scenarios import Changes, Source, loaded
+from podusv_cli.metrics.table import observer
+from podusv_cli.storage import json_files
+from podusv_cli.verification import verify as verification
+from podusv_cli.workflows import compare as comparing
+from podusv_cli.workflows import run as running
+from podusv_cli.workflows.execute import Stopwatch, monitored, simulated, summary
+from podusv_cli.workflows.gather import Item, from_folder, from_scenario, gathered
+from podusv_cli.workflows.members import Member
+from podusv_cli.workflows.members import from_folder as members_of
+
+
+def simulate(source: Source, changes: Changes | None = None) -> Run:
+    """Simulate a scenario in memory; nothing is written.
+
+    A run that diverges is returned like any other, see `Run.status`. Ctrl-C ends the run and
+    returns what was computed. Raises ScenarioError, and LawError for a law that fails.
+
+    >>> import podusv_cli as podusv
+    >>> run = podusv.simulate("podusv:own_vessel.yaml", {"simulation.duration": 30.0})
+    >>> run
+    <podusv run pid: finished at 30 s>
+    >>> float(run.log["z_e"].sel(time=20.0).round(1)), run.log["z_e"].units
+    (1.6, 'm')
+    >>> float(run.metrics["iae"].round()), run["z_e"].shape
+    (71.0, (3001,))
+    """
+    scenario = loaded(source, changes).scenario.alone()
+    recording = simulated(scenario, Stopwatch())
+    whole, _ = monitored(scenario, recording)
+    found = not_silenced([*preflight(scenario), *postflight(scenario, whole)], scenario)
+    warned = tuple(map(str, found))
+    return Run(whole.controller, scenario, whole, summary(scenario, recording), warned)
+
+
+def run(
+    source: Source, changes: Changes | None = None, *,
+    out: str | os.PathLike[str] | None = None, force: bool = False, figures: bool = True,
+) -> Run:  # fmt: skip
+    """Simulate a scenario into a run folder, as `podusv run` does it.
+
+    `out` is the folder, by default `results/<name>/<time>-<digest>`; a finished one is replaced
+    only with `force`. Raises ScenarioError, LawError, StorageError.
+
+    >>> import podusv_cli as podusv
+    >>> run = podusv.run("podusv:own_vessel.yaml", out="mine", figures=False)
+    >>> run.status, sorted(path.name for path in run.folder.iterdir())[:3]
+    ('finished', ['log.h5', 'manifest.json', 'metrics.csv'])
+    """
+    done = running.run_loaded(loaded(source, changes), _request(out, force, figures))
+    return open_run(done.folder)
+
+
+def open_run(folder: str | os.PathLike[str]) -> Run:
+    """A finished run, read from its folder. Raises StorageError where it is damaged.
+
+    >>> import podusv_cli as podusv
+    >>> _ = podusv.run("podusv:own_vessel.yaml", out="kept", figures=False)
+    >>> podusv.open_run("kept")
+    <podusv run pid: finished at 120 s, kept>
+    """
+    members = members_of(Path(folder))
+    if len(members) > 1:
+        names = ", ".join(f"{folder}/{member.label}" for member in members)
+        raise UsageError(f"{folder} is a comparison; open one of its runs: {names}")
+    return _opened(members[0])
+
+
+def compare(
+    sources: Source | Run | Iterable[Source | Run], changes: Changes | None = None, *,
+    out: str | os.PathLike[str] | None = None, force: bool = False, figures: bool = True,
+) -> Comparison:  # fmt: skip
+    """Simulate scenarios and compare them with finished runs, as `podusv compare` does it.
+
+    One scenario with `controllers`, several scenarios, run folders, runs that have a folder, or any
+    mixture. Raises ScenarioError, UsageError, StorageError.
+
+    >>> import podusv_cli as podusv
+    >>> scenario = podusv.load("podusv:own_vessel.yaml", {"simulation.duration": 30.0})
+    >>> gains = {"soft": {"K_Pu": 50.0}, "stiff": {"K_Pu": 200.0}}
+    >>> comparison = podusv.compare(scenario, {"controllers": gains}, figures=False)
+    >>> comparison.table.loc["iae"].round()
+    soft     72.0
+    stiff    68.0
+    Name: iae, dtype: float64
+    """
+    given = _several(sources)
+    files = [_file(one) for one in given]
+    items, request = _items(given, files, changes), _request(out, force, figures)
+    done = comparing.compare_gathered(gathered(items), [f for f in files if f], request)
+    verdicts = [verdict.as_json() for verdict in done.result.verdicts]
+    claims = pd.DataFrame(verdicts).set_index("claim") if verdicts else pd.DataFrame()
+    failed = {label: text for label, text in done.result.endings.items() if text}
+    return Comparison(done.folder, _compared(done), done.result.table, claims, failed)
+
+
+def simulate_many(
+    source: Source, parameters: Mapping[str, Sequence[float] | Vector], *, workers: int = 0
+) -> pd.DataFrame:
+    """Simulate a scenario once for each entry of the parameters; a row a run.
+
+    `parameters` are dotted keys of numbers, each with one value a run; `vessel.m` changes the
+    vessel, not what the controller is told of it (`nominal.m`). The columns are the parameters,
+    `status`, and the metrics, NaN where a run ended before one is defined. `workers` runs are
+    simulated at a time (0: one a core). No logs are kept. Raises ScenarioError, and ValueError for
+    unknown keys, unequal lengths and numbers out of range.
+
+    >>> import podusv_cli as podusv
+    >>> scenario = podusv.load("podusv:own_vessel.yaml", {"simulation.duration": 30.0})
+    >>> podusv.simulate_many(scenario, {"vessel.m": [50.0, 60.0]})[["vessel.m", "status"]]
+       vessel.m    status
+    0      50.0  finished
+    1      60.0  finished
+    """
+    scenario = loaded(source).scenario.alone()
+    loop, grid, settings = scenario.closed_loop(), scenario.time_grid(), scenario.metrics
+    check_law(loop)
+    watching = observer(
+        loop, grid,
+        steady_fraction=settings.steady_fraction, settling_radius=settings.settling_radius,
+    )  # fmt: skip
+    done = batch.simulate_many(variants(loop, parameters), grid, observer=watching, workers=workers)
+    given = {key: np.asarray(numbers, float) for key, numbers in parameters.items()}
+    return pd.DataFrame({**given, "status": done.status, **watching.summaries(done.seen)})
+
+
+def verify(
+    source: Source, changes: Changes | None = None, *, tolerance: float = 0.01
+) -> pd.DataFrame:
+    """Whether the numbers of a scenario have converged, as `podusv verify` finds out.
+
+    A row for each run and number: its `value` at the scenario's step, the `order` of convergence
+    (NaN where there is none), the `relative_error`, and whether that is within `tolerance`. Raises
+    ScenarioError, LawError.
+
+    >>> import podusv_cli as podusv
+    >>> found = podusv.verify("podusv:own_vessel.yaml", {"simulation.duration": 20.0})
+    >>> bool(found.loc[("pid", "iae"), "converged"])
+    True
+    """
+    scenario = loaded(source, changes).scenario
+    for single in scenario.singles().values():
+        check_law(single.closed_loop())
+    done = verification.verify(scenario, tolerance)
+    rows = {
+        (label, name): (e.values[0], e.order, e.relative, e.converged(tolerance))
+        for label, one in done.runs.items()
+        for name, e in one.estimates.items()
+    }
+    columns = ["value", "order", "relative_error", "converged"]
+    frame = pd.DataFrame.from_dict(rows, orient="index", columns=columns)
+    frame.index = pd.MultiIndex.from_tuples(list(rows), names=["run", "number"])
+    return frame
+
+
+def _request(out: Any, force: bool, figures: bool) -> running.Request:
+    return running.Request(out=Path(out) if out is not None else None, force=force, figures=figures)
+
+
+def _opened(member: Member) -> Run:
+    run = member.run
+    assert run is not None  # the members of a folder are finished
+    numbers = {n: math.nan if x is None else float(x) for n, x in run.metrics.items()}
+    told = json_files.read(run.folder / "metrics.json").get("warnings", [])
+    warned = tuple(str(Finding(**one)) for one in told)
+    law, scenario = run.recording.controller, member.scenario
+    return Run(law, scenario, run.recording, numbers, warned, run.folder)
+
+
+def _compared(done: comparing.Compared) -> dict[str, Run]:
+    """The runs of a comparison that have a log, by label."""
+    result = done.result
+    folders = {e.label: done.folder / e.label for e in result.entries if e.label in result.timings}
+    return {
+        e.label: Run(
+            e.label, e.scenario, e.recording, e.metrics(),
+            tuple(map(str, result.warnings[e.label])), folders.get(e.label, e.run.folder),
+        )
+        for e in result.entries
+    }  # fmt: skip
+
+
+def _several(sources: Any) -> list[Any]:
+    """One source, or several of them, as a list."""
+    single = isinstance(sources, (str, os.PathLike, Mapping, Component, Run))
+    return [sources] if single else list(sources)
+
+
+def _file(source: Any) -> Path | None:
+    """The file or folder that a source is, None for a scenario in memory. Raises UsageError."""
+    if isinstance(source, Run):
+        if source.folder is None:
+            raise UsageError(
+                f"{source!r} has no folder; make it with podusv.run, or compare its scenario"
+            )
+        return source.folder
+    return Path(source) if isinstance(source, (str, os.PathLike)) else None
+
+
+def _items(
+    given: Sequence[Any], files: Sequence[Path | None], changes: Changes | None
+) -> list[Item]:
+    folders = [file if file and file.is_dir() else None for file in files]
+    if changes and all(folders):
+        raise UsageError(f"{', '.join(changes)}: only finished runs are given, which do not change")
+    return [
+        from_folder(folder)
+        if folder
+        else from_scenario(loaded(one, changes), alone=len(given) == 1)
+        for one, folder in zip(given, folders, strict=True)
+    ]

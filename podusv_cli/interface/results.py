@@ -1,0 +1,179 @@
+"""Runs and comparisons in Python: log, metrics, figures, and how notebooks show them."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property, partial
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+
+from podusv_cli.core.errors import UsageError
+from podusv_cli.core.kernel import Vector
+from podusv_cli.core.recording import Recording
+from podusv_cli.metrics.table import METRICS
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.phrases import unknown
+from podusv_cli.theory import derived
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.figure import Figure
+
+NO_XARRAY = (
+    "run.log is an xarray.Dataset and xarray is not installed: pip install 'podusv[python]'; "
+    "run['z_e'] is a numpy array and needs nothing"
+)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Run:
+    """A run that is over: its log, metrics and figures.
+
+    `status` is "finished", "diverged" or "interrupted", and `message` says why a run did not
+    finish. `warnings` are the findings before and after the run. `folder` is None for a run that
+    was only simulated. `run["z_e"]` is a signal as a numpy array.
+    """
+
+    label: str
+    scenario: Scenario
+    recording: Recording
+    numbers: Mapping[str, float]
+    warnings: tuple[str, ...] = ()
+    folder: Path | None = None
+
+    @property
+    def status(self) -> str:
+        """How the run ended."""
+        return self.recording.status
+
+    @property
+    def message(self) -> str:
+        """Why the run did not finish; empty if it did."""
+        return self.recording.message
+
+    @property
+    def metrics(self) -> pd.Series[float]:
+        """Every metric by name; NaN where it is not defined. `podusv explain NAME` has its unit."""
+        return pd.Series(dict(self.numbers), name=self.label, dtype=float).rename_axis("metric")
+
+    @cached_property
+    def log(self) -> xarray.Dataset:
+        """Every signal over `time` [s], with units and meaning, as log.h5 has it.
+
+        Raises ImportError where xarray is not installed.
+        """
+        try:
+            import xarray
+        except ImportError as error:
+            raise ImportError(NO_XARRAY) from error
+        log = self.recording
+        arrays = {
+            name: (about.dimensions, log[name], {"units": about.unit, "long_name": about.meaning})
+            for name, about in log.about.items()
+            if name in log
+        }
+        facts = {"status": self.status, "controller": log.controller, "message": self.message}
+        return xarray.Dataset(arrays, attrs=facts).set_coords("time")
+
+    def __getitem__(self, signal: str) -> Vector:
+        """A signal that the log has or that follows from it; KeyError with those that there are."""
+        if not derived.has(self.recording, signal):
+            raise KeyError(unknown(f"signal {signal!r}", signal, self.recording.signals))
+        return derived.signal(self.recording, signal)
+
+    def plot(self, name: str = "trajectory", *, columns: int = 2) -> Figure:
+        """A matplotlib figure, which notebooks show; `podusv plot --help` tells of the files.
+
+        `columns` is its width in columns of a journal page. Raises UsageError for a figure that
+        podusv does not have or that the run has no signals for.
+        """
+        return figure({self.label: self}, name, columns)
+
+    def __repr__(self) -> str:
+        """One line: what ran, how it ended, where it is."""
+        end = self.recording["time"][-1] if len(self.recording["time"]) else 0.0
+        where = f", {self.folder}" if self.folder else ""
+        return f"<podusv run {self.label}: {self.status} at {end:g} s{where}>"
+
+    def _repr_html_(self) -> str:
+        """The trajectory beside the metrics, what was warned of above."""
+        rows = {n: f"{x:.5g} {METRICS[n].unit}" for n, x in self.numbers.items() if n in METRICS}
+        table = pd.Series(rows, name=self.label, dtype=str).to_frame().to_html(border=0)
+        lines = [repr(self), self.message, *self.warnings]
+        return _html(lines, {self.label: self}, table)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison:
+    """Runs side by side.
+
+    `table` has a row a metric and a column a run; `claims` a row for each claim of the scenario;
+    `failed` says why a run did not finish. `report` is the HTML page, None without figures.
+    """
+
+    folder: Path
+    runs: Mapping[str, Run]
+    table: pd.DataFrame
+    claims: pd.DataFrame
+    failed: Mapping[str, str]
+
+    @property
+    def report(self) -> Path | None:
+        """The HTML page with table, claims and figures."""
+        page = self.folder / "report.html"
+        return page if page.exists() else None
+
+    def __getitem__(self, label: str) -> Run:
+        """The run of this label."""
+        return self.runs[label]
+
+    def plot(self, name: str = "trajectory", *, columns: int = 2) -> Figure:
+        """All runs in one matplotlib figure; as `Run.plot`."""
+        return figure(self.runs, name, columns)
+
+    def __repr__(self) -> str:
+        """One line: the runs, and where they are."""
+        return f"<podusv comparison of {', '.join(self.table.columns)}: {self.folder}>"
+
+    def _repr_html_(self) -> str:
+        """All trajectories beside the table."""
+        lines = [repr(self), *(f"{label}: {text}" for label, text in self.failed.items())]
+        return _html(lines, self.runs, self.table.to_html(border=0, float_format="{:.5g}".format))
+
+
+def figure(runs: Mapping[str, Run], name: str, columns: int = 2) -> Figure:
+    """One of podusv's figures of several runs. Raises UsageError."""
+    from podusv_cli.figures.drawing import FIGURES, dressed  # matplotlib is slow to import
+    from podusv_cli.figures.style import house_style, image
+
+    if name not in FIGURES:
+        raise UsageError(unknown(f"figure {name!r}", name, FIGURES))
+    shown = dressed([(label, run.recording, run.scenario) for label, run in runs.items()])
+    if not shown or not FIGURES[name].fits(shown):
+        wanted = ", ".join(FIGURES[name].signals)
+        raise UsageError(f"figure {name!r} shows {wanted}, and {', '.join(runs)} logged none of it")
+    with house_style():
+        drawn = FIGURES[name].family(shown, columns)
+    # A figure without pyplot is shown by notebooks only if it says how.
+    vars(drawn)["_repr_png_"] = partial(image, drawn, "png")
+    return drawn
+
+
+def _html(lines: list[str], runs: Mapping[str, Run], table: str) -> str:
+    """Lines of text over a picture of the trajectories, where there are any, and a table."""
+    said = "".join(f"<div>{escape(line)}</div>" for line in lines if line)
+    drawable = {label: run for label, run in runs.items() if len(run.recording["time"]) > 1}
+    picture = _picture(drawable) if drawable else ""
+    return f'{said}<div style="display: flex; align-items: center">{picture}{table}</div>'
+
+
+def _picture(runs: Mapping[str, Run]) -> str:
+    from podusv_cli.figures.style import image
+
+    content: Any = image(figure(runs, "trajectory", 1), "png")
+    return f'<img src="data:image/png;base64,{base64.b64encode(content).decode()}">'

@@ -1,0 +1,145 @@
+"""Scenarios from files, from dictionaries, and from other scenarios."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from functools import singledispatch
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from podusv_cli.core.component import Component
+from podusv_cli.core.errors import UsageError
+from podusv_cli.findings.finding import unknown_codes
+from podusv_cli.scenario import model, plugins
+from podusv_cli.scenario.limits import limits
+from podusv_cli.scenario.load import Loaded, load_text, yaml_text
+from podusv_cli.scenario.load import load as load_file
+
+Changes = Mapping[str, Any]
+Source = str | os.PathLike[str] | Mapping[str, Any] | model.Scenario
+IN_PYTHON = "scenario"  # what messages call a dictionary, and the name of its results
+
+
+def Scenario(sections: Mapping[str, Any] | None = None, /, **more: Any) -> model.Scenario:
+    """A scenario from its sections: vessel, path, disturbance, actuator, controller, ...
+
+    Takes them as a dictionary or by keyword: as short as in YAML, with presets, `extends` and
+    defaults. `podusv explain` on the command line tells every key, unit, range and default. The
+    scenario is a value that does not change; `load(scenario, {...})` makes another one. Raises
+    ScenarioError with every fault.
+
+    >>> import podusv_cli as podusv
+    >>> scenario = podusv.Scenario(
+    ...     vessel={"preset": "paper_nonlinear", "m": 25.0},
+    ...     path={"kind": "line", "speed": 0.5},
+    ...     disturbance={"kind": "none"},
+    ...     actuator={"kind": "ideal"},
+    ...     controller={"kind": "pid", "K_Pu": 40.0},
+    ...     simulation={"duration": 20.0},
+    ... )
+    >>> scenario.vessel.m, scenario.vessel.length, scenario.controller.kind
+    (25.0, 1.255, 'pid')
+    >>> podusv.Scenario({"extends": "podusv:paper/corrected.yaml", "vessel": {"lenght": 2}})
+    Traceback (most recent call last):
+    podusv_cli.core.errors.ScenarioError: scenario: vessel.lenght: unknown key; did you mean ...
+    """
+    return loaded({**(sections or {}), **more}).scenario
+
+
+def load(source: Source, changes: Changes | None = None) -> model.Scenario:
+    """The scenario of a file, a dictionary or another scenario, with some values changed.
+
+    `source` may name a scenario of podusv (`podusv:paper/corrected.yaml`). `changes` are what
+    `--set` is on the command line: dotted keys and values. A vessel that is changed without
+    `nominal` is also the one that the controller is told about, unless `source` is a scenario: that
+    has a `nominal` of its own. Raises ScenarioError with every fault.
+
+    >>> import podusv_cli as podusv
+    >>> scenario = podusv.load("podusv:paper/corrected.yaml", {"controller.k_ze": 0.2})
+    >>> scenario.controller.k_ze, scenario.actuator.surge_limit
+    (0.2, 8.0)
+    >>> podusv.load(scenario, {"path": {"kind": "circle", "radius": 20.0}}).path.radius
+    20.0
+    """
+    return loaded(source, changes).scenario
+
+
+def loaded(source: Source, changes: Changes | None = None) -> Loaded:
+    """A scenario with its text and the origin of each value. Raises ScenarioError."""
+    return _loaded(source, [f"{key}={_json(value)}" for key, value in (changes or {}).items()])
+
+
+CHECKS = (unknown_codes, limits(read_back=True, insist=""))
+
+
+@singledispatch
+def _loaded(source: Any, overrides: list[str]) -> Loaded:
+    return load_file(os.fspath(source), overrides, CHECKS)
+
+
+@_loaded.register
+def _(source: model.Scenario, overrides: list[str]) -> Loaded:
+    sections = {key: part for key, part in source.model_dump().items() if key != plugins.KEY}
+    files = [plugin.path for plugin in source.plugged if plugin.path]
+    text = yaml_text(sections)
+    return load_text(text, source.name, overrides, CHECKS, files, placed=False)
+
+
+@_loaded.register
+def _(source: Mapping, overrides: list[str]) -> Loaded:  # type: ignore[type-arg]
+    text = yaml_text(_plain(source))
+    return load_text(text, IN_PYTHON, overrides, CHECKS, placed=False)
+
+
+def _json(value: Any) -> str:
+    """A value as `--set` takes it; text in quotes, so that it stays text."""
+    return json.dumps(_plain(value), ensure_ascii=False)
+
+
+@singledispatch
+def _plain(value: Any) -> Any:
+    """A value as it stands in YAML. Raises UsageError for one that cannot."""
+    raise UsageError(
+        f"{IN_PYTHON}: a {type(value).__name__} cannot stand in a scenario; give numbers, texts, "
+        "lists and dictionaries"
+    )
+
+
+@_plain.register(type(None))
+@_plain.register(bool)
+@_plain.register(int)
+@_plain.register(float)
+@_plain.register(str)
+def _(value: Any) -> Any:
+    return value
+
+
+@_plain.register
+def _(value: Path) -> str:
+    return str(value)
+
+
+@_plain.register(np.ndarray)
+@_plain.register(np.generic)
+def _(value: Any) -> Any:
+    return _plain(value.tolist())
+
+
+@_plain.register
+def _(value: Component) -> Any:
+    return _plain(value.model_dump())
+
+
+@_plain.register(list)
+@_plain.register(tuple)
+def _(value: Any) -> Any:
+    return tuple(_plain(item) for item in value)
+
+
+@_plain.register
+def _(value: Mapping) -> Any:  # type: ignore[type-arg]
+    return {str(key): _plain(item) for key, item in value.items()}

@@ -1,0 +1,305 @@
+"""podusv from Python: scenarios from dictionaries, runs, comparisons, what notebooks show."""
+
+from __future__ import annotations
+
+import ast
+import base64
+import doctest
+import inspect
+import math
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray
+from command_samples import BASE, ROOT, write
+from matplotlib.figure import Figure
+from test_cli_words import python
+
+import podusv_cli as podusv
+from podusv_cli import interface
+from podusv_cli.core.errors import ScenarioError, UsageError
+from podusv_cli.interface import functions, scenarios
+from podusv_cli.metrics.table import CLOCKED
+from podusv_cli.scenario.load import load as load_file
+
+SHORT: dict[str, Any] = {
+    "vessel": {"preset": "paper_nonlinear"},
+    "path": {"kind": "line"},
+    "disturbance": {"kind": "none"},
+    "actuator": {"kind": "saturated"},
+    "start": {"x": -5.0, "y": -2.0, "u": 0.3},
+    "simulation": {"duration": 1.0},
+    "controller": {"kind": "pid", "K_Pu": 100.0},
+    "silence": ["saturated"],
+}
+TWO = {**SHORT, "controllers": {"stiff": {"K_Pu": 200.0}, "soft": {"K_Pu": 5.0}}}
+CLAIM = {"says": "s", "source": "p", "expect": "stiff.iae > 0"}
+
+
+@pytest.fixture(autouse=True)
+def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+# --- the names
+
+
+def test_the_package_has_the_names_of_the_interface_and_its_stub() -> None:
+    assert podusv.__all__ == interface.__all__
+    assert all(getattr(podusv, name) is getattr(interface, name) for name in podusv.__all__)
+    assert set(podusv.__all__) < set(dir(podusv))
+    stub = ast.parse((ROOT / "podusv_cli/__init__.pyi").read_text())
+    named = [
+        part.asname for node in stub.body if isinstance(node, ast.ImportFrom) for part in node.names
+    ]
+    assert named == podusv.__all__
+    with pytest.raises(AttributeError, match="has no attribute 'simulat'"):
+        _ = podusv.simulat  # type: ignore[attr-defined]
+
+
+def test_importing_the_package_imports_nothing_else() -> None:
+    script = (
+        "import sys\nbefore = {*sys.modules}\nimport podusv_cli\nprint({*sys.modules} - before)"
+    )
+    assert python("-c", script).stdout == "{'podusv_cli'}\n"
+
+
+@pytest.mark.parametrize("module", [scenarios, functions])
+def test_the_examples_in_the_docstrings_run(module: Any) -> None:
+    found = doctest.testmod(module, optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
+    assert found.failed == 0
+    assert found.attempted > 5
+
+
+def test_every_public_name_is_typed_and_has_an_example_or_is_a_result() -> None:
+    for name in podusv.__all__:
+        thing = getattr(podusv, name)
+        assert inspect.getdoc(thing)
+        assert ">>> " in thing.__doc__ or name in ("Run", "Comparison")
+        if inspect.isfunction(thing):
+            signature = inspect.signature(thing)
+            parts = [part.annotation for part in signature.parameters.values()]
+            assert inspect.Signature.empty not in (*parts, signature.return_annotation)
+
+
+# --- scenarios
+
+
+def test_a_dictionary_is_as_short_as_the_file() -> None:
+    write("scenario.yaml", BASE)
+    assert podusv.Scenario(SHORT) == podusv.Scenario(**SHORT) == podusv.load(SHORT)
+    assert podusv.load(SHORT) == podusv.load("scenario.yaml") == podusv.load(Path("scenario.yaml"))
+    whole = load_file("scenario.yaml").scenario
+    assert podusv.load(SHORT).model_dump() == whole.model_dump()
+    assert podusv.load(podusv.load(SHORT)) == podusv.load(SHORT)
+
+
+def test_sections_may_be_parts_of_podusv_and_numbers_those_of_numpy() -> None:
+    scenario = podusv.load(SHORT)
+    again = podusv.Scenario(
+        {
+            **SHORT,
+            "controller": scenario.controller,
+            "start": {"x": np.float64(-5), "y": np.int64(-2), "u": 0.3},
+        }
+    )
+    assert again == scenario
+    points = np.array([[0.0, 0.0], [10.0, 1.0], [18.0, 6.0]])
+    path = podusv.Scenario(SHORT, path={"kind": "waypoints", "points": points}).path
+    assert path.points == ((0.0, 0.0), (10.0, 1.0), (18.0, 6.0))  # type: ignore[attr-defined]
+
+
+def test_changes_are_what_set_is_on_the_command_line() -> None:
+    write("a.yaml", BASE)
+    changes = {"vessel.m": 30.0, "path": {"kind": "circle", "radius": 9.0}, "description": "true"}
+    there = load_file(
+        "a.yaml", ["vessel.m=30", "path.kind=circle", "path.radius=9", 'description="true"']
+    )
+    assert podusv.load("a.yaml", changes).model_dump() == there.scenario.model_dump()
+    kept = podusv.load(podusv.load(SHORT), {"vessel.m": 30.0})
+    assert (kept.vessel.m, kept.nominal.m) == (30.0, 23.8)  # as the docstring says
+
+
+@pytest.mark.parametrize(
+    ("sections", "text"),
+    [
+        ({**SHORT, "strat": {}}, "scenario: strat: unknown key; did you mean 'start'?"),
+        ({**SHORT, "start": {"x": math.nan}}, "scenario: start.x: .nan is not a finite number"),
+        ({**SHORT, "start": {"x": "5"}}, "scenario: start.x: must be a number [m], found '5'; "),
+        ({**SHORT, "extends": "podusv:x.yaml"}, "scenario: extends: 'podusv:x.yaml' cannot be"),
+    ],
+)  # fmt: skip
+def test_a_faulty_dictionary_is_a_line_without_a_place(sections: Any, text: str) -> None:
+    for make in (podusv.Scenario, podusv.load):
+        with pytest.raises(ScenarioError, match=re.escape(text)):
+            make(sections)
+
+
+def test_what_cannot_stand_in_a_scenario_is_named() -> None:
+    with pytest.raises(UsageError, match="a complex cannot stand in a scenario"):
+        podusv.Scenario({**SHORT, "start": {"x": 1j}})
+    with pytest.raises(ScenarioError, match=r"^--set start\.z=1: start\.z: unknown key"):
+        podusv.load(SHORT, {"start.z": 1})
+
+
+# --- runs
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory: pytest.TempPathFactory) -> podusv.Run:
+    """A run in a folder."""
+    return podusv.run(SHORT, out=tmp_path_factory.mktemp("kept") / "run", figures=False)
+
+
+def test_a_run_in_memory_has_the_log_and_metrics_of_the_one_in_a_folder(kept: podusv.Run) -> None:
+    run = podusv.simulate(SHORT)
+    assert not list(Path().iterdir())
+    assert (run.folder, run.status, run.message) == (None, "finished", "")
+    xarray.testing.assert_identical(run.log, kept.log)
+    pd.testing.assert_series_equal(run.metrics, kept.metrics.drop([*CLOCKED]))
+    assert run.scenario == kept.scenario == podusv.load(SHORT)
+    assert podusv.open_run(str(kept.folder)).metrics.equals(kept.metrics)
+
+
+def test_the_log_is_that_of_the_file(kept: podusv.Run) -> None:
+    assert kept.folder
+    with xarray.open_dataset(kept.folder / "log.h5") as there:
+        xarray.testing.assert_equal(kept.log, there)
+        for name in kept.log:
+            assert kept.log[name].units == there[name].units
+            assert kept.log[name].long_name == there[name].long_name
+    assert list(kept.log.coords) == ["time"]
+
+
+def test_a_log_with_networks_has_their_axes() -> None:
+    run = podusv.simulate("podusv:paper/corrected.yaml", {"simulation.duration": 0.1})
+    assert run.log["W_hat_u"].dims == ("time", "node")
+    assert run.log["rbf_center"].dims == ("node", "input")
+    assert run.log["W_hat_u"].sizes == {"time": 11, "node": 27}
+
+
+def test_a_signal_is_an_array_and_an_unknown_one_is_told(kept: podusv.Run) -> None:
+    assert kept["z_e"].shape == (101,)
+    with pytest.raises(KeyError, match="did you mean 'z_e'"):
+        kept["ze"]
+
+
+def test_a_run_that_diverges_is_a_run_and_its_warnings_are_there() -> None:
+    run = podusv.simulate("podusv:paper/printed_from_zero.yaml", {"simulation.duration": 1.0})
+    assert run.status == "diverged"
+    assert run.message.startswith("diverged at t = 0.08 s")
+    assert math.isnan(run.metrics["iae"]) or run.metrics["iae"] > 0.0
+    assert any("warning[" in line for line in run.warnings)
+    assert "diverged at t = 0.08 s" in run._repr_html_()
+
+
+def test_without_xarray_a_sentence_says_what_to_do(
+    kept: podusv.Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    with pytest.raises(
+        ImportError, match=r"xarray is not installed: pip install 'podusv\[python\]'"
+    ):
+        _ = podusv.simulate(SHORT).log
+
+
+def test_a_figure_shows_in_a_notebook(kept: podusv.Run) -> None:
+    figure = kept.plot("errors")
+    assert isinstance(figure, Figure)
+    png = figure._repr_png_()  # type: ignore[attr-defined]
+    assert png.startswith(b"\x89PNG")
+    with pytest.raises(UsageError, match="unknown figure 'error'; did you mean 'errors'"):
+        kept.plot("error")
+    with pytest.raises(UsageError, match=r"figure 'pods' shows .* and pid logged none of it"):
+        kept.plot("pods")
+
+
+def test_a_notebook_shows_trajectory_and_numbers(kept: podusv.Run) -> None:
+    page = kept._repr_html_()
+    (image,) = re.findall(r'<img src="data:image/png;base64,(.*?)">', page)
+    assert base64.b64decode(image).startswith(b"\x89PNG")
+    assert f"{kept.metrics['iae']:.5g} m s" in page
+    assert repr(kept) == f"<podusv run pid: finished at 1 s, {kept.folder}>"
+
+
+# --- comparisons
+
+
+def test_a_comparison_has_table_claims_runs_and_figures() -> None:
+    done = podusv.compare(TWO, {"claims": {"C1": CLAIM}}, out="both", figures=False)
+    assert list(done.table) == list(done.runs) == ["stiff", "soft"]
+    assert done.table.loc["iae", "stiff"] == done["stiff"].metrics["iae"]
+    assert done.claims.loc["C1", "verdict"] == "reproduced"
+    assert (done.failed, done.report) == ({}, None)
+    assert done["soft"].folder == Path("both/soft")
+    assert isinstance(done.plot("errors"), Figure)
+    page = done._repr_html_()
+    assert "stiff" in page
+    assert page.count("<img ") == 1
+    with pytest.raises(
+        UsageError, match=r"both is a comparison; open one of its runs: both/stiff, b"
+    ):
+        podusv.open_run("both")
+    assert podusv.open_run("both/soft").metrics["iae"] == done["soft"].metrics["iae"]
+
+
+def test_scenarios_runs_and_folders_are_compared(kept: podusv.Run) -> None:
+    other = podusv.load(SHORT, {"controller.K_Pu": 5.0, "name": "soft"})
+    done = podusv.compare([kept, other], figures=False)
+    assert list(done.table) == ["run", "soft"]
+    assert done["run"].folder == kept.folder
+    assert done.folder.parent == Path("results/run-soft")
+    again = podusv.compare([str(kept.folder), done.folder / "soft"], figures=False)
+    assert again.table.loc["iae"].tolist() == done.table.loc["iae"].tolist()
+
+
+def test_what_cannot_be_compared_is_told(kept: podusv.Run) -> None:
+    with pytest.raises(
+        UsageError, match=r"has no folder; make it with podusv\.run, or compare its"
+    ):
+        podusv.compare([podusv.simulate(SHORT), kept])
+    with pytest.raises(UsageError, match=r"^start\.x: only finished runs are given"):
+        podusv.compare(kept, {"start.x": 1.0})
+
+
+def test_many_runs_are_the_rows_of_a_table() -> None:
+    masses = np.array([20.0, 25.0])
+    many = podusv.simulate_many(SHORT, {"vessel.m": masses}, workers=1)
+    assert list(many["vessel.m"]) == [20.0, 25.0]
+    assert set(many["status"]) == {"finished"}
+    nominal = {"nominal": {"preset": "paper_nonlinear"}}
+    for row, mass in enumerate(masses):
+        alone = podusv.simulate({**SHORT, **nominal}, {"vessel.m": mass})
+        assert many.loc[row, "iae"] == alone.metrics["iae"]
+
+
+def test_verify_is_a_table_of_numbers() -> None:
+    found = podusv.verify(SHORT, tolerance=1e-9)
+    assert list(found) == ["value", "order", "relative_error", "converged"]
+    assert found.loc[("pid", "iae"), "value"] == podusv.simulate(SHORT).metrics["iae"]
+    assert not found["converged"].all()
+
+
+def test_the_example_in_the_documentation_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs/python.md").read_text(), re.DOTALL)
+    exec(code, {})  # noqa: S102
+    out = capsys.readouterr().out
+    assert re.search(r"^soft +\d+\.\d+$", out, re.MULTILINE)
+
+
+def test_the_documentation_names_all_that_there_is() -> None:
+    text = (ROOT / "docs/python.md").read_text()
+    for name in podusv.__all__:
+        assert f"`{name}" in text
+    for result in (podusv.Run, podusv.Comparison):
+        public = {name for name in (*vars(result), *result.__dataclass_fields__) if name[0] != "_"}
+        assert {name for name in public if f"`{name}" not in text} <= {
+            "label",
+            "recording",
+            "numbers",
+        }
