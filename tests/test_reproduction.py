@@ -89,7 +89,7 @@ def signs(letter, sets, laws=("proposed", "li", "pid")):
 
 def sensitivity():
     """(letter, keys, claim and sign that change) of every line of the README's second table."""
-    table = README.partition("## What the verdicts hang on")[2].partition("\n## ")[0]
+    table = README.partition("## What the verdicts depend on")[2].partition("\n## ")[0]
     for line in table.splitlines():
         if line.startswith("| `"):
             _, sets, changes, _ = line.split("|")

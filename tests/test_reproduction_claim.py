@@ -72,6 +72,7 @@ def test_wrong_vessels() -> None:
         assert all(map(same, numbers, table.loc[name])), name
     told = table[table.index.str.startswith("told")] / table.loc["as it is"] - 1
     assert told[["proposed", "dsc", "li", "pid", "high_gain"]].abs().max(axis=None) < 0.003
+    assert told["no_adaptation"].abs().max() < 0.01
     ratio = table["high_gain"] / table["proposed"]
     assert (ratio - 1).abs().max() < 0.0105
 
