@@ -132,3 +132,9 @@ def test_the_numbers_of_the_pods_are_the_committed_ones() -> None:
         table = pd.read_csv(ROOT / f"results/pod/{name}/comparison.csv", index_col=0)
         found = table.loc["iae", ["proposed", "dsc", "li", "pid"]].astype(float)
         assert row[1:] == [f"{number:.0f}" for number in found]
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_yaml_block_is_yaml(page: str) -> None:
+    for text in re.findall(r"^```yaml\n(.*?)^```", text_of(page), re.M | re.S):
+        assert isinstance(yaml.safe_load(text), dict)
