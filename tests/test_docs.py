@@ -138,3 +138,15 @@ def test_the_numbers_of_the_pods_are_the_committed_ones() -> None:
 def test_every_yaml_block_is_yaml(page: str) -> None:
     for text in re.findall(r"^```yaml\n(.*?)^```", text_of(page), re.M | re.S):
         assert isinstance(yaml.safe_load(text), dict)
+
+
+def test_every_option_of_the_errata_exists(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    podusv = commanded(monkeypatch, capsys)
+    errata = text_of("docs/model.md").partition("## Errata of the paper")[2]
+    options = re.findall(r"\| option, (.*) \|$", errata, re.M)
+    names = [name for words in options for name in re.findall(r"`([\w.]+)`", words)]
+    assert len(names) > 8
+    for name in names:
+        assert podusv("explain", name).code == 0, name
