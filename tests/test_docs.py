@@ -150,3 +150,28 @@ def test_every_option_of_the_errata_exists(
     assert len(names) > 8
     for name in names:
         assert podusv("explain", name).code == 0, name
+
+
+FOLDERS = r"(?:podusv_cli|tests|configs|docs|benchmarks|results/pod|results/paper|examples)"
+
+
+def missing(text: str) -> Iterator[str]:
+    """Files of the repository and targets of make that a page names and that are not there."""
+    for path in re.findall(rf"`({FOLDERS}/[\w./-]+)`", text):
+        if "NAME" not in path and not (ROOT / path).exists():
+            yield path
+    targets = set(re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(), re.M))
+    for words in re.findall(r"`make ([a-z -]+)`", text):
+        yield from (word for word in words.split() if word not in targets)
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if page != "CHANGELOG.md"])
+def test_files_and_targets_that_a_page_names_exist(page: str) -> None:
+    assert list(missing(text_of(page))) == []
+
+
+def test_a_file_or_target_that_is_not_there_is_noticed() -> None:
+    assert list(missing("`tests/none.py`, `make nothing`, `make test`")) == [
+        "tests/none.py",
+        "nothing",
+    ]

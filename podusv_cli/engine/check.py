@@ -50,7 +50,7 @@ def _asked(
     if isinstance(work.error, LawError):
         raise work.error
     if work.result is None and not isinstance(work.error, left):
-        message = f"law {loop.controller.label}: asked at the start, {work.fault()}"
+        message = f"law {loop.controller.label}, evaluated once before the run: {work.fault()}"
         raise LawError(message) from work.error
 
 

@@ -168,7 +168,7 @@ ASKED: dict[type[Controller], str] = {
 
 @pytest.mark.parametrize("law", ASKED)
 def test_all_its_functions_are_asked(law: type[Controller]) -> None:
-    assert refused(law).startswith(f"law constant: asked at the start, {ASKED[law]}")
+    assert refused(law).startswith(f"law constant, evaluated once before the run: {ASKED[law]}")
 
 
 def helper(t: float) -> float:
