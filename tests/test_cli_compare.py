@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
+import re
 from functools import partial
 from pathlib import Path
 
 import pytest
-from command_samples import BASE, TWO, Command, Said, commanded, write
+from command_samples import BASE, PATIENCE, TWO, Command, Said, commanded, under_way, write
 
 from podusv_cli.figures import drawing
 from podusv_cli.process.workers import Outcome
@@ -296,3 +297,73 @@ def test_the_last_line_tells_how_to_check_that_numbers_have_converged(podusv: Co
         "podusv verify one.yaml --set 'description=two words'"
     )
     assert podusv("x", "--out", "y").err.endswith(": podusv verify SCENARIO\n")
+
+
+# --- figures as asked for
+
+# One stream, so that the order of its lines is that of printing.
+BOTH = "import sys; sys.stderr = sys.stdout; from podusv_cli.cli import main; main()"
+FIGURED = TWO.replace("duration: 1.0", "duration: 0.1")
+
+
+def figures(folder: str) -> set[str]:
+    """The figures in a folder."""
+    return {path.name for path in Path(folder, "figures").iterdir()}
+
+
+def figures_of_report(folder: str) -> int:
+    """How many different figures the report embeds; some it shows twice."""
+    page = Path(folder, "report.html").read_text()
+    return len(set(re.findall(r"data:image/svg\+xml;base64,([^\"]+)", page)))
+
+
+def test_only_what_is_asked_for_is_drawn(podusv: Command) -> None:
+    config = write("two.yaml", FIGURED)
+    asked = ("--figures", "--figure", "errors", "--figure", "controls", "--format", "pdf, png")
+    assert podusv(config, "--out", "x", "--jobs", "1", *asked).code == 0
+    names = {"errors", "controls"}
+    assert figures("x") == {f"{name}.{form}" for name in names for form in ("pdf", "png")}
+    assert figures_of_report("x") == 2
+
+
+def test_figures_are_png_and_the_report_has_them_all_the_same(podusv: Command) -> None:
+    config = write("two.yaml", FIGURED)
+    assert podusv(config, "--out", "x", "--figures").code == 0
+    assert {Path(name).suffix for name in figures("x")} == {".png"}
+    assert figures_of_report("x") == len(figures("x")) > 3
+
+
+def test_a_figure_without_signals_is_missing_and_told(podusv: Command) -> None:
+    config = write("two.yaml", FIGURED)
+    said = podusv(config, "--out", "x", "--figures", "--figure", "pods", "--figure", "errors")
+    assert said.code == 0
+    assert "figure pods could not be made: no run logged any of n, " in said.err
+    assert figures("x") == {"errors.png"}
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (("--figure", "error"), "unknown figure 'error'; did you mean 'errors'?"),
+        (("--format", "jpg"), "unknown format 'jpg'; did you mean 'png'? (allowed: png, pdf, svg)"),
+        (("--no-figures", "--figure", "errors"), "--figure errors and --no-figures contradict"),
+    ],
+)
+def test_what_cannot_be_drawn_is_told_before_anything_is_simulated(
+    podusv: Command, words: tuple[str, ...], text: str
+) -> None:
+    config = write("two.yaml", FIGURED)
+    said = podusv(config, "--figures", *words)
+    assert said.code == 2
+    assert said.err.startswith(text)
+    assert not Path("results").exists()
+
+
+def test_the_report_is_named_after_everything_else(tmp_path: Path) -> None:
+    config = tmp_path / "two.yaml"
+    config.write_text(FIGURED)
+    words = ["compare", str(config), "--out", str(tmp_path / "x"), "--figure", "errors"]
+    with under_way(*words, script=BOTH) as process:
+        lines = process.communicate(timeout=PATIENCE)[0].splitlines()
+    assert lines[-1] == f"report: {tmp_path}/x/report.html"
+    assert lines[-2].startswith("the numbers may not have converged")

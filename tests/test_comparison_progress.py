@@ -27,7 +27,7 @@ def test_names_are_told_apart():
     assert members.numbered(["figures", "unit"], outputs.RESERVED) == ["figures_2", "unit_2"]
 
 
-def test_drawing_is_progress_too(monkeypatch):
+def test_drawing_is_progress_too():
     seen = []
     t = np.linspace(0, 1, 5)
     signals = dict.fromkeys(("time", "x", "y", "x_d", "y_d", "psi", "u", "v", "r"), t)
@@ -35,7 +35,6 @@ def test_drawing_is_progress_too(monkeypatch):
     run.recording = Recording("finished", "pid", signals, about=ABOUT)
     entry = Entry("a", run, scenario())
     result = outputs.Result({}, [entry], {}, {}, pd.DataFrame(), [], {}, {})
-    monkeypatch.setattr("podusv_cli.figures.style.FORMATS", {"png": None})
     drawn = outputs.drawn(result, Extras(), lambda name, fraction: seen.append((name, fraction)))
     assert "velocities.png" in drawn
     assert {name for name, _ in seen} == {"drawing figures"}

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from podusv_cli.cli import completion
 from podusv_cli.cli.exit_codes import INTERRUPTED
 from podusv_cli.cli.options import (
     AllowLarge,
@@ -47,6 +48,18 @@ def compare(
     out: Out = None,
     force: Force = False,
     figures: Figures = True,
+    figure: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="What to draw; repeatable, all by default.", autocompletion=completion.figures
+        ),
+    ] = None,
+    form: Annotated[
+        str, typer.Option("--format", help="Of figures: png, pdf, svg; several with commas.")
+    ] = "png",
+    jobs: Annotated[
+        int, typer.Option(min=0, help="Processes at a time.", show_default="one a core")
+    ] = 0,
     as_json: AsJson = False,
     allow_large: AllowLarge = False,
     quiet: Quiet = False,
@@ -73,6 +86,9 @@ def compare(
         warned,
         allow_large,
         tuple(plugin or ()),
+        tuple(figure or ()),
+        tuple(name.strip() for name in form.split(",")),
+        jobs,
     )
     with progress_bars(wanted=not (quiet or as_json)) as progress:
         done = workflow.compare([Path(item) for item in items], request, progress)
@@ -87,13 +103,13 @@ def compare(
     _warn(done)
     for part in done.missing:
         echo(f"{part}; {TRACED}", err=True)
-    if not (as_json or quiet):
-        _name_report(done.folder / "report.html")
     if done.status == "interrupted":
         echo("interrupted; the runs made so far are compared, without figures", err=True)
         raise typer.Exit(INTERRUPTED)
     if done.result.entries and not quiet:
         echo(_advice(items, assign or ()), err=True)
+    if not (as_json or quiet):
+        _name_report(done.folder / "report.html")
     raise typer.Exit(SOME_FAILED if any(done.result.endings.values()) else 0)
 
 

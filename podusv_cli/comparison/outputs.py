@@ -14,13 +14,14 @@ from podusv_cli.comparison.entries import Entry
 from podusv_cli.core.finding import Finding
 from podusv_cli.findings.preflight import merged
 from podusv_cli.metrics.table import CLOCKED
-from podusv_cli.process.extras import Extras
+from podusv_cli.process.extras import Extras, Missing
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage import json_files
 from podusv_cli.storage.run_folder import RunWriter
 
 TABLE = "comparison.csv"
 TIMING = "timing.json"
+IN_REPORT = "svg"  # the format of figures in report.html
 # Names that no run may have: files of the comparison's folder and columns of its table.
 RESERVED = (
     TABLE, "comparison.md", "comparison.tex", "claims.json", "claims.md", "figures",
@@ -84,19 +85,37 @@ def add_made(writer: RunWriter, extras: Extras, name: str, form: Callable[[], by
         writer.add(name, content)
 
 
+@dataclass(frozen=True)
+class Asked:
+    """Figures by name (empty: all that fit), formats, and processes at a time (0: one a core)."""
+
+    names: Sequence[str] = ()
+    formats: Sequence[str] = ("png",)
+    jobs: int = 0
+
+
 def drawn(
-    result: Result, extras: Extras, progress: Callable[[str, float], None] | None = None
-) -> dict[str, bytes]:
-    """The figures of all runs together, in every format, by file name."""
+    result: Result, extras: Extras, progress: Callable[[str, float], None] | None = None,
+    asked: Asked = Asked(),
+) -> dict[str, bytes]:  # fmt: skip
+    """The figures of all runs together by file name: as asked, and as SVG for the report.
+
+    A figure that was asked for and that no run has signals for is missing among the `extras`.
+    """
     # matplotlib is slow to import
     from podusv_cli.figures.drawing import FIGURES, draw_in_parallel, dressed
-    from podusv_cli.figures.style import FORMATS
 
     tell = progress and partial(progress, "drawing figures")
     if tell:
         tell(0.0)
     shown = dressed([(e.label, e.recording, e.scenario) for e in result.entries])
-    return draw_in_parallel(shown, FIGURES, FORMATS, extras, progress=tell)
+    for name in asked.names:
+        if not FIGURES[name].fits(shown):
+            wanted = ", ".join(FIGURES[name].signals)
+            extras.missing.append(Missing(f"figure {name}", f"no run logged any of {wanted}"))
+    names = tuple(dict.fromkeys(asked.names)) or tuple(FIGURES)
+    formats = tuple(dict.fromkeys((*asked.formats, IN_REPORT)))
+    return draw_in_parallel(shown, names, formats, extras, progress=tell, workers=asked.jobs)
 
 
 def as_report(
@@ -111,9 +130,9 @@ def as_report(
         from podusv_cli.figures.drawing import FIGURES, dressed
 
         pictures = [
-            report.Picture(name, sheet.caption, figures[f"{name}.svg"], sheet.source)
+            report.Picture(name, sheet.caption, figures[f"{name}.{IN_REPORT}"], sheet.source)
             for name, sheet in FIGURES.items()
-            if f"{name}.svg" in figures
+            if f"{name}.{IN_REPORT}" in figures
         ]
         moving = chase.chase(dressed([(e.label, e.recording, e.scenario) for e in result.entries]))
     story = report.Story(

@@ -10,14 +10,16 @@ from functools import partial
 import numpy as np
 
 from podusv_cli.core import registry
+from podusv_cli.core.errors import UsageError
 from podusv_cli.core.escaping import visible
 from podusv_cli.core.recording import Recording
 from podusv_cli.figures.sheet import Sheet
-from podusv_cli.figures.style import Shown, house_style, image, look, places
+from podusv_cli.figures.style import FORMATS, Shown, house_style, image, look, places
 from podusv_cli.process.extras import Extras, Missing
 from podusv_cli.process.interrupts import interrupts_enabled
 from podusv_cli.process.workers import run_all
 from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.phrases import unknown
 
 
 def _place(sheet: Sheet) -> tuple[int, str]:
@@ -56,7 +58,7 @@ def draw(
 
 def draw_in_parallel(
     runs: Sequence[Shown], names: Iterable[str], formats: Sequence[str], extras: Extras,
-    columns: int = 2, progress: Callable[[float], None] | None = None,
+    columns: int = 2, progress: Callable[[float], None] | None = None, workers: int = 0,
 ) -> dict[str, bytes]:  # fmt: skip
     """The same as `draw`, each of several figures in a process of its own.
 
@@ -82,7 +84,7 @@ def draw_in_parallel(
 
     if len(names) == 1:
         return extras.attempt(f"figure {names[0]}", partial(drawn, names[0])) or {}
-    outcomes = run_all([partial(job, name) for name in names], tell)
+    outcomes = run_all([partial(job, name) for name in names], tell, workers)
     if any(outcome.interrupted for outcome in outcomes):
         raise KeyboardInterrupt
     found: dict[str, bytes] = {}
@@ -91,3 +93,11 @@ def draw_in_parallel(
         found |= files
         extras.missing += missing
     return found
+
+
+def check_names(figures: Sequence[str], formats: Sequence[str]) -> None:
+    """UsageError for a figure or format that there is not."""
+    for what, names, known in (("figure", figures, tuple(FIGURES)), ("format", formats, FORMATS)):
+        for name in names:
+            if name not in known:
+                raise UsageError(unknown(f"{what} {name!r}", name, known))

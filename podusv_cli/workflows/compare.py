@@ -95,6 +95,7 @@ def compare_gathered(
 ) -> Compared:
     """The same for what is gathered already; `items` are the files and folders that it is from."""
     started, argv = datetime.now(UTC), list(request.argv)
+    _check_figures(request)
     for finding in merged({member.label: member.noticed for member in given.members}):
         request.warn(finding)
     target = request.out or _default_folder(given.title, given.members)
@@ -110,11 +111,21 @@ def compare_gathered(
         origin = provenance.collect(argv, started, datetime.now(UTC), plugins)
         outputs.write(writer, result, extras)
         if request.figures:
-            _add_figures(writer, result, given.title, origin, extras, progress)
+            _add_figures(writer, result, given.title, origin, extras, progress, request)
         writer.add_json("provenance.json", origin)
         writer.add_missing(extras)
         status: Status = "interrupted" if extras.interrupted else "finished"
         return Compared(writer.finish(status, lost), result, status, tuple(extras.missing))
+
+
+def _check_figures(request: Request) -> None:
+    """UsageError for a figure or format that there is not, and for figures that are not wanted."""
+    if request.names and not request.figures:
+        raise UsageError(f"--figure {request.names[0]} and --no-figures contradict each other")
+    if request.names or set(request.formats) != {"png"}:
+        from podusv_cli.figures.drawing import check_names  # matplotlib is slow to import
+
+        check_names(request.names, request.formats)
 
 
 def _default_folder(title: str, members: Sequence[Member]) -> Path:
@@ -137,7 +148,7 @@ def _keep_apart(items: Sequence[Path], target: Path) -> None:
 
 def _writer(target: Path, members: Sequence[Member], request: Request) -> RunWriter:
     sizes = [estimate(member.scenario) for member in members if member.run is None]
-    space = needed(sizes, available_workers())
+    space = needed(sizes, request.jobs or available_workers())
     return RunWriter(target, force=request.force, named=request.out is not None, needed=space)
 
 
@@ -162,7 +173,7 @@ def make_runs(
         if progress:
             progress(wanted[position].label, fraction)
 
-    outcomes = run_all([partial(execute, task) for task in tasks], advance)
+    outcomes = run_all([partial(execute, task) for task in tasks], advance, request.jobs)
     return {member.label: outcome for member, outcome in zip(wanted, outcomes, strict=True)}
 
 
@@ -223,13 +234,15 @@ def _with_costs(entries: Sequence[Entry], extras: Extras) -> list[Entry]:
 
 def _add_figures(
     writer: RunWriter, result: outputs.Result, title: str, origin: Mapping[str, Any],
-    extras: Extras, progress: Progress | None,
+    extras: Extras, progress: Progress | None, request: Request,
 ) -> None:  # fmt: skip
-    """Draw the figures and write the report, which shows them."""
-    draw = partial(outputs.drawn, result, extras, progress)
+    """Draw the figures, write those in the formats asked for, and the report, which has all."""
+    asked = outputs.Asked(request.names, request.formats, request.jobs)
+    draw = partial(outputs.drawn, result, extras, progress, asked)
     figures = extras.attempt("figures", draw) or {}
     for name, content in figures.items():
-        writer.add(f"figures/{name}", content)
+        if name.rpartition(".")[2] in request.formats:
+            writer.add(f"figures/{name}", content)
     heading = f"{title} (interrupted)" if extras.interrupted else title
     page = partial(outputs.as_report, result, heading, figures, origin, extras.missing)
     outputs.add_made(writer, extras, "report.html", lambda: page().encode())

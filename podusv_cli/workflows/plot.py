@@ -15,10 +15,9 @@ from podusv_cli.comparison.differences import differences
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.core.escaping import visible
 from podusv_cli.figures.animation import FILE, animate
-from podusv_cli.figures.drawing import FIGURES, draw_in_parallel, dressed
-from podusv_cli.figures.style import FORMATS, Shown
+from podusv_cli.figures.drawing import FIGURES, check_names, draw_in_parallel, dressed
+from podusv_cli.figures.style import Shown
 from podusv_cli.process.extras import Extras, Missing
-from podusv_cli.scenario.phrases import unknown
 from podusv_cli.storage import files, manifest
 from podusv_cli.workflows.members import Member, from_folder
 
@@ -53,7 +52,7 @@ def plot(runs: Sequence[Path], drawing: Drawing) -> Drawn:
     Raises UsageError for an unknown figure or format, for a figure that the runs lack the signals
     of, and for a file that belongs to a finished folder; StorageError.
     """
-    _check_names(drawing.figures, drawing.formats)
+    check_names(drawing.figures, drawing.formats)
     members = _labelled(member for path in runs for member in from_folder(path))
     shown = dressed([(m.label, m.run.recording, m.scenario) for m in members if m.run])
     empty = _empty(members, shown)
@@ -134,14 +133,6 @@ def _chosen(asked: Sequence[str], shown: Sequence[Shown]) -> tuple[str, ...]:
                 f"(figures there are: {', '.join(fitting)})"
             )
     return tuple(dict.fromkeys(asked)) or fitting
-
-
-def _check_names(figures: Sequence[str], formats: Sequence[str]) -> None:
-    """UsageError for a figure or format that there is not."""
-    for what, names, known in (("figure", figures, tuple(FIGURES)), ("format", formats, FORMATS)):
-        for name in names:
-            if name not in known:
-                raise UsageError(unknown(f"{what} {name!r}", name, known))
 
 
 def _check_not_finished(out: Path, names: Iterable[str]) -> None:

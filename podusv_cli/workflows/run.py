@@ -30,6 +30,9 @@ class Request:
     warn: Callable[[Finding], None] = lambda finding: None  # called before any simulation
     allow_large: bool = False
     plugins: Sequence[str] = ()  # files beside those that a scenario names
+    names: Sequence[str] = ()  # of figures of a comparison; all that fit where empty
+    formats: Sequence[str] = ("png",)  # of figures of a comparison
+    jobs: int = 0  # processes at a time; 0: one a core
 
 
 def run(config: Path, request: Request, progress: Progress | None = None) -> Finished:
