@@ -77,5 +77,5 @@ z_e_steady = Metric(
 )  # fmt: skip
 settling_time = Metric(
     "settling_time", "s", "time from which z_e stays within the settling radius", OF,
-    _settling_time, 1, happens=True,
+    _settling_time, 1, happens=True, counts_standoff=True,
 )  # fmt: skip

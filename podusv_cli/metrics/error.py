@@ -64,5 +64,5 @@ cross_track_rms = Metric(
 )  # fmt: skip
 along_track_rms = Metric(
     "along_track_rms", "m", "rms distance from the target along its course, steady window",
-    STEADY, _rms(ALONG), 2,
+    STEADY, _rms(ALONG), 2, counts_standoff=True,
 )  # fmt: skip
