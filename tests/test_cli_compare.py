@@ -367,3 +367,47 @@ def test_the_report_is_named_after_everything_else(tmp_path: Path) -> None:
         lines = process.communicate(timeout=PATIENCE)[0].splitlines()
     assert lines[-1] == f"report: {tmp_path}/x/report.html"
     assert lines[-2].startswith("the numbers may not have converged")
+
+
+# --- controllers without a controller
+
+ALONE = FIGURED.replace("controller: {kind: pid, K_Pu: 100.0}\n", "").replace(
+    "{stiff: {", "{stiff: {kind: pid, "
+).replace("soft: {", "soft: {kind: pid, ")  # fmt: skip
+
+
+def test_controllers_need_no_controller(
+    podusv: Command, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert "\ncontroller:" not in ALONE
+    config, run = write("two.yaml", ALONE), commanded(monkeypatch, capsys)
+    assert podusv(config, "--out", "x").out.splitlines()[-1] == "compared 2 runs: x"
+    assert run("validate", config).out.startswith("two.yaml: ok (two, stiff, soft, 10 steps)\n")
+    refused = (
+        "two has several controllers; choose one with --controller (stiff, soft), or compare all: "
+        "podusv compare\n"
+    )
+    assert run("run", config, "--no-figures") == (2, "", refused)
+    said = run("run", config, "--controller", "soft", "--out", "y", "--no-figures")
+    assert (said.code, said.err) == (0, "")
+    assert Path("y/log.h5").read_bytes() == Path("x/soft/log.h5").read_bytes()
+    said = run("run", config, "--controller", "sotf", "--no-figures")
+    assert said.err == ("unknown controller 'sotf'; did you mean 'soft'? (allowed: stiff, soft)\n")
+
+
+def test_the_only_one_of_the_controllers_is_run(
+    podusv: Command, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write("two.yaml", ALONE)
+    config = write("one.yaml", "extends: two.yaml\ncontrollers: {soft: null}\n")
+    said = commanded(monkeypatch, capsys)("run", config, "--out", "y", "--no-figures")
+    assert (said.code, said.err) == (0, "")
+    assert "K_Pu: 200.0" in Path("y/resolved.yaml").read_text()
+
+
+def test_a_fault_in_controllers_is_told_once_where_it_is(podusv: Command) -> None:
+    config = write("two.yaml", ALONE.replace("K_Pu: 200.0", "K_Pv: 200.0"))
+    said = podusv(config)
+    assert said.code == 2
+    (line,) = said.err.splitlines()
+    assert re.match(r"two.yaml:\d+:\d+: controllers.stiff.K_Pv: unknown key; did you mean", line)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -41,6 +41,9 @@ def run(
     quiet: Quiet = False,
     verbose: Verbose = False,
     plugin: Plugins = None,
+    controller: Annotated[
+        str, typer.Option(metavar="NAME", help="Which of `controllers` to run.", show_default=False)
+    ] = "",
 ) -> None:
     """Simulate a scenario and write a run folder: log, metrics, figures.
 
@@ -60,6 +63,7 @@ def run(
         warned,
         allow_large,
         tuple(plugin or ()),
+        controller=controller,
     )
     with progress_bar(str(config), wanted=not (quiet or as_json)) as progress:
         done = workflow.run(Path(config), request, progress)

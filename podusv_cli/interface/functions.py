@@ -49,7 +49,7 @@ def simulate(source: Source, changes: Changes | None = None) -> Run:
     >>> float(run.metrics["iae"].round()), run["z_e"].shape
     (71.0, (3001,))
     """
-    scenario = loaded(source, changes).scenario.alone()
+    scenario = running.single(loaded(source, changes))
     recording = simulated(scenario, Stopwatch())
     whole, _ = monitored(scenario, recording)
     found = not_silenced([*preflight(scenario), *postflight(scenario, whole)], scenario)
@@ -136,7 +136,7 @@ def simulate_many(
     0      50.0  finished
     1      60.0  finished
     """
-    scenario = loaded(source).scenario.alone()
+    scenario = running.single(loaded(source))
     loop, grid, settings = scenario.closed_loop(), scenario.time_grid(), scenario.metrics
     check_law(loop)
     watching = observer(

@@ -17,7 +17,7 @@ from podusv_cli.scenario.layers import composed
 from podusv_cli.scenario.messages import Check, check
 from podusv_cli.scenario.model import Scenario, scenario_class
 from podusv_cli.scenario.phrases import found
-from podusv_cli.scenario.presets import complete
+from podusv_cli.scenario.presets import complete, has_choice
 from podusv_cli.scenario.yaml_text import read, read_text, resolve
 from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, Route, dotted, find, printable
 
@@ -30,12 +30,14 @@ class Loaded:
     """A scenario and the origins of its values.
 
     `origins` maps every dotted key to "configs/a.yaml:12:5", "--set a.b=v", "vessel file
-    paper.yaml" or "default"; `text` is the scenario file as given.
+    paper.yaml" or "default"; `text` is the scenario file as given. `open_choice`: several
+    `controllers` and no `controller` are given.
     """
 
     scenario: Scenario
     origins: Mapping[str, str]
     text: str
+    open_choice: bool = False
 
 
 def load(
@@ -69,7 +71,8 @@ def load_text(
     if root is None:
         raise ScenarioError(_findings(faults, source))
     root, known = _plugged(plugins.with_given(root, files), source, faults)
-    return Loaded(*_checked(root, known, source, faults, checks), text)
+    scenario, origins, choice = _checked(root, known, source, faults, checks)
+    return Loaded(scenario, origins, text, choice)
 
 
 def _plugged(root: Node, source: str, faults: list[Fault]) -> tuple[Node, Plugins]:
@@ -83,14 +86,14 @@ def _plugged(root: Node, source: str, faults: list[Fault]) -> tuple[Node, Plugin
 
 def _checked(
     root: Node, known: Plugins, source: str, faults: list[Fault], checks: Sequence[Check]
-) -> tuple[Scenario, dict[str, str]]:
-    """The scenario of a tree, and the origins of its values."""
+) -> tuple[Scenario, dict[str, str], bool]:
+    """The scenario of a tree, the origins of its values, and whether a run has to be chosen."""
     top = keys_of(scenario_class(known))
     root = complete(root, top, faults)
     scenario = check(root, top, faults, checks)
     if scenario is None or faults:
         raise ScenarioError(_findings(faults, source))
-    return scenario, _origins(scenario, root)
+    return scenario, _origins(scenario, root), has_choice(root)
 
 
 def load_resolved(

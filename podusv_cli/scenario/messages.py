@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from podusv_cli.scenario.keys import NAME, NUMBER, Key, either
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import did_you_mean, found, hint, unknown, without_case
+from podusv_cli.scenario.presets import stands_in
 from podusv_cli.scenario.yaml_tree import Fault, Node, Route, dotted, follow, plain, route
 
 MOST_PLACES = 4  # of a key, in a message
@@ -58,6 +59,8 @@ def _faults(root: Node, top: Key, error: ValidationError) -> Iterator[Fault]:
 
 def _copied(root: Node, route: Route) -> bool:
     """Whether a value was copied from another section, where it has a message already."""
+    if stands_in(root) and route[:1] != ("nominal",):
+        return route[:1] == ("controller",)
     if route[:1] not in (("nominal",), ("controllers",)):
         return False
     source: Route = ("vessel", *route[1:]) if route[0] == "nominal" else ("controller", *route[2:])

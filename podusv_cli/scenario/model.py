@@ -158,7 +158,8 @@ class Scenario(Component):
     controllers: dict[str, AnyController] = value(
         {},
         "",
-        "laws to compare, by name; each starts from those keys of `controller` that it has too",
+        "laws to compare, by name; each starts from those keys of `controller` that it has too; "
+        "`name: null` takes out an inherited one",
     )
     claims: dict[str, Claim] = value({}, "", "what `podusv compare` is to judge, by name")
     simulation: Simulation = value(Simulation(), "", "integration")

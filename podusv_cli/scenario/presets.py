@@ -200,12 +200,29 @@ def _rows_in(given: Node, section: str, keys: tuple[str, str], faults: list[Faul
 
 
 def _controllers(root: Node, top: Key) -> Node:
-    """Each of `controllers` over those keys of `controller` that its kind has too."""
+    """Each of `controllers` over those keys of `controller` that its kind has too.
+
+    Without `controller`, the first of `controllers` stands there; see `has_choice`.
+    """
     base, several = root.mapping.get("controller"), root.mapping.get("controllers")
-    if not base or not several:
+    if not several or not several.mapping:
         return root
+    if not base:
+        return root.with_entry("controller", next(iter(several.mapping.values())))
     filled = {name: _over_base(base, own, top) for name, own in several.mapping.items()}
     return root.with_entry("controllers", replace(several, content=filled))
+
+
+def stands_in(root: Node) -> bool:
+    """Whether the `controller` of a complete tree is the first of `controllers`, not given."""
+    several = root.mapping.get("controllers")
+    laws = several.mapping.values() if several else ()
+    return any(law is root.mapping.get("controller") for law in laws)
+
+
+def has_choice(root: Node) -> bool:
+    """Whether it is open which of several `controllers` a single run is to have."""
+    return stands_in(root) and len(root.mapping["controllers"].mapping) > 1
 
 
 def _over_base(base: Node, own: Node, top: Key) -> Node:

@@ -6,11 +6,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from podusv_cli.core.errors import UsageError
 from podusv_cli.core.finding import Finding
 from podusv_cli.findings.finding import not_silenced, unknown_codes
 from podusv_cli.findings.preflight import preflight
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Loaded, load, resolved_yaml
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.phrases import unknown
 from podusv_cli.storage.run_folder import default_folder
 from podusv_cli.workflows.execute import Finished, Progress, Stopwatch, Task, execute
 
@@ -33,6 +36,7 @@ class Request:
     names: Sequence[str] = ()  # of figures of a comparison; all that fit where empty
     formats: Sequence[str] = ("png",)  # of figures of a comparison
     jobs: int = 0  # processes at a time; 0: one a core
+    controller: str = ""  # which of `controllers` to run
 
 
 def run(config: Path, request: Request, progress: Progress | None = None) -> Finished:
@@ -51,7 +55,7 @@ def run_loaded(
     """Execute a scenario that is loaded and checked. Raises StorageError."""
     watch = watch or Stopwatch()
     with watch.part("load"):
-        scenario = loaded.scenario.alone()
+        scenario = single(loaded, request.controller)
         target = request.out or default_folder(RESULTS, scenario.name, resolved_yaml(scenario))
     with watch.part("preflight"):
         noticed = not_silenced(preflight(scenario), scenario)
@@ -61,4 +65,27 @@ def run_loaded(
         scenario, loaded.text, target, force=request.force, named=request.out is not None,
         figures=DRAWN if request.figures else (), argv=request.argv, noticed=noticed,
     )  # fmt: skip
-    return replace(execute(task, progress, watch), others=tuple(loaded.scenario.controllers))
+    others = () if request.controller else _not_run(loaded.scenario)
+    return replace(execute(task, progress, watch), others=others)
+
+
+def _not_run(scenario: Scenario) -> tuple[str, ...]:
+    """The `controllers` where they are more than the `controller` under a name."""
+    same = list(scenario.controllers.values()) == [scenario.controller]
+    return () if same else tuple(scenario.controllers)
+
+
+def single(loaded: Loaded, label: str = "") -> Scenario:
+    """The scenario of one run: of the law that is chosen from `controllers`, or of `controller`.
+
+    Raises UsageError for an unknown law, and where `controllers` leaves the choice open.
+    """
+    known = loaded.scenario.controllers
+    if label and label not in known:
+        raise UsageError(unknown(f"controller {label!r}", label, known))
+    if loaded.open_choice and not label:
+        raise UsageError(
+            f"{loaded.scenario.name} has several controllers; choose one with --controller "
+            f"({', '.join(known)}), or compare all: podusv compare"
+        )
+    return loaded.scenario.singles()[label] if label else loaded.scenario.alone()
