@@ -62,6 +62,22 @@ def test_a_bend_of_the_path_is_told_and_only_a_law_with_accelerations_steps() ->
     assert jump("tau_r_cmd", "path={kind: line}", law, ON_TARGET) < 0.1 * 2.76 * 0.015 / z_e
 
 
+def test_a_target_that_goes_on_after_its_last_point_is_told() -> None:
+    points = "points: [[0, 0], [3, 1], [6, 0]], speed: 0.5"
+    on, stop = (
+        f"path={{kind: waypoints, {points}}}",
+        f"path={{kind: waypoints, {points}, after: stop}}",
+    )
+    assert (
+        "last point at 12.65 s and goes straight on until 20 s" in finding("path-runs-on", on).text
+    )
+    assert log(on)["x_d"][-1] > 8.0
+    for there in (stop, stop.replace("stop", "loop")):
+        assert "path-runs-on" not in codes(there)
+        assert log(there)["x_d"].max() < 6.5
+    assert "path-runs-on" not in codes(on, "simulation.duration=12")
+
+
 def test_what_comes_after_the_run_is_not_told() -> None:
     assert "path-jump" not in codes(turning("literal"), "simulation.duration=10")
 

@@ -31,6 +31,10 @@ PATHS: dict[str, Any] = {name: example(kind) for name, kind in kinds("paths").it
     "oblique line": Line(course=2.0, x=1.0, y=-4.0),
     "bends": Waypoints(points=POINTS),
     "two points": Waypoints(points=POINTS[:2]),
+    "a stop": Waypoints(points=POINTS, after="stop"),
+    "a loop": Waypoints(points=POINTS, after="loop"),
+    "a loop of two points": Waypoints(points=POINTS[:2], after="loop"),
+    "a closed loop": Waypoints(points=(*POINTS, POINTS[0]), after="loop"),
 }
 every_path = pytest.mark.parametrize("path", PATHS.values(), ids=PATHS.keys())
 
@@ -138,6 +142,26 @@ def test_after_the_last_point_the_target_goes_straight_on() -> None:
     later = target_at(path, end + 40.0)
     np.testing.assert_allclose(later[:2], last[:2] + 40.0 * last[2:4], rtol=1e-12)
     np.testing.assert_array_equal(later[2:], [*last[2:4], 0.0, 0.0])
+
+
+def test_after_the_last_point_the_target_may_stop() -> None:
+    path = Waypoints(points=POINTS, after="stop")
+    ((end, _),) = [(known.time, known.what) for known in path.breaks()]
+    assert end == pytest.approx(sum(math.dist(a, b) for a, b in pairwise(POINTS)) / 0.5)
+    for t in (end + 1e-9, end + 40.0):
+        np.testing.assert_allclose(target_at(path, t), [*POINTS[-1], 0, 0, 0, 0], atol=1e-12)
+    before = target_at(Waypoints(points=POINTS), 0.7 * end)
+    np.testing.assert_array_equal(target_at(path, 0.7 * end), before)
+
+
+def test_after_the_last_point_the_target_may_go_round_again() -> None:
+    path, closed = (Waypoints(points=p, after="loop") for p in (POINTS, (*POINTS, POINTS[0])))
+    period = sum(math.dist(a, b) for a, b in pairwise((*POINTS, POINTS[0]))) / 0.5
+    for t in np.random.default_rng(5).uniform(0, period, 20):
+        once = target_at(path, t)
+        np.testing.assert_allclose(target_at(path, t + 3 * period), once, atol=1e-9)
+        np.testing.assert_array_equal(target_at(closed, t), once)
+    np.testing.assert_allclose(target_at(path, period - 1e-9), target_at(path, 0.0), atol=1e-8)
 
 
 def test_two_points_make_a_line() -> None:

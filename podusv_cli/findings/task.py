@@ -76,6 +76,23 @@ path_bend = _path_break(
 
 
 @before(
+    "path-runs-on",
+    about="path",
+    meaning="the target goes straight on after the last waypoint",
+    condition="the run lasts longer than the way through the points",
+    remedy="set path.after to stop or loop, or simulate no longer",
+)
+def path_runs_on(case: Case) -> Sentences:
+    """The target leaves the given course before the run ends."""
+    end, duration = case.scenario.path.runs_on_from(), case.scenario.simulation.duration
+    if end < duration:
+        yield (
+            f"the target passes its last point at {end:.4g} s and goes straight on until "
+            f"{duration:.6g} s; set path.after to stop or loop, or simulate no longer"
+        )
+
+
+@before(
     "sway-drift",
     about="path",
     meaning="the sway load drifts the hull faster than the target",

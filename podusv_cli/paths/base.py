@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -36,6 +37,10 @@ class Path(Component):
     def waypoints(self) -> tuple[Point, ...]:
         """Points [m], north and east, that the path is made from; none for most paths."""
         return ()
+
+    def runs_on_from(self) -> float:
+        """Time [s] at which the target leaves the given course and goes on; never for most."""
+        return math.inf
 
     def breaks(self) -> tuple[Break, ...]:
         """Times at which the target is not smooth, in order."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -9,7 +10,9 @@ from pydantic import model_validator
 
 from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, kernel
-from podusv_cli.paths.base import Path, Point
+from podusv_cli.paths.base import Break, Path, Point
+
+LOOP = 2.0  # the place of "loop" among the choices of `after`, as kernels know it
 
 
 @kernel
@@ -30,7 +33,8 @@ class Waypoints(Path):
     """A natural cubic spline through the points, in the time that chords at `speed` would take.
 
     Position, velocity and acceleration are continuous, so the speed varies a little in bends.
-    After the last point the target goes straight on with the speed it has there.
+    After the last point the target goes straight on with the speed it has there, or stops, or goes
+    back to the first point and round again.
     """
 
     kind: Literal["waypoints"] = "waypoints"
@@ -42,6 +46,10 @@ class Waypoints(Path):
         (), "m", "list of [x, y], at least two, neighbours apart", strict=False
     )
     speed: float = value(0.5, "m/s", "speed along the chords between the points", gt=0)
+    after: Literal["continue", "stop", "loop"] = value(
+        "continue", "", "after the last point: straight on, a stop, or from there to the first "
+        "point and round again",
+    )  # fmt: skip
 
     @model_validator(mode="after")
     def _travelled(self) -> Self:
@@ -59,22 +67,39 @@ class Waypoints(Path):
         """The points as they are given."""
         return self.points
 
+    def runs_on_from(self) -> float:
+        """When the target passes the last point, if it goes straight on."""
+        return float(self._knots()[-1]) if self.after == "continue" else math.inf
+
+    def breaks(self) -> tuple[Break, ...]:
+        """The stop at the last point."""
+        return (Break(float(self._knots()[-1]), "velocity"),) if self.after == "stop" else ()
+
+    def _course(self) -> Vector:
+        """The points that the spline goes through; a loop ends where it begins."""
+        closing = (
+            self.points[:1] if self.after == "loop" and self.points[0] != self.points[-1] else ()
+        )
+        return np.asarray((*self.points, *closing), float)
+
     def _knots(self) -> Vector:
         """Time [s] at which the target passes each point."""
-        chords = np.hypot(*np.diff(np.asarray(self.points), axis=0).T)
+        chords = np.hypot(*np.diff(self._course(), axis=0).T)
         return np.concatenate([[0.0], np.cumsum(chords)]) / self.speed
 
     def constants(self) -> dict[str, float]:
-        """The speed and the number of points."""
-        return super().constants() | {"count": float(len(self.points))}
+        """The speed, what comes after, the number of points, and the time that they take."""
+        knots = self._knots()
+        return super().constants() | {"count": float(len(knots)), "period": float(knots[-1])}
 
     def table(self) -> Vector:
         """The knots, then eight coefficients a knot: cubic in x and in y, highest power first."""
         from scipy.interpolate import CubicSpline
 
-        knots = self._knots()
-        spline = CubicSpline(knots, np.asarray(self.points), bc_type="natural")
-        last = np.concatenate([[0, 0], spline(knots[-1], 1), spline(knots[-1])])
+        knots, ends = self._knots(), "periodic" if self.after == "loop" else "natural"
+        spline = CubicSpline(knots, self._course(), bc_type=ends)
+        velocity = np.zeros(2) if self.after == "stop" else spline(knots[-1], 1)
+        last = np.concatenate([[0, 0], velocity, spline(knots[-1])])
         cubic = np.vstack(
             [spline.c.transpose(1, 2, 0).reshape(-1, 8), last[[0, 1, 2, 4, 0, 1, 3, 5]]]
         )
@@ -85,6 +110,8 @@ class Waypoints(Path):
     def evaluate(t: float, k: Any, table: Vector, target: Vector) -> None:
         """The spline and its derivatives, by Horner's rule."""
         count = int(k.count)
+        if k.after == LOOP:
+            t -= k.period * math.floor(t / k.period)
         i = _segment(t, count, table)
         s = t - table[i]
         for axis in range(2):
