@@ -13,7 +13,7 @@ OLDEST := .venv-oldest
 LOWEST := sed -n '/^dependencies = \[/,/^\]/s/^ *"\(.*\)>=\(.*\)",/\1==\2/p' pyproject.toml
 PODS := kept dropped ideal no_anti_windup single
 ABLATIONS := ablation ablation_figures ablation_standoff ablation_gains ablation_gains_figures \
-    ablation_gains_standoff
+    ablation_gains_standoff ablation_pid
 TABLES := unknown:unknown_dynamics discrete:discrete_signals limits:period_limits learnt:learnt
 COMPARISONS := printed_compare figures_compare figures_compare_standoff corrected_compare
 

@@ -60,6 +60,16 @@ def test_parts_switched_off() -> None:
         assert same(row[5], tables["C"].loc["peak_tau_u", law]), law
 
 
+def test_pid_without_windup() -> None:
+    table = pd.read_csv(PAPER / "ablation_pid/comparison.csv", index_col=0)
+    laws = ("proposed", "pid", "pid_no_integral", "pid_anti_windup")
+    for law, (_, error, settled, energy) in zip(laws, rows("PID"), strict=True):
+        found = table[law]
+        assert same(error, found["iae_e"])
+        assert same(settled, 1000 * found["e_steady"])
+        assert same(energy, found["energy"])
+
+
 def test_what_the_networks_learn() -> None:
     table = pd.read_csv(PAPER / "learnt.csv", index_col=[0, 1])
     for name, *numbers in rows("Parts switched off", which=1):
