@@ -163,8 +163,9 @@ def test_a_file_that_is_no_plug_in_is_refused_in_a_line(podusv: Command, law: st
 
 NAMED = {
     "plugins: [nothing.py]": "'nothing.py' cannot be read: no such file or directory",
-    "plugins: 5": "plugins: must be a list of files like my_law.py, found 5",
-    "plugins: [{}]": "plugins: must be a list of files like my_law.py, found an empty mapping",
+    "plugins: 5": "plugins: must be a list of files like my_law.py and installed packages, found 5",
+    "plugins: [{}]": "like my_law.py and installed packages, found an empty mapping",
+    "plugins: [my_lab]": "'my_lab' is no file (these end in .py) and no installed package",
     "plugins: {laws/my_law.py: {sha: abc}}": "unknown key; did you mean 'sha256'?",
     "plugins: {laws/my_law.py: {sha256: abc}}": "is not the one that was used; without sha256",
 }

@@ -103,17 +103,18 @@ def drawn(
     A figure that was asked for and that no run has signals for is missing among the `extras`.
     """
     # matplotlib is slow to import
-    from podusv_cli.figures.drawing import FIGURES, draw_in_parallel, dressed
+    from podusv_cli.figures.drawing import draw_in_parallel, dressed, figures_of
 
     tell = progress and partial(progress, "drawing figures")
     if tell:
         tell(0.0)
     shown = dressed([(e.label, e.recording, e.scenario) for e in result.entries])
+    known = figures_of(run.scenario for run in shown)
     for name in asked.names:
-        if not FIGURES[name].fits(shown):
-            wanted = ", ".join(FIGURES[name].signals)
+        if not known[name].fits(shown):
+            wanted = ", ".join(known[name].signals)
             extras.missing.append(Missing(f"figure {name}", f"no run logged any of {wanted}"))
-    names = tuple(dict.fromkeys(asked.names)) or tuple(FIGURES)
+    names = tuple(dict.fromkeys(asked.names)) or tuple(known)
     formats = tuple(dict.fromkeys((*asked.formats, IN_REPORT)))
     return draw_in_parallel(shown, names, formats, extras, progress=tell, workers=asked.jobs)
 
@@ -127,11 +128,11 @@ def as_report(
     moving: dict[str, Any] = {}
     if figures:
         # matplotlib is slow to import
-        from podusv_cli.figures.drawing import FIGURES, dressed
+        from podusv_cli.figures.drawing import dressed, figures_of
 
         pictures = [
             report.Picture(name, sheet.caption, figures[f"{name}.{IN_REPORT}"], sheet.source)
-            for name, sheet in FIGURES.items()
+            for name, sheet in figures_of(result.scenarios.values()).items()
             if f"{name}.{IN_REPORT}" in figures
         ]
         moving = chase.chase(dressed([(e.label, e.recording, e.scenario) for e in result.entries]))

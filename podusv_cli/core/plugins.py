@@ -10,18 +10,22 @@ import hashlib
 import re
 import sys
 import traceback
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from functools import cache
+from importlib.metadata import EntryPoint, distributions
+from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from podusv_cli.core.errors import LawError
+from podusv_cli.core.errors import LawError, in_a_line
 from podusv_cli.core.escaping import visible
 
 ROOMS = (
     "controllers", "paths", "disturbances", "actuators", "vessels", "metrics", "figures", "findings"
 )  # fmt: skip
+GROUPS = tuple(f"podusv.{room}" for room in ROOMS)
 MODULES = "podusv_plugins"  # what the modules of files are called: podusv_plugins.my_law_1a2b3c4d
 
 
@@ -30,8 +34,8 @@ class Plugin:
     """What one file or one installed package offers, and which it is.
 
     `sha256` is the digest of the file, or of the package's modules that entry points name. `text`
-    is the file's own, "" for a package. `offers` are modules and objects, each with its room; a
-    file's module is for all rooms.
+    is the file's own, "" for a package. `offers` are modules, objects and entry points, each with
+    its room; a file's module is for all rooms.
     """
 
     name: str  # of the file, or of the package
@@ -42,10 +46,31 @@ class Plugin:
     offers: tuple[tuple[str, Any], ...] = field(default=(), compare=False)
 
     def members(self, room: str) -> Iterator[Any]:
-        """Everything in this plug-in that may belong to a room."""
+        """Everything in this plug-in that may belong to a room. Raises LawError."""
+        for thing in self._offered(room):
+            yield from _inside(thing)
+
+    def folders(self, room: str) -> list[str]:
+        """The packages of this plug-in whose YAML files are presets of a room. Raises LawError."""
+        return [thing.__name__ for thing in self._offered(room) if hasattr(thing, "__path__")]
+
+    def _offered(self, room: str) -> Iterator[Any]:
         for place, thing in self.offers:
             if place in ("", room):
-                yield from _inside(thing)
+                yield self._loaded(thing) if isinstance(thing, EntryPoint) else thing
+
+    def _loaded(self, point: EntryPoint) -> Any:
+        try:
+            return point.load()
+        except Exception as error:
+            what = f"installed package {self}: entry point {point.name} = {point.value}"
+            raise LawError(f"{what} cannot be imported: {in_a_line(error)}") from error
+
+    def without_components(self) -> Plugin:
+        """Its metrics, figures, findings and vessels alone."""
+        rest = ("vessels", "metrics", "figures", "findings")
+        offers = tuple((r, thing) for r in rest for place, thing in self.offers if place in ("", r))
+        return replace(self, name=f"{self.name} without components", offers=offers)
 
     def as_json(self) -> dict[str, str]:
         """What provenance.json says of it."""
@@ -111,3 +136,36 @@ def _fault(error: BaseException, path: str) -> str:
     place = f" ({Path(path).name}, line {lines[-1]})" if lines else ""
     told = " ".join(str(error).split("\n\nFor further information")[0].split())
     return visible(f"{type(error).__name__}: {told}{place}")
+
+
+@cache
+def installed() -> Plugins:
+    """What installed packages offer by entry points of the groups `podusv.controllers` and so on.
+
+    Their modules are imported when something is looked for in their room.
+    """
+    found: dict[str, Plugin] = {}
+    for package in distributions():
+        points = tuple(
+            (point.group.removeprefix("podusv."), point)
+            for point in package.entry_points
+            if point.group in GROUPS
+        )
+        if points and package.name not in found:  # another one is hidden by the first
+            digest = _package_digest(points)
+            found[package.name] = Plugin(package.name, digest, package.version, offers=points)
+    return tuple(found[name] for name in sorted(found))
+
+
+def _package_digest(points: Iterable[tuple[str, EntryPoint]]) -> str:
+    """The digest of all Python and YAML files of the packages in which the entry points are."""
+    whole = hashlib.sha256()
+    for top in sorted({point.module.partition(".")[0] for _, point in points}):
+        spec = find_spec(top)
+        folders = (spec and spec.submodule_search_locations) or ()
+        files = [path for folder in folders for path in Path(folder).rglob("*")]
+        alone = [Path(spec.origin)] if spec and spec.origin and not folders else []
+        for path in sorted([*files, *alone]):
+            if path.suffix in (".py", ".yaml"):
+                whole.update(path.name.encode() + b"\0" + path.read_bytes())
+    return whole.hexdigest()

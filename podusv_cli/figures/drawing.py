@@ -30,6 +30,15 @@ _found = registry.named("podusv_cli.figures", Sheet).values()
 FIGURES: dict[str, Sheet] = {sheet.name: sheet for sheet in sorted(_found, key=_place)}
 
 
+def figures_of(scenarios: Iterable[Scenario]) -> dict[str, Sheet]:
+    """All figures by name, in order, with those of these scenarios' plug-ins."""
+    plugins = tuple(dict.fromkeys(plugin for one in scenarios for plugin in one.plugged))
+    if not plugins:
+        return FIGURES
+    more = registry.named("podusv_cli.figures", Sheet, plugins)
+    return {sheet.name: sheet for sheet in sorted((more | FIGURES).values(), key=_place)}
+
+
 def dressed(runs: Sequence[tuple[str, Recording, Scenario]]) -> list[Shown]:
     """Labelled recordings with their looks, in order; without those too short to draw.
 
@@ -50,8 +59,9 @@ def draw(
     """File name and content of each figure that fits the runs, in each format."""
     with house_style(), np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of numbers near the end of all, as diverged runs have
-        for name in (name for name in names if FIGURES[name].fits(runs)):
-            figure = FIGURES[name].family(runs, columns)
+        known = figures_of(run.scenario for run in runs)
+        for name in (name for name in names if known[name].fits(runs)):
+            figure = known[name].family(runs, columns)
             for form in formats:
                 yield f"{name}.{form}", image(figure, form)
 
@@ -95,9 +105,11 @@ def draw_in_parallel(
     return found
 
 
-def check_names(figures: Sequence[str], formats: Sequence[str]) -> None:
-    """UsageError for a figure or format that there is not."""
-    for what, names, known in (("figure", figures, tuple(FIGURES)), ("format", formats, FORMATS)):
+def check_names(
+    figures: Sequence[str], formats: Sequence[str], sheets: Iterable[str] = FIGURES
+) -> None:
+    """UsageError for a figure, of all `sheets`, or format that there is not."""
+    for what, names, known in (("figure", figures, tuple(sheets)), ("format", formats, FORMATS)):
         for name in names:
             if name not in known:
                 raise UsageError(unknown(f"{what} {name!r}", name, known))

@@ -42,7 +42,7 @@ def postflight(scenario: Scenario, log: Recording) -> list[Finding]:
     """All findings about a run of this scenario, silenced ones included."""
     if not len(log["time"]):
         return []
-    kinds = [kind for kind in finding_kinds().values() if kind.when == "after"]
+    kinds = [kind for kind in finding_kinds(scenario.plugged).values() if kind.when == "after"]
     with np.errstate(all="ignore"):
         return [
             finding

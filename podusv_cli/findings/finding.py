@@ -11,6 +11,7 @@ import numpy as np
 from podusv_cli.core import registry
 from podusv_cli.core.finding import Finding, FindingKind
 from podusv_cli.core.kernel import Vector, bundle
+from podusv_cli.core.plugins import Plugins
 from podusv_cli.findings.reference import Reference, reference
 from podusv_cli.paths.base import TARGET
 from podusv_cli.scenario.model import Scenario
@@ -21,11 +22,14 @@ PACKAGES = ("findings", "paths", "disturbances", "actuators", "controllers")
 
 
 @cache
-def finding_kinds() -> dict[str, FindingKind]:
-    """Every kind of finding by code, in the order of the scenario's sections."""
+def finding_kinds(plugins: Plugins = ()) -> dict[str, FindingKind]:
+    """Every kind of finding by code, in the order of the scenario's sections.
+
+    Those of these plug-ins are among them.
+    """
     found: dict[str, FindingKind] = {}
     for package in PACKAGES:
-        found |= registry.named(f"podusv_cli.{package}", FindingKind)
+        found |= registry.named(f"podusv_cli.{package}", FindingKind, plugins)
     sections = list(Scenario.model_fields)
     ordered = sorted(found.values(), key=lambda n: sections.index(n.about.partition(".")[0]))
     return {kind.name: kind for kind in ordered}
@@ -33,7 +37,7 @@ def finding_kinds() -> dict[str, FindingKind]:
 
 def unknown_codes(scenario: Scenario) -> list[tuple[str, str]]:
     """Key and sentence for every unknown code in `silence`; a check for `load`."""
-    codes = tuple(finding_kinds())
+    codes = tuple(finding_kinds(scenario.plugged))
     return [
         (f"silence[{place}]", unknown(f"finding {code!r}", code, codes))
         for place, code in enumerate(scenario.silence)

@@ -20,7 +20,7 @@ def preflight(scenario: Scenario) -> list[Finding]:
     if scenario.controllers:
         return merged({name: preflight(one) for name, one in scenario.singles().items()})
     case = Case(scenario)
-    kinds = [kind for kind in finding_kinds().values() if kind.when == "before"]
+    kinds = [kind for kind in finding_kinds(scenario.plugged).values() if kind.when == "before"]
     with np.errstate(all="ignore"):
         return [found for kind in kinds for found in kind.findings(scenario.controller, case)]
 

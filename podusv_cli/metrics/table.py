@@ -11,14 +11,22 @@ import numpy as np
 
 from podusv_cli.core import registry
 from podusv_cli.core.kernel import Vector, kernel, specialise, tail
+from podusv_cli.core.plugins import Plugins
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import ClosedLoop, Observer
 from podusv_cli.metrics.metric import Accumulator, Layout, Metric, close_integrals
 
-_found = registry.named("podusv_cli.metrics", Metric).values()
-METRICS: dict[str, Metric] = {m.name: m for m in sorted(_found, key=lambda m: m.place)}
 
-CLOCKED = tuple(m.name for m in _found if m.unit == "ns")  # measured times, which never repeat
+@cache
+def metrics_with(plugins: Plugins) -> dict[str, Metric]:
+    """All metrics by name, in the order of tables, with those of these plug-ins."""
+    found = registry.named("podusv_cli.metrics", Metric, plugins).values()
+    return {m.name: m for m in sorted(found, key=lambda m: m.place)}
+
+
+METRICS = metrics_with(())
+# Measured times, which never repeat
+CLOCKED = tuple(name for name, metric in METRICS.items() if metric.unit == "ns")
 
 Parts = tuple[tuple[Accumulator, int], ...]
 COUNT = 0  # placeholder: how many numbers `first_kernel` gathers
@@ -56,6 +64,7 @@ class Metrics(Observer):
 
     parts: Parts = ()
     step: float = 0.0
+    plugins: Plugins = ()
 
     def summary(self, seen: Vector) -> dict[str, float]:
         """Metrics by name; NaN where a run ended before one is defined."""
@@ -68,7 +77,7 @@ class Metrics(Observer):
         }
         return {
             metric.name: metric.result(own[metric.accumulator], self.step)
-            for metric in METRICS.values()
+            for metric in metrics_with(self.plugins).values()
             if metric.accumulator in own
         }
 
@@ -83,15 +92,18 @@ class Metrics(Observer):
 
 
 def observer(
-    loop: ClosedLoop, grid: TimeGrid, *, steady_fraction: float, settling_radius: float
-) -> Metrics:
-    """The observer of all metrics that this loop has."""
+    loop: ClosedLoop, grid: TimeGrid, *, steady_fraction: float, settling_radius: float,
+    plugins: Plugins = (),
+) -> Metrics:  # fmt: skip
+    """The observer of all metrics that this loop has, those of plug-ins included."""
     layout = Layout(loop, loop.layout(grid), grid.last_part(steady_fraction), settling_radius)
-    accumulators = dict.fromkeys(m.accumulator for m in METRICS.values() if m.accumulator)
+    known = metrics_with(plugins).values()
+    accumulators = dict.fromkeys(m.accumulator for m in known if m.accumulator)
     parts = tuple((part, part.size(layout)) for part in accumulators if part.size(layout))
     constants: dict[str, float] = {}
     for part, _ in parts:
         for name, number in part.constants(layout).items():
             if constants.setdefault(name, number) != number:
                 raise ValueError(f"two accumulators use {name!r} for different numbers")
-    return Metrics(_watch(parts), constants, sum(size for _, size in parts), parts, grid.step)
+    size = sum(size for _, size in parts)
+    return Metrics(_watch(parts), constants, size, parts, grid.step, plugins)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import yaml
@@ -70,15 +71,19 @@ def load_text(
     root = composed(text, source, overrides, faults, placed=placed)
     if root is None:
         raise ScenarioError(_findings(faults, source))
-    root, known = _plugged(plugins.with_given(root, files), source, faults)
+    root = plugins.with_given(root, files)
+    root, known = _plugged(plugins.loaded, root, source, faults)
     scenario, origins, choice = _checked(root, known, source, faults, checks)
     return Loaded(scenario, origins, text, choice)
 
 
-def _plugged(root: Node, source: str, faults: list[Fault]) -> tuple[Node, Plugins]:
+def _plugged(
+    plugged: Callable[[Node, list[Fault]], tuple[Node, Plugins]], root: Node, source: str,
+    faults: list[Fault],
+) -> tuple[Node, Plugins]:  # fmt: skip
     """The tree with its plug-ins. Without one of them, nothing else can be said of the tree."""
     before = len(faults)
-    root, known = plugins.loaded(root, faults)
+    root, known = plugged(root, faults)
     if len(faults) > before:
         raise ScenarioError(_findings(faults, source))
     return root, known
@@ -97,11 +102,13 @@ def _checked(
 
 
 def load_resolved(
-    text: str, source: str, checks: Sequence[Check] = (), *, to_run: bool = False
-) -> Scenario:
+    text: str, source: str, checks: Sequence[Check] = (), *, to_run: bool = False,
+    files: Sequence[str] = (),
+) -> Scenario:  # fmt: skip
     """The scenario of a finished run, which refers to no file but its plug-ins.
 
-    With `to_run` these are loaded; else their components are kept as plain values. Raises
+    With `to_run` these are loaded. Else no file but `files` is, and components that are in none of
+    these and in no installed package are kept as plain values. Raises
     StorageError where it does or is no YAML mapping at all, ScenarioError where it is one that this
     podusv does not know.
     """
@@ -118,7 +125,8 @@ def load_resolved(
         (first, *_) = _findings(faults, source)
         raise StorageError(f"{first} (damaged: not as podusv wrote it)")
     root = replace(root, mark=Mark(source))
-    root, known = _plugged(root, source, faults) if to_run else (root, plugins.recorded(root))
+    plugged = plugins.loaded if to_run else partial(plugins.recorded, files)
+    root, known = _plugged(plugged, root, source, faults)
     return _checked(root, known, source, faults, checks)[0]
 
 

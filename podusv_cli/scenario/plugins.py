@@ -13,11 +13,12 @@ from podusv_cli.actuators.base import Actuator
 from podusv_cli.controllers.base import Controller
 from podusv_cli.core.component import Component, Recorded, value
 from podusv_cli.core.errors import LawError
-from podusv_cli.core.plugins import Plugin, Plugins, digest, from_file
+from podusv_cli.core.plugins import Plugin, Plugins, digest, from_file, installed
 from podusv_cli.disturbances.base import Disturbance
 from podusv_cli.paths.base import Path
+from podusv_cli.scenario.keys import keys_of
 from podusv_cli.scenario.model import Scenario, scenario_class
-from podusv_cli.scenario.phrases import found
+from podusv_cli.scenario.phrases import did_you_mean, found, quoted
 from podusv_cli.scenario.shipped import relative_to
 from podusv_cli.scenario.yaml_text import read_text
 from podusv_cli.scenario.yaml_tree import Fault, Mark, Node
@@ -33,10 +34,20 @@ def with_given(root: Node, files: Sequence[str]) -> Node:
     """The tree with files of the command line (`--plugin`) after those that it names itself."""
     if not files:
         return root
-    entries = [Node(file, Mark(f"--plugin {file}"), text=file) for file in files]
+    entries = [_given(file) for file in files]
     own = root.mapping.get(KEY)
     listed = tuple(node for node, _ in _listed(own)) if own else ()
     return root.with_entry(KEY, Node((*listed, *entries), own.mark if own else entries[0].mark))
+
+
+def from_files(files: Sequence[str], faults: list[Fault]) -> Plugins:
+    """The plug-ins in these files of the command line, and all that are installed."""
+    given = (_file(_given(file), faults) for file in files)
+    return (*(plugin for plugin in given if plugin), *installed())
+
+
+def _given(file: str) -> Node:
+    return Node(file, Mark(f"--plugin {file}"), text=file)
 
 
 def _listed(own: Node) -> list[tuple[Node, Node]]:
@@ -51,50 +62,81 @@ def _listed(own: Node) -> list[tuple[Node, Node]]:
 def loaded(root: Node, faults: list[Fault]) -> tuple[Node, Plugins]:
     """The tree with plug-ins as they stand in resolved.yaml, and the plug-ins.
 
-    There a file is named as in the run's folder, with its digest. Where one cannot be loaded, or
-    its components are none, there is a fault.
+    There a file is named as in the run's folder, with its digest, and an installed package stands
+    where the scenario uses a component of it. Where a plug-in cannot be loaded, or its components
+    are none, there is a fault.
     """
-    own = root.mapping.get(KEY)
-    if own is None or own.faulty:
-        return root, ()
+    own = root.mapping.get(KEY) or Node({}, root.mark)
     entries: dict[str, Node] = {}
     known: dict[str, Plugin] = {}
-    for name, wanted in _listed(own):
+    for name, wanted in [] if own.faulty else _listed(own):
         if plugin := _plugin(name, wanted, faults):
             place = next(n for n in _names(plugin) if known.setdefault(n, plugin) == plugin)
-            sha256 = Node(plugin.sha256, name.mark, text=plugin.sha256)
-            entries[place] = wanted.with_entry("sha256", sha256)
-    plugins = tuple(known.values())
+            entries[place] = _required(plugin, name.mark, wanted)
+    plugins = tuple(dict.fromkeys((*known.values(), *installed())))
     try:
         scenario_class(plugins)
+        entries = {p.name: _required(p, own.mark) for p in _used(root)} | entries
     except LawError as error:
         faults.append(Fault(own.mark, KEY, str(error)))
-    return root.with_entry(KEY, replace(own, content=entries)), plugins
+    return (root.with_entry(KEY, replace(own, content=entries)) if entries else root), plugins
 
 
-def _names(plugin: Plugin) -> tuple[str, str]:
-    """What the file is called in a run's folder, and where another has that name."""
+def _required(plugin: Plugin, mark: Mark, given: Node | None = None) -> Node:
+    """The plug-in's entry in resolved.yaml."""
+    entry = given or Node({}, mark)
+    for name in ("version", "sha256"):
+        text = getattr(plugin, name)
+        entry = entry.with_entry(name, Node(text, mark, text=text))
+    return entry
+
+
+def _used(root: Node) -> Iterator[Plugin]:
+    """The installed packages that have a component which the scenario names."""
+    named = [(section, node.get("kind")) for section, node in _components(root)]
+    foreign = [(section, kind) for section, kind in named if kind not in _kinds(Scenario, section)]
+    for plugin in installed() if foreign else ():
+        if any(kind in _kinds(scenario_class((plugin,)), section) for section, kind in foreign):
+            yield plugin
+
+
+def _names(plugin: Plugin) -> tuple[str, ...]:
+    """What a file is called in a run's folder, and where another has that name; or a package."""
+    if not plugin.text:
+        return (plugin.name,)
     return f"{FOLDER}/{plugin.name}", f"{FOLDER}/{plugin.sha256[:8]}_{plugin.name}"
 
 
 def _plugin(name: Node, wanted: Node, faults: list[Fault]) -> Plugin | None:
     """The plug-in that the scenario names, or None with a fault."""
-    if not isinstance(name.content, str) or not name.content.endswith(".py"):
+    if not isinstance(name.content, str):
         what = found(name.content, name.text)
-        faults.append(
-            Fault(name.mark, KEY, f"must be a list of files like my_law.py, found {what}")
-        )
+        text = f"must be a list of files like my_law.py and installed packages, found {what}"
+        faults.append(Fault(name.mark, KEY, text))
         return None
+    plugin = _file(name, faults) if name.content.endswith(".py") else _package(name, faults)
+    return plugin if plugin and _is_wanted(plugin, wanted, faults) else None
+
+
+def _package(name: Node, faults: list[Fault]) -> Plugin | None:
+    packages = {plugin.name: plugin for plugin in installed()}
+    if name.content not in packages:
+        what = f"{quoted(name.content)} is no file (these end in .py) and no installed package"
+        hint = did_you_mean(name.content, packages)
+        faults.append(Fault(name.mark, KEY, f"{what} with entry points of podusv{hint}"))
+    return packages.get(name.content)
+
+
+def _file(name: Node, faults: list[Fault]) -> Plugin | None:
     path = relative_to(name.mark.source, name.content) if name.mark.line else name.content
     text = read_text(path, name.mark, KEY, faults)
     if text is None:
         return None
     try:
-        plugin = from_file(path, text)
+        return from_file(path, text)
     except LawError as error:
         faults.append(Fault(name.mark, KEY, f"{path} {error}"))
         return None
-    return plugin if _is_wanted(plugin, wanted, faults) else None
 
 
 def _is_wanted(plugin: Plugin, wanted: Node, faults: list[Fault]) -> bool:
@@ -106,14 +148,21 @@ def _is_wanted(plugin: Plugin, wanted: Node, faults: list[Fault]) -> bool:
     return False
 
 
-def recorded(root: Node) -> Plugins:
-    """What stands in for the plug-ins of a finished run: its components as plain values.
+def recorded(files: Sequence[str], root: Node, faults: list[Fault]) -> tuple[Node, Plugins]:
+    """The tree of a finished run, and what stands in for its plug-ins.
 
-    The plug-ins themselves are not read, so that looking at a run runs nobody's code.
+    The files in its folder are not read, so that looking at a run runs nobody's code. Those that
+    the user names (`files`) and installed packages are, and where they are the very ones that were
+    used, their components, too. All other components are kept as plain values.
     """
-    if not root.get(KEY):
-        return ()
-    known = scenario_class(())
+    own = root.mapping.get(KEY)
+    used = {entry.get("sha256") for entry in own.mapping.values()} if own else set()
+    here = from_files(files, faults)
+    known = tuple(p if p.sha256 in used else p.without_components() for p in here)
+    return root, (*known, *(_stand_ins(root, scenario_class(known)) if used else ()))
+
+
+def _stand_ins(root: Node, known: type[Scenario]) -> Plugins:
     unknown: dict[tuple[str, str], frozenset[str]] = {}
     for section, node in _components(root):
         kind = node.get("kind")
@@ -131,8 +180,6 @@ def _components(root: Node) -> Iterator[tuple[str, Node]]:
 
 
 def _kinds(scenario: type[Scenario], section: str) -> Iterable[str]:
-    from podusv_cli.scenario.keys import keys_of
-
     return keys_of(scenario).keys[section].kinds
 
 

@@ -95,7 +95,7 @@ def compare_gathered(
 ) -> Compared:
     """The same for what is gathered already; `items` are the files and folders that it is from."""
     started, argv = datetime.now(UTC), list(request.argv)
-    _check_figures(request)
+    _check_figures(request, given.members)
     for finding in merged({member.label: member.noticed for member in given.members}):
         request.warn(finding)
     target = request.out or _default_folder(given.title, given.members)
@@ -118,14 +118,18 @@ def compare_gathered(
         return Compared(writer.finish(status, lost), result, status, tuple(extras.missing))
 
 
-def _check_figures(request: Request) -> None:
+def _check_figures(request: Request, members: Sequence[Member]) -> None:
     """UsageError for a figure or format that there is not, and for figures that are not wanted."""
     if request.names and not request.figures:
         raise UsageError(f"--figure {request.names[0]} and --no-figures contradict each other")
     if request.names or set(request.formats) != {"png"}:
-        from podusv_cli.figures.drawing import check_names  # matplotlib is slow to import
+        from podusv_cli.figures.drawing import (
+            check_names,
+            figures_of,
+        )  # matplotlib is slow to import
 
-        check_names(request.names, request.formats)
+        sheets = figures_of(member.scenario for member in members)
+        check_names(request.names, request.formats, sheets)
 
 
 def _default_folder(title: str, members: Sequence[Member]) -> Path:

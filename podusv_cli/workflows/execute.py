@@ -23,7 +23,7 @@ from podusv_cli.engine.simulate import marcher, simulate
 from podusv_cli.findings.after import postflight
 from podusv_cli.findings.finding import not_silenced
 from podusv_cli.metrics.cost import law_costs
-from podusv_cli.metrics.table import METRICS, Metrics, observer
+from podusv_cli.metrics.table import Metrics, metrics_with, observer
 from podusv_cli.process.extras import Extras, Missing
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.process.workers import Outcome
@@ -198,6 +198,7 @@ def _observer(scenario: Scenario) -> Metrics:
     return observer(
         scenario.closed_loop(), scenario.time_grid(),
         steady_fraction=settings.steady_fraction, settling_radius=settings.settling_radius,
+        plugins=scenario.plugged,
     )  # fmt: skip
 
 
@@ -268,7 +269,8 @@ def _write(
     status = {"status": recording.status, "controller": recording.controller}
     told = [finding.as_json() for finding in warnings]
     writer.add_json("metrics.json", {**status, "metrics": metrics, "warnings": told})
-    rows = [f"{name},{metrics[name]!r},{METRICS[name].unit}" for name in METRICS if name in metrics]
+    known = metrics_with(task.scenario.plugged)
+    rows = [f"{name},{metrics[name]!r},{m.unit}" for name, m in known.items() if name in metrics]
     writer.add("metrics.csv", "\n".join(["metric,value,unit", *rows, ""]).encode())
 
 

@@ -57,15 +57,15 @@ def gathered(found: Sequence[Item]) -> Gathered:
 
 def _opened(path: Path, request: Request, *, alone: bool) -> Item:
     if path.is_dir():
-        return from_folder(path)
+        return from_folder(path, request.plugins)
     fits = limits(request.allow_large, read_back=True)
     loaded = load(path, request.overrides, (unknown_codes, fits), request.plugins)
     return from_scenario(loaded, alone=alone)
 
 
-def from_folder(path: Path) -> Item:
-    """The finished runs of a folder. Raises UsageError, StorageError."""
-    members = comparable(path)
+def from_folder(path: Path, files: Sequence[str] = ()) -> Item:
+    """The finished runs of a folder; `files` are plug-ins. Raises UsageError, StorageError."""
+    members = comparable(path, files)
     return Item(path.resolve().name, members, [member.label for member in members])
 
 

@@ -32,16 +32,18 @@ class Member:
     noticed: Sequence[Finding] = ()  # before the run
 
 
-def from_folder(path: Path, checks: Sequence[Check] = (), *, to_run: bool = False) -> list[Member]:
+def from_folder(
+    path: Path, checks: Sequence[Check] = (), *, to_run: bool = False, files: Sequence[str] = ()
+) -> list[Member]:
     """The finished runs of a folder: one run, or all those of a comparison.
 
-    `checks` as `load`, `to_run` as `load_resolved` has them. Raises UsageError for a folder without
-    finished runs, StorageError for a damaged one.
+    `checks` as `load`, `to_run` and `files` as `load_resolved` has them. Raises UsageError for a
+    folder without finished runs, StorageError for a damaged one.
     """
     inner = _listed(path) if os.path.lexists(path / manifest.NAME) else _unlisted(path)
     if not inner:
         manifest.demand(path)
-    return [_from_run(child, checks, to_run) for child in (inner or [path])]
+    return [_from_run(child, checks, to_run, files) for child in (inner or [path])]
 
 
 def _unlisted(path: Path) -> list[Path]:
@@ -66,20 +68,20 @@ def _first_row(path: Path) -> list[str]:
         raise StorageError(f"cannot read {path}: no CSV ({error})") from error
 
 
-def _from_run(path: Path, checks: Sequence[Check], to_run: bool) -> Member:
+def _from_run(path: Path, checks: Sequence[Check], to_run: bool, files: Sequence[str]) -> Member:
     """A finished run whose log and theory.json were checked. StorageError, ScenarioError."""
     run = open_run(path)
     source = str(path / "resolved.yaml")
-    scenario = load_resolved(run.resolved_yaml, source, checks, to_run=to_run)
+    scenario = load_resolved(run.resolved_yaml, source, checks, to_run=to_run, files=files)
     if wrong := log_check.fault(run.recording):
         raise StorageError(f"{path / LOG}: damaged, or not a log of a run: {wrong}")
     stability.check(run.theory, run.folder / THEORY)
     return Member(path.name, scenario, run=run)
 
 
-def comparable(path: Path) -> list[Member]:
+def comparable(path: Path, files: Sequence[str] = ()) -> list[Member]:
     """As `from_folder`; also checks that the logs hold the memory with which laws are timed."""
-    members = from_folder(path)
+    members = from_folder(path, files=files)
     for member in members:
         if member.run:
             _check_memory(member.run, member.scenario)

@@ -15,7 +15,8 @@ from podusv_cli.comparison.differences import differences
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.core.escaping import visible
 from podusv_cli.figures.animation import FILE, animate
-from podusv_cli.figures.drawing import FIGURES, check_names, draw_in_parallel, dressed
+from podusv_cli.figures.drawing import check_names, draw_in_parallel, dressed, figures_of
+from podusv_cli.figures.sheet import Sheet
 from podusv_cli.figures.style import Shown
 from podusv_cli.process.extras import Extras, Missing
 from podusv_cli.storage import files, manifest
@@ -46,17 +47,18 @@ class Drawn:
     differences: Mapping[str, Mapping[str, Any]]  # between the runs, besides the controller
 
 
-def plot(runs: Sequence[Path], drawing: Drawing) -> Drawn:
+def plot(runs: Sequence[Path], drawing: Drawing, plugins: Sequence[str] = ()) -> Drawn:
     """Draw finished runs, overlaid; files of the same names in the folder are replaced.
 
     Raises UsageError for an unknown figure or format, for a figure that the runs lack the signals
     of, and for a file that belongs to a finished folder; StorageError.
     """
-    check_names(drawing.figures, drawing.formats)
-    members = _labelled(member for path in runs for member in from_folder(path))
+    members = _labelled(member for path in runs for member in from_folder(path, files=plugins))
+    known = figures_of(member.scenario for member in members)
+    check_names(drawing.figures, drawing.formats, known)
     shown = dressed([(m.label, m.run.recording, m.scenario) for m in members if m.run])
     empty = _empty(members, shown)
-    names = _chosen(drawing.figures, shown)
+    names = _chosen(drawing.figures, known, shown)
     planned = [f"{name}.{form}" for name in names for form in drawing.formats]
     planned += [FILE] * drawing.animate
     _check_not_finished(drawing.out, planned)
@@ -119,16 +121,18 @@ LONGER_NAMES: tuple[Callable[[Member], str], ...] = (
 )
 
 
-def _chosen(asked: Sequence[str], shown: Sequence[Shown]) -> tuple[str, ...]:
+def _chosen(
+    asked: Sequence[str], known: Mapping[str, Sheet], shown: Sequence[Shown]
+) -> tuple[str, ...]:
     """The figures to draw: those that are asked for, or all that the runs have signals for.
 
     Raises UsageError for one that they have no signals for.
     """
-    fitting = tuple(name for name, sheet in FIGURES.items() if sheet.fits(shown))
+    fitting = tuple(name for name, sheet in known.items() if sheet.fits(shown))
     for name in asked:
         if name not in fitting:
             raise UsageError(
-                f"figure {name!r} shows {', '.join(FIGURES[name].signals)}, and "
+                f"figure {name!r} shows {', '.join(known[name].signals)}, and "
                 f"{', '.join(run.label for run in shown)} logged none of these "
                 f"(figures there are: {', '.join(fitting)})"
             )
