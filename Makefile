@@ -7,7 +7,7 @@ PIP := $(BIN)/pip install --quiet --disable-pip-version-check --constraint const
 STEP := PODUSV=$(BIN)/podusv results/step.sh
 # A file to a core; what its tests share is made once.
 PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/pytest --numprocesses auto --dist loadfile
-OURS := podusv_cli tests benchmarks results
+OURS := podusv_cli tests benchmarks results examples
 # Every dependency of a run at its lower bound; what tests need beside them, as new as may be.
 OLDEST := .venv-oldest
 LOWEST := sed -n '/^dependencies = \[/,/^\]/s/^ *"\(.*\)>=\(.*\)",/\1==\2/p' pyproject.toml

@@ -117,7 +117,9 @@ def _report(done: Compared, verbose: bool) -> None:
     from podusv_cli.comparison.table import NOTE, cells
 
     result = done.result
-    echo_table(["metric", "unit", *map(str, result.table.columns)], cells(result.table))
+    echo_table(
+        ["metric", "unit", *map(str, result.table.columns)], cells(result.table, result.metrics)
+    )
     echo(NOTE)
     for v in result.verdicts:
         echo_entry(v.name, v.claim.says, v.evidence(), facts=v.answer)

@@ -67,8 +67,9 @@ def _show_metrics(found: RunDifference) -> None:
     from podusv_cli.comparison.run_difference import relative
     from podusv_cli.metrics.table import METRICS
 
+    units = {name: metric.unit for name, metric in METRICS.items()}
     rows = [
-        [name, METRICS[name].unit, _number(a), _number(b), _signed(relative(a, b))]
+        [name, units.get(name, ""), _number(a), _number(b), _signed(relative(a, b))]
         for name, (a, b) in found.metrics.items()
         if a != b
     ]

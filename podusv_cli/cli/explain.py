@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from podusv_cli.cli.completion import names
+from podusv_cli.cli.options import Plugins
 from podusv_cli.cli.terminal import echo_entry
 
 if TYPE_CHECKING:
@@ -25,23 +26,26 @@ def explain(
             autocompletion=names,
         ),
     ] = None,
+    plugin: Plugins = None,
 ) -> None:
     """Explain keys, kinds, signals, metrics, presets and findings in words.
 
     Without a key: the sections of a scenario.
     """
     from podusv_cli.findings.finding import finding_kinds
-    from podusv_cli.metrics.table import METRICS
+    from podusv_cli.metrics.table import metrics_with
     from podusv_cli.scenario.explain import explain as rows
+    from podusv_cli.scenario.plugins import on_hand
 
-    if key in finding_kinds():
-        _echo_finding(finding_kinds()[key])
-        return
-    if key in METRICS:
-        echo_entry(key, METRICS[key].meaning, facts=f"metric [{METRICS[key].unit}]")
-        return
-    for row in rows(key, (*finding_kinds(), *METRICS)):
-        _echo(row)
+    plugins = on_hand(plugin or ())
+    findings, metrics = finding_kinds(plugins), metrics_with(plugins)
+    if key in findings:
+        _echo_finding(findings[key])
+    elif key in metrics:
+        echo_entry(key, metrics[key].meaning, facts=f"metric [{metrics[key].unit}]")
+    else:
+        for row in rows(key, (*findings, *metrics), plugins):
+            _echo(row)
 
 
 def _echo_finding(kind: FindingKind) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from podusv_cli.cli.completion import figures
+from podusv_cli.cli.options import Plugins
 from podusv_cli.cli.terminal import echo, echo_path, warn_of_differences
 
 if TYPE_CHECKING:
@@ -30,6 +31,7 @@ def plot(
     out: Annotated[
         Path, typer.Option(help="Folder for the figures; replaces those of the same name there.")
     ] = Path("figures"),
+    plugin: Plugins = None,
 ) -> None:
     """Draw finished runs, several in one figure; needs their folders and nothing else.
 
@@ -39,7 +41,7 @@ def plot(
 
     formats = tuple(name.strip() for name in form.split(","))
     drawing = workflow.Drawing(tuple(figure or ()), formats, columns, animate, out)
-    drawn = workflow.plot([Path(run) for run in runs], drawing)
+    drawn = workflow.plot([Path(run) for run in runs], drawing, plugin or ())
     for path in drawn.files:
         echo_path(path)
     _warn(drawn)

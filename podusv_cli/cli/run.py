@@ -86,13 +86,11 @@ def run(
 
 
 def _report(done: Finished, verbose: bool) -> None:
-    from podusv_cli.metrics.table import METRICS
-
-    for name, metric in METRICS.items():
+    for name, unit in done.units.items():
         if name in done.metrics and done.status == "finished":
             number = done.metrics[name]
             shown = "never" if name == "settling_time" and math.isnan(number) else f"{number:.6g}"
-            echo(f"{name:<18} {shown:>12} {metric.unit if shown != 'never' else ''}".rstrip())
+            echo(f"{name:<18} {shown:>12} {unit if shown != 'never' else ''}".rstrip())
     if verbose:
         for name, seconds in done.timing.items():
             echo(f"{name:<18} {seconds:>12.4f} s")

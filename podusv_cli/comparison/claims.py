@@ -12,7 +12,8 @@ from podusv_cli.comparison.curves import Source
 from podusv_cli.comparison.expressions import Evaluation, ExpressionError, parse, with_labels
 from podusv_cli.core.errors import ScenarioError, ScenarioFault
 from podusv_cli.core.escaping import markdown, markdown_cell, markdown_code
-from podusv_cli.metrics.table import CLOCKED
+from podusv_cli.metrics.metric import Metric
+from podusv_cli.metrics.table import CLOCKED, METRICS, metrics_with
 from podusv_cli.scenario import explain
 from podusv_cli.scenario.load import Loaded
 from podusv_cli.scenario.model import Claim
@@ -87,7 +88,8 @@ class Verdict:
 def parse_claims(loaded: Loaded) -> list[ParsedClaim]:
     """The claims of a scenario. Raises ScenarioError with a line for each invalid one."""
     scenario, claims, faults = loaded.scenario, [], []
-    signals = {signal.name: signal for signal in explain.signals()}
+    signals = {signal.name: signal for signal in explain.signals(scenario.plugged)}
+    metrics = metrics_with(scenario.plugged)
     for single in scenario.singles().values():
         signals |= single.about()
     for name, claim in scenario.claims.items():
@@ -96,7 +98,7 @@ def parse_claims(loaded: Loaded) -> list[ParsedClaim]:
             key = f"claims.{name}.{field}"
             try:
                 if text or field == "expect":
-                    trees[field] = parse(text, scenario.labels(), signals)
+                    trees[field] = parse(text, scenario.labels(), signals, metrics)
             except ExpressionError as error:
                 faults.append(ScenarioFault(loaded.origins[key], key, str(error)))
         if "expect" in trees:
@@ -106,17 +108,22 @@ def parse_claims(loaded: Loaded) -> list[ParsedClaim]:
     return claims
 
 
-def judge(claims: Sequence[ParsedClaim], runs: Mapping[str, Source]) -> list[Verdict]:
+def judge(
+    claims: Sequence[ParsedClaim], runs: Mapping[str, Source],
+    metrics: Mapping[str, Metric] = METRICS,
+) -> list[Verdict]:  # fmt: skip
     """A verdict on every claim; `runs` by label."""
-    return [_verdict(parsed, runs) for parsed in claims]
+    return [_verdict(parsed, runs, metrics) for parsed in claims]
 
 
-def _verdict(parsed: ParsedClaim, runs: Mapping[str, Source]) -> Verdict:
-    evaluation = Evaluation(runs, parsed.claim.tolerance)
+def _verdict(
+    parsed: ParsedClaim, runs: Mapping[str, Source], metrics: Mapping[str, Metric]
+) -> Verdict:
+    evaluation = Evaluation(runs, parsed.claim.tolerance, metrics)
     if parsed.given and evaluation.holds(parsed.given) is not True:
         reason = f"not given: {parsed.claim.given}"
         return Verdict(parsed.name, parsed.claim, ANSWERS[None], evaluation.numbers, reason)
-    evaluation = Evaluation(runs, parsed.claim.tolerance)
+    evaluation = Evaluation(runs, parsed.claim.tolerance, metrics)
     answer = evaluation.holds(parsed.expect)
     reason = "; ".join(dict.fromkeys(evaluation.doubts)) if answer is None else ""
     return Verdict(parsed.name, parsed.claim, ANSWERS[answer], evaluation.numbers, reason)

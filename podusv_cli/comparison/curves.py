@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from podusv_cli.core.kernel import Vector
-from podusv_cli.metrics.table import METRICS
+from podusv_cli.metrics.metric import Metric
 
 NEAR = 1e-9  # s; times closer than this are the same
 
@@ -61,13 +61,13 @@ class Curve:
 Quantity = float | Curve
 
 
-def metric(label: str, run: Source, name: str) -> float:
+def metric(label: str, run: Source, about: Metric) -> float:
     """A metric of a run, infinite where its event never happened. Raises CannotTell."""
-    number = run.metric(name)
+    name, number = about.name, run.metric(about.name)
     if np.isnan(number):
-        if METRICS[name].happens and not run.ending:
+        if about.happens and not run.ending:
             return np.inf
-        undefined = f"this run has none ({METRICS[name].meaning})"
+        undefined = f"this run has none ({about.meaning})"
         raise CannotTell(f"{label}.{name}: {f'{label} {run.ending}' if run.ending else undefined}")
     return number
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -12,9 +12,13 @@ import numpy as np
 from podusv_cli.comparison.checks import CHECKS
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
+from podusv_cli.metrics.metric import Metric
+from podusv_cli.metrics.table import metrics_with
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage.run_folder import Run
 from podusv_cli.theory import derived
+
+UNKNOWN = "a metric of a plug-in that is not here; its unit is in the run's metrics.csv"
 
 
 @dataclass(frozen=True)
@@ -69,6 +73,14 @@ class Entry:
     def check(self, name: str) -> bool | None:
         """Whether a named property holds."""
         return CHECKS[name](self.scenario, self.recording.status)
+
+
+def metrics_of(entries: Sequence[Entry]) -> dict[str, Metric]:
+    """All metrics that podusv or a run's plug-ins know, and those that only a run's files name."""
+    plugins = dict.fromkeys(plugin for entry in entries for plugin in entry.scenario.plugged)
+    known = metrics_with(tuple(plugins))
+    names = dict.fromkeys(name for entry in entries for name in entry.run.metrics)
+    return known | {name: Metric(name, "", UNKNOWN) for name in names if name not in known}
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,7 @@ from podusv_cli.comparison.curves import REDUCERS, CannotTell, Curve, Quantity, 
 from podusv_cli.comparison.tolerance import SIGNS
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.signal import Signal
+from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.scenario.phrases import unknown
 from podusv_cli.theory.derived import DERIVED
@@ -42,7 +43,10 @@ class ExpressionError(ValueError):
     """An expression that has no meaning; the text says what to write instead."""
 
 
-def parse(text: str, runs: Collection[str], signals: Mapping[str, Signal]) -> ast.expr:
+def parse(
+    text: str, runs: Collection[str], signals: Mapping[str, Signal],
+    metrics: Mapping[str, Metric] = METRICS,
+) -> ast.expr:  # fmt: skip
     """The syntax tree of an expression about these runs; `signals` are those that a run may log.
 
     It is checked by evaluating it for runs that have all of these. Raises ExpressionError.
@@ -58,7 +62,8 @@ def parse(text: str, runs: Collection[str], signals: Mapping[str, Signal]) -> as
         level = [child for node in level for child in ast.iter_child_nodes(node)]
     if level:
         raise ExpressionError(f"is nested more than {DEEPEST} deep")
-    Evaluation(dict.fromkeys(runs, _Example(signals))).holds(tree)
+    example = _Example(signals, metrics)
+    Evaluation(dict.fromkeys(runs, example), metrics=metrics).holds(tree)
     return tree
 
 
@@ -67,6 +72,7 @@ class _Example:
     """A run that has every metric and signal; to check an expression before there are runs."""
 
     signals: Mapping[str, Signal]
+    metrics: Mapping[str, Metric]
     until = math.inf
     every = 1
     ending = ""
@@ -89,7 +95,7 @@ class _Example:
                 f"{name!r} has a value for every {' and '.join(about.axes)}{hint}"
             )
         usable = [s.name for s in self.signals.values() if not (s.fixed or s.axes)]
-        _known(name, [*usable, *METRICS], "signal or metric")
+        _known(name, [*usable, *self.metrics], "signal or metric")
         return np.array([0.0, 1.0])
 
 
@@ -102,6 +108,7 @@ class Evaluation:
 
     runs: Mapping[str, Source]
     tolerance: float = 0.0
+    metrics: Mapping[str, Metric] = field(default_factory=lambda: METRICS)
     numbers: dict[str, float] = field(default_factory=dict)
     doubts: list[str] = field(default_factory=list)
 
@@ -166,7 +173,11 @@ class Evaluation:
             case ast.BinOp(left=ast.Constant(), right=part, op=ast.Mult()):
                 return self._never(part)
             case ast.Attribute(attr=name):
-                return name in METRICS and METRICS[name].happens and self.value(node) == math.inf
+                return (
+                    name in self.metrics
+                    and self.metrics[name].happens
+                    and self.value(node) == math.inf
+                )
         return False
 
     def _check(self, node: ast.Call) -> bool | None:
@@ -188,8 +199,9 @@ class Evaluation:
                 return _literal(node)
             case ast.Attribute(value=ast.Name(id=label), attr=name):
                 run = self._run(label)
-                if name in METRICS:
-                    return self._or_doubt(lambda: curves.metric(label, run, name))
+                if name in self.metrics:
+                    about = self.metrics[name]
+                    return self._or_doubt(lambda: curves.metric(label, run, about))
                 return curves.signal(label, run, name)
             case ast.UnaryOp(op=ast.USub(), operand=part):
                 return curves.pointwise(operator.neg, [self.value(part)])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -13,7 +13,8 @@ from podusv_cli.comparison import chase, claims, report, table
 from podusv_cli.comparison.entries import Entry
 from podusv_cli.core.finding import Finding
 from podusv_cli.findings.preflight import merged
-from podusv_cli.metrics.table import CLOCKED
+from podusv_cli.metrics.metric import Metric
+from podusv_cli.metrics.table import CLOCKED, METRICS
 from podusv_cli.process.extras import Extras, Missing
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage import json_files
@@ -45,6 +46,7 @@ class Result:
     verdicts: Sequence[claims.Verdict]
     timings: Mapping[str, Mapping[str, float]]
     warnings: Mapping[str, Sequence[Finding]]
+    metrics: Mapping[str, Metric] = field(default_factory=lambda: METRICS)  # that the table knows
 
 
 def write(writer: RunWriter, result: Result, extras: Extras) -> None:
@@ -63,9 +65,11 @@ def _forms(result: Result) -> dict[str, Callable[[], bytes]]:
     judged = [verdict for verdict in result.verdicts if not verdict.timed]
     timed = [verdict for verdict in result.verdicts if verdict.timed]
     forms: dict[str, Callable[[], bytes]] = {
-        TABLE: lambda: table.as_csv(lasting).encode(),
-        "comparison.md": lambda: table.as_markdown(lasting, result.endings).encode(),
-        "comparison.tex": lambda: table.as_latex(lasting).encode(),
+        TABLE: lambda: table.as_csv(lasting, result.metrics).encode(),
+        "comparison.md": lambda: table.as_markdown(
+            lasting, result.endings, result.metrics
+        ).encode(),
+        "comparison.tex": lambda: table.as_latex(lasting, result.metrics).encode(),
         TIMING: lambda: json_files.encode({**_claims(timed), "metrics": times}),
     }
     if result.verdicts:
@@ -143,6 +147,6 @@ def as_report(
         differences=result.differences,
         noticed=merged(result.warnings), table=result.table, verdicts=result.verdicts,
         theories={entry.label: entry.run.theory for entry in result.entries if entry.run.theory},
-        figures=pictures, provenance=provenance, chase=moving,
+        figures=pictures, provenance=provenance, chase=moving, metrics=result.metrics,
     )  # fmt: skip
     return report.page(story)

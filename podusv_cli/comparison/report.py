@@ -18,7 +18,9 @@ from podusv_cli.comparison.table import cells, leaders
 from podusv_cli.core.component import Component
 from podusv_cli.core.escaping import lines
 from podusv_cli.core.finding import Finding
+from podusv_cli.core.plugins import Plugins
 from podusv_cli.findings.finding import finding_kinds
+from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.scenario.model import Scenario
 
@@ -65,6 +67,7 @@ class Story:
     provenance: Mapping[str, Any]
     missing: Sequence[str] = ()  # what could not be made, and why
     chase: Mapping[str, Any] = field(default_factory=dict)  # see `chase.chase`
+    metrics: Mapping[str, Metric] = field(default_factory=lambda: METRICS)  # of the table
 
 
 def page(story: Story) -> str:
@@ -72,17 +75,18 @@ def page(story: Story) -> str:
     from markupsafe import Markup  # with jinja2
 
     figures = [*enumerate(story.figures, 1)]
+    best = leaders(story.table, story.metrics)
     return environment().get_template("report.html.j2").render(
         story=story,
         scenario=story.scenario,
         bad={label: ending for label, ending in story.endings.items() if ending},
         differing=as_text(story.differences),
         answers=_answers(story.verdicts),
-        leaders={label: names for label, names in leaders(story.table).items() if names},
-        noticed=_by_code(story.noticed),
-        metrics={str(name): METRICS[str(name)] for name in story.table.index},
+        leaders={label: names for label, names in best.items() if names},
+        noticed=_by_code(story.noticed, story.scenario.plugged),
+        metrics={str(name): story.metrics[str(name)] for name in story.table.index},
         single=len(story.table.columns) == 1,
-        cells=cells(story.table),
+        cells=cells(story.table, story.metrics),
         stability=(stability.HEAD, [*stability.rows(story.theories)]),
         beside=figures[:BESIDE],
         figures=figures,
@@ -132,9 +136,9 @@ def _answers(verdicts: Sequence[Verdict]) -> dict[str, list[tuple[int, Verdict]]
     }
 
 
-def _by_code(findings: Sequence[Finding]) -> dict[str, tuple[str, list[Finding]]]:
+def _by_code(findings: Sequence[Finding], plugins: Plugins) -> dict[str, tuple[str, list[Finding]]]:
     """The findings of each code, and what the code means."""
-    known, told = finding_kinds(), dict[str, tuple[str, list[Finding]]]()
+    known, told = finding_kinds(plugins), dict[str, tuple[str, list[Finding]]]()
     for finding in findings:
         meaning = getattr(known.get(finding.code), "meaning", "")
         told.setdefault(finding.code, (meaning, []))[1].append(finding)

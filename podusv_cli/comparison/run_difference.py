@@ -73,7 +73,8 @@ def difference(one: Run, other: Run) -> RunDifference:
     """Compare two opened run folders. Raises StorageError."""
     entries = [manifest.read(run.folder).files[LOG] for run in (one, other)]
     texts = [log_reader.resolved_yaml(run.folder / LOG) for run in (one, other)]
-    names = [name for name in METRICS if name in one.metrics or name in other.metrics]
+    given = dict.fromkeys((*one.metrics, *other.metrics))
+    names = sorted(given, key=lambda name: [*METRICS, *given].index(name))
     return RunDifference(
         log=compare(one.recording, other.recording),
         digests=(entries[0].sha256, entries[1].sha256),

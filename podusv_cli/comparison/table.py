@@ -9,6 +9,7 @@ from collections.abc import Mapping
 import pandas as pd
 
 from podusv_cli.core import escaping, quantities
+from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import CLOCKED, METRICS
 
 METRIC = "metric"
@@ -18,10 +19,12 @@ NOTE = (
 )
 
 
-def table(metrics: Mapping[str, Mapping[str, float]]) -> pd.DataFrame:
-    """Metrics by label as a table: one row per metric, one column per run."""
-    known = [name for name in METRICS if any(name in numbers for numbers in metrics.values())]
-    rows = {name: [numbers.get(name, math.nan) for numbers in metrics.values()] for name in known}
+def table(
+    metrics: Mapping[str, Mapping[str, float]], known: Mapping[str, Metric] = METRICS
+) -> pd.DataFrame:
+    """Metrics by label as a table: one row per metric that is known, one column per run."""
+    names = [name for name in known if any(name in numbers for numbers in metrics.values())]
+    rows = {name: [numbers.get(name, math.nan) for numbers in metrics.values()] for name in names}
     frame = pd.DataFrame.from_dict(rows, orient="index", columns=list(metrics), dtype=float)
     return frame.rename_axis(METRIC)
 
@@ -34,51 +37,51 @@ def numbers(frame: pd.DataFrame) -> dict[str, dict[str, float | None]]:
     }
 
 
-def with_ratios(frame: pd.DataFrame) -> pd.DataFrame:
+def with_ratios(frame: pd.DataFrame, known: Mapping[str, Metric] = METRICS) -> pd.DataFrame:
     """The table with units, and a column of ratios to the first run for each further run."""
     first = frame.columns[0]
     full = frame.copy()
-    full.insert(0, "unit", [METRICS[name].unit for name in frame.index])
+    full.insert(0, "unit", [known[name].unit for name in frame.index])
     for label in frame.columns[1:]:
         full[f"{label}/{first}"] = frame[label] / frame[first].where(frame[first] != 0)
     return full
 
 
-def as_csv(frame: pd.DataFrame) -> str:
+def as_csv(frame: pd.DataFrame, known: Mapping[str, Metric] = METRICS) -> str:
     """The table as CSV, in full precision, with ratios last."""
-    full = with_ratios(frame)
+    full = with_ratios(frame, known)
     return full.to_csv(lineterminator="\n", header=[escaping.csv(str(c)) for c in full.columns])
 
 
-def cells(frame: pd.DataFrame) -> list[list[str]]:
+def cells(frame: pd.DataFrame, known: Mapping[str, Metric] = METRICS) -> list[list[str]]:
     """Rows of text: metric, unit, then number and ratio to the first run; best marked with *."""
-    rows, unranked = [], _unranked(frame)
+    rows, unranked = [], _unranked(frame, known)
     for name, numbers in frame.iterrows():
         best = math.nan if name in unranked else numbers.min()
         first = numbers.iloc[0]
         texts = [_cell(number, first, best, i) for i, number in enumerate(numbers)]
-        rows.append([str(name), METRICS[str(name)].unit, *texts])
+        rows.append([str(name), known[str(name)].unit, *texts])
     return rows
 
 
-def _unranked(frame: pd.DataFrame) -> list[str]:
+def _unranked(frame: pd.DataFrame, known: Mapping[str, Metric] = METRICS) -> list[str]:
     """Metrics in which no run is marked best.
 
     Measured times vary. Where a law keeps a standoff, being nearer to the target is not better.
     """
-    known = {"iae", "iae_e"} <= set(frame.index)
-    standoff = known and bool((frame.loc["iae"].gt(frame.loc["iae_e"])).any())
+    has_both = {"iae", "iae_e"} <= set(frame.index)
+    standoff = has_both and bool((frame.loc["iae"].gt(frame.loc["iae_e"])).any())
     return [
         name
         for name in frame.index
-        if name in CLOCKED or (standoff and METRICS[name].counts_standoff)
+        if name in CLOCKED or (standoff and known[name].counts_standoff)
     ]
 
 
-def leaders(frame: pd.DataFrame) -> dict[str, list[str]]:
+def leaders(frame: pd.DataFrame, known: Mapping[str, Metric] = METRICS) -> dict[str, list[str]]:
     """The metrics in which each run is best; equal numbers and measured times rank nobody."""
     best: dict[str, list[str]] = {str(label): [] for label in frame.columns}
-    for name, numbers in frame.drop(index=_unranked(frame)).iterrows():
+    for name, numbers in frame.drop(index=_unranked(frame, known)).iterrows():
         shown = numbers.dropna().map(_shown)
         if shown.nunique() > 1:
             for label in shown.index[shown == _shown(numbers.min())]:
@@ -99,7 +102,9 @@ def _cell(number: float, first: float, best: float, position: int) -> str:
     return f"{_shown(number)}{mark}{ratio}"
 
 
-def as_markdown(frame: pd.DataFrame, endings: Mapping[str, str]) -> str:
+def as_markdown(
+    frame: pd.DataFrame, endings: Mapping[str, str], known: Mapping[str, Metric] = METRICS
+) -> str:
     """The table in Markdown, followed by the reasons why runs did not finish."""
     last = {label: ending.strip().splitlines()[-1:] for label, ending in endings.items()}
     failures = [
@@ -108,7 +113,7 @@ def as_markdown(frame: pd.DataFrame, endings: Mapping[str, str]) -> str:
         for line in lines
     ]
     head = ["metric", "unit", *(escaping.markdown_cell(str(label)) for label in frame.columns)]
-    lines = [head, ["---", "---", *["---:"] * len(frame.columns)], *cells(frame)]
+    lines = [head, ["---", "---", *["---:"] * len(frame.columns)], *cells(frame, known)]
     return (
         "\n".join("| " + " | ".join(line) + " |" for line in lines)
         + f"\n\n{NOTE}\n"
@@ -116,11 +121,11 @@ def as_markdown(frame: pd.DataFrame, endings: Mapping[str, str]) -> str:
     )
 
 
-def as_latex(frame: pd.DataFrame) -> str:
+def as_latex(frame: pd.DataFrame, known: Mapping[str, Metric] = METRICS) -> str:
     """The table in LaTeX (booktabs): symbols where metrics have one, the best of a row in bold."""
     head = ["metric", "unit", *map(str, frame.columns)]
     body = [[escaping.latex(cell) for cell in head]]
-    for name, unit, *numbers in cells(frame):
+    for name, unit, *numbers in cells(frame, known):
         body.append([_symbol(name), quantities.raised(unit), *map(_marked, numbers)])
     lines = [" & ".join(row) + r" \\" for row in body]
     columns = "ll" + "r" * len(frame.columns)

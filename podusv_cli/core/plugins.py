@@ -83,6 +83,8 @@ class Plugin:
 
 
 Plugins = tuple[Plugin, ...]
+# Stands for those of a finished run that are not here; what only they know is taken as it stands.
+ABSENT = Plugin("plug-ins that are not here", "")
 
 
 def _inside(thing: Any) -> Iterator[Any]:

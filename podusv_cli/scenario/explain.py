@@ -10,8 +10,10 @@ from functools import cache
 from podusv_cli.core import registry
 from podusv_cli.core.component import Component
 from podusv_cli.core.errors import PodusvError
+from podusv_cli.core.plugins import Plugins
 from podusv_cli.core.signal import Signal
-from podusv_cli.scenario.keys import MISSING, NAME, NUMBER, SCENARIO, Key, either
+from podusv_cli.scenario.keys import MISSING, NAME, NUMBER, SCENARIO, Key, either, keys_of
+from podusv_cli.scenario.model import scenario_class
 from podusv_cli.scenario.phrases import as_yaml, did_you_mean
 from podusv_cli.scenario.presets import preset_names, preset_text, with_presets
 from podusv_cli.scenario.yaml_tree import dotted, route
@@ -54,31 +56,38 @@ EXTENDS = Row(
 )
 
 
-def explain(name: str | None = None, others: Iterable[str] = ()) -> list[Row]:
+def explain(
+    name: str | None = None, others: Iterable[str] = (), plugins: Plugins = ()
+) -> list[Row]:
     """Rows for a key, a kind, a section, a signal, a preset or, with None, all sections.
 
     `controller` gives its kinds, `controller.pid` that kind's keys, `controller.k_ze` or just
     `k_ze` one key, and `pid` alone the kind. Raises UnknownKeyError, with what was probably meant;
     `others` are names that are explained elsewhere.
     """
+    top = keys_of(scenario_class(plugins))
     if name is None:
-        return [EXTENDS, *_rows(SCENARIO.keys.values())]
+        return [EXTENDS, *_rows(top.keys.values())]
     if name == EXTENDS.key:
         return [EXTENDS]
     place = tuple(NUMBER if str(step).isdecimal() else step for step in route(name))
-    keys = SCENARIO.follow(place) if place else []
-    named = [key for key in SCENARIO.all() if key.name == name]
-    found = _with_contents(keys) or [*_signals(name), *_with_contents(named), *_presets(name)]
+    keys = top.follow(place) if place else []
+    named = [key for key in top.all() if key.name == name]
+    found = _with_contents(keys) or [
+        *_signals(name, plugins), *_with_contents(named), *_presets(name, top)
+    ]  # fmt: skip
     if not found:
-        raise UnknownKeyError(f"{name}: no such name{did_you_mean(name, [*names(), *others])}")
+        known = [*names(plugins), *others]
+        raise UnknownKeyError(f"{name}: no such name{did_you_mean(name, known)}")
     return found
 
 
-def kinds() -> dict[str, dict[str, str]]:
+def kinds(plugins: Plugins = ()) -> dict[str, dict[str, str]]:
     """For every section that has kinds, what each kind is, in a sentence."""
+    top = keys_of(scenario_class(plugins))
     return {
         name: {kind: summary(inner.model) for kind, inner in key.kinds.items()}
-        for name, key in SCENARIO.keys.items()
+        for name, key in top.keys.items()
         if key.kinds
     }
 
@@ -94,11 +103,12 @@ def first_sentence(text: str) -> str:
     return paragraph.partition(". ")[0].removesuffix(".") + "."
 
 
-def names() -> list[str]:
+def names(plugins: Plugins = ()) -> list[str]:
     """Every name that can be explained."""
-    places = [place for key in SCENARIO.all() for place in (key.path, key.route, key.route[-1:])]
-    presets = [name for _, given in with_presets().values() for name in preset_names(given)]
-    return [*map(dotted, places), *(signal.name for signal in signals()), *presets]
+    top = keys_of(scenario_class(plugins))
+    places = [place for key in top.all() for place in (key.path, key.route, key.route[-1:])]
+    presets = [n for _, given in with_presets(top).values() for n in preset_names(given, plugins)]
+    return [*map(dotted, places), *(signal.name for signal in signals(plugins)), *presets]
 
 
 def assignments() -> dict[str, str]:
@@ -125,28 +135,30 @@ def _with_contents(keys: list[Key]) -> list[Row]:
 
 
 @cache
-def signals() -> tuple[Signal, ...]:
+def signals(plugins: Plugins = ()) -> tuple[Signal, ...]:
     """Every signal that a run of podusv can log or give; a name may have several meanings."""
     packages = ("core", "controllers", "actuators", "theory")
-    return tuple(registry.signals(*(f"podusv_cli.{package}" for package in packages)))
+    rooms = (f"podusv_cli.{package}" for package in packages)
+    return tuple(registry.signals(*rooms, plugins=plugins))
 
 
-def _signals(name: str) -> list[Row]:
-    found = [signal for signal in signals() if signal.name == name]
+def _signals(name: str, plugins: Plugins) -> list[Row]:
+    found = [signal for signal in signals(plugins) if signal.name == name]
     return [Row(name, signal.meaning, "signal", signal.unit) for signal in found]
 
 
-def _presets(name: str) -> list[Row]:
+def _presets(name: str, top: Key) -> list[Row]:
     """Every preset of this name: where its numbers come from, and what they hold for."""
+    plugins = top.scenario.plugged
     return [
         Row(
             name,
-            f"{preset_text(presets, name, 'source')} "
-            f"Validity: {preset_text(presets, name, 'validity')}",
+            f"{preset_text(presets, name, 'source', plugins)} "
+            f"Validity: {preset_text(presets, name, 'validity', plugins)}",
             f"{presets.noun} ({key}.preset)",
         )
-        for key, (_, presets) in with_presets().items()
-        if name in preset_names(presets)
+        for key, (_, presets) in with_presets(top).items()
+        if name in preset_names(presets, plugins)
     ]
 
 
@@ -178,9 +190,9 @@ def _meaning(key: Key) -> str:
 def _choices(key: Key) -> tuple[str, ...]:
     """The words that a value may be; of a kind, all that its section has."""
     if key.name == "preset" and key.model.presets:
-        return preset_names(key.model.presets)
+        return preset_names(key.model.presets, key.scenario.plugged)
     if key.name == "kind":
-        return tuple(SCENARIO.follow(key.path[:-1])[0].kinds)
+        return tuple(key.top.follow(key.path[:-1])[0].kinds)
     return key.choices
 
 

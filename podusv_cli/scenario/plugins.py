@@ -12,16 +12,18 @@ from pydantic import create_model
 from podusv_cli.actuators.base import Actuator
 from podusv_cli.controllers.base import Controller
 from podusv_cli.core.component import Component, Recorded, value
-from podusv_cli.core.errors import LawError
-from podusv_cli.core.plugins import Plugin, Plugins, digest, from_file, installed
+from podusv_cli.core.errors import LawError, ScenarioError, ScenarioFault
+from podusv_cli.core.plugins import ABSENT, Plugin, Plugins, digest, from_file, installed
 from podusv_cli.disturbances.base import Disturbance
 from podusv_cli.paths.base import Path
 from podusv_cli.scenario.keys import keys_of
 from podusv_cli.scenario.model import Scenario, scenario_class
 from podusv_cli.scenario.phrases import did_you_mean, found, quoted
+from podusv_cli.scenario.presets import preset_names
 from podusv_cli.scenario.shipped import relative_to
 from podusv_cli.scenario.yaml_text import read_text
 from podusv_cli.scenario.yaml_tree import Fault, Mark, Node
+from podusv_cli.vessels.vessel import VESSELS
 
 KEY = "plugins"
 FOLDER = "plugins"  # of a run, where its plug-in files are
@@ -38,6 +40,18 @@ def with_given(root: Node, files: Sequence[str]) -> Node:
     own = root.mapping.get(KEY)
     listed = tuple(node for node, _ in _listed(own)) if own else ()
     return root.with_entry(KEY, Node((*listed, *entries), own.mark if own else entries[0].mark))
+
+
+def on_hand(files: Sequence[str]) -> Plugins:
+    """The plug-ins in these files of the command line, and all that are installed.
+
+    Raises ScenarioError for a file that is none.
+    """
+    faults: list[Fault] = []
+    found = from_files(files, faults)
+    if faults:
+        raise ScenarioError([ScenarioFault(str(f.mark), f.key, f.text) for f in faults])
+    return found
 
 
 def from_files(files: Sequence[str], faults: list[Fault]) -> Plugins:
@@ -92,11 +106,17 @@ def _required(plugin: Plugin, mark: Mark, given: Node | None = None) -> Node:
 
 
 def _used(root: Node) -> Iterator[Plugin]:
-    """The installed packages that have a component which the scenario names."""
+    """The installed packages that have a component or a vessel which the scenario names."""
+    vessels = {
+        root.mapping[key].get("preset") for key in ("vessel", "nominal") if key in root.mapping
+    }
+    vessels -= {None, *preset_names(VESSELS)}
     named = [(section, node.get("kind")) for section, node in _components(root)]
     foreign = [(section, kind) for section, kind in named if kind not in _kinds(Scenario, section)]
-    for plugin in installed() if foreign else ():
-        if any(kind in _kinds(scenario_class((plugin,)), section) for section, kind in foreign):
+    for plugin in installed() if foreign or vessels else ():
+        if vessels & set(preset_names(VESSELS, (plugin,))) or any(
+            kind in _kinds(scenario_class((plugin,)), section) for section, kind in foreign
+        ):
             yield plugin
 
 
@@ -159,7 +179,8 @@ def recorded(files: Sequence[str], root: Node, faults: list[Fault]) -> tuple[Nod
     used = {entry.get("sha256") for entry in own.mapping.values()} if own else set()
     here = from_files(files, faults)
     known = tuple(p if p.sha256 in used else p.without_components() for p in here)
-    return root, (*known, *(_stand_ins(root, scenario_class(known)) if used else ()))
+    absent = (ABSENT, *_stand_ins(root, scenario_class(known))) if used else ()
+    return root, (*known, *absent)
 
 
 def _stand_ins(root: Node, known: type[Scenario]) -> Plugins:

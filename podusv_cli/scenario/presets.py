@@ -7,9 +7,11 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 from importlib.resources import files
+from importlib.resources.abc import Traversable
 from pathlib import Path
 
 from podusv_cli.core.component import Component, Presets
+from podusv_cli.core.plugins import ABSENT, Plugins
 from podusv_cli.scenario.keys import SCENARIO, Key
 from podusv_cli.scenario.model import NAME, NAME_IN_WORDS
 from podusv_cli.scenario.phrases import found, quoted, unknown
@@ -24,21 +26,34 @@ HEADER = re.compile(r'\s*"?(?!nan|inf)[a-z]', re.IGNORECASE)
 
 
 @cache
-def preset_names(presets: Presets) -> tuple[str, ...]:
-    """Names of the preset files of podusv, sorted."""
-    names = (Path(entry.name) for entry in files(presets.package).iterdir())
-    return tuple(sorted(name.stem for name in names if name.suffix == ".yaml"))
+def _preset_files(presets: Presets, plugins: Plugins) -> dict[str, Traversable]:
+    """The preset files of podusv and of plug-ins by name; podusv's own come first."""
+    room = presets.package.rpartition(".")[2]
+    packages = [presets.package, *(one for plugin in plugins for one in plugin.folders(room))]
+    found: dict[str, Traversable] = {}
+    for package in packages:
+        for entry in files(package).iterdir():
+            if entry.name.endswith(".yaml"):
+                found.setdefault(entry.name.removesuffix(".yaml"), entry)
+    return {name: found[name] for name in sorted(found)}
 
 
-def preset_file(presets: Presets, name: str, faults: list[Fault]) -> Node | None:
+def preset_names(presets: Presets, plugins: Plugins = ()) -> tuple[str, ...]:
+    """Names of the preset files, sorted."""
+    return tuple(_preset_files(presets, plugins))
+
+
+def preset_file(
+    presets: Presets, name: str, faults: list[Fault], plugins: Plugins = ()
+) -> Node | None:
     """The values of a preset by its name, one of `preset_names`."""
-    text = files(presets.package).joinpath(f"{name}.yaml").read_text("utf-8")
+    text = _preset_files(presets, plugins)[name].read_text("utf-8")
     return read(text, f"{presets.file} {name}.yaml", faults, placed=False)
 
 
-def preset_text(presets: Presets, name: str, key: str) -> str:
+def preset_text(presets: Presets, name: str, key: str, plugins: Plugins = ()) -> str:
     """A text, such as `source`, from a preset's file."""
-    node = preset_file(presets, name, [])
+    node = preset_file(presets, name, [], plugins)
     return str(node.get(key)) if node else ""
 
 
@@ -57,8 +72,9 @@ def complete(root: Node, top: Key, faults: list[Fault]) -> Node:
 
     `top` are the scenario's keys.
     """
-    for fill in (_without_removed, _name, _vessel, _nominal):
-        root = fill(root, faults)
+    plugins = top.scenario.plugged
+    root = _name(_without_removed(root, faults), faults)
+    root = _nominal(_vessel(root, plugins, faults), plugins, faults)
     return _controllers(_sections(root, top, faults), top)
 
 
@@ -69,7 +85,8 @@ def _sections(root: Node, top: Key, faults: list[Fault]) -> Node:
         kind = key.kinds.get(str(given.get("kind"))) if given else None
         if given and kind and given.mapping:
             if kind.model.presets:
-                given = _over_preset(given, name, kind.model.presets, faults)
+                presets, plugins = kind.model.presets, top.scenario.plugged
+                given = _over_preset(given, name, presets, plugins, faults)
             for file, rows in kind.model.rows_of.items():
                 given = _rows_in(given, name, (file, rows), faults)
             root = root.with_entry(name, given)
@@ -98,16 +115,16 @@ def _name(root: Node, faults: list[Fault]) -> Node:
     return root.with_entry("name", Node(stem if usable else None, root.mark, faulty=not usable))
 
 
-def _vessel(root: Node, faults: list[Fault]) -> Node:
+def _vessel(root: Node, plugins: Plugins, faults: list[Fault]) -> Node:
     given = root.mapping.get("vessel")
     if given is None:
         given = Node({}, root.mark, faulty=root.faulty)
     if not isinstance(given.content, dict):
         return root
-    return root.with_entry("vessel", _from_preset(given, "vessel", faults))
+    return root.with_entry("vessel", _from_preset(given, "vessel", plugins, faults))
 
 
-def _nominal(root: Node, faults: list[Fault]) -> Node:
+def _nominal(root: Node, plugins: Plugins, faults: list[Fault]) -> Node:
     """`nominal` is the vessel unless given; with `preset` it starts from that, or from nothing."""
     vessel = root.mapping["vessel"]
     given = root.mapping.get("nominal")
@@ -116,39 +133,40 @@ def _nominal(root: Node, faults: list[Fault]) -> Node:
     if not isinstance(given.content, dict):
         return root
     if "preset" in given.content:
-        return root.with_entry("nominal", _from_preset(given, "nominal", faults))
-    whole = _with_source(merge(vessel, given))
+        return root.with_entry("nominal", _from_preset(given, "nominal", plugins, faults))
+    whole = _with_source(merge(vessel, given), plugins)
     lost = not isinstance(vessel.content, dict)
     return root.with_entry("nominal", replace(whole, faulty=whole.faulty or lost))
 
 
-def _from_preset(given: Node, key: str, faults: list[Fault]) -> Node:
+def _from_preset(given: Node, key: str, plugins: Plugins, faults: list[Fault]) -> Node:
     """The vessel's values over those of its preset, where it has one."""
     preset = given.mapping.get("preset")
     if preset is None or preset.content == "":
-        return _without_preset(given, key, faults)
-    vessel = _over_preset(given, key, VESSELS, faults)
-    return replace(vessel, faulty=True) if preset.faulty else _with_source(vessel)
+        return _without_preset(given, key, plugins, faults)
+    vessel = _over_preset(given, key, VESSELS, plugins, faults)
+    return replace(vessel, faulty=True) if preset.faulty else _with_source(vessel, plugins)
 
 
-def _without_preset(given: Node, key: str, faults: list[Fault]) -> Node:
+def _without_preset(given: Node, key: str, plugins: Plugins, faults: list[Fault]) -> Node:
     """A vessel without preset; a fault if it lacks required keys."""
     fields = Vessel.model_fields.items()
     lacking = [name for name, field in fields if field.is_required() and name not in given.mapping]
     if not lacking or given.faulty:
         return given
-    text = f"missing (allowed: {', '.join(preset_names(VESSELS))}); a vessel without one needs "
+    known = ", ".join(preset_names(VESSELS, plugins))
+    text = f"missing (allowed: {known}); a vessel without one needs "
     faults.append(Fault(given.mark, f"{key}.preset", text + ", ".join(lacking)))
     return replace(given, faulty=True)
 
 
-def _with_source(vessel: Node) -> Node:
+def _with_source(vessel: Node, plugins: Plugins) -> Node:
     """The vessel with a `source` that names the numbers that are not its preset's.
 
     A source that is not the preset's own is left as it is.
     """
     name, source = vessel.get("preset"), vessel.mapping.get("source")
-    base = preset_file(VESSELS, name, []) if name in preset_names(VESSELS) else None
+    base = _preset(VESSELS, name, plugins)
     if not base or not source or not str(source.content).startswith(_stem(base)):
         return vessel
     numbers = [name for name in COEFFICIENTS if name in Vessel.model_fields]
@@ -156,6 +174,11 @@ def _with_source(vessel: Node) -> Node:
     text = f"{_stem(base)}; {', '.join(changed)} changed by the scenario."
     source_text = text if changed else str(base.get("source"))
     return vessel.with_entry("source", replace(source, content=source_text))
+
+
+def _preset(presets: Presets, name: str, plugins: Plugins) -> Node | None:
+    known = name in preset_names(presets, plugins)
+    return preset_file(presets, name, [], plugins) if known else None
 
 
 def _stem(base: Node) -> str:
@@ -167,14 +190,18 @@ def _differs(vessel: Node, base: Node, name: str) -> bool:
     return bool(here != (Vessel.model_fields[name].default if there is None else there))
 
 
-def _over_preset(given: Node, key: str, presets: Presets, faults: list[Fault]) -> Node:
+def _over_preset(
+    given: Node, key: str, presets: Presets, plugins: Plugins, faults: list[Fault]
+) -> Node:
     """What is given over the values of its preset, where it names one."""
-    preset, names = given.mapping.get("preset"), preset_names(presets)
+    preset, names = given.mapping.get("preset"), preset_names(presets, plugins)
     if preset is None or preset.content == "" or preset.faulty:
         return given
     if preset.content in names:
-        base = preset_file(presets, str(preset.content), faults)
+        base = preset_file(presets, str(preset.content), faults, plugins)
         return merge(base, given) if base else given
+    if ABSENT in plugins:
+        return given
     what = f"{presets.noun} {found(preset.content, preset.text)}"
     faults.append(Fault(preset.mark, f"{key}.preset", unknown(what, str(preset.content), names)))
     wrong = given.with_entry("preset", replace(preset, content=None, faulty=True))

@@ -14,7 +14,7 @@ from typing import Any
 from podusv_cli.comparison import claims, outputs, table
 from podusv_cli.comparison.curves import Source
 from podusv_cli.comparison.differences import differences
-from podusv_cli.comparison.entries import Absent, Entry
+from podusv_cli.comparison.entries import Absent, Entry, metrics_of
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.recording import Status
@@ -207,14 +207,17 @@ def collect(
     numbers: dict[str, dict[str, float]] = {m.label: {} for m in members}
     numbers |= {entry.label: entry.metrics() for entry in entries}
     scenarios = {m.label: m.scenario for m in members}
+    known = metrics_of(entries)
     return outputs.Result(
         scenarios=scenarios,
         entries=entries,
         endings=endings,
         differences=differences({label: one.model_dump() for label, one in scenarios.items()}),
-        table=table.table(numbers),
-        verdicts=extras.made("the claims' verdicts", lambda: claims.judge(parsed, sources)) or [],
+        table=table.table(numbers, known),
+        verdicts=extras.made("the claims' verdicts", lambda: claims.judge(parsed, sources, known))
+        or [],
         timings={label: done.timing for label, done in finished.items()},
+        metrics=known,
         warnings={m.label: getattr(finished.get(m.label), "warnings", m.noticed) for m in members},
     )
 

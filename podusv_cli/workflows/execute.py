@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
@@ -96,6 +96,7 @@ class Finished:
     others: tuple[str, ...] = ()  # runs of a comparison that the scenario also has
     warnings: tuple[Finding, ...] = ()
     missing: tuple[Missing, ...] = ()
+    units: Mapping[str, str] = field(default_factory=dict)  # of all metrics, in their order
 
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints of a run."""
@@ -164,6 +165,7 @@ def execute(
     return Finished(
         final, recording.controller, status, message, metrics, watch.total(),
         warnings=warnings, missing=tuple(extras.missing),
+        units={name: m.unit for name, m in metrics_with(task.scenario.plugged).items()},
     )  # fmt: skip
 
 

@@ -1,0 +1,1 @@
+"""Our lab's own parts for podusv."""

@@ -1,0 +1,18 @@
+"""How far east, or west, the vessel ever gets."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from podusv_cli.core.kernel import Vector, kernel
+from podusv_cli.metrics.metric import Accumulator, Metric, gathered
+
+
+@kernel
+def watch(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
+    """Keep the largest |y|; s begins with (x, y, psi, u, v, r)."""
+    seen[0] = max(seen[0], abs(s[1]))
+
+
+OF = Accumulator(watch, lambda layout: 1, lambda layout: {})
+largest_east = Metric("largest_east", "m", "largest |y|, east or west", OF, gathered(0))

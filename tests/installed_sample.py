@@ -1,0 +1,29 @@
+"""`examples/my_lab` as an installer leaves it, made without one, so that no network is needed."""
+
+from __future__ import annotations
+
+import shutil
+import tomllib
+from pathlib import Path
+
+from command_samples import ROOT
+
+LAB = ROOT / "examples" / "my_lab"
+
+
+def install(site: Path) -> Path:
+    """The package and its .dist-info in the folder `site`, as pyproject.toml describes them."""
+    project = tomllib.loads((LAB / "pyproject.toml").read_text())["project"]
+    shutil.copytree(LAB / "my_lab", site / "my_lab", ignore=shutil.ignore_patterns("__pycache__"))
+    info = site / f"my_lab-{project['version']}.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(
+        f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n"
+    )
+    groups = project["entry-points"].items()
+    sections = [
+        f"[{group}]\n" + "".join(f"{name} = {place}\n" for name, place in points.items())
+        for group, points in groups
+    ]
+    (info / "entry_points.txt").write_text("\n".join(sections))
+    return site
