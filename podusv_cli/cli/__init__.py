@@ -24,7 +24,7 @@ from podusv_cli.cli.exit_codes import (
 # NAME is the function NAME of cli/NAME.py
 COMMANDS = (
     "init", "run", "compare", "rerun", "diff", "plot", "validate", "verify", "explain", "list",
-    "schema",
+    "schema", "new",
 )  # fmt: skip
 
 FIRST_STEPS = """\

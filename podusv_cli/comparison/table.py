@@ -126,7 +126,7 @@ def as_latex(frame: pd.DataFrame, known: Mapping[str, Metric] = METRICS) -> str:
     head = ["metric", "unit", *map(str, frame.columns)]
     body = [[escaping.latex(cell) for cell in head]]
     for name, unit, *numbers in cells(frame, known):
-        body.append([_symbol(name), quantities.raised(unit), *map(_marked, numbers)])
+        body.append([_symbol(known[name]), quantities.raised(unit), *map(_marked, numbers)])
     lines = [" & ".join(row) + r" \\" for row in body]
     columns = "ll" + "r" * len(frame.columns)
     opening = [rf"\begin{{tabular}}{{{columns}}}", r"\toprule", lines[0], r"\midrule"]
@@ -141,5 +141,5 @@ def _marked(cell: str) -> str:
     return rf"\textbf{{{bold}{number}}}{ratio}" if marked else number
 
 
-def _symbol(name: str) -> str:
-    return f"${METRICS[name].symbol}$" if METRICS[name].symbol else escaping.latex(name)
+def _symbol(metric: Metric) -> str:
+    return f"${metric.symbol}$" if metric.symbol else escaping.latex(metric.name)

@@ -112,10 +112,12 @@ def _used(root: Node) -> Iterator[Plugin]:
     }
     vessels -= {None, *preset_names(VESSELS)}
     named = [(section, node.get("kind")) for section, node in _components(root)]
-    foreign = [(section, kind) for section, kind in named if kind not in _kinds(Scenario, section)]
+    foreign = [
+        (section, kind) for section, kind in named if kind not in kinds_of(Scenario, section)
+    ]
     for plugin in installed() if foreign or vessels else ():
         if vessels & set(preset_names(VESSELS, (plugin,))) or any(
-            kind in _kinds(scenario_class((plugin,)), section) for section, kind in foreign
+            kind in kinds_of(scenario_class((plugin,)), section) for section, kind in foreign
         ):
             yield plugin
 
@@ -187,7 +189,7 @@ def _stand_ins(root: Node, known: type[Scenario]) -> Plugins:
     unknown: dict[tuple[str, str], frozenset[str]] = {}
     for section, node in _components(root):
         kind = node.get("kind")
-        if isinstance(kind, str) and kind not in _kinds(known, section):
+        if isinstance(kind, str) and kind not in kinds_of(known, section):
             names = unknown.get((section, kind), frozenset()) | node.mapping.keys() - {"kind"}
             unknown[section, kind] = names
     return tuple(_stand_in(*key, names) for key, names in unknown.items())
@@ -200,7 +202,8 @@ def _components(root: Node) -> Iterator[tuple[str, Node]]:
     yield from (("controller", node) for node in (several.mapping.values() if several else ()))
 
 
-def _kinds(scenario: type[Scenario], section: str) -> Iterable[str]:
+def kinds_of(scenario: type[Scenario], section: str) -> Iterable[str]:
+    """The kinds that a section may be of."""
     return keys_of(scenario).keys[section].kinds
 
 

@@ -1,0 +1,193 @@
+"""Contract tests for laws, paths, disturbances and actuators of your own, with pytest.
+
+    LAW = Path(__file__).with_name("my_law.py")
+
+    @pytest.mark.parametrize(("check", "component"), contract(LAW))
+    def test_contract(check, component):
+        check(component)
+
+Each check raises AssertionError, or LawError with file, line and what to write.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from podusv_cli.actuators.base import Actuator
+from podusv_cli.actuators.ideal import Ideal
+from podusv_cli.controllers.base import Controller
+from podusv_cli.controllers.pid import Pid
+from podusv_cli.core import plugins, registry
+from podusv_cli.core.component import Component
+from podusv_cli.core.kernel import Vector, bundle
+from podusv_cli.core.recording import Recording
+from podusv_cli.disturbances.base import Disturbance
+from podusv_cli.disturbances.calm import Calm
+from podusv_cli.engine.check import check_law
+from podusv_cli.engine.grid import TimeGrid
+from podusv_cli.engine.simulate import ClosedLoop, simulate
+from podusv_cli.paths.base import TARGET
+from podusv_cli.paths.base import Path as AnyPath
+from podusv_cli.paths.line import Line
+from podusv_cli.scenario.presets import preset_file
+from podusv_cli.scenario.yaml_tree import plain
+from podusv_cli.vessels.vessel import VESSELS, Vessel
+
+Check = Callable[[Any], None]
+STATES = 50  # random ones
+STEP, STEPS = 0.01, 50  # of the runs
+ROOMS: dict[str, tuple[str, type[Component]]] = {
+    "controllers": ("controller", Controller), "paths": ("path", AnyPath),
+    "disturbances": ("disturbance", Disturbance), "actuators": ("actuator", Actuator),
+}  # fmt: skip
+
+
+def contract(file: Path, fields: Mapping[str, Mapping[str, Any]] | None = None) -> list[Any]:
+    """Every check with every component of a plug-in file, as parameters of a test.
+
+    `fields` are by kind the fields that a component cannot do without. Raises LawError for a file
+    that is no plug-in.
+    """
+    import pytest  # which only tests need
+
+    return [
+        pytest.param(check, component, id=f"{component_kind(component)}-{check.__name__}")
+        for component in components(file, fields or {})
+        for check in CHECKS
+    ]
+
+
+def components(file: Path, fields: Mapping[str, Mapping[str, Any]]) -> Iterator[Component]:
+    """Every component of a plug-in file, with its defaults."""
+    own = (plugins.from_file(str(file), file.read_text("utf-8")),)
+    for room, (_, base) in ROOMS.items():
+        package = f"podusv_cli.{room}"
+        known = registry.kinds(package, base)
+        for kind, made in registry.kinds(package, base, own).items():
+            if kind not in known:
+                yield made(**fields.get(kind, {}))
+
+
+def component_kind(component: Component) -> str:
+    """The component's kind."""
+    return str(type(component).model_fields["kind"].default)
+
+
+def keeps_its_declaration(component: Component) -> None:
+    """Signals, memory and constants are as declared, every output is written."""
+    check_law(loop_with(component))
+
+
+def is_finite(component: Component) -> None:
+    """At random states every output is written, and is a finite number."""
+    for seed in range(STATES):
+        for out in evaluated(component, seed):
+            assert np.isfinite(out).all(), f"at random state {seed} it writes {out}"
+
+
+def remembers_nothing(component: Component) -> None:
+    """The same state gives the same bits, whatever was evaluated in between."""
+    first = [evaluated(component, seed) for seed in range(STATES)]
+    again = [evaluated(component, seed) for seed in reversed(range(STATES))][::-1]
+    for seed, (one, other) in enumerate(zip(first, again, strict=True)):
+        for a, b in zip(one, other, strict=True):
+            np.testing.assert_array_equal(a, b, f"random state {seed}")
+
+
+def runs_alike_compiled_and_plain(component: Component) -> None:
+    """A run in machine code has the numbers of one in plain Python."""
+    _compare(run_with(component, True), run_with(component, False), rtol=1e-9, atol=1e-12)
+
+
+def repeats_itself(component: Component) -> None:
+    """Two runs are the same to the last bit."""
+    _compare(run_with(component, True), run_with(component, True), rtol=0.0, atol=0.0)
+
+
+CHECKS: tuple[Check, ...] = (
+    keeps_its_declaration, is_finite, remembers_nothing, runs_alike_compiled_and_plain,
+    repeats_itself,
+)  # fmt: skip
+
+
+def _compare(one: Recording, other: Recording, *, rtol: float, atol: float) -> None:
+    assert one.status == other.status == "finished", one.message or other.message
+    for name in one.signals:
+        np.testing.assert_allclose(
+            one[name], other[name], rtol=rtol, atol=atol, err_msg=f"signal {name}"
+        )
+
+
+@cache
+def _vessel() -> Vessel:
+    node = preset_file(VESSELS, "paper_nonlinear", [])
+    return Vessel(**{**(plain(node) if node else {}), "preset": "paper_nonlinear"})
+
+
+def loop_with(component: Component) -> ClosedLoop:
+    """A closed loop of podusv's own parts, with this one in its place."""
+    parts: dict[str, Any] = {
+        "path": Line(), "disturbance": Calm(), "actuator": Ideal(), "controller": Pid()
+    }  # fmt: skip
+    place = next(name for name, base in ROOMS.values() if isinstance(component, base))
+    return ClosedLoop(
+        vessel=_vessel(), nominal=_vessel(), start=(-5.0, -2.0, 0.1, 0.3, 0.0, 0.0),
+        **parts | {place: component},
+    )  # fmt: skip
+
+
+def run_with(component: Component, compiled: bool) -> Recording:
+    """A short run."""
+    return simulate(loop_with(component), TimeGrid(STEP, STEPS), compiled=compiled)
+
+
+def evaluated(component: Component, seed: int) -> list[Vector]:
+    """What the component's kernel writes at a random state; NaN where it writes nothing."""
+    random = np.random.default_rng(seed)
+    t = float(random.uniform(0.0, 300.0))
+    x = random.uniform(-1.0, 1.0, 6) * [20.0, 20.0, 3.0, 1.5, 0.5, 0.8]
+    bearing, distance = random.uniform(-np.pi, np.pi), random.uniform(1.0, 20.0)
+    place = x[:2] + distance * np.array([np.cos(bearing), np.sin(bearing)])
+    target = np.concatenate([place, random.uniform(-1.0, 1.0, 4) * [0.7, 0.7, 0.1, 0.1]])
+    for base, call in CALLS:
+        if isinstance(component, base):
+            return call(component, t, x, target, random)
+    raise TypeError(f"{component_kind(component)} is no law, path, disturbance or actuator")
+
+
+def _law(law: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vector]:
+    memory, k = law.start(x, target, _vessel()), bundle(law.constants_with(_vessel()))
+    memory = memory + random.normal(0.0, 0.1, len(memory))
+    outputs = [np.full(size, np.nan) for size in (2, len(memory), len(law.signals))]
+    if law.sample_period() > 0:
+        law.sample(t, x, memory, target, k, law.table())
+    law.law(t, x, memory, target, k, law.table(), *outputs, np.full(law.workspace(), np.nan))
+    return outputs
+
+
+def _path(path: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vector]:
+    out = np.full(len(TARGET), np.nan)
+    path.evaluate(t, bundle(path.constants()), path.table(), out)
+    return [out]
+
+
+def _sea(sea: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vector]:
+    out = np.full(3, np.nan)
+    sea.evaluate(t, x, bundle(sea.constants()), sea.table(), out)
+    return [out]
+
+
+def _actuator(actuator: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vector]:
+    state, demand = actuator.rest(), random.normal(0.0, 5.0, 2)
+    outputs = [np.full(size, np.nan) for size in (3, len(state), len(actuator.signals))]
+    k = bundle(actuator.constants())
+    actuator.drive(t, x, state, demand, k, actuator.table(), *outputs)
+    return outputs
+
+
+CALLS = ((Controller, _law), (AnyPath, _path), (Disturbance, _sea), (Actuator, _actuator))
