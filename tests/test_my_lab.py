@@ -42,7 +42,7 @@ def test_a_comparison_has_its_law_path_vessel_metric_and_figure(place: Path) -> 
     assert any(row.startswith("largest_east,m,") for row in rows)
     (claim,) = json.loads((place / "c/claims.json").read_text())["claims"]
     assert claim["verdict"] in ("reproduced", "not reproduced")
-    assert (place / "c/figures/track_error.svg").exists()
+    assert (place / "c/figures/track_error.png").exists()
     assert "largest |y|, east or west" in (place / "c/report.html").read_text()
     (own,) = json.loads((place / "c/los/provenance.json").read_text())["plugins"]
     named = yaml.safe_load((place / "c/los/resolved.yaml").read_text())["plugins"]
