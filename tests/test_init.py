@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from zipfile import ZipFile
 
 import numpy
 import pytest
@@ -174,6 +175,7 @@ def _built(folder: Path) -> Path:
         shutil.copytree(ROOT / name, copy / name, symlinks=True, ignore=unwanted)
     _pip("wheel", "--no-build-isolation", "--no-deps", "--wheel-dir", folder, copy)
     (wheel,) = folder.glob("*.whl")
+    assert {"podusv_cli/py.typed", "podusv_cli/__init__.pyi"} <= {*ZipFile(wheel).namelist()}
     return wheel
 
 
