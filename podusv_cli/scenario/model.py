@@ -13,11 +13,12 @@ from pydantic import create_model
 from podusv_cli.actuators.base import Actuator
 from podusv_cli.controllers.base import Controller
 from podusv_cli.core.component import Component, value
-from podusv_cli.core.errors import LawError
+from podusv_cli.core.errors import LawError, in_a_line
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.core.registry import any_of
 from podusv_cli.core.signal import Signal
 from podusv_cli.disturbances.base import Disturbance
+from podusv_cli.engine.check import called
 from podusv_cli.engine.grid import TimeGrid, whole_steps
 from podusv_cli.engine.simulate import ClosedLoop
 from podusv_cli.paths.base import Path
@@ -224,7 +225,17 @@ class Scenario(Component):
 
     def conflicts(self) -> list[tuple[str, str]]:
         """Key and message for every pair of values that contradict each other."""
-        return [*self._times(), *self._samples(), *self._names(), *self._signals()]
+        return [*self._unanswered()] or [
+            *self._times(), *self._samples(), *self._names(), *self._signals()
+        ]  # fmt: skip
+
+    def _unanswered(self) -> Conflicts:
+        """Laws that fail when they are asked what they declare: their own fault, whatever it is."""
+        for key, law in self.laws().items():
+            try:
+                law.sample_period(), law.declared()
+            except Exception as error:
+                yield key, f"{called(law)}: asked what it logs, {in_a_line(error)}"
 
     def laws(self) -> dict[str, Controller]:
         """`controller` and all `controllers`, by their keys."""

@@ -1,0 +1,37 @@
+"""A mistake in a plug-in's law is refused before the run with file and line, never as a bug."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from command_samples import Command
+from plugin_samples import LAW, put
+
+# What is written in place of what, and what is said.
+MISTAKES = {
+    "undeclared": ("(E_CT,)", '("e_ct",)', "law cross_track declares 'e_ct', which is no Signal"),
+    "numpy": ("push(k)", "np.dot(x, x)", "cannot become machine code"),
+    "no constant": ("return PUSH * k.gain", "return PUSH * k.gian", "no attribute 'gian'"),
+    "no rate": ("        rate[0] = signals[0]\n", "", "it leaves the rate of drift unwritten"),
+    "wrong shape": ("np.zeros(1)", "np.zeros(2)", "a memory of shape (2,), its slots are (1,)"),
+    "too many": ("rate[0] =", "rate[1] =", "IndexError: index 1 is out of bounds"),
+    "no kernel": ("@kernel\ndef push", "def push", "cannot become machine code"),
+    "slots raise": ("return ((DRIFT, 1),)", "return self.nothing", "AttributeError"),
+    "no slots": ("return ((DRIFT, 1),)", "return 5", "TypeError"),
+    "start raises": ("return np.zeros(1)", "return 1 / 0", "ZeroDivisionError"),
+}
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+def test_it_is_refused_before_the_run(podusv: Command, name: str) -> None:
+    right, wrong, words = MISTAKES[name]
+    assert right in LAW
+    for command in ("run", "compare"):
+        said = podusv(command, put(law=LAW.replace(right, wrong)), "--out", "r", "--no-figures")
+        told = " ".join(said.err.split())
+        assert said.code == 2, said.err
+        assert words in told
+        assert "my_law.py, line " in told or "a.yaml:9:13: controller: law cross_track" in told
+        assert "bug" not in told
+        assert not Path("r").exists()
