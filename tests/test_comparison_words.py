@@ -153,7 +153,7 @@ def test_a_claim_whose_premise_fails_cannot_be_told(given, expect, answer):
     trees = (parse(text, RUNS, ABOUT) for text in (expect, given))
     (found,) = judge([ParsedClaim("C", claim, *trees)], RUNS)
     assert found.answer == answer
-    assert (found.reason == f"not given: {given}") == (answer == "cannot tell")
+    assert (found.reason == f"the premise does not hold: {given}") == (answer == "cannot tell")
 
 
 @pytest.mark.parametrize(

@@ -89,8 +89,10 @@ def test_wrong_vessels() -> None:
     change = (error[error.index.str.startswith("told")] / error.loc["as it is"] - 1).abs().max()
     assert change["proposed"] < 0.004
     assert change["equal_gain"] < 0.00003
-    assert change.max() == change["no_adaptation"] < 0.0135
-    assert (error["equal_gain"] / error["proposed"] - 1).abs().max() < 0.005
+    assert round(100 * change.max(), 2) == round(100 * change["no_adaptation"], 2) == 1.34
+    ratio = error["equal_gain"] / error["proposed"] - 1
+    assert ratio.abs().max() < 0.005
+    assert ratio[ratio.index.str.startswith("true")].abs().max() < 0.0004
     family = error[["proposed", "dsc", "li"]]
     assert (family.max(axis=1) / family.min(axis=1) - 1).max() < 0.053
     assert (len(error), int((error["li"] < error["proposed"]).sum())) == (41, 38)

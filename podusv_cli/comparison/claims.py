@@ -121,7 +121,7 @@ def _verdict(
 ) -> Verdict:
     evaluation = Evaluation(runs, parsed.claim.tolerance, metrics)
     if parsed.given and evaluation.holds(parsed.given) is not True:
-        reason = f"not given: {parsed.claim.given}"
+        reason = f"the premise does not hold: {parsed.claim.given}"
         return Verdict(parsed.name, parsed.claim, ANSWERS[None], evaluation.numbers, reason)
     evaluation = Evaluation(runs, parsed.claim.tolerance, metrics)
     answer = evaluation.holds(parsed.expect)

@@ -14,8 +14,9 @@ from podusv_cli.metrics.table import CLOCKED, METRICS
 
 METRIC = "metric"
 NOTE = (
-    "* smallest of its row, but for measured times; in brackets the ratio to the first run; - not "
-    "defined, or the run did not finish"
+    "* smallest of its row, except for measured times and, where a law keeps a standoff, for "
+    "numbers that contain it; in brackets the ratio to the first run; - not defined, or the run "
+    "did not finish"
 )
 
 
