@@ -13,7 +13,6 @@ from podusv_cli.comparison import table
 from podusv_cli.comparison.differences import differences
 from podusv_cli.core.errors import ScenarioError, UsageError
 from podusv_cli.figures.drawing import FIGURES, dressed
-from podusv_cli.figures.style import FORMATS
 from podusv_cli.process.extras import Extras
 from podusv_cli.scenario.load import load
 from podusv_cli.workflows import compare, members, run
@@ -220,9 +219,9 @@ def test_ratios_to_a_first_run_that_is_zero_are_left_out():
     assert table.cells(frame)[0][2:] == ["0*", "2"]
 
 
-def test_every_figure_that_fits_is_there_in_every_format(done):
+def test_every_figure_that_fits_is_there_as_png(done):
     shown = dressed([(e.label, e.recording, e.scenario) for e in done.result.entries])
     fitting = [name for name, sheet in FIGURES.items() if sheet.fits(shown)]
     found = {path.name for path in (Path(done.folder) / "figures").iterdir()}
-    assert found == {f"{name}.{form}" for name in fitting for form in FORMATS}
+    assert found == {f"{name}.png" for name in fitting}
     assert {"trajectory", "errors", "controls", "filters", "velocities"} <= set(fitting)
