@@ -1,4 +1,4 @@
-"""Metrics of the distance z_e to the target."""
+"""Metrics of the distance z_e to the target, as a whole, beyond a standoff, across and along."""
 
 from __future__ import annotations
 
@@ -7,22 +7,23 @@ from typing import Any
 
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.engine.closed_loop import DISTANCE
-from podusv_cli.metrics.metric import Accumulator, Layout, Metric, add, gathered, ratio
+from podusv_cli.metrics.metric import Accumulator, Layout, Metric, Result, add, gathered, ratio
 
-# Positions of the gathered numbers.
-TIME, ABSOLUTE, SQUARE, TIMED, INTEGRALS = range(5)
+# Positions of the gathered numbers: integrals over the run, and over the steady window.
+TIME, ABSOLUTE, ERROR, SQUARE, TIMED, INTEGRALS = range(6)
 OUTSIDE, NOW, SIZE = range(2 * INTEGRALS, 2 * INTEGRALS + 3)
-SETTLED = 2  # integrals over the steady window: TIME, ABSOLUTE
+ACROSS, ALONG, SETTLED = range(3, 6)
 
 
 @kernel
 def watch(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
-    """Gather integrals of z_e, and when it was last outside the settling radius."""
+    """Gather integrals of z_e and |z_e - standoff|, and when z_e last left the settling radius."""
     z_e = row[DISTANCE]
     if t == 0.0:
         seen[OUTSIDE] = -1.0  # not outside so far
     add(seen, INTEGRALS, TIME, weight)
     add(seen, INTEGRALS, ABSOLUTE, weight * z_e)
+    add(seen, INTEGRALS, ERROR, weight * abs(z_e - k.standoff))
     add(seen, INTEGRALS, SQUARE, weight * z_e * z_e)
     add(seen, INTEGRALS, TIMED, weight * t * z_e)
     seen[NOW] = t
@@ -32,16 +33,31 @@ def watch(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector)
 
 @kernel
 def watch_settled(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
-    """Gather the integral of z_e over the steady window, whose first instant has half a weight."""
+    """Gather z_e, the error and the squared path errors over the steady window.
+
+    The window's first instant has half a weight. Across is positive to the right of the target's
+    course, along ahead of it. While the target stands still both count as zero.
+    """
     if t >= k.steady_from:
         opens = seen[TIME] == 0.0 and t > 0.0
         share = 0.5 * weight if opens else weight
-        add(seen, SETTLED, ABSOLUTE, share * row[DISTANCE])
+        x, y = s[0] - row[0], s[1] - row[1]
+        speed = max(math.sqrt(row[2] * row[2] + row[3] * row[3]), 1e-300)
+        across, along = (y * row[2] - x * row[3]) / speed, (x * row[2] + y * row[3]) / speed
         add(seen, SETTLED, TIME, share)
+        add(seen, SETTLED, ABSOLUTE, share * row[DISTANCE])
+        add(seen, SETTLED, ERROR, share * abs(row[DISTANCE] - k.standoff))
+        add(seen, SETTLED, ACROSS, share * across * across)
+        add(seen, SETTLED, ALONG, share * along * along)
 
 
 def _constants(layout: Layout) -> dict[str, float]:
-    return {"steady_from": layout.steady_from, "settling_radius": layout.settling_radius}
+    approach = layout.loop.controller.approach()
+    return {
+        "steady_from": layout.steady_from,
+        "settling_radius": layout.settling_radius,
+        "standoff": approach.standoff if approach else 0.0,
+    }
 
 
 def _rmse(seen: Vector, step: float) -> float:
@@ -51,6 +67,11 @@ def _rmse(seen: Vector, step: float) -> float:
 def _settling_time(seen: Vector, step: float) -> float:
     inside_from = float(seen[OUTSIDE]) + step if seen[OUTSIDE] >= 0.0 else 0.0
     return inside_from if inside_from < seen[NOW] + 0.5 * step else math.nan
+
+
+def _rms(position: int) -> Result:
+    mean = ratio(position, TIME)
+    return lambda seen, step: math.sqrt(mean(seen, step))
 
 
 OF = Accumulator(watch, lambda layout: SIZE, _constants, INTEGRALS)
@@ -78,4 +99,17 @@ z_e_steady = Metric(
 settling_time = Metric(
     "settling_time", "s", "time from which z_e stays within the settling radius", OF,
     _settling_time, 1, happens=True, counts_standoff=True,
+)  # fmt: skip
+iae_e = Metric("iae_e", "m s", "integral of |z_e - standoff|", OF, gathered(ERROR), 2)
+e_steady = Metric(
+    "e_steady", "m", "mean of |z_e - standoff| over the steady window", OF_SETTLED,
+    ratio(ERROR, TIME), 2,
+)  # fmt: skip
+cross_track_rms = Metric(
+    "cross_track_rms", "m", "rms distance from the target across its course, steady window",
+    OF_SETTLED, _rms(ACROSS), 2,
+)  # fmt: skip
+along_track_rms = Metric(
+    "along_track_rms", "m", "rms distance from the target along its course, steady window",
+    OF_SETTLED, _rms(ALONG), 2, counts_standoff=True,
 )  # fmt: skip
