@@ -3,25 +3,15 @@
 from __future__ import annotations
 
 import os
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import reduce
 
 from podusv_cli.scenario.phrases import found
 from podusv_cli.scenario.shipped import relative_to
-from podusv_cli.scenario.yaml_text import (
-    MAX_CHARACTERS,
-    MAX_DEPTH,
-    MAX_NODES,
-    plain_node,
-    read,
-    read_text,
-)
-from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, count, merge, overlay
+from podusv_cli.scenario.yaml_text import MAX_DEPTH, plain_node, read, read_text
+from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, merge, overlay
 
-# In a scenario and all that it extends; each file alone has the limits of its reader.
-MOST = {"files": 100, "characters": 2 * MAX_CHARACTERS, "values": 3 * MAX_NODES}
 FLOW = ("[", "{", "'", '"')  # what lists, mappings and text in quotes start with
 
 
@@ -51,30 +41,22 @@ def _layers(text: str, source: str, faults: list[Fault], placed: bool) -> list[N
     node = _mapping(text, source, faults, placed)
     if not node:
         return []
-    bases = list(_bases(node, source, _size_of(text, node), faults))
+    bases = list(_bases(node, source, faults))
     own = replace(_without_extends(node), faulty=node.faulty or not all(bases))
     return [own, *filter(None, bases)]
 
 
-def _bases(
-    node: Node, source: str, totals: Counter[str], faults: list[Fault]
-) -> Iterator[Node | None]:
+def _bases(node: Node, source: str, faults: list[Fault]) -> Iterator[Node | None]:
     """The trees of all extended files, nearest first; None for one that cannot be read."""
     waiting: list[tuple[Node, tuple[str, ...]]] = [
         (name, (source,)) for name in extended_files(node)
     ]
     while waiting:
         name, sources = waiting.pop()
-        if most := _limit_reached(totals):
-            text = f"this scenario and all that it extends are more than {most}; extend fewer files"
-            faults.append(Fault(name.mark, "extends", text))
-            yield None
-            return
         base = _read_base(name, sources, faults)
         tree = _mapping(base[1], base[0], faults) if base else None
         yield tree and _without_extends(tree)
         if base and tree:
-            totals += _size_of(base[1], tree)
             waiting += [(further, (*sources, base[0])) for further in extended_files(tree)]
 
 
@@ -89,17 +71,6 @@ def extended_files(node: Node) -> tuple[Node, ...]:
     if above is None:
         return ()
     return above.content if isinstance(above.content, tuple) else (above,)
-
-
-def _size_of(text: str, node: Node) -> Counter[str]:
-    """What a file adds to the totals limited by MOST."""
-    return Counter({"files": 1, "characters": len(text), "values": count(node)})
-
-
-def _limit_reached(totals: Counter[str]) -> str:
-    """The limit in MOST that is reached, in words; empty if none."""
-    full = (f"{most:,} {what}" for what, most in MOST.items() if totals[what] >= most)
-    return next(full, "")
 
 
 def _mapping(text: str, source: str, faults: list[Fault], placed: bool = True) -> Node | None:

@@ -5,22 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import islice
-from typing import Any
 
 from podusv_cli.core.quantities import bytes_in_words, time_in_words
 from podusv_cli.engine.simulate import names
 from podusv_cli.paths.base import TARGET
-from podusv_cli.scenario.load import resolved_yaml, values
 from podusv_cli.scenario.messages import Check
 from podusv_cli.scenario.model import Conflicts, Scenario, Simulation
-from podusv_cli.scenario.yaml_text import MAX_CHARACTERS, MAX_NODES
 from podusv_cli.theory import monitor
 
 NUMBER = 8  # bytes
 MOST_STEPS = 10**8
 MOST_CONTENT = 4 * 10**9  # bytes of log that podusv reads back
-MOST_RUNS = 1000  # of a comparison; a manifest of 1 300 runs with long names would be refused
-ESCAPED, LINE = 10, 60  # characters in resolved.yaml: at most for one of text, and for a key
 HELD = 256 * 2**20  # bytes of a log that is held in memory; a larger one is made on the disk
 WORKED = 64 * 2**20  # bytes of a larger log that are in memory at a time
 # Rough costs on one core (benchmarks/results.md): of a step, of a step for each number of the
@@ -119,13 +114,6 @@ def limits(
 
 
 def _too_large(scenario: Scenario, allow_large: bool, read_back: bool, insist: str) -> Conflicts:
-    if read_back and (runs := len(scenario.controllers)) > MOST_RUNS:
-        most = f"more than the {MOST_RUNS:,} that podusv reads back as one comparison"
-        yield "controllers", f"has {runs:,} runs, {most}; make several scenarios of it"
-    for place, law in scenario.laws().items():
-        single = scenario.alone().model_copy(update={"controller": law})
-        for key, text in _unreadable(single):
-            yield key.replace("controller", place, 1), text
     size = largest(scenario)
     if scenario.log.every > size.steps:
         only = f"the run has {size.steps} steps, so that its first instant alone would be logged"
@@ -138,32 +126,6 @@ def _too_large(scenario: Scenario, allow_large: bool, read_back: bool, insist: s
         most = f"more than the {bytes_in_words(HELD)} that can be compressed"
         remedy = f"leave it uncompressed or {_log_less(scenario.log.every, size, HELD)}"
         yield "log.compress", f"the log would hold {bytes_in_words(size.content)}, {most}; {remedy}"
-
-
-def _unreadable(run: Scenario) -> Conflicts:
-    """The largest value of a scenario whose resolved.yaml podusv would refuse to read."""
-    leaves, nodes = values(run), _nodes(run.model_dump())
-    letters = sum(len(str(leaf)) for leaf in leaves.values())
-    if nodes > MAX_NODES:
-        key = max(leaves, key=lambda key: _nodes(leaves[key]))
-        yield key, _beyond(f"{nodes:,} values", MAX_NODES, "give fewer here")
-    elif ESCAPED * letters + LINE * nodes < MAX_CHARACTERS:
-        return  # it fits without writing it out, which takes as long as loading it
-    elif (length := len(resolved_yaml(run))) > MAX_CHARACTERS:
-        key = max(leaves, key=lambda key: len(str(leaves[key])))
-        yield key, _beyond(f"{length:,} characters", MAX_CHARACTERS, "shorten this")
-
-
-def _nodes(content: Any) -> int:
-    """How many keys and values the reader of resolved.yaml counts."""
-    if isinstance(content, dict):
-        return 1 + sum(1 + _nodes(inner) for inner in content.values())
-    return 1 + sum(map(_nodes, content)) if isinstance(content, tuple) else 1
-
-
-def _beyond(amount: str, most: int, remedy: str) -> str:
-    text = f"with every default written out the scenario has {amount}, more than the {most:,} that "
-    return f"{text}podusv reads back; {remedy}"
 
 
 def _too_long(run: Simulation, size: Size, insist: str) -> tuple[str, str]:

@@ -19,10 +19,12 @@ from podusv_cli.scenario.messages import Check, check
 from podusv_cli.scenario.model import Scenario, scenario_class
 from podusv_cli.scenario.phrases import found
 from podusv_cli.scenario.presets import complete, has_choice
-from podusv_cli.scenario.yaml_text import read, read_text, resolve
+from podusv_cli.scenario.yaml_text import MAX_NODES, read, read_text, resolve
 from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, Route, dotted, find, printable
 
 REFERENCES: tuple[Route, ...] = (("extends",), ("path", "file"))  # to other files
+# Values; several times those of one file, since a scenario may extend files with long lists.
+MOST_RESOLVED = 3 * MAX_NODES
 HEADING = "# A complete scenario, every value written out; it runs again to the same log.\n"
 
 
@@ -113,7 +115,7 @@ def load_resolved(
     podusv does not know.
     """
     faults: list[Fault] = []
-    root = read(text, source, faults)
+    root = read(text, source, faults, most=MOST_RESOLVED)
     faults += [
         Fault(node.mark, dotted(route), "refers to another file, which no finished run does")
         for route in REFERENCES

@@ -22,7 +22,7 @@ from podusv_cli.scenario.phrases import found, quoted
 from podusv_cli.scenario.shipped import file_of
 from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, Route, dotted
 
-MAX_BYTES = MAX_CHARACTERS = 1_000_000
+MAX_BYTES = 1_000_000
 MAX_DEPTH = 32
 MAX_NODES = 20_000
 
@@ -119,16 +119,14 @@ def text_node(content: Any, mark: Mark, key: str, faults: list[Fault], *, text: 
     return Node(None if unfit else content, mark, text=text, faulty=bool(unfit))
 
 
-def read(text: str, source: str, faults: list[Fault], *, placed: bool = True) -> Node | None:
-    """The tree of a single YAML document, None if parsing could not continue.
+def read(
+    text: str, source: str, faults: list[Fault], *, placed: bool = True, most: int = MAX_NODES
+) -> Node | None:
+    """The tree of a single YAML document of at most `most` values; None if that is not possible.
 
     Every fault is appended to `faults`. Marks have lines only where `placed`.
     """
-    if len(text) > MAX_CHARACTERS:
-        text = f"is longer than {MAX_CHARACTERS:,} characters"
-        faults.append(Fault(Mark(source), "", text))
-        return None
-    reader = _Reader(text, source, faults, placed)
+    reader = _Reader(text, source, faults, placed, most)
     try:
         return reader.document()
     except _CannotContinue as stop:
@@ -146,8 +144,10 @@ class _CannotContinue(Exception):
 class _Reader:
     """Reads one document from the parser's events."""
 
-    def __init__(self, text: str, source: str, faults: list[Fault], placed: bool) -> None:
-        self._text, self._source, self._placed = text, source, placed
+    def __init__(
+        self, text: str, source: str, faults: list[Fault], placed: bool, most: int
+    ) -> None:
+        self._text, self._source, self._placed, self._most = text, source, placed, most
         self._events = yaml.parse(text, Loader=yaml.SafeLoader)
         self._faults = faults
         self._nodes = 0
@@ -206,8 +206,8 @@ class _Reader:
 
     def _node(self, event: Any, route: Route) -> Node:
         self._nodes += 1
-        if self._nodes > MAX_NODES:
-            raise _CannotContinue(self._start(event), f"more than {MAX_NODES:,} values")
+        if self._nodes > self._most:
+            raise _CannotContinue(self._start(event), f"more than {self._most:,} values")
         if len(route) > MAX_DEPTH:
             raise _CannotContinue(self._start(event), f"nested deeper than {MAX_DEPTH} levels")
         if isinstance(event, yaml.AliasEvent):

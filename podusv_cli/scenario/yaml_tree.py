@@ -114,13 +114,6 @@ def plain(node: Node) -> Any:
     return node.content
 
 
-def count(node: Node) -> int:
-    """How many values a tree has, keys, lists and mappings included."""
-    if isinstance(node.content, dict):
-        return 1 + sum(1 + count(entry) for entry in node.content.values())
-    return 1 + sum(count(item) for item in _items(node.content))
-
-
 def overlay(base: Node, top: Node, replaces: Callable[[Node, Node], bool]) -> Node:
     """`top` over `base`: mappings key by key, unless `replaces` holds; other values replaced.
 

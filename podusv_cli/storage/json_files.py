@@ -16,7 +16,6 @@ from podusv_cli.core import escaping
 from podusv_cli.core.errors import StorageError
 from podusv_cli.storage.files import read_text
 
-LARGEST = 2 * 2**20  # bytes
 DEEPEST = 32  # levels
 LONGEST = 300  # digits of an integer that is a finite float
 
@@ -41,7 +40,7 @@ def read(path: Path) -> dict[str, Any]:
     """Read a JSON object; raises StorageError for anything that podusv does not write."""
     try:
         content = json.loads(
-            read_text(path, LARGEST), object_pairs_hook=_object,
+            read_text(path), object_pairs_hook=_object,
             parse_float=_finite, parse_int=_whole, parse_constant=_finite,
         )  # fmt: skip
         _check_depth(content)

@@ -118,8 +118,8 @@ def yaml(folder: Path, argument: str) -> None:
 
 YAML = {
     "empty": "", "list": "- a", "word": "a", "open": "{a: [", "no_text": "a: \udcff",
-    "deep": "a: " + "[" * 100_000, "long": "a: '" + "a" * 3_000_000 + "'",
-    "many": "a: [" + "1, " * 300_000 + "]", "lines": "a:\n" + "- 1\n" * 200_000,
+    "deep": "a: " + "[" * 100_000, "long": "a: '" + "a" * 20_000_000 + "'",
+    "many": "a: [" + "1, " * 300_000 + "]",
     "comments": "#\n" * 450_000 + "{whole}", "aliases": "a: &a [1]\nb: [*a, *a]\n{whole}",
     "extends": "extends: {pipe}\n{whole}", "file": "path: {kind: waypoints, file: {pipe}}\n",
     "escaped": '"\\e[2J": 1\n{whole}', "tag": "a: !!python/object/apply:os.abort []\n{whole}",
