@@ -7,7 +7,7 @@ PIP := $(BIN)/pip install --quiet --disable-pip-version-check --constraint const
 STEP := PODUSV=$(BIN)/podusv results/step.sh
 # A file to a core; what its tests share is made once.
 PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/pytest --numprocesses auto --dist loadfile
-OURS := podusv_cli tests benchmarks results examples
+OURS := podusv_cli tests benchmarks results examples docs
 # Every dependency of a run at its lower bound; what tests need beside them, as new as may be.
 OLDEST := .venv-oldest
 LOWEST := sed -n '/^dependencies = \[/,/^\]/s/^ *"\(.*\)>=\(.*\)",/\1==\2/p' pyproject.toml
@@ -18,7 +18,7 @@ TABLES := unknown:unknown_dynamics discrete:discrete_signals limits:period_limit
 COMPARISONS := printed_compare figures_compare figures_compare_standoff corrected_compare
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce claim pod test test-all test-faults test-oldest bench lint types contracts clean
+.PHONY: help reproduce claim pod docs test test-all test-faults test-oldest bench lint types contracts clean
 
 help: ## what can be made
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -54,6 +54,10 @@ pod: $(VENV)/run.done ## the laws behind a pod, into results/pod/
 	@for name in $(PODS); do $(STEP) compare pod $$name 0 || exit 1; done
 	@echo "what was found: results/pod.md; every table and figure: results/pod/*/report.html"
 
+docs: $(VENV)/dev.done ## the documentation as a site, into site/index.html
+	@$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet -c docs -d build/doctrees . site
+	@echo "open site/index.html; it needs no network"
+
 test: lint types contracts ## lint, types, import contracts, all tests but the slow ones
 	@$(PYTEST)
 
@@ -76,7 +80,7 @@ bench: $(VENV)/dev.done ## speed beside hand-written C (needs a C compiler), int
 
 lint: $(VENV)/dev.done
 	@$(BIN)/ruff check $(OURS)
-	@$(BIN)/ruff format --check $(OURS) docs README.md
+	@$(BIN)/ruff format --check $(OURS) README.md
 
 types: $(VENV)/dev.done
 	@$(BIN)/mypy
@@ -85,7 +89,7 @@ contracts: $(VENV)/dev.done
 	@$(BIN)/lint-imports
 
 clean: ## remove the virtual environment and all caches
-	rm -rf $(VENV) build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) build site docs/reference *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 
 $(BIN)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \

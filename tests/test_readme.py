@@ -18,7 +18,7 @@ from command_samples import ROOT, Command, commanded
 
 from podusv_cli.storage.run_folder import open_run
 
-PAGES = ("README.md", "docs/tutorial.md", "docs/write_your_law.md")
+PAGES = ("README.md", "docs/tutorial.md", "docs/write_your_law.md", "docs/vessel.md")
 LARGEST = 10.0  # N m; four times the yaw moment that the actuator of README's scenario delivers
 
 

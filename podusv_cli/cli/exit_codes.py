@@ -22,6 +22,19 @@ Given = ParamSpec("Given")
 INTERRUPTED = 130
 PIPE_CLOSED = 141  # what a shell reports for a program that SIGPIPE ended
 BUG = 1
+MEANINGS = {
+    0: "done",
+    1: "a bug in podusv",
+    2: "wrong usage or scenario",
+    3: "some of several runs failed (`compare`) or figures (`plot`), a number is not converged "
+    "(`verify`), or runs differ (`rerun`, `diff`)",
+    4: "the simulation diverged; what was computed is kept",
+    5: "input or output failed",
+    129: "the terminal was closed",
+    130: "interrupted with Ctrl-C",
+    141: "the reader of a pipe closed it",
+    143: "terminated",
+}
 # A run has up to 18 files open at once, a comparison two more for each worker.
 LEAST_OPEN_FILES, OPEN_FILES = 64, 1024
 PLEASE_REPORT = "This is a bug in podusv. Please report it with the lines above."
