@@ -2,115 +2,23 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
-import shutil
-import subprocess
-import sys
-from collections.abc import Callable, Iterator
 from ctypes import CFUNCTYPE, c_double
 from enum import Enum
-from importlib import import_module
 from pathlib import Path
-from pkgutil import walk_packages
 from threading import Thread
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
-from conftest import PACKAGE, Constant, adrift, run
+from conftest import Constant, adrift, run
 from numba import njit
 
-from podusv_cli.core.kernel import Vector, is_kernel, kernel, specialise
+from podusv_cli.core.kernel import Vector, kernel, specialise
 from podusv_cli.core.kinematics import wrap
 from podusv_cli.engine import code_folder, compile, object_cache
-from podusv_cli.process.temporary_names import temporary_name
-
-SCRIPT = """
-import json, sys
-from pathlib import Path
-import numpy as np
-from podusv_cli.actuators.ideal import Ideal
-from podusv_cli.controllers.pid import Pid
-from podusv_cli.disturbances.calm import Calm
-from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.simulate import ClosedLoop, simulate
-from podusv_cli.paths.line import Line
-from podusv_cli.vessels.vessel import Vessel
-
-hull = Vessel(preset="box", length=1.0, beam=0.5, m=20.0, I_z=2.0, X_u=-1.0, Y_v=-2.0, N_r=-1.0)
-start = (-4.0, -3.0, 0.2, 0.1, 0.0, 0.0)
-loop = ClosedLoop(hull, hull, Line(), Calm(), Ideal(), Pid(), start)
-for edit in sys.argv[1:]:  # of the source, behind the back of this process
-    name, old, new = edit.split("|")
-    Path(name).write_text(Path(name).read_text().replace(old, new))
-fast, slow = (simulate(loop, TimeGrid(0.01, 50), compiled=c)["x"][-1] for c in (True, False))
-print(json.dumps({"fast": fast, "slow": slow, "translated": "numba" in sys.modules}))
-"""
-FASTER = ("rate[0] = x[3] * cos_psi", "rate[0] = 2.0 * x[3] * cos_psi")
-
-
-class Copy:
-    """A copy of the package with its own cache, run in processes of its own."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self.kinematics = folder / "podusv_cli/core/kinematics.py"
-        self.cache = folder / "cache"
-        shutil.copytree(
-            PACKAGE, folder / "podusv_cli", ignore=shutil.ignore_patterns("__pycache__")
-        )
-
-    def simulate(self, *edits: str) -> dict[str, Any]:
-        paths = {"PYTHONPATH": str(self.folder), "PODUSV_CACHE": str(self.cache)}
-        out = subprocess.run(
-            [sys.executable, "-c", SCRIPT, *edits], cwd=self.folder, env=os.environ | paths,
-            capture_output=True, text=True, check=True,
-        )  # fmt: skip
-        result: dict[str, Any] = json.loads(out.stdout)
-        return result
-
-    def edit(self, old: str, new: str) -> None:
-        text = self.kinematics.read_text()
-        assert old in text
-        self.kinematics.write_text(text.replace(old, new))
-
-    def files(self) -> set[tuple[str, int]]:
-        return {(p.name, p.stat().st_mtime_ns) for p in self.cache.rglob("*.*")}
-
-
-@pytest.fixture
-def copy(tmp_path: Path) -> Copy:
-    return Copy(tmp_path)
-
-
-@pytest.mark.slow
-def test_a_second_process_finds_the_code_and_a_changed_helper_is_noticed(copy: Copy) -> None:
-    first = copy.simulate()
-    made = copy.files()
-    assert first["translated"]
-    assert made
-    again = copy.simulate()
-    assert not again["translated"]
-    assert copy.files() == made
-    assert again["fast"] == first["fast"] == first["slow"]
-    copy.edit(*FASTER)
-    changed = copy.simulate()
-    assert changed["fast"] == changed["slow"] != first["slow"]
-
-
-@pytest.mark.slow
-def test_code_compiled_after_its_source_was_edited_is_not_left_for_the_new_source(
-    copy: Copy,
-) -> None:
-    # The process has imported the old source when the file changes under it.
-    old = copy.simulate("|".join([str(copy.kinematics), *FASTER]))
-    assert old["fast"] == old["slow"]
-    new = copy.simulate()
-    assert new["fast"] == new["slow"] != old["slow"]
-
 
 FORCE = 0.0
 
@@ -151,80 +59,12 @@ def test_kernels_that_read_different_constants_are_not_taken_for_each_other() ->
 
 
 @pytest.fixture
-def code_kept() -> Iterator[Callable[[int], Path | None]]:
-    """Where code of the n-th state of the source is kept, asked anew each time."""
-
-    def asked(number: int) -> Path | None:
-        code_folder.code_folder.cache_clear()
-        return code_folder.code_folder(f"{number:016x}")
-
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """The folder where code is kept, empty."""
+    monkeypatch.setenv("PODUSV_CACHE", str(tmp_path))
     code_folder.code_folder.cache_clear()
-    yield asked
+    yield tmp_path
     code_folder.code_folder.cache_clear()
-
-
-MANY = code_folder.KEPT + 4
-
-
-def test_a_cache_among_other_folders_leaves_what_is_not_its_own(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code_kept: Any
-) -> None:
-    """Also where their names are those of caches, or somebody put a file into a cache."""
-    monkeypatch.setenv("PODUSV_CACHE", str(tmp_path))
-    for number in range(MANY):
-        theirs = tmp_path / f"{number:016x}"
-        theirs.mkdir()
-        (theirs / "thesis.tex").touch()
-        (theirs / "of-mine.code").touch()
-        (code_kept(100 + number) / f"notes-{number}").touch()
-        code_kept(200 + number)
-    assert len(list(tmp_path.glob("*/thesis.tex"))) == MANY
-    assert len(list(tmp_path.glob("*/of-mine.code"))) == MANY
-    noted = list(tmp_path.glob("*/notes-*"))
-    assert len(noted) == MANY
-    assert all((path.parent / code_folder.MARK).exists() for path in noted)
-
-
-def test_a_folder_that_only_looks_like_a_cache_is_left(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code_kept: Any
-) -> None:
-    """Without the mark, with another program's, or with a link in its place."""
-    monkeypatch.setenv("PODUSV_CACHE", str(tmp_path))
-    for number in range(MANY):
-        empty, other, link = (tmp_path / f"{n + number:016x}" for n in (100, 200, 300))
-        empty.mkdir()
-        other.mkdir()
-        (other / code_folder.MARK).write_bytes(b"Signature: 8a477f597d28d172789f06886806bc55")
-        link.symlink_to(code_kept(400))
-        code_kept(500 + number)
-    assert len(list(tmp_path.iterdir())) == 3 * MANY + code_folder.KEPT + 1
-
-
-def test_old_caches_are_forgotten(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code_kept: Any
-) -> None:
-    monkeypatch.setenv("PODUSV_CACHE", str(tmp_path))
-    for number in range(MANY):
-        folder = code_kept(number)
-        (folder / "law_entry_1.code").touch()
-        (folder / temporary_name()).touch()
-        os.utime(folder, (number, number))
-    assert code_kept(MANY - 1) == folder
-    left = sorted(int(path.name, 16) for path in tmp_path.iterdir())
-    assert left == list(range(MANY))[-code_folder.KEPT - 1 :]
-
-
-def test_a_folder_that_cannot_be_written_is_passed_over_and_that_is_told(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code_kept: Any, caplog: Any
-) -> None:
-    (tmp_path / "file").write_text("")
-    monkeypatch.setenv("PODUSV_CACHE", str(tmp_path / "file"))
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
-    assert code_kept(1) == tmp_path / "home/podusv" / f"{1:016x}"
-    assert caplog.messages == [
-        f"podusv: compiled code is kept in {tmp_path}/home/podusv "
-        f"({tmp_path}/file: {tmp_path}/file is not a folder)"
-    ]
 
 
 def test_machine_code_is_what_the_kernel_computes() -> None:
@@ -255,6 +95,11 @@ def halved(x: float) -> float:
 def one_after_the_other(x: float) -> float:
     """Stand-ins that `specialise` replaces."""
     return doubled(x) + halved(x) + ready(x)
+
+
+def calling(function: Any) -> Any:
+    """The kernel that calls another, with this one in the other's place."""
+    return specialise(one_after_the_other, "one_after_the_other", ready=function)
 
 
 SHIFT = np.array([1.0, 2.0])
@@ -312,66 +157,42 @@ Fast = Enum("Slow", {"PACE": 2}, module=__name__)
         [specialise(ready, "ready", FORCE=(1.0, np.arange(2000.0) == n)) for n in (900, 901)],
         [specialise(ready, "ready", FORCE=mode) for mode in (Slow, Fast)],
         [eval(f"lambda x: (lambda y: {n} * y)(x)") for n in (2, 3)],
+        [specialise(ready, "ready", FORCE=n) for n in (1.0, 2.0)],
+        [specialise(shifted, "shifted", SHIFT=np.array([1.0, n])) for n in (2.0, 3.0)],
+        [calling(ready), calling(doubled), calling(halved), calling(math.sin), calling(math.cos)],
     ],
-    ids=["module", "numba", "float32", "complex", "tuple", "enumeration", "inside"],
+    ids=["module", "numba", "float32", "complex", "tuple", "enumeration", "inside", "float",
+         "table", "function"],
 )  # fmt: skip
 def test_whatever_a_kernel_reads_is_in_the_fingerprint(variants: list[Any]) -> None:
     marks = {object_cache.fingerprint(variant) for variant in variants}
     assert len(marks) == len(variants)
-
-
-def test_a_changed_number_of_a_module_is_noticed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code_kept: Any
-) -> None:
-    monkeypatch.setenv("PODUSV_CACHE", str(tmp_path))
-    for gain in (2.0, 3.0):
-        code = compile.compiled(tuned_by(gain=gain), CFUNCTYPE(c_double, c_double))
-        assert code(10.0) == gain * 10.0 + 1.0
-
-
-def test_what_a_name_stands_for_is_in_the_fingerprint() -> None:
-    """The same code, with other kernels, functions or tables behind its names."""
-    variants = [
-        one_after_the_other,
-        specialise(one_after_the_other, "one_after_the_other", ready=doubled),
-        specialise(one_after_the_other, "one_after_the_other", ready=halved),
-        specialise(one_after_the_other, "one_after_the_other", ready=math.sin),
-        specialise(one_after_the_other, "one_after_the_other", ready=math.cos),
-        shifted,
-        specialise(shifted, "shifted", SHIFT=np.array([1.0, 3.0])),
-        specialise(ready, "ready", FORCE=1.0),
-        specialise(ready, "ready", FORCE=2.0),
-    ]
-    marks = [object_cache.fingerprint(variant) for variant in variants]
-    assert len(set(marks)) == len(variants)
-    again = specialise(one_after_the_other, "one_after_the_other", ready=halved)
-    assert object_cache.fingerprint(again) == marks[2]
+    assert object_cache.fingerprint(calling(halved)) == object_cache.fingerprint(calling(halved))
 
 
 ONE_TO_ONE = CFUNCTYPE(c_double, c_double)
 
 
-def test_a_damaged_piece_is_made_anew(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code_kept: Any
+def test_a_piece_that_is_damaged_or_anothers_is_made_anew(
+    cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("PODUSV_CACHE", str(tmp_path))
-    assert compile.compiled(ready, ONE_TO_ONE)(2.5) == 2.5
-    (path,) = tmp_path.rglob("ready_*")
+    for function in (ready, doubled):
+        assert compile.compiled(function, ONE_TO_ONE)(2.5) == function(2.5)
+    (path,), (other,) = (list(cache.rglob(f"{name}_*")) for name in ("ready", "doubled"))
     whole = path.read_bytes()
     middle = len(whole) // 2
     flipped = whole[:middle] + bytes([whole[middle] ^ 1]) + whole[middle + 1 :]
-    for damaged in (b"", whole[:-1], whole[:300], flipped, whole + b"."):
+    for damaged in (b"", whole[:-1], whole[:300], flipped, whole + b".", other.read_bytes()):
         path.write_bytes(damaged)
         assert compile.compiled(ready, ONE_TO_ONE)(2.5) == 2.5
         assert object_cache._read(path) is not None
 
 
 def test_pieces_are_whole_when_several_processes_write_them(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code_kept: Any
+    cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("PODUSV_CACHE", str(tmp_path))
     code = object_cache.Code("symbol", bytes(range(256)) * 4000)
-    path = tmp_path / "piece"
+    path = cache / "piece"
     torn = []
 
     def write() -> None:
@@ -386,20 +207,17 @@ def test_pieces_are_whole_when_several_processes_write_them(
         thread.join()
     assert len(torn) == 80
     assert not any(torn)
-    assert list(tmp_path.iterdir()) == [path]
+    assert list(cache.iterdir()) == [path]
 
 
-def test_a_full_disk_costs_time_only(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code_kept: Any
-) -> None:
+def test_a_full_disk_costs_time_only(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*paths: Any, **folders: Any) -> None:
         raise OSError("no space left on device")
 
-    monkeypatch.setenv("PODUSV_CACHE", str(tmp_path))
     assert code_folder.code_folder(object_cache.source_digest())
     monkeypatch.setattr(os, "replace", full)
     assert compile.compiled(ready, ONE_TO_ONE)(2.5) == 2.5
-    assert [path.name for path in tmp_path.rglob("*.*")] == [code_folder.MARK]
+    assert [path.name for path in cache.rglob("*.*")] == [code_folder.MARK]
 
 
 def test_another_processor_or_version_gets_a_piece_of_its_own(
@@ -420,40 +238,3 @@ def test_a_kernel_that_allocates_is_refused_and_not_left_to_end_the_process() ->
 
     with pytest.raises(TypeError, match=r"allocating needs \w+, which is no function"):
         compile.compiled(allocating, ONE_TO_ONE)
-
-
-def test_every_file_that_makes_a_kernel_is_in_the_digest() -> None:
-    modules = [import_module(found.name) for found in walk_packages([str(PACKAGE)], "podusv_cli.")
-               if found.name != "podusv_cli.__main__"]  # fmt: skip
-    things = [thing for module in modules for thing in vars(module).values()]
-    things += [part for thing in things if isinstance(thing, type) for part in vars(thing).values()]
-    bare = [getattr(thing, "__func__", thing) for thing in things]
-    files = {thing.__code__.co_filename for thing in bare if is_kernel(thing)}
-    paths = [Path(file) for file in files if file != "<string>"]  # of `unpacker`, which writes it
-    assert len(paths) > 20
-    for path in paths:
-        assert any(mark in path.read_bytes() for mark in object_cache.MARKS), path
-
-
-def test_loading_takes_no_compiler_and_a_run_no_tables_or_plots(tmp_path: Path) -> None:
-    script = """
-import sys
-from podusv_cli.cli import main
-try:
-    main()
-finally:
-    print(*sys.modules, file=sys.stderr)
-"""
-    scenario = PACKAGE.parent / "configs/paper/corrected.yaml"
-
-    def modules(out: str) -> set[str]:
-        words = ["run", str(scenario), "--set", "simulation.duration=1.0", "--no-figures"]
-        done = subprocess.run(
-            [sys.executable, "-c", script, *words, "--out", str(tmp_path / out)],
-            check=True, capture_output=True, text=True,
-        )  # fmt: skip
-        return set(done.stderr.split())
-
-    modules("first")  # fills the cache where it is empty
-    heavy = {"numba", "pandas", "matplotlib", "scipy", "rich", "numpy.ma"}
-    assert not modules("second") & heavy

@@ -8,14 +8,18 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator
+from ctypes import CFUNCTYPE, c_double
 from pathlib import Path
 from typing import Any
 
 import pytest
 from command_samples import BASE, ROOT, write
 
-from podusv_cli.engine import code_folder, object_cache
+from podusv_cli.core.kinematics import wrap
+from podusv_cli.engine import code_folder, compile, object_cache
+from podusv_cli.process.temporary_names import temporary_name
 
 FRESH = code_folder.code_folder
 NAME = "0123456789abcdef"
@@ -61,6 +65,7 @@ def spoil(content: bytes) -> Iterator[bytes]:
         yield bytes(len(content))
 
 
+@pytest.mark.slow  # compiles everything anew
 def test_damage_races_and_missing_places_change_no_byte(folder: Path) -> None:
     cache = folder / "cache"
     together = [begun(out, PODUSV_CACHE=str(cache)) for out in ("a", "b")]
@@ -80,25 +85,17 @@ def test_damage_races_and_missing_places_change_no_byte(folder: Path) -> None:
     assert all(object_cache._read(path) for path in pieces[1:])  # mended on the way
 
 
-def test_pieces_swapped_are_not_taken_for_each_other(folder: Path) -> None:
-    """Each is whole; only its name is another's."""
-    cache = folder / "cache"
-    first = log(begun("a", PODUSV_CACHE=str(cache)))
-    pieces = sorted(cache.rglob("law_entry*.code")) + sorted(cache.rglob("actuator_entry*.code"))
-    one, other = pieces[0].read_bytes(), pieces[1].read_bytes()
-    pieces[0].write_bytes(other)
-    pieces[1].write_bytes(one)
-    assert log(begun("b", PODUSV_CACHE=str(cache))) == first
-
-
-def test_without_any_place_it_compiles_leaves_nothing_and_says_so(folder: Path) -> None:
-    nowhere = "/dev/null/nowhere"
-    before = {path.name for path in folder.iterdir()}
-    process = begun("x", PODUSV_CACHE=nowhere, XDG_CACHE_HOME=nowhere, TMPDIR=str(folder / "tmp"))
+def test_without_any_place_it_compiles_leaves_nothing_and_says_so(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
     (folder / "tmp").mkdir()
-    assert log(process, "podusv: compiled code is not kept, so each command compiles anew; set")
-    assert {path.name for path in folder.iterdir()} == before | {"tmp", "x"}
-    assert not list((folder / "tmp").iterdir())
+    monkeypatch.setattr(tempfile, "tempdir", str(folder / "tmp"))
+    for name in ("PODUSV_CACHE", "XDG_CACHE_HOME"):
+        monkeypatch.setenv(name, "/dev/null/nowhere")
+    assert compile.compiled(wrap, CFUNCTYPE(c_double, c_double))(7.0) == wrap(7.0)
+    (told,) = caplog.messages
+    assert told.startswith("podusv: compiled code is not kept, so each command compiles anew; set")
+    assert {path.name for path in folder.rglob("*")} == {"a.yaml", "tmp"}
 
 
 @pytest.mark.parametrize("home", ["~", "relative", ""])
@@ -210,3 +207,68 @@ def test_no_piece_is_read_that_is_a_link_a_pipe_or_anothers(
     assert object_cache._read(piece) is None
     place.chmod(0o700)
     assert object_cache._read(piece) == code
+
+
+# --- folders of former states of the source
+
+
+def code_kept(number: int) -> Path | None:
+    """Where code of the n-th state of the source is kept, asked anew each time."""
+    FRESH.cache_clear()
+    return FRESH(f"{number:016x}")
+
+
+MANY = code_folder.KEPT + 4
+
+
+def test_a_cache_among_other_folders_leaves_what_is_not_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where their names are those of caches, or somebody put a file into a cache.
+
+    A cache has a mark: what has none, another program's, or is a link, only looks like one.
+    """
+    cache = tmp_path / "cache"
+    cache.mkdir(mode=0o700)
+    monkeypatch.setenv("PODUSV_CACHE", str(cache))
+    for number in range(MANY):
+        theirs, empty, other, link = (cache / f"{n + number:016x}" for n in (0, 300, 400, 500))
+        for made in (theirs, empty, other):
+            made.mkdir()
+        (theirs / "thesis.tex").touch()
+        (theirs / "of-mine.code").touch()
+        (other / code_folder.MARK).write_bytes(b"Signature: 8a477f597d28d172789f06886806bc55")
+        link.symlink_to(code_kept(600))
+        (code_kept(100 + number) / f"notes-{number}").touch()
+        code_kept(200 + number)
+    for name in ("thesis.tex", "of-mine.code", "notes-*"):
+        assert len(list(cache.glob(f"*/{name}"))) == MANY
+    assert all((path.parent / code_folder.MARK).exists() for path in cache.glob("*/notes-*"))
+    assert len(list(cache.iterdir())) == 5 * MANY + code_folder.KEPT + 1
+
+
+def test_old_caches_are_forgotten(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    cache = tmp_path / "cache"
+    cache.mkdir(mode=0o700)
+    monkeypatch.setenv("PODUSV_CACHE", str(cache))
+    for number in range(MANY):
+        folder = code_kept(number)
+        (folder / "law_entry_1.code").touch()
+        (folder / temporary_name()).touch()
+        os.utime(folder, (number, number))
+    assert code_kept(MANY - 1) == folder
+    left = sorted(int(path.name, 16) for path in cache.iterdir())
+    assert left == list(range(MANY))[-code_folder.KEPT - 1 :]
+
+
+def test_a_folder_that_cannot_be_written_is_passed_over_and_that_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: Any
+) -> None:
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("PODUSV_CACHE", str(tmp_path / "file"))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
+    assert code_kept(1) == tmp_path / "home/podusv" / f"{1:016x}"
+    assert caplog.messages == [
+        f"podusv: compiled code is kept in {tmp_path}/home/podusv "
+        f"({tmp_path}/file: {tmp_path}/file is not a folder)"
+    ]
