@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Iterator
 from ctypes import CFUNCTYPE, c_double
 from enum import Enum
 from pathlib import Path
