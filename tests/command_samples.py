@@ -106,6 +106,8 @@ def send(process: subprocess.Popen[str], number: signal.Signals, times: int) -> 
 
 
 SIGNALS = [(signal.SIGINT, 130), (signal.SIGTERM, 143)]
+# For tests with a process of their own; where it makes a difference they take both.
+MOSTLY_SIGINT = [SIGNALS[0], pytest.param(*SIGNALS[1], marks=pytest.mark.slow)]
 
 
 def gone(process: subprocess.Popen[str]) -> bool:

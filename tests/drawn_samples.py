@@ -1,8 +1,10 @@
 """Runs made by hand, every signal a curve of its own, for tests of what figures show."""
 
+from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from known_signals import ABOUT
 from matplotlib.patches import Polygon
 
@@ -35,6 +37,15 @@ USUAL = {
     "law": "{kind: pid}",
     "duration": 100.0,
 }
+
+
+@contextmanager
+def no_figures_but(*names):
+    """Only these figures: to draw them all takes its time."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name in set(FIGURES) - {*names}:
+            patch.delitem(FIGURES, name)
+        yield
 
 
 def scenario(name="drawn", **given):

@@ -136,11 +136,6 @@ def test_text_fits_the_terminal(
     assert "the last part of the run" in " ".join(out.split())
 
 
-def test_nothing_but_plain_text_goes_into_a_pipe(podusv: Command) -> None:
-    for words in (["explain"], ["explain", "controller"], ["list"], ["--help"], ["schema"]):
-        assert "\x1b" not in podusv(*words).out
-
-
 def test_list_names_every_kind_and_every_vessel(podusv: Command) -> None:
     out = podusv("list").out
     for kind in ("line_circle", "harmonic", "saturated", "adaptive_neural", *preset_names(SHIPPED)):
@@ -253,16 +248,6 @@ def test_a_bug_shows_its_trace_and_asks_for_a_report(capsys: pytest.CaptureFixtu
 
 def test_the_exit_code_of_a_command_is_kept() -> None:
     assert outcome(typer.Exit(4)) == 4
-
-
-@pytest.mark.parametrize("words", [["explain", "vessel"], ["schema"], ["--help"]])
-def test_a_closed_pipe_ends_quietly(words: list[str]) -> None:
-    reading, writing = os.pipe()
-    os.close(reading)
-    process = podusv_process(*words, stdout=writing)
-    os.close(writing)
-    assert process.stderr == ""
-    assert process.returncode != 0
 
 
 def test_a_name_that_is_no_text_is_shown_escaped(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from pydantic import BaseModel, ValidationError
 
 from podusv_cli.controllers.base import Controller
 from podusv_cli.core import registry
-from podusv_cli.core.component import Component, unit_of
+from podusv_cli.core.component import Component
 from podusv_cli.core.kernel import Vector, bundle, is_kernel
 from podusv_cli.engine.simulate import names
 from podusv_cli.paths.base import TARGET
@@ -115,19 +115,6 @@ def test_the_kernels_are_marked_for_the_compiler(room: str, kind: type[Component
     component = example(kind)
     if isinstance(component, Controller) and component.sample_period() > 0:
         assert is_kernel(component.sample)
-
-
-@every_kind
-def test_documentation_is_complete(room: str, kind: type[Component]) -> None:
-    for part in parts(kind):
-        assert part.__doc__
-        assert part.__doc__ != Component.__doc__
-        assert "__doc__" in vars(part)
-        for name, field in part.model_fields.items():
-            if name != "kind":
-                assert field.description, f"{part.__name__}.{name} says nothing"
-                assert isinstance((field.json_schema_extra or {}).get("unit"), str), name
-                assert unit_of(field) == unit_of(field).strip()
 
 
 @every_kind

@@ -10,9 +10,8 @@ from conftest import Constant, corrected, run
 
 from podusv_cli.controllers.base import Slots
 from podusv_cli.controllers.pid import Pid
-from podusv_cli.core.errors import LawError
 from podusv_cli.core.kernel import Vector, kernel
-from podusv_cli.core.signal import Signal, by_name
+from podusv_cli.core.signal import Signal
 from podusv_cli.engine.check import check_law
 
 E_CT = Signal("e_ct", "m", "cross-track error")
@@ -68,50 +67,3 @@ def test_z_e_is_the_distance_to_the_target_whatever_the_law() -> None:
         out = run(corrected(controller=law), 0.5, hold_every=5)
         x_e, y_e = out["x_d"] - out["x"], out["y_d"] - out["y"]
         np.testing.assert_array_equal(out["z_e"], np.sqrt(x_e * x_e + y_e * y_e))
-
-
-class Clashing(CrossTrack):
-    """A law that calls something else z_e."""
-
-    kind: Literal["clashing"] = "clashing"  # type: ignore[assignment]
-    signals: ClassVar[tuple[Signal, ...]] = (Signal("z_e", "m", "distance less the standoff"),)
-
-
-def test_two_parts_with_one_name_are_refused_with_a_sentence() -> None:
-    words = r"law clashing logs 'z_e', distance less the standoff \[m\], and the closed loop logs"
-    for deed in (check_law, lambda loop: run(loop, 0.1)):
-        with pytest.raises(LawError, match=words):
-            deed(corrected(controller=Clashing()))
-    assert by_name([("pods", (MODES, MODES))]) == {"modes": MODES}
-
-
-class Unnamed(CrossTrack):
-    """A law with a bare name for its memory."""
-
-    kind: Literal["unnamed"] = "unnamed"  # type: ignore[assignment]
-
-    def slots(self) -> Slots:
-        return (("modes", 3),)  # type: ignore[return-value]
-
-
-def test_a_bare_name_is_no_signal() -> None:
-    with pytest.raises(LawError, match="it declares 'modes', which is no Signal"):
-        check_law(corrected(controller=Unnamed()))
-
-
-class Shapeless(CrossTrack):
-    """A law with two parts of other lengths along one axis, or a part without any."""
-
-    kind: Literal["shapeless"] = "shapeless"  # type: ignore[assignment]
-    axes: Literal["none", "one"] = "one"
-
-    def slots(self) -> Slots:
-        named = ("mode",) if self.axes == "one" else ()
-        return ((MODES, 3), (Signal("more", "1", "more modes", axes=named), 2))
-
-
-def test_arrays_that_no_log_can_hold_are_refused_before_the_run() -> None:
-    with pytest.raises(LawError, match="more: it has 2 values along 'mode', and modes has 3"):
-        check_law(corrected(controller=Shapeless()))
-    with pytest.raises(LawError, match=r"more: its values have the shape \(2,\)"):
-        check_law(corrected(controller=Shapeless(axes="none")))

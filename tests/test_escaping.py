@@ -150,7 +150,7 @@ def made(podusv: Command, names: tuple[str, str]) -> tuple[str, str]:
 def test_no_command_lets_a_folders_name_through(podusv: Command) -> None:
     one, other = made(podusv, (f"=a{COLOUR}\n{TURNED}", f"-b\x9b{TURNED}"))
     for words in (
-        ("compare", "--out", "x", one, f"./{other}"),
+        ("compare", "--figure", "errors", "--out", "x", one, f"./{other}"),
         ("compare", "--json", "--no-figures", "--out", "y", one, f"./{other}"),
         ("rerun", one),
         ("rerun", one, "--out", f"again{COLOUR}"),
@@ -158,12 +158,12 @@ def test_no_command_lets_a_folders_name_through(podusv: Command) -> None:
         ("diff", one, "x"),
         ("diff", "--json", one, f"./{other}"),
         ("run", "a.yaml", f"--out={one}"),
-        ("run", "--json", "a.yaml", f"--out=c{COLOUR}"),
+        ("run", "--json", "--no-figures", "a.yaml", f"--out=c{COLOUR}"),
         ("run", f"{COLOUR}\n.yaml"),
         ("validate", f"{COLOUR}\n.yaml"),
         ("verify", f"{COLOUR}\n.yaml"),
         ("verify", one),
-        ("plot", one, "--out", "x"),
+        ("plot", one, "--figure", "errors", "--out", "x"),
     ):
         said = podusv(*words)
         assert said.code in (0, 2, 3, 5), said

@@ -191,13 +191,6 @@ def test_away_from_limits_the_loop_is_of_fourth_order() -> None:
     assert order(ends) == pytest.approx(4.0, abs=0.2)
 
 
-def test_machine_code_does_what_python_does() -> None:
-    loop = corrected(actuator=pods(*TWIN, horizon=0.5), start=SMOOTH_START)
-    one, other = (run(loop, 0.3, compiled=compiled) for compiled in (True, False))
-    for name in one.signals:
-        np.testing.assert_allclose(one[name], other[name], rtol=1e-7, atol=1e-9, err_msg=name)
-
-
 def test_a_demand_out_of_reach_is_an_event_and_no_accident() -> None:
     for actuator in (pods(), pods(*TWIN)):
         loop = adrift(actuator=actuator, controller=Constant(surge=1e9, yaw=-1e12))

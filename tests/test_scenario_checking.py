@@ -75,6 +75,7 @@ def test_a_wrong_value_is_one_sentence_at_its_place(text: str, says: str) -> Non
             "metrics: {steady_fraction: 2}",
             "28: metrics.steady_fraction: must be a number above 0 and not above 1, found 2",
         ),
+        ("start: {<<: {x: 1}}", "9: start.<<: unknown key (allowed: x, y, psi, u, v, r)"),
         ("start: 3", "8: start: must be a mapping of keys: x, y, psi, u, v, r, found 3"),
         (
             "name: a b",

@@ -4,23 +4,12 @@ from __future__ import annotations
 
 import pytest
 from counting import counted
-from scenario_samples import SOUND, findings, loaded, told
+from scenario_samples import SOUND, loaded, told
 
 from podusv_cli.controllers.pid import Pid
 from podusv_cli.core.errors import ScenarioError
 from podusv_cli.scenario.load import load_text, values
 from podusv_cli.scenario.model import Scenario
-
-
-@pytest.mark.parametrize(
-    ("name", "says"),
-    [
-        ("nope.yaml", "nope.yaml: cannot be read: no such file or directory"),
-        (".", ".: cannot be read: is a directory"),
-    ],
-)
-def test_a_file_that_cannot_be_read_is_a_finding(name: str, says: str) -> None:
-    assert findings(name) == [says]
 
 
 def test_every_value_has_an_origin() -> None:

@@ -9,7 +9,7 @@ import yaml
 from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
-from scenario_samples import SOUND, loaded, told
+from scenario_samples import SOUND, loaded
 
 from podusv_cli.core.component import Component
 from podusv_cli.scenario.keys import limits, members, sections
@@ -173,24 +173,3 @@ def test_values_are_all_leaves_by_their_dotted_keys() -> None:
     assert found["path.kind"] == "line"
     assert found["controllers"] == {}
     assert not any(content for content in found.values() if isinstance(content, dict))
-
-
-ODDITIES = [
-    *("1e999", "9" * 400, ".nan", "~", "no", "017", "1:30", "*a", "&a x", "!!python/object:x y"),
-    *("[", "{", "]", "- 1", "? x", "|", ">", "'", "@", "%", "\t", "a: b", "---", "...", "\x00"),
-    *("{kind: pid}", "{kind: [1]}", "{kind: waypoints, file: a.csv}", "{preset: {a: 1}}"),
-    *("[[1, 2], [3]]", "<<: {a: 1}", "{? [a] : 1}", '"\\U99999999"', '"\\ud800"'),
-]
-
-
-@settings(max_examples=100, deadline=None)
-@given(st.data())
-def test_whatever_is_done_to_a_file_ends_in_a_scenario_or_in_findings(data: st.DataObject) -> None:
-    lines = resolved_yaml(loaded(SOUND).scenario).splitlines()
-    for _ in range(data.draw(st.integers(1, 3))):
-        at = data.draw(st.integers(0, len(lines) - 1))
-        before = data.draw(
-            st.sampled_from([lines[at].partition(":")[0] + ": ", lines[at], "", " "])
-        )
-        lines[at] = before + data.draw(st.sampled_from(ODDITIES) | TEXT)
-    assert all(line.isprintable() for line in told("\n".join(lines)))

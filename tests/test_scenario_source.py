@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import pytest
 
@@ -86,6 +87,7 @@ def test_every_key_and_value_knows_its_line_and_column() -> None:
         ('a: "\\0"\n', "a.yaml:1:4: a: character U+0000 cannot stand in text"),
         ('a: "\\ud800"\n', "a.yaml:1:4: a: character U+D800 cannot stand in text"),
         ('a: "\\U99999999"\n', "a.yaml:1:2: what follows is not valid YAML"),
+        ("%YAML 1.1.1.1\n", "a.yaml:1:10: not valid YAML: expected a digit or ' ', but found '.'"),
         ("%YAML " + "9" * 5000 + ".1\n---\na: 1\n", "a.yaml:1:1: what follows is not valid YAML"),
         ("a:\n\tb: 1\n", "a.yaml:2:1: a tab; use spaces"),
         ("a: 1\t# x\n", "a.yaml:1:5: a tab; use spaces"),
@@ -123,6 +125,13 @@ def test_all_faults_are_told_together_up_to_where_reading_stops() -> None:
 def test_nesting_stops_at_the_limit_whatever_its_depth(opening: str) -> None:
     told = faults_of(opening * 30_000)
     assert [line.partition(": ")[2] for line in told] == [f"nested deeper than {MAX_DEPTH} levels"]
+
+
+def test_aliases_of_aliases_do_not_grow() -> None:
+    bomb = "".join(f"{c}: &{c} [{', '.join([f'*{b}'] * 9)}]\n" for b, c in pairwise("abcdefghi"))
+    told = faults_of("a: &a [x]\n" + bomb)
+    assert told[2] == "a.yaml:2:8: b[0]: alias *a; write the value out, or use extends"
+    assert len(told) == 1 + 8 * (1 + 9)
 
 
 def test_values_are_counted() -> None:

@@ -5,13 +5,10 @@ from __future__ import annotations
 import errno
 import os
 import re
-import subprocess
 from pathlib import Path
 
 import pytest
 from storage_samples import (
-    ENVIRONMENT,
-    PYTHON,
     Deed,
     Saboteur,
     durable_steps,
@@ -148,23 +145,3 @@ def test_create_never_touches_a_file_that_is_there(path: Path) -> None:
     with pytest.raises(StorageError, match="exists"):
         atomic.create(path, NEW)
     assert path.read_bytes() == OLD
-
-
-def test_past_the_file_size_limit_nothing_is_lost(path: Path) -> None:
-    # In a process of its own: the limit cannot be raised again.
-    code = (
-        "import resource, sys; from pathlib import Path\n"
-        "from podusv_cli.core.errors import StorageError\n"
-        "from podusv_cli.storage import files as atomic\n"
-        "resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))\n"
-        "try: atomic.write_bytes(Path(sys.argv[1]), b'n' * 6000)\n"
-        "except StorageError as error: sys.exit(str(error))\n"
-    )
-    done = subprocess.run(
-        [PYTHON, "-c", code, str(path)], env=ENVIRONMENT, capture_output=True, text=True, timeout=60
-    )
-    expected = (
-        f"cannot write {path} (6000 bytes): larger than the file size limit of this session\n"
-    )
-    assert (done.returncode, done.stderr) == (1, expected)
-    assert files(path.parent) == {path.name: OLD}

@@ -16,7 +16,6 @@ from podusv_cli.core.errors import StorageError
 from podusv_cli.core.recording import Recording
 from podusv_cli.storage import log_reader
 
-TINY = recording(rows=20, nodes=4)
 WORDS = ("units", "long_name", "symbol", "axes", "wrapped")  # attributes of a variable
 
 
@@ -70,35 +69,6 @@ def test_the_order_of_signals_is_kept(path: Path) -> None:
 def test_the_scenario_comes_back_whatever_its_length(path: Path, text: str) -> None:
     path.write_bytes(log(resolved_yaml=text))
     assert log_reader.resolved_yaml(path) == text
-
-
-def outcome(path: Path, content: bytes) -> str:
-    """'refused' or 'read'; an altered number is for the manifest to tell."""
-    path.write_bytes(content)
-    try:
-        log_reader.read_log(path)
-        log_reader.resolved_yaml(path)
-    except StorageError:
-        return "refused"
-    return "read"
-
-
-def test_truncated_logs_are_refused(path: Path) -> None:
-    content = log(TINY)
-    for length in [*range(0, 400, 7), *range(400, len(content), 211), len(content) - 1]:
-        assert outcome(path, content[:length]) == "refused", length
-
-
-def test_a_flipped_bit_or_a_burst_of_rubbish_ends_nothing(path: Path) -> None:
-    content, random = log(TINY), np.random.default_rng(17)
-    outcomes = set()
-    for size in [0] * 500 + [64] * 150:
-        damaged = bytearray(content)
-        start = int(random.integers(len(content) - 64))
-        damaged[start : start + size] = random.bytes(size)
-        damaged[start] ^= 1 << int(random.integers(8))
-        outcomes.add(outcome(path, bytes(damaged)))
-    assert outcomes == {"refused", "read"}
 
 
 PACKED = {"compression": "gzip", "shuffle": True, "fletcher32": True}

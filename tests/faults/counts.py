@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import pytest
 
+T = TypeVar("T")
 
-def count(few: int, full: int) -> int:
+
+def count(few: T, full: T) -> T:
     """`full` where the environment variable PODUSV_FAULTS is `full`, else `few`."""
     return full if os.environ.get("PODUSV_FAULTS") == "full" else few
 

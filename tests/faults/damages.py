@@ -229,7 +229,7 @@ def _giant(file: h5py.File, pipe: Path) -> None:
 
 
 HDF5: dict[str, Callable[[h5py.File, Path], object]] = {
-    "bomb": _bomb(2**30), "no_numbers": _replaced("u", shape=(11,), dtype="<f8"),
+    "bomb": _bomb(2**29), "no_numbers": _replaced("u", shape=(11,), dtype="<f8"),
     "giant": _giant,
     "declared": _replaced("u", shape=(2**47,), dtype="<f8", chunks=(2**17,), **PACKED),
     "wide_chunk": _replaced("u", shape=(11,), dtype="<f8", chunks=(2**28,), maxshape=(None,)),

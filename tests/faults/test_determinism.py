@@ -24,9 +24,12 @@ from scenario_samples import SOUND
 from podusv_cli.actuators.saturated import Saturated
 from podusv_cli.comparison.log_difference import compare
 from podusv_cli.comparison.run_difference import CLOCKED
+from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
+from podusv_cli.controllers.backstepping import Backstepping
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import ClosedLoop, simulate
 from podusv_cli.metrics.table import observer
+from podusv_cli.paths.line_circle import LineCircle
 from podusv_cli.process.workers import run_all
 from podusv_cli.scenario.load import load, load_text
 from podusv_cli.storage.files import fingerprint
@@ -38,10 +41,16 @@ CORRECTED = str(ROOT / "configs/paper/corrected.yaml")
 INTEL = pytest.mark.skipif(
     platform.machine() not in ("x86_64", "AMD64"), reason="names instruction sets of x86"
 )
-PARTS = [(room, name) for room in ROOMS for name in kinds(room)]
-ROLES = {
-    "paths": "path", "disturbances": "disturbance", "actuators": "actuator",
-    "controllers": "controller",
+ASTERN = (9.0, -9.0, -2.0, 0.3, 0.1, 0.0)
+PARTS: dict[str, dict[str, Any]] = {
+    **{
+        f"{room[:-1]} {name}": {room[:-1]: example(kind)}
+        for room in ROOMS for name, kind in kinds(room).items()
+    },
+    "difference": {"controller": AdaptiveNeural(rate="difference", B_u=5.0)},
+    "held direction": {"controller": AdaptiveNeural(hold_below=20.0)},
+    "folded": {"controller": Backstepping(fold="printed"), "start": ASTERN},
+    "literal path": {"path": LineCircle(switch=0.05, reading="literal")},
 }  # fmt: skip
 
 # Runs a scenario as if on another processor and leaves its log. Arguments: the scenario, the
@@ -82,22 +91,23 @@ def repeatable(folder: Path) -> dict[str, Any]:
 # --- compiled or not
 
 
-def both(loop: ClosedLoop) -> tuple[Any, Any]:
+def both(loop: ClosedLoop, hold_every: int) -> tuple[Any, Any]:
     """The loop's recording from machine code and from plain Python."""
-    grid = TimeGrid(0.01, 150)
+    grid = TimeGrid(0.002, 150, hold_every=hold_every)
     seeing = observer(loop, grid, steady_fraction=0.25, settling_radius=2.0)
     one, other = (simulate(loop, grid, observer=seeing, compiled=c) for c in (True, False))
     return one, other
 
 
-@pytest.mark.parametrize(("room", "name"), PARTS, ids=[f"{r}-{n}" for r, n in PARTS])
-def test_machine_code_and_plain_python_agree_to_the_last_bit(room: str, name: str) -> None:
-    part = example(kinds(room)[name])
-    loop = corrected(**{"actuator": Saturated(), ROLES[room]: part})
-    compiled, plain = both(loop)
-    found = compare(compiled, plain)
-    assert found.same, found.first
-    assert compiled.seen.tobytes() == plain.seen.tobytes()
+@pytest.mark.parametrize("part", PARTS)
+def test_machine_code_and_plain_python_agree_to_the_last_bit(part: str) -> None:
+    loop = corrected(**{"actuator": Saturated(), **PARTS[part]})
+    for hold_every in (0, 5):
+        compiled, plain = both(loop, hold_every)
+        assert compiled.status == "finished"
+        found = compare(compiled, plain)
+        assert found.same, found.first
+        assert compiled.seen.tobytes() == plain.seen.tobytes()
 
 
 # --- again, elsewhere, beside others

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from children import in_a_child, needs_mount, small_disk
 from command_samples import BASE, ROOT, Command, Said, one_line, write
-from counts import count
+from counts import count, few
 from old_results import (
     COMMANDS,
     SUCCESS,
@@ -32,9 +32,8 @@ from podusv_cli.storage import manifest
 FULL = Path("/dev/full")
 needs_full = pytest.mark.skipif(not FULL.exists(), reason="there is no /dev/full")
 WRITING = [(made, words) for made, words in COMMANDS if made]
-LIMITS = [(made, words, limit) for made, words in WRITING for limit in (1000, 0)[: count(1, 2)]]
-# The log alone is larger than this, and what compares the runs is not.
-LIMITS += [(made, words, 40_000) for made, words in WRITING if words[0] not in ("plot", "verify")]
+# The log alone is larger than the last of these, and what compares the runs is not.
+LIMITS = [1000, 0, 40_000][:: count(2, 1)]
 
 
 @pytest.fixture
@@ -42,10 +41,13 @@ def podusv(beside_old_results: Command) -> Command:
     return beside_old_results
 
 
-@pytest.mark.parametrize(("made", "words", "limit"), LIMITS, ids=str)
+@pytest.mark.parametrize("limit", LIMITS)
+@pytest.mark.parametrize(("made", "words"), few(WRITING), ids=str)
 def test_past_the_file_size_limit(
     podusv: Command, made: str, words: tuple[str, ...], limit: int
 ) -> None:
+    if limit > 1000 and words[0] in ("plot", "verify"):
+        pytest.skip("what it writes is smaller than the limit")
     old = files(Path())
 
     def limited() -> Said:
@@ -64,7 +66,7 @@ def test_past_the_file_size_limit(
 
 @needs_mount
 @pytest.mark.parametrize("free", [150_000, 4096][: count(1, 2)])
-@pytest.mark.parametrize(("made", "words"), WRITING, ids=str)
+@pytest.mark.parametrize(("made", "words"), few(WRITING), ids=str)
 def test_on_a_full_disk(
     podusv: Command, before: Path, made: str, words: tuple[str, ...], free: int
 ) -> None:
@@ -113,7 +115,7 @@ def test_a_full_disk_for_compiled_code_costs_time_and_nothing_else(
 
 
 @needs_full
-@pytest.mark.parametrize(("made", "words"), COMMANDS, ids=str)
+@pytest.mark.parametrize(("made", "words"), few(COMMANDS), ids=str)
 def test_stdout_that_takes_nothing(podusv: Command, made: str, words: tuple[str, ...]) -> None:
     """What is made is made all the same."""
     old = files(Path())

@@ -17,6 +17,7 @@ import pytest
 from command_samples import (
     BASE,
     LONG,
+    MOSTLY_SIGINT,
     PATIENCE,
     ROOT,
     SIGNALS,
@@ -31,7 +32,7 @@ from command_samples import (
 from podusv_cli.storage import manifest
 from podusv_cli.storage.run_folder import open_run
 
-INTERRUPTS = pytest.mark.parametrize(("number", "code"), SIGNALS)
+INTERRUPTS = pytest.mark.parametrize(("number", "code"), MOSTLY_SIGINT)
 SLOW_MODULE = """
 import time
 open("imported", "w").close()
@@ -85,10 +86,12 @@ def ended(process: object, number: signal.Signals, times: int = 1) -> tuple[int,
     return (code if code >= 0 else 128 - code), out, err
 
 
-@INTERRUPTS
-@pytest.mark.parametrize("module", ["typer", "numpy", "h5py", "pandas"])
+@pytest.mark.parametrize(
+    ("module", "number", "code"),
+    [("typer", *SIGNALS[1]), ("h5py", *SIGNALS[0]), ("pandas", *SIGNALS[1])],
+)
 def test_while_importing(folder: Path, module: str, number: signal.Signals, code: int) -> None:
-    """typer before there is a command, h5py by each worker, the others by the command."""
+    """typer before there is a command, h5py by each worker, pandas by the command."""
     says = {
         "typer": "", "h5py": "interrupted before any run finished; nothing was written\n",
     }.get(module, "interrupted\n")  # fmt: skip
@@ -99,21 +102,6 @@ def test_while_importing(folder: Path, module: str, number: signal.Signals, code
         wait_for("imported")
         assert ended(process, number) == (code, "", says)
     assert not Path("x").exists()
-
-
-@INTERRUPTS
-def test_in_the_compiled_loop(number: signal.Signals, code: int) -> None:
-    script = PATCHED.format(patches=MOVING.format(fraction=1e-4))  # beyond the first row
-    words = ("run", write("long.yaml", LONG), "--out", "x", "--no-figures")
-    with under_way(*words, script=script) as process:
-        wait_for("moved")
-        got, out, err = ended(process, number)
-    assert (got, out) == (code, "pid interrupted: x\n")
-    assert err.startswith("long.yaml: interrupted after t = ")
-    run = open_run(Path("x"))
-    assert (manifest.check(Path("x")).status, run.recording.status) == ("interrupted",) * 2
-    assert 0 < run.recording["time"][-1] < 2e5
-    assert not list(Path().glob(".x*"))
 
 
 def lose_the_terminal(*words: str, until: str) -> None:
@@ -164,33 +152,6 @@ def test_a_hangup_ends_it_but_not_under_nohup(ignored: bool, code: int) -> None:
         process.send_signal(signal.SIGHUP)
         assert process.wait(60) == code
     assert manifest.check(Path("x")).status == ("finished" if ignored else "interrupted")
-
-
-@INTERRUPTS
-def test_while_writing(number: signal.Signals, code: int) -> None:
-    patches = 'patch(execute, "_write", lambda old, *given: (time.sleep(1.0), old(*given)))'
-    script = PATCHED.format(patches=patches)
-    with under_way("run", write("a.yaml", BASE), "--out", "x", script=script) as process:
-        wait_for("reached")
-        got, out, err = ended(process, number)
-    assert (got, out) == (code, "pid interrupted: x\n")
-    assert err.startswith("a.yaml: interrupted after the simulation; log.h5 is complete")
-    assert open_run(Path("x")).recording.status == "finished"
-    assert not Path("x/figures").exists()
-
-
-@INTERRUPTS
-def test_while_a_run_is_drawn(number: signal.Signals, code: int) -> None:
-    patches = """
-interrupts.SAME_INTERRUPT = 600
-patch(execute, "_drawn", lambda old, *given: time.sleep(600))
-"""
-    script = PATCHED.format(patches=patches)
-    with under_way("run", write("a.yaml", BASE), "--out", "x", script=script) as process:
-        wait_for("reached")
-        got, out, _ = ended(process, number, times=3)  # in a row: one interrupt
-    assert (got, out) == (code, "pid interrupted: x\n")
-    assert manifest.check(Path("x")).status == "interrupted"
 
 
 @INTERRUPTS
