@@ -1,8 +1,7 @@
 """The folder where compiled code is kept: one that nobody but its user can write to.
 
 Whoever can write a piece of compiled code has it run by the next command. So the folder and all
-folders above it have to be safe from other users, and every file is opened through its folder, no
-link followed, and its owner asked of what was opened.
+folders above it have to be safe from other users.
 """
 
 from __future__ import annotations
@@ -12,27 +11,21 @@ import logging
 import os
 import pwd
 import re
+import shutil
 import stat
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
 from podusv_cli.core.escaping import visible
-from podusv_cli.process.temporary_names import (
-    is_temporary_name,
-    remove_abandoned_files,
-    temporary_name,
-)
+from podusv_cli.process.temporary_names import remove_abandoned_files, temporary_name
 
 KEPT = 8  # folders of this many other states of the source stay on disk
 DIGEST = re.compile(r"[0-9a-f]{16}")
-PIECE = re.compile(r"\w+\.code")
 # By this name and first line other programs know a cache; the second line says that it is ours.
 MARK = "CACHEDIR.TAG"
 MARKED = b"Signature: 8a477f597d28d172789f06886806bc55\n# Compiled code of podusv.\n"
-NEW = os.O_CREAT | os.O_EXCL | os.O_WRONLY
-OTHERS = stat.S_IWGRP | stat.S_IWOTH
 
 
 @cache
@@ -63,46 +56,14 @@ def _warn(text: str) -> None:
     logging.getLogger("podusv").warning("podusv: %s", visible(text))
 
 
-def read(path: Path) -> bytes:
-    """What a file of the folder holds. Raises OSError, also where others could have written it."""
-    with (
-        _opened(path.parent, os.O_DIRECTORY) as folder,
-        _opened(path.name, 0, folder) as file,
-        open(file, "rb", closefd=False) as stream,
-    ):
-        return stream.read()
-
-
 def write(path: Path, content: bytes) -> None:
-    """Make or replace a file of the folder; it is whole, whoever else writes or reads it now.
-
-    Raises OSError.
-    """
-    part = temporary_name()
-    with _opened(path.parent, os.O_DIRECTORY) as folder:
-        try:
-            with _opened(part, NEW, folder) as file, open(file, "wb", closefd=False) as stream:
-                stream.write(content)
-            os.replace(part, path.name, src_dir_fd=folder, dst_dir_fd=folder)
-        except BaseException:
-            with suppress(OSError):
-                os.unlink(part, dir_fd=folder)
-            raise
-
-
-@contextmanager
-def _opened(name: Path | str, flags: int, folder: int | None = None) -> Iterator[int]:
-    """A descriptor of a file or folder that is the user's own and no link."""
-    # Without O_NONBLOCK a pipe of that name would be waited for.
-    safe = os.O_NOFOLLOW | os.O_CLOEXEC | os.O_NONBLOCK
-    descriptor = os.open(name, flags | safe, 0o600, dir_fd=folder)
+    """Make or replace a file; it is whole, whoever else writes or reads it. Raises OSError."""
+    part = path.with_name(temporary_name())
     try:
-        found = os.fstat(descriptor)
-        _demand(found.st_uid == os.getuid(), f"another user owns {name}")
-        _demand(not found.st_mode & OTHERS, f"others can write to {name}")
-        yield descriptor
+        part.write_bytes(content)
+        part.replace(path)
     finally:
-        os.close(descriptor)
+        part.unlink(missing_ok=True)
 
 
 def _demand(true: bool, otherwise: str) -> None:
@@ -122,9 +83,9 @@ def _made(root: Path, name: str) -> Path:
     """The folder, there, safe, marked, and rid of what is old. Raises OSError."""
     _check(root)
     root.mkdir(parents=True, exist_ok=True, mode=0o700)
-    _check(root)  # somebody else may have made it just now
     folder = root / name
     folder.mkdir(exist_ok=True, mode=0o700)
+    _check(folder)  # and the root, which somebody else may have made just now
     if not _is_marked(folder):
         write(folder / MARK, MARKED)
     _forget_old(folder)
@@ -164,29 +125,13 @@ def _is_own_group(number: int) -> bool:
 
 def _is_marked(folder: Path) -> bool:
     with suppress(OSError):
-        return read(folder / MARK) == MARKED
+        return (folder / MARK).read_bytes() == MARKED
     return False
 
 
 def _forget_old(current: Path) -> None:
-    """Remove the folders that were used longest ago.
-
-    They may lie among other people's: what bears no mark of podusv, or holds anything else, stays.
-    """
+    """Remove the folders that were used longest ago, of those that bear the mark of podusv."""
     alike = [path for path in current.parent.iterdir() if DIGEST.fullmatch(path.name)]
     caches = [path for path in alike if path != current and _is_marked(path)]
     for old in sorted(caches, key=lambda path: -path.stat().st_mtime)[KEPT:]:
-        with suppress(OSError), _opened(old, os.O_DIRECTORY) as folder:
-            _remove(old, folder)
-
-
-def _remove(old: Path, folder: int) -> None:
-    names = [entry.name for entry in os.scandir(folder) if entry.is_file(follow_symlinks=False)]
-    own = [
-        name for name in names if name == MARK or PIECE.fullmatch(name) or is_temporary_name(name)
-    ]
-    if len(own) < len(os.listdir(folder)):
-        return
-    for name in own:
-        os.unlink(name, dir_fd=folder)
-    old.rmdir()
+        shutil.rmtree(old, ignore_errors=True)

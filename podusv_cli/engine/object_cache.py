@@ -71,7 +71,7 @@ def _loaded(prototype: Any, code: Code) -> Any:
 
 def _read(path: Path) -> Code | None:
     with suppress(OSError):
-        digest, _, rest = code_folder.read(path).partition(b"\n")
+        digest, _, rest = path.read_bytes().partition(b"\n")
         if _seal(path, rest) == digest:
             symbol, _, content = rest.partition(b"\n")
             return Code(symbol.decode(), content)

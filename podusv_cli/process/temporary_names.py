@@ -26,11 +26,6 @@ def temporary_name(final: str = "") -> str:
     return f"{shown}.podusv-{_machine()}-{os.getpid()}-{secrets.token_hex(4)}.part"
 
 
-def is_temporary_name(name: str) -> bool:
-    """Whether this is the name of an unfinished file or folder, of any process."""
-    return _PART.fullmatch(name) is not None
-
-
 def abandoned(folder: Path) -> Iterator[tuple[Path, str]]:
     """Unfinished files and folders of ended processes, and their final names ("" if unknown).
 
