@@ -7,9 +7,8 @@ from comparison_samples import FRAME, Folder, scenario, verdicts
 from matplotlib.mathtext import MathTextParser
 
 from podusv_cli.comparison import claims, table
-from podusv_cli.comparison.checks import CHECKS
 from podusv_cli.comparison.differences import as_text, differences
-from podusv_cli.comparison.entries import Absent, Entry
+from podusv_cli.comparison.entries import CHECKS, Absent, Entry
 from podusv_cli.metrics.table import METRICS
 
 # A key of every section that a run has besides its law, and another value.

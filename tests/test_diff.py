@@ -26,9 +26,8 @@ from rerun_samples import (
 from storage_samples import recording
 
 from podusv_cli.cli.difference_text import deviation_in_words
-from podusv_cli.comparison.bit_difference import Deviation, differing
-from podusv_cli.comparison.causes import scenario_changes, version_changes
-from podusv_cli.comparison.log_difference import compare
+from podusv_cli.comparison.log_difference import Deviation, compare, differing
+from podusv_cli.comparison.run_difference import scenario_changes, version_changes
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import Signal

@@ -17,10 +17,8 @@ from findings_samples import CONFIGS, PLAIN, log, scene
 
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.recording import Recording
-from podusv_cli.findings.after import postflight
-from podusv_cli.findings.finding import finding_kinds
-from podusv_cli.findings.preflight import merged, preflight
-from podusv_cli.findings.underactuation import argument, input_rank
+from podusv_cli.findings.finding import finding_kinds, merged, postflight, preflight
+from podusv_cli.findings.proof import argument, input_rank
 from podusv_cli.scenario.load import load
 from podusv_cli.scenario.model import Scenario
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from podusv_cli.findings.gains import conditions
+from podusv_cli.findings.proof import conditions
 from podusv_cli.scenario.load import load
 
 CONFIGS = Path(__file__).parent.parent / "configs/paper"

@@ -9,7 +9,7 @@ import pytest
 
 from podusv_cli.actuators.pod import Pods
 from podusv_cli.engine.simulate import simulate
-from podusv_cli.findings.preflight import preflight
+from podusv_cli.findings.finding import preflight
 from podusv_cli.scenario.load import load
 from podusv_cli.scenario.presets import preset_names, preset_text
 from podusv_cli.vessels.vessel import VESSELS

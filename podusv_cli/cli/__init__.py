@@ -55,7 +55,7 @@ def _show_version(wanted: bool) -> None:
 
 
 @app.callback()
-def options(
+def podusv(
     context: typer.Context,
     version: Annotated[
         bool,

@@ -10,25 +10,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from podusv_cli.cli import completion
+from podusv_cli.cli import completion, options
 from podusv_cli.cli.exit_codes import INTERRUPTED
-from podusv_cli.cli.options import (
-    AllowLarge,
-    AsJson,
-    Assignments,
-    Figures,
-    Force,
-    Out,
-    Plugins,
-    Quiet,
-    Verbose,
-)
 from podusv_cli.cli.run import TRACED
 from podusv_cli.cli.terminal import (
     Warnings,
     echo,
     echo_entry,
-    echo_path,
+    echo_result,
     echo_table,
     warn_of_differences,
 )
@@ -44,10 +33,10 @@ def compare(
         list[str],
         typer.Argument(metavar="CONFIG_OR_RUN...", help="Scenarios, run folders, comparisons."),
     ],
-    assign: Assignments = None,
-    out: Out = None,
-    force: Force = False,
-    figures: Figures = True,
+    assign: options.Assignments = None,
+    out: options.Out = None,
+    force: options.Force = False,
+    figures: options.Figures = True,
     figure: Annotated[
         list[str] | None,
         typer.Option(
@@ -60,11 +49,11 @@ def compare(
     jobs: Annotated[
         int, typer.Option(min=0, help="Processes at a time.", show_default="one a core")
     ] = 0,
-    as_json: AsJson = False,
-    allow_large: AllowLarge = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
-    plugin: Plugins = None,
+    as_json: options.AsJson = False,
+    allow_large: options.AllowLarge = False,
+    quiet: options.Quiet = False,
+    verbose: options.Verbose = False,
+    plugin: options.Plugins = None,
 ) -> None:
     """Simulate scenarios, and compare them with finished runs: table, claims, figures, report.
 
@@ -72,35 +61,23 @@ def compare(
     when a run failed or diverged; the others are compared all the same.
     """
     from podusv_cli.cli.progress import progress_bars
-    from podusv_cli.storage.json_files import encode
     from podusv_cli.workflows import compare as workflow  # heavy imports only when needed
     from podusv_cli.workflows.run import Request
 
     warned = Warnings(quiet)
     request = Request(
-        tuple(assign or ()),
-        out,
-        force,
-        figures,
-        tuple(sys.argv),
-        warned,
-        allow_large,
-        tuple(plugin or ()),
-        tuple(figure or ()),
-        tuple(name.strip() for name in form.split(",")),
-        jobs,
-    )
+        assign or (), out, force, figures, sys.argv, warned, allow_large, plugin or (),
+        figure or (), [name.strip() for name in form.split(",")], jobs,
+    )  # fmt: skip
     with progress_bars(wanted=not (quiet or as_json)) as progress:
         done = workflow.compare([Path(item) for item in items], request, progress)
-    if as_json:
-        typer.echo(encode(done.as_json()), nl=False)
-    elif quiet:
-        echo_path(done.folder)
-    else:
-        _report(done, verbose)
+    echo_result(done, lambda: _report(done, verbose), as_json=as_json, quiet=quiet)
     for finding in done.warnings():
         warned(finding)
-    _warn(done)
+    warn_of_differences(done.result.differences)
+    for label, ending in done.result.endings.items():
+        if ending:
+            echo(*f"{label}: {ending}".splitlines(), err=True)
     for part in done.missing:
         echo(f"{part}; {TRACED}", err=True)
     if done.status == "interrupted":
@@ -108,8 +85,9 @@ def compare(
         raise typer.Exit(INTERRUPTED)
     if done.result.entries and not quiet:
         echo(_advice(items, assign or ()), err=True)
-    if not (as_json or quiet):
-        _name_report(done.folder / "report.html")
+    page = done.folder / "report.html"
+    if page.exists() and not (as_json or quiet):
+        echo(f"report: {page}")
     raise typer.Exit(SOME_FAILED if any(done.result.endings.values()) else 0)
 
 
@@ -137,16 +115,3 @@ def _advice(items: Sequence[str], assign: Sequence[str]) -> str:
     changes = [word for change in assign for word in ("--set", change)]
     command = shlex.join(["podusv", "verify", scenario, *changes])
     return f"the numbers may not have converged; check them: {command}"
-
-
-def _name_report(page: Path) -> None:
-    """Print the report's path; without figures there is no report."""
-    if page.exists():
-        echo(f"report: {page}")
-
-
-def _warn(done: Compared) -> None:
-    warn_of_differences(done.result.differences)
-    for label, ending in done.result.endings.items():
-        if ending:
-            echo(*f"{label}: {ending}".splitlines(), err=True)

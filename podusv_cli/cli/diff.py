@@ -10,12 +10,11 @@ import typer
 
 from podusv_cli.cli.difference_text import DIFFERENT
 from podusv_cli.cli.options import AsJson
-from podusv_cli.cli.terminal import echo, echo_entry, echo_table
+from podusv_cli.cli.terminal import echo, echo_entry, echo_json, echo_table
 
 if TYPE_CHECKING:
-    from podusv_cli.comparison.causes import Change
     from podusv_cli.comparison.log_difference import LogDifference
-    from podusv_cli.comparison.run_difference import RunDifference
+    from podusv_cli.comparison.run_difference import Change, RunDifference
 
 
 def diff(
@@ -29,12 +28,11 @@ def diff(
     versions and the measured time of a law do not count. Of two comparisons, runs of the same name
     are compared.
     """
-    from podusv_cli.storage import json_files
     from podusv_cli.workflows import diff as workflow  # heavy imports only when they are needed
 
     found = workflow.diff(Path(one), Path(other))
     if as_json:
-        typer.echo(json_files.encode(found.as_json()).decode(), nl=False)
+        echo_json(found.as_json())
     else:
         for label, (_, _, difference) in found.pairs.items():
             _report(label, difference)
@@ -69,7 +67,7 @@ def _show_metrics(found: RunDifference) -> None:
 
     units = {name: metric.unit for name, metric in METRICS.items()}
     rows = [
-        [name, units.get(name, ""), _number(a), _number(b), _signed(relative(a, b))]
+        [name, units.get(name, ""), _number(a), _number(b), _number(relative(a, b), "+.2g")]
         for name, (a, b) in found.metrics.items()
         if a != b
     ]
@@ -81,7 +79,7 @@ def _show_log(log: LogDifference) -> None:
     from podusv_cli.cli.difference_text import log_in_words
 
     rows = [
-        [d.signal, d.unit, _number(d.gap), _number(d.relative_to_peak), _time(d.time)]
+        [d.signal, d.unit, _number(d.gap), _number(d.relative_to_peak), _number(d.time)]
         for d in log.largest
     ]
     if rows:
@@ -91,13 +89,5 @@ def _show_log(log: LogDifference) -> None:
         echo_entry("log", *lines)
 
 
-def _number(number: float | None) -> str:
-    return "-" if number is None else f"{number:.6g}"
-
-
-def _signed(number: float | None) -> str:
-    return "-" if number is None else f"{number:+.2g}"
-
-
-def _time(time: float | None) -> str:
-    return "-" if time is None else f"{time:.6g}"
+def _number(number: float | None, form: str = ".6g") -> str:
+    return "-" if number is None else f"{number:{form}}"

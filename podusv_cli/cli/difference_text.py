@@ -7,9 +7,8 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from podusv_cli.comparison.bit_difference import Deviation
-    from podusv_cli.comparison.causes import Change
-    from podusv_cli.comparison.log_difference import LogDifference
+    from podusv_cli.comparison.log_difference import Deviation, LogDifference
+    from podusv_cli.comparison.run_difference import Change
 
 DIFFERENT = 3  # exit code
 COUNTABLE = 1000  # ulps; beyond, only the relative difference says something

@@ -12,7 +12,7 @@ import typer
 from podusv_cli.cli.difference_text import DIFFERENT
 from podusv_cli.cli.exit_codes import INTERRUPTED
 from podusv_cli.cli.options import AllowLarge, AsJson, Force
-from podusv_cli.cli.terminal import echo, echo_entry
+from podusv_cli.cli.terminal import echo, echo_entry, echo_json
 
 if TYPE_CHECKING:
     from podusv_cli.workflows.rerun import Repeated, Repetition
@@ -41,9 +41,10 @@ def rerun(
     with progress_bars(wanted=not as_json) as progress:
         done = repeating.rerun(Path(run), request, progress)
     if as_json:
-        _print_json(done, out)
+        echo_json(done.as_json() | {"folder": out and str(out)})
     else:
-        _report(done)
+        for label, repeated in done.runs.items():
+            echo_entry(label, *_lines(repeated), facts=_verdict(repeated))
         if out:
             echo(f"repeated: {out}")
     for label, repeated in done.runs.items():
@@ -62,22 +63,6 @@ def _exit_code(done: Repetition) -> int:
     if done.diverges:
         return DIVERGED
     return 0 if done.identical else DIFFERENT
-
-
-def _print_json(done: Repetition, folder: Path | None) -> None:
-    from podusv_cli.storage import json_files
-
-    runs = [{"label": label, **run.as_json()} for label, run in done.runs.items()]
-    content = {
-        "format": 1, "identical": done.identical, "folder": folder and str(folder),
-        "runs": runs, "failed": done.failures,
-    }  # fmt: skip
-    typer.echo(json_files.encode(content).decode(), nl=False)
-
-
-def _report(done: Repetition) -> None:
-    for label, run in done.runs.items():
-        echo_entry(label, *_lines(run), facts=_verdict(run))
 
 
 def _verdict(run: Repeated) -> str:

@@ -9,19 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from podusv_cli.cli.options import (
-    AllowLarge,
-    AsJson,
-    Assignments,
-    Config,
-    Figures,
-    Force,
-    Out,
-    Plugins,
-    Quiet,
-    Verbose,
-)
-from podusv_cli.cli.terminal import Warnings, echo, echo_path
+from podusv_cli.cli import options
+from podusv_cli.cli.terminal import Warnings, echo, echo_result
 
 if TYPE_CHECKING:
     from podusv_cli.workflows.execute import Finished
@@ -31,16 +20,16 @@ EXIT_CODES = {"finished": 0, "diverged": 4, "interrupted": 130}
 
 
 def run(
-    config: Config,
-    assign: Assignments = None,
-    out: Out = None,
-    force: Force = False,
-    figures: Figures = True,
-    as_json: AsJson = False,
-    allow_large: AllowLarge = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
-    plugin: Plugins = None,
+    config: options.Config,
+    assign: options.Assignments = None,
+    out: options.Out = None,
+    force: options.Force = False,
+    figures: options.Figures = True,
+    as_json: options.AsJson = False,
+    allow_large: options.AllowLarge = False,
+    quiet: options.Quiet = False,
+    verbose: options.Verbose = False,
+    plugin: options.Plugins = None,
     controller: Annotated[
         str, typer.Option(metavar="NAME", help="Which of `controllers` to run.", show_default=False)
     ] = "",
@@ -50,29 +39,16 @@ def run(
     Draws trajectory, errors and controls; `podusv plot RUN` draws all that the run has signals for.
     """
     from podusv_cli.cli.progress import progress_bar
-    from podusv_cli.storage.json_files import encode
     from podusv_cli.workflows import run as workflow  # heavy imports only when they are needed
 
     warned = Warnings(quiet)
     request = workflow.Request(
-        tuple(assign or ()),
-        out,
-        force,
-        figures,
-        tuple(sys.argv),
-        warned,
-        allow_large,
-        tuple(plugin or ()),
+        assign or (), out, force, figures, sys.argv, warned, allow_large, plugin or (),
         controller=controller,
-    )
+    )  # fmt: skip
     with progress_bar(str(config), wanted=not (quiet or as_json)) as progress:
         done = workflow.run(Path(config), request, progress)
-    if as_json:
-        typer.echo(encode(done.as_json()), nl=False)
-    elif quiet:
-        echo_path(done.folder)
-    else:
-        _report(done, verbose)
+    echo_result(done, lambda: _report(done, verbose), as_json=as_json, quiet=quiet)
     for finding in done.warnings:
         warned(finding)
     if done.message:

@@ -6,7 +6,7 @@ import os
 import shutil
 import sys
 import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -33,6 +33,23 @@ def echo_path(path: Path) -> None:
     """A path alone, for scripts; byte for byte in a pipe, as `ls` does it."""
     shown = visible(path).encode() if sys.stdout.isatty() else os.fsencode(path)
     typer.echo(shown + b"\n", nl=False)
+
+
+def echo_json(content: Mapping[str, Any]) -> None:
+    """One JSON object."""
+    from podusv_cli.storage.json_files import encode
+
+    typer.echo(encode(content), nl=False)
+
+
+def echo_result(done: Any, report: Callable[[], None], *, as_json: bool, quiet: bool) -> None:
+    """What a command is asked to print of its result: JSON, its folder's path, or a report."""
+    if as_json:
+        echo_json(done.as_json())
+    elif quiet:
+        echo_path(done.folder)
+    else:
+        report()
 
 
 def echo_entry(name: str, *lines: str, facts: str = "") -> None:

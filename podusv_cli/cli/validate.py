@@ -32,8 +32,7 @@ def validate(
     Exit code 0, with a line for each finding; or 2 with a line for each fault.
     """
     from podusv_cli.comparison.claims import parse_claims
-    from podusv_cli.findings.finding import not_silenced, unknown_codes
-    from podusv_cli.findings.preflight import preflight
+    from podusv_cli.findings.finding import preflight, unknown_codes
     from podusv_cli.scenario.limits import largest, limits
     from podusv_cli.scenario.load import load
 
@@ -44,15 +43,14 @@ def validate(
     laws, steps = ", ".join(scenario.labels()), scenario.time_grid().steps
     echo(f"{config}: ok ({scenario.name}, {laws}, {steps} steps)")
     echo(f"a run takes {largest(scenario)}")
-    for finding in not_silenced(preflight(scenario), scenario):
+    for finding in preflight(scenario):
         echo(str(finding))
     if verbose:
         _explain(loaded)
 
 
 def _explain(loaded: Loaded) -> None:
-    from podusv_cli.findings.gains import conditions
-    from podusv_cli.findings.underactuation import argument
+    from podusv_cli.findings.proof import argument, conditions
     from podusv_cli.scenario.load import values
     from podusv_cli.scenario.phrases import as_yaml
 

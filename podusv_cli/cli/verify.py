@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from podusv_cli.cli.options import AsJson, Assignments, Config, Plugins
-from podusv_cli.cli.terminal import echo, echo_entry, echo_table
+from podusv_cli.cli.terminal import echo, echo_entry, echo_json, echo_table
 
 if TYPE_CHECKING:
     from podusv_cli.verification.ranking import Ranking
@@ -43,20 +43,14 @@ def verify(
     Exit code 3 when something is not converged.
     """
     from podusv_cli.cli.progress import progress_bars
-    from podusv_cli.storage.json_files import encode
     from podusv_cli.workflows import verify as verifying  # heavy imports only when they are needed
 
     with progress_bars(wanted=not (quiet or as_json)) as progress:
         try:
             done = verifying.verify(
-                Path(config),
-                assign or (),
-                tolerance,
-                out,
-                progress,
-                force=force,
+                Path(config), assign or (), tolerance, out, progress, force=force,
                 plugins=plugin or (),
-            )
+            )  # fmt: skip
         except KeyboardInterrupt:
             text = f"{config}: interrupted before all steps were simulated; nothing was written"
             raise KeyboardInterrupt(text) from None
@@ -65,7 +59,7 @@ def verify(
             verifying.keep(done, out, force=force)
     finally:  # print the result even if the file cannot be written
         if as_json:
-            typer.echo(encode(done.as_json()), nl=False)
+            echo_json(done.as_json())
         elif not quiet:
             _report(done)
     raise typer.Exit(NOT_CONVERGED if done.unconverged else 0)

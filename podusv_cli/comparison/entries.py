@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
-from podusv_cli.comparison.checks import CHECKS
 from podusv_cli.core.kernel import Vector
-from podusv_cli.core.recording import Recording
+from podusv_cli.core.recording import Recording, Status
+from podusv_cli.findings.proof import input_rank
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import metrics_with
 from podusv_cli.scenario.model import Scenario
@@ -19,6 +19,16 @@ from podusv_cli.storage.run_folder import Run
 from podusv_cli.theory import derived
 
 UNKNOWN = "a metric of a plug-in that is not here; its unit is in the run's metrics.csv"
+# What claims can check of a run. Arguments: the scenario, and how its run ended (None without a
+# log). None means unknown.
+CHECKS: dict[str, Callable[[Scenario, Status | None], bool | None]] = {
+    "finished": lambda scenario, status: (
+        status == "finished" if status in ("finished", "diverged") else None
+    ),
+    "underactuated": lambda scenario, status: (
+        None if scenario.actuator.is_recorded else input_rank(scenario.actuator) < 3
+    ),
+}
 
 
 @dataclass(frozen=True)

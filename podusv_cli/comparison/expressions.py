@@ -22,8 +22,8 @@ from typing import NoReturn
 import numpy as np
 
 from podusv_cli.comparison import curves
-from podusv_cli.comparison.checks import CHECKS
 from podusv_cli.comparison.curves import REDUCERS, CannotTell, Curve, Quantity, Source
+from podusv_cli.comparison.entries import CHECKS
 from podusv_cli.comparison.tolerance import SIGNS
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.signal import Signal

@@ -12,7 +12,7 @@ import pandas as pd
 from podusv_cli.comparison import chase, claims, report, table
 from podusv_cli.comparison.entries import Entry
 from podusv_cli.core.finding import Finding
-from podusv_cli.findings.preflight import merged
+from podusv_cli.findings.finding import merged
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import CLOCKED, METRICS
 from podusv_cli.process.extras import Extras, Missing

@@ -1,9 +1,9 @@
-"""All kinds of findings, and the `Case` that those before a run are given."""
+"""All kinds of findings, what they say of a scenario and its run, and the `Case` they look at."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 
 import numpy as np
@@ -12,8 +12,8 @@ from podusv_cli.core import registry
 from podusv_cli.core.finding import Finding, FindingKind
 from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.core.plugins import Plugins
+from podusv_cli.core.recording import Recording
 from podusv_cli.findings.reference import Reference, reference
-from podusv_cli.paths.base import TARGET
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import unknown
 
@@ -45,9 +45,38 @@ def unknown_codes(scenario: Scenario) -> list[tuple[str, str]]:
     ]
 
 
-def not_silenced(findings: Iterable[Finding], scenario: Scenario) -> list[Finding]:
-    """The findings that the scenario does not silence."""
-    return [finding for finding in findings if finding.code not in scenario.silence]
+def preflight(scenario: Scenario) -> list[Finding]:
+    """The findings about a scenario before it runs, but those that it silences.
+
+    With `controllers` these are the findings for each law, merged.
+    """
+    if scenario.controllers:
+        return merged({name: preflight(one) for name, one in scenario.singles().items()})
+    return _findings("before", scenario, Case(scenario))
+
+
+def postflight(scenario: Scenario, log: Recording) -> list[Finding]:
+    """The findings about a run of this scenario, but those that it silences."""
+    return _findings("after", scenario, scenario, log) if len(log["time"]) else []
+
+
+def _findings(when: str, scenario: Scenario, *seen: object) -> list[Finding]:
+    known = finding_kinds(scenario.plugged).items()
+    kinds = [kind for code, kind in known if kind.when == when and code not in scenario.silence]
+    with np.errstate(all="ignore"):
+        return [found for kind in kinds for found in kind.findings(scenario.controller, *seen)]
+
+
+def merged(findings: Mapping[str, Sequence[Finding]]) -> list[Finding]:
+    """Findings of several runs (by label), each once, with its runs unless all runs have it."""
+    alike: dict[Finding, list[str]] = {}
+    for label, several in findings.items():
+        for finding in dict.fromkeys(several):
+            alike.setdefault(finding, []).append(label)
+    return [
+        replace(finding, runs=() if len(labels) == len(findings) else tuple(labels))
+        for finding, labels in alike.items()
+    ]
 
 
 @dataclass(frozen=True)
@@ -72,8 +101,7 @@ class Case:
         """The law's signals at t = 0; NaN where undefined, as on top of the target."""
         loop = self.scenario.closed_loop()
         law, memory = loop.controller, loop.first_memory()
-        x, target = np.array(loop.start), np.zeros(len(TARGET))
-        loop.path.evaluate(0.0, bundle(loop.path.constants()), loop.path.table(), target)
+        x, target = np.array(loop.start), loop.first_target()
         k, table = bundle(law.constants_with(loop.nominal)), law.table()
         signals, rate = np.zeros(len(law.signals)), np.zeros(len(memory))
         work = np.zeros(law.workspace())

@@ -18,9 +18,7 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.engine import batch
 from podusv_cli.engine.check import check_law
 from podusv_cli.engine.variants import variants
-from podusv_cli.findings.after import postflight
-from podusv_cli.findings.finding import not_silenced
-from podusv_cli.findings.preflight import preflight
+from podusv_cli.findings.finding import postflight, preflight
 from podusv_cli.interface.results import Comparison, Run
 from podusv_cli.interface.scenarios import Changes, Source, loaded
 from podusv_cli.metrics.table import observer
@@ -52,7 +50,7 @@ def simulate(source: Source, changes: Changes | None = None) -> Run:
     scenario = running.single(loaded(source, changes))
     recording = simulated(scenario, Stopwatch())
     whole, _ = monitored(scenario, recording)
-    found = not_silenced([*preflight(scenario), *postflight(scenario, whole)], scenario)
+    found = [*preflight(scenario), *postflight(scenario, whole)]
     warned = tuple(map(str, found))
     return Run(whole.controller, scenario, whole, summary(scenario, recording), warned)
 

@@ -18,7 +18,7 @@ from podusv_cli.comparison.entries import Absent, Entry, metrics_of
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.recording import Status
-from podusv_cli.findings.preflight import merged
+from podusv_cli.findings.finding import merged
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.table import CLOCKED
 from podusv_cli.process.extras import Extras, Missing

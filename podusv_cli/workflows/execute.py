@@ -20,8 +20,7 @@ from podusv_cli.core.finding import Finding
 from podusv_cli.core.recording import Allocate, Recording, Status
 from podusv_cli.engine.check import check_law
 from podusv_cli.engine.simulate import marcher, simulate
-from podusv_cli.findings.after import postflight
-from podusv_cli.findings.finding import not_silenced
+from podusv_cli.findings.finding import postflight
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.table import Metrics, metrics_with, observer
 from podusv_cli.process.extras import Extras, Missing
@@ -143,7 +142,7 @@ def execute(
         with watch.part("write"):
             whole = _logged(writer, task.scenario, whole, again=long)
         with watch.part("metrics"):
-            noticed = extras.made("warnings", lambda: _noticed(task.scenario, whole))
+            noticed = extras.made("warnings", lambda: postflight(task.scenario, whole))
         warnings = (*task.noticed, *(noticed or ()))
         with watch.part("write"):
             _write(writer, task, whole, metrics, warnings)
@@ -167,10 +166,6 @@ def execute(
         warnings=warnings, missing=tuple(extras.missing),
         units={name: m.unit for name, m in metrics_with(task.scenario.plugged).items()},
     )  # fmt: skip
-
-
-def _noticed(scenario: Scenario, recording: Recording) -> list[Finding]:
-    return not_silenced(postflight(scenario, recording), scenario)
 
 
 def unwritten(outcomes: Iterable[Outcome]) -> str:

@@ -9,8 +9,7 @@ from pathlib import Path
 
 from podusv_cli.comparison.claims import ParsedClaim, parse_claims
 from podusv_cli.core.errors import UsageError
-from podusv_cli.findings.finding import not_silenced, unknown_codes
-from podusv_cli.findings.preflight import preflight
+from podusv_cli.findings.finding import preflight, unknown_codes
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Loaded, load
 from podusv_cli.workflows.members import Member, comparable, distinct, numbered
@@ -74,7 +73,7 @@ def from_scenario(loaded: Loaded, *, alone: bool) -> Item:
     scenario, singles = loaded.scenario, loaded.scenario.singles()
     labels = list(singles) if alone or scenario.controllers else [scenario.name]
     members = [
-        Member(label, single, loaded.text, noticed=not_silenced(preflight(single), single))
+        Member(label, single, loaded.text, noticed=preflight(single))
         for label, single in zip(labels, singles.values(), strict=True)
     ]
     return Item(scenario.name, members, list(singles), parse_claims(loaded))

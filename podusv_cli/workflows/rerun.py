@@ -75,6 +75,12 @@ class Repetition:
         """Whether every run was repeated to the last bit."""
         return not self.failures and all(run.identical for run in self.runs.values())
 
+    def as_json(self) -> dict[str, Any]:
+        """What `--json` prints of them, but for the folder."""
+        runs = [{"label": label, **run.as_json()} for label, run in self.runs.items()]
+        failed = dict(self.failures)
+        return {"format": 1, "identical": self.identical, "runs": runs, "failed": failed}
+
     @property
     def interrupted(self) -> bool:
         """Whether the user ended it."""

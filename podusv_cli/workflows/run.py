@@ -8,8 +8,7 @@ from pathlib import Path
 
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.finding import Finding
-from podusv_cli.findings.finding import not_silenced, unknown_codes
-from podusv_cli.findings.preflight import preflight
+from podusv_cli.findings.finding import preflight, unknown_codes
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Loaded, load, resolved_yaml
 from podusv_cli.scenario.model import Scenario
@@ -58,7 +57,7 @@ def run_loaded(
         scenario = single(loaded, request.controller)
         target = request.out or default_folder(RESULTS, scenario.name, resolved_yaml(scenario))
     with watch.part("preflight"):
-        noticed = not_silenced(preflight(scenario), scenario)
+        noticed = preflight(scenario)
     for finding in noticed:
         request.warn(finding)
     task = Task(

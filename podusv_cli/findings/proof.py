@@ -1,11 +1,15 @@
-"""Whether a vessel is underactuated: its actuator cannot make all three loads independently."""
+"""What the paper's proof is about, in words, before any run: underactuation, and its gains."""
 
 from __future__ import annotations
+
+from collections.abc import Iterator
 
 import numpy as np
 
 from podusv_cli.actuators.base import Actuator
+from podusv_cli.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.scenario.model import Scenario
+from podusv_cli.theory.bounds import Condition, ultimate_bound
 
 
 def input_rank(actuator: Actuator) -> int:
@@ -32,3 +36,26 @@ def argument(scenario: Scenario) -> str:
         f"{kind} on {scenario.vessel.preset or 'the vessel'} is [{rows}], "
         f"rank {rank} of {len(matrix)}; {sway}"
     )
+
+
+def conditions(scenario: Scenario) -> Iterator[str]:
+    """A line for each law that the proof covers: lambda of (49), and which conditions fail."""
+    for label, single in scenario.singles().items():
+        law = single.controller.lyapunov()
+        if law is not None:
+            yield f"{label}, conditions of the stability proof: {_summary(law, single)}"
+
+
+def _summary(law: PolarBackstepping, scenario: Scenario) -> str:
+    bound = ultimate_bound(law, scenario.vessel)
+    failed = [_short(condition) for condition in bound.conditions if not condition.holds]
+    printed = [condition.name for condition in bound.conditions if not condition.holds_printed]
+    return (
+        f"{'; '.join(failed) or 'all hold'}; lambda at most {bound.corrected.lambda_:.3g} 1/s "
+        f"(as printed: {', '.join(printed) + ' fail' if printed else 'all hold'}, "
+        f"{bound.printed.lambda_:.3g} 1/s)"
+    )
+
+
+def _short(condition: Condition) -> str:
+    return f"{condition.name} = {condition.value:g} fails: it must exceed {condition.limit:.3g}"
