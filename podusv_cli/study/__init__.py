@@ -1,0 +1,1 @@
+"""Studies: thousands of drawn runs of several laws, judged with their uncertainty."""

@@ -1,0 +1,200 @@
+"""Statistics of a study: intervals that hold for any distribution, win rates, Holm's correction.
+
+Metrics are smaller-is-better. A failed run is +inf. NaN is a number that nobody knows: it may lie
+anywhere, so it widens an interval, and in an estimate it counts as the worst. All intervals are
+two-sided: each side misses with a probability of at most (1 - level) / 2. Functions work along the
+last axis. docs/study_claims.md gives the sources.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from math import inf
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from podusv_cli.core.kernel import Vector
+
+MOST = 1_000_000_000  # draws; beyond this `needed` gives up
+MEDIAN = 0.5
+
+
+class Interval(NamedTuple):
+    """An estimate and the ends of its interval: numbers, or arrays of them."""
+
+    estimate: Any
+    low: Any
+    high: Any
+
+
+def share(yes: Any, n: Any, level: float, unknown: Any = 0) -> Interval:
+    """A probability, from how often it happened in n draws: Clopper and Pearson's exact interval.
+
+    Of `unknown` draws nobody knows whether it happened.
+    """
+    from scipy.special import betaincinv  # slow to import
+
+    tail, n, most = (1.0 - level) / 2.0, np.asarray(n, float), np.add(yes, unknown)
+    with np.errstate(all="ignore"):
+        low = np.where(np.equal(yes, 0), 0.0, betaincinv(yes, n - yes + 1.0, tail))
+        high = np.where(np.equal(most, n), 1.0, betaincinv(most + 1.0, n - most, 1.0 - tail))
+        return Interval(np.divide(yes, n)[()], low[()], high[()])
+
+
+def quantile(values: Vector, q: float, level: float) -> Interval:
+    """The q-quantile, between two of the sorted values; valid for any distribution.
+
+    The estimate is the smallest value that a share q of the values does not exceed. An end is
+    infinite where there are too few values for one.
+    """
+    n = values.shape[-1]
+    unknown = np.isnan(values).any()
+    high = np.sort(np.where(np.isnan(values), inf, values), axis=-1)
+    low = np.sort(np.where(np.isnan(values), -inf, values), axis=-1) if unknown else high
+    first = _rank(n, q, level)
+    last = n + 1 - _rank(n, 1.0 - q, level)
+    return Interval(_at(high, _middle(n, q)), _at(low, first), _at(high, last))
+
+
+def _middle(n: int, q: float) -> int:
+    """The smallest rank whose share of n is q or more, but for rounding."""
+    return min(max(int(np.ceil(q * n * (1.0 - 1e-12))), 1), n)
+
+
+@cache
+def _rank(n: int, q: float, level: float) -> int:
+    """The rank of the lower end: the largest r so that r - 1 values or fewer lie below seldom."""
+    from scipy.special import bdtr  # slow to import
+
+    tail = (1.0 - level) / 2.0
+    return bisect_right(range(1, n + 1), tail, key=lambda r: float(bdtr(r - 1, n, q)))
+
+
+def _at(ordered: Vector, rank: int) -> Any:
+    """The value with this rank from 1; infinite for a rank that does not exist."""
+    n = ordered.shape[-1]
+    if 1 <= rank <= n:
+        return ordered[..., rank - 1][()]
+    return np.full(ordered.shape[:-1], inf if rank > n else -inf)[()]
+
+
+def below(a: Any, b: Any, margin: float) -> Any:
+    """Where a is smaller than b by more than the margin, relative to the larger of the two."""
+    with np.errstate(invalid="ignore"):
+        return np.subtract(b, a) > _around(np.maximum(np.abs(a), np.abs(b)), margin)
+
+
+def at_most(a: Any, b: Any, margin: float) -> Any:
+    """Where a exceeds b by no more than the margin, relative to b."""
+    return np.less_equal(a, np.add(b, _around(b, margin)))
+
+
+def _around(number: Any, margin: float) -> Any:
+    return np.where(np.isfinite(number), margin * np.abs(number), 0.0)
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """How often one law's metric is below the other's in the same draw by more than the margin.
+
+    `ties` are all other pairs, those in which both failed among them. Where a number is `unknown`
+    there is no pair.
+    """
+
+    n: int
+    wins: int
+    losses: int
+    both_failed: int
+    unknown: int
+
+    @property
+    def ties(self) -> int:
+        """Pairs without a winner."""
+        return self.n - self.wins - self.losses - self.unknown
+
+    def win_rate(self, level: float) -> Interval:
+        """The share of draws in which the first law wins; a tie is no win."""
+        return share(self.wins, self.n, level, self.unknown)
+
+    def loss_rate(self, level: float) -> Interval:
+        """The share of draws in which the second law wins."""
+        return share(self.losses, self.n, level, self.unknown)
+
+
+def pairs(a: Vector, b: Vector, margin: float) -> Pairs:
+    """The comparison of two laws that met the same draws."""
+    wins, losses = below(a, b, margin), below(b, a, margin)
+    failed, unknown = np.isposinf(a) & np.isposinf(b), np.isnan(a) | np.isnan(b)
+    return Pairs(len(a), *(int(where.sum()) for where in (wins, losses, failed, unknown)))
+
+
+def ratios(a: Vector, b: Vector) -> Vector:
+    """a / b in each draw: 1 where both failed or both are 0, inf and 0 where one of them failed."""
+    with np.errstate(all="ignore"):
+        return np.where(np.equal(a, b), 1.0, np.where(np.isposinf(a), inf, a / b))
+
+
+def needed(estimate: float, bound: float, level: float) -> int | None:
+    """Draws after which a share's interval would leave the bound out, were the share as estimated.
+
+    None where no number of draws would do, because the estimate lies on the bound.
+    """
+    from scipy.special import betainc  # slow to import
+
+    if estimate < bound:
+        estimate, bound = 1.0 - estimate, 1.0 - bound
+    tail = (1.0 - level) / 2.0
+
+    def decides(n: int) -> bool:
+        yes = estimate * n
+        return bool(betainc(yes, n - yes + 1.0, bound) <= tail)
+
+    if estimate - bound <= 1e-12:
+        return None
+    count = 1 + bisect_left(range(1, MOST + 1), True, key=decides)
+    return count if count <= MOST else None
+
+
+def holm(decides: Callable[[int, float], bool], count: int, level: float) -> list[float]:
+    """The level of each of `count` claims by Holm's step-down procedure.
+
+    `decides(i, level)` tells whether claim i is decided by intervals of this level. The claims
+    that are still open share 1 - level equally; each that is decided leaves more to the others.
+    The probability that any claim is decided wrongly is then at most 1 - level.
+    """
+    levels, left = [level] * count, list(range(count))
+    while left:
+        each = 1.0 - (1.0 - level) / len(left)
+        for i in left:
+            levels[i] = each
+        undecided = [i for i in left if not decides(i, each)]
+        if len(undecided) == len(left):
+            break
+        left = undecided
+    return levels
+
+
+def ranks(values: Vector) -> Vector:
+    """Ranks from 1; equal values, failures (+inf) among them, share the mean of their ranks."""
+    _, places, counts = np.unique(values, return_inverse=True, return_counts=True)
+    return np.asarray((np.cumsum(counts) - (counts - 1) / 2.0)[places])
+
+
+def rank_correlation(quantity: Vector, metric: Vector) -> float:
+    """Spearman's rank correlation over the draws that are known; NaN where one does not vary."""
+    known = ~(np.isnan(quantity) | np.isnan(metric))
+    x, y = (ranks(values[known]) for values in (quantity, metric))
+    if not known.any() or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
+        return float("nan")
+    return float(np.corrcoef(x, y)[0, 1])
+
+
+def by_chance(n: int, level: float) -> float:
+    """The rank correlation that unrelated quantities stay within, on either side, in n draws."""
+    from scipy.special import ndtri  # slow to import
+
+    return min(float(ndtri((1.0 + level) / 2.0)) / np.sqrt(n - 1.0), 1.0) if n > 1 else 1.0
