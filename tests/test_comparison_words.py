@@ -11,8 +11,9 @@ from test_reproduction import rerun
 
 from podusv_cli.comparison.claims import ParsedClaim, judge
 from podusv_cli.comparison.curves import Curve, pointwise
-from podusv_cli.comparison.expressions import Evaluation, ExpressionError, parse, with_labels
+from podusv_cli.comparison.expressions import Evaluation, parse, with_labels
 from podusv_cli.core.signal import Signal
+from podusv_cli.scenario.expressions import ExpressionError
 from podusv_cli.scenario.load import load
 from podusv_cli.scenario.model import Claim
 

@@ -9,12 +9,13 @@ from dataclasses import dataclass, replace
 from typing import Literal, Self
 
 from podusv_cli.comparison.curves import Source
-from podusv_cli.comparison.expressions import Evaluation, ExpressionError, parse, with_labels
+from podusv_cli.comparison.expressions import Evaluation, parse, with_labels
 from podusv_cli.core.errors import ScenarioError, ScenarioFault
 from podusv_cli.core.escaping import markdown, markdown_cell, markdown_code
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import CLOCKED, METRICS, metrics_with
 from podusv_cli.scenario import explain
+from podusv_cli.scenario.expressions import ExpressionError
 from podusv_cli.scenario.load import Loaded
 from podusv_cli.scenario.model import Claim
 

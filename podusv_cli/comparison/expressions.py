@@ -17,7 +17,6 @@ from collections.abc import Callable, Collection, Mapping
 from copy import deepcopy
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import NoReturn
 
 import numpy as np
 
@@ -29,18 +28,20 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.core.signal import Signal
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import METRICS
-from podusv_cli.scenario.phrases import unknown
+from podusv_cli.scenario.expressions import (
+    ExpressionError,
+    all_hold,
+    function,
+    known,
+    literal,
+    refuse,
+    syntax_tree,
+)
 from podusv_cli.theory.derived import DERIVED
 
-LONGEST = 500  # characters of an expression
-LARGEST = 1e300  # of numbers written down
-DEEPEST = 60  # nested brackets, signs and operations
+EXAMPLE = "a.iae < b.iae"
 # norms of the weights, which have one value for every node of a network
 NORMS = {derived.needs[0]: name for name, derived in DERIVED.items() if len(derived.needs) == 1}
-
-
-class ExpressionError(ValueError):
-    """An expression that has no meaning; the text says what to write instead."""
 
 
 def parse(
@@ -51,17 +52,7 @@ def parse(
 
     It is checked by evaluating it for runs that have all of these. Raises ExpressionError.
     """
-    if len(text) > LONGEST:
-        raise ExpressionError(f"is longer than {LONGEST} characters")
-    try:
-        tree = ast.parse(text.strip(), mode="eval").body
-    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        raise ExpressionError(f"cannot read {text!r}; example: a.iae < b.iae") from error
-    level: list[ast.AST] = [tree]
-    for _ in range(DEEPEST):
-        level = [child for node in level for child in ast.iter_child_nodes(node)]
-    if level:
-        raise ExpressionError(f"is nested more than {DEEPEST} deep")
+    tree = syntax_tree(text, EXAMPLE)
     example = _Example(signals, metrics)
     Evaluation(dict.fromkeys(runs, example), metrics=metrics).holds(tree)
     return tree
@@ -95,7 +86,7 @@ class _Example:
                 f"{name!r} has a value for every {' and '.join(about.axes)}{hint}"
             )
         usable = [s.name for s in self.signals.values() if not (s.fixed or s.axes)]
-        _known(name, [*usable, *self.metrics], "signal or metric")
+        known(name, [*usable, *self.metrics], "signal or metric")
         return np.array([0.0, 1.0])
 
 
@@ -126,18 +117,18 @@ class Evaluation:
                 answer = self.holds(part)
                 return None if answer is None else not answer
             case ast.BoolOp(op=ast.And(), values=parts):
-                return _all([self.holds(part) for part in parts])
+                return all_hold([self.holds(part) for part in parts])
             case ast.BoolOp():
-                _refuse(node, "join conditions with `and` only")
-        _refuse(node, f"not a condition; compare numbers, or use one of {', '.join(CHECKS)}")
+                refuse(node, "join conditions with `and` only")
+        refuse(node, f"not a condition; compare numbers, or use one of {', '.join(CHECKS)}")
 
     def _comparison(self, node: ast.Compare) -> bool | None:
         """All links of a < b <= c."""
         if any(type(sign) not in SIGNS for sign in node.ops):
-            _refuse(node, "compare with <, <=, >, >=, ==")
+            refuse(node, "compare with <, <=, >, >=, ==")
         sides = [(side, self._number(side)) for side in (node.left, *node.comparators)]
         links = zip(node.ops, pairwise(sides), strict=True)
-        return _all([self._link(sign, *left, *right) for sign, (left, right) in links])
+        return all_hold([self._link(sign, *left, *right) for sign, (left, right) in links])
 
     def _link(
         self, sign: ast.cmpop, left: ast.expr, a: float, right: ast.expr, b: float
@@ -156,7 +147,7 @@ class Evaluation:
         """One side of a comparison, kept as evidence; NaN where it is unknown."""
         doubts, number, text = len(self.doubts), self.value(node), ast.unparse(node)
         if isinstance(number, Curve):
-            _refuse(
+            refuse(
                 node, f"a signal over time; reduce it to a number with one of {', '.join(REDUCERS)}"
             )
         if not (math.isfinite(number) or self._never(node)):
@@ -181,9 +172,9 @@ class Evaluation:
         return False
 
     def _check(self, node: ast.Call) -> bool | None:
-        name = _known(_function(node), CHECKS, "check")
+        name = known(function(node), CHECKS, "check")
         if len(node.args) != 1 or not isinstance(node.args[0], ast.Name):
-            _refuse(node, "a check takes the name of one run")
+            refuse(node, "a check takes the name of one run")
         label = node.args[0].id
         run, text = self._run(label), ast.unparse(node)
         answer = run.check(name)
@@ -196,7 +187,7 @@ class Evaluation:
         """A number, NaN where it is unknown, or a curve. Raises CannotTell for an unknown curve."""
         match node:
             case ast.Constant():
-                return _literal(node)
+                return literal(node)
             case ast.Attribute(value=ast.Name(id=label), attr=name):
                 run = self._run(label)
                 if name in self.metrics:
@@ -209,18 +200,18 @@ class Evaluation:
                 parts = [self.value(left), self.value(right)]
                 return curves.pointwise(ARITHMETIC[type(sign)], parts)
             case ast.BinOp():
-                _refuse(node, "calculate with + - * / only")
+                refuse(node, "calculate with + - * / only")
             case ast.Call():
                 return self._call(node)
-        _refuse(node, "no meaning here; write run.metric or run.signal")
+        refuse(node, "no meaning here; write run.metric or run.signal")
 
     def _call(self, node: ast.Call) -> Quantity:
-        name = _known(_function(node), [*REDUCERS, *OPERATIONS, "rate"], "function")
+        name = known(function(node), [*REDUCERS, *OPERATIONS, "rate"], "function")
         if name in REDUCERS:
             return self._or_doubt(lambda: self._reduced(name, node))
         count, operation = OPERATIONS.get(name, (1, None))
         if len(node.args) != count:
-            _refuse(node, f"{name} takes {count} argument(s)")
+            refuse(node, f"{name} takes {count} argument(s)")
         if operation:
             return curves.pointwise(operation, [self.value(part) for part in node.args])
         return curves.rate(self._curve(node.args[0]))
@@ -228,17 +219,17 @@ class Evaluation:
     def _curve(self, node: ast.expr) -> Curve:
         curve = self.value(node)
         if not isinstance(curve, Curve):
-            _refuse(node, "a number where a signal is needed")
+            refuse(node, "a number where a signal is needed")
         return curve
 
     def _reduced(self, name: str, node: ast.Call) -> float:
         if len(node.args) not in (1, 3):
-            _refuse(node, f"{name} takes a signal, or a signal and two times")
+            refuse(node, f"{name} takes a signal, or a signal and two times")
         if not all(isinstance(end, ast.Constant) for end in node.args[1:]):
-            _refuse(node, "the two times must be plain numbers in s")
-        curve, window = self._curve(node.args[0]), [_literal(end) for end in node.args[1:]]
+            refuse(node, "the two times must be plain numbers in s")
+        curve, window = self._curve(node.args[0]), [literal(end) for end in node.args[1:]]
         if window and not 0 <= window[0] < window[1]:
-            _refuse(node, "the first time must lie before the second")
+            refuse(node, "the first time must lie before the second")
         return curves.reduced(name, ast.unparse(node), curve, window)
 
     def _or_doubt(self, number: Callable[[], float]) -> float:
@@ -250,7 +241,7 @@ class Evaluation:
             return math.nan
 
     def _run(self, label: str) -> Source:
-        return self.runs[_known(label, self.runs, "run")]
+        return self.runs[known(label, self.runs, "run")]
 
 
 def with_labels(tree: ast.expr, labels: Mapping[str, str]) -> ast.expr:
@@ -262,38 +253,6 @@ def with_labels(tree: ast.expr, labels: Mapping[str, str]) -> ast.expr:
             if isinstance(name, ast.Name):
                 name.id = labels[name.id]
     return tree
-
-
-def _refuse(node: ast.AST, why: str) -> NoReturn:
-    raise ExpressionError(f"{ast.unparse(node)!r}: {why}")
-
-
-def _known(name: str, names: Collection[str], what: str) -> str:
-    if name in names:
-        return name
-    raise ExpressionError(unknown(f"{what} {name!r}", name, sorted(names)))
-
-
-def _function(node: ast.Call) -> str:
-    if not isinstance(node.func, ast.Name) or node.keywords:
-        _refuse(node, "functions are called by name, without keywords")
-    return node.func.id
-
-
-def _literal(node: ast.expr) -> float:
-    number = getattr(node, "value", None)
-    if isinstance(number, bool) or not isinstance(number, (int, float)):
-        _refuse(node, "not a plain number")
-    if abs(number) > LARGEST:
-        raise ExpressionError(f"a number is too large, the largest is {LARGEST:g}")
-    return float(number)
-
-
-def _all(answers: Collection[bool | None]) -> bool | None:
-    """False where one is False, else None where one is None, else True."""
-    if any(answer is False for answer in answers):
-        return False
-    return None if None in answers else True
 
 
 ARITHMETIC: dict[type[ast.operator], Callable[..., object]] = {

@@ -1,0 +1,72 @@
+"""Reading expressions: a syntax tree within limits, and what every mistake in one is told.
+
+They are parsed by Python, and evaluated by whoever gives them a meaning; never run as Python.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Collection
+from typing import NoReturn
+
+from podusv_cli.scenario.phrases import unknown
+
+LONGEST = 500  # characters of an expression
+LARGEST = 1e300  # of numbers written down
+DEEPEST = 60  # nested brackets, signs and operations
+
+
+class ExpressionError(ValueError):
+    """An expression that has no meaning; the text says what to write instead."""
+
+
+def syntax_tree(text: str, example: str) -> ast.expr:
+    """The syntax tree of an expression; messages show the example. Raises ExpressionError."""
+    if len(text) > LONGEST:
+        raise ExpressionError(f"is longer than {LONGEST} characters")
+    try:
+        tree = ast.parse(text.strip(), mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        raise ExpressionError(f"cannot read {text!r}; example: {example}") from error
+    level: list[ast.AST] = [tree]
+    for _ in range(DEEPEST):
+        level = [child for node in level for child in ast.iter_child_nodes(node)]
+    if level:
+        raise ExpressionError(f"is nested more than {DEEPEST} deep")
+    return tree
+
+
+def refuse(node: ast.AST, why: str) -> NoReturn:
+    """Refuse a part of an expression, with its text. Raises ExpressionError."""
+    raise ExpressionError(f"{ast.unparse(node)!r}: {why}")
+
+
+def known(name: str, names: Collection[str], what: str) -> str:
+    """The name, if it is one of these. Raises ExpressionError with the nearest that is."""
+    if name in names:
+        return name
+    raise ExpressionError(unknown(f"{what} {name!r}", name, sorted(names)))
+
+
+def function(node: ast.Call) -> str:
+    """The name of the function that is called. Raises ExpressionError."""
+    if not isinstance(node.func, ast.Name) or node.keywords:
+        refuse(node, "functions are called by name, without keywords")
+    return node.func.id
+
+
+def literal(node: ast.expr) -> float:
+    """A number as written. Raises ExpressionError."""
+    number = getattr(node, "value", None)
+    if isinstance(number, bool) or not isinstance(number, (int, float)):
+        refuse(node, "not a plain number")
+    if abs(number) > LARGEST:
+        raise ExpressionError(f"a number is too large, the largest is {LARGEST:g}")
+    return float(number)
+
+
+def all_hold(answers: Collection[bool | None]) -> bool | None:
+    """False where one is False, else None where one is None, else True."""
+    if any(answer is False for answer in answers):
+        return False
+    return None if None in answers else True
