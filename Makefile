@@ -11,6 +11,14 @@ OURS := podusv_cli tests benchmarks results examples docs
 # Every dependency of a run at its lower bound; what tests need beside them, as new as may be.
 OLDEST := .venv-oldest
 LOWEST := sed -n '/^dependencies = \[/,/^\]/s/^ *"\(.*\)>=\(.*\)",/\1==\2/p' pyproject.toml
+NEWEST := .venv-newest
+# $(call SEPARATE,FOLDER,PINS): the tests in an environment of their own, without constraints.
+define SEPARATE
+$(PYTHON) -m venv --clear $(1) && \
+$(1)/bin/pip install --quiet --disable-pip-version-check --editable . $(2) $(TESTED_WITH) && \
+OPENBLAS_NUM_THREADS=1 $(1)/bin/pytest --numprocesses auto --dist loadfile
+endef
+TESTED_WITH := pytest pytest-xdist hypothesis sympy xarray h5netcdf netCDF4 import-linter
 PODS := kept dropped ideal no_anti_windup single
 ABLATIONS := ablation ablation_figures ablation_standoff ablation_gains ablation_gains_figures \
     ablation_gains_standoff ablation_pid
@@ -18,7 +26,7 @@ TABLES := unknown:unknown_dynamics discrete:discrete_signals limits:period_limit
 COMPARISONS := printed_compare figures_compare figures_compare_standoff corrected_compare
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce claim pod docs test test-all test-faults test-oldest bench lint types contracts clean
+.PHONY: help reproduce claim pod docs test test-all test-faults test-oldest test-newest bench lint types contracts clean
 
 help: ## what can be made
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -68,11 +76,10 @@ test-faults: $(VENV)/dev.done ## the fault tests with their full counts
 	@PODUSV_FAULTS=full $(PYTEST) -m "not benchmark" tests/faults
 
 test-oldest: ## the tests with every dependency at its lower bound, in $(OLDEST)
-	@$(PYTHON) -m venv --clear $(OLDEST)
-	@$(OLDEST)/bin/pip install --quiet --disable-pip-version-check --editable . $$($(LOWEST)) \
-	    pytest pytest-xdist hypothesis sympy xarray h5netcdf netCDF4 import-linter
-	@OPENBLAS_NUM_THREADS=1 $(OLDEST)/bin/pytest --numprocesses auto --dist loadfile \
-	    -W ignore::DeprecationWarning
+	@$(call SEPARATE,$(OLDEST),$$($(LOWEST))) -W ignore::DeprecationWarning
+
+test-newest: ## the tests with the newest versions, in $(NEWEST); make PYTHON=python3.14 test-newest
+	@$(call SEPARATE,$(NEWEST),)
 
 bench: $(VENV)/dev.done ## speed beside hand-written C (needs a C compiler), into benchmarks/results.md
 	@$(BIN)/python -m benchmarks.bench

@@ -10,10 +10,12 @@ from __future__ import annotations
 import inspect
 import sys
 from collections.abc import Iterator
+from functools import reduce
 from importlib import import_module
+from operator import or_
 from pathlib import Path
 from pkgutil import iter_modules
-from typing import Annotated, Any, Literal, TypeVar, Union, get_origin
+from typing import Annotated, Any, Literal, TypeVar, get_origin
 
 from pydantic import Field
 
@@ -66,8 +68,8 @@ def _place(component: type[Component]) -> str:
 def any_of(package: str, base: type[Kind], plugins: Plugins = ()) -> Any:
     """The type of a scenario's field that takes any component of `package`, chosen by `kind`."""
     choices = tuple(kinds(package, base, plugins).values())
-    union = Union.__getitem__(choices)  # the members are known at run time only
-    return Annotated[union, Field(discriminator="kind")]
+    # The members are known at run time only.
+    return Annotated[reduce(or_, choices), Field(discriminator="kind")]
 
 
 def named(package: str, kind: type[Named], plugins: Plugins = ()) -> dict[str, Named]:
