@@ -89,22 +89,14 @@ def add_made(writer: RunWriter, extras: Extras, name: str, form: Callable[[], by
         writer.add(name, content)
 
 
-@dataclass(frozen=True)
-class Asked:
-    """Figures by name (empty: all that fit), formats, and processes at a time (0: one a core)."""
-
-    names: Sequence[str] = ()
-    formats: Sequence[str] = ("png",)
-    jobs: int = 0
-
-
 def drawn(
     result: Result, extras: Extras, progress: Callable[[str, float], None] | None = None,
-    asked: Asked = Asked(),
+    names: Sequence[str] = (), formats: Sequence[str] = ("png",), jobs: int = 0,
 ) -> dict[str, bytes]:  # fmt: skip
     """The figures of all runs together by file name: as asked, and as SVG for the report.
 
-    A figure that was asked for and that no run has signals for is missing among the `extras`.
+    Without `names` these are all that fit. `jobs` processes draw at a time (0: one a core). A
+    figure that was asked for and that no run has signals for is missing among the `extras`.
     """
     # matplotlib is slow to import
     from podusv_cli.figures.drawing import draw_in_parallel, dressed, figures_of
@@ -114,13 +106,13 @@ def drawn(
         tell(0.0)
     shown = dressed([(e.label, e.recording, e.scenario) for e in result.entries])
     known = figures_of(run.scenario for run in shown)
-    for name in asked.names:
+    for name in names:
         if not known[name].fits(shown):
             wanted = ", ".join(known[name].signals)
             extras.missing.append(Missing(f"figure {name}", f"no run logged any of {wanted}"))
-    names = tuple(dict.fromkeys(asked.names)) or tuple(known)
-    formats = tuple(dict.fromkeys((*asked.formats, IN_REPORT)))
-    return draw_in_parallel(shown, names, formats, extras, progress=tell, workers=asked.jobs)
+    names = tuple(dict.fromkeys(names)) or tuple(known)
+    formats = tuple(dict.fromkeys((*formats, IN_REPORT)))
+    return draw_in_parallel(shown, names, formats, extras, progress=tell, workers=jobs)
 
 
 def as_report(

@@ -211,27 +211,14 @@ class PolarBackstepping(TrackingController):
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
         """(26), (27) with a = W . Phi at frozen Phi: a' = Gamma (m |Phi|^2 e - sigma a)."""
         power = float((activation(self.network, nu[None]) ** 2).sum())
-        surge, yaw = axes
-        bounds = (
-            AdaptedBound(
-                "u_e",
-                "gamma_u",
-                self.gamma_u,
-                self.sigma_bu,
-                self.b_hat_u0,
-                self.partial,
-                surge.inertia,
-            ),
-            AdaptedBound(
-                "r_e",
-                "gamma_r",
-                self.gamma_r,
-                self.sigma_br,
-                self.b_hat_r0,
-                self.partial,
-                yaw.inertia,
-            ),
+        learnt = (
+            ("u_e", "gamma_u", self.gamma_u, self.sigma_bu, self.b_hat_u0),
+            ("r_e", "gamma_r", self.gamma_r, self.sigma_br, self.b_hat_r0),
         )
+        bounds = [
+            AdaptedBound(*bound, self.partial, axis.inertia)
+            for bound, axis in zip(learnt, axes, strict=True)
+        ]
         gains = (
             ("Gamma_u", self.k_ue, self.Gamma_u, self.sigma_u),
             ("Gamma_r", self.k_re, self.Gamma_r, self.sigma_r),

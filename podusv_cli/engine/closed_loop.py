@@ -281,19 +281,7 @@ def rates_along(
     for i in range(count):
         here = tail(logged, i * (1 + n.states))
         there = tail(out, i * (n.states + n.columns))
-        rates(
-            here[0],
-            tail(here, 1),
-            there,
-            path,
-            disturbance,
-            law,
-            actuator,
-            after,
-            c,
-            n,
-            False,
-        )
+        rates(here[0], tail(here, 1), there, path, disturbance, law, actuator, after, c, n, False)
         measure(tail(here, 1), c.row)
         for j in range(n.columns):
             there[n.states + j] = c.row[j]

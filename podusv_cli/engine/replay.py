@@ -8,13 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from podusv_cli.core.kernel import Vector, bundle
+from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
 from podusv_cli.engine import closed_loop, signatures
 from podusv_cli.engine.closed_loop import Plan, Wires
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import STATE, ClosedLoop, Observer, by_name, entries, names, wire
-from podusv_cli.paths.base import TARGET
 
 
 def _rows(loop: ClosedLoop, recording: Recording, most: int) -> Vector:
@@ -22,11 +21,7 @@ def _rows(loop: ClosedLoop, recording: Recording, most: int) -> Vector:
     chosen = np.linspace(0, len(times) - 1, min(most, len(times))).astype(int)
     names = [*STATE, *(part.name for part, _ in loop.controller.slots())]
     logged = np.column_stack([recording[name][chosen] for name in names])
-    k, table = bundle(loop.path.constants()), loop.path.table()
-    targets = np.zeros((len(chosen), len(TARGET)))
-    for t, target in zip(times[chosen], targets, strict=True):
-        loop.path.evaluate(float(t), k, table, target)
-    return np.column_stack([times[chosen], targets, logged])
+    return np.column_stack([times[chosen], loop.path.targets(times[chosen].tolist()), logged])
 
 
 def replayer(

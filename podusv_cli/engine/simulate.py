@@ -12,7 +12,7 @@ import numpy as np
 from podusv_cli.actuators.base import Actuator
 from podusv_cli.controllers.base import Controller
 from podusv_cli.core import signal
-from podusv_cli.core.kernel import Vector, bundle, kernel
+from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.recording import Allocate, Recording
 from podusv_cli.core.signal import LOOP, Signal
 from podusv_cli.disturbances.base import Disturbance
@@ -74,9 +74,7 @@ class ClosedLoop:
 
     def first_target(self) -> Vector:
         """Where the target is at t = 0."""
-        target = np.zeros(len(TARGET))
-        self.path.evaluate(0.0, bundle(self.path.constants()), self.path.table(), target)
-        return target
+        return np.asarray(self.path.targets([0.0])[0])
 
     def about(self) -> dict[str, Signal]:
         """Every signal that the loop logs, by name. Raises LawError where two have one name."""

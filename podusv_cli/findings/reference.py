@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 
 from podusv_cli.core.kernel import Vector, bundle
-from podusv_cli.paths.base import TARGET
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.vessels.plant import surge_force, sway_force, yaw_moment
 
@@ -64,7 +63,7 @@ def median(values: Vector) -> float:
 def reference(scenario: Scenario) -> Reference:
     """Sample a scenario's target and loads, and balance the hull's loads at each sample."""
     time = np.linspace(0.0, scenario.simulation.duration, SAMPLES)
-    target = _targets(scenario, time)
+    target = scenario.path.targets(time.tolist())
     speed, turn, along = _motion(target)
     load = _loads(scenario, time, target, turn)
     balance = _balance(scenario, float(load[:, 1].mean()))
@@ -76,14 +75,6 @@ def reference(scenario: Scenario) -> Reference:
     )
     demand[:, 0] += scenario.vessel.m11 * along
     return Reference(time, speed, nu, load, demand - load[:, [0, 2]])
-
-
-def _targets(scenario: Scenario, time: Vector) -> Vector:
-    path, target = scenario.path, np.zeros((len(time), len(TARGET)))
-    k, table = bundle(path.constants()), path.table()
-    for t, row in zip(time.tolist(), target, strict=True):
-        path.evaluate(t, k, table, row)
-    return target
 
 
 def _motion(target: Vector) -> tuple[Vector, Vector, Vector]:

@@ -9,11 +9,10 @@ import numpy as np
 
 from podusv_cli.controllers.base import Approach
 from podusv_cli.core.finding import FindingKind, Sentences, after, before, rows_where, times_of
-from podusv_cli.core.kernel import Vector, bundle
+from podusv_cli.core.kernel import bundle
 from podusv_cli.core.recording import Recording
 from podusv_cli.findings.finding import Case
 from podusv_cli.findings.reference import FASTEST, drift, median
-from podusv_cli.paths.base import TARGET
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.vessels.plant import sway_force
 
@@ -49,17 +48,11 @@ def path_breaks(case: Case, what: str) -> Sentences:
     offset, unit = BREAKS[what]
     for at in case.scenario.path.breaks():
         if at.what == what and at.time < case.scenario.simulation.duration:
-            size = float(np.hypot(*_jump(case, at.time)[offset : offset + 2]))
+            beside = BESIDE * max(at.time, 1.0)
+            before, after = case.scenario.path.targets((at.time - beside, at.time + beside))
+            size = float(np.hypot(*(after - before)[offset : offset + 2]))
             meaning = CONSEQUENCES[what](size, case)
             yield f"the target's {what} jumps by {size:.3g} {unit} at {at.time:g} s; {meaning}"
-
-
-def _jump(case: Case, time: float) -> Vector:
-    path, sides = case.scenario.path, np.zeros((2, len(TARGET)))
-    k, table = bundle(path.constants()), path.table()
-    for side, target in zip((-BESIDE, BESIDE), sides, strict=True):
-        path.evaluate(time + side * max(time, 1.0), k, table, target)
-    return np.asarray(sides[1] - sides[0])
 
 
 def _path_break(code: str, what: str, remedy: str) -> FindingKind:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Literal
 
+import numpy as np
+
 from podusv_cli.core.component import Component
-from podusv_cli.core.kernel import Vector
+from podusv_cli.core.kernel import Vector, bundle
 
 Point = tuple[float, float]
 
@@ -33,6 +36,14 @@ class Path(Component):
     def evaluate(t: float, k: Any, table: Vector, target: Vector) -> None:
         """Write the target at time t; every path has its own."""
         raise NotImplementedError
+
+    def targets(self, times: Iterable[float]) -> Vector:
+        """The target at each of these times [s], a row of `TARGET` each."""
+        times = list(times)
+        rows, k, table = np.zeros((len(times), len(TARGET))), bundle(self.constants()), self.table()
+        for t, row in zip(times, rows, strict=True):
+            self.evaluate(t, k, table, row)
+        return rows
 
     def waypoints(self) -> tuple[Point, ...]:
         """Points [m], north and east, that the path is made from; none for most paths."""

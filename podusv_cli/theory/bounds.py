@@ -149,13 +149,10 @@ def _corrected(law: PolarBackstepping, axes: Axes, observed: Observed | None) ->
         "b_r": law.gamma_r * law.sigma_br / 2.0,
     }
     if observed is None:
-        return _unobserved(candidates)
-    terms = _fixed_terms(law, observed) | {
-        "rest_u": _half_square(observed.rest.u),
-        "rest_r": _half_square(observed.rest.r),
-    }
+        return Bound(_least(candidates), math.nan, math.nan, candidates)
     rates = np.arange(1, TRIES) / TRIES * _least(candidates)
     rooms = (surge.room(rates), yaw.room(rates))
+    terms = _terms(law, observed, "rest", observed.rest)
     return _best(candidates, terms, rates, rooms, observed.drift)
 
 
@@ -168,28 +165,23 @@ def _printed(law: PolarBackstepping, axes: Axes, observed: Observed | None) -> B
         "y_u": surge.A, "y_r": yaw.A,
     }  # fmt: skip
     if observed is None:
-        return _unobserved(candidates)
-    terms = _fixed_terms(law, observed) | {
-        "epsilon_u": _half_square(observed.epsilon.u),
-        "epsilon_r": _half_square(observed.epsilon.r),
-    }
+        return Bound(_least(candidates), math.nan, math.nan, candidates)
     rates = np.arange(1, TRIES) / TRIES * _least(candidates)
     rooms = (2.0 * (surge.A - rates), 2.0 * (yaw.A - rates))
+    terms = _terms(law, observed, "epsilon", observed.epsilon)
     return _best(candidates, terms, rates, rooms, observed.alpha_dot)
 
 
-def _unobserved(candidates: dict[str, float]) -> Bound:
-    return Bound(_least(candidates), math.nan, math.nan, candidates)
-
-
-def _fixed_terms(law: PolarBackstepping, observed: Observed) -> dict[str, float]:
-    """The terms of Delta that are common to both forms and independent of lambda."""
+def _terms(law: PolarBackstepping, observed: Observed, left: str, over: Pair) -> dict[str, float]:
+    """The terms of Delta that are independent of lambda; what is `left` over differs by form."""
     return {
         "W_u": law.sigma_u * _half_square(observed.W.u),
         "W_r": law.sigma_r * _half_square(observed.W.r),
         "b_u": law.sigma_bu * _half_square(observed.b.u - law.b_hat_u0),
         "b_r": law.sigma_br * _half_square(observed.b.r - law.b_hat_r0),
         "lemma": law.partial * (observed.b.u + observed.b.r),
+        f"{left}_u": _half_square(over.u),
+        f"{left}_r": _half_square(over.r),
     }
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from podusv_cli.controllers.polar_backstepping import PolarBackstepping
@@ -32,31 +30,6 @@ TERMS = (
 )
 
 
-@dataclass(frozen=True)
-class Estimates:
-    """Squared errors of the estimates, and the product of each with its rate."""
-
-    W_u: Vector
-    W_r: Vector
-    b_u: Vector
-    b_r: Vector
-    W_u_rate: Vector
-    W_r_rate: Vector
-    b_u_rate: Vector
-    b_r_rate: Vector
-
-
-def estimates(log: Recording, now: Replayed, ideal: IdealWeights, b: Pair) -> Estimates:
-    """Errors of the estimated weights and bounds against the ideal weights and true bounds."""
-    b_u, b_r = log["b_hat_u"] - b.u, log["b_hat_r"] - b.r
-    W_u, W_r = log["W_hat_u"] - ideal.W_u, log["W_hat_r"] - ideal.W_r
-    return Estimates(
-        _dot(W_u, W_u), _dot(W_r, W_r), b_u**2, b_r**2,
-        _dot(W_u, now.rates["W_hat_u"]), _dot(W_r, now.rates["W_hat_r"]),
-        b_u * now.rates["b_hat_u"], b_r * now.rates["b_hat_r"],
-    )  # fmt: skip
-
-
 def _dot(a: Vector, b: Vector) -> Vector:
     return np.asarray(np.einsum("ij,ij->i", a, b))
 
@@ -67,13 +40,17 @@ def norms(weights: Vector) -> Vector:
 
 
 def lyapunov(
-    loop: ClosedLoop, law: PolarBackstepping, e: Errors, errors: Estimates
-) -> dict[str, Vector]:
+    loop: ClosedLoop, law: PolarBackstepping, log: Recording, now: Replayed, e: Errors,
+    ideal: IdealWeights, b: Pair,
+) -> dict[str, Vector]:  # fmt: skip
     """V (46), its terms, and V' by the chain rule, named as in the log; each of shape (rows,).
 
-    An estimate with adaptation gain 0 has no term in V.
+    The errors of the estimates are against the ideal weights and the true bounds `b`. An estimate
+    with adaptation gain 0 has no term in V.
     """
-    m11, m33 = loop.vessel.m11, loop.vessel.m33
+    m11, m33, rates = loop.vessel.m11, loop.vessel.m33, now.rates
+    b_u, b_r = log["b_hat_u"] - b.u, log["b_hat_r"] - b.r
+    W_u, W_r = log["W_hat_u"] - ideal.W_u, log["W_hat_r"] - ideal.W_r
     parts = {
         "V_z_e": (1.0, e.z_e**2, e.z_e * e.z_e_dot),
         "V_psi_e": (1.0, e.psi_e**2, e.psi_e * e.psi_e_dot),
@@ -81,10 +58,10 @@ def lyapunov(
         "V_r_e": (m33, e.r_e**2, e.r_e * e.r_e_dot),
         "V_y_u": (1.0, e.y_u**2, e.y_u * e.y_u_dot),
         "V_y_r": (1.0, e.y_r**2, e.y_r * e.y_r_dot),
-        "V_W_u": (_inverse(law.Gamma_u), errors.W_u, errors.W_u_rate),
-        "V_W_r": (_inverse(law.Gamma_r), errors.W_r, errors.W_r_rate),
-        "V_b_u": (_inverse(law.gamma_u), errors.b_u, errors.b_u_rate),
-        "V_b_r": (_inverse(law.gamma_r), errors.b_r, errors.b_r_rate),
+        "V_W_u": (_inverse(law.Gamma_u), _dot(W_u, W_u), _dot(W_u, rates["W_hat_u"])),
+        "V_W_r": (_inverse(law.Gamma_r), _dot(W_r, W_r), _dot(W_r, rates["W_hat_r"])),
+        "V_b_u": (_inverse(law.gamma_u), b_u**2, b_u * rates["b_hat_u"]),
+        "V_b_r": (_inverse(law.gamma_r), b_r**2, b_r * rates["b_hat_r"]),
     }
     terms = {name: 0.5 * weight * square for name, (weight, square, _) in parts.items()}
     rate = sum(weight * product for weight, _, product in parts.values())

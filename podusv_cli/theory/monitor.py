@@ -26,15 +26,7 @@ from podusv_cli.theory.ideal_weights import (
     rows_to_fit,
     unloaded_accelerations,
 )
-from podusv_cli.theory.lyapunov import (
-    TERMS,
-    V_DOT,
-    V,
-    estimates,
-    lyapunov,
-    norms,
-    remainders,
-)
+from podusv_cli.theory.lyapunov import TERMS, V_DOT, V, lyapunov, norms, remainders
 from podusv_cli.theory.rates import error_rates
 from podusv_cli.theory.sway import SwayBound, sway_bound, sway_push
 
@@ -194,7 +186,7 @@ def _traces(
     rest_u, rest_r = remainders(loop, law, log, now, e)
     A_u, A_r = law.filter_decay(now.signals["alpha_u"], now.signals["alpha_r"])
     push, printed_push = sway_push(loop.vessel, log, now)
-    return lyapunov(loop, law, e, estimates(log, now, ideal, b)) | {
+    return lyapunov(loop, law, log, now, e, ideal, b) | {
         "alpha_u_dot": e.alpha_u_dot,
         "alpha_r_dot": e.alpha_r_dot,
         "drift_u": np.where(np.isinf(A_u), 0.0, e.y_u_dot + A_u * e.y_u),

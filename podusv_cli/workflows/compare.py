@@ -244,9 +244,8 @@ def _add_figures(
     extras: Extras, progress: Progress | None, request: Request,
 ) -> None:  # fmt: skip
     """Draw the figures, write those in the formats asked for, and the report, which has all."""
-    asked = outputs.Asked(request.names, request.formats, request.jobs)
-    draw = partial(outputs.drawn, result, extras, progress, asked)
-    figures = extras.attempt("figures", draw) or {}
+    draw = partial(outputs.drawn, result, extras, progress, request.names, request.formats)
+    figures = extras.attempt("figures", partial(draw, request.jobs)) or {}
     for name, content in figures.items():
         if name.rpartition(".")[2] in request.formats:
             writer.add(f"figures/{name}", content)
