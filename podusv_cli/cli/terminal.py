@@ -88,7 +88,9 @@ def echo_table(head: list[str], rows: list[list[str]]) -> None:
     widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
     room = shutil.get_terminal_size().columns if sys.stdout.isatty() else sys.maxsize
     if sum(widths[:2]) + max(widths[2:]) + 2 * len(SPACE) > room:
-        _echo_blocks(head, rows)
+        for row in rows:
+            cells = [f"{title} {cell}" for title, cell in zip(head[2:], row[2:], strict=True)]
+            echo_entry(row[0], ", ".join(cells), facts=f"[{row[1]}]")
         return
     for place, part in enumerate(_parts(widths, room)):
         if place:
@@ -106,12 +108,6 @@ def _parts(widths: list[int], room: int) -> Iterator[list[int]]:
             part = [0, 1]
         part.append(i)
     yield part
-
-
-def _echo_blocks(head: list[str], rows: list[list[str]]) -> None:
-    for row in rows:
-        cells = [f"{title} {cell}" for title, cell in zip(head[2:], row[2:], strict=True)]
-        echo_entry(row[0], ", ".join(cells), facts=f"[{row[1]}]")
 
 
 def folded(text: str, width: int) -> str:

@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from podusv_cli.core.kernel import Vector
-
 if TYPE_CHECKING:
     from podusv_cli.figures.style import Shown
 
@@ -45,6 +43,7 @@ def _track(run: Shown) -> dict[str, Any]:
     rows = np.unique(np.linspace(0, count - 1, min(count, FRAMES)).round().astype(int))
     names = ("time", *WHERE, "x_d", "y_d", "z_e")
     approach = run.scenario.controller.approach()
+    stopped = f"{run.recording.status} at t = {run.end:g} s"
     return {
         "label": run.label,
         "color": run.color,
@@ -52,18 +51,13 @@ def _track(run: Shown) -> dict[str, Any]:
         "length": run.length,
         "beam": run.beam,
         "standoff": approach.standoff if approach else 0.0,
-        "ending": "" if run.whole else _ending(run),
-        **{name: _column(name, run.signal(name)[rows]) for name in names if run.has(name)},
+        "ending": "" if run.whole else run.recording.message.partition(":")[0] or stopped,
+        **{
+            name: [_rounded(x, DIGITS.get(name, MILLIMETRES)) for x in run.signal(name)[rows]]
+            for name in names
+            if run.has(name)
+        },
     }
-
-
-def _ending(run: Shown) -> str:
-    said = run.recording.message.partition(":")[0]
-    return said or f"{run.recording.status} at t = {run.end:g} s"
-
-
-def _column(name: str, numbers: Vector) -> list[float | None]:
-    return [_rounded(number, DIGITS.get(name, MILLIMETRES)) for number in numbers]
 
 
 def _rounded(number: float, digits: int = MILLIMETRES) -> float | None:

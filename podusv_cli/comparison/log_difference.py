@@ -162,7 +162,8 @@ def compare(one: Recording, other: Recording) -> LogDifference:
     pairs = list(_paired(one, other))
     alike = [pair for pair in pairs if pair.one.shape == pair.other.shape]
     unequal = [pair for pair in alike if differing(pair.one, pair.other).any()]
-    names, others = _names(one), _names(other)
+    names, others = ((*log.signals, *log.fixed) for log in (one, other))
+    endings = {name: (getattr(one, name), getattr(other, name)) for name in ENDINGS}
     shared = len(pairs[0].one)
     return LogDifference(
         first=_first(unequal),
@@ -172,17 +173,8 @@ def compare(one: Recording, other: Recording) -> LogDifference:
         reshaped=tuple(pair.name for pair in pairs if pair.one.shape != pair.other.shape),
         only_one=tuple(name for name in names if name not in others),
         only_other=tuple(name for name in others if name not in names),
-        endings=_endings(one, other),
+        endings={name: pair for name, pair in endings.items() if pair[0] != pair[1]},
     )
-
-
-def _names(recording: Recording) -> tuple[str, ...]:
-    return (*recording.signals, *recording.fixed)
-
-
-def _endings(one: Recording, other: Recording) -> dict[str, tuple[str, str]]:
-    pairs = {name: (getattr(one, name), getattr(other, name)) for name in ENDINGS}
-    return {name: pair for name, pair in pairs.items() if pair[0] != pair[1]}
 
 
 def _paired(one: Recording, other: Recording) -> Iterator[_Pair]:
@@ -211,15 +203,11 @@ def _shared_times(one: Vector, other: Vector) -> tuple[Vector, Any, Any]:
 
 def _first(unequal: list[_Pair]) -> Deviation | None:
     """The earliest deviation; at equal times that of the first signal in the log."""
-    found = [(pair, _place_of_first(pair)) for pair in unequal]
+    found = [(pair, _place_of_maximum(differing(pair.one, pair.other))) for pair in unequal]
     if not found:
         return None
     pair, place = min(found, key=lambda item: -1 if item[0].times is None else item[1][0])
     return _deviation(pair, place)
-
-
-def _place_of_first(pair: _Pair) -> Place:
-    return _place_of_maximum(differing(pair.one, pair.other))
 
 
 def _place_of_largest(pair: _Pair) -> Place:

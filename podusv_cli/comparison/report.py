@@ -146,16 +146,14 @@ def _by_code(findings: Sequence[Finding], plugins: Plugins) -> dict[str, tuple[s
 
 
 def _parts(story: Story) -> list[tuple[str, str, str]]:
-    """A row for each part: its name, what it is, all its values."""
+    """A row for each part: its name, the first line of what it says of itself, all its values."""
     parts = settings.parts(story.scenario)
     parts |= {f"controller {label}": part for label, part in story.controllers.items()}
-    return [(name, _said(part), _values(part)) for name, part in parts.items()]
-
-
-def _said(part: Component) -> str:
-    """The first line of what the part says of itself."""
-    return (inspect.getdoc(type(part)) or "").partition("\n")[0]
-
-
-def _values(part: Component) -> str:
-    return ", ".join(f"{key} {value_text(value)}" for key, value in flat(part.model_dump()))
+    return [
+        (
+            name,
+            (inspect.getdoc(type(part)) or "").partition("\n")[0],
+            ", ".join(f"{key} {value_text(value)}" for key, value in flat(part.model_dump())),
+        )
+        for name, part in parts.items()
+    ]

@@ -127,7 +127,9 @@ def as_latex(frame: pd.DataFrame, known: Mapping[str, Metric] = METRICS) -> str:
     head = ["metric", "unit", *map(str, frame.columns)]
     body = [[escaping.latex(cell) for cell in head]]
     for name, unit, *numbers in cells(frame, known):
-        body.append([_symbol(known[name]), quantities.raised(unit), *map(_marked, numbers)])
+        symbol = known[name].symbol
+        shown = f"${symbol}$" if symbol else escaping.latex(name)
+        body.append([shown, quantities.raised(unit), *map(_marked, numbers)])
     lines = [" & ".join(row) + r" \\" for row in body]
     columns = "ll" + "r" * len(frame.columns)
     opening = [rf"\begin{{tabular}}{{{columns}}}", r"\toprule", lines[0], r"\midrule"]
@@ -140,7 +142,3 @@ def _marked(cell: str) -> str:
     number, marked, ratio = powers.partition("*")
     bold = r"\boldmath " if "$" in number else ""
     return rf"\textbf{{{bold}{number}}}{ratio}" if marked else number
-
-
-def _symbol(metric: Metric) -> str:
-    return f"${metric.symbol}$" if metric.symbol else escaping.latex(metric.name)

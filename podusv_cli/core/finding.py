@@ -81,22 +81,23 @@ class FindingKind:
 Decorator = Callable[[Callable[..., Sentences]], FindingKind]
 
 
-def before(
-    name: str, *, about: str, meaning: str, condition: str = "", remedy: str = "",
-    law: type[Any] = object,
-) -> Decorator:  # fmt: skip
-    """Make a kind of finding of a function that takes a `Case` (a scenario before its run)."""
-    return lambda search: FindingKind(
-        name, about, meaning, "before", search, law, condition, remedy
-    )
+def _decorator(when: Literal["before", "after"]) -> Callable[..., Decorator]:
+    def kind_of(
+        name: str, *, about: str, meaning: str, condition: str = "", remedy: str = "",
+        law: type[Any] = object,
+    ) -> Decorator:  # fmt: skip
+        """Make a kind of finding of a function.
+
+        `before` a run it takes a `Case`, `after` a run the scenario and its recording.
+        """
+        return lambda search: FindingKind(
+            name, about, meaning, when, search, law, condition, remedy
+        )
+
+    return kind_of
 
 
-def after(
-    name: str, *, about: str, meaning: str, condition: str = "", remedy: str = "",
-    law: type[Any] = object,
-) -> Decorator:  # fmt: skip
-    """Make a kind of finding of a function that takes a scenario and its recording."""
-    return lambda search: FindingKind(name, about, meaning, "after", search, law, condition, remedy)
+before, after = _decorator("before"), _decorator("after")
 
 
 def rows_where(log: Recording, test: Callable[[Recording], Mask]) -> Mask:

@@ -73,7 +73,11 @@ def simulate_many(
     observer = observer or Observer()
     grid = replace(grid, log_every=grid.steps + 1)  # one row, for the first instant
     plan = _common_plan(loops, grid, observer)
-    batch = _blank(len(loops), observer)
+    batch = Batch(
+        status=np.full(len(loops), "interrupted"), reached=np.zeros(len(loops), np.int64),
+        state=np.full((len(loops), len(STATE)), np.nan),
+        seen=np.full((len(loops), observer.size), np.nan),
+    )  # fmt: skip
     if plan is None:
         return batch
     advance, last, bell = marcher(loops[0], observer, True), grid.steps + 1, Bell()
@@ -119,13 +123,6 @@ def _march_all(
             run.work.stop()
         for run in busy:
             batch.note(run, run.work.interrupted(last))
-
-
-def _blank(count: int, observer: Observer) -> Batch:
-    return Batch(
-        status=np.full(count, "interrupted"), reached=np.zeros(count, np.int64),
-        state=np.full((count, len(STATE)), np.nan), seen=np.full((count, observer.size), np.nan),
-    )  # fmt: skip
 
 
 def _common_plan(loops: Sequence[ClosedLoop], grid: TimeGrid, observer: Observer) -> Plan | None:

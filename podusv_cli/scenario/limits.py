@@ -10,7 +10,7 @@ from podusv_cli.core.quantities import bytes_in_words, time_in_words
 from podusv_cli.engine.simulate import names
 from podusv_cli.paths.base import TARGET
 from podusv_cli.scenario.messages import Check
-from podusv_cli.scenario.model import Conflicts, Scenario, Simulation
+from podusv_cli.scenario.model import Conflicts, Scenario
 from podusv_cli.theory import monitor
 
 NUMBER = 8  # bytes
@@ -119,26 +119,21 @@ def _too_large(scenario: Scenario, allow_large: bool, read_back: bool, insist: s
         only = f"the run has {size.steps} steps, so that its first instant alone would be logged"
         yield "log.every", f"{only}; must be at most {size.steps}"
     if size.steps > MOST_STEPS and not allow_large:
-        yield _too_long(scenario.simulation, size, insist)
+        run = scenario.simulation
+        text = (
+            f"{run.duration:g} s in steps of {run.step:g} s are {size.steps:.3g} steps, more than"
+        )
+        remedy = f"simulate less or take a longer step{insist}"
+        yield run.outlier, f"{text} {MOST_STEPS:.0e}: {size}; {remedy}"
     if size.content > MOST_CONTENT and (read_back or not allow_large):
-        yield _too_full(scenario.log.every, size, "" if read_back else insist)
+        most = f"more than the {bytes_in_words(MOST_CONTENT)} that podusv reads back: {size}"
+        text = f"the log would hold {bytes_in_words(size.content)} in {size.rows:.3g} rows, {most}"
+        remedy = _log_less(scenario.log.every, size, MOST_CONTENT)
+        yield "log.every", f"{text}; {remedy}{'' if read_back else insist}"
     if size.content > HELD and scenario.log.compress:
         most = f"more than the {bytes_in_words(HELD)} that can be compressed"
         remedy = f"leave it uncompressed or {_log_less(scenario.log.every, size, HELD)}"
         yield "log.compress", f"the log would hold {bytes_in_words(size.content)}, {most}; {remedy}"
-
-
-def _too_long(run: Simulation, size: Size, insist: str) -> tuple[str, str]:
-    text = f"{run.duration:g} s in steps of {run.step:g} s are {size.steps:.3g} steps, more than "
-    remedy = f"simulate less or take a longer step{insist}"
-    return run.outlier, f"{text}{MOST_STEPS:.0e}: {size}; {remedy}"
-
-
-def _too_full(every: int, size: Size, insist: str) -> tuple[str, str]:
-    content, most = bytes_in_words(size.content), bytes_in_words(MOST_CONTENT)
-    text = f"the log would hold {content} in {size.rows:.3g} rows, more than the {most} that "
-    remedy = f"{_log_less(every, size, MOST_CONTENT)}{insist}"
-    return "log.every", f"{text}podusv reads back: {size}; {remedy}"
 
 
 def _log_less(every: int, size: Size, most: int) -> str:

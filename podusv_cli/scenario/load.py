@@ -100,7 +100,9 @@ def _checked(
     scenario = check(root, top, faults, checks)
     if scenario is None or faults:
         raise ScenarioError(_findings(faults, source))
-    return scenario, _origins(scenario, root), has_choice(root)
+    nodes = {route: find(root, route) for route, _ in _leaves(scenario.model_dump(), ())}
+    origins = {dotted(at): str(node.mark) if node else "default" for at, node in nodes.items()}
+    return scenario, origins, has_choice(root)
 
 
 def load_resolved(
@@ -152,11 +154,6 @@ def _leaves(data: dict[str, Any], above: Route) -> Iterator[tuple[Route, Any]]:
             yield from _leaves(content, (*above, name))
         else:
             yield (*above, name), content
-
-
-def _origins(scenario: Scenario, root: Node) -> dict[str, str]:
-    nodes = {route: find(root, route) for route, _ in _leaves(scenario.model_dump(), ())}
-    return {dotted(route): str(node.mark) if node else "default" for route, node in nodes.items()}
 
 
 def resolved_yaml(scenario: Scenario) -> str:

@@ -38,18 +38,15 @@ def ranking(estimates: Mapping[str, Estimate]) -> Ranking | None:
     known = {label: e for label, e in estimates.items() if not e.undefined}
     if len(known) < 2:
         return None
-    orders = tuple(_order({label: e.values[i] for label, e in known.items()}) for i in range(3))
+    # Smallest first, NaN last; equal numbers in the order given.
+    values = [{label: e.values[i] for label, e in known.items()} for i in range(3)]
+    orders = tuple(tuple(sorted(v, key=lambda one: (math.isnan(v[one]), v[one]))) for v in values)
     pairs = tuple(pairwise(orders[0]))
     equal = tuple((a, b) for a, b in pairs if known[a].values == known[b].values)
     close = tuple(
         (a, b) for a, b in pairs if (a, b) not in equal and _too_close(known[a], known[b])
     )
     return Ranking(orders, close, equal)
-
-
-def _order(values: Mapping[str, float]) -> tuple[str, ...]:
-    """Smallest first, NaN last; equal numbers in the order given."""
-    return tuple(sorted(values, key=lambda label: (math.isnan(values[label]), values[label])))
 
 
 def _too_close(a: Estimate, b: Estimate) -> bool:

@@ -98,7 +98,8 @@ def compare_gathered(
     _check_figures(request, given.members)
     for finding in merged({member.label: member.noticed for member in given.members}):
         request.warn(finding)
-    target = request.out or _default_folder(given.title, given.members)
+    text = "".join(f"{one.label}\n{resolved_yaml(one.scenario)}" for one in given.members)
+    target = request.out or default_folder(RESULTS, given.title, text)
     _keep_apart(items, target)
     with interrupts_deferred(), _writer(target, given.members, request) as writer:
         outcomes = make_runs(given.members, writer.folder, request, progress)
@@ -130,11 +131,6 @@ def _check_figures(request: Request, members: Sequence[Member]) -> None:
 
         sheets = figures_of(member.scenario for member in members)
         check_names(request.names, request.formats, sheets)
-
-
-def _default_folder(title: str, members: Sequence[Member]) -> Path:
-    text = "".join(f"{member.label}\n{resolved_yaml(member.scenario)}" for member in members)
-    return default_folder(RESULTS, title, text)
 
 
 def _keep_apart(items: Sequence[Path], target: Path) -> None:

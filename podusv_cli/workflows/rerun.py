@@ -15,9 +15,8 @@ from podusv_cli.comparison.run_difference import RunDifference, difference
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.recording import Status
 from podusv_cli.process.extras import Missing
-from podusv_cli.process.workers import INTERRUPTED, Outcome, available_workers, run_all
+from podusv_cli.process.workers import INTERRUPTED, available_workers, run_all
 from podusv_cli.scenario.limits import estimate, limits, needed
-from podusv_cli.scenario.messages import Check
 from podusv_cli.storage import manifest, provenance, run_folder
 from podusv_cli.storage.staging import Staging, remove_abandoned
 from podusv_cli.workflows.execute import Task, execute, unwritten, warm_up
@@ -100,7 +99,8 @@ def rerun(path: Path, request: RerunRequest, progress: Progress | None = None) -
     Raises UsageError where `path` is no run folder or a run was interrupted, ScenarioError where
     this podusv does not know a key any more or the run is too large, and StorageError.
     """
-    members = _parts(path, (limits(request.allow_large, read_back=True),))
+    manifest.demand(path)
+    members = from_folder(path, (limits(request.allow_large, read_back=True),), to_run=True)
     for member in members:
         if member.run and member.run.status == "interrupted":
             text = f"{member.run.folder} was interrupted; there is no whole run to repeat"
@@ -108,12 +108,6 @@ def rerun(path: Path, request: RerunRequest, progress: Progress | None = None) -
     if len(members) == 1:
         return _one(members[0], request, progress)
     return _several(members, request, progress)
-
-
-def _parts(path: Path, checks: Sequence[Check] = ()) -> list[Member]:
-    """The finished runs of a folder; UsageError where it is none."""
-    manifest.demand(path)
-    return from_folder(path, checks, to_run=True)
 
 
 def _one(member: Member, request: RerunRequest, progress: Progress | None) -> Repetition:
@@ -142,18 +136,14 @@ def _several(
             jobs = [partial(_repeat, p, writer.folder / p.label, request) for p in members]
             outcomes = run_all(jobs, tell)
             missing = unwritten(outcomes)
-            done = _repetition(members, outcomes)
+            pairs = dict(zip((member.label for member in members), outcomes, strict=True))
+            runs = {label: outcome.result for label, outcome in pairs.items() if outcome.result}
+            failures = {n: outcome.failure for n, outcome in pairs.items() if not outcome.result}
+            done = Repetition(runs, failures)
             origin = provenance.collect(request.argv, started, datetime.now(UTC))
             writer.add_json("provenance.json", origin)
             writer.finish("interrupted" if done.interrupted else "finished", missing)
         return done
-
-
-def _repetition(members: Sequence[Member], outcomes: Sequence[Outcome]) -> Repetition:
-    pairs = [(member.label, outcome) for member, outcome in zip(members, outcomes, strict=True)]
-    runs = {label: outcome.result for label, outcome in pairs if outcome.result}
-    failures = {label: outcome.failure for label, outcome in pairs if not outcome.result}
-    return Repetition(runs, failures)
 
 
 @contextmanager

@@ -64,14 +64,9 @@ def run_loaded(
         scenario, loaded.text, target, force=request.force, named=request.out is not None,
         figures=DRAWN if request.figures else (), argv=request.argv, noticed=noticed,
     )  # fmt: skip
-    others = () if request.controller else _not_run(loaded.scenario)
-    return replace(execute(task, progress, watch), others=others)
-
-
-def _not_run(scenario: Scenario) -> tuple[str, ...]:
-    """The `controllers` where they are more than the `controller` under a name."""
-    same = list(scenario.controllers.values()) == [scenario.controller]
-    return () if same else tuple(scenario.controllers)
+    several = loaded.scenario.controllers  # one may be the `controller` under a name
+    all_run = request.controller or list(several.values()) == [loaded.scenario.controller]
+    return replace(execute(task, progress, watch), others=() if all_run else tuple(several))
 
 
 def single(loaded: Loaded, label: str = "") -> Scenario:
