@@ -14,8 +14,7 @@ from podusv_cli.controllers.backstepping import Backstepping
 from podusv_cli.controllers.dsc import DynamicSurface
 from podusv_cli.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.disturbances.harmonic import HarmonicDisturbance
-from podusv_cli.theory.bounds import Observed, Pair, UltimateBound, ultimate_bound
-from podusv_cli.theory.sway import sway_bound
+from podusv_cli.theory.bounds import Observed, Pair, UltimateBound, sway_bound, ultimate_bound
 
 SEEN = Observed(
     b=Pair(0.9, 0.7), W=Pair(0.7, 0.4), alpha_dot=Pair(0.2, 0.03), drift=Pair(0.3, 0.05),

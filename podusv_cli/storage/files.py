@@ -193,19 +193,15 @@ def file_size(file: BufferedReader) -> int:
     return os.fstat(file.fileno()).st_size
 
 
-def read_bytes(path: Path, limit: int, remedy: str = "") -> bytes:
-    """The whole file; StorageError, with a remedy, where it holds more than `limit` bytes."""
+def read_text(path: Path) -> str:
+    """A UTF-8 text of at most LARGEST_TEXT bytes; raises StorageError."""
     with opened(path) as file:
         size = file_size(file)
-        if size > limit:
-            raise StorageError(f"cannot read {path}: {size} bytes, at most {limit} allowed{remedy}")
-        return file.read(size)
-
-
-def read_text(path: Path, limit: int = LARGEST_TEXT) -> str:
-    """A UTF-8 text of at most `limit` bytes; raises StorageError."""
+        if size > LARGEST_TEXT:
+            raise StorageError(f"cannot read {path}: {size} bytes, at most {LARGEST_TEXT} allowed")
+        content = file.read(size)
     try:
-        return read_bytes(path, limit).decode()
+        return content.decode()
     except UnicodeDecodeError as error:
         raise StorageError(f"cannot read {path}: not UTF-8 text ({error})") from error
 

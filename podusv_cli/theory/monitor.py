@@ -15,7 +15,16 @@ from podusv_cli.core.signal import Signal, by_name
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.replay import Replayed, rates_replay
 from podusv_cli.engine.simulate import ClosedLoop
-from podusv_cli.theory.bounds import Bound, Observed, Pair, UltimateBound, ultimate_bound
+from podusv_cli.theory.bounds import (
+    Bound,
+    Observed,
+    Pair,
+    SwayBound,
+    UltimateBound,
+    sway_bound,
+    sway_push,
+    ultimate_bound,
+)
 from podusv_cli.theory.ideal_weights import (
     IdealWeights,
     exponents,
@@ -28,7 +37,6 @@ from podusv_cli.theory.ideal_weights import (
 )
 from podusv_cli.theory.lyapunov import TERMS, V_DOT, V, lyapunov, norms, remainders
 from podusv_cli.theory.rates import error_rates
-from podusv_cli.theory.sway import SwayBound, sway_bound, sway_push
 
 WINDOWS = ("whole", "settled")
 BLOCK = 4096  # rows computed together, so that they stay in the processor's cache

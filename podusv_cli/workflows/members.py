@@ -9,16 +9,36 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from podusv_cli.comparison import stability
 from podusv_cli.comparison.outputs import RESERVED, TABLE
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.finding import Finding
+from podusv_cli.core.recording import Recording
 from podusv_cli.scenario.load import load_resolved
 from podusv_cli.scenario.messages import Check
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.storage import log_check, manifest
+from podusv_cli.storage import manifest
 from podusv_cli.storage.files import read_text
 from podusv_cli.storage.run_folder import LOG, THEORY, Run, open_run
+
+# Signals that every log has, as figures and comparisons need them.
+NEEDED = (
+    "time", "x", "y", "psi", "u", "v", "r", "x_d", "y_d", "tau_u_cmd", "tau_r_cmd", "tau_u",
+    "tau_r",
+)  # fmt: skip
+_TERMS = ("z_e", "psi_e", "u_e", "r_e", "y_u", "y_r", "W_u", "W_r", "b_u", "b_r")
+_BOUNDS = ("V", "window_start", "V_lambda", "V_Delta", "V_bound", "v_bound")
+# Signals that a signal needs beside it.
+BESIDE = {
+    "V": (*(f"V_{term}" for term in _TERMS), *_BOUNDS),
+    "V_dot": _BOUNDS,
+    "n": ("delta",),
+    "n_part": ("delta",),
+    "power": ("delta",),
+}
+LARGEST = 1e300  # beyond it the engine calls a run diverged and logs no row
 
 
 @dataclass(frozen=True)
@@ -73,10 +93,22 @@ def _from_run(path: Path, checks: Sequence[Check], to_run: bool, files: Sequence
     run = open_run(path)
     source = str(path / "resolved.yaml")
     scenario = load_resolved(run.resolved_yaml, source, checks, to_run=to_run, files=files)
-    if wrong := log_check.fault(run.recording):
+    if wrong := _fault(run.recording):
         raise StorageError(f"{path / LOG}: damaged, or not a log of a run: {wrong}")
     stability.check(run.theory, run.folder / THEORY)
     return Member(path.name, scenario, run=run)
+
+
+def _fault(log: Recording) -> str:
+    """The first fault of a log, in words; empty if there is none."""
+    wanted = [*NEEDED, *(name for one, rest in BESIDE.items() if one in log for name in rest)]
+    lacking = [name for name in wanted if name not in log]
+    if lacking:
+        return f"it has no {lacking[0]}"
+    wild = [name for name in NEEDED if not np.all(np.abs(log[name]) <= LARGEST)]
+    if wild:
+        return f"{wild[0]} holds something that is no finite number"
+    return "" if np.all(np.diff(log["time"]) > 0.0) else "its times do not increase"
 
 
 def comparable(path: Path, files: Sequence[str] = ()) -> list[Member]:
