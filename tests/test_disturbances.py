@@ -36,6 +36,28 @@ def test_every_axis_has_its_own_numbers() -> None:
     np.testing.assert_allclose(load_at(sea, t), [b_u, b_v, 7.0], rtol=1e-14)
 
 
+def test_phases_are_angles_of_the_waves_at_the_start() -> None:
+    axis = Harmonic(mean=1.0, sin=2.0, sin_rate=0.3, sin_phase=0.7, cos=-4.0, cos_phase=-2.9)
+    sea = HarmonicDisturbance(b_u=axis, b_v=axis, b_r=Harmonic(cos=1.0, cos_phase=100.0))
+    for t in (0.0, 2.7, 300.0):
+        load = 1 + 2 * math.sin(0.3 * t + 0.7) - 4 * math.cos(0.2 * t - 2.9)
+        expected = [load, load, math.cos(0.2 * t + 100.0)]
+        np.testing.assert_allclose(load_at(sea, t), expected, rtol=1e-13, atol=1e-13)
+
+
+def test_phases_of_zero_leave_every_bit_of_the_tables() -> None:
+    """The kernel is as it was, and so the loads are, to the last bit."""
+    u, v, r = (Harmonic(sin=-0.1 * i, cos=0.3 * i, sin_rate=i, cos_rate=9 - i) for i in (1, 2, 3))
+    rates, cosines, sines = HarmonicDisturbance(b_u=u, b_v=v, b_r=r).table().reshape(3, -1)[:, :6]
+    zero = [0.0] * 3
+    for found, expected in (
+        (rates, [1, 2, 3, 8, 7, 6]),
+        (cosines, zero + [axis.cos for axis in (u, v, r)]),
+        (sines, [axis.sin for axis in (u, v, r)] + zero),
+    ):
+        assert found.tobytes() == np.array(expected, float).tobytes()
+
+
 def test_scale_multiplies_everything_and_zero_is_calm_water() -> None:
     for t in (0.0, 3.3, 200.0):
         once = load_at(HarmonicDisturbance(), t)
@@ -61,6 +83,11 @@ def test_the_load_is_bounded_as_assumption_1_wants() -> None:
         (Harmonic(mean=-1.0, sin=3.0, sin_rate=0.0, cos=0.25, cos_rate=0.3), 1.25),
         (Harmonic(mean=-1.0, sin=0.5, sin_rate=0.3, cos=0.25, cos_rate=0.0), 1.25),
         (Harmonic(mean=-1.0, sin=0.5, sin_rate=0.0, cos=0.25, cos_rate=0.0), 0.75),
+        (Harmonic(sin=3.0, sin_phase=0.4, sin_rate=0.3, cos=-4.0, cos_phase=2.0), 7.0),
+        (Harmonic(mean=0.5, sin=3.0, sin_phase=math.pi / 2, cos=-4.0), 1.5),  # they cancel to 1
+        (Harmonic(mean=-0.5, sin=3.0, cos=-4.0, cos_phase=math.pi / 2), 7.5),  # they add up
+        (Harmonic(sin=2.0, sin_rate=0.0, sin_phase=math.pi / 6, cos=0.25, cos_rate=0.3), 1.25),
+        (Harmonic(mean=1.0, cos=0.5, cos_rate=0.0, cos_phase=math.pi, sin_rate=0.0), 0.5),
     ],
 )
 def test_a_bound_is_never_exceeded_and_nearly_reached(axis: Harmonic, bound: float) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
@@ -13,14 +13,34 @@ from podusv_cli.core.kernel import LANES, Vector, kernel, scratch, whole_lanes
 from podusv_cli.disturbances.base import Disturbance
 
 
+class Wave(NamedTuple):
+    """cos cos(rate t) + sin sin(rate t)."""
+
+    rate: float
+    cos: float
+    sin: float
+
+
 class Harmonic(Component):
-    """mean + sin sin(sin_rate t) + cos cos(cos_rate t) on one axis; in N, in yaw N m."""
+    """mean + sin sin(sin_rate t + sin_phase) + cos cos(cos_rate t + cos_phase) on one axis.
+
+    In N, in yaw N m.
+    """
 
     mean: float = value(0.0, "N or N m", "constant part")
     sin: float = value(0.0, "N or N m", "amplitude of the sine")
     sin_rate: float = value(0.2, "rad/s", "angular frequency of the sine", ge=0)
+    sin_phase: float = value(0.0, "rad", "angle of the sine at t = 0", ge=-1e6, le=1e6)
     cos: float = value(0.0, "N or N m", "amplitude of the cosine")
     cos_rate: float = value(0.2, "rad/s", "angular frequency of the cosine", ge=0)
+    cos_phase: float = value(0.0, "rad", "angle of the cosine at t = 0", ge=-1e6, le=1e6)
+
+    def waves(self) -> tuple[Wave, ...]:
+        """The sine and the cosine, each as a cosine and a sine without phase."""
+        c, s = cos_sin(self.sin_phase)
+        sine = Wave(self.sin_rate, float(self.sin * s), float(self.sin * c))
+        c, s = cos_sin(self.cos_phase)
+        return sine, Wave(self.cos_rate, float(self.cos * c), float(-self.cos * s))
 
     def bound(self) -> float:
         """What its magnitude never exceeds.
@@ -28,11 +48,12 @@ class Harmonic(Component):
         A wave of rate 0 is constant, and waves of one rate are one wave. Of two rates it is the sum
         of the amplitudes, which the load reaches only where the rates have no common period.
         """
-        sin = self.sin if self.sin_rate > 0.0 else 0.0
-        mean, cos = (self.mean, self.cos) if self.cos_rate > 0.0 else (self.mean + self.cos, 0.0)
-        if self.sin_rate == self.cos_rate:
-            return abs(mean) + math.hypot(sin, cos)
-        return abs(mean) + abs(sin) + abs(cos)
+        sine, cosine = waves = self.waves()
+        if sine.rate == cosine.rate:
+            waves = (Wave(sine.rate, sine.cos + cosine.cos, sine.sin + cosine.sin),)
+        mean = self.mean + sum(wave.cos for wave in waves if wave.rate == 0.0)
+        moving = (math.hypot(wave.sin, wave.cos) for wave in waves if wave.rate > 0.0)
+        return sum(moving, abs(mean))
 
 
 class HarmonicDisturbance(Disturbance):
@@ -56,12 +77,11 @@ class HarmonicDisturbance(Disturbance):
         return super().constants() | {"waves": float(whole_lanes(6))}
 
     def table(self) -> Vector:
-        """Rates of the sines and the cosines, their cosines, their sines: three rows."""
-        axes = (self.b_u, self.b_v, self.b_r)
-        rates, cosines, sines = rows = np.zeros((3, whole_lanes(6)))
-        rates[:6] = [axis.sin_rate for axis in axes] + [axis.cos_rate for axis in axes]
-        cosines[3:6] = [axis.cos for axis in axes]
-        sines[:3] = [axis.sin for axis in axes]
+        """Rates of the waves, their cosines, their sines: three rows, the sines of (52) first."""
+        axes = (self.b_u.waves(), self.b_v.waves(), self.b_r.waves())
+        waves = [sine for sine, _ in axes] + [cosine for _, cosine in axes]
+        rows = np.zeros((3, whole_lanes(6)))
+        rows[:, :6] = np.transpose(waves) + 0.0  # no -0.0
         return rows.ravel()
 
     def bounds(self) -> tuple[float, float, float]:
