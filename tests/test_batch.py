@@ -6,6 +6,7 @@ import math
 import re
 import threading
 import time
+import weakref
 from _ctypes import FUNCFLAG_PYTHONAPI
 from dataclasses import replace
 from pathlib import Path
@@ -21,9 +22,10 @@ from podusv_cli.controllers.dsc import DynamicSurface
 from podusv_cli.controllers.network import Network
 from podusv_cli.controllers.pid import Pid
 from podusv_cli.core.component import value
+from podusv_cli.core.errors import LawError
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.engine import signatures
-from podusv_cli.engine.batch import Batch, simulate_many
+from podusv_cli.engine.batch import Batch, Lazily, simulate_many
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import STATE, ClosedLoop, simulate
 from podusv_cli.engine.variants import variants
@@ -101,6 +103,8 @@ def test_a_run_that_diverges_stops_no_other() -> None:
     batch = simulate_many(loops, GRID, observer=watching)
     assert batch.status.tolist() == ["finished", "diverged", "finished", "diverged"]
     assert batch.reached.tolist() == [2001, 500, 2001, 250]
+    broke = "at t = {} s: u is not finite"
+    assert batch.cause.tolist() == ["", broke.format(5), "", broke.format(2.5)]
     np.testing.assert_array_equal(np.isfinite(batch.state).all(axis=1), batch.reached == 2001)
     for loop, row in zip(loops, batch.seen, strict=True):
         np.testing.assert_array_equal(row, simulate(loop, GRID, observer=watching).seen)
@@ -169,9 +173,13 @@ def test_an_interrupt_keeps_the_runs_that_are_done() -> None:
         corrected(controller=AdaptiveNeural(rate="difference")),
     ],
 )
-def test_another_structure_is_refused(other: ClosedLoop) -> None:
-    with pytest.raises(ValueError, match=r"run 1 has another structure than run 0: .* not .*"):
-        simulate_many([corrected(), other], GRID)
+def test_a_loop_of_another_structure_is_invalid(other: ClosedLoop) -> None:
+    batch = simulate_many([corrected(), other], TimeGrid(0.01, 10))
+    assert batch.status.tolist() == ["finished", "invalid"]
+    assert re.fullmatch(r"it has another structure than the batch: .* not .*", batch.cause[1])
+    # The same structure for every part of a study, whichever run is its first.
+    turned = simulate_many([other, corrected()], TimeGrid(0.01, 10), like=corrected())
+    assert turned.status.tolist() == ["invalid", "finished"]
 
 
 def test_no_runs_are_an_empty_batch() -> None:
@@ -180,13 +188,94 @@ def test_no_runs_are_an_empty_batch() -> None:
     assert observer(corrected(), GRID, **SETTINGS).summaries(batch.seen)["iae"].shape == (0,)
 
 
-def test_a_fault_in_one_run_is_raised() -> None:
-    class Faulty(Constant):
-        def start(self, x: Vector, target: Vector, nominal: Any) -> Vector:
-            raise ZeroDivisionError
+class Faulty(Lost):
+    """A law for tests: it raises an exception before the run where it is told to."""
 
-    with pytest.raises(ZeroDivisionError):
-        simulate_many([adrift(controller=Faulty())] * 3, GRID)
+    kind: Literal["faulty"] = "faulty"  # type: ignore[assignment]
+    sound: float = value(1.0, "", "0: it raises")
+
+    def start(self, x: Vector, target: Vector, nominal: Any) -> Vector:
+        """Divide by zero, or not."""
+        return super().start(x, target, nominal) * (1.0 / self.sound)
+
+
+def test_no_run_that_fails_changes_a_bit_of_the_others() -> None:
+    """Every twentieth run is no loop at all, raises, has another structure, or diverges."""
+    sound = variants(corrected(), {"start.x": np.linspace(-15, -5, 100)})
+    ends = {3: "invalid", 23: "crashed", 43: "invalid", 63: "diverged", 83: "crashed"}
+    bad: dict[int, Any] = {
+        3: ValueError("start.x: draw 3 is\nno number"), 23: KeyError("gone"), 43: adrift(),
+        63: replace(corrected(), start=(0.0, 0.0, 0.0, 1e301, 0.0, 0.0)), 83: SystemExit(7),
+    }  # fmt: skip
+
+    def make(position: int) -> ClosedLoop:
+        one = bad.get(position, sound[position])
+        if isinstance(one, BaseException):
+            raise one
+        return one
+
+    grid, fractions = TimeGrid(0.01, 20), list[float]()
+    watching = observer(sound[0], grid, **SETTINGS)
+    whole = simulate_many(sound, grid, observer=watching, workers=1)
+    mixed = simulate_many(
+        Lazily(100, make), grid, observer=watching, workers=3, progress=fractions.append
+    )
+    others = [i for i in range(100) if i not in ends]
+    assert {i: mixed.status[i] for i in ends} == ends
+    assert set(mixed.status[others]) == {"finished"}
+    assert not any(mixed.cause[others])
+    for rows in ("seen", "state", "reached"):
+        assert getattr(mixed, rows)[others].tobytes() == getattr(whole, rows)[others].tobytes()
+    assert mixed.cause[3] == "start.x: draw 3 is no number"
+    assert re.fullmatch(r"KeyError: 'gone' \(test_batch.py, line \d+\)", mixed.cause[23])
+    assert mixed.cause[63] == "at t = 0 s: u is not finite"
+    assert np.isnan(mixed.seen[[3, 23, 43, 83]]).all()
+    assert fractions == [i / 100 for i in range(1, 101)]
+
+
+def test_a_law_that_raises_before_the_run_ends_that_run() -> None:
+    loops = variants(adrift(controller=Faulty()), {"controller.sound": [1.0, 0.0, 1.0]})
+    batch = simulate_many(loops, TimeGrid(0.01, 10))
+    assert batch.status.tolist() == ["finished", "crashed", "finished"]
+    assert batch.cause[1].startswith("ZeroDivisionError: float division by zero (test_batch.py")
+
+
+def test_lazy_loops_are_made_when_their_runs_begin_and_not_kept() -> None:
+    alive: weakref.WeakSet[Any] = weakref.WeakSet()
+    most = 0
+
+    def make(position: int) -> ClosedLoop:
+        nonlocal most
+        law = Pid(K_Pu=100.0 + position)
+        alive.add(law)
+        most = max(most, len(alive))
+        return corrected(controller=law)
+
+    like = corrected(controller=Pid())
+    batch = simulate_many(Lazily(50, make), TimeGrid(0.01, 10), workers=2, like=like)
+    assert set(batch.status) == {"finished"}
+    assert most <= 6  # two runs, the next one, and what has not been collected
+
+
+def test_an_interrupt_while_a_loop_is_made_keeps_what_is_done() -> None:
+    def make(position: int) -> ClosedLoop:
+        if position == 3:
+            raise KeyboardInterrupt
+        return corrected()
+
+    batch = simulate_many(Lazily(5, make), TimeGrid(0.01, 10), workers=1)
+    assert batch.status.tolist() == ["finished"] * 3 + ["interrupted"] * 2
+
+
+def test_a_kernel_that_cannot_be_compiled_is_raised() -> None:
+    class Broken(Constant):
+        @staticmethod
+        @kernel
+        def law(t, x, memory, target, k, table, tau, rate, signals, work):  # type: ignore[no-untyped-def, override]
+            tau[0] = k.nothing_of_this_name
+
+    with pytest.raises(LawError):
+        simulate_many([adrift(controller=Broken())] * 3, GRID)
 
 
 def test_the_documented_monte_carlo_runs(capsys: pytest.CaptureFixture[str]) -> None:

@@ -83,7 +83,7 @@ def test_the_load_is_bounded_as_assumption_1_wants() -> None:
         (Harmonic(mean=-1.0, sin=3.0, sin_rate=0.0, cos=0.25, cos_rate=0.3), 1.25),
         (Harmonic(mean=-1.0, sin=0.5, sin_rate=0.3, cos=0.25, cos_rate=0.0), 1.25),
         (Harmonic(mean=-1.0, sin=0.5, sin_rate=0.0, cos=0.25, cos_rate=0.0), 0.75),
-        (Harmonic(sin=3.0, sin_phase=0.4, sin_rate=0.3, cos=-4.0, cos_phase=2.0), 7.0),
+        (Harmonic(sin=3.0, sin_phase=0.4, sin_rate=0.3, cos=-4.0, cos_rate=0.283), 7.0),
         (Harmonic(mean=0.5, sin=3.0, sin_phase=math.pi / 2, cos=-4.0), 1.5),  # they cancel to 1
         (Harmonic(mean=-0.5, sin=3.0, cos=-4.0, cos_phase=math.pi / 2), 7.5),  # they add up
         (Harmonic(sin=2.0, sin_rate=0.0, sin_phase=math.pi / 6, cos=0.25, cos_rate=0.3), 1.25),

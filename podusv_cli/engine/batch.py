@@ -6,44 +6,87 @@ of `simulate`. No log is kept; a run's observer gathers what is wanted of it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
-from itertools import islice
-from typing import Any
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
+from podusv_cli.core.errors import PodusvError, in_a_line
+from podusv_cli.core.escaping import visible
 from podusv_cli.core.kernel import LANES, Vector, whole_lanes
 from podusv_cli.engine.closed_loop import Plan, Wires
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.march import Bell, Ending, Work
-from podusv_cli.engine.simulate import STATE, ClosedLoop, Observer, entries, marcher, wire
+from podusv_cli.engine.simulate import STATE, ClosedLoop, Observer, entries, marcher, why, wire
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.process.workers import available_workers
 
+T = TypeVar("T")
 NUMBER = 8  # bytes; LANES numbers are a cache line
+
+
+class Loops(Protocol):
+    """Closed loops by position; a run's loop is asked for once, when the run is to begin."""
+
+    def __len__(self) -> int:
+        """The number of runs."""
+
+    def __getitem__(self, position: int, /) -> ClosedLoop:
+        """The loop of a run. ValueError and PodusvError say that there cannot be such a loop."""
+
+
+@dataclass(frozen=True)
+class Lazily:
+    """Loops that `make` makes one by one, so that they need not exist all at once."""
+
+    count: int
+    make: Callable[[int], ClosedLoop]
+
+    def __len__(self) -> int:
+        """The number of runs."""
+        return self.count
+
+    def __getitem__(self, position: int, /) -> ClosedLoop:
+        """Make the loop of a run."""
+        return self.make(position)
 
 
 @dataclass(frozen=True)
 class Batch:
     """How N runs ended and what was gathered in them, one entry or row a run.
 
-    `status` holds the words of `Recording.status`; a run that an interrupt kept from beginning is
-    `interrupted` with 0 instants reached and NaN in its rows.
+    `status` is one of these words; `cause` is a sentence for the middle four, else empty.
+
+    finished      it reached the last instant
+    diverged      a number is not finite
+    hung          a step took more than `march.PATIENCE` of processor time
+    crashed       the law, or another part, raised an exception
+    invalid       its loop cannot be made, or has another structure than the others
+    interrupted   an interrupt stopped it, or kept it from beginning
+
+    A run that did not begin has 0 instants reached and NaN in its rows.
     """
 
     status: npt.NDArray[np.str_]  # (N,)
+    cause: npt.NDArray[np.object_]  # (N,), str
     reached: npt.NDArray[np.int64]  # (N,), good instants; steps + 1 for a finished run
     state: Vector  # (N, 6), the vessel's state where the march ended
     seen: Vector  # (N, observer.size)
 
-    def note(self, run: BatchRun, ending: Ending) -> None:
+    def note(self, run: BatchRun, ending: Ending, grid: TimeGrid) -> None:
         """Enter how a run ended."""
         i, wires = run.position, run.wires
-        self.reached[i], self.status[i], _ = ending
+        self.reached[i], self.status[i] = ending.reached, ending.status
         self.state[i], self.seen[i] = wires.s[: len(STATE)], wires.seen
+        if ending.status not in ("finished", "interrupted"):
+            self.cause[i] = why(ending, run.loop, grid, wires)
+
+    def refuse(self, position: int, status: str, cause: str) -> None:
+        """Enter that a run cannot begin."""
+        self.status[position], self.cause[position] = status, visible(" ".join(cause.split()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,92 +94,164 @@ class BatchRun:
     """One run of a batch."""
 
     position: int
+    loop: ClosedLoop
     wires: Wires
     work: Work
 
 
+@dataclass(frozen=True)
+class Common:
+    """What the runs of a batch share: the structure of one of their loops, and its march."""
+
+    like: ClosedLoop
+    grid: TimeGrid
+    observer: Observer
+    bell: Bell = field(default_factory=Bell)
+
+    @cached_property
+    def structure(self) -> tuple[Plan, list[Any]]:
+        """The layout, and the kernels with the names of their constants."""
+        return self.like.layout(self.grid), list(entries(self.like, self.observer))
+
+    @cached_property
+    def advance(self) -> Callable[..., int]:
+        """The compiled march."""
+        return marcher(self.like, self.observer, True)
+
+    def check(self, loop: ClosedLoop) -> None:
+        """Raise ValueError for a loop of another structure."""
+        found, wanted = Common(loop, self.grid, self.observer).structure, self.structure
+        if found != wanted:
+            raise ValueError(
+                f"it has another structure than the batch: {_kinds(loop)} with {found[0]}, not "
+                f"{_kinds(self.like)} with {wanted[0]}; runs of one batch differ in numbers only"
+            )
+
+    def run(self, position: int, loop: ClosedLoop, advance: Callable[..., int]) -> BatchRun:
+        """A run that is ready to start."""
+        plan, grid = self.structure[0], self.grid
+        wires = _apart(wire(loop, plan, self.observer))
+        function = partial(advance, 0, grid.steps + 1, grid.step, wires, plan)
+        return BatchRun(position, loop, wires, Work(function, wires.under_way, self.bell))
+
+
 def simulate_many(
-    loops: Sequence[ClosedLoop],
+    loops: Loops,
     grid: TimeGrid,
     *,
     observer: Observer | None = None,
     workers: int = 0,
     progress: Callable[[float], None] | None = None,
+    like: ClosedLoop | None = None,
 ) -> Batch:
     """Integrate loops of one structure over the grid, `workers` at a time (0: one a core).
 
-    Every run gives the bits that `simulate` gives, whatever the number of workers; one that
-    diverges ends by itself. `progress` is called with the fraction of runs done. KeyboardInterrupt
-    stops all runs at once and keeps what is done. Raises ValueError for loops of different
-    structure: other kinds, other sizes of memory, other sampling.
+    The structure (kinds, sizes of memory, sampling) is that of `like`, by default that of the first
+    loop that can be made. Every run gives the bits that `simulate` gives, whatever the number of
+    workers and however the others end; `Batch` says how a run may end. `progress` is called with
+    the fraction of runs done. KeyboardInterrupt stops all runs at once and keeps what is done.
+    Raises LawError where a kernel cannot be compiled.
     """
     observer = observer or Observer()
     grid = replace(grid, log_every=grid.steps + 1)  # one row, for the first instant
-    plan = _common_plan(loops, grid, observer)
-    batch = Batch(
-        status=np.full(len(loops), "interrupted"), reached=np.zeros(len(loops), np.int64),
-        state=np.full((len(loops), len(STATE)), np.nan),
-        seen=np.full((len(loops), observer.size), np.nan),
-    )  # fmt: skip
-    if plan is None:
-        return batch
-    advance, last, bell = marcher(loops[0], observer, True), grid.steps + 1, Bell()
-
-    def run(i: int) -> BatchRun:
-        wires = _apart(wire(loops[i], plan, observer))
-        function = partial(advance, 0, last, grid.step, wires, plan)
-        return BatchRun(i, wires, Work(function, wires.under_way, bell))
-
-    def tell(done: int) -> None:
-        if progress:
-            progress(done / len(loops))
-
+    batch = _blank(len(loops), observer)
     with interrupts_deferred():
-        _march_all(map(run, range(len(loops))), last, workers or available_workers(), batch, tell)
+        _Runs(loops, grid, batch, observer, like, progress).march(workers or available_workers())
     return batch
 
 
-def _march_all(
-    runs: Iterator[BatchRun], last: int, workers: int, batch: Batch, progress: Callable[[int], None]
-) -> None:
-    """March over all runs; an interrupt or an error stops those that are under way."""
-    busy: list[BatchRun] = []
-    done = 0
-    try:
-        while True:
-            for run in islice(runs, workers - len(busy)):
-                run.work.start()
-                busy.append(run)
-            if not busy:
-                break
+class _Runs:
+    """The runs of a batch while they are made."""
+
+    def __init__(
+        self, loops: Loops, grid: TimeGrid, batch: Batch, observer: Observer,
+        like: ClosedLoop | None, progress: Callable[[float], None] | None,
+    ) -> None:  # fmt: skip
+        self._loops, self._grid, self._batch, self._observer = loops, grid, batch, observer
+        self._common = Common(like, grid, observer) if like else None
+        self._progress = progress or (lambda fraction: None)
+        self._busy: list[BatchRun] = []
+        self._over = 0
+
+    def march(self, workers: int) -> None:
+        """March over all runs; an interrupt or an error stops those that are under way."""
+        try:
+            for position in range(len(self._loops)):
+                self._begin(position)
+                while len(self._busy) >= workers:
+                    self._wait()
+            while self._busy:
+                self._wait()
+        except KeyboardInterrupt:
+            pass
+        finally:
+            self._stop()
+
+    def _begin(self, position: int) -> None:
+        run = self._made(position)
+        if run:
+            run.work.start()
+            self._busy.append(run)
+        else:
+            self._count()
+
+    def _made(self, position: int) -> BatchRun | None:
+        """The run, or None and an entry of why there is none."""
+
+        def checked() -> tuple[ClosedLoop, Common]:
+            loop = self._loops[position]
+            common = self._common or Common(loop, self._grid, self._observer)
+            common.check(loop)
+            return loop, common
+
+        found = self._contained(position, checked, invalid=(PodusvError, ValueError))
+        if found is None:
+            return None
+        loop, self._common = found
+        make = partial(self._common.run, position, loop, self._common.advance)
+        return self._contained(position, make)
+
+    def _contained(
+        self, position: int, make: Callable[[], T], invalid: tuple[type[Exception], ...] = ()
+    ) -> T | None:
+        """What is made for a run; an exception is that run's end and no other's."""
+        try:
             with interrupts_enabled():
-                busy[0].work.wait()  # any of them rings the bell
-            for run in [run for run in busy if run.work.over or run.work.hangs()]:
-                busy.remove(run)
-                batch.note(run, run.work.ending(last))
-                done += 1
-                progress(done)
-    except KeyboardInterrupt:
-        pass
-    finally:
-        for run in busy:
+                return make()
+        except invalid as error:
+            self._batch.refuse(position, "invalid", str(error))
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # a law may raise anything
+            self._batch.refuse(position, "crashed", in_a_line(error))
+        return None
+
+    def _wait(self) -> None:
+        """Wait a moment for a run to end, and enter those that have, or that hang."""
+        with interrupts_enabled():
+            self._busy[0].work.wait()  # any of them rings the bell
+        for run in [run for run in self._busy if run.work.over or run.work.hangs()]:
+            self._busy.remove(run)
+            self._batch.note(run, run.work.ending(self._grid.steps + 1), self._grid)
+            self._count()
+
+    def _count(self) -> None:
+        self._over += 1
+        self._progress(self._over / len(self._loops))
+
+    def _stop(self) -> None:
+        for run in self._busy:
             run.work.stop()
-        for run in busy:
-            batch.note(run, run.work.interrupted(last))
+        for run in self._busy:
+            self._batch.note(run, run.work.interrupted(self._grid.steps + 1), self._grid)
 
 
-def _common_plan(loops: Sequence[ClosedLoop], grid: TimeGrid, observer: Observer) -> Plan | None:
-    """The layout that all loops share, None where there are none."""
-    found: tuple[Plan, list[Any]] | None = None
-    for i, loop in enumerate(loops):
-        structure = loop.layout(grid), list(entries(loop, observer))
-        found = found or structure
-        if structure != found:
-            raise ValueError(
-                f"run {i} has another structure than run 0: {_kinds(loop)} with {structure[0]}, "
-                f"not {_kinds(loops[0])} with {found[0]}; runs of one batch differ in numbers only"
-            )
-    return found[0] if found else None
+def _blank(count: int, observer: Observer) -> Batch:
+    return Batch(
+        status=np.full(count, "interrupted"), cause=np.full(count, "", object),
+        reached=np.zeros(count, np.int64), state=np.full((count, len(STATE)), np.nan),
+        seen=np.full((count, observer.size), np.nan),
+    )  # fmt: skip
 
 
 def _kinds(loop: ClosedLoop) -> str:

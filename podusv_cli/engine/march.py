@@ -13,13 +13,12 @@ from contextvars import copy_context
 from functools import partial
 from queue import Empty, SimpleQueue
 from threading import Thread, get_ident
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from podusv_cli.core.errors import in_a_line
 from podusv_cli.core.kernel import Vector
-from podusv_cli.core.recording import Status
 from podusv_cli.engine.closed_loop import STOP
 from podusv_cli.process.interrupts import interrupts_enabled
 
@@ -29,11 +28,14 @@ PATIENCE = 10.0  # s of processor time that a step may take
 LAST_CHANCE = 1.0  # s for a march to end after its stop flag is set
 
 
+Word = Literal["finished", "diverged", "crashed", "hung", "interrupted"]
+
+
 class Ending(NamedTuple):
     """How many instants are good, how the march ended, and the error that ended it, if any."""
 
     reached: int
-    status: Status
+    status: Word
     cause: str = ""
 
 
@@ -103,7 +105,7 @@ class Work:
         """How a march up to this instant ended; one that hangs is abandoned."""
         if self.result is None:
             self.stop()  # should the law return one day
-            return Ending(self.reached, "diverged", self.fault())
+            return Ending(self.reached, "crashed" if self.error else "hung", self.fault())
         return Ending(self.result, "finished" if self.result == last else "diverged")
 
     def interrupted(self, last: int) -> Ending:

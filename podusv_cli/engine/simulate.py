@@ -13,19 +13,24 @@ from podusv_cli.actuators.base import Actuator
 from podusv_cli.controllers.base import Controller
 from podusv_cli.core import signal
 from podusv_cli.core.kernel import Vector, kernel
-from podusv_cli.core.recording import Allocate, Recording
+from podusv_cli.core.recording import Allocate, Recording, Status
 from podusv_cli.core.signal import LOOP, Signal
 from podusv_cli.disturbances.base import Disturbance
 from podusv_cli.engine import closed_loop, signatures
 from podusv_cli.engine.closed_loop import Plan, Wires
 from podusv_cli.engine.grid import TimeGrid, whole_steps
-from podusv_cli.engine.march import Ending, march
+from podusv_cli.engine.march import Ending, Word, march
 from podusv_cli.paths.base import TARGET, Path
 from podusv_cli.process.interrupts import interrupts_deferred
 from podusv_cli.vessels.vessel import Vessel
 
 STATE = tuple(state.name for state in signal.STATE)
 DEMAND = ("tau_u_cmd", "tau_r_cmd")
+# What a log says of a run, by how its march ended.
+RECORDED: dict[Word, Status] = {
+    "finished": "finished", "interrupted": "interrupted",
+    "diverged": "diverged", "crashed": "diverged", "hung": "diverged",
+}  # fmt: skip
 LOADS = ("tau_u", "tau_v", "tau_r", "b_u", "b_v", "b_r")
 
 
@@ -225,16 +230,21 @@ def _logged(loop: ClosedLoop, table: Vector) -> dict[str, Vector]:
 def _record(
     loop: ClosedLoop, grid: TimeGrid, wires: Wires, plan: Plan, ending: Ending
 ) -> Recording:
-    reached, status, cause = ending
-    rows = -(-reached // plan.log_every)
-    signals, message = _logged(loop, wires.log.reshape(-1, plan.width)[:rows]), ""
+    rows = -(-ending.reached // plan.log_every)
+    signals = _logged(loop, wires.log.reshape(-1, plan.width)[:rows])
+    status, message = RECORDED[ending.status], ""
     if status == "interrupted":
-        message = f"interrupted after t = {max(reached - 1, 0) * grid.step:.6g} s"
+        message = f"interrupted after t = {max(ending.reached - 1, 0) * grid.step:.6g} s"
     if status == "diverged":
-        cause = cause or _culprit(wires, names(loop), reached * grid.step)
-        message = f"diverged at t = {reached * grid.step:.6g} s: {cause}; {_last_words(signals)}"
+        message = f"diverged {why(ending, loop, grid, wires)}; {_last_words(signals)}"
     fixed = {part.name: array for part, array in loop.controller.fixed_signals().items()}
     return Recording(status, loop.controller.label, signals, fixed, wires.seen.copy(), message)
+
+
+def why(ending: Ending, loop: ClosedLoop, grid: TimeGrid, wires: Wires) -> str:
+    """When and why a march that nobody interrupted did not reach its last instant."""
+    at = ending.reached * grid.step
+    return f"at t = {at:.6g} s: {ending.cause or _culprit(wires, names(loop), at)}"
 
 
 def _culprit(wires: Wires, labels: list[str], at: float) -> str:

@@ -123,9 +123,10 @@ def simulate_many(
 
     `parameters` are dotted keys of numbers, each with one value a run; `vessel.m` changes the
     vessel, not what the controller is told of it (`nominal.m`). The columns are the parameters,
-    `status`, and the metrics, NaN where a run ended before one is defined. `workers` runs are
-    simulated at a time (0: one a core). No logs are kept. Raises ScenarioError, and ValueError for
-    unknown keys, unequal lengths and numbers out of range.
+    `status`, `cause` (why a run did not finish), and the metrics, NaN where a run ended
+    before one is defined. A run that diverges, hangs or raises an exception costs no other.
+    `workers` runs are simulated at a time (0: one a core). No logs are kept. Raises ScenarioError,
+    and ValueError for unknown keys, unequal lengths and numbers out of range.
 
     >>> import podusv_cli as podusv
     >>> scenario = podusv.load("podusv:own_vessel.yaml", {"simulation.duration": 30.0})
@@ -143,7 +144,8 @@ def simulate_many(
     )  # fmt: skip
     done = batch.simulate_many(variants(loop, parameters), grid, observer=watching, workers=workers)
     given = {key: np.asarray(numbers, float) for key, numbers in parameters.items()}
-    return pd.DataFrame({**given, "status": done.status, **watching.summaries(done.seen)})
+    ends = {"status": done.status, "cause": done.cause}
+    return pd.DataFrame({**given, **ends, **watching.summaries(done.seen)})
 
 
 def verify(

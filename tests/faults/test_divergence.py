@@ -127,8 +127,10 @@ def test_in_a_batch_one_law_that_does_not_return_costs_no_other_run(
     monkeypatch.setattr(march, "PATIENCE", QUICK)
     loops = [adrift(controller=Stubborn(surge=surge)) for surge in (1.0, 2.0, 3.0)]
     batch = simulate_many(loops, TimeGrid(0.01, 100), workers=2)
-    assert batch.status.tolist() == ["finished", "diverged", "finished"]
+    assert batch.status.tolist() == ["finished", "hung", "finished"]
     assert batch.reached.tolist() == [101, 49, 101]
+    cause = f"at t = 0.49 s: it is not over after {QUICK:g} s of computing"
+    assert batch.cause.tolist() == ["", cause, ""]
 
 
 def test_a_law_that_returns_after_it_was_abandoned_goes_no_step_further(
