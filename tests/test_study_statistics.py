@@ -278,6 +278,24 @@ def test_holm_decides_what_the_textbook_procedure_decides() -> None:
         assert levels_of(p)[0] == textbook
 
 
+@pytest.mark.parametrize("true_effects", [0, 1, 2])
+def test_the_probability_that_any_null_is_decided_keeps_to_the_level(true_effects: int) -> None:
+    random, studies = np.random.default_rng(11), 10 * STUDIES
+    p = np.where(np.arange(4) < true_effects, 0.8, 0.5)
+    yes = random.binomial(200, p, (studies, 4))
+    decided = {
+        left: (low > 0.5) | (high < 0.5)
+        for left in range(1, 5)
+        for _, low, high in [st.share(yes, 200, 1 - 0.05 / left)]
+    }
+    wrong = 0
+    for k in range(studies):
+        levels = st.holm(lambda i, at, k=k: decided[round(0.05 / (1 - at))][k, i], 4, 0.95)
+        wrong += any(decided[round(0.05 / (1 - levels[i]))][k, i] for i in range(true_effects, 4))
+    assert 0.02 < wrong / studies <= 0.05
+    assert decided[1][:, true_effects:].any(axis=-1).mean() > 0.05  # without the correction
+
+
 # ranks -------------------------------------------------------------------------------------------
 
 

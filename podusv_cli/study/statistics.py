@@ -94,7 +94,7 @@ def at_most(a: Any, b: Any, margin: float) -> Any:
 
 
 def _around(number: Any, margin: float) -> Any:
-    return np.where(np.isfinite(number), margin * np.abs(number), 0.0)
+    return margin * np.abs(np.where(np.isfinite(number), number, 0.0))
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,47 @@
+"""The runs of a study, as its statistics, tables and claims need them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+from numpy.typing import NDArray
+
+from podusv_cli.core.kernel import Vector
+
+Mask = NDArray[Any]  # of booleans
+
+
+class Runs(Protocol):
+    """Arrays over (cell, draw); every law meets the same draws."""
+
+    @property
+    def laws(self) -> Sequence[str]:
+        """Names of the laws."""
+
+    @property
+    def metrics(self) -> Sequence[str]:
+        """Names of the metrics that runs have."""
+
+    @property
+    def cells(self) -> Sequence[str]:
+        """A label for every cell; "" for the only cell of a study without a grid."""
+
+    @property
+    def wanted(self) -> int:
+        """Draws of each cell that were asked for."""
+
+    def metric(self, law: str, name: str) -> Vector:
+        """A metric of every run; NaN where the run has none of this name."""
+
+    def done(self, law: str) -> Mask:
+        """Whether the run was tried at all; the arrays mean nothing where it was not."""
+
+    def finished(self, law: str) -> Mask:
+        """Whether the run reached its end."""
+
+    def success(self, law: str) -> Mask:
+        """Whether the run was a success; any other counts as failed, and as the worst."""
+
+    def broken(self, law: str) -> Mask:
+        """Whether the run crashed, hung or was invalid: no result of the law."""

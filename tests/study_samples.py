@@ -1,0 +1,71 @@
+"""Runs of a study made of given numbers, for tests of claims, tables and figures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from podusv_cli.scenario.model import Claim
+from podusv_cli.study.claims import ParsedClaim, judge, parse
+from podusv_cli.study.verdict import StudyVerdict
+
+
+@dataclass(frozen=True)
+class Made:
+    """Runs with these metrics by law and name, over (cell, draw); iae of inf is a failed run."""
+
+    values: Mapping[str, Mapping[str, Any]]
+    cells: Sequence[str] = ("",)
+    wanted: int = 0
+    undone: Mapping[str, Any] = field(default_factory=dict)  # masks
+    broke: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def laws(self) -> list[str]:
+        return list(self.values)
+
+    @property
+    def metrics(self) -> list[str]:
+        return list(dict.fromkeys(name for metrics in self.values.values() for name in metrics))
+
+    def metric(self, law: str, name: str) -> Any:
+        nothing = np.full(self.done(law).shape, math.nan)
+        values = np.atleast_2d(self.values[law].get(name, nothing))
+        return np.where(self.finished(law), values, math.nan)  # as a run that diverged has it
+
+    def finished(self, law: str) -> Any:
+        return ~np.isposinf(np.atleast_2d(self.values[law]["iae"]))
+
+    success = finished
+
+    def done(self, law: str) -> Any:
+        shape = np.atleast_2d(self.values[law]["iae"]).shape
+        return ~np.broadcast_to(self.undone.get(law, False), shape)
+
+    def broken(self, law: str) -> Any:
+        shape = np.atleast_2d(self.values[law]["iae"]).shape
+        return np.broadcast_to(self.broke.get(law, False), shape)
+
+
+def study(cells: Sequence[str] = ("",), **iae: Any) -> Made:
+    """Runs with the IAE of each law."""
+    shape = np.atleast_2d(next(iter(iae.values()))).shape
+    return Made({law: {"iae": values} for law, values in iae.items()}, cells, shape[-1])
+
+
+def claim(
+    expect: str, laws: Sequence[str], tolerance: float = 0.0, name: str = "S1"
+) -> ParsedClaim:
+    stated = Claim(says="One is better.", source="ours", expect=expect, tolerance=tolerance)
+    return ParsedClaim(name, stated, parse(expect, laws))
+
+
+def judged(runs: Made, *expected: str, tolerance: float = 0.0, level: float = 0.95) -> Any:
+    """Verdicts on claims put like this; a single one alone."""
+    claims = [claim(text, runs.laws, tolerance, f"S{i}") for i, text in enumerate(expected, 1)]
+    verdicts: list[StudyVerdict] = judge(claims, runs, level)
+    return verdicts if len(verdicts) > 1 else verdicts[0]

@@ -1,0 +1,325 @@
+"""Claims about studies: their meaning, what mistakes are told, how seldom verdicts are wrong."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+from scipy.special import bdtr
+from study_samples import Made, claim, judged, study
+
+from podusv_cli.scenario.expressions import ExpressionError
+from podusv_cli.study import statistics as st
+from podusv_cli.study.claims import judge, parse
+from podusv_cli.study.expressions import parse_success, succeeded
+from podusv_cli.study.verdict import as_markdown
+
+inf, nan = math.inf, math.nan
+LAWS = ["proposed", "pid", "li"]
+STUDIES = 2000
+
+
+def sea(seed: int, n: int = 400) -> tuple[np.random.Generator, np.ndarray]:
+    """A generator, and how hard each draw is for every law."""
+    random = np.random.default_rng(seed)
+    return random, np.exp(random.normal(size=n))
+
+
+# meaning -----------------------------------------------------------------------------------------
+
+
+def test_every_statistic_is_what_its_definition_says() -> None:
+    a, b = np.array([1.0, 2.0, inf, 4.0, 5.0, inf]), np.array([2.0, 1.0, inf, 8.0, inf, 1.0])
+    runs = study(a=a, b=b)
+    for text, expected in {
+        "share(a.iae < b.iae)": st.share(3, 6, 0.95),
+        "share(a.iae <= b.iae)": st.share(4, 6, 0.95),  # both failing is a tie
+        "share(not a.iae < b.iae)": st.share(3, 6, 0.95),
+        "share(a.iae < b.iae and finished(b))": st.share(2, 6, 0.95),
+        "share(not success(a))": st.share(2, 6, 0.95),
+        "share(a.iae > 3 * b.iae)": st.share(1, 6, 0.95),
+        "share(1 < a.iae <= 4)": st.share(2, 6, 0.95),
+        "failures(a)": st.share(2, 6, 0.95),
+        "quantile(a.iae, 0.25)": st.quantile(a, 0.25, 0.95),
+        "median(a.iae / b.iae)": st.quantile(np.array([0.5, 2, 1, 0.5, 0, inf]), 0.5, 0.95),
+        "median(a.iae - b.iae)": st.quantile(np.array([-1, 1, 0, -4, -inf, inf]), 0.5, 0.95),
+        # the limit of a large common number: 1 / (1 + 1)
+        "quantile(a.iae / (a.iae + b.iae), 0.6)": st.quantile(
+            np.array([1 / 3, 2 / 3, 0.5, 1 / 3, 0, 1]), 0.6, 0.95
+        ),
+    }.items():
+        (part,) = judged(runs, f"{text} >= 0.5").parts
+        assert (part.estimate, part.low, part.high) == pytest.approx(tuple(expected)), text
+        assert part.n == 6
+
+
+def test_a_share_shows_draws_without_a_winner() -> None:
+    runs = study(a=[1.0, 1.0, inf, 1.0], b=[1.004, 2.0, inf, inf])
+    (part,) = judged(runs, "share(a.iae < b.iae) > 0.5", tolerance=0.01).parts
+    assert (part.estimate, part.both_failed, part.close) == (0.5, 1, 1)
+    assert "both failed in 1, 1 within the margin" in part.in_words()
+
+
+def test_a_number_on_the_left_means_the_same() -> None:
+    runs = study(a=np.arange(100.0))
+    mirrored = judged(runs, "0.6 < share(a.iae < 80)", "0.9 >= share(a.iae < 80) >= 0.6")
+    plain = judged(runs, "share(a.iae < 80) > 0.6", "share(a.iae < 80) <= 0.9")
+    assert [v.answer for v in mirrored] == [v.answer for v in plain] == [True, True]
+
+
+def test_the_tolerance_is_a_margin_between_metrics_and_not_of_a_share() -> None:
+    _, hard = sea(1)
+    runs = study(dsc=0.9996 * hard, proposed=hard)
+    better, ratio = "share(dsc.iae < proposed.iae) > 0.9", "median(dsc.iae / proposed.iae) < 1"
+    assert [v.answer for v in judged(runs, better, ratio)] == [True, True]
+    assert [v.answer for v in judged(runs, better, ratio, tolerance=0.01)] == [False, False]
+    worse = "median(proposed.iae / dsc.iae) <= 1"
+    assert judged(runs, worse).answer is False
+    assert judged(runs, worse, tolerance=0.01).answer is True
+    many = study(a=np.r_[np.ones(920), np.zeros(80)])
+    assert judged(many, "share(a.iae > 0.5) >= 0.95", tolerance=0.05).answer is False
+
+
+def test_times_that_never_come_and_numbers_that_a_law_lacks() -> None:
+    time = np.array([*range(18), nan, nan])
+    runs = Made({"a": {"iae": np.ones(20), "settling_time": time, "energy": time}}, wanted=20)
+    (never,) = judged(runs, "quantile(a.settling_time, 0.5) <= 30").parts
+    assert (never.unknown, never.low, never.high) == (0, 5.0, 14.0)
+    (lacking,) = judged(runs, "quantile(a.energy, 0.5) <= 30").parts
+    assert (lacking.unknown, lacking.low, lacking.high) == (2, 3.0, 14.0)
+
+
+def test_success_is_a_condition_on_one_run() -> None:
+    tree = parse_success("finished and z_e_steady <= 1.5")
+    values = {"z_e_steady": np.array([1.0, 1.6, 1.0, nan])}
+    finished = np.array([True, True, False, True])
+    assert succeeded(tree, values, finished).tolist() == [True, False, False, False]
+    for unknown in ("not z_e_steady > 1.5", "not settling_time < 9"):
+        ended = np.array([False])
+        assert not succeeded(parse_success(unknown), {}, ended).any()
+
+
+MISTAKES = {
+    "share(propsed.iae < pid.iae) >= 0.9": "unknown law 'propsed'; did you mean 'proposed'?",
+    "median(pid.z_e_stedy) >= 0.9": "unknown metric 'z_e_stedy'; did you mean 'z_e_steady'?",
+    "shares(proposed.iae < pid.iae) >= 0.9": "unknown statistic 'shares'; did you mean 'share'?",
+    "share(finish(pid)) >= 0.9": "unknown property 'finish'; did you mean 'finished'?",
+    "failures(pdi) <= 0.1": "unknown law 'pdi'; did you mean 'pid'?",
+    "failures(pid.iae) <= 0.1": "failures takes the name of one law",
+    "failures(pid) <= 5": "is a share between 0 and 1, and cannot be compared with 5",
+    "failures(pid) < failures(li)": "compare a statistic with a number",
+    "median(pid.iae) < median(li.iae)": "median(a.iae / b.iae)",
+    "proposed.iae < pid.iae": "compare a statistic with a number",
+    "proposed.iae < 3": "no statistic of all draws; write one of share",
+    "failures(pid)": "not a condition; compare one of share",
+    "failures(pid) == 0.1": "compare with <, <=, >, >=",
+    "failures(pid) < 0.1 or failures(li) < 0.1": "join conditions with `and` only",
+    "share(pid.iae == 3) < 0.1": "compare with <, <=, >, >=",
+    "share(pid.iae) < 0.1": "not a condition; compare numbers, or write finished(law)",
+    "share(1 < 2) < 0.1": "names no law",
+    "share(median(pid.iae) < 3) < 0.1": "no function of numbers here",
+    "share(iae < 3) < 0.1": "no meaning here; write law.metric",
+    "share() < 0.1": "share takes one condition",
+    "median(pid.iae ** 2) < 3": "calculate with + - * / only",
+    "median(pid.iae, 3) < 3": "median takes one number of each draw",
+    "quantile(pid.iae) < 3": "quantile takes a number of each draw and a share",
+    "quantile(pid.iae, 95) < 3": "the share must lie between 0 and 1",
+    "quantile(pid.iae, q=0.9) < 3": "functions are called by name, without keywords",
+    "failures(pid) < 'a'": "not a plain number",
+    "failures(pid) <": "cannot read",
+    "__import__('os')": "not a condition",
+    "": "cannot read",
+    "not " * 70 + "failures(pid) < 0.1": "nested more than",
+}
+
+
+@pytest.mark.parametrize("text", MISTAKES)
+def test_every_mistake_is_told_with_what_to_write(text: str) -> None:
+    with pytest.raises(ExpressionError) as error:
+        parse(text, LAWS)
+    assert MISTAKES[text] in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("finished and z_e_stedy <= 1.5", "did you mean 'z_e_steady'?"),
+        ("finishd", "did you mean 'finished'?"),
+        ("pid.iae < 3", "write metrics by their names alone"),
+        ("finished(pid)", "write finished alone"),
+        ("finished or iae < 3", "join conditions with `and` only"),
+    ],
+)
+def test_every_mistake_in_success_is_told(text: str, told: str) -> None:
+    with pytest.raises(ExpressionError) as error:
+        parse_success(text)
+    assert told in str(error.value)
+
+
+# verdicts ----------------------------------------------------------------------------------------
+
+
+def test_a_planted_winner_is_found_and_its_opposite_refuted() -> None:
+    random, hard = sea(2)
+    runs = study(
+        proposed=hard * np.exp(0.1 * random.normal(size=400)),
+        pid=hard * np.exp(0.2 + 0.1 * random.normal(size=400)),
+    )
+    found, refuted, ratio = judged(
+        runs, "share(proposed.iae < pid.iae) >= 0.85", "share(pid.iae < proposed.iae) >= 0.15",
+        "median(proposed.iae / pid.iae) <= 0.9",
+    )  # fmt: skip
+    assert (found.verdict, refuted.verdict) == ("reproduced", "not reproduced")
+    assert ratio.verdict == "reproduced"
+    assert found.as_json()["needed"] is None
+
+
+def test_laws_of_the_same_distribution_are_told_apart_no_more_often_than_the_level() -> None:
+    random = np.random.default_rng(3)
+    a, b = random.random((2, STUDIES, 60))
+    one_each = study([f"study {i}" for i in range(STUDIES)], a=a, b=b)
+    for null in ("median(a.iae - b.iae) <= 0", "share(a.iae < b.iae) >= 0.5"):
+        verdict = judged(one_each, null)
+        decided = [answer is not None for answer in verdict.by_cell.values()]
+        assert (len(decided), verdict.level) == (STUDIES, 0.95)
+        assert 0 < np.mean(decided) <= 0.05
+
+
+def test_claims_are_judged_together_as_holm_says() -> None:
+    random, met = np.random.default_rng(4), set()
+    claims = [claim(f"share({law}.iae < 0.5) >= 0.5", "abc", name=law) for law in "abc"]
+    for _ in range(60):
+        numbers = random.random((3, 60)) ** random.choice([0.6, 1.0, 1.5], (3, 1))
+        yes = (numbers < 0.5).sum(axis=-1)
+        p = [2 * min(bdtr(k, 60, 0.5), bdtr(60 - k, 60, 0.5)) for k in yes]
+        steps = np.maximum.accumulate(np.sort(p) * [3, 2, 1])  # Holm's adjusted probabilities
+        wrong = dict(zip(np.argsort(p).tolist(), steps, strict=True))
+        verdicts = judge(claims, study(**dict(zip("abc", numbers, strict=True))), 0.95)
+        expected = [bool(yes[i] > 30) if wrong[i] <= 0.05 else None for i in range(3)]
+        assert [verdict.answer for verdict in verdicts] == expected
+        met.add(sum(answer is None for answer in expected))
+    assert met == {0, 1, 2, 3}
+
+
+def test_a_decided_claim_leaves_its_part_of_the_level_to_the_others() -> None:
+    runs = study(a=np.r_[np.zeros(30), np.ones(70)], b=np.zeros(100))
+    clear, open_ = judged(runs, "failures(b) <= 0.5", "share(a.iae < 0.5) <= 0.3")
+    assert (clear.level, open_.level) == pytest.approx((0.975, 0.95))
+    alone = judged(runs, "share(a.iae < 0.5) <= 0.3")
+    assert alone.parts == open_.parts
+
+
+def test_statistics_of_one_claim_share_its_level() -> None:
+    runs = study(a=np.arange(100.0))
+    both = judged(runs, "failures(a) <= 0.5 and quantile(a.iae, 0.5) <= 90 and failures(a) < 0.9")
+    assert [part.level for part in both.parts] == pytest.approx([0.975, 0.975])
+    assert both.answer is True
+    refuted = judged(runs, "failures(a) <= 0.5 and quantile(a.iae, 0.5) <= 9")
+    assert refuted.answer is False
+
+
+def test_all_cells_have_to_agree() -> None:
+    good, bad, between = np.zeros(200), np.full(200, inf), np.r_[np.zeros(100), np.full(100, inf)]
+    text, cells = "failures(a) <= 0.5", ["scale=1", "scale=2"]
+    answers = [
+        judged(study(cells, a=np.array(pair)), text)
+        for pair in ((good, good), (bad, bad), (good, bad), (good, between))
+    ]
+    assert [v.answer for v in answers] == [True, False, None, None]
+    disagree = "the cells disagree: reproduced at scale=1, not reproduced at scale=2"
+    assert disagree in answers[2].evidence()
+    assert answers[2].as_json()["needed"] is None
+    assert "failures(a) at scale=1 = 0 [0, 0.01" in answers[0].evidence()
+
+
+def test_what_cannot_be_told_says_how_many_draws_would_tell() -> None:
+    open_ = judged(study(a=np.ones(100)), "failures(a) <= 0.01")
+    assert open_.answer is None
+    assert open_.more == 368
+    assert "about 368 draws would decide, if shares stay as they are" in open_.evidence()
+    assert judged(study(a=np.ones(368)), "failures(a) <= 0.01").answer is True
+    values = np.r_[np.zeros(48), np.ones(2)]
+    quantile = judged(study(a=values), "quantile(a.iae, 0.9) <= 0.5")
+    assert quantile.more == st.needed(0.96, 0.9, 0.95)
+    bound = judged(study(a=np.r_[np.zeros(5), np.full(5, inf)]), "failures(a) <= 0.5")
+    assert "an estimate lies on its bound" in bound.evidence()
+
+
+def test_the_draws_needed_decide_the_quantile_too() -> None:
+    share, q = 0.96, 0.9
+    n = st.needed(share, q, 0.95)
+    assert n
+    for factor, answer in ((0.8, None), (1.2, True)):
+        count = round(n * factor / 25) * 25
+        values = np.r_[np.zeros(round(share * count)), np.ones(count - round(share * count))]
+        assert judged(study(a=values), "quantile(a.iae, 0.9) <= 0.5").answer is answer
+
+
+def test_an_unfinished_study_is_preliminary() -> None:
+    undone = {"a": np.arange(200) >= 150}
+    runs = Made({"a": {"iae": np.zeros(200)}}, wanted=200, undone=undone)
+    verdict = judged(runs, "failures(a) <= 0.1")
+    assert (verdict.answer, verdict.preliminary, verdict.draws) == (True, True, 150)
+    assert "preliminary: 150 of 200 draws" in verdict.evidence()
+    assert "**reproduced**, preliminary" in as_markdown([verdict])
+    assert not judged(study(a=np.zeros(200)), "failures(a) <= 0.1").preliminary
+
+
+def test_only_draws_that_all_laws_of_the_claim_met_count() -> None:
+    undone = {"a": np.arange(10) < 3, "b": np.arange(10) >= 8}
+    runs = Made({x: {"iae": np.ones(10)} for x in "ab"}, wanted=10, undone=undone)
+    ratio, alone = judged(runs, "median(a.iae / b.iae) <= 2", "failures(a) <= 0.9")
+    assert (ratio.draws, alone.draws) == (5, 7)
+    nothing = Made({"a": {"iae": np.ones(4)}}, wanted=4, undone={"a": True})
+    for text in ("failures(a) <= 0.9", "quantile(a.iae, 0.5) <= 2"):
+        verdict = judged(nothing, text)
+        assert verdict.answer is None
+        assert "no draw has runs of all laws in the claim" in verdict.evidence()
+
+
+def test_broken_runs_count_as_failed_and_are_named_where_they_decide() -> None:
+    broken = np.arange(400) < 60
+    runs = Made({"a": {"iae": np.where(broken, inf, 1.0)}}, wanted=400, broke={"a": broken})
+    verdict = judged(runs, "failures(a) <= 0.05")
+    assert verdict.answer is False
+    assert "60 runs crashed, hung or were invalid, and count as failed" in verdict.evidence()
+    assert "without their draws it would be `reproduced`" in verdict.evidence()
+    harmless = judged(runs, "failures(a) <= 0.5")
+    assert harmless.without_broken is harmless.answer is True
+    assert "decide the verdict" not in harmless.evidence()
+
+
+def test_missing_numbers_are_never_counted_silently() -> None:
+    lacking = Made(
+        {x: {"iae": np.ones(50)} for x in "ab"} | {"c": {"iae": np.ones(50), "energy": np.ones(50)}}
+    )
+    missing = judged(lacking, "median(a.energy / c.energy) <= 1")
+    assert missing.answer is None
+    assert "no run has a number that the claim is about" in missing.evidence()
+    some = np.where(np.arange(100) < 20, nan, 0.0)
+    runs = Made({"a": {"iae": np.ones(100), "energy": some}})
+    open_ = judged(runs, "share(a.energy <= 1) >= 0.85")
+    assert open_.answer is None
+    assert "a number is missing in 20" in open_.evidence()
+    assert judged(runs, "share(a.energy <= 1) >= 0.6").answer is True
+    assert judged(runs, "quantile(a.energy, 0.5) <= 1").answer is True
+    assert judged(runs, "quantile(a.energy, 0.85) <= 1").answer is None
+
+
+def test_verdicts_as_plain_data_and_as_a_table() -> None:
+    runs = study(a=np.r_[np.ones(5), inf], b=np.ones(6))
+    verdict = judged(runs, "quantile(a.iae, 0.9) <= 2")
+    plain = json.loads(json.dumps(verdict.as_json(), allow_nan=False))
+    assert plain["verdict"] == "cannot tell"
+    assert plain["statistics"][0]["high"] is None
+    assert plain["expect"] == "quantile(a.iae, 0.9) <= 2"
+    table = as_markdown([verdict]).splitlines()
+    assert table[2].startswith("| S1 | One is better. (ours) | **cannot tell** | `quantile(a.iae")
+    assert table[2].count(" | ") == 4
+
+
+def test_names_of_text_are_escaped_in_the_table() -> None:
+    text = as_markdown([judged(study(["a|b"], a=np.ones((1, 6))), "failures(a) <= 0.9")])
+    assert "a\\|b" in text
