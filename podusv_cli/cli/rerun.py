@@ -36,8 +36,9 @@ def rerun(
     """
     from podusv_cli.cli.progress import progress_bars
     from podusv_cli.workflows import rerun as repeating  # heavy imports only when they are needed
+    from podusv_cli.workflows.run import Request
 
-    request = repeating.RerunRequest(out, force, tuple(sys.argv), allow_large)
+    request = Request(out=out, force=force, figures=False, argv=sys.argv, allow_large=allow_large)
     with progress_bars(wanted=not as_json) as progress:
         done = repeating.rerun(Path(run), request, progress)
     if as_json:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
@@ -15,24 +15,17 @@ from podusv_cli.comparison.run_difference import RunDifference, difference
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.recording import Status
 from podusv_cli.process.extras import Missing
-from podusv_cli.process.workers import INTERRUPTED, available_workers, run_all
+from podusv_cli.process.workers import INTERRUPTED, available_workers
 from podusv_cli.scenario.limits import estimate, limits, needed
 from podusv_cli.storage import manifest, provenance, run_folder
+from podusv_cli.storage.run_folder import Run
 from podusv_cli.storage.staging import Staging, remove_abandoned
-from podusv_cli.workflows.execute import Task, execute, unwritten, warm_up
+from podusv_cli.workflows.compare import make_runs
+from podusv_cli.workflows.execute import Finished, Task, execute, unwritten
 from podusv_cli.workflows.members import Member, from_folder
+from podusv_cli.workflows.run import Request
 
 Progress = Callable[[str, float], None]
-
-
-@dataclass(frozen=True)
-class RerunRequest:
-    """Where repeated runs go (None: nowhere), whether they may replace what is there, be large."""
-
-    out: Path | None = None
-    force: bool = False
-    argv: Sequence[str] = ()
-    allow_large: bool = False
 
 
 @dataclass(frozen=True)
@@ -93,7 +86,7 @@ class Repetition:
         return any(run.status == "diverged" and run.was != "diverged" for run in runs)
 
 
-def rerun(path: Path, request: RerunRequest, progress: Progress | None = None) -> Repetition:
+def rerun(path: Path, request: Request, progress: Progress | None = None) -> Repetition:
     """Make a run, or every run of a comparison, once more from what its folder holds.
 
     Raises UsageError where `path` is no run folder or a run was interrupted, ScenarioError where
@@ -101,53 +94,53 @@ def rerun(path: Path, request: RerunRequest, progress: Progress | None = None) -
     """
     manifest.demand(path)
     members = from_folder(path, (limits(request.allow_large, read_back=True),), to_run=True)
-    for member in members:
-        if member.run and member.run.status == "interrupted":
-            text = f"{member.run.folder} was interrupted; there is no whole run to repeat"
-            raise UsageError(text)
+    for run in _runs(members):
+        if run.status == "interrupted":
+            raise UsageError(f"{run.folder} was interrupted; there is no whole run to repeat")
     if len(members) == 1:
         return _one(members[0], request, progress)
     return _several(members, request, progress)
 
 
-def _one(member: Member, request: RerunRequest, progress: Progress | None) -> Repetition:
-    label = member.label or str(member.run and member.run.folder)
+def _one(member: Member, request: Request, progress: Progress | None) -> Repetition:
+    (original,) = _runs([member])
+    label = member.label or str(original.folder)
     advance = partial(progress, label) if progress else None
     with _passing(request) as place:
-        target = request.out or place / "again"
-        return Repetition({label: _repeat(member, target, request, advance)}, {})
+        target, text = request.out or place / "again", original.resolved_yaml
+        task = Task(member.scenario, text, target, request.force, argv=request.argv)
+        return Repetition({label: _repeated(original, execute(task, advance))}, {})
 
 
-def _several(
-    members: Sequence[Member], request: RerunRequest, progress: Progress | None
-) -> Repetition:
-    started = datetime.now(UTC)
-
-    def tell(position: int, fraction: float) -> None:
-        if progress:
-            progress(members[position].label, fraction)
-
+def _several(members: Sequence[Member], request: Request, progress: Progress | None) -> Repetition:
+    started, originals = datetime.now(UTC), _runs(members)
+    again = [
+        replace(member, run=None, text=original.resolved_yaml)
+        for member, original in zip(members, originals, strict=True)
+    ]
     with _passing(request) as place:
         target = request.out or place / "again"
         room = needed([estimate(member.scenario) for member in members], available_workers())
         with run_folder.RunWriter(target, force=request.force, needed=room) as writer:
-            for member in members:
-                warm_up(member.scenario)
-            jobs = [partial(_repeat, p, writer.folder / p.label, request) for p in members]
-            outcomes = run_all(jobs, tell)
-            missing = unwritten(outcomes)
-            pairs = dict(zip((member.label for member in members), outcomes, strict=True))
-            runs = {label: outcome.result for label, outcome in pairs.items() if outcome.result}
-            failures = {n: outcome.failure for n, outcome in pairs.items() if not outcome.result}
-            done = Repetition(runs, failures)
+            outcomes = make_runs(again, writer.folder, request, progress)
+            missing = unwritten(outcomes.values())
+            ended = zip(originals, outcomes.items(), strict=True)
+            done = Repetition(
+                {label: _repeated(run, end.result) for run, (label, end) in ended if end.result},
+                {label: end.failure for label, end in outcomes.items() if not end.result},
+            )
             origin = provenance.collect(request.argv, started, datetime.now(UTC))
             writer.add_json("provenance.json", origin)
             writer.finish("interrupted" if done.interrupted else "finished", missing)
         return done
 
 
+def _runs(members: Sequence[Member]) -> list[Run]:
+    return [member.run for member in members if member.run]
+
+
 @contextmanager
-def _passing(request: RerunRequest) -> Iterator[Path]:
+def _passing(request: Request) -> Iterator[Path]:
     """A folder that is gone afterwards, for runs that are not to be kept."""
     if request.out is not None:
         yield request.out.parent
@@ -161,18 +154,8 @@ def _passing(request: RerunRequest) -> Iterator[Path]:
         staging.discard()
 
 
-def _repeat(
-    member: Member,
-    target: Path,
-    request: RerunRequest,
-    progress: Callable[[float], None] | None = None,
-) -> Repeated:
-    """Run the scenario into `target` and hold it against the original."""
-    original = member.run
-    if original is None:
-        raise ValueError(f"{member.label} has not been run")
-    task = Task(member.scenario, original.resolved_yaml, target, request.force, argv=request.argv)
-    done = execute(task, progress)
+def _repeated(original: Run, done: Finished) -> Repeated:
+    """A run that was made once more, held against the original."""
     found = difference(original, run_folder.open_run(done.folder))
     return Repeated(
         original.folder, original.status, done.status, found, done.missing, done.message
