@@ -13,7 +13,7 @@ from counts import count
 from storage_samples import deadline
 
 from podusv_cli.figures import drawing
-from podusv_cli.workflows import compare, execute, rerun
+from podusv_cli.workflows import compare, execute
 
 MINUTES = LONG + TWO.splitlines()[-1] + "\n"
 RUN, COMPARE = ("run", "long.yaml", "--no-figures"), ("compare", "long.yaml", "--no-figures")
@@ -57,9 +57,8 @@ def podusv(beside_old_results: Command, monkeypatch: pytest.MonkeyPatch) -> Comm
     write("long.yaml", MINUTES)
     Path().chmod(0o755)
     monkeypatch.setattr(execute, "simulate", begun)
-    for room in (compare, rerun):  # whose runs are made in processes of their own
-        monkeypatch.setattr(room, "run_all", begun)
-        monkeypatch.setattr(room, "warm_up", begun)
+    monkeypatch.setattr(compare, "run_all", begun)  # whose processes rerun uses, too
+    monkeypatch.setattr(compare, "warm_up", begun)
     monkeypatch.setattr(drawing, "draw_in_parallel", begun)
     return beside_old_results
 

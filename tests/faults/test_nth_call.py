@@ -18,7 +18,7 @@ from storage_samples import Saboteur, fails, files
 from podusv_cli.process import workers
 from podusv_cli.process.interrupts import Interrupts
 from podusv_cli.storage import provenance, staging
-from podusv_cli.workflows import compare, rerun
+from podusv_cli.workflows import compare
 
 NAMING = ("replace", "rename")
 FILLING = ("write", "fsync")
@@ -32,8 +32,7 @@ def one_by_one(jobs: Sequence[workers.Job], *more: object) -> list[workers.Outco
 @pytest.fixture
 def podusv(beside_old_results: Command, monkeypatch: pytest.MonkeyPatch) -> Command:
     monkeypatch.setattr(provenance, "collect", lambda *of_a_run: {})  # which takes its time
-    for room in (compare, rerun):
-        monkeypatch.setattr(room, "run_all", one_by_one)
+    monkeypatch.setattr(compare, "run_all", one_by_one)
     return beside_old_results
 
 
