@@ -9,13 +9,7 @@ import numpy as np
 from pydantic import model_validator
 
 from podusv_cli.controllers.base import Slots, each
-from podusv_cli.controllers.tracking import (
-    HELD,
-    TRACKED,
-    Tracking,
-    TrackingController,
-    track,
-)
+from podusv_cli.controllers.tracking import HELD, TRACKED, Tracking, TrackingController, track
 from podusv_cli.controllers.velocity_loop import Axis, Loop
 from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, bundle, kernel

@@ -20,13 +20,7 @@ from podusv_cli.controllers.network import (
     adapt,
     weigh,
 )
-from podusv_cli.controllers.tracking import (
-    HELD,
-    TRACKED,
-    Tracking,
-    TrackingController,
-    track,
-)
+from podusv_cli.controllers.tracking import HELD, TRACKED, Tracking, TrackingController, track
 from podusv_cli.controllers.velocity_loop import AdaptedBound, Axis, Loop
 from podusv_cli.core.component import value
 from podusv_cli.core.derived import difference

@@ -65,9 +65,7 @@ def _path_break(code: str, what: str, remedy: str) -> FindingKind:
 path_jump = _path_break("path-jump", "position", "let the parts of the path meet")
 path_corner = _path_break("path-corner", "velocity", "round the corner")
 path_bend = _path_break(
-    "path-bend",
-    "acceleration",
-    "none needed: Assumption 3 holds; a smooth path avoids the step",
+    "path-bend", "acceleration", "none needed: Assumption 3 holds; a smooth path avoids the step"
 )
 
 

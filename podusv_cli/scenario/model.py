@@ -288,10 +288,7 @@ class Scenario(Component):
             if not LABEL.fullmatch(label):
                 yield f"controllers.{label}", LABEL_IN_WORDS
             if label == "figures":
-                yield (
-                    f"controllers.{label}",
-                    "is the folder of the figures; take another name",
-                )
+                yield (f"controllers.{label}", "is the folder of the figures; take another name")
         for name in self.claims:
             if not CLAIM.fullmatch(name):
                 yield f"claims.{name}", CLAIM_IN_WORDS

@@ -55,10 +55,7 @@ def error_rates(log: Recording, now: Replayed, law: PolarBackstepping) -> Errors
     signals, rates = now.signals, now.rates
     sight = _line_of_sight(log, now, law)
     psi_e, psi_e_dot = signals["psi_e"], sight.w - log["r"]
-    z_e, z_e_dot = (
-        sight.side * (sight.distance - law.standoff),
-        sight.side * sight.distance_rate,
-    )
+    z_e, z_e_dot = (sight.side * (sight.distance - law.standoff), sight.side * sight.distance_rate)
     alpha_u_dot = _alpha_u_rate(log, now, law, sight)
     alpha_r_dot = sight.w_rate * (law.rate == "analytic") + law.k_psie * psi_e_dot
     filtered = "beta_u" in rates
