@@ -216,14 +216,14 @@ def test_every_run_of_a_comparison_is_repeated(
 def test_a_run_that_cannot_be_repeated_takes_no_other_with_it(
     compared: Path, podusv: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    real = rerun.execute
+    real = compare.execute
 
     def execute(task: Any, progress: Any = None) -> Any:
         if task.scenario.controller.K_Pu == 500.0:
             raise RuntimeError("planted")
         return real(task, progress)
 
-    monkeypatch.setattr(rerun, "execute", execute)
+    monkeypatch.setattr(compare, "execute", execute)
     said = podusv("rerun", compared)
     assert said.code == 3
     assert said.out.startswith("hard  identical")

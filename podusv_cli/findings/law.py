@@ -81,12 +81,10 @@ sampled_adaptation, sampled_derivative, sampled_loop = map(_sampled, LOOPS)
 
 
 @before(
-    "stiff-start",
-    about="simulation.step",
-    meaning="start error makes the bound too stiff",
+    "stiff-start", about="simulation.step", meaning="start error makes the bound too stiff",
     condition="RK4 makes the error, marched from t = 0 with its bound, grow",
     remedy="take a shorter step, a smaller bound gain, or a start nearer to the target's velocity",
-)
+)  # fmt: skip
 def stiff_start(case: Case) -> Sentences:
     """The start error drives the estimated bound so high that RK4 becomes unstable.
 

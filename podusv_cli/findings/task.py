@@ -70,12 +70,10 @@ path_bend = _path_break(
 
 
 @before(
-    "path-runs-on",
-    about="path",
-    meaning="the target goes straight on after the last waypoint",
+    "path-runs-on", about="path", meaning="the target goes straight on after the last waypoint",
     condition="the run lasts longer than the way through the points",
     remedy="set path.after to stop or loop, or simulate no longer",
-)
+)  # fmt: skip
 def path_runs_on(case: Case) -> Sentences:
     """The target leaves the given course before the run ends."""
     end, duration = case.scenario.path.runs_on_from(), case.scenario.simulation.duration
@@ -87,12 +85,10 @@ def path_runs_on(case: Case) -> Sentences:
 
 
 @before(
-    "sway-drift",
-    about="path",
-    meaning="the sway load drifts the hull faster than the target",
+    "sway-drift", about="path", meaning="the sway load drifts the hull faster than the target",
     condition="no heading balances sway damping and mean load at the target's speed",
     remedy="check the sway damping, the load and the speed",
-)
+)  # fmt: skip
 def sway_drift(case: Case) -> Sentences:
     """The mean sway load pushes the hull sideways faster than the target moves."""
     seen = case.reference
@@ -110,12 +106,10 @@ def sway_drift(case: Case) -> Sentences:
 
 
 @before(
-    "sway-unstable",
-    about="controller.k_ze",
-    meaning="pointing at the target makes sway grow",
+    "sway-unstable", about="controller.k_ze", meaning="pointing at the target makes sway grow",
     condition=f"m11 k_ze exceeds the sway damping, and sway grows beyond {RUNAWAY:g} target speed",
     remedy="take a smaller k_ze, or a hull with more sway damping",
-)
+)  # fmt: skip
 def sway_unstable(case: Case) -> Sentences:
     """The sway of a hull that points at the target grows: m11 k_ze > d, the linear sway damping.
 
@@ -174,12 +168,10 @@ def _damping(case: Case, drive: float) -> tuple[float, float]:
 
 
 @before(
-    "thrust-short",
-    about="actuator",
-    meaning="keeping up takes more than the actuator gives",
+    "thrust-short", about="actuator", meaning="keeping up takes more than the actuator gives",
     condition=f"less than {DELIVERED:.1%} of the force or moment along the path is delivered",
     remedy="raise the actuator's limit, or slow the target down",
-)
+)  # fmt: skip
 def thrust_short(case: Case) -> Sentences:
     """Following takes more surge force or yaw moment than the actuator delivers."""
     seen = case.reference
@@ -214,12 +206,10 @@ def _driven_ahead(case: Case, row: int) -> Sentences:
 
 
 @before(
-    "stiff-actuator",
-    about="simulation.step",
-    meaning="a pod's lag too short for RK4's step",
+    "stiff-actuator", about="simulation.step", meaning="a pod's lag too short for RK4's step",
     condition=f"the step exceeds {STABLE:g} times the shortest lag",
     remedy="take a shorter step, or a longer lag",
-)
+)  # fmt: skip
 def stiff_actuator(case: Case) -> Sentences:
     """An actuator's lag is too short for RK4, which is unstable for steps above 2.78 lags."""
     lag, step = case.scenario.actuator.shortest_lag(), case.scenario.simulation.step
@@ -232,12 +222,10 @@ def stiff_actuator(case: Case) -> Sentences:
 
 
 @after(
-    "saturated",
-    about="actuator",
-    meaning="the actuator limited the law for long",
+    "saturated", about="actuator", meaning="the actuator limited the law for long",
     condition=f"limited during more than {LONG:.0%} of the run",
     remedy="take anti_windup: auxiliary, smaller gains, or a stronger actuator",
-)
+)  # fmt: skip
 def saturated(scenario: Scenario, log: Recording) -> Sentences:
     """The actuator limits the law during a considerable part of the run."""
     if "saturated" not in log:

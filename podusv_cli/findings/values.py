@@ -14,12 +14,10 @@ TURN = 2.0 * math.pi
 
 
 @before(
-    "damping-sign",
-    about="vessel",
-    meaning="nonlinear damping drives the motion",
+    "damping-sign", about="vessel", meaning="nonlinear damping drives the motion",
     condition="X_uu, X_uuu, Y_vv or N_rr is positive",
     remedy="make the coefficient negative, as damping is published",
-)
+)  # fmt: skip
 def damping_sign(case: Case) -> Sentences:
     """A nonlinear damping coefficient is positive, so it accelerates the motion."""
     vessels = {"vessel": case.scenario.vessel, "nominal": case.scenario.nominal}
@@ -38,12 +36,9 @@ def damping_sign(case: Case) -> Sentences:
 
 
 @before(
-    "large-angle",
-    about="start.psi",
-    meaning="an angle is beyond a whole turn",
-    condition="an angle of start or path beyond 2 pi",
-    remedy="give the angle in radians",
-)
+    "large-angle", about="start.psi", meaning="an angle is beyond a whole turn",
+    condition="an angle of start or path beyond 2 pi", remedy="give the angle in radians",
+)  # fmt: skip
 def large_angle(case: Case) -> Sentences:
     """An angle of the start or of the path exceeds a whole turn."""
     for section, part in (("start", case.scenario.start), ("path", case.scenario.path)):
