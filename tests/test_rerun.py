@@ -27,7 +27,7 @@ from storage_samples import ENVIRONMENT, beside, files
 
 from podusv_cli.storage import manifest
 from podusv_cli.storage.run_folder import open_run
-from podusv_cli.workflows import compare, rerun
+from podusv_cli.workflows import compare
 from podusv_cli.workflows import run as running
 
 
