@@ -1,39 +1,75 @@
 """What a shell completes after an option or as an argument: keys, kinds, figures, names.
 
-A shell asks at every Tab, so each function imports what it needs itself.
+A shell asks at every Tab, so each function imports what it needs itself. What installed packages
+and the files after `--plugin` offer is completed too; a scenario's own plug-ins are not, since that
+would run them at every Tab.
 """
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
 
-def starting_points(incomplete: str) -> list[tuple[str, str]]:
+import typer
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from podusv_cli.core.plugins import Plugins
+
+Offered = list[tuple[str, str]]
+
+
+def starting_points(incomplete: str) -> Offered:
     """Names that `podusv init` takes."""
     from podusv_cli.workflows.init import starting_points
 
-    return [item for item in starting_points().items() if item[0].startswith(incomplete)]
+    return _beginning(incomplete, starting_points())
 
 
-def keys(incomplete: str) -> list[tuple[str, str]]:
+def keys(context: typer.Context, incomplete: str) -> Offered:
     """`controller.k_ze=` for `--set`; after the equals sign the words that the value may be."""
     from podusv_cli.scenario.explain import assignments
 
-    return [item for item in assignments().items() if item[0].startswith(incomplete)]
+    return _beginning(incomplete, assignments(_plugins(context)))
 
 
-def figures(incomplete: str) -> list[tuple[str, str]]:
+def figures(context: typer.Context, incomplete: str) -> Offered:
     """Names of figures."""
-    from podusv_cli.figures.drawing import FIGURES
+    from podusv_cli.figures.drawing import figures_with
 
-    return [(n, sheet.caption) for n, sheet in FIGURES.items() if n.startswith(incomplete)]
+    known = figures_with(_plugins(context))
+    return _beginning(incomplete, {name: sheet.caption for name, sheet in known.items()})
 
 
-def names(incomplete: str) -> list[tuple[str, str]]:
+def names(context: typer.Context, incomplete: str) -> Offered:
     """What `podusv explain` explains: keys, kinds, signals, presets, metrics, findings."""
     from podusv_cli.findings.finding import finding_kinds
-    from podusv_cli.metrics.table import METRICS
+    from podusv_cli.metrics.table import metrics_with
     from podusv_cli.scenario.explain import names
 
-    found = dict.fromkeys(names(), "")
-    found |= {name: metric.meaning for name, metric in METRICS.items()}
-    found |= {name: finding.meaning for name, finding in finding_kinds().items()}
-    return [item for item in found.items() if item[0].startswith(incomplete)]
+    plugins = _plugins(context)
+    found = dict.fromkeys(names(plugins), "")
+    found |= {name: metric.meaning for name, metric in metrics_with(plugins).items()}
+    found |= {name: finding.meaning for name, finding in finding_kinds(plugins).items()}
+    return _beginning(incomplete, found)
+
+
+def _plugins(context: typer.Context) -> Plugins:
+    """Those on the line and installed ones; none where one of them cannot be loaded.
+
+    A shell has no place for a message; the command itself will tell.
+    """
+    from podusv_cli.core.errors import PodusvError
+    from podusv_cli.scenario.model import scenario_class
+    from podusv_cli.scenario.plugins import on_hand
+
+    try:
+        plugins = on_hand(context.params.get("plugin") or ())
+        scenario_class(plugins)
+    except PodusvError:
+        return ()
+    return plugins
+
+
+def _beginning(incomplete: str, known: Mapping[str, str]) -> Offered:
+    return [item for item in known.items() if item[0].startswith(incomplete)]

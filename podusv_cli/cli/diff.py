@@ -63,9 +63,10 @@ def _show_changes(what: str, changes: Mapping[str, Change]) -> None:
 
 def _show_metrics(found: RunDifference) -> None:
     from podusv_cli.comparison.run_difference import relative
-    from podusv_cli.metrics.table import METRICS
+    from podusv_cli.core.plugins import installed
+    from podusv_cli.metrics.table import metrics_with
 
-    units = {name: metric.unit for name, metric in METRICS.items()}
+    units = {name: metric.unit for name, metric in metrics_with(installed()).items()}
     rows = [
         [name, units.get(name, ""), _number(a), _number(b), _number(relative(a, b), "+.2g")]
         for name, (a, b) in found.metrics.items()

@@ -12,6 +12,7 @@ from podusv_cli.cli.terminal import echo_entry
 
 if TYPE_CHECKING:
     from podusv_cli.core.finding import FindingKind
+    from podusv_cli.core.plugins import Plugins as Known
     from podusv_cli.scenario.explain import Row
 
 
@@ -21,19 +22,21 @@ def explain(
         typer.Argument(
             metavar="KEY",
             help="A section (controller), a kind (controller.pid), a key (controller.k_ze or k_ze) "
-            "a signal (z_e), a metric (iae), a preset (otter) or a finding (near-target).",
+            "a signal (z_e), a metric (iae), a preset (otter), a finding (near-target) or a figure "
+            "(errors).",
             show_default=False,
             autocompletion=names,
         ),
     ] = None,
     plugin: Plugins = None,
 ) -> None:
-    """Explain keys, kinds, signals, metrics, presets and findings in words.
+    """Explain keys, kinds, signals, metrics, presets, findings and figures in words.
 
     Without a key: the sections of a scenario.
     """
     from podusv_cli.findings.finding import finding_kinds
     from podusv_cli.metrics.table import metrics_with
+    from podusv_cli.scenario.explain import UnknownKeyError
     from podusv_cli.scenario.explain import explain as rows
     from podusv_cli.scenario.plugins import on_hand
 
@@ -44,8 +47,24 @@ def explain(
     elif key in metrics:
         echo_entry(key, metrics[key].meaning, facts=f"metric [{metrics[key].unit}]")
     else:
-        for row in rows(key, (*findings, *metrics), plugins):
+        try:
+            found = rows(key, (*findings, *metrics), plugins)
+        except UnknownKeyError:
+            if not _echo_figure(key, plugins):
+                raise
+            return
+        for row in found:
             _echo(row)
+
+
+def _echo_figure(name: str | None, plugins: Known) -> bool:
+    """Explain a figure, if it is one."""
+    from podusv_cli.figures.drawing import figures_with  # slow, and hardly anybody asks for one
+
+    sheet = figures_with(plugins).get(name or "")
+    if sheet:
+        echo_entry(sheet.name, sheet.caption, f"shows {', '.join(sheet.signals)}", facts="figure")
+    return sheet is not None
 
 
 def _echo_finding(kind: FindingKind) -> None:

@@ -1,4 +1,4 @@
-"""`podusv list`: the kinds, presets, metrics and findings."""
+"""`podusv list`: the kinds, presets, metrics, figures and findings."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from podusv_cli.cli.terminal import echo, echo_entry
 
 
 def list(plugin: Plugins = None) -> None:
-    """List the kinds of components, the presets, the metrics and the findings.
+    """List the kinds of components, the presets, the metrics, the figures and the findings.
 
     `podusv explain NAME` tells more about each.
     """
+    from podusv_cli.figures.drawing import figures_with
     from podusv_cli.findings.finding import finding_kinds
     from podusv_cli.metrics.table import metrics_with
     from podusv_cli.scenario.explain import first_sentence, kinds
@@ -29,6 +30,9 @@ def list(plugin: Plugins = None) -> None:
     echo("metrics:")
     for name, metric in metrics_with(plugins).items():
         echo_entry(f"  {name}", metric.meaning, facts=f"[{metric.unit}]")
+    echo("figures:")
+    for name, sheet in figures_with(plugins).items():
+        echo_entry(f"  {name}", sheet.caption)
     echo("findings (silence):")
     for name, finding in finding_kinds(plugins).items():
         echo_entry(f"  {name}", finding.meaning, facts=f"{finding.when} a run, {finding.about}")

@@ -67,7 +67,7 @@ def verify(
 
 def _report(done: Verification) -> None:
     for label, run in done.runs.items():
-        _show_run(label, run, done.tolerance)
+        _show_run(label, run, done)
     if done.rankings:
         _show_rankings(done.rankings)
     failed = [f"{label}: {', '.join(names)}" for label, names in done.unconverged.items()]
@@ -76,13 +76,11 @@ def _report(done: Verification) -> None:
     echo(f"{heading} within {done.tolerance:.3g} relative", *failed)
 
 
-def _show_run(label: str, run: RunVerification, tolerance: float) -> None:
-    from podusv_cli.metrics.table import METRICS
-
-    units = {name: metric.unit for name, metric in METRICS.items()}
+def _show_run(label: str, run: RunVerification, done: Verification) -> None:
     steps = [f"{level.step:.6g} s" for level in run.levels]
     rows = [
-        [name, units.get(name, "m"), *_cells(e, tolerance)] for name, e in run.estimates.items()
+        [name, done.units.get(name, "m"), *_cells(e, done.tolerance)]
+        for name, e in run.estimates.items()
     ]
     echo(f"{label}:")
     echo_table(["number", "unit", *steps, "order", "rel. error", "verdict"], rows)

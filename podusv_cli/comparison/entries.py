@@ -77,8 +77,9 @@ class Entry:
 
     def signal(self, name: str) -> Vector:
         """A logged or derived signal; empty where the run has none of this name."""
-        has = derived.has(self.recording, name)
-        return derived.signal(self.recording, name) if has else np.empty(0)
+        log, plugins = self.recording, self.scenario.plugged
+        has = derived.has(log, name, plugins)
+        return derived.signal(log, name, plugins) if has else np.empty(0)
 
     def check(self, name: str) -> bool | None:
         """Whether a named property holds."""

@@ -5,13 +5,14 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 
 from podusv_cli.core import registry
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.escaping import visible
+from podusv_cli.core.plugins import Plugins
 from podusv_cli.core.recording import Recording
 from podusv_cli.figures.sheet import Sheet
 from podusv_cli.figures.style import FORMATS, Shown, house_style, image, look, places
@@ -26,17 +27,19 @@ def _place(sheet: Sheet) -> tuple[int, str]:
     return sheet.place, sheet.name
 
 
-_found = registry.named("podusv_cli.figures", Sheet).values()
-FIGURES: dict[str, Sheet] = {sheet.name: sheet for sheet in sorted(_found, key=_place)}
+@cache
+def figures_with(plugins: Plugins) -> dict[str, Sheet]:
+    """All figures by name, in order, with those of these plug-ins."""
+    found = registry.named("podusv_cli.figures", Sheet, plugins).values()
+    return {sheet.name: sheet for sheet in sorted(found, key=_place)}
+
+
+FIGURES = figures_with(())
 
 
 def figures_of(scenarios: Iterable[Scenario]) -> dict[str, Sheet]:
     """All figures by name, in order, with those of these scenarios' plug-ins."""
-    plugins = tuple(dict.fromkeys(plugin for one in scenarios for plugin in one.plugged))
-    if not plugins:
-        return FIGURES
-    more = registry.named("podusv_cli.figures", Sheet, plugins)
-    return {sheet.name: sheet for sheet in sorted((more | FIGURES).values(), key=_place)}
+    return figures_with(tuple(dict.fromkeys(p for one in scenarios for p in one.plugged)))
 
 
 def dressed(runs: Sequence[tuple[str, Recording, Scenario]]) -> list[Shown]:

@@ -114,11 +114,11 @@ class Shown:
 
     def has(self, name: str) -> bool:
         """Whether the run has the signal, logged or derivable."""
-        return derived.has(self.recording, name)
+        return derived.has(self.recording, name, self.scenario.plugged)
 
     def signal(self, name: str) -> Vector:
         """A logged or derived signal."""
-        return derived.signal(self.recording, name)
+        return derived.signal(self.recording, name, self.scenario.plugged)
 
     def during(self, name: str, span: tuple[float, float] | None) -> tuple[Vector, Vector]:
         """Time and a signal, all of it or that of a part [s]."""
@@ -177,7 +177,9 @@ def new_figure(columns: int, height: float) -> Figure:
 def about(runs: Sequence[Shown], name: str) -> Signal:
     """What a signal is, by the first of the runs that have it, else as podusv derives it."""
     having = [run for run in runs if run.has(name)]
-    return derived.about(having[0].recording, name) if having else derived.DERIVED[name].signal
+    if not having:
+        return derived.DERIVED[name].signal
+    return derived.about(having[0].recording, name, having[0].scenario.plugged)
 
 
 def axis_label(runs: Sequence[Shown], name: str) -> str:

@@ -21,7 +21,6 @@ from podusv_cli.engine.variants import variants
 from podusv_cli.findings.finding import postflight, preflight
 from podusv_cli.interface.results import Comparison, Run
 from podusv_cli.interface.scenarios import Changes, Source, loaded
-from podusv_cli.metrics.table import observer
 from podusv_cli.storage import json_files
 from podusv_cli.verification import verify as verification
 from podusv_cli.workflows import compare as comparing
@@ -136,12 +135,8 @@ def simulate_many(
     1      60.0  finished
     """
     scenario = running.single(loaded(source))
-    loop, grid, settings = scenario.closed_loop(), scenario.time_grid(), scenario.metrics
+    loop, grid, watching = scenario.closed_loop(), scenario.time_grid(), scenario.observer()
     check_law(loop)
-    watching = observer(
-        loop, grid,
-        steady_fraction=settings.steady_fraction, settling_radius=settings.settling_radius,
-    )  # fmt: skip
     done = batch.simulate_many(variants(loop, parameters), grid, observer=watching, workers=workers)
     given = {key: np.asarray(numbers, float) for key, numbers in parameters.items()}
     ends = {"status": done.status, "cause": done.cause}

@@ -15,7 +15,7 @@ import pandas as pd
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
-from podusv_cli.metrics.table import METRICS
+from podusv_cli.metrics.table import metrics_with
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import unknown
 from podusv_cli.theory import derived
@@ -82,9 +82,10 @@ class Run:
 
     def __getitem__(self, signal: str) -> Vector:
         """A signal that the log has or that follows from it; KeyError with those that there are."""
-        if not derived.has(self.recording, signal):
-            raise KeyError(unknown(f"signal {signal!r}", signal, self.recording.signals))
-        return derived.signal(self.recording, signal)
+        log, plugins = self.recording, self.scenario.plugged
+        if not derived.has(log, signal, plugins):
+            raise KeyError(unknown(f"signal {signal!r}", signal, log.signals))
+        return derived.signal(log, signal, plugins)
 
     def plot(self, name: str = "trajectory", *, columns: int = 2) -> Figure:
         """A matplotlib figure, which notebooks show; `podusv plot --help` tells of the files.
@@ -102,7 +103,8 @@ class Run:
 
     def _repr_html_(self) -> str:
         """The trajectory beside the metrics, what was warned of above."""
-        rows = {n: f"{x:.5g} {METRICS[n].unit}" for n, x in self.numbers.items() if n in METRICS}
+        known = metrics_with(self.scenario.plugged)
+        rows = {n: f"{x:.5g} {known[n].unit}" for n, x in self.numbers.items() if n in known}
         table = pd.Series(rows, name=self.label, dtype=str).to_frame().to_html(border=0)
         lines = [repr(self), self.message, *self.warnings]
         return _html(lines, {self.label: self}, table)
@@ -148,17 +150,18 @@ class Comparison:
 
 def figure(runs: Mapping[str, Run], name: str, columns: int = 2) -> Figure:
     """One of podusv's figures of several runs. Raises UsageError."""
-    from podusv_cli.figures.drawing import FIGURES, dressed  # matplotlib is slow to import
+    from podusv_cli.figures.drawing import dressed, figures_of  # matplotlib is slow to import
     from podusv_cli.figures.style import house_style, image
 
-    if name not in FIGURES:
-        raise UsageError(unknown(f"figure {name!r}", name, FIGURES))
+    known = figures_of(run.scenario for run in runs.values())
+    if name not in known:
+        raise UsageError(unknown(f"figure {name!r}", name, known))
     shown = dressed([(label, run.recording, run.scenario) for label, run in runs.items()])
-    if not shown or not FIGURES[name].fits(shown):
-        wanted = ", ".join(FIGURES[name].signals)
+    if not shown or not known[name].fits(shown):
+        wanted = ", ".join(known[name].signals)
         raise UsageError(f"figure {name!r} shows {wanted}, and {', '.join(runs)} logged none of it")
     with house_style():
-        drawn = FIGURES[name].family(shown, columns)
+        drawn = known[name].family(shown, columns)
     # A figure without pyplot is shown by notebooks only if it says how.
     vars(drawn)["_repr_png_"] = partial(image, drawn, "png")
     return drawn

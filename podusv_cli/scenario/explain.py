@@ -12,7 +12,7 @@ from podusv_cli.core.component import Component
 from podusv_cli.core.errors import PodusvError
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.core.signal import Signal
-from podusv_cli.scenario.keys import MISSING, NAME, NUMBER, SCENARIO, Key, either, keys_of
+from podusv_cli.scenario.keys import MISSING, NAME, NUMBER, Key, either, keys_of
 from podusv_cli.scenario.model import scenario_class
 from podusv_cli.scenario.phrases import as_yaml, did_you_mean
 from podusv_cli.scenario.presets import preset_names, preset_text, with_presets
@@ -111,9 +111,10 @@ def names(plugins: Plugins = ()) -> list[str]:
     return [*map(dotted, places), *(signal.name for signal in signals(plugins)), *presets]
 
 
-def assignments() -> dict[str, str]:
+def assignments(plugins: Plugins = ()) -> dict[str, str]:
     """What `--set` takes, and the key's meaning: `control.period=`, `path.kind=line`, ..."""
-    keys = [key for key in SCENARIO.all() if key.field and not key.keys]
+    top = keys_of(scenario_class(plugins))
+    keys = [key for key in top.all() if key.field and not key.keys]
     own = [key for key in keys if {NAME, NUMBER}.isdisjoint(key.path)]
     return {
         f"{dotted(key.path)}={word}": _meaning(key)

@@ -21,6 +21,7 @@ from podusv_cli.disturbances.base import Disturbance
 from podusv_cli.engine.check import called
 from podusv_cli.engine.grid import TimeGrid, whole_steps
 from podusv_cli.engine.simulate import ClosedLoop
+from podusv_cli.metrics.table import Metrics, observer
 from podusv_cli.paths.base import Path
 from podusv_cli.theory import monitor
 from podusv_cli.vessels.vessel import Vessel
@@ -218,6 +219,14 @@ class Scenario(Component):
         # Beyond the last step only the first is logged; machine code knows no larger numbers.
         every = min(self.log.every, steps + 1)
         return TimeGrid(step, steps, every, whole_steps(self.control.period, step) or 0)
+
+    def observer(self, grid: TimeGrid | None = None) -> Metrics:
+        """What gathers the numbers of all metrics, over another grid than the run's where given."""
+        return observer(
+            self.closed_loop(), grid or self.time_grid(), plugins=self.plugged,
+            steady_fraction=self.metrics.steady_fraction,
+            settling_radius=self.metrics.settling_radius,
+        )  # fmt: skip
 
     def steady_from(self) -> float:
         """When the part of the run begins that counts as settled [s]."""

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from podusv_cli.core.component import Component
+from podusv_cli.core.plugins import Plugins
 from podusv_cli.scenario.explain import EXTENDS
-from podusv_cli.scenario.keys import SCENARIO
-from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.keys import Key, keys_of
+from podusv_cli.scenario.model import scenario_class
 from podusv_cli.scenario.presets import preset_names, with_presets
+from podusv_cli.vessels.vessel import Vessel
 
 TITLE = "podusv scenario"
 DIALECT = "http://json-schema.org/draft-07/schema#"
@@ -18,41 +20,50 @@ DIALECT = "http://json-schema.org/draft-07/schema#"
 DROPPED = ("title", "discriminator", "required", "unit", "$defs")
 
 
-def json_schema(codes: Sequence[str]) -> dict[str, Any]:
+def json_schema(codes: Sequence[str], plugins: Plugins = ()) -> dict[str, Any]:
     """A draft-07 schema of what may stand in one file; `codes` are what `silence` may name.
+
+    Kinds and presets of these plug-ins are among podusv's own.
 
     No key is required, since any may come from the file that this one extends, and defaults are
     given where they do not depend on anything else.
     """
-    made = Scenario.model_json_schema()
+    top = keys_of(scenario_class(plugins))
+    made = top.scenario.model_json_schema()
     definitions = {name: _converted(part) for name, part in made["$defs"].items()}
-    for name in _filled_from_outside():
-        for part in definitions[name]["properties"].values():
+    for model in _filled_from_outside(top):
+        for part in definitions[_name(model, definitions)]["properties"].values():
             part.pop("default", None)
-    for model, presets in with_presets().values():
-        allowed = ["", *preset_names(presets)]
-        definitions[model.__name__]["properties"]["preset"]["enum"] = allowed
+    for model, presets in with_presets(top).values():
+        properties = definitions[_name(model, definitions)]["properties"]
+        properties["preset"]["enum"] = ["", *preset_names(presets, plugins)]
     scenario = _converted(made)
     scenario["properties"]["silence"]["items"]["enum"] = list(codes)
     names = {"type": "array", "items": {"type": "string"}}
     either = [{"type": "string"}, names]
     extends = {"anyOf": either, "description": EXTENDS.meaning}
-    plugins = scenario["properties"]["plugins"]
-    meaning = plugins.pop("description")
-    scenario["properties"]["plugins"] = {"anyOf": [*either, plugins], "description": meaning}
+    named = scenario["properties"]["plugins"]
+    meaning = named.pop("description")
+    scenario["properties"]["plugins"] = {"anyOf": [*either, named], "description": meaning}
     scenario["properties"] = {"extends": extends} | scenario["properties"]
     return {"$schema": DIALECT, "title": TITLE} | scenario | {"definitions": definitions}
 
 
-def schema_text(codes: Sequence[str]) -> str:
-    """The schema as a file, ending with a newline; `codes` as for `json_schema`."""
-    return json.dumps(json_schema(codes), indent=2) + "\n"
+def schema_text(codes: Sequence[str], plugins: Plugins = ()) -> str:
+    """The schema as a file, ending with a newline; arguments as for `json_schema`."""
+    return json.dumps(json_schema(codes, plugins), indent=2) + "\n"
 
 
-def _filled_from_outside() -> set[str]:
+def _name(model: type[Component], definitions: Mapping[str, Any]) -> str:
+    """What pydantic calls a class: in full where a plug-in has one of the same name."""
+    whole = f"{model.__module__}.{model.__qualname__}".replace(".", "__")
+    return whole if whole in definitions else model.__name__
+
+
+def _filled_from_outside(top: Key) -> set[type[Component]]:
     """Classes whose fields take their values from a preset or differ with where they are used."""
-    wholes = [key.default for key in SCENARIO.all() if isinstance(key.default, Component)]
-    return {"Vessel"} | {type(whole).__name__ for whole in wholes if whole != type(whole)()}
+    wholes = [key.default for key in top.all() if isinstance(key.default, Component)]
+    return {Vessel} | {type(whole) for whole in wholes if whole != type(whole)()}
 
 
 def _converted(schema: dict[str, Any]) -> dict[str, Any]:

@@ -11,7 +11,6 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Status
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import simulate
-from podusv_cli.metrics.table import observer
 from podusv_cli.scenario.model import Scenario
 
 Progress = Callable[[float], None]
@@ -40,11 +39,8 @@ def refined(scenario: Scenario, halvings: int) -> TimeGrid:
 
 def run_level(scenario: Scenario, halvings: int, progress: Progress | None = None) -> Level:
     """Run a scenario of one law with its step halved `halvings` times."""
-    loop, grid, settings = scenario.closed_loop(), refined(scenario, halvings), scenario.metrics
-    seeing = observer(
-        loop, grid, steady_fraction=settings.steady_fraction,
-        settling_radius=settings.settling_radius,
-    )  # fmt: skip
+    loop, grid = scenario.closed_loop(), refined(scenario, halvings)
+    seeing = scenario.observer(grid)
     compiled = scenario.simulation.compiled
     out = simulate(loop, grid, observer=seeing, compiled=compiled, progress=progress)
     if out.status == "interrupted":

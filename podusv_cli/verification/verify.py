@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from podusv_cli.metrics.table import METRICS
+from podusv_cli.metrics.table import metrics_with
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.verification.dop853 import Dop853Result, integrate, why_skipped
 from podusv_cli.verification.ranking import Ranking, ranking
@@ -73,6 +73,7 @@ class Verification:
     runs: dict[str, RunVerification]
     rankings: dict[str, Ranking]
     tolerance: float
+    units: dict[str, str]  # of the metrics
 
     @property
     def unconverged(self) -> dict[str, list[str]]:
@@ -110,13 +111,14 @@ def verify(
         label: check(one, progress and partial(progress, label))
         for label, one in scenario.singles().items()
     }
-    rankings = {}
-    for name in METRICS:
+    rankings, metrics = {}, metrics_with(scenario.plugged)
+    for name in metrics:
         of_runs = {label: r.estimates[name] for label, r in runs.items() if name in r.estimates}
         rank = ranking(of_runs)
         if rank:
             rankings[name] = rank
-    return Verification(runs, rankings, tolerance)
+    units = {name: metric.unit for name, metric in metrics.items()}
+    return Verification(runs, rankings, tolerance, units)
 
 
 def check(scenario: Scenario, progress: Progress | None = None) -> RunVerification:

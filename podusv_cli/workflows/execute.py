@@ -22,7 +22,7 @@ from podusv_cli.engine.check import check_law
 from podusv_cli.engine.simulate import marcher, simulate
 from podusv_cli.findings.finding import postflight
 from podusv_cli.metrics.cost import law_costs
-from podusv_cli.metrics.table import Metrics, metrics_with, observer
+from podusv_cli.metrics.table import metrics_with
 from podusv_cli.process.extras import Extras, Missing
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.process.workers import Outcome
@@ -185,18 +185,9 @@ def warm_up(scenario: Scenario) -> None:
     """Have all code of this scenario's loop compiled and loaded. Raises LawError."""
     loop, compiled = scenario.closed_loop(), scenario.simulation.compiled
     check_law(loop)
-    marcher(loop, _observer(scenario), compiled)
+    marcher(loop, scenario.observer(), compiled)
     if scenario.log.monitor:
         monitor.prepare(loop, scenario.time_grid(), compiled)
-
-
-def _observer(scenario: Scenario) -> Metrics:
-    settings = scenario.metrics
-    return observer(
-        scenario.closed_loop(), scenario.time_grid(),
-        steady_fraction=settings.steady_fraction, settling_radius=settings.settling_radius,
-        plugins=scenario.plugged,
-    )  # fmt: skip
 
 
 def simulated(
@@ -204,7 +195,7 @@ def simulated(
     allocate: Allocate = np.empty,
 ) -> Recording:  # fmt: skip
     """Simulate a scenario, observed for its metrics; `allocate` as `simulate` has it."""
-    loop, grid, seeing = scenario.closed_loop(), scenario.time_grid(), _observer(scenario)
+    loop, grid, seeing = scenario.closed_loop(), scenario.time_grid(), scenario.observer()
     compiled = scenario.simulation.compiled
     with watch.part("compile"), interrupts_enabled():
         warm_up(scenario)
@@ -217,7 +208,7 @@ def simulated(
 def summary(scenario: Scenario, recording: Recording) -> dict[str, float]:
     """The metrics of a run that was observed."""
     seen = recording.seen
-    return _observer(scenario).summary(seen) if seen is not None else {}
+    return scenario.observer().summary(seen) if seen is not None else {}
 
 
 def _cost(scenario: Scenario, recording: Recording) -> dict[str, float]:

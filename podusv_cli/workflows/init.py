@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from podusv_cli.core.errors import StorageError, UsageError
+from podusv_cli.core.plugins import installed
 from podusv_cli.findings.finding import finding_kinds
 from podusv_cli.scenario import shipped
 from podusv_cli.scenario.layers import extended_files
@@ -58,8 +59,9 @@ def init(name: str, out: Path | None = None) -> Begun:
     text = own_copy(source)
     scenario = load_text(text, str(config)).scenario
     files.make_folder(config.parent)
-    codes = tuple(finding_kinds())
-    files.write_all({config: text.encode(), schema: schema_text(codes).encode()})
+    plugins = installed()
+    known_to_editors = schema_text(tuple(finding_kinds(plugins)), plugins)
+    files.write_all({config: text.encode(), schema: known_to_editors.encode()})
     return Begun(config, schema, bool(scenario.controllers))
 
 
