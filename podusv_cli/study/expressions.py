@@ -23,7 +23,7 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.scenario.expressions import function, known, literal, refuse, syntax_tree
-from podusv_cli.study.runs import Mask, Runs
+from podusv_cli.study.runs import Mask, Runs, worst
 from podusv_cli.study.statistics import at_most, below
 
 # A failed run's metric in arithmetic: larger than any number of a run, and the same for all, so
@@ -103,10 +103,10 @@ class Walk(ABC):
                 refuse(node, "calculate with + - * / only")
         return self.metric(node)
 
-    def worst(self, name: str, values: Vector, failed: Mask) -> Vector:
-        """A metric with FAILED for failed runs, and for the time of what never happened."""
-        never = np.isnan(values) if self.metrics[name].happens else np.isposinf(values)
-        return np.where(failed | never, FAILED, values)
+    def countable(self, name: str, values: Vector, failed: Mask) -> Vector:
+        """A metric with FAILED in place of infinity."""
+        numbers = worst(self.metrics[name], values, failed)
+        return np.where(np.isposinf(numbers), FAILED, numbers)
 
 
 @dataclass
@@ -121,7 +121,7 @@ class OverLaws(Walk):
         match node:
             case ast.Attribute(value=ast.Name(id=label), attr=name):
                 law, name = self.law(label), known(name, self.metrics, "metric")
-                return self.worst(name, self.runs.metric(law, name), ~self.runs.success(law))
+                return self.countable(name, self.runs.metric(law, name), ~self.runs.success(law))
             case ast.Call():
                 refuse(node, "no function of numbers here; write law.metric, as in a.iae < b.iae")
         refuse(node, "no meaning here; write law.metric, as in a.iae")
@@ -161,7 +161,7 @@ class OfOneRun(Walk):
             refuse(node, "write metrics by their names alone, as in finished and z_e_steady <= 1.5")
         name = known(node.id, self.metrics, "metric")
         values = self.values.get(name, np.full(np.shape(self.ended), np.nan))
-        return np.where(self.ended, self.worst(name, values, ~self.ended), np.nan)
+        return np.where(self.ended, self.countable(name, values, ~self.ended), np.nan)
 
     def property(self, node: ast.expr) -> Mask:
         """`finished`."""

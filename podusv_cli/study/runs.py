@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Protocol
 
+import numpy as np
 from numpy.typing import NDArray
 
 from podusv_cli.core.kernel import Vector
+from podusv_cli.metrics.metric import Metric
 
 Mask = NDArray[Any]  # of booleans
 
@@ -45,3 +47,9 @@ class Runs(Protocol):
 
     def broken(self, law: str) -> Mask:
         """Whether the run crashed, hung or was invalid: no result of the law."""
+
+
+def worst(about: Metric, values: Vector, failed: Mask) -> Vector:
+    """A metric with the worst, +inf, for failed runs and for the time of what never happened."""
+    never = np.isnan(values) if about.happens else False
+    return np.where(failed | never, np.inf, values)
