@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 import threading
-import time
 import weakref
 from _ctypes import FUNCFLAG_PYTHONAPI
 from dataclasses import replace
@@ -113,21 +112,6 @@ def test_a_run_that_diverges_stops_no_other() -> None:
 def test_a_march_lets_go_of_the_interpreters_lock() -> None:
     for prototype in (signatures.ADVANCE, signatures.RATES_ALONG):
         assert not prototype._flags_ & FUNCFLAG_PYTHONAPI
-
-
-@pytest.mark.benchmark
-def test_other_threads_go_on_while_one_marches() -> None:
-    runs = threading.Thread(
-        target=simulate_many, args=([corrected(controller=Pid())], TimeGrid(0.01, 1_000_000))
-    )
-    simulate_many([corrected(controller=Pid())], GRID)  # compiled by now
-    runs.start()
-    naps = 0
-    while runs.is_alive():
-        time.sleep(0.001)
-        naps += 1
-    # Hundreds; about two for each of some ten blocks where a march keeps the lock.
-    assert naps > 60
 
 
 def test_progress_comes_to_one() -> None:

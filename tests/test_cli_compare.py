@@ -96,13 +96,6 @@ def test_finished_folders_and_a_scenario_mix(podusv: Command) -> None:
     assert list(found["comparison"]["iae"]) == ["stiff", "soft", "soft_2", "one"]
 
 
-@pytest.mark.parametrize("name", ["nope.yaml", "nope"])
-def test_an_unknown_file_is_a_line(podusv: Command, name: str) -> None:
-    said = podusv(name, "--out", "x")
-    assert said == (2, "", f"{name}: cannot be read: no such file or directory\n")
-    assert not Path("x").exists()
-
-
 # --- claims of several scenarios
 
 
@@ -358,11 +351,3 @@ def test_the_only_one_of_the_controllers_is_run(
     said = commanded(monkeypatch, capsys)("run", config, "--out", "y", "--no-figures")
     assert (said.code, said.err) == (0, "")
     assert "K_Pu: 200.0" in Path("y/resolved.yaml").read_text()
-
-
-def test_a_fault_in_controllers_is_told_once_where_it_is(podusv: Command) -> None:
-    config = write("two.yaml", ALONE.replace("K_Pu: 200.0", "K_Pv: 200.0"))
-    said = podusv(config)
-    assert said.code == 2
-    (line,) = said.err.splitlines()
-    assert re.match(r"two.yaml:\d+:\d+: controllers.stiff.K_Pv: unknown key; did you mean", line)

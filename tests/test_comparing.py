@@ -10,7 +10,7 @@ import pytest
 from drawn_samples import no_figures_but
 
 from podusv_cli.comparison.differences import differences
-from podusv_cli.core.errors import ScenarioError, UsageError
+from podusv_cli.core.errors import ScenarioError
 from podusv_cli.process.extras import Extras
 from podusv_cli.scenario.load import load
 from podusv_cli.workflows import compare, members, run
@@ -50,12 +50,6 @@ def done(config, tmp_path_factory):
 
 def quick(*overrides, out):
     return run.Request(overrides, out, figures=False)
-
-
-def test_every_controller_is_run_from_the_shared_keys(done):
-    laws = {entry.label: entry.scenario.controller for entry in done.result.entries}
-    assert list(laws) == ["fast", "slow", "pid"]
-    assert (laws["fast"].k_ze, laws["slow"].k_ze, laws["pid"].k_ze) == (0.2, 0.02, 0.2)
 
 
 def test_run_takes_the_one_controller_and_says_what_it_left(config, tmp_path):
@@ -146,11 +140,6 @@ def test_costs_are_measured_side_by_side(done, monkeypatch):
     monkeypatch.setattr(compare, "law_costs", costs)
     entries = compare._with_costs(list(done.result.entries), Extras())
     assert [entry.metric("law_ns") for entry in entries] == [0.0, 1.0, 2.0]
-
-
-def test_something_that_is_no_run_is_refused(tmp_path):
-    with pytest.raises(UsageError, match="is no run folder"):
-        compare.compare([tmp_path], quick(out=tmp_path / "x"))
 
 
 class Links(HTMLParser):

@@ -92,27 +92,12 @@ def test_the_answer_says_who_is_best_in_what():
     assert "Nothing to rank" in section("answer", table=FRAME[["a", "lost"]]).text
 
 
-def test_a_single_run_has_no_rivals():
-    answer = section("answer", table=FRAME[["a"]])
-    assert [pair.text for pair in answer.all("dl")[0].all("div")] == [
-        "iae 4 m s", "energy 0 J", "law_ns 10 ns",
-    ]  # fmt: skip
-    assert "best" not in answer.text
-    assert not section("comparison", table=FRAME[["a"]]).all("b")
-
-
 def test_equal_numbers_and_measured_times_are_no_ranking():
     numbers = {"iae": [1.0, 1.0 + 1e-9], "ise": [2.0, math.nan], "law_ns": [1.0, 2.0]}
     frame = pd.DataFrame.from_dict(numbers, orient="index", columns=["a", "b"])
     assert table.leaders(frame) == {"a": [], "b": []}
     frame.loc["rmse"] = [2.0, 1.0]
     assert table.leaders(frame) == {"a": [], "b": ["rmse"]}
-
-
-def test_every_metric_is_explained_in_a_legend():
-    told = [pair.text for pair in section("comparison").all("dl")[0].all("div")]
-    assert told[0] == "iae integral of z_e [m s]"
-    assert len(told) == len(FRAME)
 
 
 def test_the_report_has_every_verdict_escaped():
@@ -166,14 +151,6 @@ def test_figures_are_numbered_and_captioned_in_words():
     linked = [link.attributes["href"] for link in told.all("section", id="figures")[0].all("a")]
     assert linked == ["#figure-1", "#figure-2", "#figure-3"]
     assert 'id="figures"' not in page(figures=[])
-
-
-def test_what_only_the_first_run_has_is_not_said_of_all():
-    for text in ("1 run of 4 s: a. Path line,", "the last 20 % of the run"):
-        assert text not in tree(page()).text
-        assert text in tree(page(differences={})).text
-    assert "The scenario of a; the answer lists" in section("scenario").text
-    assert "answer" not in section("scenario", differences={}).text
 
 
 def test_every_link_leads_somewhere():

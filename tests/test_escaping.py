@@ -115,18 +115,6 @@ def test_the_verdicts_in_markdown_are_text() -> None:
     assert row.replace("\\|", "").count("|") == 6
 
 
-def test_the_report_shows_provenance_as_text() -> None:
-    """Arguments of the command and the processor's name are anybody's."""
-    origin = {"argv": ["podusv", f"<script>alert(1)</script>{EVIL}"], EVIL: {"b": "<img src=x>"}}
-    text = page(provenance=origin)
-    found = tree(text)
-    assert len(found.all("script")) == len(tree(page()).all("script"))
-    assert not tree(page(provenance=origin, figures=[])).all("img")
-    assert "<script>alert(1)</script>" in found.text
-    assert "<img src=x>" in found.text
-    assert not nasty(text)
-
-
 def test_every_text_of_the_report_is_text() -> None:
     odd = f"<script>{EVIL}"
     plain = page()

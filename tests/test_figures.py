@@ -1,12 +1,9 @@
 """Figures by their data: which line shows which numbers, under which label, on which scale."""
 
-import io
-
 import numpy as np
 import pytest
 from drawn_samples import CENTER, WIDTH, drawn, line, panels, recording, scenario, shown
 from known_signals import ABOUT
-from PIL import Image
 
 from podusv_cli.figures import style
 from podusv_cli.figures.curves import thinned
@@ -63,15 +60,6 @@ def test_every_panel_shows_its_signal_of_every_run(two, name):
             assert curve.get_ydata() == pytest.approx(expected(run.recording), abs=1e-12)
 
 
-@pytest.mark.parametrize("name", [*GRIDS, "filters", "loads"])
-def test_time_stands_below_the_last_row_alone(two, name):
-    figure = drawn(name, two)
-    lowest = min(axes.get_position().y0 for axes in figure.axes)
-    for axes in figure.axes:
-        last = axes.get_position().y0 == pytest.approx(lowest)
-        assert axes.get_xlabel() == ("time [s]" if last else "")
-
-
 def test_only_the_distance_is_on_a_logarithmic_axis(two):
     scales = {label: axes.get_yscale() for label, axes in panels(drawn("errors", two)).items()}
     assert scales.pop("$z_e$ [m]") == "log"
@@ -86,19 +74,6 @@ def test_what_no_run_logged_has_no_panel_and_a_run_without_it_no_line():
     found = panels(drawn("adaptation", runs))
     assert r"$\hat b_u$ [N]" not in found
     assert [curve.get_label() for curve in found[r"$\hat b_r$ [N m]"].lines] == ["b"]
-
-
-def test_a_panel_alone_in_its_row_fills_it(two):
-    figure = drawn("adaptation", two)
-    figure.canvas.draw()
-    left, right, last = (axes.get_position() for axes in figure.axes[-3:])
-    assert (last.x0, last.x1) == pytest.approx((left.x0, right.x1), abs=0.01)
-
-
-@pytest.mark.parametrize(("columns", "count"), [(2, 2), (1, 1)])
-def test_panels_stand_in_as_many_columns_as_the_page_has(two, columns, count):
-    figure = drawn("errors", two, columns)
-    assert len({round(axes.get_position().x0, 3) for axes in figure.axes}) == count
 
 
 def test_every_run_has_its_own_look_and_its_name_in_the_legend(two):
@@ -137,21 +112,6 @@ def test_markers_stand_on_the_curve_at_their_times(two):
     assert line(panels(drawn("velocities", [alone]))["$u$ [m/s]"], "a").get_marker() == "None"
 
 
-def test_markers_of_a_long_log_are_drawn_where_an_axis_shows_a_part(two):
-    runs = shown(("a", recording(period=0.01)), ("b", recording(period=0.01)))
-    figure = drawn("controls", runs)
-    style.image(figure, "png")  # matplotlib leaves points beyond the axes out before it counts
-    (early, *_), last = figure.axes, 100.0
-    assert early.get_xlim()[1] < 0.01 * last
-    assert len(line(early, "a").get_markevery()) == len(runs[0].places)
-
-
-def test_panels_have_letters_ahead_of_titles_on_the_left(two):
-    titles = [axes.get_title(loc="left") for axes in drawn("errors", two).axes]
-    assert titles == ["(a)", "(b)", "(c)", "(d)"]
-    assert drawn("trajectory", two).axes[0].get_title(loc="left").startswith("(a) hulls ")
-
-
 def standoffs(*kept):
     laws = [scenario(law=f"{{kind: pid, standoff: {standoff}}}") for standoff in kept]
     runs = shown(*((f"run{i}", recording(), law) for i, law in enumerate(laws)))
@@ -183,33 +143,6 @@ def test_a_run_that_did_not_finish_is_told_in_the_legend_and_marked_at_its_end()
         (cross,) = (curve for curve in axes.lines if curve.get_marker() == "x")
         assert list(cross.get_xdata()) == [60.0]
         assert cross.get_color() == runs[1].color
-
-
-def test_captions_begin_as_a_sentence_would_and_end_open():
-    for sheet in FIGURES.values():
-        assert sheet.caption[0].isalpha()
-        assert sheet.caption[-1] != "."  # the report ends the sentence
-        assert "_" not in sheet.caption
-
-
-def test_a_legend_is_no_wider_than_its_figure():
-    names = ["short", *(f"a law with a long name {i}" for i in range(8))]
-    for columns in (1, 2):
-        figure = drawn("errors", shown(*((name, recording()) for name in names)), columns)
-        style.image(figure, "png")
-        assert figure.legends[0].get_window_extent().width <= figure.bbox.width
-
-
-def test_a_long_log_is_thinned_with_every_extreme_kept():
-    spike = {"u": lambda t: np.where(t == t[7771], 9.0, np.where(t == t[20_001], -8.0, 0.1 * t))}
-    runs = shown(("a", recording(period=0.004, **spike)))
-    curve = line(panels(drawn("velocities", runs))["$u$ [m/s]"], "a")
-    log = runs[0].recording
-    assert len(curve.get_xdata()) < 3100 < len(log["time"])
-    rows = np.searchsorted(log["time"], curve.get_xdata())
-    assert np.array_equal(log["u"][rows], curve.get_ydata())
-    assert (curve.get_ydata().max(), curve.get_ydata().min()) == (log["u"].max(), -8.0)
-    assert curve.get_xdata()[-1] == log["time"][-1]
 
 
 def test_thinning_keeps_the_extremes_of_every_bin_in_order():
@@ -260,17 +193,3 @@ def test_the_same_runs_give_the_same_bytes_without_a_date(two, form):
     assert first == second
     assert not any(word in first for word in (b"CreationDate", b"dc:date", b"Software"))
     assert first.startswith({"png": b"\x89PNG", "pdf": b"%PDF", "svg": b"<?xml"}[form])
-
-
-def test_columns_reach_the_drawing(two):
-    (_, content), *_ = draw(two, ["errors"], ("png",), columns=1)
-    with Image.open(io.BytesIO(content)) as picture:
-        assert picture.width == round(3.46 * 200)
-
-
-def test_the_style_stays_inside(two):
-    import matplotlib as mpl
-
-    before = mpl.rcParams["font.size"]
-    drawn("errors", two)
-    assert mpl.rcParams["font.size"] == before

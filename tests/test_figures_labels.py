@@ -16,6 +16,7 @@ from podusv_cli.workflows.members import from_folder
 # An odd and an even number of $, what they would enclose, and what a legend would leave out.
 ODD = ["_a$x^{2$b \\frac{ 3$", "$\\undefined$\udcff\x1b[31m\n"]
 SCENARIO = SOUND.replace("kind: ideal", "kind: pod, preset: otter").replace("pid", "dsc")
+QUICK = ("errors", "trajectory", "pods")
 BRIEF = "name: x\nsimulation: {step: 0.01, duration: 0.1, compiled: false}\n"
 
 
@@ -29,7 +30,9 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> list[Shown]:
     return dressed([(label, part.run.recording, part.scenario) for label, part in parts])
 
 
-@pytest.mark.parametrize("name", FIGURES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name not in QUICK)) for name in FIGURES]
+)
 def test_every_figure_shows_labels_as_they_are(runs: list[Shown], name: str) -> None:
     assert FIGURES[name].fits(runs)
     with house_style():

@@ -146,22 +146,6 @@ def test_a_close_up_shows_where_the_runs_are_farthest_apart():
     assert [text.get_text() for text in whole.texts] == ["b", "c"]
 
 
-@pytest.mark.parametrize(("size", "at"), [(0.01, 40.0), (4.0, 99.0)])
-def test_there_is_no_close_up_of_runs_that_are_nowhere_apart_or_only_at_the_end(size, at):
-    off = {"y": lambda t: np.sin(0.05 * t) + size * gap(t, at, 1.0)}
-    axes = drawn("trajectory", shown(("a", recording()), ("b", recording(**off)))).axes
-    assert [title(panel)[:7] for panel in axes[1:]] == ["(b) end"]
-
-
-def test_the_start_of_every_run_is_marked_once():
-    runs = shown(("a", recording()), ("b", recording()), ("c", recording(shift=0.7)))
-    start = line(drawn("trajectory", runs).axes[0], "start")
-    marks = set(zip(start.get_xdata(), start.get_ydata(), strict=True))
-    assert marks == {(r.recording["y"][0], r.recording["x"][0]) for r in runs}
-    assert len(start.get_xdata()) == 2
-    assert start.get_marker() == "o"
-
-
 def test_the_close_up_shows_the_last_twentieth_to_scale(two):
     whole, *_, end = drawn("trajectory", two).axes
     for run in two:
@@ -188,14 +172,6 @@ def test_the_close_up_shows_the_last_twentieth_to_scale(two):
     *_, box = (patch for patch in whole.patches if isinstance(patch, Rectangle))
     assert (box.get_x(), box.get_x() + box.get_width()) == pytest.approx(end.get_xlim())
     assert (box.get_y(), box.get_y() + box.get_height()) == pytest.approx(end.get_ylim())
-
-
-@pytest.mark.parametrize(("away", "lengths"), [(0.1, 2.0), (1e4, 20.0)])
-def test_the_close_up_is_neither_too_close_nor_too_far(away, lengths):
-    log = recording()
-    off = changed(log, x=log["x_d"] - away, y=log["y_d"])
-    end = drawn("trajectory", shown(("a", off))).axes[-1]
-    assert np.ptp(end.get_xlim()) == pytest.approx(2.0 * lengths * LENGTH)
 
 
 def test_the_close_up_marks_the_target_and_leaves_out_who_diverged():
@@ -225,13 +201,6 @@ def test_a_run_that_diverges_does_not_set_the_limits_of_the_map():
     assert line(whole, "bad").get_ydata()[-1] > 1e20
 
 
-def test_where_all_diverged_the_map_is_the_target_s():
-    wild = recording(end=60.0, status="diverged", x=lambda t: -10.0 + np.exp(t))
-    whole = drawn("trajectory", shown(("bad", wild))).axes[0]
-    assert whole.get_ylim()[0] < -10.0
-    assert 30.0 < whole.get_ylim()[1] < 60.0
-
-
 def test_every_differing_target_is_drawn_and_named():
     runs = different_targets()
     whole, *_, end = drawn("trajectory", runs).axes
@@ -246,16 +215,3 @@ def test_every_differing_target_is_drawn_and_named():
     assert whole.get_ylim()[0] < -50.0
     assert [curve.get_label() for curve in end.lines[:-1]] == ["target of a, c", "a", "c"]
     assert end.lines[-1].get_label() == "target of a, c at this time"
-
-
-def test_one_target_is_drawn_as_long_as_any_run_lasts():
-    runs = shown(("short", recording(end=30.0, status="diverged")), ("long", recording()))
-    target = line(drawn("trajectory", runs).axes[0], "target")
-    assert target.get_ydata()[-1] == runs[1].recording["x_d"][-1]
-
-
-def test_a_long_track_is_drawn_in_even_steps():
-    (run,) = shown(("a", recording(period=0.01)))
-    curve = line(drawn("trajectory", [run]).axes[0], "a")
-    assert 2500 < len(curve.get_xdata()) <= 4000
-    assert np.array_equal(curve.get_ydata(), run.recording["x"][::3])

@@ -32,17 +32,6 @@ def test_a_run_that_diverges_is_drawn_but_does_not_set_the_scale(place):
     assert axes.get_yscale() == "linear"
 
 
-def test_runs_that_all_diverge_set_the_scale_themselves():
-    axes = panels(drawn("velocities", shown(("bad", blown_up()))))["$u$ [m/s]"]
-    assert inside(axes.get_ylim(), line(axes, "bad").get_ydata())
-
-
-def test_the_time_axis_reaches_to_the_end_of_the_longest_run_finished_or_not():
-    runs = shown(("good", recording(end=20.0)), ("bad", blown_up(end=50.0)))
-    axes = panels(drawn("velocities", runs))["$u$ [m/s]"]
-    assert axes.get_xlim()[1] >= 50.0
-
-
 def test_an_axis_with_a_tall_peak_is_logarithmic_beyond_the_settled_values():
     peak = {"r": lambda t: np.where(t < 1.0, 60.0, 0.04)}
     axes = panels(drawn("velocities", shown(("a", recording(**peak)))))["$r$ [rad/s]"]
@@ -57,13 +46,6 @@ def test_a_peak_is_tall_from_twenty_times_the_settled_values_on(peak, scale):
     given = {"r": lambda t: np.where(t < 1.0, -peak, 1.0)}
     axes = panels(drawn("velocities", shown(("a", recording(**given)))))["$r$ [rad/s]"]
     assert axes.get_yscale() == scale
-
-
-def test_a_logarithmic_axis_spans_four_decades_where_nothing_remains():
-    given = {"b_hat_u": lambda t: np.where(t < 1.0, 900.0, 1e-12)}
-    runs = shown(("a", recording(**given)))
-    axes = panels(drawn("adaptation", runs))[r"$\hat b_u$ [N]"]
-    assert axes.yaxis.get_transform().linthresh == pytest.approx(0.1)
 
 
 IDEAL = scenario(actuator="{kind: ideal}")
@@ -97,12 +79,6 @@ def test_controls_show_the_peak_the_whole_run_and_the_settled_part():
         r"$\tau_r$ [N m]", r"$\tau_{r,\mathrm{cmd}}$ [N m]",
     ]  # fmt: skip
     assert [axes.get_xlabel() for axes in found] == [""] * 9 + ["time [s]"] * 3
-
-
-def test_what_an_actuator_without_limits_passes_on_has_no_panel_of_its_own():
-    _, found = controls(("a", free(recording()), IDEAL))
-    assert [axes.get_ylabel() for axes in found[::3]] == [r"$\tau_u$ [N]", r"$\tau_r$ [N m]"]
-    assert [text.get_text() for text in found[0].figure.legends[0].get_texts()] == ["a"]
 
 
 def test_controls_without_limits_are_logarithmic_where_the_peak_is():
@@ -149,29 +125,6 @@ def test_the_actuator_s_limits_are_drawn_ahead_and_astern(given, force, moment):
     assert found[2].get_ylim()[1] < 0.5 * force  # they do not set the scale
 
 
-def test_controls_in_one_column_stand_above_each_other():
-    log = recording()
-    _, found = controls(("a", log), columns=1)
-    assert [axes.get_title() for axes in found[::2]] == ["early", "whole run", "settled"] * 2
-    assert [axes.get_ylabel() for axes in found[:2]] == [r"$\tau_u$ [N]", r"$\tau_r$ [N m]"]
-    assert found[3].get_xlim() == pytest.approx((0.0, 100.0))
-    assert np.isin(line(found[3], "a").get_ydata(), log["tau_r"]).all()
-    assert [bool(axes.get_xlabel()) for axes in found] == [False] * 10 + [True] * 2
-
-
-def test_the_early_part_of_a_coarse_log_has_rows_enough_to_see():
-    by, _ = controls(("a", recording(period=0.5)))
-    assert by["early"].get_xlim() == pytest.approx((0.0, 10.0))
-
-
-def test_the_early_peak_of_a_run_that_diverges_later_is_not_cut():
-    late = recording(end=60.0, status="diverged", tau_u=lambda t: np.where(t < 30.0, 500.0, 1e9))
-    by, _ = controls(("good", free(recording()), IDEAL), ("bad", free(late), IDEAL))
-    assert inside(by["early"].get_ylim(), [500.0])
-    assert by["early"].get_ylim()[1] < 1e4
-    assert by["whole"].get_ylim()[1] < 1e3
-
-
 def test_what_a_diverging_run_asks_for_does_not_set_the_scale():
     wild = recording(end=60.0, status="diverged", tau_u_cmd=lambda t: np.where(t < 50.0, 0.0, 1e9))
     _, found = controls(("good", recording()), ("bad", wild))
@@ -200,30 +153,6 @@ def test_filters_show_virtual_control_and_output_together_and_their_difference()
         assert np.array_equal(curve.get_ydata(), log[f"beta_{part}"] - log[f"alpha_{part}"])
     words = [text.get_text() for text in figure.legends[0].get_texts()]
     assert words == ["filtered", "plain", "virtual control before the filter"]
-
-
-def test_filters_with_a_tall_peak_are_logarithmic_beyond_the_settled_values():
-    peak = {"alpha_r": lambda t: np.where(t < 1.0, 90.0, 0.05), "beta_r": lambda t: 0.0 * t}
-    _, yaw, _, error = drawn("filters", shown(("a", recording(**peak)))).axes
-    for axes in (yaw, error):
-        assert axes.get_yscale() == "symlog"
-        assert axes.yaxis.get_transform().linthresh == pytest.approx(0.1)
-
-
-def test_without_a_filter_there_are_only_virtual_controls():
-    log = recording(without=("beta_u", "beta_r"))
-    figure = drawn("filters", shown(("plain", log)))
-    assert list(panels(figure)) == [r"$\alpha_u$ [m/s]", r"$\alpha_r$ [rad/s]"]
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["plain"]
-
-
-def test_an_unfiltered_run_that_diverges_does_not_set_the_scale_of_filters():
-    wild = recording(
-        end=60.0, status="diverged", without=("beta_u",),
-        alpha_u=lambda t: np.where(t < 50.0, 0.0, 1e9),
-    )  # fmt: skip
-    axes = drawn("filters", shown(("good", recording()), ("bad", wild))).axes[0]
-    assert axes.get_ylim()[1] < 1e3
 
 
 def test_a_disturbance_that_all_runs_share_is_drawn_once():
@@ -262,15 +191,3 @@ def test_limits_are_marked_while_they_act_in_a_line_for_each_run():
     assert len(never.get_paths()) == 0
     assert axes.get_ylim()[0] > 1.3
     assert axes.get_ylim()[1] < -0.3
-
-
-def test_limits_that_act_to_the_end_are_marked_to_the_end():
-    to_end = changed(recording(), saturated=np.arange(1001) >= 900)
-    (bars,) = drawn("loads", shown(("a", to_end))).axes[-1].collections
-    (box,) = (path.get_extents() for path in bars.get_paths())
-    assert (box.x0, box.x1) == pytest.approx((90.0, 100.0))
-
-
-def test_settled_starts_where_the_scenario_says():
-    (run,) = shown(("a", recording(), scenario(duration=200.0)))
-    assert run.steady_from == pytest.approx(150.0)

@@ -149,15 +149,6 @@ def test_what_laws_share_is_told_once_and_names_them() -> None:
     assert kicks == [(("proposed", "dsc"), "controller.first_difference")]
 
 
-@pytest.mark.parametrize(
-    "override",
-    ["start={x: 0, y: 0}", "start.u=1e300", "vessel.Y_v=0", "path.speed=0", "control.period=1"],
-)
-def test_whatever_the_scenario_there_is_an_answer(override: str) -> None:
-    for law in ("adaptive_neural", "pid"):
-        preflight(scene(f"controller.kind={law}", override))
-
-
 # --- where warnings go
 
 SHORT = ("--set", "simulation.duration=1", "--set", "actuator={kind: ideal}", "--no-figures")
@@ -199,17 +190,6 @@ def test_an_unknown_code_is_refused_with_a_suggestion(podusv: Any) -> None:
     said = podusv("validate", "a.yaml", "--set", "silence=[path-jumps]")
     assert said.code == 2
     assert "did you mean 'path-jump'?" in said.err
-
-
-def test_a_comparison_warns_once_for_all_laws_it_holds_for(podusv: Any) -> None:
-    said = podusv(
-        "compare", scenario_file("printed_compare.yaml"), "--set", "simulation.duration=0.5",
-        "--no-figures", "--json", "--out", "c",
-    )  # fmt: skip
-    assert said.err.count("warning[sway-unstable]: controller.k_ze") == 1
-    assert said.err.count("warning[sway-drift]: path: ") == said.err.count("[sway-drift]") == 1
-    runs = {Path(run["run"]).name: run["warnings"] for run in json.loads(said.out)["runs"]}
-    assert "sway-drift" in {w["code"] for w in runs["li"]}
 
 
 def test_findings_that_not_all_runs_share_name_their_runs() -> None:

@@ -23,6 +23,7 @@ from podusv_cli.scenario.schema import schema_text
 from podusv_cli.workflows.init import SCHEMA, starting_points
 
 CONFIGS = ROOT / "configs"
+TELLING = ("own_vessel", "paper/figures_compare", "pod/vessels/otter")  # one of each kind
 
 
 @pytest.fixture
@@ -106,7 +107,13 @@ def test_init_lists_every_scenario_that_is_meant_to_be_run(podusv: Command) -> N
     )
 
 
-@pytest.mark.parametrize("name", starting_points())
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[pytest.mark.slow] * (name not in TELLING))
+        for name in starting_points()
+    ],
+)
 def test_a_copy_anywhere_is_the_same_scenario(podusv: Command, name: str) -> None:
     said = podusv("init", name, "--out", f"deep/er/{name}.yaml")
     assert said.code == 0, said.err

@@ -38,7 +38,7 @@ DATED = {"provenance.json", "manifest.json", "metrics.json", "metrics.csv"}  # t
 
 def made(place: Path, text: str, held: int, figures: bool = False) -> dict[str, bytes]:
     """The files of a run of this scenario, less those that clocks are in."""
-    names = ("controls", "trajectory", "errors") if figures else ()
+    names = ("errors",) if figures else ()
     folder = execute(Task(loaded(text).scenario, text, place, held=held, figures=names)).folder
     assert [path.name for path in place.parent.iterdir()] == [place.name]
     return {name: content for name, content in files(folder).items() if name not in DATED}

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import NONLINEAR, POD, SMOOTH_START, Constant, corrected, example, target_at
+from conftest import NONLINEAR, POD, Constant, corrected, example, target_at
 
 from podusv_cli.actuators.pod import Pod, Pods
 from podusv_cli.actuators.saturated import Saturated
@@ -180,30 +180,9 @@ def test_the_settled_part_begins_at_the_first_instant_that_belongs_to_it(steps, 
     assert grid.last_part(percent / 100) == (100 - percent) * steps // 100 * 0.01
 
 
-def test_a_settled_part_between_two_instants_begins_at_the_later_one():
-    assert TimeGrid(0.5, 10).last_part(0.25) == 8 * 0.5  # of 7.5 steps
-    assert TimeGrid(0.5, 10).last_part(1e-9) == 10 * 0.5
-
-
-def test_a_settled_part_of_seven_tenths_has_every_instant():
-    log, got = gathered(corrected(actuator=Saturated()), steps=1000, steady_fraction=0.7)
-    expected = by_definition(log, slice(300, None))
-    names = ("z_e_steady", "tv_tau_u", "tv_tau_r")
-    assert {name: got[name] for name in names} == pytest.approx(
-        {name: expected[name] for name in names}, rel=1e-12
-    )
-
-
 def test_a_thinned_log_leaves_metrics_as_they_are(limited):
     _, thin = gathered(corrected(actuator=Saturated()), log_every=50)
     assert thin == limited[1]
-
-
-def test_metrics_in_plain_python_agree():
-    loop = corrected(start=SMOOTH_START)
-    _, compiled = gathered(loop, steps=100)
-    _, plain = gathered(loop, steps=100, compiled=False)
-    assert plain == pytest.approx(compiled, rel=1e-9, nan_ok=True)
 
 
 def test_settling_that_never_happens_is_no_number():

@@ -22,7 +22,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     install(folder / "site")
     text = (LAB / "scenario.yaml").read_text().replace("duration: 20.0", "duration: 5.0")
     (folder / "a.yaml").write_text(text)
-    podusv(folder, "compare", "a.yaml", "--out", "c")
+    podusv(folder, "compare", "a.yaml", "--out", "c", "--figure", "track_error")
     return folder
 
 
@@ -73,7 +73,7 @@ def test_another_state_of_the_package_is_not_taken_for_the_one_that_was_used(pla
 
 
 def test_its_runs_are_looked_at_where_it_is_not_installed(place: Path, podusv: Command) -> None:
-    assert podusv("plot", place / "c", "--out", "p").code == 0
+    assert podusv("plot", place / "c", "--figure", "errors", "--out", "p").code == 0
     said = podusv("compare", place / "c/los", place / "c/far", "--out", "d", "--no-figures")
     assert said.code == 0
     assert "largest_east" in said.out

@@ -23,7 +23,10 @@ def pytest_of(test: str) -> str:
     return done.stdout + done.stderr
 
 
-@pytest.mark.parametrize("what", ["law", "path", "disturbance"])
+@pytest.mark.parametrize(
+    "what",
+    ["law", *(pytest.param(what, marks=pytest.mark.slow) for what in ("path", "disturbance"))],
+)
 def test_what_is_written_runs_and_passes_its_own_test(podusv: Command, what: str) -> None:
     said = podusv("new", what, "our_own")
     assert said.code == 0

@@ -98,7 +98,7 @@ def folders(request: pytest.FixtureRequest, tmp_path: Path) -> dict[Path, Any]:
 
 
 def test_runs_are_drawn(folders: dict[Path, Any], tmp_path: Path, podusv: Command) -> None:
-    wanted = ("trajectory", "errors", "stability", "pods")
+    wanted = ("stability", "pods")
     asked = [word for name in wanted for word in ("--figure", name)]
     said = podusv("plot", *folders, *asked, "--out", tmp_path / "drawn")
     assert said.code == 0

@@ -88,12 +88,12 @@ def test_a_finished_run_is_looked_at_without_reading_its_file(podusv: Command) -
         del whole["files"]["plugins/my_law.py"]
         manifest.write_text(json.dumps(whole))
     Path("laws/my_law.py").write_text(trap)
-    assert podusv("plot", "c/soft", "c/pid", "--out", "p", "--format", "svg").code == 0
-    assert Path("p/trajectory.svg").exists()
+    assert podusv("plot", "c/soft", "c/pid", "--out", "p", "--figure", "trajectory").code == 0
+    assert Path("p/trajectory.png").exists()
     said = podusv("diff", "c/soft", "c/stiff")
     assert said.code == 3
     assert "controller.gain 0.25 -> 0.5" in said.out
-    said = podusv("compare", "c/soft", "c/pid", "--out", "d", "--json")
+    said = podusv("compare", "c/soft", "c/pid", "--out", "d", "--json", "--figure", "errors")
     assert said.code == 0
     assert json.loads(said.out)["comparison"]["law_ns"]["soft"] is None
     assert "0.25" in Path("d/report.html").read_text()

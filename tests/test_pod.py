@@ -7,12 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import NONLINEAR, POD, SMOOTH_START, Constant, adrift, corrected, example, run, vessel
+from conftest import NONLINEAR, POD, SMOOTH_START, Constant, adrift, corrected, run
 from drawn_samples import drawn, shown
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
-from test_actuators import drive
 from test_closed_loop import order
 from test_metrics import gathered
 
@@ -135,33 +134,6 @@ def test_speed_and_angle_follow_their_lags_and_rates_exactly(rate: float) -> Non
     assert out["rate_limited"][-1] == 0.0
 
 
-def test_a_steady_run_ahead_is_where_thrust_is_drag() -> None:
-    law = Constant(surge=DRAG)
-    out = run(adrift(actuator=pods(*TWIN), controller=law, start=(0, 0, 0, 0.4, 0, 0)), 200.0)
-    assert out["u"][-1] == pytest.approx(0.5, abs=1e-6)
-    n = math.sqrt(DRAG / 2 / 3.65e-3)
-    np.testing.assert_allclose(out["n"][-1], n, rtol=1e-6)
-
-
-def test_a_steady_turn_solves_the_equations_of_motion() -> None:
-    law, hull = Constant(surge=2.0, yaw=0.4), vessel("cybership2")
-    out = run(adrift(actuator=pods(), controller=law, vessel=hull), 400.0, 0.02)
-    k = hull.constants()
-    u, v, r = (float(out[name][-1]) for name in "uvr")
-    Y = 0.4 / -0.499  # the sway force that comes with the moment
-    damping = np.array([
-        (k["X_u"] + k["X_uu"] * abs(u) + k["X_uuu"] * u * u) * u,
-        (k["Y_v"] + k["Y_vv"] * abs(v) + k["Y_rv"] * abs(r)) * v
-        + (k["Y_r"] + k["Y_vr"] * abs(v) + k["Y_rr"] * abs(r)) * r,
-        (k["N_v"] + k["N_vv"] * abs(v) + k["N_rv"] * abs(r)) * v
-        + (k["N_r"] + k["N_vr"] * abs(v) + k["N_rr"] * abs(r)) * r,
-    ])  # fmt: skip
-    m22v = k["m22"] * v + k["m23"] * r
-    coriolis = np.array([-m22v * r, k["m11"] * u * r, m22v * u - k["m11"] * u * v])
-    np.testing.assert_allclose(np.array([2.0, Y, 0.4]) + damping - coriolis, 0.0, atol=1e-7)
-    assert abs(r) > 0.05
-
-
 def test_port_is_starboard_in_the_mirror() -> None:
     """Everything to starboard changes sign: y, psi, v, r, yaw moment, sway force, angles."""
     both = []
@@ -214,23 +186,6 @@ def test_energy_and_travel_are_those_of_the_log() -> None:
     assert got["angle_travel"] > 1.0
     for metric, flag in (("at_rate_limit", "rate_limited"), ("at_angle_limit", "angle_limited")):
         assert got[metric] == pytest.approx(np.trapezoid(log[flag], log["time"]) / log["time"][-1])
-
-
-def test_without_a_power_law_there_is_no_energy() -> None:
-    log, got = gathered(corrected(actuator=pods()), steps=10)
-    assert "power" not in log
-    assert math.isnan(got["energy_pod"])
-
-
-def test_pods_start_at_rest() -> None:
-    assert not example(Pods).rest().any()
-    np.testing.assert_array_equal(drive(example(Pods), 3.0, 0.1)[0], 0.0)
-
-
-def test_two_inputs_for_three_axes() -> None:
-    matrix = pods().input_matrix()
-    assert np.linalg.matrix_rank(matrix) == 2
-    np.testing.assert_allclose(matrix, [[1, 0], [0, -1 / 0.499], [0, 1]], atol=1e-6)
 
 
 @pytest.mark.parametrize(

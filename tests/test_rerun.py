@@ -4,11 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-import signal
-import subprocess
-import sys
 import tempfile
-import time
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +19,7 @@ from rerun_samples import (
     replaced,
     told_otherwise,
 )  # fmt: skip
-from storage_samples import ENVIRONMENT, beside, files
+from storage_samples import beside, files
 
 from podusv_cli.storage import manifest
 from podusv_cli.storage.run_folder import open_run
@@ -108,16 +104,6 @@ def test_the_same_numbers_in_another_file_are_identical(
     assert "identical in every number" in shown(said)
 
 
-def test_signals_that_only_one_podusv_logs_are_named(
-    run: Path, tmp_path: Path, podusv: Command
-) -> None:
-    change = relogged(run, lambda signals: signals.pop("psi_e"))
-    said = podusv("rerun", copied(run, tmp_path / "copy", log_h5=change))
-    assert said.code == 3
-    assert "in the second only: psi_e" in shown(said)
-    assert "first difference" not in said.out
-
-
 def test_out_keeps_the_repeated_run(run: Path, tmp_path: Path, podusv: Command) -> None:
     said = podusv("rerun", run, "--out", tmp_path / "kept", "--json")
     assert said.code == 0
@@ -152,28 +138,6 @@ def test_an_interrupted_run_is_refused(run: Path, tmp_path: Path, podusv: Comman
     said = podusv("rerun", other)
     assert said.code == 2
     assert said.err == f"{other} was interrupted; there is no whole run to repeat\n"
-
-
-def test_ctrl_c_ends_it_and_leaves_nothing(run: Path, tmp_path: Path) -> None:
-    change = replaced("duration: 0.5", "duration: 4000.0")
-    other = copied(run, tmp_path / "copy", resolved_yaml=change)
-    room = tmp_path / "passing"
-    room.mkdir()
-    process = subprocess.Popen(
-        [sys.executable, "-m", "podusv_cli", "rerun", str(other)],
-        env={**ENVIRONMENT, "TMPDIR": str(room)}, stdout=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    try:
-        while not any(room.rglob(".again.*")) and process.poll() is None:
-            time.sleep(0.05)
-        time.sleep(0.5)
-        process.send_signal(signal.SIGINT)
-        out, _ = process.communicate(timeout=60)
-    finally:
-        process.kill()
-    assert process.returncode == 130
-    assert out.startswith("copy  interrupted\n")
-    assert not list(room.iterdir())
 
 
 def test_what_is_no_run_folder(run: Path, tmp_path: Path, podusv: Command) -> None:

@@ -10,7 +10,7 @@ from known_signals import ABOUT
 from pydantic.types import Strict
 
 from podusv_cli.core.component import Component
-from podusv_cli.scenario.explain import Row, UnknownKeyError, explain, first_sentence, kinds
+from podusv_cli.scenario.explain import Row, UnknownKeyError, explain, kinds
 from podusv_cli.scenario.keys import BOUNDS, PATTERNS_IN_WORDS, limits, members, sections
 from podusv_cli.scenario.model import Claim, Scenario
 
@@ -178,10 +178,6 @@ def test_every_signal_is_explained(name: str) -> None:
     assert Row(name, signal.meaning, "signal", signal.unit) in explain(name)
 
 
-def test_a_word_that_is_a_signal_and_a_key_is_explained_as_both() -> None:
-    assert [row.key for row in explain("psi")] == ["psi", "start.psi"]
-
-
 @pytest.mark.parametrize(
     ("key", "hint"),
     [
@@ -207,8 +203,3 @@ def test_every_kind_has_a_summary() -> None:
     assert set(kinds()) == {"path", "disturbance", "actuator", "controller"}
     for summaries in kinds().values():
         assert all(len(summary) > 8 and summary.endswith(".") for summary in summaries.values())
-
-
-def test_a_first_sentence_ends_at_the_first_full_stop_before_a_space() -> None:
-    assert first_sentence("Up to 0.5 m/s.\n  And more. Yes.") == "Up to 0.5 m/s."
-    assert first_sentence("One paragraph\n\nand another") == "One paragraph."

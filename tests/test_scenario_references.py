@@ -224,14 +224,6 @@ def test_pods_come_from_their_file_and_what_is_given_goes_over_it() -> None:
     assert pod.x == -1.0
 
 
-def test_every_set_of_pods_that_podusv_brings_is_sound_and_says_where_it_comes_from() -> None:
-    for name in preset_names(Pods.presets):
-        actuator = loaded(POD_SOUND.replace("otter", name)).scenario.actuator
-        assert isinstance(actuator, Pods)
-        assert actuator.source
-        assert actuator.validity
-
-
 def test_what_is_wrong_with_pods_is_one_sentence_at_its_place() -> None:
     assert told(POD_SOUND.replace("otter", "oter")) == [
         "a.yaml:4:31: actuator.preset: unknown set of pods 'oter'; did you mean 'otter'? "

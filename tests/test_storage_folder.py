@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import re
 from datetime import UTC, datetime
 from pathlib import Path
@@ -13,12 +12,10 @@ from storage_samples import (
     NEW,
     OLD,
     YAML,
-    Saboteur,
     assert_same,
     beside,
     content,
     durable_steps,
-    fails,
     files,
     log,
     recording,
@@ -115,13 +112,6 @@ def test_a_finished_folder_needs_force(final: Path) -> None:
     assert beside(final) == set()
 
 
-def test_a_damaged_run_folder_can_be_replaced_too(final: Path) -> None:
-    write(final, OLD)
-    (final / "log.h5").write_bytes(b"rotten")
-    write(final, NEW, force=True)
-    assert content(final) == NEW
-
-
 @pytest.mark.parametrize("name", ["notes.txt", "figures/mine.png"])
 def test_files_that_others_put_into_a_run_folder_are_not_removed(final: Path, name: str) -> None:
     write(final, OLD)
@@ -179,34 +169,6 @@ def test_files_and_links_are_not_replaced(final: Path, force: bool) -> None:
             RunWriter(place, force=force)
     assert final.read_text() == "precious"
     assert content(link.resolve()) == OLD
-
-
-def test_a_place_that_cannot_be_written_to_is_known_at_once(
-    final: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    final.parent.write_text("a file")
-    with pytest.raises(StorageError, match=r"is a file, not a folder|exists"):
-        RunWriter(final)
-    Saboteur(fails(errno.EACCES), 1).watch(monkeypatch, "mkdir")
-    with pytest.raises(StorageError, match="not permitted"):
-        RunWriter(final.parent.with_name("elsewhere") / "run")
-
-
-def test_a_name_that_is_too_long(final: Path) -> None:
-    with pytest.raises(StorageError, match="the name is too long"):
-        RunWriter(final.with_name("n" * 250))
-
-
-def test_runs_can_be_made_inside_a_folder_in_the_making(final: Path) -> None:
-    with RunWriter(final) as several:
-        for name in ("pid", "shunting"):
-            run_to(several.folder / name)
-        several.add("comparison.csv", b"controller,iae\n")
-        several.finish("finished")
-    assert beside(final) == set()
-    names = set(manifest.check(final).files)
-    assert {"comparison.csv", "pid/manifest.json", "shunting/log.h5"} <= names
-    assert open_run(final / "pid").status == "finished"
 
 
 def test_a_finished_run_opens_with_all_that_plots_and_comparisons_need(final: Path) -> None:

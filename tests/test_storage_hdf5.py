@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
 import io
-import subprocess
 from pathlib import Path
 
 import h5py
@@ -13,7 +11,7 @@ import pytest
 import xarray as xr
 from conftest import corrected, run
 from numpy.testing import assert_array_equal
-from storage_samples import ENVIRONMENT, PYTHON, TEXTS, YAML, assert_same, log, recording
+from storage_samples import TEXTS, YAML, assert_same, log, recording
 
 from podusv_cli.core.signal import Signal
 from podusv_cli.storage import log_reader
@@ -90,27 +88,6 @@ def test_a_run_that_logged_nothing_opens(tmp_path: Path, engine: str) -> None:
     with xr.open_dataset(path, engine=engine) as found:
         assert dict(found.sizes) == {"time": 0, "node": 8, "input": 3}
         assert found.attrs["message"] == "diverged at t = 0 s"
-
-
-def test_a_message_only_where_there_is_one() -> None:
-    assert "message" not in objects(log())["/"].attrs
-
-
-def test_the_same_recording_gives_the_same_bytes_in_another_process() -> None:
-    code = (
-        "import hashlib, sys, storage_samples as s;"
-        "sys.stdout.write(hashlib.sha256(s.log()).hexdigest())"
-    )
-    tests = str(Path(__file__).parent)
-    paths = f"{ENVIRONMENT['PYTHONPATH']}:{tests}"
-    environment = ENVIRONMENT | {"PYTHONPATH": paths, "PYTHONHASHSEED": "77", "TZ": "Asia/Tokyo"}
-    found = subprocess.run([PYTHON, "-c", code], env=environment, capture_output=True, check=True)
-    assert found.stdout.decode() == hashlib.sha256(log()).hexdigest()
-
-
-def test_nothing_in_a_log_has_a_time_stamp() -> None:
-    for name, thing in objects(log()).items():
-        assert h5py.h5g.get_objinfo(thing.id).mtime == 0, name
 
 
 def test_nothing_in_a_log_is_of_variable_length() -> None:

@@ -88,11 +88,6 @@ def test_files_of_others_are_allowed_and_told(folder: Path) -> None:
     assert manifest.foreign(folder, found) == ["figures/mine.png", "latest", "notes.txt"]
 
 
-def test_a_folder_without_a_manifest_is_not_finished(tmp_path: Path) -> None:
-    with pytest.raises(StorageError, match=r"manifest\.json: no such file"):
-        manifest.check(tmp_path)
-
-
 @pytest.mark.parametrize(
     "name", ["../secret", "figures/../../secret", "", ".", "a//b", "./a", "a/", "a\0b"]
 )
@@ -100,12 +95,6 @@ def test_names_that_leave_the_folder_are_refused(folder: Path, name: str) -> Non
     (folder.parent / "secret").write_bytes(b"numbers")
     rewrite(folder, lambda it: it["files"].update({name: it["files"]["log.h5"]}))
     with pytest.raises(StorageError, match=r"is no file of this folder|do not show"):
-        manifest.check(folder)
-
-
-def test_absolute_names_are_refused(folder: Path) -> None:
-    rewrite(folder, lambda it: it["files"].update({str(folder / "log.h5"): it["files"]["log.h5"]}))
-    with pytest.raises(StorageError, match="is no file of this folder"):
         manifest.check(folder)
 
 

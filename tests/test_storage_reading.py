@@ -53,18 +53,6 @@ def test_what_was_written_is_read(path: Path, recorded: Recording) -> None:
     assert log_reader.resolved_yaml(path) == YAML
 
 
-def test_the_order_of_signals_is_kept(path: Path) -> None:
-    signals = recording().signals
-    turned = recording(signals={name: signals[name] for name in reversed(signals)})
-    found = read(path, log(turned))
-    assert [name for name in found.signals if name != "time"] == [
-        "z_e",
-        "W_hat_u",
-        "tau_u_cmd",
-        "x",
-    ]
-
-
 @pytest.mark.parametrize("text", ["", "a: 1\n", "# Schräglage ψ\n" * 20_000])
 def test_the_scenario_comes_back_whatever_its_length(path: Path, text: str) -> None:
     path.write_bytes(log(resolved_yaml=text))

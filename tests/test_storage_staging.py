@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import os
-import re
 import shutil
 import subprocess
 from collections.abc import Callable
@@ -23,7 +22,6 @@ from storage_samples import (
     beside,
     content,
     fails,
-    files,
     interrupts,
     kills,
     until_nothing_breaks,
@@ -33,7 +31,6 @@ from storage_samples import (
 from podusv_cli.core.errors import StorageError
 from podusv_cli.storage import staging
 from podusv_cli.storage.run_folder import RunWriter
-from podusv_cli.storage.staging import Staging, Taken
 
 CALLS = ("mkdir", "write", "fsync", "replace", "rename")
 DEADLY = (*CALLS, "open", "unlink", "rmdir")
@@ -156,17 +153,6 @@ def in_a_child(work: Callable[[], object]) -> None:
     os.waitpid(child, 0)
 
 
-def test_a_folder_made_by_others_at_the_last_moment_is_left_as_it_is(final: Path) -> None:
-    staging = Staging(final)
-    final.mkdir()
-    (final / "thesis.tex").write_text("ten years")
-    with pytest.raises(Taken, match="is there already and is left as it is"):
-        staging.publish(replace=False)
-    staging.discard()
-    assert files(final) == {"thesis.tex": b"ten years"}
-    assert beside(final) == set()
-
-
 @pytest.mark.parametrize("lost", [False, True])
 def test_killed_at_any_step_the_old_run_or_the_new_one_comes_back(
     final: Path, lost: bool, exchanging: bool
@@ -223,25 +209,6 @@ def test_what_a_live_run_is_making_is_left_alone(final: Path) -> None:
         live.communicate(b"", timeout=60)
     assert content(final) == {"log.h5": b"live"}
     assert beside(final) == {"other"}
-
-
-def test_what_is_not_a_dead_run_of_this_machine_is_left_alone(final: Path) -> None:
-    with RunWriter(final) as writer:
-        mine = writer.folder.parent.name
-    machine, process = re.findall(r"podusv-(\w{8})-(\d+)-", mine)[0]
-    dead = subprocess.Popen(["true"])
-    dead.wait()
-    kept = [
-        mine.replace(machine, "0" * 8).replace(process, str(dead.pid)),
-        mine.replace(process, "9" * 40),
-        ".run.podusv-notes.part",
-        "run.part",
-    ]
-    gone = mine.replace(process, str(dead.pid))
-    for name in (*kept, gone):
-        (final.parent / name / "new").mkdir(parents=True)
-    write(final, NEW)
-    assert beside(final) == set(kept)
 
 
 def test_a_nested_run_that_was_killed_leaves_no_trace(final: Path) -> None:

@@ -7,13 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import NONLINEAR, PAPER, load_at
+from conftest import NONLINEAR, PAPER
 
 from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
 from podusv_cli.controllers.backstepping import Backstepping
 from podusv_cli.controllers.dsc import DynamicSurface
 from podusv_cli.controllers.polar_backstepping import PolarBackstepping
-from podusv_cli.disturbances.harmonic import HarmonicDisturbance
 from podusv_cli.theory.bounds import Observed, Pair, UltimateBound, sway_bound, ultimate_bound
 
 SEEN = Observed(
@@ -134,16 +133,6 @@ def test_bound_cannot_be_made_arbitrarily_small() -> None:
     assert large.corrected.Delta > 0.9 * sum(
         large.corrected.terms[name] for name in ("W_u", "W_r", "b_u", "b_r", "lemma")
     )
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_no_disturbance_exceeds_its_bound(seed: int) -> None:
-    sea, random = HarmonicDisturbance(scale=1.7), np.random.default_rng(seed)
-    loads = np.array([load_at(sea, t) for t in random.uniform(0, 2000, 3000)])
-    largest = np.abs(loads).max(axis=0)
-    assert np.all(largest <= sea.bounds())
-    # Reached where the two rates have no common period; b_v and b_r stop short of it.
-    assert largest[0] > 0.98 * sea.bounds()[0]
 
 
 def test_sway_bound_is_where_damping_meets_the_push() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,7 @@ from matplotlib.axes import Axes
 from podusv_cli.controllers.network import Network
 from podusv_cli.core.recording import Recording
 from podusv_cli.figures.drawing import FIGURES, draw, dressed
-from podusv_cli.figures.stability import FAR, POINTS, THIN
+from podusv_cli.figures.stability import FAR, POINTS
 from podusv_cli.scenario.load import load
 from podusv_cli.storage.log_reader import read_log
 from podusv_cli.theory.derived import DERIVED
@@ -130,16 +129,6 @@ def test_a_stack_shows_parts_that_make_up_all_of_V(log: Recording) -> None:
         assert np.all(np.diff(tops) >= 0.0)
 
 
-def test_V_of_a_run_that_diverged_does_not_set_the_scale(log: Recording) -> None:
-    scenario = load(CONFIGS / "theory/monitor.yaml", SHORT).scenario
-    grown = {name: log[name] * np.exp(5.0 * log["time"]) for name in ("V", "V_dot")}
-    wild = replace(log, status="diverged", signals={**log.signals, **grown})
-    alone = FIGURES["stability"].family(dressed([("a", log, scenario), ("b", log, scenario)]), 2)
-    both = FIGURES["stability"].family(dressed([("a", log, scenario), ("b", wild, scenario)]), 2)
-    for expected, found in zip(alone.axes[:2], both.axes[:2], strict=True):
-        assert found.get_ylim() == pytest.approx(expected.get_ylim())
-
-
 def tops_of(stack: Axes) -> list[float]:
     return [layer.get_paths()[0].vertices[:, 1].max() for layer in stack.collections]
 
@@ -156,18 +145,6 @@ def test_V_of_a_single_run_is_stacked_below_its_bound(log: Recording) -> None:
     assert near
     assert drawn == near
     assert stack.get_ylim()[1] > max(near)
-
-
-def test_bounds_have_their_runs_line_styles(log: Recording) -> None:
-    scenario = load(CONFIGS / "theory/monitor.yaml", SHORT).scenario
-    shown = dressed([("one", log, scenario), ("other", log, scenario)])
-    for name, place in (("stability", 0), ("stability", 1), ("validity", -1)):
-        axes = FIGURES[name].family(shown, 2).axes[place]
-        thin = [line for line in axes.lines if line.get_linewidth() == THIN]
-        styles = {
-            (line.get_color(), line.get_linestyle()) for line in thin if len(line.get_xdata())
-        }
-        assert styles == {(shown[0].color, "-"), (shown[1].color, "--")}
 
 
 def test_the_log_has_filter_errors_norms_and_nodes(log: Recording) -> None:

@@ -37,7 +37,7 @@ from podusv_cli.engine.replay import rates_replay
 from podusv_cli.engine.simulate import STATE, ClosedLoop, by_name, names
 from podusv_cli.paths.circle import Circle
 from podusv_cli.paths.line import Line
-from podusv_cli.theory.ideal_weights import node_outputs, unloaded_accelerations
+from podusv_cli.theory.ideal_weights import unloaded_accelerations
 from podusv_cli.theory.lyapunov import TERMS
 from podusv_cli.theory.monitor import Monitored, monitored
 from podusv_cli.theory.rates import error_rates
@@ -218,16 +218,6 @@ def test_a_wrong_sign_planted_in_the_law_is_caught(sign: str) -> None:
     assert mismatch(honest, watched(honest, 1.0, 0.02)) < 1e-10
 
 
-def test_printed_sign_leaves_the_doubled_cross_terms() -> None:
-    loop = smooth(GENTLE.model_copy(update={"coupling": "printed"}))
-    found = watched(loop, 20.0)
-    log = found.recording
-    left = log["V_dot"] - sum_of_terms(loop, found)
-    z_e = log["z_e"] - GENTLE.standoff
-    doubled = -2.0 * z_e * log["u_e"] * np.cos(log["psi_e"]) - 2.0 * log["psi_e"] * log["r_e"]
-    np.testing.assert_allclose(left, doubled, rtol=0, atol=1e-10 * np.abs(log["V_dot"]).max())
-
-
 @every_law
 def test_V_is_the_sum_of_its_terms_and_stays_below_its_bound(law: PolarBackstepping) -> None:
     found = watched(smooth(law, vessel=NONLINEAR), 200.0)
@@ -242,12 +232,6 @@ def test_V_is_the_sum_of_its_terms_and_stays_below_its_bound(law: PolarBackstepp
     assert found.windows["settled"].largest_V < found.windows["settled"].bound.corrected.value
 
 
-def test_without_a_filter_there_is_no_filter_error() -> None:
-    log = watched(smooth(LAWS[2]), 1.0).recording
-    assert not log["V_y_u"].any()
-    assert not log["V_y_r"].any()
-
-
 def test_ideal_weights_are_what_makes_their_share_of_Delta_least() -> None:
     loop = smooth(GENTLE, vessel=NONLINEAR)
     found = watched(loop, 15.0)  # short enough for the fit to take every row
@@ -257,12 +241,6 @@ def test_ideal_weights_are_what_makes_their_share_of_Delta_least() -> None:
         W, left = log[f"W_star_{axis}"], found.traces[f"epsilon_{axis}"]
         gradient = -(m**2) * (phi.T @ left) / len(left) + sigma * W
         assert np.abs(gradient).max() < 1e-9 * np.abs(sigma * W).max()
-
-
-def test_node_outputs_are_those_of_the_law() -> None:
-    log = run(smooth(GENTLE), 1.0)
-    nu = np.column_stack([log["u"], log["v"], log["r"]])
-    np.testing.assert_allclose(node_outputs(GENTLE.network, log), activation(GENTLE.network, nu))
 
 
 def test_vessel_with_coupled_sway_and_yaw_and_a_wrong_nominal_one() -> None:

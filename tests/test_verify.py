@@ -329,10 +329,6 @@ def test_what_is_not_converged_ends_with_3_and_is_named(podusv: Any) -> None:
     assert verify(two(), 1e-9).unconverged.keys() == {"quick", "slow"}
 
 
-def test_a_wrong_scenario_is_told_as_everywhere(podusv: Any) -> None:
-    assert podusv("verify", "nope.yaml").code == 2
-
-
 def test_a_run_folder_leads_to_its_scenario(podusv: Any, tmp_path: Path) -> None:
     (tmp_path / "resolved.yaml").touch()
     said = podusv("verify", str(tmp_path))

@@ -21,7 +21,7 @@ from damaging import damaged
 from rerun_samples import copied, made, relogged
 from storage_samples import ENVIRONMENT, deadline, files
 
-from podusv_cli.core.errors import StorageError, UsageError
+from podusv_cli.core.errors import StorageError
 from podusv_cli.storage import manifest
 from podusv_cli.workflows import members
 
@@ -268,10 +268,6 @@ def labels(folder: Path) -> list[str]:
     return [part.label for part in members.from_folder(folder)]
 
 
-def test_runs_of_a_comparison_stand_as_in_its_table(comparison: Path) -> None:
-    assert labels(comparison) == ["b", "a"]
-
-
 @pytest.mark.parametrize("what", [w for w in OTHERS if w != "hole"])
 def test_a_damaged_table_of_a_comparison(comparison: Path, what: str) -> None:
     table = comparison / "comparison.csv"
@@ -344,11 +340,3 @@ def test_a_run_folder_is_no_scenario_damaged_or_not(run: Path, podusv: Command) 
         said = podusv("validate", path)
         assert said.code == 2
         assert said.err.count("\n") == 1
-
-
-def test_a_folder_without_a_manifest_is_no_run_folder(run: Path) -> None:
-    folder = run.with_name("bare")
-    damaged(run, folder, "become manifest.json nothing")
-    (folder / "log.h5").unlink()
-    with pytest.raises(UsageError, match=r"no run folder: it has no manifest\.json"):
-        members.from_folder(folder)
