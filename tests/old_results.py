@@ -13,6 +13,7 @@ from storage_samples import files
 
 from podusv_cli.figures import drawing
 from podusv_cli.storage import manifest
+from podusv_cli.workflows import plot
 
 SET = ("--set", "controller.K_Pu=50.0", "--no-figures", "-q")
 # What is made or replaced, and the command that does it; the last leaves nothing.
@@ -29,9 +30,16 @@ COMMANDS = [
 SUCCESS = {"verify": 3}  # else 0; what these scenarios verify is not converged
 
 
-def quickly(shown: object, names: Sequence[str], forms: Sequence[str], *more: object) -> object:
-    """Figures of which only the bytes matter."""
-    return {f"{name}.{form}": name.encode() * 1000 for name in names for form in forms}
+def draw_quickly(patch: pytest.MonkeyPatch) -> None:
+    """Make figures of which only the bytes matter."""
+
+    def draw(
+        shown: object, names: Sequence[str], forms: Sequence[str], *more: object, **how: object
+    ) -> object:
+        return {f"{name}.{form}": name.encode() * 1000 for name in names for form in forms}
+
+    for room in (drawing, plot):
+        patch.setattr(room, "draw_in_parallel", draw)
 
 
 def among_old_results(
@@ -39,7 +47,7 @@ def among_old_results(
 ) -> Command:
     """The command line in a folder like `old`, which is filled the first time."""
     podusv = commanded(monkeypatch, capsys)
-    monkeypatch.setattr(drawing, "draw_in_parallel", quickly)
+    draw_quickly(monkeypatch)
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "passing"))
     (tmp_path / "passing").mkdir()
     if not any(old.iterdir()):

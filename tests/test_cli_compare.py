@@ -283,9 +283,9 @@ def test_only_what_is_asked_for_is_drawn_and_what_cannot_be_is_told(podusv: Comm
 
 def test_figures_are_png_and_the_report_has_them_all_the_same(podusv: Command) -> None:
     config = write("two.yaml", FIGURED)
-    with no_figures_but("errors", "velocities"):
+    with no_figures_but("controls", "errors"):
         assert podusv(config, "--out", "x", "--figures").code == 0
-    assert figures("x") == {"errors.png", "velocities.png"}
+    assert figures("x") == {"controls.png", "errors.png"}
     assert figures_of_report("x") == 2
 
 

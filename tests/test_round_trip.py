@@ -9,10 +9,13 @@ from typing import Any
 import pytest
 from command_samples import ROOT, Command
 from conftest import ROOMS, example, kinds
+from old_results import draw_quickly
 from storage_samples import files
+from test_reproduction import untimed
 
 from podusv_cli.scenario.load import load, load_resolved, resolved_yaml
 from podusv_cli.scenario.presets import preset_names, with_presets
+from podusv_cli.workflows import compare, execute
 
 SECTIONS = {room: room.removesuffix("s") for room in ROOMS}
 CSV = "0, 0\n10, 1\n18, 6\n"
@@ -45,8 +48,11 @@ def named(parts: dict[str, Any]) -> str:
 
 @pytest.mark.parametrize("parts", scenarios(), ids=named)
 def test_a_run_of_every_component_is_plotted_repeated_and_compared(
-    podusv: Command, parts: dict[str, Any], tmp_path: Any
+    podusv: Command, parts: dict[str, Any], tmp_path: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    draw_quickly(monkeypatch)
+    for room in (compare, execute):
+        monkeypatch.setattr(room, "law_costs", untimed)
     brief = {"simulation": {"step": 0.01, "duration": 0.05, "compiled": False}}
     (tmp_path / "b.yaml").write_text(json.dumps(parts | brief))
     (tmp_path / "points.csv").write_text(CSV)

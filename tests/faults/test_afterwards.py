@@ -10,6 +10,7 @@ from typing import Any, NoReturn
 
 import pytest
 from command_samples import BASE, Command, write
+from old_results import draw_quickly
 
 from podusv_cli.comparison import claims, outputs, report, table
 from podusv_cli.core.errors import StorageError
@@ -106,7 +107,7 @@ def test_json_and_a_complete_run_say_what_is_missing(
 def test_a_comparison_keeps_its_runs(
     podusv: Command, monkeypatch: pytest.MonkeyPatch, what: str
 ) -> None:
-    monkeypatch.setattr(outputs, "drawn", lambda *given: {})  # which takes its time
+    draw_quickly(monkeypatch)
     monkeypatch.setattr(*AFTER_RUNS[what], broken)
     said = podusv("compare", write("a.yaml", TWO + CLAIM), "--out", "x", "-q")
     assert (said.code, said.out) == (0, "x\n")

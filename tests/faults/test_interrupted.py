@@ -37,6 +37,8 @@ from podusv_cli.storage.run_folder import open_run
 from podusv_cli.verification import step_halving
 from podusv_cli.workflows import compare, execute
 
+COMPARE = ("compare", "--out", "x", "--no-figures")
+
 
 @pytest.fixture
 def podusv(
@@ -62,7 +64,7 @@ def test_an_interrupted_comparison_keeps_what_it_has(
 ) -> None:
     write("short.yaml", BASE)
     write("long.yaml", LONG)
-    with under_way("compare", "short.yaml", "long.yaml", "--out", "x") as process:
+    with under_way(*COMPARE, "short.yaml", "long.yaml") as process:
         wait_for(".x.podusv-*.part/new/short/manifest.json")
         send(process, number, times)
         out, err = process.communicate(timeout=PATIENCE)

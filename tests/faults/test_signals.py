@@ -134,7 +134,8 @@ def test_a_lost_terminal_ends_a_run_and_keeps_it() -> None:
 
 
 def test_a_lost_terminal_ends_a_comparison_and_keeps_it() -> None:
-    words = ("compare", write("short.yaml", BASE), write("long.yaml", LONG), "--out", "x")
+    scenarios = write("short.yaml", BASE), write("long.yaml", LONG)
+    words = ("compare", *scenarios, "--out", "x", "--no-figures")
     lose_the_terminal(*words, until=".x.podusv-*.part/new/short/manifest.json")
     assert manifest.check(Path("x")).status == "interrupted"
     assert manifest.check(Path("x/short")).status == "finished"
