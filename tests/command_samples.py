@@ -1,7 +1,5 @@
 """Scenarios and processes for tests of commands from outside."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """Values and measurements that the tests of the numerical rooms share."""
 
-from __future__ import annotations
-
 import gc
 import os
 import signal
@@ -13,7 +11,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import pytest
 import yaml
-from command_samples import Command, commanded, write
+from command_samples import commanded, write
 from hypothesis import settings
 from old_results import among_old_results
 
@@ -197,7 +195,7 @@ class Constant(Controller):
 
 
 @pytest.fixture(scope="module")
-def tidy() -> Iterator[None]:
+def tidy():
     """What other tests left is not looked through for garbage while a test takes the time."""
     gc.collect()
     gc.freeze()
@@ -206,9 +204,7 @@ def tidy() -> Iterator[None]:
 
 
 @pytest.fixture
-def podusv(
-    tmp_path: File, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Command:
+def podusv(tmp_path, monkeypatch, capsys):
     """The command line, in a folder of its own with one sound scenario."""
     from scenario_samples import SOUND  # which has this module's vessels
 
@@ -218,22 +214,22 @@ def podusv(
 
 
 @pytest.fixture(scope="module")
-def before(tmp_path_factory: pytest.TempPathFactory) -> File:
+def before(tmp_path_factory):
     """Where old results are, once they are made."""
     return tmp_path_factory.mktemp("before")
 
 
 @pytest.fixture
 def beside_old_results(
-    before: File, tmp_path: File, monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> Command:  # fmt: skip
+    before, tmp_path, monkeypatch,
+    capsys,
+):  # fmt: skip
     """The command line in a folder with finished results, the same for every test of a file."""
     return among_old_results(before, tmp_path, monkeypatch, capsys)
 
 
 @pytest.fixture(autouse=True)
-def own_handlers() -> Iterator[None]:
+def own_handlers():
     """A command that was interrupted leaves its process deaf to signals; the tests go on in it.
 
     Signals that are ignored where the tests begin (`nohup make test &`) are not ignored in them.

@@ -1,7 +1,5 @@
 """How much work something is, counted in calls: the same on every machine, however busy it is."""
 
-from __future__ import annotations
-
 import cProfile
 from collections.abc import Callable
 from typing import TypeVar

@@ -1,7 +1,5 @@
 """Scenarios from overrides of the corrected one, their findings, and their runs."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """`examples/my_lab` as an installer leaves it, made without one, so that no network is needed."""
 
-from __future__ import annotations
-
 import shutil
 import tomllib
 from pathlib import Path

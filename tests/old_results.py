@@ -1,7 +1,5 @@
 """Old results of every kind, and whether they are still there, or new ones, whole."""
 
-from __future__ import annotations
-
 import shutil
 import tempfile
 from collections.abc import Sequence

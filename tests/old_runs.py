@@ -6,8 +6,6 @@ For every scenario in SCENARIOS an archive and, in plain text, the numbers that 
 finds them, into tests/fixtures/format_<number>. What is there already stays as it is.
 """
 
-from __future__ import annotations
-
 import gzip
 import io
 import json

@@ -1,7 +1,5 @@
 """Files of laws and other components that podusv does not bring along."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 LAW = '''"""A law of somebody's own."""

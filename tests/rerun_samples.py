@@ -1,7 +1,5 @@
 """A finished run made in a second without a compiler, and copies of it with a planted change."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import replace

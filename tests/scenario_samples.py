@@ -1,7 +1,5 @@
 """Scenario texts that the tests of configuration and commands start from."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

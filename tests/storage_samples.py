@@ -1,7 +1,5 @@
 """A small recording, its log, its folder, and ways to break them, for the tests of the logbook."""
 
-from __future__ import annotations
-
 import io
 import itertools
 import os

@@ -1,7 +1,5 @@
 """Runs of a study made of given numbers, for tests of claims, tables and figures."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Actuators: limits, their flag, and demands that are no numbers."""
 
-from __future__ import annotations
-
 import math
 from typing import Any, Literal
 
@@ -30,26 +28,24 @@ def drive(actuator: Actuator, surge: float, yaw: float) -> tuple[Vector, Vector,
 
 
 @given(surge=st.floats(-1e6, 1e6), yaw=st.floats(-1e6, 1e6))
-def test_limits_hold_on_each_axis_by_itself(surge: float, yaw: float) -> None:
+def test_limits_hold_on_each_axis_by_itself(surge, yaw):
     tau, (flag,), _ = drive(Saturated(), surge, yaw)
     np.testing.assert_array_equal(tau, [np.clip(surge, -8, 8), 0, np.clip(yaw, -2.5, 2.5)])
     assert flag == (1.0 if abs(surge) > 8 or abs(yaw) > 2.5 else 0.0)
 
 
-def test_a_demand_at_the_limit_is_not_saturated() -> None:
+def test_a_demand_at_the_limit_is_not_saturated():
     assert drive(Saturated(surge_limit=3.0, yaw_limit=1.0), -3.0, 1.0)[1] == 0.0
 
 
 @given(surge=st.floats(allow_nan=False), yaw=st.floats(allow_nan=False))
-def test_the_ideal_actuator_does_what_it_is_told(surge: float, yaw: float) -> None:
+def test_the_ideal_actuator_does_what_it_is_told(surge, yaw):
     np.testing.assert_array_equal(drive(Ideal(), surge, yaw)[0], [surge, 0.0, yaw])
 
 
 @every_kind
 @pytest.mark.parametrize("demand", [(math.nan, 0.5), (0.5, math.nan), (math.nan, math.nan)])
-def test_a_demand_that_is_no_number_never_becomes_a_finite_load(
-    kind: type[Actuator], demand: tuple[float, float]
-) -> None:
+def test_a_demand_that_is_no_number_never_becomes_a_finite_load(kind, demand):
     tau, _, rate = drive(example(kind), *demand)
     # At once, or with the lag that the state's rate stands for.
     assert not np.isfinite(np.concatenate([tau, rate])).all()
@@ -72,7 +68,7 @@ class HiddenNaN(Constant):
 
 
 @pytest.mark.parametrize("compiled", [True, False])
-def test_a_limit_does_not_hide_what_is_no_number_inside_a_step(compiled: bool) -> None:
+def test_a_limit_does_not_hide_what_is_no_number_inside_a_step(compiled):
     out = run(adrift(actuator=Saturated(), controller=HiddenNaN()), 0.1, compiled=compiled)
     assert out.status == "diverged"
     assert len(out["time"]) == 2

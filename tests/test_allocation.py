@@ -1,7 +1,5 @@
 """Allocation: what is asked for is made where it can be, and nothing else does better where not."""
 
-from __future__ import annotations
-
 import math
 from itertools import product
 from typing import Any
@@ -37,7 +35,7 @@ def one(X: float, Y: float, priority: float = 0.0, low: float = -LIMIT, high: fl
 @given(
     T=st.floats(-ASTERN, AHEAD), delta=st.floats(-LIMIT, LIMIT), priority=st.sampled_from([0, 1])
 )
-def test_what_one_pod_can_make_it_makes(T: float, delta: float, priority: float) -> None:
+def test_what_one_pod_can_make_it_makes(T, delta, priority):
     X, Y = T * math.cos(delta), T * math.sin(delta)
     assert one(X, Y, priority)[2:] == pytest.approx((X, Y), abs=1e-9)
     if abs(T) > 1e-6:
@@ -55,9 +53,7 @@ GRIDS = {ahead: grid_of_forces(ahead) for ahead in (True, False)}
 
 
 @given(X=force, Y=force, priority=st.sampled_from([0.0, 1.0]))
-def test_the_preferred_axis_is_met_as_far_as_can_be_and_then_the_other(
-    X: float, Y: float, priority: float
-) -> None:
+def test_the_preferred_axis_is_met_as_far_as_can_be_and_then_the_other(X, Y, priority):
     """Against all forces on a grid, first by the one distance, then by the other."""
     wanted, made = np.array([X, Y]), np.array(one(X, Y, priority)[2:])
     first, second = (1, 0) if priority == 0.0 else (0, 1)
@@ -70,7 +66,7 @@ def test_the_preferred_axis_is_met_as_far_as_can_be_and_then_the_other(
         assert mine[second] <= apart[second][as_good].min() + coarse
 
 
-def test_going_astern_the_angle_stays_within_its_limits_and_does_not_jump_by_half_a_turn() -> None:
+def test_going_astern_the_angle_stays_within_its_limits_and_does_not_jump_by_half_a_turn():
     """With a yaw moment that is kept, only the sign of the angle changes where the thrust does."""
     answers = [one(X, 0.3) for X in np.linspace(3, -3, 601)]
     T, delta = (np.array([answer[i] for answer in answers]) for i in (0, 1))
@@ -82,7 +78,7 @@ def test_going_astern_the_angle_stays_within_its_limits_and_does_not_jump_by_hal
 
 
 @given(X=force, Y=force, low=st.floats(-LIMIT, LIMIT), width=st.floats(0.01, 0.5))
-def test_a_narrow_reach_of_angles_is_kept_to(X: float, Y: float, low: float, width: float) -> None:
+def test_a_narrow_reach_of_angles_is_kept_to(X, Y, low, width):
     for priority in (0.0, 1.0):
         one(X, Y, priority, low, min(LIMIT, low + width) + 1e-9)
 
@@ -169,9 +165,7 @@ LAYOUTS = {
     layout=st.sampled_from(sorted(LAYOUTS)), surge=unit, yaw=unit, size=st.sampled_from([0.3, 1.5]),
     sway=st.sampled_from([0.0, 0.1]), priority=st.sampled_from(["yaw", "surge"]),
 )  # fmt: skip
-def test_no_other_thrusts_and_angles_cost_less(
-    layout: str, surge: float, yaw: float, size: float, sway: float, priority: Any
-) -> None:
+def test_no_other_thrusts_and_angles_cost_less(layout, surge, yaw, size, sway, priority):
     pods = several(LAYOUTS[layout], sway_weight=sway, priority=priority)
     demand = np.array([surge * size * 8, yaw * size * 3])
     problem = Problem(pods, demand)
@@ -181,9 +175,7 @@ def test_no_other_thrusts_and_angles_cost_less(
 
 @settings(max_examples=40)
 @given(surge=unit, yaw=unit, size=st.sampled_from([0.3, 1.0, 3.0]))
-def test_differential_thrust_is_bounded_least_squares(
-    surge: float, yaw: float, size: float
-) -> None:
+def test_differential_thrust_is_bounded_least_squares(surge, yaw, size):
     """Fixed propellers leave a convex problem in the thrusts, which scipy solves exactly."""
     pods = several([(-0.5, -0.4, 0.0), (-0.5, 0.4, 0.0), (0.2, 0.1, 0.0)])
     demand = np.array([surge * size * 10, yaw * size * 4])
@@ -198,7 +190,7 @@ def test_differential_thrust_is_bounded_least_squares(
 
 
 @given(surge=unit, yaw=unit)
-def test_what_several_pods_can_make_they_make(surge: float, yaw: float) -> None:
+def test_what_several_pods_can_make_they_make(surge, yaw):
     pods = several(LAYOUTS["bow and stern"])
     demand = np.array([surge * 2.0, yaw * 0.8])
     k, T, delta = bundle(pods.constants()), np.zeros(2), np.zeros(2)
@@ -209,7 +201,7 @@ def test_what_several_pods_can_make_they_make(surge: float, yaw: float) -> None:
     assert (np.array([0.6, -0.5]) @ Y) == pytest.approx(demand[1], abs=1e-4)
 
 
-def test_an_axis_far_out_of_reach_does_not_take_what_the_preferred_one_needs() -> None:
+def test_an_axis_far_out_of_reach_does_not_take_what_the_preferred_one_needs():
     pods = several(LAYOUTS["twin"])
     T, delta = allocated(pods, np.array([36e3, 0.5]))
     x, y = np.array([-0.5, -0.5]), np.array([-0.1, 0.1])
@@ -218,7 +210,7 @@ def test_an_axis_far_out_of_reach_does_not_take_what_the_preferred_one_needs() -
     assert T.sum() > 0.9 * Problem(pods, np.zeros(2)).ahead.sum()
 
 
-def test_with_a_horizon_only_what_rates_allow_is_asked_for() -> None:
+def test_with_a_horizon_only_what_rates_allow_is_asked_for():
     turn, change = POD["angle_rate"] * 0.1, POD["n_rate"] * 0.1
     for pods in (several(LAYOUTS["twin"], horizon=0.1), Pods(pods=(Pod(**POD),), horizon=0.1)):
         count = len(pods.pods)
@@ -237,18 +229,14 @@ ZEROS = (0.0, -0.0)
 @pytest.mark.parametrize("priority", [0.0, 1.0])
 @pytest.mark.parametrize("X", ZEROS)
 @pytest.mark.parametrize("Y", ZEROS)
-def test_one_pod_that_is_asked_for_nothing_does_not_turn(
-    X: float, Y: float, priority: float
-) -> None:
+def test_one_pod_that_is_asked_for_nothing_does_not_turn(X, Y, priority):
     assert one(X, Y, priority)[:2] == (0.0, 0.0)
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
 @pytest.mark.parametrize("horizon", [0.0, 0.3])
 @pytest.mark.parametrize("astern", [0.0, POD["n_max_astern"]])
-def test_no_pod_is_asked_for_an_angle_out_of_its_reach(
-    layout: str, horizon: float, astern: float
-) -> None:
+def test_no_pod_is_asked_for_an_angle_out_of_its_reach(layout, horizon, astern):
     """Nor does the sign of a thrust of zero turn it by half a turn."""
     free = several(LAYOUTS[layout], horizon=horizon)
     own = tuple(pod.model_copy(update={"n_max_astern": astern}) for pod in free.pods)

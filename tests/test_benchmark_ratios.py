@@ -1,9 +1,5 @@
 """The compiled closed loop is as fast as hand-written C; run by `make bench`."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,12 +17,12 @@ every_case = pytest.mark.parametrize("case", CASES, ids=[case.label for case in 
 
 
 @pytest.fixture(scope="module")
-def programs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+def programs(tmp_path_factory):
     return build(tmp_path_factory.mktemp("c"))
 
 
 @pytest.fixture(scope="module")
-def level(programs: dict[str, Path]) -> Callable[[Case], dict[str, float]]:
+def level(programs):
     def measured(case: Case) -> dict[str, float]:
         ratios: dict[str, Any] = beside_c(programs, case, ROUNDS)["ratios"]
         return {name: middle for name, (_, middle, _) in ratios.items()}
@@ -35,40 +31,40 @@ def level(programs: dict[str, Path]) -> Callable[[Case], dict[str, float]]:
 
 
 @every_case
-def test_podusv_and_c_agree(programs: dict[str, Path], case: Case) -> None:
+def test_podusv_and_c_agree(programs, case):
     assert max(agreement(programs, case).values()) <= TOLERANCE
 
 
 @every_case
-def test_a_run_takes_less_time_than_in_plain_c(level: Any, case: Case) -> None:
+def test_a_run_takes_less_time_than_in_plain_c(level, case):
     ratios = level(case)
     assert ratios["podusv / C -O3"] < 1.0
     assert ratios["podusv with metrics / C -O3"] < 1.0
 
 
 @pytest.mark.parametrize("law", ["adaptive_neural", "dsc", "backstepping", "pid"])
-def test_a_run_of_the_usual_size(level: Any, law: str) -> None:
+def test_a_run_of_the_usual_size(level, law):
     ratios = level(Case(law, "" if law == "pid" else "27 grid"))
     assert ratios["podusv / C -O3"] <= 0.8
     # Level with C that may reorder sums and vectorise its exponentials, to within the scatter.
     assert ratios["podusv / C -Ofast"] <= 1.1
 
 
-def test_the_cost_of_a_step_does_not_depend_on_how_many_there_are() -> None:
+def test_the_cost_of_a_step_does_not_depend_on_how_many_there_are():
     seconds = {int(n): low for n, (low, _, _) in growth()["steps"].items()}
     assert seconds[100_000] <= 1.1 * seconds[10_000]
     # Less would mean that the clock does not count the thread in which the march computes.
     assert seconds[100_000] >= 0.5 * seconds[10_000]
 
 
-def test_many_runs_cost_what_their_steps_cost() -> None:
+def test_many_runs_cost_what_their_steps_cost():
     whole = batch_costs()["31000"]
     assert whole["processor cost"][1] <= 1.05
     # Other programs take cores away; they do not give any.
     assert whole["cost"][0] <= 1.05
 
 
-def test_python_alternatives_are_slower_at_the_same_accuracy() -> None:
+def test_python_alternatives_are_slower_at_the_same_accuracy():
     times = python_alternatives()["per_simulated_s"]
     middle = {name: quartiles[1] for name, quartiles in times.items()}
     assert np.isfinite(list(middle.values())).all()

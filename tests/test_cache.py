@@ -1,13 +1,9 @@
 """Machine code on disk: found again, and never older than the source it was made from."""
 
-from __future__ import annotations
-
 import math
 import os
-from collections.abc import Iterator
 from ctypes import CFUNCTYPE, c_double
 from enum import Enum
-from pathlib import Path
 from threading import Thread
 from types import ModuleType
 from typing import Any
@@ -41,13 +37,13 @@ def constant_law(force: float) -> Constant:
     return law()
 
 
-def test_kernels_of_the_same_name_are_not_taken_for_each_other() -> None:
+def test_kernels_of_the_same_name_are_not_taken_for_each_other():
     for force in (1.0, 7.0):
         out = run(adrift(controller=constant_law(force)), 0.05)
         np.testing.assert_array_equal(out["tau_u_cmd"], force)
 
 
-def test_kernels_that_read_different_constants_are_not_taken_for_each_other() -> None:
+def test_kernels_that_read_different_constants_are_not_taken_for_each_other():
     class Padded(Constant):
         offset: float = 0.0
 
@@ -60,7 +56,7 @@ def test_kernels_that_read_different_constants_are_not_taken_for_each_other() ->
 
 
 @pytest.fixture
-def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def cache(tmp_path, monkeypatch):
     """The folder where code is kept, empty."""
     monkeypatch.setenv("PODUSV_CACHE", str(tmp_path))
     code_folder.code_folder.cache_clear()
@@ -68,7 +64,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     code_folder.code_folder.cache_clear()
 
 
-def test_machine_code_is_what_the_kernel_computes() -> None:
+def test_machine_code_is_what_the_kernel_computes():
     code = compile.compiled(wrap, CFUNCTYPE(c_double, c_double))
     for angle in np.random.default_rng(1).uniform(-50, 50, 100):
         assert code(angle) == wrap(angle)
@@ -165,7 +161,7 @@ Fast = Enum("Slow", {"PACE": 2}, module=__name__)
     ids=["module", "numba", "float32", "complex", "tuple", "enumeration", "inside", "float",
          "table", "function"],
 )  # fmt: skip
-def test_whatever_a_kernel_reads_is_in_the_fingerprint(variants: list[Any]) -> None:
+def test_whatever_a_kernel_reads_is_in_the_fingerprint(variants):
     marks = {object_cache.fingerprint(variant) for variant in variants}
     assert len(marks) == len(variants)
     assert object_cache.fingerprint(calling(halved)) == object_cache.fingerprint(calling(halved))
@@ -174,9 +170,7 @@ def test_whatever_a_kernel_reads_is_in_the_fingerprint(variants: list[Any]) -> N
 ONE_TO_ONE = CFUNCTYPE(c_double, c_double)
 
 
-def test_a_piece_that_is_damaged_or_anothers_is_made_anew(
-    cache: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_piece_that_is_damaged_or_anothers_is_made_anew(cache, monkeypatch):
     for function in (ready, doubled):
         assert compile.compiled(function, ONE_TO_ONE)(2.5) == function(2.5)
     (path,), (other,) = (list(cache.rglob(f"{name}_*")) for name in ("ready", "doubled"))
@@ -189,9 +183,7 @@ def test_a_piece_that_is_damaged_or_anothers_is_made_anew(
         assert object_cache._read(path) is not None
 
 
-def test_pieces_are_whole_when_several_processes_write_them(
-    cache: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_pieces_are_whole_when_several_processes_write_them(cache, monkeypatch):
     code = object_cache.Code("symbol", bytes(range(256)) * 4000)
     path = cache / "piece"
     torn = []
@@ -211,7 +203,7 @@ def test_pieces_are_whole_when_several_processes_write_them(
     assert list(cache.iterdir()) == [path]
 
 
-def test_a_full_disk_costs_time_only(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_costs_time_only(cache, monkeypatch):
     def full(*paths: Any, **folders: Any) -> None:
         raise OSError("no space left on device")
 
@@ -221,16 +213,14 @@ def test_a_full_disk_costs_time_only(cache: Path, monkeypatch: pytest.MonkeyPatc
     assert [path.name for path in cache.rglob("*.*")] == [code_folder.MARK]
 
 
-def test_another_processor_or_version_gets_a_piece_of_its_own(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_another_processor_or_version_gets_a_piece_of_its_own(monkeypatch):
     here = object_cache.fingerprint(ready)
     assert object_cache.fingerprint(ready) == here
     monkeypatch.setattr(object_cache, "_circumstances", lambda: ("another processor",))
     assert object_cache.fingerprint(ready) != here
 
 
-def test_a_kernel_that_allocates_is_refused_and_not_left_to_end_the_process() -> None:
+def test_a_kernel_that_allocates_is_refused_and_not_left_to_end_the_process():
     @kernel
     def allocating(x: float) -> float:
         """The rules forbid this."""

@@ -1,7 +1,5 @@
 """Machine code on disk is never older than the source it was made from."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil
@@ -72,12 +70,12 @@ class Copy:
 
 
 @pytest.fixture
-def copy(tmp_path: Path) -> Copy:
+def copy(tmp_path):
     return Copy(tmp_path)
 
 
 @pytest.mark.slow
-def test_a_second_process_finds_the_code_and_a_changed_helper_is_noticed(copy: Copy) -> None:
+def test_a_second_process_finds_the_code_and_a_changed_helper_is_noticed(copy):
     first = copy.simulate()
     made = copy.files()
     assert first["translated"]
@@ -92,9 +90,7 @@ def test_a_second_process_finds_the_code_and_a_changed_helper_is_noticed(copy: C
 
 
 @pytest.mark.slow
-def test_code_compiled_after_its_source_was_edited_is_not_left_for_the_new_source(
-    copy: Copy,
-) -> None:
+def test_code_compiled_after_its_source_was_edited_is_not_left_for_the_new_source(copy):
     # The process has imported the old source when the file changes under it.
     old = copy.simulate("|".join([str(copy.kinematics), *FASTER]))
     assert old["fast"] == old["slow"]
@@ -102,7 +98,7 @@ def test_code_compiled_after_its_source_was_edited_is_not_left_for_the_new_sourc
     assert new["fast"] == new["slow"] != old["slow"]
 
 
-def test_every_file_that_makes_a_kernel_is_in_the_digest() -> None:
+def test_every_file_that_makes_a_kernel_is_in_the_digest():
     modules = [import_module(found.name) for found in walk_packages([str(PACKAGE)], "podusv_cli.")
                if found.name != "podusv_cli.__main__"]  # fmt: skip
     things = [thing for module in modules for thing in vars(module).values()]
@@ -115,7 +111,7 @@ def test_every_file_that_makes_a_kernel_is_in_the_digest() -> None:
         assert any(mark in path.read_bytes() for mark in object_cache.MARKS), path
 
 
-def test_loading_takes_no_compiler_and_a_run_no_tables_or_plots(tmp_path: Path) -> None:
+def test_loading_takes_no_compiler_and_a_run_no_tables_or_plots(tmp_path):
     script = """
 import sys
 from podusv_cli.cli import main

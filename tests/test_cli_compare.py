@@ -1,14 +1,12 @@
 """`podusv compare` on the command line: exit codes, what is told where, what is refused."""
 
-from __future__ import annotations
-
 import json
 import re
 from functools import partial
 from pathlib import Path
 
 import pytest
-from command_samples import BASE, PATIENCE, TWO, Command, Said, commanded, under_way, write
+from command_samples import BASE, PATIENCE, TWO, Said, commanded, under_way, write
 from drawn_samples import no_figures_but
 
 from podusv_cli.process.workers import Outcome
@@ -17,9 +15,7 @@ from podusv_cli.workflows import compare
 
 
 @pytest.fixture
-def podusv(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Command:
+def podusv(tmp_path, monkeypatch, capsys):
     """`podusv compare` without figures, in a folder of its own."""
     monkeypatch.chdir(tmp_path)
     return partial(commanded(monkeypatch, capsys), "compare", "--no-figures")
@@ -38,7 +34,7 @@ def claims_of(said: Said) -> dict[str, dict]:
 # --- what is told
 
 
-def test_a_diverging_run_is_exit_code_3_and_hides_no_other(podusv: Command) -> None:
+def test_a_diverging_run_is_exit_code_3_and_hides_no_other(podusv):
     config = write("two.yaml", TWO)
     said = podusv(config, "--out", "x", "--set", "controllers.soft.T_d=1e-5")
     assert said.code == 3
@@ -50,7 +46,7 @@ def test_a_diverging_run_is_exit_code_3_and_hides_no_other(podusv: Command) -> N
     assert manifest.check(Path("x")).status == "finished"
 
 
-def test_runs_that_differ_in_more_are_warned_of_by_key(podusv: Command) -> None:
+def test_runs_that_differ_in_more_are_warned_of_by_key(podusv):
     write("a.yaml", BASE)
     write("b.yaml", BASE.replace("y: -2.0", "y: -3.0"))
     said = podusv("a.yaml", "b.yaml", "--out", "x")
@@ -62,7 +58,7 @@ def test_runs_that_differ_in_more_are_warned_of_by_key(podusv: Command) -> None:
     assert "warning" not in podusv(write("two.yaml", TWO), "--out", "y").err
 
 
-def test_json_has_the_documented_shape(podusv: Command) -> None:
+def test_json_has_the_documented_shape(podusv):
     config = write("two.yaml", TWO + claim("C1", "stiff.iae <= soft.iae"))
     said = podusv(config, "--out", "x", "--json")
     found = json.loads(said.out)
@@ -82,11 +78,11 @@ def test_json_has_the_documented_shape(podusv: Command) -> None:
     assert found["claims"][0]["verdict"] == "reproduced"
 
 
-def test_quiet_is_the_folder_alone(podusv: Command) -> None:
+def test_quiet_is_the_folder_alone(podusv):
     assert podusv(write("two.yaml", TWO), "--out", "x", "-q") == (0, "x\n", "")
 
 
-def test_finished_folders_and_a_scenario_mix(podusv: Command) -> None:
+def test_finished_folders_and_a_scenario_mix(podusv):
     podusv(write("two.yaml", TWO), "--out", "x")
     said = podusv("x", "x/soft", write("one.yaml", BASE), "--out", "y", "--json")
     found = json.loads(said.out)
@@ -99,7 +95,7 @@ def test_finished_folders_and_a_scenario_mix(podusv: Command) -> None:
 # --- claims of several scenarios
 
 
-def test_claims_speak_of_their_own_scenarios_runs(podusv: Command) -> None:
+def test_claims_speak_of_their_own_scenarios_runs(podusv):
     """The second scenario's `stiff` and `soft` are swapped, and run under other names."""
     swapped = BASE + "controllers: {soft: {K_Pu: 200.0}, stiff: {K_Pu: 5.0}}\n"
     write("a.yaml", TWO + claim("C1", "stiff.peak_tau_u > soft.peak_tau_u"))
@@ -114,7 +110,7 @@ def test_claims_speak_of_their_own_scenarios_runs(podusv: Command) -> None:
     assert found["C2"]["expect"].startswith("stiff_2.peak_tau_u > soft_2.peak_tau_u")
 
 
-def test_claims_reach_runs_that_are_named_after_their_scenario(podusv: Command) -> None:
+def test_claims_reach_runs_that_are_named_after_their_scenario(podusv):
     write("my-a.yaml", BASE + claim("C1", "pid.peak_tau_u > 1 and max(pid.u, 0, 1) > 0"))
     write("my-b.yaml", BASE)
     found = claims_of(podusv("my-a.yaml", "my-b.yaml", "--out", "x", "--json"))
@@ -122,7 +118,7 @@ def test_claims_reach_runs_that_are_named_after_their_scenario(podusv: Command) 
     assert list(found["C1"]["numbers"]) == ["my-a.peak_tau_u", "max(my-a.u, 0, 1)"]
 
 
-def test_claims_are_not_about_finished_runs_of_the_same_name(podusv: Command) -> None:
+def test_claims_are_not_about_finished_runs_of_the_same_name(podusv):
     config = write("two.yaml", TWO + claim("C1", "soft.peak_tau_u < 100"))
     podusv(config, "--out", "old", "--set", "controllers.soft.K_Pu=900")
     found = claims_of(podusv("old/soft", config, "--out", "x", "--json"))
@@ -130,7 +126,7 @@ def test_claims_are_not_about_finished_runs_of_the_same_name(podusv: Command) ->
     assert list(found["C1"]["numbers"]) == ["soft_2.peak_tau_u"]
 
 
-def test_claims_of_the_same_name_keep_apart(podusv: Command) -> None:
+def test_claims_of_the_same_name_keep_apart(podusv):
     write("a.yaml", TWO + claim("C1", "finished(soft)"))
     write("b.yaml", TWO + claim("C1", "not finished(soft)"))
     found = claims_of(podusv("a.yaml", "b.yaml", "a.yaml", "--out", "x", "--json"))
@@ -139,7 +135,7 @@ def test_claims_of_the_same_name_keep_apart(podusv: Command) -> None:
     }  # fmt: skip
 
 
-def test_cannot_tell_says_why(podusv: Command) -> None:
+def test_cannot_tell_says_why(podusv):
     config = write("two.yaml", TWO + claim("C1", "soft.iae < stiff.iae"))
     said = podusv(config, "--out", "x", "--set", "controllers.soft.T_d=1e-5")
     assert "C1  cannot tell" in said.out
@@ -152,7 +148,7 @@ def test_cannot_tell_says_why(podusv: Command) -> None:
 # --- what is refused
 
 
-def test_what_is_compared_is_not_overwritten(podusv: Command) -> None:
+def test_what_is_compared_is_not_overwritten(podusv):
     podusv(write("two.yaml", TWO), "--out", "x")
     before = manifest.check(Path("x"))
     for out in ("x", "x/", "./x/../x", "x/soft", "x/new", "."):
@@ -167,7 +163,7 @@ def test_what_is_compared_is_not_overwritten(podusv: Command) -> None:
     assert not Path("x/new").exists()
 
 
-def test_set_without_a_scenario_is_refused(podusv: Command) -> None:
+def test_set_without_a_scenario_is_refused(podusv):
     podusv(write("two.yaml", TWO), "--out", "x")
     said = podusv("x/soft", "x/stiff", "--set", "start.x=1", "--out", "y")
     assert said.code == 2
@@ -188,9 +184,7 @@ def test_set_without_a_scenario_is_refused(podusv: Command) -> None:
         ("not " * 100 + "finished(stiff)", "nested"),
     ],
 )
-def test_a_claim_without_meaning_is_a_scenario_error(
-    podusv: Command, expect: str, says: str
-) -> None:
+def test_a_claim_without_meaning_is_a_scenario_error(podusv, expect, says):
     config = write("two.yaml", TWO + claim("C1", expect))
     said = podusv(config, "--out", "x")
     line = len(TWO.splitlines()) + 2
@@ -200,7 +194,7 @@ def test_a_claim_without_meaning_is_a_scenario_error(
     assert says in said.err
 
 
-def test_runs_that_all_die_are_reported(podusv: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_runs_that_all_die_are_reported(podusv, monkeypatch):
     lost = Outcome(failure="its process ended with exit code -9, 2 times")
     monkeypatch.setattr(compare, "run_all", lambda jobs, *rest: [lost] * len(jobs))
     config = write("two.yaml", TWO + claim("C1", "soft.iae < stiff.iae"))
@@ -222,9 +216,7 @@ FIVE = BASE.replace("duration: 1.0", "duration: 0.1, compiled: false") + (
 )
 
 
-def test_five_runs_are_tables_below_each_other_on_a_narrow_terminal(
-    podusv: Command, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_five_runs_are_tables_below_each_other_on_a_narrow_terminal(podusv, monkeypatch):
     config = write("five.yaml", FIVE)
     whole = podusv(config, "--out", "x").out.splitlines()
     assert whole[0].split() == ["metric", "unit", "one", "another", "third", "the_fourth", "last"]
@@ -242,7 +234,7 @@ def test_five_runs_are_tables_below_each_other_on_a_narrow_terminal(
         assert all(line[start - 1] == " " for line in lines[: len(first)] for start in starts)
 
 
-def test_the_last_line_tells_how_to_check_that_numbers_have_converged(podusv: Command) -> None:
+def test_the_last_line_tells_how_to_check_that_numbers_have_converged(podusv):
     config = write("one.yaml", BASE)
     said = podusv(config, "--out", "x", "--set", "description=two words")
     assert said.out.splitlines()[-1] == "compared 1 run: x"
@@ -271,7 +263,7 @@ def figures_of_report(folder: str) -> int:
     return len(set(re.findall(r"data:image/svg\+xml;base64,([^\"]+)", page)))
 
 
-def test_only_what_is_asked_for_is_drawn_and_what_cannot_be_is_told(podusv: Command) -> None:
+def test_only_what_is_asked_for_is_drawn_and_what_cannot_be_is_told(podusv):
     config = write("two.yaml", FIGURED)
     asked = ("--figures", "--figure", "errors", "--figure", "pods", "--format", "pdf, png")
     said = podusv(config, "--out", "x", "--jobs", "1", *asked)
@@ -281,7 +273,7 @@ def test_only_what_is_asked_for_is_drawn_and_what_cannot_be_is_told(podusv: Comm
     assert figures_of_report("x") == 1
 
 
-def test_figures_are_png_and_the_report_has_them_all_the_same(podusv: Command) -> None:
+def test_figures_are_png_and_the_report_has_them_all_the_same(podusv):
     config = write("two.yaml", FIGURED)
     with no_figures_but("controls", "errors"):
         assert podusv(config, "--out", "x", "--figures").code == 0
@@ -297,9 +289,7 @@ def test_figures_are_png_and_the_report_has_them_all_the_same(podusv: Command) -
         (("--no-figures", "--figure", "errors"), "--figure errors and --no-figures contradict"),
     ],
 )
-def test_what_cannot_be_drawn_is_told_before_anything_is_simulated(
-    podusv: Command, words: tuple[str, ...], text: str
-) -> None:
+def test_what_cannot_be_drawn_is_told_before_anything_is_simulated(podusv, words, text):
     config = write("two.yaml", FIGURED)
     said = podusv(config, "--figures", *words)
     assert said.code == 2
@@ -307,7 +297,7 @@ def test_what_cannot_be_drawn_is_told_before_anything_is_simulated(
     assert not Path("results").exists()
 
 
-def test_the_report_is_named_after_everything_else(tmp_path: Path) -> None:
+def test_the_report_is_named_after_everything_else(tmp_path):
     config = tmp_path / "two.yaml"
     config.write_text(FIGURED)
     words = ["compare", str(config), "--out", str(tmp_path / "x"), "--figure", "errors"]
@@ -324,9 +314,7 @@ ALONE = FIGURED.replace("controller: {kind: pid, K_Pu: 100.0}\n", "").replace(
 ).replace("soft: {", "soft: {kind: pid, ")  # fmt: skip
 
 
-def test_controllers_need_no_controller(
-    podusv: Command, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_controllers_need_no_controller(podusv, monkeypatch, capsys):
     assert "\ncontroller:" not in ALONE
     config, run = write("two.yaml", ALONE), commanded(monkeypatch, capsys)
     assert podusv(config, "--out", "x").out.splitlines()[-1] == "compared 2 runs: x"
@@ -343,9 +331,7 @@ def test_controllers_need_no_controller(
     assert said.err == ("unknown controller 'sotf'; did you mean 'soft'? (allowed: stiff, soft)\n")
 
 
-def test_the_only_one_of_the_controllers_is_run(
-    podusv: Command, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_only_one_of_the_controllers_is_run(podusv, monkeypatch, capsys):
     write("two.yaml", ALONE)
     config = write("one.yaml", "extends: two.yaml\ncontrollers: {soft: null}\n")
     said = commanded(monkeypatch, capsys)("run", config, "--out", "y", "--no-figures")

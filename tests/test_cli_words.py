@@ -1,7 +1,5 @@
 """Commands that answer in words: validate, explain, list, schema; exit codes, pipes, help."""
 
-from __future__ import annotations
-
 import ast
 import os
 import re
@@ -12,7 +10,6 @@ from pathlib import Path
 
 import pytest
 import typer
-from command_samples import Command
 from scenario_samples import SOUND, write
 
 import podusv_cli
@@ -53,13 +50,13 @@ def podusv_process(*words: str, stdout: int = subprocess.PIPE) -> subprocess.Com
 # --- validate
 
 
-def test_a_sound_scenario_is_a_line_and_what_it_takes(podusv: Command) -> None:
+def test_a_sound_scenario_is_a_line_and_what_it_takes(podusv):
     said = podusv("validate", "a.yaml", "--set", "controller.k_ze=0.03")
     takes = "a run takes about 0.63 s, 160 MB of memory and 7.4 MB of disk"
     assert said == (0, f"a.yaml: ok (a, pid, 31000 steps)\n{takes}\n", "")
 
 
-def test_every_fault_is_a_line_on_stderr(podusv: Command) -> None:
+def test_every_fault_is_a_line_on_stderr(podusv):
     write("bad.yaml", SOUND + "start: {x: no, z: 1}\n")
     assert podusv("validate", "bad.yaml", "--set", "log.every=0") == (
         2,
@@ -70,12 +67,12 @@ def test_every_fault_is_a_line_on_stderr(podusv: Command) -> None:
     )
 
 
-def test_a_missing_file_is_a_line_on_stderr(podusv: Command) -> None:
+def test_a_missing_file_is_a_line_on_stderr(podusv):
     said = podusv("validate", "nope.yaml")
     assert said == (2, "", "nope.yaml: cannot be read: no such file or directory\n")
 
 
-def test_the_laws_to_compare_are_named_and_claims_are_checked(podusv: Command) -> None:
+def test_the_laws_to_compare_are_named_and_claims_are_checked(podusv):
     several = SOUND + "controllers: {slow: {k_ze: 0.01}, fast: {k_ze: 1}}\nclaims:\n"
     write("b.yaml", several + "  C1: {says: s, source: p, expect: slow.iae > fast.iae}\n")
     ok, *_ = podusv("validate", "b.yaml").out.splitlines()
@@ -86,7 +83,7 @@ def test_the_laws_to_compare_are_named_and_claims_are_checked(podusv: Command) -
     assert said.err.startswith("c.yaml:8:36: claims.C1.expect: ")
 
 
-def test_verbose_shows_every_value_and_where_it_comes_from(podusv: Command) -> None:
+def test_verbose_shows_every_value_and_where_it_comes_from(podusv):
     said = podusv("validate", "a.yaml", "-v", "--set", "start.x=-5", "--set", "name=b")
     assert said.code == 0
     lines = said.out.splitlines()
@@ -102,7 +99,7 @@ def test_verbose_shows_every_value_and_where_it_comes_from(podusv: Command) -> N
 # --- explain, list, schema
 
 
-def test_explain_shows_everything_about_a_key(podusv: Command) -> None:
+def test_explain_shows_everything_about_a_key(podusv):
     assert podusv("explain", "controller.K_Pu") == (
         0,
         "controller.K_Pu  a number >= 0 [kg/s], default 1100.0\n"
@@ -112,7 +109,7 @@ def test_explain_shows_everything_about_a_key(podusv: Command) -> None:
     )
 
 
-def test_explain_shows_the_sections_without_a_key(podusv: Command) -> None:
+def test_explain_shows_the_sections_without_a_key(podusv):
     out = podusv("explain").out
     assert [line for line in out.splitlines() if line in Scenario.model_fields] == [
         "vessel", "nominal", "start", "path", "disturbance", "actuator", "controller", "simulation",
@@ -121,29 +118,27 @@ def test_explain_shows_the_sections_without_a_key(podusv: Command) -> None:
     assert "    kinds: circle, line, line_circle, waypoints\n" in out
 
 
-def test_explain_tells_an_unknown_key(podusv: Command) -> None:
+def test_explain_tells_an_unknown_key(podusv):
     said = podusv("explain", "contoller")
     assert said == (2, "", "contoller: no such name; did you mean 'controller'?\n")
 
 
 @pytest.mark.parametrize("columns", ["20", "40", "300"])
-def test_text_fits_the_terminal(
-    podusv: Command, monkeypatch: pytest.MonkeyPatch, columns: str
-) -> None:
+def test_text_fits_the_terminal(podusv, monkeypatch, columns):
     monkeypatch.setenv("COLUMNS", columns)
     out = podusv("explain", "metrics").out
     assert max(map(len, out.splitlines())) <= min(int(columns), 100)
     assert "the last part of the run" in " ".join(out.split())
 
 
-def test_list_names_every_kind_and_every_vessel(podusv: Command) -> None:
+def test_list_names_every_kind_and_every_vessel(podusv):
     out = podusv("list").out
     for kind in ("line_circle", "harmonic", "saturated", "adaptive_neural", *preset_names(SHIPPED)):
         assert f"\n  {kind}\n" in out
     assert "CyberShip II" in out
 
 
-def test_every_name_that_is_listed_is_explained(podusv: Command) -> None:
+def test_every_name_that_is_listed_is_explained(podusv):
     out = podusv("list").out
     names = re.findall(r"^  (\S+)", out, re.MULTILINE)
     assert {"otter", "near-target", "iae", "line", "none"} <= set(names)
@@ -153,7 +148,7 @@ def test_every_name_that_is_listed_is_explained(podusv: Command) -> None:
         assert re.search(rf"^(\w+\.)*{name}\b", said.out, re.MULTILINE), name
 
 
-def test_a_preset_is_explained_with_its_source_and_what_it_holds_for(podusv: Command) -> None:
+def test_a_preset_is_explained_with_its_source_and_what_it_holds_for(podusv):
     vessel, pods = podusv("explain", "otter").out.split("otter  ")[1:]
     assert vessel.startswith("vessel (vessel.preset)\n")
     assert pods.startswith("set of pods (actuator.pod.preset)\n")
@@ -162,7 +157,7 @@ def test_a_preset_is_explained_with_its_source_and_what_it_holds_for(podusv: Com
             assert preset_text(presets, "otter", key) in " ".join(text.split())
 
 
-def test_schema_prints_the_schema(podusv: Command) -> None:
+def test_schema_prints_the_schema(podusv):
     assert podusv("schema") == (0, schema_text(tuple(finding_kinds())), "")
 
 
@@ -170,7 +165,7 @@ def test_schema_prints_the_schema(podusv: Command) -> None:
 
 
 @pytest.mark.parametrize("name", cli.COMMANDS)
-def test_every_command_and_option_has_help(name: str, podusv: Command) -> None:
+def test_every_command_and_option_has_help(name, podusv):
     command = typer.main.get_command(cli.app).commands[name]
     assert command.help
     assert all(getattr(option, "help", "") for option in command.params), name
@@ -179,20 +174,20 @@ def test_every_command_and_option_has_help(name: str, podusv: Command) -> None:
     assert " ".join(command.help.split()) in " ".join(said.out.split())
 
 
-def test_a_command_is_a_function_of_its_name() -> None:
+def test_a_command_is_a_function_of_its_name():
     assert {"validate", "explain", "list", "schema"} <= set(cli.COMMANDS)
     for name in cli.COMMANDS:
         assert callable(getattr(import_module(f"podusv_cli.cli.{name}"), name))
 
 
-def test_version(podusv: Command) -> None:
+def test_version(podusv):
     assert podusv("--version") == (0, f"podusv {podusv_cli.__version__}\n", "")
 
 
 @pytest.mark.parametrize(
     "words", [["validate"], ["valdate", "a.yaml"], ["validate", "a.yaml", "--x"]]
 )
-def test_wrong_usage_exits_with_2(podusv: Command, words: list[str]) -> None:
+def test_wrong_usage_exits_with_2(podusv, words):
     said = podusv(*words)
     assert said.code == 2
     assert said.out == ""
@@ -214,9 +209,7 @@ def outcome(error: BaseException) -> object:
     return ended.value.exit_code
 
 
-def test_a_foreseen_failure_is_its_message_and_exit_code(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_foreseen_failure_is_its_message_and_exit_code(capsys):
     assert (
         outcome(
             ScenarioError([ScenarioFault("a.yaml:1:1", "m", "bad"), ScenarioFault("", "", "worse")])
@@ -233,24 +226,24 @@ def test_a_foreseen_failure_is_its_message_and_exit_code(
     )
 
 
-def test_an_interrupt_is_130_and_a_line(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_interrupt_is_130_and_a_line(capsys):
     assert outcome(KeyboardInterrupt()) == 130
     assert outcome(KeyboardInterrupt("interrupted; nothing was written")) == 130
     assert capsys.readouterr() == ("", "interrupted\ninterrupted; nothing was written\n")
 
 
-def test_a_bug_shows_its_trace_and_asks_for_a_report(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_bug_shows_its_trace_and_asks_for_a_report(capsys):
     assert outcome(ZeroDivisionError("oops")) == 1
     err = capsys.readouterr().err
     assert err.startswith("Traceback (most recent call last):\n")
     assert err.endswith(f"ZeroDivisionError: oops\n{PLEASE_REPORT}\n")
 
 
-def test_the_exit_code_of_a_command_is_kept() -> None:
+def test_the_exit_code_of_a_command_is_kept():
     assert outcome(typer.Exit(4)) == 4
 
 
-def test_a_name_that_is_no_text_is_shown_escaped(tmp_path: Path) -> None:
+def test_a_name_that_is_no_text_is_shown_escaped(tmp_path):
     path = os.fsencode(tmp_path) + b"/\xff.yaml"
     with open(path, "w", encoding="utf-8") as file:
         file.write(SOUND + "name: a\n")
@@ -270,7 +263,7 @@ except SystemExit:
 
 
 @pytest.mark.parametrize("words", [["--help"], ["--version"], ["validate", "--help"], ["nonsense"]])
-def test_help_and_mistakes_import_nothing_heavy(words: list[str]) -> None:
+def test_help_and_mistakes_import_nothing_heavy(words):
     process = python("-c", LOADED, *words)
     modules = set(ast.literal_eval(process.stdout.splitlines()[-1]))
     assert "podusv_cli.cli.validate" in modules

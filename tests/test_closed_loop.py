@@ -1,7 +1,5 @@
 """The closed loop as mathematics: order of RK4, an independent integrator, symmetry, readings."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from typing import Any
 
@@ -37,13 +35,13 @@ def order(ends: list[Vector]) -> float:
 
 
 @every_law
-def test_the_loop_is_integrated_at_fourth_order(kind: Any) -> None:
+def test_the_loop_is_integrated_at_fourth_order(kind):
     # The weights' loop turns at up to 90 rad/s: larger steps are not in the asymptotic range.
     ends = [end(smooth(example(kind)), 0.002 / 2**i) for i in range(4)]
     assert order(ends) == pytest.approx(4.0, abs=0.2)
 
 
-def test_a_sampled_law_is_integrated_at_fourth_order_to_another_solution() -> None:
+def test_a_sampled_law_is_integrated_at_fourth_order_to_another_solution():
     loop, steps = smooth(GENTLE), [0.02, 0.01, 0.005, 0.0025]
     sampled = [end(loop, h, hold_every=round(0.04 / h)) for h in steps]
     assert order(sampled) == pytest.approx(4.0, abs=0.2)
@@ -53,7 +51,7 @@ def test_a_sampled_law_is_integrated_at_fourth_order_to_another_solution() -> No
     )
 
 
-def test_a_sampled_law_approaches_the_continuous_one_at_first_order() -> None:
+def test_a_sampled_law_approaches_the_continuous_one_at_first_order():
     loop, h = smooth(GENTLE), 0.00125
     continuous = end(loop, h)
     gaps = [abs(end(loop, h, hold_every=n) - continuous).max() for n in (16, 8, 4)]
@@ -98,7 +96,7 @@ def right_hand_side(t: float, s: Vector) -> Vector:
     return np.concatenate([pose, nu_dot, b_hat_dot, W_hat_dot.ravel(), beta_dot])
 
 
-def test_the_corrected_run_agrees_with_dop853_on_equations_written_out_anew() -> None:
+def test_the_corrected_run_agrees_with_dop853_on_equations_written_out_anew():
     loop = corrected()
     first = np.concatenate([loop.start, loop.first_memory()[2:]])
     other = solve_ivp(
@@ -122,7 +120,7 @@ def mirrored(sea: HarmonicDisturbance) -> HarmonicDisturbance:
 
 
 @every_law
-def test_a_run_to_port_is_the_mirror_image_of_one_to_starboard(kind: Any) -> None:
+def test_a_run_to_port_is_the_mirror_image_of_one_to_starboard(kind):
     parts = {"controller": example(kind), "actuator": Saturated(surge_limit=50.0, yaw_limit=5.0)}
     one = corrected(**parts, path=Circle(angle=0.4), start=(-3.0, -9.0, 0.3, 0.2, 0.1, 0.05))
     other = corrected(
@@ -148,7 +146,7 @@ def distance(out: Any) -> Vector:
     return z_e[-len(z_e) // 5 :]
 
 
-def test_the_reading_of_the_figures_gives_the_paper_s_peaks() -> None:
+def test_the_reading_of_the_figures_gives_the_paper_s_peaks():
     # The paper: 300 N and 1000 N m.
     out = run(corrected(controller=AdaptiveNeural(**AS_PRINTED, B_u=5.0, B_r=5.0)), 310.0)
     assert 300 < abs(out["tau_u_cmd"]).max() < 320
@@ -156,14 +154,14 @@ def test_the_reading_of_the_figures_gives_the_paper_s_peaks() -> None:
     assert 0.5 < distance(out).mean() < 0.6
 
 
-def test_the_corrected_law_keeps_its_standoff_within_limits() -> None:
+def test_the_corrected_law_keeps_its_standoff_within_limits():
     out = run(corrected(actuator=Saturated()), 310.0)
     assert abs(out["tau_u"]).max() <= 8.0
     assert abs(out["tau_r"]).max() <= 2.5
     assert abs(distance(out) - 0.5).max() < 0.05
 
 
-def test_the_printed_vessel_orbits_the_printed_target() -> None:
+def test_the_printed_vessel_orbits_the_printed_target():
     law = AdaptiveNeural(**AS_PRINTED | {"first_difference": "from_start"})
     out = run(corrected(vessel=PAPER, path=LineCircle(reading="literal"), controller=law), 310.0)
     assert out.status == "finished"
@@ -171,7 +169,7 @@ def test_the_printed_vessel_orbits_the_printed_target() -> None:
     assert distance(out).mean() == pytest.approx(2.0, abs=0.2)
 
 
-def test_the_printed_first_difference_blows_up_within_a_second() -> None:
+def test_the_printed_first_difference_blows_up_within_a_second():
     path = LineCircle(reading="literal")
     out = run(corrected(vessel=PAPER, path=path, controller=AdaptiveNeural(**AS_PRINTED)), 310.0)
     assert out.status == "diverged"

@@ -1,7 +1,5 @@
 """What every registered component promises, asked of each by being registered."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -14,7 +12,6 @@ from pydantic import BaseModel, ValidationError
 
 from podusv_cli.controllers.base import Controller
 from podusv_cli.core import registry
-from podusv_cli.core.component import Component
 from podusv_cli.core.kernel import Vector, bundle, is_kernel
 from podusv_cli.engine.simulate import names
 from podusv_cli.paths.base import TARGET
@@ -81,9 +78,7 @@ class Call:
 
 
 @every_kind
-def test_every_output_is_written_and_nothing_is_remembered_or_changed(
-    room: str, kind: type[Component]
-) -> None:
+def test_every_output_is_written_and_nothing_is_remembered_or_changed(room, kind):
     asked = [Call(room, example(kind), seed) for seed in range(50)]
     before = [[np.array(argument) for argument in call.reads] for call in asked]
     first = [call() for call in asked]
@@ -96,7 +91,7 @@ def test_every_output_is_written_and_nothing_is_remembered_or_changed(
 
 
 @every_kind
-def test_the_kernels_are_marked_for_the_compiler(room: str, kind: type[Component]) -> None:
+def test_the_kernels_are_marked_for_the_compiler(room, kind):
     assert is_kernel(getattr(kind, KERNELS[room]))
     component = example(kind)
     if isinstance(component, Controller) and component.sample_period() > 0:
@@ -104,7 +99,7 @@ def test_the_kernels_are_marked_for_the_compiler(room: str, kind: type[Component
 
 
 @every_kind
-def test_a_component_is_a_frozen_value_without_surprises(room: str, kind: type[Component]) -> None:
+def test_a_component_is_a_frozen_value_without_surprises(room, kind):
     component = example(kind)
     assert component == example(kind)
     hash(component)
@@ -116,14 +111,14 @@ def test_a_component_is_a_frozen_value_without_surprises(room: str, kind: type[C
 
 
 @every_kind
-def test_a_component_survives_being_written_out(room: str, kind: type[Component]) -> None:
+def test_a_component_survives_being_written_out(room, kind):
     component = example(kind)
     assert kind.model_validate(component.model_dump()) == component
     assert kind.model_validate_json(component.model_dump_json()) == component
 
 
 @every_kind
-def test_numbers_that_are_none_are_refused(room: str, kind: type[Component]) -> None:
+def test_numbers_that_are_none_are_refused(room, kind):
     for part in parts(kind):
         for name, field in part.model_fields.items():
             if field.annotation is float:
@@ -138,9 +133,7 @@ def test_numbers_that_are_none_are_refused(room: str, kind: type[Component]) -> 
 
 
 @every_kind
-def test_constants_are_numbers_under_names_that_kernels_can_read(
-    room: str, kind: type[Component]
-) -> None:
+def test_constants_are_numbers_under_names_that_kernels_can_read(room, kind):
     constants = example(kind).constants()
     assert all(name.isidentifier() and isinstance(n, float) for name, n in constants.items())
     table = example(kind).table()
@@ -149,7 +142,7 @@ def test_constants_are_numbers_under_names_that_kernels_can_read(
     assert len(table) > 0
 
 
-def test_kinds_and_class_names_are_unique() -> None:
+def test_kinds_and_class_names_are_unique():
     classes = [
         thing
         for room, base in ROOMS.items()
@@ -167,14 +160,14 @@ def test_kinds_and_class_names_are_unique() -> None:
 
 
 @pytest.mark.parametrize("kind", kinds("controllers").values(), ids=kinds("controllers"))
-def test_a_law_s_own_constants_do_not_hide_the_vessel_s(kind: type[Controller]) -> None:
+def test_a_law_s_own_constants_do_not_hide_the_vessel_s(kind):
     law = example(kind)
     assert not set(law.constants()) & set(NONLINEAR.constants())
     assert law.constants_with(NONLINEAR) == NONLINEAR.constants() | law.constants()
 
 
 @pytest.mark.parametrize("kind", kinds("controllers").values(), ids=kinds("controllers"))
-def test_a_law_s_memory_has_the_declared_size_and_is_made_anew(kind: type[Controller]) -> None:
+def test_a_law_s_memory_has_the_declared_size_and_is_made_anew(kind):
     law = example(kind)
     at = next(situations(law, 1))
     one, other = (law.start(at.x, at.target, NONLINEAR) for _ in range(2))
@@ -187,7 +180,7 @@ def test_a_law_s_memory_has_the_declared_size_and_is_made_anew(kind: type[Contro
 
 
 @every_kind
-def test_every_logged_column_has_one_meaning(room: str, kind: type[Component]) -> None:
+def test_every_logged_column_has_one_meaning(room, kind):
     loop = corrected(**{room[:-1]: example(kind)})
     own = Counter([*loop.actuator.states, *loop.actuator.signals])
     wide = {part.name: size for part, size in (dict(loop.controller.slots()) | own).items()}
@@ -200,7 +193,7 @@ def test_every_logged_column_has_one_meaning(room: str, kind: type[Component]) -
             assert about[name] in signals(), f"`explain {name}` does not find it"
 
 
-def test_every_vessel_has_the_same_constants_in_the_same_order() -> None:
+def test_every_vessel_has_the_same_constants_in_the_same_order():
     for vessel in VESSELS.values():
         assert tuple(vessel.constants()) == COEFFICIENTS
         assert vessel.source
@@ -208,7 +201,7 @@ def test_every_vessel_has_the_same_constants_in_the_same_order() -> None:
         assert Vessel.model_validate(vessel.model_dump()) == vessel
 
 
-def test_the_registry_is_sorted_and_leaves_out_what_has_no_kind() -> None:
+def test_the_registry_is_sorted_and_leaves_out_what_has_no_kind():
     for room, base in ROOMS.items():
         found = registry.kinds(f"podusv_cli.{room}", base)
         assert list(found) == sorted(found)

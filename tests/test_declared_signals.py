@@ -1,7 +1,5 @@
 """Signals: a law declares its own, whatever they are called; nobody else has a table of them."""
 
-from __future__ import annotations
-
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -42,7 +40,7 @@ class CrossTrack(Constant):
         signals[0] = target[1] - x[1]
 
 
-def test_a_signal_has_a_symbol_of_its_name_and_needs_a_name_that_a_claim_can_use() -> None:
+def test_a_signal_has_a_symbol_of_its_name_and_needs_a_name_that_a_claim_can_use():
     assert [Signal(name, "m", "").symbol for name in ("e", "e_c", "e_ct", "e_c_t")] == [
         "e", "e_c", "e_{ct}", "e_{c,t}",
     ]  # fmt: skip
@@ -51,7 +49,7 @@ def test_a_signal_has_a_symbol_of_its_name_and_needs_a_name_that_a_claim_can_use
 
 
 @pytest.mark.parametrize("compiled", [True, False])
-def test_a_law_without_psi_e_runs_and_its_recording_says_what_it_logged(compiled: bool) -> None:
+def test_a_law_without_psi_e_runs_and_its_recording_says_what_it_logged(compiled):
     loop = corrected(controller=CrossTrack())
     check_law(loop)
     out = run(loop, 0.3, compiled=compiled)
@@ -62,7 +60,7 @@ def test_a_law_without_psi_e_runs_and_its_recording_says_what_it_logged(compiled
     np.testing.assert_allclose(out["modes"], np.outer(out["time"], [1.0, 2.0, 3.0]), atol=1e-12)
 
 
-def test_z_e_is_the_distance_to_the_target_whatever_the_law() -> None:
+def test_z_e_is_the_distance_to_the_target_whatever_the_law():
     for law in (CrossTrack(), Pid(standoff=2.0)):
         out = run(corrected(controller=law), 0.5, hold_every=5)
         x_e, y_e = out["x_d"] - out["x"], out["y_d"] - out["y"]

@@ -1,7 +1,5 @@
 """The derivatives of the virtual controls in the full law, (40) and (44), against sympy."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import cache
@@ -71,7 +69,7 @@ def both(law: Backstepping, p: Vessel, at: Situation, tau_u: float) -> tuple[Any
 
 @pytest.mark.parametrize("fold", ["none", "joint", "printed"])
 @pytest.mark.parametrize("p", [PAPER, NONLINEAR], ids=["paper", "paper_nonlinear"])
-def test_rates_are_those_along_the_nominal_flow(p: Vessel, fold: Any) -> None:
+def test_rates_are_those_along_the_nominal_flow(p, fold):
     law = Backstepping(fold=fold, **GAINS)
     turned = 0
     for at in situations(law, 60):
@@ -81,7 +79,7 @@ def test_rates_are_those_along_the_nominal_flow(p: Vessel, fold: Any) -> None:
     assert turned == 0 if fold == "none" else 15 < turned < 45
 
 
-def test_the_yaw_rate_feels_the_surge_force_that_was_just_asked_for() -> None:
+def test_the_yaw_rate_feels_the_surge_force_that_was_just_asked_for():
     law = Backstepping(**GAINS)
     at = next(situations(law, 1))
     low, high = (both(law, NONLINEAR, at, tau_u) for tau_u in (0.0, 50.0))
@@ -99,9 +97,7 @@ def candidate(law: Backstepping, x: Vector, target: Vector) -> float:
 
 
 @pytest.mark.parametrize(("coupling", "left"), [("corrected", 0.0), ("printed", -2.0)])
-def test_the_cross_terms_of_the_lyapunov_function_cancel_or_double(
-    coupling: Any, left: float
-) -> None:
+def test_the_cross_terms_of_the_lyapunov_function_cancel_or_double(coupling, left):
     # V' along the plant's own flow, by differences: nothing of the law's derivatives is used here.
     law, h = Backstepping(coupling=coupling, **GAINS), 1e-5
     k = bundle(law.constants_with(NONLINEAR))

@@ -1,17 +1,14 @@
 """`podusv diff`: what two runs differ in, to the last bit and in words."""
 
-from __future__ import annotations
-
 import json
 import math
 import struct
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from command_samples import Command, commanded
+from command_samples import commanded
 from hypothesis import given
 from hypothesis import strategies as st
 from known_signals import ABOUT
@@ -41,7 +38,7 @@ def deviation(one: float, other: float) -> Deviation:
 
 
 @given(FINITE, st.integers(1, 5))
-def test_units_in_the_last_place_are_counted_also_across_zero(start: float, count: int) -> None:
+def test_units_in_the_last_place_are_counted_also_across_zero(start, count):
     number = start
     for _ in range(count):
         number = math.nextafter(number, math.inf)
@@ -50,7 +47,7 @@ def test_units_in_the_last_place_are_counted_also_across_zero(start: float, coun
 
 
 @pytest.mark.parametrize("name", ["psi_d", "psi_e", "psi_d_held"])
-def test_wrapped_angles_are_the_shorter_way_round_apart(name: str) -> None:
+def test_wrapped_angles_are_the_shorter_way_round_apart(name):
     angle = np.zeros(50)
     one, other = np.array(angle), np.array(angle)
     one[10], other[10] = 3.13, -3.12  # across the seam
@@ -63,12 +60,12 @@ def test_wrapped_angles_are_the_shorter_way_round_apart(name: str) -> None:
     assert compare(changed(psi=one), changed(psi=other)).largest[0].gap == pytest.approx(6.25)
 
 
-def test_zeros_of_either_sign_are_no_distance_apart_but_differ() -> None:
+def test_zeros_of_either_sign_are_no_distance_apart_but_differ():
     assert deviation(0.0, -0.0).ulps == 0
     assert differing(np.array([0.0]), np.array([-0.0]))[0]
 
 
-def test_what_is_not_finite_is_infinitely_far_from_what_is() -> None:
+def test_what_is_not_finite_is_infinitely_far_from_what_is():
     assert deviation(math.nan, 1.0).ulps is None
     for bad in (math.nan, math.inf):
         assert deviation(bad, 1.0).gap == deviation(1.0, bad).relative == math.inf
@@ -91,7 +88,7 @@ def bumped(name: str, place: Any, by: float) -> Any:
     return array
 
 
-def test_signals_of_others_have_their_own_unit_and_period() -> None:
+def test_signals_of_others_have_their_own_unit_and_period():
     about = {"bearing_2": Signal("bearing_2", "deg", "a law's own", wrapped=True)}
     one, other = np.full(50, 3.13), np.full(50, -3.12)
     pair = (replace(changed(bearing_2=array), about=ABOUT | about) for array in (one, other))
@@ -101,7 +98,7 @@ def test_signals_of_others_have_their_own_unit_and_period() -> None:
 
 
 @given(st.sampled_from(["x", "z_e", "tau_u_cmd"]), st.integers(0, 49), st.integers(0, 62))
-def test_any_flipped_bit_of_any_signal_is_found(name: str, row: int, bit: int) -> None:
+def test_any_flipped_bit_of_any_signal_is_found(name, row, bit):
     array = np.array(recording()[name])
     array.view(np.int64)[row] ^= 1 << bit
     found = compare(recording(), changed(**{name: array}))
@@ -110,7 +107,7 @@ def test_any_flipped_bit_of_any_signal_is_found(name: str, row: int, bit: int) -
     assert (found.first.signal, found.first.time) == (name, recording()["time"][row])
 
 
-def test_the_first_difference_is_the_earliest_and_the_largest_the_widest() -> None:
+def test_the_first_difference_is_the_earliest_and_the_largest_the_widest():
     other = changed(
         x=bumped("x", 30, 5.0), W_hat_u=bumped("W_hat_u", (12, 3), 1e-9),
         z_e=bumped("z_e", [20, 40], [1.0, -2.0]),
@@ -127,7 +124,7 @@ def test_the_first_difference_is_the_earliest_and_the_largest_the_widest() -> No
     }
 
 
-def test_logs_of_one_length_are_compared_at_the_times_that_both_have() -> None:
+def test_logs_of_one_length_are_compared_at_the_times_that_both_have():
     """More than half of the times differ: two grids, not one that is damaged."""
     base = recording()
     t, rows = base["time"], len(base["time"])
@@ -141,7 +138,7 @@ def test_logs_of_one_length_are_compared_at_the_times_that_both_have() -> None:
         assert compare(base, changed(time=moved)).rows == (rows, rows, shared)
 
 
-def test_what_does_not_run_over_time_comes_first() -> None:
+def test_what_does_not_run_over_time_comes_first():
     base = recording()
     centres = np.array(base["rbf_center"])
     centres[2, 1] += 1.0
@@ -151,7 +148,7 @@ def test_what_does_not_run_over_time_comes_first() -> None:
     assert (first.signal, first.time) == ("rbf_center[2,1]", None)
 
 
-def test_logs_of_other_steps_are_compared_at_the_times_of_both() -> None:
+def test_logs_of_other_steps_are_compared_at_the_times_of_both():
     base = recording()
     thin = replace(base, signals={name: array[::2] for name, array in base.signals.items()})
     found = compare(base, thin)
@@ -162,13 +159,13 @@ def test_logs_of_other_steps_are_compared_at_the_times_of_both() -> None:
     assert compare(shorter, base).rows == (7, 50, 7)
 
 
-def test_one_wrong_time_does_not_set_the_rows_adrift() -> None:
+def test_one_wrong_time_does_not_set_the_rows_adrift():
     found = compare(recording(), changed(time=bumped("time", 9, 1e-6)))
     assert found.rows == (50, 50, 50)
     assert [d.signal for d in found.largest] == ["time"]
 
 
-def test_signals_of_another_size_or_of_one_log_alone_are_named() -> None:
+def test_signals_of_another_size_or_of_one_log_alone_are_named():
     base = recording()
     other = replace(
         base, signals={k: v for k, v in changed(u=base["x"]).signals.items() if k != "z_e"}
@@ -179,7 +176,7 @@ def test_signals_of_another_size_or_of_one_log_alone_are_named() -> None:
     assert not found.same
 
 
-def test_how_a_run_ended_counts() -> None:
+def test_how_a_run_ended_counts():
     found = compare(recording(), recording(status="diverged", message="at t = 1"))
     assert found.endings == {"status": ("finished", "diverged"), "message": ("", "at t = 1")}
     assert not found.same
@@ -188,7 +185,7 @@ def test_how_a_run_ended_counts() -> None:
 # --- causes
 
 
-def test_every_key_of_the_scenario_counts() -> None:
+def test_every_key_of_the_scenario_counts():
     one = "name: a\ncontroller: {kind: pid, K_Pu: 1.0}\nvessel: {m: 2.0, source: tank}\n"
     other = "name: b\ncontroller: {kind: pid, K_Pu: 2.0}\nvessel: {m: 2.0}\nlog: {every: 1}\n"
     assert scenario_changes(one, other) == {
@@ -197,13 +194,13 @@ def test_every_key_of_the_scenario_counts() -> None:
     }  # fmt: skip
 
 
-def test_versions_count_and_moments_do_not() -> None:
+def test_versions_count_and_moments_do_not():
     one = {"podusv": "1", "packages": {"numba": "1"}, "argv": ["a"], "started": "x", "git": None}
     other = {"podusv": "1", "packages": {"numba": "2"}, "argv": [], "started": "y", "git": {"c": 1}}
     assert version_changes(one, other) == {"packages.numba": ("1", "2")}
 
 
-def test_a_log_without_a_readable_scenario_is_damaged() -> None:
+def test_a_log_without_a_readable_scenario_is_damaged():
     for text in ("a: [1", "- 1\n"):
         with pytest.raises(StorageError, match="the scenario in a log is damaged"):
             scenario_changes("a: 1\n", text)
@@ -213,24 +210,22 @@ def test_a_log_without_a_readable_scenario_is_damaged() -> None:
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def run(tmp_path_factory):
     return made(tmp_path_factory.mktemp("diff") / "first")
 
 
 @pytest.fixture
-def podusv(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Command:
+def podusv(monkeypatch, capsys):
     return commanded(monkeypatch, capsys)
 
 
-def test_a_copy_is_identical(run: Path, tmp_path: Path, podusv: Command) -> None:
+def test_a_copy_is_identical(run, tmp_path, podusv):
     said = podusv("diff", run, copied(run, tmp_path / "copy"))
     assert said == (0, "identical: scenario, metrics, log.h5 byte for byte\n", "")
 
 
 @pytest.mark.parametrize(("name", "code"), [("law_ns", 0), ("iae", 3)])
-def test_metrics_count_but_for_what_a_clock_measured(
-    name: str, code: int, run: Path, tmp_path: Path, podusv: Command
-) -> None:
+def test_metrics_count_but_for_what_a_clock_measured(name, code, run, tmp_path, podusv):
     def change(content: bytes) -> bytes:
         told = json.loads(content)
         told["metrics"][name] = 12.5
@@ -242,7 +237,7 @@ def test_metrics_count_but_for_what_a_clock_measured(
     assert ("identical" in said.out) == (code == 0)
 
 
-def test_another_gain_moves_metrics_and_signals(run: Path, tmp_path: Path, podusv: Command) -> None:
+def test_another_gain_moves_metrics_and_signals(run, tmp_path, podusv):
     other = made(tmp_path / "other", "controller.K_Pu=900")
     said = podusv("diff", run, other)
     assert said.code == 3
@@ -257,9 +252,7 @@ def test_another_gain_moves_metrics_and_signals(run: Path, tmp_path: Path, podus
     assert pair["scenario"] == {"controller.K_Pu": [1100.0, 900.0]}
 
 
-def test_comparisons_are_held_together_run_by_run(
-    run: Path, tmp_path: Path, podusv: Command
-) -> None:
+def test_comparisons_are_held_together_run_by_run(run, tmp_path, podusv):
     for name, labels in (("one", ("a", "b")), ("two", ("b", "c"))):
         for label in labels:
             copied(run, tmp_path / name / label)
@@ -272,8 +265,6 @@ def test_comparisons_are_held_together_run_by_run(
     )
 
 
-def test_the_scenario_that_counts_is_the_one_in_the_log(
-    run: Path, tmp_path: Path, podusv: Command
-) -> None:
+def test_the_scenario_that_counts_is_the_one_in_the_log(run, tmp_path, podusv):
     other = copied(run, tmp_path / "copy", resolved_yaml=replaced("K_Pu: 1100.0", "K_Pu: 1.0"))
     assert podusv("diff", run, other).code == 0

@@ -1,9 +1,6 @@
 """The sea: (52) at instants worked out by hand, its scale, its bounds."""
 
-from __future__ import annotations
-
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -22,11 +19,11 @@ BY_HAND = [
 
 
 @pytest.mark.parametrize(("t", "load"), BY_HAND)
-def test_the_defaults_are_equation_52(t: float, load: tuple[float, float, float]) -> None:
+def test_the_defaults_are_equation_52(t, load):
     np.testing.assert_allclose(load_at(HarmonicDisturbance(), t), load, atol=1e-14)
 
 
-def test_every_axis_has_its_own_numbers() -> None:
+def test_every_axis_has_its_own_numbers():
     surge = Harmonic(mean=1.0, sin=2.0, sin_rate=0.3, cos=4.0, cos_rate=0.7)
     sway = Harmonic(mean=-1.0, sin=0.5, sin_rate=1.1, cos=0.25, cos_rate=1.3)
     sea = HarmonicDisturbance(b_u=surge, b_v=sway, b_r=Harmonic(mean=7.0))
@@ -36,7 +33,7 @@ def test_every_axis_has_its_own_numbers() -> None:
     np.testing.assert_allclose(load_at(sea, t), [b_u, b_v, 7.0], rtol=1e-14)
 
 
-def test_phases_are_angles_of_the_waves_at_the_start() -> None:
+def test_phases_are_angles_of_the_waves_at_the_start():
     axis = Harmonic(mean=1.0, sin=2.0, sin_rate=0.3, sin_phase=0.7, cos=-4.0, cos_phase=-2.9)
     sea = HarmonicDisturbance(b_u=axis, b_v=axis, b_r=Harmonic(cos=1.0, cos_phase=100.0))
     for t in (0.0, 2.7, 300.0):
@@ -45,7 +42,7 @@ def test_phases_are_angles_of_the_waves_at_the_start() -> None:
         np.testing.assert_allclose(load_at(sea, t), expected, rtol=1e-13, atol=1e-13)
 
 
-def test_phases_of_zero_leave_every_bit_of_the_tables() -> None:
+def test_phases_of_zero_leave_every_bit_of_the_tables():
     """The kernel is as it was, and so the loads are, to the last bit."""
     u, v, r = (Harmonic(sin=-0.1 * i, cos=0.3 * i, sin_rate=i, cos_rate=9 - i) for i in (1, 2, 3))
     rates, cosines, sines = HarmonicDisturbance(b_u=u, b_v=v, b_r=r).table().reshape(3, -1)[:, :6]
@@ -58,7 +55,7 @@ def test_phases_of_zero_leave_every_bit_of_the_tables() -> None:
         assert found.tobytes() == np.array(expected, float).tobytes()
 
 
-def test_scale_multiplies_everything_and_zero_is_calm_water() -> None:
+def test_scale_multiplies_everything_and_zero_is_calm_water():
     for t in (0.0, 3.3, 200.0):
         once = load_at(HarmonicDisturbance(), t)
         np.testing.assert_allclose(load_at(HarmonicDisturbance(scale=2.5), t), 2.5 * once)
@@ -67,7 +64,7 @@ def test_scale_multiplies_everything_and_zero_is_calm_water() -> None:
         )
 
 
-def test_the_load_is_bounded_as_assumption_1_wants() -> None:
+def test_the_load_is_bounded_as_assumption_1_wants():
     loads = np.array([load_at(HarmonicDisturbance(), t) for t in np.linspace(0, 400, 4001)])
     assert np.all(np.abs(loads).max(axis=0) <= [0.9, 0.8, 0.7])
     # A nonzero mean, as the paper says: about 0.5 on every axis.
@@ -90,7 +87,7 @@ def test_the_load_is_bounded_as_assumption_1_wants() -> None:
         (Harmonic(mean=1.0, cos=0.5, cos_rate=0.0, cos_phase=math.pi, sin_rate=0.0), 0.5),
     ],
 )
-def test_a_bound_is_never_exceeded_and_nearly_reached(axis: Harmonic, bound: float) -> None:
+def test_a_bound_is_never_exceeded_and_nearly_reached(axis, bound):
     sea = HarmonicDisturbance(b_u=axis, b_v=axis, b_r=axis, scale=2.0)
     assert sea.bounds() == pytest.approx((2.0 * bound,) * 3)
     loads = np.abs([load_at(sea, t)[0] for t in np.linspace(0.0, 1000.0, 5001)])
@@ -98,7 +95,7 @@ def test_a_bound_is_never_exceeded_and_nearly_reached(axis: Harmonic, bound: flo
 
 
 @pytest.mark.parametrize("kind", [k for k in kinds("disturbances").values() if k.of_time])
-def test_what_claims_to_depend_on_time_alone_does(kind: Any) -> None:
+def test_what_claims_to_depend_on_time_alone_does(kind):
     sea, random = example(kind), np.random.default_rng(1)
     for t in random.uniform(0, 300, 20):
         loads = [load_at(sea, t, random.normal(0, 5, 6)) for _ in range(3)]

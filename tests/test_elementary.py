@@ -1,7 +1,5 @@
 """Exponential, cosine and sine: against the library's, and the same bits compiled or not."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -30,11 +28,11 @@ def compiled(function: Any, numbers: Vector) -> Vector:
 @example(x=-0.5 * math.log(2))  # where the nearest power of two changes
 @example(x=0.0)
 @example(x=-708.0)
-def test_the_exponential_is_right_to_the_last_place(x: float) -> None:
+def test_the_exponential_is_right_to_the_last_place(x):
     assert exponential(x) == pytest.approx(math.exp(x), rel=EPSILON, abs=0)
 
 
-def test_the_exponential_ends_in_zero_and_passes_on_what_is_no_number() -> None:
+def test_the_exponential_ends_in_zero_and_passes_on_what_is_no_number():
     assert exponential(0.0) == 1.0
     assert exponential(-709.0) == exponential(-math.inf) == 0.0
     assert math.isnan(exponential(math.nan))
@@ -45,12 +43,12 @@ def test_the_exponential_ends_in_zero_and_passes_on_what_is_no_number() -> None:
 @example(angle=-3 * math.pi / 4)
 @example(angle=0.5 * math.pi)
 @example(angle=1e6)
-def test_cosine_and_sine_are_right_to_the_last_place(angle: float) -> None:
+def test_cosine_and_sine_are_right_to_the_last_place(angle):
     assert cos_sin(angle) == pytest.approx((math.cos(angle), math.sin(angle)), abs=EPSILON)
 
 
 @given(angle=st.floats(-1e15, 1e15))
-def test_far_out_they_are_those_of_a_neighbouring_angle(angle: float) -> None:
+def test_far_out_they_are_those_of_a_neighbouring_angle(angle):
     near = 4 * math.ulp(angle) + EPSILON
     assert cos_sin(angle) == pytest.approx((math.cos(angle), math.sin(angle)), abs=near)
 
@@ -60,7 +58,7 @@ def test_far_out_they_are_those_of_a_neighbouring_angle(angle: float) -> None:
 @example(angle=1e16)
 @example(angle=-1e17)
 @example(angle=1e308)
-def test_what_they_give_is_a_rotation_or_no_number(angle: float) -> None:
+def test_what_they_give_is_a_rotation_or_no_number(angle):
     cosine, sine = cos_sin(angle)
     if abs(angle) <= 1e15:
         assert cosine * cosine + sine * sine == pytest.approx(1.0, abs=4 * EPSILON)
@@ -69,19 +67,19 @@ def test_what_they_give_is_a_rotation_or_no_number(angle: float) -> None:
         assert math.isnan(sine)
 
 
-def test_no_angle_has_no_cosine() -> None:
+def test_no_angle_has_no_cosine():
     for angle in (math.nan, math.inf, -math.inf):
         assert np.isnan(cos_sin(angle)).all()
 
 
-def test_a_disturbance_of_which_no_phase_is_known_ends_the_run() -> None:
+def test_a_disturbance_of_which_no_phase_is_known_ends_the_run():
     sea = HarmonicDisturbance(b_u=Harmonic(sin=1.0, sin_rate=1e19))
     out = run(adrift(disturbance=sea), 1.0)
     assert (out.status, len(out["time"])) == ("diverged", 1)
 
 
 @pytest.mark.parametrize("function", [exponential, cos_sin])
-def test_machine_code_gives_the_same_bits(function: Any) -> None:
+def test_machine_code_gives_the_same_bits(function):
     numbers = -np.random.default_rng(3).exponential(20.0, 2000)
     numbers = np.append(numbers, [-1e15, -1e17, -1e308])
     plain = np.array([function(float(x)) for x in numbers])

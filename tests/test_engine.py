@@ -1,7 +1,5 @@
 """The engine: what is logged, when the law acts, how a run ends, and both ways of running it."""
 
-from __future__ import annotations
-
 import math
 import time
 from dataclasses import replace
@@ -53,7 +51,7 @@ def _integrate(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Ve
 WATCH = Observer(_integrate, {"nothing": 0.0}, 3)
 
 
-def test_the_same_loop_gives_the_same_bits_whatever_the_blocks() -> None:
+def test_the_same_loop_gives_the_same_bits_whatever_the_blocks():
     loop = corrected(actuator=Saturated())
     once = run(loop, 60.0)
     assert same(once, run(loop, 60.0))
@@ -79,7 +77,7 @@ class Asked(HarmonicDisturbance):
     of_time: ClassVar[bool] = False
 
 
-def test_a_load_that_depends_on_the_state_is_evaluated_at_every_stage() -> None:
+def test_a_load_that_depends_on_the_state_is_evaluated_at_every_stage():
     """The order of the method, which it loses where a stage takes over the load of another."""
     loop = adrift(disturbance=Current(), controller=Constant(surge=9.0))
     fine, half, whole = (run(loop, 32.0, h)["x"][-1] for h in (0.05, 0.8, 1.6))
@@ -87,24 +85,24 @@ def test_a_load_that_depends_on_the_state_is_evaluated_at_every_stage() -> None:
 
 
 @pytest.mark.parametrize("hold_every", [0, 5])
-def test_not_evaluating_a_load_twice_changes_no_bit(hold_every: int) -> None:
+def test_not_evaluating_a_load_twice_changes_no_bit(hold_every):
     loop = corrected(disturbance=HarmonicDisturbance())
     asked = run(replace(loop, disturbance=Asked()), 20.0, hold_every=hold_every)
     assert same(asked, run(loop, 20.0, hold_every=hold_every))
 
 
-def test_time_is_a_whole_number_of_steps() -> None:
+def test_time_is_a_whole_number_of_steps():
     out = run(adrift(), 60.0, 0.1)
     np.testing.assert_array_equal(out["time"], [k * 0.1 for k in range(601)])
 
 
 @given(steps=st.integers(0, 10**6), step=st.sampled_from([0.001, 0.01, 0.02, 0.1, 1 / 3]))
-def test_whole_steps_are_found_and_nothing_else(steps: int, step: float) -> None:
+def test_whole_steps_are_found_and_nothing_else(steps, step):
     assert whole_steps(steps * step, step) == steps
     assert whole_steps((steps + 0.3) * step, step) is None
 
 
-def test_every_row_is_one_instant() -> None:
+def test_every_row_is_one_instant():
     """Each column of a row belongs to the row's own time and state, not to a stage in between."""
     law = Backstepping()
     told, start = VESSELS["cybership2"], SMOOTH_START
@@ -126,7 +124,7 @@ def test_every_row_is_one_instant() -> None:
         assert not np.array_equal(said.tau, ask(law, x, memory, target, NONLINEAR).tau)
 
 
-def test_the_plant_is_the_vessel_whatever_the_law_is_told() -> None:
+def test_the_plant_is_the_vessel_whatever_the_law_is_told():
     start = (0.0, 0.0, 0.3, 1.0, 0.2, 0.1)
     for told in VESSELS.values():
         out = run(adrift(vessel=NONLINEAR, nominal=told, start=start), 2.0)
@@ -134,7 +132,7 @@ def test_the_plant_is_the_vessel_whatever_the_law_is_told() -> None:
 
 
 @pytest.mark.parametrize("log_every", [7, 10, 64])
-def test_thinning_the_log_drops_rows_and_changes_nothing(log_every: int) -> None:
+def test_thinning_the_log_drops_rows_and_changes_nothing(log_every):
     full = run(corrected(), 3.0, observer=WATCH)
     thin = run(corrected(), 3.0, observer=WATCH, log_every=log_every)
     assert len(thin["time"]) == 300 // log_every + 1
@@ -144,7 +142,7 @@ def test_thinning_the_log_drops_rows_and_changes_nothing(log_every: int) -> None
     np.testing.assert_array_equal(thin.seen, full.seen)
 
 
-def test_an_observer_sees_every_instant_with_trapezoidal_weights() -> None:
+def test_an_observer_sees_every_instant_with_trapezoidal_weights():
     out = run(corrected(), 3.0, observer=WATCH, log_every=100)
     full = run(corrected(), 3.0)
     assert out.seen is not None
@@ -152,7 +150,7 @@ def test_an_observer_sees_every_instant_with_trapezoidal_weights() -> None:
     np.testing.assert_allclose(out.seen, [3.0, integral, 301], rtol=1e-12)
 
 
-def test_sampled_control_is_the_law_at_samples_held_in_between() -> None:
+def test_sampled_control_is_the_law_at_samples_held_in_between():
     law = GENTLE
     loop = corrected(controller=law, start=SMOOTH_START)
     out = run(loop, 1.0, hold_every=20)
@@ -170,13 +168,13 @@ def test_sampled_control_is_the_law_at_samples_held_in_between() -> None:
     np.testing.assert_allclose(beta[1:], expected, rtol=1e-8)
 
 
-def test_a_difference_that_fits_no_step_is_refused() -> None:
+def test_a_difference_that_fits_no_step_is_refused():
     loop = corrected(controller=AdaptiveNeural(rate="difference", difference_step=0.015))
     with pytest.raises(ValueError, match=r"0\.015"):
         simulate(loop, TimeGrid(0.01, 10), compiled=False)
 
 
-def test_a_difference_within_a_held_measurement_is_refused() -> None:
+def test_a_difference_within_a_held_measurement_is_refused():
     # The law would see in its memory what it has not been given to measure.
     loop = corrected(controller=AdaptiveNeural(rate="difference", difference_step=0.01))
     with pytest.raises(ValueError, match=r"0\.01"):
@@ -201,9 +199,7 @@ class Exploding(Constant):
 
 @pytest.mark.parametrize("compiled", [True, False])
 @pytest.mark.parametrize(("hold_every", "culprit"), [(0, "u"), (10, "tau_u_cmd")])
-def test_divergence_is_reported_where_it_happens(
-    hold_every: int, culprit: str, compiled: bool
-) -> None:
+def test_divergence_is_reported_where_it_happens(hold_every, culprit, compiled):
     # Continuously, the last stage of the step to 0.5 s has seen it; sampled, only the law has.
     loop = adrift(controller=Exploding())
     out = run(loop, 5.0, hold_every=hold_every, compiled=compiled)
@@ -218,7 +214,7 @@ def test_divergence_is_reported_where_it_happens(
 
 
 @pytest.mark.parametrize("compiled", [True, False])
-def test_a_run_that_leaves_the_numbers_ends_alike_in_both_ways(compiled: bool) -> None:
+def test_a_run_that_leaves_the_numbers_ends_alike_in_both_ways(compiled):
     # Plain Python's sin, cos and ceil raise where machine code returns no number.
     law = AdaptiveNeural(rate="difference", first_difference="from_zero", k_psie=0.01)
     out = run(corrected(controller=law, start=(-10, -10, 0, 0, 0, 1e5)), 5.0, compiled=compiled)
@@ -226,7 +222,7 @@ def test_a_run_that_leaves_the_numbers_ends_alike_in_both_ways(compiled: bool) -
     assert "is not finite" in out.message
 
 
-def test_an_interrupt_keeps_the_rows_so_far() -> None:
+def test_an_interrupt_keeps_the_rows_so_far():
     def press(_: float) -> None:
         raise KeyboardInterrupt
 
@@ -242,7 +238,7 @@ def test_an_interrupt_keeps_the_rows_so_far() -> None:
     assert -0.001 < reached - out["time"][-1] < 0.1
 
 
-def test_progress_grows_to_one_and_the_log_takes_no_notice() -> None:
+def test_progress_grows_to_one_and_the_log_takes_no_notice():
     fractions: list[float] = []
     loop = corrected(disturbance=HarmonicDisturbance(scale=0.5))
     assert same(run(loop, 60.0, progress=fractions.append), run(loop, 60.0))
@@ -250,12 +246,12 @@ def test_progress_grows_to_one_and_the_log_takes_no_notice() -> None:
     assert fractions[-1] == 1.0
 
 
-def test_no_steps_is_the_start_alone() -> None:
+def test_no_steps_is_the_start_alone():
     out = run(corrected(), 0.0)
     assert (out.status, out["time"].tolist(), out["x"].tolist()) == ("finished", [0.0], [-10.0])
 
 
-def test_a_run_leaves_its_loop_as_it_was() -> None:
+def test_a_run_leaves_its_loop_as_it_was():
     loop = corrected()
     before = loop.first_memory()
     run(loop, 1.0)
@@ -263,7 +259,7 @@ def test_a_run_leaves_its_loop_as_it_was() -> None:
     np.testing.assert_array_equal(loop.first_memory(), before)
 
 
-def test_an_interrupt_after_the_last_step_does_not_cut_a_run_short() -> None:
+def test_an_interrupt_after_the_last_step_does_not_cut_a_run_short():
     def press(fraction: float) -> None:
         if fraction == 1.0:
             raise KeyboardInterrupt

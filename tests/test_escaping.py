@@ -1,7 +1,5 @@
 """What users write and call their folders, in a terminal, Markdown, CSV, LaTeX, HTML, JSON."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json
@@ -26,9 +24,7 @@ NASTY = [chr(n) for n in (*range(32), *range(127, 160), 0x200B, 0x200E, 0x2028, 
 
 
 @pytest.fixture
-def podusv(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Command:
+def podusv(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     write("a.yaml", BASE)
     return commanded(monkeypatch, capsys)
@@ -40,12 +36,12 @@ def nasty(text: str) -> set[str]:
 
 
 @pytest.mark.parametrize("form", ["visible", "csv", "latex", "markdown"])
-def test_no_format_has_a_letter_that_does_not_show(form: str) -> None:
+def test_no_format_has_a_letter_that_does_not_show(form):
     for letter in [*NASTY, "\ud800", "\U000e0041"]:
         assert getattr(escaping, form)(f"a{letter}b").isprintable(), ascii(letter)
 
 
-def test_text_of_any_language_is_left_as_it_is() -> None:
+def test_text_of_any_language_is_left_as_it_is():
     for text in (
         "Kurs 5 m/s",
         "\u03b1 = 1\u202f\u00b0",
@@ -57,7 +53,7 @@ def test_text_of_any_language_is_left_as_it_is() -> None:
         assert escaping.csv(text) == escaping.lines(text) == escaping.json(text) == text
 
 
-def test_markdown_is_text_and_stays_in_its_line() -> None:
+def test_markdown_is_text_and_stays_in_its_line():
     assert escaping.markdown("a_b_c\n# d | <b> [e](f) ![g][h] *i* `j` &lt; \\ _k_ l_") == (
         "a_b_c # d | \\<b\\> [e\\](f) ![g\\][h] \\*i\\* \\`j\\` \\&lt; \\\\ \\_k\\_ l\\_"
     )
@@ -67,12 +63,12 @@ def test_markdown_is_text_and_stays_in_its_line() -> None:
 
 
 @pytest.mark.parametrize("sign", [*"=+-@", "\uff1d", "\t=", "\r="])
-def test_a_cell_is_no_formula(sign: str) -> None:
+def test_a_cell_is_no_formula(sign):
     assert escaping.csv(f"{sign}1+1")[0] in "'\\"
     assert escaping.csv("1=1") == "1=1"
 
 
-def test_html_is_text() -> None:
+def test_html_is_text():
     shown = report.environment().from_string("<p a='{{ text }}'>{{ text }}</p>")
     text = f"<b a='\"'>&\n{COLOUR}"
     (element,) = tree(shown.render(text=text)).all()
@@ -80,7 +76,7 @@ def test_html_is_text() -> None:
     assert element.attributes == {"a": element.raw}
 
 
-def test_json_says_the_same_without_the_letters() -> None:
+def test_json_says_the_same_without_the_letters():
     content = {"a": "".join(NASTY) + "\U000e0041\u8239", "b": [1, "\ud800"]}
     text = json_files.encode(content).decode()
     assert not nasty(text)
@@ -88,7 +84,7 @@ def test_json_says_the_same_without_the_letters() -> None:
     assert json.loads(text) == content
 
 
-def test_the_tables_of_a_comparison_hold_no_label_that_is_more_than_text() -> None:
+def test_the_tables_of_a_comparison_hold_no_label_that_is_more_than_text():
     frame = FRAME[["a", "lost"]].set_axis([EVIL, "=b"], axis=1)
     head = next(csv.reader(io.StringIO(table.as_csv(frame))))
     assert head[2:] == [escaping.csv(EVIL), "'=b", f"'=b/{escaping.visible(EVIL)}"]
@@ -100,7 +96,7 @@ def test_the_tables_of_a_comparison_hold_no_label_that_is_more_than_text() -> No
     assert r"\textbackslash{}x1b" in table.as_latex(frame)
 
 
-def test_the_verdicts_in_markdown_are_text() -> None:
+def test_the_verdicts_in_markdown_are_text():
     plain = verdicts()[0]
     odd = {name: f"{name} {EVIL}" for name in ("says", "source", "remark")}
     verdict = claims.Verdict(
@@ -115,7 +111,7 @@ def test_the_verdicts_in_markdown_are_text() -> None:
     assert row.replace("\\|", "").count("|") == 6
 
 
-def test_every_text_of_the_report_is_text() -> None:
+def test_every_text_of_the_report_is_text():
     odd = f"<script>{EVIL}"
     plain = page()
     text = page(
@@ -135,7 +131,7 @@ def made(podusv: Command, names: tuple[str, str]) -> tuple[str, str]:
     return names
 
 
-def test_no_command_lets_a_folders_name_through(podusv: Command) -> None:
+def test_no_command_lets_a_folders_name_through(podusv):
     one, other = made(podusv, (f"=a{COLOUR}\n{TURNED}", f"-b\x9b{TURNED}"))
     for words in (
         ("compare", "--figure", "errors", "--out", "x", one, f"./{other}"),
@@ -163,7 +159,7 @@ def test_no_command_lets_a_folders_name_through(podusv: Command) -> None:
     assert podusv("run", "a.yaml", f"--out={one}").err.count("\n") == 1
 
 
-def test_a_figure_with_such_a_name_is_one_that_browsers_read(podusv: Command) -> None:
+def test_a_figure_with_such_a_name_is_one_that_browsers_read(podusv):
     names = made(podusv, (f"a{COLOUR}{TURNED}", "b"))
     said = podusv("plot", *names, "--figure", "trajectory", "--format", "svg", "--out", "x")
     assert (said.code, said.err) == (0, "")
@@ -171,7 +167,7 @@ def test_a_figure_with_such_a_name_is_one_that_browsers_read(podusv: Command) ->
     assert not nasty(Path("x/trajectory.svg").read_text())
 
 
-def test_whatever_prints_lines_prints_text(capsys: pytest.CaptureFixture[str]) -> None:
+def test_whatever_prints_lines_prints_text(capsys):
     terminal.echo(EVIL, EVIL, err=True)
     terminal.echo(EVIL)
     terminal.echo_entry(EVIL, EVIL, facts=EVIL)
@@ -184,7 +180,7 @@ def test_whatever_prints_lines_prints_text(capsys: pytest.CaptureFixture[str]) -
         assert "\n#" not in shown
 
 
-def test_a_bar_shows_names_as_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_bar_shows_names_as_they_are(monkeypatch):
     class Terminal(io.StringIO):
         def isatty(self) -> bool:
             return True

@@ -1,7 +1,5 @@
 """The notebooks in examples/: sound files without outputs, and their cells run."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any
@@ -19,12 +17,12 @@ def cells(path: Path) -> list[dict[str, Any]]:
     return json.loads(path.read_text())["cells"]
 
 
-def test_there_are_notebooks() -> None:
+def test_there_are_notebooks():
     assert {path.stem for path in NOTEBOOKS} == {"first_run", "monte_carlo", "own_law"}
 
 
 @every
-def test_a_notebook_has_no_outputs(path: Path) -> None:
+def test_a_notebook_has_no_outputs(path):
     assert json.loads(path.read_text())["nbformat"] == 4
     code = [cell for cell in cells(path) if cell["cell_type"] == "code"]
     assert code
@@ -33,9 +31,7 @@ def test_a_notebook_has_no_outputs(path: Path) -> None:
 
 @pytest.mark.slow  # simulates all that the notebooks show
 @every
-def test_the_cells_of_a_notebook_run(
-    path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_cells_of_a_notebook_run(path, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     code = ["".join(cell["source"]) for cell in cells(path) if cell["cell_type"] == "code"]
     text = "\n".join(code).replace("RUNS = 200", f"RUNS = {MOST_RUNS}")

@@ -1,7 +1,5 @@
 """Labels of runs in figures: folder names may hold anything, and are shown as they are."""
 
-from __future__ import annotations
-
 import pytest
 from matplotlib.cbook import is_math_text
 from rerun_samples import made
@@ -10,7 +8,7 @@ from scenario_samples import SOUND
 from podusv_cli.core import escaping
 from podusv_cli.figures.animation import stage
 from podusv_cli.figures.drawing import FIGURES, dressed
-from podusv_cli.figures.style import Shown, house_style, image, new_figure
+from podusv_cli.figures.style import house_style, image, new_figure
 from podusv_cli.workflows.members import from_folder
 
 # An odd and an even number of $, what they would enclose, and what a legend would leave out.
@@ -21,7 +19,7 @@ BRIEF = "name: x\nsimulation: {step: 0.01, duration: 0.1, compiled: false}\n"
 
 
 @pytest.fixture(scope="module")
-def runs(tmp_path_factory: pytest.TempPathFactory) -> list[Shown]:
+def runs(tmp_path_factory):
     """Runs of which every figure can be drawn, along paths of their own."""
     place = tmp_path_factory.mktemp("runs")
     folders = [made(place / x, f"path.x={x}", text=SCENARIO + BRIEF) for x in ("1", "2")]
@@ -33,7 +31,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> list[Shown]:
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[pytest.mark.slow] * (name not in QUICK)) for name in FIGURES]
 )
-def test_every_figure_shows_labels_as_they_are(runs: list[Shown], name: str) -> None:
+def test_every_figure_shows_labels_as_they_are(runs, name):
     assert FIGURES[name].fits(runs)
     with house_style():
         figure = FIGURES[name].family(runs, 2)
@@ -45,7 +43,7 @@ def test_every_figure_shows_labels_as_they_are(runs: list[Shown], name: str) -> 
     assert not any(map(is_math_text, ours))
 
 
-def test_an_animation_shows_labels_as_they_are(runs: list[Shown]) -> None:
+def test_an_animation_shows_labels_as_they_are(runs):
     with house_style():
         figure = new_figure(1, 3.0)
         stage(figure.add_subplot(), runs)(0.05)
@@ -54,14 +52,14 @@ def test_an_animation_shows_labels_as_they_are(runs: list[Shown]) -> None:
 
 
 @pytest.mark.parametrize("text", [*ODD, "", "_", "$", "a\\$b", "50$ or 60$", "ψ _ x"], ids=ascii)
-def test_the_text_of_a_figure_reads_as_it_was(text: str) -> None:
+def test_the_text_of_a_figure_reads_as_it_was(text):
     found = escaping.figure(text)
     assert not is_math_text(found)
     assert not found.startswith("_")
     assert found.replace(r"\$", "$").removeprefix(" ") == escaping.visible(text)
 
 
-def test_a_run_whose_name_looks_hidden_is_in_the_legend(runs: list[Shown]) -> None:
+def test_a_run_whose_name_looks_hidden_is_in_the_legend(runs):
     with house_style():
         figure = FIGURES["errors"].family(runs, 2)
     assert [text.get_text() for text in figure.legends[0].get_texts()][:2] == [

@@ -1,7 +1,5 @@
 """Warnings after a run, with times; where warnings go; how they are silenced; underactuation."""
 
-from __future__ import annotations
-
 import json
 import math
 import re
@@ -11,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from command_samples import Command, Said
+from command_samples import Said
 from conftest import PACKAGE, VESSELS, example, kinds
 from findings_samples import CONFIGS, PLAIN, log, scene
 
@@ -36,7 +34,7 @@ def changed(out: Recording, **signals: Any) -> Recording:
 # --- the table
 
 
-def test_findings_come_in_the_order_of_the_scenario_s_sections() -> None:
+def test_findings_come_in_the_order_of_the_scenario_s_sections():
     sections = [
         list(Scenario.model_fields).index(n.about.split(".")[0]) for n in finding_kinds().values()
     ]
@@ -45,14 +43,14 @@ def test_findings_come_in_the_order_of_the_scenario_s_sections() -> None:
     assert len(finding_kinds()) == 26
 
 
-def test_every_code_is_documented_with_its_meaning() -> None:
+def test_every_code_is_documented_with_its_meaning():
     text = (PACKAGE.parent / "docs" / "findings.md").read_text()
     for code in finding_kinds().values():
         assert f"| `{code.name}` | `{code.about}` | {code.meaning}" in text
 
 
 @pytest.mark.parametrize("code", finding_kinds())
-def test_explain_shows_when_a_finding_comes_true_and_what_to_do(code: str, podusv: Command) -> None:
+def test_explain_shows_when_a_finding_comes_true_and_what_to_do(code, podusv):
     notice, out = finding_kinds()[code], " ".join(podusv("explain", code).out.split())
     assert f"condition: {notice.condition} remedy: {notice.remedy}" in out
     assert len(notice.condition) > 10
@@ -62,7 +60,7 @@ def test_explain_shows_when_a_finding_comes_true_and_what_to_do(code: str, podus
 # --- each look, on a run where it is so and on one where it is not
 
 
-def test_a_run_that_touches_the_singularity_is_told_with_the_time() -> None:
+def test_a_run_that_touches_the_singularity_is_told_with_the_time():
     touching = ("controller={kind: pid, standoff: 0.0}", "simulation.duration=60")
     (text,) = told("near-target", *touching)
     out = log(*touching)
@@ -74,7 +72,7 @@ def test_a_run_that_touches_the_singularity_is_told_with_the_time() -> None:
     assert "near-target" not in {f.code for f in postflight(held, out)}
 
 
-def test_a_heading_across_the_line_of_sight_is_told_with_the_time() -> None:
+def test_a_heading_across_the_line_of_sight_is_told_with_the_time():
     quiet = log()
     assert told("crosswise") == []
     psi_e = np.array(quiet["psi_e"])
@@ -86,14 +84,14 @@ def test_a_heading_across_the_line_of_sight_is_told_with_the_time() -> None:
     ]
 
 
-def test_velocities_outside_the_network_are_told_and_the_activation_is_low_there() -> None:
+def test_velocities_outside_the_network_are_told_and_the_activation_is_low_there():
     far = ("controller.network.low=[3, 2, 2]", "controller.network.high=[6, 4, 4]")
     (text,) = told("off-network", *far)
     assert text.startswith("no node within 2 widths of (u, v, r) from 0 s to 20 s")
     assert told("off-network") == []
 
 
-def test_listed_centres_are_looked_at_like_a_grid() -> None:
+def test_listed_centres_are_looked_at_like_a_grid():
     grid = scene().controller
     listed = "[" + ", ".join(str(list(map(float, c))) for c in grid.network.center_array()) + "]"
     widths = list(map(float, grid.network.width_array()))
@@ -103,13 +101,13 @@ def test_listed_centres_are_looked_at_like_a_grid() -> None:
     assert told("off-network", f"controller.network.centers={shifted}", same[1]) == []
 
 
-def test_a_bound_without_leakage_still_grows_at_the_end() -> None:
+def test_a_bound_without_leakage_still_grows_at_the_end():
     wind_up = ("controller.sigma_bu=0", "actuator={kind: saturated, surge_limit: 0.5}")
     assert told("bound-growing", *wind_up)[0].startswith("b_hat_u still grows at the end")
     assert told("bound-growing", "simulation.duration=60") == []
 
 
-def test_long_saturation_is_told_with_its_times() -> None:
+def test_long_saturation_is_told_with_its_times():
     tight = "actuator={kind: saturated, surge_limit: 2.0}"
     (text,) = told("saturated", tight)
     limited = log(tight)["saturated"] > 0.5
@@ -120,7 +118,7 @@ def test_long_saturation_is_told_with_its_times() -> None:
     assert told("saturated", "actuator={kind: saturated, surge_limit: 1e6, yaw_limit: 1e6}") == []
 
 
-def test_nothing_is_told_about_a_run_without_rows() -> None:
+def test_nothing_is_told_about_a_run_without_rows():
     empty = {name: values[:0] for name, values in log().signals.items()}
     assert postflight(scene(), Recording("interrupted", "adaptive_neural", empty)) == []
 
@@ -128,12 +126,12 @@ def test_nothing_is_told_about_a_run_without_rows() -> None:
 # --- no false alarms
 
 
-def test_the_shipped_corrected_scenario_has_only_the_findings_that_are_true_of_it() -> None:
+def test_the_shipped_corrected_scenario_has_only_the_findings_that_are_true_of_it():
     found = preflight(load(CONFIGS / "corrected.yaml").scenario)
     assert [f.code for f in found] == ["path-bend"]
 
 
-def test_the_printed_scenario_is_told_why_it_cannot_track() -> None:
+def test_the_printed_scenario_is_told_why_it_cannot_track():
     found = {f.code: f.text for f in preflight(load(CONFIGS / "printed.yaml").scenario)}
     assert set(found) == {
         "path-jump", "sway-drift", "sway-unstable", "coupling-saddle"
@@ -142,7 +140,7 @@ def test_the_printed_scenario_is_told_why_it_cannot_track() -> None:
     assert "2.58 kg/s exceeds the sway damping 0.89 kg/s" in found["sway-unstable"]
 
 
-def test_what_laws_share_is_told_once_and_names_them() -> None:
+def test_what_laws_share_is_told_once_and_names_them():
     found = preflight(load(CONFIGS / "figures_compare.yaml").scenario)
     assert len(found) == len(set(found))
     kicks = [(f.runs, f.where) for f in found if f.code == "start-kick"]
@@ -159,7 +157,7 @@ def scenario_file(name: str) -> str:
     return str(CONFIGS / name)
 
 
-def test_warnings_come_on_stderr_in_json_and_in_the_run_folder(podusv: Any) -> None:
+def test_warnings_come_on_stderr_in_json_and_in_the_run_folder(podusv):
     bad = ("run", scenario_file("corrected.yaml"), *SWAYING, *SHORT)
     said: Said = podusv(*bad, "--out", "out", "--json")
     assert said.code == 0
@@ -173,7 +171,7 @@ def test_warnings_come_on_stderr_in_json_and_in_the_run_folder(podusv: Any) -> N
     assert podusv(*bad, "--out", "quiet", "-q").err == ""
 
 
-def test_what_is_silenced_is_not_shown(podusv: Any) -> None:
+def test_what_is_silenced_is_not_shown(podusv):
     bad = (
         "--set",
         "vessel.preset=paper",
@@ -186,13 +184,13 @@ def test_what_is_silenced_is_not_shown(podusv: Any) -> None:
     assert "path-bend" in said.out
 
 
-def test_an_unknown_code_is_refused_with_a_suggestion(podusv: Any) -> None:
+def test_an_unknown_code_is_refused_with_a_suggestion(podusv):
     said = podusv("validate", "a.yaml", "--set", "silence=[path-jumps]")
     assert said.code == 2
     assert "did you mean 'path-jump'?" in said.err
 
 
-def test_findings_that_not_all_runs_share_name_their_runs() -> None:
+def test_findings_that_not_all_runs_share_name_their_runs():
     shared, some, own = (Finding(code, "actuator", code) for code in ("a", "b", "c"))
     found = merged({"x": [shared, some], "y": [some, shared, own], "z": [shared, own, own]})
     assert [str(finding) for finding in found] == [
@@ -209,7 +207,7 @@ def transcripts() -> list[tuple[str, list[str]]]:
     return [(config, shown.replace("\n    ", "\n")[4:].splitlines()) for config, shown in blocks]
 
 
-def test_docs_show_what_a_terminal_shows(podusv: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_docs_show_what_a_terminal_shows(podusv, monkeypatch):
     monkeypatch.setattr("podusv_cli.cli.terminal.sys.stdout.isatty", lambda: True, raising=False)
     monkeypatch.setenv("COLUMNS", "100")
     monkeypatch.chdir(PACKAGE.parent)
@@ -218,9 +216,7 @@ def test_docs_show_what_a_terminal_shows(podusv: Any, monkeypatch: pytest.Monkey
         assert podusv("validate", config).out.splitlines() == shown
 
 
-def test_findings_are_wrapped_on_a_terminal_and_whole_in_a_pipe(
-    podusv: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_findings_are_wrapped_on_a_terminal_and_whole_in_a_pipe(podusv, monkeypatch):
     monkeypatch.setenv("COLUMNS", "60")
     validate, run = (
         (command, scenario_file("corrected.yaml"), *SWAYING, *SHORT[:4])
@@ -240,7 +236,7 @@ def test_findings_are_wrapped_on_a_terminal_and_whole_in_a_pipe(
         assert " ".join(line.strip() for line in shown) == " ".join(whole)
 
 
-def test_silencing_is_no_difference_between_runs_and_survives_resolving(podusv: Any) -> None:
+def test_silencing_is_no_difference_between_runs_and_survives_resolving(podusv):
     loud = (*PLAIN, "silence=[path-jump, saturated]")
     assert load(CONFIGS / "corrected.yaml", loud).scenario.silence == ("path-jump", "saturated")
     run = ("run", scenario_file("corrected.yaml"), *SHORT)
@@ -258,7 +254,7 @@ ACTUATORS = {name: example(kind) for name, kind in kinds("actuators").items()}
 
 @pytest.mark.parametrize("actuator", ACTUATORS)
 @pytest.mark.parametrize("hull", VESSELS)
-def test_every_hull_with_every_actuator_is_underactuated(hull: str, actuator: str) -> None:
+def test_every_hull_with_every_actuator_is_underactuated(hull, actuator):
     vessel, drive = VESSELS[hull], ACTUATORS[actuator]
     inertia = np.array(
         [[vessel.m11, 0, 0], [0, vessel.m22, vessel.m23], [0, vessel.m32, vessel.m33]]
@@ -271,15 +267,13 @@ def test_every_hull_with_every_actuator_is_underactuated(hull: str, actuator: st
     assert "rank 2 of 3" in text
 
 
-def test_a_third_input_is_told_apart(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_third_input_is_told_apart(monkeypatch):
     drive = ACTUATORS["ideal"]
     monkeypatch.setattr(type(drive), "input_matrix", lambda self: np.eye(3))
     assert input_rank(drive) == 3
     assert argument(scene()).startswith("fully actuated: ")
 
 
-def test_validate_shows_the_argument(podusv: Any) -> None:
+def test_validate_shows_the_argument(podusv):
     said = podusv("validate", "-v", scenario_file("corrected.yaml"))
     assert "[[1, 0], [0, 0], [0, 1]], rank 2 of 3; its sway row is zero (Y_p = 0)" in said.out

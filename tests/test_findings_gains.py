@@ -1,7 +1,5 @@
 """Gain conditions in words: what `podusv validate -v` says of the proof."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

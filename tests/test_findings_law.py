@@ -1,7 +1,5 @@
 """Findings about the law: told where they hold, borne out by simulation."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from findings_samples import BARE, codes, finding, late, log, scene, simulated
@@ -14,7 +12,7 @@ LONG = "simulation.duration=120"
 PRINTED = "controller.coupling=printed"
 
 
-def test_the_printed_sign_with_low_gains_is_a_saddle_and_runs_away() -> None:
+def test_the_printed_sign_with_low_gains_is_a_saddle_and_runs_away():
     saddle = (*BARE, LONG, PRINTED)  # k_ze k_ue = 0.4
     assert "coupling-saddle" in codes(*saddle)
     assert late("z_e", *saddle).min() > 100.0
@@ -23,7 +21,7 @@ def test_the_printed_sign_with_low_gains_is_a_saddle_and_runs_away() -> None:
         assert late("z_e", *sound).max() < 2.0
 
 
-def test_the_saddle_grows_at_the_rate_that_is_told() -> None:
+def test_the_saddle_grows_at_the_rate_that_is_told():
     out = log(*BARE, LONG, PRINTED)
     assert "grows at 0.071 1/s" in finding("coupling-saddle", *BARE, LONG, PRINTED).text
     # Drag slows it down: X_u alone makes it 0.062 1/s, the rest of the drag more so.
@@ -33,7 +31,7 @@ def test_the_saddle_grows_at_the_rate_that_is_told() -> None:
 
 
 @pytest.mark.parametrize("fold", ["printed", "none"])
-def test_a_start_that_faces_away_is_told_and_drives_away(fold: str) -> None:
+def test_a_start_that_faces_away_is_told_and_drives_away(fold):
     astern = (f"controller.fold={fold}", "start.psi=3.0")
     assert "start-astern" in codes(*astern)
     assert log(*astern).status == "diverged"
@@ -42,7 +40,7 @@ def test_a_start_that_faces_away_is_told_and_drives_away(fold: str) -> None:
         assert late("z_e", *sound).max() < 5.0
 
 
-def test_a_first_difference_from_zero_is_told_and_kicks() -> None:
+def test_a_first_difference_from_zero_is_told_and_kicks():
     difference = ("controller.rate=difference", "controller.B_r=5.0", "controller.standoff=0.5")
     zero = (*difference, "controller.first_difference=from_zero")
     assert "start-kick" in codes(*zero)
@@ -51,7 +49,7 @@ def test_a_first_difference_from_zero_is_told_and_kicks() -> None:
     assert simulated(*zero)[1]["peak_tau_r"] > 20 * simulated(*difference)[1]["peak_tau_r"]
 
 
-def test_a_network_far_from_the_speeds_needed_is_told_and_stays_silent() -> None:
+def test_a_network_far_from_the_speeds_needed_is_told_and_stays_silent():
     far = ("controller.network.low=[3, 2, 2]", "controller.network.high=[6, 4, 4]", LONG)
     assert "network-range" in codes(*far)
     assert np.abs(late("f_hat_u", *far)).max() < 1e-3
@@ -69,7 +67,7 @@ STIFF = {
 
 
 @pytest.mark.parametrize("code", STIFF)
-def test_a_loop_too_fast_for_the_step_is_told_and_diverges(code: str) -> None:
+def test_a_loop_too_fast_for_the_step_is_told_and_diverges(code):
     coarse, fine = (*STIFF[code], "simulation.step=0.01"), (*STIFF[code], "simulation.step=0.005")
     assert code in codes(*coarse)
     assert log(*coarse).status == "diverged"
@@ -79,7 +77,7 @@ def test_a_loop_too_fast_for_the_step_is_told_and_diverges(code: str) -> None:
 
 @pytest.mark.parametrize("Gamma", [500, 1000, 2000, 4000])
 @pytest.mark.parametrize("step", [0.02, 0.01])
-def test_the_step_at_which_the_adaptation_fails_is_the_one_told(Gamma: int, step: float) -> None:
+def test_the_step_at_which_the_adaptation_fails_is_the_one_told(Gamma, step):
     case = (f"controller.Gamma_u={Gamma}", f"simulation.step={step}")
     out, metrics = simulated(*case)
     chatters = out.status == "diverged" or metrics["tv_tau_u"] > 10.0
@@ -94,7 +92,7 @@ SAMPLED = {
 
 
 @pytest.mark.parametrize("code", SAMPLED)
-def test_a_loop_too_fast_for_its_sampling_is_told_and_chatters(code: str) -> None:
+def test_a_loop_too_fast_for_its_sampling_is_told_and_chatters(code):
     law, slow, fast = SAMPLED[code]
     held = [(*law, "simulation.step=0.001", f"control.period={t}") for t in (slow, fast)]
     assert [code in codes(*case) for case in held] == [True, False]
@@ -105,7 +103,7 @@ def test_a_loop_too_fast_for_its_sampling_is_told_and_chatters(code: str) -> Non
 @pytest.mark.parametrize(
     "law", [(), ("controller={kind: pid}",), ("controller={kind: dsc}",)], ids=["an", "pid", "dsc"]
 )
-def test_the_linearised_loops_are_those_of_the_whole_closed_loop(law: tuple[str, ...]) -> None:
+def test_the_linearised_loops_are_those_of_the_whole_closed_loop(law):
     """Their eigenvalues are among the largest of the closed loop's, differentiated numerically."""
     start = "start={x: -8, y: -4, psi: 0.4, u: 0.5, v: 0.05, r: 0.02}"
     scenario = scene(*law, start, "disturbance={kind: none}")
@@ -126,7 +124,7 @@ def bare_loop(feedback: list[float], memory: list[list[float]]) -> Loop:
     return Loop("surge", "k", 0.0, np.array(feedback), np.array(memory).reshape(-1, len(feedback)))
 
 
-def test_rk4_is_stable_up_to_its_textbook_limits() -> None:
+def test_rk4_is_stable_up_to_its_textbook_limits():
     decay, swing = bare_loop([-1.0], []), bare_loop([0.0, -1.0], [[1.0, 0.0]])
     assert rk4_growth(decay, 2.785) < 1.0 < rk4_growth(decay, 2.786)
     assert rk4_growth(swing, 2.828) < 1.0 < rk4_growth(swing, 2.829)
@@ -134,7 +132,7 @@ def test_rk4_is_stable_up_to_its_textbook_limits() -> None:
 
 
 @pytest.mark.parametrize("count", [1, 4])
-def test_a_held_feedback_is_an_euler_step_of_the_period(count: int) -> None:
+def test_a_held_feedback_is_an_euler_step_of_the_period(count):
     assert sampled_growth(bare_loop([-1.0], []), 1.9 / count, count) == pytest.approx(0.9)
     assert sampled_growth(bare_loop([-1.0], []), 2.1 / count, count) == pytest.approx(1.1)
     # e' = -a, a' = e, both held: one step of Euler, which spirals out by sqrt(1 + T^2).

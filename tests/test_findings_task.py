@@ -1,7 +1,5 @@
 """Findings about path, hull and actuator: told where they hold, borne out by simulation."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -33,7 +31,7 @@ def jump(signal: str, *overrides: str) -> float:
     return float(np.abs(np.diff(out[signal][at - 1 : at + 2])).max())
 
 
-def test_a_jump_of_the_path_is_told_and_the_distance_jumps() -> None:
+def test_a_jump_of_the_path_is_told_and_the_distance_jumps():
     there, not_there = turning("literal"), turning("velocity")
     assert "path-jump" in codes(there, ON_TARGET)
     assert "0.5 m at 15 s" in finding("path-jump", there).text
@@ -42,7 +40,7 @@ def test_a_jump_of_the_path_is_told_and_the_distance_jumps() -> None:
     assert jump("z_e", not_there, ON_TARGET) < 0.01
 
 
-def test_a_corner_of_the_path_is_told_and_the_virtual_speed_jumps() -> None:
+def test_a_corner_of_the_path_is_told_and_the_virtual_speed_jumps():
     there, not_there = turning("velocity", 0.4), turning("velocity")
     assert codes(there) & {"path-jump", "path-corner", "path-bend"} == {"path-corner"}
     assert "0.1 m/s at 15 s" in finding("path-corner", there).text
@@ -51,7 +49,7 @@ def test_a_corner_of_the_path_is_told_and_the_virtual_speed_jumps() -> None:
     assert jump("alpha_u", not_there, ON_TARGET) < 0.01
 
 
-def test_a_bend_of_the_path_is_told_and_only_a_law_with_accelerations_steps() -> None:
+def test_a_bend_of_the_path_is_told_and_only_a_law_with_accelerations_steps():
     path, law = turning("velocity"), "controller={kind: backstepping}"
     assert codes(path) & {"path-jump", "path-corner", "path-bend"} == {"path-bend"}
     assert "0.015 m/s2 at 15 s" in finding("path-bend", path).text
@@ -62,7 +60,7 @@ def test_a_bend_of_the_path_is_told_and_only_a_law_with_accelerations_steps() ->
     assert jump("tau_r_cmd", "path={kind: line}", law, ON_TARGET) < 0.1 * 2.76 * 0.015 / z_e
 
 
-def test_a_target_that_goes_on_after_its_last_point_is_told() -> None:
+def test_a_target_that_goes_on_after_its_last_point_is_told():
     points = "points: [[0, 0], [3, 1], [6, 0]], speed: 0.5"
     on, stop = (
         f"path={{kind: waypoints, {points}}}",
@@ -78,14 +76,14 @@ def test_a_target_that_goes_on_after_its_last_point_is_told() -> None:
     assert "path-runs-on" not in codes(on, "simulation.duration=12")
 
 
-def test_what_comes_after_the_run_is_not_told() -> None:
+def test_what_comes_after_the_run_is_not_told():
     assert "path-jump" not in codes(turning("literal"), "simulation.duration=10")
 
 
 DRIFTS = ("vessel={preset: paper}", "controller.k_ze=0.03", LONG)
 
 
-def test_a_load_that_drifts_the_hull_faster_than_the_target_is_told_and_nothing_holds() -> None:
+def test_a_load_that_drifts_the_hull_faster_than_the_target_is_told_and_nothing_holds():
     assert "sway-drift" in codes(*DRIFTS)
     assert "0.57 m/s" in finding("sway-drift", *DRIFTS).text
     assert late("z_e", *DRIFTS).min() > 2.0
@@ -94,7 +92,7 @@ def test_a_load_that_drifts_the_hull_faster_than_the_target_is_told_and_nothing_
     assert np.abs(late("z_e", *half) - 0.5).max() < 0.1
 
 
-def test_the_steady_hull_of_the_reference_is_at_rest_in_the_plant() -> None:
+def test_the_steady_hull_of_the_reference_is_at_rest_in_the_plant():
     """The plant's rates vanish at the balance that the findings rest on, for every vessel."""
     for name, hull in VESSELS.items():
         calm = scene(f"vessel={{preset: {name}}}", "disturbance.scale=0.4", "path={kind: circle}")
@@ -109,7 +107,7 @@ def test_the_steady_hull_of_the_reference_is_at_rest_in_the_plant() -> None:
             assert math.hypot(*seen.nu[i, :2]) == pytest.approx(0.5)
 
 
-def test_the_drift_is_where_damping_holds_the_load() -> None:
+def test_the_drift_is_where_damping_holds_the_load():
     assert drift(scene("vessel={preset: paper}"), 0.5) == pytest.approx(0.5 / 0.8896)
     v = drift(scene(), 0.5)
     assert 0.8896 * v + 36.47287 * v * v == pytest.approx(0.5)
@@ -118,7 +116,7 @@ def test_the_drift_is_where_damping_holds_the_load() -> None:
 SLIDES = ("vessel={preset: paper}", "disturbance.scale=0.05", LONG)
 
 
-def test_a_hull_too_slippery_to_point_at_the_target_is_told_and_slides_away() -> None:
+def test_a_hull_too_slippery_to_point_at_the_target_is_told_and_slides_away():
     assert "sway-unstable" in codes(*SLIDES)
     assert late("z_e", *SLIDES).min() > 2.0
     assert np.abs(late("v", *SLIDES)).max() > 2.0
@@ -136,9 +134,7 @@ def astern(distance: float) -> str:
 
 
 @pytest.mark.parametrize("k_ze", [0.06, 0.1, 0.2])
-def test_a_hull_slides_from_beyond_the_distance_that_is_told_and_not_from_within(
-    k_ze: float,
-) -> None:
+def test_a_hull_slides_from_beyond_the_distance_that_is_told_and_not_from_within(k_ze):
     law = (*CALM, f"controller.k_ze={k_ze}")
     case = Case(scene(*law))
     distance = sliding_distance(case, case.scenario.controller.approach(), 0.8896)
@@ -153,7 +149,7 @@ def test_a_hull_slides_from_beyond_the_distance_that_is_told_and_not_from_within
 
 
 @pytest.mark.parametrize("standoff", [0.0, 0.5, 2.0])
-def test_the_distance_is_where_the_plants_sway_starts_to_grow(standoff: float) -> None:
+def test_the_distance_is_where_the_plants_sway_starts_to_grow(standoff):
     """Eigenvalues of the hull that points at the target, by differences of the plant's kernel."""
     case = Case(scene(*CALM, f"controller.standoff={standoff}"))
     k, U, h = bundle(VESSELS["paper"].constants()), 0.5, 1e-6
@@ -180,18 +176,14 @@ def with_damping(ratio: float) -> str:
 
 @pytest.mark.parametrize("distance", [10.0, 14.0, 28.0])
 @pytest.mark.parametrize("scale", [0.0, 0.3])
-def test_sway_that_stops_short_of_the_targets_speed_is_not_told_and_the_hull_holds(
-    distance: float, scale: float
-) -> None:
+def test_sway_that_stops_short_of_the_targets_speed_is_not_told_and_the_hull_holds(distance, scale):
     slow = (with_damping(0.9), f"disturbance.scale={scale}", astern(distance), LONG)
     assert "sway-unstable" not in codes(*slow)
     assert np.abs(late("z_e", *slow) - 0.5).max() < 0.05
 
 
 @pytest.mark.parametrize("ratio", [1.75, 2.5])
-def test_sway_that_outgrows_the_targets_speed_is_told_and_the_hull_circles_the_target(
-    ratio: float,
-) -> None:
+def test_sway_that_outgrows_the_targets_speed_is_told_and_the_hull_circles_the_target(ratio):
     fast = (with_damping(ratio), "disturbance={kind: none}", astern(7.0 * math.sqrt(2.0)), LONG)
     assert "sway-unstable" in codes(*fast)
     assert late("z_e", *fast).min() > 0.8
@@ -199,7 +191,7 @@ def test_sway_that_outgrows_the_targets_speed_is_told_and_the_hull_circles_the_t
 
 
 @pytest.mark.parametrize("k_ze", [0.1, 0.5])
-def test_sway_that_nonlinear_damping_stops_is_no_finding_and_does_no_harm(k_ze: float) -> None:
+def test_sway_that_nonlinear_damping_stops_is_no_finding_and_does_no_harm(k_ze):
     calm = (f"controller.k_ze={k_ze}", "disturbance={kind: none}", LONG)
     assert 25.8 * k_ze > 0.8896
     assert "sway-unstable" not in codes(*calm)
@@ -213,28 +205,26 @@ def limits(surge: float, yaw: float) -> str:
 @pytest.mark.parametrize(
     ("short", "enough"), [((0.5, 2.5), (4.0, 2.5)), ((8.0, 0.1), (8.0, 2.5))], ids=["surge", "yaw"]
 )
-def test_an_actuator_too_weak_is_told_and_falls_behind(
-    short: tuple[float, float], enough: tuple[float, float]
-) -> None:
+def test_an_actuator_too_weak_is_told_and_falls_behind(short, enough):
     assert "thrust-short" in codes(limits(*short), ON_TARGET, LONG)
     assert late("z_e", limits(*short), ON_TARGET, LONG).max() > 3.0
     assert "thrust-short" not in codes(limits(*enough), ON_TARGET, LONG)
     assert np.abs(late("z_e", limits(*enough), ON_TARGET, LONG) - 0.5).max() < 0.1
 
 
-def test_the_thrust_needed_is_what_the_law_ends_up_asking_for() -> None:
+def test_the_thrust_needed_is_what_the_law_ends_up_asking_for():
     needed = Case(scene(LONG)).reference.demand[:, 0]
     asked = late("tau_u_cmd", LONG)
     assert needed.max() == pytest.approx(asked.max(), rel=0.1)
     assert needed.min() == pytest.approx(asked.min(), abs=0.15)
 
 
-def test_an_actuator_without_states_delivers_what_it_is_asked_for_within_limits() -> None:
+def test_an_actuator_without_states_delivers_what_it_is_asked_for_within_limits():
     actuator = scene(limits(3.0, 1.0)).actuator
     assert actuator.settled(np.zeros(6), np.array([9.0, -0.5])).tolist() == [3.0, 0.0, -0.5]
 
 
-def test_a_quick_pod_is_not_taken_for_a_weak_one() -> None:
+def test_a_quick_pod_is_not_taken_for_a_weak_one():
     """What a pod delivers in the end does not hang on its lags."""
     quick = [f"actuator.pods.{i}={{n_lag: 0.004, angle_lag: 0.004}}" for i in (0, 1)]
     pair = "actuator={kind: pod, preset: cybership2_pod}"
@@ -243,7 +233,7 @@ def test_a_quick_pod_is_not_taken_for_a_weak_one() -> None:
     assert "thrust-short" in codes(pair, *weak, LONG)
 
 
-def test_a_lag_too_short_for_the_step_is_told_and_does_not_settle() -> None:
+def test_a_lag_too_short_for_the_step_is_told_and_does_not_settle():
     """RK4 decays up to step = 2.785 lags: 0.01 s for 3.6 ms."""
     pair, calm = "actuator={kind: pod, preset: cybership2_pod}", "disturbance={kind: none}"
     for lag, stiff in ((0.0034, True), (0.0038, False)):
@@ -254,7 +244,7 @@ def test_a_lag_too_short_for_the_step_is_told_and_does_not_settle() -> None:
         assert (np.median(apart) > 0.1) == stiff, np.median(apart)
 
 
-def test_a_pod_that_turns_too_little_drives_the_hull_ahead_and_that_is_told() -> None:
+def test_a_pod_that_turns_too_little_drives_the_hull_ahead_and_that_is_told():
     place = "x: -0.499, T_nn: 7.3e-3, T_nn_astern: 1e-2, n_max: 33, n_max_astern: 33"
     slow = "n_rate: 200, n_lag: 0.1, angle_rate: 1.75, angle_lag: 0.1"
 

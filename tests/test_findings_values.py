@@ -1,7 +1,5 @@
 """Findings about signs and units: told where they hold, borne out by simulation."""
 
-from __future__ import annotations
-
 import math
 
 import pytest
@@ -15,14 +13,14 @@ CALM = ("disturbance={kind: none}", "simulation.duration=60")
 
 
 @pytest.mark.parametrize("name", ["X_uu", "X_uuu", "Y_vv", "N_rr"])
-def test_damping_that_drives_is_told_at_its_key_once(name: str) -> None:
+def test_damping_that_drives_is_told_at_its_key_once(name):
     case = Case(scene(f"vessel.{name}=1.32"))
     (told,) = damping_sign.findings(case.scenario.controller, case)
     assert (told.code, told.where) == ("damping-sign", f"vessel.{name}")
     assert "-1.32?" in told.text
 
 
-def test_a_hull_with_damping_of_the_wrong_sign_has_to_be_held_back() -> None:
+def test_a_hull_with_damping_of_the_wrong_sign_has_to_be_held_back():
     wrong, right = (*CALM, "vessel.X_uu=8.0"), (*CALM, "vessel.X_uu=-8.0")
     assert "damping-sign" in codes(*wrong)
     assert late("tau_u", *wrong).max() < -0.5
@@ -30,17 +28,17 @@ def test_a_hull_with_damping_of_the_wrong_sign_has_to_be_held_back() -> None:
     assert late("tau_u", *right).min() > 0.5
 
 
-def test_what_the_law_is_told_is_looked_at_too() -> None:
+def test_what_the_law_is_told_is_looked_at_too():
     assert finding("damping-sign", "nominal.Y_vv=36.0").where == "nominal.Y_vv"
 
 
-def test_no_vessel_that_podusv_brings_along_drives_itself() -> None:
+def test_no_vessel_that_podusv_brings_along_drives_itself():
     for name in VESSELS:
         assert "damping-sign" not in codes(f"vessel={{preset: {name}}}")
 
 
 @pytest.mark.parametrize("key", ["start.psi", "path.course"])
-def test_degrees_are_told_and_radians_are_not(key: str) -> None:
+def test_degrees_are_told_and_radians_are_not(key):
     told = finding("large-angle", f"{key}=-90")
     assert told.where == key
     assert "-90 deg is -1.571" in told.text

@@ -1,7 +1,5 @@
 """Starting from nothing: the shipped scenarios by name, `podusv init`, the wheel."""
 
-from __future__ import annotations
-
 import os
 import re
 import shlex
@@ -13,7 +11,7 @@ from zipfile import ZipFile
 
 import numpy
 import pytest
-from command_samples import ROOT, Command, commanded, write
+from command_samples import ROOT, commanded, write
 
 from podusv_cli.cli import FIRST_STEPS
 from podusv_cli.findings.finding import finding_kinds
@@ -27,9 +25,7 @@ TELLING = ("own_vessel", "paper/figures_compare", "pod/vessels/otter")  # one of
 
 
 @pytest.fixture
-def podusv(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Command:
+def podusv(tmp_path, monkeypatch, capsys):
     """The command line in an empty folder."""
     monkeypatch.chdir(tmp_path)
     return commanded(monkeypatch, capsys)
@@ -38,13 +34,13 @@ def podusv(
 # --- scenarios by name
 
 
-def test_every_file_in_configs_has_a_name() -> None:
+def test_every_file_in_configs_has_a_name():
     paths = {f"podusv:{path.relative_to(CONFIGS).as_posix()}" for path in CONFIGS.rglob("*.yaml")}
     assert set(shipped.names()) == paths
     assert len(paths) > 20
 
 
-def test_a_scenario_extends_a_shipped_one_from_anywhere(podusv: Command) -> None:
+def test_a_scenario_extends_a_shipped_one_from_anywhere(podusv):
     write("a.yaml", "extends: podusv:pod/kept.yaml\nname: kept\n")
     here, there = load("a.yaml"), load(CONFIGS / "pod/kept.yaml")
     assert here.scenario == there.scenario
@@ -63,7 +59,7 @@ def test_a_scenario_extends_a_shipped_one_from_anywhere(podusv: Command) -> None
         ("podusv:", ""),
     ],
 )
-def test_a_name_that_podusv_does_not_have_is_a_line(podusv: Command, name: str, hint: str) -> None:
+def test_a_name_that_podusv_does_not_have_is_a_line(podusv, name, hint):
     wrong = f"podusv has no scenario of this name{hint} (`podusv init` lists them)"
     assert podusv("validate", name) == (2, "", f"{name}: cannot be read: {wrong}\n")
     write("a.yaml", f'extends: "{name}"\n')
@@ -71,7 +67,7 @@ def test_a_name_that_podusv_does_not_have_is_a_line(podusv: Command, name: str, 
     assert podusv("validate", "a.yaml") == (2, "", f"{place} cannot be read: {wrong}\n")
 
 
-def test_shipped_files_name_each_other_relative_to_themselves() -> None:
+def test_shipped_files_name_each_other_relative_to_themselves():
     assert shipped.relative_to("podusv:pod/kept.yaml", "../paper/x.yaml") == "podusv:paper/x.yaml"
     assert shipped.relative_to("podusv:own.yaml", "x.yaml") == "podusv:x.yaml"
     assert shipped.relative_to("podusv:own.yaml", "podusv:b/x.yaml") == "podusv:b/x.yaml"
@@ -79,7 +75,7 @@ def test_shipped_files_name_each_other_relative_to_themselves() -> None:
     assert shipped.relative_to("mine/own.yaml", "/x.yaml") == "/x.yaml"
 
 
-def test_the_advice_of_a_comparison_names_a_shipped_scenario(podusv: Command) -> None:
+def test_the_advice_of_a_comparison_names_a_shipped_scenario(podusv):
     said = podusv(
         "compare", "podusv:theory/sign.yaml", "--no-figures", "--set", "simulation.duration=1",
         "--out", "x",
@@ -91,13 +87,13 @@ def test_the_advice_of_a_comparison_names_a_shipped_scenario(podusv: Command) ->
 # --- init
 
 
-def test_bare_podusv_says_what_to_do_first_in_about_eight_lines(podusv: Command) -> None:
+def test_bare_podusv_says_what_to_do_first_in_about_eight_lines(podusv):
     said = podusv()
     assert said == (0, f"{FIRST_STEPS}\n", "")
     assert len(said.out.splitlines()) <= 9
 
 
-def test_init_lists_every_scenario_that_is_meant_to_be_run(podusv: Command) -> None:
+def test_init_lists_every_scenario_that_is_meant_to_be_run(podusv):
     points = starting_points()
     others = {name[7:-5] for name in shipped.names()} - set(points)
     assert others == {"paper/base", "paper/claims", "paper/ablation_laws", "theory/base"}
@@ -114,7 +110,7 @@ def test_init_lists_every_scenario_that_is_meant_to_be_run(podusv: Command) -> N
         for name in starting_points()
     ],
 )
-def test_a_copy_anywhere_is_the_same_scenario(podusv: Command, name: str) -> None:
+def test_a_copy_anywhere_is_the_same_scenario(podusv, name):
     said = podusv("init", name, "--out", f"deep/er/{name}.yaml")
     assert said.code == 0, said.err
     copy = Path("deep/er") / f"{name}.yaml"
@@ -129,12 +125,12 @@ def test_a_copy_anywhere_is_the_same_scenario(podusv: Command, name: str) -> Non
 
 
 @pytest.mark.parametrize("name", ["own_vessel", "paper/printed", "pod/vessels/otter"])
-def test_a_copy_is_called_as_the_file(podusv: Command, name: str) -> None:
+def test_a_copy_is_called_as_the_file(podusv, name):
     assert podusv("init", name).code == 0
     assert {path.name for path in Path().iterdir()} == {f"{name.split('/')[-1]}.yaml", SCHEMA}
 
 
-def test_init_replaces_nothing(podusv: Command) -> None:
+def test_init_replaces_nothing(podusv):
     assert podusv("init", "paper/corrected").code == 0
     write("corrected.yaml", "mine")
     said = podusv("init", "podusv:paper/corrected.yaml")
@@ -147,7 +143,7 @@ def test_init_replaces_nothing(podusv: Command) -> None:
     assert not Path("figures.yaml").exists()
 
 
-def test_an_unknown_starting_point_is_a_line_with_those_that_there_are(podusv: Command) -> None:
+def test_an_unknown_starting_point_is_a_line_with_those_that_there_are(podusv):
     said = podusv("init", "paper/corected")
     assert said.code == 2
     assert said.err.startswith(
@@ -157,7 +153,7 @@ def test_an_unknown_starting_point_is_a_line_with_those_that_there_are(podusv: C
     assert not list(Path().iterdir())
 
 
-def test_the_copy_is_edited_and_resolved_like_any_scenario(podusv: Command) -> None:
+def test_the_copy_is_edited_and_resolved_like_any_scenario(podusv):
     podusv("init", "paper/corrected")
     text = Path("corrected.yaml").read_text()
     write("corrected.yaml", text.replace("surge_limit: 8.0", "surge_limit: 9.0"))
@@ -202,7 +198,7 @@ def _installed(wheel: Path, folder: Path) -> Path:
 
 
 @pytest.mark.slow  # builds a wheel, and an environment compiles anew
-def test_the_wheel_alone_starts_from_an_empty_folder(tmp_path: Path) -> None:
+def test_the_wheel_alone_starts_from_an_empty_folder(tmp_path):
     pytest.importorskip("setuptools", "77", "building a wheel needs setuptools 77 or newer")
     bin_folder = _installed(_built(tmp_path), tmp_path / "venv")
     empty = tmp_path / "empty"

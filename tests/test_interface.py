@@ -1,7 +1,5 @@
 """podusv from Python: scenarios from dictionaries, runs, comparisons, what notebooks show."""
 
-from __future__ import annotations
-
 import ast
 import base64
 import doctest
@@ -42,14 +40,14 @@ CLAIM = {"says": "s", "source": "p", "expect": "stiff.iae > 0"}
 
 
 @pytest.fixture(autouse=True)
-def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def _in_an_empty_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
 # --- the names
 
 
-def test_the_package_has_the_names_of_the_interface_and_its_stub() -> None:
+def test_the_package_has_the_names_of_the_interface_and_its_stub():
     assert podusv.__all__ == interface.__all__
     assert all(getattr(podusv, name) is getattr(interface, name) for name in podusv.__all__)
     assert set(podusv.__all__) < set(dir(podusv))
@@ -62,7 +60,7 @@ def test_the_package_has_the_names_of_the_interface_and_its_stub() -> None:
         _ = podusv.simulat  # type: ignore[attr-defined]
 
 
-def test_importing_the_package_imports_nothing_else() -> None:
+def test_importing_the_package_imports_nothing_else():
     script = (
         "import sys\nbefore = {*sys.modules}\nimport podusv_cli\nprint({*sys.modules} - before)"
     )
@@ -70,13 +68,13 @@ def test_importing_the_package_imports_nothing_else() -> None:
 
 
 @pytest.mark.parametrize("module", [scenarios, functions])
-def test_the_examples_in_the_docstrings_run(module: Any) -> None:
+def test_the_examples_in_the_docstrings_run(module):
     found = doctest.testmod(module, optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
     assert found.failed == 0
     assert found.attempted > 5
 
 
-def test_every_public_name_is_typed_and_has_an_example_or_is_a_result() -> None:
+def test_every_public_name_is_typed_and_has_an_example_or_is_a_result():
     for name in podusv.__all__:
         thing = getattr(podusv, name)
         assert inspect.getdoc(thing)
@@ -90,7 +88,7 @@ def test_every_public_name_is_typed_and_has_an_example_or_is_a_result() -> None:
 # --- scenarios
 
 
-def test_a_dictionary_is_as_short_as_the_file() -> None:
+def test_a_dictionary_is_as_short_as_the_file():
     write("scenario.yaml", BASE)
     assert podusv.Scenario(SHORT) == podusv.Scenario(**SHORT) == podusv.load(SHORT)
     assert podusv.load(SHORT) == podusv.load("scenario.yaml") == podusv.load(Path("scenario.yaml"))
@@ -99,7 +97,7 @@ def test_a_dictionary_is_as_short_as_the_file() -> None:
     assert podusv.load(podusv.load(SHORT)) == podusv.load(SHORT)
 
 
-def test_sections_may_be_parts_of_podusv_and_numbers_those_of_numpy() -> None:
+def test_sections_may_be_parts_of_podusv_and_numbers_those_of_numpy():
     scenario = podusv.load(SHORT)
     again = podusv.Scenario(
         {
@@ -114,7 +112,7 @@ def test_sections_may_be_parts_of_podusv_and_numbers_those_of_numpy() -> None:
     assert path.points == ((0.0, 0.0), (10.0, 1.0), (18.0, 6.0))  # type: ignore[attr-defined]
 
 
-def test_changes_are_what_set_is_on_the_command_line() -> None:
+def test_changes_are_what_set_is_on_the_command_line():
     write("a.yaml", BASE)
     changes = {"vessel.m": 30.0, "path": {"kind": "circle", "radius": 9.0}, "description": "true"}
     there = load_file(
@@ -134,13 +132,13 @@ def test_changes_are_what_set_is_on_the_command_line() -> None:
         ({**SHORT, "extends": "podusv:x.yaml"}, "scenario: extends: 'podusv:x.yaml' cannot be"),
     ],
 )  # fmt: skip
-def test_a_faulty_dictionary_is_a_line_without_a_place(sections: Any, text: str) -> None:
+def test_a_faulty_dictionary_is_a_line_without_a_place(sections, text):
     for make in (podusv.Scenario, podusv.load):
         with pytest.raises(ScenarioError, match=re.escape(text)):
             make(sections)
 
 
-def test_what_cannot_stand_in_a_scenario_is_named() -> None:
+def test_what_cannot_stand_in_a_scenario_is_named():
     with pytest.raises(UsageError, match="a complex cannot stand in a scenario"):
         podusv.Scenario({**SHORT, "start": {"x": 1j}})
     with pytest.raises(ScenarioError, match=r"^--set start\.z=1: start\.z: unknown key"):
@@ -151,12 +149,12 @@ def test_what_cannot_stand_in_a_scenario_is_named() -> None:
 
 
 @pytest.fixture(scope="module")
-def kept(tmp_path_factory: pytest.TempPathFactory) -> podusv.Run:
+def kept(tmp_path_factory):
     """A run in a folder."""
     return podusv.run(SHORT, out=tmp_path_factory.mktemp("kept") / "run", figures=False)
 
 
-def test_a_run_in_memory_has_the_log_and_metrics_of_the_one_in_a_folder(kept: podusv.Run) -> None:
+def test_a_run_in_memory_has_the_log_and_metrics_of_the_one_in_a_folder(kept):
     run = podusv.simulate(SHORT)
     assert not list(Path().iterdir())
     assert (run.folder, run.status, run.message) == (None, "finished", "")
@@ -166,7 +164,7 @@ def test_a_run_in_memory_has_the_log_and_metrics_of_the_one_in_a_folder(kept: po
     assert podusv.open_run(str(kept.folder)).metrics.equals(kept.metrics)
 
 
-def test_the_log_is_that_of_the_file(kept: podusv.Run) -> None:
+def test_the_log_is_that_of_the_file(kept):
     assert kept.folder
     with xarray.open_dataset(kept.folder / "log.h5") as there:
         xarray.testing.assert_equal(kept.log, there)
@@ -176,20 +174,20 @@ def test_the_log_is_that_of_the_file(kept: podusv.Run) -> None:
     assert list(kept.log.coords) == ["time"]
 
 
-def test_a_log_with_networks_has_their_axes() -> None:
+def test_a_log_with_networks_has_their_axes():
     run = podusv.simulate("podusv:paper/corrected.yaml", {"simulation.duration": 0.1})
     assert run.log["W_hat_u"].dims == ("time", "node")
     assert run.log["rbf_center"].dims == ("node", "input")
     assert run.log["W_hat_u"].sizes == {"time": 11, "node": 27}
 
 
-def test_a_signal_is_an_array_and_an_unknown_one_is_told(kept: podusv.Run) -> None:
+def test_a_signal_is_an_array_and_an_unknown_one_is_told(kept):
     assert kept["z_e"].shape == (101,)
     with pytest.raises(KeyError, match="did you mean 'z_e'"):
         kept["ze"]
 
 
-def test_a_run_that_diverges_is_a_run_and_its_warnings_are_there() -> None:
+def test_a_run_that_diverges_is_a_run_and_its_warnings_are_there():
     run = podusv.simulate("podusv:paper/printed_from_zero.yaml", {"simulation.duration": 1.0})
     assert run.status == "diverged"
     assert run.message.startswith("diverged at t = 0.08 s")
@@ -198,9 +196,7 @@ def test_a_run_that_diverges_is_a_run_and_its_warnings_are_there() -> None:
     assert "diverged at t = 0.08 s" in run._repr_html_()
 
 
-def test_without_xarray_a_sentence_says_what_to_do(
-    kept: podusv.Run, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_xarray_a_sentence_says_what_to_do(kept, monkeypatch):
     monkeypatch.setitem(sys.modules, "xarray", None)
     with pytest.raises(
         ImportError, match=r"xarray is not installed: pip install 'podusv\[python\]'"
@@ -208,7 +204,7 @@ def test_without_xarray_a_sentence_says_what_to_do(
         _ = podusv.simulate(SHORT).log
 
 
-def test_a_figure_shows_in_a_notebook(kept: podusv.Run) -> None:
+def test_a_figure_shows_in_a_notebook(kept):
     figure = kept.plot("errors")
     assert isinstance(figure, Figure)
     png = figure._repr_png_()  # type: ignore[attr-defined]
@@ -219,7 +215,7 @@ def test_a_figure_shows_in_a_notebook(kept: podusv.Run) -> None:
         kept.plot("pods")
 
 
-def test_a_notebook_shows_trajectory_and_numbers(kept: podusv.Run) -> None:
+def test_a_notebook_shows_trajectory_and_numbers(kept):
     page = kept._repr_html_()
     (image,) = re.findall(r'<img src="data:image/png;base64,(.*?)">', page)
     assert base64.b64decode(image).startswith(b"\x89PNG")
@@ -230,7 +226,7 @@ def test_a_notebook_shows_trajectory_and_numbers(kept: podusv.Run) -> None:
 # --- comparisons
 
 
-def test_a_comparison_has_table_claims_runs_and_figures() -> None:
+def test_a_comparison_has_table_claims_runs_and_figures():
     done = podusv.compare(TWO, {"claims": {"C1": CLAIM}}, out="both", figures=False)
     assert list(done.table) == list(done.runs) == ["stiff", "soft"]
     assert done.table.loc["iae", "stiff"] == done["stiff"].metrics["iae"]
@@ -248,7 +244,7 @@ def test_a_comparison_has_table_claims_runs_and_figures() -> None:
     assert podusv.open_run("both/soft").metrics["iae"] == done["soft"].metrics["iae"]
 
 
-def test_scenarios_runs_and_folders_are_compared(kept: podusv.Run) -> None:
+def test_scenarios_runs_and_folders_are_compared(kept):
     other = podusv.load(SHORT, {"controller.K_Pu": 5.0, "name": "soft"})
     done = podusv.compare([kept, other], figures=False)
     assert list(done.table) == ["run", "soft"]
@@ -258,7 +254,7 @@ def test_scenarios_runs_and_folders_are_compared(kept: podusv.Run) -> None:
     assert again.table.loc["iae"].tolist() == done.table.loc["iae"].tolist()
 
 
-def test_what_cannot_be_compared_is_told(kept: podusv.Run) -> None:
+def test_what_cannot_be_compared_is_told(kept):
     with pytest.raises(
         UsageError, match=r"has no folder; make it with podusv\.run, or compare its"
     ):
@@ -267,7 +263,7 @@ def test_what_cannot_be_compared_is_told(kept: podusv.Run) -> None:
         podusv.compare(kept, {"start.x": 1.0})
 
 
-def test_many_runs_are_the_rows_of_a_table() -> None:
+def test_many_runs_are_the_rows_of_a_table():
     masses = np.array([20.0, 25.0])
     many = podusv.simulate_many(SHORT, {"vessel.m": masses}, workers=1)
     assert list(many["vessel.m"]) == [20.0, 25.0]
@@ -278,21 +274,21 @@ def test_many_runs_are_the_rows_of_a_table() -> None:
         assert many.loc[row, "iae"] == alone.metrics["iae"]
 
 
-def test_verify_is_a_table_of_numbers() -> None:
+def test_verify_is_a_table_of_numbers():
     found = podusv.verify(SHORT, tolerance=1e-9)
     assert list(found) == ["value", "order", "relative_error", "converged"]
     assert found.loc[("pid", "iae"), "value"] == podusv.simulate(SHORT).metrics["iae"]
     assert not found["converged"].all()
 
 
-def test_the_example_in_the_documentation_runs(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_example_in_the_documentation_runs(capsys):
     (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs/python.md").read_text(), re.DOTALL)
     exec(code, {})  # noqa: S102
     out = capsys.readouterr().out
     assert re.search(r"^soft +\d+\.\d+$", out, re.MULTILINE)
 
 
-def test_the_documentation_names_all_that_there_is() -> None:
+def test_the_documentation_names_all_that_there_is():
     text = (ROOT / "docs/python.md").read_text()
     for name in podusv.__all__:
         assert f"`{name}" in text

@@ -1,7 +1,5 @@
 """`make reproduce` and `make pod`: a line a step, and a checkout that stays as it was committed."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil
@@ -34,8 +32,8 @@ def kept(path: str) -> bool:
 
 
 def test_what_is_committed_of_a_comparison_comes_out_the_same_every_time(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+    tmp_path, monkeypatch, capsys
+):
     monkeypatch.chdir(tmp_path)
     podusv: Command = commanded(monkeypatch, capsys)
     write("two.yaml", TWO + SAYS)
@@ -51,14 +49,14 @@ def test_what_is_committed_of_a_comparison_comes_out_the_same_every_time(
         assert not committed & moved
 
 
-def test_git_tracks_nothing_that_it_would_not_keep() -> None:
+def test_git_tracks_nothing_that_it_would_not_keep():
     listed = ["git", "ls-files", "--cached", "--ignored", "--exclude-standard"]
     told = subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=True)
     assert told.stdout == ""
 
 
 @pytest.fixture
-def checkout(tmp_path: Path) -> Path:
+def checkout(tmp_path):
     """A checkout with a committed result and a stub of podusv."""
     (tmp_path / "results/paper/one").mkdir(parents=True)
     (tmp_path / "results/paper/one/comparison.md").write_text("old\n")
@@ -75,7 +73,7 @@ def step(checkout: Path, name: str, code: int) -> subprocess.CompletedProcess[st
     )  # fmt: skip
 
 
-def test_a_step_is_a_line_with_its_time_and_the_rest_is_in_a_file(checkout: Path) -> None:
+def test_a_step_is_a_line_with_its_time_and_the_rest_is_in_a_file(checkout):
     done = step(checkout, "one", 0)
     assert (done.returncode, done.stderr) == (0, "")
     assert re.fullmatch(r"  one +\d+ s  done\n", done.stdout)
@@ -84,7 +82,7 @@ def test_a_step_is_a_line_with_its_time_and_the_rest_is_in_a_file(checkout: Path
     assert re.fullmatch(r"  figures +\d+ s  done, some runs .* as expected\n", diverged.stdout)
 
 
-def test_a_step_that_ends_otherwise_stops_and_shows_why(checkout: Path) -> None:
+def test_a_step_that_ends_otherwise_stops_and_shows_why(checkout):
     done = step(checkout, "figures", 0)
     assert done.returncode == 1
     assert "exit code 3 in place of 0" in done.stdout
@@ -92,7 +90,7 @@ def test_a_step_that_ends_otherwise_stops_and_shows_why(checkout: Path) -> None:
     assert (checkout / "results/paper/one/comparison.md").read_text() == "old\n"
 
 
-def test_a_step_replaces_committed_files_and_leaves_others(checkout: Path) -> None:
+def test_a_step_replaces_committed_files_and_leaves_others(checkout):
     own = checkout / "results/paper/one/mine.txt"
     own.write_text("mine\n")
     for _ in range(2):  # over committed files alone, then over a whole result

@@ -1,7 +1,5 @@
 """The laws: shunting (17), the demands and adaptation (26)-(28), (35)-(37), and every option."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -41,24 +39,20 @@ def evaluate(law: Any, at: Situation) -> tuple[Answer, Tracking]:
 
 
 @given(alpha=number, beta=number, A=st.floats(0.1, 20), B=st.floats(0.1, 20))
-def test_shunting_is_17_with_f_and_g(alpha: float, beta: float, A: float, B: float) -> None:
+def test_shunting_is_17_with_f_and_g(alpha, beta, A, B):
     f, g = max(alpha, 0.0), max(-alpha, 0.0)
     printed = -A * beta + (B - beta) * f - (B + beta) * g
     assert shunting_rate(alpha, beta, A, B) == pytest.approx(printed, rel=1e-12, abs=1e-9)
 
 
 @given(alpha=number, beta=number, A=st.floats(0.1, 20))
-def test_an_adaptive_bound_makes_shunting_a_first_order_filter(
-    alpha: float, beta: float, A: float
-) -> None:
+def test_an_adaptive_bound_makes_shunting_a_first_order_filter(alpha, beta, A):
     rate = -(A + abs(alpha)) * (beta - alpha)
     assert shunting_rate(alpha, beta, A, math.nan) == pytest.approx(rate, rel=1e-12, abs=1e-9)
 
 
 @given(alpha=number, A=st.floats(0.1, 20), B=st.floats(0.1, 20))
-def test_a_constant_bound_is_one_and_its_gain_is_less_than_one_over_it(
-    alpha: float, A: float, B: float
-) -> None:
+def test_a_constant_bound_is_one_and_its_gain_is_less_than_one_over_it(alpha, A, B):
     # At the bound beta is driven back whatever alpha is, so |beta| < B for good.
     assert shunting_rate(alpha, B, A, B) < 0 < shunting_rate(alpha, -B, A, B)
     settled = B / (A + abs(alpha)) * alpha
@@ -68,7 +62,7 @@ def test_a_constant_bound_is_one_and_its_gain_is_less_than_one_over_it(
     )
 
 
-def test_in_a_run_a_constant_bound_holds_and_the_adaptive_one_does_not() -> None:
+def test_in_a_run_a_constant_bound_holds_and_the_adaptive_one_does_not():
     tight = corrected(controller=AdaptiveNeural(B_u=0.8, filter_start="zero"))
     out = run(tight, 3.0)
     assert abs(out["beta_u"]).max() < 0.8 < abs(out["alpha_u"]).max()
@@ -90,7 +84,7 @@ def filtered(law: Any, at: Situation, e: Tracking) -> tuple[Vector, Vector]:
 
 
 @pytest.mark.parametrize("kind", POLAR)
-def test_demand_and_adaptation_are_26_to_28_and_35_to_37(kind: Any) -> None:
+def test_demand_and_adaptation_are_26_to_28_and_35_to_37(kind):
     law, m = changed(kind), np.array([NONLINEAR.m11, NONLINEAR.m33])
     k, Gamma, sigma = np.array([[3.0, 30.0], [90.0, 80.0], [0.2, 0.3]])
     gamma, sigma_b, b_0 = np.array([[700.0, 600.0], [0.02, 0.03], [0.1, 0.2]])
@@ -118,7 +112,7 @@ def test_demand_and_adaptation_are_26_to_28_and_35_to_37(kind: Any) -> None:
 
 
 @pytest.mark.parametrize("kind", POLAR)
-def test_the_sign_of_the_coupling_changes_its_own_terms_only(kind: Any) -> None:
+def test_the_sign_of_the_coupling_changes_its_own_terms_only(kind):
     printed, right = kind(coupling="printed"), kind(coupling="corrected")
     for at in situations(right, 100):
         (one, e), (other, _) = evaluate(printed, at), evaluate(right, at)
@@ -134,14 +128,14 @@ def test_the_sign_of_the_coupling_changes_its_own_terms_only(kind: Any) -> None:
 
 
 @pytest.mark.parametrize("kind", POLAR)
-def test_only_the_nominal_vessel_s_inertia_enters_a_filtered_law(kind: Any) -> None:
+def test_only_the_nominal_vessel_s_inertia_enters_a_filtered_law(kind):
     law = kind()
     for at in situations(law, 20):
         same = np.array_equal(ask(law, *at, NONLINEAR).tau, ask(law, *at, PAPER).tau)
         assert same == (kind is not Backstepping)
 
 
-def test_pid_is_three_gains_on_the_velocity_errors() -> None:
+def test_pid_is_three_gains_on_the_velocity_errors():
     law = Pid(K_Pu=11.0, K_Iu=12.0, K_Du=13.0, K_Pr=21.0, K_Ir=22.0, K_Dr=23.0, T_d=0.3)
     for at in situations(law, 100):
         found, e = evaluate(law, at)
@@ -154,7 +148,7 @@ def test_pid_is_three_gains_on_the_velocity_errors() -> None:
         assert (found.signals["u_e"], found.signals["r_e"]) == (-error[0], -error[1])
 
 
-def test_pid_may_follow_the_path_s_own_speed_and_yaw_rate() -> None:
+def test_pid_may_follow_the_path_s_own_speed_and_yaw_rate():
     law = Pid(reference="path", K_Pu=1.0, K_Iu=0.0, K_Du=0.0, K_Pr=1.0, K_Ir=0.0, K_Dr=0.0)
     for at in situations(law, 100):
         speed, course, turn, gain = 0.7, 0.3 + at.x[0], -0.11, 0.05  # u_d, psi_d, r_d, u_d'
@@ -174,7 +168,7 @@ def test_pid_may_follow_the_path_s_own_speed_and_yaw_rate() -> None:
 
 
 @pytest.mark.parametrize("kind", [AdaptiveNeural, DynamicSurface])
-def test_the_filter_starts_at_zero_or_settled(kind: Any) -> None:
+def test_the_filter_starts_at_zero_or_settled(kind):
     for at in situations(kind(), 20):
         cold = kind(filter_start="zero").start(at.x, at.target, NONLINEAR)
         warm = kind(filter_start="alpha").start(at.x, at.target, NONLINEAR)
@@ -185,7 +179,7 @@ def test_the_filter_starts_at_zero_or_settled(kind: Any) -> None:
         assert found.rate[-2:].tolist() == [0.0, 0.0]
 
 
-def test_the_lag_starts_at_zero_or_at_the_error() -> None:
+def test_the_lag_starts_at_zero_or_at_the_error():
     for at in situations(Pid(), 20):
         cold = Pid(lag_start="zero").start(at.x, at.target, NONLINEAR)
         warm = Pid(lag_start="error").start(at.x, at.target, NONLINEAR)
@@ -197,7 +191,7 @@ def test_the_lag_starts_at_zero_or_at_the_error() -> None:
 
 
 @pytest.mark.parametrize("kind", POLAR)
-def test_bounds_and_weights_start_where_leakage_pulls_them(kind: Any) -> None:
+def test_bounds_and_weights_start_where_leakage_pulls_them(kind):
     law: PolarBackstepping = kind(b_hat_u0=0.3, b_hat_r0=0.4, network={"initial_weight": 0.05})
     at = next(situations(law, 1))
     memory = law.start(at.x, at.target, NONLINEAR)
@@ -206,7 +200,7 @@ def test_bounds_and_weights_start_where_leakage_pulls_them(kind: Any) -> None:
 
 
 @pytest.mark.parametrize("kind", [*POLAR, Pid])
-def test_a_law_works_where_the_direction_is_held(kind: Any) -> None:
+def test_a_law_works_where_the_direction_is_held(kind):
     # The paper's rule for z_e = 0: psi_d keeps its value and its derivatives are zero.
     law = kind(hold_below=0.2)
     for distance in (0.0, 1e-9, 0.1):
@@ -216,7 +210,7 @@ def test_a_law_works_where_the_direction_is_held(kind: Any) -> None:
         assert np.abs(tau).max() < 1e4
 
 
-def test_while_held_the_full_law_s_derivatives_are_those_of_a_fixed_direction() -> None:
+def test_while_held_the_full_law_s_derivatives_are_those_of_a_fixed_direction():
     law = Backstepping(hold_below=2.0, k_psie=0.7)
     x, target = np.array([0, 0, 0.1, 0.3, 0.1, 0.2]), np.array([0.9, 0.3, 0.5, 0.1, 0, 0])
     memory = law.start(x, target, NONLINEAR)

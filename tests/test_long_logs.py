@@ -1,7 +1,5 @@
 """Logs larger than memory: they are made on the disk, and come out as the very same file."""
 
-from __future__ import annotations
-
 import errno
 import io
 import os
@@ -53,24 +51,24 @@ def same_files(place: Path, text: str, **options: Any) -> None:
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_every_law_leaves_the_same_files(tmp_path: Path, law: str) -> None:
+def test_every_law_leaves_the_same_files(tmp_path, law):
     kind, period = LAWS[law]
     text = SCENARIO.format(actuator="{kind: saturated}", law=kind, period=period, compiled="false")
     same_files(tmp_path, text)
 
 
 @pytest.mark.parametrize("law", ["adaptive_neural", "pid"])
-def test_pods_leave_the_same_files(tmp_path: Path, law: str) -> None:
+def test_pods_leave_the_same_files(tmp_path, law):
     same_files(tmp_path, SCENARIO.format(actuator=POD, law=law, period=0, compiled="false"))
 
 
-def test_machine_code_leaves_the_same_files_and_figures(tmp_path: Path) -> None:
+def test_machine_code_leaves_the_same_files_and_figures(tmp_path):
     text = SCENARIO.format(actuator="{kind: saturated}", law="pid", period=0, compiled="true")
     same_files(tmp_path, text.replace("duration: 0.4", "duration: 60.0"), figures=True)
 
 
 @pytest.mark.parametrize("law", ["adaptive_neural", "pid"])
-def test_runs_that_diverge_leave_the_same_files(tmp_path: Path, law: str) -> None:
+def test_runs_that_diverge_leave_the_same_files(tmp_path, law):
     gain = {"pid": "K_Pu: 2e+4", "adaptive_neural": "k_ue: 1e+7"}[law]
     text = SCENARIO.format(
         actuator="{kind: ideal}", law=f"{law}, {gain}", period=0, compiled="false"
@@ -79,7 +77,7 @@ def test_runs_that_diverge_leave_the_same_files(tmp_path: Path, law: str) -> Non
     assert "diverged" in (tmp_path / "held/run/manifest.json").read_text()
 
 
-def test_room_on_the_disk_has_no_name_and_reads_as_it_was_written(tmp_path: Path) -> None:
+def test_room_on_the_disk_has_no_name_and_reads_as_it_was_written(tmp_path):
     room = disk_array(tmp_path, 10_000)
     room[:] = np.arange(10_000.0)
     assert list(tmp_path.iterdir()) == []
@@ -114,9 +112,7 @@ def writes_left(path: Path, monkeypatch: pytest.MonkeyPatch, writes: int) -> int
     return opened[0].left
 
 
-def test_a_disk_that_is_full_from_any_write_on_is_an_error_in_one_line(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_disk_that_is_full_from_any_write_on_is_an_error_in_one_line(tmp_path, monkeypatch):
     path = tmp_path / "log.h5"
     total = 10**9 - writes_left(path, monkeypatch, 10**9)
     assert path.read_bytes() == log()
@@ -171,7 +167,7 @@ FULL = {
 
 
 @pytest.mark.parametrize("case", FULL)
-def test_what_cannot_be_written_is_an_error_in_one_line(tmp_path: Path, case: str) -> None:
+def test_what_cannot_be_written_is_an_error_in_one_line(tmp_path, case):
     limit, held, says = FULL[case]
     text = SCENARIO.format(actuator="{kind: ideal}", law="pid", period=0, compiled="false")
     text = text.replace("duration: 0.4", "duration: 3.0")
@@ -184,7 +180,7 @@ def test_what_cannot_be_written_is_an_error_in_one_line(tmp_path: Path, case: st
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere memory cannot be limited so")
-def test_a_run_takes_far_less_memory_than_its_log(tmp_path: Path) -> None:
+def test_a_run_takes_far_less_memory_than_its_log(tmp_path):
     law = {"law": "adaptive_neural", "period": 0, "compiled": "true"}
     text = SCENARIO.format(actuator="{kind: saturated}", **law)
     text = text.replace("duration: 0.4", "duration: 2500.0")

@@ -1,22 +1,19 @@
 """`examples/my_lab`, installed: its law, path, vessel, metric and figure are found."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 import yaml
-from command_samples import ROOT, Command
+from command_samples import ROOT
 from installed_sample import LAB, install
 
 
 @pytest.fixture(scope="module")
-def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+def place(tmp_path_factory):
     """A folder with the package installed in `site`, and its scenario compared in `c`."""
     folder = tmp_path_factory.mktemp("lab")
     install(folder / "site")
@@ -37,7 +34,7 @@ def podusv(place: Path, *words: str, code: int = 0) -> str:
     return done.stdout + done.stderr
 
 
-def test_a_comparison_has_its_law_path_vessel_metric_and_figure(place: Path) -> None:
+def test_a_comparison_has_its_law_path_vessel_metric_and_figure(place):
     rows = (place / "c/comparison.csv").read_text().splitlines()
     assert any(row.startswith("largest_east,m,") for row in rows)
     (claim,) = json.loads((place / "c/claims.json").read_text())["claims"]
@@ -50,7 +47,7 @@ def test_a_comparison_has_its_law_path_vessel_metric_and_figure(place: Path) -> 
     assert own["package"] == "my-lab"
 
 
-def test_commands_list_explain_and_draw_it(place: Path) -> None:
+def test_commands_list_explain_and_draw_it(place):
     listed = podusv(place, "list")
     for name in ("los", "lawn", "skiff", "largest_east"):
         assert f"\n  {name}" in listed
@@ -61,7 +58,7 @@ def test_commands_list_explain_and_draw_it(place: Path) -> None:
     assert "identical" in podusv(place, "rerun", "c/los")
 
 
-def test_another_state_of_the_package_is_not_taken_for_the_one_that_was_used(place: Path) -> None:
+def test_another_state_of_the_package_is_not_taken_for_the_one_that_was_used(place):
     law = place / "site/my_lab/los.py"
     text = law.read_text()
     law.write_text(text + "\n")
@@ -72,7 +69,7 @@ def test_another_state_of_the_package_is_not_taken_for_the_one_that_was_used(pla
         law.write_text(text)
 
 
-def test_its_runs_are_looked_at_where_it_is_not_installed(place: Path, podusv: Command) -> None:
+def test_its_runs_are_looked_at_where_it_is_not_installed(place, podusv):
     assert podusv("plot", place / "c", "--figure", "errors", "--out", "p").code == 0
     said = podusv("compare", place / "c/los", place / "c/far", "--out", "d", "--no-figures")
     assert said.code == 0
@@ -84,7 +81,7 @@ def test_its_runs_are_looked_at_where_it_is_not_installed(place: Path, podusv: C
     assert "'my-lab' is no file (these end in .py) and no installed package" in said.err
 
 
-def test_a_package_that_cannot_be_imported_is_named(place: Path) -> None:
+def test_a_package_that_cannot_be_imported_is_named(place):
     figure = place / "site/my_lab/los.py"
     text = figure.read_text()
     figure.write_text("import no_such_module\n")

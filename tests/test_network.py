@@ -1,7 +1,5 @@
 """The radial basis network: (13)-(15), and its adaptation (27), (36)."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -44,7 +42,7 @@ def outputs(network: Network, nu: Any) -> Vector:
 
 @every_network
 @given(nu=velocities)
-def test_nodes_are_the_gaussians_of_14(network: Network, nu: Any) -> None:
+def test_nodes_are_the_gaussians_of_14(network, nu):
     c, sigma = network.center_array(), network.width_array()
     direct = np.array([np.exp(-sum((nu - c_i) ** 2 / (2 * sigma**2))) for c_i in c])
     np.testing.assert_allclose(outputs(network, nu), direct, rtol=1e-13, atol=1e-300)
@@ -53,18 +51,18 @@ def test_nodes_are_the_gaussians_of_14(network: Network, nu: Any) -> None:
 
 @every_network
 @given(nu=velocities, seed=st.integers(0, 1000))
-def test_the_output_is_the_sum_of_15(network: Network, nu: Any, seed: int) -> None:
+def test_the_output_is_the_sum_of_15(network, nu, seed):
     weights, phi = np.random.default_rng(seed).normal(size=network.count), outputs(network, nu)
     assert weigh(network.count, weights, phi) == pytest.approx(weights @ phi, rel=1e-12, abs=1e-15)
 
 
 @every_network
-def test_a_node_is_one_at_its_centre_and_in_the_order_of_the_weights(network: Network) -> None:
+def test_a_node_is_one_at_its_centre_and_in_the_order_of_the_weights(network):
     for node, center in enumerate(network.center_array()):
         assert outputs(network, center)[node] == 1.0
 
 
-def test_the_default_grid() -> None:
+def test_the_default_grid():
     network = Network()
     assert network.count == 27
     np.testing.assert_allclose(network.width_array(), [0.7 * 1.75, 0.7, 0.7])
@@ -76,7 +74,7 @@ def test_the_default_grid() -> None:
     assert {tuple(row) for row in c * [1, -1, -1]} == {tuple(row) for row in c}
 
 
-def test_weights_follow_27() -> None:
+def test_weights_follow_27():
     random = np.random.default_rng(2)
     weights, phi, rate = random.normal(size=9), random.uniform(size=9), np.full(9, np.nan)
     adapt(9, weights, phi, 0.8, 100.0, 0.1, 0.25, rate)
@@ -94,6 +92,6 @@ def test_weights_follow_27() -> None:
         {"spread": 0.0},
     ],
 )
-def test_a_network_that_spans_nothing_is_refused(fields: dict[str, Any]) -> None:
+def test_a_network_that_spans_nothing_is_refused(fields):
     with pytest.raises(ValidationError):
         Network(**fields)

@@ -1,14 +1,12 @@
 """`podusv new` writes files that work as they are; `podusv_cli.testing` finds what is wrong."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
-from command_samples import ROOT, Command
+from command_samples import ROOT
 from plugin_samples import LAW
 
 from podusv_cli import testing
@@ -27,7 +25,7 @@ def pytest_of(test: str) -> str:
     "what",
     ["law", *(pytest.param(what, marks=pytest.mark.slow) for what in ("path", "disturbance"))],
 )
-def test_what_is_written_runs_and_passes_its_own_test(podusv: Command, what: str) -> None:
+def test_what_is_written_runs_and_passes_its_own_test(podusv, what):
     said = podusv("new", what, "our_own")
     assert said.code == 0
     assert "next: podusv" in said.out
@@ -39,7 +37,7 @@ def test_what_is_written_runs_and_passes_its_own_test(podusv: Command, what: str
     assert "  our_own" in podusv("list", "--plugin", "our_own.py").out
 
 
-def test_nothing_is_replaced_and_names_are_checked(podusv: Command) -> None:
+def test_nothing_is_replaced_and_names_are_checked(podusv):
     podusv("new", "law", "mine")
     assert "mine.py exists" in podusv("new", "path", "mine").err
     assert podusv("new", "path", "mine").code == 5
@@ -72,18 +70,18 @@ def failures(law: str) -> list[str]:
 
 
 @pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def here(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
 @pytest.mark.usefixtures("here")
-def test_a_sound_law_keeps_the_contract() -> None:
+def test_a_sound_law_keeps_the_contract():
     assert failures(LAW) == []
 
 
 @pytest.mark.usefixtures("here")
 @pytest.mark.parametrize("line", WRONG)
-def test_a_mistake_breaks_the_contract(line: str) -> None:
+def test_a_mistake_breaks_the_contract(line):
     assert line in LAW
     wrong, words = WRONG[line]
     law = LAW.replace(line, wrong).replace("import numpy", "import math\n\nimport numpy")
@@ -91,7 +89,7 @@ def test_a_mistake_breaks_the_contract(line: str) -> None:
 
 
 @pytest.mark.usefixtures("here")
-def test_hidden_memory_breaks_the_contract() -> None:
+def test_hidden_memory_breaks_the_contract():
     law = LAW.replace("PUSH = 1.0", "PUSH = [1.0]").replace(
         "    return PUSH * k.gain", "    PUSH[0] += 1.0\n    return PUSH[0] * k.gain"
     )

@@ -5,18 +5,14 @@ numbers in them in plain text beside. Whoever raises `manifest.FORMAT` reads the
 makes new ones with `python tests/old_runs.py`.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import shutil
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
 import pytest
-from command_samples import Command
 from numpy.testing import assert_array_equal
 
 from podusv_cli.core.errors import StorageError
@@ -35,29 +31,29 @@ def unpacked(archive: Path, folder: Path) -> Path:
 
 
 @pytest.fixture(params=ARCHIVES, ids=NAMES)
-def archive(request: pytest.FixtureRequest) -> Path:
+def archive(request):
     path: Path = request.param
     return path
 
 
 @pytest.fixture
-def run(archive: Path, tmp_path: Path) -> Path:
+def run(archive, tmp_path):
     return unpacked(archive, tmp_path / "old")
 
 
 @pytest.fixture
-def told(archive: Path) -> Any:
+def told(archive):
     """What is in the run, in plain text."""
     return json.loads(archive.with_name(archive.name.replace(".tar.gz", ".json")).read_text())
 
 
-def test_there_are_runs_of_every_format() -> None:
+def test_there_are_runs_of_every_format():
     formats = range(1, manifest.FORMAT + 1)
     wanted = {f"format_{number}-{kind}" for number in formats for kind in KINDS}
     assert wanted <= set(NAMES), "python tests/old_runs.py makes those of this format"
 
 
-def test_every_number_is_read(run: Path, told: Any) -> None:
+def test_every_number_is_read(run, told):
     log = log_reader.read_log(run / "log.h5")
     assert {*log.signals, *log.fixed} == set(told["arrays"])
     for name, numbers in told["arrays"].items():
@@ -66,7 +62,7 @@ def test_every_number_is_read(run: Path, told: Any) -> None:
     assert log.message.startswith("diverged at t = " if log.status == "diverged" else "")
 
 
-def test_the_folder_is_opened(run: Path, told: Any) -> None:
+def test_the_folder_is_opened(run, told):
     opened = open_run(run)
     assert opened.status == told["status"]
     assert opened.metrics == told["metrics"]
@@ -75,7 +71,7 @@ def test_the_folder_is_opened(run: Path, told: Any) -> None:
 
 
 @pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4"])
-def test_xarray_reads_every_number(run: Path, told: Any, engine: str) -> None:
+def test_xarray_reads_every_number(run, told, engine):
     xarray = pytest.importorskip("xarray", reason="xarray reads logs but is not needed by podusv")
     pytest.importorskip({"netcdf4": "netCDF4"}.get(engine, engine), reason="an engine of xarray's")
     with xarray.open_dataset(run / "log.h5", engine=engine, decode_timedelta=False) as log:
@@ -86,7 +82,7 @@ def test_xarray_reads_every_number(run: Path, told: Any, engine: str) -> None:
 
 
 @pytest.fixture(params=range(1, manifest.FORMAT + 1))
-def folders(request: pytest.FixtureRequest, tmp_path: Path) -> dict[Path, Any]:
+def folders(request, tmp_path):
     """All runs of a format, and what is told of them."""
     place = FIXTURES / f"format_{request.param}"
     return {
@@ -97,7 +93,7 @@ def folders(request: pytest.FixtureRequest, tmp_path: Path) -> dict[Path, Any]:
     }
 
 
-def test_runs_are_drawn(folders: dict[Path, Any], tmp_path: Path, podusv: Command) -> None:
+def test_runs_are_drawn(folders, tmp_path, podusv):
     wanted = ("stability", "pods")
     asked = [word for name in wanted for word in ("--figure", name)]
     said = podusv("plot", *folders, *asked, "--out", tmp_path / "drawn")
@@ -105,7 +101,7 @@ def test_runs_are_drawn(folders: dict[Path, Any], tmp_path: Path, podusv: Comman
     assert {path.stem for path in (tmp_path / "drawn").iterdir()} == set(wanted)
 
 
-def test_runs_are_compared(folders: dict[Path, Any], tmp_path: Path, podusv: Command) -> None:
+def test_runs_are_compared(folders, tmp_path, podusv):
     said = podusv("compare", *folders, "--out", tmp_path / "all", "--no-figures", "--json")
     assert said.code == 3  # one of them diverged
     runs = {Path(run["run"]): run for run in json.loads(said.out)["runs"]}
@@ -114,7 +110,7 @@ def test_runs_are_compared(folders: dict[Path, Any], tmp_path: Path, podusv: Com
         assert runs[folder]["status"] == told["status"]
 
 
-def test_it_differs_in_nothing_from_itself(run: Path, podusv: Command) -> None:
+def test_it_differs_in_nothing_from_itself(run, podusv):
     said = podusv("diff", run, run)
     assert said == (0, "identical: scenario, metrics, log.h5 byte for byte\n", "")
 
@@ -122,7 +118,7 @@ def test_it_differs_in_nothing_from_itself(run: Path, podusv: Command) -> None:
 # --- what comes after this podusv
 
 
-def test_a_log_of_a_later_format_is_refused_in_a_sentence(run: Path) -> None:
+def test_a_log_of_a_later_format_is_refused_in_a_sentence(run):
     later = manifest.FORMAT + 1
     content = io.BytesIO((run / "log.h5").read_bytes())
     with h5py.File(content, "r+") as file:
@@ -133,7 +129,7 @@ def test_a_log_of_a_later_format_is_refused_in_a_sentence(run: Path) -> None:
         log_reader.read_log(run / "log.h5")
 
 
-def test_a_folder_of_a_later_format_is_refused_in_a_sentence(run: Path, podusv: Command) -> None:
+def test_a_folder_of_a_later_format_is_refused_in_a_sentence(run, podusv):
     later = manifest.FORMAT + 1
     stated = json.loads((run / manifest.NAME).read_text())
     (run / manifest.NAME).write_text(json.dumps(stated | {"podusv_format": later}))

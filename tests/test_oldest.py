@@ -1,7 +1,5 @@
 """The lower bounds in pyproject.toml are those that `make test-oldest` installs."""
 
-from __future__ import annotations
-
 import subprocess
 import tomllib
 
@@ -15,7 +13,7 @@ def said(command: str) -> str:
     ).stdout
 
 
-def test_the_oldest_set_has_every_dependency_at_its_lower_bound() -> None:
+def test_the_oldest_set_has_every_dependency_at_its_lower_bound():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     shown = said("make --dry-run test-oldest")
     listing = shown[shown.index("sed ") : shown.index("pyproject.toml")] + "pyproject.toml"

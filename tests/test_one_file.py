@@ -3,14 +3,11 @@
 Each is written into a copy of the package; no other file is touched. All commands know it then.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import h5py
@@ -172,7 +169,7 @@ claims:
 
 
 @pytest.fixture(scope="module")
-def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+def place(tmp_path_factory):
     """A folder with a copy of the package that has one file more of each kind."""
     folder = tmp_path_factory.mktemp("extended")
     copy = folder / "podusv_cli"
@@ -196,7 +193,7 @@ def podusv(place: Path, *words: str, code: int = 0) -> str:
     return done.stdout + done.stderr
 
 
-def test_every_command_knows_what_one_file_brings(place: Path) -> None:
+def test_every_command_knows_what_one_file_brings(place):
     said = podusv(place, "validate", "a.yaml")
     assert "a.yaml: ok (a, one, other, pid" in said
     assert "warning[lazy-law]: one: controller: the gain is small" in said
@@ -221,7 +218,7 @@ def test_every_command_knows_what_one_file_brings(place: Path) -> None:
     podusv(place, "diff", "c/one", "c/other", code=3)
 
 
-def test_everything_is_listed_and_explained(place: Path) -> None:
+def test_everything_is_listed_and_explained(place):
     listed = podusv(place, "list")
     kinds = ("cross_track", "still", "steady", "lagging", "barge")
     for name in (*kinds, "lazy-law", "far-off", "reach"):

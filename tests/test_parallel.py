@@ -113,9 +113,7 @@ def test_an_interrupted_caller_leaves_no_process(tmp_path):
             os.kill(process, 0)
 
 
-def test_an_interrupt_while_figures_are_drawn_is_one_and_no_bug(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_an_interrupt_while_figures_are_drawn_is_one_and_no_bug(monkeypatch):
     monkeypatch.setattr(
         drawing, "run_all", lambda jobs, *rest: [Outcome(failure=INTERRUPTED, interrupted=True)] * 2
     )

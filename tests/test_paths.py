@@ -1,7 +1,5 @@
 """Paths: derivatives, breaks, the three readings of (53), and splines through waypoints."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from itertools import pairwise
@@ -54,7 +52,7 @@ def jumps(path: Path, until: float) -> Iterator[tuple[float, str]]:
 
 
 @every_path
-def test_breaks_are_exactly_the_jumps(path: Path) -> None:
+def test_breaks_are_exactly_the_jumps(path):
     found = list(jumps(path, 130.0))
     stated = [(known.time, known.what) for known in path.breaks()]
     assert [order for _, order in found] == [order for _, order in stated]
@@ -62,7 +60,7 @@ def test_breaks_are_exactly_the_jumps(path: Path) -> None:
 
 
 @every_path
-def test_velocity_and_acceleration_are_derivatives(path: Path) -> None:
+def test_velocity_and_acceleration_are_derivatives(path):
     h = 1e-3
     broken = [known.time for known in path.breaks()]
     for t in np.random.default_rng(3).uniform(h, 150.0, 200):
@@ -72,14 +70,14 @@ def test_velocity_and_acceleration_are_derivatives(path: Path) -> None:
         np.testing.assert_allclose(now[2:], (after - before)[:4] / (2 * h), atol=2e-6)
 
 
-def test_the_straight_part_is_the_first_line_of_53() -> None:
+def test_the_straight_part_is_the_first_line_of_53():
     for reading in ("literal", "velocity", "sine"):
         for t in (0.0, 37.5, 100.0):
             found = target_at(LineCircle(reading=reading), t)
             np.testing.assert_array_equal(found, [0.5 * t, 0, 0.5, 0, 0, 0])
 
 
-def test_the_literal_reading_is_the_second_line_of_53_and_jumps_half_a_metre() -> None:
+def test_the_literal_reading_is_the_second_line_of_53_and_jumps_half_a_metre():
     path = LineCircle(reading="literal")
     for s in (0.25, 20.0, 150.0):
         expected = [50 + 0.5 * math.cos(0.03 * s), 0.5 * math.sin(0.03 * s)]
@@ -89,7 +87,7 @@ def test_the_literal_reading_is_the_second_line_of_53_and_jumps_half_a_metre() -
     assert math.hypot(*target_at(path, 170.0)[2:4]) == pytest.approx(0.015)
 
 
-def test_the_velocity_reading_is_the_printed_terms_integrated() -> None:
+def test_the_velocity_reading_is_the_printed_terms_integrated():
     path = LineCircle()
     for s in (1e-6, 20.0, 150.0):
         now = target_at(path, 100 + s)
@@ -102,7 +100,7 @@ def test_the_velocity_reading_is_the_printed_terms_integrated() -> None:
     np.testing.assert_allclose(target_at(path, turned)[:4], [50, 0, 0.5, 0], atol=1e-10)
 
 
-def test_only_the_sine_reading_keeps_the_speed_along_x() -> None:
+def test_only_the_sine_reading_keeps_the_speed_along_x():
     times = np.linspace(0, 309, 200)
     speeds = {reading: {round(target_at(LineCircle(reading=reading), t)[2], 12) for t in times}
               for reading in ("literal", "velocity", "sine")}  # fmt: skip
@@ -112,7 +110,7 @@ def test_only_the_sine_reading_keeps_the_speed_along_x() -> None:
 
 
 @pytest.mark.parametrize(("turn", "sense"), [("starboard", 1.0), ("port", -1.0)])
-def test_a_circle_turns_the_named_way_at_constant_speed(turn: Any, sense: float) -> None:
+def test_a_circle_turns_the_named_way_at_constant_speed(turn, sense):
     path = Circle(x=1.0, y=-2.0, radius=8.0, speed=0.4, turn=turn)
     for t in np.linspace(0, 200, 50):
         now = target_at(path, t)
@@ -122,7 +120,7 @@ def test_a_circle_turns_the_named_way_at_constant_speed(turn: Any, sense: float)
         assert np.sign(now[2] * now[5] - now[3] * now[4]) == sense
 
 
-def test_a_spline_passes_its_points_when_chords_at_speed_would() -> None:
+def test_a_spline_passes_its_points_when_chords_at_speed_would():
     path = Waypoints(points=POINTS, speed=0.8)
     chords = [math.dist(a, b) for a, b in pairwise(POINTS)]
     knots = np.concatenate([[0.0], np.cumsum(chords)]) / 0.8
@@ -134,7 +132,7 @@ def test_a_spline_passes_its_points_when_chords_at_speed_would() -> None:
         np.testing.assert_allclose(target_at(path, t), expected, atol=1e-12)
 
 
-def test_after_the_last_point_the_target_goes_straight_on() -> None:
+def test_after_the_last_point_the_target_goes_straight_on():
     path = Waypoints(points=POINTS)
     end = sum(math.dist(a, b) for a, b in pairwise(POINTS)) / 0.5
     last = target_at(path, end)
@@ -144,7 +142,7 @@ def test_after_the_last_point_the_target_goes_straight_on() -> None:
     np.testing.assert_array_equal(later[2:], [*last[2:4], 0.0, 0.0])
 
 
-def test_after_the_last_point_the_target_may_stop() -> None:
+def test_after_the_last_point_the_target_may_stop():
     path = Waypoints(points=POINTS, after="stop")
     ((end, _),) = [(known.time, known.what) for known in path.breaks()]
     assert end == pytest.approx(sum(math.dist(a, b) for a, b in pairwise(POINTS)) / 0.5)
@@ -154,7 +152,7 @@ def test_after_the_last_point_the_target_may_stop() -> None:
     np.testing.assert_array_equal(target_at(path, 0.7 * end), before)
 
 
-def test_after_the_last_point_the_target_may_go_round_again() -> None:
+def test_after_the_last_point_the_target_may_go_round_again():
     path, closed = (Waypoints(points=p, after="loop") for p in (POINTS, (*POINTS, POINTS[0])))
     period = sum(math.dist(a, b) for a, b in pairwise((*POINTS, POINTS[0]))) / 0.5
     for t in np.random.default_rng(5).uniform(0, period, 20):
@@ -164,7 +162,7 @@ def test_after_the_last_point_the_target_may_go_round_again() -> None:
     np.testing.assert_allclose(target_at(path, period - 1e-9), target_at(path, 0.0), atol=1e-8)
 
 
-def test_two_points_make_a_line() -> None:
+def test_two_points_make_a_line():
     straight = Line(course=math.atan2(3, 4), speed=0.5)
     path = Waypoints(points=((0.0, 0.0), (4.0, 3.0)))
     for t in (0.0, 3.3, 10.0, 55.0):
@@ -172,6 +170,6 @@ def test_two_points_make_a_line() -> None:
 
 
 @pytest.mark.parametrize("points", [(), ((1.0, 2.0),), ((0.0, 0.0), (1.0, 1.0), (1.0, 1.0))])
-def test_points_without_a_way_are_refused(points: Any) -> None:
+def test_points_without_a_way_are_refused(points):
     with pytest.raises(ValidationError):
         Waypoints(points=points)

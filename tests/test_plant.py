@@ -1,7 +1,5 @@
 """The vessel: kinematics (1)-(3), kinetics (4)-(7) and (12), and their exact solutions."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -76,7 +74,7 @@ def without_cross_damping(p: Vessel) -> Vessel:
 
 
 @given(nu=velocities, load=velocities, psi=st.floats(-10, 10))
-def test_the_plant_is_the_matrix_equation(nu: Any, load: Any, psi: float) -> None:
+def test_the_plant_is_the_matrix_equation(nu, load, psi):
     c, s = math.cos(psi), math.sin(psi)
     J = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
     for p in (*VESSELS.values(), UNLIKE):
@@ -88,7 +86,7 @@ def test_the_plant_is_the_matrix_equation(nu: Any, load: Any, psi: float) -> Non
 
 
 @given(nu=velocities, tau=st.tuples(speed, speed), b=velocities)
-def test_the_paper_s_vessel_is_equation_12(nu: Any, tau: Any, b: Any) -> None:
+def test_the_paper_s_vessel_is_equation_12(nu, tau, b):
     (u, v, r), (tau_u, tau_r) = nu, tau
     u_dot = 33.8 / 25.8 * v * r - 0.72 / 25.8 * u + (tau_u + b[0]) / 25.8
     v_dot = -25.8 / 33.8 * u * r - 0.8896 / 33.8 * v + b[1] / 33.8
@@ -97,7 +95,7 @@ def test_the_paper_s_vessel_is_equation_12(nu: Any, tau: Any, b: Any) -> None:
     np.testing.assert_allclose(found, [u_dot, v_dot, r_dot], rtol=1e-12, atol=1e-13)
 
 
-def test_the_three_vessels_share_the_paper_s_inertia_and_linear_damping() -> None:
+def test_the_three_vessels_share_the_paper_s_inertia_and_linear_damping():
     for p in (PAPER, NONLINEAR, VESSELS["cybership2"]):
         assert (p.m11, p.m22, p.m33) == pytest.approx((25.8, 33.8, 2.76))
         assert (-p.X_u, -p.Y_v, -p.N_r) == pytest.approx((0.72, 0.8896, 1.9), rel=4e-3)
@@ -107,7 +105,7 @@ def test_the_three_vessels_share_the_paper_s_inertia_and_linear_damping() -> Non
 
 
 @given(nu=velocities)
-def test_coriolis_forces_do_no_work(nu: Any) -> None:
+def test_coriolis_forces_do_no_work(nu):
     for p in VESSELS.values():
         undamped = p.model_copy(update=dict.fromkeys(DAMPING, 0.0))
         power = nu @ inertia(p) @ accelerations(undamped, nu)
@@ -115,7 +113,7 @@ def test_coriolis_forces_do_no_work(nu: Any) -> None:
 
 
 @given(nu=velocities)
-def test_kinetic_energy_never_grows_in_calm_water(nu: Any) -> None:
+def test_kinetic_energy_never_grows_in_calm_water(nu):
     for p in (PAPER, NONLINEAR, without_cross_damping(VESSELS["cybership2"])):
         power = nu @ inertia(p) @ accelerations(p, nu)
         assert power <= 1e-13 * np.abs(nu).max() ** 3
@@ -123,7 +121,7 @@ def test_kinetic_energy_never_grows_in_calm_water(nu: Any) -> None:
             assert power < 0
 
 
-def test_the_published_cross_damping_of_cybership2_feeds_energy_in() -> None:
+def test_the_published_cross_damping_of_cybership2_feeds_energy_in():
     # Y_r + N_v = -7.2 outweighs 2 sqrt(Y_v N_r) = 2.6: no property above can be asked of it.
     p, nu = VESSELS["cybership2"], np.array([0.0, 0.05, -0.1])
     assert nu @ inertia(p) @ accelerations(p, nu) > 0
@@ -131,13 +129,13 @@ def test_the_published_cross_damping_of_cybership2_feeds_energy_in() -> None:
 
 @every_vessel
 @given(nu=velocities, load=velocities)
-def test_port_is_the_mirror_image_of_starboard(vessel: Vessel, nu: Any, load: Any) -> None:
+def test_port_is_the_mirror_image_of_starboard(vessel, nu, load):
     mirror = np.array([1, -1, -1])
     there = accelerations(vessel, mirror * nu, mirror * load)
     np.testing.assert_array_equal(there, mirror * accelerations(vessel, nu, load))
 
 
-def test_coasting_under_linear_damping_is_an_exponential() -> None:
+def test_coasting_under_linear_damping_is_an_exponential():
     loop = adrift(vessel=PAPER, start=(3.0, -2.0, 0.7, 1.5, 0.0, 0.0))
     out = run(loop, 60.0, 0.05)
     decay = 0.72 / 25.8
@@ -148,7 +146,7 @@ def test_coasting_under_linear_damping_is_an_exponential() -> None:
 
 
 @every_vessel
-def test_a_balanced_turn_is_a_circle(vessel: Vessel) -> None:
+def test_a_balanced_turn_is_a_circle(vessel):
     u, r = 0.8, 0.2
     v = float(root(lambda v: balance(vessel, np.array([u, v[0], r]), np.zeros(3))[1], [0.0]).x[0])
     surge, _, yaw = -balance(vessel, np.array([u, v, r]), np.zeros(3))
@@ -164,7 +162,7 @@ def test_a_balanced_turn_is_a_circle(vessel: Vessel) -> None:
 
 
 @pytest.mark.parametrize("p", [PAPER, NONLINEAR], ids=["paper", "paper_nonlinear"])
-def test_a_constant_load_ends_in_its_static_balance(p: Vessel) -> None:
+def test_a_constant_load_ends_in_its_static_balance(p):
     load = np.array([0.4, 0.3, 0.2])
     b_u, b_v, b_r = (Harmonic(mean=mean) for mean in load)
     sea = HarmonicDisturbance(b_u=b_u, b_v=b_v, b_r=b_r)
@@ -176,7 +174,7 @@ def test_a_constant_load_ends_in_its_static_balance(p: Vessel) -> None:
 
 
 @given(x=st.lists(st.floats(-50, 50), min_size=6, max_size=6).map(np.array))
-def test_earth_velocity_keeps_the_speed_and_the_turn(x: Any) -> None:
+def test_earth_velocity_keeps_the_speed_and_the_turn(x):
     rate = np.full(6, np.nan)
     earth_velocity(x, rate)
     assert math.hypot(rate[0], rate[1]) == pytest.approx(math.hypot(x[3], x[4]), rel=1e-12)
@@ -184,14 +182,14 @@ def test_earth_velocity_keeps_the_speed_and_the_turn(x: Any) -> None:
 
 
 @given(angle=st.floats(-1e6, 1e6))
-def test_wrapping_changes_whole_turns_only(angle: float) -> None:
+def test_wrapping_changes_whole_turns_only(angle):
     wrapped = wrap(angle)
     assert -math.pi < wrapped <= math.pi
     turns = (angle - wrapped) / (2 * math.pi)
     assert turns == pytest.approx(round(turns), abs=1e-9)
 
 
-def test_wrapping_at_its_edges() -> None:
+def test_wrapping_at_its_edges():
     assert wrap(math.pi) == math.pi
     assert wrap(-math.pi) == math.pi
     assert wrap(math.nextafter(math.pi, 4)) == pytest.approx(-math.pi)
@@ -202,6 +200,6 @@ def test_wrapping_at_its_edges() -> None:
     "change",
     [{"X_udot": 30.0}, {"x_g": 0.5}, {"Y_v": 0.1}, {"N_r": 0.1}, {"X_u": 0.1}, {"m": -1.0}],
 )
-def test_an_impossible_vessel_is_refused(change: dict[str, float]) -> None:
+def test_an_impossible_vessel_is_refused(change):
     with pytest.raises(ValidationError):
         Vessel(**NONLINEAR.model_dump() | change)

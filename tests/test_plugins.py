@@ -1,7 +1,5 @@
 """Components in files outside the package: found, run, recorded; not needed to look at runs."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import shutil
@@ -10,7 +8,7 @@ from pathlib import Path
 import h5py
 import pytest
 import yaml
-from command_samples import BASE, Command, one_line, write
+from command_samples import BASE, one_line, write
 from plugin_samples import LAW, SCENARIO, TWO, put
 
 from podusv_cli.core.plugins import from_file
@@ -26,7 +24,7 @@ def digits(place: str) -> str:
     return place.strip()[-8:]
 
 
-def test_a_file_s_law_runs_compiled_and_its_run_says_which_file(podusv: Command) -> None:
+def test_a_file_s_law_runs_compiled_and_its_run_says_which_file(podusv):
     assert podusv("run", put(), "--out", "r", *QUIET).code == 0
     with h5py.File("r/log.h5") as log:
         assert (log["e_ct"].attrs["units"], log["drift"].attrs["units"]) == (b"m", b"m s")
@@ -39,7 +37,7 @@ def test_a_file_s_law_runs_compiled_and_its_run_says_which_file(podusv: Command)
     assert Path("r/plugins/my_law.py").read_text() == LAW
 
 
-def test_a_file_is_named_on_the_command_line_too(podusv: Command) -> None:
+def test_a_file_is_named_on_the_command_line_too(podusv):
     text = SCENARIO.replace("plugins: [laws/my_law.py]\n", "")
     shutil.move("laws/my_law.py", "own.py") if put(text) else None
     assert podusv("run", "a.yaml", *QUIET).code == 2
@@ -48,7 +46,7 @@ def test_a_file_is_named_on_the_command_line_too(podusv: Command) -> None:
         assert podusv(command, "a.yaml", "--plugin", "own.py", *options).code in (0, 3), command
 
 
-def test_the_file_is_looked_for_beside_the_scenario(podusv: Command, tmp_path: Path) -> None:
+def test_the_file_is_looked_for_beside_the_scenario(podusv, tmp_path):
     put()
     Path("inner").mkdir()
     shutil.move("laws", "inner")
@@ -58,7 +56,7 @@ def test_the_file_is_looked_for_beside_the_scenario(podusv: Command, tmp_path: P
     assert podusv("validate", "b.yaml").code == 0
 
 
-def test_workers_of_a_comparison_know_it(podusv: Command) -> None:
+def test_workers_of_a_comparison_know_it(podusv):
     assert podusv("compare", put(TWO), "--out", "c", *QUIET).code == 0
     for label, force in (("soft", 0.25), ("stiff", 0.5)):
         with h5py.File(f"c/{label}/log.h5") as log:
@@ -68,7 +66,7 @@ def test_workers_of_a_comparison_know_it(podusv: Command) -> None:
     assert own["sha256"] == DIGEST
 
 
-def test_a_run_repeats_itself_without_the_original(podusv: Command) -> None:
+def test_a_run_repeats_itself_without_the_original(podusv):
     podusv("run", put(), "--out", "r", *QUIET)
     shutil.move("r", "moved")
     shutil.rmtree("laws")
@@ -78,7 +76,7 @@ def test_a_run_repeats_itself_without_the_original(podusv: Command) -> None:
     assert podusv("diff", "moved", "again").code == 0
 
 
-def test_a_finished_run_is_looked_at_without_reading_its_file(podusv: Command) -> None:
+def test_a_finished_run_is_looked_at_without_reading_its_file(podusv):
     podusv("compare", put(TWO), "--out", "c", *QUIET)
     trap = LAW + '\nfrom pathlib import Path\nPath("touched").touch()\n'
     for place in Path("c").glob("*/plugins/my_law.py"):
@@ -101,7 +99,7 @@ def test_a_finished_run_is_looked_at_without_reading_its_file(podusv: Command) -
     assert podusv("rerun", "c/soft").code == 2
 
 
-def test_an_edit_is_noticed_by_the_code_cache_and_in_the_name(podusv: Command) -> None:
+def test_an_edit_is_noticed_by_the_code_cache_and_in_the_name(podusv):
     first = podusv("run", put(), *QUIET)
     put(law=LAW.replace("PUSH = 1.0", "PUSH = 2.0"))
     second = podusv("run", "a.yaml", *QUIET)
@@ -114,7 +112,7 @@ def test_an_edit_is_noticed_by_the_code_cache_and_in_the_name(podusv: Command) -
     assert DIGEST[:30] in said.out
 
 
-def test_a_changed_copy_is_not_run_as_if_it_were_the_same(podusv: Command) -> None:
+def test_a_changed_copy_is_not_run_as_if_it_were_the_same(podusv):
     podusv("run", put(), "--out", "r", *QUIET)
     Path("r/plugins/my_law.py").write_text(LAW + "\n")
     said = podusv("run", "r/resolved.yaml", *QUIET)
@@ -122,9 +120,7 @@ def test_a_changed_copy_is_not_run_as_if_it_were_the_same(podusv: Command) -> No
     assert "r/plugins/my_law.py is not the one that was used; without sha256, any is" in said.err
 
 
-def test_scenarios_of_one_process_know_only_their_own_files(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_scenarios_of_one_process_know_only_their_own_files(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     own = load(put()).scenario
     assert own.controller.label == "cross_track"
@@ -151,7 +147,7 @@ FAULTY = {
 
 
 @pytest.mark.parametrize("law", FAULTY)
-def test_a_file_that_is_no_plug_in_is_refused_in_a_line(podusv: Command, law: str) -> None:
+def test_a_file_that_is_no_plug_in_is_refused_in_a_line(podusv, law):
     for command in ("run", "compare", "validate"):
         said = podusv(command, put(law=law))
         assert (said.code, said.out) == (2, "")
@@ -172,13 +168,13 @@ NAMED = {
 
 
 @pytest.mark.parametrize("text", NAMED)
-def test_what_plugins_may_name(podusv: Command, text: str) -> None:
+def test_what_plugins_may_name(podusv, text):
     said = podusv("validate", put(SCENARIO.replace("plugins: [laws/my_law.py]", text)))
     assert said.code == 2
     assert NAMED[text] in said.err
 
 
-def test_a_file_may_stand_alone_or_twice(podusv: Command) -> None:
+def test_a_file_may_stand_alone_or_twice(podusv):
     for entry in (
         "laws/my_law.py",
         "[laws/my_law.py, ./laws/my_law.py]",

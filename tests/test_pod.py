@@ -1,7 +1,5 @@
 """Pods as mechanics: thrust and its inverse, lags and rates, equilibria, symmetry, bad input."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -54,9 +52,7 @@ def loads(actuator: Pods, state: Vector, x: Vector, demand: tuple[float, float] 
     T=st.floats(-8, 8), u=st.floats(-1, 1), v=st.floats(-1, 1), T_nV=st.floats(0, 0.5),
     form=st.sampled_from(["physical", "printed"]),
 )  # fmt: skip
-def test_the_inverse_gives_the_thrust_back(
-    T: float, u: float, v: float, T_nV: float, form: Any
-) -> None:
+def test_the_inverse_gives_the_thrust_back(T, u, v, T_nV, form):
     one = pods({"T_nV": T_nV}, thrust_form=form)
     k, table, x = bundle(one.constants()), one.table(), np.array([0, 0, 0, u, v, 0.1])
     gain = speed_gain(x, table, 0.3, k)
@@ -65,7 +61,7 @@ def test_the_inverse_gives_the_thrust_back(
     assert n * T >= 0.0
 
 
-def test_physical_thrust_falls_with_speed_and_the_printed_one_rises() -> None:
+def test_physical_thrust_falls_with_speed_and_the_printed_one_rises():
     ahead = np.array([0, 0, 0, 0.5, 0, 0])
     for form, sign in (("physical", -1), ("printed", 1)):
         one = pods({"T_nV": 2e-3}, thrust_form=form)
@@ -73,7 +69,7 @@ def test_physical_thrust_falls_with_speed_and_the_printed_one_rises() -> None:
         assert tau[0] == pytest.approx(POD["T_nn"] * 400 + sign * 2e-3 * 20 * 0.5)
 
 
-def test_the_advance_speed_is_that_of_the_water_along_the_pod() -> None:
+def test_the_advance_speed_is_that_of_the_water_along_the_pod():
     one = pods({"T_nV": 2e-3, "y": 0.1})
     x, delta = np.array([0, 0, 0, 0.5, 0.2, 0.3]), 0.4
     velocity = [0.5 - 0.1 * 0.3, 0.2 - 0.499 * 0.3]  # nu + r x (x_p, y_p)
@@ -81,7 +77,7 @@ def test_the_advance_speed_is_that_of_the_water_along_the_pod() -> None:
     assert speed_gain(x, one.table(), delta, bundle(one.constants())) == pytest.approx(-2e-3 * V_a)
 
 
-def test_at_rest_nothing_is_undefined() -> None:
+def test_at_rest_nothing_is_undefined():
     one = pods({"T_nV": 2e-3})
     tau, rate, signals = loads(one, np.zeros(2), np.zeros(6))
     assert not tau.any()
@@ -90,7 +86,7 @@ def test_at_rest_nothing_is_undefined() -> None:
 
 
 @given(n=st.floats(-33, 33), delta=st.floats(-0.6, 0.6))
-def test_loads_are_those_of_the_force_at_its_place(n: float, delta: float) -> None:
+def test_loads_are_those_of_the_force_at_its_place(n, delta):
     for kept in (True, False):
         pair = pods(*TWIN, neglect_sway_force=not kept)
         tau, _, signals = loads(pair, state_of(pair, n, delta), np.zeros(6))
@@ -101,7 +97,7 @@ def test_loads_are_those_of_the_force_at_its_place(n: float, delta: float) -> No
         np.testing.assert_allclose(tau, 2 * T * np.array(expected), atol=1e-12)
 
 
-def test_bollard_pull_of_cybership_ii() -> None:
+def test_bollard_pull_of_cybership_ii():
     """facts: 4.0 N ahead and 5.7 N astern each, about."""
     one = pods({"T_nn": 3.65034e-3, "T_nn_astern": 5.10256e-3})
     ahead, astern = (loads(one, state_of(one, n, 0.0), np.zeros(6))[0][0] for n in (33, -33))
@@ -117,7 +113,7 @@ def step_response(lag: float, rate: float, goal: float, t: Vector) -> Vector:
 
 
 @pytest.mark.parametrize("rate", [60.0, 1e9])
-def test_speed_and_angle_follow_their_lags_and_rates_exactly(rate: float) -> None:
+def test_speed_and_angle_follow_their_lags_and_rates_exactly(rate):
     T, angle = 4.0, 0.5
     law = Constant(surge=T * math.cos(angle), yaw=-0.499 * T * math.sin(angle))
     one = pods({"n_rate": rate, "n_lag": 0.25, "angle_rate": rate / 60, "angle_lag": 0.125})
@@ -134,7 +130,7 @@ def test_speed_and_angle_follow_their_lags_and_rates_exactly(rate: float) -> Non
     assert out["rate_limited"][-1] == 0.0
 
 
-def test_port_is_starboard_in_the_mirror() -> None:
+def test_port_is_starboard_in_the_mirror():
     """Everything to starboard changes sign: y, psi, v, r, yaw moment, sway force, angles."""
     both = []
     for side in (1.0, -1.0):
@@ -150,7 +146,7 @@ def test_port_is_starboard_in_the_mirror() -> None:
     np.testing.assert_allclose(one["delta"], -other["delta"][:, ::-1], atol=1e-6)
 
 
-def test_away_from_limits_the_loop_is_of_fourth_order() -> None:
+def test_away_from_limits_the_loop_is_of_fourth_order():
     fast = pods({"n_rate": 1e6, "angle_rate": 1e6, "n_max": 1e3, "angle_limit": 1.5})
     law = Pid(K_Pu=20.0, K_Iu=1.0, K_Du=0.0, K_Pr=2.0, K_Ir=0.1, K_Dr=0.0, anti_windup="auxiliary")
     loop = corrected(actuator=fast, controller=law, path=Line(), start=SMOOTH_START)
@@ -163,7 +159,7 @@ def test_away_from_limits_the_loop_is_of_fourth_order() -> None:
     assert order(ends) == pytest.approx(4.0, abs=0.2)
 
 
-def test_a_demand_out_of_reach_is_an_event_and_no_accident() -> None:
+def test_a_demand_out_of_reach_is_an_event_and_no_accident():
     for actuator in (pods(), pods(*TWIN)):
         loop = adrift(actuator=actuator, controller=Constant(surge=1e9, yaw=-1e12))
         log, got = gathered(loop, steps=500)
@@ -176,7 +172,7 @@ def test_a_demand_out_of_reach_is_an_event_and_no_accident() -> None:
         assert np.abs(log["n"]).max() <= 33.0
 
 
-def test_energy_and_travel_are_those_of_the_log() -> None:
+def test_energy_and_travel_are_those_of_the_log():
     actuator = pods(*({**one, "power_nnn": 2e-4} for one in TWIN))
     log, got = gathered(corrected(actuator=actuator), steps=2000)
     power = 2e-4 * np.abs(log["n"]) ** 3
@@ -210,16 +206,14 @@ def test_energy_and_travel_are_those_of_the_log() -> None:
         ),
     ],
 )
-def test_pods_that_cannot_be_are_refused(several: list[dict[str, float]], words: str) -> None:
+def test_pods_that_cannot_be_are_refused(several, words):
     with pytest.raises(ValidationError, match=words):
         Pods(pods=tuple({**POD, **own} for own in several))
 
 
 @pytest.mark.parametrize("demand", [(math.nan, 1.0), (5.0, 1.0)])
 @pytest.mark.parametrize("gain", [0.0, math.nan, math.inf])
-def test_what_is_no_number_is_no_allocation_and_none_is_searched_for(
-    demand: tuple[float, float], gain: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_no_number_is_no_allocation_and_none_is_searched_for(demand, gain, monkeypatch):
     tried: list[int] = []
 
     def pull(*arguments: Any) -> None:
@@ -239,12 +233,12 @@ def test_what_is_no_number_is_no_allocation_and_none_is_searched_for(
     assert len(tried) < 200
 
 
-def test_the_paper_s_vessel_has_the_drag_of_the_hand_calculation() -> None:
+def test_the_paper_s_vessel_has_the_drag_of_the_hand_calculation():
     k = NONLINEAR.constants()
     assert -(k["X_u"] + k["X_uu"] * 0.5 + k["X_uuu"] * 0.25) * 0.5 == pytest.approx(DRAG)
 
 
-def test_the_figure_shows_what_each_pod_did_over_what_it_was_asked_for() -> None:
+def test_the_figure_shows_what_each_pod_did_over_what_it_was_asked_for():
     log = run(corrected(actuator=pods(*TWIN)), 5.0)
     panels = np.reshape(drawn("pods", shown(("pods", log))).axes, (2, 2))
     for row, name in zip(panels, ("n", "delta"), strict=True):
@@ -264,7 +258,7 @@ def test_the_figure_shows_what_each_pod_did_over_what_it_was_asked_for() -> None
         pods(horizon=0.02),
     ],
 )
-def test_settled_force_and_moment_are_where_lags_and_limits_end(one: Pods) -> None:
+def test_settled_force_and_moment_are_where_lags_and_limits_end(one):
     x, demand, step = np.array([0, 0, 0, 0.5, 0.1, 0.05]), np.array([3.0, 0.8]), 0.02
     state = one.rest()
     for _ in range(400):

@@ -1,7 +1,5 @@
 """Where a vessel behind a pod comes to rest: scipy's root of the balances, and long simulations."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any
@@ -73,9 +71,7 @@ def steady_run(actuator: Pods, b: Loads, duration: float = 240.0) -> Recording:
 
 
 @pytest.mark.parametrize(("b", "kept", "told"), LINES, ids=lambda value: str(value)[-24:])
-def test_on_a_line_the_pod_turns_by_what_the_balance_of_loads_says(
-    b: Loads, kept: bool, told: str
-) -> None:
+def test_on_a_line_the_pod_turns_by_what_the_balance_of_loads_says(b, kept, told):
     u, v, T, delta = straight(b, kept)
     one = pods({"angle_limit": 1.2}, neglect_sway_force=not kept)
     log = steady_run(one, b)
@@ -86,14 +82,14 @@ def test_on_a_line_the_pod_turns_by_what_the_balance_of_loads_says(
     assert told in RESULTS
 
 
-def test_what_35_deg_cannot_hold_is_a_pod_at_its_limit() -> None:
+def test_what_35_deg_cannot_hold_is_a_pod_at_its_limit():
     beyond = steady_run(pods(), (0.9, 0.5, 0.7), 100.0)
     held = steady_run(pods(), (0.5, 0.5, 0.7), 100.0)
     assert beyond["angle_limited"][-1] == beyond["saturated"][-1] == 1.0
     assert held["angle_limited"][-1] == held["saturated"][-1] == 0.0
 
 
-def test_a_pod_alone_makes_a_third_of_a_newton_metre_with_the_load_from_behind() -> None:
+def test_a_pod_alone_makes_a_third_of_a_newton_metre_with_the_load_from_behind():
     """results/pod.md: T cos(delta) is drag less b_u; with b_u against, it is the 0.67 N m."""
     drag = (0.72 + 1.32742 * U + 5.86643 * U * U) * U
     behind, against = (-X_P * (drag - b_u) * math.tan(math.radians(35.0)) for b_u in (0.5, -0.5))
@@ -101,7 +97,7 @@ def test_a_pod_alone_makes_a_third_of_a_newton_metre_with_the_load_from_behind()
     assert f"{against:.2f} N m that one gets" in RESULTS
 
 
-def test_a_steady_turn_is_the_root_of_the_published_equations_of_motion() -> None:
+def test_a_steady_turn_is_the_root_of_the_published_equations_of_motion():
     """CyberShip II (Skjetne, Smogeli, Fossen 2004) under T cos(delta) = 2 N and 0.4 N m."""
 
     def short(q: Any) -> list[float]:
@@ -127,7 +123,7 @@ def test_a_steady_turn_is_the_root_of_the_published_equations_of_motion() -> Non
     )
 
 
-def test_bollard_a_pod_at_rest_pulls_and_turns_by_its_thrust() -> None:
+def test_bollard_a_pod_at_rest_pulls_and_turns_by_its_thrust():
     """Held at rest: 7.30068e-3 * 20^2 = 2.92 N, and what of it is across at the lever arm."""
     T = 7.30068e-3 * 20.0**2
     wanted = np.array([T * math.cos(0.4), X_P * T * math.sin(0.4)])

@@ -1,7 +1,5 @@
 """The vessels that have pods of their own, each along a line: they follow, within their limits."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +17,7 @@ CONFIGS = Path(__file__).parent.parent / "configs/pod/vessels"
 SCENARIOS = sorted(CONFIGS.glob("*.yaml"))
 
 
-def test_every_vessel_with_pods_has_a_scenario() -> None:
+def test_every_vessel_with_pods_has_a_scenario():
     both = set(preset_names(PODS)) & set(preset_names(VESSELS))
     assert {path.stem for path in SCENARIOS} == both == {"milliampere", "otter", "revolt", "wamv"}
 
@@ -29,7 +27,7 @@ TOLD = {"milliampere": ["sway-unstable"]}
 
 
 @pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: path.stem)
-def test_it_follows_the_line_and_keeps_its_distance(path: Path) -> None:
+def test_it_follows_the_line_and_keeps_its_distance(path):
     scenario = load(path).scenario
     assert [finding.code for finding in preflight(scenario)] == TOLD.get(path.stem, [])
     log = simulate(scenario.closed_loop(), scenario.time_grid())
@@ -49,9 +47,7 @@ def test_it_follows_the_line_and_keeps_its_distance(path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", sorted({"cybership2_pod", *(path.stem for path in SCENARIOS)}))
-def test_every_set_of_pods_says_where_its_numbers_come_from_and_what_they_hold_for(
-    name: str,
-) -> None:
+def test_every_set_of_pods_says_where_its_numbers_come_from_and_what_they_hold_for(name):
     assert len(preset_text(PODS, name, "source")) > 60
     assert len(preset_text(PODS, name, "validity")) > 30
 
@@ -67,9 +63,7 @@ ASTERN = ("actuator.pods.0.n_max_astern=0", "actuator.pods.1.n_max_astern=0")
         ("kept", ASTERN),
     ],
 )
-def test_no_pod_turns_half_a_turn_where_its_thrust_goes_through_zero(
-    name: str, keys: tuple[str, ...]
-) -> None:
+def test_no_pod_turns_half_a_turn_where_its_thrust_goes_through_zero(name, keys):
     scenario = load(CONFIGS.parent / f"{name}.yaml", keys).scenario
     log = simulate(scenario.closed_loop(), scenario.time_grid())
     assert log.status == "finished"

@@ -1,7 +1,5 @@
 """The committed results of the pods, made anew: the tables, and what results/pod.md says."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any
@@ -33,16 +31,14 @@ def committed(name: str, folder: Path = ROOT / "results/pod") -> Any:
 @pytest.mark.parametrize(
     "name", [pytest.param(n, marks=[pytest.mark.slow] * (n not in SOON)) for n in NAMES]
 )
-def test_the_committed_table_is_what_comes_out(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_committed_table_is_what_comes_out(name, tmp_path, monkeypatch):
     monkeypatch.setattr(compare, "law_costs", untimed)
     request = run.Request(out=tmp_path / name, figures=False)
     compare.compare([ROOT / f"configs/pod/{name}.yaml"], request)
     pd.testing.assert_frame_equal(committed(name, tmp_path), committed(name), rtol=1e-6)
 
 
-def test_the_table_in_words_is_the_committed_one() -> None:
+def test_the_table_in_words_is_the_committed_one():
     rows = re.findall(r"^\| [^|]*\(`(\w+)`\) \|(.*)\|$", FOUND, re.MULTILINE)
     assert [name for name, _ in rows] == list(NAMES)
     for name, cells in rows:
@@ -69,14 +65,12 @@ def test_the_table_in_words_is_the_committed_one() -> None:
         ("single", "pid", "saturated_fraction", 100, "({} % of the time out of"),
     ],
 )
-def test_a_number_in_the_text_is_the_committed_one(
-    name: str, law: str, metric: str, unit: float, told: str
-) -> None:
+def test_a_number_in_the_text_is_the_committed_one(name, law, metric, unit, told):
     number = float(committed(name).loc[metric, law]) * unit
     assert told.format(f"{number:.0f}") in " ".join(FOUND.split())
 
 
-def test_which_law_arrives_first_is_as_committed() -> None:
+def test_which_law_arrives_first_is_as_committed():
     settling = committed("kept").loc["settling_time", LAWS].astype(float)
     assert settling.idxmin() == "pid"
     assert f"({settling['pid']:.1f} against {settling['proposed']:.1f} s)" in FOUND
@@ -86,7 +80,7 @@ def test_which_law_arrives_first_is_as_committed() -> None:
     ("name", "keys", "proposed", "pid"),
     [pytest.param(*line, marks=[pytest.mark.slow] * (i % 4 > 0)) for i, line in enumerate(LINES)],
 )
-def test_what_the_findings_hang_on_comes_out(name: str, keys: str, proposed: str, pid: str) -> None:
+def test_what_the_findings_hang_on_comes_out(name, keys, proposed, pid):
     singles = load(
         ROOT / f"configs/pod/{name}.yaml", re.findall("`(.*?)`", keys)
     ).scenario.singles()
@@ -95,7 +89,7 @@ def test_what_the_findings_hang_on_comes_out(name: str, keys: str, proposed: str
         assert iae == pytest.approx(int(told), abs=0.6, rel=1e-3)
 
 
-def test_the_lines_that_say_so_are_there() -> None:
+def test_the_lines_that_say_so_are_there():
     assert len(LINES) == 13
 
 
@@ -107,14 +101,12 @@ def test_the_lines_that_say_so_are_there() -> None:
         ("kept", tuple(f"actuator.pods.{i}.T_nV=0.075" for i in (0, 1)), "({} against 337 J)"),
     ],
 )
-def test_what_else_costs_at_the_propeller_comes_out(
-    name: str, keys: tuple[str, ...], told: str
-) -> None:
+def test_what_else_costs_at_the_propeller_comes_out(name, keys, told):
     law = load(ROOT / f"configs/pod/{name}.yaml", keys).scenario.singles()["proposed"]
     assert told.format(round(rerun(law).run.metrics["energy_pod"])) in FOUND
 
 
-def test_unequal_thrust_holds_twice_the_disturbance_as_told() -> None:
+def test_unequal_thrust_holds_twice_the_disturbance_as_told():
     keys = ("disturbance.scale=2",)
     law = load(ROOT / "configs/pod/kept.yaml", keys).scenario.singles()["proposed"]
     got = rerun(law).run.metrics

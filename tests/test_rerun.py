@@ -1,15 +1,12 @@
 """`podusv rerun`: the same comes out, or podusv says what parted and what had changed."""
 
-from __future__ import annotations
-
 import json
 import re
 import tempfile
-from pathlib import Path
 from typing import Any
 
 import pytest
-from command_samples import Command, commanded
+from command_samples import commanded
 from rerun_samples import (
     SCENARIO,
     copied,
@@ -28,14 +25,12 @@ from podusv_cli.workflows import run as running
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def run(tmp_path_factory):
     return made(tmp_path_factory.mktemp("rerun") / "first")
 
 
 @pytest.fixture
-def podusv(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Command:
+def podusv(tmp_path, monkeypatch, capsys):
     room = tmp_path / "passing"
     room.mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(room))
@@ -47,9 +42,7 @@ def shown(said: Any) -> str:
     return " ".join(said.out.split())
 
 
-def test_an_untouched_run_comes_out_the_same_and_leaves_nothing(
-    run: Path, tmp_path: Path, podusv: Command
-) -> None:
+def test_an_untouched_run_comes_out_the_same_and_leaves_nothing(run, tmp_path, podusv):
     before = files(run.parent)
     said = podusv("rerun", run)
     assert said.code == 0
@@ -60,7 +53,7 @@ def test_an_untouched_run_comes_out_the_same_and_leaves_nothing(
     assert not list((tmp_path / "passing").iterdir())
 
 
-def test_a_changed_gain_is_found_and_named(run: Path, tmp_path: Path, podusv: Command) -> None:
+def test_a_changed_gain_is_found_and_named(run, tmp_path, podusv):
     change = replaced("K_Pu: 1100.0", "K_Pu: 1200.0")
     said = podusv("rerun", copied(run, tmp_path / "copy", resolved_yaml=change))
     assert said.code == 3
@@ -70,9 +63,7 @@ def test_a_changed_gain_is_found_and_named(run: Path, tmp_path: Path, podusv: Co
     assert "first difference: tau_u_cmd at t = 0.0 s: " in shown(said)
 
 
-def test_a_changed_version_is_named_though_nothing_moved(
-    run: Path, tmp_path: Path, podusv: Command
-) -> None:
+def test_a_changed_version_is_named_though_nothing_moved(run, tmp_path, podusv):
     other = copied(run, tmp_path / "copy", provenance_json=told_otherwise(numba="0.1.0"))
     said = podusv("rerun", other)
     assert said.code == 0
@@ -81,9 +72,7 @@ def test_a_changed_version_is_named_though_nothing_moved(
     assert told in shown(said).replace('"', "")
 
 
-def test_one_flipped_bit_is_found_with_time_values_and_size(
-    run: Path, tmp_path: Path, podusv: Command
-) -> None:
+def test_one_flipped_bit_is_found_with_time_values_and_size(run, tmp_path, podusv):
     change = relogged(run, lambda signals: flip(signals["psi"], 31))
     other = copied(run, tmp_path / "copy", log_h5=change)
     said = podusv("rerun", other)
@@ -95,16 +84,14 @@ def test_one_flipped_bit_is_found_with_time_values_and_size(
     )
 
 
-def test_the_same_numbers_in_another_file_are_identical(
-    run: Path, tmp_path: Path, podusv: Command
-) -> None:
+def test_the_same_numbers_in_another_file_are_identical(run, tmp_path, podusv):
     other = copied(run, tmp_path / "copy", log_h5=relogged(run, lambda signals: None))
     said = podusv("rerun", other)
     assert said.code == 0
     assert "identical in every number" in shown(said)
 
 
-def test_out_keeps_the_repeated_run(run: Path, tmp_path: Path, podusv: Command) -> None:
+def test_out_keeps_the_repeated_run(run, tmp_path, podusv):
     said = podusv("rerun", run, "--out", tmp_path / "kept", "--json")
     assert said.code == 0
     told = json.loads(said.out)
@@ -116,22 +103,20 @@ def test_out_keeps_the_repeated_run(run: Path, tmp_path: Path, podusv: Command) 
     assert again == (5, "", f"{tmp_path / 'kept'} exists already; --force replaces it\n")
 
 
-def test_a_run_that_diverges_and_had_not_has_a_code_of_its_own(
-    run: Path, tmp_path: Path, podusv: Command
-) -> None:
+def test_a_run_that_diverges_and_had_not_has_a_code_of_its_own(run, tmp_path, podusv):
     change = replaced("K_Pu: 1100.0", "K_Pu: 1.0e+300")
     said = podusv("rerun", copied(run, tmp_path / "copy", resolved_yaml=change))
     assert said.code == 4
     assert "status: finished -> diverged" in shown(said)
 
 
-def test_a_run_that_diverges_as_it_did_is_identical(tmp_path: Path, podusv: Command) -> None:
+def test_a_run_that_diverges_as_it_did_is_identical(tmp_path, podusv):
     run = made(tmp_path / "wild", "controller.K_Pu=1e300")
     assert open_run(run).status == "diverged"
     assert podusv("rerun", run).code == 0
 
 
-def test_an_interrupted_run_is_refused(run: Path, tmp_path: Path, podusv: Command) -> None:
+def test_an_interrupted_run_is_refused(run, tmp_path, podusv):
     other = copied(run, tmp_path / "copy")
     stated = (other / "manifest.json").read_text()
     (other / "manifest.json").write_text(stated.replace('"finished"', '"interrupted"'))
@@ -140,7 +125,7 @@ def test_an_interrupted_run_is_refused(run: Path, tmp_path: Path, podusv: Comman
     assert said.err == f"{other} was interrupted; there is no whole run to repeat\n"
 
 
-def test_what_is_no_run_folder(run: Path, tmp_path: Path, podusv: Command) -> None:
+def test_what_is_no_run_folder(run, tmp_path, podusv):
     reason = {tmp_path: "it has no manifest.json", run / "log.h5": "it has no manifest.json"}
     for path, why in (reason | {tmp_path / "nowhere": "it does not exist"}).items():
         assert podusv("rerun", path) == (2, "", f"{path} is no run folder: {why}\n")
@@ -149,7 +134,7 @@ def test_what_is_no_run_folder(run: Path, tmp_path: Path, podusv: Command) -> No
     assert podusv("rerun", broken).code == 5
 
 
-def test_a_key_that_this_podusv_does_not_know(run: Path, tmp_path: Path, podusv: Command) -> None:
+def test_a_key_that_this_podusv_does_not_know(run, tmp_path, podusv):
     change = replaced("K_Pu:", "K_Qu:")
     other = copied(run, tmp_path / "copy", resolved_yaml=change)
     said = podusv("rerun", other)
@@ -158,16 +143,14 @@ def test_a_key_that_this_podusv_does_not_know(run: Path, tmp_path: Path, podusv:
 
 
 @pytest.fixture
-def compared(tmp_path: Path) -> Path:
+def compared(tmp_path):
     config = tmp_path / "two.yaml"
     config.write_text(SCENARIO + "controllers: {soft: {K_Pu: 500.0}, hard: {K_Pu: 1500.0}}\n")
     request = running.Request(out=tmp_path / "two", figures=False)
     return compare.compare([config], request).folder
 
 
-def test_every_run_of_a_comparison_is_repeated(
-    compared: Path, tmp_path: Path, podusv: Command
-) -> None:
+def test_every_run_of_a_comparison_is_repeated(compared, tmp_path, podusv):
     said = podusv("rerun", compared, "--out", tmp_path / "kept")
     assert said.code == 0
     assert re.findall(r"^(\w+)  identical", said.out, re.MULTILINE) == ["soft", "hard"]
@@ -177,9 +160,7 @@ def test_every_run_of_a_comparison_is_repeated(
     manifest.check(tmp_path / "kept")
 
 
-def test_a_run_that_cannot_be_repeated_takes_no_other_with_it(
-    compared: Path, podusv: Command, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_run_that_cannot_be_repeated_takes_no_other_with_it(compared, podusv, monkeypatch):
     real = compare.execute
 
     def execute(task: Any, progress: Any = None) -> Any:

@@ -1,13 +1,11 @@
 """Every registered component: its runs are read again by all commands that take finished runs."""
 
-from __future__ import annotations
-
 import json
 from itertools import cycle, islice
 from typing import Any
 
 import pytest
-from command_samples import ROOT, Command
+from command_samples import ROOT
 from conftest import ROOMS, example, kinds
 from old_results import draw_quickly
 from storage_samples import files
@@ -48,8 +46,8 @@ def named(parts: dict[str, Any]) -> str:
 
 @pytest.mark.parametrize("parts", scenarios(), ids=named)
 def test_a_run_of_every_component_is_plotted_repeated_and_compared(
-    podusv: Command, parts: dict[str, Any], tmp_path: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    podusv, parts, tmp_path, monkeypatch
+):
     draw_quickly(monkeypatch)
     for room in (compare, execute):
         monkeypatch.setattr(room, "law_costs", untimed)
@@ -79,6 +77,6 @@ SHIPPED = {path.relative_to(CONFIGS).as_posix(): path for path in CONFIGS.rglob(
 
 
 @pytest.mark.parametrize("name", sorted(SHIPPED.keys() - PARTS))
-def test_every_run_of_a_shipped_scenario_reads_back(name: str) -> None:
+def test_every_run_of_a_shipped_scenario_reads_back(name):
     for scenario in load(SHIPPED[name]).scenario.singles().values():
         assert load_resolved(resolved_yaml(scenario), "resolved.yaml") == scenario

@@ -1,7 +1,5 @@
 """Sentences about values: what must be, what was found, what was probably meant."""
 
-from __future__ import annotations
-
 import pytest
 from scenario_samples import SOUND, VESSEL_NAMES, told
 
@@ -15,7 +13,7 @@ TRUTH = "compiled: must be true or false, found"
 NETWORK = "    network:\n      "
 
 
-def test_a_sound_scenario_has_no_findings() -> None:
+def test_a_sound_scenario_has_no_findings():
     assert told() == []
 
 
@@ -59,7 +57,7 @@ def test_a_sound_scenario_has_no_findings() -> None:
         ("zzz: 1", "2: zzz: unknown key (allowed: step, duration, compiled)"),
     ],
 )
-def test_a_wrong_value_is_one_sentence_at_its_place(text: str, says: str) -> None:
+def test_a_wrong_value_is_one_sentence_at_its_place(text, says):
     column, says = says.split(": ", 1)
     assert told(f"{SOUND}simulation:\n {text}\n") == [f"a.yaml:7:{column}: simulation.{says}"]
 
@@ -103,7 +101,7 @@ def test_a_wrong_value_is_one_sentence_at_its_place(text: str, says: str) -> Non
         ),
     ],
 )
-def test_a_wrong_section_is_one_sentence_at_its_place(text: str, says: str) -> None:
+def test_a_wrong_section_is_one_sentence_at_its_place(text, says):
     assert told(f"{SOUND}{text}\n") == [f"a.yaml:6:{says}"]
 
 
@@ -191,7 +189,7 @@ def test_a_wrong_section_is_one_sentence_at_its_place(text: str, says: str) -> N
         ),
     ],
 )
-def test_a_wrong_component_is_one_sentence_at_its_place(sound: str, wrong: str, says: str) -> None:
+def test_a_wrong_component_is_one_sentence_at_its_place(sound, wrong, says):
     assert told(SOUND.replace(sound, wrong)) == [f"a.yaml:{says}"]
 
 
@@ -245,7 +243,7 @@ def test_a_wrong_component_is_one_sentence_at_its_place(sound: str, wrong: str, 
         ),
     ],
 )
-def test_a_key_of_a_kind_is_told_without_the_kind(text: str, says: list[str]) -> None:
+def test_a_key_of_a_kind_is_told_without_the_kind(text, says):
     law = SOUND.replace(
         "controller: {kind: pid}", f"controller:\n  kind: adaptive_neural\n  {text}"
     )
@@ -253,7 +251,7 @@ def test_a_key_of_a_kind_is_told_without_the_kind(text: str, says: list[str]) ->
     assert told(law) == [f"a.yaml:7:{column}: controller.{said}" for column, said in places]
 
 
-def test_what_is_missing_is_told_at_the_file() -> None:
+def test_what_is_missing_is_told_at_the_file():
     assert told("description: nothing else\n") == [
         "a.yaml: vessel.preset: missing (allowed: " + VESSEL_NAMES + "); a vessel without one "
         "needs length, beam, m, I_z",
@@ -266,7 +264,7 @@ def test_what_is_missing_is_told_at_the_file() -> None:
     ]
 
 
-def test_all_faults_come_at_once_in_the_order_of_lines() -> None:
+def test_all_faults_come_at_once_in_the_order_of_lines():
     text = (
         "log: {every: 0}\nlog: {}\n" + SOUND.replace("paper", "papr") + "start: {x: .nan, z: 1}\n"
     )
@@ -280,7 +278,7 @@ def test_all_faults_come_at_once_in_the_order_of_lines() -> None:
     ]
 
 
-def test_a_fault_does_not_hide_others_in_the_same_section() -> None:
+def test_a_fault_does_not_hide_others_in_the_same_section():
     text = SOUND.replace("{preset: paper}", "{preset: papr, m: -1, lenght: 3}")
     assert [line.split(": ")[1] for line in told(text)] == [
         "vessel.preset",
@@ -289,5 +287,5 @@ def test_a_fault_does_not_hide_others_in_the_same_section() -> None:
     ]
 
 
-def test_a_value_that_both_vessels_have_is_told_once() -> None:
+def test_a_value_that_both_vessels_have_is_told_once():
     assert len(told(SOUND + "nominal: {X_u: -1}\n", ["vessel.m=-1"])) == 1

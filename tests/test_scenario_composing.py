@@ -1,7 +1,5 @@
 """One scenario from several sources: `extends` below, `--set` on top."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -11,13 +9,13 @@ from podusv_cli.scenario.load import load
 
 
 @pytest.fixture(autouse=True)
-def _in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def _in_a_folder(tmp_path, monkeypatch):
     """Messages show file names as a user gives them."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "sub").mkdir()
 
 
-def test_a_child_changes_single_keys_of_its_base() -> None:
+def test_a_child_changes_single_keys_of_its_base():
     write("base.yaml", SOUND + "start: {x: 1, y: 2}\nsimulation: {step: 0.02}\n")
     write("sub/child.yaml", "extends: ../base.yaml\nstart: {y: 5}\ncontroller: {k_ze: 0.3}\n")
     got = load("sub/child.yaml")
@@ -30,7 +28,7 @@ def test_a_child_changes_single_keys_of_its_base() -> None:
     assert got.text == Path("sub/child.yaml").read_text()
 
 
-def test_several_levels_and_lists_are_replaced_whole() -> None:
+def test_several_levels_and_lists_are_replaced_whole():
     law = "controller: {kind: dsc, network: {nodes: [5, 5, 5], low: [-2, -2, -2]}}\n"
     write("a.yaml", SOUND.replace("controller: {kind: pid}\n", law))
     write("b.yaml", "extends: a.yaml\ncontroller: {network: {nodes: [4, 3, 2]}}\n")
@@ -39,7 +37,7 @@ def test_several_levels_and_lists_are_replaced_whole() -> None:
     assert (network.nodes, network.low, network.high) == ((4, 3, 2), (-2, -2, -2), (3, 3, 3))
 
 
-def test_another_kind_replaces_the_section_and_the_same_kind_does_not() -> None:
+def test_another_kind_replaces_the_section_and_the_same_kind_does_not():
     write("base.yaml", SOUND.replace("{kind: pid}", "{kind: dsc, k_ze: 0.4, T_u: 0.5}"))
     write("other.yaml", "extends: base.yaml\ncontroller: {kind: pid}\n")
     write("same.yaml", "extends: base.yaml\ncontroller: {kind: dsc, T_r: 0.7}\n")
@@ -48,14 +46,14 @@ def test_another_kind_replaces_the_section_and_the_same_kind_does_not() -> None:
     assert (same.k_ze, same.T_u, same.T_r) == (0.4, 0.5, 0.7)
 
 
-def test_another_preset_replaces_the_vessel_with_its_changes() -> None:
+def test_another_preset_replaces_the_vessel_with_its_changes():
     write("base.yaml", SOUND.replace("{preset: paper}", "{preset: paper, m: 30}"))
     write("other.yaml", "extends: base.yaml\nvessel: {preset: cybership2, beam: 0.3}\n")
     vessel = load("other.yaml").scenario.vessel
     assert (vessel.m, vessel.beam, vessel.N_vv) == (23.8, 0.3, 3.95645)
 
 
-def test_null_is_a_value_and_does_not_fall_back_to_the_base() -> None:
+def test_null_is_a_value_and_does_not_fall_back_to_the_base():
     write("base.yaml", SOUND.replace("{kind: pid}", "{kind: dsc, network: {widths: [1, 1, 1]}}"))
     write("none.yaml", "extends: base.yaml\ncontroller: {network: {widths: null}}\n")
     assert load("none.yaml").scenario.controller.network.widths is None
@@ -65,14 +63,14 @@ def test_null_is_a_value_and_does_not_fall_back_to_the_base() -> None:
     ]
 
 
-def test_a_fault_of_the_base_is_told_at_the_base() -> None:
+def test_a_fault_of_the_base_is_told_at_the_base():
     write("sub/base.yaml", SOUND + "log: {every: 0}\n")
     write("child.yaml", "extends: sub/base.yaml\nlgo: {}\n")
     lines = findings("child.yaml")
     assert [line.split(": ")[0] for line in lines] == ["child.yaml:2:1", "sub/base.yaml:6:14"]
 
 
-def test_a_missing_base_is_told_at_the_key_and_alone() -> None:
+def test_a_missing_base_is_told_at_the_key_and_alone():
     write("child.yaml", "description: x\nextends: nope.yaml\nlog: {evry: 1}\n")
     assert findings("child.yaml") == [
         "child.yaml:2:10: extends: 'nope.yaml' cannot be read: no such file or directory",
@@ -81,13 +79,13 @@ def test_a_missing_base_is_told_at_the_key_and_alone() -> None:
     ]
 
 
-def test_a_base_that_is_no_yaml_is_told_once() -> None:
+def test_a_base_that_is_no_yaml_is_told_once():
     write("base.yaml", "a: [1\n")
     write("child.yaml", "extends: base.yaml\n")
     assert findings("child.yaml") == ["base.yaml:1:4: the bracket opened here is never closed"]
 
 
-def test_a_circle_is_told_at_the_key_that_closes_it() -> None:
+def test_a_circle_is_told_at_the_key_that_closes_it():
     write("a.yaml", "extends: sub/b.yaml\n")
     write("sub/b.yaml", "extends: ../a.yaml\n")
     assert findings("a.yaml") == [
@@ -99,7 +97,7 @@ def test_a_circle_is_told_at_the_key_that_closes_it() -> None:
     ]
 
 
-def test_of_several_bases_the_later_goes_over_the_earlier() -> None:
+def test_of_several_bases_the_later_goes_over_the_earlier():
     write("first.yaml", SOUND + "description: first\nname: first\n")
     write("second.yaml", "description: second\nstart: {x: 7.0}\n")
     write("a.yaml", "extends: [first.yaml, second.yaml]\nstart: {y: 8.0}\n")
@@ -108,7 +106,7 @@ def test_of_several_bases_the_later_goes_over_the_earlier() -> None:
     assert (scenario.start.x, scenario.start.y) == (7.0, 8.0)
 
 
-def test_each_of_several_bases_is_a_file_name() -> None:
+def test_each_of_several_bases_is_a_file_name():
     write("a.yaml", "extends: [none.yaml, 3]\n")
     assert findings("a.yaml") == [
         "a.yaml:1:11: extends: 'none.yaml' cannot be read: no such file or directory",
@@ -116,7 +114,7 @@ def test_each_of_several_bases_is_a_file_name() -> None:
     ]
 
 
-def test_null_takes_out_an_inherited_run_or_claim() -> None:
+def test_null_takes_out_an_inherited_run_or_claim():
     runs = "controllers: {a: {kind: pid}, b: {kind: dsc}}\n"
     claims = "claims: {c: {says: x, source: y, expect: a.iae < b.iae}}\n"
     write("base.yaml", SOUND + runs + claims)
@@ -126,14 +124,14 @@ def test_null_takes_out_an_inherited_run_or_claim() -> None:
     assert not scenario.claims
 
 
-def test_an_override_wins_and_is_told_as_origin() -> None:
+def test_an_override_wins_and_is_told_as_origin():
     got = loaded(SOUND, ["start.x=1e-3", "controller.k_ze=2"])
     assert (got.scenario.start.x, got.scenario.controller.k_ze) == (1e-3, 2.0)
     assert got.origins["start.x"] == "--set start.x=1e-3"
     assert got.text == SOUND
 
 
-def test_overrides_take_text_lists_and_mappings() -> None:
+def test_overrides_take_text_lists_and_mappings():
     got = loaded(
         SOUND,
         [
@@ -150,12 +148,12 @@ def test_overrides_take_text_lists_and_mappings() -> None:
 
 
 @pytest.mark.parametrize("turn", [1, -1])
-def test_the_order_of_kind_and_gain_on_the_command_line_does_not_matter(turn: int) -> None:
+def test_the_order_of_kind_and_gain_on_the_command_line_does_not_matter(turn):
     law = loaded(SOUND, ["controller.kind=dsc", "controller.k_ze=0.7"][::turn]).scenario.controller
     assert (law.kind, law.k_ze) == ("dsc", 0.7)
 
 
-def test_the_last_of_two_equal_keys_wins() -> None:
+def test_the_last_of_two_equal_keys_wins():
     assert loaded(SOUND, ["start.x=1", "start.x=2"]).scenario.start.x == 2
 
 
@@ -189,15 +187,15 @@ def test_the_last_of_two_equal_keys_wins() -> None:
         ),
     ],
 )  # fmt: skip
-def test_a_wrong_override_is_told_as_given(override: str, says: str) -> None:
+def test_a_wrong_override_is_told_as_given(override, says):
     assert told(SOUND, [override]) == [f"--set {override}: {says}"]
 
 
-def test_a_wrong_override_does_not_hide_the_others() -> None:
+def test_a_wrong_override_does_not_hide_the_others():
     assert len(told(SOUND, ["a", "start.z=1", "start.x=.inf", "start.y=x"])) == 4
 
 
-def test_an_override_is_always_on_one_line() -> None:
+def test_an_override_is_always_on_one_line():
     assert told(SOUND, ["start.x=a\nb"]) == [
         r"--set 'start.x=a\nb': start.x: must be a number [m], found 'a\nb'"
     ]
@@ -206,7 +204,7 @@ def test_an_override_is_always_on_one_line() -> None:
 PODS = SOUND.replace("{kind: ideal}", "{kind: pod, preset: cybership2_pod}")
 
 
-def test_an_item_of_a_list_can_be_set_by_its_place_also_where_a_preset_brings_the_list() -> None:
+def test_an_item_of_a_list_can_be_set_by_its_place_also_where_a_preset_brings_the_list():
     sets = ("actuator.pods.1.n_lag=0.5", "actuator.pods.0={angle_lag: 0.2, n_lag: 0.3}")
     one, two = loaded(PODS, sets).scenario.actuator.pods
     assert (one.n_lag, one.angle_lag, one.T_nn) == (0.3, 0.2, 3.65034e-3)
@@ -217,12 +215,12 @@ def test_an_item_of_a_list_can_be_set_by_its_place_also_where_a_preset_brings_th
     ]
 
 
-def test_a_place_that_a_list_does_not_have_is_no_item() -> None:
+def test_a_place_that_a_list_does_not_have_is_no_item():
     (line,) = told(PODS, ["actuator.pods.2.n_lag=0.5"])
     assert "actuator.pods: must be a list" in line
 
 
-def test_another_preset_of_pods_keeps_the_kind_and_nothing_else() -> None:
+def test_another_preset_of_pods_keeps_the_kind_and_nothing_else():
     text = PODS.replace("kind: pod,", "kind: pod, priority: surge,")
     write("base.yaml", text)
     actuator = load("base.yaml", ["actuator.preset=revolt"]).scenario.actuator
@@ -231,19 +229,19 @@ def test_another_preset_of_pods_keeps_the_kind_and_nothing_else() -> None:
     assert "unknown set of pods 'revol'; did you mean 'revolt'?" in line
 
 
-def test_a_chain_of_bases_may_be_long() -> None:
+def test_a_chain_of_bases_may_be_long():
     for i in range(300):
         write(f"{i}.yaml", f"extends: {i + 1}.yaml\n")
     write("300.yaml", SOUND)
     assert findings("0.yaml") == []
 
 
-def test_a_setting_is_nested_no_deeper_than_a_file() -> None:
+def test_a_setting_is_nested_no_deeper_than_a_file():
     deep = ".".join(["a"] * 5000)
     assert told(SOUND, [f"{deep}=1"]) == [f"--set {deep}=1: nested deeper than 32 levels"]
 
 
-def test_a_setting_may_name_a_place_that_no_list_has() -> None:
+def test_a_setting_may_name_a_place_that_no_list_has():
     digits = "1" * 5000
     for key in (f"controller.{digits}", f"silence.{digits}", f"{digits}.{digits}"):
         (said,) = told(SOUND + "silence: [saturated]\n", [f"{key}=1"])

@@ -1,7 +1,5 @@
 """Explanations: of every key, generated from the models."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest
@@ -45,7 +43,7 @@ KEYS = [
 ]
 
 
-def test_the_models_are_all_found() -> None:
+def test_the_models_are_all_found():
     assert len(MODELS) > 20
     assert {"Network", "Harmonic", "Claim", "Pid"} <= {model.__name__ for model in MODELS}
 
@@ -53,9 +51,7 @@ def test_the_models_are_all_found() -> None:
 @pytest.mark.parametrize(
     ("model", "name"), FIELDS, ids=lambda part: getattr(part, "__name__", part)
 )
-def test_every_field_has_a_meaning_and_every_number_a_unit(
-    model: type[Component], name: str
-) -> None:
+def test_every_field_has_a_meaning_and_every_number_a_unit(model, name):
     field = model.model_fields[name]
     assert name == "kind" or (field.description or "").strip()
     assert not (field.description or "").endswith("."), "meanings are phrases"
@@ -67,7 +63,7 @@ def test_every_field_has_a_meaning_and_every_number_a_unit(
 @pytest.mark.parametrize(
     ("model", "name"), FIELDS, ids=lambda part: getattr(part, "__name__", part)
 )
-def test_every_limit_of_a_field_can_be_put_in_words(model: type[Component], name: str) -> None:
+def test_every_limit_of_a_field_can_be_put_in_words(model, name):
     field = model.model_fields[name]
     said = limits(field)
     for data in field.metadata:
@@ -78,7 +74,7 @@ def test_every_limit_of_a_field_can_be_put_in_words(model: type[Component], name
 
 
 @pytest.mark.parametrize(("route", "path"), KEYS)
-def test_every_key_is_explained_by_its_path_and_by_its_route(route: str, path: str) -> None:
+def test_every_key_is_explained_by_its_path_and_by_its_route(route, path):
     for row in (explain(route)[0], *(row for row in explain(path) if row.key == path)):
         assert row.key == path
         assert row.meaning
@@ -87,20 +83,20 @@ def test_every_key_is_explained_by_its_path_and_by_its_route(route: str, path: s
     assert any(row.key == path for row in explain(path.rpartition(".")[2]))
 
 
-def test_without_a_key_the_sections_are_explained() -> None:
+def test_without_a_key_the_sections_are_explained():
     assert [row.key for row in explain()] == ["extends", *Scenario.model_fields]
     law = next(row for row in explain() if row.key == "controller")
     assert (law.type, law.choices) == ("kinds", ("adaptive_neural", "backstepping", "dsc", "pid"))
 
 
-def test_a_section_with_kinds_is_explained_kind_by_kind() -> None:
+def test_a_section_with_kinds_is_explained_kind_by_kind():
     head, *rest = explain("controller")
     assert head.key == "controller"
     assert [row.key for row in rest] == [f"controller.{kind}" for kind in head.choices]
     assert all("k_ze" in row.choices and row.meaning for row in rest)
 
 
-def test_a_kind_is_explained_key_by_key() -> None:
+def test_a_kind_is_explained_key_by_key():
     head, *rest = explain("path.circle")
     assert head.meaning == "About (x, y), from `angle` on, to starboard where `turn` is starboard."
     assert [row.key for row in rest] == [
@@ -109,7 +105,7 @@ def test_a_kind_is_explained_key_by_key() -> None:
 
 
 @pytest.mark.parametrize("asked", ["actuator.pod", "actuator.pods", "actuator.pod.pods", "pods"])
-def test_keys_of_a_lists_items_are_explained_with_the_list(asked: str) -> None:
+def test_keys_of_a_lists_items_are_explained_with_the_list(asked):
     rows = {row.key: row for row in explain(asked)}
     pod = sections(Scenario.model_fields["actuator"].annotation)["pod"].model_fields["pods"]
     (one,) = _classes(pod.annotation)
@@ -121,24 +117,24 @@ def test_keys_of_a_lists_items_are_explained_with_the_list(asked: str) -> None:
 
 
 @pytest.mark.parametrize("place", ["claims.NAME", "claims.C1"])
-def test_an_entry_of_a_mapping_is_explained_with_its_keys(place: str) -> None:
+def test_an_entry_of_a_mapping_is_explained_with_its_keys(place):
     head, *rest = explain(place)
     assert (head.key, head.meaning) == (place, "one of `claims`")
     assert [row.key for row in rest] == [f"{place}.{name}" for name in Claim.model_fields]
 
 
-def test_a_key_of_an_item_is_found_by_the_place_that_messages_name() -> None:
+def test_a_key_of_an_item_is_found_by_the_place_that_messages_name():
     assert explain("actuator.pods[0].x") == explain("actuator.pods.NUMBER.x")
     assert explain("controllers.slow.K_Pu")[0].kinds == ("pid",)
 
 
-def test_a_kind_is_explained_by_its_name_alone() -> None:
+def test_a_kind_is_explained_by_its_name_alone():
     assert explain("pid") == explain("controller.pid")
     heads = [row.key for row in explain("none") if row.type == "keys"]
     assert heads == ["disturbance.none"]
 
 
-def test_a_key_says_everything_that_its_field_says() -> None:
+def test_a_key_says_everything_that_its_field_says():
     assert explain("controller.pid.T_d") == [
         Row(
             "controller.T_d",
@@ -160,12 +156,12 @@ def test_a_key_says_everything_that_its_field_says() -> None:
     assert (kind.default, kind.choices) == ("required", fold.kinds)
 
 
-def test_kinds_in_which_a_key_is_the_same_share_a_row() -> None:
+def test_kinds_in_which_a_key_is_the_same_share_a_row():
     rows = explain("path.speed")
     assert [row.kinds for row in rows] == [("circle", "line"), ("line_circle",), ("waypoints",)]
 
 
-def test_a_default_is_what_the_section_has_when_it_is_left_out() -> None:
+def test_a_default_is_what_the_section_has_when_it_is_left_out():
     assert [row.default for row in explain("disturbance.b_u.sin")] == ["0.1"]
     assert [row.default for row in explain("disturbance.b_v.sin")] == ["0.2"]
     assert [row.default for row in explain("vessel.X_uu")] == ["the preset's"]
@@ -173,7 +169,7 @@ def test_a_default_is_what_the_section_has_when_it_is_left_out() -> None:
 
 
 @pytest.mark.parametrize("name", ABOUT)
-def test_every_signal_is_explained(name: str) -> None:
+def test_every_signal_is_explained(name):
     signal = ABOUT[name]
     assert Row(name, signal.meaning, "signal", signal.unit) in explain(name)
 
@@ -192,14 +188,14 @@ def test_every_signal_is_explained(name: str) -> None:
         ("", ""),
     ],
 )
-def test_an_unknown_key_is_told_with_what_was_probably_meant(key: str, hint: str) -> None:
+def test_an_unknown_key_is_told_with_what_was_probably_meant(key, hint):
     with pytest.raises(UnknownKeyError) as raised:
         explain(key, ["near-target"])
     assert str(raised.value) == f"{key}: no such name{hint}"
     assert raised.value.exit_code == 2
 
 
-def test_every_kind_has_a_summary() -> None:
+def test_every_kind_has_a_summary():
     assert set(kinds()) == {"path", "disturbance", "actuator", "controller"}
     for summaries in kinds().values():
         assert all(len(summary) > 8 and summary.endswith(".") for summary in summaries.values())

@@ -1,7 +1,5 @@
 """Files in, scenarios out: origins, laws to compare, claims, further checks, how much work."""
 
-from __future__ import annotations
-
 import pytest
 from counting import counted
 from scenario_samples import SOUND, loaded, told
@@ -12,14 +10,14 @@ from podusv_cli.scenario.load import load_text, values
 from podusv_cli.scenario.model import Scenario
 
 
-def test_every_value_has_an_origin() -> None:
+def test_every_value_has_an_origin():
     got = loaded()
     assert list(got.origins) == list(values(got.scenario))
     assert got.origins["name"] == "a.yaml"
     assert got.origins["controller.kind"] == "a.yaml:5:20"
 
 
-def test_loading_a_scenario_is_little_work() -> None:
+def test_loading_a_scenario_is_little_work():
     loaded()  # tables are made once
     _, calls = counted(loaded)
     assert calls < 40_000  # 18 136; some 10 ms
@@ -28,7 +26,7 @@ def test_loading_a_scenario_is_little_work() -> None:
 SEVERAL = SOUND.replace("{kind: pid}", "{kind: dsc, k_ze: 0.4, T_u: 0.5, network: {spread: 2}}")
 
 
-def test_laws_to_compare_start_from_the_keys_that_they_share_with_the_controller() -> None:
+def test_laws_to_compare_start_from_the_keys_that_they_share_with_the_controller():
     text = SEVERAL + "controllers: {slow: {kind: pid, K_Pu: 5}, fast: {k_ze: 2}}\n"
     got = loaded(text)
     slow, fast = got.scenario.controllers["slow"], got.scenario.controllers["fast"]
@@ -38,7 +36,7 @@ def test_laws_to_compare_start_from_the_keys_that_they_share_with_the_controller
     assert got.origins["controllers.fast.k_ze"] == "a.yaml:6:56"
 
 
-def test_a_fault_of_a_law_to_compare_is_told_without_its_kind() -> None:
+def test_a_fault_of_a_law_to_compare_is_told_without_its_kind():
     text = (
         SEVERAL + "controllers: {slow: {kind: pid, T_u: x, K_Pu: -1}, fast: {T_u: x}, other: 3}\n"
     )
@@ -52,14 +50,14 @@ def test_a_fault_of_a_law_to_compare_is_told_without_its_kind() -> None:
     ]
 
 
-def test_a_fault_of_the_controller_is_told_once_however_many_laws_take_it_over() -> None:
+def test_a_fault_of_the_controller_is_told_once_however_many_laws_take_it_over():
     text = SEVERAL.replace("0.4", "-1") + "controllers: {a: {kind: pid}, b: {}, c: {}}\n"
     assert told(text) == [
         "a.yaml:5:31: controller.k_ze: must be a number not below 0 [1/s], found -1"
     ]
 
 
-def test_faults_of_claims_are_told_at_their_name() -> None:
+def test_faults_of_claims_are_told_at_their_name():
     sound = "claims:\n C1: {says: s, source: p, expect: e}\n"
     assert told(SOUND + sound + " C2: {sayz: s, source: 2, tolerance: 1}\n") == [
         "a.yaml:8:6: claims.C2.says: missing; must be text",
@@ -71,7 +69,7 @@ def test_faults_of_claims_are_told_at_their_name() -> None:
     ]
 
 
-def test_further_checks_are_told_at_the_place_of_the_key() -> None:
+def test_further_checks_are_told_at_the_place_of_the_key():
     claims = "claims:\n  C1: {says: s, source: p, expect: e}\n"
 
     def look(scenario: Scenario) -> list[tuple[str, str]]:

@@ -1,10 +1,7 @@
 """What a scenario takes from elsewhere: vessel files, waypoints, the file's name, shared keys."""
 
-from __future__ import annotations
-
 import os
 import signal
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -19,14 +16,14 @@ from podusv_cli.vessels.vessel import VESSELS, Vessel
 
 
 @pytest.fixture(autouse=True)
-def _in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def _in_a_folder(tmp_path, monkeypatch):
     """Messages show file names as a user gives them."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "sub").mkdir()
 
 
 @pytest.mark.parametrize("name", preset_names(VESSELS))
-def test_a_preset_is_its_file(name: str) -> None:
+def test_a_preset_is_its_file(name):
     faults: list[object] = []
     node = preset_file(VESSELS, name, faults)
     assert node is not None
@@ -35,7 +32,7 @@ def test_a_preset_is_its_file(name: str) -> None:
     assert vessel == Vessel(preset=name, **plain(node))
 
 
-def test_a_vessel_can_change_some_values_of_its_preset() -> None:
+def test_a_vessel_can_change_some_values_of_its_preset():
     got = loaded(SOUND.replace("preset: paper", "preset: paper, X_u: -2"))
     assert (got.scenario.vessel.X_u, got.scenario.vessel.Y_v) == (-2.0, -0.8896)
     assert got.origins["vessel.X_u"] == "a.yaml:1:30"
@@ -43,20 +40,20 @@ def test_a_vessel_can_change_some_values_of_its_preset() -> None:
     assert got.origins["vessel.N_vv"] == "default"
 
 
-def test_the_nominal_vessel_is_the_vessel_with_its_changes() -> None:
+def test_the_nominal_vessel_is_the_vessel_with_its_changes():
     got = loaded(SOUND.replace("preset: paper", "preset: paper, m: 30"))
     assert got.scenario.nominal == got.scenario.vessel
     assert got.origins["nominal.m"] == got.origins["vessel.m"]
 
 
-def test_a_nominal_vessel_without_preset_is_the_vessel_but_for_what_it_says() -> None:
+def test_a_nominal_vessel_without_preset_is_the_vessel_but_for_what_it_says():
     got = loaded(SOUND, ["vessel.m=30", "nominal.X_u=-1"]).scenario
     source = got.vessel.source.replace("; m changed", "; m, X_u changed")
     assert source != got.vessel.source
     assert got.nominal == got.vessel.model_copy(update={"X_u": -1.0, "source": source})
 
 
-def test_a_nominal_vessel_with_preset_starts_from_it() -> None:
+def test_a_nominal_vessel_with_preset_starts_from_it():
     got = loaded(SOUND, ["vessel.m=30", "nominal={preset: cybership2, X_u: -1}"]).scenario
     whole = loaded(SOUND.replace("paper", "cybership2")).scenario.vessel
     source = whole.source.removesuffix(".") + "; X_u changed by the scenario."
@@ -67,7 +64,7 @@ OWN = "length: 2.0, beam: 1.0, m: 60.0, I_z: 20.0, X_u: -9.0"
 
 
 @pytest.mark.parametrize("given", [OWN, OWN + ", preset: ''"])
-def test_a_vessel_without_preset_has_what_it_says_and_no_more(given: str) -> None:
+def test_a_vessel_without_preset_has_what_it_says_and_no_more(given):
     text = SOUND.replace("preset: paper", given)
     own = Vessel(length=2.0, beam=1.0, m=60.0, I_z=20.0, X_u=-9.0)
     assert loaded(text).scenario.vessel == own
@@ -77,20 +74,20 @@ def test_a_vessel_without_preset_has_what_it_says_and_no_more(given: str) -> Non
 
 
 @pytest.mark.parametrize("given", [OWN, OWN + ", preset: ''", OWN + ", source: my tank"])
-def test_a_nominal_vessel_over_one_without_preset_changes_what_it_says(given: str) -> None:
+def test_a_nominal_vessel_over_one_without_preset_changes_what_it_says(given):
     text = SOUND.replace("preset: paper", given) + "nominal: {m: 66.0}\n"
     got = loaded(text).scenario
     assert got.nominal == got.vessel.model_copy(update={"m": 66.0})
 
 
 @pytest.mark.parametrize("given", ["3", "{preset: x}", "{preset: []}", "{preset: 3}", "{m: 3}"])
-def test_a_vessel_that_is_wrong_is_told_once_under_a_nominal_vessel(given: str) -> None:
+def test_a_vessel_that_is_wrong_is_told_once_under_a_nominal_vessel(given):
     text = SOUND.replace("{preset: paper}", given)
     assert told(text)
     assert told(text + "nominal: {m: 66.0}\n") == told(text)
 
 
-def test_a_source_tells_what_the_scenario_changed_and_is_the_same_when_loaded_again() -> None:
+def test_a_source_tells_what_the_scenario_changed_and_is_the_same_when_loaded_again():
     changed = loaded(SOUND, ["vessel.I_z=2", "vessel.m=30", "vessel.X_u=-0.72", "vessel.X_uu=0"])
     whole = loaded(SOUND).scenario.vessel.source
     told = whole.removesuffix(".") + "; m, I_z changed by the scenario."
@@ -102,25 +99,25 @@ def test_a_source_tells_what_the_scenario_changed_and_is_the_same_when_loaded_ag
     assert own.source == "my tank"
 
 
-def test_a_wrong_nominal_value_is_told_at_its_place() -> None:
+def test_a_wrong_nominal_value_is_told_at_its_place():
     assert told(SOUND + "nominal: {X_u: 1, preset: x}\n") == [
         "a.yaml:6:16: nominal.X_u: must be a number not above 0 [kg/s], found 1",
         "a.yaml:6:27: nominal.preset: unknown vessel 'x' (allowed: " + VESSEL_NAMES + ")",
     ]
 
 
-def test_one_key_of_a_disturbance_leaves_the_others_at_the_papers_values() -> None:
+def test_one_key_of_a_disturbance_leaves_the_others_at_the_papers_values():
     text = SOUND.replace("{kind: none}", "{kind: harmonic, b_u: {mean: 0}}")
     b_u = loaded(text).scenario.disturbance.b_u
     assert (b_u.mean, b_u.sin, b_u.cos, b_u.cos_rate) == (0.0, 0.1, 0.3, 0.5)
 
 
-def test_the_name_is_that_of_the_file_unless_given() -> None:
+def test_the_name_is_that_of_the_file_unless_given():
     assert load_text(SOUND, "dir/my-run.v2.yaml").scenario.name == "my-run.v2"
     assert load_text(SOUND + "name: other\n", "dir/my-run.yaml").scenario.name == "other"
 
 
-def test_a_file_name_that_is_no_name_is_told() -> None:
+def test_a_file_name_that_is_no_name_is_told():
     with pytest.raises(ScenarioError) as raised:
         load_text(SOUND, "my run.yaml")
     assert str(raised.value) == (
@@ -136,7 +133,7 @@ def with_route(text: str = ROUTE) -> str:
     return SOUND.replace("path: {kind: line}\n", text)
 
 
-def test_waypoints_come_from_a_file_beside_the_scenario() -> None:
+def test_waypoints_come_from_a_file_beside_the_scenario():
     write("sub/route.csv", 'x, "y"\n# first leg\n0, 0\n\n10.5,-1e1  # bend\n"20",5\n')
     write("sub/a.yaml", with_route())
     got = load("sub/a.yaml")
@@ -146,7 +143,7 @@ def test_waypoints_come_from_a_file_beside_the_scenario() -> None:
     assert got.origins["path.file"] == "default"
 
 
-def test_a_route_is_beside_the_file_that_names_it() -> None:
+def test_a_route_is_beside_the_file_that_names_it():
     write("sub/route.csv", "0,0\n1,1\n")
     write("sub/base.yaml", with_route())
     write("a.yaml", "extends: sub/base.yaml\n")
@@ -154,7 +151,7 @@ def test_a_route_is_beside_the_file_that_names_it() -> None:
     assert len(load("a.yaml", ["path.file=sub/route.csv"]).scenario.path.points) == 2
 
 
-def test_a_file_saved_by_a_spreadsheet_is_read() -> None:
+def test_a_file_saved_by_a_spreadsheet_is_read():
     Path("route.csv").write_bytes(b"\xef\xbb\xbfx,y\r\n0,0\r\n3,4\r\n")
     write("a.yaml", with_route())
     assert load("a.yaml").scenario.path.points == ((0.0, 0.0), (3.0, 4.0))
@@ -177,26 +174,26 @@ def test_a_file_saved_by_a_spreadsheet_is_read() -> None:
         ("", ["a.yaml:2:7: path: needs at least two points, has 0"]),
     ],
 )  # fmt: skip
-def test_a_wrong_row_is_told_at_its_line(rows: str, says: list[str]) -> None:
+def test_a_wrong_row_is_told_at_its_line(rows, says):
     write("route.csv", rows)
     write("a.yaml", with_route())
     assert findings("a.yaml") == says
 
 
-def test_faults_of_a_route_end_before_they_fill_the_screen() -> None:
+def test_faults_of_a_route_end_before_they_fill_the_screen():
     write("route.csv", "a;b\n" * 5000)
     write("a.yaml", with_route())
     assert len(findings("a.yaml")) < 20
 
 
-def test_a_missing_route_is_told_at_the_key() -> None:
+def test_a_missing_route_is_told_at_the_key():
     write("a.yaml", with_route())
     assert findings("a.yaml") == [
         "a.yaml:2:31: path.file: 'route.csv' cannot be read: no such file or directory"
     ]
 
 
-def test_points_and_file_together_are_told() -> None:
+def test_points_and_file_together_are_told():
     write("route.csv", "0,0\n1,1\n")
     write(
         "a.yaml", with_route("path: {kind: waypoints, file: route.csv, points: [[0, 0], [1, 1]]}\n")
@@ -204,7 +201,7 @@ def test_points_and_file_together_are_told() -> None:
     assert findings("a.yaml") == ["a.yaml:2:31: path.file: give either file or points, not both"]
 
 
-def test_a_route_stays_short_enough_to_be_written_out() -> None:
+def test_a_route_stays_short_enough_to_be_written_out():
     write("route.csv", "".join(f"{i},0\n" for i in range(MAX_POINTS + 1)))
     write("a.yaml", with_route())
     assert findings("a.yaml") == [f"route.csv: more than {MAX_POINTS:,} points"]
@@ -213,7 +210,7 @@ def test_a_route_stays_short_enough_to_be_written_out() -> None:
 POD_SOUND = SOUND.replace("{kind: ideal}", "{kind: pod, preset: otter}")
 
 
-def test_pods_come_from_their_file_and_what_is_given_goes_over_it() -> None:
+def test_pods_come_from_their_file_and_what_is_given_goes_over_it():
     actuator = loaded(POD_SOUND, ["actuator.priority=surge"]).scenario.actuator
     assert isinstance(actuator, Pods)
     assert [pod.y for pod in actuator.pods] == [-0.395, 0.395]
@@ -224,7 +221,7 @@ def test_pods_come_from_their_file_and_what_is_given_goes_over_it() -> None:
     assert pod.x == -1.0
 
 
-def test_what_is_wrong_with_pods_is_one_sentence_at_its_place() -> None:
+def test_what_is_wrong_with_pods_is_one_sentence_at_its_place():
     assert told(POD_SOUND.replace("otter", "oter")) == [
         "a.yaml:4:31: actuator.preset: unknown set of pods 'oter'; did you mean 'otter'? "
         f"(allowed: {', '.join(preset_names(Pods.presets))})"
@@ -247,7 +244,7 @@ SECRET = "root:x:0:0:root:/root:/bin/sh\n'sync':s3cret,4:65534:sync,/bin\ns3cret
 
 
 @pytest.mark.parametrize("option", ["path.file", "extends", "scenario"])
-def test_what_a_file_holds_that_is_no_file_of_podusv_is_not_repeated(option: str) -> None:
+def test_what_a_file_holds_that_is_no_file_of_podusv_is_not_repeated(option):
     write("passwd", SECRET)
     write("a.yaml", with_route(along("passwd")) if option == "path.file" else "extends: passwd\n")
     said = "\n".join(findings("passwd" if option == "scenario" else "a.yaml"))
@@ -257,7 +254,7 @@ def test_what_a_file_holds_that_is_no_file_of_podusv_is_not_repeated(option: str
 
 
 @pytest.fixture
-def patience() -> Iterator[None]:
+def patience():
     """What waits for ever is interrupted."""
 
     def give_up(*_: object) -> None:
@@ -272,7 +269,7 @@ def patience() -> Iterator[None]:
 
 @pytest.mark.parametrize("special", ["pipe", "/dev/zero", "/dev/tty"])
 @pytest.mark.usefixtures("patience")
-def test_pipes_and_devices_are_not_waited_for(special: str) -> None:
+def test_pipes_and_devices_are_not_waited_for(special):
     os.mkfifo("pipe")
     write("a.yaml", with_route(along(special)))
     write("b.yaml", f"extends: {special}\n")
@@ -282,6 +279,6 @@ def test_pipes_and_devices_are_not_waited_for(special: str) -> None:
 
 
 @pytest.mark.usefixtures("patience")
-def test_a_pipe_is_told_what_to_do_instead() -> None:
+def test_a_pipe_is_told_what_to_do_instead():
     os.mkfifo("pipe")
     assert findings("pipe") == ["pipe: cannot be read: a pipe or device; save it as a file first"]

@@ -1,7 +1,5 @@
 """A resolved scenario is complete, and reads back to the same bits."""
 
-from __future__ import annotations
-
 from typing import Any, Literal, get_args, get_origin
 
 import pytest
@@ -107,28 +105,28 @@ def possible(data: dict[str, Any]) -> Scenario:
 
 @settings(max_examples=40, deadline=None)
 @given(SCENARIOS)
-def test_a_resolved_scenario_reads_back_to_the_same_bits(data: dict[str, Any]) -> None:
+def test_a_resolved_scenario_reads_back_to_the_same_bits(data):
     scenario = possible(data)
     again = load_resolved(resolved_yaml(scenario), "resolved.yaml")
     assert again == scenario
     assert repr(again) == repr(scenario), "-0.0 equals 0.0, but is not the same number"
 
 
-def test_every_value_is_written_out_and_none_is_a_default_any_more() -> None:
+def test_every_value_is_written_out_and_none_is_a_default_any_more():
     first = loaded(SOUND)
     again = load_text(resolved_yaml(first.scenario), "resolved.yaml")
     assert list(again.origins) == list(first.origins)
     assert all(origin.startswith("resolved.yaml:") for origin in again.origins.values())
 
 
-def test_the_same_scenario_gives_the_same_text_and_another_one_another() -> None:
+def test_the_same_scenario_gives_the_same_text_and_another_one_another():
     text = resolved_yaml(loaded(SOUND).scenario)
     assert text == resolved_yaml(loaded(SOUND).scenario)
     assert resolved_yaml(load_text(text, "b.yaml").scenario) == text
     assert resolved_yaml(loaded(SOUND, ["start.x=1e-300"]).scenario) != text
 
 
-def test_keys_stand_in_the_order_of_the_fields_behind_the_kind() -> None:
+def test_keys_stand_in_the_order_of_the_fields_behind_the_kind():
     text = resolved_yaml(loaded(SOUND).scenario)
     assert text.startswith(HEADING)
     assert HEADING.startswith("#")
@@ -143,7 +141,7 @@ def test_keys_stand_in_the_order_of_the_fields_behind_the_kind() -> None:
 @pytest.mark.parametrize(
     "number", [1e-5, 1e16, 1e22, 5e-324, 1.7976931348623157e308, 0.1 + 0.2, -0.0]
 )
-def test_a_float_reads_back_whatever_its_notation(number: float) -> None:
+def test_a_float_reads_back_whatever_its_notation(number):
     scenario = loaded(SOUND, [f"start.x={number!r}"]).scenario
     again = load_text(resolved_yaml(scenario), "a.yaml").scenario
     assert repr(again.start.x) == repr(number)
@@ -154,19 +152,19 @@ def test_a_float_reads_back_whatever_its_notation(number: float) -> None:
     ["no", "null", "017", "1e-3", "1:30", "~", "# x", "a: b", "'", '"', " x ", "x\n\ny\t",
      "\u2028", "💥", "é\u0301", "- a", "[1]", "true", "0x1F", "2026-11-20", "<<", "=", "\ufeffa"],
 )  # fmt: skip
-def test_a_text_reads_back_whatever_it_looks_like(text: str) -> None:
+def test_a_text_reads_back_whatever_it_looks_like(text):
     scenario = loaded(SOUND).scenario.model_copy(update={"description": text})
     assert load_text(resolved_yaml(scenario), "a.yaml").scenario == scenario
 
 
-def test_other_readers_of_yaml_find_the_same_values() -> None:
+def test_other_readers_of_yaml_find_the_same_values():
     scenario = loaded(SOUND).scenario
     found = yaml.safe_load(resolved_yaml(scenario))
     assert found["controller"] == scenario.controller.model_dump()
     assert found["vessel"] == scenario.vessel.model_dump()
 
 
-def test_values_are_all_leaves_by_their_dotted_keys() -> None:
+def test_values_are_all_leaves_by_their_dotted_keys():
     scenario = loaded(SOUND).scenario
     found = values(scenario)
     assert found["vessel.m"] == scenario.vessel.m

@@ -1,7 +1,5 @@
 """The JSON schema: draft-07, complete, and the same as the one in the documentation."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -10,7 +8,7 @@ import pytest
 
 import podusv_cli
 from podusv_cli.findings.finding import finding_kinds
-from podusv_cli.scenario.keys import NAME, NUMBER, SCENARIO, Key, sections
+from podusv_cli.scenario.keys import NAME, NUMBER, SCENARIO, sections
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.presets import preset_names
 from podusv_cli.scenario.schema import json_schema, schema_text
@@ -71,12 +69,12 @@ def places(schema: dict[str, Any], path: tuple[str, ...]) -> list[dict[str, Any]
     return found
 
 
-def test_the_schema_uses_the_words_of_draft_07_only() -> None:
+def test_the_schema_uses_the_words_of_draft_07_only():
     assert SCHEMA["$schema"] == "http://json-schema.org/draft-07/schema#"
     assert {word for schema in schemas(SCHEMA) for word in schema} <= WORDS
 
 
-def test_every_reference_leads_somewhere_and_stands_alone() -> None:
+def test_every_reference_leads_somewhere_and_stands_alone():
     references = [schema for schema in schemas(SCHEMA) if "$ref" in schema]
     assert references
     for schema in references:
@@ -84,7 +82,7 @@ def test_every_reference_leads_somewhere_and_stands_alone() -> None:
         assert schema["$ref"].removeprefix("#/definitions/") in SCHEMA["definitions"]
 
 
-def test_lists_of_fixed_length_are_closed() -> None:
+def test_lists_of_fixed_length_are_closed():
     lists = [schema for schema in schemas(SCHEMA) if isinstance(schema.get("items"), list)]
     assert lists
     for schema in lists:
@@ -92,7 +90,7 @@ def test_lists_of_fixed_length_are_closed() -> None:
         assert len(schema["items"]) == schema["minItems"] == schema["maxItems"]
 
 
-def test_no_key_is_required_and_no_unknown_one_allowed() -> None:
+def test_no_key_is_required_and_no_unknown_one_allowed():
     sections_of_keys = [schema for schema in schemas(SCHEMA) if "properties" in schema]
     assert len(sections_of_keys) > 10
     for schema in sections_of_keys:
@@ -100,14 +98,14 @@ def test_no_key_is_required_and_no_unknown_one_allowed() -> None:
         assert "required" not in schema
 
 
-def test_a_file_can_extend_another() -> None:
+def test_a_file_can_extend_another():
     one, several = SCHEMA["properties"]["extends"]["anyOf"]
     assert (one["type"], several["type"], several["items"]["type"]) == ("string", "array", "string")
     assert set(SCHEMA["properties"]) == {"extends", *Scenario.model_fields}
 
 
 @pytest.mark.parametrize("key", KEYS, ids=lambda key: dotted(key.route))
-def test_every_key_of_the_models_is_there_with_its_meaning_and_unit(key: Key) -> None:
+def test_every_key_of_the_models_is_there_with_its_meaning_and_unit(key):
     found = places(SCHEMA, key.path)
     assert found
     if key.path[-1] != "kind":
@@ -116,21 +114,21 @@ def test_every_key_of_the_models_is_there_with_its_meaning_and_unit(key: Key) ->
         assert shown in [schema["description"] for schema in found]
 
 
-def test_a_kind_is_one_word_and_a_preset_one_of_the_vessels() -> None:
+def test_a_kind_is_one_word_and_a_preset_one_of_the_vessels():
     laws = sections(Scenario.model_fields["controller"].annotation)
     assert {schema["const"] for schema in places(SCHEMA, ("controller", "kind"))} == set(laws)
     (preset,) = places(SCHEMA, ("vessel", "preset"))
     assert preset["enum"] == ["", *preset_names(SHIPPED)]
 
 
-def test_defaults_are_there_but_where_they_depend_on_the_place() -> None:
+def test_defaults_are_there_but_where_they_depend_on_the_place():
     assert places(SCHEMA, ("simulation", "step"))[0]["default"] == 0.01
     assert "default" not in places(SCHEMA, ("vessel", "X_uu"))[0], "it is the preset's"
     assert "default" not in places(SCHEMA, ("disturbance", "b_u", "sin"))[0], "b_v has another one"
     assert places(SCHEMA, ("disturbance", "b_u"))[0]["default"]["sin"] == 0.1
 
 
-def test_the_copy_in_the_documentation_is_up_to_date() -> None:
+def test_the_copy_in_the_documentation_is_up_to_date():
     assert COPY.read_text("utf-8") == schema_text(tuple(finding_kinds())), (
         "write it anew: podusv schema > docs/schema.json"
     )

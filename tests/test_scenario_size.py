@@ -1,21 +1,16 @@
 """What podusv accepts, it reads back afterwards; what runs need of the disk."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import pytest
 from scenario_samples import SOUND, write
 
 from podusv_cli.scenario import limits
 from podusv_cli.scenario.load import load, load_resolved, resolved_yaml
-from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.yaml_text import MAX_NODES
 from podusv_cli.storage import json_files, manifest
 
 
 @pytest.fixture
-def of_two_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Scenario:
+def of_two_files(tmp_path, monkeypatch):
     """A scenario of more values than one file may have."""
     monkeypatch.chdir(tmp_path)
     several = MAX_NODES // 3 - 100
@@ -26,12 +21,12 @@ def of_two_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Scenario:
     return load("a.yaml").scenario
 
 
-def test_a_scenario_of_several_long_files_is_read_back(of_two_files: Scenario) -> None:
+def test_a_scenario_of_several_long_files_is_read_back(of_two_files):
     text = resolved_yaml(of_two_files)
     assert load_resolved(text, "resolved.yaml") == of_two_files
 
 
-def test_the_manifest_of_many_runs_is_read_back(tmp_path: Path) -> None:
+def test_the_manifest_of_many_runs_is_read_back(tmp_path):
     entry = manifest.FileEntry(sha256="a" * 64, bytes=10**9)
     names = ("scenario.yaml", "resolved.yaml", "log.h5", "metrics.json", "metrics.csv",
              "theory.json", "figures/controls.png", "provenance.json", "manifest.json",
@@ -43,7 +38,7 @@ def test_the_manifest_of_many_runs_is_read_back(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("at_once", "largest"), [(1, 1000), (2, 1100), (3, 1110), (9, 1110)])
-def test_runs_made_at_once_may_be_those_that_need_the_most_disk(at_once: int, largest: int) -> None:
+def test_runs_made_at_once_may_be_those_that_need_the_most_disk(at_once, largest):
     sizes = [limits.Size(1, 1, 50, 0.0, scratch, compressed=True) for scratch in (100, 10, 1000)]
     packed = limits.LEAST_COMPRESSED * 150
     assert limits.needed(sizes, at_once) == pytest.approx(packed + largest)

@@ -1,7 +1,5 @@
 """YAML texts to trees: what every scalar means, and where every fault stands."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 
@@ -30,25 +28,23 @@ def faults_of(text: str) -> list[str]:
         ("e5", "e5"), (".", "."), ("-", "-"), ("1e", "1e"),
     ],
 )  # fmt: skip
-def test_a_plain_scalar_means_what_yaml_1_2_says_and_nothing_else(
-    text: str, meaning: object
-) -> None:
+def test_a_plain_scalar_means_what_yaml_1_2_says_and_nothing_else(text, meaning):
     found = resolve(text)
     assert (type(found), repr(found)) == (type(meaning), repr(meaning))
 
 
-def test_a_whole_number_of_any_length_stays_exact_or_becomes_infinite() -> None:
+def test_a_whole_number_of_any_length_stays_exact_or_becomes_infinite():
     assert resolve("9" * 300) == int("9" * 300)
     assert resolve("9" * 5000) == math.inf
 
 
-def test_text_in_quotes_and_blocks_stays_text() -> None:
+def test_text_in_quotes_and_blocks_stays_text():
     node = read('a: "1"\nb: \'true\'\nc: "null"\nd: |\n  1\ne: >-\n  2\n  3\n', "a.yaml", [])
     assert node is not None
     assert plain(node) == {"a": "1", "b": "true", "c": "null", "d": "1\n", "e": "2 3"}
 
 
-def test_every_key_and_value_knows_its_line_and_column() -> None:
+def test_every_key_and_value_knows_its_line_and_column():
     node = read("# first line\na: 1\nb:\n  c: [10, 20]\n", "dir/a.yaml", [])
     assert node is not None
     inner = node.mapping["b"].mapping["c"]
@@ -111,42 +107,42 @@ def test_every_key_and_value_knows_its_line_and_column() -> None:
         ("a: 1\n...\nb: 2\n", "a.yaml:3:1: text after the end of the document"),
     ],
 )
-def test_a_fault_is_one_sentence_at_its_place(text: str, told: str) -> None:
+def test_a_fault_is_one_sentence_at_its_place(text, told):
     assert faults_of(text) == [told]
 
 
-def test_all_faults_are_told_together_up_to_where_reading_stops() -> None:
+def test_all_faults_are_told_together_up_to_where_reading_stops():
     told = faults_of("a: .inf\na: 1\n2: 3\nb: *x\nc: [1\n")
     places = [line.split(": ")[0] for line in told]
     assert places == ["a.yaml:1:4", "a.yaml:2:1", "a.yaml:3:1", "a.yaml:4:4", "a.yaml:5:4"]
 
 
 @pytest.mark.parametrize("opening", ["[", "{a: ", "- ", "? "])
-def test_nesting_stops_at_the_limit_whatever_its_depth(opening: str) -> None:
+def test_nesting_stops_at_the_limit_whatever_its_depth(opening):
     told = faults_of(opening * 30_000)
     assert [line.partition(": ")[2] for line in told] == [f"nested deeper than {MAX_DEPTH} levels"]
 
 
-def test_aliases_of_aliases_do_not_grow() -> None:
+def test_aliases_of_aliases_do_not_grow():
     bomb = "".join(f"{c}: &{c} [{', '.join([f'*{b}'] * 9)}]\n" for b, c in pairwise("abcdefghi"))
     told = faults_of("a: &a [x]\n" + bomb)
     assert told[2] == "a.yaml:2:8: b[0]: alias *a; write the value out, or use extends"
     assert len(told) == 1 + 8 * (1 + 9)
 
 
-def test_values_are_counted() -> None:
+def test_values_are_counted():
     row = "[" + "1," * (MAX_NODES - 4) + "1]"  # with the mapping, its key and the list
     assert faults_of(f"a: {row}") == []
     assert faults_of(f"a: [{row}]") == [f"a.yaml:1:{2 * MAX_NODES - 2}: more than 20,000 values"]
 
 
-def test_without_places_marks_are_the_source_alone() -> None:
+def test_without_places_marks_are_the_source_alone():
     faults: list[Fault] = []
     read("a: .nan\nb: [\n", "--set x=1", faults, placed=False)
     assert [str(fault.mark) for fault in faults] == ["--set x=1", "--set x=1"]
 
 
-def test_files_that_cannot_be_read_say_why(tmp_path, monkeypatch) -> None:
+def test_files_that_cannot_be_read_say_why(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "folder").mkdir()
     (tmp_path / "latin.yaml").write_bytes("a: 1\nbé: 2\n".encode("latin-1"))
@@ -164,7 +160,7 @@ def test_files_that_cannot_be_read_say_why(tmp_path, monkeypatch) -> None:
     ]
 
 
-def test_a_file_at_the_size_limit_is_read(tmp_path) -> None:
+def test_a_file_at_the_size_limit_is_read(tmp_path):
     path = tmp_path / "full.yaml"
     path.write_bytes(b"#" * yaml_text.MAX_BYTES)
     assert read_text(str(path), Mark(str(path)), "", []) == "#" * MAX_BYTES

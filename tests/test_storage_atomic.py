@@ -1,15 +1,11 @@
 """One file, whole or not at all, whatever fails on the way."""
 
-from __future__ import annotations
-
 import errno
 import os
 import re
-from pathlib import Path
 
 import pytest
 from storage_samples import (
-    Deed,
     Saboteur,
     durable_steps,
     fails,
@@ -26,7 +22,7 @@ CALLS = ("open", "write", "fsync", "replace", "close")
 
 
 @pytest.fixture
-def path(tmp_path: Path) -> Path:
+def path(tmp_path):
     file = tmp_path / "metrics.json"
     file.write_bytes(OLD)
     return file
@@ -38,16 +34,14 @@ def in_pieces(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(os, "write", lambda descriptor, content: write(descriptor, content[:700]))
 
 
-def test_writes_and_replaces(tmp_path: Path, path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_writes_and_replaces(tmp_path, path, monkeypatch):
     in_pieces(monkeypatch)
     atomic.write_bytes(path, NEW)
     atomic.write_bytes(tmp_path / "empty", b"")
     assert files(tmp_path) == {"metrics.json": NEW, "empty": b""}
 
 
-def test_it_lasts_before_it_has_its_name_and_then_so_does_the_name(
-    path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_it_lasts_before_it_has_its_name_and_then_so_does_the_name(path, monkeypatch):
     steps = durable_steps(monkeypatch)
     atomic.write_bytes(path, NEW)
     (first, part), *rest = steps
@@ -56,7 +50,7 @@ def test_it_lasts_before_it_has_its_name_and_then_so_does_the_name(
     assert rest == [("name", str(path)), ("sync", str(path.parent))]
 
 
-def test_others_may_read_what_the_user_lets_them(path: Path) -> None:
+def test_others_may_read_what_the_user_lets_them(path):
     before = os.umask(0o027)
     try:
         atomic.write_bytes(path, NEW)
@@ -66,7 +60,7 @@ def test_others_may_read_what_the_user_lets_them(path: Path) -> None:
 
 
 @pytest.mark.parametrize("deed", [fails(errno.ENOSPC), fails(errno.EIO), interrupts])
-def test_a_failure_at_any_step_leaves_the_old_file_or_the_new_one(path: Path, deed: Deed) -> None:
+def test_a_failure_at_any_step_leaves_the_old_file_or_the_new_one(path, deed):
     def attempt(saboteur: Saboteur) -> None:
         path.write_bytes(OLD)
         with pytest.MonkeyPatch.context() as patch:
@@ -88,7 +82,7 @@ def test_a_failure_at_any_step_leaves_the_old_file_or_the_new_one(path: Path, de
     assert len(seen) > len(NEW) / 700 + 6, "every write was sabotaged"
 
 
-def test_a_disk_that_fills_up_leaves_all_of_several_files(path: Path) -> None:
+def test_a_disk_that_fills_up_leaves_all_of_several_files(path):
     """None is new unless all are."""
     contents = {path: NEW, path.with_name("metrics.csv"): NEW}
 
@@ -116,16 +110,14 @@ def test_a_disk_that_fills_up_leaves_all_of_several_files(path: Path) -> None:
         (errno.EIO, os.strerror(errno.EIO)),
     ],
 )
-def test_one_sentence_names_path_size_and_cause(
-    path: Path, monkeypatch: pytest.MonkeyPatch, number: int, cause: str
-) -> None:
+def test_one_sentence_names_path_size_and_cause(path, monkeypatch, number, cause):
     Saboteur(fails(number), 1).watch(monkeypatch, "write")
     with pytest.raises(StorageError) as caught:
         atomic.write_bytes(path, NEW)
     assert str(caught.value) == f"cannot write {path} (6000 bytes): {cause}"
 
 
-def test_a_folder_that_is_missing_or_a_file(tmp_path: Path, path: Path) -> None:
+def test_a_folder_that_is_missing_or_a_file(tmp_path, path):
     with pytest.raises(StorageError, match="no such file or folder"):
         atomic.write_bytes(tmp_path / "nowhere/log.h5", NEW)
     with pytest.raises(StorageError, match="is a file, not a folder"):
@@ -133,15 +125,13 @@ def test_a_folder_that_is_missing_or_a_file(tmp_path: Path, path: Path) -> None:
     assert path.read_bytes() == OLD
 
 
-def test_file_systems_that_cannot_sync_folders_are_good_enough(
-    path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_file_systems_that_cannot_sync_folders_are_good_enough(path, monkeypatch):
     Saboteur(fails(errno.EINVAL), 2).watch(monkeypatch, "fsync")
     atomic.write_bytes(path, NEW)
     assert path.read_bytes() == NEW
 
 
-def test_create_never_touches_a_file_that_is_there(path: Path) -> None:
+def test_create_never_touches_a_file_that_is_there(path):
     with pytest.raises(StorageError, match="exists"):
         atomic.create(path, NEW)
     assert path.read_bytes() == OLD

@@ -7,7 +7,6 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
-from command_samples import Command
 from storage_samples import (
     NEW,
     OLD,
@@ -28,7 +27,7 @@ from podusv_cli.storage.run_folder import RunWriter, default_folder, open_run
 
 
 @pytest.fixture
-def final(tmp_path: Path) -> Path:
+def final(tmp_path):
     return tmp_path / "results" / "run"
 
 
@@ -45,7 +44,7 @@ def run_to(final: Path, **how: bool) -> Path:
         return writer.finish("finished")
 
 
-def test_a_folder_appears_only_when_it_is_finished(final: Path) -> None:
+def test_a_folder_appears_only_when_it_is_finished(final):
     with RunWriter(final) as writer:
         for name, part in NEW.items():
             writer.add(name, part)
@@ -57,9 +56,7 @@ def test_a_folder_appears_only_when_it_is_finished(final: Path) -> None:
     assert manifest.read(final).status == "finished"
 
 
-def test_everything_in_it_lasts_before_it_has_its_name(
-    final: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_everything_in_it_lasts_before_it_has_its_name(final, monkeypatch):
     steps = durable_steps(monkeypatch)
     with RunWriter(final) as writer:
         for name, part in NEW.items():
@@ -72,9 +69,7 @@ def test_everything_in_it_lasts_before_it_has_its_name(
     assert ("sync", str(final.parent)) in steps[named:]
 
 
-def test_every_file_of_a_run_is_synced_before_the_run_has_its_name(
-    podusv: Command, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_every_file_of_a_run_is_synced_before_the_run_has_its_name(podusv, monkeypatch):
     """The log, too, which is written in another way than the other files."""
     steps = durable_steps(monkeypatch)
     assert podusv("run", "a.yaml", "--out", "x", "-q").code == 0
@@ -85,13 +80,13 @@ def test_every_file_of_a_run_is_synced_before_the_run_has_its_name(
     assert made - synced == {"manifest.json"}  # which is synced under a hidden name
 
 
-def test_without_finish_nothing_is_left(final: Path) -> None:
+def test_without_finish_nothing_is_left(final):
     with RunWriter(final) as writer:
         writer.add("log.h5", b"new log")
     assert list(final.parent.iterdir()) == []
 
 
-def test_a_file_is_written_once_and_only_inside(final: Path) -> None:
+def test_a_file_is_written_once_and_only_inside(final):
     with RunWriter(final) as writer:
         writer.add("figures/a.png", b"a")
         for name in ("../a", "/tmp/a", "a/../../a", "", ".", "manifest.json", "a\0b", "figures/"):
@@ -102,7 +97,7 @@ def test_a_file_is_written_once_and_only_inside(final: Path) -> None:
         assert files(writer.folder) == {"figures/a.png": b"a"}
 
 
-def test_a_finished_folder_needs_force(final: Path) -> None:
+def test_a_finished_folder_needs_force(final):
     write(final, OLD)
     with pytest.raises(StorageError, match="exists already; --force replaces it"):
         RunWriter(final)
@@ -113,7 +108,7 @@ def test_a_finished_folder_needs_force(final: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["notes.txt", "figures/mine.png"])
-def test_files_that_others_put_into_a_run_folder_are_not_removed(final: Path, name: str) -> None:
+def test_files_that_others_put_into_a_run_folder_are_not_removed(final, name):
     write(final, OLD)
     (final / ".DS_Store").touch()  # of a system that shows folders
     write(final, OLD, force=True)
@@ -126,7 +121,7 @@ def test_files_that_others_put_into_a_run_folder_are_not_removed(final: Path, na
 
 
 @pytest.mark.parametrize("force", [False, True])
-def test_what_is_no_run_folder_is_never_replaced(final: Path, force: bool) -> None:
+def test_what_is_no_run_folder_is_never_replaced(final, force):
     final.mkdir(parents=True)
     (final / "thesis.tex").write_text("ten years")
     with pytest.raises(StorageError, match="not a finished run folder"):
@@ -139,7 +134,7 @@ def test_what_is_no_run_folder_is_never_replaced(final: Path, force: bool) -> No
 
 
 @pytest.mark.parametrize("force", [False, True])
-def test_what_became_no_run_folder_meanwhile_is_not_replaced(final: Path, force: bool) -> None:
+def test_what_became_no_run_folder_meanwhile_is_not_replaced(final, force):
     with RunWriter(final, force=force) as writer:
         writer.add("log.h5", b"new log")
         final.mkdir()
@@ -152,14 +147,14 @@ def test_what_became_no_run_folder_meanwhile_is_not_replaced(final: Path, force:
 
 
 @pytest.mark.parametrize("force", [False, True])
-def test_an_empty_folder_may_be_filled(final: Path, force: bool) -> None:
+def test_an_empty_folder_may_be_filled(final, force):
     final.mkdir(parents=True)
     write(final, NEW, force=force)
     assert content(final) == NEW
 
 
 @pytest.mark.parametrize("force", [False, True])
-def test_files_and_links_are_not_replaced(final: Path, force: bool) -> None:
+def test_files_and_links_are_not_replaced(final, force):
     final.parent.mkdir()
     final.write_text("precious")
     link = final.with_name("latest")
@@ -171,7 +166,7 @@ def test_files_and_links_are_not_replaced(final: Path, force: bool) -> None:
     assert content(link.resolve()) == OLD
 
 
-def test_a_finished_run_opens_with_all_that_plots_and_comparisons_need(final: Path) -> None:
+def test_a_finished_run_opens_with_all_that_plots_and_comparisons_need(final):
     run = open_run(run_to(final))
     assert run.folder == final
     assert run.status == "finished"
@@ -182,7 +177,7 @@ def test_a_finished_run_opens_with_all_that_plots_and_comparisons_need(final: Pa
     assert run.recording is run.recording
 
 
-def test_only_finished_runs_open(final: Path, tmp_path: Path) -> None:
+def test_only_finished_runs_open(final, tmp_path):
     with pytest.raises(StorageError, match="no such file"):
         open_run(tmp_path / "nowhere")
     with pytest.raises(StorageError, match="no such file"):
@@ -197,7 +192,7 @@ def test_only_finished_runs_open(final: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("metrics", [{}, {"metrics": [1.0]}])
-def test_metrics_of_another_shape_do_not_open(final: Path, metrics: dict[str, object]) -> None:
+def test_metrics_of_another_shape_do_not_open(final, metrics):
     with RunWriter(final) as writer:
         for name in ("resolved.yaml", "log.h5", "provenance.json"):
             writer.add(name, b"{}")
@@ -207,7 +202,7 @@ def test_metrics_of_another_shape_do_not_open(final: Path, metrics: dict[str, ob
         open_run(final)
 
 
-def test_the_default_folder_tells_time_and_scenario(tmp_path: Path) -> None:
+def test_the_default_folder_tells_time_and_scenario(tmp_path):
     before = datetime.now(UTC).replace(microsecond=0)
     folder = default_folder(tmp_path, "ferry", YAML)
     assert folder.parent == tmp_path / "ferry"
@@ -219,9 +214,7 @@ def test_the_default_folder_tells_time_and_scenario(tmp_path: Path) -> None:
     assert digest != default_folder(tmp_path, "tug", YAML + " ").name.split("-")[1]
 
 
-def test_a_second_run_in_the_same_second_has_a_name_of_its_own(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_second_run_in_the_same_second_has_a_name_of_its_own(tmp_path, monkeypatch):
     class Clock(datetime):
         @classmethod
         def now(cls, tz: object = None) -> Clock:

@@ -1,9 +1,6 @@
 """log.h5 as others see it: xarray, netCDF, h5py, an old HDF5; and the same bytes every time."""
 
-from __future__ import annotations
-
 import io
-from pathlib import Path
 
 import h5py
 import numpy as np
@@ -27,7 +24,7 @@ SCALES = {"DIMENSION_LIST", "REFERENCE_LIST", "CLASS", "NAME"}
 
 
 @pytest.fixture
-def path(tmp_path: Path) -> Path:
+def path(tmp_path):
     file = tmp_path / "log.h5"
     file.write_bytes(log())
     return file
@@ -41,7 +38,7 @@ def objects(content: bytes) -> dict[str, h5py.Group | h5py.Dataset]:
 
 
 @pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4", None])
-def test_xarray_reads_every_signal_with_its_axes_and_units(path: Path, engine: str | None) -> None:
+def test_xarray_reads_every_signal_with_its_axes_and_units(path, engine):
     recorded = recording()
     with xr.open_dataset(path, engine=engine) as found:
         assert {name: found[name].dims for name in found.variables} == DIMENSIONS
@@ -57,7 +54,7 @@ def test_xarray_reads_every_signal_with_its_axes_and_units(path: Path, engine: s
         assert_array_equal(found.node, np.arange(8))
 
 
-def test_every_axis_has_its_scale_by_name() -> None:
+def test_every_axis_has_its_scale_by_name():
     found = objects(log())
     for name, axes in DIMENSIONS.items():
         scales = [list(axis.keys()) for axis in found[name].dims]
@@ -65,7 +62,7 @@ def test_every_axis_has_its_scale_by_name() -> None:
 
 
 @pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4"])
-def test_attributes_of_the_file(path: Path, engine: str) -> None:
+def test_attributes_of_the_file(path, engine):
     with xr.open_dataset(path, engine=engine) as found:
         assert found.attrs == {
             "podusv_format": 2, "podusv_version": "1.2.3", "Conventions": "CF-1.11",
@@ -75,14 +72,14 @@ def test_attributes_of_the_file(path: Path, engine: str) -> None:
 
 
 @pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4"])
-def test_the_scenario_is_in_the_log(path: Path, engine: str) -> None:
+def test_the_scenario_is_in_the_log(path, engine):
     with xr.open_dataset(path, engine=engine, group="provenance") as found:
         text = found.resolved_yaml.item()
         assert (text.decode() if isinstance(text, bytes) else text) == YAML
 
 
 @pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4"])
-def test_a_run_that_logged_nothing_opens(tmp_path: Path, engine: str) -> None:
+def test_a_run_that_logged_nothing_opens(tmp_path, engine):
     path = tmp_path / "log.h5"
     path.write_bytes(log(recording(rows=0, status="diverged", message="diverged at t = 0 s")))
     with xr.open_dataset(path, engine=engine) as found:
@@ -90,7 +87,7 @@ def test_a_run_that_logged_nothing_opens(tmp_path: Path, engine: str) -> None:
         assert found.attrs["message"] == "diverged at t = 0 s"
 
 
-def test_nothing_in_a_log_is_of_variable_length() -> None:
+def test_nothing_in_a_log_is_of_variable_length():
     for name, thing in objects(log()).items():
         kinds = {key: thing.attrs.get_id(key).dtype for key in set(thing.attrs) - SCALES}
         if isinstance(thing, h5py.Dataset):
@@ -101,7 +98,7 @@ def test_nothing_in_a_log_is_of_variable_length() -> None:
             assert text is None or (text.encoding == "utf-8" and text.length), (name, key)
 
 
-def test_every_array_lies_in_one_piece_where_a_map_can_use_it() -> None:
+def test_every_array_lies_in_one_piece_where_a_map_can_use_it():
     datasets = objects(log())
     for name in (*recording().signals, *recording().fixed):
         found = datasets[name]
@@ -109,7 +106,7 @@ def test_every_array_lies_in_one_piece_where_a_map_can_use_it() -> None:
         assert found.id.get_offset() % 8 == 0
 
 
-def test_compressed_arrays_are_the_same_and_smaller(tmp_path: Path) -> None:
+def test_compressed_arrays_are_the_same_and_smaller(tmp_path):
     recorded = recording(rows=20_000)
     plain, packed = log(recorded), log(recorded, compress=True)
     found = objects(packed)["W_hat_u"]
@@ -119,24 +116,24 @@ def test_compressed_arrays_are_the_same_and_smaller(tmp_path: Path) -> None:
     assert_same(recorded, log_reader.read_log(tmp_path / "log.h5"))
 
 
-def test_hdf5_1_8_and_so_every_matlab_can_read_it() -> None:
+def test_hdf5_1_8_and_so_every_matlab_can_read_it():
     assert log()[8] == 2, "version of the superblock"
 
 
-def test_a_signal_without_a_meaning_is_a_bug() -> None:
+def test_a_signal_without_a_meaning_is_a_bug():
     signals = dict(recording().signals) | {"tau_w": np.zeros(50)}
     with pytest.raises(KeyError, match="tau_w"):
         log(recording(signals=signals))
 
 
 @pytest.mark.parametrize("shape", [(49,), (50, 8), ()])
-def test_a_signal_of_another_shape_is_a_bug(shape: tuple[int, ...]) -> None:
+def test_a_signal_of_another_shape_is_a_bug(shape):
     signals = dict(recording().signals) | {"x": np.zeros(shape)}
     with pytest.raises(ValueError, match=r"x: 49 values along time, not 50|zip"):
         log(recording(signals=signals))
 
 
-def test_texts_longer_than_an_attribute_of_old_files_can_be(tmp_path: Path) -> None:
+def test_texts_longer_than_an_attribute_of_old_files_can_be(tmp_path):
     path, text = tmp_path / "log.h5", "# Schräglage ψ\n" * 20_000
     path.write_bytes(log(title=text, resolved_yaml=text))
     assert log_reader.resolved_yaml(path) == text
@@ -144,12 +141,12 @@ def test_texts_longer_than_an_attribute_of_old_files_can_be(tmp_path: Path) -> N
         assert found.attrs["title"] == text
 
 
-def test_a_text_that_no_file_can_hold_is_spelt_out() -> None:
+def test_a_text_that_no_file_can_hold_is_spelt_out():
     title = objects(log(title="half \ud83d"))["/"].attrs["title"]
     assert title.decode() == r"half \ud83d"
 
 
-def test_a_simulated_run_comes_back_as_it_was(tmp_path: Path) -> None:
+def test_a_simulated_run_comes_back_as_it_was(tmp_path):
     recorded, path = run(corrected(), 2.0), tmp_path / "log.h5"
     path.write_bytes(log(recorded))
     assert_same(recorded, log_reader.read_log(path))
@@ -165,7 +162,7 @@ SPEED = Signal("speed_2", "m/s", "a law's own speed", r"\nu_2", ("layer",), wrap
 GAINS = Signal("gains", "1", "a law's own gains", "K", ("layer",), fixed=True)
 
 
-def test_signals_of_others_bring_their_description(tmp_path: Path) -> None:
+def test_signals_of_others_bring_their_description(tmp_path):
     base = recording()
     recorded = recording(
         signals={**base.signals, "speed_2": np.ones((50, 3))},
@@ -186,7 +183,7 @@ def test_signals_of_others_bring_their_description(tmp_path: Path) -> None:
 # --- the file in memory in which HDF5 lays the log out
 
 
-def test_a_layout_is_a_file_whose_empty_parts_take_no_room(tmp_path: Path) -> None:
+def test_a_layout_is_a_file_whose_empty_parts_take_no_room(tmp_path):
     layout, plain = LogLayout(), io.BytesIO()
     random = np.random.default_rng(3)
     for _ in range(200):

@@ -1,7 +1,5 @@
 """The manifest: what "finished" means, and JSON as podusv writes it."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math
@@ -21,7 +19,7 @@ FILES = {"log.h5": b"numbers", "figures/path.png": b"picture", "metrics.csv": b"
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(tmp_path):
     """A finished folder."""
     place = tmp_path / "run"
     for name, content in FILES.items():
@@ -38,7 +36,7 @@ def rewrite(folder: Path, change: Callable[[dict[str, Any]], object]) -> None:
     path.write_text(json.dumps(content))
 
 
-def test_it_lists_every_file_in_order(folder: Path) -> None:
+def test_it_lists_every_file_in_order(folder):
     assert json.loads((folder / "manifest.json").read_text()) == {
         "podusv_format": 2,
         "status": "diverged",
@@ -51,7 +49,7 @@ def test_it_lists_every_file_in_order(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_a_missing_file_is_named(folder: Path, name: str) -> None:
+def test_a_missing_file_is_named(folder, name):
     (folder / name).unlink()
     with pytest.raises(StorageError, match=f"{name} is missing"):
         manifest.check(folder)
@@ -61,26 +59,26 @@ def test_a_missing_file_is_named(folder: Path, name: str) -> None:
     ("name", "content"),
     [("log.h5", b"numberS"), ("log.h5", b"numbers "), ("log.h5", b""), ("metrics.csv", b"1")],
 )
-def test_an_altered_file_is_named(folder: Path, name: str, content: bytes) -> None:
+def test_an_altered_file_is_named(folder, name, content):
     (folder / name).write_bytes(content)
     with pytest.raises(StorageError, match=f"{name} was altered"):
         manifest.check(folder)
 
 
-def test_a_file_that_claims_to_be_beyond_all_measure_is_not_read(folder: Path) -> None:
+def test_a_file_that_claims_to_be_beyond_all_measure_is_not_read(folder):
     rewrite(folder, lambda content: content["files"]["log.h5"].update(bytes=LARGEST_FILE + 1))
     with pytest.raises(StorageError, match=r"log\.h5: .* at most .* read it with h5py or xarray"):
         manifest.check(folder)
 
 
-def test_the_first_fault_in_order_of_names_is_told(folder: Path) -> None:
+def test_the_first_fault_in_order_of_names_is_told(folder):
     (folder / "metrics.csv").write_text("altered")
     (folder / "figures/path.png").unlink()
     with pytest.raises(StorageError, match=r"figures/path\.png is missing"):
         manifest.check(folder)
 
 
-def test_files_of_others_are_allowed_and_told(folder: Path) -> None:
+def test_files_of_others_are_allowed_and_told(folder):
     (folder / "notes.txt").write_text("good run")
     (folder / "figures/mine.png").touch()
     (folder / "latest").symlink_to(folder)
@@ -91,14 +89,14 @@ def test_files_of_others_are_allowed_and_told(folder: Path) -> None:
 @pytest.mark.parametrize(
     "name", ["../secret", "figures/../../secret", "", ".", "a//b", "./a", "a/", "a\0b"]
 )
-def test_names_that_leave_the_folder_are_refused(folder: Path, name: str) -> None:
+def test_names_that_leave_the_folder_are_refused(folder, name):
     (folder.parent / "secret").write_bytes(b"numbers")
     rewrite(folder, lambda it: it["files"].update({name: it["files"]["log.h5"]}))
     with pytest.raises(StorageError, match=r"is no file of this folder|do not show"):
         manifest.check(folder)
 
 
-def test_links_are_not_followed(folder: Path) -> None:
+def test_links_are_not_followed(folder):
     secret = folder.parent / "secret"
     secret.mkdir()
     (secret / "log.h5").write_bytes(FILES["log.h5"])
@@ -115,7 +113,7 @@ def test_links_are_not_followed(folder: Path) -> None:
         manifest.check(folder)
 
 
-def test_a_folder_reached_through_a_link_is_itself(folder: Path) -> None:
+def test_a_folder_reached_through_a_link_is_itself(folder):
     link = folder.with_name("latest")
     link.symlink_to(folder)
     assert manifest.check(link) == manifest.check(folder)
@@ -140,7 +138,7 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("case", BROKEN)
-def test_a_manifest_of_another_shape_is_refused(folder: Path, case: str) -> None:
+def test_a_manifest_of_another_shape_is_refused(folder, case):
     change, words = BROKEN[case]
     rewrite(folder, change)
     with pytest.raises(StorageError, match=words) as caught:
@@ -158,15 +156,13 @@ def test_a_manifest_of_another_shape_is_refused(folder: Path, case: str) -> None
         (b'"\xff"', "not UTF-8"),
     ],
 )
-def test_a_manifest_that_is_no_json_object_is_refused(
-    folder: Path, content: bytes, words: str
-) -> None:
+def test_a_manifest_that_is_no_json_object_is_refused(folder, content, words):
     (folder / "manifest.json").write_bytes(content)
     with pytest.raises(StorageError, match=words):
         manifest.check(folder)
 
 
-def test_json_keeps_the_order_and_has_null_for_what_is_no_number(tmp_path: Path) -> None:
+def test_json_keeps_the_order_and_has_null_for_what_is_no_number(tmp_path):
     content = {
         "z": 1.5, "a": math.nan, "m": [math.inf, -math.inf, (1, True)], "ψ": None,
         "numpy": {"f": np.float64(0.1), "n": np.float32("nan"), "i": np.int64(3), "v": np.ones(2)},
@@ -183,12 +179,12 @@ def test_json_keeps_the_order_and_has_null_for_what_is_no_number(tmp_path: Path)
     assert list(json_files.read(path)) == list(content)
 
 
-def test_json_of_arguments_that_are_no_text(tmp_path: Path) -> None:
+def test_json_of_arguments_that_are_no_text(tmp_path):
     path = tmp_path / "a.json"
     path.write_bytes(json_files.encode({"argv": [os.fsdecode(b"caf\xe9.yaml")]}))
     assert os.fsencode(json_files.read(path)["argv"][0]) == b"caf\xe9.yaml"
 
 
-def test_what_json_does_not_know_is_a_bug() -> None:
+def test_what_json_does_not_know_is_a_bug():
     with pytest.raises(TypeError):
         json_files.encode({"path": Path("a")})

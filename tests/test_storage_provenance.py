@@ -1,7 +1,5 @@
 """Where a result comes from."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -23,7 +21,7 @@ STARTED = datetime(2026, 3, 1, 12, 0, 0, 250_000, tzinfo=timezone(timedelta(hour
 FINISHED = datetime(2026, 3, 1, 10, 0, 3, tzinfo=UTC)
 
 
-def test_versions_platform_command_and_times() -> None:
+def test_versions_platform_command_and_times():
     found = provenance.collect(["podusv", "run", "a.yaml"], STARTED, FINISHED)
     assert found["podusv"] == podusv_cli.__version__
     assert found["python"] == ".".join(map(str, sys.version_info[:3]))
@@ -42,7 +40,7 @@ def test_versions_platform_command_and_times() -> None:
     assert json_files.encode(found)
 
 
-def test_a_package_that_is_not_installed_has_no_version(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_package_that_is_not_installed_has_no_version(monkeypatch):
     def version(name: str) -> str:
         raise PackageNotFoundError(name)
 
@@ -58,7 +56,7 @@ def git(folder: Path, *words: str) -> str:
 
 
 @pytest.fixture
-def package(tmp_path: Path) -> Path:
+def package(tmp_path):
     """A package in a checkout of its own, with everything committed."""
     place = tmp_path / "checkout" / "package"
     place.mkdir(parents=True)
@@ -70,7 +68,7 @@ def package(tmp_path: Path) -> Path:
     return place
 
 
-def test_a_checkout_is_known_by_its_commit(package: Path) -> None:
+def test_a_checkout_is_known_by_its_commit(package):
     commit = git(package, "rev-parse", "HEAD")
     assert provenance.source_tree(package) == {"commit": commit, "dirty": False}
 
@@ -84,35 +82,31 @@ def test_a_checkout_is_known_by_its_commit(package: Path) -> None:
         ("../results.txt", False),
     ],
 )
-def test_only_what_changes_the_package_makes_it_dirty(
-    package: Path, changed: str, dirty: bool
-) -> None:
+def test_only_what_changes_the_package_makes_it_dirty(package, changed, dirty):
     (package / changed).write_text("changed")
     found = provenance.source_tree(package)
     assert found is not None
     assert found["dirty"] is dirty
 
 
-def test_a_package_installed_below_another_checkout_is_no_part_of_it(package: Path) -> None:
+def test_a_package_installed_below_another_checkout_is_no_part_of_it(package):
     installed = package.parent / ".venv" / "package"
     installed.mkdir(parents=True)
     (installed / "__init__.py").write_text("")
     assert provenance.source_tree(installed) is None
 
 
-def test_outside_of_any_checkout(tmp_path: Path) -> None:
+def test_outside_of_any_checkout(tmp_path):
     (tmp_path / "__init__.py").write_text("")
     assert provenance.source_tree(tmp_path) is None
 
 
-def test_without_git(package: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_git(package, tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
     assert provenance.source_tree(package) is None
 
 
-def test_inside_a_hook_of_another_checkout(
-    package: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_inside_a_hook_of_another_checkout(package, tmp_path, monkeypatch):
     expected = provenance.source_tree(package)
     git(tmp_path, "init", "--quiet", "other")
     monkeypatch.setenv("GIT_DIR", str(tmp_path / "other" / ".git"))
@@ -121,7 +115,7 @@ def test_inside_a_hook_of_another_checkout(
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="asks what the GNU C library says of itself")
-def test_processor_and_c_library_are_told() -> None:
+def test_processor_and_c_library_are_told():
     found = provenance.collect([], STARTED, FINISHED)["platform"]
     assert found["processor"] is None or found["processor"] in Path("/proc/cpuinfo").read_text()
     assert found["libc"] == os.confstr("CS_GNU_LIBC_VERSION")

@@ -1,10 +1,8 @@
 """Reading logs back: whole ones exactly, damaged and hostile ones with one sentence."""
 
-from __future__ import annotations
-
 import math
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import h5py
@@ -20,13 +18,13 @@ WORDS = ("units", "long_name", "symbol", "axes", "wrapped")  # attributes of a v
 
 
 @pytest.fixture(autouse=True)
-def never_hangs() -> Iterator[None]:
+def never_hangs():
     with deadline():
         yield
 
 
 @pytest.fixture
-def path(tmp_path: Path) -> Path:
+def path(tmp_path):
     return tmp_path / "log.h5"
 
 
@@ -48,13 +46,13 @@ def read(path: Path, content: bytes) -> Recording:
         recording(signals={"time": np.array([0.0, 1.0]), "z_e": np.array([-0.0, 5e-324])}),
     ],
 )
-def test_what_was_written_is_read(path: Path, recorded: Recording) -> None:
+def test_what_was_written_is_read(path, recorded):
     assert_same(recorded, read(path, log(recorded)))
     assert log_reader.resolved_yaml(path) == YAML
 
 
 @pytest.mark.parametrize("text", ["", "a: 1\n", "# Schräglage ψ\n" * 20_000])
-def test_the_scenario_comes_back_whatever_its_length(path: Path, text: str) -> None:
+def test_the_scenario_comes_back_whatever_its_length(path, text):
     path.write_bytes(log(resolved_yaml=text))
     assert log_reader.resolved_yaml(path) == text
 
@@ -193,21 +191,21 @@ HOSTILE = {
 
 
 @pytest.mark.parametrize("case", HOSTILE)
-def test_a_log_that_is_not_as_podusv_writes_it_is_refused(path: Path, case: str) -> None:
+def test_a_log_that_is_not_as_podusv_writes_it_is_refused(path, case):
     change, words = HOSTILE[case]
     with pytest.raises(StorageError, match=words) as caught:
         read(path, rewritten(change))
     assert "\n" not in str(caught.value)
 
 
-def test_a_log_behind_something_else_is_refused(path: Path) -> None:
+def test_a_log_behind_something_else_is_refused(path):
     # HDF5 would find it there, and count all places in the file from there.
     with pytest.raises(StorageError, match="no HDF5 file of the kind that podusv writes"):
         read(path, bytes(512) + log())
 
 
 @pytest.fixture
-def secret(tmp_path: Path) -> Path:
+def secret(tmp_path):
     """Another log, and plain numbers, that a hostile log would like to have read."""
     other = tmp_path / "secret.h5"
     other.write_bytes(log())
@@ -215,7 +213,7 @@ def secret(tmp_path: Path) -> Path:
     return other
 
 
-def test_data_in_other_files_are_refused(path: Path, secret: Path) -> None:
+def test_data_in_other_files_are_refused(path, secret):
     outside = [(str(secret.with_suffix(".bin")), 0, 400)]
     link = linked("x", h5py.ExternalLink(str(secret), "/x"))
     with pytest.raises(StorageError, match="link to elsewhere"):
@@ -237,15 +235,13 @@ def test_data_in_other_files_are_refused(path: Path, secret: Path) -> None:
         (lambda file: file.pop("provenance"), "damaged"),
     ],
 )
-def test_a_scenario_that_is_not_as_podusv_writes_it_is_refused(
-    path: Path, change: Callable[[h5py.File], object], words: str
-) -> None:
+def test_a_scenario_that_is_not_as_podusv_writes_it_is_refused(path, change, words):
     path.write_bytes(rewritten(change))
     with pytest.raises(StorageError, match=words):
         log_reader.resolved_yaml(path)
 
 
-def test_only_regular_files_are_read(tmp_path: Path, path: Path) -> None:
+def test_only_regular_files_are_read(tmp_path, path):
     path.write_bytes(log())
     link, pipe, empty = tmp_path / "link", tmp_path / "pipe", tmp_path / "empty"
     link.symlink_to(path)
@@ -265,14 +261,14 @@ def test_only_regular_files_are_read(tmp_path: Path, path: Path) -> None:
         assert str(place) in str(caught.value)
 
 
-def test_a_file_beyond_all_measure_is_not_even_opened(path: Path) -> None:
+def test_a_file_beyond_all_measure_is_not_even_opened(path):
     path.touch()
     os.truncate(path, log_reader.LARGEST_FILE + 1)  # a hole: takes no room on the disk
     with pytest.raises(StorageError, match=r"at most .* read it with h5py or xarray"):
         log_reader.read_log(path)
 
 
-def test_the_size_that_is_allowed_is_for_the_caller_to_say(path: Path) -> None:
+def test_the_size_that_is_allowed_is_for_the_caller_to_say(path):
     path.write_bytes(log())
     with pytest.raises(StorageError, match="at most 1000 allowed"):
         log_reader.read_log(path, 1000)

@@ -1,14 +1,11 @@
 """Folders in the making: at the same time, failing and killed at every step, left behind."""
 
-from __future__ import annotations
-
 import errno
 import os
 import shutil
 import subprocess
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 from threading import Barrier
 
 import pytest
@@ -17,7 +14,6 @@ from storage_samples import (
     NEW,
     OLD,
     PYTHON,
-    Deed,
     Saboteur,
     beside,
     content,
@@ -37,14 +33,12 @@ DEADLY = (*CALLS, "open", "unlink", "rmdir")
 
 
 @pytest.fixture
-def final(tmp_path: Path) -> Path:
+def final(tmp_path):
     return tmp_path / "results" / "run"
 
 
 @pytest.mark.parametrize("named", [False, True])
-def test_of_two_writers_the_first_to_finish_wins_and_the_other_keeps_what_it_has(
-    final: Path, named: bool
-) -> None:
+def test_of_two_writers_the_first_to_finish_wins_and_the_other_keeps_what_it_has(final, named):
     """An error only where the user asked for this very name."""
     with RunWriter(final, named=named) as one, RunWriter(final, force=not named) as other:
         one.add("log.h5", b"one")
@@ -61,9 +55,7 @@ def test_of_two_writers_the_first_to_finish_wins_and_the_other_keeps_what_it_has
 
 
 @pytest.mark.parametrize("named", [False, True])
-def test_a_name_that_nobody_asked_for_is_never_taken_from_another_run(
-    final: Path, named: bool
-) -> None:
+def test_a_name_that_nobody_asked_for_is_never_taken_from_another_run(final, named):
     with RunWriter(final, force=True, named=named) as writer:
         writer.add("log.h5", b"new")
         write(final, OLD)
@@ -72,7 +64,7 @@ def test_a_name_that_nobody_asked_for_is_never_taken_from_another_run(
     assert beside(final) == (set() if named else {"run-2"})
 
 
-def test_a_lesser_one_takes_no_place(final: Path) -> None:
+def test_a_lesser_one_takes_no_place(final):
     write(final, OLD)
     with RunWriter(final, force=True) as writer:
         writer.add("log.h5", b"half")
@@ -83,7 +75,7 @@ def test_a_lesser_one_takes_no_place(final: Path) -> None:
 
 
 @pytest.fixture(params=[True, False], ids=["exchanging", "plain"])
-def exchanging(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> bool:
+def exchanging(request, monkeypatch):
     """Whether the file system lets two names trade places."""
     if not request.param:
         monkeypatch.setattr(staging, "exchange", lambda one, other: fails(errno.EINVAL)())
@@ -91,7 +83,7 @@ def exchanging(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) 
 
 
 @pytest.mark.parametrize("force", [False, True])
-def test_writers_that_finish_at_the_same_time(final: Path, force: bool, exchanging: bool) -> None:
+def test_writers_that_finish_at_the_same_time(final, force, exchanging):
     writers = [RunWriter(final, force=force) for _ in range(8)]
     for number, writer in enumerate(writers):
         writer.add("log.h5", bytes([number]) * 1000)
@@ -118,9 +110,7 @@ def test_writers_that_finish_at_the_same_time(final: Path, force: bool, exchangi
 
 @pytest.mark.parametrize("deed", [fails(errno.ENOSPC), interrupts])
 @pytest.mark.parametrize("before", [None, OLD])
-def test_a_failure_at_any_step_leaves_the_old_run_or_the_new_one(
-    final: Path, before: dict[str, bytes] | None, deed: Deed, exchanging: bool
-) -> None:
+def test_a_failure_at_any_step_leaves_the_old_run_or_the_new_one(final, before, deed, exchanging):
     def attempt(saboteur: Saboteur) -> None:
         shutil.rmtree(final, ignore_errors=True)
         if before:
@@ -154,9 +144,7 @@ def in_a_child(work: Callable[[], object]) -> None:
 
 
 @pytest.mark.parametrize("lost", [False, True])
-def test_killed_at_any_step_the_old_run_or_the_new_one_comes_back(
-    final: Path, lost: bool, exchanging: bool
-) -> None:
+def test_killed_at_any_step_the_old_run_or_the_new_one_comes_back(final, lost, exchanging):
     """`lost`: somebody deletes the folder before the next run clears up; no half of one appears.
 
     It need not even come back where names can trade places: it was there all the time.
@@ -192,7 +180,7 @@ def test_killed_at_any_step_the_old_run_or_the_new_one_comes_back(
     assert all(found in ((None, OLD) if lost else (OLD, NEW)) for found in seen)
 
 
-def test_what_a_live_run_is_making_is_left_alone(final: Path) -> None:
+def test_what_a_live_run_is_making_is_left_alone(final):
     code = (
         "import sys; from pathlib import Path\n"
         "from podusv_cli.storage.run_folder import RunWriter\n"
@@ -211,7 +199,7 @@ def test_what_a_live_run_is_making_is_left_alone(final: Path) -> None:
     assert beside(final) == {"other"}
 
 
-def test_a_nested_run_that_was_killed_leaves_no_trace(final: Path) -> None:
+def test_a_nested_run_that_was_killed_leaves_no_trace(final):
     def die() -> None:
         RunWriter(several.folder / "pid").add("log.h5", b"half a log")
         kills()

@@ -1,7 +1,5 @@
 """Tables of a study: by hand, with failures, missing runs and missing numbers."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -24,7 +22,7 @@ def interval(row: pd.Series, name: str) -> tuple[float, ...]:
     return tuple(row[[name, f"{name}_low", f"{name}_high"]])
 
 
-def test_the_summary_has_failures_and_quantiles_of_every_law_and_cell() -> None:
+def test_the_summary_has_failures_and_quantiles_of_every_law_and_cell():
     a = np.vstack([np.arange(1.0, 41.0), np.r_[np.arange(1.0, 31.0), [inf] * 10]])
     runs = Made({"a": {"iae": a}, "b": {"iae": 2 * a}}, ("s=1", "s=2"), 40)
     frame = summary(runs)
@@ -37,7 +35,7 @@ def test_the_summary_has_failures_and_quantiles_of_every_law_and_cell() -> None:
     assert row(frame, law="b", cell="s=1").q50 == 40.0
 
 
-def test_the_summary_counts_only_runs_that_are_there_and_broken_ones_as_failed() -> None:
+def test_the_summary_counts_only_runs_that_are_there_and_broken_ones_as_failed():
     a, broken = np.r_[np.ones(8), inf, inf], np.arange(10) == 8
     runs = Made({"a": {"iae": a}}, undone={"a": np.arange(10) < 3}, broke={"a": broken})
     found = summary(runs).iloc[0]
@@ -48,7 +46,7 @@ def test_the_summary_counts_only_runs_that_are_there_and_broken_ones_as_failed()
     assert as_csv(summary(nothing)).strip() in ("", '""')
 
 
-def test_metrics_that_a_law_lacks_are_left_out_and_missing_numbers_are_counted() -> None:
+def test_metrics_that_a_law_lacks_are_left_out_and_missing_numbers_are_counted():
     numbers = np.r_[nan, np.ones(19)]
     runs = Made({
         "a": {"iae": np.ones(20), "energy": numbers, "settling_time": numbers},
@@ -64,7 +62,7 @@ def test_metrics_that_a_law_lacks_are_left_out_and_missing_numbers_are_counted()
     assert row(both, metric="energy", a="a", b="dead").unknown == 1
 
 
-def test_pairs_have_both_win_rates_and_the_median_ratio() -> None:
+def test_pairs_have_both_win_rates_and_the_median_ratio():
     a = np.r_[np.ones(10), 1.995, inf, inf]
     b = np.r_[np.full(10, 2.0), 2.0, inf, 1.0]
     found = row(pairs(study(a=a, b=b)), metric="iae")
@@ -77,7 +75,7 @@ def test_pairs_have_both_win_rates_and_the_median_ratio() -> None:
     assert len(pairs(study(a=a, b=b, c=a))) == 3
 
 
-def test_sensitivity_finds_the_quantity_that_matters_and_ranks_failures_worst() -> None:
+def test_sensitivity_finds_the_quantity_that_matters_and_ranks_failures_worst():
     random = np.random.default_rng(1)
     mass, noise = random.random((2, 300))
     runs = study(a=np.where(mass > 0.8, inf, np.exp(mass)), b=random.random(300))
@@ -92,12 +90,12 @@ def test_sensitivity_finds_the_quantity_that_matters_and_ranks_failures_worst() 
     assert row(sensitivity(study(a=late), draws), quantity="vessel.m").correlation > 0.5
 
 
-def test_measured_times_are_in_no_table() -> None:
+def test_measured_times_are_in_no_table():
     runs = Made({"a": {"iae": np.ones(9), "law_ns": np.ones(9)}})
     assert set(summary(runs).metric) == {"iae"}
 
 
-def test_tables_as_csv_have_six_digits_and_no_formulas() -> None:
+def test_tables_as_csv_have_six_digits_and_no_formulas():
     runs = study(["=cell"], a=np.full((1, 7), 1 / 3), b=np.full((1, 7), inf))
     text = as_csv(summary(runs))
     assert "\r" not in text

@@ -4,8 +4,6 @@ Symbols are the paper's. Each test compares an identity with the implementation 
 so that a wrong sign planted in a law, in the plant or in the shunting model fails here.
 """
 
-from __future__ import annotations
-
 import math
 from types import SimpleNamespace
 from typing import Any
@@ -95,16 +93,16 @@ def terms_of_rate() -> Any:
     )  # fmt: skip
 
 
-def test_rate_of_V_of_the_corrected_law_is_the_sum_of_its_terms() -> None:
+def test_rate_of_V_of_the_corrected_law_is_the_sum_of_its_terms():
     assert sp.simplify(rate_of_V().subs(s, 1) - terms_of_rate()) == 0
 
 
-def test_printed_signs_leave_the_cross_terms_doubled() -> None:
+def test_printed_signs_leave_the_cross_terms_doubled():
     left = sp.simplify(rate_of_V().subs(s, -1) - terms_of_rate())
     assert sp.simplify(left + 2 * z_e * u_e * sp.cos(psi_e) + 2 * psi_e * r_e) == 0
 
 
-def test_the_proof_is_short_of_two_terms() -> None:
+def test_the_proof_is_short_of_two_terms():
     # (47) is reached from V' without -z_e y_u cos psi_e - psi_e y_r; they are not negative.
     short = terms_of_rate() + z_e * y_u * sp.cos(psi_e) + psi_e * y_r
     left = rate_of_V().subs(s, 1) - short
@@ -190,12 +188,12 @@ EXACT = 1e-10
 LAW = AdaptiveNeural(Gamma_u=3.0, Gamma_r=3.0, gamma_u=2.0, gamma_r=2.0)
 
 
-def test_the_implemented_law_has_that_rate() -> None:
+def test_the_implemented_law_has_that_rate():
     assert worst_gap(LAW) < EXACT
 
 
 @pytest.mark.parametrize("sign", ["coupling", "k_ue", "k_re", "Gamma_u", "gamma_r", "sigma_bu"])
-def test_a_wrong_sign_planted_in_the_law_is_seen(sign: str) -> None:
+def test_a_wrong_sign_planted_in_the_law_is_seen(sign):
     assert worst_gap(flipped(LAW, sign)) > 1e5 * EXACT
 
 
@@ -229,11 +227,11 @@ def model_12() -> Any:
     return sp.Matrix([f_u + (tau_u + bu) / M11, f_v + bv / M22, f_r + (tau_r + br) / M33])
 
 
-def test_12_follows_from_4_to_7() -> None:
+def test_12_follows_from_4_to_7():
     assert sp.simplify(kinetics().subs(SIMPLIFIED) - model_12()) == sp.zeros(3, 1)
 
 
-def test_the_simplification_as_printed_is_not_enough() -> None:
+def test_the_simplification_as_printed_is_not_enough():
     # It names Y_r and N_v twice and leaves Y_rdot and N_vdot, which couple sway and yaw.
     printed = {x_g: 0, Yr: 0, Nv: 0}
     left = sp.simplify(kinetics().subs(printed) - model_12())
@@ -241,7 +239,7 @@ def test_the_simplification_as_printed_is_not_enough() -> None:
     assert left[2] != 0
 
 
-def test_11_needs_the_other_sign_of_d23() -> None:
+def test_11_needs_the_other_sign_of_d23():
     # Row 2 of (11): d22 v - d23 r + m11 u r as printed, with d23 = -Y_r; D nu of (7) has + d23 r.
     D_nu_row = -(Yv * v + Yr * r)
     d22, d23 = -Yv, -Yr
@@ -250,7 +248,7 @@ def test_11_needs_the_other_sign_of_d23() -> None:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_the_plant_is_that_model(seed: int) -> None:
+def test_the_plant_is_that_model(seed):
     random = np.random.default_rng(seed)
     vessel = PAPER.model_copy(
         update={"x_g": 0.05, "Y_rdot": -0.3, "N_vdot": -0.2, "Y_r": -1.1, "N_v": 0.4}
@@ -265,7 +263,7 @@ def test_the_plant_is_that_model(seed: int) -> None:
     np.testing.assert_allclose(ds[3:], np.array(expected, dtype=float).ravel(), rtol=1e-12)
 
 
-def test_lemma_1_holds_for_its_function() -> None:
+def test_lemma_1_holds_for_its_function():
     # xi phi(xi) + partial - |xi| is a square over 4 partial.
     size = sp.symbols("xi", nonnegative=True)
     left = size * phi(size) + partial - size
@@ -273,7 +271,7 @@ def test_lemma_1_holds_for_its_function() -> None:
 
 
 @pytest.mark.parametrize("p", [0.01, 0.1, 3.0])
-def test_the_implemented_function_satisfies_lemma_1(p: float) -> None:
+def test_the_implemented_function_satisfies_lemma_1(p):
     k = SimpleNamespace(partial=p)
     for xi in np.linspace(-10.0 * p, 10.0 * p, 2001):
         assert abs(xi) <= xi * lemma(float(xi), k) + p * (1.0 + 1e-12)
@@ -281,7 +279,7 @@ def test_the_implemented_function_satisfies_lemma_1(p: float) -> None:
     assert touching == pytest.approx(touching * lemma(touching, k) + p)
 
 
-def test_16_becomes_17() -> None:
+def test_16_becomes_17():
     V_m, E_p, E_Na, E_K, g_p, g_Na, g_K = sp.symbols("V_m E_p E_Na E_K g_p g_Na g_K")
     rate_16 = -(E_p + V_m) * g_p + (E_Na - V_m) * g_Na - (E_K + V_m) * g_K  # C_m = 1
     chi, A, B, D, S_plus, S_minus = sp.symbols("chi A B D S_plus S_minus")
@@ -290,7 +288,7 @@ def test_16_becomes_17() -> None:
     assert sp.expand(rate_17.subs(named) - rate_16) == 0
 
 
-def test_the_shunting_model_is_17() -> None:
+def test_the_shunting_model_is_17():
     chi, A, B, a = sp.symbols("chi A B alpha", real=True)
     f, g = sp.Max(a, 0), sp.Max(-a, 0)
     rate_17 = sp.lambdify((a, chi, A, B), -A * chi + (B - chi) * f - (B + chi) * g)

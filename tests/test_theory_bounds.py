@@ -1,7 +1,5 @@
 """lambda, Delta and the conditions on the gains, against a search over what they promise."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -53,7 +51,7 @@ def lowest_by_search(law: PolarBackstepping, seen: Observed, coupled: bool) -> f
 
 
 @pytest.mark.parametrize("gains", [{}, {"k_ze": 2.0, "k_psie": 1.0}, {"A_u": 3.0, "k_ze": 0.12}])
-def test_the_bound_is_the_lowest_that_the_free_constants_of_47_allow(gains: dict[str, Any]) -> None:
+def test_the_bound_is_the_lowest_that_the_free_constants_of_47_allow(gains):
     law = AdaptiveNeural(**gains)
     searched = lowest_by_search(law, SEEN, coupled=True)
     found = ultimate_bound(law, NONLINEAR, SEEN).corrected
@@ -64,7 +62,7 @@ def test_the_bound_is_the_lowest_that_the_free_constants_of_47_allow(gains: dict
 
 @pytest.mark.parametrize("coupling", ["corrected", "printed"])
 @pytest.mark.parametrize("k", [0.02, 0.049, 0.051, 0.1, 0.4, 2.0])
-def test_lambda_is_what_the_worst_direction_leaves(coupling: Any, k: float) -> None:
+def test_lambda_is_what_the_worst_direction_leaves(coupling, k):
     law = AdaptiveNeural(k_ze=k, k_psie=5.0, coupling=coupling)
     found = ultimate_bound(law, PAPER).corrected.candidates["z_e, y_u"]
     doubled = 2.0 if coupling == "printed" else 0.0
@@ -85,7 +83,7 @@ def test_lambda_is_what_the_worst_direction_leaves(coupling: Any, k: float) -> N
         (AdaptiveNeural(coupling="printed"), 0.05 + 1.0 / 3.5),
     ],
 )
-def test_limit_of_k_ze_is_where_lambda_changes_sign(law: PolarBackstepping, limit: float) -> None:
+def test_limit_of_k_ze_is_where_lambda_changes_sign(law, limit):
     condition = ultimate_bound(law, PAPER).conditions[0]
     assert condition.name == "k_ze"
     assert condition.limit == pytest.approx(limit)
@@ -96,7 +94,7 @@ def test_limit_of_k_ze_is_where_lambda_changes_sign(law: PolarBackstepping, limi
             assert math.copysign(1.0, there.corrected.candidates["z_e, y_u"]) == sign
 
 
-def test_gains_as_printed_fail_where_the_paper_sees_no_failure() -> None:
+def test_gains_as_printed_fail_where_the_paper_sees_no_failure():
     printed = bound(k_psie=0.01)
     failing = [c.name for c in printed.conditions if not c.holds]
     assert failing == ["k_psie"]
@@ -106,28 +104,28 @@ def test_gains_as_printed_fail_where_the_paper_sees_no_failure() -> None:
 
 
 @pytest.mark.parametrize("name", ["sigma_u", "gamma_r", "Gamma_u", "sigma_br"])
-def test_without_leakage_there_is_no_bound(name: str) -> None:
+def test_without_leakage_there_is_no_bound(name):
     without = bound(**{name: 0.0})
     assert [c.name for c in without.conditions if not c.holds] == [name]
     assert without.corrected.value == math.inf
     assert without.printed.value == math.inf or "amma" in name  # gains that the paper dropped
 
 
-def test_before_a_run_only_lambda_and_the_conditions_are_known() -> None:
+def test_before_a_run_only_lambda_and_the_conditions_are_known():
     before = bound(None)
     assert all(condition.holds for condition in before.conditions)
     assert before.corrected.lambda_ > bound().corrected.lambda_
     assert math.isnan(before.corrected.value)
 
 
-def test_the_printed_lambda_leaves_out_masses_and_gains() -> None:
+def test_the_printed_lambda_leaves_out_masses_and_gains():
     candidates = bound().printed.candidates
     assert candidates["u_e"] == 3.5
     assert candidates["W_u"] == 0.05
     assert min(candidates, key=lambda name: candidates[name]) == "b_u"
 
 
-def test_bound_cannot_be_made_arbitrarily_small() -> None:
+def test_bound_cannot_be_made_arbitrarily_small():
     # Gains a thousand times as large: what leakage and the lemma's constant leave stays.
     large = bound(k_ze=100.0, k_psie=100.0, k_ue=4e3, k_re=4e4, A_u=5e3, A_r=5e3)
     assert large.corrected.Delta > 0.9 * sum(
@@ -135,7 +133,7 @@ def test_bound_cannot_be_made_arbitrarily_small() -> None:
     )
 
 
-def test_sway_bound_is_where_damping_meets_the_push() -> None:
+def test_sway_bound_is_where_damping_meets_the_push():
     for vessel in (PAPER, NONLINEAR):
         v = sway_bound(vessel, 1.3, 1.3).value
         assert -(vessel.Y_v + vessel.Y_vv * v) * v == pytest.approx(1.3)

@@ -1,10 +1,7 @@
 """What the monitor leaves in a run folder, and the figures made of it."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -27,23 +24,23 @@ SHORT = ("simulation.duration=20",)
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory):
     out = tmp_path_factory.mktemp("theory") / "run"
     request = Request(SHORT, out, figures=False)
     return run(CONFIGS / "theory/monitor.yaml", request).folder
 
 
 @pytest.fixture(scope="module")
-def found(folder: Path) -> dict[str, Any]:
+def found(folder):
     return json.loads((folder / "theory.json").read_text())  # type: ignore[no-any-return]
 
 
 @pytest.fixture(scope="module")
-def log(folder: Path) -> Recording:
+def log(folder):
     return read_log(folder / "log.h5")
 
 
-def test_the_log_carries_V_its_terms_and_its_bounds(log: Recording) -> None:
+def test_the_log_carries_V_its_terms_and_its_bounds(log):
     rows = log["time"].shape
     for name in ("V", "V_dot", *(term.name for term in TERMS)):
         assert log[name].shape == rows
@@ -52,7 +49,7 @@ def test_the_log_carries_V_its_terms_and_its_bounds(log: Recording) -> None:
     assert log["W_star_u"].shape == log["W_hat_u"][0].shape
 
 
-def test_theory_json_says_the_same_as_the_log(log: Recording, found: dict[str, Any]) -> None:
+def test_theory_json_says_the_same_as_the_log(log, found):
     for i, name in enumerate(WINDOWS):
         part = found["windows"][name]
         assert part["corrected"]["lambda"] == log["V_lambda"][i]
@@ -63,7 +60,7 @@ def test_theory_json_says_the_same_as_the_log(log: Recording, found: dict[str, A
         assert part["V_dot_below_bound"] == 1.0
 
 
-def test_everything_that_the_proof_assumes_holds_here(found: dict[str, Any]) -> None:
+def test_everything_that_the_proof_assumes_holds_here(found):
     assert all(each["holds"] for each in found["assumptions"])
     assert all(each["holds"] for each in found["conditions"])
 
@@ -79,7 +76,7 @@ def test_everything_that_the_proof_assumes_holds_here(found: dict[str, Any]) -> 
         ("controller.hold_below=40.0", "hold_below"),
     ],
 )
-def test_an_assumption_that_fails_is_named(change: str, words: str, tmp_path: Path) -> None:
+def test_an_assumption_that_fails_is_named(change, words, tmp_path):
     turned = ("start.psi=-2.0",) if words == "folded alone" else ()
     gentle = ("controller.Gamma_u=1.0", "controller.Gamma_r=1.0", "controller.gamma_u=10.0",
               "controller.gamma_r=10.0", "simulation.duration=2")  # fmt: skip
@@ -91,7 +88,7 @@ def test_an_assumption_that_fails_is_named(change: str, words: str, tmp_path: Pa
 
 
 @pytest.mark.parametrize("change", ["log.monitor=false", "controller={kind: pid}"])
-def test_without_a_monitor_there_is_nothing_of_it(change: str, tmp_path: Path) -> None:
+def test_without_a_monitor_there_is_nothing_of_it(change, tmp_path):
     request = Request(("simulation.duration=2", change), tmp_path / "run", figures=False)
     done = run(CONFIGS / "theory/base.yaml", request).folder
     assert not (done / "theory.json").exists()
@@ -99,7 +96,7 @@ def test_without_a_monitor_there_is_nothing_of_it(change: str, tmp_path: Path) -
     assert not [name for name in logged if name.startswith("V") or name in (*ERRORS, *NETWORKS)]
 
 
-def test_thinned_logs_are_monitored_where_they_are_logged(tmp_path: Path, log: Recording) -> None:
+def test_thinned_logs_are_monitored_where_they_are_logged(tmp_path, log):
     request = Request((*SHORT, "log.every=7"), tmp_path / "run", figures=False)
     thin = read_log(run(CONFIGS / "theory/monitor.yaml", request).folder / "log.h5")
     assert len(thin["V"]) == len(thin["time"]) == len(log["time"][::7])
@@ -109,7 +106,7 @@ def test_thinned_logs_are_monitored_where_they_are_logged(tmp_path: Path, log: R
 
 
 @pytest.mark.parametrize("name", ["stability", "validity"])
-def test_figures_of_the_monitor(name: str, log: Recording) -> None:
+def test_figures_of_the_monitor(name, log):
     scenario = load(CONFIGS / "theory/monitor.yaml", SHORT).scenario
     shown = dressed([("one", log, scenario), ("other", log, scenario)])
     assert FIGURES[name].fits(shown)
@@ -117,7 +114,7 @@ def test_figures_of_the_monitor(name: str, log: Recording) -> None:
     assert content == again
 
 
-def test_a_stack_shows_parts_that_make_up_all_of_V(log: Recording) -> None:
+def test_a_stack_shows_parts_that_make_up_all_of_V(log):
     scenario = load(CONFIGS / "theory/monitor.yaml", SHORT).scenario
     shown = dressed([("one", log, scenario), ("other", log, scenario)])
     value, _, *stacks = FIGURES["stability"].family(shown, 2).axes
@@ -133,7 +130,7 @@ def tops_of(stack: Axes) -> list[float]:
     return [layer.get_paths()[0].vertices[:, 1].max() for layer in stack.collections]
 
 
-def test_V_of_a_single_run_is_stacked_below_its_bound(log: Recording) -> None:
+def test_V_of_a_single_run_is_stacked_below_its_bound(log):
     scenario = load(CONFIGS / "theory/monitor.yaml", SHORT).scenario
     stack = FIGURES["stability"].family(dressed([("one", log, scenario)]), 2).axes[0]
     tops = tops_of(stack)
@@ -147,14 +144,14 @@ def test_V_of_a_single_run_is_stacked_below_its_bound(log: Recording) -> None:
     assert stack.get_ylim()[1] > max(near)
 
 
-def test_the_log_has_filter_errors_norms_and_nodes(log: Recording) -> None:
+def test_the_log_has_filter_errors_norms_and_nodes(log):
     for name in (signal.name for signal in (*ERRORS, *NETWORKS)):
         np.testing.assert_allclose(
             log.signals[name], DERIVED[name].compute(log), rtol=1e-12, atol=1e-15
         )
 
 
-def test_nearest_node_of_a_list_of_centres_far_from_all_of_them() -> None:
+def test_nearest_node_of_a_list_of_centres_far_from_all_of_them():
     centers = ((0.0, 0.0, 0.0), (1.0, 0.5, -0.2))
     network = Network(centers=centers, widths=(0.5, 0.2, 0.1))
     nu = np.array([[0.9, 0.4, 0.0], [40.0, 0.0, 0.0]])
@@ -164,7 +161,7 @@ def test_nearest_node_of_a_list_of_centres_far_from_all_of_them() -> None:
     np.testing.assert_allclose(node_distance(network, exponents(network, log)), expected)
 
 
-def test_law_without_a_filter_has_no_filter_error(tmp_path: Path) -> None:
+def test_law_without_a_filter_has_no_filter_error(tmp_path):
     request = Request(("simulation.duration=1", "controller={kind: backstepping}"), tmp_path / "r",
                       figures=False)  # fmt: skip
     log = read_log(run(CONFIGS / "theory/base.yaml", request).folder / "log.h5")
@@ -172,7 +169,7 @@ def test_law_without_a_filter_has_no_filter_error(tmp_path: Path) -> None:
     assert all(part.name in log for part in NETWORKS)
 
 
-def test_derived_signals_of_the_monitor(log: Recording) -> None:
+def test_derived_signals_of_the_monitor(log):
     near, largest = (DERIVED[name].compute(log) for name in ("node_distance", "activation"))
     nu = np.column_stack([log["u"], log["v"], log["r"]])[::50]
     apart = (nu[:, None, :] - log["rbf_center"]) / log["rbf_width"]

@@ -1,7 +1,5 @@
 """The stability monitor: V' is the rate of V, V' is the sum of its terms, and faults are seen."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 
@@ -67,7 +65,7 @@ def simpson(y: Vector, h: float) -> float:
 
 
 @every_law
-def test_rate_integrates_to_the_change_of_V_to_fourth_order(law: PolarBackstepping) -> None:
+def test_rate_integrates_to_the_change_of_V_to_fourth_order(law):
     gaps = []
     for step in (0.02, 0.01, 0.005, 0.0025):
         log = watched(smooth(law), 8.0, step).recording
@@ -79,9 +77,7 @@ def test_rate_integrates_to_the_change_of_V_to_fourth_order(law: PolarBacksteppi
 
 @pytest.mark.parametrize("anti_windup", ["none", "auxiliary"])
 @pytest.mark.parametrize("places", [(0.0,), (-0.078, 0.078)], ids=["one pod", "two pods"])
-def test_rate_integrates_to_the_change_of_V_behind_pods_too(
-    anti_windup: Any, places: tuple[float, ...]
-) -> None:
+def test_rate_integrates_to_the_change_of_V_behind_pods_too(anti_windup, places):
     """At limits and rates the integrand has corners, hence no order but closeness."""
     own = {"T_nV": 1e-3, "n_rate": 200.0, "angle_rate": 1.75, "n_lag": 0.1, "angle_lag": 0.1}
     actuator = Pods(pods=tuple(Pod(**POD | own | {"y": y}) for y in places))
@@ -94,7 +90,7 @@ def test_rate_integrates_to_the_change_of_V_behind_pods_too(
 
 
 @pytest.mark.parametrize("name", ["paper", "cybership2"])
-def test_unloaded_accelerations_are_those_of_the_hull_left_alone(name: str) -> None:
+def test_unloaded_accelerations_are_those_of_the_hull_left_alone(name):
     """Also where inertia couples sway and yaw, and the actuator makes a sway force."""
     hull = VESSELS[name]
     actuator = Pods(pods=tuple(Pod(**POD | {"y": y}) for y in (-0.078, 0.078)))
@@ -118,9 +114,7 @@ FOLDS = [
 
 @pytest.mark.parametrize("options", FOLDS, ids=str)
 @every_law
-def test_rates_of_errors_are_derivatives_along_the_flow(
-    law: PolarBackstepping, options: dict[str, Any]
-) -> None:
+def test_rates_of_errors_are_derivatives_along_the_flow(law, options):
     law = law.model_copy(update=options)
     loop = corrected(controller=law, path=Circle(), vessel=VESSELS["cybership2"])
     for at in situations(law, 12):
@@ -189,7 +183,7 @@ def mismatch(loop: ClosedLoop, found: Monitored) -> float:
 
 
 @pytest.mark.parametrize("law", LAWS[:2], ids=lambda law: law.label)
-def test_rate_along_a_run_is_the_sum_of_its_terms(law: PolarBackstepping) -> None:
+def test_rate_along_a_run_is_the_sum_of_its_terms(law):
     loop = smooth(law, vessel=NONLINEAR)
     assert mismatch(loop, watched(loop, 20.0)) < 1e-10
 
@@ -198,7 +192,7 @@ FAULTS = ["coupling", "k_ue", "k_re", "Gamma_u", "Gamma_r", "gamma_u", "gamma_r"
 
 
 @pytest.mark.parametrize("sign", FAULTS)
-def test_a_wrong_sign_planted_in_the_law_is_caught(sign: str) -> None:
+def test_a_wrong_sign_planted_in_the_law_is_caught(sign):
     @kernel
     def wrong(t: float, x: Vector, memory: Vector, target: Vector, k: Any, *rest: Any) -> None:
         turned = 1.0 - k.coupling if sign == "coupling" else -getattr(k, sign)
@@ -219,7 +213,7 @@ def test_a_wrong_sign_planted_in_the_law_is_caught(sign: str) -> None:
 
 
 @every_law
-def test_V_is_the_sum_of_its_terms_and_stays_below_its_bound(law: PolarBackstepping) -> None:
+def test_V_is_the_sum_of_its_terms_and_stays_below_its_bound(law):
     found = watched(smooth(law, vessel=NONLINEAR), 200.0)
     log = found.recording
     np.testing.assert_allclose(log["V"], sum(log[term.name] for term in TERMS), rtol=1e-13)
@@ -232,7 +226,7 @@ def test_V_is_the_sum_of_its_terms_and_stays_below_its_bound(law: PolarBackstepp
     assert found.windows["settled"].largest_V < found.windows["settled"].bound.corrected.value
 
 
-def test_ideal_weights_are_what_makes_their_share_of_Delta_least() -> None:
+def test_ideal_weights_are_what_makes_their_share_of_Delta_least():
     loop = smooth(GENTLE, vessel=NONLINEAR)
     found = watched(loop, 15.0)  # short enough for the fit to take every row
     log, law = found.recording, GENTLE
@@ -243,7 +237,7 @@ def test_ideal_weights_are_what_makes_their_share_of_Delta_least() -> None:
         assert np.abs(gradient).max() < 1e-9 * np.abs(sigma * W).max()
 
 
-def test_vessel_with_coupled_sway_and_yaw_and_a_wrong_nominal_one() -> None:
+def test_vessel_with_coupled_sway_and_yaw_and_a_wrong_nominal_one():
     # What the proof does not know of is in `rest`, and V' stays below its bound all the same.
     loop = smooth(GENTLE, vessel=VESSELS["cybership2"], nominal=PAPER)
     found = watched(loop, 60.0)
@@ -253,7 +247,7 @@ def test_vessel_with_coupled_sway_and_yaw_and_a_wrong_nominal_one() -> None:
     np.testing.assert_allclose(told["rest_r"], PAPER.m33 * told["epsilon_r"], atol=1e-10)
 
 
-def test_sway_stays_below_its_bound() -> None:
+def test_sway_stays_below_its_bound():
     for vessel in VESSELS.values():
         loop = smooth(GENTLE, vessel=vessel)
         whole = watched(loop, 100.0).windows["whole"]
@@ -261,13 +255,13 @@ def test_sway_stays_below_its_bound() -> None:
         assert vessel is not PAPER or whole.sway.value <= whole.sway.printed * (1.0 + 1e-12)
 
 
-def test_law_without_a_lyapunov_function_has_no_monitor() -> None:
+def test_law_without_a_lyapunov_function_has_no_monitor():
     loop = smooth(GENTLE)
     pid = replace(loop, controller=Pid())
     assert monitored(pid, TimeGrid(0.01, 100), run(pid, 1.0)) is None
 
 
-def test_sampled_control_has_V_but_no_rate() -> None:
+def test_sampled_control_has_V_but_no_rate():
     loop, grid = smooth(GENTLE), TimeGrid(0.01, 100, hold_every=10)
     found = monitored(loop, grid, run(loop, 1.0, hold_every=10))
     assert found
@@ -279,7 +273,7 @@ def test_sampled_control_has_V_but_no_rate() -> None:
     np.testing.assert_allclose(found.recording["V_z_e"], z_e**2 / 2.0)
 
 
-def test_a_run_that_diverges_is_monitored_as_far_as_it_went() -> None:
+def test_a_run_that_diverges_is_monitored_as_far_as_it_went():
     law = AdaptiveNeural(coupling="printed", rate="difference", first_difference="from_zero",
                          filter_start="zero", fold="printed", standoff=0.0)  # fmt: skip
     loop = corrected(controller=law, vessel=PAPER)
@@ -291,7 +285,7 @@ def test_a_run_that_diverges_is_monitored_as_far_as_it_went() -> None:
     assert np.isfinite(found.recording["W_star_u"]).all()
 
 
-def test_plain_and_compiled_monitor_agree() -> None:
+def test_plain_and_compiled_monitor_agree():
     loop, grid = smooth(GENTLE), TimeGrid(0.05, 20)
     recording = run(loop, 1.0, 0.05)
     one, other = (monitored(loop, grid, recording, compiled=c) for c in (True, False))
@@ -301,7 +295,7 @@ def test_plain_and_compiled_monitor_agree() -> None:
         np.testing.assert_allclose(one.recording[name], other.recording[name], rtol=1e-9, atol=1e-9)
 
 
-def test_what_a_limit_withholds_counts_as_disturbance() -> None:
+def test_what_a_limit_withholds_counts_as_disturbance():
     loop = smooth(GENTLE, actuator=Saturated(surge_limit=2.0, yaw_limit=0.5))
     found = watched(loop, 20.0)
     log = found.recording

@@ -1,7 +1,5 @@
 """Errors and virtual controls: (18)-(21), (30), Remark 5, and the readings of each."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -42,7 +40,7 @@ def near_target(distance: float, psi: float = 0.1) -> Situation:
     return Situation(x, memory, np.array([distance, 0, 0.3, 0.4, 0, 0]))
 
 
-def test_the_sign_of_a_zero_is_no_direction() -> None:
+def test_the_sign_of_a_zero_is_no_direction():
     for x in (0.0, -0.0):
         for y in (0.0, -0.0):
             assert direction(x, y) == 0.0
@@ -52,9 +50,7 @@ def test_the_sign_of_a_zero_is_no_direction() -> None:
 
 
 @pytest.mark.parametrize("velocity", [(0.0, 0.0), (-0.0, 0.0), (-0.0, -0.0)])
-def test_a_target_that_rests_where_the_vessel_is_lies_in_no_direction(
-    velocity: tuple[float, float],
-) -> None:
+def test_a_target_that_rests_where_the_vessel_is_lies_in_no_direction(velocity):
     target = np.array([1.0, 2.0, *velocity, 0.0, 0.0])
     memory = AdaptiveNeural().start(np.array([1.0, 2.0, 0, 0, 0, 0]), target, NONLINEAR)
     assert memory[PSI_D_HELD] == 0.0
@@ -64,7 +60,7 @@ def around(law: AdaptiveNeural, count: int = 200) -> list[tuple[Situation, Track
     return [(at, seen_by(law, at)) for at in situations(law, count)]
 
 
-def test_distance_and_direction_are_18_to_20() -> None:
+def test_distance_and_direction_are_18_to_20():
     for at, e in around(AdaptiveNeural(fold="none", standoff=0.0)):
         x_e, y_e = at.target[:2] - at.x[:2]
         printed = math.atan(y_e / x_e) + 0.5 * math.pi * (1 - np.sign(x_e)) * np.sign(y_e)
@@ -79,7 +75,7 @@ def test_distance_and_direction_are_18_to_20() -> None:
 
 
 @pytest.mark.parametrize("fold", ["printed", "joint", "none"])
-def test_virtual_controls_are_21_and_30_as_printed_while_nothing_is_folded(fold: Any) -> None:
+def test_virtual_controls_are_21_and_30_as_printed_while_nothing_is_folded(fold):
     law = AdaptiveNeural(fold=fold, standoff=0.0, k_ze=0.3, k_psie=0.7)
     facing = [(at, e) for at, e in around(law) if e.half_turn == 0.0]
     assert len(facing) > 50
@@ -91,7 +87,7 @@ def test_virtual_controls_are_21_and_30_as_printed_while_nothing_is_folded(fold:
 
 
 @pytest.mark.parametrize("fold", ["printed", "joint"])
-def test_folding_brings_the_error_within_a_right_angle(fold: Any) -> None:
+def test_folding_brings_the_error_within_a_right_angle(fold):
     plain = around(AdaptiveNeural(fold="none"))
     folded = around(AdaptiveNeural(fold=fold))
     turned = 0
@@ -106,7 +102,7 @@ def test_folding_brings_the_error_within_a_right_angle(fold: Any) -> None:
 
 
 @pytest.mark.parametrize("fold", ["joint", "none"])
-def test_virtual_controls_close_the_error_loops(fold: Any) -> None:
+def test_virtual_controls_close_the_error_loops(fold):
     # z_e' = -k_ze z_e - (u - alpha_u) cos psi_e and psi_e' = -k_psie psi_e - (r - alpha_r).
     law = AdaptiveNeural(fold=fold, k_ze=0.3, k_psie=0.7, standoff=0.5)
     for at, e in around(law):
@@ -118,7 +114,7 @@ def test_virtual_controls_close_the_error_loops(fold: Any) -> None:
         assert psi_d_dot - at.x[5] == pytest.approx(-0.7 * e.psi_e - yaw, rel=1e-10, abs=1e-12)
 
 
-def test_folding_as_printed_drives_away_from_the_target() -> None:
+def test_folding_as_printed_drives_away_from_the_target():
     # With u = alpha_u the distance obeys z_e' = k_ze z_e + 2P instead of -k_ze z_e.
     law = AdaptiveNeural(fold="printed", k_ze=0.3, standoff=0.0)
     astern = [(at, e) for at, e in around(law) if e.half_turn]
@@ -130,7 +126,7 @@ def test_folding_as_printed_drives_away_from_the_target() -> None:
 
 
 @given(psi_e=st.floats(-3.1, 3.1))
-def test_standoff_shortens_the_distance_and_nothing_else(psi_e: float) -> None:
+def test_standoff_shortens_the_distance_and_nothing_else(psi_e):
     if abs(math.cos(psi_e)) < 1e-3:
         return
     at = Situation(
@@ -145,7 +141,7 @@ def test_standoff_shortens_the_distance_and_nothing_else(psi_e: float) -> None:
 
 
 @pytest.mark.parametrize(("distance", "held"), [(0.19, True), (0.2, True), (0.21, False)])
-def test_the_direction_is_held_near_the_target(distance: float, held: bool) -> None:
+def test_the_direction_is_held_near_the_target(distance, held):
     law = AdaptiveNeural(hold_below=0.2)
     memory = np.zeros(60)
     memory[PSI_D_HELD] = 0.9
@@ -157,7 +153,7 @@ def test_the_direction_is_held_near_the_target(distance: float, held: bool) -> N
     assert e.w == (0.0 if held else pytest.approx(motion(at)[1]))
 
 
-def test_on_the_target_the_paper_s_rule_holds_even_with_hold_below_zero() -> None:
+def test_on_the_target_the_paper_s_rule_holds_even_with_hold_below_zero():
     memory = np.zeros(60)
     memory[PSI_D_HELD] = 0.9
     at = Situation(
@@ -178,7 +174,7 @@ def sampled(law: AdaptiveNeural, before: float, direction: float, t: float = 1.0
     return float(memory[PSI_D_RATE_HELD])
 
 
-def test_the_difference_is_remark_5_and_takes_the_short_way_round() -> None:
+def test_the_difference_is_remark_5_and_takes_the_short_way_round():
     law = AdaptiveNeural(**DIFFERENCE)
     assert sampled(law, 0.3, 0.32) == pytest.approx(2.0)
     assert sampled(law, math.pi - 0.01, -math.pi + 0.01) == pytest.approx(2.0)
@@ -188,7 +184,7 @@ def test_the_difference_is_remark_5_and_takes_the_short_way_round() -> None:
 
 
 @pytest.mark.parametrize(("first", "kick"), [("from_zero", 25 * math.pi), ("from_start", 0.0)])
-def test_the_first_difference_at_the_printed_start(first: Any, kick: float) -> None:
+def test_the_first_difference_at_the_printed_start(first, kick):
     law = AdaptiveNeural(first_difference=first, **DIFFERENCE)
     out = run(corrected(controller=law), 0.0, compiled=False)
     # pi/4 in 0.01 s is 78.5 rad/s.
@@ -196,7 +192,7 @@ def test_the_first_difference_at_the_printed_start(first: Any, kick: float) -> N
     assert out["alpha_r"][0] == pytest.approx(kick + law.k_psie * math.pi / 4, abs=1e-9)
 
 
-def test_a_difference_stays_what_it_is_between_two_samples() -> None:
+def test_a_difference_stays_what_it_is_between_two_samples():
     law = AdaptiveNeural(**DIFFERENCE | {"difference_step": 0.05})
     out = run(corrected(controller=law), 2.0, 0.01, compiled=False)
     held = out["psi_d_rate_held"]
@@ -205,7 +201,7 @@ def test_a_difference_stays_what_it_is_between_two_samples() -> None:
     np.testing.assert_allclose(held[5::5], np.diff(directions) / 0.05, rtol=1e-9, atol=1e-12)
 
 
-def test_the_difference_approaches_the_exact_rate_at_first_order() -> None:
+def test_the_difference_approaches_the_exact_rate_at_first_order():
     def finish(**options: Any) -> Vector:
         # A filter that starts on alpha_r would start on the first difference, which has no past.
         loop = corrected(controller=AdaptiveNeural(filter_start="zero", **options), path=Line())
@@ -216,7 +212,7 @@ def test_the_difference_approaches_the_exact_rate_at_first_order() -> None:
     assert np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(1.0, abs=0.1)
 
 
-def test_signals_show_what_the_virtual_controls_were_made_of() -> None:
+def test_signals_show_what_the_virtual_controls_were_made_of():
     law = AdaptiveNeural()
     for at in situations(law, 20):
         e, said = seen_by(law, at), ask(law, *at, NONLINEAR).signals

@@ -1,7 +1,5 @@
 """Convergence: Richardson on known sequences, real runs, DOP853, rankings, the command."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path
@@ -21,7 +19,7 @@ from podusv_cli.verification.dop853 import integrate, why_skipped
 from podusv_cli.verification.ranking import ranking
 from podusv_cli.verification.richardson import estimate, estimate_position
 from podusv_cli.verification.step_halving import refined, run_level
-from podusv_cli.verification.verify import POSITION, RunVerification, check, verify
+from podusv_cli.verification.verify import POSITION, check, verify
 from podusv_cli.workflows import verify as verifying
 
 # Behind the target, facing it and moving; a step at which the adaptation is well resolved.
@@ -36,26 +34,26 @@ DIFFERENCE = ("controller.rate=difference", "controller.first_difference=from_st
 
 
 @pytest.mark.parametrize("order", [1.0, 2.0, 4.0])
-def test_a_power_of_the_step_gives_its_order_and_its_error(order: float) -> None:
+def test_a_power_of_the_step_gives_its_order_and_its_error(order):
     got = estimate([3.0 + 0.5 * 0.1**order * 2.0 ** (-order * n) for n in range(3)])
     assert got.order == pytest.approx(order, abs=1e-6)
     assert got.error == pytest.approx(0.5 * 0.1**order, rel=1e-6)
 
 
-def test_differences_that_do_not_shrink_have_no_order_and_are_all_error() -> None:
+def test_differences_that_do_not_shrink_have_no_order_and_are_all_error():
     got = estimate([1.0, 1.01, 0.995])
     assert math.isnan(got.order)
     assert got.error == pytest.approx(4 * 0.015)
     assert not got.converged(0.05)
 
 
-def test_a_peak_that_hits_an_instant_has_no_order_beyond_the_integrators() -> None:
+def test_a_peak_that_hits_an_instant_has_no_order_beyond_the_integrators():
     got = estimate([1.0, 1.01, 1.01 + 1e-9])
     assert math.isnan(got.order)
     assert got.error == pytest.approx(0.01, rel=1e-3)
 
 
-def test_numbers_that_do_not_change_or_exist_nowhere_are_converged() -> None:
+def test_numbers_that_do_not_change_or_exist_nowhere_are_converged():
     assert estimate([0.0, 0.0, 0.0]).converged(0.0)
     assert estimate([2.0, 2.0 + 4e-16, 2.0]).converged(1e-12)
     never = estimate([math.nan] * 3)
@@ -65,7 +63,7 @@ def test_numbers_that_do_not_change_or_exist_nowhere_are_converged() -> None:
     assert not estimate([0.0, 0.1, 0.1]).converged(1.0)
 
 
-def test_a_position_is_judged_by_the_hulls_length() -> None:
+def test_a_position_is_judged_by_the_hulls_length():
     ends = [np.array([100.0 + 0.08 * 4.0**-n, 50.0 - 0.06 * 4.0**-n]) for n in range(3)]
     got = estimate_position(ends, 2.0)
     assert got.order == pytest.approx(2.0)
@@ -76,7 +74,7 @@ def test_a_position_is_judged_by_the_hulls_length() -> None:
 # --- grids
 
 
-def test_times_in_seconds_stay_when_the_step_is_halved() -> None:
+def test_times_in_seconds_stay_when_the_step_is_halved():
     scenario = scene("control.period=0.04", "log.every=3", "simulation.duration=1.2")
     grid = refined(scenario, 2)
     assert (grid.step, grid.steps, grid.hold_every) == (0.0025, 480, 16)
@@ -85,7 +83,7 @@ def test_times_in_seconds_stay_when_the_step_is_halved() -> None:
     assert sampled.layout(refined(scene(*DIFFERENCE), 2)).sample_every == 4
 
 
-def test_the_first_level_is_the_run_itself() -> None:
+def test_the_first_level_is_the_run_itself():
     scenario = scene("simulation.duration=5", "log.every=7")
     level, out = run_level(scenario, 0), run(scenario.closed_loop(), 5.0)
     np.testing.assert_array_equal(level.position, [out["x"][-1], out["y"][-1]])
@@ -96,16 +94,16 @@ def test_the_first_level_is_the_run_itself() -> None:
 
 
 @pytest.fixture(scope="module")
-def smooth() -> RunVerification:
+def smooth():
     return check(scene(*SMOOTH))
 
 
-def test_a_smooth_scenario_is_of_fourth_order_and_converged(smooth: RunVerification) -> None:
+def test_a_smooth_scenario_is_of_fourth_order_and_converged(smooth):
     assert smooth.estimates[POSITION].order == pytest.approx(4.0, abs=0.4)
     assert smooth.unconverged(0.01) == []
 
 
-def test_the_error_that_is_estimated_is_the_error_that_there_is(smooth: RunVerification) -> None:
+def test_the_error_that_is_estimated_is_the_error_that_there_is(smooth):
     """Against DOP853, which knows nothing of the three runs."""
     assert not smooth.dop853.skipped
     true = math.dist(smooth.levels[0].position, smooth.dop853.position)
@@ -114,7 +112,7 @@ def test_the_error_that_is_estimated_is_the_error_that_there_is(smooth: RunVerif
     assert smooth.distances()["iae"] < 1e-6
 
 
-def test_dop853_starts_anew_where_the_path_jumps() -> None:
+def test_dop853_starts_anew_where_the_path_jumps():
     jumping, smooth = (
         scene(
             f"path={{kind: line_circle, reading: literal, switch: {switch}}}",
@@ -140,12 +138,12 @@ def test_dop853_starts_anew_where_the_path_jumps() -> None:
         (("controller.Gamma_r=4000",), "does not reach its end"),
     ],
 )
-def test_dop853_is_skipped_with_a_reason(overrides: tuple[str, ...], reason: str) -> None:
+def test_dop853_is_skipped_with_a_reason(overrides, reason):
     scenario = scene(*overrides, "simulation.duration=3")
     assert reason in why_skipped(scenario, [run_level(scenario, 0)])
 
 
-def test_the_continuous_loop_is_the_engines() -> None:
+def test_the_continuous_loop_is_the_engines():
     loop = corrected()
     fast, start = continuous(loop)
     slow, same = continuous(loop, compiled=False)
@@ -160,7 +158,7 @@ def test_the_continuous_loop_is_the_engines() -> None:
         fast(math.inf, start)
 
 
-def test_a_held_difference_leaves_chattering_unconverged() -> None:
+def test_a_held_difference_leaves_chattering_unconverged():
     """What results/README.md warns of: finer steps see more of the sawtooth."""
     printed = load(CONFIGS / "printed.yaml", ["simulation={step: 0.0025, duration: 40}"]).scenario
     names = check(printed.alone()).unconverged(0.01)
@@ -168,7 +166,7 @@ def test_a_held_difference_leaves_chattering_unconverged() -> None:
     assert "iae" not in names
 
 
-def test_a_step_that_is_too_coarse_is_found_out() -> None:
+def test_a_step_that_is_too_coarse_is_found_out():
     coarse = scene("simulation={step: 0.04, duration: 20}")
     assert "status" in check(coarse).unconverged(0.01)
     hardly = scene("simulation={step: 0.02, duration: 20}", "start={u: 0.5, psi: 0.5}")
@@ -178,7 +176,7 @@ def test_a_step_that_is_too_coarse_is_found_out() -> None:
 # --- rankings
 
 
-def test_a_ranking_that_holds_changes_or_is_too_close() -> None:
+def test_a_ranking_that_holds_changes_or_is_too_close():
     a, b = estimate([1.0, 1.001, 1.0012]), estimate([2.0, 2.01, 2.012])
     held = ranking({"b": b, "a": a})
     assert held is not None
@@ -195,7 +193,7 @@ def test_a_ranking_that_holds_changes_or_is_too_close() -> None:
     assert not turning.converged
 
 
-def test_equal_numbers_are_a_tie_and_missing_ones_are_left_out() -> None:
+def test_equal_numbers_are_a_tie_and_missing_ones_are_left_out():
     zero, never = estimate([0.0] * 3), estimate([math.nan] * 3)
     tie = ranking({"a": zero, "b": zero, "c": never})
     assert tie is not None
@@ -208,7 +206,7 @@ def test_equal_numbers_are_a_tie_and_missing_ones_are_left_out() -> None:
     assert not gone.converged
 
 
-def test_a_tie_is_called_equal_and_no_ranking() -> None:
+def test_a_tie_is_called_equal_and_no_ranking():
     zero, one = estimate([0.0] * 3), estimate([1.0, 1.001, 1.0012])
     all_tie, two_tie = ranking({"a": zero, "b": zero}), ranking({"c": one, "a": zero, "b": zero})
     apart = ranking({"a": zero, "c": one})
@@ -220,7 +218,7 @@ def test_a_tie_is_called_equal_and_no_ranking() -> None:
     assert _in_order(apart) == "a, c; the same at all steps, beyond the errors"
 
 
-def test_runs_of_the_same_law_are_equal_though_their_numbers_have_errors() -> None:
+def test_runs_of_the_same_law_are_equal_though_their_numbers_have_errors():
     law, other = estimate([1.0, 1.1, 1.12]), estimate([1.0, 1.1, 1.13])
     same, alike = ranking({"a": law, "b": law}), ranking({"a": law, "b": other})
     assert same
@@ -246,7 +244,7 @@ def two() -> Scenario:
     return load("two.yaml").scenario
 
 
-def test_the_command_shows_tables_and_rankings_and_leaves_nothing(podusv: Any) -> None:
+def test_the_command_shows_tables_and_rankings_and_leaves_nothing(podusv):
     two()
     before = sorted(Path().iterdir())
     said = podusv("verify", "two.yaml")
@@ -264,7 +262,7 @@ def test_the_command_shows_tables_and_rankings_and_leaves_nothing(podusv: Any) -
     assert sorted(Path().iterdir()) == before
 
 
-def test_the_command_prints_and_writes_the_same_json(podusv: Any) -> None:
+def test_the_command_prints_and_writes_the_same_json(podusv):
     two()
     said = podusv("verify", "two.yaml", "--json", "--out", "v.json")
     got = json.loads(said.out)
@@ -275,9 +273,7 @@ def test_the_command_prints_and_writes_the_same_json(podusv: Any) -> None:
     assert got["runs"]["slow"]["numbers"]["iae"]["converged"] is True
 
 
-def test_only_an_earlier_verification_is_replaced_without_force(
-    podusv: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_only_an_earlier_verification_is_replaced_without_force(podusv, monkeypatch):
     scenario = Path("two.yaml")
     two()
     before = scenario.read_text()
@@ -303,8 +299,8 @@ def test_only_an_earlier_verification_is_replaced_without_force(
 
 
 def test_a_file_that_comes_while_it_computes_is_spared_and_the_numbers_are_printed(
-    podusv: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    podusv, monkeypatch
+):
     def meanwhile(*given: Any) -> Any:
         Path("v.json").write_text("mine")
         return verify(*given)
@@ -317,7 +313,7 @@ def test_a_file_that_comes_while_it_computes_is_spared_and_the_numbers_are_print
     assert Path("v.json").read_text() == "mine"
 
 
-def test_what_is_not_converged_ends_with_3_and_is_named(podusv: Any) -> None:
+def test_what_is_not_converged_ends_with_3_and_is_named(podusv):
     two()
     coarse = podusv("verify", "two.yaml", "--set", "simulation={step: 0.1, duration: 4}")
     assert coarse.code == 3
@@ -329,7 +325,7 @@ def test_what_is_not_converged_ends_with_3_and_is_named(podusv: Any) -> None:
     assert verify(two(), 1e-9).unconverged.keys() == {"quick", "slow"}
 
 
-def test_a_run_folder_leads_to_its_scenario(podusv: Any, tmp_path: Path) -> None:
+def test_a_run_folder_leads_to_its_scenario(podusv, tmp_path):
     (tmp_path / "resolved.yaml").touch()
     said = podusv("verify", str(tmp_path))
     assert said == (2, "", f"{tmp_path} is a run folder; verify its resolved.yaml\n")

@@ -1,7 +1,5 @@
 """Presets that follow from a published program, derived again from what that program is given."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 
@@ -27,7 +25,7 @@ def pods_of(name: str) -> Pods:
     return actuator
 
 
-def test_the_otters_hull_is_that_of_the_version_that_its_source_names() -> None:
+def test_the_otters_hull_is_that_of_the_version_that_its_source_names():
     vessel = scenario_of("otter").vessel
     assert "otter.m of 2026-06-27" in vessel.source
     m, length, ahead = 55.0, 2.0, 0.2
@@ -50,14 +48,14 @@ def test_the_otters_hull_is_that_of_the_version_that_its_source_names() -> None:
     assert told == pytest.approx(derived, rel=1e-5)  # the file gives five digits
 
 
-def test_the_otter_keeps_the_munk_moment_as_its_source_does() -> None:
+def test_the_otter_keeps_the_munk_moment_as_its_source_does():
     vessel = scenario_of("otter").vessel
     surge_added = 2.7 * WATER * (55.0 / WATER) ** (5 / 3) / 2.0**2
     munk = (surge_added - 1.5 * 55.0) * 1.2 * 0.3
     assert yaw_moment(1.2, 0.3, 0.0, bundle(vessel.constants())) == pytest.approx(munk, rel=1e-5)
 
 
-def test_the_otters_gains_are_those_of_its_inertia() -> None:
+def test_the_otters_gains_are_those_of_its_inertia():
     scenario = scenario_of("otter")
     law, hull = scenario.controller.model_dump(), scenario.vessel
     for axis, inertia in (("u", hull.m11), ("r", hull.m33)):
@@ -67,7 +65,7 @@ def test_the_otters_gains_are_those_of_its_inertia() -> None:
         assert law[f"sigma_b{axis}"] == law[f"Gamma_{axis}"]
 
 
-def test_the_otters_propellers_are_those_of_its_source_in_turns_a_second() -> None:
+def test_the_otters_propellers_are_those_of_its_source_in_turns_a_second():
     for pod in pods_of("otter").pods:
         for per_radian, weight, T_nn, n_max in (
             (0.02216 / 2, 24.4 / 2, pod.T_nn, pod.n_max),
@@ -78,7 +76,7 @@ def test_the_otters_propellers_are_those_of_its_source_in_turns_a_second() -> No
             assert n_max == pytest.approx(fastest / math.tau, rel=5e-4)
 
 
-def test_the_wamvs_thrust_is_its_sources_in_newtons_and_goes_with_the_square_of_speed() -> None:
+def test_the_wamvs_thrust_is_its_sources_in_newtons_and_goes_with_the_square_of_speed():
     speed = 7.71667
     ahead = (51.3 + 72.4 * speed) * speed / 2
     for pod in pods_of("wamv").pods:
@@ -88,7 +86,7 @@ def test_the_wamvs_thrust_is_its_sources_in_newtons_and_goes_with_the_square_of_
         assert astern == pytest.approx(1000.0, rel=1e-3)  # Gazebo's, where no limit is set
 
 
-def test_the_wamvs_file_tells_its_source_from_podusvs_assumptions() -> None:
+def test_the_wamvs_file_tells_its_source_from_podusvs_assumptions():
     actuator = pods_of("wamv")
     assert "takes newtons" in " ".join(actuator.source.split())
     source, validity = actuator.source, actuator.validity.partition("podusv's assumptions:")

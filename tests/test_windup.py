@@ -1,7 +1,5 @@
 """Anti-windup: nothing where nothing saturates, and memories that stay small where it does."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -13,7 +11,6 @@ from test_pod import TWIN, pods
 from podusv_cli.actuators.saturated import Saturated
 from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
 from podusv_cli.controllers.backstepping import Backstepping
-from podusv_cli.controllers.base import Controller
 from podusv_cli.controllers.pid import Pid
 from podusv_cli.core.kernel import bundle, is_kernel
 from podusv_cli.core.recording import Recording
@@ -30,14 +27,14 @@ def both(kind: Any, duration: float, **parts: Any) -> list[Recording]:
 
 
 @every_law
-def test_where_everything_asked_for_acts_it_changes_nothing(kind: type[Controller]) -> None:
+def test_where_everything_asked_for_acts_it_changes_nothing(kind):
     without, with_it = both(kind, 5.0)
     for name in without.signals:
         np.testing.assert_array_equal(without[name], with_it[name], err_msg=name)
 
 
 @every_law
-def test_a_law_that_does_not_ask_is_not_told(kind: type[Controller]) -> None:
+def test_a_law_that_does_not_ask_is_not_told(kind):
     loop = corrected(controller=kind())
     assert loop.controller.wants_loads() is False
     assert not {"xi_u", "xi_r"} & {part.name for part, _ in loop.controller.slots()}
@@ -45,7 +42,7 @@ def test_a_law_that_does_not_ask_is_not_told(kind: type[Controller]) -> None:
 
 
 @every_law
-def test_what_is_learnt_does_not_run_away_behind_a_limit(kind: type[Controller]) -> None:
+def test_what_is_learnt_does_not_run_away_behind_a_limit(kind):
     """0.5 N can never hold the speed that is asked for."""
     weak = {"actuator": Saturated(surge_limit=0.5, yaw_limit=0.5)}
     without, with_it = both(kind, 60.0, **weak)
@@ -55,7 +52,7 @@ def test_what_is_learnt_does_not_run_away_behind_a_limit(kind: type[Controller])
         assert np.abs(with_it["tau_u_cmd"][-1]) < 0.5 * np.abs(without["tau_u_cmd"][-1])
 
 
-def test_pid_no_longer_overruns_the_target_and_goes_on_astern() -> None:
+def test_pid_no_longer_overruns_the_target_and_goes_on_astern():
     without, with_it = both(Pid, 150.0, actuator=Saturated())
     late = without["time"] > 120.0
     assert without["u"][late].mean() < -0.3
@@ -63,7 +60,7 @@ def test_pid_no_longer_overruns_the_target_and_goes_on_astern() -> None:
 
 
 @pytest.mark.parametrize("kind", [AdaptiveNeural, Backstepping])
-def test_behind_a_real_pod_it_decides_whether_the_law_tracks(kind: type[Controller]) -> None:
+def test_behind_a_real_pod_it_decides_whether_the_law_tracks(kind):
     slow = {"n_rate": 200.0, "n_lag": 0.1, "angle_rate": 1.75, "angle_lag": 0.1}
     pair = pods(*({**one, **slow} for one in TWIN))
     without, with_it = both(kind, 100.0, actuator=pair, start=PRINTED_START)
@@ -71,7 +68,7 @@ def test_behind_a_real_pod_it_decides_whether_the_law_tracks(kind: type[Controll
     assert with_it["z_e"][-1] == pytest.approx(0.5, abs=0.2)
 
 
-def test_the_auxiliary_state_obeys_its_equation() -> None:
+def test_the_auxiliary_state_obeys_its_equation():
     """m11 xi_u' = -k_ue xi_u + (tau_u - tau_u_cmd), by trapezoids over the log."""
     law = AdaptiveNeural(anti_windup="auxiliary")
     log = run(corrected(controller=law, actuator=Saturated()), 20.0, 0.001)
@@ -88,7 +85,7 @@ def test_the_auxiliary_state_obeys_its_equation() -> None:
         np.testing.assert_allclose(log[xi], grown, atol=5e-3 * size)
 
 
-def test_compensated_errors_obey_the_equations_without_limits() -> None:
+def test_compensated_errors_obey_the_equations_without_limits():
     """The rates of bounds and weights see u_e - xi_u where those without see u_e."""
     law, plain = AdaptiveNeural(anti_windup="auxiliary"), AdaptiveNeural()
     k, k_plain = (bundle(one.constants_with(NONLINEAR)) for one in (law, plain))
@@ -109,14 +106,14 @@ def test_compensated_errors_obey_the_equations_without_limits() -> None:
         assert told == pytest.approx(expected, rel=1e-12)
 
 
-def test_pid_without_a_proportional_gain_has_nothing_to_feed_back_over() -> None:
+def test_pid_without_a_proportional_gain_has_nothing_to_feed_back_over():
     Pid(K_Pu=0.0)
     with pytest.raises(ValidationError, match="above 0"):
         Pid(K_Pu=0.0, anti_windup="auxiliary")
 
 
 @pytest.mark.parametrize("compiled", [True, False])
-def test_sampled_control_settles_too(compiled: bool) -> None:
+def test_sampled_control_settles_too(compiled):
     law = Pid(anti_windup="auxiliary")
     log = run(corrected(controller=law, actuator=Saturated()), 0.2, hold_every=5, compiled=compiled)
     # The first sample asks for far too much; conditioned, the integral stays where tau would fit.

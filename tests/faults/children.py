@@ -1,7 +1,5 @@
 """Work in a forked process: killed, limited, without rights, without Python's start each time."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import signal

@@ -1,7 +1,5 @@
 """How many samples a test takes: few by default, all of them with PODUSV_FAULTS=full."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from typing import Any, TypeVar

@@ -1,7 +1,5 @@
 """Ways to damage a finished run: each changes its folder, by an argument in words."""
 
-from __future__ import annotations
-
 import io
 import json
 import os

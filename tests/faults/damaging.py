@@ -7,8 +7,6 @@ made to fit the damage. What came of it is a line of JSON on stdout: in a word, 
 a sentence, and how much work [calls] and memory [MiB] it took.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -1,7 +1,5 @@
 """Laws that fail, each in its own way, from t = 0.5 s on; `install` puts one in the PID's place."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

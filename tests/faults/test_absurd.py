@@ -1,11 +1,8 @@
 """Absurd numbers are refused at once, in a sentence; on what is merely large one can insist."""
 
-from __future__ import annotations
-
 import shutil
 import tracemalloc
 from collections import namedtuple
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -71,14 +68,14 @@ LARGE = {
 
 
 @pytest.fixture(autouse=True)
-def begun(podusv: Command) -> None:
+def begun(podusv):
     """A scenario of our own, and everything imported that a refusal needs."""
     write("a.yaml", LAW)
     assert podusv("validate", "a.yaml").code == 0
 
 
 @pytest.fixture
-def idle(monkeypatch: pytest.MonkeyPatch) -> None:
+def idle(monkeypatch):
     """Nothing is simulated, whatever is not refused."""
     for module in (compare, execute):
         monkeypatch.setattr(module, "warm_up", lambda _: pytest.fail("begun"))
@@ -102,7 +99,7 @@ def refused(podusv: Command, *words: str) -> str:
 
 @pytest.mark.usefixtures("idle")
 @pytest.mark.parametrize("override", WRONG, ids=lambda override: override[:40])
-def test_what_is_wrong_stays_wrong_whoever_insists(podusv: Command, override: str) -> None:
+def test_what_is_wrong_stays_wrong_whoever_insists(podusv, override):
     told = refused(podusv, "run", "a.yaml", *given(override), "--allow-large")
     assert told.endswith(f": {WRONG[override]}\n")
     assert told.count("\n") == 1
@@ -117,9 +114,7 @@ def given(overrides: str) -> list[str]:
 @pytest.mark.usefixtures("idle")
 @pytest.mark.parametrize("command", ["run", "compare", "validate"])
 @pytest.mark.parametrize("overrides", LARGE)
-def test_what_is_too_large_is_refused_with_an_estimate(
-    podusv: Command, overrides: str, command: str
-) -> None:
+def test_what_is_too_large_is_refused_with_an_estimate(podusv, overrides, command):
     full = LARGE[overrides].startswith("log.every")
     told = refused(podusv, command, "a.yaml", *given(overrides))
     assert told.count("\n") == 1
@@ -129,26 +124,26 @@ def test_what_is_too_large_is_refused_with_an_estimate(
     assert told.endswith(f": {LARGE[overrides]}{insist}\n")
 
 
-def test_verify_has_nothing_to_insist_with(podusv: Command) -> None:
+def test_verify_has_nothing_to_insist_with(podusv):
     told = refused(podusv, "verify", "a.yaml", *given("simulation.duration=1e12"))
     assert told.endswith(STEPS + "\n")
 
 
-def test_validate_shows_what_a_large_run_takes(podusv: Command) -> None:
+def test_validate_shows_what_a_large_run_takes(podusv):
     said = podusv("validate", "a.yaml", *given("simulation.duration=1e5"), "--allow-large")
     assert (said.code, said.err) == (0, "")
     assert "a run takes about 2.1 min, 220 MB of memory and 8.4 GB of disk\n" in said.out
 
 
 @pytest.fixture
-def modest(podusv: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+def modest(podusv, monkeypatch):
     """A hundred steps are many, and so are a thousand bytes."""
     monkeypatch.setattr(limits, "MOST_STEPS", 99)
     monkeypatch.setattr(limits, "MOST_CONTENT", 1000)
 
 
 @pytest.mark.usefixtures("modest")
-def test_a_user_who_insists_gets_a_large_run(podusv: Command) -> None:
+def test_a_user_who_insists_gets_a_large_run(podusv):
     write("b.yaml", BASE + "log: {every: 50}\n")
     plain = ("b.yaml", "--set", "simulation.compiled=false", "--no-figures")
     for command, other in (("run", "compare"), ("compare", "run")):
@@ -164,7 +159,7 @@ def test_a_user_who_insists_gets_a_large_run(podusv: Command) -> None:
 
 @pytest.mark.usefixtures("modest")
 @pytest.mark.parametrize("command", ["compare", "rerun"])
-def test_logs_that_cannot_be_read_back_are_not_made_for_it(podusv: Command, command: str) -> None:
+def test_logs_that_cannot_be_read_back_are_not_made_for_it(podusv, command):
     plain = ("--set", "simulation.compiled=false", "--no-figures", "--out", "b", "-q")
     assert podusv("run", "a.yaml", *plain, "--allow-large").code == 0
     told = refused(podusv, command, "b" if command == "rerun" else "a.yaml", "--allow-large")
@@ -181,7 +176,7 @@ SHAPES: list[dict[str, Any]] = [
 
 @pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: " ".join(map(str, shape.values())))
 @pytest.mark.parametrize("actuator", ["{kind: ideal}", "{kind: pod, preset: milliampere}"])
-def test_the_estimate_has_the_rows_and_bytes_of_the_log(actuator: str, shape: Any) -> None:
+def test_the_estimate_has_the_rows_and_bytes_of_the_log(actuator, shape):
     text = f"""
 vessel: {{preset: paper}}
 path: {{kind: line}}
@@ -201,13 +196,13 @@ log: {{every: {shape["every"]}, monitor: {shape["monitor"]}}}
     assert expected.content == sum(array.nbytes for array in recording.signals.values())
 
 
-def test_a_time_grid_has_no_numbers_that_machine_code_does_not_know() -> None:
+def test_a_time_grid_has_no_numbers_that_machine_code_does_not_know():
     grid = loaded(LAW + f"log: {{every: {HUGE}}}\n").scenario.time_grid()
     assert (grid.rows, grid.log_every) == (1, 101)
 
 
 @pytest.fixture
-def crowded(monkeypatch: pytest.MonkeyPatch) -> Callable[[float], None]:
+def crowded(monkeypatch):
     """A disk with so many bytes free."""
     usage = namedtuple("usage", "free")
     return lambda free: monkeypatch.setattr(shutil, "disk_usage", lambda place: usage(free))
@@ -215,9 +210,7 @@ def crowded(monkeypatch: pytest.MonkeyPatch) -> Callable[[float], None]:
 
 @pytest.mark.parametrize("command", ["run", "compare"])
 @pytest.mark.usefixtures("idle")
-def test_what_the_disk_has_no_room_for_is_not_begun(
-    podusv: Command, crowded: Callable[[float], None], command: str
-) -> None:
+def test_what_the_disk_has_no_room_for_is_not_begun(podusv, crowded, command):
     crowded(2e9)
     said = podusv(command, "a.yaml", *given("simulation.duration=2e4"), "--out", "x")
     assert said.code == 5
@@ -228,7 +221,7 @@ def test_what_the_disk_has_no_room_for_is_not_begun(
     assert {path.name for path in Path().iterdir()} == {"a.yaml"}
 
 
-def test_a_disk_that_may_do_is_tried(podusv: Command, crowded: Callable[[float], None]) -> None:
+def test_a_disk_that_may_do_is_tried(podusv, crowded):
     """How small a log gets when it is compressed, nobody knows before."""
     write("a.yaml", f"{LAW}log: {{compress: true}}\n".replace("1.0}", "0.1, compiled: false}"))
     scenario = load("a.yaml").scenario

@@ -1,7 +1,5 @@
 """Whatever fails once the simulation is over costs itself and nothing else, and is told."""
 
-from __future__ import annotations
-
 import html
 import json
 from dataclasses import replace
@@ -9,7 +7,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import pytest
-from command_samples import BASE, Command, write
+from command_samples import BASE, write
 from old_results import draw_quickly
 
 from podusv_cli.comparison import claims, outputs, report, table
@@ -60,9 +58,7 @@ def missing(folder: str) -> list[dict[str, str]]:
 
 @pytest.mark.parametrize(("options", "code"), [((), 0), (DIVERGING, 4)], ids=["done", "diverged"])
 @pytest.mark.parametrize("what", AFTER_A_RUN)
-def test_the_log_is_kept_and_what_is_missing_is_told(
-    podusv: Command, monkeypatch: pytest.MonkeyPatch, what: str, options: tuple[str, ...], code: int
-) -> None:
+def test_the_log_is_kept_and_what_is_missing_is_told(podusv, monkeypatch, what, options, code):
     with monkeypatch.context() as patch:
         patch.setattr(*AFTER_A_RUN[what], broken)
         said = podusv(
@@ -79,9 +75,7 @@ def test_the_log_is_kept_and_what_is_missing_is_told(
     assert podusv("compare", "x", "--no-figures", "--out", "y").code == (3 if code else 0)
 
 
-def test_one_figure_that_fails_costs_no_other(
-    podusv: Command, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_one_figure_that_fails_costs_no_other(podusv, monkeypatch):
     monkeypatch.setitem(FIGURES, "errors", replace(FIGURES["errors"], family=broken))
     said = podusv("run", write("a.yaml", ADAPTIVE), "--out", "x", "-q")
     assert said.code == 0
@@ -92,9 +86,7 @@ def test_one_figure_that_fails_costs_no_other(
     assert podusv("plot", "x", "--figure", "errors", "--out", "none").code == 3
 
 
-def test_json_and_a_complete_run_say_what_is_missing(
-    podusv: Command, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_json_and_a_complete_run_say_what_is_missing(podusv, monkeypatch):
     words = ("run", write("a.yaml", ADAPTIVE), "--json", "--no-figures", "--out")
     assert json.loads(podusv(*words, "x").out)["missing"] == []
     assert not Path("x/missing.json").exists()
@@ -104,9 +96,7 @@ def test_json_and_a_complete_run_say_what_is_missing(
 
 
 @pytest.mark.parametrize("what", AFTER_RUNS)
-def test_a_comparison_keeps_its_runs(
-    podusv: Command, monkeypatch: pytest.MonkeyPatch, what: str
-) -> None:
+def test_a_comparison_keeps_its_runs(podusv, monkeypatch, what):
     draw_quickly(monkeypatch)
     monkeypatch.setattr(*AFTER_RUNS[what], broken)
     said = podusv("compare", write("a.yaml", TWO + CLAIM), "--out", "x", "-q")
@@ -120,9 +110,7 @@ def test_a_comparison_keeps_its_runs(
         assert f"{what} {BUG}" in html.unescape(Path("x/report.html").read_text())
 
 
-def test_what_a_run_of_a_comparison_lacks_is_told_of_the_run(
-    podusv: Command, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_a_run_of_a_comparison_lacks_is_told_of_the_run(podusv, monkeypatch):
     monkeypatch.setattr(monitor, "ideal_weights", broken)
     said = podusv("compare", write("a.yaml", TWO), "--out", "x", "-q", "--no-figures")
     assert said.code == 0
@@ -132,9 +120,7 @@ def test_what_a_run_of_a_comparison_lacks_is_told_of_the_run(
     assert [part["what"].partition(":")[0] for part in missing("x")] == ["one", "other"]
 
 
-def test_rerun_tells_what_the_repeated_run_lacks(
-    podusv: Command, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_rerun_tells_what_the_repeated_run_lacks(podusv, monkeypatch):
     write("a.yaml", ADAPTIVE)
     assert podusv("run", "a.yaml", "--out", "x", "-q", "--no-figures").code == 0
     monkeypatch.setattr(monitor, "ideal_weights", broken)
@@ -144,9 +130,7 @@ def test_rerun_tells_what_the_repeated_run_lacks(
     assert podusv("rerun", "x", "--json").err == said.err
 
 
-def test_what_cannot_be_stored_stays_an_error(
-    podusv: Command, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_cannot_be_stored_stays_an_error(podusv, monkeypatch):
     def full(*given: Any) -> NoReturn:
         raise StorageError("the disk is full")
 
@@ -163,9 +147,7 @@ def test_what_cannot_be_stored_stays_an_error(
         "controller.gamma_r=1e5", "vessel.Y_vv=100",
     ],
 )  # fmt: skip
-def test_the_theory_of_a_run_that_leaves_all_numbers_is_made(
-    podusv: Command, override: str
-) -> None:
+def test_the_theory_of_a_run_that_leaves_all_numbers_is_made(podusv, override):
     said = podusv("run", CORRECTED, "--set", override, "--no-figures", "-q", "--out", "x")
     assert said.code == 4
     assert said.err.startswith(f"{CORRECTED}: diverged at t = ")

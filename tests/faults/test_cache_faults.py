@@ -3,8 +3,6 @@
 Edited sources, torn writes, old caches: tests/test_cache.py.
 """
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -26,7 +24,7 @@ NAME = "0123456789abcdef"
 
 
 @pytest.fixture(autouse=True)
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write("a.yaml", BASE)
     FRESH.cache_clear()
@@ -66,7 +64,7 @@ def spoil(content: bytes) -> Iterator[bytes]:
 
 
 @pytest.mark.slow  # compiles everything anew
-def test_damage_races_and_missing_places_change_no_byte(folder: Path) -> None:
+def test_damage_races_and_missing_places_change_no_byte(folder):
     cache = folder / "cache"
     together = [begun(out, PODUSV_CACHE=str(cache)) for out in ("a", "b")]
     first, second = map(log, together)
@@ -85,9 +83,7 @@ def test_damage_races_and_missing_places_change_no_byte(folder: Path) -> None:
     assert all(object_cache._read(path) for path in pieces[1:])  # mended on the way
 
 
-def test_without_any_place_it_compiles_leaves_nothing_and_says_so(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_without_any_place_it_compiles_leaves_nothing_and_says_so(folder, monkeypatch, caplog):
     (folder / "tmp").mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(folder / "tmp"))
     for name in ("PODUSV_CACHE", "XDG_CACHE_HOME"):
@@ -99,9 +95,7 @@ def test_without_any_place_it_compiles_leaves_nothing_and_says_so(
 
 
 @pytest.mark.parametrize("home", ["~", "relative", ""])
-def test_without_a_home_no_folder_is_made_here(
-    folder: Path, home: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_without_a_home_no_folder_is_made_here(folder, home, monkeypatch, caplog):
     monkeypatch.delenv("PODUSV_CACHE", raising=False)
     monkeypatch.setenv("XDG_CACHE_HOME", home)
     if home != "relative":
@@ -125,9 +119,7 @@ def refused(place: Path, monkeypatch: pytest.MonkeyPatch, caplog: Any) -> str:
     return text.partition(f"({place}: ")[2].partition(";")[0]
 
 
-def test_a_folder_that_is_not_ones_own_is_not_used(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_folder_that_is_not_ones_own_is_not_used(folder, monkeypatch, caplog):
     """Code that somebody else could have put there would be run."""
     (folder / "theirs").mkdir()
     monkeypatch.setattr(os, "getuid", lambda: 12345)
@@ -136,9 +128,7 @@ def test_a_folder_that_is_not_ones_own_is_not_used(
 
 
 @pytest.mark.parametrize("mode", [0o777, 0o707, 0o770])
-def test_a_folder_that_others_can_write_to_is_not_used(
-    folder: Path, mode: int, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_folder_that_others_can_write_to_is_not_used(folder, mode, monkeypatch, caplog):
     """Neither it nor one inside it, nor a link to it: they could rename what is in it."""
     monkeypatch.setattr(code_folder, "_is_own_group", lambda group: False)
     shared = folder / "shared"
@@ -149,9 +139,7 @@ def test_a_folder_that_others_can_write_to_is_not_used(
         assert refused(place, monkeypatch, caplog) == f"others can write to {shared}"
 
 
-def test_a_folder_in_one_like_tmp_or_of_ones_own_group_is_used(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_folder_in_one_like_tmp_or_of_ones_own_group_is_used(folder, monkeypatch, caplog):
     (folder / "tmp").mkdir()
     (folder / "tmp").chmod(0o1777)  # where nobody can rename what is another's
     (folder / "grouped").mkdir()
@@ -167,8 +155,8 @@ def test_a_folder_in_one_like_tmp_or_of_ones_own_group_is_used(
 
 
 def test_a_folder_for_all_in_place_of_the_code_is_not_used_nor_a_link_to_one(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
+    folder, monkeypatch, caplog
+):
     cache = folder / "cache"
     cache.mkdir()
     for place in (folder / "open", cache / NAME):
@@ -192,9 +180,7 @@ def code_kept(number: int) -> Path | None:
 MANY = code_folder.KEPT + 4
 
 
-def test_a_cache_among_other_folders_leaves_what_is_not_its_own(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_cache_among_other_folders_leaves_what_is_not_its_own(tmp_path, monkeypatch):
     """Also where their names are those of caches.
 
     A cache has a mark: what has none, another program's, or is a link, only looks like one.
@@ -218,7 +204,7 @@ def test_a_cache_among_other_folders_leaves_what_is_not_its_own(
     assert len(names) < 4 * MANY + code_folder.KEPT + 2  # the others are forgotten
 
 
-def test_old_caches_are_forgotten(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_old_caches_are_forgotten(tmp_path, monkeypatch):
     cache = tmp_path / "cache"
     cache.mkdir(mode=0o700)
     monkeypatch.setenv("PODUSV_CACHE", str(cache))
@@ -233,8 +219,8 @@ def test_old_caches_are_forgotten(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 
 def test_a_folder_that_cannot_be_written_is_passed_over_and_that_is_told(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: Any
-) -> None:
+    tmp_path, monkeypatch, caplog
+):
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("PODUSV_CACHE", str(tmp_path / "file"))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))

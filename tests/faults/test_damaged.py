@@ -1,19 +1,16 @@
 """Damaged results: the manifest tells, or else the reader does; soon, in a line, and from no other
 file."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from command_samples import Command
 from counts import count
 from damages import FOREIGN, HDF5, OTHERS, PIPE, TEXTS, YAML
 from damaging import __file__ as DAMAGING
@@ -88,14 +85,14 @@ class Opener:
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def run(tmp_path_factory):
     place = tmp_path_factory.mktemp("damaged")
     os.mkfifo(place / PIPE)
     return made(place / "whole", text=SCENARIO)
 
 
 @pytest.fixture(scope="module")
-def opened(run: Path) -> Iterator[Opener]:
+def opened(run):
     opener = Opener(run)
     yield opener
     opener.close()
@@ -115,12 +112,12 @@ def size(run: Path, name: str = "log.h5") -> int:
     return (run / name).stat().st_size
 
 
-def test_an_undamaged_run_is_opened(opened: Opener) -> None:
+def test_an_undamaged_run_is_opened(opened):
     assert opened("entry provenance.json argv [1]").word == "refused"
     assert opened("!entry provenance.json argv [1]").word == "same"
 
 
-def test_a_log_cut_short_is_refused(opened: Opener, run: Path) -> None:
+def test_a_log_cut_short_is_refused(opened, run):
     whole = size(run)
     step = 512 * count(max(1, whole // 512 // 8), 1)
     for length in [*range(0, whole, step), whole - 1]:
@@ -128,14 +125,14 @@ def test_a_log_cut_short_is_refused(opened: Opener, run: Path) -> None:
             check(way, opened(way), "refused")
 
 
-def test_a_flipped_bit_is_told_by_the_manifest(opened: Opener) -> None:
+def test_a_flipped_bit_is_told_by_the_manifest(opened):
     for name in ("manifest.json", *READ, *UNREAD):
         for seed in range(count(2, 300)):
             way = f"flip {name} {seed}"
             check(way, opened(way), "refused")
 
 
-def test_a_flipped_bit_that_the_manifest_does_not_tell_ends_nothing(opened: Opener) -> None:
+def test_a_flipped_bit_that_the_manifest_does_not_tell_ends_nothing(opened):
     """Only the manifest knows the numbers of a log; whoever alters both can write any number."""
     words = set()
     for seed in range(count(20, 2000)):
@@ -150,7 +147,7 @@ def test_a_flipped_bit_that_the_manifest_does_not_tell_ends_nothing(opened: Open
 
 
 @pytest.mark.parametrize("what", OTHERS)
-def test_what_stands_in_place_of_a_file(opened: Opener, what: str) -> None:
+def test_what_stands_in_place_of_a_file(opened, what):
     for name in count(FEW, (*READ, *UNREAD)):
         way = f"become {name} {what}"
         check(way, opened(way), "refused")
@@ -161,7 +158,7 @@ def test_what_stands_in_place_of_a_file(opened: Opener, what: str) -> None:
 
 
 @pytest.mark.parametrize("which", TEXTS)
-def test_json_that_podusv_does_not_write(opened: Opener, which: str) -> None:
+def test_json_that_podusv_does_not_write(opened, which):
     check(which, opened(f"text manifest.json {which}"), "refused")
     large = which in ("wide", "keys")
     for name in JSON[-1:] if large else count(JSON[-1:], JSON):
@@ -180,7 +177,7 @@ WRONG = [
 
 
 @pytest.mark.parametrize("what", WRONG)
-def test_values_of_another_type(opened: Opener, what: str) -> None:
+def test_values_of_another_type(opened, what):
     check(what, opened(f"!entry {what}"), "refused")
 
 
@@ -188,7 +185,7 @@ def test_values_of_another_type(opened: Opener, what: str) -> None:
     "which",
     [pytest.param(which, marks=[pytest.mark.slow] * (which in LENGTHY)) for which in YAML],
 )
-def test_a_scenario_that_podusv_does_not_write(opened: Opener, which: str) -> None:
+def test_a_scenario_that_podusv_does_not_write(opened, which):
     check(which, opened(f"!yaml {which}"), "same" if which == "comments" else "refused")
 
 
@@ -199,7 +196,7 @@ def test_a_scenario_that_podusv_does_not_write(opened: Opener, which: str) -> No
         *(f"foreign {which}" for which in FOREIGN),
     ],
 )
-def test_a_log_of_another_program(opened: Opener, way: str) -> None:
+def test_a_log_of_another_program(opened, way):
     harmless = way.removeprefix("hdf5 ") in HARMLESS
     found = opened(f"!{way}", patience=600)  # for making it
     check(way, found, "same" if harmless else "refused")
@@ -233,14 +230,14 @@ UNSOUND = {
 
 
 @pytest.mark.parametrize("case", UNSOUND)
-def test_a_log_that_lacks_what_every_run_has(run: Path, tmp_path: Path, case: str) -> None:
+def test_a_log_that_lacks_what_every_run_has(run, tmp_path, case):
     change, words = UNSOUND[case]
     other = copied(run, tmp_path / "other", log_h5=relogged(run, change))
     with pytest.raises(StorageError, match=words):
         members.from_folder(other)
 
 
-def test_a_law_is_not_timed_with_the_memory_of_another(run: Path, tmp_path: Path) -> None:
+def test_a_law_is_not_timed_with_the_memory_of_another(run, tmp_path):
     # In machine code it would read beyond the end of what it remembers.
     def shorter(signals: dict[str, Any]) -> None:
         for name in ("W_hat_u", "W_hat_r"):
@@ -256,7 +253,7 @@ def test_a_law_is_not_timed_with_the_memory_of_another(run: Path, tmp_path: Path
 
 
 @pytest.fixture
-def comparison(run: Path, tmp_path: Path) -> Path:
+def comparison(run, tmp_path):
     for label in ("a", "b"):
         copied(run, tmp_path / "two" / label)
     (tmp_path / "two/comparison.csv").write_text("metric,unit,b,a\niae,m s,1,2\n")
@@ -269,7 +266,7 @@ def labels(folder: Path) -> list[str]:
 
 
 @pytest.mark.parametrize("what", [w for w in OTHERS if w != "hole"])
-def test_a_damaged_table_of_a_comparison(comparison: Path, what: str) -> None:
+def test_a_damaged_table_of_a_comparison(comparison, what):
     table = comparison / "comparison.csv"
     table.unlink()
     OTHERS[what](table)
@@ -278,27 +275,27 @@ def test_a_damaged_table_of_a_comparison(comparison: Path, what: str) -> None:
 
 
 @pytest.mark.parametrize("content", [b"\xff", b"a" * 200_000, b"a" * 20_000_000])
-def test_a_table_of_another_program(comparison: Path, content: bytes) -> None:
+def test_a_table_of_another_program(comparison, content):
     (comparison / "comparison.csv").write_bytes(content)
     manifest.write(comparison, "finished")
     with pytest.raises(StorageError, match=r"comparison\.csv"):
         members.from_folder(comparison)
 
 
-def test_a_run_that_a_comparison_has_lost_is_missed(comparison: Path) -> None:
+def test_a_run_that_a_comparison_has_lost_is_missed(comparison):
     (comparison / "a/log.h5").unlink()
     with pytest.raises(StorageError, match=r"a/log\.h5 is missing"):
         members.from_folder(comparison)
 
 
-def test_links_among_runs_do_not_count(run: Path, comparison: Path) -> None:
+def test_links_among_runs_do_not_count(run, comparison):
     (comparison / "c").symlink_to(run)
     assert labels(comparison) == ["b", "a"]
     (comparison / "manifest.json").unlink()
     assert labels(comparison) == ["a", "b"]
 
 
-def test_a_log_that_is_no_file_is_no_reason_to_overlook_its_run(comparison: Path) -> None:
+def test_a_log_that_is_no_file_is_no_reason_to_overlook_its_run(comparison):
     (comparison / "manifest.json").unlink()
     (comparison / "a/log.h5").unlink()
     os.mkfifo(comparison / "a/log.h5")
@@ -316,9 +313,7 @@ WAYS = [
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_every_command_says_so_in_a_line_and_leaves_nothing(
-    run: Path, tmp_path: Path, podusv: Command, way: str
-) -> None:
+def test_every_command_says_so_in_a_line_and_leaves_nothing(run, tmp_path, podusv, way):
     folder = run.with_name("commanded")
     damaged(run, folder, way)
     before = files(folder) if "pipe" not in way else {}
@@ -333,7 +328,7 @@ def test_every_command_says_so_in_a_line_and_leaves_nothing(
     assert before == (files(folder) if "pipe" not in way else {})
 
 
-def test_a_run_folder_is_no_scenario_damaged_or_not(run: Path, podusv: Command) -> None:
+def test_a_run_folder_is_no_scenario_damaged_or_not(run, podusv):
     folder = run.with_name("commanded")
     damaged(run, folder, "become log.h5 pipe")
     for path in (run, folder):

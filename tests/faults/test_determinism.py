@@ -4,8 +4,6 @@ Between processors one thing is left: sine, cosine and arctangent of the C libra
 several versions. Those are held to a bound.
 """
 
-from __future__ import annotations
-
 import ast
 import json
 import os
@@ -100,7 +98,7 @@ def both(loop: ClosedLoop, hold_every: int) -> tuple[Any, Any]:
 
 
 @pytest.mark.parametrize("part", PARTS)
-def test_machine_code_and_plain_python_agree_to_the_last_bit(part: str) -> None:
+def test_machine_code_and_plain_python_agree_to_the_last_bit(part):
     loop = corrected(**{"actuator": Saturated(), **PARTS[part]})
     for hold_every in (0, 5):
         compiled, plain = both(loop, hold_every)
@@ -113,9 +111,7 @@ def test_machine_code_and_plain_python_agree_to_the_last_bit(part: str) -> None:
 # --- again, elsewhere, beside others
 
 
-def test_processes_that_differ_in_all_but_the_scenario_write_the_same_bytes(
-    tmp_path: Path,
-) -> None:
+def test_processes_that_differ_in_all_but_the_scenario_write_the_same_bytes(tmp_path):
     config = tmp_path / "a.yaml"
     config.write_text(SOUND + "simulation: {duration: 5.0}\n")
     surroundings: Sequence[dict[str, str]] = (
@@ -128,7 +124,7 @@ def test_processes_that_differ_in_all_but_the_scenario_write_the_same_bytes(
     assert repeatable(folders[0]) == repeatable(folders[1])
 
 
-def test_one_worker_and_many_write_the_same_bytes(tmp_path: Path) -> None:
+def test_one_worker_and_many_write_the_same_bytes(tmp_path):
     gains = [50.0, 100.0, 200.0, 400.0, 800.0]
     scenarios = [
         load_text(SOUND, "a.yaml", [f"controller.K_Pu={gain}", "simulation.duration=5"]).scenario
@@ -152,9 +148,7 @@ def test_one_worker_and_many_write_the_same_bytes(tmp_path: Path) -> None:
 ])  # fmt: skip
 @pytest.mark.slow  # compiles everything anew
 @INTEL
-def test_code_for_other_instruction_sets_writes_the_same_bytes(
-    processor: str, tmp_path: Path
-) -> None:
+def test_code_for_other_instruction_sets_writes_the_same_bytes(processor, tmp_path):
     words = ["simulation.duration=20"]
     scenario = load(CORRECTED, words).scenario.alone()
     here = execute(Task(scenario, Path(CORRECTED).read_text(), tmp_path / "here")).folder
@@ -170,7 +164,7 @@ BOUND = 1e-12  # of a signal's peak; 3e-16 was seen over the whole 310 s of corr
 
 
 @INTEL
-def test_a_c_library_that_rounds_otherwise_stays_within_the_bound(tmp_path: Path) -> None:
+def test_a_c_library_that_rounds_otherwise_stays_within_the_bound(tmp_path):
     """The corrected loop forgets a last bit. A loop at its singularity does not; see the docs."""
     if python("-c", ANGLES).stdout == python("-c", ANGLES, **WITHOUT_FMA).stdout:
         pytest.skip("this C library rounds alike with and without fused instructions")
@@ -195,7 +189,7 @@ EXACT = {
 }  # fmt: skip
 
 
-def test_trigonometry_is_all_that_kernels_take_from_the_c_library() -> None:
+def test_trigonometry_is_all_that_kernels_take_from_the_c_library():
     called = {
         f"{module}.{name}"
         for path in (ROOT / "podusv_cli").rglob("*.py")

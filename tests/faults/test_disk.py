@@ -1,7 +1,5 @@
 """Full disks, limits of file sizes, streams that take nothing: a line, and nothing is lost."""
 
-from __future__ import annotations
-
 import os
 import re
 import resource
@@ -13,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from children import in_a_child, needs_mount, small_disk
-from command_samples import BASE, ROOT, Command, Said, one_line, write
+from command_samples import BASE, ROOT, Said, one_line, write
 from counts import count, few
 from old_results import (
     COMMANDS,
@@ -37,15 +35,13 @@ LIMITS = [1000, 0, 40_000][:: count(2, 1)]
 
 
 @pytest.fixture
-def podusv(beside_old_results: Command) -> Command:
+def podusv(beside_old_results):
     return beside_old_results
 
 
 @pytest.mark.parametrize("limit", LIMITS)
 @pytest.mark.parametrize(("made", "words"), few(WRITING), ids=str)
-def test_past_the_file_size_limit(
-    podusv: Command, made: str, words: tuple[str, ...], limit: int
-) -> None:
+def test_past_the_file_size_limit(podusv, made, words, limit):
     if limit > 1000 and words[0] in ("plot", "verify"):
         pytest.skip("what it writes is smaller than the limit")
     old = files(Path())
@@ -67,9 +63,7 @@ def test_past_the_file_size_limit(
 @needs_mount
 @pytest.mark.parametrize("free", [150_000, 4096][: count(1, 2)])
 @pytest.mark.parametrize(("made", "words"), few(WRITING), ids=str)
-def test_on_a_full_disk(
-    podusv: Command, before: Path, made: str, words: tuple[str, ...], free: int
-) -> None:
+def test_on_a_full_disk(podusv, before, made, words, free):
     """With old results on it, where only the child sees it."""
 
     def on_a_small_disk() -> object:
@@ -96,9 +90,7 @@ def fill(free: int) -> None:
 
 
 @needs_mount
-def test_a_full_disk_for_compiled_code_costs_time_and_nothing_else(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_full_disk_for_compiled_code_costs_time_and_nothing_else(tmp_path, monkeypatch):
     monkeypatch.setenv("PODUSV_CACHE", str(tmp_path))
     law = Code("law", b"\x90" * 100_000)
 
@@ -116,7 +108,7 @@ def test_a_full_disk_for_compiled_code_costs_time_and_nothing_else(
 
 @needs_full
 @pytest.mark.parametrize(("made", "words"), few(COMMANDS), ids=str)
-def test_stdout_that_takes_nothing(podusv: Command, made: str, words: tuple[str, ...]) -> None:
+def test_stdout_that_takes_nothing(podusv, made, words):
     """What is made is made all the same."""
     old = files(Path())
 
@@ -135,9 +127,7 @@ def test_stdout_that_takes_nothing(podusv: Command, made: str, words: tuple[str,
 @needs_full
 @pytest.mark.parametrize("unbuffered", ["", "1"][: count(1, 2)])
 @pytest.mark.parametrize("streams", ["out", "err", "out err"])
-def test_streams_that_take_nothing_until_python_ends(
-    podusv: Command, streams: str, unbuffered: str
-) -> None:
+def test_streams_that_take_nothing_until_python_ends(podusv, streams, unbuffered):
     """When nothing can be told, the exit code is all there is, and it is not a bug's."""
     write("a.yaml", BASE.replace("silence", "# silence"))  # so that there is something to say
     words = ["run", "a.yaml", "--out", "new", "--no-figures", "--json"]
@@ -169,7 +159,7 @@ ODD: dict[str, Callable[[str], None]] = {
 
 
 @pytest.mark.parametrize("place", ODD)
-def test_what_is_no_file_is_not_replaced_by_one(podusv: Command, place: str) -> None:
+def test_what_is_no_file_is_not_replaced_by_one(podusv, place):
     """As root even a device would be."""
     ODD[place](place)
     Path("figures/controls.png").unlink()

@@ -1,17 +1,14 @@
 """Runs that go wrong, each in its own way: an exit code, the first bad step, a log to look at."""
 
-from __future__ import annotations
-
 import inspect
 import sys
 import threading
-from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import faulty_laws
 import numpy as np
 import pytest
-from command_samples import BASE, Command, commanded, write
+from command_samples import BASE, commanded, write
 from conftest import Constant, adrift, corrected, run
 
 from podusv_cli.controllers.base import Slots
@@ -29,16 +26,14 @@ QUICK = 0.4  # s of computing; what a law may take in these tests
 
 
 @pytest.fixture
-def podusv(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Command:
+def podusv(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(march, "PATIENCE", QUICK)
     return commanded(monkeypatch, capsys)
 
 
 @pytest.fixture
-def law() -> Iterator[Callable[[str], None]]:
+def law():
     """Puts a faulty law in the PID's place, until the test is over."""
     restore = []
     yield lambda name: restore.append(faulty_laws.install(name))
@@ -55,9 +50,7 @@ WAYS = {
 
 
 @pytest.mark.parametrize("name", WAYS)
-def test_a_law_that_fails_on_the_way_leaves_its_log(
-    podusv: Command, law: Callable[[str], None], name: str
-) -> None:
+def test_a_law_that_fails_on_the_way_leaves_its_log(podusv, law, name):
     compiled, last, says = WAYS[name]
     law(name)
     write("a.yaml", BASE.replace("saturated", "ideal", 1))
@@ -86,9 +79,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_a_law_that_is_not_what_it_says_is_refused_before_the_run(
-    podusv: Command, law: Callable[[str], None], name: str
-) -> None:
+def test_a_law_that_is_not_what_it_says_is_refused_before_the_run(podusv, law, name):
     law(name)
     said = podusv("run", write("a.yaml", BASE), "--out", "x")
     assert (said.code, said.out) == (2, "")
@@ -98,7 +89,7 @@ def test_a_law_that_is_not_what_it_says_is_refused_before_the_run(
     assert not Path("x").exists()
 
 
-def test_a_memory_of_another_size_is_refused() -> None:
+def test_a_memory_of_another_size_is_refused():
     class Forgetful(Constant):
         def slots(self) -> Slots:
             return ((Signal("integrals", "m", "two integrals", axes=("axis",)), 2),)
@@ -107,7 +98,7 @@ def test_a_memory_of_another_size_is_refused() -> None:
         check_law(adrift(controller=Forgetful()))
 
 
-def test_what_a_law_raises_is_not_taken_for_the_end_of_its_thread() -> None:
+def test_what_a_law_raises_is_not_taken_for_the_end_of_its_thread():
     class Leaving(Constant):
         @staticmethod
         def law(t, x, memory, target, k, table, tau, rate, signals, work):  # type: ignore[no-untyped-def, override]
@@ -118,9 +109,7 @@ def test_what_a_law_raises_is_not_taken_for_the_end_of_its_thread() -> None:
     assert out.message.startswith("diverged at t = 0 s: SystemExit: 7 (test_divergence.py, line ")
 
 
-def test_in_a_batch_one_law_that_does_not_return_costs_no_other_run(
-    law: Callable[[str], None], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_in_a_batch_one_law_that_does_not_return_costs_no_other_run(law, monkeypatch):
     class Stubborn(Constant):
         law = staticmethod(faulty_laws.slow_when_told)
 
@@ -133,9 +122,7 @@ def test_in_a_batch_one_law_that_does_not_return_costs_no_other_run(
     assert batch.cause.tolist() == ["", cause, ""]
 
 
-def test_a_law_that_returns_after_it_was_abandoned_goes_no_step_further(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_law_that_returns_after_it_was_abandoned_goes_no_step_further(monkeypatch):
     released, times = threading.Event(), []
 
     class Late(Constant):
@@ -157,7 +144,7 @@ def test_a_law_that_returns_after_it_was_abandoned_goes_no_step_further(
     assert max(times) <= 0.06
 
 
-def test_computing_counts_and_not_the_clock(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_computing_counts_and_not_the_clock(monkeypatch):
     """A process that was stopped for an hour, or a busy machine, is no law that hangs."""
     import time
 
@@ -172,7 +159,7 @@ def test_computing_counts_and_not_the_clock(monkeypatch: pytest.MonkeyPatch) -> 
     assert run(adrift(controller=Waiting()), 0.1, compiled=False).status == "finished"
 
 
-def test_what_a_law_raises_in_several_lines_is_told_in_one() -> None:
+def test_what_a_law_raises_in_several_lines_is_told_in_one():
     class Talkative(Constant):
         @staticmethod
         def law(t, x, memory, target, k, table, tau, rate, signals, work):  # type: ignore[no-untyped-def, override]
@@ -185,7 +172,7 @@ def test_what_a_law_raises_in_several_lines_is_told_in_one() -> None:
 
 
 @pytest.mark.filterwarnings("error")
-def test_numbers_that_overflow_are_left_for_the_run_to_tell() -> None:
+def test_numbers_that_overflow_are_left_for_the_run_to_tell():
     class Overflowing(Constant):
         @staticmethod
         def law(t, x, memory, target, k, table, tau, rate, signals, work):  # type: ignore[no-untyped-def, override]

@@ -1,7 +1,5 @@
 """Places where nothing can be written: told in a line, before anything is computed."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -53,7 +51,7 @@ ITSELF = [(*words, "--out", "place") for words in (RUN, COMPARE, *RERUNS, ("plot
 
 
 @pytest.fixture
-def podusv(beside_old_results: Command, monkeypatch: pytest.MonkeyPatch) -> Command:
+def podusv(beside_old_results, monkeypatch):
     write("long.yaml", MINUTES)
     Path().chmod(0o755)
     monkeypatch.setattr(execute, "simulate", begun)
@@ -89,18 +87,14 @@ def refused(podusv: Command, words: tuple[str, ...], before: Callable[[], None])
 
 @pytest.mark.parametrize("make", ODD)
 @pytest.mark.parametrize("words", [*INSIDE, *ITSELF], ids=" ".join)
-def test_something_that_is_no_folder(
-    podusv: Command, words: tuple[str, ...], make: Callable[[Path], None]
-) -> None:
+def test_something_that_is_no_folder(podusv, words, make):
     make(Path("place"))
     assert "place" in refused(podusv, words, lambda: None)
 
 
 @pytest.mark.parametrize("make", ODD)
 @pytest.mark.parametrize("words", [RUN, COMPARE, ("plot", "x")], ids=" ".join)
-def test_something_that_is_no_folder_where_results_go_by_default(
-    podusv: Command, words: tuple[str, ...], make: Callable[[Path], None]
-) -> None:
+def test_something_that_is_no_folder_where_results_go_by_default(podusv, words, make):
     place = Path("figures" if words[0] == "plot" else "results")
     for path in place.glob("*"):
         path.unlink()
@@ -112,9 +106,7 @@ def test_something_that_is_no_folder_where_results_go_by_default(
 
 @pytest.mark.parametrize("make", FORBIDDEN)
 @pytest.mark.parametrize("words", INSIDE, ids=" ".join)
-def test_somewhere_where_one_may_not(
-    podusv: Command, words: tuple[str, ...], make: Callable[[Path], None]
-) -> None:
+def test_somewhere_where_one_may_not(podusv, words, make):
     make(Path("place"))
     line = refused(podusv, words, give_up_rights)
     assert "place" in line
@@ -122,6 +114,6 @@ def test_somewhere_where_one_may_not(
 
 
 @pytest.mark.parametrize("words", [RUN, COMPARE], ids=" ".join)
-def test_results_go_by_default_where_one_may_not(podusv: Command, words: tuple[str, ...]) -> None:
+def test_results_go_by_default_where_one_may_not(podusv, words):
     closed(Path("results"))
     assert refused(podusv, words, give_up_rights).endswith(": not permitted")

@@ -1,7 +1,5 @@
 """Interrupts of runs and comparisons: what was finished is kept, and says that it was cut."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess
@@ -21,7 +19,6 @@ from command_samples import (
     ROOT,
     SIGNALS,
     TWO,
-    Command,
     commanded,
     gone,
     send,
@@ -41,14 +38,12 @@ COMPARE = ("compare", "--out", "x", "--no-figures")
 
 
 @pytest.fixture
-def podusv(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Command:
+def podusv(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     return commanded(monkeypatch, capsys)
 
 
-def test_nothing_finished_leaves_nothing(podusv: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nothing_finished_leaves_nothing(podusv, monkeypatch):
     lost = Outcome(failure=INTERRUPTED, interrupted=True)
     monkeypatch.setattr(compare, "run_all", lambda jobs, *rest: [lost] * len(jobs))
     said = podusv("compare", "--no-figures", write("two.yaml", TWO), "--out", "x")
@@ -59,9 +54,7 @@ def test_nothing_finished_leaves_nothing(podusv: Command, monkeypatch: pytest.Mo
 @pytest.mark.parametrize(
     ("number", "code", "times"), [(signal.SIGINT, 130, 3), (signal.SIGTERM, 143, 1)]
 )
-def test_an_interrupted_comparison_keeps_what_it_has(
-    podusv: Command, number: signal.Signals, code: int, times: int
-) -> None:
+def test_an_interrupted_comparison_keeps_what_it_has(podusv, number, code, times):
     write("short.yaml", BASE)
     write("long.yaml", LONG)
     with under_way(*COMPARE, "short.yaml", "long.yaml") as process:
@@ -80,9 +73,7 @@ def test_an_interrupted_comparison_keeps_what_it_has(
 
 
 @pytest.mark.parametrize(("number", "code"), MOSTLY_SIGINT)
-def test_an_interrupt_while_drawing_costs_the_figures_only(
-    podusv: Command, number: signal.Signals, code: int
-) -> None:
+def test_an_interrupt_while_drawing_costs_the_figures_only(podusv, number, code):
     config = write("two.yaml", TWO)
     with under_way("compare", config, "--out", "x") as process:
         wait_for(".x.podusv-*.part/new/comparison.csv")
@@ -109,9 +100,7 @@ def soon(number: signal.Signals, work: Callable[..., object]) -> Callable[..., o
 
 
 @pytest.mark.parametrize(("number", "code"), [*SIGNALS, (signal.SIGHUP, 129)])
-def test_an_interrupted_run_is_kept(
-    podusv: Command, number: signal.Signals, code: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_interrupted_run_is_kept(podusv, number, code, monkeypatch):
     monkeypatch.setattr(execute, "simulate", soon(number, execute.simulate))
     said = podusv("run", write("long.yaml", LONG), "--out", "x")
     assert said.code == code
@@ -120,9 +109,7 @@ def test_an_interrupted_run_is_kept(
     assert 0 < open_run(Path("x")).recording["time"][-1] < 2e5
 
 
-def test_an_interrupted_run_takes_no_finished_ones_place(
-    podusv: Command, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_interrupted_run_takes_no_finished_ones_place(podusv, monkeypatch):
     assert podusv("run", write("short.yaml", BASE), "--out", "x", "--no-figures").code == 0
     old = files(Path("x"))
     monkeypatch.setattr(execute, "simulate", soon(signal.SIGINT, execute.simulate))
@@ -132,9 +119,7 @@ def test_an_interrupted_run_takes_no_finished_ones_place(
     assert manifest.check(Path("x-2")).status == "interrupted"
 
 
-def test_a_fault_after_an_interrupt_is_told(
-    podusv: Command, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_fault_after_an_interrupt_is_told(podusv, monkeypatch):
     def faulty(*args: object) -> None:
         raise TypeError("no such thing")
 
@@ -148,8 +133,8 @@ def test_a_fault_after_an_interrupt_is_told(
 @pytest.mark.parametrize(("number", "code"), SIGNALS)
 @pytest.mark.parametrize("stage", ["_drawn", "_cost", "_write"])
 def test_a_run_that_is_interrupted_after_its_simulation_is_whole(
-    podusv: Command, number: signal.Signals, code: int, stage: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    podusv, number, code, stage, monkeypatch
+):
     write_all = execute._write
 
     def late(*given: Any) -> object:
@@ -166,9 +151,7 @@ def test_a_run_that_is_interrupted_after_its_simulation_is_whole(
     assert not Path("x/figures").exists()
 
 
-def test_an_interrupted_verification_says_that_nothing_was_written(
-    podusv: Command, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_interrupted_verification_says_that_nothing_was_written(podusv, monkeypatch):
     monkeypatch.setattr(step_halving, "simulate", soon(signal.SIGINT, step_halving.simulate))
     said = podusv("verify", write("long.yaml", LONG), "--out", "x.json")
     text = "long.yaml: interrupted before all steps were simulated; nothing was written\n"
@@ -176,9 +159,7 @@ def test_an_interrupted_verification_says_that_nothing_was_written(
     assert not Path("x.json").exists()
 
 
-def test_run_and_rerun_tell_an_interruption_in_the_same_words(
-    podusv: Command, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_run_and_rerun_tell_an_interruption_in_the_same_words(podusv, monkeypatch):
     simulate = execute.simulate
 
     def interrupted(*args: object, **options: object) -> object:
@@ -194,7 +175,7 @@ def test_run_and_rerun_tell_an_interruption_in_the_same_words(
     assert rerun.err == run.err.replace("short.yaml", "x")
 
 
-def test_these_tests_end_where_signals_are_ignored() -> None:
+def test_these_tests_end_where_signals_are_ignored():
     """As in `nohup make test &`."""
 
     def deaf() -> None:

@@ -3,8 +3,6 @@
 The moment is the n-th call of the system that makes, fills or names something, or any time at all.
 """
 
-from __future__ import annotations
-
 import os
 import random
 import signal
@@ -15,7 +13,6 @@ from pathlib import Path
 
 import pytest
 from children import Died, begun, in_a_child
-from command_samples import Command
 from counts import count, few
 from old_results import (
     COMMANDS,
@@ -33,7 +30,7 @@ CALLS = ("mkdir", "open", "write", "fsync", "replace", "rename", "unlink", "rmdi
 
 
 @pytest.fixture
-def podusv(beside_old_results: Command) -> Command:
+def podusv(beside_old_results):
     return beside_old_results
 
 
@@ -71,9 +68,7 @@ def attempts(work: Callable[[], object], seeds: range) -> list[Callable[[], obje
 
 
 @pytest.mark.parametrize(("made", "words"), few(COMMANDS), ids=str)
-def test_old_or_new_and_the_next_one_clears_up(
-    podusv: Command, before: Path, made: str, words: tuple[str, ...]
-) -> None:
+def test_old_or_new_and_the_next_one_clears_up(podusv, before, made, words):
     old, work = files(before), partial(podusv, *words)
     deaths, seen = attempts(work, range(count(2, 26))), []
     new = files(Path())
@@ -90,9 +85,7 @@ def test_old_or_new_and_the_next_one_clears_up(
     assert len(seen) >= len(deaths) / 2  # a process may be faster than it was
 
 
-def test_no_piece_of_code_is_left_half_written(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_piece_of_code_is_left_half_written(tmp_path, monkeypatch):
     monkeypatch.setenv("PODUSV_CACHE", str(tmp_path))
     found = partial(code_folder.code_folder.__wrapped__, "0123456789abcdef")
     path, piece = found() / "law.code", object_cache.Code("law", b"\x90" * 1000)
@@ -119,7 +112,7 @@ def test_no_piece_of_code_is_left_half_written(
     assert object_cache._read(path) == piece
 
 
-def test_what_others_may_be_making_is_left_alone(podusv: Command) -> None:
+def test_what_others_may_be_making_is_left_alone(podusv):
     """Parts of a process that lives or of another machine, and names that only look like parts."""
     mine = temporary_name()
     dead = in_a_child(temporary_name)

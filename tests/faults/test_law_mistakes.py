@@ -1,7 +1,5 @@
 """A mistake in somebody's own law is refused before the run: where it is, and what to write."""
 
-from __future__ import annotations
-
 import math
 import sys
 from collections.abc import Callable
@@ -10,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
-from command_samples import BASE, Command, write
+from command_samples import BASE, write
 from conftest import Constant, adrift
 
 from podusv_cli.controllers.base import Controller
@@ -147,7 +145,7 @@ def refused(law: type[Controller]) -> str:
 
 
 @pytest.mark.parametrize("law", DECLARED)
-def test_what_it_declares_is_checked(law: type[Controller]) -> None:
+def test_what_it_declares_is_checked(law):
     line = _line(law.__name__)
     told = refused(law)
     assert told.startswith(f"law constant (test_law_mistakes.py, line {line}): ")
@@ -167,7 +165,7 @@ ASKED: dict[type[Controller], str] = {
 
 
 @pytest.mark.parametrize("law", ASKED)
-def test_all_its_functions_are_asked(law: type[Controller]) -> None:
+def test_all_its_functions_are_asked(law):
     assert refused(law).startswith(f"law constant, evaluated once before the run: {ASKED[law]}")
 
 
@@ -222,7 +220,7 @@ COMPILED: dict[Callable[..., None], str] = {
 
 
 @pytest.mark.parametrize("inner", COMPILED)
-def test_what_cannot_become_machine_code_is_its_kernels_fault(inner: Callable[..., None]) -> None:
+def test_what_cannot_become_machine_code_is_its_kernels_fault(inner):
     class Own(Constant):
         law = staticmethod(inner)
 
@@ -236,7 +234,7 @@ def test_what_cannot_become_machine_code_is_its_kernels_fault(inner: Callable[..
     assert "\n" not in told
 
 
-def test_a_command_refuses_it_in_a_line(podusv: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_command_refuses_it_in_a_line(podusv, monkeypatch):
     monkeypatch.setattr(Pid, "signals", (*Pid.signals, "my_error"))
     for command in ("run", "compare", "verify"):
         said = podusv(command, write("a.yaml", BASE), "--out", "x")
@@ -261,9 +259,7 @@ IMPORTED = {
 
 
 @pytest.mark.parametrize("text", IMPORTED)
-def test_a_file_that_cannot_be_imported_is_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str
-) -> None:
+def test_a_file_that_cannot_be_imported_is_named(tmp_path, monkeypatch, text):
     package = tmp_path / "own_laws"
     package.mkdir()
     (package / "__init__.py").touch()

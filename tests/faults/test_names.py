@@ -1,20 +1,16 @@
 """Names that try to leave, links in the way, names that are too long or too odd for a folder."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
 import pytest
-from command_samples import BASE, Command, commanded, write
+from command_samples import BASE, commanded, write
 
 from podusv_cli.storage import manifest
 
 
 @pytest.fixture
-def podusv(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Command:
+def podusv(tmp_path, monkeypatch, capsys):
     """A command without figures, in a folder inside the test's own."""
     (tmp_path / "work").mkdir()
     monkeypatch.chdir(tmp_path / "work")
@@ -36,7 +32,7 @@ ODD = [
 
 @pytest.mark.parametrize("name", [*LEAVING, *ODD, "a" * 81, "a" * 300], ids=ascii)
 @pytest.mark.parametrize("where", ["name", "label", "claim", "assigned"])
-def test_a_name_that_is_no_plain_word_is_refused(podusv: Command, name: str, where: str) -> None:
+def test_a_name_that_is_no_plain_word_is_refused(podusv, name, where):
     words: list[str] = []
     quoted = json.dumps(name)
     text = {
@@ -57,7 +53,7 @@ def test_a_name_that_is_no_plain_word_is_refused(podusv: Command, name: str, whe
 
 
 @pytest.mark.parametrize("labels", [("A", "a"), ("CON", "x"), ("Stiff", "soft")])
-def test_labels_cannot_differ_in_case_alone(podusv: Command, labels: tuple[str, str]) -> None:
+def test_labels_cannot_differ_in_case_alone(podusv, labels):
     """On disks that do not tell cases apart they would share a folder."""
     runs = ", ".join(f"{label}: {{kind: dsc}}" for label in labels)
     said = podusv("compare", write("a.yaml", BASE + f"controllers: {{{runs}}}\n"), "--no-figures")
@@ -65,9 +61,7 @@ def test_labels_cannot_differ_in_case_alone(podusv: Command, labels: tuple[str, 
     assert f"controllers.{labels[0]}" in said.err
 
 
-def test_scenarios_whose_names_differ_in_case_alone_get_folders_of_their_own(
-    podusv: Command,
-) -> None:
+def test_scenarios_whose_names_differ_in_case_alone_get_folders_of_their_own(podusv):
     write("Ship.yaml", BASE)
     write("other.yaml", BASE + "name: ship\n")
     said = podusv("compare", "Ship.yaml", "other.yaml", "--out", "x", "--no-figures", "-q")
@@ -78,9 +72,7 @@ def test_scenarios_whose_names_differ_in_case_alone_get_folders_of_their_own(
 
 @pytest.mark.parametrize("target", ["elsewhere", "nowhere", "."])
 @pytest.mark.parametrize("force", [[], ["--force"]])
-def test_a_link_in_place_of_the_folder_is_left_alone(
-    podusv: Command, target: str, force: list[str]
-) -> None:
+def test_a_link_in_place_of_the_folder_is_left_alone(podusv, target, force):
     Path("elsewhere").mkdir()
     Path("elsewhere/kept").write_text("kept")
     Path("x").symlink_to(target)
@@ -91,14 +83,14 @@ def test_a_link_in_place_of_the_folder_is_left_alone(
     assert [path.name for path in Path("elsewhere").iterdir()] == ["kept"]
 
 
-def test_a_folder_reached_by_a_link_is_a_folder(podusv: Command) -> None:
+def test_a_folder_reached_by_a_link_is_a_folder(podusv):
     Path("real").mkdir()
     Path("link").symlink_to("real")
     said = podusv("run", write("a.yaml", BASE), "--out", "link/x", "--no-figures", "-q")
     assert (said.code, manifest.check(Path("real/x")).status) == (0, "finished")
 
 
-def test_out_may_begin_with_a_dash_and_hold_any_letters(podusv: Command) -> None:
+def test_out_may_begin_with_a_dash_and_hold_any_letters(podusv):
     config = write("a.yaml", BASE)
     for out in ("-x", "\u0130 \u202e\U0001f6a2", "e\u0301", "a'b\"c", "new\nline"):
         said = podusv("run", config, f"--out={out}", "--no-figures", "-q")
@@ -106,13 +98,13 @@ def test_out_may_begin_with_a_dash_and_hold_any_letters(podusv: Command) -> None
         assert manifest.check(Path(out)).status == "finished"
 
 
-def test_a_scenario_may_begin_with_a_dash(podusv: Command) -> None:
+def test_a_scenario_may_begin_with_a_dash(podusv):
     write("-a.yaml", BASE + "name: a\n")
     assert podusv("run", "--out", "x", "--no-figures", "-q", "--", "-a.yaml").code == 0
 
 
 @pytest.mark.parametrize("out", ["a" * 300, "a" * 255, "a/" * 3000])
-def test_a_folder_that_cannot_be_is_one_line(podusv: Command, out: str) -> None:
+def test_a_folder_that_cannot_be_is_one_line(podusv, out):
     said = podusv("run", write("a.yaml", BASE), "--out", out, "--no-figures")
     assert said.code in (2, 5)
     assert said.err.count("\n") == 1

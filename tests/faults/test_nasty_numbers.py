@@ -3,8 +3,6 @@
 Whatever comes of it is told in words: no traceback, no exit code 1, and in time.
 """
 
-from __future__ import annotations
-
 import io
 import os
 import random
@@ -14,10 +12,8 @@ from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import redirect_stderr, redirect_stdout
 from multiprocessing import get_context
-from pathlib import Path
 from typing import Any, NamedTuple
 
-import pytest
 import yaml
 from command_samples import ROOT
 from counts import count
@@ -126,7 +122,7 @@ def fault(found: Found) -> str:
     return f"{found.seconds:.1f} s" if found.seconds > SECONDS else ""
 
 
-def test_no_number_ends_in_a_traceback(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_number_ends_in_a_traceback(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     every = list(tries())
     chosen = random.Random(1).sample(every, min(MOST, len(every)))

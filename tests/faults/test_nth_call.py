@@ -1,7 +1,5 @@
 """The n-th call that makes, writes or names something fails, for every n (by default some)."""
 
-from __future__ import annotations
-
 import errno
 import itertools
 import os
@@ -10,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from command_samples import Command, Said
+from command_samples import Said
 from counts import count, few
 from old_results import COMMANDS, SUCCESS, assert_nothing_lost, bring_back
 from storage_samples import Saboteur, fails, files
@@ -30,7 +28,7 @@ def one_by_one(jobs: Sequence[workers.Job], *more: object) -> list[workers.Outco
 
 
 @pytest.fixture
-def podusv(beside_old_results: Command, monkeypatch: pytest.MonkeyPatch) -> Command:
+def podusv(beside_old_results, monkeypatch):
     monkeypatch.setattr(provenance, "collect", lambda *of_a_run: {})  # which takes its time
     monkeypatch.setattr(compare, "run_all", one_by_one)
     return beside_old_results
@@ -81,9 +79,7 @@ def to_write(path: object, flags: int, *mode: int) -> int:
 
 @pytest.mark.parametrize(("error", "lasting"), [(errno.EIO, False), (errno.ENOSPC, True)])
 @pytest.mark.parametrize(("made", "words"), few(COMMANDS), ids=str)
-def test_it_is_a_line_and_nothing_is_lost(
-    podusv: Command, before: Path, made: str, words: tuple[str, ...], error: int, lasting: bool
-) -> None:
+def test_it_is_a_line_and_nothing_is_lost(podusv, before, made, words, error, lasting):
     old, said = files(before), podusv(*words)
     assert said.code == SUCCESS.get(words[0], 0)
     new = files(Path())

@@ -1,7 +1,5 @@
 """`ulimit -n`: few open files are told before anything is computed, and cost no result."""
 
-from __future__ import annotations
-
 import os
 import resource
 import subprocess
@@ -33,7 +31,7 @@ def podusv(
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write("two.yaml", CONFIG)
     return tmp_path
@@ -41,9 +39,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.mark.parametrize("limit", [8, 16, LEAST_OPEN_FILES - 1][:: count(2, 1)])
 @pytest.mark.parametrize("words", COMMANDS, ids=lambda words: words[0])
-def test_too_few_open_files_are_told_before_anything_is_computed(
-    folder: Path, words: Sequence[str], limit: int
-) -> None:
+def test_too_few_open_files_are_told_before_anything_is_computed(folder, words, limit):
     done = podusv(words, limit, limit, folder)
     assert done.returncode == 5
     assert done.stderr == (
@@ -57,16 +53,14 @@ def test_too_few_open_files_are_told_before_anything_is_computed(
     ("limit", "most"), [(16, 4096), (LEAST_OPEN_FILES, LEAST_OPEN_FILES)], ids=str
 )
 @pytest.mark.parametrize("words", COMMANDS, ids=lambda words: words[0])
-def test_enough_open_files_or_leave_to_have_them_make_a_whole_result(
-    folder: Path, words: Sequence[str], limit: int, most: int
-) -> None:
+def test_enough_open_files_or_leave_to_have_them_make_a_whole_result(folder, words, limit, most):
     more = () if count(0, 1) else ("--no-figures",)
     done = podusv([*words, *more], limit, most, folder)
     assert (done.returncode, "could not be made" in done.stderr) == (0, False), done.stderr
     assert manifest.check(folder / "x").status == "finished"
 
 
-def test_an_error_of_the_system_in_a_job_is_a_line() -> None:
+def test_an_error_of_the_system_in_a_job_is_a_line():
     def job(_: object) -> None:
         raise OSError(24, "Too many open files")
 

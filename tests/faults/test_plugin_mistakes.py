@@ -1,11 +1,8 @@
 """A mistake in a plug-in's law is refused before the run with file and line, never as a bug."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
-from command_samples import Command
 from plugin_samples import LAW, put
 
 # What is written in place of what, and what is said.
@@ -24,7 +21,7 @@ MISTAKES = {
 
 
 @pytest.mark.parametrize("name", MISTAKES)
-def test_it_is_refused_before_the_run(podusv: Command, name: str) -> None:
+def test_it_is_refused_before_the_run(podusv, name):
     right, wrong, words = MISTAKES[name]
     assert right in LAW
     for command in ("run", "compare"):

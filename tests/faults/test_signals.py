@@ -3,8 +3,6 @@
 What does not stop sleeps or computes for many minutes: it would be waited for in vain.
 """
 
-from __future__ import annotations
-
 import os
 import pty
 import signal
@@ -72,7 +70,7 @@ patch(execute, "simulate", told)
 
 
 @pytest.fixture(autouse=True)
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -90,7 +88,7 @@ def ended(process: object, number: signal.Signals, times: int = 1) -> tuple[int,
     ("module", "number", "code"),
     [("typer", *SIGNALS[1]), ("h5py", *SIGNALS[0]), ("pandas", *SIGNALS[1])],
 )
-def test_while_importing(folder: Path, module: str, number: signal.Signals, code: int) -> None:
+def test_while_importing(folder, module, number, code):
     """typer before there is a command, h5py by each worker, pandas by the command."""
     says = {
         "typer": "", "h5py": "interrupted before any run finished; nothing was written\n",
@@ -125,7 +123,7 @@ def lose_the_terminal(*words: str, until: str) -> None:
             os.killpg(process, signal.SIGKILL)
 
 
-def test_a_lost_terminal_ends_a_run_and_keeps_it() -> None:
+def test_a_lost_terminal_ends_a_run_and_keeps_it():
     """As a lost ssh does; nothing that is still to be printed stands in the way."""
     words = ("run", write("long.yaml", LONG), "--out", "x", "--no-figures")
     lose_the_terminal(*words, until="long.yaml")
@@ -133,7 +131,7 @@ def test_a_lost_terminal_ends_a_run_and_keeps_it() -> None:
     assert 0 < open_run(Path("x")).recording["time"][-1] < 1e5
 
 
-def test_a_lost_terminal_ends_a_comparison_and_keeps_it() -> None:
+def test_a_lost_terminal_ends_a_comparison_and_keeps_it():
     scenarios = write("short.yaml", BASE), write("long.yaml", LONG)
     words = ("compare", *scenarios, "--out", "x", "--no-figures")
     lose_the_terminal(*words, until=".x.podusv-*.part/new/short/manifest.json")
@@ -142,7 +140,7 @@ def test_a_lost_terminal_ends_a_comparison_and_keeps_it() -> None:
 
 
 @pytest.mark.parametrize(("ignored", "code"), [(False, 129), (True, 0)])
-def test_a_hangup_ends_it_but_not_under_nohup(ignored: bool, code: int) -> None:
+def test_a_hangup_ends_it_but_not_under_nohup(ignored, code):
     patches = 'patch(execute, "simulate", lambda old, *given, **more: old(*given, **more))'
     if ignored:
         patches = f"import signal; signal.signal(signal.SIGHUP, signal.SIG_IGN); {patches}"
@@ -156,7 +154,7 @@ def test_a_hangup_ends_it_but_not_under_nohup(ignored: bool, code: int) -> None:
 
 
 @INTERRUPTS
-def test_twice_ends_what_does_not_listen_and_its_workers(number: signal.Signals, code: int) -> None:
+def test_twice_ends_what_does_not_listen_and_its_workers(number, code):
     patches = """
 import multiprocessing, signal
 interrupts.SAME_INTERRUPT = 0.5
@@ -184,7 +182,7 @@ patch(execute, "_write", deaf)
 
 
 @INTERRUPTS
-def test_in_a_law_that_never_returns(number: signal.Signals, code: int) -> None:
+def test_in_a_law_that_never_returns(number, code):
     """Machine code hears nothing: the run is kept up to there, the law is left behind."""
     patches = MOVING.format(fraction=0.0) + 'import faulty_laws; faulty_laws.install("endless")'
     script = PATCHED.format(patches=patches)

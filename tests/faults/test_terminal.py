@@ -1,7 +1,5 @@
 """Nobody listens, no terminal, a plain one: no traceback, and codes for terminals only."""
 
-from __future__ import annotations
-
 import errno
 import io
 import os
@@ -25,7 +23,7 @@ FULL = Path("/dev/full")
 
 
 @pytest.fixture(autouse=True)
-def scenario(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def scenario(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write("a.yaml", BASE)
 
@@ -43,7 +41,7 @@ def podusv(*words: str, extra: Mapping[str, str] | None = None, **streams: Any) 
 
 
 @pytest.mark.parametrize("words", [("nope",), RUN])
-def test_closed_streams_are_as_good_as_dev_null(words: tuple[str, ...]) -> None:
+def test_closed_streams_are_as_good_as_dev_null(words):
     """Also no file of the run gets the number of a stream, and messages with it."""
     wanted = podusv(*words, capture_output=True).returncode
     for closing in (">&-", "<&- >&- 2>&-"):
@@ -62,7 +60,7 @@ def test_closed_streams_are_as_good_as_dev_null(words: tuple[str, ...]) -> None:
 @pytest.mark.parametrize(
     ("words", "unbuffered"), [(("list",), ""), (("--version",), "1"), (("run", "--help"), "")]
 )
-def test_a_full_disk_behind_stdout_is_a_line(words: tuple[str, ...], unbuffered: str) -> None:
+def test_a_full_disk_behind_stdout_is_a_line(words, unbuffered):
     extra = {"PYTHONUNBUFFERED": unbuffered}
     with FULL.open("w") as full:
         done = podusv(*words, extra=extra, stdout=full, stderr=subprocess.PIPE, text=True)
@@ -71,7 +69,7 @@ def test_a_full_disk_behind_stdout_is_a_line(words: tuple[str, ...], unbuffered:
 
 
 @pytest.mark.parametrize("unbuffered", ["", "1"])
-def test_a_disk_that_fills_up_behind_stdout_is_a_line(unbuffered: str) -> None:
+def test_a_disk_that_fills_up_behind_stdout_is_a_line(unbuffered):
     """Half of the text is there, and it is known."""
 
     def limit() -> None:
@@ -87,7 +85,7 @@ def test_a_disk_that_fills_up_behind_stdout_is_a_line(unbuffered: str) -> None:
 
 
 @pytest.mark.parametrize("words", [("schema",), ("validate", "a.yaml", "-v")])
-def test_a_reader_that_leaves_ends_it_quietly(words: tuple[str, ...]) -> None:
+def test_a_reader_that_leaves_ends_it_quietly(words):
     reading, writing = os.pipe()
     os.close(reading)
     done = podusv(*words, stdout=writing, stderr=subprocess.PIPE)
@@ -100,7 +98,7 @@ def test_a_reader_that_leaves_ends_it_quietly(words: tuple[str, ...]) -> None:
     [(("list",), {"LC_ALL": "C", "PYTHONUTF8": "0"}), (("schema",), PLAIN[0]), (RUN, {})],
     ids=str,
 )
-def test_pipes_get_no_codes(words: tuple[str, ...], extra: dict[str, str]) -> None:
+def test_pipes_get_no_codes(words, extra):
     done = podusv(*words, extra={"TERM": "xterm", **extra}, capture_output=True)
     assert done.returncode == 0
     assert ESCAPE not in done.stdout + done.stderr
@@ -132,7 +130,7 @@ def _read(terminal: int) -> bytes:
         return b""
 
 
-def test_a_plain_terminal_gets_no_codes_and_another_one_does() -> None:
+def test_a_plain_terminal_gets_no_codes_and_another_one_does():
     for extra in PLAIN:
         assert ESCAPE not in on_a_terminal(extra, "list")
     assert ESCAPE in on_a_terminal({"TERM": "xterm"}, "list")
@@ -148,7 +146,7 @@ class Lost(io.StringIO):
         raise OSError(errno.EIO, "Input/output error")
 
 
-def test_a_terminal_that_is_lost_costs_the_bar_only(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_terminal_that_is_lost_costs_the_bar_only(monkeypatch):
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setattr(progress, "PATIENCE", -1.0)
     monkeypatch.setattr(sys, "stderr", Lost())
@@ -158,7 +156,7 @@ def test_a_terminal_that_is_lost_costs_the_bar_only(monkeypatch: pytest.MonkeyPa
             advance("run", part / 2)
 
 
-def test_a_plain_terminal_gets_no_bar() -> None:
+def test_a_plain_terminal_gets_no_bar():
     write(
         "a.yaml",
         BASE.replace("duration: 1.0", "duration: 3e3, step: 1e-3") + "log: {every: 1000}\n",

@@ -22,7 +22,7 @@ TIMES = range(count(1, 40))
 
 
 @pytest.fixture
-def podusv(beside_old_results: Command) -> Command:
+def podusv(beside_old_results):
     return beside_old_results
 
 
@@ -44,9 +44,7 @@ def is_whole(run: Path) -> bool:
 
 
 @pytest.mark.parametrize("words", [RUN, COMPARE, (*RUN, "--force")], ids=" ".join)
-def test_without_a_name_each_gets_a_folder_of_its_own(
-    podusv: Command, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...]
-) -> None:
+def test_without_a_name_each_gets_a_folder_of_its_own(podusv, monkeypatch, words):
     """Also in the same second."""
     monkeypatch.setattr(run_folder, "datetime", Clock)
     said = at_once(podusv, *[(*words, "-q")] * 4)
@@ -66,7 +64,7 @@ class Clock(datetime):
 
 
 @pytest.mark.parametrize("words", [RUN, COMPARE, ("rerun", "both")], ids=" ".join)
-def test_of_those_that_want_one_name_one_gets_it(podusv: Command, words: tuple[str, ...]) -> None:
+def test_of_those_that_want_one_name_one_gets_it(podusv, words):
     said = at_once(podusv, *[(*words, "--out", "new")] * 3)
     assert sorted(str(each.code) for each in said) == ["0", "5", "5"]
     refused = [one_line(each.err) for each in said if each.code == 5]
@@ -78,7 +76,7 @@ def test_of_those_that_want_one_name_one_gets_it(podusv: Command, words: tuple[s
 
 
 @pytest.mark.parametrize("place", ["x", "new"])
-def test_of_those_that_replace_the_last_one_stays(podusv: Command, place: str) -> None:
+def test_of_those_that_replace_the_last_one_stays(podusv, place):
     gains = ("30.0", "40.0", "50.0")
     commands = [
         (*RUN, "--out", place, "--force", "--set", f"controller.K_Pu={gain}") for gain in gains
@@ -91,7 +89,7 @@ def test_of_those_that_replace_the_last_one_stays(podusv: Command, place: str) -
         assert not left_over()
 
 
-def test_figures_that_are_drawn_at_once_are_whole(podusv: Command, before: Path) -> None:
+def test_figures_that_are_drawn_at_once_are_whole(podusv, before):
     said = podusv("plot", "x", "--out", "figures")
     new = files(Path())
     for _ in TIMES:
@@ -103,7 +101,7 @@ def test_figures_that_are_drawn_at_once_are_whole(podusv: Command, before: Path)
         assert not left_over()
 
 
-def test_a_run_that_is_replaced_while_it_is_drawn_is_drawn_or_refused(podusv: Command) -> None:
+def test_a_run_that_is_replaced_while_it_is_drawn_is_drawn_or_refused(podusv):
     """What is read across the change is seen to be damaged.
 
     That it is there at every moment is in tests/test_storage_staging.py, step by step.

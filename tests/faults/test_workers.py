@@ -1,7 +1,5 @@
 """Workers of a comparison that are killed, and workers whose comparison is."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal
@@ -32,9 +30,7 @@ def worker_of(parent: int, but: int = 0) -> int:
     raise AssertionError("there is no worker")
 
 
-def test_a_worker_killed_twice_is_reported_and_the_others_finish(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_worker_killed_twice_is_reported_and_the_others_finish(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names = [write("a.yaml", BASE), write("long.yaml", LONG), write("b.yaml", BASE)]
     with under_way("compare", *names, "--out", "x", "--no-figures", "--json") as process:
@@ -55,9 +51,7 @@ def test_a_worker_killed_twice_is_reported_and_the_others_finish(
     assert sorted(p.name for p in Path("x").iterdir() if p.is_dir()) == ["a", "b"]
 
 
-def test_workers_do_not_outlive_a_comparison_that_is_killed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_workers_do_not_outlive_a_comparison_that_is_killed(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names = [write("a.yaml", LONG), write("b.yaml", LONG)]
     with under_way("compare", *names, "--out", "x", "--no-figures") as process:
@@ -74,7 +68,7 @@ def choke(said: bytes, progress: Any) -> None:
 
 
 @pytest.mark.parametrize("said", [b"\0", b"\0\0\1\0half", b"\xff\xff\xff\xf0"])
-def test_a_message_cut_short_is_a_worker_killed(said: bytes) -> None:
+def test_a_message_cut_short_is_a_worker_killed(said):
     outcomes = run_all([partial(choke, said), partial(pow, 3)], workers=1)
     assert "exit code -9, 2 times" in outcomes[0].failure
     assert "TypeError" in outcomes[1].failure
@@ -85,7 +79,7 @@ def unfit(progress: Any) -> Any:
     return lambda: None
 
 
-def test_a_result_that_cannot_be_sent_is_told_as_such() -> None:
+def test_a_result_that_cannot_be_sent_is_told_as_such():
     outcome = run_all([unfit], workers=1)[0]
     assert outcome.result is None
     assert outcome.failure.startswith("its result cannot be sent: Can't pickle")

@@ -1,7 +1,5 @@
 """Shipped scenarios, spoilt at random: each is sound or a scenario error, with little work."""
 
-from __future__ import annotations
-
 import random
 import re
 import resource
@@ -169,7 +167,7 @@ def check(folder: Path, name: Path, data: bytes) -> str:
 
 
 @pytest.mark.usefixtures("tidy")
-def test_spoilt_scenarios_are_told_and_nothing_else(tmp_path: Path) -> None:
+def test_spoilt_scenarios_are_told_and_nothing_else(tmp_path):
     whole = verdict(CONFIGS / "paper" / "corrected.yaml")  # imports and tables are made once
     assert whole == "ok"
     shutil.copytree(CONFIGS, tmp_path / "configs")
