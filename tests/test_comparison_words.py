@@ -263,7 +263,7 @@ def test_the_numbers_are_shown_by_their_text():
         ("max(a.iae) < 3", "a number where a signal is needed"),
         ("max(a.z_e, 5) < 3", "takes a signal, or a signal and two times"),
         ("max(a.z_e, 5, 2) < 3", "the first time must lie before the second"),
-        ("max(a.z_e, a.iae, 9) < 3", "times must be plain numbers"),
+        ("max(a.z_e, a.iae, 9) < 3", "must be plain numbers"),
         ("a.iae < b.iae or finished(a)", "join conditions with `and` only"),
         ("a.iae ** 2 < 3", "calculate with + - * / only"),
         ("a.iae != 3", "compare with <, <=, >, >=, =="),

@@ -19,6 +19,7 @@ from podusv_cli.engine.simulate import simulate
 from podusv_cli.metrics import distance
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.metric import close_integrals
+from podusv_cli.metrics.operations import operations
 from podusv_cli.metrics.table import METRICS, observer
 from podusv_cli.paths.line_circle import LineCircle
 
@@ -208,7 +209,7 @@ def test_every_metric_is_computed_and_documented(limited):
     log, got = limited
     (cost,) = law_costs([(corrected(), log)])
     _, of_pods = gathered(corrected(actuator=example(Pods)), steps=10)
-    assert set(METRICS) == set(got | cost | of_pods)
+    assert set(METRICS) == set(got | cost | operations(corrected(), log) | of_pods)
     assert set(of_pods) > set(got)
     assert all(metric.unit and metric.meaning for metric in METRICS.values())
 

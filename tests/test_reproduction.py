@@ -11,6 +11,7 @@ import pytest
 from podusv_cli.comparison.claims import judge, parse_claims
 from podusv_cli.comparison.entries import Entry
 from podusv_cli.engine.simulate import simulate
+from podusv_cli.metrics.operations import operations
 from podusv_cli.metrics.table import observer
 from podusv_cli.scenario.load import load
 from podusv_cli.workflows import compare, run
@@ -81,7 +82,8 @@ def rerun(scenario):
         settling_radius=settings.settling_radius,
     )  # fmt: skip
     recording = simulate(loop, grid, observer=seeing)
-    run = SimpleNamespace(recording=recording, metrics=seeing.summary(recording.seen))
+    numbers = seeing.summary(recording.seen) | operations(loop, recording)
+    run = SimpleNamespace(recording=recording, metrics=numbers)
     return Entry("", run, scenario)
 
 

@@ -109,6 +109,23 @@ def parse_claims(loaded: Loaded) -> list[ParsedClaim]:
     return claims
 
 
+def peaks(claims: Sequence[ParsedClaim]) -> dict[str, float]:
+    """Signals of which a claim says how large they become: `max(abs(run.signal)) == number`."""
+    found = {}
+    for node in (node for parsed in claims for node in ast.walk(parsed.expect)):
+        match node:
+            case ast.Compare(
+                left=ast.Call(
+                    func=ast.Name(id="max"),
+                    args=[ast.Call(func=ast.Name(id="abs"), args=[ast.Attribute(attr=name)]), *_],
+                ),
+                ops=[ast.Eq()],
+                comparators=[ast.Constant(value=int() | float() as number)],
+            ):
+                found[name] = float(number)
+    return found
+
+
 def judge(
     claims: Sequence[ParsedClaim], runs: Mapping[str, Source],
     metrics: Mapping[str, Metric] = METRICS,

@@ -9,6 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from podusv_cli.core.kernel import Vector
+from podusv_cli.core.spectrum import periodogram
 from podusv_cli.metrics.metric import Metric
 
 NEAR = 1e-9  # s; times closer than this are the same
@@ -111,11 +112,14 @@ def rate(curve: Curve) -> Curve:
 
 
 @np.errstate(all="ignore")
-def reduced(name: str, text: str, curve: Curve, window: Sequence[float] = ()) -> float:
-    """One number for a curve, over the whole run or a window (start and end [s]).
+def reduced(
+    name: str, text: str, curve: Curve, settings: Sequence[float], window: Sequence[float]
+) -> float:
+    """One number for a curve, over the whole run or a window (start and end [s], or empty).
 
-    `text` names it in messages. Raises CannotTell where a run does not cover the window or did not
-    reach its end. Of a thinned log, only the last value is known, if it is logged.
+    `settings` are what the reducer takes besides; `text` names the number in messages. Raises
+    CannotTell where a run does not cover the window or did not reach its end. Of a thinned log,
+    only the last value is known, if it is logged.
     """
     t, y = curve.time, curve.values
     for label, run in curve.runs.items():
@@ -129,7 +133,7 @@ def reduced(name: str, text: str, curve: Curve, window: Sequence[float] = ()) ->
         t, y = t[inside], y[inside]
     if not len(y):
         raise CannotTell(f"{text}: nothing is logged in this window")
-    return float(REDUCERS[name](t, y))
+    return float(REDUCERS[name](t, y, *settings))
 
 
 def _thinned(text: str, label: str, run: Source) -> CannotTell:
@@ -139,12 +143,20 @@ def _thinned(text: str, label: str, run: Source) -> CannotTell:
     )
 
 
-# of times [s] and values; a single sample has no variation and no integral
-REDUCERS: dict[str, Callable[[Vector, Vector], Any]] = {
+def rms_above(t: Vector, y: Vector, omega: float) -> float:
+    """Rms of all harmonics faster than omega [rad/s]; NaN where there is no spectrum."""
+    rates, power = periodogram(t, y)
+    return float(np.sqrt(np.sum(power[rates > omega]))) if len(rates) else np.nan
+
+
+# of times [s] and values, and of settings; a single sample has no variation and no integral
+REDUCERS: dict[str, Callable[..., Any]] = {
     "max": lambda t, y: np.max(y),
     "min": lambda t, y: np.min(y),
     "mean": lambda t, y: np.trapezoid(y, t) / (t[-1] - t[0]) if len(t) > 1 else y[0],
     "final": lambda t, y: y[-1],
     "variation": lambda t, y: np.sum(np.abs(np.diff(y))) if len(t) > 1 else np.nan,
     "integral": lambda t, y: np.trapezoid(y, t) if len(t) > 1 else np.nan,
+    "rms_above": rms_above,
 }
+SETTINGS = {"rms_above": 1}  # numbers between the signal and the window; 0 for the others

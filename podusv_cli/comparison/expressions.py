@@ -21,7 +21,7 @@ from itertools import pairwise
 import numpy as np
 
 from podusv_cli.comparison import curves
-from podusv_cli.comparison.curves import REDUCERS, CannotTell, Curve, Quantity, Source
+from podusv_cli.comparison.curves import REDUCERS, SETTINGS, CannotTell, Curve, Quantity, Source
 from podusv_cli.comparison.entries import CHECKS
 from podusv_cli.comparison.tolerance import SIGNS
 from podusv_cli.core.kernel import Vector
@@ -40,6 +40,7 @@ from podusv_cli.scenario.expressions import (
 from podusv_cli.theory.derived import DERIVED
 
 EXAMPLE = "a.iae < b.iae"
+TAKEN = {1: "a signal", 2: "a signal and an angular frequency in rad/s"}
 # norms of the weights, which have one value for every node of a network
 NORMS = {derived.needs[0]: name for name, derived in DERIVED.items() if len(derived.needs) == 1}
 
@@ -223,14 +224,16 @@ class Evaluation:
         return curve
 
     def _reduced(self, name: str, node: ast.Call) -> float:
-        if len(node.args) not in (1, 3):
-            refuse(node, f"{name} takes a signal, or a signal and two times")
+        count = 1 + SETTINGS.get(name, 0)
+        if len(node.args) not in (count, count + 2):
+            refuse(node, f"{name} takes {TAKEN[count]}, or {TAKEN[count]} and two times")
         if not all(isinstance(end, ast.Constant) for end in node.args[1:]):
-            refuse(node, "the two times must be plain numbers in s")
-        curve, window = self._curve(node.args[0]), [literal(end) for end in node.args[1:]]
+            refuse(node, "the numbers after the signal must be plain numbers, the two times in s")
+        curve, numbers = self._curve(node.args[0]), [literal(end) for end in node.args[1:]]
+        settings, window = numbers[: count - 1], numbers[count - 1 :]
         if window and not 0 <= window[0] < window[1]:
             refuse(node, "the first time must lie before the second")
-        return curves.reduced(name, ast.unparse(node), curve, window)
+        return curves.reduced(name, ast.unparse(node), curve, settings, window)
 
     def _or_doubt(self, number: Callable[[], float]) -> float:
         """The number, or NaN and a doubt."""

@@ -47,6 +47,7 @@ class Result:
     timings: Mapping[str, Mapping[str, float]]
     warnings: Mapping[str, Sequence[Finding]]
     metrics: Mapping[str, Metric] = field(default_factory=lambda: METRICS)  # that the table knows
+    peaks: Mapping[str, float] = field(default_factory=dict)  # of signals, as claims name them
 
 
 def write(writer: RunWriter, result: Result, extras: Extras) -> None:
@@ -104,7 +105,7 @@ def drawn(
     tell = progress and partial(progress, "drawing figures")
     if tell:
         tell(0.0)
-    shown = dressed([(e.label, e.recording, e.scenario) for e in result.entries])
+    shown = dressed([(e.label, e.recording, e.scenario) for e in result.entries], result.peaks)
     known = figures_of(run.scenario for run in shown)
     for name in names:
         if not known[name].fits(shown):

@@ -16,7 +16,8 @@ from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import STATE, ClosedLoop, Observer, by_name, entries, names, wire
 
 
-def _rows(loop: ClosedLoop, recording: Recording, most: int) -> Vector:
+def logged_rows(loop: ClosedLoop, recording: Recording, most: int) -> Vector:
+    """At most so many rows of a log, evenly spread: time, target, vessel's state, law's memory."""
     times = recording["time"]
     chosen = np.linspace(0, len(times) - 1, min(most, len(times))).astype(int)
     names = [*STATE, *(part.name for part, _ in loop.controller.slots())]
@@ -33,7 +34,7 @@ def replayer(
     """
     from podusv_cli.engine import compile  # a loop in plain Python needs no compiler
 
-    rows = _rows(loop, recording, most)
+    rows = logged_rows(loop, recording, most)
     count, width = rows.shape
     rounds = -(-evaluations // count)
     room = max(width, len(loop.controller.signals)) * 2 + loop.controller.workspace()

@@ -20,6 +20,7 @@ EARLY = 0.005  # of the run: where the peaks are
 EARLY_ROWS = 20  # at least
 LOADS = (("tau_u", "tau_u_cmd"), ("tau_r", "tau_r_cmd"))  # on the hull, and what the law demands
 LIMIT: dict[str, Any] = {"color": "#444444", "linewidth": 0.8, "linestyle": (0, (6, 2, 1, 2))}
+CLAIMED: dict[str, Any] = {"color": "#444444", "linewidth": 0.8, "linestyle": (0, (1, 1))}
 HEIGHTS = {1: 1.25, 2: 1.4}  # inches of a row of panels, by the width in columns
 
 
@@ -38,6 +39,8 @@ def controls(runs: Sequence[Shown], columns: int) -> Figure:
     cells = _cells(figure, kinds, list(spans), columns)
     for (load, kind, part), axes in np.ndenumerate(cells):
         _panel(axes, runs, (load, kind), list(spans.values())[part])
+        if kind == kinds - 1 and part == 0:
+            _claimed(axes, runs, LOADS[load][1])
         if columns == 1 or part == 0:
             axes.set_ylabel(axis_label(runs, LOADS[load][kind]))
     for axes in cells[-1, -1] if columns == 2 else cells[:, -1, -1]:
@@ -83,6 +86,13 @@ def _panel(axes: Axes, runs: Sequence[Shown], shown: tuple[int, int], span: Span
         _limits(axes, runs, load, span)
     else:
         compress(axes, runs, name)
+
+
+def _claimed(axes: Axes, runs: Sequence[Shown], name: str) -> None:
+    """Lines at the early peak of the demand that a claim names."""
+    for peak in {run.peaks[name] for run in runs if name in run.peaks}:
+        for side in (peak, -peak):
+            axes.axhline(side, label="peak that a claim names", **CLAIMED)
 
 
 def _limits(axes: Axes, runs: Sequence[Shown], load: int, span: Span) -> None:

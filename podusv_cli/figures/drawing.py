@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, partial
 
@@ -42,14 +42,16 @@ def figures_of(scenarios: Iterable[Scenario]) -> dict[str, Sheet]:
     return figures_with(tuple(dict.fromkeys(p for one in scenarios for p in one.plugged)))
 
 
-def dressed(runs: Sequence[tuple[str, Recording, Scenario]]) -> list[Shown]:
+def dressed(
+    runs: Sequence[tuple[str, Recording, Scenario]], peaks: Mapping[str, float] | None = None
+) -> list[Shown]:
     """Labelled recordings with their looks, in order; without those too short to draw.
 
-    A run alone has no markers.
+    A run alone has no markers. `peaks` are those of signals as claims about the runs name them.
     """
     count = len(runs)
     shown = [
-        Shown(visible(label), recording, scenario, *look(i), places(i, count))
+        Shown(visible(label), recording, scenario, *look(i), places(i, count), peaks or {})
         for i, (label, recording, scenario) in enumerate(runs)
         if len(recording["time"]) > 1
     ]

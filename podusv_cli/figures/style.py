@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -60,7 +60,8 @@ NO_STAMP: dict[str, dict[str, Any]] = {
 class Shown:
     """A run with the name, colour, line style and marker under which every figure shows it.
 
-    `places` are fractions of a curve, in time, where its markers stand.
+    `places` are fractions of a curve, in time, where its markers stand. `peaks` are those of
+    signals that a claim about the runs names.
     """
 
     label: str
@@ -70,6 +71,7 @@ class Shown:
     linestyle: Any
     marker: str
     places: Vector
+    peaks: Mapping[str, float]
 
     @property
     def name(self) -> str:

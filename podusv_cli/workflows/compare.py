@@ -214,6 +214,7 @@ def collect(
         or [],
         timings={label: done.timing for label, done in finished.items()},
         metrics=known,
+        peaks=claims.peaks(parsed),
         warnings={m.label: getattr(finished.get(m.label), "warnings", m.noticed) for m in members},
     )
 
@@ -230,7 +231,7 @@ def _with_costs(entries: Sequence[Entry], extras: Extras) -> list[Entry]:
         and e.scenario.can_run()
     ]  # fmt: skip
     loops = [(entry.scenario.closed_loop(), entry.recording) for entry in timed]
-    costs = extras.attempt("law_ns", lambda: law_costs(loops)) or [UNMEASURED] * len(timed)
+    costs = extras.attempt("the laws' times", lambda: law_costs(loops)) or [UNMEASURED] * len(timed)
     by_label = {entry.label: cost for entry, cost in zip(timed, costs, strict=True)}
     return [replace(entry, cost=by_label.get(entry.label, UNMEASURED)) for entry in entries]
 

@@ -22,6 +22,7 @@ from podusv_cli.engine.check import check_law
 from podusv_cli.engine.simulate import marcher, simulate
 from podusv_cli.findings.finding import postflight
 from podusv_cli.metrics.cost import law_costs
+from podusv_cli.metrics.operations import operations
 from podusv_cli.metrics.table import metrics_with
 from podusv_cli.process.extras import Extras, Missing
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
@@ -133,7 +134,9 @@ def execute(
         extras = Extras(recording.status == "interrupted")
         with watch.part("metrics"):
             metrics = extras.made("the metrics", lambda: summary(task.scenario, recording)) or {}
-            metrics |= extras.attempt("law_ns", lambda: _cost(task.scenario, recording)) or {}
+            metrics |= (
+                extras.attempt("the law's cost", lambda: _cost(task.scenario, recording)) or {}
+            )
         with watch.part("theory"):
             whole, theory = extras.made(
                 "theory.json with the stability monitor's signals",
@@ -212,8 +215,11 @@ def summary(scenario: Scenario, recording: Recording) -> dict[str, float]:
 
 
 def _cost(scenario: Scenario, recording: Recording) -> dict[str, float]:
-    timed = scenario.simulation.compiled and len(recording["time"])
-    return law_costs([(scenario.closed_loop(), recording)])[0] if timed else {}
+    if not len(recording["time"]):
+        return {}
+    loop = scenario.closed_loop()
+    timed = law_costs([(loop, recording)])[0] if scenario.simulation.compiled else {}
+    return timed | operations(loop, recording)
 
 
 def monitored(

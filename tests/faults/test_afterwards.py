@@ -33,13 +33,13 @@ def broken(*given: Any, **more: Any) -> NoReturn:
 BUG = "could not be made: ArithmeticError: planted here (test_afterwards.py, line "
 AFTER_A_RUN = {
     "the metrics": (execute, "summary"),
-    "law_ns": (execute, "law_costs"),
+    "the law's cost": (execute, "law_costs"),
     "warnings": (execute, "postflight"),
     "theory.json with the stability monitor's signals": (monitor, "ideal_weights"),
     "figures": (execute, "_drawn"),
 }
 AFTER_RUNS = {
-    "law_ns": (compare, "law_costs"),
+    "the laws' times": (compare, "law_costs"),
     "the claims' verdicts": (claims, "judge"),
     "comparison.csv": (table, "as_csv"),
     "comparison.md": (table, "as_markdown"),

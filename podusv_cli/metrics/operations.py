@@ -1,0 +1,130 @@
+"""The arithmetic that a law takes, counted by evaluating it on numbers that count."""
+
+from __future__ import annotations
+
+import dis
+import math
+import operator
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from podusv_cli.core.kernel import bundle, is_kernel, scratch, with_globals
+from podusv_cli.core.recording import Recording
+from podusv_cli.engine.replay import logged_rows
+from podusv_cli.engine.simulate import STATE, ClosedLoop
+from podusv_cli.metrics.metric import Metric
+from podusv_cli.paths.base import TARGET
+
+# where the target, the vessel's state and the law's memory begin in a logged row
+ENDS = (1, 1 + len(TARGET), 1 + len(TARGET) + len(STATE))
+
+law_operations = Metric(
+    "law_operations", "1", "floating-point operations of one evaluation of the law",
+    place=200,
+)  # fmt: skip
+
+
+@dataclass
+class Tally:
+    """How many operations were done so far; stands in a kernel for the module math."""
+
+    count: int = 0
+
+    def __getattr__(self, name: str) -> Any:
+        """As the module math: a constant of it, or a function that counts."""
+        found = getattr(math, name)
+        return partial(self.apply, found) if callable(found) else found
+
+    def apply(self, operation: Callable[..., Any], *operands: Any) -> Counted:
+        """One operation."""
+        self.count += 1
+        return self.number(operation(*map(_plain, operands)))
+
+    def number(self, number: Any) -> Counted:
+        """A number that counts; numpy's, because division by zero is no error in a law."""
+        return Counted(np.float64(number), self)
+
+    def vector(self, numbers: Any) -> Any:
+        """An array of numbers that count."""
+        return np.array([self.number(number) for number in np.ravel(numbers)], dtype=object)
+
+    def kernel(self, function: Any) -> Any:
+        """The kernel, and all that it calls, with arithmetic that counts."""
+        code = dis.get_instructions(function)
+        named = {part.argval for part in code if part.opname == "LOAD_GLOBAL"}
+        names = {name: function.__globals__.get(name) for name in named}
+        replaced = {name: self.kernel(part) for name, part in names.items() if is_kernel(part)}
+        replaced |= {name: self for name, part in names.items() if part is math}
+        replaced |= {
+            name: partial(np.empty, dtype=object) for name, part in names.items() if part is scratch
+        }
+        return with_globals(function, function.__name__, **replaced)
+
+
+@dataclass(eq=False, slots=True)
+class Counted:
+    """A number whose arithmetic is counted; comparisons and changes of sign are free."""
+
+    number: Any
+    tally: Tally
+
+
+def _plain(number: Any) -> Any:
+    return number.number if type(number) is Counted else number
+
+
+def _forward(operation: Callable[..., Any]) -> Callable[..., Counted]:
+    return lambda self, other: self.tally.apply(operation, self, other)
+
+
+def _backward(operation: Callable[..., Any]) -> Callable[..., Counted]:
+    return lambda self, other: self.tally.apply(operation, other, self)
+
+
+def _comparison(operation: Callable[..., Any]) -> Callable[..., bool]:
+    return lambda self, other: bool(operation(self.number, _plain(other)))
+
+
+def _conversion(kind: Callable[[Any], Any]) -> Callable[..., Any]:
+    return lambda self: kind(self.number)
+
+
+def _sign(operation: Callable[..., Any]) -> Callable[..., Counted]:
+    return lambda self: Counted(operation(self.number), self.tally)
+
+
+for _kind in (float, int, bool):
+    setattr(Counted, f"__{_kind.__name__}__", _conversion(_kind))
+for _name in ("neg", "abs"):
+    setattr(Counted, f"__{_name}__", _sign(getattr(operator, _name)))
+for _name in ("add", "sub", "mul", "truediv", "pow", "mod"):
+    setattr(Counted, f"__{_name}__", _forward(getattr(operator, _name)))
+    setattr(Counted, f"__r{_name}__", _backward(getattr(operator, _name)))
+for _name in ("lt", "le", "gt", "ge", "eq", "ne"):
+    setattr(Counted, f"__{_name}__", _comparison(getattr(operator, _name)))
+
+
+def _of_numpy(self: Counted, function: Callable[..., Any], _: str, *operands: Any) -> Counted:
+    return self.tally.apply(function, *operands)
+
+
+setattr(Counted, "__array_ufunc__", _of_numpy)  # noqa: B010 - as the others
+
+
+@np.errstate(all="ignore")
+def operations(loop: ClosedLoop, recording: Recording) -> dict[str, float]:
+    """The metric of this run's law, by its name."""
+    law, tally = loop.controller, Tally()
+    rows = logged_rows(loop, recording, 3)
+    t, target, state, memory = np.split(rows[len(rows) // 2], ENDS)
+    constants = law.constants_with(loop.nominal)
+    outputs = np.zeros(2), np.zeros(len(memory)), np.zeros(len(law.signals))
+    vectors = (state, memory, target, law.table(), *outputs, np.zeros(law.workspace()))
+    x, m, d, table, *out = map(tally.vector, vectors)
+    k: Any = {name: tally.number(number) for name, number in constants.items()}
+    tally.kernel(law.law)(tally.number(t[0]), x, m, d, bundle(k), table, *out)
+    return {law_operations.name: float(tally.count)}

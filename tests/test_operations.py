@@ -1,0 +1,59 @@
+"""Operations of a law, counted: by hand for a small kernel, and by differences for the laws."""
+
+import math
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+
+from podusv_cli.core.kernel import kernel, scratch
+from podusv_cli.engine.simulate import simulate
+from podusv_cli.metrics.operations import Tally, operations
+from podusv_cli.scenario.load import load
+
+CONFIGS = Path(__file__).parents[1] / "configs"
+
+
+@kernel
+def slope(x, k):
+    """Two operations, and a square root."""
+    return math.sqrt(k.slope * x + 1.0)
+
+
+@kernel
+def sample(x, k, out):
+    room = scratch(2)
+    room[0] = slope(x[0], k)  # 3
+    room[1] = 2.0 * room[0] if x[1] > 0.0 else room[0]  # 1
+    out[0] = abs(-room[1]) / math.pi - max(x[0], x[1])  # 2
+    for i in range(int(k.slope)):
+        out[0] = out[0] + x[i]  # 1 each time
+
+
+def test_every_operation_is_counted_once_and_the_numbers_stay():
+    tally, plain = Tally(), np.zeros(1)
+    sample(np.array([4.0, 5.0]), SimpleNamespace(slope=2.0), plain)
+    x, out = tally.vector([4.0, 5.0]), tally.vector([0.0])
+    tally.kernel(sample)(x, SimpleNamespace(slope=tally.vector([2.0])[0]), out)
+    assert (tally.count, float(out[0])) == (3 + 1 + 2 + 2, plain[0])
+
+
+def counts(*keys):
+    scenario = load(CONFIGS / "paper/corrected_compare.yaml", ["simulation.duration=1", *keys])
+    found = {}
+    for name, one in scenario.scenario.singles().items():
+        loop = one.closed_loop()
+        recording = simulate(loop, one.time_grid())
+        found[name] = operations(loop, recording)["law_operations"]
+    return found
+
+
+def test_nodes_cost_the_same_in_every_law_that_has_them():
+    few, many = (counts(f"controller.network.nodes={n}") for n in ([2, 2, 2], [5, 5, 5]))
+    more = {name: many[name] - few[name] for name in few}
+    assert more["pid"] == 0
+    assert (
+        more["proposed"] == more["dsc"] == more["li"] > 117 * 2 * 4
+    )  # f_hat, and both adaptations
+    # the law without a filter differentiates its virtual controls instead
+    assert few["li"] - few["proposed"] == many["li"] - many["proposed"] > 0
