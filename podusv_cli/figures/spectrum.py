@@ -49,6 +49,6 @@ def _draw(axes: Axes, run: Shown, name: str, **look: Any) -> None:
 
 def _scales(axes: Axes) -> None:
     """Both axes logarithmic, down to what rounding leaves."""
-    top = max((float(np.nanmax(line.get_ydata())) for line in axes.lines), default=0.0)
+    top = max((float(np.max(line.get_ydata(), initial=0.0)) for line in axes.lines), default=0.0)
     if np.isfinite(top) and top > 0.0:
         axes.set(xscale="log", yscale="log", ylim=(top * 10.0**-DECADES, 3.0 * top))
