@@ -6,11 +6,12 @@ The printed sign, and a network that lies elsewhere; then folding and singularit
 from __future__ import annotations
 
 import math
+import operator
 from typing import Any
 
 import numpy as np
 
-from podusv_cli.controllers.network import nearest
+from podusv_cli.controllers.network import NODE_DISTANCE, nearest, node_distance
 from podusv_cli.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.controllers.tracking import TrackingController
 from podusv_cli.core.finding import Sentences, after, before, rows_where, times_of
@@ -60,7 +61,8 @@ def network_range(case: Any) -> Sentences:
     nu = case.reference.nu[np.isfinite(case.reference.nu).all(axis=1)]
     if not len(nu):
         return
-    distance = nearest(case.scenario.controller.network, nu)
+    network = case.scenario.controller.network
+    distance = nearest(nu, network.center_array(), network.width_array())
     worst = int(distance.argmax())
     if distance[worst] > FAR:
         u, v, r = nu[worst]
@@ -78,12 +80,9 @@ def network_range(case: Any) -> Sentences:
 )  # fmt: skip
 def off_network(scenario: Any, log: Recording) -> Sentences:
     """No node of the network within two widths of (u, v, r)."""
-    network = scenario.controller.network
-
-    def far(part: Recording) -> Any:
-        return nearest(network, np.column_stack([part["u"], part["v"], part["r"]])) > FAR
-
-    off = rows_where(log, far)
+    name = NODE_DISTANCE.name
+    distance = operator.itemgetter(name) if name in log else node_distance.compute
+    off = rows_where(log, lambda part: distance(part) > FAR)
     if off.any():
         yield (
             f"no node within {FAR:g} widths of (u, v, r) {times_of(log, off)}; the network is "

@@ -184,15 +184,12 @@ def adapt(
         rate[i] = Gamma * (drive * phi[i] - sigma * (weights[i] - initial))
 
 
-def nearest(network: Network, nu: Vector) -> Vector:
-    """Distance from velocities (n, 3) to the nearest node, in widths."""
-    widths = network.width_array()
-    if network.centers:
-        gaps = [((row - network.center_array()) / widths) ** 2 for row in nu]
-        return np.sqrt([gap.sum(axis=1).min() for gap in gaps])
-    axes = zip(nu.T, network.axes(), widths, strict=True)
-    gaps = [(((v[:, None] - axis) / width) ** 2).min(axis=1) for v, axis, width in axes]
-    return np.asarray(np.sqrt(np.sum(gaps, axis=0)))
+def nearest(nu: Vector, centers: Vector, widths: Vector) -> Vector:
+    """Distance from velocities (n, 3) to the nearest of these centres, in widths."""
+    squares = np.full(len(nu), np.inf)
+    for center in centers:  # one by one: a long log times all nodes is too large
+        squares = np.minimum(squares, np.sum(((nu - center) / widths) ** 2, axis=1))
+    return np.asarray(np.sqrt(squares))
 
 
 def activation(network: Network, nu: npt.NDArray[np.float64]) -> Vector:
@@ -203,10 +200,7 @@ def activation(network: Network, nu: npt.NDArray[np.float64]) -> Vector:
 
 def _node_distance(log: Recording) -> Vector:
     nu = np.stack([log[name] for name in "uvr"], axis=1)
-    nearest = np.full(len(nu), np.inf)
-    for center in log["rbf_center"]:  # one by one: a long log times all nodes is too large
-        nearest = np.minimum(nearest, np.sum(((nu - center) / log["rbf_width"]) ** 2, axis=1))
-    return np.asarray(np.sqrt(nearest))
+    return nearest(nu, log["rbf_center"], log["rbf_width"])
 
 
 def _activation(log: Recording) -> Vector:
