@@ -19,7 +19,7 @@ from rerun_samples import (
 )  # fmt: skip
 from storage_samples import recording
 
-from podusv_cli.cli.difference_text import deviation_in_words
+from podusv_cli.cli.diff import deviation_in_words
 from podusv_cli.comparison.log_difference import Deviation, compare, differing
 from podusv_cli.comparison.run_difference import scenario_changes, version_changes
 from podusv_cli.core.errors import StorageError

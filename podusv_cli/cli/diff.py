@@ -1,20 +1,23 @@
-"""`podusv diff`: compare two finished runs number by number."""
+"""`podusv diff`: two finished runs number by number, and in words, which `rerun` prints too."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from podusv_cli.cli.difference_text import DIFFERENT
 from podusv_cli.cli.options import AsJson
 from podusv_cli.cli.terminal import echo, echo_entry, echo_json, echo_table
 
 if TYPE_CHECKING:
-    from podusv_cli.comparison.log_difference import LogDifference
+    from podusv_cli.comparison.log_difference import Deviation, LogDifference
     from podusv_cli.comparison.run_difference import Change, RunDifference
+
+DIFFERENT = 3  # exit code
+COUNTABLE = 1000  # ulps; beyond, only the relative difference says something
 
 
 def diff(
@@ -55,8 +58,6 @@ def _report(label: str, found: RunDifference) -> None:
 
 
 def _show_changes(what: str, changes: Mapping[str, Change]) -> None:
-    from podusv_cli.cli.difference_text import change_in_words
-
     if changes:
         echo_entry(what, *(change_in_words(key, change) for key, change in changes.items()))
 
@@ -77,8 +78,6 @@ def _show_metrics(found: RunDifference) -> None:
 
 
 def _show_log(log: LogDifference) -> None:
-    from podusv_cli.cli.difference_text import log_in_words
-
     rows = [
         [d.signal, d.unit, _number(d.gap), _number(d.relative_to_peak), _number(d.time)]
         for d in log.largest
@@ -92,3 +91,51 @@ def _show_log(log: LogDifference) -> None:
 
 def _number(number: float | None, form: str = ".6g") -> str:
     return "-" if number is None else f"{number:{form}}"
+
+
+def deviation_in_words(d: Deviation) -> str:
+    """`psi_e at t = 0.3 s: 0.1 -> 0.2 rad (relative difference 0.5)`."""
+    when = "" if d.time is None else f" at t = {d.time!r} s"
+    return f"{d.signal}{when}: {d.one!r} -> {d.other!r} {d.unit} ({size(d)})"
+
+
+def size(d: Deviation) -> str:
+    """How far apart the two numbers are."""
+    if math.isinf(d.gap):
+        return "one is not finite"
+    if d.ulps == 0:
+        return "the sign of zero"
+    if d.ulps is not None and d.ulps <= COUNTABLE:
+        return f"{d.ulps} ulp, relative difference {d.relative:.2g}"
+    return f"relative difference {d.relative:.2g}"
+
+
+def changes_in_words(changes: Mapping[str, Change]) -> str:
+    """`a 1 -> 2; b x -> y`."""
+    return "; ".join(change_in_words(key, change) for key, change in changes.items())
+
+
+def change_in_words(key: str, change: Change) -> str:
+    """`a 1 -> 2`, with - for no value."""
+    from podusv_cli.scenario.phrases import as_yaml
+
+    one, other = ("-" if value is None else as_yaml(value) for value in change)
+    return f"{key} {one} -> {other}"
+
+
+def log_in_words(log: LogDifference) -> Iterator[str]:
+    """Sentences about everything in which two logs differ but the signals' largest differences."""
+    if log.first:
+        yield f"first difference: {deviation_in_words(log.first)}"
+        yield f"{len(log.largest)} of {len(log.compared)} signals differ"
+    for name, (one, other) in log.endings.items():
+        yield f"{name}: {one or '-'} -> {other or '-'}"
+    if len(set(log.rows)) > 1:
+        yield "rows: {} -> {}, compared at the {} times that both have".format(*log.rows)
+    for names, what in (
+        (log.reshaped, "of another size"),
+        (log.only_one, "in the first only"),
+        (log.only_other, "in the second only"),
+    ):
+        if names:
+            yield f"{what}: {', '.join(names)}"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from podusv_cli.cli.difference_text import DIFFERENT
+from podusv_cli.cli.diff import DIFFERENT, changes_in_words, deviation_in_words, log_in_words
 from podusv_cli.cli.exit_codes import INTERRUPTED
 from podusv_cli.cli.options import AllowLarge, AsJson, Force
 from podusv_cli.cli.terminal import echo, echo_entry, echo_json
@@ -75,8 +75,6 @@ def _verdict(run: Repeated) -> str:
 
 
 def _lines(run: Repeated) -> Iterator[str]:
-    from podusv_cli.cli.difference_text import changes_in_words, deviation_in_words, log_in_words
-
     found = run.found
     yield from log_in_words(found.log)
     if found.log.largest:
