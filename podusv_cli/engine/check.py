@@ -57,7 +57,7 @@ def _asked(
 def _check_declared(loop: ClosedLoop) -> int:
     law = loop.controller
     _check_signals(loop)
-    memory, declared = _first_memory(loop), (sum(size for _, size in law.slots()),)
+    memory, declared = loop.first_memory(), (sum(size for _, size in law.slots()),)
     if np.shape(memory) != declared:
         shapes = f"it starts with a memory of shape {np.shape(memory)}, its slots are {declared}"
         raise LawError(f"{called(law)}: {shapes}")
@@ -70,28 +70,27 @@ def _check_declared(loop: ClosedLoop) -> int:
     return 0
 
 
-def _first_memory(loop: ClosedLoop) -> Vector:
-    return loop.controller.start(np.array(loop.start), loop.first_target(), loop.nominal)
+def evaluated(loop: ClosedLoop, before: float) -> tuple[Vector, Vector, Vector]:
+    """Demand, rates and signals that the law writes at the start of a run, over `before`."""
+    law, memory, target = loop.controller, loop.first_memory(), loop.first_target()
+    x, k, table = np.array(loop.start), bundle(law.constants_with(loop.nominal)), law.table()
+    tau, rate, signals = (np.full(n, before) for n in (2, len(memory), len(law.signals)))
+    if law.sample_period() > 0:
+        law.sample(0.0, x, memory, target, k, table)
+    law.law(0.0, x, memory, target, k, table, tau, rate, signals, np.zeros(law.workspace()))
+    return tau, rate, signals
 
 
 def _ask(loop: ClosedLoop) -> int:
-    law, memory, target = loop.controller, _first_memory(loop), loop.first_target()
-    x, k, table = np.array(loop.start), bundle(law.constants_with(loop.nominal)), law.table()
-    slots = [part.name for part, size in law.slots() for _ in range(size)]
-    tau, rate, signals = (np.full(size, UNWRITTEN) for size in (2, len(slots), len(law.signals)))
-    if law.sample_period() > 0:
-        law.sample(0.0, x, memory, target, k, table)
-    law.law(
-        0.0, x, memory, target, k, table, tau, rate, signals, np.zeros(law.workspace())
-    )  # fmt: skip
-    outputs = [*zip(("tau_u_cmd", "tau_r_cmd"), tau, strict=True)]
-    outputs += [*zip((part.name for part in law.signals), signals, strict=True)]
-    outputs += [(f"the rate of {name}", number) for name, number in zip(slots, rate, strict=True)]
-    left = next((name for name, number in outputs if number == UNWRITTEN), "")
-    if left:
+    law, (tau, rate, signals) = loop.controller, evaluated(loop, UNWRITTEN)
+    slots = [f"the rate of {part.name}" for part, size in law.slots() for _ in range(size)]
+    names = ("tau_u_cmd", "tau_r_cmd", *(part.name for part in law.signals), *slots)
+    outputs = zip(names, (*tau, *signals, *rate), strict=True)
+    if left := next((name for name, number in outputs if number == UNWRITTEN), ""):
         raise LawError(f"{called(law)}: it leaves {left} unwritten")
     if law.wants_loads():
-        law.after_saturation(0.0, memory, tau, np.zeros(3), k, table, rate)
+        k, memory = bundle(law.constants_with(loop.nominal)), loop.first_memory()
+        law.after_saturation(0.0, memory, tau, np.zeros(3), k, law.table(), rate)
     return 0
 
 

@@ -10,9 +10,10 @@ import numpy as np
 
 from podusv_cli.core import registry
 from podusv_cli.core.finding import Finding, FindingKind
-from podusv_cli.core.kernel import Vector, bundle
+from podusv_cli.core.kernel import Vector
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.core.recording import Recording
+from podusv_cli.engine.check import evaluated
 from podusv_cli.findings.reference import Reference, reference
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import unknown
@@ -100,15 +101,9 @@ class Case:
     def first_signals(self) -> dict[str, float]:
         """The law's signals at t = 0; NaN where undefined, as on top of the target."""
         loop = self.scenario.closed_loop()
-        law, memory = loop.controller, loop.first_memory()
-        x, target = np.array(loop.start), loop.first_target()
-        k, table = bundle(law.constants_with(loop.nominal)), law.table()
-        signals, rate = np.zeros(len(law.signals)), np.zeros(len(memory))
-        work = np.zeros(law.workspace())
         try:
-            if law.sample_period() > 0:
-                law.sample(0.0, x, memory, target, k, table)
-            law.law(0.0, x, memory, target, k, table, np.zeros(2), rate, signals, work)
+            _, _, signals = evaluated(loop, 0.0)
         except Exception:  # `check_law` reports a faulty law before the run
-            signals[:] = np.nan
-        return dict(zip((part.name for part in law.signals), signals.tolist(), strict=True))
+            signals = np.full(len(loop.controller.signals), np.nan)
+        names = (part.name for part in loop.controller.signals)
+        return dict(zip(names, signals.tolist(), strict=True))
