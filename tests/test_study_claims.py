@@ -158,6 +158,13 @@ def test_every_mistake_in_success_is_told(text: str, told: str) -> None:
     assert told in str(error.value)
 
 
+def test_an_expression_that_python_finds_odd_gives_no_warning(
+    recwarn: pytest.WarningsRecorder,
+) -> None:
+    parse("failures(pid) < 0.5and failures(li) < 0.5", LAWS)
+    assert not recwarn.list
+
+
 # verdicts ----------------------------------------------------------------------------------------
 
 

@@ -6,6 +6,7 @@ They are parsed by Python, and evaluated by whoever gives them a meaning; never 
 from __future__ import annotations
 
 import ast
+import warnings
 from collections.abc import Collection
 from typing import NoReturn
 
@@ -25,7 +26,8 @@ def syntax_tree(text: str, example: str) -> ast.expr:
     if len(text) > LONGEST:
         raise ExpressionError(f"is longer than {LONGEST} characters")
     try:
-        tree = ast.parse(text.strip(), mode="eval").body
+        with warnings.catch_warnings(action="ignore"):  # Python's, about `1and a.iae < 2`
+            tree = ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         raise ExpressionError(f"cannot read {text!r}; example: {example}") from error
     level: list[ast.AST] = [tree]
