@@ -26,7 +26,7 @@ TABLES := unknown:unknown_dynamics discrete:discrete_signals limits:period_limit
 COMPARISONS := printed_compare figures_compare figures_compare_standoff corrected_compare
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce claim pod docs test test-all test-faults test-oldest test-newest bench lint types contracts clean
+.PHONY: help reproduce claim pod docs test test-all test-faults test-oldest test-newest dist bench lint types contracts clean
 
 help: ## what can be made
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -81,6 +81,12 @@ test-oldest: ## the tests with every dependency at its lower bound, in $(OLDEST)
 test-newest: ## the tests with the newest versions, in $(NEWEST); make PYTHON=python3.14 test-newest
 	@$(call SEPARATE,$(NEWEST),)
 
+dist: ## sdist and wheel into dist/, checked with twine
+	@$(PYTHON) -m venv --clear .venv-dist
+	@.venv-dist/bin/pip install --quiet --disable-pip-version-check build twine
+	@rm -rf dist && .venv-dist/bin/python -m build --outdir dist .
+	@.venv-dist/bin/twine check --strict dist/*
+
 bench: $(VENV)/dev.done ## speed beside hand-written C (needs a C compiler), into benchmarks/results.md
 	@$(BIN)/python -m benchmarks.bench
 	@$(BIN)/pytest -m benchmark
@@ -96,7 +102,7 @@ contracts: $(VENV)/dev.done
 	@$(BIN)/lint-imports
 
 clean: ## remove the virtual environment and all caches
-	rm -rf $(VENV) build site docs/reference *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) build dist site docs/reference *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 
 $(BIN)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \

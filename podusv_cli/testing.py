@@ -1,17 +1,19 @@
-"""Contract tests for laws, paths, disturbances and actuators of your own, with pytest.
+"""Contract tests for components, metrics and figures of your own, with pytest.
 
     LAW = Path(__file__).with_name("my_law.py")
 
-    @pytest.mark.parametrize(("check", "component"), contract(LAW))
-    def test_contract(check, component):
-        check(component)
+    @pytest.mark.parametrize(("check", "part"), contract(LAW))
+    def test_contract(check, part):
+        check(part)
 
 Each check raises AssertionError, or LawError with file, line and what to write.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -25,22 +27,38 @@ from podusv_cli.controllers.pid import Pid
 from podusv_cli.core import plugins, registry
 from podusv_cli.core.component import Component
 from podusv_cli.core.kernel import Vector, bundle
+from podusv_cli.core.plugins import Plugin
 from podusv_cli.core.recording import Recording
+from podusv_cli.core.signal import Signal
 from podusv_cli.disturbances.base import Disturbance
 from podusv_cli.disturbances.calm import Calm
 from podusv_cli.engine.check import check_law
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import ClosedLoop, simulate
+from podusv_cli.figures.drawing import dressed
+from podusv_cli.figures.sheet import Sheet
+from podusv_cli.figures.style import house_style, image
+from podusv_cli.metrics.metric import Metric
+from podusv_cli.metrics.table import observer
 from podusv_cli.paths.base import TARGET
 from podusv_cli.paths.base import Path as AnyPath
 from podusv_cli.paths.line import Line
+from podusv_cli.scenario.load import load_text
 from podusv_cli.scenario.presets import preset_file
 from podusv_cli.scenario.yaml_tree import plain
+from podusv_cli.theory import derived
 from podusv_cli.vessels.vessel import VESSELS, Vessel
 
 Check = Callable[[Any], None]
 STATES = 50  # random ones
 STEP, STEPS = 0.01, 50  # of the runs
+SCENARIO = """
+vessel: {preset: paper_nonlinear}
+path: {kind: line}
+disturbance: {kind: none}
+actuator: {kind: ideal}
+controller: {kind: pid}
+"""
 ROOMS: dict[str, tuple[str, type[Component]]] = {
     "controllers": ("controller", Controller), "paths": ("path", AnyPath),
     "disturbances": ("disturbance", Disturbance), "actuators": ("actuator", Actuator),
@@ -48,27 +66,34 @@ ROOMS: dict[str, tuple[str, type[Component]]] = {
 
 
 def contract(file: Path, fields: Mapping[str, Mapping[str, Any]] | None = None) -> list[Any]:
-    """Every check with every component of a plug-in file, as parameters of a test.
+    """Every check with every component, metric and figure of a plug-in file, for a test.
 
     `fields` are by kind the fields that a component cannot do without. Raises LawError for a file
     that is no plug-in.
     """
     import pytest  # which only tests need
 
+    own = plugins.from_file(str(file), file.read_text("utf-8"))
+    made = [(one, component_kind(one), CHECKS) for one in components(own, fields or {})]
+    made += [(one, one.name, METRIC_CHECKS) for one in _members(own, "metrics", Metric)]
+    made += [(one, one.name, FIGURE_CHECKS) for one in _members(own, "figures", Sheet)]
     return [
-        pytest.param(check, component, id=f"{component_kind(component)}-{check.__name__}")
-        for component in components(file, fields or {})
-        for check in CHECKS
+        pytest.param(check, part, id=f"{name}-{check.__name__}")
+        for part, name, checks in made
+        for check in checks
     ]
 
 
-def components(file: Path, fields: Mapping[str, Mapping[str, Any]]) -> Iterator[Component]:
+def _members(own: Plugin, room: str, kind: type[Any]) -> list[Any]:
+    return [thing for thing in own.members(room) if isinstance(thing, kind)]
+
+
+def components(own: Plugin, fields: Mapping[str, Mapping[str, Any]]) -> Iterator[Component]:
     """Every component of a plug-in file, with its defaults."""
-    own = (plugins.from_file(str(file), file.read_text("utf-8")),)
     for room, (_, base) in ROOMS.items():
         package = f"podusv_cli.{room}"
         known = registry.kinds(package, base)
-        for kind, made in registry.kinds(package, base, own).items():
+        for kind, made in registry.kinds(package, base, (own,)).items():
             if kind not in known:
                 yield made(**fields.get(kind, {}))
 
@@ -113,6 +138,59 @@ CHECKS: tuple[Check, ...] = (
     keeps_its_declaration, is_finite, remembers_nothing, runs_alike_compiled_and_plain,
     repeats_itself,
 )  # fmt: skip
+
+
+def has_a_number(metric: Metric) -> None:
+    """A run that reaches its end has a number; NaN is for events that never happened."""
+    number = gathered_number(metric, True)
+    assert math.isfinite(number) or metric.happens, f"it is {number} for a run that finished"
+
+
+def gathers_alike_compiled_and_plain(metric: Metric) -> None:
+    """Gathered in machine code, the number is that of plain Python."""
+    np.testing.assert_allclose(
+        gathered_number(metric, True), gathered_number(metric, False), rtol=1e-9, atol=1e-12
+    )
+
+
+METRIC_CHECKS: tuple[Check, ...] = (has_a_number, gathers_alike_compiled_and_plain)
+
+
+def gathered_number(metric: Metric, compiled: bool) -> float:
+    """The metric of a short run."""
+    loop, grid = loop_with(Pid()), TimeGrid(STEP, STEPS)
+    alone = Plugin(metric.name, f"{id(metric)}", offers=(("metrics", metric),))
+    seeing = observer(loop, grid, steady_fraction=0.2, settling_radius=1.0, plugins=(alone,))
+    run = simulate(loop, grid, observer=seeing, compiled=compiled)
+    assert run.seen is not None
+    return seeing.summary(run.seen)[metric.name]
+
+
+def draws_any_number_of_runs(sheet: Sheet) -> None:
+    """One run and three, one column wide and two."""
+    for count, columns in ((1, 1), (1, 2), (3, 1), (3, 2)):
+        assert picture(sheet, count, columns)
+
+
+def draws_the_same_bytes_twice(sheet: Sheet) -> None:
+    """The same runs give the same file."""
+    assert picture(sheet, 2, 2) == picture(sheet, 2, 2)
+
+
+FIGURE_CHECKS: tuple[Check, ...] = (draws_any_number_of_runs, draws_the_same_bytes_twice)
+
+
+def picture(sheet: Sheet, count: int, columns: int) -> bytes:
+    """The figure of some runs as PNG. They have a wave for signals that no law of podusv logs."""
+    loop, scenario = loop_with(Pid()), load_text(SCENARIO, "contract.yaml").scenario
+    run = simulate(loop, TimeGrid(STEP, STEPS))
+    known = {name for name in sheet.signals if derived.has(run, name)}
+    waves = {name: np.sin(run["time"]) for name in sheet.signals if name not in known}
+    about = {name: Signal(name, "1", "a wave") for name in waves}
+    run = replace(run, signals={**run.signals, **waves}, about={**run.about, **about})
+    shown = dressed([(f"run {n}", run, scenario) for n in range(count)])
+    with house_style():
+        return image(sheet.family(shown, columns), "png")
 
 
 def _compare(one: Recording, other: Recording, *, rtol: float, atol: float) -> None:

@@ -1,15 +1,8 @@
 """Starting from nothing: the shipped scenarios by name, `podusv init`, the wheel."""
 
-import os
 import re
-import shlex
-import shutil
-import subprocess
-import sys
 from pathlib import Path
-from zipfile import ZipFile
 
-import numpy
 import pytest
 from command_samples import ROOT, commanded, write
 
@@ -162,65 +155,3 @@ def test_the_copy_is_edited_and_resolved_like_any_scenario(podusv):
         values(load("podusv:paper/corrected.yaml").scenario),
     )
     assert {key for key in base if changed[key] != base[key]} == {"actuator.surge_limit"}
-
-
-# --- the wheel
-
-
-def _built(folder: Path) -> Path:
-    """The wheel of this checkout; made from a copy, so that the checkout stays as it is."""
-    copy = folder / "checkout"
-    copy.mkdir()
-    for name in ("pyproject.toml", "README.md", "LICENSE"):
-        shutil.copy(ROOT / name, copy)
-    for name in ("podusv_cli", "configs"):
-        unwanted = shutil.ignore_patterns("__pycache__")
-        shutil.copytree(ROOT / name, copy / name, symlinks=True, ignore=unwanted)
-    _pip("wheel", "--no-build-isolation", "--no-deps", "--wheel-dir", folder, copy)
-    (wheel,) = folder.glob("*.whl")
-    assert {"podusv_cli/py.typed", "podusv_cli/__init__.pyi"} <= {*ZipFile(wheel).namelist()}
-    return wheel
-
-
-def _pip(*words: object) -> None:
-    command = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet", *words]
-    subprocess.run([str(word) for word in command], check=True, capture_output=True, timeout=120)
-
-
-def _installed(wheel: Path, folder: Path) -> Path:
-    """An environment with nothing but the wheel, and what it needs as it is here; its `bin`."""
-    subprocess.run([sys.executable, "-m", "venv", "--without-pip", folder], check=True)
-    python = folder / "bin/python"
-    _pip("--python", python, "install", "--no-deps", "--no-index", wheel)
-    (site,) = folder.glob("lib/python*/site-packages")
-    (site / "needed.pth").write_text(f"{Path(numpy.__file__).parents[1]}\n")
-    return folder / "bin"
-
-
-@pytest.mark.slow  # builds a wheel, and an environment compiles anew
-def test_the_wheel_alone_starts_from_an_empty_folder(tmp_path):
-    pytest.importorskip("setuptools", "77", "building a wheel needs setuptools 77 or newer")
-    bin_folder = _installed(_built(tmp_path), tmp_path / "venv")
-    empty = tmp_path / "empty"
-    empty.mkdir()
-    environment = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
-
-    def said(words: str) -> str:
-        return subprocess.run(
-            [bin_folder / words.split()[0], *shlex.split(words)[1:]], cwd=empty, env=environment,
-            capture_output=True, text=True, check=True, timeout=120,
-        ).stdout  # fmt: skip
-
-    where = said("python -c 'import podusv_cli; print(podusv_cli.__file__)'")
-    assert Path(where).is_relative_to(tmp_path / "venv")
-    shipped_there = said(
-        "python -c 'from podusv_cli.scenario import shipped; print(*shipped.names())'"
-    )
-    assert shipped_there.split() == list(shipped.names())
-    assert said("podusv") == f"{FIRST_STEPS}\n"
-    assert "\npaper/corrected\n" in said("podusv init")
-    assert said("podusv init paper/corrected").endswith("next: podusv run corrected.yaml\n")
-    short = "--set simulation.duration=2"
-    assert "adaptive_neural finished: " in said(f"podusv run corrected.yaml {short}")
-    assert "report: " in said(f"podusv compare podusv:theory/sign.yaml {short}")
-    assert len(list(empty.glob("results/*/*/report.html"))) == 1

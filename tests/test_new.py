@@ -1,6 +1,7 @@
 """`podusv new` writes files that work as they are; `podusv_cli.testing` finds what is wrong."""
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -21,20 +22,70 @@ def pytest_of(test: str) -> str:
     return done.stdout + done.stderr
 
 
-@pytest.mark.parametrize(
-    "what",
-    ["law", *(pytest.param(what, marks=pytest.mark.slow) for what in ("path", "disturbance"))],
-)
+PASSED = {"law": 5, "path": 5, "disturbance": 5, "metric": 2, "figure": 2}
+
+
+SLOW = [pytest.param(what, marks=pytest.mark.slow) for what in list(PASSED)[1:]]
+
+
+@pytest.mark.parametrize("what", ["law", *SLOW])
 def test_what_is_written_runs_and_passes_its_own_test(podusv, what):
     said = podusv("new", what, "our_own")
     assert said.code == 0
-    assert "next: podusv" in said.out
-    command = "compare" if what == "law" else "run"
-    shorter = ("--set", "simulation.duration=5", "--no-figures", "--out", "r", "-q")
-    assert podusv(command, "our_own.yaml", *shorter).code == 0
-    assert "5 passed" in pytest_of("test_our_own.py")
+    (command,) = re.findall("next: podusv (.*)", said.out)
+    plain = ["--no-figures"] * (what != "figure")
+    shorter = ("--set", "simulation.duration=5", *plain, "--out", "r", "-q")
+    assert podusv(*command.split(), *shorter).code == 0
+    assert Path("r/figures/our_own.png").exists() == (what == "figure")
+    assert f"{PASSED[what]} passed" in pytest_of("test_our_own.py")
     assert podusv("explain", "our_own", "--plugin", "our_own.py").code == 0
     assert "  our_own" in podusv("list", "--plugin", "our_own.py").out
+
+
+def test_a_vessel_is_written_with_a_task(podusv):
+    said = podusv("new", "vessel", "our_own")
+    assert "next: podusv run our_own_line.yaml" in said.out
+    assert podusv("run", "our_own_line.yaml", "--no-figures", "--out", "r", "-q").code == 0
+    assert "is a vessel of podusv" in podusv("new", "vessel", "otter").err
+
+
+METRIC = """
+from podusv_cli.core.kernel import kernel
+from podusv_cli.metrics.metric import Accumulator, Metric, gathered
+
+@kernel
+def watch(t, weight, s, row, k, seen):
+    seen[0] = abs(s[1])
+
+own = Metric("own", "m", "of its own", Accumulator(watch, lambda _: 1, lambda _: {}), RESULT)
+"""
+FIGURE = """
+from podusv_cli.figures.panels import signals_over_time
+from podusv_cli.figures.sheet import figure
+
+COUNT = []
+@figure("own", caption="of its own", signals=("e_ct",))
+def own(runs, columns):
+    COUNT.append(1)
+    drawn = signals_over_time("e_ct")(runs, columns)
+    drawn.axes[0].set_title(TITLE)
+    return drawn
+"""
+
+
+@pytest.mark.usefixtures("here")
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        (METRIC.replace("RESULT", "gathered(0)"), []),
+        (METRIC.replace("RESULT", "lambda seen, step: float('nan')"), ["has_a_number"]),
+        (FIGURE.replace("TITLE", '"own"'), []),
+        (FIGURE.replace("TITLE", "str(len(COUNT))"), ["draws_the_same_bytes_twice"]),
+        (FIGURE.replace("TITLE", "runs[1].label"), ["draws_any_number_of_runs"]),
+    ],
+)
+def test_a_mistake_in_a_metric_or_figure_breaks_the_contract(text, found):
+    assert [failure.partition(":")[0] for failure in failures(text)] == found
 
 
 def test_nothing_is_replaced_and_names_are_checked(podusv):

@@ -26,6 +26,13 @@ def starting_points(incomplete: str) -> Offered:
     return _beginning(incomplete, starting_points())
 
 
+def parts(incomplete: str) -> Offered:
+    """What `podusv new` writes."""
+    from podusv_cli.workflows.new import PARTS
+
+    return _beginning(incomplete, dict.fromkeys(PARTS, ""))
+
+
 def keys(context: typer.Context, incomplete: str) -> Offered:
     """`controller.k_ze=` for `--set`; after the equals sign the words that the value may be."""
     from podusv_cli.scenario.explain import assignments

@@ -1,4 +1,4 @@
-"""`podusv new`: a law, path or disturbance of one's own to start from."""
+"""`podusv new`: a part of one's own to start from."""
 
 from __future__ import annotations
 
@@ -6,20 +6,31 @@ from typing import Annotated
 
 import typer
 
+from podusv_cli.cli.completion import parts
 from podusv_cli.cli.terminal import echo
 
 
 def new(
-    what: Annotated[str, typer.Argument(metavar="WHAT", help="law, path or disturbance.")],
+    what: Annotated[
+        str,
+        typer.Argument(
+            metavar="WHAT",
+            help="law, path, disturbance, metric, figure or vessel.",
+            autocompletion=parts,
+        ),
+    ],
     name: Annotated[str, typer.Argument(help="What it is called, like my_law.")],
 ) -> None:
-    """Write a small working law, path or disturbance of your own, with its test and a scenario.
+    """Write a small working law, path, metric, ... of your own, with its test and a scenario.
 
-    The files NAME.py, test_NAME.py and NAME.yaml appear in the current folder; none is replaced.
+    The files NAME.py, test_NAME.py and NAME.yaml appear in the current folder, for a vessel
+    NAME.yaml and NAME_line.yaml; none is replaced.
     """
     from podusv_cli.workflows import new as workflow  # heavy imports only when needed
 
-    code, test, scenario = workflow.new(what, name)
-    echo(f"wrote {code}, {test} and {scenario}")
-    echo(f"next: podusv {'compare' if what == 'law' else 'run'} {scenario}")
-    echo(f"then: python -m pytest {test}, and edit {code}")
+    written = workflow.new(what, name)
+    *others, last = map(str, written.files)
+    echo(f"wrote {', '.join(others)} and {last}")
+    for word, command in zip(("next", "then"), written.commands, strict=False):
+        echo(f"{word}: {command}")
+    echo(f"edit {written.files[0]}")

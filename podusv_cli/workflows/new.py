@@ -1,59 +1,113 @@
-"""`podusv new`: a starting file for a component of one's own, with its test and a scenario."""
+"""`podusv new`: a starting file for a part of one's own, with its test and a scenario."""
 
 from __future__ import annotations
 
 import keyword
 import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
 from string import Template
 
 from podusv_cli.core.errors import StorageError, UsageError
+from podusv_cli.metrics.table import METRICS
+from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import unknown
 from podusv_cli.scenario.plugins import kinds_of
+from podusv_cli.scenario.presets import preset_names
 from podusv_cli.storage import files as storage
+from podusv_cli.vessels.vessel import VESSELS
 
-# What there are starting files for, and the scenario's section of each.
-SECTIONS = {"law": "controller", "path": "path", "disturbance": "disturbance"}
 TEMPLATES = "podusv_cli.workflows"
 FOLDER = "starting_files"
+TESTED = "python -m pytest test_$name.py"
+DEFAULTS = {"path": "line", "disturbance": "none", "law": "pid", "several": ""}
 
 
-def new(what: str, name: str) -> list[Path]:
-    """Write NAME.py, test_NAME.py and NAME.yaml into the current folder.
+def _figures() -> Iterable[str]:
+    from podusv_cli.figures.drawing import FIGURES  # matplotlib is slow to import
+
+    return FIGURES
+
+
+@dataclass(frozen=True)
+class Part:
+    """What there is a starting file for: the names that are taken, files, and commands to try.
+
+    `files` are templates by name; `words` are for templates.
+    """
+
+    taken: Callable[[], Iterable[str]]
+    files: Mapping[str, str]
+    commands: tuple[str, ...]
+    words: Mapping[str, str] = field(default_factory=dict)
+
+
+def _plugin(what: str, taken: Callable[[], Iterable[str]], command: str, **words: str) -> Part:
+    made = {"$name.py": f"{what}.py", "test_$name.py": "test.py", "$name.yaml": "scenario.yaml"}
+    return Part(taken, made, (f"podusv {command} $name.yaml", TESTED), words)
+
+
+PARTS = {
+    "law": _plugin(
+        "law", partial(kinds_of, Scenario, "controller"), "compare",
+        law="$name", several="controllers: {$name: {}, pid: {kind: pid}}",
+    ),
+    "path": _plugin("path", partial(kinds_of, Scenario, "path"), "run", path="$name"),
+    "disturbance": _plugin(
+        "disturbance", partial(kinds_of, Scenario, "disturbance"), "run", disturbance="$name"
+    ),
+    "metric": _plugin("metric", lambda: METRICS, "run"),
+    "figure": _plugin("figure", _figures, "compare"),
+    "vessel": Part(
+        partial(preset_names, VESSELS),
+        {"$name.yaml": "vessel.yaml", "$name_line.yaml": "vessel_task.yaml"},
+        ("podusv run $name_line.yaml",),
+    ),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Written:
+    """The files that were written, and commands to try them with."""
+
+    files: tuple[Path, ...]
+    commands: tuple[str, ...]
+
+
+def new(what: str, name: str) -> Written:
+    """Write the starting files of a part into the current folder.
 
     Raises UsageError for a name that cannot be one, StorageError where a file exists.
     """
-    if what not in SECTIONS:
-        raise UsageError(unknown(f"part {what!r}", what, SECTIONS))
+    if what not in PARTS:
+        raise UsageError(unknown(f"part {what!r}", what, PARTS))
+    part = PARTS[what]
     _check_name(what, name)
-    places = [Path(f"{name}.py"), Path(f"test_{name}.py"), Path(f"{name}.yaml")]
+    words = _words(what, name)
+    places = {Path(file.replace("$name", name)): form for file, form in part.files.items()}
     for place in places:
         if place.exists():
             raise StorageError(f"{place} exists; take another name, or another folder")
-    words = _words(what, name)
-    texts = [_filled(form, words) for form in (f"{what}.py", "test.py", "scenario.yaml")]
-    storage.write_all({p: t.encode() for p, t in zip(places, texts, strict=True)})
-    return places
+    storage.write_all({place: _filled(form, words).encode() for place, form in places.items()})
+    return Written(tuple(places), tuple(one.replace("$name", name) for one in part.commands))
 
 
 def _check_name(what: str, name: str) -> None:
     if not re.fullmatch("[a-z][a-z0-9_]{0,29}", name) or keyword.iskeyword(name):
         raise UsageError(f"{name!r}: a name here is at most 30 of a-z, 0-9 and _, like my_law")
-    from podusv_cli.scenario.model import Scenario
-
-    if name in kinds_of(Scenario, SECTIONS[what]):
+    if name in PARTS[what].taken():
         raise UsageError(f"{name!r} is a {what} of podusv; take another name")
 
 
 def _words(what: str, name: str) -> dict[str, str]:
-    parts = {"path": "line", "disturbance": "none", "law": "pid"} | {what: name}
-    several = f"controllers: {{{name}: {{}}, pid: {{kind: pid}}}}"
-    return parts | {
+    own = {word: text.replace("$name", name) for word, text in PARTS[what].words.items()}
+    return DEFAULTS | own | {
         "name": name, "what": what, "file": f"{name}.py",
         "Class": "".join(word.capitalize() for word in name.split("_")),
         "sentence": f"A {what} of our own.",
-        "several": several if what == "law" else "",
     }  # fmt: skip
 
 
