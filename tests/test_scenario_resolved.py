@@ -13,10 +13,19 @@ from podusv_cli.core.component import Component
 from podusv_cli.scenario.keys import limits, members, sections
 from podusv_cli.scenario.load import HEADING, load_resolved, load_text, resolved_yaml, values
 from podusv_cli.scenario.model import LABEL, Scenario
+from podusv_cli.scenario.sweep import Sweep
 from podusv_cli.scenario.yaml_text import read
 
 LARGEST = 1e6  # inertia of more than this overflows where two are multiplied
 TEXT = st.text(st.characters(exclude_categories=("Cs", "Cc"), include_characters="\t\n"))
+
+
+SWEEP = {
+    "draws": 3,
+    "vary": {"vessel.m": {"times": {"normal": {"sigma": 0.1, "within": (-0.5, 1e-3)}}}},
+    "grid": {"path": ({"kind": "line", "x": (1, 2.5)}, None, True), "name": ("a: b", "")},
+    "claims": {"S1": {"says": "#", "source": "ours", "expect": "share(a.iae < b.iae) > 0.5"}},
+}
 
 
 def numbers(found: dict[str, Any]) -> st.SearchStrategy[float]:
@@ -28,6 +37,8 @@ def numbers(found: dict[str, Any]) -> st.SearchStrategy[float]:
 
 def contents(annotation: Any, found: dict[str, Any]) -> st.SearchStrategy[Any]:
     """Anything that a type allows within the field's limits."""
+    if Sweep in sections(annotation).values():
+        return st.sampled_from([None, SWEEP])
     if sections(annotation):
         return st.one_of(*(components(part) for part in sections(annotation).values()))
     simple = {
@@ -133,7 +144,7 @@ def test_keys_stand_in_the_order_of_the_fields_behind_the_kind():
     assert HEADING.count("\n") == 1
     node = read(text, "a.yaml", [])
     assert node is not None
-    assert list(node.mapping) == list(Scenario.model_fields)
+    assert [*node.mapping, "sweep"] == list(Scenario.model_fields)  # no run has a sweep
     law = list(node.mapping["controller"].mapping)
     assert law[:3] == ["kind", "k_ze", "k_psie"]
 

@@ -31,6 +31,7 @@ NOUNS: dict[Any, tuple[str, str]] = {
     bool: ("true or false", "true or false"),
     str: ("text", "texts"),
     type(None): ("null", "null"),
+    Any: ("any value", "any values"),
 }
 SHOWN_KEYS = 6
 

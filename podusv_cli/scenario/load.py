@@ -100,7 +100,7 @@ def _checked(
     scenario = check(root, top, faults, checks)
     if scenario is None or faults:
         raise ScenarioError(_findings(faults, source))
-    nodes = {route: find(root, route) for route, _ in _leaves(scenario.model_dump(), ())}
+    nodes = {route: find(root, route) for route, _ in _leaves(_data(scenario), ())}
     origins = {dotted(at): str(node.mark) if node else "default" for at, node in nodes.items()}
     return scenario, origins, has_choice(root)
 
@@ -145,7 +145,13 @@ def _findings(faults: list[Fault], first: str) -> list[ScenarioFault]:
 
 def values(scenario: Scenario) -> dict[str, Any]:
     """Every value of a scenario by its dotted key, in the order of the fields."""
-    return {dotted(route): content for route, content in _leaves(scenario.model_dump(), ())}
+    return {dotted(route): content for route, content in _leaves(_data(scenario), ())}
+
+
+def _data(scenario: Scenario) -> dict[str, Any]:
+    """The scenario as plain data; `sweep` only where there is one, since runs have none."""
+    data = scenario.model_dump()
+    return data if data["sweep"] is not None else {k: v for k, v in data.items() if k != "sweep"}
 
 
 def _leaves(data: dict[str, Any], above: Route) -> Iterator[tuple[Route, Any]]:
@@ -158,7 +164,7 @@ def _leaves(data: dict[str, Any], above: Route) -> Iterator[tuple[Route, Any]]:
 
 def resolved_yaml(scenario: Scenario) -> str:
     """The scenario as a file with every value in it; loading it gives an equal scenario."""
-    return HEADING + yaml_text(scenario.model_dump())
+    return HEADING + yaml_text(_data(scenario))
 
 
 def yaml_text(data: Mapping[str, Any]) -> str:

@@ -23,6 +23,7 @@ from podusv_cli.engine.grid import TimeGrid, whole_steps
 from podusv_cli.engine.simulate import ClosedLoop
 from podusv_cli.metrics.table import Metrics, observer
 from podusv_cli.paths.base import Path
+from podusv_cli.scenario.sweep import Sweep
 from podusv_cli.theory import monitor
 from podusv_cli.vessels.vessel import Vessel
 
@@ -175,13 +176,17 @@ class Scenario(Component):
         {}, "", "files with laws and other components of your own; see docs/plugins.md"
     )
 
+    sweep: Sweep | None = value(
+        None, "", "the study that `podusv sweep` makes of this scenario; see docs/studies.md"
+    )
+
     def labels(self) -> tuple[str, ...]:
         """The names of the runs that a comparison of this scenario has."""
         return tuple(self.controllers) or (self.controller.label,)
 
     def alone(self) -> Scenario:
-        """The scenario of one run: `controller` only, without controllers and claims."""
-        return self.model_copy(update={"controllers": {}, "claims": {}})
+        """The scenario of one run: `controller` only, without controllers, claims and sweep."""
+        return self.model_copy(update={"controllers": {}, "claims": {}, "sweep": None})
 
     def singles(self) -> dict[str, Scenario]:
         """A scenario for each run of a comparison, by label, without controllers and claims."""

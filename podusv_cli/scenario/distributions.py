@@ -1,0 +1,206 @@
+"""Distributions of numbers, as a scenario's `sweep` names them.
+
+Each takes u, uniform in (0, 1), to a value by the inverse of its distribution function. The values
+have the same bits on every machine.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any, Literal, Self
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import model_validator
+
+from podusv_cli.core.component import Component, value
+from podusv_cli.core.kernel import Vector
+from podusv_cli.core.portable import exponential, standard_normal
+
+LEAST = 1e-6  # the share of a distribution that `within` has to leave
+HALVINGS = 60  # of (0, 1), until nothing is left between two numbers
+Interval = tuple[float, float]
+Numbers = npt.NDArray[Any]  # floats, whole numbers, or Python objects
+
+
+class Bounded(Component):
+    """A distribution that may be cut off on both sides; what remains keeps its shape."""
+
+    within: Interval | None = value(
+        None, "", "two bounds: only what is between them is drawn; none where left out"
+    )
+
+    def whole(self, u: Vector) -> Vector:
+        """The values without `within`."""
+        raise NotImplementedError
+
+    def at(self, u: Vector) -> Vector:
+        """The values."""
+        if self.within is None:
+            return self.whole(u)
+        low, high = self.shares
+        return np.clip(self.whole(low + u * (high - low)), *self.within)
+
+    @cached_property
+    def shares(self) -> Interval:
+        """Which shares of the whole distribution are below the two bounds."""
+        low, high = self.within or (-math.inf, math.inf)
+        return self._share_below(low), self._share_below(high)
+
+    def _share_below(self, x: float) -> float:
+        low, high = 0.0, 1.0
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            if not low < middle < high:
+                break
+            below = self.whole(np.array([middle]))[0] <= x
+            low, high = (middle, high) if below else (low, middle)
+        return high if high == 1.0 else low
+
+    @model_validator(mode="after")
+    def _leaves_something(self) -> Self:
+        if self.within is not None:
+            _ordered("within", self.within)
+            left = self.shares[1] - self.shares[0]
+            if left < LEAST:
+                raise ValueError(
+                    f"within: {list(self.within)} excludes all but a share of {left:.1g}; "
+                    f"at least {LEAST:g} has to be left"
+                )
+        return self
+
+
+class Normal(Bounded):
+    """A normal distribution."""
+
+    mean: float = value(0.0, "", "its mean, in the unit of the key")
+    sigma: float = value(..., "", "its standard deviation, in the unit of the key", gt=0)
+
+    def whole(self, u: Vector) -> Vector:
+        """The values without `within`."""
+        return self.mean + self.sigma * standard_normal(u)
+
+
+class LogNormal(Bounded):
+    """A distribution whose logarithm is normal: factors, and numbers that are above 0."""
+
+    median: float = value(1.0, "", "its median, in the unit of the key", gt=0)
+    sigma: float = value(
+        ..., "", "the standard deviation of the logarithm: 0.1 is about 10 %", gt=0, le=5
+    )
+
+    def whole(self, u: Vector) -> Vector:
+        """The values without `within`."""
+        return self.median * exponential(self.sigma * standard_normal(u))
+
+
+def _ordered(name: str, bounds: tuple[float, ...]) -> None:
+    low, high = bounds[0], bounds[-1]
+    if not low < high:
+        raise ValueError(f"{name}: {low:.15g} is not below {high:.15g}")
+    if not math.isfinite(high - low):
+        raise ValueError(f"{name}: {low:g} and {high:g} are too far apart")
+
+
+def _corners(name: str, corners: tuple[float, ...]) -> None:
+    low, mode, high = corners
+    _ordered(name, corners)
+    if not low <= mode <= high:
+        raise ValueError(f"{name}: write [low, mode, high]; {mode:g} is not between the others")
+
+
+def _some(name: str, values: tuple[Any, ...]) -> None:
+    if not values:
+        raise ValueError(f"{name}: is empty; write the values to choose from")
+
+
+def _uniform(bounds: Interval, u: Vector) -> Numbers:
+    low, high = bounds
+    return np.clip(low + u * (high - low), low, high)
+
+
+def _triangular(corners: tuple[float, float, float], u: Vector) -> Numbers:
+    low, mode, high = corners
+    width, rise, fall = high - low, mode - low, high - mode
+    up, down = low + np.sqrt(u * width * rise), high - np.sqrt((1.0 - u) * width * fall)
+    return np.clip(np.where(u * width < rise, up, down), low, high)
+
+
+def _choice(values: tuple[Any, ...], u: Vector) -> Numbers:
+    chosen = np.empty(len(values), object)
+    chosen[:] = values
+    return chosen[_place(len(values), u)]
+
+
+def _integers(bounds: tuple[int, int], u: Vector) -> Numbers:
+    low, high = bounds
+    return low + _place(high - low + 1, u)
+
+
+def _place(count: int, u: Vector) -> npt.NDArray[np.int64]:
+    return np.minimum((u * count).astype(np.int64), count - 1)
+
+
+def _angle(word: str, u: Vector) -> Numbers:
+    return math.pi * (1.0 - 2.0 * u)
+
+
+def _at(distribution: Bounded, u: Vector) -> Numbers:
+    return distribution.at(u)
+
+
+def _sound(name: str, content: Any) -> None:
+    """Nothing more to check."""
+
+
+# For every key of `Distribution`: what else has to hold, and the values for u.
+WAYS: dict[str, tuple[Callable[[str, Any], None], Callable[[Any, Vector], Numbers]]] = {
+    "uniform": (_ordered, _uniform),
+    "normal": (_sound, _at),
+    "lognormal": (_sound, _at),
+    "triangular": (_corners, _triangular),
+    "choice": (_some, _choice),
+    "integers": (_ordered, _integers),
+    "angle": (_sound, _angle),
+}
+
+
+class Distribution(Component):
+    """A distribution: one of the keys says which."""
+
+    uniform: Interval | None = value(None, "", "[low, high]: all between them are equally likely")
+    normal: Normal | None = value(None, "", "a normal distribution")
+    lognormal: LogNormal | None = value(None, "", "its logarithm is normal; for factors")
+    triangular: tuple[float, float, float] | None = value(
+        None, "", "[low, mode, high]: likeliest at the mode, falling to both sides"
+    )
+    choice: tuple[bool | int | float | str, ...] | None = value(
+        None, "", "values to choose from; all are equally likely, one that is written twice twice"
+    )
+    integers: tuple[int, int] | None = value(
+        None, "", "[low, high]: whole numbers, both ends included"
+    )
+    angle: Literal["all"] | None = value(None, "rad", "all: every direction is equally likely")
+
+    @property
+    def given(self) -> list[str]:
+        """The keys that say how to draw."""
+        return [name for name in WAYS if getattr(self, name) is not None]
+
+    def at(self, u: Vector) -> Numbers:
+        """The value for every u."""
+        (name,) = self.given
+        return WAYS[name][1](getattr(self, name), u)
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        given = self.given
+        if len(given) != 1:
+            ways = [n for n in type(self).model_fields if n != "keys"]
+            found = f"found {' and '.join(given)}" if given else "found none"
+            raise ValueError(f"must have one of {', '.join(ways)}; {found}")
+        check, _ = WAYS.get(given[0], (_sound, None))
+        check(given[0], getattr(self, given[0]))
+        return self

@@ -1,0 +1,108 @@
+"""The key `sweep`: many runs of every law, whose numbers are drawn."""
+
+from __future__ import annotations
+
+from typing import Any, Literal, Self
+
+from pydantic import model_validator
+
+from podusv_cli.core.component import Component, value
+from podusv_cli.scenario.distributions import WAYS, Distribution
+
+
+class Quantity(Distribution):
+    """A drawn quantity: how it is drawn, and what becomes of the scenario's own value."""
+
+    keys: tuple[str, ...] = value(
+        (), "", "keys that all get the same draw; where left out, the quantity's name is the key"
+    )
+    times: Distribution | None = value(None, "", "a factor on the scenario's own value")
+    plus: Distribution | None = value(None, "", "a summand to the scenario's own value")
+    seed: bool = value(False, "", "true: a whole number from 0 to 2^53 - 1, as seed of something")
+
+    @property
+    def given(self) -> list[str]:
+        """The keys that say how to draw."""
+        return [name for name in (*WAYS, "times", "plus", "seed") if self._says(name)]
+
+    def _says(self, name: str) -> bool:
+        content = getattr(self, name)
+        return content is not None and content is not False
+
+    @property
+    def distribution(self) -> Distribution:
+        """What is drawn from; not for seeds."""
+        return self.times or self.plus or self
+
+    @property
+    def relative(self) -> bool:
+        """Whether the scenario's own value matters."""
+        return bool(self.times or self.plus)
+
+    def value(self, own: Any, drawn: Any) -> Any:
+        """The value of a key, from the scenario's own and the draw."""
+        if self.times:
+            return own * drawn
+        return own + drawn if self.plus else drawn
+
+    def targets(self, name: str) -> tuple[str, ...]:
+        """The keys that the quantity of this name changes."""
+        return self.keys or (name,)
+
+    @model_validator(mode="after")
+    def _of_numbers(self) -> Self:
+        words = [one for one in self.distribution.choice or () if isinstance(one, (str, bool))]
+        if self.relative and words:
+            raise ValueError(f"{self.given[0]}: needs numbers, choice has {words[0]!r}")
+        return self
+
+
+class Keep(Component):
+    """Which runs are made again as full run folders, with log and figures."""
+
+    failed: int = value(0, "", "so many failed runs of every law", ge=0)
+    worst: dict[str, int] = value({}, "", "by metric: so many of the worst runs of every law")
+    draws: tuple[int, ...] = value((), "", "these draws, of every law; the first is 0")
+
+
+class StudyClaim(Component):
+    """A sentence about all runs of a study, and how these decide on it."""
+
+    says: str = value(..., "", "the claim, in a sentence of your own")
+    source: str = value(..., "", "where it was published, or `ours`")
+    expect: str = value(..., "", "the claim as an expression over runs; see docs/studies.md")
+    tolerance: float = value(
+        0.0,
+        "",
+        "relative: by how much one number must be smaller than another to count",
+        ge=0,
+        lt=1,
+    )
+    remark: str = value("", "", "choices made where the source is silent")
+
+
+class Sweep(Component):
+    """Many runs of every law with numbers that are drawn, as one answer."""
+
+    seed: int = value(
+        1, "", "a draw depends on the seed, the quantity's name and its index alone", ge=0, lt=2**63
+    )
+    draws: int = value(1000, "", "draws for each cell; all laws get the same ones", ge=1, le=10**9)
+    design: Literal["random", "sobol"] = value(
+        "random", "", "independent draws, or Sobol' points, which are for sensitivities only"
+    )
+    laws: tuple[str, ...] = value(
+        (), "", "names of `controllers` that take part; all where left out"
+    )
+    vary: dict[str, Quantity] = value(
+        {}, "", "what is drawn, by key; `name: null` takes out an inherited one"
+    )
+    grid: dict[str, tuple[Any, ...]] = value(
+        {}, "", "lists of values by key: each combination is a cell, with all draws"
+    )
+    success: str = value(
+        "finished", "", "when a run counts as a success; all others are the worst of all"
+    )
+    level: float = value(0.95, "", "confidence of all intervals", gt=0.5, lt=1)
+    keep: Keep = value(Keep(), "", "runs of which a full run folder is wanted")
+    claims: dict[str, StudyClaim] = value({}, "", "what the study is to judge, by name")
