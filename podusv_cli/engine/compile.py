@@ -22,16 +22,16 @@ RULES = (
 
 
 @cache
-def entry(door: Any, inner: Any, names: tuple[str, ...]) -> Any:
-    """The compiled kernel `inner` of a component, callable by the loop through this door.
+def entry(part: str, inner: Any, names: tuple[str, ...]) -> Any:
+    """The compiled kernel `inner` of a component, callable by the loop as this part.
 
     `names` are those of the component's constants. Raises LawError for a kernel that cannot be
     compiled.
     """
-    label = f"{door.__name__}_{inner.__module__}_{inner.__qualname__}"
-    bound = signatures.bind(door, inner, names)
+    label = f"{part}_entry_{inner.__module__}_{inner.__qualname__}"
+    bound = signatures.bind(part, inner, names)
     try:
-        return compiled(bound, signatures.PROTOTYPES[door], label)
+        return compiled(bound, signatures.PROTOTYPES[part], label)
     except TypeError as error:
         place = f"{Path(inner.__code__.co_filename).name}, line {inner.__code__.co_firstlineno}"
         raise LawError(

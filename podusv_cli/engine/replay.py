@@ -43,7 +43,7 @@ def replayer(
     buffers = (rows.ravel(), p, loop.controller.table(), np.zeros(2), np.zeros(room))
     vectors = [signatures.pointer(buffer) for buffer in buffers]
     replay: Callable[..., None] = compile.routine(closed_loop.evaluate_all, signatures.EVALUATE_ALL)
-    law = compile.entry(signatures.law_entry, loop.controller.law, tuple(constants))
+    law = compile.entry("law", loop.controller.law, tuple(constants))
 
     def timed() -> float:
         began = time.thread_time_ns()  # of the processor: what else it does is not the law's

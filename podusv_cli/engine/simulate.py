@@ -145,19 +145,19 @@ def simulate(
         return replace(_record(loop, grid, wires, plan, ending), about=about)
 
 
-def entries(loop: ClosedLoop, observer: Observer) -> Iterator[tuple[Any, Any, tuple[str, ...]]]:
-    """Door, kernel and constants' names of every part, in the order the loop takes them."""
+def entries(loop: ClosedLoop, observer: Observer) -> Iterator[tuple[str, Any, tuple[str, ...]]]:
+    """Name, kernel and constants' names of every part, in the order the loop takes them."""
     law, path, disturbance, actuator = loop.controller, loop.path, loop.disturbance, loop.actuator
     constants = tuple(law.constants_with(loop.nominal))
     sample = law.sample if law.sample_period() > 0 else _no_sample
     after_saturation = law.after_saturation if law.wants_loads() else _ignore_loads
-    yield signatures.path_entry, path.evaluate, tuple(path.constants())
-    yield signatures.disturbance_entry, disturbance.evaluate, tuple(disturbance.constants())
-    yield signatures.law_entry, law.law, constants
-    yield signatures.sample_entry, sample, constants
-    yield signatures.actuator_entry, actuator.drive, tuple(actuator.constants())
-    yield signatures.after_saturation_entry, after_saturation, constants
-    yield signatures.observer_entry, observer.watch, tuple(observer.constants)
+    yield "path", path.evaluate, tuple(path.constants())
+    yield "disturbance", disturbance.evaluate, tuple(disturbance.constants())
+    yield "law", law.law, constants
+    yield "sample", sample, constants
+    yield "actuator", actuator.drive, tuple(actuator.constants())
+    yield "after_saturation", after_saturation, constants
+    yield "observer", observer.watch, tuple(observer.constants)
 
 
 def marcher(loop: ClosedLoop, observer: Observer, compiled: bool) -> Callable[..., int]:
