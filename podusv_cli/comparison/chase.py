@@ -49,7 +49,7 @@ def _track(run: Shown) -> dict[str, Any]:
         "color": run.color,
         "dash": [] if run.linestyle == "-" else list(run.linestyle[1]),
         "length": run.length,
-        "beam": run.beam,
+        "beam": run.scenario.vessel.beam,
         "standoff": approach.standoff if approach else 0.0,
         "ending": "" if run.whole else run.recording.message.partition(":")[0] or stopped,
         **{

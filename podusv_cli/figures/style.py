@@ -84,11 +84,6 @@ class Shown:
         return self.scenario.vessel.length
 
     @property
-    def beam(self) -> float:
-        """Of the vessel [m]."""
-        return self.scenario.vessel.beam
-
-    @property
     def end(self) -> float:
         """Time of the last row [s]."""
         return float(self.recording["time"][-1])
@@ -100,14 +95,9 @@ class Shown:
 
     @property
     def look(self) -> dict[str, Any]:
-        """Keyword arguments of `Axes.plot`."""
-        return {"color": self.color, "linestyle": self.linestyle, "label": self.told}
-
-    @property
-    def told(self) -> str:
-        """The name as a legend tells it: how a run ended, and when, where it did not finish."""
-        ending = f" ({self.recording.status} at {self.end:g} s)"
-        return self.name + ("" if self.whole else ending)
+        """Keyword arguments of `Axes.plot`; a legend tells how a run ended that did not finish."""
+        ending = "" if self.whole else f" ({self.recording.status} at {self.end:g} s)"
+        return {"color": self.color, "linestyle": self.linestyle, "label": self.name + ending}
 
     @property
     def whole(self) -> bool:

@@ -27,14 +27,6 @@ MARK: dict[str, Any] = {"color": "#444444", "linestyle": "none"}
 WAYPOINT: dict[str, Any] = {**MARK, "marker": "s", "markersize": 5.0, "markerfacecolor": "none"}
 
 
-def hull(x: float, y: float, psi: float, *, length: float, beam: float) -> Vector:
-    """Outline of the vessel on a map: columns east, north [m]."""
-    ahead, right = (HULL * (length, beam)).T
-    north = x + ahead * np.cos(psi) - right * np.sin(psi)
-    east = y + ahead * np.sin(psi) + right * np.cos(psi)
-    return np.column_stack([east, north])
-
-
 @dataclass(frozen=True)
 class Target:
     """A target, the runs that follow it, how it is drawn, and a log that holds its whole track."""
@@ -100,9 +92,13 @@ def map_axes(axes: Axes, east: Span, north: Span) -> None:
 
 
 def hull_of(run: Shown, t: float, scale: float) -> Vector:
-    """Outline of a run's vessel at a time [s], drawn `scale` times as large."""
+    """Outline of a run's vessel at a time [s], `scale` times as large: columns east, north [m]."""
     x, y, psi = (run.at(t, name) for name in ("x", "y", "psi"))
-    return hull(x, y, psi, length=scale * run.length, beam=scale * run.beam)
+    vessel = run.scenario.vessel
+    ahead, right = (HULL * (scale * vessel.length, scale * vessel.beam)).T
+    north = x + ahead * np.cos(psi) - right * np.sin(psi)
+    east = y + ahead * np.sin(psi) + right * np.cos(psi)
+    return np.column_stack([east, north])
 
 
 @figure(
