@@ -16,6 +16,10 @@ inf, nan = math.inf, math.nan
 STUDIES = 2000
 
 
+def rank_correlation(x: np.ndarray, y: np.ndarray) -> float:
+    return st.rank_correlations({"x": st.ranks(x)}, y)["x"]
+
+
 def binomial(k: int, n: int, p: float) -> float:
     """The probability of k of n, by its definition."""
     return math.comb(n, k) * p**k * (1 - p) ** (n - k)
@@ -194,7 +198,7 @@ def test_unrelated_quantities_stay_within_what_chance_gives() -> None:
     random = np.random.default_rng(8)
     x, y = random.normal(size=(2, 500, 60))
     y[y > 1.5] = inf
-    found = [abs(st.rank_correlation(*pair)) for pair in zip(x, y, strict=True)]
+    found = [abs(rank_correlation(*pair)) for pair in zip(x, y, strict=True)]
     assert np.mean(np.array(found) <= st.by_chance(60, 0.95)) >= 0.93  # 500 studies: 0.95 - 2 sigma
 
 
@@ -306,10 +310,10 @@ def test_ranks_share_ties_and_failures_are_worst() -> None:
 
 def test_rank_correlation_of_known_rows() -> None:
     x = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
-    assert st.rank_correlation(x, np.exp(x)) == pytest.approx(1.0)
-    assert st.rank_correlation(x, np.array([1.0, 2.0, 3.0, inf, inf])) > 0.97
+    assert rank_correlation(x, np.exp(x)) == pytest.approx(1.0)
+    assert rank_correlation(x, np.array([1.0, 2.0, 3.0, inf, inf])) > 0.97
     # 1 - 6 sum(d^2) / (n (n^2 - 1)) with d = 1, 1, 0, 1, 1
-    assert st.rank_correlation(x, np.array([2.0, 1.0, 3.0, 5.0, 4.0])) == pytest.approx(0.8)
-    assert math.isnan(st.rank_correlation(x, np.ones(5)))
+    assert rank_correlation(x, np.array([2.0, 1.0, 3.0, 5.0, 4.0])) == pytest.approx(0.8)
+    assert math.isnan(rank_correlation(x, np.ones(5)))
     y = np.array([2.0, 1.0, nan, 5.0, 4.0])
-    assert st.rank_correlation(x, y) == pytest.approx(0.6)
+    assert rank_correlation(x, y) == pytest.approx(0.6)

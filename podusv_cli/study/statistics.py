@@ -9,10 +9,10 @@ last axis. docs/study_claims.md gives the sources.
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from math import inf
+from math import inf, nan
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -51,13 +51,22 @@ def quantile(values: Vector, q: float, level: float) -> Interval:
     The estimate is the smallest value that a share q of the values does not exceed. An end is
     infinite where there are too few values for one.
     """
+    return quantiles(values, (q,), level)[0]
+
+
+def quantiles(values: Vector, shares: Sequence[float], level: float) -> list[Interval]:
+    """Several quantiles, for which the values are sorted once."""
     n = values.shape[-1]
     unknown = np.isnan(values).any()
     high = np.sort(np.where(np.isnan(values), inf, values), axis=-1)
     low = np.sort(np.where(np.isnan(values), -inf, values), axis=-1) if unknown else high
-    first = _rank(n, q, level)
-    last = n + 1 - _rank(n, 1.0 - q, level)
-    return Interval(_at(high, _middle(n, q)), _at(low, first), _at(high, last))
+    return [
+        Interval(
+            _at(high, _middle(n, q)), _at(low, _rank(n, q, level)),
+            _at(high, n + 1 - _rank(n, 1.0 - q, level)),
+        )
+        for q in shares
+    ]  # fmt: skip
 
 
 def _middle(n: int, q: float) -> int:
@@ -184,12 +193,21 @@ def ranks(values: Vector) -> Vector:
     return np.asarray((np.cumsum(counts) - (counts - 1) / 2.0)[places])
 
 
-def rank_correlation(quantity: Vector, metric: Vector) -> float:
-    """Spearman's rank correlation over the draws that are known; NaN where one does not vary."""
-    known = ~(np.isnan(quantity) | np.isnan(metric))
-    x, y = (ranks(values[known]) for values in (quantity, metric))
-    if not known.any() or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
-        return float("nan")
+def rank_correlations(quantities: Mapping[str, Vector], metric: Vector) -> dict[str, float]:
+    """Spearman's rank correlation of a metric with the ranks of every quantity; see `ranks`.
+
+    Of the draws where the metric is known; NaN where one of the two does not vary.
+    """
+    known = ~np.isnan(metric)
+    y, whole = ranks(metric[known]), bool(known.all())
+    return {
+        name: _correlation(x if whole else ranks(x[known]), y) for name, x in quantities.items()
+    }
+
+
+def _correlation(x: Vector, y: Vector) -> float:
+    if not len(x) or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
+        return nan
     return float(np.corrcoef(x, y)[0, 1])
 
 

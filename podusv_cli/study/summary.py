@@ -63,12 +63,12 @@ def sensitivity(
     numbers = {name: values for name, values in drawn.items() if values.dtype.kind in "fiub"}
     rows = [
         {"law": law, "cell": runs.cells[cell], "quantity": quantity, "metric": name,
-         "n": len(values),
-         "correlation": statistics.rank_correlation(column[runs.done(law)[cell]], values),
+         "n": len(values), "correlation": correlation,
          "by_chance": statistics.by_chance(len(values), level)}
         for law in runs.laws for cell in range(len(runs.cells))
+        for ranked in [{q: statistics.ranks(numbers[q][runs.done(law)[cell]]) for q in numbers}]
         for name, values in _columns(runs, law, cell, metrics)
-        for quantity, column in numbers.items()
+        for quantity, correlation in statistics.rank_correlations(ranked, values).items()
     ]  # fmt: skip
     return pd.DataFrame(rows)
 
@@ -116,8 +116,9 @@ def _failures(runs: Runs, law: str, cell: int, level: float) -> dict[str, Any]:
 
 def _quantiles(values: Vector, level: float) -> dict[str, Any]:
     found: dict[str, Any] = {"unknown": int(np.isnan(values).sum())}
-    for q in QUANTILES:
-        found |= _named(f"q{round(100 * q):02d}", statistics.quantile(values, q, level))
+    intervals = statistics.quantiles(values, QUANTILES, level)
+    for q, interval in zip(QUANTILES, intervals, strict=True):
+        found |= _named(f"q{round(100 * q):02d}", interval)
     return found
 
 
