@@ -21,6 +21,7 @@ class Made:
     wanted: int = 0
     undone: Mapping[str, Any] = field(default_factory=dict)  # masks
     broke: Mapping[str, Any] = field(default_factory=dict)
+    poor: Mapping[str, Any] = field(default_factory=dict)  # finished, but no success
 
     @property
     def laws(self) -> list[str]:
@@ -38,7 +39,10 @@ class Made:
     def finished(self, law: str) -> Any:
         return ~np.isposinf(np.atleast_2d(self.values[law]["iae"]))
 
-    success = finished
+    def success(self, law: str) -> Any:
+        return self.finished(law) & ~np.broadcast_to(
+            self.poor.get(law, False), self.done(law).shape
+        )
 
     def done(self, law: str) -> Any:
         shape = np.atleast_2d(self.values[law]["iae"]).shape

@@ -91,6 +91,16 @@ def test_times_that_never_come_and_numbers_that_a_law_lacks() -> None:
     assert (lacking.unknown, lacking.low, lacking.high) == (2, 3.0, 14.0)
 
 
+def test_a_run_that_finished_without_success_is_failed_and_the_worst() -> None:
+    poor = np.arange(20) < 4
+    runs = Made({"a": {"iae": np.ones(20)}, "b": {"iae": np.full(20, 2.0)}}, poor={"a": poor})
+    for text, expected in {
+        "failures(a)": 0.2, "share(finished(a))": 1.0, "share(success(a))": 0.8,
+        "share(a.iae < b.iae)": 0.8, "quantile(a.iae, 0.9)": inf, "quantile(a.iae, 0.8)": 1.0,
+    }.items():  # fmt: skip
+        assert judged(runs, f"{text} >= 0.5").parts[0].estimate == expected, text
+
+
 def test_success_is_a_condition_on_one_run() -> None:
     tree = parse_success("finished and z_e_steady <= 1.5")
     values = {"z_e_steady": np.array([1.0, 1.6, 1.0, nan])}
@@ -250,6 +260,7 @@ def test_what_cannot_be_told_says_how_many_draws_would_tell() -> None:
     values = np.r_[np.zeros(48), np.ones(2)]
     quantile = judged(study(a=values), "quantile(a.iae, 0.9) <= 0.5")
     assert quantile.more == st.needed(0.96, 0.9, 0.95)
+    assert judged(study(a=1 - values), "quantile(a.iae, 0.1) >= 0.5").more == quantile.more
     bound = judged(study(a=np.r_[np.zeros(5), np.full(5, inf)]), "failures(a) <= 0.5")
     assert "an estimate lies on its bound" in bound.evidence()
 
