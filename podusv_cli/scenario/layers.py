@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import reduce
+from functools import partial, reduce
 
 from podusv_cli.scenario.phrases import found
 from podusv_cli.scenario.shipped import relative_to
 from podusv_cli.scenario.yaml_text import MAX_DEPTH, plain_node, read, read_text
-from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, merge, overlay
+from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, merge
 
 FLOW = ("[", "{", "'", '"')  # what lists, mappings and text in quotes start with
 
@@ -28,7 +28,7 @@ def composed(
         return None
     # All overrides are one layer, so that their order matters only where they give the same key.
     nothing = Node({}, Mark(source))
-    top = reduce(lambda a, b: overlay(a, b, lambda *_: False), settings, nothing)
+    top = reduce(partial(merge, by_kind=False), settings, nothing)
     return replace(reduce(merge, [*reversed(layers), top]), mark=Mark(source))
 
 

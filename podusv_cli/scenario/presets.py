@@ -17,7 +17,7 @@ from podusv_cli.scenario.model import NAME, NAME_IN_WORDS
 from podusv_cli.scenario.phrases import found, quoted, unknown
 from podusv_cli.scenario.shipped import PREFIX, relative_to
 from podusv_cli.scenario.yaml_text import MAX_NODES, read, read_text, resolve
-from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, dotted, merge, overlay
+from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, dotted, merge
 from podusv_cli.vessels.vessel import COEFFICIENTS, VESSELS, Vessel
 
 MAX_POINTS = MAX_NODES // 4  # a point is three values, and the resolved scenario has to be readable
@@ -257,7 +257,7 @@ def _over_base(base: Node, own: Node, top: Key) -> Node:
     if not law or not isinstance(own.content, dict):
         return own
     shared = {key: part for key, part in base.mapping.items() if key in law.keys}
-    return overlay(replace(base, content=shared), own, lambda *_: False)
+    return merge(replace(base, content=shared), own, by_kind=False)
 
 
 def _rows(text: str, name: str, faults: list[Fault]) -> Iterator[Node]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -114,24 +113,28 @@ def plain(node: Node) -> Any:
     return node.content
 
 
-def overlay(base: Node, top: Node, replaces: Callable[[Node, Node], bool]) -> Node:
-    """`top` over `base`: mappings key by key, unless `replaces` holds; other values replaced.
+def merge(base: Node, top: Node, *, by_kind: bool = True) -> Node:
+    """`top` over `base`: mappings key by key, other values replaced.
 
-    A mapping of positions {"0": ...} over a list changes those items only.
+    `by_kind`: a section of another kind or preset replaces the base's section; where only the
+    preset differs, the kind is kept. A mapping of positions {"0": ...} over a list changes those
+    items only.
     """
     if _names_places(base, top):
         items = list(base.content)
         for place, item in top.content.items():
-            items[int(place)] = overlay(items[int(place)], item, replaces)
+            items[int(place)] = merge(items[int(place)], item, by_kind=by_kind)
         return replace(top, content=tuple(items), faulty=top.faulty or base.faulty)
     if not (isinstance(base.content, dict) and isinstance(top.content, dict)):
         return top
-    if replaces(base, top):
+    pairs = [(base.get(key), top.get(key)) for key in ("kind", "preset")]
+    if by_kind and any(None not in pair and pair[0] != pair[1] for pair in pairs):
         kind = base.content.get("kind")
         return top.with_entry("kind", kind) if kind and "kind" not in top.content else top
     entries = dict(base.content)
     for key, entry in top.content.items():
-        entries[key] = overlay(entries[key], entry, replaces) if key in entries else entry
+        known = key in entries
+        entries[key] = merge(entries[key], entry, by_kind=by_kind) if known else entry
     return replace(top, content=entries, faulty=top.faulty or base.faulty)
 
 
@@ -142,17 +145,3 @@ def _names_places(base: Node, top: Node) -> bool:
         place.isdecimal() and len(place) <= LONGEST_PLACE and int(place) < len(_items(base.content))
         for place in places
     )
-
-
-def another_kind(base: Node, top: Node) -> bool:
-    """Whether `top` has another kind or preset than `base`, whose keys then do not apply."""
-    pairs = ((base.get(key), top.get(key)) for key in ("kind", "preset"))
-    return any(None not in pair and pair[0] != pair[1] for pair in pairs)
-
-
-def merge(base: Node, top: Node) -> Node:
-    """`top` merged over `base`; a section of another kind or preset replaces the base's section.
-
-    If only the preset differs, the kind is kept.
-    """
-    return overlay(base, top, another_kind)
