@@ -6,7 +6,6 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
-from functools import partial
 from typing import TYPE_CHECKING
 
 from podusv_cli.cli.terminal import supports_colours
@@ -60,10 +59,3 @@ def progress_bars(*, wanted: bool) -> Iterator[Callable[[str, float], None] | No
 def _stop(bars: Progress) -> None:
     with suppress(OSError):
         bars.stop()
-
-
-@contextmanager
-def progress_bar(label: str, *, wanted: bool) -> Iterator[Callable[[float], None] | None]:
-    """The same for one run."""
-    with progress_bars(wanted=wanted) as advance:
-        yield advance and partial(advance, label)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -38,7 +39,7 @@ def run(
 
     Draws trajectory, errors and controls; `podusv plot RUN` draws all that the run has signals for.
     """
-    from podusv_cli.cli.progress import progress_bar
+    from podusv_cli.cli.progress import progress_bars
     from podusv_cli.workflows import run as workflow  # heavy imports only when they are needed
 
     warned = Warnings(quiet)
@@ -46,8 +47,8 @@ def run(
         assign or (), out, force, figures, sys.argv, warned, allow_large, plugin or (),
         controller=controller,
     )  # fmt: skip
-    with progress_bar(str(config), wanted=not (quiet or as_json)) as progress:
-        done = workflow.run(Path(config), request, progress)
+    with progress_bars(wanted=not (quiet or as_json)) as bars:
+        done = workflow.run(Path(config), request, bars and partial(bars, str(config)))
     echo_result(done, lambda: _report(done, verbose), as_json=as_json, quiet=quiet)
     for finding in done.warnings:
         warned(finding)
