@@ -8,7 +8,7 @@ import signal
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from types import FrameType
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)  # the last: the terminal is lost
@@ -97,18 +97,14 @@ def _install(here: Interrupts) -> dict[signal.Signals, signal.Handlers]:
     return wanted  # type: ignore[return-value]  # any callable that was a handler
 
 
-@contextmanager
-def interrupts_deferred() -> Iterator[None]:
+def interrupts_deferred() -> AbstractContextManager[None]:
     """Interrupts wait for the end of the block, or for `interrupts_enabled` inside it."""
-    with _deferring(True):
-        yield
+    return _deferring(True)
 
 
-@contextmanager
-def interrupts_enabled() -> Iterator[None]:
+def interrupts_enabled() -> AbstractContextManager[None]:
     """Interrupts, also waiting ones, raise KeyboardInterrupt in the block."""
-    with _deferring(False):
-        yield
+    return _deferring(False)
 
 
 @contextmanager
