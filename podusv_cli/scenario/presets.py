@@ -166,28 +166,18 @@ def _with_source(vessel: Node, plugins: Plugins) -> Node:
     A source that is not the preset's own is left as it is.
     """
     name, source = vessel.get("preset"), vessel.mapping.get("source")
-    base = _preset(VESSELS, name, plugins)
-    if not base or not source or not str(source.content).startswith(_stem(base)):
+    known = name in preset_names(VESSELS, plugins)
+    base = preset_file(VESSELS, name, [], plugins) if known else None
+    stem = str(base.get("source")).removesuffix(".") if base else ""
+    if not base or not source or not str(source.content).startswith(stem):
         return vessel
-    numbers = [name for name in COEFFICIENTS if name in Vessel.model_fields]
-    changed = [name for name in numbers if name in vessel.mapping and _differs(vessel, base, name)]
-    text = f"{_stem(base)}; {', '.join(changed)} changed by the scenario."
+    fields = Vessel.model_fields.items()
+    usual = {name: field.default for name, field in fields if name in COEFFICIENTS}
+    usual |= {name: base.get(name) for name in usual if base.get(name) is not None}
+    changed = [n for n in usual if n in vessel.mapping and vessel.get(n) != usual[n]]
+    text = f"{stem}; {', '.join(changed)} changed by the scenario."
     source_text = text if changed else str(base.get("source"))
     return vessel.with_entry("source", replace(source, content=source_text))
-
-
-def _preset(presets: Presets, name: str, plugins: Plugins) -> Node | None:
-    known = name in preset_names(presets, plugins)
-    return preset_file(presets, name, [], plugins) if known else None
-
-
-def _stem(base: Node) -> str:
-    return str(base.get("source")).removesuffix(".")
-
-
-def _differs(vessel: Node, base: Node, name: str) -> bool:
-    here, there = vessel.get(name), base.get(name)
-    return bool(here != (Vessel.model_fields[name].default if there is None else there))
 
 
 def _over_preset(
