@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -15,26 +16,7 @@ from podusv_cli.core.signal import Signal, by_name
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.replay import Replayed, rates_replay
 from podusv_cli.engine.simulate import ClosedLoop
-from podusv_cli.theory.bounds import (
-    Bound,
-    Observed,
-    Pair,
-    SwayBound,
-    UltimateBound,
-    sway_bound,
-    sway_push,
-    ultimate_bound,
-)
-from podusv_cli.theory.ideal_weights import (
-    IdealWeights,
-    exponents,
-    ideal_weights,
-    network_output,
-    node_distance,
-    outputs,
-    rows_to_fit,
-    unloaded_accelerations,
-)
+from podusv_cli.theory import bounds, ideal_weights
 from podusv_cli.theory.lyapunov import TERMS, V_DOT, V, lyapunov, norms, remainders
 from podusv_cli.theory.rates import error_rates
 
@@ -43,16 +25,8 @@ BLOCK = 4096  # rows computed together, so that they stay in the processor's cac
 LARGEST_BLOCK = 2**22  # numbers in a block, with one for every node in every row
 ERRORS = (Y_U, Y_R)  # of the filters; a law without them has none
 NETWORKS = (W_NORM_U, W_NORM_R, ACTIVATION, NODE_DISTANCE)
-
-
-def _of_windows(name: str, unit: str, meaning: str, symbol: str) -> Signal:
-    return Signal(name, unit, meaning, symbol, ("window",), fixed=True)
-
-
-def _of_nodes(name: str, unit: str, meaning: str, symbol: str) -> Signal:
-    return Signal(name, unit, meaning, symbol, ("node",), fixed=True)
-
-
+_of_windows = partial(Signal, axes=("window",), fixed=True)
+_of_nodes = partial(Signal, axes=("node",), fixed=True)
 FIXED = (
     _of_nodes("W_star_u", "m/s2", "ideal weights of the surge network, fitted to the run", "W_u^*"),
     _of_nodes("W_star_r", "rad/s2", "ideal weights of the yaw network, fitted to the run", "W_r^*"),
@@ -88,9 +62,9 @@ class Window:
     """
 
     since: float
-    observed: Observed | None
-    bound: UltimateBound
-    sway: SwayBound
+    observed: bounds.Observed | None
+    bound: bounds.UltimateBound
+    sway: bounds.SwayBound
     largest_V: float
     largest_v: float
     kept: float
@@ -145,8 +119,8 @@ def monitored(
         return None
     with np.errstate(all="ignore"):  # numbers of a diverging run overflow
         replayed = rates_replay(loop, grid, compiled=compiled)
-        chosen = recording.part(rows_to_fit(count, law.network.count))
-        ideal = ideal_weights(loop, law, chosen, replayed(chosen))
+        chosen = recording.part(ideal_weights.rows_to_fit(count, law.network.count))
+        ideal = ideal_weights.fitted(loop, law, chosen, replayed(chosen))
         b = _disturbance_bound(loop, recording)
         traces: Traces = {}
         for rows in blocks(count, min(BLOCK, max(1, LARGEST_BLOCK // law.network.count))):
@@ -169,12 +143,12 @@ def monitored(
     return Monitored(extended, windows, traces)
 
 
-def _disturbance_bound(loop: ClosedLoop, log: Recording) -> Pair:
+def _disturbance_bound(loop: ClosedLoop, log: Recording) -> bounds.Pair:
     """Largest |b_u|, |b_r| of the disturbance; where it gives no bounds, those in the run."""
     known = loop.disturbance.bounds()
     if known is not None:
-        return Pair(known[0], known[2])
-    return Pair(_largest(log["b_u"]), _largest(log["b_r"]))
+        return bounds.Pair(known[0], known[2])
+    return bounds.Pair(_largest(log["b_u"]), _largest(log["b_r"]))
 
 
 def _largest(values: Vector) -> float:
@@ -183,17 +157,18 @@ def _largest(values: Vector) -> float:
 
 def _traces(
     loop: ClosedLoop, law: PolarBackstepping, log: Recording, now: Replayed,
-    unknown: tuple[IdealWeights, Pair],
+    unknown: tuple[ideal_weights.IdealWeights, bounds.Pair],
 ) -> Traces:  # fmt: skip
     ideal, b = unknown
     e = error_rates(log, now, law)
-    factors = exponents(law.network, log)
-    phi, distance = outputs(law.network, factors), node_distance(law.network, factors)
-    fit_u, fit_r = network_output(phi, ideal.W_u), network_output(phi, ideal.W_r)
-    f_u, f_r = unloaded_accelerations(loop, now)
+    factors = ideal_weights.exponents(law.network, log)
+    phi = ideal_weights.outputs(law.network, factors)
+    distance = ideal_weights.node_distance(law.network, factors)
+    fit_u, fit_r = (ideal_weights.network_output(phi, W) for W in (ideal.W_u, ideal.W_r))
+    f_u, f_r = ideal_weights.unloaded_accelerations(loop, now)
     rest_u, rest_r = remainders(loop, law, log, now, e)
     A_u, A_r = law.filter_decay(now.signals["alpha_u"], now.signals["alpha_r"])
-    push, printed_push = sway_push(loop.vessel, log, now)
+    push, printed_push = bounds.sway_push(loop.vessel, log, now)
     return lyapunov(loop, law, log, now, e, ideal, b) | {
         "alpha_u_dot": e.alpha_u_dot,
         "alpha_r_dot": e.alpha_r_dot,
@@ -223,8 +198,8 @@ class _Observer:
     law: PolarBackstepping
     log: Recording
     traces: Traces
-    ideal: IdealWeights
-    b: Pair
+    ideal: ideal_weights.IdealWeights
+    b: bounds.Pair
     continuous: bool
 
     def window(self, since: float) -> Window:
@@ -232,30 +207,30 @@ class _Observer:
         rows = slice(int(np.searchsorted(self.log["time"], since - 1e-9)), None)
         value, rate = self.traces["V"][rows], self.traces["V_dot"][rows]
         observed = self._observed(rows) if self.continuous and len(value) else None
-        bound = ultimate_bound(self.law, self.loop.vessel, observed)
+        bound = bounds.ultimate_bound(self.law, self.loop.vessel, observed)
         kept = _kept(bound.corrected, value, rate)
         pushes = [_largest(self.traces[name][rows]) for name in ("push", "printed_push")]
-        sway = sway_bound(self.loop.vessel, *pushes)
+        sway = bounds.sway_bound(self.loop.vessel, *pushes)
         largest_v = _largest(self.log["v"][rows])
         return Window(since, observed, bound, sway, _largest(value), largest_v, kept)
 
-    def _observed(self, rows: slice) -> Observed:
+    def _observed(self, rows: slice) -> bounds.Observed:
         start, ideal = self.law.network.initial_weight, self.ideal
         W = (float(np.linalg.norm(weights - start)) for weights in (ideal.W_u, ideal.W_r))
-        return Observed(
+        return bounds.Observed(
             b=self.b,
-            W=Pair(*W),
+            W=bounds.Pair(*W),
             alpha_dot=self._both(rows, "alpha_u_dot", "alpha_r_dot"),
             drift=self._both(rows, "drift_u", "drift_r"),
             epsilon=self._both(rows, "epsilon_u", "epsilon_r"),
             rest=self._both(rows, "rest_u", "rest_r"),
         )
 
-    def _both(self, rows: slice, u: str, r: str) -> Pair:
-        return Pair(_largest(self.traces[u][rows]), _largest(self.traces[r][rows]))
+    def _both(self, rows: slice, u: str, r: str) -> bounds.Pair:
+        return bounds.Pair(_largest(self.traces[u][rows]), _largest(self.traces[r][rows]))
 
 
-def _kept(bound: Bound, V: Vector, rate: Vector) -> float:
+def _kept(bound: bounds.Bound, V: Vector, rate: Vector) -> float:
     """Fraction of the rows with V' <= -2 lambda V + Delta; NaN without a bound or rows."""
     if not (np.isfinite(bound.Delta) and len(V)):
         return np.nan
@@ -263,7 +238,7 @@ def _kept(bound: Bound, V: Vector, rate: Vector) -> float:
     return sum(int(np.count_nonzero(part)) for part in keeps) / len(V)
 
 
-def _fixed(windows: dict[str, Window], ideal: IdealWeights) -> dict[str, Vector]:
+def _fixed(windows: dict[str, Window], ideal: ideal_weights.IdealWeights) -> dict[str, Vector]:
     """The arrays of the monitor that are constant in time."""
     parts = windows.values()
     numbers = {
