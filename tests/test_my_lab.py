@@ -53,8 +53,6 @@ def test_commands_list_explain_and_draw_it(place):
         assert f"\n  {name}" in listed
     assert "a number > 0 [m], default 3.0" in podusv(place, "explain", "lookahead")
     assert "cross-track error" in podusv(place, "explain", "e_y")
-    podusv(place, "plot", "c", "--figure", "track_error", "--out", "p")
-    assert (place / "p/track_error.png").exists()
     assert "identical" in podusv(place, "rerun", "c/los")
 
 

@@ -94,7 +94,7 @@ def folders(request, tmp_path):
 
 
 def test_runs_are_drawn(folders, tmp_path, podusv):
-    wanted = ("stability", "pods")
+    wanted = ("stability",)
     asked = [word for name in wanted for word in ("--figure", name)]
     said = podusv("plot", *folders, *asked, "--out", tmp_path / "drawn")
     assert said.code == 0

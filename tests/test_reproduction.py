@@ -19,7 +19,7 @@ from podusv_cli.workflows import compare, run
 ROOT = Path(__file__).parent.parent
 NAMES = ("printed_compare", "figures_compare", "figures_compare_standoff", "corrected_compare")
 LETTERS = dict(zip("PFSC", NAMES, strict=True))  # as results/README.md calls them
-SOON = ("figures_compare_standoff", "corrected_compare")  # in `make test` already
+SOON = ("corrected_compare",)  # in `make test` already
 SIGNS = {"reproduced": "+", "not reproduced": "-", "cannot tell": "?"}
 README = (ROOT / "results/README.md").read_text()
 # Sits on the singularity and chatters; the last bit of the start decides its settled numbers.

@@ -33,7 +33,7 @@ def registered() -> dict[str, list[dict[str, Any]]]:
 
 
 def scenarios() -> list[dict[str, Any]]:
-    """So many scenarios that every choice is in one of them."""
+    """So many scenarios that every choice is in one of them; kinds first, then presets."""
     found = registered()
     count = max(map(len, found.values()))
     columns = [islice(cycle(choices), count) for choices in found.values()]
@@ -44,7 +44,11 @@ def named(parts: dict[str, Any]) -> str:
     return "-".join(part.get("preset") or part["kind"] for part in parts.values())
 
 
-@pytest.mark.parametrize("parts", scenarios(), ids=named)
+@pytest.mark.parametrize(
+    "parts",
+    [pytest.param(s, marks=[pytest.mark.slow] * (i > 3)) for i, s in enumerate(scenarios())],
+    ids=named,
+)
 def test_a_run_of_every_component_is_plotted_repeated_and_compared(
     podusv, parts, tmp_path, monkeypatch
 ):

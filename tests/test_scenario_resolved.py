@@ -114,7 +114,7 @@ def possible(data: dict[str, Any]) -> Scenario:
         return reject()
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(SCENARIOS)
 def test_a_resolved_scenario_reads_back_to_the_same_bits(data):
     scenario = possible(data)

@@ -65,8 +65,6 @@ def test_a_law_that_fails_on_the_way_leaves_its_log(podusv, law, name):
     if last:
         assert f"{run.recording['time'][-1]:.6g}" == last
     assert all(np.isfinite(signal).all() for signal in run.recording.signals.values())
-    assert podusv("plot", "x", "--figure", "trajectory", "--out", "figures").code == 0
-    assert list(Path("figures").glob("*"))
 
 
 REFUSED = {

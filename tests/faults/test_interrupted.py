@@ -137,12 +137,13 @@ def test_a_run_that_is_interrupted_after_its_simulation_is_whole(
 ):
     write_all = execute._write
 
-    def late(*given: Any) -> object:
-        """What is being written is waited for, and nothing else."""
-        time.sleep(1.0 if stage == "_write" else 60.0)
+    def written(*given: Any) -> object:
+        """What is being written is written to its end."""
+        os.kill(os.getpid(), number)
         return write_all(*given)
 
-    monkeypatch.setattr(execute, stage, soon(number, late))
+    slow = soon(number, lambda *given: time.sleep(60))
+    monkeypatch.setattr(execute, stage, written if stage == "_write" else slow)
     said = podusv("run", write("short.yaml", BASE), "--out", "x")
     assert said.code == code
     assert said.err.startswith("short.yaml: interrupted after the simulation; log.h5 is complete")
@@ -175,6 +176,7 @@ def test_run_and_rerun_tell_an_interruption_in_the_same_words(podusv, monkeypatc
     assert rerun.err == run.err.replace("short.yaml", "x")
 
 
+@pytest.mark.slow  # runs pytest
 def test_these_tests_end_where_signals_are_ignored():
     """As in `nohup make test &`."""
 

@@ -50,9 +50,10 @@ def test_too_few_open_files_are_told_before_anything_is_computed(folder, words, 
 
 
 @pytest.mark.parametrize(
-    ("limit", "most"), [(16, 4096), (LEAST_OPEN_FILES, LEAST_OPEN_FILES)], ids=str
+    ("words", "limit", "most"),
+    [(COMMANDS[0], 16, 4096), (COMMANDS[1], LEAST_OPEN_FILES, LEAST_OPEN_FILES)],
+    ids=str,
 )
-@pytest.mark.parametrize("words", COMMANDS, ids=lambda words: words[0])
 def test_enough_open_files_or_leave_to_have_them_make_a_whole_result(folder, words, limit, most):
     more = () if count(0, 1) else ("--no-figures",)
     done = podusv([*words, *more], limit, most, folder)

