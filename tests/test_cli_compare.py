@@ -1,17 +1,15 @@
 """`podusv compare` on the command line: exit codes, what is told where, what is refused."""
 
 import json
-import re
 from functools import partial
 from pathlib import Path
 
 import pytest
-from command_samples import BASE, PATIENCE, TWO, Said, commanded, under_way, write
-from drawn_samples import no_figures_but
+from command_samples import BASE, TWO, Said, commanded, write
 
 from podusv_cli.process.workers import Outcome
 from podusv_cli.storage import manifest
-from podusv_cli.workflows import compare, execute
+from podusv_cli.workflows import compare
 
 
 @pytest.fixture
@@ -173,25 +171,14 @@ def test_set_without_a_scenario_is_refused(podusv):
     assert not Path("y").exists()
 
 
-@pytest.mark.parametrize(
-    ("expect", "says"),
-    [
-        ("max(stiff.W_hat_u) < 1", "W_norm_u"),
-        ("max(stiff.rbf_center) < 1", "does not run over time"),
-        ("-" * 300 + "1 < stiff.iae", "nested"),
-        ("1" + "0" * 400 + " < stiff.iae", "too large"),
-        ("1e999 < stiff.iae", "too large"),
-        ("not " * 100 + "finished(stiff)", "nested"),
-    ],
-)
-def test_a_claim_without_meaning_is_a_scenario_error(podusv, expect, says):
-    config = write("two.yaml", TWO + claim("C1", expect))
+def test_a_claim_without_meaning_is_a_scenario_error(podusv):
+    config = write("two.yaml", TWO + claim("C1", "max(stiff.W_hat_u) < 1"))
     said = podusv(config, "--out", "x")
     line = len(TWO.splitlines()) + 2
     assert said.code == 2
     assert said.err.startswith(f"two.yaml:{line}:")
     assert "claims.C1.expect: " in said.err
-    assert says in said.err
+    assert "W_norm_u" in said.err
 
 
 def test_runs_that_all_die_are_reported(podusv, monkeypatch):
@@ -245,74 +232,10 @@ def test_the_last_line_tells_how_to_check_that_numbers_have_converged(podusv):
     assert podusv("x", "--out", "y").err.endswith(": podusv verify SCENARIO\n")
 
 
-# --- figures as asked for
-
-# One stream, so that the order of its lines is that of printing.
-BOTH = "import sys; sys.stderr = sys.stdout; from podusv_cli.cli import main; main()"
-FIGURED = TWO.replace("duration: 1.0", "duration: 0.1")
-
-
-def figures(folder: str) -> set[str]:
-    """The figures in a folder."""
-    return {path.name for path in Path(folder, "figures").iterdir()}
-
-
-def figures_of_report(folder: str) -> int:
-    """How many different figures the report embeds; some it shows twice."""
-    page = Path(folder, "report.html").read_text()
-    return len(set(re.findall(r"data:image/svg\+xml;base64,([^\"]+)", page)))
-
-
-def test_only_what_is_asked_for_is_drawn_and_what_cannot_be_is_told(podusv, monkeypatch):
-    monkeypatch.setattr(execute, "_drawn", lambda *given: {})  # of each run
-    config = write("two.yaml", FIGURED)
-    asked = ("--figures", "--figure", "errors", "--figure", "pods", "--format", "pdf, png")
-    said = podusv(config, "--out", "x", "--jobs", "1", *asked)
-    assert said.code == 0
-    assert "figure pods could not be made: no run logged any of n, " in said.err
-    assert figures("x") == {"errors.pdf", "errors.png"}
-    assert figures_of_report("x") == 1
-
-
-def test_figures_are_png_and_the_report_has_them_all_the_same(podusv, monkeypatch):
-    monkeypatch.setattr(execute, "_drawn", lambda *given: {})
-    config = write("two.yaml", FIGURED)
-    with no_figures_but("errors", "velocities"):
-        assert podusv(config, "--out", "x", "--figures").code == 0
-    assert figures("x") == {"errors.png", "velocities.png"}
-    assert figures_of_report("x") == 2
-
-
-@pytest.mark.parametrize(
-    ("words", "text"),
-    [
-        (("--figure", "error"), "unknown figure 'error'; did you mean 'errors'?"),
-        (("--format", "jpg"), "unknown format 'jpg'; did you mean 'png'? (allowed: png, pdf, svg)"),
-        (("--no-figures", "--figure", "errors"), "--figure errors and --no-figures contradict"),
-    ],
-)
-def test_what_cannot_be_drawn_is_told_before_anything_is_simulated(podusv, words, text):
-    config = write("two.yaml", FIGURED)
-    said = podusv(config, "--figures", *words)
-    assert said.code == 2
-    assert said.err.startswith(text)
-    assert not Path("results").exists()
-
-
-@pytest.mark.slow  # imports everything anew
-def test_the_report_is_named_after_everything_else(tmp_path):
-    config = tmp_path / "two.yaml"
-    config.write_text(FIGURED)
-    words = ["compare", str(config), "--out", str(tmp_path / "x"), "--figure", "errors"]
-    with under_way(*words, script=BOTH) as process:
-        lines = process.communicate(timeout=PATIENCE)[0].splitlines()
-    assert lines[-1] == f"report: {tmp_path}/x/report.html"
-    assert lines[-2].startswith("the numbers may not have converged")
-
-
 # --- controllers without a controller
 
-ALONE = FIGURED.replace("controller: {kind: pid, K_Pu: 100.0}\n", "").replace(
+SHORT = TWO.replace("duration: 1.0", "duration: 0.1")
+ALONE = SHORT.replace("controller: {kind: pid, K_Pu: 100.0}\n", "").replace(
     "{stiff: {", "{stiff: {kind: pid, "
 ).replace("soft: {", "soft: {kind: pid, ")  # fmt: skip
 

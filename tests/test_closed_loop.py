@@ -5,17 +5,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import GENTLE, PAPER, SMOOTH_START, corrected, example, kinds, last_state, run
+from conftest import GENTLE, SMOOTH_START, corrected, example, kinds, last_state, run
 from scipy.integrate import solve_ivp
 
 from podusv_cli.actuators.saturated import Saturated
-from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
 from podusv_cli.core.kernel import Vector
 from podusv_cli.disturbances.harmonic import Harmonic, HarmonicDisturbance
 from podusv_cli.engine.simulate import STATE, ClosedLoop
 from podusv_cli.paths.circle import Circle
 from podusv_cli.paths.line import Line
-from podusv_cli.paths.line_circle import LineCircle
 
 every_law = pytest.mark.parametrize("kind", kinds("controllers").values(), ids=kinds("controllers"))
 
@@ -144,36 +142,3 @@ def distance(out: Any) -> Vector:
     """Distance to the target over the last fifth of the run."""
     z_e = np.hypot(out["x_d"] - out["x"], out["y_d"] - out["y"])
     return z_e[-len(z_e) // 5 :]
-
-
-def test_the_reading_of_the_figures_gives_the_paper_s_peaks():
-    # The paper: 300 N and 1000 N m.
-    out = run(corrected(controller=AdaptiveNeural(**AS_PRINTED, B_u=5.0, B_r=5.0)), 310.0)
-    assert 300 < abs(out["tau_u_cmd"]).max() < 320
-    assert 1050 < abs(out["tau_r_cmd"]).max() < 1100
-    assert 0.5 < distance(out).mean() < 0.6
-
-
-def test_the_corrected_law_keeps_its_standoff_within_limits():
-    out = run(corrected(actuator=Saturated()), 310.0)
-    assert abs(out["tau_u"]).max() <= 8.0
-    assert abs(out["tau_r"]).max() <= 2.5
-    assert abs(distance(out) - 0.5).max() < 0.05
-
-
-def test_the_printed_vessel_orbits_the_printed_target():
-    law = AdaptiveNeural(**AS_PRINTED | {"first_difference": "from_start"})
-    out = run(corrected(vessel=PAPER, path=LineCircle(reading="literal"), controller=law), 310.0)
-    assert out.status == "finished"
-    assert distance(out).min() > 1.0
-    assert distance(out).mean() == pytest.approx(2.0, abs=0.2)
-
-
-def test_the_printed_first_difference_blows_up_within_a_second():
-    path = LineCircle(reading="literal")
-    out = run(corrected(vessel=PAPER, path=path, controller=AdaptiveNeural(**AS_PRINTED)), 310.0)
-    assert out.status == "diverged"
-    assert 0 < out["time"][-1] < 1.0
-    assert f"t = {out['time'][-1] + 0.01:.6g} s" in out.message
-    assert "alpha_u is not finite" in out.message
-    assert all(np.isfinite(signal).all() for signal in out.signals.values())

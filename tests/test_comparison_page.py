@@ -4,12 +4,11 @@ import math
 
 import pandas as pd
 import pytest
-from comparison_samples import FRAME, Folder, scenario, verdicts
+from comparison_samples import FRAME, scenario, verdicts
 from drawn_samples import recording, shown
 from html_tree import tree
 
-from podusv_cli.comparison import chase, outputs, report, settings, table
-from podusv_cli.comparison.entries import Entry
+from podusv_cli.comparison import chase, report, settings, table
 from podusv_cli.comparison.report import Picture
 from podusv_cli.core.finding import Finding
 
@@ -125,17 +124,6 @@ def test_the_report_has_what_was_noticed_escaped():
     answer = section("answer", noticed=[Finding("of one's own", "path", "text")])
     assert "of one's own all runs" in answer.text
     assert "Noticed" not in page(noticed=[])
-
-
-def test_the_report_of_a_comparison_has_its_warnings():
-    saturated = Finding("saturated", "actuator", "long <b>")
-    entries = [Entry(label, Folder({}), scenario()) for label in ("a", "b")]
-    told = {"a": [saturated], "b": []}
-    result = outputs.Result(
-        {"a": scenario(), "b": scenario()}, entries, {}, {}, FRAME, [], {}, told
-    )
-    text = tree(outputs.as_report(result, "title", {}, {})).text
-    assert "a: actuator long <b>" in text
 
 
 def test_figures_are_numbered_and_captioned_in_words():

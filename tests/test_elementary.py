@@ -67,11 +67,6 @@ def test_what_they_give_is_a_rotation_or_no_number(angle):
         assert math.isnan(sine)
 
 
-def test_no_angle_has_no_cosine():
-    for angle in (math.nan, math.inf, -math.inf):
-        assert np.isnan(cos_sin(angle)).all()
-
-
 def test_a_disturbance_of_which_no_phase_is_known_ends_the_run():
     sea = HarmonicDisturbance(b_u=Harmonic(sin=1.0, sin_rate=1e19))
     out = run(adrift(disturbance=sea), 1.0)

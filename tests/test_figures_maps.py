@@ -17,7 +17,7 @@ from drawn_samples import (
 from matplotlib.colors import to_rgba
 from matplotlib.patches import Polygon, Rectangle
 
-from podusv_cli.figures.trajectory import bounds, enlargement, hull
+from podusv_cli.figures.trajectory import enlargement, hull
 
 LENGTH = scenario().vessel.length
 
@@ -38,19 +38,6 @@ def test_a_map_shows_tracks_and_target_with_north_up(two):
     assert np.array_equal(target.get_ydata(), two[0].recording["x_d"])
     assert (whole.get_xlabel(), whole.get_ylabel()) == ("$y$ [m], east", "$x$ [m], north")
     assert whole.get_aspect() == 1.0
-
-
-def test_a_map_leaves_a_small_margin_around_tracks_and_target(two):
-    east, north = bounds(two)
-    tracks = [(run.recording["y"], run.recording["x"]) for run in two]
-    tracks.append((two[0].recording["y_d"], two[0].recording["x_d"]))
-    y, x = (np.concatenate(parts) for parts in zip(*tracks, strict=True))
-    margin = 0.06 * np.ptp(x)
-    assert east == pytest.approx((y.min() - margin, y.max() + margin))
-    assert north == pytest.approx((x.min() - margin, x.max() + margin))
-    whole = drawn("trajectory", two).axes[0]
-    assert whole.get_xlim() == pytest.approx(east)
-    assert whole.get_ylim() == pytest.approx(north)
 
 
 def test_silhouettes_stand_where_the_vessels_are_and_point_where_they_head(two):
@@ -89,14 +76,6 @@ def test_a_hull_has_its_bow_ahead_and_its_beam_across():
     starboard = hull(0.0, 0.0, 0.0, length=2.0, beam=0.5)[1]
     assert starboard[0] > 0.0
     assert east[1][1] < 3.0  # heading east, starboard is south
-
-
-def test_silhouettes_of_a_run_alone_stand_at_nine_instants_from_start_to_end():
-    runs = shown(("alone", recording()))
-    found = hulls(drawn("trajectory", runs).axes[0])
-    for (bow, _, _), t in zip(found, np.arange(9) * 12.5, strict=True):
-        expected = expected_hull(runs[0].recording, t, enlargement(runs))[0]
-        assert bow == pytest.approx(expected)
 
 
 def test_the_last_place_on_the_map_of_a_run_that_diverged_is_marked():
@@ -182,15 +161,6 @@ def test_the_close_up_marks_the_target_and_leaves_out_who_diverged():
     assert (cross.get_xdata()[0], cross.get_ydata()[0]) == (log["y_d"][-1], log["x_d"][-1])
     assert "bad" not in [curve.get_label() for curve in end.lines]
     assert len(hulls(end)) == 1
-
-
-def test_the_close_up_of_runs_of_different_length_shows_one_instant():
-    runs = shown(("long", recording()), ("short", recording(end=60.0)))
-    end = drawn("trajectory", runs).axes[-1]
-    for (bow, _, _), run in zip(hulls(end), runs, strict=True):
-        assert bow == pytest.approx(expected_hull(run.recording, 60.0, 1.0)[0])
-    assert title(end).endswith("end, t = 60 s")
-    assert line(end, "long").get_ydata()[-1] == runs[0].recording["x"][600]
 
 
 def test_a_run_that_diverges_does_not_set_the_limits_of_the_map():

@@ -164,15 +164,6 @@ def test_a_disturbance_that_all_runs_share_is_drawn_once():
     assert [a.get_ylabel() for a in figure.axes] == ["$b_u$ [N]", "$b_v$ [N]", "$b_r$ [N m]", ""]
 
 
-def test_disturbances_that_differ_are_drawn_for_each_run():
-    logs = {"a": recording(), "b": recording(shift=0.01)}
-    axes = drawn("loads", shown(*logs.items())).axes[1]
-    for label, log in logs.items():
-        assert np.array_equal(line(axes, label).get_ydata(), log["b_v"])
-    (alone,) = drawn("loads", shown(("a", logs["a"]))).axes[1].lines
-    assert alone.get_label() == "a"
-
-
 def test_limits_are_marked_while_they_act_in_a_line_for_each_run():
     never = changed(recording(), saturated=np.zeros(1001))
     runs = shown(

@@ -127,14 +127,6 @@ def test_the_published_cross_damping_of_cybership2_feeds_energy_in():
     assert nu @ inertia(p) @ accelerations(p, nu) > 0
 
 
-@every_vessel
-@given(nu=velocities, load=velocities)
-def test_port_is_the_mirror_image_of_starboard(vessel, nu, load):
-    mirror = np.array([1, -1, -1])
-    there = accelerations(vessel, mirror * nu, mirror * load)
-    np.testing.assert_array_equal(there, mirror * accelerations(vessel, nu, load))
-
-
 def test_coasting_under_linear_damping_is_an_exponential():
     loop = adrift(vessel=PAPER, start=(3.0, -2.0, 0.7, 1.5, 0.0, 0.0))
     out = run(loop, 60.0, 0.05)

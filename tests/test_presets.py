@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import xarray as xr
 
 from podusv_cli.scenario.load import load, load_text
 from podusv_cli.storage.run_folder import open_run
@@ -69,41 +68,6 @@ def test_the_printed_bound_does_not_recover_the_peaks(tmp_path):
     adaptive = ("controller.B_u=adaptive", "controller.B_r=adaptive", "simulation.duration=1")
     request = running.Request(adaptive, tmp_path / "run", figures=False)
     assert running.run(CONFIGS / "paper/figures.yaml", request).status == "diverged"
-
-
-@pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4"])
-def test_the_log_opens_in_xarray_with_units(runs, engine):
-    with xr.open_dataset(runs["corrected"].folder / "log.h5", engine=engine) as log:
-        assert log.sizes["time"] == 31001
-        assert log.z_e.attrs["units"] == "m"
-        assert log.W_hat_u.dims == ("time", "node")
-        assert float(log.z_e[-1]) == pytest.approx(0.5, abs=0.05)
-
-
-def test_the_same_scenario_gives_the_same_bytes(runs, tmp_path):
-    request = running.Request(out=tmp_path / "again", figures=False)
-    again = running.run(CONFIGS / "paper/corrected.yaml", request)
-    first, second = (d.folder / "log.h5" for d in (runs["corrected"], again))
-    assert first.read_bytes() == second.read_bytes()
-
-
-def test_a_resolved_scenario_runs_again_to_the_same_log(runs, tmp_path):
-    resolved = runs["figures"].folder / "resolved.yaml"
-    again = running.run(resolved, running.Request(out=tmp_path / "again", figures=False))
-    assert (again.folder / "log.h5").read_bytes() == (
-        runs["figures"].folder / "log.h5"
-    ).read_bytes()
-
-
-def test_a_thinned_log_is_every_nth_row_and_changes_no_metric(runs, tmp_path):
-    request = running.Request(("log.every=100",), tmp_path / "thin", figures=False)
-    thin = running.run(CONFIGS / "paper/corrected.yaml", request)
-    full, every = (open_run(d.folder).recording for d in (runs["corrected"], thin))
-    assert np.array_equal(every["z_e"], full["z_e"][::100])
-    timed = {"law_ns", "law_ns_low", "law_ns_high"}
-    assert {k: v for k, v in thin.metrics.items() if k not in timed} == {
-        k: v for k, v in runs["corrected"].metrics.items() if k not in timed
-    }
 
 
 def test_a_run_folder_has_what_is_promised(runs):

@@ -35,26 +35,19 @@ def test_a_sound_scenario_has_no_findings():
         ("step: .inf", "8: step: .inf is not a finite number"),
         ("step: fast", f"8: {NUMBER} 'fast'"),
         ("step: true", f"8: {NUMBER} true"),
-        ("step: 0", f"8: {NUMBER} 0"),
         ("step: -1e-3", f"8: {NUMBER} -1e-3"),
         ("step:", f"7: {NUMBER} nothing"),
-        ("step: null", f"8: {NUMBER} null"),
         ("step: [0.1]", f"8: {NUMBER} a list of 1"),
-        ("step: {a: 1}", f"8: {NUMBER} a mapping of keys"),
         ("step: {}", f"8: {NUMBER} an empty mapping"),
         ("compiled: no", f"12: {TRUTH} 'no'; write false"),
-        ("compiled: yes", f"12: {TRUTH} 'yes'; write true"),
-        ("compiled: off", f"12: {TRUTH} 'off'; write false"),
         ("compiled: On", f"12: {TRUTH} 'On'; write true"),
         ("compiled: 'true'", f"12: {TRUTH} 'true'; write true"),
-        ("compiled: 1", f"12: {TRUTH} 1; write true"),
         ("compiled: maybe", f"12: {TRUTH} 'maybe'"),
         ("stp: 1", "2: stp: unknown key; did you mean 'step'? (allowed: step, duration, compiled)"),
         (
             "Step: 1",
             "2: Step: unknown key; did you mean 'step'? (allowed: step, duration, compiled)",
         ),
-        ("zzz: 1", "2: zzz: unknown key (allowed: step, duration, compiled)"),
     ],
 )
 def test_a_wrong_value_is_one_sentence_at_its_place(text, says):
@@ -95,10 +88,6 @@ def test_a_wrong_value_is_one_sentence_at_its_place(text, says):
             "simulation: {duration: 0.015}",
             "24: simulation.duration: 0.015 s is no whole number of steps of 0.01 s; try 0.01",
         ),
-        (
-            "control: {period: 0.025}",
-            "19: control.period: 0.025 s is no whole number of steps of 0.01 s; try 0.02",
-        ),
     ],
 )
 def test_a_wrong_section_is_one_sentence_at_its_place(text, says):
@@ -108,11 +97,6 @@ def test_a_wrong_section_is_one_sentence_at_its_place(text, says):
 @pytest.mark.parametrize(
     ("sound", "wrong", "says"),
     [
-        (
-            "{preset: paper}",
-            "{preset: paper, lenght: 1}",
-            f"1:25: vessel.lenght: unknown key; did you mean 'length'? (allowed: {VESSEL_KEYS})",
-        ),
         (
             "{preset: paper}",
             "{preset: paper, X_u: 0.5}",
@@ -132,11 +116,6 @@ def test_a_wrong_section_is_one_sentence_at_its_place(text, says):
         ),
         (
             "{preset: paper}",
-            "{preset: 3}",
-            "1:18: vessel.preset: unknown vessel 3 (allowed: " + VESSEL_NAMES + ")",
-        ),
-        (
-            "{preset: paper}",
             "{m: 3}",
             "1:9: vessel.preset: missing (allowed: " + VESSEL_NAMES + "); a vessel without one "
             "needs length, beam, I_z",
@@ -152,11 +131,6 @@ def test_a_wrong_section_is_one_sentence_at_its_place(text, says):
             "{kind: lin}",
             "2:14: path.kind: unknown kind 'lin'; did you mean 'line'? "
             "(allowed: circle, line, line_circle, waypoints)",
-        ),
-        (
-            "{kind: line}",
-            "{kind: 3}",
-            "2:14: path.kind: unknown kind 3 (allowed: circle, line, line_circle, waypoints)",
         ),
         (
             "{kind: line}",

@@ -40,12 +40,6 @@ def test_a_vessel_can_change_some_values_of_its_preset():
     assert got.origins["vessel.N_vv"] == "default"
 
 
-def test_the_nominal_vessel_is_the_vessel_with_its_changes():
-    got = loaded(SOUND.replace("preset: paper", "preset: paper, m: 30"))
-    assert got.scenario.nominal == got.scenario.vessel
-    assert got.origins["nominal.m"] == got.origins["vessel.m"]
-
-
 def test_a_nominal_vessel_without_preset_is_the_vessel_but_for_what_it_says():
     got = loaded(SOUND, ["vessel.m=30", "nominal.X_u=-1"]).scenario
     source = got.vessel.source.replace("; m changed", "; m, X_u changed")
@@ -104,12 +98,6 @@ def test_a_wrong_nominal_value_is_told_at_its_place():
         "a.yaml:6:16: nominal.X_u: must be a number not above 0 [kg/s], found 1",
         "a.yaml:6:27: nominal.preset: unknown vessel 'x' (allowed: " + VESSEL_NAMES + ")",
     ]
-
-
-def test_one_key_of_a_disturbance_leaves_the_others_at_the_papers_values():
-    text = SOUND.replace("{kind: none}", "{kind: harmonic, b_u: {mean: 0}}")
-    b_u = loaded(text).scenario.disturbance.b_u
-    assert (b_u.mean, b_u.sin, b_u.cos, b_u.cos_rate) == (0.0, 0.1, 0.3, 0.5)
 
 
 def test_the_name_is_that_of_the_file_unless_given():

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 
 from podusv_cli.controllers.network import Network
 from podusv_cli.core.recording import Recording
-from podusv_cli.figures.drawing import FIGURES, draw, dressed
+from podusv_cli.figures.drawing import FIGURES, dressed
 from podusv_cli.figures.stability import FAR, POINTS
 from podusv_cli.scenario.load import load
 from podusv_cli.storage.log_reader import read_log
@@ -103,15 +103,6 @@ def test_thinned_logs_are_monitored_where_they_are_logged(tmp_path, log):
     # The errors are the same; the weights' fit sees other rows.
     np.testing.assert_array_equal(thin["V_z_e"], log["V_z_e"][::7])
     np.testing.assert_allclose(thin["V"], log["V"][::7], rtol=0.05)
-
-
-@pytest.mark.parametrize("name", ["stability", "validity"])
-def test_figures_of_the_monitor(name, log):
-    scenario = load(CONFIGS / "theory/monitor.yaml", SHORT).scenario
-    shown = dressed([("one", log, scenario), ("other", log, scenario)])
-    assert FIGURES[name].fits(shown)
-    (_, content), (_, again) = (next(iter(draw(shown, [name], ("png",)))) for _ in range(2))
-    assert content == again
 
 
 def test_a_stack_shows_parts_that_make_up_all_of_V(log):

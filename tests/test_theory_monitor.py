@@ -24,7 +24,6 @@ from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
 from podusv_cli.controllers.backstepping import Backstepping
 from podusv_cli.controllers.dsc import DynamicSurface
 from podusv_cli.controllers.network import activation
-from podusv_cli.controllers.pid import Pid
 from podusv_cli.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.core.kernel import Vector, bundle, kernel
 from podusv_cli.core.recording import Recording
@@ -253,12 +252,6 @@ def test_sway_stays_below_its_bound():
         whole = watched(loop, 100.0).windows["whole"]
         assert whole.largest_v < whole.sway.value
         assert vessel is not PAPER or whole.sway.value <= whole.sway.printed * (1.0 + 1e-12)
-
-
-def test_law_without_a_lyapunov_function_has_no_monitor():
-    loop = smooth(GENTLE)
-    pid = replace(loop, controller=Pid())
-    assert monitored(pid, TimeGrid(0.01, 100), run(pid, 1.0)) is None
 
 
 def test_sampled_control_has_V_but_no_rate():

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import NONLINEAR, Situation, ask, corrected, last_state, run, situations
+from conftest import NONLINEAR, Situation, corrected, last_state, run, situations
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -210,12 +210,3 @@ def test_the_difference_approaches_the_exact_rate_at_first_order():
     exact, steps = finish(), [0.04, 0.02, 0.01]
     errors = [abs(finish(rate="difference", difference_step=h) - exact).max() for h in steps]
     assert np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(1.0, abs=0.1)
-
-
-def test_signals_show_what_the_virtual_controls_were_made_of():
-    law = AdaptiveNeural()
-    for at in situations(law, 20):
-        e, said = seen_by(law, at), ask(law, *at, NONLINEAR).signals
-        assert [said[n] for n in ("psi_d", "psi_e", "alpha_u", "alpha_r")] == [
-            e.psi_d, e.psi_e, e.alpha_u, e.alpha_r,
-        ]  # fmt: skip

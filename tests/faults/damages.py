@@ -164,16 +164,6 @@ def _linked(name: str, link: Callable[[Path], object]) -> Callable[[h5py.File, P
     return change
 
 
-def _virtual(file: h5py.File, pipe: Path) -> None:
-    # Without an end, so that its mere shape asks the other file.
-    how: Any = {"shape": file["u"].shape, "maxshape": (None,), "dtype": "<f8"}
-    endless = slice(0, h5py.h5s.UNLIMITED)
-    del file["u"]
-    made = h5py.VirtualLayout(**how)
-    made[endless] = h5py.VirtualSource(str(pipe), "u", **how)[endless]
-    file.create_virtual_dataset("u", made)
-
-
 def _external(file: h5py.File, pipe: Path) -> None:
     shape = file["u"].shape
     del file["u"]
@@ -229,17 +219,11 @@ def _giant(file: h5py.File, pipe: Path) -> None:
 HDF5: dict[str, Callable[[h5py.File, Path], object]] = {
     "bomb": _bomb(2**29), "no_numbers": _replaced("u", shape=(11,), dtype="<f8"),
     "giant": _giant,
-    "declared": _replaced("u", shape=(2**47,), dtype="<f8", chunks=(2**17,), **PACKED),
     "wide_chunk": _replaced("u", shape=(11,), dtype="<f8", chunks=(2**28,), maxshape=(None,)),
-    "enum": _replaced("u", shape=(11,), dtype=h5py.enum_dtype({"a": 1})),
-    "opaque": _replaced("u", shape=(11,), dtype="V8"),
-    "array": _replaced("u", shape=(11,), dtype=np.dtype(("<f8", (1,)))),
     "nested_ragged": _replaced("u", shape=(11,), dtype=h5py.vlen_dtype(np.dtype("V16"))),
-    "virtual": _virtual,
     "external": _external,
     "external_link": _linked("u", lambda pipe: h5py.ExternalLink(str(pipe), "/u")),
     "external_provenance": _linked("provenance", lambda pipe: h5py.ExternalLink(str(pipe), "/")),
-    "soft_link_to_itself": _linked("u", lambda pipe: h5py.SoftLink("/u")),
     "attributes": _attributes(2000),
     "many_attributes": _attributes(1_000_000),
     "nested": _nested(1000),
