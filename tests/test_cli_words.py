@@ -110,7 +110,7 @@ def test_explain_shows_the_sections_without_a_key(podusv):
     out = podusv("explain").out
     assert [line for line in out.splitlines() if line in Scenario.model_fields] == [
         "vessel", "nominal", "start", "path", "disturbance", "actuator", "controller", "simulation",
-        "control", "log", "metrics",
+        "control", "log", "metrics", "sweep",
     ]  # fmt: skip
     assert "    kinds: circle, line, line_circle, waypoints\n" in out
 
