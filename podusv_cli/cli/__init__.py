@@ -20,6 +20,7 @@ from podusv_cli.cli.exit_codes import (
     report_error,
     with_exit_codes,
 )
+from podusv_cli.cli.sweep import sweep
 
 # NAME is the function NAME of cli/NAME.py
 COMMANDS = (
@@ -46,6 +47,8 @@ app = typer.Typer(
 )
 for _name in COMMANDS:
     app.command(_name)(with_exit_codes(getattr(import_module(f"podusv_cli.cli.{_name}"), _name)))
+
+app.add_typer(sweep, name="sweep")
 
 
 def _show_version(wanted: bool) -> None:

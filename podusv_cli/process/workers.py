@@ -7,7 +7,7 @@ import os
 import time
 import traceback
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection, wait
@@ -37,12 +37,14 @@ class Outcome:
     """A job's result, or in `failure` the reason why there is none.
 
     `interrupted`: an interrupt came before the job ended. `code`: the exit code of its error.
+    `killed`: its process ended by itself, twice.
     """
 
     result: Any = None
     failure: str = ""
     interrupted: bool = False
     code: int = 0
+    killed: bool = False
 
 
 def available_workers() -> int:
@@ -63,78 +65,100 @@ def run_all(
     deferred. An interrupt is passed on to them; after GRACE seconds those that have not returned
     are killed.
     """
-    pool = _Pool(jobs, progress)
+    outcomes: dict[int, Outcome] = {}
+    run_each(enumerate(jobs), outcomes.__setitem__, progress, workers)
+    missing = Outcome(failure=INTERRUPTED, interrupted=True)
+    return [outcomes.get(position, missing) for position in range(len(jobs))]
+
+
+def run_each(
+    jobs: Iterable[tuple[int, Job]], done: Callable[[int, Outcome], None],
+    progress: Report = lambda position, fraction: None, workers: int = 0,
+) -> bool:  # fmt: skip
+    """The same for numbered jobs that are taken one by one as processes become free.
+
+    `done` is called with a job's number and outcome, and may add jobs to those that are still to be
+    taken. False after an interrupt; jobs that did not return have no outcome then.
+    """
+    pool = _Pool(iter(jobs), done, progress)
     with interrupts_deferred():
         try:
-            while pool.waiting or pool.running:
-                pool.start(workers or available_workers())
+            while pool.start(workers or available_workers()):
                 with interrupts_enabled():
                     ready = wait(pool.running)
                 pool.receive(ready)
         except KeyboardInterrupt:
             pool.interrupt()
+            return False
         finally:
             pool.kill()
-    missing = Outcome(failure=INTERRUPTED, interrupted=True)
-    return [pool.outcomes.get(position, missing) for position in range(len(jobs))]
+    return True
 
 
 class _Pool:
-    """Waiting jobs by position, running processes by their pipe, outcomes by position."""
+    """Jobs that wait, running processes by their pipe, and where outcomes go."""
 
-    def __init__(self, jobs: Sequence[Job], progress: Report) -> None:
-        self._jobs, self._progress, self._tries = jobs, progress, Counter[int]()
-        self.waiting = list(range(len(jobs)))
-        self.running: dict[Connection, tuple[int, BaseProcess]] = {}
-        self.outcomes: dict[int, Outcome] = {}
+    def __init__(
+        self, jobs: Iterator[tuple[int, Job]], done: Callable[[int, Outcome], None],
+        progress: Report,
+    ) -> None:  # fmt: skip
+        self._jobs, self._done, self._progress = jobs, done, progress
+        self._tries = Counter[int]()
+        self._again: list[tuple[int, Job]] = []
+        self.running: dict[Connection, tuple[int, Job, BaseProcess]] = {}
 
-    def start(self, most: int) -> None:
-        """Start waiting jobs until `most` processes run."""
-        while self.waiting and len(self.running) < most:
-            position = self.waiting.pop(0)
+    def start(self, most: int) -> bool:
+        """Start jobs until `most` processes run; whether any runs."""
+        while len(self.running) < most:
+            waiting = self._again.pop() if self._again else next(self._jobs, None)
+            if waiting is None:
+                break
+            number, job = waiting
             ours, theirs = FORK.Pipe(duplex=False)
             # A process notices that its parent has ended only if no other holds the pipe's end.
             inherited = [ours, *self.running]
-            process = FORK.Process(target=_work, args=(self._jobs[position], theirs, inherited))
+            process = FORK.Process(target=_work, args=(job, theirs, inherited))
             process.start()
             theirs.close()
-            self._tries[position] += 1
-            self.running[ours] = position, process
+            self._tries[number] += 1
+            self.running[ours] = number, job, process
+        return bool(self.running)
 
     def receive(self, ready: Iterable[Any]) -> None:
         """Read one message from each pipe: progress, an outcome, or the end of the pipe."""
         for pipe in ready:
-            position, process = self.running[pipe]
+            number, job, process = self.running[pipe]
             try:
                 message = pipe.recv()
             except (EOFError, OSError, UnpicklingError):  # killed, perhaps within a message
                 message = None
             if isinstance(message, float):
-                self._progress(position, message)
+                self._progress(number, message)
                 continue
             del self.running[pipe]
             pipe.close()
             process.join()
-            if message is None and self._tries[position] < TRIES:
-                self.waiting.append(position)
-            else:
-                killed = f"its process ended with exit code {process.exitcode}, {TRIES} times"
-                self.outcomes[position] = message or Outcome(failure=killed)
+            if message is None and self._tries[number] < TRIES:
+                self._again.append((number, job))
+                continue
+            killed = f"its process ended with exit code {process.exitcode}, {TRIES} times"
+            del self._tries[number]
+            self._done(number, message or Outcome(failure=killed, killed=True))
 
     def interrupt(self) -> None:
         """Interrupt all processes and collect what they return within GRACE seconds."""
-        self._progress = lambda position, fraction: None
-        done, end = set(self.outcomes), time.monotonic() + GRACE
-        for _, process in self.running.values():
+        self._progress, done = lambda number, fraction: None, self._done
+        self._done = lambda number, outcome: done(number, replace(outcome, interrupted=True))
+        self._tries.update(dict.fromkeys((number for number, _, _ in self.running.values()), TRIES))
+        end = time.monotonic() + GRACE
+        for _, _, process in self.running.values():
             process.terminate()
         while self.running and (left := end - time.monotonic()) > 0:
             self.receive(wait(self.running, left))
-        for position in self.outcomes.keys() - done:
-            self.outcomes[position] = replace(self.outcomes[position], interrupted=True)
 
     def kill(self) -> None:
         """Kill all processes that still run."""
-        for pipe, (_, process) in self.running.items():
+        for pipe, (_, _, process) in self.running.items():
             process.kill()
             process.join()
             pipe.close()

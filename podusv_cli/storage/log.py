@@ -33,10 +33,10 @@ AXES = {
 ROWS = 4096  # written of all arrays in turn, since the engine stores a row's numbers side by side
 # The newest format that HDF5 1.8 reads, and so does any MATLAB. Every array begins at a multiple of
 # 8 bytes, so that it can be used where it lies when the file is mapped into memory.
-_FILE: dict[str, Any] = {
+FILE: dict[str, Any] = {
     "libver": ("v108", "v108"), "alignment_threshold": 1, "alignment_interval": 8,
 }  # fmt: skip
-_UNDATED = {"track_order": True, "track_times": False}
+UNDATED = {"track_order": True, "track_times": False}
 _COMPRESSED = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
 
 
@@ -55,7 +55,7 @@ def write(path: Path, recording: Recording, texts: Texts, *, compress: bool = Fa
     A compressed log is made in memory. Raises StorageError; a part of the file may then exist.
     """
     layout = LogLayout()
-    with h5py.File(layout, "w", **_FILE, **_UNDATED) as file:
+    with h5py.File(layout, "w", **FILE, **UNDATED) as file:
         places = _fill(file, recording, texts, compress)
     with new_file(path, layout.size) as out:
         layout.write_to(out)
@@ -127,16 +127,16 @@ def _fill(
 ) -> list[tuple[int, Vector]]:
     """Create datasets and attributes; returns the arrays yet to be written, with their offsets."""
     file.attrs.create("podusv_format", np.int32(FORMAT))
-    _describe(file, _facts(recording, texts))
-    group = file.create_group(PROVENANCE, **_UNDATED)
-    group.create_dataset(RESOLVED, data=_text(texts.resolved_yaml))
+    describe(file, _facts(recording, texts))
+    group = file.create_group(PROVENANCE, **UNDATED)
+    group.create_dataset(RESOLVED, data=text(texts.resolved_yaml))
     arrays = {**recording.signals, **recording.fixed}
     names = sorted(arrays, key="time".__ne__)  # the scale of the time axis first
     places = []
     scales = _scales(file, arrays, recording.about)
     for name in names:
         dataset = _dataset(file, name, arrays[name], compress)
-        _describe(dataset, _description(recording.about[name]))
+        describe(dataset, _description(recording.about[name]))
         if name == "time":
             dataset.make_scale(name)
             scales[name] = dataset
@@ -175,7 +175,7 @@ def _scales(
 def _scale(file: h5py.File, axis: str, size: int) -> h5py.Dataset:
     scale = file.create_dataset(axis, data=np.arange(size, dtype=np.int32))
     scale.make_scale(axis)
-    _describe(scale, {"units": "1", "long_name": AXES.get(axis, axis)})
+    describe(scale, {"units": "1", "long_name": AXES.get(axis, axis)})
     return scale
 
 
@@ -198,12 +198,14 @@ def _description(signal: Signal) -> dict[str, str]:
     return facts | ({"wrapped": "modulo 2 pi"} if signal.wrapped else {})
 
 
-def _describe(thing: h5py.HLObject, facts: Mapping[str, str]) -> None:
+def describe(thing: h5py.HLObject, facts: Mapping[str, str]) -> None:
+    """Give an object these attributes, texts."""
     for name, words in facts.items():
-        thing.attrs.create(name, _text(words))
+        thing.attrs.create(name, text(words))
 
 
-def _text(words: str) -> np.ndarray[tuple[()], np.dtype[np.bytes_]]:
+def text(words: str) -> np.ndarray[tuple[()], np.dtype[np.bytes_]]:
+    """A text as HDF5 stores it."""
     # Of fixed length: variable-length strings make readers of damaged files hang.
     content = words.encode("utf-8", "backslashreplace")
     return np.array(content, dtype=h5py.string_dtype("utf-8", max(1, len(content))))

@@ -1,0 +1,221 @@
+"""`podusv sweep`: many draws of a scenario as one answer."""
+
+from __future__ import annotations
+
+import re
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from podusv_cli.cli import options
+from podusv_cli.cli.exit_codes import INTERRUPTED, with_exit_codes
+from podusv_cli.cli.terminal import (
+    echo,
+    echo_entry,
+    echo_json,
+    echo_path,
+    echo_result,
+    echo_table,
+    supports_colours,
+)
+from podusv_cli.core.errors import UsageError
+from podusv_cli.core.quantities import time_in_words
+
+if TYPE_CHECKING:
+    from podusv_cli.study.march import Tally, Tell
+    from podusv_cli.workflows.sweep import Swept
+
+sweep = typer.Typer(help="Draw a scenario many times, and judge laws by all draws.")
+UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
+Study = Annotated[Path, typer.Argument(metavar="STUDY", help="The folder of a study.")]
+
+
+def command(function: object) -> object:
+    """Make a function a command of `podusv sweep`, with podusv's exit codes."""
+    return sweep.command()(with_exit_codes(function))  # type: ignore[arg-type]
+
+
+@command
+def run(
+    config: options.Config,
+    assign: options.Assignments = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder of the study.", show_default="results/<name>-sweep"),
+    ] = None,
+    draws: Annotated[
+        int, typer.Option(min=0, help="How many draws.", show_default="the scenario's")
+    ] = 0,
+    until: Annotated[
+        str, typer.Option(help="Time after which no more runs are begun, as 90s, 30min, 8h.")
+    ] = "",
+    workers: Annotated[
+        int, typer.Option(min=0, help="Processes at a time.", show_default="one a core")
+    ] = 0,
+    shard: Annotated[
+        str, typer.Option(help="A part of the study, as 3/20: for `podusv sweep merge`.")
+    ] = "",
+    figures: options.Figures = True,
+    as_json: options.AsJson = False,
+    quiet: options.Quiet = False,
+    plugin: options.Plugins = None,
+) -> None:
+    """Simulate all draws of all laws, or those that are missing, and judge the study's claims.
+
+    Run it again to continue after an interrupt, or with more draws. Exit code 3 when a run crashed,
+    hung or was invalid; runs that diverge are results.
+    """
+    from podusv_cli.workflows import sweep as workflow  # heavy imports only when needed
+
+    changes = [*(assign or ()), *([f"sweep.draws={draws}"] if draws else [])]
+    request = workflow.Request(
+        changes, out, seconds(until), workers, part_of(shard), sys.argv, plugin or (), figures
+    )
+    with progress(wanted=not (quiet or as_json)) as tell:
+        try:
+            done = workflow.run(Path(config), request, tell)
+        except KeyboardInterrupt:
+            echo("interrupted; all finished units are kept: run it again to continue", err=True)
+            raise typer.Exit(INTERRUPTED) from None
+    echo_result(done, lambda: _report(done), as_json=as_json, quiet=quiet)
+    broken = done.results.broken if done.results else 0
+    raise typer.Exit(3 if broken else 0)
+
+
+def seconds(text: str) -> float:
+    """A time such as 30min in seconds, infinite for none. Raises UsageError."""
+    if not text:
+        return float("inf")
+    found = re.fullmatch(r"(\d+(?:\.\d+)?)(s|min|h|d)", text)
+    if not found:
+        raise UsageError(f"--until {text!r} is no time; write a number and s, min, h or d: 30min")
+    return float(found[1]) * UNITS[found[2]]
+
+
+def part_of(text: str) -> tuple[int, int]:
+    """A shard such as 3/20 as its number from 1, and how many there are. Raises UsageError."""
+    found = re.fullmatch(r"(\d+)/(\d+)", text or "1/1")
+    if not found or not 1 <= int(found[1]) <= int(found[2]):
+        raise UsageError(f"--shard {text!r} is no part; write its number and the count: 3/20")
+    return int(found[1]), int(found[2])
+
+
+@contextmanager
+def progress(*, wanted: bool) -> Iterator[Tell]:
+    """A function that shows how far a study is: runs done, rate, time left, failures so far."""
+    shown = wanted and supports_colours(sys.stderr)
+    last = 0.0
+
+    def tell(tally: Tally) -> None:
+        nonlocal last
+        if shown and time.monotonic() - last > 0.2:
+            last = time.monotonic()
+            left = f", {time_in_words(tally.left)} left" if tally.made < tally.wanted else ""
+            line = (
+                f"{tally.made} of {tally.wanted} runs, {tally.rate:.3g} a second{left}, "
+                f"{tally.failed} did not finish; Ctrl-C keeps what is done"
+            )
+            typer.echo(f"\r\x1b[K{line[: _columns()]}", nl=False, err=True)
+
+    try:
+        yield tell
+    finally:
+        if shown and last:
+            typer.echo("\r\x1b[K", nl=False, err=True)
+
+
+def _columns() -> int:
+    import shutil
+
+    return max(20, shutil.get_terminal_size().columns - 1)
+
+
+def _report(done: Swept) -> None:
+    if done.results is None:
+        echo(f"{done.tally.made} of {done.tally.wanted} runs are made; run it again to continue")
+        echo(f"study: {done.folder}")
+        return
+    echo_table(*done.results.cells())
+    for v in done.results.verdicts:
+        echo_entry(v.name, v.claim.says, v.evidence(), facts=v.verdict)
+    echo(f"study: {done.folder}")
+    if (done.folder / "report.html").exists():
+        echo(f"report: {done.folder / 'report.html'}")
+
+
+@command
+def status(study: Study, as_json: options.AsJson = False) -> None:
+    """Say how far a study is: the runs of every law and cell that are made."""
+    from podusv_cli.workflows import sweep as workflow
+
+    made = workflow.status(study)
+    if as_json:
+        echo_json({"format": 1, "folder": str(study), "made": made.as_json()})
+        return
+    rows = [[law, cell or "-", str(count), str(made.wanted)] for law, cell, count in made.rows]
+    echo_table(["law", "cell", "made", "wanted"], rows)
+
+
+@command
+def report(
+    study: Study, figures: options.Figures = True, as_json: options.AsJson = False,
+    quiet: options.Quiet = False,
+) -> None:  # fmt: skip
+    """Make the tables, verdicts and figures of a study anew, of what is there."""
+    from podusv_cli.workflows import sweep as workflow
+
+    done = workflow.report(study, sys.argv, figures=figures)
+    echo_result(done, lambda: _report(done), as_json=as_json, quiet=quiet)
+
+
+@command
+def merge(
+    studies: Annotated[list[Path], typer.Argument(metavar="STUDY...", help="Folders of shards.")],
+    out: Annotated[Path, typer.Option(help="Folder of the whole study.")],
+    figures: options.Figures = True,
+    as_json: options.AsJson = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Join the runs of several folders of one study, as `--shard` makes them."""
+    from podusv_cli.workflows import sweep as workflow
+
+    done = workflow.merge(studies, out, sys.argv, figures=figures)
+    echo_result(done, lambda: _report(done), as_json=as_json, quiet=quiet)
+
+
+@command
+def draw(
+    study: Study,
+    law: Annotated[str, typer.Option(help="The law.")],
+    number: Annotated[int, typer.Option("--draw", min=0, help="The draw.")],
+    cell: Annotated[int, typer.Option(min=0, help="The cell of the grid.")] = 0,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="The file to write.", show_default="<name>-<law>-<draw>.yaml"),
+    ] = None,
+) -> None:
+    """Write one run of a study as a scenario of its own, for `podusv run` and `compare`."""
+    from podusv_cli.workflows import sweep as workflow
+
+    path = workflow.draw(study, law, number, cell, out)
+    echo_path(path)
+    echo(f"run it: podusv run {path}", err=True)
+
+
+@command
+def export(
+    study: Study,
+    form: Annotated[str, typer.Option("--format", help="csv or parquet.")] = "csv",
+    out: Annotated[
+        Path | None, typer.Option(help="The file to write.", show_default="<study>/runs.<format>")
+    ] = None,
+) -> None:
+    """Write all runs as one table: a row a run, with its draw, status and metrics."""
+    from podusv_cli.workflows import sweep as workflow
+
+    echo_path(workflow.export(study, form, out))

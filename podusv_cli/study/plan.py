@@ -1,0 +1,114 @@
+"""What a study is to simulate: laws, cells, draws, and the identity of the result."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from podusv_cli.core.errors import UsageError
+from podusv_cli.engine import closed_loop
+from podusv_cli.engine.object_cache import ingredients
+from podusv_cli.engine.simulate import entries
+from podusv_cli.metrics.table import Metrics, metrics_with, observer
+from podusv_cli.scenario.load import values
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.sweep import Sweep
+from podusv_cli.study.cells import Cell, cells
+
+# Sections of a scenario that change no number of a study.
+COSMETIC = ("name", "description", "log", "silence", "claims", "controllers", "sweep")
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A scenario with its key `sweep`, in cells."""
+
+    scenario: Scenario
+    cells: tuple[Cell, ...]
+
+    @property
+    def sweep(self) -> Sweep:
+        """The study's settings. Raises UsageError where the scenario has none."""
+        if self.scenario.sweep is None:
+            raise UsageError(f"{self.scenario.name} has no key `sweep`; see docs/studies.md")
+        return self.scenario.sweep
+
+    @property
+    def laws(self) -> tuple[str, ...]:
+        """The names of the laws that meet the draws."""
+        return tuple(self.sweep.laws) or self.scenario.labels()
+
+    @cached_property
+    def metrics(self) -> tuple[str, ...]:
+        """The names of the metrics that a law of the study has during a run, in their order."""
+        loops = [watching(self.single(law, cell.index)) for law in self.laws for cell in self.cells]
+        found = {name for one in loops for name in one.summary(np.full(one.size, np.nan))}
+        return tuple(name for name in metrics_with(self.scenario.plugged) if name in found)
+
+    def single(self, law: str, cell: int) -> Scenario:
+        """The scenario of one law in one cell."""
+        return self.cells[cell].scenario.singles()[law]
+
+    @cached_property
+    def identity(self) -> dict[str, Any]:
+        """All that the numbers depend on, by dotted keys; two studies that agree can be joined."""
+        sweep = self.sweep
+        told: dict[str, Any] = {"sweep.seed": sweep.seed, "sweep.design": sweep.design}
+        for name, quantity in sweep.vary.items():
+            told[f"sweep.vary.{name}"] = quantity.model_dump(exclude_defaults=True)
+        for cell in self.cells:
+            for law in self.laws:
+                single = self.single(law, cell.index)
+                kept = {
+                    key: value for key, value in values(single).items()
+                    if key.partition(".")[0] not in COSMETIC
+                }  # fmt: skip
+                told |= {f"{law}[{cell.index}].{key}": value for key, value in kept.items()}
+                told[f"{law}[{cell.index}] kernels"] = kernels(single)
+        return told
+
+
+def plan(scenario: Scenario) -> Plan:
+    """The plan of a scenario with a key `sweep`. Raises UsageError, ScenarioError."""
+    return Plan(scenario, tuple(cells(scenario)))
+
+
+def kernels(scenario: Scenario) -> str:
+    """A digest of the source of all kernels of a law's loop, the same on every processor."""
+    parts = [kernel for _, kernel, _ in entries(scenario.closed_loop(), watching(scenario))]
+    found = hashlib.sha256()
+    for kernel in (closed_loop.advance, *parts):
+        for text in ingredients(kernel, {}):
+            found.update(text.encode() + b"\0")
+    return found.hexdigest()[:16]
+
+
+def watching(scenario: Scenario) -> Metrics:
+    """The observer of a law's metrics."""
+    return observer(
+        scenario.closed_loop(), scenario.time_grid(),
+        steady_fraction=scenario.metrics.steady_fraction,
+        settling_radius=scenario.metrics.settling_radius, plugins=scenario.plugged,
+    )  # fmt: skip
+
+
+def digest(identity: Mapping[str, Any]) -> str:
+    """A short digest of an identity."""
+    text = json.dumps(identity, sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def disagreements(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[str]:
+    """Each key that two identities have different values for, with both values."""
+    keys = dict.fromkeys([*one, *other])
+    return [
+        f"{key}: {one.get(key, 'not there')}, not {other.get(key, 'not there')}"
+        for key in keys
+        if one.get(key) != other.get(key)
+    ]

@@ -1,0 +1,201 @@
+"""`podusv sweep`: a scenario with the key `sweep` in, one folder with all its runs out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from podusv_cli.core.errors import StorageError, UsageError
+from podusv_cli.findings.finding import unknown_codes
+from podusv_cli.scenario.limits import limits
+from podusv_cli.scenario.load import Loaded, load, yaml_text
+from podusv_cli.scenario.phrases import unknown
+from podusv_cli.storage import files, manifest, provenance
+from podusv_cli.storage.json_files import encode
+from podusv_cli.study import outputs
+from podusv_cli.study.draws import drawn, draws
+from podusv_cli.study.march import Part, Tally, Tell, march
+from podusv_cli.study.plan import plan
+from podusv_cli.study.store import Store
+from podusv_cli.workflows.run import RESULTS
+
+SCENARIO = "scenario.yaml"  # whole: it refers to no other file
+FORMATS = ("csv", "parquet")
+
+
+@dataclass(frozen=True)
+class Request:
+    """The options of `podusv sweep run`; see its help."""
+
+    overrides: Sequence[str] = ()
+    out: Path | None = None
+    seconds: float = math.inf  # of computing, after which no unit is begun
+    workers: int = 0
+    shard: Part = (1, 1)
+    argv: Sequence[str] = ()
+    plugins: Sequence[str] = ()
+    figures: bool = True
+
+
+@dataclass(frozen=True)
+class Swept:
+    """A study as far as it is made; without results where it is not whole."""
+
+    folder: Path
+    tally: Tally
+    results: outputs.Results | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        """What `--json` prints."""
+        told = self.results.as_json() if self.results else {}
+        status = "finished" if self.results else "unfinished"
+        counts = {"wanted": self.tally.wanted, "made": self.tally.made}
+        return {"format": 1, "status": status, "folder": str(self.folder), **counts, **told}
+
+
+@dataclass(frozen=True)
+class Made:
+    """How many draws of every law and cell are made, of those wanted."""
+
+    wanted: int
+    rows: Sequence[tuple[str, str, int]]
+
+    def as_json(self) -> list[dict[str, Any]]:
+        """As plain data."""
+        return [
+            {"law": law, "cell": cell, "made": count, "wanted": self.wanted}
+            for law, cell, count in self.rows
+        ]
+
+
+def run(config: Path, request: Request, tell: Tell) -> Swept:
+    """Simulate what is missing of a study, and judge it once all of it is there.
+
+    `config` is a scenario or the folder of a study. Raises ScenarioError, UsageError where the
+    folder holds another study, StorageError, and KeyboardInterrupt; every unit that was finished is
+    kept.
+    """
+    started = datetime.now(UTC)
+    store = _opened(config, request, started)
+    tally, whole = march(
+        store, tell, workers=request.workers, seconds=request.seconds, part=request.shard
+    )
+    if not whole:
+        return Swept(store.folder, tally)
+    store.write_runs()
+    return Swept(store.folder, tally, _judged(store, request.argv, started, request.figures))
+
+
+def _opened(config: Path, request: Request, started: datetime) -> Store:
+    """The store of a new study, or of one that is to be continued."""
+    given = config.is_dir()
+    loaded = _loaded(config / SCENARIO if given else config, request)
+    folder = request.out or (config if given else RESULTS / f"{loaded.scenario.name}-sweep")
+    store = Store(folder, plan(loaded.scenario))
+    store.open(started.isoformat(timespec="seconds"))
+    whole = yaml_text(loaded.scenario.model_dump())
+    files.write_bytes(store.folder / SCENARIO, whole.encode())
+    return store
+
+
+def _loaded(config: Path, request: Request) -> Loaded:
+    checks = (unknown_codes, limits(allow_large=True))
+    loaded = load(config, request.overrides, checks, request.plugins)
+    if loaded.scenario.sweep is None:
+        raise UsageError(
+            f"{config} has no key `sweep`, which says what is to be drawn; see docs/studies.md, or "
+            "start from one: podusv init studies/hull_and_sea"
+        )
+    return loaded
+
+
+def _judged(store: Store, argv: Sequence[str], started: datetime, figures: bool) -> outputs.Results:
+    """Judge the runs that are there, and write everything about them."""
+    results = outputs.judged(store.plan, store.runs())
+    origin = provenance.collect(argv, started, datetime.now(UTC), store.plan.scenario.plugged)
+    files.write_bytes(store.folder / "provenance.json", encode(origin))
+    outputs.write(store.folder, results, figures=figures)
+    manifest.write(store.folder, "finished")
+    return results
+
+
+def stored(study: Path) -> Store:
+    """The store of a study's folder. Raises UsageError where it is none."""
+    if not (study / SCENARIO).is_file():
+        raise UsageError(f"{study} is no study: it has no {SCENARIO}")
+    return Store(study, plan(load(study / SCENARIO).scenario))
+
+
+def status(study: Path) -> Made:
+    """How far a study is. Raises UsageError, StorageError."""
+    store = stored(study)
+    rows = [
+        (law, store.plan.cells[cell].label, int(there.sum()))
+        for (law, cell), there in store.covered().items()
+    ]
+    return Made(store.plan.sweep.draws, rows)
+
+
+def report(study: Path, argv: Sequence[str], *, figures: bool) -> Swept:
+    """Judge a study anew, of the runs that are there. Raises UsageError where there are none."""
+    started, store = datetime.now(UTC), stored(study)
+    tally = Tally.of(store.covered())
+    if not tally.made:
+        raise UsageError(f"{study} has no runs yet: podusv sweep run {study}")
+    store.write_runs()
+    return Swept(study, tally, _judged(store, argv, started, figures))
+
+
+def merge(studies: Sequence[Path], out: Path, argv: Sequence[str], *, figures: bool) -> Swept:
+    """Join the units of several folders of one study, and judge it where it is whole.
+
+    Raises UsageError where one holds another study, and StorageError where two have made the same
+    run with other numbers, as machines of another kind do.
+    """
+    started, first = datetime.now(UTC), stored(studies[0])
+    store = Store(out, first.plan)
+    store.open(started.isoformat(timespec="seconds"))
+    files.write_bytes(out / SCENARIO, (studies[0] / SCENARIO).read_bytes())
+    for study in studies:
+        other = stored(study)
+        store.agree(study, other.plan)
+        for result in other.results():
+            if clash := store.clash(result):
+                raise StorageError(f"{study}: {clash}")
+            store.write(result)
+    tally = Tally.of(store.covered())
+    if tally.made < tally.wanted:
+        return Swept(out, tally)
+    store.write_runs()
+    return Swept(out, tally, _judged(store, argv, started, figures))
+
+
+def draw(study: Path, law: str, number: int, cell: int, out: Path | None) -> Path:
+    """Write the scenario of one run of a study. Raises UsageError, StorageError."""
+    made = stored(study).plan
+    if law not in made.laws:
+        raise UsageError(unknown(f"law {law!r}", law, made.laws))
+    if cell >= len(made.cells):
+        raise UsageError(f"--cell {cell}: the study has {len(made.cells)} cells, from 0 on")
+    (numbers,) = draws(made.sweep, number, 1)
+    one = drawn(made.single(law, cell), made.sweep.vary, numbers)
+    name = f"{one.name}-{law}-{number}"
+    path = out or Path(f"{name}.yaml")
+    if path.exists():
+        raise UsageError(f"{path} exists already; name another file with --out")
+    text = yaml_text(one.model_copy(update={"name": name}).model_dump())
+    files.write_bytes(path, f"# Draw {number} of {study}, law {law}.\n{text}".encode())
+    return path
+
+
+def export(study: Path, form: str, out: Path | None) -> Path:
+    """Write all runs as one table. Raises UsageError, StorageError."""
+    if form not in FORMATS:
+        raise UsageError(unknown(f"format {form!r}", form, FORMATS))
+    path = out or study / f"runs.{form}"
+    outputs.export(stored(study).runs(), path)
+    return path

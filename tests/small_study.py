@@ -1,0 +1,45 @@
+"""A small study for tests: two laws, a second of simulation, some quantities drawn."""
+
+from pathlib import Path
+
+from podusv_cli.scenario.load import load_text
+from podusv_cli.study.march import march
+from podusv_cli.study.plan import plan
+from podusv_cli.study.store import Store
+
+TEXT = """
+name: small
+vessel: {preset: paper_nonlinear}
+path: {kind: line}
+disturbance: {kind: harmonic}
+actuator: {kind: saturated}
+controllers:
+  pid: {kind: pid}
+  li: {kind: backstepping}
+simulation: {duration: 1.0, step: 0.02}
+sweep:
+  seed: 7
+  draws: 40
+  vary:
+    vessel.m: {times: {uniform: [0.7, 1.3]}}
+    start.psi: {angle: all}
+    disturbance.b_u.sin_phase: {angle: all}
+  claims:
+    S1: {says: Li tracks better., source: ours, expect: share(li.iae < pid.iae) >= 0.5}
+"""
+
+
+def small(**changes):
+    """The plan of the study, with changes such as draws=20 below `sweep`."""
+    sets = [f"sweep.{name}={value}" for name, value in changes.items()]
+    return plan(load_text(TEXT, "small.yaml", sets).scenario)
+
+
+def made(folder: Path, workers=1, part=(1, 1), **changes):
+    """The store of the study, simulated into a folder; runs.h5 where it is whole."""
+    store = Store(folder, small(**changes))
+    store.open("now")
+    _, whole = march(store, lambda tally: None, workers=workers, part=part)
+    if whole and part == (1, 1):
+        store.write_runs()
+    return store
