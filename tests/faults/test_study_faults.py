@@ -1,0 +1,118 @@
+"""A study after killed processes and failed writes has the bytes of an undisturbed one."""
+
+import errno
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from counts import count
+from small_study import TEXT, made, small
+from storage_samples import Saboteur, fails
+
+from podusv_cli.core.errors import StorageError
+from podusv_cli.study.store import RUNS
+
+KILLS, WRITES = count(3, 200), count(4, 60)
+LONGER = TEXT.replace("duration: 1.0", "duration: 20.0").replace("draws: 40", "draws: 300")
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    return made(tmp_path_factory.mktemp("whole") / "study")
+
+
+def content(store):
+    return (store.folder / RUNS).read_bytes()
+
+
+@pytest.mark.parametrize("error", [errno.EIO, errno.ENOSPC])
+def test_after_a_failed_write_the_study_goes_on(whole, tmp_path, error):
+    """The n-th call that writes, names or syncs fails; what was whole before is still there."""
+    nth, failed = 1, True
+    while failed and nth <= 400:
+        failed = sabotaged(tmp_path / str(nth), nth, error)
+        again = made(tmp_path / str(nth))
+        assert content(again) == content(whole), nth
+        left = [path.name for path in again.folder.rglob("*") if ".podusv-" in path.name]
+        assert not left
+        nth += count(11, 1)
+
+
+def sabotaged(folder, nth, error):
+    """Whether the call failed before the study was whole; a StorageError says that it did."""
+    calls = []
+    saboteur = Saboteur(lambda: (calls.append(nth), fails(error)())[1], nth)
+    with pytest.MonkeyPatch.context() as patch:
+        saboteur.watch(patch, "write", "fsync", "replace")
+        try:
+            made(folder)
+        except StorageError as told:
+            assert calls
+            assert "cannot write" in str(told)
+    return bool(calls)
+
+
+def test_killed_at_any_time_it_goes_on_where_it_was(tmp_path):
+    (tmp_path / "small.yaml").write_text(LONGER)
+    undisturbed = started(tmp_path, "undisturbed")
+    assert undisturbed.wait(120) == 0
+    chance = random.Random(5)
+    for _ in range(KILLS):
+        process = started(tmp_path, "killed")
+        time.sleep(chance.uniform(0.8, 3.0))
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        children_are_gone(process.pid)
+    assert started(tmp_path, "killed").wait(120) == 0
+    one, other = ((tmp_path / name / RUNS).read_bytes() for name in ("undisturbed", "killed"))
+    assert one == other
+
+
+def started(folder, name):
+    command = [sys.executable, "-m", "podusv_cli", "sweep", "run", "small.yaml", "--out", name]
+    return subprocess.Popen(
+        [*command, "--no-figures"], cwd=folder,
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
+    )  # fmt: skip
+
+
+def children_are_gone(group, patience=20.0):
+    """Processes that simulate notice that the one that started them is gone."""
+    end = time.monotonic() + patience
+    while time.monotonic() < end:
+        try:
+            os.killpg(group, 0)
+        except ProcessLookupError:
+            return
+        time.sleep(0.02)
+    raise AssertionError("processes of a killed study go on")
+
+
+def test_a_full_disk_is_a_sentence_and_nothing_is_lost(whole, tmp_path, monkeypatch):
+    from podusv_cli.storage import files
+
+    real, budget = files._create, [40_000]
+
+    def limited(path, content):
+        budget[0] -= len(content)
+        if budget[0] < 0:
+            raise OSError(errno.ENOSPC, "full")
+        return real(path, content)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(files, "_create", limited)
+        with pytest.raises(StorageError, match="the disk is full"):
+            made(tmp_path / "study")
+    kept = small().sweep.draws * 2
+    assert 0 < sum(int(m.sum()) for m in made_so_far(tmp_path / "study").values()) < kept
+    assert content(made(tmp_path / "study")) == content(whole)
+
+
+def made_so_far(folder):
+    from podusv_cli.study.store import Store
+
+    return Store(folder, small()).covered()
