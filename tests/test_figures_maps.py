@@ -17,7 +17,7 @@ from drawn_samples import (
 from matplotlib.colors import to_rgba
 from matplotlib.patches import Polygon, Rectangle
 
-from podusv_cli.figures.trajectory import enlargement, hull
+from podusv_cli.figures.trajectory import enlargement, hull_of
 
 LENGTH = scenario().vessel.length
 
@@ -67,14 +67,20 @@ def test_hulls_are_enlarged_to_a_twentieth_of_the_target_s_way(two):
     assert enlargement(shown(("a", still))) == 1.0
 
 
+def hull_at(x, y, psi):
+    """The outline of a vessel there, with its bow first."""
+    state = {"x": x, "y": y, "psi": psi}
+    still = {name: lambda t, number=number: number + 0.0 * t for name, number in state.items()}
+    (run,) = shown(("a", recording(**still)))
+    return hull_of(run, 1.0, 1.0)
+
+
 def test_a_hull_has_its_bow_ahead_and_its_beam_across():
-    north = hull(0.0, 0.0, 0.0, length=2.0, beam=0.5)
-    assert north[0] == pytest.approx([0.0, 1.0])  # the bow: east 0, north 1
-    assert np.ptp(north, axis=0) == pytest.approx([0.5, 2.0])
-    east = hull(3.0, 4.0, np.pi / 2, length=2.0, beam=0.5)
-    assert east[0] == pytest.approx([5.0, 3.0])
-    starboard = hull(0.0, 0.0, 0.0, length=2.0, beam=0.5)[1]
-    assert starboard[0] > 0.0
+    north, east = hull_at(0.0, 0.0, 0.0), hull_at(3.0, 4.0, np.pi / 2)
+    assert north[0] == pytest.approx([0.0, 0.5 * LENGTH])  # the bow: east, north
+    assert np.ptp(north, axis=0) == pytest.approx([scenario().vessel.beam, LENGTH])
+    assert east[0] == pytest.approx([4.0 + 0.5 * LENGTH, 3.0])
+    assert north[1][0] > 0.0
     assert east[1][1] < 3.0  # heading east, starboard is south
 
 

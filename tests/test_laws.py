@@ -38,19 +38,6 @@ def evaluate(law: Any, at: Situation) -> tuple[Answer, Tracking]:
     return ask(law, *at, NONLINEAR), e
 
 
-@given(alpha=number, beta=number, A=st.floats(0.1, 20), B=st.floats(0.1, 20))
-def test_shunting_is_17_with_f_and_g(alpha, beta, A, B):
-    f, g = max(alpha, 0.0), max(-alpha, 0.0)
-    printed = -A * beta + (B - beta) * f - (B + beta) * g
-    assert shunting_rate(alpha, beta, A, B) == pytest.approx(printed, rel=1e-12, abs=1e-9)
-
-
-@given(alpha=number, beta=number, A=st.floats(0.1, 20))
-def test_an_adaptive_bound_makes_shunting_a_first_order_filter(alpha, beta, A):
-    rate = -(A + abs(alpha)) * (beta - alpha)
-    assert shunting_rate(alpha, beta, A, math.nan) == pytest.approx(rate, rel=1e-12, abs=1e-9)
-
-
 @given(alpha=number, A=st.floats(0.1, 20), B=st.floats(0.1, 20))
 def test_a_constant_bound_is_one_and_its_gain_is_less_than_one_over_it(alpha, A, B):
     # At the bound beta is driven back whatever alpha is, so |beta| < B for good.

@@ -51,20 +51,13 @@ def test_the_models_are_all_found():
 @pytest.mark.parametrize(
     ("model", "name"), FIELDS, ids=lambda part: getattr(part, "__name__", part)
 )
-def test_every_field_has_a_meaning_and_every_number_a_unit(model, name):
+def test_every_field_has_a_meaning_a_unit_and_limits_that_can_be_put_in_words(model, name):
     field = model.model_fields[name]
     assert name == "kind" or (field.description or "").strip()
     assert not (field.description or "").endswith("."), "meanings are phrases"
     if {int, float} & set(members(field.annotation)):
         assert isinstance(field.json_schema_extra, dict)
         assert isinstance(field.json_schema_extra["unit"], str)
-
-
-@pytest.mark.parametrize(
-    ("model", "name"), FIELDS, ids=lambda part: getattr(part, "__name__", part)
-)
-def test_every_limit_of_a_field_can_be_put_in_words(model, name):
-    field = model.model_fields[name]
     said = limits(field)
     for data in field.metadata:
         known = isinstance(data, (Gt, Ge, Lt, Le, Strict)) or hasattr(data, "pattern")
