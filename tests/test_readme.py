@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from command_samples import ROOT, Command, commanded
 
+from podusv_cli.engine import march
 from podusv_cli.storage.run_folder import open_run
 
 PAGES = ("README.md", "docs/tutorial.md", "docs/write_your_law.md", "docs/vessel.md")
@@ -86,22 +87,40 @@ def test_the_first_scenario_follows_ahead_and_demands_what_is_available(podusv: 
 
 
 MISTAKES = {  # what is replaced in the page's law
+    "a signal is not declared as one": ("= (HEADING_ERROR,)", '= ("heading_error",)'),
     "a rate or a signal is not written": ("rate[0] = k.K_i * missing", "pass"),
     "more written than declared": ("signals[0] =", "signals[1] ="),
     "`start` and `slots` disagree": ("np.zeros(1)", "np.zeros(2)"),
-    "an unknown field": ("k.K_u *", "k.K_w *"),
+    "an unknown constant": ("k.K_u *", "k.K_w *"),
+    "a default that is no number, or out of range": (
+        "K_u: float = value(20.0",
+        'K_u: float = value("much"',
+    ),
+    "text or another value that is no number is written": (
+        "tau[0] = k.K_u * missing + memory[0]",
+        'tau[0] = "much"',
+    ),
+    "numpy works on a vector in the kernel": (
+        "tau[0] = k.K_u * missing + memory[0]",
+        "tau[0] = np.dot(x, x)",
+    ),
     "`@kernel` is missing, or a slice, a list, `print` or `raise` is in the kernel": (
         "    @kernel\n    def law",
         "    def law",
     ),
+    "an endless loop": ("rate[0] = k.K_i * missing", "while True:\n            pass"),
     "a `kind` that exists": ('"pursuit"', '"pid"'),
     "a signal named as one of the closed loop's": ('"heading_error", "rad"', '"psi", "rad"'),
-    "the file cannot be imported": ("tau[0] =", "tau[0] = ="),
+    "the file is no Python": ("tau[0] =", "tau[0] = ="),
+    "the file raises when it is imported": ("TRIM = Signal(", "TRIM = Sgnal("),
 }
 
 
 @pytest.mark.parametrize("mistake", MISTAKES)
-def test_a_mistake_in_a_law_gets_the_message_of_the_page(mistake: str, podusv: Command) -> None:
+def test_a_mistake_in_a_law_gets_the_message_of_the_page(
+    mistake: str, podusv: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(march, "PATIENCE", 0.3)
     page = "docs/write_your_law.md"
     write_files(page)
     law, (right, wrong) = Path("pursuit.py"), MISTAKES[mistake]
@@ -109,5 +128,6 @@ def test_a_mistake_in_a_law_gets_the_message_of_the_page(mistake: str, podusv: C
     law.write_text(law.read_text().replace(right, wrong))
     said = podusv("compare", "laws.yaml", "--set", "simulation.duration=1", "--no-figures")
     (message,) = re.findall(rf"^\| {re.escape(mistake)} \| `(.*)` \|$", text_of(page), re.MULTILINE)
+    message = message.replace(" 10 s of computing", " 0.3 s of computing")
     assert re.search(pattern(message), " ".join((said.err + said.out).split())), said.err
     assert said.code in (2, 3)

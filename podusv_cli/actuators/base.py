@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -27,6 +27,8 @@ class Actuator(Component):
     `states` and `signals` declare every number; the numbers of one vector have the same signal,
     which has an axis.
     """
+
+    noun: ClassVar[str] = "actuator"
 
     @property
     def states(self) -> tuple[Signal, ...]:

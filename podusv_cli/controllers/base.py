@@ -45,6 +45,8 @@ class Controller(Component):
     `fixed_signals()`. `explain` finds a signal that is in `signals` or a constant of the module.
     """
 
+    noun: ClassVar[str] = "law"
+
     signals: ClassVar[tuple[Signal, ...]] = ()
 
     @property

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, get_args, get_origin
 
 import numpy as np
@@ -26,12 +29,13 @@ class Component(BaseModel):
 
     `presets` are what its field `preset` chooses from. `rows_of` has the fields that may name a
     CSV file of pairs, each with the field that takes the file's rows. `is_recorded` says that this
-    is `Recorded`.
+    is `Recorded`. `noun` is what messages call it.
     """
 
     presets: ClassVar[Presets | None] = None
     rows_of: ClassVar[dict[str, str]] = {}
     is_recorded: ClassVar[bool] = False
+    noun: ClassVar[str] = "component"
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
 
     def constants(self) -> dict[str, float]:
@@ -86,3 +90,12 @@ def unit_of(field: FieldInfo) -> str:
 
 
 Positive = Annotated[float, Field(gt=0)]
+
+
+def called(owner: Component) -> str:
+    """`law mine (mine.py, line 12)`: a component's kind, and where its class is written."""
+    kind, place = type(owner), ""
+    with suppress(OSError, TypeError):  # made where there is no source
+        name = Path(inspect.getsourcefile(kind) or "").name
+        place = f" ({name}, line {inspect.getsourcelines(kind)[1]})"
+    return f"{owner.noun} {kind.model_fields['kind'].default}{place}"

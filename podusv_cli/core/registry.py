@@ -15,7 +15,7 @@ from importlib import import_module
 from operator import or_
 from pathlib import Path
 from pkgutil import iter_modules
-from typing import Annotated, Any, Literal, TypeVar, get_origin
+from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin
 
 from pydantic import Field
 
@@ -48,7 +48,9 @@ def kinds(package: str, base: type[Kind], plugins: Plugins = ()) -> dict[str, ty
 
 def _kind(component: type[Component]) -> str:
     field = component.model_fields["kind"]
-    if get_origin(field.annotation) is not Literal:
+    if get_origin(field.annotation) is not Literal or get_args(field.annotation) != (
+        field.default,
+    ):
         raise LawError(
             f'{_place(component)}: its kind is no fixed word; write kind: Literal["mine"] = "mine"'
         )

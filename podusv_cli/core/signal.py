@@ -7,7 +7,7 @@ it holds, so that logs, figures and claims need no table of them.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from podusv_cli.core.errors import LawError
@@ -75,17 +75,25 @@ LOOP = (
 )  # fmt: skip
 
 
-def by_name(declared: Iterable[tuple[str, Iterable[Signal]]]) -> dict[str, Signal]:
-    """Signals of the parts of one log, by name. Raises LawError where two have the same name."""
-    found: dict[str, tuple[str, Signal]] = {}
+def by_name(
+    declared: Iterable[tuple[Callable[[], str], Iterable[Signal]]],
+) -> dict[str, Signal]:
+    """Signals of the parts of one log, by name.
+
+    Raises LawError where two have the same name; what a part is called is only asked then.
+    """
+    found: dict[str, tuple[Callable[[], str], Signal]] = {}
     for part, signals in declared:
         for signal in signals:
             if not isinstance(signal, Signal):
-                raise LawError(f"{part} declares {signal!r}, which is no Signal")
+                raise LawError(
+                    f"{part()}: it declares {signal!r}, which is no Signal; write "
+                    f'Signal("{signal}", unit, meaning)'
+                )
             other, known = found.setdefault(signal.name, (part, signal))
             if (other, known) != (part, signal):
                 raise LawError(
-                    f"{part} logs {signal.name!r}, {described(signal)}, and {other} logs "
+                    f"{part()}: it logs {signal.name!r}, {described(signal)}, and {other()} logs "
                     f"{described(known)} under this name; give one of them another name"
                 )
     return {name: signal for name, (_, signal) in found.items()}

@@ -16,6 +16,8 @@ class Disturbance(Component):
     `of_time`, and is not asked twice for the same t.
     """
 
+    noun: ClassVar[str] = "disturbance"
+
     of_time: ClassVar[bool] = False
 
     @staticmethod

@@ -5,19 +5,17 @@ There its vectors are bare pointers, and what it writes past their ends is someb
 
 from __future__ import annotations
 
-import inspect
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from functools import partial
 from numbers import Real
-from pathlib import Path
 
 import numpy as np
+from pydantic import ValidationError
 
 from podusv_cli.controllers.base import Controller
-from podusv_cli.core.component import Component
-from podusv_cli.core.errors import LawError
+from podusv_cli.core.component import called
+from podusv_cli.core.errors import LawError, in_a_line
 from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.core.signal import NAME, Signal
 from podusv_cli.engine.march import Work
@@ -50,12 +48,22 @@ def _asked(
     if isinstance(work.error, LawError):
         raise work.error
     if work.result is None and not isinstance(work.error, left):
-        message = f"law {loop.controller.label}, evaluated once before the run: {work.fault()}"
+        fault = _constant(loop.controller, work.error) or work.fault()
+        message = f"{called(loop.controller)}, evaluated once before the run: {fault}"
         raise LawError(message) from work.error
+
+
+def _constant(law: Controller, error: BaseException | None) -> str:
+    """What is wrong where a kernel reads a constant that there is not; else empty."""
+    if not (isinstance(error, AttributeError) and hasattr(error.obj, "_fields")):
+        return ""
+    own = ", ".join(type(law).model_fields)
+    return f"{in_a_line(error)}; it has those of the nominal vessel, and {own}"
 
 
 def _check_declared(loop: ClosedLoop) -> int:
     law = loop.controller
+    _check_defaults(law)
     _check_signals(loop)
     memory, declared = loop.first_memory(), (sum(size for _, size in law.slots()),)
     if np.shape(memory) != declared:
@@ -68,6 +76,16 @@ def _check_declared(loop: ClosedLoop) -> int:
         if not (name.isidentifier() and isinstance(number, Real)):
             raise LawError(f"{called(law)}: its constant {name} = {number!r} is no named number")
     return 0
+
+
+def _check_defaults(law: Controller) -> None:
+    """LawError for a default that its own field does not allow; pydantic checks given values."""
+    try:
+        type(law)(**dict(law))
+    except ValidationError as error:
+        first = error.errors()[0]
+        name, told = ".".join(map(str, first["loc"])), first["msg"]
+        raise LawError(f"{called(law)}: its default {name} = {first['input']!r}: {told}") from error
 
 
 def evaluated(loop: ClosedLoop, before: float) -> tuple[Vector, Vector, Vector]:
@@ -96,21 +114,11 @@ def _ask(loop: ClosedLoop) -> int:
 
 def _check_signals(loop: ClosedLoop) -> None:
     """LawError for what the log could not take, or would mix up."""
-    law, actuator = loop.controller, loop.actuator
+    law = loop.controller
     if isinstance(law.signals, str):
         raise LawError(f"{called(law)}: its signals are no tuple; write (Signal(...),)")
-    for owner, declared in (
-        (law, (*dict(law.slots()), *law.signals, *law.fixed_signals())),
-        (actuator, (*actuator.states, *actuator.signals)),
-    ):
-        for part in declared:
-            if not isinstance(part, Signal):
-                raise LawError(
-                    f"{called(owner)}: it declares {part!r}, which is no Signal; write "
-                    f'(Signal("{part}", unit, meaning),)'
-                )
+    loop.about()
     try:
-        loop.about()
         _check_axes(loop)
     except LawError as error:
         raise LawError(f"{called(law)}: {error}") from error
@@ -147,13 +155,3 @@ def _shapes(loop: ClosedLoop) -> Iterator[tuple[Signal, tuple[int, ...]]]:
     for part, count in (*law.slots(), *Counter((*actuator.states, *actuator.signals)).items()):
         yield part, (count,) if part.axes or count > 1 else ()
     yield from ((part, array.shape) for part, array in law.fixed_signals().items())
-
-
-def called(owner: Component) -> str:
-    """`law mine (mine.py, line 12)`: a component's kind, and where its class is written."""
-    kind, place = type(owner), ""
-    with suppress(OSError, TypeError):  # made where there is no source
-        name = Path(inspect.getsourcefile(kind) or "").name
-        place = f" ({name}, line {inspect.getsourcelines(kind)[1]})"
-    what = "law" if isinstance(owner, Controller) else "actuator"
-    return f"{what} {kind.model_fields['kind'].default}{place}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import dis
+import linecache
 import re
 from functools import cache
 from pathlib import Path
@@ -52,6 +53,7 @@ def object_code(function: Any, prototype: Any) -> Code:
 
     Raises TypeError for a kernel that needs more than arithmetic and the mathematical library.
     """
+    linecache.checkcache()  # numba shows lines from there; a file may have been edited meanwhile
     try:
         compiled = cfunc(_signature(prototype), **OPTIONS)(_with_inlined(function))
     except NumbaError as error:

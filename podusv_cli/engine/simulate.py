@@ -12,6 +12,7 @@ import numpy as np
 from podusv_cli.actuators.base import Actuator
 from podusv_cli.controllers.base import Controller
 from podusv_cli.core import signal
+from podusv_cli.core.component import called
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.recording import Allocate, Recording, Status
 from podusv_cli.core.signal import LOOP, Signal
@@ -84,9 +85,9 @@ class ClosedLoop:
     def about(self) -> dict[str, Signal]:
         """Every signal that the loop logs, by name. Raises LawError where two have one name."""
         law, actuator = self.controller, self.actuator
-        own = (f"actuator {type(actuator).__name__}", (*actuator.states, *actuator.signals))
-        parts = (("the closed loop", LOOP), (f"law {law.label}", law.declared()), own)
-        return signal.by_name(parts)
+        own = (partial(called, actuator), (*actuator.states, *actuator.signals))
+        loop = (lambda: "the closed loop", LOOP)
+        return signal.by_name((loop, (partial(called, law), law.declared()), own))
 
     def layout(self, grid: TimeGrid) -> Plan:
         """Sizes and offsets of the loop on this grid."""

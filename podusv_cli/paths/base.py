@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -31,6 +31,8 @@ class Path(Component):
     `evaluate(t, k, table, target)` is a kernel that writes position [m], velocity [m/s] and
     acceleration [m/s2] at time t [s] into `target`, in the order of `TARGET`.
     """
+
+    noun: ClassVar[str] = "path"
 
     @staticmethod
     def evaluate(t: float, k: Any, table: Vector, target: Vector) -> None:

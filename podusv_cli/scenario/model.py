@@ -12,13 +12,12 @@ from pydantic import create_model
 
 from podusv_cli.actuators.base import Actuator
 from podusv_cli.controllers.base import Controller
-from podusv_cli.core.component import Component, value
+from podusv_cli.core.component import Component, called, value
 from podusv_cli.core.errors import LawError, in_a_line
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.core.registry import any_of
 from podusv_cli.core.signal import Signal
 from podusv_cli.disturbances.base import Disturbance
-from podusv_cli.engine.check import called
 from podusv_cli.engine.grid import TimeGrid, whole_steps
 from podusv_cli.engine.simulate import ClosedLoop
 from podusv_cli.metrics.table import Metrics, observer

@@ -95,7 +95,9 @@ def about(loop: ClosedLoop, *, sampled: bool) -> dict[str, Signal]:
     """All signals of the log, the monitor's included. Raises LawError as `loop.about`."""
     added = signals(loop, sampled=sampled)
     added += FIXED if added else ()
-    return by_name((("the loop", loop.about().values()), ("the stability monitor", added)))
+    return by_name(
+        ((lambda: "the loop", loop.about().values()), (lambda: "the stability monitor", added))
+    )
 
 
 def prepare(loop: ClosedLoop, grid: TimeGrid, compiled: bool) -> None:

@@ -68,11 +68,11 @@ def test_a_law_that_fails_on_the_way_leaves_its_log(podusv, law, name):
 
 
 REFUSED = {
-    "too_long": "law pid, evaluated once before the run: IndexError: index 2 is out of bounds for "
-    "axis 0 with size 2 (faulty_laws.py, line ",
+    "too_long": "law pid (pid.py, line {line}), evaluated once before the run: IndexError: "
+    "index 2 is out of bounds for axis 0 with size 2 (faulty_laws.py, line ",
     "too_short": "law pid (pid.py, line {line}): it leaves tau_r_cmd unwritten\n",
-    "slow_at_once": "law pid, evaluated once before the run: it is not over after 0.4 s of "
-    "computing\n",
+    "slow_at_once": "law pid (pid.py, line {line}), evaluated once before the run: it is not "
+    "over after 0.4 s of computing\n",
 }
 
 

@@ -110,8 +110,8 @@ class Settling(Constant):
 
 
 DECLARED: dict[type[Controller], str] = {
-    Undeclared: "it declares 'my_error', which is no Signal; write (Signal(\"my_error\", unit, "
-    "meaning),)",
+    Undeclared: "it declares 'my_error', which is no Signal; write Signal(\"my_error\", unit, "
+    "meaning)",
     Text: "its signals are no tuple; write (Signal(...),)",
     Twice: "logs 'u', a quantity of this law [m], and the closed loop logs surge velocity [m/s] "
     "under this name; give one of them another name",
@@ -166,7 +166,8 @@ ASKED: dict[type[Controller], str] = {
 
 @pytest.mark.parametrize("law", ASKED)
 def test_all_its_functions_are_asked(law):
-    assert refused(law).startswith(f"law constant, evaluated once before the run: {ASKED[law]}")
+    place = f"law constant (test_law_mistakes.py, line {_line(law.__name__)})"
+    assert refused(law).startswith(f"{place}, evaluated once before the run: {ASKED[law]}")
 
 
 def helper(t: float) -> float:
@@ -239,7 +240,8 @@ def test_a_command_refuses_it_in_a_line(podusv, monkeypatch):
     for command in ("run", "compare", "verify"):
         said = podusv(command, write("a.yaml", BASE), "--out", "x")
         assert (said.code, said.out) == (2, "")
-        assert said.err.endswith("law pid declares 'my_error', which is no Signal\n")
+        assert "law pid (pid.py, line" in said.err
+        assert "it declares 'my_error', which is no Signal; write Signal(" in said.err
         assert said.err.count("\n") == 1
         assert not Path("x").exists()
 
