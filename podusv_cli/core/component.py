@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, get_args, get_origin
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic.fields import FieldInfo
 
 from podusv_cli.core.kernel import Vector
@@ -90,6 +90,20 @@ def unit_of(field: FieldInfo) -> str:
 
 
 Positive = Annotated[float, Field(gt=0)]
+
+
+def wrong_default(owner: Component) -> str:
+    """What is wrong with a default that its own field does not allow; else empty.
+
+    pydantic checks given values only.
+    """
+    try:
+        type(owner)(**dict(owner))
+    except ValidationError as error:
+        first = error.errors()[0]
+        name = ".".join(map(str, first["loc"]))
+        return f"its default {name} = {first['input']!r}: {first['msg']}"
+    return ""
 
 
 def called(owner: Component) -> str:

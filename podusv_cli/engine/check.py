@@ -11,7 +11,6 @@ from functools import partial
 from numbers import Real
 
 import numpy as np
-from pydantic import ValidationError
 
 from podusv_cli.controllers.base import Controller
 from podusv_cli.core.component import called
@@ -63,7 +62,6 @@ def _constant(law: Controller, error: BaseException | None) -> str:
 
 def _check_declared(loop: ClosedLoop) -> int:
     law = loop.controller
-    _check_defaults(law)
     _check_signals(loop)
     memory, declared = loop.first_memory(), (sum(size for _, size in law.slots()),)
     if np.shape(memory) != declared:
@@ -76,16 +74,6 @@ def _check_declared(loop: ClosedLoop) -> int:
         if not (name.isidentifier() and isinstance(number, Real)):
             raise LawError(f"{called(law)}: its constant {name} = {number!r} is no named number")
     return 0
-
-
-def _check_defaults(law: Controller) -> None:
-    """LawError for a default that its own field does not allow; pydantic checks given values."""
-    try:
-        type(law)(**dict(law))
-    except ValidationError as error:
-        first = error.errors()[0]
-        name, told = ".".join(map(str, first["loc"])), first["msg"]
-        raise LawError(f"{called(law)}: its default {name} = {first['input']!r}: {told}") from error
 
 
 def evaluated(loop: ClosedLoop, before: float) -> tuple[Vector, Vector, Vector]:

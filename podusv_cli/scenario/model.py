@@ -12,7 +12,7 @@ from pydantic import create_model
 
 from podusv_cli.actuators.base import Actuator
 from podusv_cli.controllers.base import Controller
-from podusv_cli.core.component import Component, called, value
+from podusv_cli.core.component import Component, called, value, wrong_default
 from podusv_cli.core.errors import LawError, in_a_line
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.core.registry import any_of
@@ -238,9 +238,16 @@ class Scenario(Component):
 
     def conflicts(self) -> list[tuple[str, str]]:
         """Key and message for every pair of values that contradict each other."""
-        return [*self._unanswered()] or [
+        return [*self._defaults(), *self._unanswered()] or [
             *self._times(), *self._samples(), *self._names(), *self._signals()
         ]  # fmt: skip
+
+    def _defaults(self) -> Conflicts:
+        """Parts whose classes have a default that they do not allow themselves."""
+        others = {"path": self.path, "disturbance": self.disturbance, "actuator": self.actuator}
+        for key, part in {**others, **self.laws()}.items():
+            if told := wrong_default(part):
+                yield key, f"{called(part)}: {told}"
 
     def _unanswered(self) -> Conflicts:
         """Laws that fail when they are asked what they declare: their own fault, whatever it is."""
