@@ -11,6 +11,7 @@ from podusv_cli.cli.terminal import echo
 
 if TYPE_CHECKING:
     from podusv_cli.scenario.load import Loaded
+    from podusv_cli.scenario.sweep import Sweep
 
 
 def validate(
@@ -35,18 +36,39 @@ def validate(
     from podusv_cli.findings.finding import preflight, unknown_codes
     from podusv_cli.scenario.limits import largest, limits
     from podusv_cli.scenario.load import load
+    from podusv_cli.study.check import sweep_faults
 
-    checks = (unknown_codes, limits(allow_large))
+    checks = (unknown_codes, limits(allow_large), sweep_faults)
     loaded = load(config, assign or (), checks, plugin or ())
     parse_claims(loaded)
     scenario = loaded.scenario
     laws, steps = ", ".join(scenario.labels()), scenario.time_grid().steps
     echo(f"{config}: ok ({scenario.name}, {laws}, {steps} steps)")
     echo(f"a run takes {largest(scenario)}")
+    if scenario.sweep:
+        _tell_study(loaded, scenario.sweep)
     for finding in preflight(scenario):
         echo(str(finding))
     if verbose:
         _explain(loaded)
+
+
+def _tell_study(loaded: Loaded, sweep: Sweep) -> None:
+    """How many runs the study has, and which of its draws the scenario cannot take."""
+    from podusv_cli.study.cells import cells
+    from podusv_cli.study.check import singles, sweep_faults
+    from podusv_cli.study.invalid import invalid_draws
+
+    made = cells(loaded, sweep_faults)
+    runs = [one for cell in made for one in singles(cell.scenario).values()]
+    laws, draws = len(runs) // len(made), sweep.draws
+    echo(
+        f"the study has {len(runs) * draws:,} runs: {laws} laws in {len(made)} cells, "
+        f"{draws:,} draws each"
+    )
+    invalid = invalid_draws(runs, sweep)
+    share = f"{invalid.count:,} of the {draws:,} draws are invalid ({invalid.count / draws:.2%})"
+    echo(f"{share}; draw {invalid.first}: {invalid.reason}" if invalid.count else share)
 
 
 def _explain(loaded: Loaded) -> None:

@@ -20,7 +20,7 @@ from podusv_cli.scenario.model import Scenario, scenario_class
 from podusv_cli.scenario.phrases import found
 from podusv_cli.scenario.presets import complete, has_choice
 from podusv_cli.scenario.yaml_text import MAX_NODES, read, read_text, resolve
-from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, Route, dotted, find, printable
+from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, Route, dotted, find, merge, printable
 
 REFERENCES: tuple[Route, ...] = (("extends",), ("path", "file"))  # to other files
 # Values; several times those of one file, since a scenario may extend files with long lists.
@@ -34,13 +34,20 @@ class Loaded:
 
     `origins` maps every dotted key to "configs/a.yaml:12:5", "--set a.b=v", "vessel file
     paper.yaml" or "default"; `text` is the scenario file as given. `open_choice`: several
-    `controllers` and no `controller` are given.
+    `controllers` and no `controller` are given. `root` is the tree of which the scenario is made,
+    without what is filled in.
     """
 
     scenario: Scenario
     origins: Mapping[str, str]
     text: str
-    open_choice: bool = False
+    open_choice: bool
+    root: Node
+
+    def changed(self, top: Node, checks: Sequence[Check] = ()) -> Scenario:
+        """The scenario of the same tree with another merged over it. Raises ScenarioError."""
+        root, known, source = merge(self.root, top), self.scenario.plugged, self.root.mark.source
+        return _checked(root, known, source, [], checks)[0]
 
 
 def load(
@@ -76,7 +83,7 @@ def load_text(
     root = plugins.with_given(root, files)
     root, known = _plugged(plugins.loaded, root, source, faults)
     scenario, origins, choice = _checked(root, known, source, faults, checks)
-    return Loaded(scenario, origins, text, choice)
+    return Loaded(scenario, origins, text, choice, root)
 
 
 def _plugged(

@@ -16,7 +16,8 @@ from podusv_cli.scenario.yaml_tree import Fault, Node, Route, dotted, follow, pl
 
 MOST_PLACES = 4  # of a key, in a message
 
-Check = Callable[[Scenario], list[tuple[str, str]]]  # key and message
+# Key and message; a key as its steps where names of a mapping contain dots.
+Check = Callable[[Scenario], Sequence[tuple[str | Route, str]]]
 
 
 def check(root: Node, top: Key, faults: list[Fault], more: Sequence[Check] = ()) -> Scenario | None:
@@ -30,7 +31,9 @@ def check(root: Node, top: Key, faults: list[Fault], more: Sequence[Check] = ())
         faults.extend(dict.fromkeys(_faults(root, top, error)))
         return None
     for key, text in chain(scenario.conflicts(), *(look(scenario) for look in more)):
-        faults.append(Fault(follow(root, route(key))[-1].mark, key, text))
+        steps = route(key) if isinstance(key, str) else key
+        name = key if isinstance(key, str) else dotted(key)
+        faults.append(Fault(follow(root, steps)[-1].mark, name, text))
     return scenario
 
 

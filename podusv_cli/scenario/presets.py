@@ -17,11 +17,15 @@ from podusv_cli.scenario.model import NAME, NAME_IN_WORDS
 from podusv_cli.scenario.phrases import found, quoted, unknown
 from podusv_cli.scenario.shipped import PREFIX, relative_to
 from podusv_cli.scenario.yaml_text import MAX_NODES, read, read_text, resolve
-from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, dotted, merge
+from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, Route, dotted, merge
 from podusv_cli.vessels.vessel import COEFFICIENTS, VESSELS, Vessel
 
 MAX_POINTS = MAX_NODES // 4  # a point is three values, and the resolved scenario has to be readable
 MOST_FAULTS = 10  # in one file of points
+# Sections whose entries have names of the user's; one that is null takes out an inherited one.
+NAMED: tuple[Route, ...] = (
+    ("controllers",), ("claims",), ("sweep", "vary"), ("sweep", "grid"), ("sweep", "claims"),
+)  # fmt: skip
 HEADER = re.compile(r'\s*"?(?!nan|inf)[a-z]', re.IGNORECASE)
 
 
@@ -73,7 +77,7 @@ def complete(root: Node, top: Key, faults: list[Fault]) -> Node:
     `top` are the scenario's keys.
     """
     plugins = top.scenario.plugged
-    root = _name(_without_removed(root, faults), faults)
+    root = _name(_without_removed(root), faults)
     root = _nominal(_vessel(root, plugins, faults), plugins, faults)
     return _controllers(_sections(root, top, faults), top)
 
@@ -93,14 +97,23 @@ def _sections(root: Node, top: Key, faults: list[Fault]) -> Node:
     return root
 
 
-def _without_removed(root: Node, faults: list[Fault]) -> Node:
-    """Entries of `controllers` and `claims` that are null are removed."""
-    for section in ("controllers", "claims"):
-        given = root.mapping.get(section)
-        if given and given.mapping:
-            kept = {k: e for k, e in given.mapping.items() if e.content is not None or e.faulty}
-            root = root.with_entry(section, replace(given, content=kept))
+def _without_removed(root: Node) -> Node:
+    """Entries that are null are removed from those sections whose entries have free names."""
+    for section in NAMED:
+        root = _without_null(root, section)
     return root
+
+
+def _without_null(root: Node, section: Route) -> Node:
+    """The tree without entries of a section that are null."""
+    name, *inner = section
+    given = root.mapping.get(str(name))
+    if not given or not given.mapping:
+        return root
+    if inner:
+        return root.with_entry(str(name), _without_null(given, tuple(inner)))
+    kept = {k: e for k, e in given.mapping.items() if e.content is not None or e.faulty}
+    return root.with_entry(str(name), replace(given, content=kept))
 
 
 def _name(root: Node, faults: list[Fault]) -> Node:

@@ -8,6 +8,12 @@ from typing import Any
 
 LONGEST_PLACE = 9  # digits of a place in a list; Python refuses to read thousands of them
 Route = tuple[str | int, ...]
+# The keys of a quantity that a study draws, and those of them that say how it is drawn.
+QUANTITY = {
+    "uniform", "normal", "lognormal", "triangular", "choice", "integers", "angle", "times", "plus",
+    "seed", "keys",
+}  # fmt: skip
+DISTRIBUTIONS = QUANTITY - {"keys"}
 
 
 @dataclass(frozen=True)
@@ -127,8 +133,7 @@ def merge(base: Node, top: Node, *, by_kind: bool = True) -> Node:
         return replace(top, content=tuple(items), faulty=top.faulty or base.faulty)
     if not (isinstance(base.content, dict) and isinstance(top.content, dict)):
         return top
-    pairs = [(base.get(key), top.get(key)) for key in ("kind", "preset")]
-    if by_kind and any(None not in pair and pair[0] != pair[1] for pair in pairs):
+    if by_kind and _another_kind(base, top):
         kind = base.content.get("kind")
         return top.with_entry("kind", kind) if kind and "kind" not in top.content else top
     entries = dict(base.content)
@@ -145,3 +150,15 @@ def _names_places(base: Node, top: Node) -> bool:
         place.isdecimal() and len(place) <= LONGEST_PLACE and int(place) < len(_items(base.content))
         for place in places
     )
+
+
+def _another_kind(base: Node, top: Node) -> bool:
+    """Whether `top` has another kind or preset than `base`, whose keys then do not apply.
+
+    The kind of a distribution is its key: `{uniform: [0, 1]}`.
+    """
+    pairs = [(base.get(key), top.get(key)) for key in ("kind", "preset")]
+    if any(None not in pair and pair[0] != pair[1] for pair in pairs):
+        return True
+    ways = [set(node.mapping) - {"keys"} for node in (base, top)]
+    return all(way and way <= DISTRIBUTIONS for way in ways) and ways[0] != ways[1]

@@ -1,25 +1,114 @@
-"""The cells of a study: every combination of the values of its grid."""
+"""The cells of a study: every combination of the values under `sweep.grid`, as a scenario."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import reduce
+from itertools import product
+from math import prod
+from typing import Any
 
-from podusv_cli.core.errors import UsageError
+from podusv_cli.core.errors import ScenarioError, ScenarioFault
+from podusv_cli.scenario.load import Loaded
+from podusv_cli.scenario.messages import Check
 from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.phrases import as_yaml
+from podusv_cli.scenario.yaml_tree import Node, find, merge, plain, printable, route
+
+MOST = 1000  # cells
+FIXED = ("extends", "plugins", "sweep", "name", "claims")  # what no cell can have of its own
 
 
 @dataclass(frozen=True)
 class Cell:
-    """A combination of values of the grid: its position, a label, and the scenario with them."""
+    """A combination of values, by key, and the scenario that has them."""
 
     index: int
-    label: str
+    values: tuple[tuple[str, Any], ...]
     scenario: Scenario
 
+    @property
+    def label(self) -> str:
+        """`disturbance.scale = 0.5, path.kind = line`; "" without a grid."""
+        return _label(self.values)
 
-def cells(scenario: Scenario) -> Iterator[Cell]:
-    """The cells of a scenario with the key `sweep`. Raises UsageError for a grid."""
-    if scenario.sweep and scenario.sweep.grid:
-        raise UsageError("sweep.grid is not supported yet; make a study for each of its values")
-    yield Cell(0, "", scenario)
+
+def cells(loaded: Loaded, check: Check | None = None) -> tuple[Cell, ...]:
+    """All cells, the last key of the grid changing fastest; one without a grid.
+
+    A value counts as if it stood in the scenario's file: `vessel.m` changes `nominal` too, where
+    that is not given. `check` is made of each. Raises ScenarioError with all that is wrong.
+    """
+    _check_grid(loaded)
+    told: dict[ScenarioFault, None] = {}
+    made = list(_made(loaded, check, told))
+    if told:
+        raise ScenarioError(list(told))
+    return tuple(made)
+
+
+def _made(loaded: Loaded, check: Check | None, told: dict[ScenarioFault, None]) -> Iterator[Cell]:
+    grid = _grid(loaded)
+    for index, nodes in enumerate(product(*grid.values())):
+        top = reduce(merge, map(_placed, grid, nodes), Node({}, loaded.root.mark))
+        values = tuple(zip(grid, map(plain, nodes), strict=True))
+        checks = [_within(check, _label(values))] if check else []
+        try:
+            yield Cell(index, values, loaded.changed(top, checks))
+        except ScenarioError as error:
+            told |= dict.fromkeys(error.findings)
+
+
+def _label(values: tuple[tuple[str, Any], ...]) -> str:
+    return ", ".join(f"{key} = {as_yaml(value)}" for key, value in values)
+
+
+def _within(check: Check, label: str) -> Check:
+    """The check, naming the cell in what it says."""
+    cell = f" (in the cell {label})" if label else ""
+    return lambda scenario: [(key, f"{text}{cell}") for key, text in check(scenario)]
+
+
+def _grid(loaded: Loaded) -> dict[str, tuple[Node, ...]]:
+    """The values of each key, with their places in the scenario's file."""
+    grid = find(loaded.root, ("sweep", "grid"))
+    entries = grid.mapping.items() if grid else ()
+    return {key: node.content for key, node in entries if node.content is not None}
+
+
+def _placed(key: str, node: Node) -> Node:
+    """The tree that has nothing but a value at a key."""
+    for step in reversed(route(key)):
+        node = Node({str(step): node}, node.mark)
+    return node
+
+
+def _check_grid(loaded: Loaded) -> None:
+    """Raise ScenarioError for keys that cannot be in a grid, empty lists, and too many cells."""
+    grid = _grid(loaded)
+    found = [
+        _fault(loaded, key, text) for key, nodes in grid.items() for text in _wrong(key, nodes)
+    ]
+    count = prod(len(nodes) for nodes in grid.values())
+    if count > MOST:
+        found.append(
+            _fault(loaded, "", f"has {count:,} combinations, at most {MOST:,} are allowed")
+        )
+    if found:
+        raise ScenarioError(found)
+
+
+def _wrong(key: str, nodes: tuple[Node, ...]) -> Iterator[str]:
+    steps = route(key)
+    if not nodes:
+        yield "is empty; write the values of the cells"
+    if not steps or steps[0] in FIXED:
+        yield f"cannot differ between cells (nor can {', '.join(FIXED)})"
+
+
+def _fault(loaded: Loaded, key: str, text: str) -> ScenarioFault:
+    place = ("sweep", "grid", *([key] if key else []))
+    node = find(loaded.root, place)
+    mark = node.key_mark or node.mark if node else loaded.root.mark
+    return ScenarioFault(str(mark), printable(".".join(place)), text)
