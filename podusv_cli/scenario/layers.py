@@ -12,7 +12,10 @@ from podusv_cli.scenario.shipped import relative_to
 from podusv_cli.scenario.yaml_text import MAX_DEPTH, plain_node, read, read_text
 from podusv_cli.scenario.yaml_tree import QUANTITY, Fault, Mark, Node, merge
 
-NAMED_BY_KEYS = (("sweep", "vary"), ("sweep", "grid"))  # sections whose entries have names with dots
+NAMED_BY_KEYS = (
+    ("sweep", "vary"),
+    ("sweep", "grid"),
+)  # sections whose entries have names with dots
 FLOW = ("[", "{", "'", '"')  # what lists, mappings and text in quotes start with
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from podusv_cli.core.component import Component
 from podusv_cli.engine.simulate import Observer, entries
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import metrics_with
@@ -111,8 +112,8 @@ def _type(key: str, quantity: Quantity, scenario: Scenario) -> Iterator[str]:
     elif words and way != "choice":
         yield f"{way} needs a number, and {key} is one of {', '.join(words)}; use choice"
     elif not words:
-        shown = found(own, "" if own is None else str(own))
-        yield f"{key} is no number but {shown}"
+        what = "a section" if isinstance(own, Component) else found(own, str(own or "null"))
+        yield f"{key} is no number but {what}"
 
 
 def _tried(name: str, quantity: Quantity, laws: Mapping[str, Scenario]) -> Iterator[str]:

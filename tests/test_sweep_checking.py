@@ -1,0 +1,278 @@
+"""The key `sweep`: mistakes are told at their place, cells are made, invalid draws are counted."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+from command_samples import Command
+
+from podusv_cli.core.errors import ScenarioError
+from podusv_cli.scenario.distributions import Distribution
+from podusv_cli.scenario.explain import explain
+from podusv_cli.scenario.load import Loaded, load_text, resolved_yaml
+from podusv_cli.scenario.sweep import Quantity
+from podusv_cli.scenario.yaml_tree import DISTRIBUTIONS, QUANTITY
+from podusv_cli.study.cells import MOST, cells
+from podusv_cli.study.check import singles, sweep_faults
+from podusv_cli.study.draws import DrawError, drawn, draws
+from podusv_cli.study.invalid import _has_ranges_only, invalid_draws
+
+BASE = """\
+vessel: {preset: paper_nonlinear}
+path: {kind: line_circle}
+disturbance: {kind: harmonic}
+actuator: {kind: saturated, surge_limit: 8.0, yaw_limit: 2.5}
+controller: {kind: adaptive_neural}
+controllers: {soft: {}, pid: {kind: pid}}
+sweep:
+"""
+
+
+def swept(text: str, overrides: Sequence[str] = ()) -> Loaded:
+    return load_text(BASE + text, "a.yaml", overrides, [sweep_faults])
+
+
+def told(text: str, overrides: Sequence[str] = ()) -> list[str]:
+    """What is wrong with a sweep, a line each; its first line is line 8."""
+    try:
+        cells(swept(text, overrides), sweep_faults)
+    except ScenarioError as error:
+        return str(error).splitlines()
+    return []
+
+
+def vary(text: str) -> str:
+    return f"  vary: {{{text}}}\n"
+
+
+# What is written under `vary`, with @ where the fault is, and what is said.
+IN_VARY = [
+    ("vessel.mm: @{angle: all}", "unknown key 'vessel.mm'; did you mean 'vessel.m'?"),
+    ("vesel.m: @{angle: all}", "unknown key 'vesel.m'; did you mean 'vessel.m'?"),
+    ("vessel: @{angle: all}", "vessel is no number but a section"),
+    ("path.points: @{angle: all}", "unknown key 'path.points'"),
+    ("vessel.source: @{choice: [me]}", "vessel.source is no number but \"The paper's"),
+    ("vessel.preset: @{choice: [paper]}", "cannot change vessel.preset; list its values under"),
+    ("disturbance.kind: @{choice: [none]}", "cannot change disturbance.kind"),
+    ("simulation.step: @{uniform: [0.01, 0.02]}", "simulation is the same for all runs of a cell"),
+    ("controllers.pid.K_Pu: @{angle: all}", "controllers is the same for all runs of a cell"),
+    ("actuator: @{angle: all}", "actuator is no number but a section"),
+    ("controller.network: @{angle: all}", "is no key of pid; name the laws that have it, soft, in"),
+    ("path.reading: @{times: {uniform: [1, 2]}}", "times needs a number, and path.reading is one"),
+    ("path.reading: @{uniform: [1, 2]}", "uniform needs a number"),
+    ("path.reading: @{choice: [velocity, fast]}", "path.reading = fast; must be literal,"),
+    ("vessel.m: @{choice: [20, heavy]}", "vessel.m = heavy; must be a number above 0 [kg]"),
+    ("vessel.m: @{uniform: [-3, -2]}", "must be a number above 0 [kg]"),
+    ("vessel.m: @{times: {choice: [1, big]}}", "times: needs numbers, choice has 'big'"),
+    ("vessel.m: @{choice: []}", "choice: is empty"),
+    ("vessel.m: @{uniform: [2, 1]}", "uniform: 2 is not below 1"),
+    ("vessel.m: {uniform: @[1]}", "vessel.m.uniform: must be a list of 2 numbers"),
+    ("vessel.m: {normal: {sigma: @0}}", "sweep.vary.vessel.m.normal.sigma: must be a number above"),
+    ("vessel.m: {normal: @{sigma: 1, within: [8, 9]}}", "within: [8.0, 9.0] excludes all but"),
+    ("vessel.m: {@unifrom: [1, 2]}", "unknown key; did you mean 'uniform'?"),
+    ("vessel.m: @{}", "must have one of uniform, normal, lognormal"),
+    ("vessel.m: @{seed: true, angle: all}", "found angle and seed"),
+    ("vessel.m: @3", "must be a mapping of keys: uniform, normal"),
+    ("a: @{keys: [vessel.m, start.x], angle: all}, start.x: {angle: all}", "drawn twice, by start"),
+    ("a: @{keys: [start.x, start.x], angle: all}", "start.x is drawn twice"),
+]
+ELSEWHERE = [
+    ("laws: [soft, @pidd]", "sweep.laws[1]: unknown law 'pidd'; did you mean 'pid'?"),
+    ("laws: [pid, @pid]", "sweep.laws[1]: pid is named twice"),
+    ("draws: @0", "sweep.draws: must be a whole number not below 1"),
+    ("level: @1", "sweep.level: must be a number above 0.5 and below 1"),
+    ("level: @0.5", "sweep.level: must be a number above 0.5 and below 1"),
+    ("seed: @-1", "sweep.seed: must be a whole number not below 0"),
+    ("design: @latin", "sweep.design: must be random or sobol"),
+    ("keep: {worst: {iaee: @1}}", "keep.worst.iaee: unknown metric 'iaee'; did you mean 'iae"),
+    ("keep: {worst: {law_ns: @1}}", "keep.worst.law_ns: unknown metric"),
+    ("keep: {draws: [0, @1000]}", "sweep.keep.draws[1]: there is no draw 1000; they are 0 to 999"),
+    ("success: @finishd", "sweep.success: unknown property 'finishd'; did you mean 'finished'?"),
+    ("claims: {S1: {says: a, source: b, expect: @share(a.iae < 1) > 0}}", "unknown law 'a'"),
+    ("claims: {1S: @{says: a, source: b, expect: failures(pid) < 1}}", "a claim's name is at"),
+    ("grid: {@start.x: []}", "sweep.grid.start.x: is empty"),
+    ("grid: {@sweep.draws: [1]}", "sweep.grid.sweep.draws: cannot differ between cells"),
+    ("grid: {start.x: @1}", "sweep.grid.start.x: must be a list"),
+    ("grid: {start.x: [1, @north]}", "start.x: must be a number [m], found 'north'"),
+    ("grid: {strat.x: [@1]}", "unknown key; did you mean 'start'?"),
+    ("tune: @3", "sweep.tune: unknown key"),
+]
+
+
+def at_mark(text: str) -> tuple[str, str]:
+    """The text without @, and what a message about that place starts with."""
+    column = text.index("@") + 1
+    return text.replace("@", ""), f"a.yaml:8:{column}: "
+
+
+@pytest.mark.parametrize(("text", "words"), IN_VARY)
+def test_a_mistake_in_vary_is_told_at_its_place(text: str, words: str) -> None:
+    text, place = at_mark(vary(text))
+    (line,) = told(text)[:1]
+    assert line.startswith(f"{place}sweep.vary.")
+    assert words in line
+
+
+@pytest.mark.parametrize(("text", "words"), ELSEWHERE)
+def test_a_mistake_is_told_at_its_place(text: str, words: str) -> None:
+    text, place = at_mark(f"  {text}\n")
+    place = place if "tune" not in text and "strat" not in text else "a.yaml:8:"
+    (line,) = told(text)[:1]
+    assert line.startswith(place)
+    assert words in line
+
+
+def test_a_mistake_in_one_cell_names_the_cell() -> None:
+    (line,) = told(
+        vary("path.amplitude: {uniform: [0, 1]}") + "  grid: {path.kind: [line_circle, line]}\n"
+    )
+    assert line.endswith("unknown key 'path.amplitude' (in the cell path.kind = line)")
+
+
+def test_a_grid_has_a_limit() -> None:
+    numbers = f"[{', '.join(['1'] * 40)}]"
+    (line,) = told(f"  grid: {{start.x: {numbers}, start.y: {numbers}}}\n")
+    assert line == f"a.yaml:8:3: sweep.grid: has 1,600 combinations, at most {MOST:,} are allowed"
+
+
+def test_a_key_is_drawn_or_in_the_grid() -> None:
+    (line,) = told(vary("start.x: {angle: all}") + "  grid: {start.x: [1]}\n")
+    assert "start.x is under grid, too" in line
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "{}\n",
+        vary("vessel.m: {times: {normal: {mean: 1, sigma: 5}}}"),  # some draws can be taken
+        vary("path.reading: {choice: [velocity, sine]}"),
+        vary("controller.k_ze: {uniform: [0.1, 0.2]}"),
+        vary("controller.K_Pu: {times: {choice: [1, 2]}}") + "  laws: [pid]\n",
+        vary("nominal.m: {plus: {integers: [-1, 1]}}"),
+    ],
+)
+def test_what_is_sound_is_taken(text: str) -> None:
+    assert told("  draws: 3\n" + text if text[0] == " " else f"  {text}") == []
+
+
+@pytest.mark.parametrize(
+    ("key", "values"),
+    [
+        ("controller.rate", "{choice: [analytic, difference]}"),
+        ("controller.difference_step", "{choice: [0.01, 0.02]}"),
+        ("'controller.network.nodes[0]'", "{integers: [2, 4]}"),
+    ],
+)
+def test_what_changes_the_structure_of_the_loop_belongs_in_the_grid(key: str, values: str) -> None:
+    text = BASE.replace("{kind: adaptive_neural}", "{kind: adaptive_neural, rate: difference}")
+    text = text.replace(", rate: difference", "" if key.endswith("rate") else ", rate: difference")
+    with pytest.raises(ScenarioError, match="changes how the loop is put together or sampled"):
+        load_text(f"{text}  laws: [soft]\n{vary(f'{key}: {values}')}", "a.yaml", (), [sweep_faults])
+
+
+def test_only_who_asks_for_the_study_is_told_of_keys() -> None:
+    """`run`, `compare`, `plot` and `verify` ignore the sweep."""
+    scenario = load_text(BASE + vary("vessel.mm: {angle: all}"), "a.yaml").scenario
+    for one in (*scenario.singles().values(), scenario.alone()):
+        assert one.sweep is None
+        assert "sweep" not in resolved_yaml(one)
+
+
+def test_cells_are_all_combinations_and_count_as_if_written_in_the_file() -> None:
+    grid = "  grid: {vessel.m: [20.0, 30.0], path: [{kind: line}, {kind: circle, radius: 9.0}]}\n"
+    made = cells(swept(grid), sweep_faults)
+    assert [cell.index for cell in made] == [0, 1, 2, 3]
+    assert made[3].label == 'vessel.m = 30.0, path = {"kind": "circle", "radius": 9.0}'
+    assert dict(made[3].values) == {"vessel.m": 30.0, "path": {"kind": "circle", "radius": 9.0}}
+    found = [(cell.scenario.vessel.m, cell.scenario.path.kind) for cell in made]
+    assert found == [(20.0, "line"), (20.0, "circle"), (30.0, "line"), (30.0, "circle")]
+    assert made[2].scenario.nominal.m == 30.0  # as if it stood in the file
+    laws = "  grid: {controller.k_ze: [0.3], controllers.pid.K_Iu: [0.0]}\n"
+    (one,) = cells(swept(laws))
+    assert [law.k_ze for law in one.scenario.controllers.values()] == [0.3, 0.3]
+    assert one.scenario.singles()["pid"].controller.K_Iu == 0.0
+    assert [cell.label for cell in cells(swept("  {}\n"))] == [""]
+
+
+def test_a_layer_above_replaces_distributions_and_takes_out_quantities() -> None:
+    below = vary(
+        "vessel.m: {times: {uniform: [1, 2]}}, start.x: {angle: all}, start.y: {seed: true}"
+    )
+    layers = ["sweep.vary.vessel.m.times.normal={sigma: 0.1}", "sweep.vary.start.x=null",
+              "sweep.vary={start.y: {uniform: [0, 1]}}", "sweep.draws=7",
+              "sweep.grid.disturbance.scale=[0.5, 2]"]  # fmt: skip
+    sweep = swept(below, layers).scenario.sweep
+    assert sweep is not None
+    assert list(sweep.vary) == ["vessel.m", "start.y"]
+    assert sweep.vary["vessel.m"].times == Distribution.model_validate({"normal": {"sigma": 0.1}})
+    assert sweep.vary["start.y"] == Quantity(uniform=(0.0, 1.0))
+    assert (sweep.draws, sweep.grid) == (7, {"disturbance.scale": (0.5, 2)})
+    assert swept(below, ["sweep=null"]).scenario.sweep is None
+
+
+def test_the_loader_knows_all_ways_to_draw() -> None:
+    assert {*Quantity.model_fields} == QUANTITY
+    assert QUANTITY - {"keys"} == DISTRIBUTIONS
+
+
+INVALID = [
+    vary("vessel.m: {times: {normal: {mean: 1, sigma: 1}}}, start.x: {angle: all}"),
+    vary("vessel.x_g: {plus: {normal: {sigma: 0.5}}}"),  # the mass matrix, no range
+    vary("disturbance.b_u.sin_rate: {plus: {normal: {sigma: 0.2}}}, vessel.m: {choice: [1, 2.5]}"),
+    vary("disturbance.b_r.sin_phase: {normal: {sigma: 1e6}}"),
+    vary("d: {keys: [vessel.X_u, vessel.N_r, actuator.surge_limit], plus: {normal: {sigma: 3}}}"),
+    vary("controller.k_psie: {normal: {mean: 1e-3, sigma: 0.01}}"),
+    vary("start.x: {uniform: [-1, 1]}"),
+]
+
+
+@pytest.mark.parametrize("text", INVALID)
+def test_all_draws_that_a_run_could_not_take_are_counted(text: str) -> None:
+    loaded = swept("  draws: 60\n" + text)
+    sweep = loaded.scenario.sweep
+    assert sweep is not None
+    laws = list(singles(loaded.scenario).values())
+    reasons: dict[int, str] = {}
+    for i, draw in enumerate(draws(sweep, 0, 60)):
+        for one in laws:
+            try:
+                drawn(one, sweep.vary, draw)
+            except DrawError as error:
+                reasons.setdefault(i, str(error))
+    found = invalid_draws(laws, sweep)
+    assert found.count == len(reasons)
+    assert (0 < found.count < 60) == (text != INVALID[-1])
+    if reasons:
+        first = min(reasons)
+        assert (found.first, found.reason) == (first, reasons[first])
+
+
+def test_sections_with_checks_of_their_own_are_known() -> None:
+    scenario = swept("  {}\n").scenario
+    parts = ("start", "disturbance", "vessel", "controller")
+    found = {part: _has_ranges_only(type(getattr(scenario, part))) for part in parts}
+    assert found == {"start": True, "disturbance": True, "vessel": False, "controller": False}
+
+
+def test_validate_tells_the_size_of_the_study(podusv: Command, tmp_path: Path) -> None:
+    file = tmp_path / "a.yaml"
+    grid = "  draws: 1500\n  grid: {disturbance.scale: [0.5, 1, 2]}\n"
+    file.write_text(BASE + grid + vary("vessel.m: {times: {normal: {mean: 1, sigma: 1}}}"))
+    done = podusv("validate", str(file))
+    assert done.code == 0
+    assert "the study has 9,000 runs: 2 laws in 3 cells, 1,500 draws each\n" in done.out
+    share = r"\d+ of the 1,500 draws are invalid \(1\d\.\d\d%\); draw \d+: sweep.vary.vessel.m: "
+    assert re.search(share + r"vessel.m = -\d.*; must be a number above 0 \[kg\]", done.out)
+    file.write_text(BASE + vary("vessel.mm: {angle: all}"))
+    assert podusv("validate", str(file)).code == 2
+
+
+def test_explain_and_the_messages_name_what_a_quantity_may_be() -> None:
+    rows = {row.key: row for row in explain("sweep.vary")}
+    assert rows["sweep.vary"].meaning.startswith("what is drawn, by key")
+    assert rows["sweep.vary.NAME.uniform"].meaning.startswith("[low, high]")
+    (row,) = explain("sweep.level")
+    assert (row.range, row.default) == ("> 0.5, < 1", "0.95")
