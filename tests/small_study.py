@@ -32,7 +32,7 @@ sweep:
 def small(**changes):
     """The plan of the study, with changes such as draws=20 below `sweep`."""
     sets = [f"sweep.{name}={value}" for name, value in changes.items()]
-    return plan(load_text(TEXT, "small.yaml", sets).scenario)
+    return plan(load_text(TEXT, "small.yaml", sets))
 
 
 def made(folder: Path, workers=1, part=(1, 1), **changes):

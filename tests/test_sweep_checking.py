@@ -12,7 +12,7 @@ from command_samples import Command
 from podusv_cli.core.errors import ScenarioError
 from podusv_cli.scenario.distributions import Distribution
 from podusv_cli.scenario.explain import explain
-from podusv_cli.scenario.load import Loaded, load_text, resolved_yaml
+from podusv_cli.scenario.load import Loaded, load, load_text, resolved_yaml, tree_yaml
 from podusv_cli.scenario.sweep import Quantity
 from podusv_cli.scenario.yaml_tree import DISTRIBUTIONS, QUANTITY
 from podusv_cli.study.cells import MOST, cells
@@ -20,6 +20,7 @@ from podusv_cli.study.check import singles, sweep_faults
 from podusv_cli.study.draws import DrawError, drawn, draws
 from podusv_cli.study.invalid import _has_ranges_only, invalid_draws
 
+ROOT = Path(__file__).parents[1]
 BASE = """\
 vessel: {preset: paper_nonlinear}
 path: {kind: line_circle}
@@ -195,6 +196,22 @@ def test_cells_are_all_combinations_and_count_as_if_written_in_the_file() -> Non
     assert [law.k_ze for law in one.scenario.controllers.values()] == [0.3, 0.3]
     assert one.scenario.singles()["pid"].controller.K_Iu == 0.0
     assert [cell.label for cell in cells(swept("  {}\n"))] == [""]
+
+
+def test_a_scenario_written_as_one_file_changes_like_the_given_one(tmp_path: Path) -> None:
+    """Its cells are the same: what is filled in is not written, what is read from files is."""
+    (tmp_path / "track.csv").write_text("x,y\n0,0\n9,3\n")
+    path = "path: {kind: waypoints, file: track.csv}\n"
+    grid = "vessel.m: [20.0], controller.k_ze: [0.3], vessel.preset: [paper, cybership2]"
+    text = BASE.replace("path: {kind: line_circle}\n", path)
+    (tmp_path / "a.yaml").write_text(f"{text}  grid: {{{grid}}}\n")
+    given = load(tmp_path / "a.yaml", ["controllers.soft.k_psie=0.2", "path.speed=0.4"])
+    kept = load_text(tree_yaml(given), "elsewhere/scenario.yaml")
+    assert kept.scenario == given.scenario
+    assert [cell.scenario for cell in cells(kept)] == [cell.scenario for cell in cells(given)]
+    for file in ("paper/corrected_compare", "pod/kept", "own_vessel"):
+        given = load(ROOT / "configs" / f"{file}.yaml")
+        assert load_text(tree_yaml(given), "scenario.yaml").scenario == given.scenario
 
 
 def test_a_layer_above_replaces_distributions_and_takes_out_quantities() -> None:

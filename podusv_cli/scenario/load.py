@@ -18,9 +18,19 @@ from podusv_cli.scenario.layers import composed
 from podusv_cli.scenario.messages import Check, check
 from podusv_cli.scenario.model import Scenario, scenario_class
 from podusv_cli.scenario.phrases import found
-from podusv_cli.scenario.presets import complete, has_choice
+from podusv_cli.scenario.presets import complete, has_choice, with_rows
 from podusv_cli.scenario.yaml_text import MAX_NODES, read, read_text, resolve
-from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, Route, dotted, find, merge, printable
+from podusv_cli.scenario.yaml_tree import (
+    Fault,
+    Mark,
+    Node,
+    Route,
+    dotted,
+    find,
+    merge,
+    plain,
+    printable,
+)
 
 REFERENCES: tuple[Route, ...] = (("extends",), ("path", "file"))  # to other files
 # Values; several times those of one file, since a scenario may extend files with long lists.
@@ -172,6 +182,16 @@ def _leaves(data: dict[str, Any], above: Route) -> Iterator[tuple[Route, Any]]:
 def resolved_yaml(scenario: Scenario) -> str:
     """The scenario as a file with every value in it; loading it gives an equal scenario."""
     return HEADING + yaml_text(_data(scenario))
+
+
+def tree_yaml(loaded: Loaded) -> str:
+    """The scenario as one file that can be changed like the given one.
+
+    It has what that extends and what was set, and nothing that is filled in: `nominal` follows the
+    vessel, and the laws follow `controller`, as before.
+    """
+    root = with_rows(loaded.root, keys_of(type(loaded.scenario)), [])
+    return yaml_text({"name": loaded.scenario.name} | plain(root))
 
 
 def yaml_text(data: Mapping[str, Any]) -> str:

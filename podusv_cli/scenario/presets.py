@@ -84,17 +84,29 @@ def complete(root: Node, top: Key, faults: list[Fault]) -> Node:
 
 def _sections(root: Node, top: Key, faults: list[Fault]) -> Node:
     """Sections with kinds, completed from presets and CSV files."""
-    for name, key in top.keys.items():
-        given = root.mapping.get(name)
-        kind = key.kinds.get(str(given.get("kind"))) if given else None
-        if given and kind and given.mapping:
-            if kind.model.presets:
-                presets, plugins = kind.model.presets, top.scenario.plugged
-                given = _over_preset(given, name, presets, plugins, faults)
-            for file, rows in kind.model.rows_of.items():
-                given = _rows_in(given, name, (file, rows), faults)
-            root = root.with_entry(name, given)
+    for name, given, model in _of_kinds(root, top):
+        if model.presets:
+            filled = _over_preset(given, name, model.presets, top.scenario.plugged, faults)
+            root = root.with_entry(name, filled)
+    return with_rows(root, top, faults)
+
+
+def with_rows(root: Node, top: Key, faults: list[Fault]) -> Node:
+    """The tree with the rows of CSV files in place of the files' names."""
+    for name, given, model in _of_kinds(root, top):
+        for keys in model.rows_of.items():
+            given = _rows_in(given, name, keys, faults)
+        root = root.with_entry(name, given)
     return root
+
+
+def _of_kinds(root: Node, top: Key) -> list[tuple[str, Node, type[Component]]]:
+    """Name, content and class of every section that is given with a kind."""
+    given = (
+        (name, root.mapping[name], key) for name, key in top.keys.items() if name in root.mapping
+    )
+    found = ((name, node, key.kinds.get(str(node.get("kind")))) for name, node, key in given)
+    return [(name, node, key.model) for name, node, key in found if key and node.mapping]
 
 
 def _without_removed(root: Node) -> Node:

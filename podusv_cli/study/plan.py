@@ -16,10 +16,11 @@ from podusv_cli.engine import closed_loop
 from podusv_cli.engine.object_cache import ingredients
 from podusv_cli.engine.simulate import entries
 from podusv_cli.metrics.table import Metrics, metrics_with, observer
-from podusv_cli.scenario.load import values
+from podusv_cli.scenario.load import Loaded, values
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sweep import Sweep
 from podusv_cli.study.cells import Cell, cells
+from podusv_cli.study.check import sweep_faults
 
 # Sections of a scenario that change no number of a study.
 COSMETIC = ("name", "description", "log", "silence", "claims", "controllers", "sweep")
@@ -74,9 +75,9 @@ class Plan:
         return told
 
 
-def plan(scenario: Scenario) -> Plan:
-    """The plan of a scenario with a key `sweep`. Raises UsageError, ScenarioError."""
-    return Plan(scenario, tuple(cells(scenario)))
+def plan(loaded: Loaded) -> Plan:
+    """The plan of a scenario with a key `sweep`. Raises ScenarioError with all that is wrong."""
+    return Plan(loaded.scenario, cells(loaded, sweep_faults))
 
 
 def kernels(scenario: Scenario) -> str:

@@ -12,11 +12,12 @@ from typing import Any
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.scenario.limits import limits
-from podusv_cli.scenario.load import Loaded, load, yaml_text
+from podusv_cli.scenario.load import Loaded, load, tree_yaml, yaml_text
 from podusv_cli.scenario.phrases import unknown
 from podusv_cli.storage import files, manifest, provenance
 from podusv_cli.storage.json_files import encode
 from podusv_cli.study import outputs
+from podusv_cli.study.check import sweep_faults
 from podusv_cli.study.draws import drawn, draws
 from podusv_cli.study.march import Part, Tally, Tell, march
 from podusv_cli.study.plan import plan
@@ -95,15 +96,14 @@ def _opened(config: Path, request: Request, started: datetime) -> Store:
     given = config.is_dir()
     loaded = _loaded(config / SCENARIO if given else config, request)
     folder = request.out or (config if given else RESULTS / f"{loaded.scenario.name}-sweep")
-    store = Store(folder, plan(loaded.scenario))
+    store = Store(folder, plan(loaded))
     store.open(started.isoformat(timespec="seconds"))
-    whole = yaml_text(loaded.scenario.model_dump())
-    files.write_bytes(store.folder / SCENARIO, whole.encode())
+    files.write_bytes(store.folder / SCENARIO, tree_yaml(loaded).encode())
     return store
 
 
 def _loaded(config: Path, request: Request) -> Loaded:
-    checks = (unknown_codes, limits(allow_large=True))
+    checks = (unknown_codes, limits(allow_large=True), sweep_faults)
     loaded = load(config, request.overrides, checks, request.plugins)
     if loaded.scenario.sweep is None:
         raise UsageError(
@@ -127,7 +127,7 @@ def stored(study: Path) -> Store:
     """The store of a study's folder. Raises UsageError where it is none."""
     if not (study / SCENARIO).is_file():
         raise UsageError(f"{study} is no study: it has no {SCENARIO}")
-    return Store(study, plan(load(study / SCENARIO).scenario))
+    return Store(study, plan(load(study / SCENARIO)))
 
 
 def status(study: Path) -> Made:
