@@ -9,8 +9,8 @@ from drawn_samples import recording, shown
 from html_tree import tree
 
 from podusv_cli.comparison import chase, report, settings, table
-from podusv_cli.comparison.report import Picture
 from podusv_cli.core.finding import Finding
+from podusv_cli.pages.page import Picture
 
 MOVING = chase.chase(shown(("a", recording())))
 ERRORS = Picture("errors", "x_e & y_e, over <time>", b"<svg/>", "the paper's figure 4")

@@ -16,6 +16,7 @@ from test_comparison_page import page
 from podusv_cli.cli import progress, terminal
 from podusv_cli.comparison import claims, report, table
 from podusv_cli.core import escaping
+from podusv_cli.pages.page import environment
 from podusv_cli.storage import json_files
 
 TURNED, COLOUR = "\u202e", "\x1b[31m"  # letters from right to left from here on; red from here on
@@ -69,7 +70,8 @@ def test_a_cell_is_no_formula(sign):
 
 
 def test_html_is_text():
-    shown = report.environment().from_string("<p a='{{ text }}'>{{ text }}</p>")
+    made = environment("podusv_cli.comparison")
+    shown = made.from_string("<p a='{{ text }}'>{{ text }}</p>")
     text = f"<b a='\"'>&\n{COLOUR}"
     (element,) = tree(shown.render(text=text)).all()
     assert (element.tag, element.raw) == ("p", "<b a='\"'>&\n\\x1b[31m")

@@ -2,20 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+from podusv_cli.pages.page import flat, value_text
+
 PROSE = (".source", ".validity")
-IGNORED = ("name", "description", "controller", "controllers", "claims", "silence")
-
-
-def flat(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Dotted keys and values of a nested mapping."""
-    for key, value in tree.items():
-        if isinstance(value, Mapping):
-            yield from flat(value, f"{prefix}{key}.")
-        else:
-            yield f"{prefix}{key}", value
+IGNORED = ("name", "description", "controller", "controllers", "claims", "silence", "sweep")
 
 
 def differences(
@@ -48,16 +41,6 @@ def as_text(found: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, str]]
         for key, values in found.items()
         if not _follows_from_kind(key, values, found)
     }
-
-
-def value_text(value: Any) -> str:
-    """A value of a scenario as text, with all digits; a dash for None."""
-    if isinstance(value, (list, tuple)):
-        return " ".join(map(value_text, value))
-    if value is None:
-        return "-"
-    text = f"{value:g}" if isinstance(value, float) else str(value)
-    return text if not isinstance(value, float) or float(text) == value else repr(value)
 
 
 def _section(key: str) -> str:

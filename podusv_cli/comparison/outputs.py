@@ -15,6 +15,7 @@ from podusv_cli.core.finding import Finding
 from podusv_cli.findings.finding import merged
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import CLOCKED, METRICS
+from podusv_cli.pages.page import Picture
 from podusv_cli.process.extras import Extras, Missing
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage import json_files
@@ -121,14 +122,14 @@ def as_report(
     missing: Iterable[object] = (),
 ) -> str:  # fmt: skip
     """The HTML report; `figures` as `drawn` gives them."""
-    pictures: list[report.Picture] = []
+    pictures: list[Picture] = []
     moving: dict[str, Any] = {}
     if figures:
         # matplotlib is slow to import
         from podusv_cli.figures.drawing import dressed, figures_of
 
         pictures = [
-            report.Picture(name, sheet.caption, figures[f"{name}.{IN_REPORT}"], sheet.source)
+            Picture(name, sheet.caption, figures[f"{name}.{IN_REPORT}"], sheet.source)
             for name, sheet in figures_of(result.scenarios.values()).items()
             if f"{name}.{IN_REPORT}" in figures
         ]

@@ -2,52 +2,27 @@
 
 from __future__ import annotations
 
-import base64
 import inspect
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any
 
 import pandas as pd
 
 from podusv_cli.comparison import chase, settings, stability
 from podusv_cli.comparison.claims import ANSWERS, Verdict
-from podusv_cli.comparison.differences import as_text, flat, value_text
+from podusv_cli.comparison.differences import as_text
 from podusv_cli.comparison.table import cells, leaders
 from podusv_cli.core.component import Component
-from podusv_cli.core.escaping import lines
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.findings.finding import finding_kinds
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import METRICS
+from podusv_cli.pages.page import Picture, environment, flat, value_text
 from podusv_cli.scenario.model import Scenario
 
-if TYPE_CHECKING:
-    from jinja2 import Environment
-
-POWERS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 BESIDE = 2  # figures beside the answer: trajectory and errors
-
-
-class Picture(NamedTuple):
-    """A figure of the report: what it shows, where one of its kind was published, and its SVG."""
-
-    name: str
-    caption: str
-    svg: bytes
-    source: str = ""
-
-    @property
-    def data(self) -> str:
-        """The picture as an address; inline markup of several figures would share its names."""
-        return f"data:image/svg+xml;base64,{base64.b64encode(self.svg).decode()}"
-
-    @property
-    def title(self) -> str:
-        """What it shows, in a few words."""
-        return self.caption.partition(";")[0].partition(":")[0].partition(",")[0]
 
 
 @dataclass(frozen=True)
@@ -76,7 +51,7 @@ def page(story: Story) -> str:
 
     figures = [*enumerate(story.figures, 1)]
     best = leaders(story.table, story.metrics)
-    return environment().get_template("report.html.j2").render(
+    return environment("podusv_cli.comparison").get_template("report.html.j2").render(
         story=story,
         scenario=story.scenario,
         bad={label: ending for label, ending in story.endings.items() if ending},
@@ -96,35 +71,6 @@ def page(story: Story) -> str:
         provenance=[(key, value_text(value)) for key, value in flat(story.provenance)],
         chase_json=Markup(chase.as_json(dict(story.chase))),
     )  # fmt: skip
-
-
-def environment() -> Environment:
-    """The templates; whatever they show is text, in which every letter shows."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined  # slow to import
-
-    made = Environment(
-        loader=PackageLoader("podusv_cli.comparison"), autoescape=True, finalize=_shown,
-        undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
-    )  # fmt: skip
-    made.filters |= {"sentence": _sentence, "raised": _raised}
-    return made
-
-
-def _shown(value: Any) -> Any:
-    """What a template shows in place of a value; markup of the template itself as it is."""
-    return value if hasattr(value, "__html__") else lines(value)
-
-
-def _sentence(text: str) -> str:
-    """The text with a capital and a full stop; a symbol at the start stays as it is."""
-    first = text.partition(" ")[0].rstrip(",;:")
-    start = text[:1].upper() if first.isalpha() and first.islower() else text[:1]
-    return f"{start}{text[1:]}{'' if text.endswith('.') else '.'}"
-
-
-def _raised(unit: str) -> str:
-    """The unit with its powers raised."""
-    return re.sub(r"(?<=[A-Za-z])\d", lambda power: power[0].translate(POWERS), unit)
 
 
 def _answers(verdicts: Sequence[Verdict]) -> dict[str, list[tuple[int, Verdict]]]:

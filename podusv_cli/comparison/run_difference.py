@@ -7,10 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from podusv_cli.comparison.differences import differences, flat
+from podusv_cli.comparison.differences import differences
 from podusv_cli.comparison.log_difference import LogDifference, compare
 from podusv_cli.core.errors import StorageError
 from podusv_cli.metrics.table import CLOCKED, METRICS
+from podusv_cli.pages.page import flat
 from podusv_cli.scenario.yaml_text import read
 from podusv_cli.scenario.yaml_tree import Fault, plain
 from podusv_cli.storage import log_reader, manifest

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
-from podusv_cli.comparison.differences import PROSE, value_text
+from podusv_cli.comparison.differences import PROSE
 from podusv_cli.core.component import Component, unit_of
+from podusv_cli.pages.page import value_text
 from podusv_cli.scenario.explain import summary
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.presets import preset_file, preset_names

@@ -1,0 +1,88 @@
+"""Templates of HTML reports, pictures in them, and values as they show them."""
+
+from __future__ import annotations
+
+import base64
+import re
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from podusv_cli.core.escaping import lines
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+POWERS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+class Picture(NamedTuple):
+    """A figure of a report: what it shows, where one of its kind was published, and its SVG."""
+
+    name: str
+    caption: str
+    svg: bytes
+    source: str = ""
+
+    @property
+    def data(self) -> str:
+        """The picture as an address; inline markup of several figures would share its names."""
+        return f"data:image/svg+xml;base64,{base64.b64encode(self.svg).decode()}"
+
+    @property
+    def title(self) -> str:
+        """What it shows, in a few words."""
+        return self.caption.partition(";")[0].partition(":")[0].partition(",")[0]
+
+
+def environment(package: str) -> Environment:
+    """A package's templates and the shared ones; what they show is text, escaped as such."""
+    from jinja2 import (  # slow to import
+        ChoiceLoader,
+        Environment,
+        PackageLoader,
+        StrictUndefined,
+    )
+
+    loader = ChoiceLoader([PackageLoader(package), PackageLoader("podusv_cli.pages")])
+    made = Environment(
+        loader=loader, autoescape=True, finalize=_shown, undefined=StrictUndefined,
+        trim_blocks=True, lstrip_blocks=True,
+    )  # fmt: skip
+    made.filters |= {"sentence": _sentence, "raised": _raised}
+    return made
+
+
+def _shown(value: Any) -> Any:
+    """What a template shows in place of a value; markup of the template itself as it is."""
+    return value if hasattr(value, "__html__") else lines(value)
+
+
+def _sentence(text: str) -> str:
+    """The text with a capital and a full stop; a symbol at the start stays as it is."""
+    first = text.partition(" ")[0].rstrip(",;:")
+    start = text[:1].upper() if first.isalpha() and first.islower() else text[:1]
+    return f"{start}{text[1:]}{'' if text.endswith('.') else '.'}"
+
+
+def _raised(unit: str) -> str:
+    """The unit with its powers raised."""
+    return re.sub(r"(?<=[A-Za-z])\d", lambda power: power[0].translate(POWERS), unit)
+
+
+def flat(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Dotted keys and values of a nested mapping."""
+    for key, value in tree.items():
+        if isinstance(value, Mapping):
+            yield from flat(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value
+
+
+def value_text(value: Any) -> str:
+    """A value of a scenario as text, with all digits; a dash for None."""
+    if isinstance(value, (list, tuple)):
+        return " ".join(map(value_text, value))
+    if value is None:
+        return "-"
+    text = f"{value:g}" if isinstance(value, float) else str(value)
+    return text if not isinstance(value, float) or float(text) == value else repr(value)
