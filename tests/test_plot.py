@@ -16,6 +16,7 @@ from podusv_cli.figures.drawing import FIGURES
 from podusv_cli.scenario.load import resolved_yaml
 from podusv_cli.storage import run_folder
 from podusv_cli.workflows import plot as plotting
+from podusv_cli.workflows.run import Request
 
 LAWLESS = ("W_hat_u", "W_hat_r", "b_hat_u", "b_hat_r", "f_hat_u", "f_hat_r", "rbf_center")
 
@@ -66,7 +67,9 @@ def stillborn(place):
 
 
 def plot(*runs, out, figures=("velocities",), formats=("svg",), animate=False):
-    return plotting.plot(runs, plotting.Drawing(figures, formats, 1, animate, out))
+    return plotting.plot(
+        runs, Request(out=out, names=figures, formats=formats), columns=1, animated=animate
+    )
 
 
 def words(path):

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from podusv_cli.cli.completion import figures
 from podusv_cli.cli.options import Plugins
 from podusv_cli.cli.terminal import echo, echo_path, warn_of_differences
-
-if TYPE_CHECKING:
-    from podusv_cli.workflows.plot import Drawn
 
 SOME_FAILED = 3
 
@@ -38,17 +35,13 @@ def plot(
     Prints every file that it wrote. Files that belong to a finished run are never replaced.
     """
     from podusv_cli.workflows import plot as workflow  # heavy imports only when needed
+    from podusv_cli.workflows.run import Request
 
-    formats = tuple(name.strip() for name in form.split(","))
-    drawing = workflow.Drawing(tuple(figure or ()), formats, columns, animate, out)
-    drawn = workflow.plot([Path(run) for run in runs], drawing, plugin or ())
+    formats = [name.strip() for name in form.split(",")]
+    request = Request(out=out, plugins=plugin or (), names=figure or (), formats=formats)
+    drawn = workflow.plot([Path(run) for run in runs], request, columns=columns, animated=animate)
     for path in drawn.files:
         echo_path(path)
-    _warn(drawn)
-    raise typer.Exit(SOME_FAILED if drawn.missing else 0)
-
-
-def _warn(drawn: Drawn) -> None:
     for part in drawn.missing:
         echo(str(part), err=True)
     for path in drawn.replaced:
@@ -56,3 +49,4 @@ def _warn(drawn: Drawn) -> None:
     for label, ending in drawn.empty.items():
         echo(f"{label}: nothing to draw: {ending}", err=True)
     warn_of_differences(drawn.differences)
+    raise typer.Exit(SOME_FAILED if drawn.missing else 0)

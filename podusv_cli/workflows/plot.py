@@ -21,19 +21,9 @@ from podusv_cli.figures.style import Shown
 from podusv_cli.process.extras import Extras, Missing
 from podusv_cli.storage import files, manifest
 from podusv_cli.workflows.members import Member, from_folder
+from podusv_cli.workflows.run import Request
 
 STAMP = re.compile(r"\d{8}T\d{6}Z-[0-9a-f]{8}(-\d+)?")  # a run folder that nobody named
-
-
-@dataclass(frozen=True)
-class Drawing:
-    """Which figures to draw, in which formats, into which folder."""
-
-    figures: Sequence[str]
-    formats: Sequence[str]
-    columns: int
-    animate: bool
-    out: Path
 
 
 @dataclass(frozen=True)
@@ -47,31 +37,34 @@ class Drawn:
     differences: Mapping[str, Mapping[str, Any]]  # between the runs, besides the controller
 
 
-def plot(runs: Sequence[Path], drawing: Drawing, plugins: Sequence[str] = ()) -> Drawn:
+def plot(
+    runs: Sequence[Path], request: Request, *, columns: int = 2, animated: bool = False
+) -> Drawn:
     """Draw finished runs, overlaid; files of the same names in the folder are replaced.
 
     Raises UsageError for an unknown figure or format, for a figure that the runs lack the signals
     of, and for a file that belongs to a finished folder; StorageError.
     """
+    out, plugins = request.out or Path(), request.plugins
     members = _labelled(member for path in runs for member in from_folder(path, files=plugins))
     known = figures_of(member.scenario for member in members)
-    check_names(drawing.figures, drawing.formats, known)
+    check_names(request.names, request.formats, known)
     shown = dressed([(m.label, m.run.recording, m.scenario) for m in members if m.run])
     empty = _empty(members, shown)
-    names = _chosen(drawing.figures, known, shown)
-    planned = [f"{name}.{form}" for name in names for form in drawing.formats]
-    planned += [FILE] * drawing.animate
-    _check_not_finished(drawing.out, planned)
-    files.check_places(drawing.out / name for name in planned)
+    names = _chosen(request.names, known, shown)
+    planned = [f"{name}.{form}" for name in names for form in request.formats]
+    planned += [FILE] * animated
+    _check_not_finished(out, planned)
+    files.check_places(out / name for name in planned)
     extras = Extras()
-    drawn = draw_in_parallel(shown, names, drawing.formats, extras, drawing.columns)
-    if drawing.animate:
+    drawn = draw_in_parallel(shown, names, request.formats, extras, columns)
+    if animated:
         drawn |= extras.attempt(FILE, lambda: {FILE: animate(shown)}) or {}
     if extras.interrupted:
         raise KeyboardInterrupt("interrupted; no figure was written")
-    replaced = _put(drawing.out, drawn)
+    replaced = _put(out, drawn)
     differing = differences({m.label: m.scenario.model_dump() for m in members})
-    return Drawn([drawing.out / n for n in drawn], replaced, empty, extras.missing, differing)
+    return Drawn([out / n for n in drawn], replaced, empty, extras.missing, differing)
 
 
 def _labelled(members: Iterable[Member]) -> list[Member]:
