@@ -15,7 +15,7 @@ from scenario_samples import SOUND, write
 import podusv_cli
 from podusv_cli import cli
 from podusv_cli.cli.exit_codes import PLEASE_REPORT, with_exit_codes
-from podusv_cli.core.errors import ScenarioError, ScenarioFault, StorageError
+from podusv_cli.core.errors import ScenarioError, StorageError
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.presets import preset_text, with_presets
 
@@ -191,12 +191,7 @@ def outcome(error: BaseException) -> object:
 
 
 def test_a_foreseen_failure_is_its_message_and_exit_code(capsys):
-    assert (
-        outcome(
-            ScenarioError([ScenarioFault("a.yaml:1:1", "m", "bad"), ScenarioFault("", "", "worse")])
-        )
-        == 2
-    )
+    assert outcome(ScenarioError(["a.yaml:1:1: m: bad", "worse"])) == 2
     assert outcome(StorageError("results: disk full")) == 5
     assert outcome(OSError(28, "No space left on device", "results/log.h5")) == 5
     out, err = capsys.readouterr()

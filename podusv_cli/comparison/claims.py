@@ -10,7 +10,7 @@ from typing import Literal, Self
 
 from podusv_cli.comparison.curves import Source
 from podusv_cli.comparison.expressions import Evaluation, parse, with_labels
-from podusv_cli.core.errors import ScenarioError, ScenarioFault
+from podusv_cli.core.errors import ScenarioError
 from podusv_cli.core.escaping import markdown, markdown_cell, markdown_code
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import CLOCKED, METRICS, metrics_with
@@ -101,7 +101,7 @@ def parse_claims(loaded: Loaded) -> list[ParsedClaim]:
                 if text or field == "expect":
                     trees[field] = parse(text, scenario.labels(), signals, metrics)
             except ExpressionError as error:
-                faults.append(ScenarioFault(loaded.origins[key], key, str(error)))
+                faults.append(f"{loaded.origins[key]}: {key}: {error}")
         if "expect" in trees:
             claims.append(ParsedClaim(name, claim, **trees))
     if faults:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import traceback
-from dataclasses import dataclass
+from collections.abc import Hashable, Sequence
 from pathlib import Path
 
 from podusv_cli.core.escaping import visible
@@ -19,32 +19,19 @@ class PodusvError(Exception):
         return [str(self)]
 
 
-@dataclass(frozen=True)
-class ScenarioFault:
-    """One fault of a scenario: where it stands, which key, what is wrong, what would be right."""
-
-    where: str  # "configs/a.yaml:12:5", "--set vessel.m=0", or a data file
-    key: str  # dotted path of the key, "" for the file as a whole
-    text: str
-
-    def __str__(self) -> str:
-        """One line: place, key, text."""
-        return ": ".join(part for part in (self.where, self.key, self.text) if part)
-
-
 class ScenarioError(PodusvError):
-    """A scenario that cannot be run; carries every finding at once."""
+    """A scenario that cannot be run; carries every fault at once."""
 
     exit_code = 2
 
-    def __init__(self, findings: list[ScenarioFault]) -> None:
-        """Take the findings; the message has one line each."""
-        self.findings = findings
+    def __init__(self, faults: Sequence[Hashable]) -> None:
+        """Take the faults; the text of each says place, key and what is wrong."""
+        self.faults = faults
         super().__init__("\n".join(self.lines()))
 
     def lines(self) -> list[str]:
-        """A line a finding."""
-        return [str(finding) for finding in self.findings]
+        """A line a fault."""
+        return [str(fault) for fault in self.faults]
 
 
 class UsageError(PodusvError):

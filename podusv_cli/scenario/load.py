@@ -10,7 +10,7 @@ from typing import Any
 
 import yaml
 
-from podusv_cli.core.errors import ScenarioError, ScenarioFault, StorageError
+from podusv_cli.core.errors import ScenarioError, StorageError
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.scenario import plugins
 from podusv_cli.scenario.keys import keys_of
@@ -29,7 +29,6 @@ from podusv_cli.scenario.yaml_tree import (
     find,
     merge,
     plain,
-    printable,
 )
 
 REFERENCES: tuple[Route, ...] = (("extends",), ("path", "file"))  # to other files
@@ -73,7 +72,7 @@ def load(
     source = os.fspath(path)
     text = read_text(source, Mark(source), "", faults)
     if text is None:
-        raise ScenarioError(_findings(faults, source))
+        raise ScenarioError(_ordered(faults, source))
     return load_text(text, source, overrides, checks, files)
 
 
@@ -89,7 +88,7 @@ def load_text(
     faults: list[Fault] = []
     root = composed(text, source, overrides, faults, placed=placed)
     if root is None:
-        raise ScenarioError(_findings(faults, source))
+        raise ScenarioError(_ordered(faults, source))
     root = plugins.with_given(root, files)
     root, known = _plugged(plugins.loaded, root, source, faults)
     scenario, origins, choice = _checked(root, known, source, faults, checks)
@@ -104,7 +103,7 @@ def _plugged(
     before = len(faults)
     root, known = plugged(root, faults)
     if len(faults) > before:
-        raise ScenarioError(_findings(faults, source))
+        raise ScenarioError(_ordered(faults, source))
     return root, known
 
 
@@ -116,7 +115,7 @@ def _checked(
     root = complete(root, top, faults)
     scenario = check(root, top, faults, checks)
     if scenario is None or faults:
-        raise ScenarioError(_findings(faults, source))
+        raise ScenarioError(_ordered(faults, source))
     nodes = {route: find(root, route) for route, _ in _leaves(_data(scenario), ())}
     origins = {dotted(at): str(node.mark) if node else "default" for at, node in nodes.items()}
     return scenario, origins, has_choice(root)
@@ -143,7 +142,7 @@ def load_resolved(
     if root and not isinstance(root.content, dict):
         faults.append(Fault(root.mark, "", f"is {found(root.content, root.text)}, no scenario"))
     if faults or not root:
-        (first, *_) = _findings(faults, source)
+        (first, *_) = _ordered(faults, source)
         raise StorageError(f"{first} (damaged: not as podusv wrote it)")
     root = replace(root, mark=Mark(source))
     plugged = plugins.loaded if to_run else partial(plugins.recorded, files)
@@ -151,13 +150,10 @@ def load_resolved(
     return _checked(root, known, source, faults, checks)[0]
 
 
-def _findings(faults: list[Fault], first: str) -> list[ScenarioFault]:
-    """Findings file by file, the file called `first` ahead, in the order of lines."""
+def _ordered(faults: list[Fault], first: str) -> list[Fault]:
+    """The faults file by file, the file called `first` ahead, in the order of lines."""
     sources = list(dict.fromkeys([first, *(fault.mark.source for fault in faults)]))
-    ordered = sorted(
-        faults, key=lambda f: (sources.index(f.mark.source), f.mark.line, f.mark.column)
-    )
-    return [ScenarioFault(str(fault.mark), printable(fault.key), fault.text) for fault in ordered]
+    return sorted(faults, key=lambda f: (sources.index(f.mark.source), f.mark.line, f.mark.column))
 
 
 def values(scenario: Scenario) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from pydantic import create_model
 from podusv_cli.actuators.base import Actuator
 from podusv_cli.controllers.base import Controller
 from podusv_cli.core.component import Component, Recorded, value
-from podusv_cli.core.errors import LawError, ScenarioError, ScenarioFault
+from podusv_cli.core.errors import LawError, ScenarioError
 from podusv_cli.core.plugins import ABSENT, Plugin, Plugins, digest, from_file, installed
 from podusv_cli.disturbances.base import Disturbance
 from podusv_cli.paths.base import Path
@@ -50,7 +50,7 @@ def on_hand(files: Sequence[str]) -> Plugins:
     faults: list[Fault] = []
     found = from_files(files, faults)
     if faults:
-        raise ScenarioError([ScenarioFault(str(f.mark), f.key, f.text) for f in faults])
+        raise ScenarioError(faults)
     return found
 
 

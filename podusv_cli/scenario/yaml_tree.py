@@ -37,6 +37,10 @@ class Fault:
     key: str
     text: str
 
+    def __str__(self) -> str:
+        """One line: place, key, text."""
+        return ": ".join(filter(None, (str(self.mark), printable(self.key), self.text)))
+
 
 @dataclass(frozen=True)
 class Node:

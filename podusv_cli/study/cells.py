@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Hashable, Iterator
 from dataclasses import dataclass
 from functools import reduce
 from itertools import product
 from math import prod
 from typing import Any
 
-from podusv_cli.core.errors import ScenarioError, ScenarioFault
+from podusv_cli.core.errors import ScenarioError
 from podusv_cli.scenario.load import Loaded
 from podusv_cli.scenario.messages import Check
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import as_yaml
-from podusv_cli.scenario.yaml_tree import Node, find, merge, plain, printable, route
+from podusv_cli.scenario.yaml_tree import Fault, Node, find, merge, plain, route
 
 MOST = 1000  # cells
 FIXED = ("extends", "plugins", "sweep", "name", "claims")  # what no cell can have of its own
@@ -41,14 +41,14 @@ def cells(loaded: Loaded, check: Check | None = None) -> tuple[Cell, ...]:
     that is not given. `check` is made of each. Raises ScenarioError with all that is wrong.
     """
     _check_grid(loaded)
-    told: dict[ScenarioFault, None] = {}
+    told: dict[Hashable, None] = {}
     made = list(_made(loaded, check, told))
     if told:
         raise ScenarioError(list(told))
     return tuple(made)
 
 
-def _made(loaded: Loaded, check: Check | None, told: dict[ScenarioFault, None]) -> Iterator[Cell]:
+def _made(loaded: Loaded, check: Check | None, told: dict[Hashable, None]) -> Iterator[Cell]:
     grid = _grid(loaded)
     for index, nodes in enumerate(product(*grid.values())):
         top = reduce(merge, map(_placed, grid, nodes), Node({}, loaded.root.mark))
@@ -57,7 +57,7 @@ def _made(loaded: Loaded, check: Check | None, told: dict[ScenarioFault, None]) 
         try:
             yield Cell(index, values, loaded.changed(top, checks))
         except ScenarioError as error:
-            told |= dict.fromkeys(error.findings)
+            told |= dict.fromkeys(error.faults)
 
 
 def _label(values: tuple[tuple[str, Any], ...]) -> str:
@@ -107,8 +107,8 @@ def _wrong(key: str, nodes: tuple[Node, ...]) -> Iterator[str]:
         yield f"cannot differ between cells (nor can {', '.join(FIXED)})"
 
 
-def _fault(loaded: Loaded, key: str, text: str) -> ScenarioFault:
+def _fault(loaded: Loaded, key: str, text: str) -> Fault:
     place = ("sweep", "grid", *([key] if key else []))
     node = find(loaded.root, place)
     mark = node.key_mark or node.mark if node else loaded.root.mark
-    return ScenarioFault(str(mark), printable(".".join(place)), text)
+    return Fault(mark, ".".join(place), text)
