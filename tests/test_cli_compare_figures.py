@@ -40,6 +40,7 @@ def test_only_what_is_asked_for_is_drawn_and_what_cannot_be_is_told(podusv, monk
     said = podusv(config, "--out", "x", "--jobs", "1", *asked)
     assert said.code == 0
     assert "figure pods could not be made: no run logged any of n, " in said.err
+    assert "traceback" not in said.err
     assert figures("x") == {"errors.pdf", "errors.png"}
     assert figures_of_report("x") == 1
 

@@ -268,3 +268,11 @@ def test_comparisons_are_held_together_run_by_run(run, tmp_path, podusv):
 def test_the_scenario_that_counts_is_the_one_in_the_log(run, tmp_path, podusv):
     other = copied(run, tmp_path / "copy", resolved_yaml=replaced("K_Pu: 1100.0", "K_Pu: 1.0"))
     assert podusv("diff", run, other).code == 0
+
+
+def test_metrics_of_runs_of_unequal_length_are_warned_of(run, tmp_path, podusv):
+    longer = made(tmp_path / "longer", "simulation.duration=0.6")
+    said = podusv("diff", run, longer)
+    warned = "the first run ends at 0.5 s, the second at 0.6 s: their metrics are about different"
+    assert warned in " ".join(said.out.split())
+    assert "ends at" not in podusv("diff", run, copied(run, tmp_path / "same")).out

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Callable, Iterator
+from datetime import date
 from pathlib import Path
 
 import pandas as pd
@@ -14,6 +15,7 @@ from command_samples import ROOT, commanded
 
 import podusv_cli
 from podusv_cli.figures.drawing import FIGURES
+from podusv_cli.findings.finding import finding_kinds
 from podusv_cli.metrics.table import METRICS
 
 PAGES = [
@@ -113,6 +115,15 @@ def test_every_metric_is_documented_with_its_unit_and_meaning() -> None:
     assert counting == {m.name for m in METRICS.values() if m.counts_standoff}
 
 
+def test_every_finding_is_documented_as_its_declaration_says():
+    documented = {tuple(row) for row in rows("docs/findings.md")}
+    declared = finding_kinds().values()
+    assert documented == {
+        (f"`{one.name}`", f"`{one.about}`", one.meaning, one.condition, one.remedy)
+        for one in declared
+    }
+
+
 def test_every_figure_is_documented_with_the_signals_that_it_needs() -> None:
     documented = {row[0][1:-1]: row[2] for row in rows("docs/figures.md")}
     assert list(documented) == list(FIGURES)
@@ -124,6 +135,7 @@ def test_the_citation_names_this_version() -> None:
     citation = yaml.safe_load(text_of("CITATION.cff"))
     assert citation["version"] == podusv_cli.__version__
     assert citation["authors"] == [{"name": "podusv contributors"}]
+    assert date.fromisoformat(citation["date-released"]).year >= 2026
 
 
 def test_the_numbers_of_the_pods_are_the_committed_ones() -> None:

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 from annotated_types import Ge, Gt, Le, Lt
+from command_samples import commanded
 from known_signals import ABOUT
 from pydantic.types import Strict
 
@@ -194,3 +195,10 @@ def test_every_kind_has_a_summary():
     assert set(kinds()) == {"path", "disturbance", "actuator", "controller"}
     for summaries in kinds().values():
         assert all(len(summary) > 8 and summary.endswith(".") for summary in summaries.values())
+
+
+def test_equation_numbers_are_said_to_be_the_papers(monkeypatch, capsys):
+    podusv = commanded(monkeypatch, capsys)
+    note = "(n) is equation n of the paper"
+    assert note in podusv("explain", "controller.k_ze").out
+    assert note not in podusv("explain", "simulation.step").out

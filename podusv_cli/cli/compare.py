@@ -12,7 +12,6 @@ import typer
 
 from podusv_cli.cli import completion, options
 from podusv_cli.cli.exit_codes import INTERRUPTED
-from podusv_cli.cli.run import TRACED
 from podusv_cli.cli.terminal import (
     Warnings,
     echo,
@@ -79,7 +78,7 @@ def compare(
         if ending:
             echo(*f"{label}: {ending}".splitlines(), err=True)
     for part in done.missing:
-        echo(f"{part}; {TRACED}", err=True)
+        echo(part.traced, err=True)
     if done.status == "interrupted":
         echo("interrupted; the runs made so far are compared, without figures", err=True)
         raise typer.Exit(INTERRUPTED)

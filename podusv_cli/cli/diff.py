@@ -75,6 +75,12 @@ def _show_metrics(found: RunDifference) -> None:
     ]
     if rows:
         echo_table(["metric", "unit", "first", "second", "relative"], rows)
+    one, other = found.log.ends
+    if rows and one != other:
+        echo(
+            f"the first run ends at {one:g} s, the second at {other:g} s: their metrics are about "
+            "different times and do not compare"
+        )
 
 
 def _show_log(log: LogDifference) -> None:

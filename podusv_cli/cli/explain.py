@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from podusv_cli.cli.completion import names
 from podusv_cli.cli.options import Plugins
-from podusv_cli.cli.terminal import echo_entry
+from podusv_cli.cli.terminal import echo, echo_entry
 
 if TYPE_CHECKING:
     from podusv_cli.core.finding import FindingKind
     from podusv_cli.core.plugins import Plugins as Known
     from podusv_cli.scenario.explain import Row
+
+EQUATION = re.compile(r"\(\d+\)")
 
 
 def explain(
@@ -55,6 +58,8 @@ def explain(
             return
         for row in found:
             _echo(row)
+        if any(EQUATION.search(row.meaning) for row in found):
+            echo("", "(n) is equation n of the paper that docs/model.md cites")
 
 
 def _echo_figure(name: str | None, plugins: Known) -> bool:

@@ -16,7 +16,6 @@ from podusv_cli.cli.terminal import Warnings, echo, echo_result
 if TYPE_CHECKING:
     from podusv_cli.workflows.execute import Finished
 
-TRACED = "missing.json in the folder has the traceback"
 EXIT_CODES = {"finished": 0, "diverged": 4, "interrupted": 130}
 
 
@@ -55,7 +54,7 @@ def run(
     if done.message:
         echo(f"{config}: {done.message}", err=True)
     for part in done.missing:
-        echo(f"{config}: {part}; {TRACED}", err=True)
+        echo(f"{config}: {part.traced}", err=True)
     if done.others:
         names = ", ".join(done.others)
         echo(f"{config}: ran `controller` only; `podusv compare` runs {names}", err=True)

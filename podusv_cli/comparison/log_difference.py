@@ -102,7 +102,8 @@ class LogDifference:
     `first` is the earliest deviation; `largest` has the largest of every signal that differs, in
     the order of the log. `rows` counts the rows of each recording, and the rows with a common time,
     which are compared. `reshaped` names signals of different size, `only_one` and `only_other`
-    those of one recording only. `endings` are differences of status, controller and message.
+    those of one recording only. `endings` are differences of status, controller and message;
+    `ends` is when each recording ends [s].
     """
 
     first: Deviation | None
@@ -113,6 +114,7 @@ class LogDifference:
     only_one: tuple[str, ...]
     only_other: tuple[str, ...]
     endings: Mapping[str, tuple[str, str]]
+    ends: tuple[float, float]
 
     @property
     def same(self) -> bool:
@@ -125,6 +127,7 @@ class LogDifference:
         return {
             "same": self.same,
             "rows": list(self.rows),
+            "ends": list(self.ends),
             "first": _as_json(self.first) if self.first else None,
             "largest": [_as_json(deviation) for deviation in self.largest],
             "compared": list(self.compared),
@@ -174,7 +177,12 @@ def compare(one: Recording, other: Recording) -> LogDifference:
         only_one=tuple(name for name in names if name not in others),
         only_other=tuple(name for name in others if name not in names),
         endings={name: pair for name, pair in endings.items() if pair[0] != pair[1]},
+        ends=(_end(one), _end(other)),
     )
+
+
+def _end(log: Recording) -> float:
+    return float(log["time"][-1]) if len(log["time"]) else 0.0
 
 
 def _paired(one: Recording, other: Recording) -> Iterator[_Pair]:

@@ -224,7 +224,7 @@ def stiff_actuator(case: Case) -> Sentences:
 @after(
     "saturated", about="actuator", meaning="the actuator limited the law for long",
     condition=f"limited during more than {LONG:.0%} of the run",
-    remedy="take anti_windup: auxiliary, smaller gains, or a stronger actuator",
+    remedy="take anti_windup: auxiliary where it is off, smaller gains, or a stronger actuator",
 )  # fmt: skip
 def saturated(scenario: Scenario, log: Recording) -> Sentences:
     """The actuator limits the law during a considerable part of the run."""

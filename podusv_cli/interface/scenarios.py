@@ -83,7 +83,8 @@ def _loaded(source: Any, overrides: list[str]) -> Loaded:
 
 @_loaded.register
 def _(source: model.Scenario, overrides: list[str]) -> Loaded:
-    sections = {key: part for key, part in source.model_dump().items() if key != plugins.KEY}
+    derived = {plugins.KEY, *(["controller"] if source.open_choice else [])}
+    sections = {key: part for key, part in source.model_dump().items() if key not in derived}
     files = [plugin.path for plugin in source.plugged if plugin.path]
     text = yaml_text(sections)
     return load_text(text, source.name, overrides, CHECKS, files, placed=False)

@@ -25,6 +25,11 @@ class Missing:
         """The sentence for the user."""
         return f"{self.what} could not be made: {self.why}"
 
+    @property
+    def traced(self) -> str:
+        """The sentence, and where the traceback is if there is one."""
+        return f"{self}; missing.json in the folder has the traceback" if self.trace else str(self)
+
 
 class Extras:
     """Work after a simulation.

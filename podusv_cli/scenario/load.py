@@ -18,7 +18,7 @@ from podusv_cli.scenario.layers import composed
 from podusv_cli.scenario.messages import Check, check
 from podusv_cli.scenario.model import Scenario, scenario_class
 from podusv_cli.scenario.phrases import found
-from podusv_cli.scenario.presets import complete, has_choice, with_rows
+from podusv_cli.scenario.presets import complete, stands_in, with_rows
 from podusv_cli.scenario.yaml_text import MAX_NODES, read, read_text, resolve
 from podusv_cli.scenario.yaml_tree import (
     Fault,
@@ -42,15 +42,13 @@ class Loaded:
     """A scenario and the origins of its values.
 
     `origins` maps every dotted key to "configs/a.yaml:12:5", "--set a.b=v", "vessel file
-    paper.yaml" or "default"; `text` is the scenario file as given. `open_choice`: several
-    `controllers` and no `controller` are given. `root` is the tree of which the scenario is made,
-    without what is filled in.
+    paper.yaml" or "default"; `text` is the scenario file as given. `root` is the tree of which the
+    scenario is made, without what is filled in.
     """
 
     scenario: Scenario
     origins: Mapping[str, str]
     text: str
-    open_choice: bool
     root: Node
 
     def changed(self, top: Node, checks: Sequence[Check] = ()) -> Scenario:
@@ -91,8 +89,8 @@ def load_text(
         raise ScenarioError(_ordered(faults, source))
     root = plugins.with_given(root, files)
     root, known = _plugged(plugins.loaded, root, source, faults)
-    scenario, origins, choice = _checked(root, known, source, faults, checks)
-    return Loaded(scenario, origins, text, choice, root)
+    scenario, origins = _checked(root, known, source, faults, checks)
+    return Loaded(scenario, origins, text, root)
 
 
 def _plugged(
@@ -109,8 +107,8 @@ def _plugged(
 
 def _checked(
     root: Node, known: Plugins, source: str, faults: list[Fault], checks: Sequence[Check]
-) -> tuple[Scenario, dict[str, str], bool]:
-    """The scenario of a tree, the origins of its values, and whether a run has to be chosen."""
+) -> tuple[Scenario, dict[str, str]]:
+    """The scenario of a tree, and the origins of its values."""
     top = keys_of(scenario_class(known))
     root = complete(root, top, faults)
     scenario = check(root, top, faults, checks)
@@ -118,7 +116,10 @@ def _checked(
         raise ScenarioError(_ordered(faults, source))
     nodes = {route: find(root, route) for route, _ in _leaves(_data(scenario), ())}
     origins = {dotted(at): str(node.mark) if node else "default" for at, node in nodes.items()}
-    return scenario, origins, has_choice(root)
+    if stands_in(root):  # the very same law says so, see `Scenario.open_choice`
+        first = next(iter(scenario.controllers.values()))
+        scenario = scenario.model_copy(update={"controller": first})
+    return scenario, origins
 
 
 def load_resolved(

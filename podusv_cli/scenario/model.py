@@ -179,6 +179,12 @@ class Scenario(Component):
         None, "", "the study that `podusv sweep` makes of this scenario; see docs/studies.md"
     )
 
+    @property
+    def open_choice(self) -> bool:
+        """Whether nobody chose `controller`: it is the first of several `controllers` itself."""
+        laws = [*self.controllers.values()]
+        return len(laws) > 1 and self.controller is laws[0]
+
     def labels(self) -> tuple[str, ...]:
         """The names of the runs that a comparison of this scenario has."""
         return tuple(self.controllers) or (self.controller.label,)

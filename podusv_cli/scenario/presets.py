@@ -244,7 +244,7 @@ def _rows_in(given: Node, section: str, keys: tuple[str, str], faults: list[Faul
 def _controllers(root: Node, top: Key) -> Node:
     """Each of `controllers` over those keys of `controller` that its kind has too.
 
-    Without `controller`, the first of `controllers` stands there; see `has_choice`.
+    Without `controller`, the first of `controllers` stands there; see `stands_in`.
     """
     base, several = root.mapping.get("controller"), root.mapping.get("controllers")
     if not several or not several.mapping:
@@ -260,11 +260,6 @@ def stands_in(root: Node) -> bool:
     several = root.mapping.get("controllers")
     laws = several.mapping.values() if several else ()
     return any(law is root.mapping.get("controller") for law in laws)
-
-
-def has_choice(root: Node) -> bool:
-    """Whether it is open which of several `controllers` a single run is to have."""
-    return stands_in(root) and len(root.mapping["controllers"].mapping) > 1
 
 
 def _over_base(base: Node, own: Node, top: Key) -> Node:

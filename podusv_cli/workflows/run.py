@@ -77,9 +77,10 @@ def single(loaded: Loaded, label: str = "") -> Scenario:
     known = loaded.scenario.controllers
     if label and label not in known:
         raise UsageError(unknown(f"controller {label!r}", label, known))
-    if loaded.open_choice and not label:
+    if loaded.scenario.open_choice and not label:
         raise UsageError(
             f"{loaded.scenario.name} has several controllers; choose one with --controller "
-            f"({', '.join(known)}), or compare all: podusv compare"
+            f"({', '.join(known)}; in Python, scenario.singles()['{next(iter(known))}']), or "
+            "compare all: podusv compare"
         )
     return loaded.scenario.singles()[label] if label else loaded.scenario.alone()
