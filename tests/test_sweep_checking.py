@@ -259,7 +259,7 @@ def test_all_draws_that_a_run_could_not_take_are_counted(text: str) -> None:
                 drawn(one, sweep.vary, draw)
             except DrawError as error:
                 reasons.setdefault(i, str(error))
-    found = invalid_draws(laws, sweep)
+    found = invalid_draws(laws, sweep, sweep.draws)
     assert found.count == len(reasons)
     assert (0 < found.count < 60) == (text != INVALID[-1])
     if reasons:
@@ -280,8 +280,8 @@ def test_validate_tells_the_size_of_the_study(podusv: Command, tmp_path: Path) -
     file.write_text(BASE + grid + vary("vessel.m: {times: {normal: {mean: 1, sigma: 1}}}"))
     done = podusv("validate", str(file))
     assert done.code == 0
-    assert "the study has 9,000 runs: 2 laws in 3 cells, 1,500 draws each\n" in done.out
-    share = r"\d+ of the 1,500 draws are invalid \(1\d\.\d\d%\); draw \d+: sweep.vary.vessel.m: "
+    assert "runs of the study: 9,000 (laws: 2, cells: 3, draws: 1,500)\n" in done.out
+    share = r"invalid draws: \d+ of 1,500 \(1\d\.\d\d%\); draw \d+: sweep.vary.vessel.m: "
     assert re.search(share + r"vessel.m = -\d.*; must be a number above 0 \[kg\]", done.out)
     file.write_text(BASE + vary("vessel.mm: {angle: all}"))
     assert podusv("validate", str(file)).code == 2

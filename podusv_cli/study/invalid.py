@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, reduce
 from typing import Any, get_args
 
 import numpy as np
@@ -36,11 +36,11 @@ class Invalid:
     reason: str = ""
 
 
-def invalid_draws(scenarios: Sequence[Scenario], sweep: Sweep) -> Invalid:
-    """All draws, checked against the ranges of every scenario: one for each law and cell."""
+def invalid_draws(scenarios: Sequence[Scenario], sweep: Sweep, count: int) -> Invalid:
+    """The first draws, checked against the ranges of every scenario: one for each law and cell."""
     parts = list(_different(scenarios, sweep.vary))
     found = Invalid()
-    for rows in blocks(sweep.draws):
+    for rows in blocks(count):
         given = table(sweep, rows.start, rows.stop - rows.start)
         bad = np.zeros(rows.stop - rows.start, bool)
         for part in parts:
@@ -88,7 +88,7 @@ class Part:
             for name, quantity in self.vary.items()
             for key in quantity.targets(name)
         ]
-        return np.logical_and.reduce(masks)
+        return reduce(np.logical_and, masks)
 
     def _numbers(self, key: str, quantity: Quantity, column: npt.NDArray[Any]) -> npt.NDArray[Any]:
         if not quantity.relative:
@@ -127,7 +127,7 @@ def _in_range(key: Key, numbers: npt.NDArray[Any]) -> Any:
     if not says_all or numbers.dtype.kind not in TAKEN.get(key.annotation, ""):
         return np.bool_(False)
     masks = [COMPARED[name](numbers, bound) for name, bound in limits(key.field).items()]
-    return np.logical_and.reduce([np.isfinite(numbers), *masks])
+    return reduce(np.logical_and, [np.isfinite(numbers), *masks])
 
 
 @cache

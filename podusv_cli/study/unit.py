@@ -78,7 +78,12 @@ def make(plan: Plan, unit: Unit, progress: Callable[[float], None] | None = None
         return drawn(scenario, vary, numbers[position]).closed_loop()
 
     done = simulate_many(
-        Lazily(unit.count, loop), grid, observer=seeing, workers=1, progress=progress
+        Lazily(unit.count, loop),
+        grid,
+        observer=seeing,
+        workers=1,
+        progress=progress,
+        like=scenario.closed_loop(),
     )
     if "interrupted" in done.status:
         raise KeyboardInterrupt

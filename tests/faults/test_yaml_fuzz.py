@@ -5,7 +5,7 @@ import re
 import resource
 import shutil
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from itertools import islice
 from pathlib import Path
@@ -19,6 +19,9 @@ import podusv_cli
 from podusv_cli.comparison.claims import parse_claims
 from podusv_cli.core.errors import ScenarioError
 from podusv_cli.scenario.load import load
+from podusv_cli.study.cells import cells
+from podusv_cli.study.check import singles, sweep_faults
+from podusv_cli.study.invalid import invalid_draws
 
 CONFIGS = Path(podusv_cli.__file__).parents[1] / "configs"
 MEBIBYTE = 1024 if sys.platform == "linux" else 1024**2  # in units of ru_maxrss
@@ -101,6 +104,15 @@ def _give_another_inner_value(draw: random.Random, lines: list[bytes], at: int) 
         lines[at] = lines[at][:first] + odd + lines[at][last:]
 
 
+def _give_another_number(draw: random.Random, lines: list[bytes], at: int) -> None:
+    """Of lists, too."""
+    numbers = list(re.finditer(rb"-?\d[\d.]*", lines[at]))
+    if numbers:
+        first, last = draw.choice(numbers).span()
+        odd = draw.choice(ODD).encode("utf-8", "surrogatepass")
+        lines[at] = lines[at][:first] + odd + lines[at][last:]
+
+
 def _bring_in_another(draw: random.Random, lines: list[bytes], at: int) -> None:
     """A line of any shipped scenario."""
     lines.insert(at, draw.choice(_shipped_lines()))
@@ -136,16 +148,28 @@ def spoilt(seed: int) -> Iterator[tuple[Path, bytes]]:
     files = sorted(CONFIGS.rglob("*.yaml"))
     while True:
         file = draw.choice(files)
-        data = bytearray(file.read_bytes())
-        for _ in range(draw.randrange(1, 5)):
-            draw.choice(MUTATIONS)(draw, data)
-        yield file.relative_to(CONFIGS), bytes(data)
+        yield file.relative_to(CONFIGS), mutated(draw, file.read_bytes())
+
+
+def mutated(
+    draw: random.Random, text: bytes, mutations: Sequence[Mutation] = MUTATIONS, most: int = 4
+) -> bytes:
+    """The text after one to so many mutations."""
+    data = bytearray(text)
+    for _ in range(draw.randrange(1, most + 1)):
+        draw.choice(mutations)(draw, data)
+    return bytes(data)
 
 
 def verdict(path: Path) -> str:
     """`ok`, or the lines that every command would print instead of running it."""
     try:
-        parse_claims(load(path))
+        loaded = load(path, (), [sweep_faults])
+        parse_claims(loaded)
+        made = [cell.scenario for cell in cells(loaded, sweep_faults)]
+        if sweep := loaded.scenario.sweep:
+            runs = [one for scenario in made for one in singles(scenario).values()]
+            invalid_draws(runs, sweep, min(sweep.draws, 20))
     except ScenarioError as error:
         return str(error)
     return "ok"
@@ -177,3 +201,53 @@ def test_spoilt_scenarios_are_told_and_nothing_else(tmp_path):
     told = set(re.findall(r": ([a-z][\w.\[\]]*): ", "\n".join(said)))
     reached = {key[:end] for key in told for end in range(1, len(key) + 1)}
     assert reached >= {*SOON, *(LATE if tries > 200 else ())}
+
+
+# Every key of a sweep, and every way to draw.
+SWEEP = b"""\
+extends: corrected.yaml
+controllers: {proposed: {kind: adaptive_neural}, pid: {kind: pid}}
+simulation: {duration: 1.0}
+sweep:
+  seed: 1
+  draws: 50
+  design: random
+  laws: [proposed, pid]
+  vary:
+    vessel.m: {times: {uniform: [0.7, 1.3]}}
+    damping: {keys: [vessel.X_u, vessel.Y_v], times: {lognormal: {sigma: 0.1, within: [0.6, 1.6]}}}
+    start.x: {plus: {normal: {mean: 1.0, sigma: 3.0, within: [-9, 9]}}}
+    start.y: {triangular: [-20, -10, 0]}
+    start.psi: {angle: all}
+    path.reading: {choice: [velocity, sine]}
+    path.switch: {plus: {integers: [-3, 3]}}
+    controller.k_ze: {choice: [0.1, 0.2]}
+  grid:
+    disturbance.scale: [0.5]
+    path: [{speed: 0.4}, {kind: line_circle, amplitude: 0.4}]
+  success: finished and z_e_steady <= 1.5
+  level: 0.95
+  keep: {failed: 3, worst: {iae: 2}, draws: [0, 1]}
+  claims:
+    S1: {says: a, source: b, expect: share(proposed.iae < pid.iae) >= 0.95, tolerance: 0.01}
+"""
+OF_VALUES = [
+    *MUTATIONS, *[_lines(_give_another_inner_value)] * 10, *[_lines(_give_another_number)] * 20
+]  # fmt: skip
+TOLD_OF_SWEEPS = (
+    "sweep", "sweep.vary", "sweep.vary.damping.times.lognormal", "sweep.laws", "sweep.grid",
+    "sweep.vary.vessel.m", "sweep.keep", "sweep.claims.S1", "sweep.success", "path", "start",
+)  # fmt: skip
+
+
+@pytest.mark.usefixtures("tidy")
+def test_spoilt_sweeps_are_told_and_nothing_else(tmp_path: Path) -> None:
+    shutil.copytree(CONFIGS, tmp_path / "configs")
+    name, draw, tries = Path("paper", "sweep.yaml"), random.Random(SEED), count(30, 2000)
+    assert check(tmp_path / "configs", name, SWEEP) == "ok"
+    texts = (mutated(draw, SWEEP, OF_VALUES, most=2) for _ in range(tries))
+    said = [check(tmp_path / "configs", name, text) for text in texts]
+    assert tries / 30 < said.count("ok") < tries / 1.5
+    told = set(re.findall(r": ([a-z][\w.\[\]]*): ", "\n".join(said)))
+    reached = {key[:end] for key in told for end in range(1, len(key) + 1)}
+    assert reached >= {*TOLD_OF_SWEEPS[:2], *(TOLD_OF_SWEEPS if tries > 30 else ())}
