@@ -150,7 +150,7 @@ def _bomb(size: int) -> Callable[[h5py.File, Path], object]:
         shape = (len(file["u"]),)
         del file["u"]
         dataset = file.create_dataset("u", shape, dtype="<f8", chunks=shape, compression="gzip")
-        dataset.id.write_direct_chunk((0,), zlib.compress(bytes(size), 9))
+        dataset.id.write_direct_chunk((0,), zlib.compress(bytes(size), 1))
 
     return change
 

@@ -5,8 +5,9 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Iterable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pytest
 from counts import count
@@ -30,8 +31,13 @@ UNREAD = ("scenario.yaml", "metrics.csv")
 READ = ("log.h5", "resolved.yaml", *JSON)
 FEW = ("log.h5", "resolved.yaml", "theory.json", "metrics.csv")  # one of each sort
 FULL = ("many_attributes", "deeply_nested", "many_members")  # take minutes to make
-LENGTHY = ("comments", "lines")  # take seconds to read
+LENGTHY = ("comments", "lines", "many", "wide", "keys")  # take seconds to read
 HARMLESS = ("attributes", "many_attributes", "nested", "deeply_nested", "cycle_aside")  # unread
+
+
+def unless_lengthy(ways: Iterable[str]) -> list[Any]:
+    """All ways; those that take long are slow tests."""
+    return [pytest.param(way, marks=[pytest.mark.slow] * (way in LENGTHY)) for way in ways]
 
 
 class Outcome(NamedTuple):
@@ -150,7 +156,7 @@ def test_what_stands_in_place_of_a_file(opened, what):
         check(what, opened(f"become manifest.json {what}"), "refused")
 
 
-@pytest.mark.parametrize("which", TEXTS)
+@pytest.mark.parametrize("which", unless_lengthy(TEXTS))
 def test_json_that_podusv_does_not_write(opened, which):
     check(which, opened(f"text manifest.json {which}"), "refused")
     large = which in ("wide", "keys")
@@ -174,10 +180,7 @@ def test_values_of_another_type(opened, what):
     check(what, opened(f"!entry {what}"), "refused")
 
 
-@pytest.mark.parametrize(
-    "which",
-    [pytest.param(which, marks=[pytest.mark.slow] * (which in LENGTHY)) for which in YAML],
-)
+@pytest.mark.parametrize("which", unless_lengthy(YAML))
 def test_a_scenario_that_podusv_does_not_write(opened, which):
     check(which, opened(f"!yaml {which}"), "same" if which == "comments" else "refused")
 
