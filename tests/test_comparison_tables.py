@@ -106,15 +106,8 @@ def test_a_difference_in_any_section_is_found(key):
 def test_every_section_of_a_scenario_is_looked_at():
     sections = {key.partition(".")[0] for key in OTHERWISE}
     rest = {
-        "name",
-        "description",
-        "controller",
-        "controllers",
-        "claims",
-        "silence",
-        "plugins",
-        "sweep",
-    }
+        "name", "description", "controller", "controllers", "claims", "silence", "plugins", "sweep",
+    }  # fmt: skip
     assert sections | rest == set(type(scenario()).model_fields)
 
 

@@ -15,7 +15,7 @@ from podusv_cli.core.errors import StorageError
 from podusv_cli.figures.drawing import FIGURES
 from podusv_cli.storage import manifest
 from podusv_cli.storage.run_folder import open_run
-from podusv_cli.theory import monitor
+from podusv_cli.theory import ideal_weights
 from podusv_cli.workflows import compare, execute
 
 ADAPTIVE = BASE.replace("{kind: pid, K_Pu: 100.0}", "{kind: adaptive_neural}")
@@ -35,7 +35,7 @@ AFTER_A_RUN = {
     "the metrics": (execute, "summary"),
     "the law's cost": (execute, "law_costs"),
     "warnings": (execute, "postflight"),
-    "theory.json with the stability monitor's signals": (monitor, "ideal_weights"),
+    "theory.json with the stability monitor's signals": (ideal_weights, "fitted"),
     "figures": (execute, "_drawn"),
 }
 AFTER_RUNS = {
@@ -111,7 +111,7 @@ def test_a_comparison_keeps_its_runs(podusv, monkeypatch, what):
 
 
 def test_what_a_run_of_a_comparison_lacks_is_told_of_the_run(podusv, monkeypatch):
-    monkeypatch.setattr(monitor, "ideal_weights", broken)
+    monkeypatch.setattr(ideal_weights, "fitted", broken)
     said = podusv("compare", write("a.yaml", TWO), "--out", "x", "-q", "--no-figures")
     assert said.code == 0
     for label in ("one", "other"):
@@ -123,7 +123,7 @@ def test_what_a_run_of_a_comparison_lacks_is_told_of_the_run(podusv, monkeypatch
 def test_rerun_tells_what_the_repeated_run_lacks(podusv, monkeypatch):
     write("a.yaml", ADAPTIVE)
     assert podusv("run", "a.yaml", "--out", "x", "-q", "--no-figures").code == 0
-    monkeypatch.setattr(monitor, "ideal_weights", broken)
+    monkeypatch.setattr(ideal_weights, "fitted", broken)
     said = podusv("rerun", "x")
     assert said.code == 3
     assert said.err.startswith(f"x: theory.json with the stability monitor's signals {BUG}")
@@ -134,7 +134,7 @@ def test_what_cannot_be_stored_stays_an_error(podusv, monkeypatch):
     def full(*given: Any) -> NoReturn:
         raise StorageError("the disk is full")
 
-    monkeypatch.setattr(monitor, "ideal_weights", full)
+    monkeypatch.setattr(ideal_weights, "fitted", full)
     said = podusv("run", write("a.yaml", ADAPTIVE), "--out", "x", "-q", "--no-figures")
     assert (said.code, said.err) == (5, "the disk is full\n")
     assert not Path("x").exists()
