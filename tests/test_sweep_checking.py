@@ -77,6 +77,7 @@ IN_VARY = [
     ("vessel.m: @{}", "must have one of uniform, normal, lognormal"),
     ("vessel.m: @{seed: true, angle: all}", "found angle and seed"),
     ("vessel.m: @3", "must be a mapping of keys: uniform, normal"),
+    ("vessel.m: @{seed: true}", "vessel.m is no seed, which is a whole number"),
     ("a: @{keys: [vessel.m, start.x], angle: all}, start.x: {angle: all}", "drawn twice, by start"),
     ("a: @{keys: [start.x, start.x], angle: all}", "start.x is drawn twice"),
 ]
@@ -291,5 +292,8 @@ def test_explain_and_the_messages_name_what_a_quantity_may_be() -> None:
     rows = {row.key: row for row in explain("sweep.vary")}
     assert rows["sweep.vary"].meaning.startswith("what is drawn, by key")
     assert rows["sweep.vary.NAME.uniform"].meaning.startswith("[low, high]")
+    # The places that messages name.
+    assert explain("sweep.vary.vessel.m.normal.sigma")[0].meaning.startswith("its standard")
+    assert explain("sweep.vary.actuator.pods[0].x")[0].type == "keys"
     (row,) = explain("sweep.level")
     assert (row.range, row.default) == ("> 0.5, < 1", "0.95")

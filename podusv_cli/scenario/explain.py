@@ -16,7 +16,7 @@ from podusv_cli.scenario.keys import MISSING, NAME, NUMBER, Key, either, keys_of
 from podusv_cli.scenario.model import scenario_class
 from podusv_cli.scenario.phrases import as_yaml, did_you_mean
 from podusv_cli.scenario.presets import preset_names, preset_text, with_presets
-from podusv_cli.scenario.yaml_tree import dotted, route
+from podusv_cli.scenario.yaml_tree import dotted, route, whole_names
 
 BOOLEANS = {"true or false": ("true", "false")}
 # What a file may leave out although the model has no default for it, and where it comes from.
@@ -70,7 +70,7 @@ def explain(
         return [EXTENDS, *_rows(top.keys.values())]
     if name == EXTENDS.key:
         return [EXTENDS]
-    place = tuple(NUMBER if str(step).isdecimal() else step for step in route(name))
+    place = tuple(NUMBER if str(step).isdecimal() else step for step in whole_names(route(name)))
     keys = top.follow(place) if place else []
     named = [key for key in top.all() if key.name == name]
     found = _with_contents(keys) or [

@@ -10,12 +10,8 @@ from functools import partial, reduce
 from podusv_cli.scenario.phrases import found
 from podusv_cli.scenario.shipped import relative_to
 from podusv_cli.scenario.yaml_text import MAX_DEPTH, plain_node, read, read_text
-from podusv_cli.scenario.yaml_tree import QUANTITY, Fault, Mark, Node, merge
+from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, merge, whole_names
 
-NAMED_BY_KEYS = (
-    ("sweep", "vary"),
-    ("sweep", "grid"),
-)  # sections whose entries have names with dots
 FLOW = ("[", "{", "'", '"')  # what lists, mappings and text in quotes start with
 
 
@@ -109,21 +105,12 @@ def _read_base(
     return None if text is None else (path, text)
 
 
-def _whole_names(keys: list[str]) -> list[str]:
-    """The keys; `vessel.m` in `sweep.vary.vessel.m.times` is one, the name of an entry."""
-    if tuple(keys[:2]) not in NAMED_BY_KEYS:
-        return keys
-    rest = keys[2:]
-    end = next((i for i, key in enumerate(rest) if key in QUANTITY), len(rest))
-    return [*keys[:2], *filter(None, [".".join(rest[:end])]), *rest[end:]]
-
-
 def _override_tree(override: str, faults: list[Fault]) -> Node:
     """The tree that `a.b=v` stands for; v is a scalar, text in quotes, a list or a mapping."""
     name, equals, text = override.partition("=")
     shown = override if override.isprintable() else ascii(override)
     mark = Mark(f"--set {shown}")
-    keys = _whole_names(name.strip().split("."))
+    keys = list(whole_names(tuple(name.strip().split("."))))
     node: Node | None = None
     if not equals or not all(keys):
         faults.append(Fault(mark, "", "write it as --set section.key=value"))

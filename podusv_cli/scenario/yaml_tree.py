@@ -13,6 +13,10 @@ QUANTITY = {
     "uniform", "normal", "lognormal", "triangular", "choice", "integers", "angle", "times", "plus",
     "seed", "keys",
 }  # fmt: skip
+NAMED_BY_KEYS = (
+    ("sweep", "vary"),
+    ("sweep", "grid"),
+)  # sections whose entries have names with dots
 DISTRIBUTIONS = QUANTITY - {"keys"}
 
 
@@ -81,6 +85,17 @@ def route(key: str) -> Route:
     """("network", "nodes", 0) for `network.nodes[0]`."""
     steps = re.findall(r"\[(\d+)\]|([^.\[\]]+)", key)
     return tuple(int(place) if place else name for place, name in steps)
+
+
+def whole_names(steps: Route) -> Route:
+    """The steps of a key, of which `vessel.m` in `sweep.vary.vessel.m.times` is a single one."""
+    above, rest = steps[:2], steps[2:]
+    if above not in NAMED_BY_KEYS:
+        return steps
+    # `seed` may be the end of a name.
+    ends = (i for i, step in enumerate(rest) if step in QUANTITY - {"seed"})
+    end = next(ends, len(rest))
+    return (*above, *filter(None, [dotted(rest[:end])]), *rest[end:])
 
 
 def printable(text: str) -> str:

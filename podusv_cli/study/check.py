@@ -107,6 +107,8 @@ def _type(key: str, quantity: Quantity, scenario: Scenario) -> Iterator[str]:
     words = described(scenario, steps).choices or (isinstance(own, bool) and ("true", "false"))
     if steps[-1] in ("kind", "preset"):
         yield f"a draw cannot change {key}; list its values under grid"
+    elif quantity.seed and int not in described(scenario, steps).types:
+        yield f"{key} is no seed, which is a whole number"
     elif _is_number(own) or (own is None and not quantity.relative):
         return
     elif words and way != "choice":

@@ -236,7 +236,7 @@ OF_VALUES = [
 ]  # fmt: skip
 TOLD_OF_SWEEPS = (
     "sweep", "sweep.vary", "sweep.vary.damping.times.lognormal", "sweep.laws", "sweep.grid",
-    "sweep.vary.vessel.m", "sweep.keep", "sweep.claims.S1", "sweep.success", "path", "start",
+    "sweep.vary.vessel.m", "sweep.keep", "sweep.claims.S1", "sweep.success", "path",
 )  # fmt: skip
 
 
