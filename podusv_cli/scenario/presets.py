@@ -26,6 +26,7 @@ MOST_FAULTS = 10  # in one file of points
 NAMED: tuple[Route, ...] = (
     ("controllers",), ("claims",), ("sweep", "vary"), ("sweep", "grid"), ("sweep", "claims"),
 )  # fmt: skip
+BESIDE_NAMED = {named[:end] for named in NAMED for end in range(len(named) + 1)}
 HEADER = re.compile(r'\s*"?(?!nan|inf)[a-z]', re.IGNORECASE)
 
 
@@ -77,7 +78,7 @@ def complete(root: Node, top: Key, faults: list[Fault]) -> Node:
     `top` are the scenario's keys.
     """
     plugins = top.scenario.plugged
-    root = _name(_without_removed(root), faults)
+    root = _name(_without_null(root), faults)
     root = _nominal(_vessel(root, plugins, faults), plugins, faults)
     return _controllers(_sections(root, top, faults), top)
 
@@ -109,23 +110,16 @@ def _of_kinds(root: Node, top: Key) -> list[tuple[str, Node, type[Component]]]:
     return [(name, node, key.model) for name, node, key in found if key and node.mapping]
 
 
-def _without_removed(root: Node) -> Node:
-    """Entries that are null are removed from those sections whose entries have free names."""
-    for section in NAMED:
-        root = _without_null(root, section)
-    return root
-
-
-def _without_null(root: Node, section: Route) -> Node:
-    """The tree without entries of a section that are null."""
-    name, *inner = section
-    given = root.mapping.get(str(name))
-    if not given or not given.mapping:
+def _without_null(root: Node, section: Route = ()) -> Node:
+    """The tree without entries that are null in those sections whose entries have free names."""
+    if section not in BESIDE_NAMED or not root.mapping:
         return root
-    if inner:
-        return root.with_entry(str(name), _without_null(given, tuple(inner)))
-    kept = {k: e for k, e in given.mapping.items() if e.content is not None or e.faulty}
-    return root.with_entry(str(name), replace(given, content=kept))
+    entries = {
+        name: _without_null(entry, (*section, name))
+        for name, entry in root.mapping.items()
+        if section not in NAMED or entry.content is not None or entry.faulty
+    }
+    return replace(root, content=entries)
 
 
 def _name(root: Node, faults: list[Fault]) -> Node:
