@@ -16,7 +16,7 @@ extends: {CONFIGS / "corrected.yaml"}
 path: {{kind: line}}
 actuator: {{kind: ideal}}
 start: {{x: -8, y: -4, psi: 0.1, u: 0.4, v: 0.05, r: 0.02}}
-simulation: {{step: 0.0025, duration: 4}}
+simulation: {{step: 0.0025, duration: 2}}
 controllers: {{quick: {{k_ze: 0.15}}, slow: {{k_ze: 0.05}}}}
 """
 
