@@ -22,7 +22,7 @@ TESTED_WITH := pytest pytest-xdist hypothesis sympy xarray h5netcdf netCDF4 impo
 PODS := kept dropped ideal no_anti_windup single
 ABLATIONS := ablation ablation_figures ablation_standoff ablation_gains ablation_gains_figures \
     ablation_gains_standoff ablation_pid
-TABLES := unknown:unknown_dynamics discrete:discrete_signals limits:period_limits learnt:learnt
+TABLES := unknown:unknown_dynamics discrete:discrete_signals limits:period_limits learnt:learnt gains:fixed_gains
 COMPARISONS := printed_compare figures_compare figures_compare_standoff corrected_compare
 
 .DEFAULT_GOAL := help

@@ -1,6 +1,6 @@
 """Tables behind results/claim.md: a law that is told a wrong vessel, sampled control, and f_hat.
 
-    python results/claim.py unknown | discrete | limits | learnt
+    python results/claim.py unknown | discrete | limits | learnt | gains
 
 Each prints a CSV table. The scenarios are those of configs/paper; every number comes from a run.
 """
@@ -52,6 +52,9 @@ FACTORS = (0.7, 0.85, 1.15, 1.3, 1.5)
 STEP = 0.0005  # s, of the sampled runs
 PERIODS = (2, 4, 10, 20, 40)  # steps: 0.001 to 0.02 s
 DIFFERENCE = 0.01  # s
+UPDATES = ("after", "before")  # the demand is formed; when the law's memory takes a sample
+# kg/s in surge by kg m2/s in yaw; the last has those on which the network settles
+GAINS = {100: 80, 200: 80, 400: 80, 800: 80, 1100: 80, 6660: 116, 13208: 191}
 LONGEST = 400  # steps of STEP: 0.2 s
 GROWS = 1 + 1e-9
 SETTLED = 0.8  # of the run, from where it counts as settled
@@ -90,6 +93,9 @@ def parallel(work: Callable[[Case], Value], runs: Sequence[Case]) -> list[Value]
 def mismatched(scenario: Scenario) -> Iterator[tuple[str, Scenario]]:
     """The scenario as it is, with its law told wrong numbers, and with another true vessel."""
     yield "as it is", scenario
+    other = load(PAPER / READINGS["C"], ["vessel.preset=cybership2"]).scenario.vessel
+    yield "told CyberShip II", scenario.model_copy(update={"nominal": other})
+    yield "true CyberShip II", scenario.model_copy(update={"vessel": other})
     for side in ("nominal", "vessel"):  # what the law is told, and the hull that moves
         for what, keys in SCALED.items():
             for factor in FACTORS:
@@ -113,16 +119,18 @@ def unknown() -> pd.DataFrame:
     return found
 
 
-def sampled(config: str, count: int) -> dict[str, Scenario]:
+def sampled(config: str, count: int, update: str) -> dict[str, Scenario]:
     """The laws sampled once in so many steps; 0 for continuous control.
 
+    `update` is when the law's memory takes the sample: after or before the demand is formed.
     Remark 5's difference is formed over 0.01 s, rounded up to a whole number of samples.
     """
     period = count * STEP
     difference = math.ceil(DIFFERENCE / period - 1e-9) * period if count else DIFFERENCE
     return laws(
         config, f"simulation.step={STEP}", f"control.period={period:.9g}",
-        f"controller.difference_step={difference:.9g}", "log.every=10", "log.monitor=false",
+        f"controller.difference_step={difference:.9g}", f"control.update={update}",
+        "log.every=10", "log.monitor=false",
     )  # fmt: skip
 
 
@@ -141,17 +149,21 @@ def predicted(scenario: Scenario) -> float:
     late = slice(int(SETTLED * len(log["time"])), None)
     found = loops(scenario, np.array([np.mean(log[name][late]) for name in "uvr"]))
     counts = range(1, LONGEST + 1)
-    unstable = (n for n in counts if any(sampled_growth(one, STEP, n) > GROWS for one in found))
+    first = scenario.time_grid().update_first
+    unstable = (
+        n for n in counts
+        if any(sampled_growth(one, STEP, n, update_first=first) > GROWS for one in found)
+    )  # fmt: skip
     return (next(unstable, LONGEST + 1) - 1) * STEP
 
 
-def longest(config: str, label: str) -> float:
+def longest(config: str, label: str, update: str) -> float:
     """The longest stable period [s]: no settled cycle beyond twice that of continuous control."""
-    allowed = 2 * cycle(sampled(config, 0)[label])["cycle_N"]
+    allowed = 2 * cycle(sampled(config, 0, update)[label])["cycle_N"]
     low, high = 0, LONGEST
     while high - low > 1:
         middle = (low + high) // 2
-        stable = cycle(sampled(config, middle)[label])["cycle_N"] <= allowed
+        stable = cycle(sampled(config, middle, update)[label])["cycle_N"] <= allowed
         low, high = (middle, high) if stable else (low, middle)
     return low * STEP
 
@@ -159,27 +171,30 @@ def longest(config: str, label: str) -> float:
 def discrete() -> pd.DataFrame:
     """Settled cycle, energy and IAE of every law and reading over the control period."""
     cases = {
-        (reading, label, count * STEP): one
+        (reading, label, update, count * STEP): one
         for reading, config in READINGS.items()
+        for update in UPDATES
         for count in (0, *PERIODS)
-        for label, one in sampled(config, count).items()
+        for label, one in sampled(config, count, update).items()
     }
-    index = pd.MultiIndex.from_tuples(cases, names=["reading", "law", "period_s"])
+    index = pd.MultiIndex.from_tuples(cases, names=["reading", "law", "update", "period_s"])
     return pd.DataFrame(parallel(cycle, list(cases.values())), index=index)
 
 
 def limits() -> pd.DataFrame:
     """The longest stable period [s], found by bisection and predicted by the linearised loops."""
-    cases = [(r, config, label) for r, config in READINGS.items() for label in laws(config)]
+    cases = [
+        (reading, label, update)
+        for reading, config in READINGS.items() for label in laws(config) for update in UPDATES
+    ]  # fmt: skip
 
     def both(case: tuple[str, str, str]) -> dict[str, float]:
-        _, config, label = case
-        one = sampled(config, 0)[label]
-        return {"predicted_s": predicted(one), "found_s": longest(config, label)}
+        reading, label, update = case
+        one = sampled(READINGS[reading], 0, update)[label]
+        found = longest(READINGS[reading], label, update)
+        return {"predicted_s": predicted(one), "found_s": found}
 
-    index = pd.MultiIndex.from_tuples(
-        [(r, label) for r, _, label in cases], names=["reading", "law"]
-    )
+    index = pd.MultiIndex.from_tuples(cases, names=["reading", "law", "update"])
     return pd.DataFrame(parallel(both, cases), index=index)
 
 
@@ -203,13 +218,39 @@ def learnt() -> pd.DataFrame:
     return pd.DataFrame(rows).T.rename_axis(["reading", "axis"])
 
 
+def gains() -> pd.DataFrame:
+    """Fixed velocity gains instead of the network: errors, and settled rms of u_e and r_e."""
+    keys = {f"k_{k}": f"{{{OFF}, k_ue: {k}, k_re: {yaw}}}" for k, yaw in GAINS.items()}
+    told = [f"controllers.{name}={law}" for name, law in keys.items()]
+    told += ["simulation.step=0.002", "log.every=5", "log.monitor=false"]
+    runs = {
+        (reading, label): one
+        for reading, config in READINGS.items()
+        for label, one in laws(config, *told).items()
+        if label in keys or label == "proposed"
+    }
+    index = pd.MultiIndex.from_tuples(runs, names=["reading", "law"])
+    return pd.DataFrame(parallel(velocity_errors, list(runs.values())), index=index)
+
+
+def velocity_errors(scenario: Scenario) -> dict[str, float]:
+    """Errors of a run, with those of the velocities."""
+    metrics, log = made(scenario)
+    if log.status != "finished":
+        return dict.fromkeys(("iae_e", "e_steady", "rms_u_e", "rms_r_e"), np.nan)
+    return {
+        "iae_e": metrics["iae_e"], "e_steady": metrics["e_steady"],
+        "rms_u_e": settled_rms(log["u_e"]), "rms_r_e": settled_rms(log["r_e"]),
+    }  # fmt: skip
+
+
 def settled_rms(signal: Vector) -> float:
     """Root mean square over the settled part."""
     return float(np.sqrt(np.mean(signal[int(SETTLED * len(signal)) :] ** 2)))
 
 
 TABLES: Mapping[str, Callable[[], pd.DataFrame]] = {
-    "unknown": unknown, "discrete": discrete, "limits": limits, "learnt": learnt,
+    "unknown": unknown, "discrete": discrete, "limits": limits, "learnt": learnt, "gains": gains,
 }  # fmt: skip
 
 if __name__ == "__main__":

@@ -23,6 +23,10 @@ def test_the_periodogram_has_the_power_of_the_signal():
     assert np.sum(power) == pytest.approx(2.0 + 0.005, rel=2e-3)
     assert math.sqrt(np.sum(power[rates > 2.0])) == pytest.approx(0.1 / math.sqrt(2.0), rel=1e-4)
     assert rates[np.argmax(power)] == pytest.approx(0.5, abs=rates[1])
+    alternating = 100.0 * (-1.0) ** np.arange(1000)
+    assert math.sqrt(np.sum(periodogram(t[:1000], alternating)[1])) == pytest.approx(
+        100.0, rel=2e-3
+    )
     assert [len(part) for part in periodogram(t[:3], y[:3])] == [0, 0]
 
 

@@ -28,8 +28,8 @@ from podusv_cli.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.core.kernel import Vector, bundle, kernel
 from podusv_cli.core.recording import Recording
 from podusv_cli.disturbances.harmonic import HarmonicDisturbance
-from podusv_cli.engine.closed_loop import Plan
 from podusv_cli.engine.grid import TimeGrid
+from podusv_cli.engine.layout import Plan
 from podusv_cli.engine.replay import rates_replay
 from podusv_cli.engine.simulate import STATE, ClosedLoop, by_name, names
 from podusv_cli.paths.circle import Circle

@@ -138,8 +138,10 @@ def _verdict(
     parsed: ParsedClaim, runs: Mapping[str, Source], metrics: Mapping[str, Metric]
 ) -> Verdict:
     evaluation = Evaluation(runs, parsed.claim.tolerance, metrics)
-    if parsed.given and evaluation.holds(parsed.given) is not True:
-        reason = f"the premise does not hold: {parsed.claim.given}"
+    if parsed.given and (given := evaluation.holds(parsed.given)) is not True:
+        doubts = "; ".join(dict.fromkeys(evaluation.doubts))
+        unknown = f"whether the premise holds is unknown: {doubts}"
+        reason = unknown if given is None else f"the premise does not hold: {parsed.claim.given}"
         return Verdict(parsed.name, parsed.claim, ANSWERS[None], evaluation.numbers, reason)
     evaluation = Evaluation(runs, parsed.claim.tolerance, metrics)
     answer = evaluation.holds(parsed.expect)

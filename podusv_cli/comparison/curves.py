@@ -159,4 +159,5 @@ REDUCERS: dict[str, Callable[..., Any]] = {
     "integral": lambda t, y: np.trapezoid(y, t) if len(t) > 1 else np.nan,
     "rms_above": rms_above,
 }
-SETTINGS = {"rms_above": 1}  # numbers between the signal and the window; 0 for the others
+# What stands between the signal and the window; nothing for the others.
+SETTINGS = {"rms_above": "an angular frequency in rad/s"}

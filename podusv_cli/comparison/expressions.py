@@ -40,7 +40,6 @@ from podusv_cli.scenario.expressions import (
 from podusv_cli.theory.derived import DERIVED
 
 EXAMPLE = "a.iae < b.iae"
-TAKEN = {1: "a signal", 2: "a signal and an angular frequency in rad/s"}
 # norms of the weights, which have one value for every node of a network
 NORMS = {derived.needs[0]: name for name, derived in DERIVED.items() if len(derived.needs) == 1}
 
@@ -224,9 +223,10 @@ class Evaluation:
         return curve
 
     def _reduced(self, name: str, node: ast.Call) -> float:
-        count = 1 + SETTINGS.get(name, 0)
+        wanted = " and ".join(["a signal", *filter(None, [SETTINGS.get(name)])])
+        count = 1 + (name in SETTINGS)
         if len(node.args) not in (count, count + 2):
-            refuse(node, f"{name} takes {TAKEN[count]}, or {TAKEN[count]} and two times")
+            refuse(node, f"{name} takes {wanted}, or {wanted} and two times")
         if not all(isinstance(end, ast.Constant) for end in node.args[1:]):
             refuse(node, "the numbers after the signal must be plain numbers, the two times in s")
         curve, numbers = self._curve(node.args[0]), [literal(end) for end in node.args[1:]]

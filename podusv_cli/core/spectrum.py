@@ -12,12 +12,15 @@ FEWEST = 4  # samples
 def periodogram(t: Vector, y: Vector) -> tuple[Vector, Vector]:
     """Angular frequencies [rad/s] of the harmonics, and the mean square of the signal in each.
 
-    The samples are equally spaced. The signal's mean is removed; Hann's window keeps a trend or a
-    period that does not fit from leaking into all frequencies. Empty for fewer than 4 samples.
+    The samples are equally spaced. The signal's mean is removed. Hann's window keeps a trend or a
+    period that does not fit from leaking into all frequencies; it weights the middle of the signal
+    most, and spreads a line over three harmonics. Empty for fewer than 4 samples.
     """
     if len(t) < FEWEST:
         return np.zeros(0), np.zeros(0)
     window = np.hanning(len(t))
     power = 2.0 * np.abs(np.fft.rfft(window * (y - np.mean(y)))) ** 2
+    if len(t) % 2 == 0:
+        power[-1] *= 0.5  # the fastest harmonic has no mirror image
     rates = 2.0 * np.pi * np.fft.rfftfreq(len(t), (t[-1] - t[0]) / (len(t) - 1))
     return rates, power / (len(t) * np.sum(window**2))

@@ -17,8 +17,8 @@ import numpy.typing as npt
 from podusv_cli.core.errors import PodusvError, in_a_line
 from podusv_cli.core.escaping import visible
 from podusv_cli.core.kernel import LANES, Vector, whole_lanes
-from podusv_cli.engine.closed_loop import Plan, Wires
 from podusv_cli.engine.grid import TimeGrid
+from podusv_cli.engine.layout import Plan, Wires
 from podusv_cli.engine.march import Bell, Ending, Work
 from podusv_cli.engine.simulate import STATE, ClosedLoop, Observer, entries, marcher, why, wire
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled

@@ -8,67 +8,26 @@ Row: target, distance to it, law's signals, demand, tau, b, actuator's signals; 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 from podusv_cli.core.kernel import Vector, kernel, tail, unpacker
+from podusv_cli.engine.layout import (
+    DISTANCE,
+    HELD_DEMAND,
+    HELD_SIGNALS,
+    HELD_TARGET,
+    HELD_X,
+    STOP,
+    Function,
+    Plan,
+    Wires,
+    shifted,
+)
+from podusv_cli.engine.sampled import sample_and_hold
 from podusv_cli.vessels.plant import plant
 from podusv_cli.vessels.vessel import COEFFICIENTS
 
-Function = Callable[..., None]
 LARGEST = 1e300
-
-
-class Plan(NamedTuple):
-    """Sizes, offsets and periods of a closed loop, all whole numbers."""
-
-    states: int  # length of s
-    memory: int  # offset of the law's memory in s
-    signals: int  # offsets in the row
-    demand: int
-    tau: int
-    b: int
-    flags: int
-    columns: int  # length of the row
-    steps: int
-    log_every: int
-    hold_every: int  # 0: the law acts continuously
-    sample_every: int  # 0: the law takes no samples
-    load_of_time: int  # 1: the disturbance depends on time alone
-    wants_loads: int  # 1: the law is told which loads really act
-
-    @property
-    def width(self) -> int:
-        """Length of a logged row: t, s, row."""
-        return 1 + self.states + self.columns
-
-
-class Wires(NamedTuple):
-    """Vectors of a closed loop: constants of every part, then what the march writes to."""
-
-    path: Vector
-    path_table: Vector
-    disturbance: Vector
-    disturbance_table: Vector
-    law: Vector
-    law_table: Vector
-    actuator: Vector
-    actuator_table: Vector
-    vessel: Vector
-    observer: Vector
-    s: Vector
-    row: Vector
-    stages: Vector  # four rates and one intermediate state
-    held: Vector  # t, x, target of the last sample; demand and signals that nobody reads
-    work: Vector
-    seen: Vector  # the observer's
-    under_way: Vector  # the instant that is under way; then 1 if the march has to stop
-    log: Vector  # rows of t, s, row
-
-
-DISTANCE = 6  # where the row has z_e (18), behind the target
-HELD_X, HELD_TARGET, HELD_DEMAND, HELD_SIGNALS = 1, 7, 13, 15
-STOP = 1  # in `under_way`
 
 
 # Vector to named coefficients of the vessel; the plant is the one part that never varies.
@@ -95,7 +54,10 @@ def rates(
         path(t, c.path, c.path_table, row)
     if not (again and n.load_of_time == 1):
         disturbance(t, s, c.disturbance, c.disturbance_table, b)
-    if n.hold_every > 0:
+    if n.hold_every > 0 and n.update_first > 0:
+        for i in range(n.states - n.memory):
+            memory_rate[i] = 0.0
+    elif n.hold_every > 0:
         held = c.held
         law(
             held[0], tail(held, HELD_X), memory, tail(held, HELD_TARGET), p, table,
@@ -107,7 +69,7 @@ def rates(
         t, s, tail(s, 6), demand, c.actuator, c.actuator_table,
         tau, tail(ds, 6), tail(row, n.flags),
     )  # fmt: skip
-    if n.wants_loads > 0:
+    if n.wants_loads > 0 and not (n.hold_every > 0 and n.update_first > 0):
         after(t, memory, demand, tau, p, table, memory_rate)
     plant(s, tau, b, coefficients(c.vessel), ds)
 
@@ -117,35 +79,6 @@ def measure(s: Vector, row: Vector) -> None:
     """The distance to the target (18)."""
     x_e, y_e = row[0] - s[0], row[1] - s[1]
     row[DISTANCE] = math.sqrt(x_e * x_e + y_e * y_e)
-
-
-@kernel
-def sample_and_hold(
-    k: int, t: float, path: Function, law: Function, sample: Function, c: Wires, n: Plan
-) -> None:
-    """What happens at instants only: the law's own samples, and the hold of sampled control."""
-    s, row, held = c.s, c.row, c.held
-    memory = tail(s, n.memory)
-    p, table = c.law, c.law_table
-    path(t, c.path, c.path_table, row)
-    if n.sample_every > 0 and k % n.sample_every == 0:
-        sample(t, s, memory, row, p, table)
-    if n.hold_every > 0 and k % n.hold_every == 0:
-        held[0] = t
-        for i in range(6):
-            held[HELD_X + i] = s[i]
-            held[HELD_TARGET + i] = row[i]
-        law(
-            t, s, memory, row, p, table, tail(row, n.demand), tail(c.stages, n.memory),
-            tail(row, n.signals), c.work,
-        )  # fmt: skip
-
-
-@kernel
-def shifted(count: int, s: Vector, h: float, ds: Vector, out: Vector) -> None:
-    """out = s + h ds."""
-    for i in range(count):
-        out[i] = s[i] + h * ds[i]
 
 
 @kernel
@@ -200,7 +133,7 @@ def instant(
     c.under_way[0] = k
     again = k > first and t == (k - 1) * h + h  # where the last stage of the step before was
     if n.sample_every > 0 or n.hold_every > 0:
-        sample_and_hold(k, t, path, law, sample, c, n)
+        sample_and_hold(k, t, h, path, law, sample, after, c, n)
     rates(t, c.s, c.stages, path, disturbance, law, actuator, after, c, n, again)
     measure(c.s, c.row)
     if not (finite(n.states, c.s) and finite(n.columns, c.row)):

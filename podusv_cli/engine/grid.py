@@ -19,12 +19,16 @@ def whole_steps(duration: float, step: float) -> int | None:
 
 @dataclass(frozen=True)
 class TimeGrid:
-    """Instants k * step for k = 0 .. steps; `log_every`, `hold_every` in steps, 0 for no hold."""
+    """Instants k * step for k = 0 .. steps; `log_every`, `hold_every` in steps, 0 for no hold.
+
+    With `update_first` a held law takes a sample into its memory before it forms the demand.
+    """
 
     step: float
     steps: int
     log_every: int = 1
     hold_every: int = 0
+    update_first: bool = False
 
     def last_part(self, fraction: float) -> float:
         """The first instant of the last part of the run that is this fraction of it [s]."""

@@ -19,7 +19,7 @@ import numpy as np
 
 from podusv_cli.core.errors import in_a_line
 from podusv_cli.core.kernel import Vector
-from podusv_cli.engine.closed_loop import STOP
+from podusv_cli.engine.layout import STOP
 from podusv_cli.process.interrupts import interrupts_enabled
 
 Bell = SimpleQueue[None]

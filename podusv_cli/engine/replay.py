@@ -11,8 +11,8 @@ import numpy as np
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
 from podusv_cli.engine import closed_loop, signatures
-from podusv_cli.engine.closed_loop import Plan, Wires
 from podusv_cli.engine.grid import TimeGrid
+from podusv_cli.engine.layout import Plan, Wires
 from podusv_cli.engine.simulate import STATE, ClosedLoop, Observer, by_name, entries, names, wire
 
 

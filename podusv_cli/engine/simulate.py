@@ -18,8 +18,8 @@ from podusv_cli.core.recording import Allocate, Recording, Status
 from podusv_cli.core.signal import LOOP, Signal
 from podusv_cli.disturbances.base import Disturbance
 from podusv_cli.engine import closed_loop, signatures
-from podusv_cli.engine.closed_loop import Plan, Wires
 from podusv_cli.engine.grid import TimeGrid, whole_steps
+from podusv_cli.engine.layout import HELD_SIGNALS, Plan, Wires
 from podusv_cli.engine.march import Ending, Word, march
 from podusv_cli.paths.base import TARGET, Path
 from podusv_cli.process.interrupts import interrupts_deferred
@@ -100,6 +100,7 @@ class ClosedLoop:
             signals=signals, demand=demand, tau=tau, b=b, flags=flags, columns=columns,
             steps=grid.steps, log_every=grid.log_every, hold_every=grid.hold_every,
             sample_every=_sample_steps(law.sample_period(), grid),
+            update_first=int(grid.update_first),
             load_of_time=int(self.disturbance.of_time), wants_loads=int(law.wants_loads()),
         )  # fmt: skip
 
@@ -195,7 +196,7 @@ def wire(
         vessel=numbers(loop.vessel.constants()), observer=numbers(observer.constants),
         s=np.concatenate([loop.start, actuator.rest(), loop.first_memory()]),
         row=np.zeros(plan.columns), stages=np.zeros(5 * plan.states),
-        held=np.zeros(closed_loop.HELD_SIGNALS + len(law.signals)),
+        held=np.zeros(HELD_SIGNALS + len(law.signals)),
         work=np.zeros(law.workspace()), seen=np.zeros(observer.size), under_way=np.zeros(2),
         log=allocate(rows * plan.width),
     )  # fmt: skip

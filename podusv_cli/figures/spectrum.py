@@ -8,12 +8,15 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from podusv_cli.core.spectrum import periodogram
+from podusv_cli.figures.curves import mark
 from podusv_cli.figures.sheet import figure
 from podusv_cli.figures.style import Shown, about, legend, new_figure, unit
 
 DEMANDS = {"tau_u_cmd": "b_u", "tau_r_cmd": "b_r"}  # what the law demands, and what disturbs it
+AXES = {"tau_u_cmd": "surge", "tau_r_cmd": "yaw"}
 SEA: dict[str, Any] = {"color": "#444444", "linestyle": (0, (1, 1)), "label": "disturbance"}
 DECADES = 6  # shown below the largest harmonic
 HEIGHT = 2.4  # inches
@@ -21,8 +24,9 @@ HEIGHT = 2.4  # inches
 
 @figure(
     "spectrum", place=8, signals=tuple(DEMANDS),
-    caption="rms of each harmonic of the settled demand, and of the disturbance on the same axis "
-    "(of the first run); what is faster than the disturbance comes from the law",
+    caption="rms of the settled demand in each harmonic, and of the disturbance on the same axis "
+    "(of the first run); Hann's window spreads a line over three harmonics; a line that the "
+    "disturbance and the path do not have comes from the law",
 )  # fmt: skip
 def spectrum(runs: Sequence[Shown], columns: int) -> Figure:
     """Demands in surge and yaw over angular frequency, of runs that got to their settled part."""
@@ -33,22 +37,27 @@ def spectrum(runs: Sequence[Shown], columns: int) -> Figure:
         for run in (run for run in whole[:1] if run.has(load)):
             _draw(axes, run, load, **SEA)
         for run in (run for run in whole if run.has(demand)):
-            _draw(axes, run, demand, **run.look)
+            mark(_draw(axes, run, demand, **run.look), run)
         _scales(axes)
+        axes.set_title(AXES[demand])
         axes.set_xlabel("angular frequency [rad/s]")
         axes.set_ylabel(f"rms of ${about(runs, demand).symbol}$ [{unit(about(runs, demand))}]")
     legend(figure, columns)
     return figure
 
 
-def _draw(axes: Axes, run: Shown, name: str, **look: Any) -> None:
+def _draw(axes: Axes, run: Shown, name: str, **look: Any) -> Line2D:
     """The harmonics of one signal's settled part."""
     rates, power = periodogram(*run.during(name, (run.steady_from, run.end)))
-    axes.plot(rates[1:], np.sqrt(power[1:]), **look)
+    return axes.plot(rates[1:], np.sqrt(power[1:]), **look)[0]
 
 
 def _scales(axes: Axes) -> None:
-    """Both axes logarithmic, down to what rounding leaves."""
-    top = max((float(np.max(line.get_ydata(), initial=0.0)) for line in axes.lines), default=0.0)
+    """Both axes logarithmic, over some decades below the largest harmonic."""
+    curves = [np.array(line.get_data()) for line in axes.lines]
+    top = max((float(np.max(rms, initial=0.0)) for _, rms in curves), default=0.0)
     if np.isfinite(top) and top > 0.0:
-        axes.set(xscale="log", yscale="log", ylim=(top * 10.0**-DECADES, 3.0 * top))
+        floor = top * 10.0**-DECADES
+        last = max(float(np.max(rates[rms > floor], initial=0.0)) for rates, rms in curves)
+        axes.set(xscale="log", yscale="log", ylim=(floor, 3.0 * top))
+        axes.set_xlim(right=1.1 * last)

@@ -51,7 +51,7 @@ def _sampled_too_fast(case: Case, cause: Cause) -> Sentences:
     if not grid.hold_every:
         return
     for loop in loops(case.scenario, case.reference.working, cause):
-        growth = sampled_growth(loop, grid.step, grid.hold_every)
+        growth = sampled_growth(loop, grid.step, grid.hold_every, update_first=grid.update_first)
         if growth > UNSTABLE:
             yield (
                 f"the {loop.axis} {loop.name}, held for {period:g} s, grows {growth:.3g} times a "

@@ -23,12 +23,16 @@ def rk4_growth(loop: Loop, step: float) -> float:
     return _radius(_rk4(loop.matrix, step))
 
 
-def sampled_growth(loop: Loop, step: float, count: int) -> float:
+def sampled_growth(loop: Loop, step: float, count: int, *, update_first: bool = False) -> float:
     """Spectral radius of one period of `count` RK4 steps, with output and measurement held.
+
+    With `update_first` the memory takes the sample before the output is formed, see `control`.
 
     During a period (e, c, e_held, m): e' = -d e + c with c = g . (e, m) at the sample, and
     m' = F (e_held, m).
     """
+    if update_first:
+        return _updated_first(loop, step, count)
     n = len(loop.memory)
     rates = np.zeros((3 + n, 3 + n))
     rates[0, :2] = -loop.damping, 1.0
@@ -39,6 +43,18 @@ def sampled_growth(loop: Loop, step: float, count: int) -> float:
     sampled[3:, 1:] = np.eye(n)
     through = np.linalg.matrix_power(_rk4(rates, step), count) @ sampled
     return _radius(np.delete(through, [1, 2], axis=0))
+
+
+def _updated_first(loop: Loop, step: float, count: int) -> float:
+    """The same where m' = F (e_held, m) comes first, and then e' = -d e + g . (e_held, m)."""
+    rates = np.vstack([np.zeros(1 + len(loop.memory)), loop.memory])
+    updated = np.linalg.matrix_power(_rk4(rates, step), count)
+    one = _rk4(np.array([[-loop.damping, 1.0], [0.0, 0.0]]), step)
+    through = np.linalg.matrix_power(one, count)
+    period = np.eye(len(updated))
+    period[0] = through[0, 1] * loop.feedback
+    period[0, 0] += through[0, 0]
+    return _radius(period @ updated)
 
 
 def _rk4(matrix: Vector, step: float) -> Vector:

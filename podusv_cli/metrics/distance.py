@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from podusv_cli.core.kernel import Vector, kernel
-from podusv_cli.engine.closed_loop import DISTANCE
+from podusv_cli.engine.layout import DISTANCE
 from podusv_cli.metrics.metric import Accumulator, Layout, Metric, Result, add, gathered, ratio
 
 # Positions of the gathered numbers: integrals over the run, and over the steady window.

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from podusv_cli.core.kernel import Vector, kernel
-from podusv_cli.engine.closed_loop import Plan
+from podusv_cli.engine.layout import Plan
 from podusv_cli.engine.simulate import ClosedLoop
 
 

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from functools import cache
 from types import GenericAlias
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from pydantic import create_model
 
@@ -84,6 +84,11 @@ class Control(Component):
     period: float = value(
         0.0, "s", "0: continuously; else the law is evaluated once a period, a whole number of "
         "steps, and its output held", ge=0,
+    )  # fmt: skip
+    update: Literal["after", "before"] = value(
+        "after", "", "of sampled control: whether the law's memory (weights, integrals, filters) "
+        "takes a sample after the demand is formed from it, or before; it is integrated over a "
+        "period with the sample held",
     )  # fmt: skip
 
 
@@ -228,7 +233,8 @@ class Scenario(Component):
         steps = whole_steps(self.simulation.duration, step) or 0
         # Beyond the last step only the first is logged; machine code knows no larger numbers.
         every = min(self.log.every, steps + 1)
-        return TimeGrid(step, steps, every, whole_steps(self.control.period, step) or 0)
+        held, first = whole_steps(self.control.period, step) or 0, self.control.update == "before"
+        return TimeGrid(step, steps, every, held, first)
 
     def observer(self, grid: TimeGrid | None = None) -> Metrics:
         """What gathers the numbers of all metrics, over another grid than the run's where given."""

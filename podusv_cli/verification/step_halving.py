@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -34,7 +34,10 @@ def refined(scenario: Scenario, halvings: int) -> TimeGrid:
     """
     grid, finer = scenario.time_grid(), 2**halvings
     steps = grid.steps * finer
-    return TimeGrid(grid.step / finer, steps, max(steps, 1), grid.hold_every * finer)
+    return replace(
+        grid, step=grid.step / finer, steps=steps, log_every=max(steps, 1),
+        hold_every=grid.hold_every * finer,
+    )  # fmt: skip
 
 
 def run_level(scenario: Scenario, halvings: int, progress: Progress | None = None) -> Level:

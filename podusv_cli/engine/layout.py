@@ -1,0 +1,70 @@
+"""Where everything lies in the vectors of a closed loop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from podusv_cli.core.kernel import Vector, kernel
+
+Function = Callable[..., None]
+
+
+class Plan(NamedTuple):
+    """Sizes, offsets and periods of a closed loop, all whole numbers."""
+
+    states: int  # length of s
+    memory: int  # offset of the law's memory in s
+    signals: int  # offsets in the row
+    demand: int
+    tau: int
+    b: int
+    flags: int
+    columns: int  # length of the row
+    steps: int
+    log_every: int
+    hold_every: int  # 0: the law acts continuously
+    sample_every: int  # 0: the law takes no samples
+    update_first: int  # 1: a held law's memory takes a sample before the demand is formed
+    load_of_time: int  # 1: the disturbance depends on time alone
+    wants_loads: int  # 1: the law is told which loads really act
+
+    @property
+    def width(self) -> int:
+        """Length of a logged row: t, s, row."""
+        return 1 + self.states + self.columns
+
+
+class Wires(NamedTuple):
+    """Vectors of a closed loop: constants of every part, then what the march writes to."""
+
+    path: Vector
+    path_table: Vector
+    disturbance: Vector
+    disturbance_table: Vector
+    law: Vector
+    law_table: Vector
+    actuator: Vector
+    actuator_table: Vector
+    vessel: Vector
+    observer: Vector
+    s: Vector
+    row: Vector
+    stages: Vector  # four rates and one intermediate state
+    held: Vector  # t, x, target of the last sample; demand and signals that nobody reads
+    work: Vector
+    seen: Vector  # the observer's
+    under_way: Vector  # the instant that is under way; then 1 if the march has to stop
+    log: Vector  # rows of t, s, row
+
+
+DISTANCE = 6  # where the row has z_e (18), behind the target
+HELD_X, HELD_TARGET, HELD_DEMAND, HELD_SIGNALS = 1, 7, 13, 15
+STOP = 1  # in `under_way`
+
+
+@kernel
+def shifted(count: int, s: Vector, h: float, ds: Vector, out: Vector) -> None:
+    """out = s + h ds."""
+    for i in range(count):
+        out[i] = s[i] + h * ds[i]
