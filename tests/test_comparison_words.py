@@ -137,19 +137,21 @@ def test_an_event_that_never_happens_is_later_than_any_other(text, answer):
 
 
 @pytest.mark.parametrize(
-    ("given", "expect", "answer"),
+    ("given", "answer", "reason"),
     [
-        ("a.iae < b.iae", "a.iae < b.iae", "reproduced"),
-        ("a.iae > b.iae", "a.iae < b.iae", "cannot tell"),
-        ("lost.iae > b.iae", "a.iae < b.iae", "cannot tell"),
+        ("a.iae < b.iae", "reproduced", ""),
+        ("a.iae > b.iae", "cannot tell", "the premise does not hold: a.iae > b.iae"),
+        ("lost.iae > b.iae", "cannot tell", "whether the premise holds is unknown: lost.iae: lost"),
     ],
 )
-def test_a_claim_whose_premise_fails_cannot_be_told(given, expect, answer):
+def test_a_claim_whose_premise_fails_cannot_be_told(given, answer, reason):
+    expect = "a.iae < b.iae"
     claim = Claim(says="x", source="x", given=given, expect=expect)
     trees = (parse(text, RUNS, ABOUT) for text in (expect, given))
     (found,) = judge([ParsedClaim("C", claim, *trees)], RUNS)
     assert found.answer == answer
-    assert (found.reason == f"the premise does not hold: {given}") == (answer == "cannot tell")
+    assert found.reason.startswith(reason)
+    assert bool(found.reason) == bool(reason)
 
 
 @pytest.mark.parametrize(

@@ -152,6 +152,15 @@ def test_a_law_that_is_not_bounded_is_told(letter, keys, claim):
     assert signs(letter, keys, laws=("proposed",))[claim] == "-"
 
 
+def test_weights_that_take_a_sample_before_the_demand_do_not_cycle():
+    keys = (
+        "control.period=0.01",
+        "control.update=before",
+        "controller.first_difference=from_start",
+    )
+    assert signs("S", keys, laws=("proposed",))["C11c"] == "+"
+
+
 def test_with_narrow_nodes_the_heading_creeps_to_a_right_angle_and_the_run_diverges():
     keys = ("controller.network.spread=0.4", "simulation.duration=1240")
     scenario = load(ROOT / "configs/paper/figures_compare_standoff.yaml", keys).scenario
