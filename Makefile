@@ -44,7 +44,7 @@ reproduce: $(VENV)/run.done ## the paper, claim by claim, into results/paper/
 
 # In F and S the law without its network diverges, as it must: exit code 3.
 claim: $(VENV)/run.done ## the paper's central claim: parts off, wrong vessels, sampling
-	@echo "$(words $(ABLATIONS) $(TABLES)) steps, about seven minutes on two cores:"
+	@echo "$(words $(ABLATIONS) $(TABLES)) steps, about ten minutes on two cores:"
 	@rm -f results/paper.log
 	@for name in $(ABLATIONS); do \
 	    $(STEP) compare paper $$name $$(case $$name in ablation_figures|ablation_standoff|ablation_gains_figures) echo 3;; *) echo 0;; esac) || exit 1; \
