@@ -76,6 +76,15 @@ def test_every_command_and_exit_code_is_in_the_reference(reference: Any) -> None
         assert re.findall(r"^\| \d+ \|.*$", text, re.M) == rows
 
 
+def test_every_page_is_in_the_contents():
+    listed = set(
+        re.findall(r"^   (?:.* <)?/?([\w/]+)>?$", (ROOT / "docs/index.rst").read_text(), re.M)
+    )
+    pages = [*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("results/*.md")]
+    names = {page.relative_to(ROOT).with_suffix("").as_posix() for page in pages}
+    assert {name.removeprefix("docs/") for name in names} <= listed
+
+
 def test_words_are_not_taken_for_markdown(reference: Any) -> None:
     assert reference.text("|a| * `b|c` <d> [e]") == r"\|a\| \* `b|c` \<d> \[e]"
     assert reference.code("|n|") == r"`\|n\|`"

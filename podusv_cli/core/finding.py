@@ -13,6 +13,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from podusv_cli.core.errors import in_a_line
 from podusv_cli.core.recording import Recording, blocks
 
 Mask = npt.NDArray[np.bool_]
@@ -73,9 +74,17 @@ class FindingKind:
 
     def findings(self, controller: object, *seen: object) -> Iterator[Finding]:
         """All findings of this kind; the arguments `seen` are passed on to `search`."""
-        for sentence in self.search(*seen) if isinstance(controller, self.law) else ():
-            at = sentence if isinstance(sentence, At) else At(self.about, sentence)
-            yield Finding(self.name, at.where, at.text)
+        if not isinstance(controller, self.law):
+            return
+        try:
+            for sentence in self.search(*seen):
+                at = sentence if isinstance(sentence, At) else At(self.about, sentence)
+                yield Finding(self.name, at.where, at.text)
+        except Exception as error:  # of a plug-in, which costs neither a run nor other findings
+            if self.search.__module__.startswith("podusv_cli."):
+                raise
+            text = f"could not be looked for: {in_a_line(error)}"
+            yield Finding(self.name, self.about, text)
 
 
 Decorator = Callable[[Callable[..., Sentences]], FindingKind]

@@ -16,6 +16,7 @@ from functools import cache
 from importlib.metadata import EntryPoint, distributions
 from importlib.util import find_spec
 from pathlib import Path
+from threading import RLock
 from types import ModuleType
 from typing import Any
 
@@ -27,6 +28,8 @@ ROOMS = (
 )  # fmt: skip
 GROUPS = tuple(f"podusv.{room}" for room in ROOMS)
 MODULES = "podusv_plugins"  # what the modules of files are called: podusv_plugins.my_law_1a2b3c4d
+
+_ONE_AT_A_TIME = RLock()
 
 
 @dataclass(frozen=True)
@@ -115,8 +118,11 @@ def from_file(path: str, text: str) -> Plugin:
 def _module(name: str, path: str, text: str) -> ModuleType:
     """The module that is made of just this text; Python's own import might take an older one."""
     whole = f"{MODULES}.{name}"
-    if whole in sys.modules:
-        return sys.modules[whole]
+    with _ONE_AT_A_TIME:  # another thread would find a module that is not complete
+        return sys.modules.get(whole) or _executed(whole, path, text)
+
+
+def _executed(whole: str, path: str, text: str) -> ModuleType:
     module = ModuleType(whole)
     module.__file__ = str(Path(path).resolve())
     sys.modules[whole] = module  # where pydantic looks up annotations, and inspect the source
@@ -165,9 +171,10 @@ def _package_digest(points: Iterable[tuple[str, EntryPoint]]) -> str:
     for top in sorted({point.module.partition(".")[0] for _, point in points}):
         spec = find_spec(top)
         folders = (spec and spec.submodule_search_locations) or ()
-        files = [path for folder in folders for path in Path(folder).rglob("*")]
+        files = [(path.relative_to(top), path) for top in folders for path in Path(top).rglob("*")]
         alone = [Path(spec.origin)] if spec and spec.origin and not folders else []
-        for path in sorted([*files, *alone]):
+        for name, path in sorted([*files, *((Path(path.name), path) for path in alone)]):
             if path.suffix in (".py", ".yaml"):
-                whole.update(path.name.encode() + b"\0" + path.read_bytes())
+                content = path.read_bytes()
+                whole.update(f"{name.as_posix()}\0{len(content)}\0".encode() + content)
     return whole.hexdigest()

@@ -80,13 +80,14 @@ def named(package: str, kind: type[Named], plugins: Plugins = ()) -> dict[str, N
     Modules come in alphabetical order, objects in the order of their definition. Raises LawError
     for two objects of one name.
     """
-    found: dict[str, Named] = {}
-    for thing in _members(package, plugins):
+    found: dict[str, tuple[str, Named]] = {}
+    for origin, thing in _placed(package, plugins):
         if isinstance(thing, kind):
             name = thing.name  # type: ignore[attr-defined]
-            if found.setdefault(name, thing) is not thing:
-                raise LawError(f"{package} has two of the name {name!r}; take another name")
-    return found
+            first, other = found.setdefault(name, (origin, thing))
+            if other is not thing:
+                raise LawError(f"{origin}: {first} has the name {name!r} already; take another")
+    return {name: thing for name, (_, thing) in found.items()}
 
 
 def signals(*packages: str, plugins: Plugins = ()) -> list[Signal]:
@@ -117,11 +118,16 @@ def _signals(thing: Any) -> Iterator[Signal]:
 
 
 def _members(package: str, plugins: Plugins) -> Iterator[Any]:
+    yield from (thing for _, thing in _placed(package, plugins))
+
+
+def _placed(package: str, plugins: Plugins) -> Iterator[tuple[str, Any]]:
+    """Everything in the modules of a package and in the plug-ins, and which of them it is in."""
     for module in iter_modules(import_module(package).__path__, f"{package}."):
         members = vars(_imported(module.name)).items()
-        yield from (thing for name, thing in members if not name.startswith("__"))
+        yield from ((module.name, thing) for name, thing in members if not name.startswith("__"))
     for plugin in plugins:
-        yield from plugin.members(package.rpartition(".")[2])
+        yield from ((str(plugin), thing) for thing in plugin.members(package.rpartition(".")[2]))
 
 
 def _imported(module: str) -> Any:

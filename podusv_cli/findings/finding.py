@@ -9,6 +9,7 @@ from functools import cache, cached_property
 import numpy as np
 
 from podusv_cli.core import registry
+from podusv_cli.core.errors import LawError
 from podusv_cli.core.finding import Finding, FindingKind
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.plugins import Plugins
@@ -32,6 +33,10 @@ def finding_kinds(plugins: Plugins = ()) -> dict[str, FindingKind]:
     for package in PACKAGES:
         found |= registry.named(f"podusv_cli.{package}", FindingKind, plugins)
     sections = list(Scenario.model_fields)
+    for kind in found.values():
+        if kind.about.partition(".")[0] not in sections:
+            what = f"finding {kind.name!r} is about {kind.about!r}: "
+            raise LawError(what + unknown("section", kind.about.partition(".")[0], sections))
     ordered = sorted(found.values(), key=lambda n: sections.index(n.about.partition(".")[0]))
     return {kind.name: kind for kind in ordered}
 

@@ -21,6 +21,7 @@ from podusv_cli.engine.variants import variants
 from podusv_cli.findings.finding import postflight, preflight
 from podusv_cli.interface.results import Comparison, Run
 from podusv_cli.interface.scenarios import Changes, Source, loaded
+from podusv_cli.process.extras import Extras
 from podusv_cli.storage import json_files
 from podusv_cli.verification import verify as verification
 from podusv_cli.workflows import compare as comparing
@@ -50,8 +51,10 @@ def simulate(source: Source, changes: Changes | None = None) -> Run:
     recording = simulated(scenario, Stopwatch())
     whole, _ = monitored(scenario, recording)
     found = [*preflight(scenario), *postflight(scenario, whole)]
-    warned = tuple(map(str, found))
-    return Run(whole.controller, scenario, whole, summary(scenario, recording), warned)
+    extras = Extras()
+    numbers = summary(scenario, recording, extras)
+    warned = tuple(map(str, (*found, *extras.missing)))
+    return Run(whole.controller, scenario, whole, numbers, warned)
 
 
 def run(

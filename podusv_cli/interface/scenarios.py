@@ -85,7 +85,7 @@ def _loaded(source: Any, overrides: list[str]) -> Loaded:
 def _(source: model.Scenario, overrides: list[str]) -> Loaded:
     derived = {plugins.KEY, *(["controller"] if source.open_choice else [])}
     sections = {key: part for key, part in source.model_dump().items() if key not in derived}
-    files = [plugin.path for plugin in source.plugged if plugin.path]
+    files = [plugin for plugin in source.plugged if plugin.text]  # as they were when it was loaded
     text = yaml_text(sections)
     return load_text(text, source.name, overrides, CHECKS, files, placed=False)
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from podusv_cli.core import registry
+from podusv_cli.core.errors import LawError, in_a_line
 from podusv_cli.core.kernel import Vector, kernel, specialise, tail
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.engine.grid import TimeGrid
@@ -28,6 +29,7 @@ METRICS = metrics_with(())
 # Measured times, which never repeat
 CLOCKED = tuple(name for name, metric in METRICS.items() if metric.unit == "ns")
 
+Failed = Callable[[str, Exception], None]
 Parts = tuple[tuple[Accumulator, int], ...]
 COUNT = 0  # placeholder: how many numbers `first_kernel` gathers
 
@@ -66,8 +68,11 @@ class Metrics(Observer):
     step: float = 0.0
     plugins: Plugins = ()
 
-    def summary(self, seen: Vector) -> dict[str, float]:
-        """Metrics by name; NaN where a run ended before one is defined."""
+    def summary(self, seen: Vector, failed: Failed | None = None) -> dict[str, float]:
+        """Metrics by name; NaN where a run ended before one is defined.
+
+        A metric that raises is left out where `failed` is told; else it raises LawError.
+        """
         if not seen.any():  # no instant at all
             seen = np.full_like(seen, np.nan)
         ends = np.cumsum([size for _, size in self.parts])[:-1]
@@ -75,11 +80,18 @@ class Metrics(Observer):
             part: close_integrals(numbers, part.integrals, self.step)
             for (part, _), numbers in zip(self.parts, np.split(seen, ends), strict=True)
         }
-        return {
-            metric.name: metric.result(own[metric.accumulator], self.step)
-            for metric in metrics_with(self.plugins).values()
-            if metric.accumulator in own
-        }
+        numbers: dict[str, float] = {}
+        for metric in metrics_with(self.plugins).values():
+            if metric.accumulator in own:
+                try:
+                    number = float(metric.result(own[metric.accumulator], self.step))
+                except Exception as error:  # a plug-in's function may raise anything
+                    if not failed:
+                        raise LawError(f"metric {metric.name}: {in_a_line(error)}") from error
+                    failed(f"metric {metric.name}", error)
+                else:
+                    numbers[metric.name] = number
+        return numbers
 
     def summaries(self, seen: Vector) -> dict[str, Vector]:
         """Metrics by name, with one number per run, from rows of gathered numbers (`Batch.seen`).
@@ -98,12 +110,20 @@ def observer(
     """The observer of all metrics that this loop has, those of plug-ins included."""
     layout = Layout(loop, loop.layout(grid), grid.last_part(steady_fraction), settling_radius)
     known = metrics_with(plugins).values()
-    accumulators = dict.fromkeys(m.accumulator for m in known if m.accumulator)
-    parts = tuple((part, part.size(layout)) for part in accumulators if part.size(layout))
+    accumulators = {m.accumulator: m.name for m in known if m.accumulator}
+    parts: Parts = ()
     constants: dict[str, float] = {}
-    for part, _ in parts:
-        for name, number in part.constants(layout).items():
+    for part, metric in accumulators.items():
+        try:
+            count = part.size(layout)
+            parts += ((part, count),) if count else ()
+            own = dict(part.constants(layout)) if count else {}
+        except Exception as error:  # a plug-in's function may raise anything
+            what = "its accumulator, asked for size and constants"
+            raise LawError(f"metric {metric}, {what}: {in_a_line(error)}") from error
+        for name, number in own.items():
             if constants.setdefault(name, number) != number:
-                raise ValueError(f"two accumulators use {name!r} for different numbers")
+                what = f"has another constant {name!r} than another metric"
+                raise LawError(f"metric {metric}: its accumulator {what}; give it another name")
     size = sum(size for _, size in parts)
     return Metrics(_watch(parts), constants, size, parts, grid.step, plugins)

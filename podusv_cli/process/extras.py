@@ -48,7 +48,7 @@ class Extras:
         try:
             return work()
         except Exception as error:
-            self._note(what, error)
+            self.note(what, error)
         return None
 
     def attempt(self, what: str, work: Callable[[], Result]) -> Result | None:
@@ -64,14 +64,15 @@ class Extras:
             except Exception as error:
                 self.interrupted = here.number > 0
                 if not self.interrupted:  # compiled code may turn an interrupt into any exception
-                    self._note(what, error)
+                    self.note(what, error)
         return None
 
     def as_json(self) -> dict[str, Any]:
         """What missing.json holds."""
         return {"format": 1, "missing": [asdict(part) for part in self.missing]}
 
-    def _note(self, what: str, error: Exception) -> None:
+    def note(self, what: str, error: Exception) -> None:
+        """Add a failure to `missing`. Raises StorageError if it is one."""
         if isinstance(error, StorageError):
             raise error
         trace = "".join(traceback.format_exception(error))

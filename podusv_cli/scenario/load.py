@@ -11,7 +11,7 @@ from typing import Any
 import yaml
 
 from podusv_cli.core.errors import ScenarioError, StorageError
-from podusv_cli.core.plugins import Plugins
+from podusv_cli.core.plugins import Plugin, Plugins
 from podusv_cli.scenario import plugins
 from podusv_cli.scenario.keys import keys_of
 from podusv_cli.scenario.layers import composed
@@ -76,7 +76,7 @@ def load(
 
 def load_text(
     text: str, source: str, overrides: Sequence[str] = (), checks: Sequence[Check] = (),
-    files: Sequence[str] = (), *, placed: bool = True,
+    files: Sequence[str | Plugin] = (), *, placed: bool = True,
 ) -> Loaded:  # fmt: skip
     """The scenario of a text; `source` names it in messages and is where its file names start.
 

@@ -32,8 +32,11 @@ BASES: dict[str, type[Component]] = {
 }  # fmt: skip
 
 
-def with_given(root: Node, files: Sequence[str]) -> Node:
-    """The tree with files of the command line (`--plugin`) after those that it names itself."""
+def with_given(root: Node, files: Sequence[str | Plugin]) -> Node:
+    """The tree with files of the command line (`--plugin`) after those that it names itself.
+
+    A plug-in among the files is taken as it is, whatever has become of its file.
+    """
     if not files:
         return root
     entries = [_given(file) for file in files]
@@ -60,8 +63,8 @@ def from_files(files: Sequence[str], faults: list[Fault]) -> Plugins:
     return (*(plugin for plugin in given if plugin), *installed())
 
 
-def _given(file: str) -> Node:
-    return Node(file, Mark(f"--plugin {file}"), text=file)
+def _given(file: str | Plugin) -> Node:
+    return Node(file, Mark(f"--plugin {file}"), text=str(file))
 
 
 def _listed(own: Node) -> list[tuple[Node, Node]]:
@@ -131,6 +134,8 @@ def _names(plugin: Plugin) -> tuple[str, ...]:
 
 def _plugin(name: Node, wanted: Node, faults: list[Fault]) -> Plugin | None:
     """The plug-in that the scenario names, or None with a fault."""
+    if isinstance(name.content, Plugin):
+        return name.content
     if not isinstance(name.content, str):
         what = found(name.content, name.text)
         text = f"must be a list of files like my_law.py and installed packages, found {what}"

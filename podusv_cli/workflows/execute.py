@@ -133,7 +133,8 @@ def execute(
         recording = simulated(task.scenario, watch, progress, allocate)
         extras = Extras(recording.status == "interrupted")
         with watch.part("metrics"):
-            metrics = extras.made("the metrics", lambda: summary(task.scenario, recording)) or {}
+            gather = partial(summary, task.scenario, recording, extras)
+            metrics = extras.made("the metrics", gather) or {}
             metrics |= (
                 extras.attempt("the law's cost", lambda: _cost(task.scenario, recording)) or {}
             )
@@ -208,10 +209,18 @@ def simulated(
         )
 
 
-def summary(scenario: Scenario, recording: Recording) -> dict[str, float]:
-    """The metrics of a run that was observed."""
+def check_figures(scenario: Scenario) -> None:
+    """LawError where a plug-in's figure has the name of another, before anything is simulated."""
+    if scenario.plugged:
+        from podusv_cli.figures.drawing import figures_with  # matplotlib is slow to import
+
+        figures_with(scenario.plugged)
+
+
+def summary(scenario: Scenario, recording: Recording, extras: Extras) -> dict[str, float]:
+    """The metrics of a run that was observed; those that raise are missing among the extras."""
     seen = recording.seen
-    return scenario.observer().summary(seen) if seen is not None else {}
+    return scenario.observer().summary(seen, extras.note) if seen is not None else {}
 
 
 def _cost(scenario: Scenario, recording: Recording) -> dict[str, float]:

@@ -12,6 +12,7 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.findings.finding import preflight, unknown_codes
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Loaded, load
+from podusv_cli.workflows.execute import check_figures
 from podusv_cli.workflows.members import Member, comparable, distinct, numbered
 from podusv_cli.workflows.run import Request
 
@@ -71,6 +72,7 @@ def from_folder(path: Path, files: Sequence[str] = ()) -> Item:
 def from_scenario(loaded: Loaded, *, alone: bool) -> Item:
     """The runs of a scenario, and its claims; `alone` says that nothing else is compared."""
     scenario, singles = loaded.scenario, loaded.scenario.singles()
+    check_figures(scenario)
     labels = list(singles) if alone or scenario.controllers else [scenario.name]
     members = [
         Member(label, single, loaded.text, noticed=preflight(single))

@@ -14,7 +14,7 @@ from podusv_cli.scenario.load import Loaded, load, resolved_yaml
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import unknown
 from podusv_cli.storage.run_folder import default_folder
-from podusv_cli.workflows.execute import Finished, Progress, Stopwatch, Task, execute
+from podusv_cli.workflows.execute import Finished, Progress, Stopwatch, Task, check_figures, execute
 
 RESULTS = Path("results")
 DRAWN = ("controls", "trajectory", "errors")  # the one that takes longest first
@@ -57,6 +57,7 @@ def run_loaded(
         scenario = single(loaded, request.controller)
         target = request.out or default_folder(RESULTS, scenario.name, resolved_yaml(scenario))
     with watch.part("preflight"):
+        check_figures(scenario)
         noticed = preflight(scenario)
     for finding in noticed:
         request.warn(finding)

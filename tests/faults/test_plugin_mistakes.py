@@ -1,9 +1,14 @@
 """A mistake in a plug-in's law is refused before the run with file and line, never as a bug."""
 
+from concurrent.futures import ThreadPoolExecutor
+from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import pytest
 from plugin_samples import LAW, put
+
+import podusv_cli as podusv_python
+from podusv_cli.core import plugins
 
 # What is written in place of what, and what is said.
 MISTAKES = {
@@ -39,3 +44,111 @@ def test_it_is_refused_before_the_run(podusv, name):
         assert "my_law.py, line " in told
         assert "bug" not in told
         assert not Path("r").exists()
+
+
+MORE = """
+from podusv_cli.core.finding import after, before
+from podusv_cli.figures.sheet import figure
+from podusv_cli.metrics.metric import Accumulator, Metric, gathered
+
+
+@kernel
+def watch(t, weight, s, row, k, seen):
+    seen[0] = abs(s[1])
+
+
+def made(name="own", size=lambda layout: 1, constants=lambda layout: {}, result=gathered(0)):
+    return Metric(name, "m", "of its own", Accumulator(watch, size, constants), result)
+
+
+def failing(*seen):
+    yield 1 / 0
+
+
+"""
+# What else a plug-in has, the exit code, and what is said.
+OTHERS = {
+    "result": (
+        "m = made(result=lambda seen, step: 1 / 0)",
+        0,
+        "own could not be made: Zero",
+    ),
+    "text": ("m = made(result=lambda seen, step: 'a')", 0, "metric own could not be made: ValueE"),
+    "size": (
+        "m = made(size=lambda layout: layout.no)",
+        2,
+        "metric own, its accumulator",
+    ),
+    "constants": ("m = made(constants=lambda layout: 5)", 2, "metric own, its accumulator, asked"),
+    "constant": (
+        "m = made(constants=lambda layout: {'standoff': 7.0})",
+        2,
+        "another constant",
+    ),
+    "metric": ("m = made('iae')", 2, "my_law.py: podusv_cli.metrics.distance has the name 'iae'"),
+    "figure": (
+        "f = figure('pods', caption='', signals=('x',))(failing)",
+        2,
+        "has the name 'pods'",
+    ),
+    "before": (
+        "f = before('a', about='path', meaning='m')(failing)",
+        0,
+        "not be looked for: Z",
+    ),
+    "after": (
+        "f = after('a', about='path', meaning='m')(failing)",
+        0,
+        "not be looked for: Z",
+    ),
+    "about": ("f = after('a', about='pth', meaning='m')(failing)", 2, "did you mean 'path'"),
+}
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_mistakes_in_metrics_figures_and_findings_cost_no_run(podusv, name):
+    text, code, words = OTHERS[name]
+    said = podusv("run", put(law=LAW + MORE + text + "\n"), "--out", "r", "--no-figures")
+    assert said.code == code, said.err
+    assert words in " ".join(said.err.split())
+    assert "bug" not in said.err
+    assert Path("r/log.h5").exists() == (code == 0)
+    if code == 0:
+        assert '"iae"' in Path("r/metrics.json").read_text()
+
+
+@pytest.mark.usefixtures("podusv")
+def test_a_metric_that_raises_costs_no_run_in_memory():
+    run = podusv_python.simulate(put(law=LAW + MORE + OTHERS["result"][0] + "\n"))
+    assert run.metrics["iae"] > 0
+    assert any("metric own could not be made" in line for line in run.warnings)
+
+
+@pytest.mark.usefixtures("podusv")
+def test_a_scenario_keeps_the_plug_in_that_it_was_loaded_with():
+    scenario = podusv_python.load(put())
+    first = podusv_python.simulate(scenario)
+    put(law=LAW.replace("PUSH = 1.0", "PUSH = 2.0"))
+    again = podusv_python.simulate(podusv_python.load(scenario, {"name": "x"}))
+    assert (again["tau_u_cmd"] == first["tau_u_cmd"]).all()
+    Path("laws/my_law.py").unlink()
+    assert podusv_python.simulate(scenario).status == "finished"
+
+
+def test_threads_find_a_whole_module():
+    text = f"import time\ntime.sleep(0.05)\nWHOLE = {id(object())}\n"
+    with ThreadPoolExecutor(4) as pool:
+        found = list(pool.map(lambda _: plugins.from_file("slow.py", text), range(4)))
+    assert all("WHOLE" in vars(module) for one in found for _, module in one.offers)
+
+
+def test_a_package_s_digest_tells_where_its_files_are(tmp_path, monkeypatch):
+    point = EntryPoint("a", "digested.a", "podusv.paths")
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "digested/one").mkdir(parents=True)
+    (tmp_path / "digested/two").mkdir()
+    (tmp_path / "digested/__init__.py").touch()
+    (tmp_path / "digested/one/a.py").write_text("A = 1\n")
+    before = plugins._package_digest([("paths", point)])
+    (tmp_path / "digested/one/a.py").rename(tmp_path / "digested/two/a.py")
+    assert plugins._package_digest([("paths", point)]) != before
