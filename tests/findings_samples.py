@@ -9,6 +9,7 @@ from podusv_cli.core.finding import Finding
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
 from podusv_cli.findings.finding import preflight
+from podusv_cli.process.extras import Extras
 from podusv_cli.scenario.load import load
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.workflows import execute
@@ -42,7 +43,7 @@ def simulated(*overrides: str) -> tuple[Recording, dict[str, float]]:
     """The run of that scenario, and its metrics."""
     scenario = scene(*overrides).alone()
     recording = execute.simulated(scenario, execute.Stopwatch())
-    return recording, execute.summary(scenario, recording)
+    return recording, execute.summary(scenario, recording, Extras())
 
 
 def log(*overrides: str) -> Recording:

@@ -126,9 +126,10 @@ def test_a_metric_that_raises_costs_no_run_in_memory():
 
 @pytest.mark.usefixtures("podusv")
 def test_a_scenario_keeps_the_plug_in_that_it_was_loaded_with():
-    scenario = podusv_python.load(put())
+    law = LAW + "# of this test alone\n"
+    scenario = podusv_python.load(put(law=law))
     first = podusv_python.simulate(scenario)
-    put(law=LAW.replace("PUSH = 1.0", "PUSH = 2.0"))
+    put(law=law.replace("PUSH = 1.0", "PUSH = 2.0"))
     again = podusv_python.simulate(podusv_python.load(scenario, {"name": "x"}))
     assert (again["tau_u_cmd"] == first["tau_u_cmd"]).all()
     Path("laws/my_law.py").unlink()
