@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from types import GenericAlias
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, SupportsIndex
 
 from pydantic import create_model
 
@@ -14,7 +14,7 @@ from podusv_cli.actuators.base import Actuator
 from podusv_cli.controllers.base import Controller
 from podusv_cli.core.component import Component, called, value, wrong_default
 from podusv_cli.core.errors import LawError, in_a_line
-from podusv_cli.core.plugins import Plugins
+from podusv_cli.core.plugins import Plugins, from_file, installed
 from podusv_cli.core.registry import any_of
 from podusv_cli.core.signal import Signal
 from podusv_cli.disturbances.base import Disturbance
@@ -184,6 +184,13 @@ class Scenario(Component):
         None, "", "the study that `podusv sweep` makes of this scenario; see docs/studies.md"
     )
 
+    def __reduce_ex__(self, protocol: SupportsIndex) -> str | tuple[Any, ...]:
+        """Pickle by value where plug-ins made the class, which another process has to make anew."""
+        if not any(plugin.text for plugin in self.plugged):
+            return super().__reduce_ex__(protocol)
+        files = tuple((plugin.path, plugin.text) for plugin in self.plugged if plugin.text)
+        return _unpickled, (files, self.model_dump(), self.open_choice)
+
     @property
     def open_choice(self) -> bool:
         """Whether nobody chose `controller`: it is the first of several `controllers` itself."""
@@ -347,6 +354,15 @@ def scenario_class(plugins: Plugins) -> type[Scenario]:
     }
     made = create_model("Scenario", __base__=Scenario, __doc__=Scenario.__doc__, **fields)
     made.plugged = plugins
+    return made
+
+
+def _unpickled(
+    files: Iterable[tuple[str, str]], data: dict[str, Any], open_choice: bool
+) -> Scenario:
+    made = scenario_class((*(from_file(*one) for one in files), *installed()))(**data)
+    if open_choice:
+        made = made.model_copy(update={"controller": next(iter(made.controllers.values()))})
     return made
 
 

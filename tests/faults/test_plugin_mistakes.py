@@ -1,5 +1,8 @@
 """A mistake in a plug-in's law is refused before the run with file and line, never as a bug."""
 
+import pickle
+import subprocess
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from importlib.metadata import EntryPoint
 from pathlib import Path
@@ -153,3 +156,17 @@ def test_a_package_s_digest_tells_where_its_files_are(tmp_path, monkeypatch):
     before = plugins._package_digest([("paths", point)])
     (tmp_path / "digested/one/a.py").rename(tmp_path / "digested/two/a.py")
     assert plugins._package_digest([("paths", point)]) != before
+
+
+@pytest.mark.usefixtures("podusv")
+def test_a_scenario_with_a_plug_in_is_run_in_another_process():
+    scenario = podusv_python.load(put(law=LAW + "# sent to another process\n"))
+    Path("sent").write_bytes(pickle.dumps(scenario))
+    Path("laws/my_law.py").unlink()
+    assert pickle.loads(Path("sent").read_bytes()) == scenario
+    code = "import pickle; print(pickle.load(open('sent', 'rb')).controller.kind)"
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert told.stdout == "cross_track\n"
+    plain = podusv_python.load("podusv:theory/sign.yaml")
+    assert pickle.loads(pickle.dumps(plain)) == plain
+    assert pickle.loads(pickle.dumps(plain)).open_choice == plain.open_choice
