@@ -169,7 +169,7 @@ def report(
     """Make the tables, verdicts and figures of a study anew, of what is there."""
     from podusv_cli.workflows import sweep as workflow
 
-    done = workflow.report(study, sys.argv, figures=figures)
+    done = workflow.report(study, workflow.Request(argv=sys.argv, figures=figures))
     echo_result(done, lambda: _report(done), as_json=as_json, quiet=quiet)
 
 
@@ -184,7 +184,7 @@ def merge(
     """Join the runs of several folders of one study, as `--shard` makes them."""
     from podusv_cli.workflows import sweep as workflow
 
-    done = workflow.merge(studies, out, sys.argv, figures=figures)
+    done = workflow.merge(studies, out, workflow.Request(argv=sys.argv, figures=figures))
     echo_result(done, lambda: _report(done), as_json=as_json, quiet=quiet)
 
 

@@ -52,6 +52,7 @@ def page(story: Story) -> str:
     figures = [*enumerate(story.figures, 1)]
     best = leaders(story.table, story.metrics)
     return environment("podusv_cli.comparison").get_template("report.html.j2").render(
+        title=story.title,
         story=story,
         scenario=story.scenario,
         bad={label: ending for label, ending in story.endings.items() if ending},

@@ -40,7 +40,8 @@ else:
 
 Conflicts = Iterator[tuple[str, str]]  # key and message
 MOST_INSTANTS = 2**53  # that are distinct numbers
-NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,79}$"
+LONGEST_NAME = 80  # letters
+NAME = rf"^[A-Za-z0-9][A-Za-z0-9_.-]{{0,{LONGEST_NAME - 1}}}$"
 NAME_IN_WORDS = (
     "of letters, digits, '_', '.' and '-', starting with a letter or digit, at most 80 long"
 )

@@ -42,6 +42,13 @@ def collect(
         "plugins": [plugin.as_json() for plugin in plugins],
         "git": source_tree(Path(podusv_cli.__file__).parent),
         "argv": list(argv),
+        **times(started, finished),
+    }
+
+
+def times(started: datetime, finished: datetime) -> dict[str, Any]:
+    """When something began and ended, and how long it took."""
+    return {
         "started": _utc(started),
         "finished": _utc(finished),
         "duration_s": round((finished - started).total_seconds(), 6),

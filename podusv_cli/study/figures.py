@@ -24,6 +24,7 @@ POINTS = 400  # of a curve
 TAIL = 0.005  # of the values beyond either end of an axis
 WIDE = 20.0  # a range this many times its lower end gets a logarithmic axis
 ROW, FRAME = 0.17, 0.75  # inches: a row of a chart, and what is around the rows
+LEAST_DISTANCE = 1e-3  # m, on a logarithmic axis
 MOST_BARS = 10  # quantities in a chart of correlations
 RATIOS = (1.01, 1.02, 1.05, 1.1, 1.2, 1.5, 2.0, 3.0, 5.0, 10.0, 30.0, 100.0, 1e3, 1e4, 1e6)
 BAND: dict[str, Any] = {"alpha": 0.18, "linewidth": 0.0}
@@ -143,6 +144,34 @@ def correlations(sensitivity: pd.DataFrame, columns: int = 1) -> Figure:
     axes.grid(visible=False, axis="y")
     legend(figure, columns)
     return figure
+
+
+def funnel(curves: Mapping[str, Sequence[tuple[Vector, Vector]]], columns: int = 2) -> Figure:
+    """The distance to the target over time of every run, in the colour of its law."""
+    figure = new_figure(columns, 2.6)
+    axes = figure.add_subplot()
+    for place, (law, runs) in enumerate(curves.items()):
+        color, linestyle, _ = look(place)
+        for number, (time, distance) in enumerate(runs):
+            label = escaping.figure(law) if not number else "_"
+            shown = np.maximum(distance, LEAST_DISTANCE)
+            axes.plot(time, shown, color=color, linestyle=linestyle, linewidth=0.8, label=label)
+    axes.set_yscale("log")
+    low, high = _span_of([distance for runs in curves.values() for _, distance in runs])
+    axes.set_ylim(low, high)
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.set(xlabel="$t$ [s]", ylabel="$z_e$ [m]")
+    axes.margins(x=0.0)
+    legend(figure, columns)
+    return figure
+
+
+def _span_of(distances: Sequence[Vector]) -> tuple[float, float]:
+    """Ends of a logarithmic axis of distances: what most runs have, a run that is lost aside."""
+    peaks = np.array([float(np.max(distance)) for distance in distances])
+    lows = [float(np.min(distance)) for distance in distances]
+    usual = peaks[peaks <= WIDE * float(np.median(peaks))]
+    return max(min(lows), LEAST_DISTANCE) / 1.5, float(usual.max()) * 1.5
 
 
 def _steps(values: Vector, ends: tuple[float, float]) -> Vector:

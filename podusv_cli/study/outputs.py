@@ -1,96 +1,31 @@
-"""What a study says: its tables, verdicts and figures, and their files."""
+"""The files of a study: tables, verdicts, figures, the report, and exports of all runs."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from podusv_cli.core.errors import UsageError
-from podusv_cli.metrics.metric import Metric
-from podusv_cli.metrics.table import metrics_with
+from podusv_cli.pages.page import Picture
+from podusv_cli.process.extras import Extras
 from podusv_cli.storage import files
 from podusv_cli.storage.json_files import encode
-from podusv_cli.study import claims, summary, verdict
-from podusv_cli.study.plan import Plan
+from podusv_cli.storage.run_folder import MISSING
+from podusv_cli.study import pictures, report, summary, verdict
+from podusv_cli.study.keep import Kept, tracks
+from podusv_cli.study.results import Results
 from podusv_cli.study.runs_file import Table
 from podusv_cli.study.unit import STATUSES
 
-ALWAYS = ("iae", "z_e_steady")  # metrics that the terminal shows beside those of claims
-DEFAULT_MARGIN = 0.01  # relative, of pairs
+FIGURES, REPORT = "figures", "report.html"
 
 
-@dataclass(frozen=True)
-class Results:
-    """The tables and verdicts of a study that is whole."""
-
-    plan: Plan
-    runs: Table
-    summary: pd.DataFrame
-    pairs: pd.DataFrame
-    sensitivity: pd.DataFrame
-    verdicts: Sequence[verdict.StudyVerdict]
-
-    @property
-    def broken(self) -> int:
-        """How many runs crashed, hung or were invalid."""
-        return sum(int(np.sum(self.runs.broken(law))) for law in self.runs.laws)
-
-    @property
-    def shown(self) -> list[str]:
-        """The metrics that the answer is about: those of the claims, and the most common."""
-        told = " ".join(claim.expect for claim in self.plan.sweep.claims.values())
-        return [m for m in self.runs.metrics if m in ALWAYS or f".{m}" in told]
-
-    def cells(self) -> tuple[list[str], list[list[str]]]:
-        """Head and rows of the table on the terminal: failures and medians of every law."""
-        head = ["law", "cell", "failed", *(f"{name}, median" for name in self.shown)]
-        rows = []
-        for law in self.runs.laws:
-            for cell in self.runs.cells:
-                mine = self.summary[(self.summary.law == law) & (self.summary.cell == cell)]
-                rows.append([law, cell or "-", *self._row(mine.set_index("metric"))])
-        return head, rows
-
-    def _row(self, mine: pd.DataFrame) -> list[str]:
-        first = mine.iloc[0]
-        failed = f"{first.failed:.4g} [{first.failed_low:.3g}, {first.failed_high:.3g}]"
-        return [failed, *(f"{mine.q50.get(name, np.nan):.5g}" for name in self.shown)]
-
-    def as_json(self) -> dict[str, Any]:
-        """What `--json` prints."""
-        return {
-            "broken": self.broken,
-            "summary": self.summary.to_dict("records"),
-            "claims": [one.as_json() for one in self.verdicts],
-        }
-
-
-def judged(plan: Plan, runs: Table) -> Results:
-    """All tables and verdicts of a study's runs."""
-    sweep, known = plan.sweep, metrics_with(plan.scenario.plugged)
-    return Results(
-        plan, runs, summary.summary(runs, sweep.level, known),
-        summary.pairs(runs, DEFAULT_MARGIN, sweep.level, known),
-        summary.sensitivity(runs, runs.drawn, sweep.level, known),
-        claims.judge(_parsed(plan, known), runs, sweep.level, known),
-    )  # fmt: skip
-
-
-def _parsed(plan: Plan, known: dict[str, Metric]) -> list[claims.ParsedClaim]:
-    return [
-        claims.ParsedClaim(name, claim, claims.parse(claim.expect, plan.laws, known))
-        for name, claim in plan.sweep.claims.items()
-    ]
-
-
-def write(folder: Path, results: Results, *, figures: bool) -> None:
-    """Write tables, verdicts, figures and the report into the study's folder."""
-    told = {"claims": [one.as_json() for one in results.verdicts]}
+def write_tables(folder: Path, results: Results) -> None:
+    """Write tables and verdicts into the study's folder. Raises StorageError."""
+    told = {"format": 1, "claims": [one.as_json() for one in results.verdicts]}
     contents = {
         "summary.csv": summary.as_csv(results.summary).encode(),
         "pairs.csv": summary.as_csv(results.pairs).encode(),
@@ -99,6 +34,36 @@ def write(folder: Path, results: Results, *, figures: bool) -> None:
         "claims.md": verdict.as_markdown(results.verdicts).encode(),
     }
     files.write_all({folder / name: content for name, content in contents.items()})
+
+
+def write_report(
+    folder: Path, results: Results, kept: Sequence[Kept], extras: Extras, *, figures: bool
+) -> None:
+    """Draw the figures and write the report. Raises StorageError.
+
+    What fails is noted in the `extras`. Files of an earlier report that are not made again are
+    removed: they would tell of other runs.
+    """
+    drawn, shown = dict[str, bytes](), list[Picture]()
+    if figures:
+        drawn, shown = pictures.drawn(results, tracks(kept, extras), extras)
+    _replace(folder / FIGURES, drawn)
+    page = extras.made(REPORT, lambda: report.page(folder, results, kept, shown, extras.missing))
+    _replace(folder, {REPORT: (page or "").encode()} if page else {}, (REPORT,))
+    missing = {MISSING: encode(extras.as_json())} if extras.missing else {}
+    _replace(folder, missing, (MISSING,))
+
+
+def _replace(folder: Path, contents: dict[str, bytes], only: Sequence[str] = ()) -> None:
+    """Write files into a folder; remove others of these names, or all PNG files there."""
+    if contents:
+        files.make_folder(folder)
+        files.write_all({folder / name: content for name, content in contents.items()})
+    old = [folder / name for name in only] if only else sorted(folder.glob("*.png"))
+    with files.storage_errors(f"cannot remove old files in {folder}"):
+        for path in old:
+            if path.name not in contents:
+                path.unlink(missing_ok=True)
 
 
 def export(runs: Table, path: Path) -> None:

@@ -191,6 +191,10 @@ class Table:
         """How every run of a law ended, positions in STATUSES."""
         return np.asarray(self._file["status"][self.laws.index(law)])
 
+    def until(self, law: str) -> Vector:
+        """The time that every run of a law reached [s]."""
+        return np.asarray(self._file["until"][self.laws.index(law)])
+
     def done(self, law: str) -> Mask:
         """Whether a run was tried."""
         return np.not_equal(self.status(law), MISSING)
@@ -205,13 +209,18 @@ class Table:
 
     def success(self, law: str) -> Mask:
         """Whether a run was a success."""
-        read = {name: self.metric(law, name) for name in self._known if name in self._asked}
+        read = {name: self.metric(law, name) for name in self.asked}
         return succeeded(self._success, read, self.finished(law), self._known)
 
+    def failed(self, law: str) -> Mask:
+        """Whether a run has a result and is no success."""
+        return self.done(law) & ~self.success(law) & ~self.broken(law)
+
     @cached_property
-    def _asked(self) -> set[str]:
+    def asked(self) -> list[str]:
         """The metrics that success depends on."""
-        return {part.id for part in ast.walk(self._success) if isinstance(part, ast.Name)}
+        used = {part.id for part in ast.walk(self._success) if isinstance(part, ast.Name)}
+        return [name for name in self._known if name in used]
 
     @cached_property
     def drawn(self) -> dict[str, Any]:

@@ -45,9 +45,9 @@ def pairs(
          **_pair(of_a[used], of_b[used], margin, level)}
         for name in _names(runs, metrics) for cell in range(len(runs.cells))
         for a, b in combinations(runs.laws, 2)
-        for of_a, of_b in [(_values(runs, law, cell, metrics[name]) for law in (a, b))]
+        for of_a, of_b in [(values_of(runs, law, cell, metrics[name]) for law in (a, b))]
         for used in [runs.done(a)[cell] & runs.done(b)[cell]]
-        if all(_has(runs, law, cell, metrics[name]) for law in (a, b))
+        if all(has(runs, law, cell, metrics[name]) for law in (a, b))
     ]  # fmt: skip
     return pd.DataFrame(rows)
 
@@ -84,14 +84,15 @@ def _names(runs: Runs, metrics: Known) -> list[str]:
     return [name for name in metrics if name in runs.metrics and name not in CLOCKED]
 
 
-def _values(runs: Runs, law: str, cell: int, about: Metric) -> Vector:
+def values_of(runs: Runs, law: str, cell: int, about: Metric) -> Vector:
+    """A metric of every draw of a cell; +inf for a run that failed."""
     return worst(about, runs.metric(law, about.name)[cell], ~runs.success(law)[cell])
 
 
-def _has(runs: Runs, law: str, cell: int, about: Metric) -> bool:
+def has(runs: Runs, law: str, cell: int, about: Metric) -> bool:
     """Whether the law has the metric: a run that succeeded has it, or there is no such run."""
     succeeded = runs.done(law)[cell] & runs.success(law)[cell]
-    values = _values(runs, law, cell, about)[succeeded]
+    values = values_of(runs, law, cell, about)[succeeded]
     return bool(runs.done(law)[cell].any() and (not len(values) or not np.isnan(values).all()))
 
 
@@ -100,8 +101,8 @@ def _columns(
 ) -> Iterator[tuple[str, Vector]]:  # fmt: skip
     """Every metric that the law has, over the draws of a cell that it met."""
     for name in _names(runs, metrics):
-        if _has(runs, law, cell, metrics[name]):
-            yield name, _values(runs, law, cell, metrics[name])[runs.done(law)[cell]]
+        if has(runs, law, cell, metrics[name]):
+            yield name, values_of(runs, law, cell, metrics[name])[runs.done(law)[cell]]
 
 
 def _failures(runs: Runs, law: str, cell: int, level: float) -> dict[str, Any]:

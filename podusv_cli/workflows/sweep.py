@@ -6,22 +6,28 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from podusv_cli.core.errors import StorageError, UsageError
+from podusv_cli.core.escaping import visible
 from podusv_cli.findings.finding import unknown_codes
+from podusv_cli.process.extras import Extras, Missing
+from podusv_cli.process.interrupts import interrupts_deferred
 from podusv_cli.scenario.limits import limits
-from podusv_cli.scenario.load import Loaded, load, tree_yaml, yaml_text
+from podusv_cli.scenario.load import Loaded, load, resolved_yaml, tree_yaml
 from podusv_cli.scenario.phrases import unknown
-from podusv_cli.storage import files, manifest, provenance
-from podusv_cli.storage.json_files import encode
+from podusv_cli.storage import files, manifest
 from podusv_cli.study import outputs
 from podusv_cli.study.check import sweep_faults
-from podusv_cli.study.draws import drawn, draws
+from podusv_cli.study.keep import found
 from podusv_cli.study.march import Part, Tally, Tell, march
 from podusv_cli.study.plan import plan
+from podusv_cli.study.results import Results, judged
+from podusv_cli.study.sittings import Sitting
 from podusv_cli.study.store import Store
+from podusv_cli.workflows.keep import alone, keep
 from podusv_cli.workflows.run import RESULTS
 
 SCENARIO = "scenario.yaml"  # whole: it refers to no other file
@@ -48,14 +54,19 @@ class Swept:
 
     folder: Path
     tally: Tally
-    results: outputs.Results | None = None
+    results: Results | None = None
+    missing: tuple[Missing, ...] = ()  # of figures, report and kept logs
 
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints."""
         told = self.results.as_json() if self.results else {}
         status = "finished" if self.results else "unfinished"
         counts = {"wanted": self.tally.wanted, "made": self.tally.made}
-        return {"format": 1, "status": status, "folder": str(self.folder), **counts, **told}
+        missing = [str(one) for one in self.missing]
+        return {
+            "format": 1, "status": status, "folder": str(self.folder), **counts, **told,
+            "missing": missing,
+        }  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -82,13 +93,19 @@ def run(config: Path, request: Request, tell: Tell) -> Swept:
     """
     started = datetime.now(UTC)
     store = _opened(config, request, started)
-    tally, whole = march(
-        store, tell, workers=request.workers, seconds=request.seconds, part=request.shard
-    )
-    if not whole:
+    sitting = Sitting(store.folder, request.argv, started, store.plan.scenario.plugged)
+    there = Tally.of(store.covered()).made
+    try:
+        tally, _ = march(
+            store, tell, workers=request.workers, seconds=request.seconds, part=request.shard
+        )
+    finally:
+        now = Tally.of(store.covered())
+        sitting.end(now.made - there)
+    if now.made < now.wanted:
         return Swept(store.folder, tally)
     store.write_runs()
-    return Swept(store.folder, tally, _judged(store, request.argv, started, request.figures))
+    return _judged(store, request)
 
 
 def _opened(config: Path, request: Request, started: datetime) -> Store:
@@ -113,14 +130,25 @@ def _loaded(config: Path, request: Request) -> Loaded:
     return loaded
 
 
-def _judged(store: Store, argv: Sequence[str], started: datetime, figures: bool) -> outputs.Results:
-    """Judge the runs that are there, and write everything about them."""
-    results = outputs.judged(store.plan, store.runs())
-    origin = provenance.collect(argv, started, datetime.now(UTC), store.plan.scenario.plugged)
-    files.write_bytes(store.folder / "provenance.json", encode(origin))
-    outputs.write(store.folder, results, figures=figures)
-    manifest.write(store.folder, "finished")
-    return results
+def _judged(store: Store, request: Request) -> Swept:
+    """Judge the runs that are there, and write everything about them.
+
+    Tables and verdicts come first. An interrupt then costs figures and kept logs, nothing else.
+    """
+    with interrupts_deferred():
+        results = judged(store.plan, store.runs())
+        outputs.write_tables(store.folder, results)
+        extras, whole = Extras(), results.made == results.wanted
+        make = partial(
+            keep, store.folder, results, extras, request.argv, request.workers,
+            figures=request.figures,
+        )  # fmt: skip
+        kept = make() if whole else found(store.folder, results, extras)
+        outputs.write_report(store.folder, results, kept, extras, figures=request.figures)
+        if extras.interrupted:
+            raise KeyboardInterrupt
+        manifest.write(store.folder, "finished" if whole else "interrupted")
+        return Swept(store.folder, Tally.of(store.covered()), results, tuple(extras.missing))
 
 
 def stored(study: Path) -> Store:
@@ -140,17 +168,17 @@ def status(study: Path) -> Made:
     return Made(store.plan.sweep.draws, rows)
 
 
-def report(study: Path, argv: Sequence[str], *, figures: bool) -> Swept:
+def report(study: Path, request: Request) -> Swept:
     """Judge a study anew, of the runs that are there. Raises UsageError where there are none."""
     started, store = datetime.now(UTC), stored(study)
-    tally = Tally.of(store.covered())
-    if not tally.made:
+    if not Tally.of(store.covered()).made:
         raise UsageError(f"{study} has no runs yet: podusv sweep run {study}")
+    Sitting(study, request.argv, started, store.plan.scenario.plugged).end(0)
     store.write_runs()
-    return Swept(study, tally, _judged(store, argv, started, figures))
+    return _judged(store, request)
 
 
-def merge(studies: Sequence[Path], out: Path, argv: Sequence[str], *, figures: bool) -> Swept:
+def merge(studies: Sequence[Path], out: Path, request: Request) -> Swept:
     """Join the units of several folders of one study, and judge it where it is whole.
 
     Raises UsageError where one holds another study, and StorageError where two have made the same
@@ -159,6 +187,7 @@ def merge(studies: Sequence[Path], out: Path, argv: Sequence[str], *, figures: b
     started, first = datetime.now(UTC), stored(studies[0])
     store = Store(out, first.plan)
     store.open(started.isoformat(timespec="seconds"))
+    sitting = Sitting(out, request.argv, started, first.plan.scenario.plugged, studies)
     files.write_bytes(out / SCENARIO, (studies[0] / SCENARIO).read_bytes())
     for study in studies:
         other = stored(study)
@@ -167,11 +196,12 @@ def merge(studies: Sequence[Path], out: Path, argv: Sequence[str], *, figures: b
             if clash := store.clash(result):
                 raise StorageError(f"{study}: {clash}")
             store.write(result)
+    sitting.end(0)
     tally = Tally.of(store.covered())
     if tally.made < tally.wanted:
         return Swept(out, tally)
     store.write_runs()
-    return Swept(out, tally, _judged(store, argv, started, figures))
+    return _judged(store, request)
 
 
 def draw(study: Path, law: str, number: int, cell: int, out: Path | None) -> Path:
@@ -181,14 +211,13 @@ def draw(study: Path, law: str, number: int, cell: int, out: Path | None) -> Pat
         raise UsageError(unknown(f"law {law!r}", law, made.laws))
     if cell >= len(made.cells):
         raise UsageError(f"--cell {cell}: the study has {len(made.cells)} cells, from 0 on")
-    (numbers,) = draws(made.sweep, number, 1)
-    one = drawn(made.single(law, cell), made.sweep.vary, numbers)
-    name = f"{one.name}-{law}-{number}"
-    path = out or Path(f"{name}.yaml")
+    one = alone(made, law, cell, number)
+    path = out or Path(f"{one.name}.yaml")
     if path.exists():
         raise UsageError(f"{path} exists already; name another file with --out")
-    text = yaml_text(one.model_copy(update={"name": name}).model_dump())
-    files.write_bytes(path, f"# Draw {number} of {study}, law {law}.\n{text}".encode())
+    at = f", cell {cell} ({made.cells[cell].label})" if len(made.cells) > 1 else ""
+    head = f"# Draw {number} of the study {visible(study)}, law {law}{visible(at)}.\n"
+    files.write_bytes(path, f"{head}{resolved_yaml(one)}".encode())
     return path
 
 

@@ -1,0 +1,99 @@
+"""What a study says: the tables and verdicts of its runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from podusv_cli.metrics.metric import Metric
+from podusv_cli.metrics.table import metrics_with
+from podusv_cli.study import claims, summary, verdict
+from podusv_cli.study.plan import Plan
+from podusv_cli.study.runs_file import Table
+
+ALWAYS = ("iae", "z_e_steady")  # metrics that the answer has beside those of claims
+MARGIN = 0.01  # relative, of pairs
+
+
+@dataclass(frozen=True)
+class Results:
+    """The tables and verdicts of a study's runs, as far as these are made."""
+
+    plan: Plan
+    runs: Table
+    summary: pd.DataFrame
+    pairs: pd.DataFrame
+    sensitivity: pd.DataFrame
+    parsed: Sequence[claims.ParsedClaim]
+    verdicts: Sequence[verdict.StudyVerdict]
+
+    @cached_property
+    def known(self) -> dict[str, Metric]:
+        """All metrics, with those of plug-ins."""
+        return metrics_with(self.plan.scenario.plugged)
+
+    @cached_property
+    def broken(self) -> int:
+        """How many runs crashed, hung or were invalid."""
+        return sum(int(np.sum(self.runs.broken(law))) for law in self.runs.laws)
+
+    @cached_property
+    def made(self) -> int:
+        """How many runs there are."""
+        return sum(int(np.sum(self.runs.done(law))) for law in self.runs.laws)
+
+    @property
+    def wanted(self) -> int:
+        """How many runs were asked for."""
+        return len(self.runs.laws) * len(self.runs.cells) * self.runs.wanted
+
+    @property
+    def shown(self) -> list[str]:
+        """The metrics that the answer is about: those of the claims, and the most common."""
+        told = " ".join(claim.expect for claim in self.plan.sweep.claims.values())
+        return [m for m in self.runs.metrics if m in ALWAYS or f".{m}" in told]
+
+    def cells(self) -> tuple[list[str], list[list[str]]]:
+        """Head and rows of the table of the answer: failures and medians of every law."""
+        head = ["law", "cell", "failed", *(f"{name}, median" for name in self.shown)]
+        rows = []
+        for law in self.runs.laws:
+            for cell in self.runs.cells:
+                mine = self.summary[(self.summary.law == law) & (self.summary.cell == cell)]
+                rows.append([law, cell or "-", *self._row(mine.set_index("metric"))])
+        return head, rows
+
+    def _row(self, mine: pd.DataFrame) -> list[str]:
+        if not len(mine):  # no run yet
+            return ["-"] * (1 + len(self.shown))
+        first = mine.iloc[0]
+        failed = f"{first.failed:.4g} [{first.failed_low:.3g}, {first.failed_high:.3g}]"
+        return [failed, *(f"{mine.q50.get(name, np.nan):.5g}" for name in self.shown)]
+
+    def as_json(self) -> dict[str, Any]:
+        """What `--json` prints."""
+        return {
+            "broken": self.broken,
+            "summary": self.summary.to_dict("records"),
+            "claims": [one.as_json() for one in self.verdicts],
+        }
+
+
+def judged(plan: Plan, runs: Table) -> Results:
+    """All tables and verdicts of a study's runs."""
+    sweep, known = plan.sweep, metrics_with(plan.scenario.plugged)
+    parsed = [
+        claims.ParsedClaim(name, claim, claims.parse(claim.expect, plan.laws, known))
+        for name, claim in sweep.claims.items()
+    ]
+    return Results(
+        plan, runs, summary.summary(runs, sweep.level, known),
+        summary.pairs(runs, MARGIN, sweep.level, known),
+        summary.sensitivity(runs, runs.drawn, sweep.level, known),
+        parsed, claims.judge(parsed, runs, sweep.level, known),
+    )  # fmt: skip

@@ -1,0 +1,50 @@
+"""provenance.json of a study: every sitting in which it was computed, with machine and versions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from podusv_cli.core.plugins import Plugin
+from podusv_cli.storage import files, json_files, manifest, provenance
+
+NAME = "provenance.json"
+
+
+def sittings(folder: Path) -> list[dict[str, Any]]:
+    """The sittings of a study so far, the oldest first. Raises StorageError."""
+    path = folder / NAME
+    return list(json_files.read(path).get("sittings", [])) if path.exists() else []
+
+
+class Sitting:
+    """One sitting, noted when it begins and again when its runs are over."""
+
+    def __init__(
+        self, folder: Path, argv: Sequence[str], started: datetime, plugins: Iterable[Plugin],
+        others: Iterable[Path] = (),
+    ) -> None:  # fmt: skip
+        """Note the sitting, after those of `others`, whose runs it takes over.
+
+        The manifest of an earlier sitting is removed, because the folder is no longer finished.
+        Raises StorageError.
+        """
+        self._folder, self._started = folder, started
+        taken = [one for other in others for one in sittings(other)]
+        self._earlier = [*sittings(folder), *taken]
+        begun = provenance.collect(argv, started, started, plugins)
+        self._origin = begun | {"finished": None, "duration_s": None, "runs": 0}
+        with files.storage_errors(f"cannot remove {folder / manifest.NAME}"):
+            (folder / manifest.NAME).unlink(missing_ok=True)
+        self._write()
+
+    def end(self, runs: int) -> None:
+        """Note that it made so many runs and is over. Raises StorageError."""
+        self._origin |= provenance.times(self._started, datetime.now(UTC)) | {"runs": runs}
+        self._write()
+
+    def _write(self) -> None:
+        content = {"format": 1, "sittings": [*self._earlier, self._origin]}
+        files.write_bytes(self._folder / NAME, json_files.encode(content))

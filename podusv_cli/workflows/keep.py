@@ -1,0 +1,59 @@
+"""Full run folders of a study's runs that `sweep.keep` asks for, made again from their draws."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+
+from podusv_cli.process.extras import Extras, Missing
+from podusv_cli.process.interrupts import interrupts_enabled
+from podusv_cli.process.workers import run_all
+from podusv_cli.scenario.load import resolved_yaml
+from podusv_cli.scenario.model import LONGEST_NAME, Scenario
+from podusv_cli.study.draws import drawn, draws
+from podusv_cli.study.keep import LOGS, Kept, Wanted, found, wanted
+from podusv_cli.study.plan import Plan
+from podusv_cli.study.results import Results
+from podusv_cli.workflows.execute import Task, execute, warm_up
+from podusv_cli.workflows.run import DRAWN
+
+
+def alone(plan: Plan, law: str, cell: int, draw: int) -> Scenario:
+    """The scenario of one run of a study, under a name of its own."""
+    (numbers,) = draws(plan.sweep, draw, 1)
+    one = drawn(plan.single(law, cell), plan.sweep.vary, numbers)
+    end = f"-{Wanted(law, cell, draw, '').name}"
+    return one.model_copy(update={"name": f"{one.name[: LONGEST_NAME - len(end)]}{end}"})
+
+
+def keep(
+    folder: Path, results: Results, extras: Extras, argv: Sequence[str], workers: int, *,
+    figures: bool,
+) -> list[Kept]:  # fmt: skip
+    """Make those kept runs that are not there yet; all of them, compared with the table.
+
+    A run that fails is missing among the `extras`. Raises StorageError only for what is not about
+    one run.
+    """
+    missing = [one for one in wanted(results) if not (folder / LOGS / one.name).exists()]
+    tasks = [_task(folder, results.plan, one, argv, figures=figures) for one in missing]
+    with interrupts_enabled():
+        for law, cell in dict.fromkeys((one.law, one.cell) for one in missing):
+            warm_up(results.plan.single(law, cell))
+    outcomes = run_all([partial(execute, task) for task in tasks], workers=workers)
+    for one, outcome in zip(missing, outcomes, strict=True):
+        if outcome.failure:
+            extras.missing.append(Missing(f"{LOGS}/{one.name}", outcome.failure))
+    extras.interrupted |= any(outcome.interrupted for outcome in outcomes)
+    return found(folder, results, extras)
+
+
+def _task(
+    folder: Path, plan: Plan, one: Wanted, argv: Sequence[str], *, figures: bool
+) -> Task:  # fmt: skip
+    scenario = alone(plan, one.law, one.cell, one.draw)
+    return Task(
+        scenario, resolved_yaml(scenario), folder / LOGS / one.name,
+        figures=DRAWN if figures else (), argv=argv, label=one.law,
+    )  # fmt: skip
