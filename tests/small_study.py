@@ -43,3 +43,13 @@ def made(folder: Path, workers=1, part=(1, 1), **changes):
     if whole and part == (1, 1):
         store.write_runs()
     return store
+
+
+def written(path: Path, *changes):
+    """The study as a scenario's file, with the text (old, new) of each change replaced."""
+    text = TEXT
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    path.write_text(text)
+    return path

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
@@ -15,7 +15,9 @@ import numpy as np
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.quantities import raised
 from podusv_cli.pages.page import Picture
-from podusv_cli.process.extras import Extras
+from podusv_cli.process.extras import Extras, Missing
+from podusv_cli.process.interrupts import interrupts_enabled
+from podusv_cli.process.workers import run_all
 from podusv_cli.scenario.phrases import as_yaml
 from podusv_cli.study.expressions import FINISHED, parse_success, succeeded
 from podusv_cli.study.keep import Track
@@ -44,24 +46,30 @@ class Sketch:
 def drawn(
     results: Results, tracks: Sequence[Track], extras: Extras
 ) -> tuple[dict[str, bytes], list[Picture]]:
-    """All figures of a study: PNG by file name, and as pictures of the report.
+    """All figures of a study, each in a process of its own: PNG by file name, and as pictures.
 
     A figure that cannot be drawn is missing among the `extras`.
     """
     files: dict[str, bytes] = {}
     pictures: list[Picture] = []
-    for sketch in extras.made("the list of figures", lambda: list(sketches(results, tracks))) or ():
-        made = extras.attempt(f"figure {sketch.name}", partial(_images, sketch))
-        if made:
-            files[f"{sketch.name}.png"] = made["png"]
-            pictures.append(Picture(sketch.name, sketch.caption, made["svg"]))
+    wanted = extras.made("the list of figures", lambda: list(sketches(results, tracks))) or []
+    outcomes = () if extras.interrupted else run_all([partial(_images, one) for one in wanted])
+    for sketch, outcome in zip(wanted, outcomes, strict=bool(outcomes)):
+        extras.interrupted |= outcome.interrupted
+        if outcome.result:
+            files[f"{sketch.name}.png"] = outcome.result["png"]
+            pictures.append(Picture(sketch.name, sketch.caption, outcome.result["svg"]))
+        elif not outcome.interrupted:
+            extras.missing.append(Missing(f"figure {sketch.name}", outcome.failure))
     return files, pictures
 
 
-def _images(sketch: Sketch) -> dict[str, bytes]:
+def _images(sketch: Sketch, tell: Callable[[float], None]) -> dict[str, bytes]:
     from podusv_cli.figures.style import house_style, image  # matplotlib is slow to import
 
-    with house_style(), np.errstate(all="ignore"), warnings.catch_warnings():
+    with (
+        interrupts_enabled(), house_style(), np.errstate(all="ignore"), warnings.catch_warnings()
+    ):  # fmt: skip
         warnings.simplefilter("ignore")  # of numbers near the end of all, as diverged runs have
         figure = sketch.draw()
         return {form: image(figure, form) for form in FORMATS}

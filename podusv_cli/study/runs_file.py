@@ -39,13 +39,14 @@ class Header:
     identity: str
     laws: Sequence[str]
     cells: Sequence[str]
+    wanted: int  # draws of each cell
     draws: Mapping[str, Any]
     metrics: Mapping[str, Metric]
 
     @property
     def shape(self) -> tuple[int, int, int]:
         """Of every array of runs."""
-        return len(self.laws), len(self.cells), len(next(iter(self.draws.values())))
+        return len(self.laws), len(self.cells), self.wanted
 
 
 def write(path: Path, header: Header, results: Sequence[UnitResult] | Any) -> None:
@@ -78,8 +79,7 @@ def _lay_out(
         scales = [_labels(file, "law", header.laws), _labels(file, "cell", header.cells)]
         scales.append(_labels(file, "draw", np.arange(header.shape[2], dtype=np.int32)))
         for name, numbers in header.draws.items():
-            drawn = _labelled(numbers) if isinstance(numbers[0], str) else numbers
-            file.create_dataset(f"drawn/{name}", data=drawn)
+            file.create_dataset(f"drawn/{name}", data=_column(numbers))
         file.create_dataset("failed_run", data=np.array(list(causes), np.int64).reshape(-1, 3))
         file.create_dataset("failed_cause", data=_labelled(list(causes.values()) or [""]))
         kinds: dict[str, Any] = {"status": np.uint8, "until": np.float64}
@@ -123,6 +123,12 @@ def _labels(file: h5py.File, axis: str, labels: Any) -> h5py.Dataset:
 
 def _labelled(words: Sequence[str]) -> Any:
     return np.array([str(word).encode() for word in words])
+
+
+def _column(drawn: Any) -> Any:
+    """A drawn quantity as HDF5 takes it: numbers, or words where any of the values is one."""
+    values = np.array(drawn.tolist()) if drawn.dtype.kind == "O" else drawn
+    return _labelled(values.tolist()) if values.dtype.kind == "U" else values
 
 
 def _fill(part: Path, header: Header, places: Mapping[str, Any], results: Iterable[Any]) -> None:
@@ -226,12 +232,14 @@ class Table:
     def drawn(self) -> dict[str, Any]:
         """The drawn quantities, one entry a draw."""
         found: dict[str, Any] = {}
+
+        def note(name: str, thing: Any) -> None:  # returns None, so that all are visited
+            if isinstance(thing, h5py.Dataset):
+                content = thing[()]
+                found[name] = np.char.decode(content) if content.dtype.kind == "S" else content
+
         if "drawn" in self._file:
-            self._file["drawn"].visititems(
-                lambda name, thing: (
-                    found.setdefault(name, thing[()]) if isinstance(thing, h5py.Dataset) else None
-                )
-            )
+            self._file["drawn"].visititems(note)
         return found
 
     @cached_property

@@ -120,7 +120,8 @@ class Store:
         plan, known = self.plan, metrics_with(self.plan.scenario.plugged)
         header = runs_file.Header(
             plan.scenario.name, self.seal, plan.laws, [cell.label for cell in plan.cells],
-            table(plan.sweep, 0, plan.sweep.draws), {name: known[name] for name in plan.metrics},
+            plan.sweep.draws, table(plan.sweep, 0, plan.sweep.draws),
+            {name: known[name] for name in plan.metrics},
         )  # fmt: skip
         runs_file.write(self.folder / RUNS, header, _Again(self.results))
         for path in (self.folder / UNITS).glob("*.h5"):

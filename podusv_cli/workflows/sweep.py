@@ -210,7 +210,11 @@ def draw(study: Path, law: str, number: int, cell: int, out: Path | None) -> Pat
     if law not in made.laws:
         raise UsageError(unknown(f"law {law!r}", law, made.laws))
     if cell >= len(made.cells):
-        raise UsageError(f"--cell {cell}: the study has {len(made.cells)} cells, from 0 on")
+        count = len(made.cells)
+        raise UsageError(f"--cell {cell}: the study has {count} cells, numbered from 0")
+    if number >= made.sweep.draws:
+        count = made.sweep.draws
+        raise UsageError(f"--draw {number}: the study has {count} draws, numbered from 0")
     one = alone(made, law, cell, number)
     path = out or Path(f"{one.name}.yaml")
     if path.exists():

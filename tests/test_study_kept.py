@@ -1,0 +1,189 @@
+"""Kept runs and drawn scenarios have the numbers of a study's table to the last bit."""
+
+import json
+import math
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from small_study import written
+
+from podusv_cli.core.errors import UsageError
+from podusv_cli.process.extras import Extras
+from podusv_cli.storage import manifest
+from podusv_cli.storage.run_folder import open_run
+from podusv_cli.study import keep
+from podusv_cli.study.results import judged
+from podusv_cli.workflows import run as running
+from podusv_cli.workflows import sweep
+
+VARIED = (
+    "    start.psi: {angle: all}\n",
+    "    start.psi: {angle: all}\n    start.y: {choice: [0, 2.5]}\n    chosen: {keys: [start.x], "
+    "choice: [-1.0, -0.3]}\n",
+)
+KEPT = (
+    "  claims:\n",
+    "  success: finished and iae <= 1.5\n"
+    "  keep: {failed: 2, worst: {iae: 1}, draws: [0]}\n  claims:\n",
+)
+GRID = (
+    "  claims:\n",
+    "  grid: {disturbance.scale: [0.5, 1], simulation.step: [0.02]}\n  claims:\n",
+)
+
+
+def run(config, out, figures=False, **given):
+    request = sweep.Request(out=out, workers=1, figures=figures, **given)
+    return sweep.run(config, request, lambda tally: None)
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("kept")
+    config = written(folder / "small.yaml", VARIED, KEPT, GRID)
+    return run(config, folder / "study", overrides=["sweep.draws=6"])
+
+
+def table_of(study, law, cell, draw):
+    runs = study.results.runs
+    return {name: float(runs.metric(law, name)[cell, draw]) for name in runs.metrics}
+
+
+def same(metrics, table):
+    return all(metrics[name] == (x if math.isfinite(x) else None) for name, x in table.items())
+
+
+def test_kept_runs_are_those_asked_for(study):
+    runs, names = study.results.runs, {path.name for path in (study.folder / "logs").iterdir()}
+    wanted = keep.wanted(study.results)
+    assert names == {one.name for one in wanted}
+    assert "failed" in {one.why for one in wanted}
+    for law in ("pid", "li"):
+        failed = [tuple(place)[::-1] for place in np.argwhere(runs.failed(law).T).tolist()][:2]
+        assert [one[1:3] for one in wanted if one.law == law and one.why == "failed"] == failed
+        assert runs.success(law).any()
+        good = np.where(runs.success(law), runs.metric(law, "iae"), -np.inf)
+        cell, draw = np.unravel_index(np.argmax(good), good.shape)
+        assert f"{law}-{cell}-{draw}" in names
+        assert {f"{law}-0-0", f"{law}-1-0"} <= names
+
+
+def test_kept_runs_equal_the_table(study):
+    assert study.missing == ()
+    for one in keep.wanted(study.results):
+        kept = open_run(study.folder / "logs" / one.name)
+        assert same(kept.metrics, table_of(study, one.law, one.cell, one.draw))
+        assert kept.recording.status == "finished"
+
+
+def test_a_kept_log_that_differs_is_told(study, tmp_path, monkeypatch):
+    results = study.results
+    (one, other, *_) = keep.wanted(results)
+    shutil.copytree(study.folder / "logs" / other.name, tmp_path / "logs" / one.name)
+    monkeypatch.setattr(keep, "wanted", lambda results: [one])
+    extras = Extras()
+    (found,) = keep.found(tmp_path, results, extras)
+    assert "in the log and" in found.difference
+    assert one.name in str(extras.missing[0])
+
+
+def test_continuing_keeps_what_is_kept(study, tmp_path):
+    folder = tmp_path / "grown"
+    shutil.copytree(study.folder, folder)
+    before = {p: p.stat().st_mtime_ns for p in (folder / "logs").rglob("log.h5")}
+    grown = run(folder, None, overrides=["sweep.draws=9"])
+    assert grown.results.made == 9 * 4
+    assert {p: p.stat().st_mtime_ns for p in before} == before
+    assert {one.name for one in keep.wanted(grown.results)} <= {
+        path.name for path in (folder / "logs").iterdir()
+    }
+    assert grown.missing == ()
+
+
+def test_a_kept_run_that_cannot_be_made_costs_nothing_else(study, tmp_path):
+    folder = tmp_path / "blocked"
+    shutil.copytree(study.folder, folder)
+    shutil.rmtree(folder / "logs")
+    (folder / "logs").write_text("in the way")
+    again = run(folder, None)
+    assert again.results.made == again.results.wanted
+    assert any(missing.what.startswith("logs/pid-") for missing in again.missing)
+    assert json.loads((folder / "missing.json").read_text())["missing"]
+    assert (folder / "report.html").exists()
+
+
+@pytest.mark.parametrize(("law", "cell", "number"), [("pid", 0, 5), ("li", 1, 3)])
+def test_a_drawn_scenario_gives_the_numbers_of_the_table(study, tmp_path, law, cell, number):
+    path = sweep.draw(study.folder, law, number, cell, tmp_path / "one.yaml")
+    done = running.run(path, running.Request(out=tmp_path / "one", figures=False))
+    told = {name: x if math.isfinite(x) else None for name, x in done.metrics.items()}
+    assert same(told, table_of(study, law, cell, number))
+
+
+def test_drawn_scenarios_have_names_of_their_own(study, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    paths = [
+        sweep.draw(study.folder, law, 0, cell, None) for law in ("pid", "li") for cell in (0, 1)
+    ]
+    assert [path.name for path in paths] == [
+        f"small-{law}-{cell}-0.yaml" for law in ("pid", "li") for cell in (0, 1)
+    ]
+    assert len({line for p in paths for line in p.read_text().splitlines() if "name:" in line}) >= 4
+    with pytest.raises(UsageError, match="exists already; name another file with --out"):
+        sweep.draw(study.folder, "pid", 0, 0, None)
+    long = written(tmp_path / "long.yaml", ("name: small", f"name: {'n' * 80}"))
+    run(long, tmp_path / "long", overrides=["sweep.draws=1"])
+    assert len(sweep.draw(tmp_path / "long", "pid", 0, 0, None).stem) == 80
+
+
+@pytest.mark.parametrize(
+    ("law", "number", "cell", "told"),
+    [
+        ("pdi", 0, 0, "did you mean 'pid'"),
+        ("pid", 0, 2, "the study has 2 cells, numbered from 0"),
+        ("pid", 6, 0, "the study has 6 draws, numbered from 0"),
+    ],
+)
+def test_a_draw_that_the_study_lacks_is_refused(study, law, number, cell, told):
+    with pytest.raises(UsageError, match=told):
+        sweep.draw(study.folder, law, number, cell, Path("never.yaml"))
+
+
+def test_a_finished_study_lists_all_its_files_and_one_being_continued_none(study, tmp_path):
+    listed = manifest.check(study.folder)
+    assert listed.status == "finished"
+    assert manifest.foreign(study.folder, listed) == []
+    folder = tmp_path / "late"
+    shutil.copytree(study.folder, folder)
+    late = run(folder, None, overrides=["sweep.draws=20"], seconds=-1.0)
+    assert late.results is None
+    assert not (folder / manifest.NAME).exists()
+    part = sweep.report(folder, sweep.Request(figures=False))
+    assert part.results.made == 6 * 4 < part.results.wanted
+    assert manifest.check(folder).status == "interrupted"
+
+
+def test_every_sitting_is_kept(study, tmp_path):
+    folder = tmp_path / "sittings"
+    shutil.copytree(study.folder, folder)
+    run(folder, None, overrides=["sweep.draws=8"], argv=["podusv", "again"])
+    first, second = json.loads((folder / "provenance.json").read_text())["sittings"]
+    assert (first["runs"], second["runs"]) == (6 * 4, 2 * 4)
+    assert second["argv"] == ["podusv", "again"]
+    assert first["finished"] <= second["started"] <= second["finished"]
+    parts = [tmp_path / f"part{number}" for number in (1, 2)]
+    for number, part in enumerate(parts, 1):
+        config = written(tmp_path / "small.yaml")
+        run(config, part, overrides=["sweep.draws=4"], shard=(number, 2))
+    merged = sweep.merge(parts, tmp_path / "merged", sweep.Request(figures=False))
+    told = json.loads((merged.folder / "provenance.json").read_text())["sittings"]
+    assert [one["runs"] for one in told] == [4, 4, 0]
+
+
+def test_values_to_choose_from_and_every_quantity_are_in_the_table(study):
+    runs = study.results.runs
+    assert list(runs.drawn) == sorted(study.results.plan.sweep.vary)
+    assert set(runs.drawn["start.y"].tolist()) <= {0.0, 2.5}
+    assert set(judged(study.results.plan, runs).sensitivity.quantity) == set(runs.drawn)

@@ -1,0 +1,254 @@
+"""A study's report, figures and words, from a small study and from numbers planted by hand."""
+
+import math
+import shutil
+
+import numpy as np
+import pytest
+from html_tree import tree
+from small_study import written
+from study_samples import claim, judged, study
+
+from podusv_cli.process.extras import Extras
+from podusv_cli.scenario.sweep import Quantity
+from podusv_cli.storage import files
+from podusv_cli.study import bars, figures, keep, outputs, pictures, report
+from podusv_cli.study.words import WORDS, in_words
+from podusv_cli.workflows import sweep
+
+SUCCESS = "  success: finished and iae <= 0.215\n  claims:\n"
+GRID = "  grid: {disturbance.scale: [0.5, 1], start.r: [0.0, 0.1]}\n"
+CHANGES = ("says: Li tracks better.", "says: 'Li <b>tracks</b> better.'")
+
+
+def made(folder, success, *, figures):
+    config = written(folder / "small.yaml", ("  claims:\n", success), CHANGES)
+    request = sweep.Request(("sweep.draws=7",), folder / "study", workers=1, figures=figures)
+    return sweep.run(config, request, lambda tally: None)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A study with a grid, without figures."""
+    return made(tmp_path_factory.mktemp("report"), GRID + SUCCESS, figures=False)
+
+
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory):
+    """A study without a grid, with figures and a kept log."""
+    kept = f"  keep: {{failed: 1}}\n  laws: [pid, li]\n{SUCCESS}"
+    return made(tmp_path_factory.mktemp("drawn"), kept, figures=True)
+
+
+@pytest.fixture(scope="module")
+def told(whole):
+    return tree((whole.folder / "report.html").read_text())
+
+
+def section(told, name):
+    (found,) = told.all("section", id=name)
+    return found
+
+
+def test_the_answer_comes_first(whole, told):
+    assert [part.attributes["id"] for part in told.all("section")] == [
+        "answer", "claims", "failures", "numbers", "varied", "provenance",
+    ]  # fmt: skip
+    answer = section(told, "answer")
+    (verdict,) = whole.results.verdicts
+    (counts,) = answer.all("div", kind="counts")
+    assert f"1 {verdict.verdict}" in counts.text
+    assert "S1 Li <b>tracks</b> better." in answer.text
+    rows = answer.rows()
+    assert rows[0] == ["law", "cell", "failed", "share", "iae", "z_e_steady"]
+    assert len(rows) == 1 + 2 * 4
+    for law, cell, failed, *_ in rows[1:]:
+        runs = whole.results.runs
+        count = int(np.sum(~runs.success(law)[runs.cells.index(cell)]))
+        assert failed == f"{count} of 7"
+    assert "Preliminary" not in answer.text
+
+
+def test_failures_are_listed_with_their_cause_and_how_to_get_one(whole, told):
+    part, runs = section(told, "failures"), whole.results.runs
+    head, *rows = part.rows()
+    assert head == ["law", "cell", "draw", "status", "until", "cause"]
+    total = sum(int(np.sum(runs.failed(law))) for law in runs.laws)
+    assert len(rows) == min(total, report.FIRST)
+    assert total > report.FIRST
+    assert f"{total - report.FIRST} more failed" in part.text
+    for law, cell, draw, status, until, cause in rows:
+        assert (status, until) == ("finished", "1 s")
+        value = runs.metric(law, "iae")[int(cell.partition(":")[0]), int(draw)]
+        assert value > 0.215
+        assert cause == f"iae = {value:.5g}"
+    law, cell, draw, *_ = rows[0]
+    (command,) = part.all("pre")
+    number = cell.partition(":")[0]
+    assert command.text == (
+        f"podusv sweep draw {whole.folder} --law {law} --draw {draw} --cell {number}"
+    )
+
+
+def test_what_was_varied_is_told_in_words(told):
+    rows = section(told, "varied").rows()
+    assert [
+        "vessel.m",
+        "the scenario's own value times a factor: uniform from 0.7 to 1.3",
+        "23.8",
+    ] in rows
+    assert ["disturbance.scale", "0.5, 1"] in rows
+
+
+def test_figures_are_files_and_pictures(drawn):
+    names = {path.stem for path in (drawn.folder / "figures").iterdir()}
+    assert names == {
+        "distribution-iae", "distribution-z_e_steady", "failures-iae", "funnel", "ratios-iae",
+        "ratios-z_e_steady", "sensitivity-iae", "sensitivity-z_e_steady",
+    }  # fmt: skip
+    told = tree((drawn.folder / "report.html").read_text())
+    captions = [caption.text for caption in told.all("figcaption")]
+    assert [c.partition(".")[0] for c in captions] == [f"Figure {i + 1}" for i in range(len(names))]
+    folders = [row[0] for row in section(told, "kept").rows()[1:]]
+    assert folders == ["logs/pid-0-0", "logs/li-0-0"]
+
+
+def test_no_figures_are_drawn_where_none_are_wanted(drawn, tmp_path):
+    folder = tmp_path / "plain"
+    shutil.copytree(drawn.folder, folder)
+    sweep.report(folder, sweep.Request(figures=False))
+    assert not list((folder / "figures").iterdir())
+    assert "<figcaption>" not in (folder / "report.html").read_text()
+
+
+def test_a_study_with_a_grid_has_figures_of_cells_and_of_the_grid(whole):
+    names = [one.name for one in pictures.sketches(whole.results, [])]
+    assert {"distribution-iae-cell0", "failures-iae-cell3", "grid-failed", "grid-iae"} <= {*names}
+    assert len({*names}) == len(names)
+
+
+def test_a_figure_that_fails_costs_nothing_else(drawn, monkeypatch, tmp_path):
+    def broken(*args, **kwargs):
+        raise ArithmeticError("no such curve")
+
+    monkeypatch.setattr(figures, "distributions", broken)
+    extras = Extras()
+    outputs.write_tables(tmp_path, drawn.results)
+    outputs.write_report(tmp_path, drawn.results, [], extras, figures=True)
+    assert {part.what for part in extras.missing} >= {"figure distribution-iae"}
+    told = tree((tmp_path / "report.html").read_text())
+    assert "no such curve" in section(told, "answer").text
+    assert (tmp_path / "figures" / "ratios-iae.png").exists()
+    assert (tmp_path / "missing.json").exists()
+    outputs.write_report(tmp_path, drawn.results, [], Extras(), figures=False)
+    assert not (tmp_path / "missing.json").exists()
+
+
+def test_the_heatmap_has_every_cell_in_its_place(whole):
+    results = whole.results
+    panel = pictures._panel(results, "pid", "iae", 2)
+    table = results.summary[(results.summary.law == "pid") & (results.summary.metric == "iae")]
+    for label, median in zip(table.cell, table.q50, strict=True):
+        values = dict(part.split(" = ") for part in label.split(", "))
+        column = [0.5, 1.0].index(float(values["disturbance.scale"]))
+        row = [0.0, 0.1].index(float(values["start.r"]))
+        assert panel[row, column] == median
+
+
+def test_a_study_with_runs_missing_is_preliminary(whole, tmp_path):
+    config = written(tmp_path / "small.yaml")
+    sweep.run(
+        config,
+        sweep.Request(("sweep.draws=6",), tmp_path / "s", workers=1, shard=(1, 2)),
+        lambda t: None,
+    )
+    done = sweep.report(tmp_path / "s", sweep.Request(figures=False))
+    answer = section(tree((tmp_path / "s" / "report.html").read_text()), "answer")
+    assert "Preliminary: 6 of 12 runs are made" in answer.text
+    assert done.results.made == 6
+
+
+def test_broken_runs_are_told_with_their_causes(whole, monkeypatch):
+    runs = whole.results.runs
+    broke = {law: np.arange(7) % 7 == 3 for law in runs.laws}
+    monkeypatch.setattr(runs, "broken", lambda law: np.broadcast_to(broke[law], (4, 7)))
+    monkeypatch.setattr(runs, "causes", {(0, 2, 3): "the law <raised>"})
+    told = tree(report.page(whole.folder, whole.results, [], [], []))
+    assert "8 runs crashed, hung or had an invalid draw" in section(told, "answer").text
+    assert "the law <raised>" in section(told, "failures").text
+
+
+# --- bars
+
+
+def only_bar(expect, runs):
+    (one,) = bars.bars(claim(expect, runs.laws), judged(runs, expect))
+    return one
+
+
+def test_a_bar_has_interval_estimate_and_bound_in_their_order():
+    runs = study(a=np.arange(1.0, 101.0), b=np.r_[np.full(30, 0.5), np.full(70, 1e3)])
+    bar = only_bar("share(a.iae < b.iae) >= 0.9", runs)
+    assert 0.0 < bar.low < bar.estimate < bar.high < bar.bound < 100.0
+    assert bar.asked == (bar.bound, 100.0)
+    assert bar.words.startswith("share(a.iae < b.iae): 70 %, between ")
+    assert bar.words.endswith("compared with: at least 90 %")
+    low, high = (float(end.removesuffix(" %")) for end in bar.ends)
+    assert low + bar.estimate / 100.0 * (high - low) == pytest.approx(70.0, abs=0.1)
+
+
+def test_a_bar_with_an_open_end_runs_to_the_edge():
+    runs = study(a=np.r_[np.arange(1.0, 18.0), [math.inf] * 3])
+    bar = only_bar("quantile(a.iae, 0.8) <= 10", runs)
+    assert bar.high == 100.0
+    assert "and a failure" in bar.words
+    lost = only_bar("quantile(a.iae, 0.95) <= 10", runs)
+    assert (lost.estimate, lost.words.split(": ")[1].split(",")[0]) == (None, "a failure")
+
+
+# --- words
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"plus": {"normal": {"sigma": 2.0, "within": (-3.0, 3.0)}}},
+         "the scenario's own value plus a summand: normal with mean 0 and standard deviation 2, "
+         "only from -3 to 3"),
+        ({"times": {"lognormal": {"sigma": 0.1}}},
+         "the scenario's own value times a factor: lognormal with median 1, standard deviation of "
+         "the logarithm 0.1"),
+        ({"triangular": (0.0, 1.0, 3.0)}, "triangular from 0 to 3, likeliest at 1"),
+        ({"choice": ("line", 2)}, "one of line, 2, all equally likely"),
+        ({"integers": (1, 6)}, "a whole number from 1 to 6, all equally likely"),
+        ({"angle": "all"}, "any direction, all equally likely"),
+        ({"seed": True}, "a new seed for every draw"),
+    ],
+)  # fmt: skip
+def test_quantities_in_words(given, words):
+    assert in_words(Quantity(**given)) == words
+
+
+def test_every_distribution_has_words():
+    from podusv_cli.scenario.distributions import WAYS
+
+    assert WORDS.keys() == WAYS.keys()
+
+
+def test_a_funnel_shows_every_kept_run_once_in_the_legend():
+    from podusv_cli.figures.style import house_style
+
+    time = np.linspace(0.0, 10.0, 50)
+    runs = {"a": [(time, np.exp(-time)), (time, np.full(50, 2.0))], "b": [(time, 1e9 + time)]}
+    with house_style():
+        axes = figures.funnel(runs).axes[0]
+    assert len(axes.lines) == 3
+    assert [line.get_label() for line in axes.lines if line.get_label()[0] != "_"] == ["a", "b"]
+    assert axes.get_ylim()[1] == pytest.approx(3.0)
+
+
+def test_a_report_needs_nothing_else(drawn):
+    text = files.read_text(drawn.folder / "report.html")
+    assert "<script" not in text
+    assert "http" not in text.replace("http://www.w3.org", "")
+    assert keep.LOGS in text
