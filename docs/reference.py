@@ -159,12 +159,15 @@ def figures_page() -> str:
 def commands_page() -> str:
     """Every command with its arguments and options."""
     whole: Any = typer.main.get_command(app)
-    parts = ["# Commands", text(whole.help)]
-    for name, command in whole.commands.items():
+    return page(["# Commands", text(whole.help), *_commands(whole, "podusv")])
+
+
+def _commands(group: Any, above: str) -> Iterable[str]:
+    for name, command in group.commands.items():
         given = [_parameter(one) for one in command.params if one.name != "help"]
-        parts += [f"## `podusv {name}`", text(command.help)]
-        parts.append(table(("argument or option", "meaning"), given) if given else "")
-    return page(parts)
+        yield from (f"## `{above} {name}`", text(command.help or ""))
+        yield table(("argument or option", "meaning"), given) if given else ""
+        yield from _commands(command, f"{above} {name}") if hasattr(command, "commands") else ()
 
 
 def _parameter(one: Any) -> tuple[str, str]:

@@ -49,7 +49,7 @@ def offered_for(typed: str, home: Path, script: str) -> list[str]:
 @pytest.mark.parametrize(
     ("typed", "offered"),
     [
-        ("podusv ", set(cli.COMMANDS)),
+        ("podusv ", {*cli.COMMANDS, "sweep"}),
         ("podusv ver", {"verify"}),
         ("podusv run --al", {"--allow-large"}),
         ("podusv run --s", {"--set"}),
