@@ -138,6 +138,8 @@ def _columns() -> int:
 def _report(done: Swept) -> None:
     if done.results is None:
         echo(f"{done.tally.made} of {done.tally.wanted} runs are made; run it again to continue")
+        for line in done.missing_runs:
+            echo(line)
         echo(f"study: {done.folder}")
         return
     echo_table(*done.results.cells())

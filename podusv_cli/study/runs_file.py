@@ -29,6 +29,7 @@ AXES = ("law", "cell", "draw")
 SEAL = "sha256"  # of all other arrays, in the order of the file
 Known = Mapping[str, Metric]
 BLOCK = 2**22  # bytes hashed at a time
+ROWS = 4096  # runs read at a time
 
 
 @dataclass(frozen=True)
@@ -254,7 +255,9 @@ class Table:
             status = self.status(law)
             for cell in range(len(self.cells)):
                 for rows in stretches(status[cell] != MISSING):
-                    yield self._unit(position, law, cell, rows, status[cell])
+                    for first in range(rows.start, rows.stop, ROWS):
+                        part = range(first, min(first + ROWS, rows.stop))
+                        yield self._unit(position, law, cell, part, status[cell])
 
     def _unit(self, place: int, law: str, cell: int, rows: range, status: Codes) -> UnitResult:
         part = slice(rows.start, rows.stop)

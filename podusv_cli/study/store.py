@@ -82,22 +82,6 @@ class Store:
                 f"{' and more' if len(differing) > 4 else ''}; name another folder with --out"
             )
 
-    def clash(self, new: UnitResult) -> str:
-        """Which of these runs the study has already with other numbers; "" where none is."""
-        for old in self.results():
-            first = max(old.unit.first, new.unit.first)
-            stop = min(old.unit.draws.stop, new.unit.draws.stop)
-            if (old.unit.law, old.unit.cell) != (new.unit.law, new.unit.cell) or first >= stop:
-                continue
-            ours, theirs = (slice(first - r.unit.first, stop - r.unit.first) for r in (old, new))
-            for name, numbers in old.metrics.items():
-                if not np.array_equal(numbers[ours], new.metrics[name][theirs], equal_nan=True):
-                    return (
-                        f"{name} of {new.unit.law}, draws {first} to {stop - 1}, has other numbers "
-                        "than the runs that are there: they come from another kind of machine"
-                    )
-        return ""
-
     def _identity(self) -> dict[str, Any]:
         """The identity as JSON gives it back."""
         encoded = json_files.encode(self.plan.identity)

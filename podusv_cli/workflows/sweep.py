@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from podusv_cli.core.errors import StorageError, UsageError
+from podusv_cli.core.errors import UsageError
 from podusv_cli.core.escaping import visible
 from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.process.extras import Extras, Missing
@@ -21,6 +21,7 @@ from podusv_cli.scenario.phrases import unknown
 from podusv_cli.storage import files, manifest
 from podusv_cli.study import outputs
 from podusv_cli.study.check import sweep_faults
+from podusv_cli.study.joining import join, missing
 from podusv_cli.study.keep import found
 from podusv_cli.study.march import Part, Tally, Tell, march
 from podusv_cli.study.plan import plan
@@ -56,6 +57,7 @@ class Swept:
     tally: Tally
     results: Results | None = None
     missing: tuple[Missing, ...] = ()  # of figures, report and kept logs
+    missing_runs: tuple[str, ...] = ()  # after a merge, in words
 
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints."""
@@ -184,22 +186,21 @@ def merge(studies: Sequence[Path], out: Path, request: Request) -> Swept:
     Raises UsageError where one holds another study, and StorageError where two have made the same
     run with other numbers, as machines of another kind do.
     """
-    started, first = datetime.now(UTC), stored(studies[0])
-    store = Store(out, first.plan)
+    if inside := [study for study in studies if study.resolve() == out.resolve()]:
+        raise UsageError(f"--out {out} is one of the studies, {inside[0]}; name another folder")
+    started, others = datetime.now(UTC), [stored(study) for study in studies]
+    most = max(others, key=lambda other: other.plan.sweep.draws)
+    store = Store(out, most.plan)
+    for other in others:
+        store.agree(other.folder, other.plan)
     store.open(started.isoformat(timespec="seconds"))
-    sitting = Sitting(out, request.argv, started, first.plan.scenario.plugged, studies)
-    files.write_bytes(out / SCENARIO, (studies[0] / SCENARIO).read_bytes())
-    for study in studies:
-        other = stored(study)
-        store.agree(study, other.plan)
-        for result in other.results():
-            if clash := store.clash(result):
-                raise StorageError(f"{study}: {clash}")
-            store.write(result)
+    sitting = Sitting(out, request.argv, started, store.plan.scenario.plugged, studies)
+    files.write_bytes(out / SCENARIO, (most.folder / SCENARIO).read_bytes())
+    join(store, others)
     sitting.end(0)
     tally = Tally.of(store.covered())
     if tally.made < tally.wanted:
-        return Swept(out, tally)
+        return Swept(out, tally, missing_runs=tuple(missing(store)))
     store.write_runs()
     return _judged(store, request)
 
