@@ -50,6 +50,8 @@ def offered_for(typed: str, home: Path, script: str) -> list[str]:
     ("typed", "offered"),
     [
         ("podusv ", {*cli.COMMANDS, "sweep"}),
+        ("podusv sweep ", {"run", "status", "report", "merge", "draw", "export"}),
+        ("podusv sweep run --un", {"--until"}),
         ("podusv ver", {"verify"}),
         ("podusv run --al", {"--allow-large"}),
         ("podusv run --s", {"--set"}),
@@ -76,6 +78,8 @@ def test_commands_and_options_are_offered_and_nothing_heavy_is_imported(
         ("podusv explain near-t", {"near-target"}),
         ("podusv explain controller.pid.K_P", {"controller.pid.K_Pu", "controller.pid.K_Pr"}),
         ("podusv init pod/k", {"pod/kept"}),
+        ("podusv sweep export x --format p", {"parquet"}),
+        ("podusv sweep run a.yaml --set control.p", {"control.period="}),
     ],
 )  # fmt: skip
 def test_keys_kinds_figures_and_names_are_offered(

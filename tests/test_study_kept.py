@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_samples import commanded
 from small_study import written
 
 from podusv_cli.core.errors import UsageError
@@ -142,8 +143,8 @@ def test_drawn_scenarios_have_names_of_their_own(study, tmp_path, monkeypatch):
     ("law", "number", "cell", "told"),
     [
         ("pdi", 0, 0, "did you mean 'pid'"),
-        ("pid", 0, 2, "the study has 2 cells, numbered from 0"),
-        ("pid", 6, 0, "the study has 6 draws, numbered from 0"),
+        ("pid", 0, 2, "no such cell; they are numbered 0 to 1"),
+        ("pid", 6, 0, "no such draw; they are numbered 0 to 5"),
     ],
 )
 def test_a_draw_that_the_study_lacks_is_refused(study, law, number, cell, told):
@@ -187,3 +188,14 @@ def test_values_to_choose_from_and_every_quantity_are_in_the_table(study):
     assert list(runs.drawn) == sorted(study.results.plan.sweep.vary)
     assert set(runs.drawn["start.y"].tolist()) <= {0.0, 2.5}
     assert set(judged(study.results.plan, runs).sensitivity.quantity) == set(runs.drawn)
+
+
+@pytest.mark.parametrize("command", ["plot", "compare", "rerun", "diff"])
+def test_a_study_is_no_run(study, monkeypatch, capsys, tmp_path, command):
+    monkeypatch.chdir(tmp_path)
+    given = [study.folder] * (2 if command == "diff" else 1)
+    ended = commanded(monkeypatch, capsys)(command, *given)
+    assert ended.code == 2
+    assert f"{study.folder} is a study, not a run; name one of the runs that it keeps" in ended.err
+    assert "podusv sweep draw" in ended.err
+    assert not list(tmp_path.iterdir())

@@ -12,7 +12,7 @@ from study_samples import claim, judged, study
 from podusv_cli.process.extras import Extras
 from podusv_cli.scenario.sweep import Quantity
 from podusv_cli.storage import files
-from podusv_cli.study import bars, figures, keep, outputs, pictures, report
+from podusv_cli.study import bars, figures, outputs, pictures, report
 from podusv_cli.study.words import WORDS, in_words
 from podusv_cli.workflows import sweep
 
@@ -251,4 +251,4 @@ def test_a_report_needs_nothing_else(drawn):
     text = files.read_text(drawn.folder / "report.html")
     assert "<script" not in text
     assert "http" not in text.replace("http://www.w3.org", "")
-    assert keep.LOGS in text
+    assert "logs/pid-0-0" in text

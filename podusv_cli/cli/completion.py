@@ -40,6 +40,23 @@ def keys(context: typer.Context, incomplete: str) -> Offered:
     return _beginning(incomplete, assignments(_plugins(context)))
 
 
+def exports(incomplete: str) -> Offered:
+    """Formats of `podusv sweep export`."""
+    return _beginning(incomplete, {"csv": "text", "parquet": "needs pyarrow"})
+
+
+def laws(context: typer.Context, incomplete: str) -> Offered:
+    """The laws of the study that is named before."""
+    import json
+    from pathlib import Path
+
+    try:
+        told = json.loads((Path(context.params["study"]) / "study.json").read_text())
+        return _beginning(incomplete, dict.fromkeys(map(str, told["laws"]), ""))
+    except (KeyError, TypeError, OSError, ValueError):
+        return []  # no study, or none that can be read: there is no place for a message
+
+
 def figures(context: typer.Context, incomplete: str) -> Offered:
     """Names of figures."""
     from podusv_cli.figures.drawing import figures_with

@@ -1,4 +1,4 @@
-"""Progress bars on the terminal, shown after a short delay."""
+"""Progress on the terminal: bars of runs, shown after a short delay, and one line of a study."""
 
 from __future__ import annotations
 
@@ -8,13 +8,20 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from typing import TYPE_CHECKING
 
-from podusv_cli.cli.terminal import supports_colours
+import typer
+
+from podusv_cli.cli.terminal import columns, supports_colours
 from podusv_cli.core.escaping import visible
+from podusv_cli.core.quantities import time_in_words
 
 if TYPE_CHECKING:
     from rich.progress import Progress
 
+    from podusv_cli.study.march import Tally
+
 PATIENCE = 0.7  # s before a bar appears
+PERIOD = 0.2  # s between two numbers of a study's line
+ERASED = "\r\x1b[K"
 
 
 @contextmanager
@@ -59,3 +66,44 @@ def progress_bars(*, wanted: bool) -> Iterator[Callable[[str, float], None] | No
 def _stop(bars: Progress) -> None:
     with suppress(OSError):
         bars.stop()
+
+
+class StudyLine:
+    """A line on stderr that tells how far a study is; nothing where stderr is no terminal."""
+
+    def __init__(self, *, wanted: bool) -> None:
+        """Nothing is shown yet."""
+        self._wanted, self._last = wanted and supports_colours(sys.stderr), 0.0
+
+    def tell(self, tally: Tally) -> None:
+        """Show runs done, rate, time left and failures so far."""
+        if time.monotonic() - self._last > PERIOD:
+            left = [f"{time_in_words(tally.left)} left"] if tally.made < tally.wanted else []
+            self._show(
+                f"{tally.made} of {tally.wanted} runs", *left, f"{tally.failed} did not finish",
+                f"{tally.rate:.3g} a second", "Ctrl-C keeps what is done",
+            )  # fmt: skip
+
+    def say(self, text: str) -> None:
+        """Show what is being done now."""
+        self._show(text)
+
+    def _show(self, *parts: str) -> None:
+        """The parts that the terminal has room for."""
+        line = parts[0]
+        for part in parts[1:]:
+            line = f"{line}, {part}" if len(line) + len(part) + 3 < columns() else line
+        self._last = time.monotonic()
+        if self._wanted:
+            with suppress(OSError):  # the terminal is lost, the study is not
+                typer.echo(f"{ERASED}{visible(line)}", nl=False, err=True)
+
+    def __enter__(self) -> StudyLine:
+        """The line itself."""
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        """Erase the line."""
+        if self._wanted and self._last:
+            with suppress(OSError):
+                typer.echo(ERASED, nl=False, err=True)

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import re
+import shlex
 import sys
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from podusv_cli.cli import options
-from podusv_cli.cli.exit_codes import INTERRUPTED, with_exit_codes
+from podusv_cli.cli import completion, options
+from podusv_cli.cli.exit_codes import with_exit_codes
+from podusv_cli.cli.progress import StudyLine
 from podusv_cli.cli.terminal import (
     echo,
     echo_entry,
@@ -21,16 +20,16 @@ from podusv_cli.cli.terminal import (
     echo_path,
     echo_result,
     echo_table,
-    supports_colours,
 )
 from podusv_cli.core.errors import UsageError
-from podusv_cli.core.quantities import time_in_words
 
 if TYPE_CHECKING:
-    from podusv_cli.study.march import Tally, Tell
     from podusv_cli.workflows.sweep import Swept
 
-sweep = typer.Typer(help="Draw a scenario many times, and judge laws by all draws.")
+sweep = typer.Typer(
+    help="Draw a scenario many times, and judge laws by all draws.", no_args_is_help=True
+)
+SOME_FAILED = 3
 UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
 Study = Annotated[Path, typer.Argument(metavar="STUDY", help="The folder of a study.")]
 
@@ -73,18 +72,15 @@ def run(
     from podusv_cli.workflows import sweep as workflow  # heavy imports only when needed
 
     changes = [*(assign or ()), *([f"sweep.draws={draws}"] if draws else [])]
-    request = workflow.Request(
-        changes, out, seconds(until), workers, part_of(shard), sys.argv, plugin or (), figures
-    )
-    with progress(wanted=not (quiet or as_json)) as tell:
-        try:
-            done = workflow.run(Path(config), request, tell)
-        except KeyboardInterrupt:
-            echo("interrupted; all finished units are kept: run it again to continue", err=True)
-            raise typer.Exit(INTERRUPTED) from None
-    echo_result(done, lambda: _report(done), as_json=as_json, quiet=quiet)
+    with StudyLine(wanted=not (quiet or as_json)) as line:
+        request = workflow.Request(
+            changes, out, seconds(until), workers, part_of(shard), sys.argv, plugin or (), figures,
+            line.say,
+        )  # fmt: skip
+        done = workflow.run(Path(config), request, line.tell)
+    _tell(done, as_json=as_json, quiet=quiet)
     broken = done.results.broken if done.results else 0
-    raise typer.Exit(3 if broken else 0)
+    raise typer.Exit(SOME_FAILED if broken else 0)
 
 
 def seconds(text: str) -> float:
@@ -105,39 +101,16 @@ def part_of(text: str) -> tuple[int, int]:
     return int(found[1]), int(found[2])
 
 
-@contextmanager
-def progress(*, wanted: bool) -> Iterator[Tell]:
-    """A function that shows how far a study is: runs done, rate, time left, failures so far."""
-    shown = wanted and supports_colours(sys.stderr)
-    last = 0.0
-
-    def tell(tally: Tally) -> None:
-        nonlocal last
-        if shown and time.monotonic() - last > 0.2:
-            last = time.monotonic()
-            left = f", {time_in_words(tally.left)} left" if tally.made < tally.wanted else ""
-            line = (
-                f"{tally.made} of {tally.wanted} runs, {tally.rate:.3g} a second{left}, "
-                f"{tally.failed} did not finish; Ctrl-C keeps what is done"
-            )
-            typer.echo(f"\r\x1b[K{line[: _columns()]}", nl=False, err=True)
-
-    try:
-        yield tell
-    finally:
-        if shown and last:
-            typer.echo("\r\x1b[K", nl=False, err=True)
-
-
-def _columns() -> int:
-    import shutil
-
-    return max(20, shutil.get_terminal_size().columns - 1)
+def _tell(done: Swept, *, as_json: bool, quiet: bool) -> None:
+    """Print a study, and on stderr what of it could not be made."""
+    echo_result(done, lambda: _report(done), as_json=as_json, quiet=quiet)
+    for part in done.missing:
+        echo(part.traced, err=True)
 
 
 def _report(done: Swept) -> None:
     if done.results is None:
-        echo(f"{done.tally.made} of {done.tally.wanted} runs are made; run it again to continue")
+        echo(f"{done.tally.made} of {done.tally.wanted} runs are made; {_next(done)}")
         for line in done.missing_runs:
             echo(line)
         echo(f"study: {done.folder}")
@@ -145,9 +118,18 @@ def _report(done: Swept) -> None:
     echo_table(*done.results.cells())
     for v in done.results.verdicts:
         echo_entry(v.name, v.claim.says, v.evidence(), facts=v.verdict)
+    if done.results.broken:
+        echo(f"{done.results.broken} runs crashed, hung or were invalid: see the report")
     echo(f"study: {done.folder}")
     if (done.folder / "report.html").exists():
         echo(f"report: {done.folder / 'report.html'}")
+
+
+def _next(done: Swept) -> str:
+    """What to do with an unfinished study."""
+    if done.part_is_whole:
+        return "this shard is done: join all of them with podusv sweep merge"
+    return f"continue with: podusv sweep run {shlex.quote(str(done.folder))}"
 
 
 @command
@@ -171,8 +153,10 @@ def report(
     """Make the tables, verdicts and figures of a study anew, of what is there."""
     from podusv_cli.workflows import sweep as workflow
 
-    done = workflow.report(study, workflow.Request(argv=sys.argv, figures=figures))
-    echo_result(done, lambda: _report(done), as_json=as_json, quiet=quiet)
+    with StudyLine(wanted=not (quiet or as_json)) as line:
+        request = workflow.Request(argv=sys.argv, figures=figures, say=line.say)
+        done = workflow.report(study, request)
+    _tell(done, as_json=as_json, quiet=quiet)
 
 
 @command
@@ -186,14 +170,16 @@ def merge(
     """Join the runs of several folders of one study, as `--shard` makes them."""
     from podusv_cli.workflows import sweep as workflow
 
-    done = workflow.merge(studies, out, workflow.Request(argv=sys.argv, figures=figures))
-    echo_result(done, lambda: _report(done), as_json=as_json, quiet=quiet)
+    with StudyLine(wanted=not (quiet or as_json)) as line:
+        request = workflow.Request(argv=sys.argv, figures=figures, say=line.say)
+        done = workflow.merge(studies, out, request)
+    _tell(done, as_json=as_json, quiet=quiet)
 
 
 @command
 def draw(
     study: Study,
-    law: Annotated[str, typer.Option(help="The law.")],
+    law: Annotated[str, typer.Option(help="The law.", autocompletion=completion.laws)],
     number: Annotated[int, typer.Option("--draw", min=0, help="The draw.")],
     cell: Annotated[int, typer.Option(min=0, help="The cell of the grid.")] = 0,
     out: Annotated[
@@ -212,7 +198,9 @@ def draw(
 @command
 def export(
     study: Study,
-    form: Annotated[str, typer.Option("--format", help="csv or parquet.")] = "csv",
+    form: Annotated[
+        str, typer.Option("--format", help="csv or parquet.", autocompletion=completion.exports)
+    ] = "csv",
     out: Annotated[
         Path | None, typer.Option(help="The file to write.", show_default="<study>/runs.<format>")
     ] = None,

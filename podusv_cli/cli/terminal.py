@@ -86,7 +86,7 @@ def echo_table(head: list[str], rows: list[list[str]]) -> None:
     """
     head, rows = [*map(visible, head)], [[*map(visible, row)] for row in rows]
     widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
-    room = shutil.get_terminal_size().columns if sys.stdout.isatty() else sys.maxsize
+    room = columns() if sys.stdout.isatty() else sys.maxsize
     if sum(widths[:2]) + max(widths[2:]) + 2 * len(SPACE) > room:
         for row in rows:
             cells = [f"{title} {cell}" for title, cell in zip(head[2:], row[2:], strict=True)]
@@ -117,8 +117,13 @@ def folded(text: str, width: int) -> str:
     )
 
 
+def columns() -> int:
+    """How wide the terminal is."""
+    return shutil.get_terminal_size().columns
+
+
 def _width() -> int:
-    return max(20, min(WIDEST, shutil.get_terminal_size().columns))
+    return max(20, min(WIDEST, columns()))
 
 
 def warn_of_differences(differences: Mapping[str, Mapping[str, Any]]) -> None:

@@ -24,6 +24,7 @@ from podusv_cli.storage.files import read_text
 from podusv_cli.storage.staging import Staging, Taken, remove_abandoned
 
 LOG, THEORY, MISSING = "log.h5", "theory.json", "missing.json"
+STUDY, LOGS = "study.json", "logs"  # in the folder of a study
 NEEDED = (LOG, "metrics.json", "provenance.json", "resolved.yaml")
 
 

@@ -17,11 +17,10 @@ import numpy as np
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.kernel import Vector
 from podusv_cli.process.extras import Extras, Missing
-from podusv_cli.storage.run_folder import Run, open_run
+from podusv_cli.storage.run_folder import LOGS, Run, open_run
 from podusv_cli.study.results import Results
 from podusv_cli.study.runs_file import Table
 
-LOGS = "logs"
 POINTS = 2000  # of a kept run's curve in a figure
 
 

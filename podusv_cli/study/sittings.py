@@ -32,8 +32,9 @@ class Sitting:
         Raises StorageError.
         """
         self._folder, self._started = folder, started
-        taken = [one for other in others for one in sittings(other)]
-        self._earlier = [*sittings(folder), *taken]
+        self._earlier = sittings(folder)
+        for other in others:
+            self._earlier += [one for one in sittings(other) if one not in self._earlier]
         begun = provenance.collect(argv, started, started, plugins)
         self._origin = begun | {"finished": None, "duration_s": None, "runs": 0}
         with files.storage_errors(f"cannot remove {folder / manifest.NAME}"):

@@ -24,13 +24,14 @@ import numpy as np
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.metrics.table import metrics_with
 from podusv_cli.storage import files, json_files
+from podusv_cli.storage.run_folder import STUDY
 from podusv_cli.study import runs_file
 from podusv_cli.study.draws import table
 from podusv_cli.study.plan import Plan, digest, disagreements
 from podusv_cli.study.runs import Mask
 from podusv_cli.study.unit import Unit, UnitResult
 
-STUDY, UNITS, RUNS = "study.json", "units", "runs.h5"
+UNITS, RUNS = "units", "runs.h5"
 FORMAT = 1
 SEAL = "sha256"
 FACTS = ("identity", "law", "cell", "first")

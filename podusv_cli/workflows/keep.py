@@ -11,8 +11,9 @@ from podusv_cli.process.interrupts import interrupts_enabled
 from podusv_cli.process.workers import run_all
 from podusv_cli.scenario.load import resolved_yaml
 from podusv_cli.scenario.model import LONGEST_NAME, Scenario
+from podusv_cli.storage.run_folder import LOGS
 from podusv_cli.study.draws import drawn, draws
-from podusv_cli.study.keep import LOGS, Kept, Wanted, found, wanted
+from podusv_cli.study.keep import Kept, Wanted, found, wanted
 from podusv_cli.study.plan import Plan
 from podusv_cli.study.results import Results
 from podusv_cli.workflows.execute import Task, execute, warm_up

@@ -13,7 +13,7 @@ import numpy as np
 
 from podusv_cli.comparison import stability
 from podusv_cli.comparison.outputs import RESERVED, TABLE
-from podusv_cli.core.errors import StorageError
+from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.recording import Recording
 from podusv_cli.scenario.load import load_resolved
@@ -21,7 +21,7 @@ from podusv_cli.scenario.messages import Check
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage import manifest
 from podusv_cli.storage.files import read_text
-from podusv_cli.storage.run_folder import LOG, THEORY, Run, open_run
+from podusv_cli.storage.run_folder import LOG, LOGS, STUDY, THEORY, Run, open_run
 
 # Signals that every log has, as figures and comparisons need them.
 NEEDED = (
@@ -60,10 +60,22 @@ def from_folder(
     `checks` as `load`, `to_run` and `files` as `load_resolved` has them. Raises UsageError for a
     folder without finished runs, StorageError for a damaged one.
     """
+    if (path / STUDY).is_file():
+        raise UsageError(_about_study(path))
     inner = _listed(path) if os.path.lexists(path / manifest.NAME) else _unlisted(path)
     if not inner:
         manifest.demand(path)
     return [_from_run(child, checks, to_run, files) for child in (inner or [path])]
+
+
+def _about_study(path: Path) -> str:
+    """What to do instead of taking a study for a run."""
+    kept = sorted(run for run in (path / LOGS).glob("*") if (run / LOG).is_file())
+    named = f"name one of the runs that it keeps, such as {kept[0]}" if kept else "it keeps no logs"
+    return (
+        f"{path} is a study, not a run; {named}, or get any of its runs as a scenario with: "
+        f"podusv sweep draw {path} --law LAW --draw N"
+    )
 
 
 def _unlisted(path: Path) -> list[Path]:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import os
+import shlex
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import partial
@@ -18,7 +20,9 @@ from podusv_cli.process.interrupts import interrupts_deferred
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Loaded, load, resolved_yaml, tree_yaml
 from podusv_cli.scenario.phrases import unknown
+from podusv_cli.scenario.sweep import Keep
 from podusv_cli.storage import files, manifest
+from podusv_cli.storage.run_folder import STUDY
 from podusv_cli.study import outputs
 from podusv_cli.study.check import sweep_faults
 from podusv_cli.study.joining import join, missing
@@ -33,6 +37,7 @@ from podusv_cli.workflows.run import RESULTS
 
 SCENARIO = "scenario.yaml"  # whole: it refers to no other file
 FORMATS = ("csv", "parquet")
+WHOLE: Part = (1, 1)  # the only shard
 
 
 @dataclass(frozen=True)
@@ -43,10 +48,11 @@ class Request:
     out: Path | None = None
     seconds: float = math.inf  # of computing, after which no unit is begun
     workers: int = 0
-    shard: Part = (1, 1)
+    shard: Part = WHOLE
     argv: Sequence[str] = ()
     plugins: Sequence[str] = ()
     figures: bool = True
+    say: Callable[[str], None] = lambda text: None  # what is done after the last run
 
 
 @dataclass(frozen=True)
@@ -58,6 +64,7 @@ class Swept:
     results: Results | None = None
     missing: tuple[Missing, ...] = ()  # of figures, report and kept logs
     missing_runs: tuple[str, ...] = ()  # after a merge, in words
+    part_is_whole: bool = False  # the runs of a shard are made, others are missing
 
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints."""
@@ -96,23 +103,46 @@ def run(config: Path, request: Request, tell: Tell) -> Swept:
     started = datetime.now(UTC)
     store = _opened(config, request, started)
     sitting = Sitting(store.folder, request.argv, started, store.plan.scenario.plugged)
-    there = Tally.of(store.covered()).made
+    seen = Tally(0)
+
+    def told(tally: Tally) -> None:
+        nonlocal seen
+        seen = tally
+        tell(tally)
+
     try:
-        tally, _ = march(
-            store, tell, workers=request.workers, seconds=request.seconds, part=request.shard
+        tally, whole = march(
+            store, told, workers=request.workers, seconds=request.seconds, part=request.shard
         )
+    except KeyboardInterrupt as stop:
+        again = f"podusv sweep run {shlex.quote(str(store.folder))}"
+        made = f"the {seen.made} runs that are made" if seen.made else "all runs that were made"
+        raise KeyboardInterrupt(f"interrupted; {made} are kept, continue with: {again}") from stop
     finally:
-        now = Tally.of(store.covered())
-        sitting.end(now.made - there)
-    if now.made < now.wanted:
+        sitting.end(seen.made - seen.before)
+    if whole and request.shard != WHOLE:
+        whole = _is_whole(store)
+        if not whole:
+            return Swept(store.folder, tally, part_is_whole=True)
+    if not whole:
         return Swept(store.folder, tally)
     store.write_runs()
     return _judged(store, request)
 
 
+def _is_whole(store: Store) -> bool:
+    """Whether all runs of the study are there."""
+    tally = Tally.of(store.covered())
+    return tally.made == tally.wanted
+
+
 def _opened(config: Path, request: Request, started: datetime) -> Store:
     """The store of a new study, or of one that is to be continued."""
     given = config.is_dir()
+    if given:
+        check_study(config)
+    if request.out and request.out.exists() and not request.out.is_dir():
+        raise UsageError(f"--out {request.out} is a file; name a folder")
     loaded = _loaded(config / SCENARIO if given else config, request)
     folder = request.out or (config if given else RESULTS / f"{loaded.scenario.name}-sweep")
     store = Store(folder, plan(loaded))
@@ -145,18 +175,37 @@ def _judged(store: Store, request: Request) -> Swept:
             keep, store.folder, results, extras, request.argv, request.workers,
             figures=request.figures,
         )  # fmt: skip
+        if results.plan.sweep.keep != Keep():
+            request.say("making the logs that are kept")
         kept = make() if whole else found(store.folder, results, extras)
+        request.say("drawing figures and writing the report")
         outputs.write_report(store.folder, results, kept, extras, figures=request.figures)
         if extras.interrupted:
-            raise KeyboardInterrupt
+            raise KeyboardInterrupt(
+                "interrupted; runs, tables and verdicts are whole, the rest is made by: "
+                f"podusv sweep report {shlex.quote(str(store.folder))}"
+            )
         manifest.write(store.folder, "finished" if whole else "interrupted")
-        return Swept(store.folder, Tally.of(store.covered()), results, tuple(extras.missing))
+        tally = Tally(results.wanted, results.made)
+        return Swept(store.folder, tally, results, tuple(extras.missing))
+
+
+def check_study(folder: Path) -> None:
+    """Raise UsageError where this is no folder of a study."""
+    if not os.path.lexists(folder):
+        raise UsageError(f"{folder} does not exist; it has to be the folder of a study")
+    if folder.is_file():
+        raise UsageError(
+            f"{folder} is a file, not the folder of a study; to make one of a scenario: "
+            "podusv sweep run SCENARIO"
+        )
+    if not (folder / STUDY).is_file():
+        raise UsageError(f"{folder} is not the folder of a study: it has no {STUDY}")
 
 
 def stored(study: Path) -> Store:
     """The store of a study's folder. Raises UsageError where it is none."""
-    if not (study / SCENARIO).is_file():
-        raise UsageError(f"{study} is no study: it has no {SCENARIO}")
+    check_study(study)
     return Store(study, plan(load(study / SCENARIO)))
 
 
@@ -211,11 +260,11 @@ def draw(study: Path, law: str, number: int, cell: int, out: Path | None) -> Pat
     if law not in made.laws:
         raise UsageError(unknown(f"law {law!r}", law, made.laws))
     if cell >= len(made.cells):
-        count = len(made.cells)
-        raise UsageError(f"--cell {cell}: the study has {count} cells, numbered from 0")
+        last = len(made.cells) - 1
+        raise UsageError(f"--cell {cell}: there is no such cell; they are numbered 0 to {last}")
     if number >= made.sweep.draws:
-        count = made.sweep.draws
-        raise UsageError(f"--draw {number}: the study has {count} draws, numbered from 0")
+        last = made.sweep.draws - 1
+        raise UsageError(f"--draw {number}: there is no such draw; they are numbered 0 to {last}")
     one = alone(made, law, cell, number)
     path = out or Path(f"{one.name}.yaml")
     if path.exists():
