@@ -35,8 +35,7 @@ podusv simulates and compares controllers for pod-propelled surface vessels. Fir
   podusv init paper/corrected              copy one here, to edit
   podusv run corrected.yaml                simulate it: log, metrics and figures in results/
   podusv compare podusv:pod/kept.yaml      simulate and compare four laws: table and report
-  podusv sweep run podusv:studies/hull_and_sea.yaml --draws 100
-                                           many hulls, seas and starts: which law wins, fails
+  podusv sweep --help                      judge laws by thousands of drawn hulls, seas, starts
   podusv explain controller                what the keys of a scenario mean
   podusv --help                            all commands"""
 OBJECTS_BETWEEN_COLLECTIONS = 100_000
