@@ -25,7 +25,7 @@ from podusv_cli.process.workers import run_all
 from podusv_cli.scenario.load import load
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.theory.ideal_weights import unloaded_accelerations
-from podusv_cli.workflows.execute import Stopwatch, simulated, summary
+from podusv_cli.workflows.execute import Stopwatch, simulated
 
 Case, Value = TypeVar("Case"), TypeVar("Value")
 PAPER = Path(__file__).parents[1] / "configs/paper"
@@ -68,7 +68,9 @@ def laws(config: str, *overrides: str) -> dict[str, Scenario]:
 def made(scenario: Scenario) -> tuple[dict[str, float], Recording]:
     """Metrics and log of a run."""
     recording = simulated(scenario, Stopwatch())
-    return summary(scenario, recording), recording
+    seen = recording.seen
+    assert seen is not None  # it was observed
+    return scenario.observer().summary(seen), recording
 
 
 def errors(scenario: Scenario) -> dict[str, float]:

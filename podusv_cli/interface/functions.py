@@ -22,6 +22,8 @@ from podusv_cli.findings.finding import postflight, preflight
 from podusv_cli.interface.results import Comparison, Run
 from podusv_cli.interface.scenarios import Changes, Source, loaded
 from podusv_cli.process.extras import Extras
+from podusv_cli.scenario.load import Loaded
+from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage import json_files
 from podusv_cli.verification import verify as verification
 from podusv_cli.workflows import compare as comparing
@@ -47,7 +49,7 @@ def simulate(source: Source, changes: Changes | None = None) -> Run:
     >>> float(run.metrics["iae"].round()), run["z_e"].shape
     (71.0, (3001,))
     """
-    scenario = running.single(loaded(source, changes))
+    scenario = _single(loaded(source, changes))
     recording = simulated(scenario, Stopwatch())
     whole, _ = monitored(scenario, recording)
     found = [*preflight(scenario), *postflight(scenario, whole)]
@@ -71,7 +73,9 @@ def run(
     >>> run.status, sorted(path.name for path in run.folder.iterdir())[:3]
     ('finished', ['log.h5', 'manifest.json', 'metrics.csv'])
     """
-    done = running.run_loaded(loaded(source, changes), _request(out, force, figures))
+    given = loaded(source, changes)
+    _single(given)
+    done = running.run_loaded(given, _request(out, force, figures))
     return open_run(done.folder)
 
 
@@ -137,7 +141,7 @@ def simulate_many(
     0      50.0  finished
     1      60.0  finished
     """
-    scenario = running.single(loaded(source))
+    scenario = _single(loaded(source))
     loop, grid, watching = scenario.closed_loop(), scenario.time_grid(), scenario.observer()
     check_law(loop)
     done = batch.simulate_many(variants(loop, parameters), grid, observer=watching, workers=workers)
@@ -173,6 +177,18 @@ def verify(
     frame = pd.DataFrame.from_dict(rows, orient="index", columns=columns)
     frame.index = pd.MultiIndex.from_tuples(list(rows), names=["run", "number"])
     return frame
+
+
+def _single(given: Loaded) -> Scenario:
+    """The scenario of one run. Raises UsageError where a choice among `controllers` is left."""
+    scenario = given.scenario
+    if scenario.open_choice:
+        first, *_ = known = tuple(scenario.controllers)
+        raise UsageError(
+            f"{scenario.name} has several controllers ({', '.join(known)}); choose one, as "
+            f"scenario.singles()[{first!r}], or use compare"
+        )
+    return scenario.alone()
 
 
 def _request(out: Any, force: bool, figures: bool) -> running.Request:

@@ -81,7 +81,6 @@ def single(loaded: Loaded, label: str = "") -> Scenario:
     if loaded.scenario.open_choice and not label:
         raise UsageError(
             f"{loaded.scenario.name} has several controllers; choose one with --controller "
-            f"({', '.join(known)}; in Python, scenario.singles()['{next(iter(known))}']), or "
-            "compare all: podusv compare"
+            f"({', '.join(known)}), or compare all: podusv compare"
         )
     return loaded.scenario.singles()[label] if label else loaded.scenario.alone()
