@@ -252,3 +252,9 @@ def test_a_report_needs_nothing_else(drawn):
     assert "<script" not in text
     assert "http" not in text.replace("http://www.w3.org", "")
     assert "logs/pid-0-0" in text
+
+
+def test_the_table_on_the_terminal_has_failures_in_percent(whole):
+    head, (row, *_) = whole.results.cells()
+    assert head == ["law", "cell", "failed", "iae, median", "z_e_steady, median"]
+    assert row[:3] == ["pid", "disturbance.scale = 0.5, start.r = 0.0", "85.7 % [42.1, 99.6]"]

@@ -60,8 +60,10 @@ class Quantity(Distribution):
 class Keep(Component):
     """Which runs are made again as full run folders, with log and figures."""
 
-    failed: int = value(0, "", "so many failed runs of every law", ge=0)
-    worst: dict[str, int] = value({}, "", "by metric: so many of the worst runs of every law")
+    failed: int = value(0, "", "so many runs of every law that diverged or were no success", ge=0)
+    worst: dict[str, int] = value(
+        {}, "", "by metric: so many runs of every law, the worst that succeeded"
+    )
     draws: tuple[int, ...] = value((), "", "these draws, of every law; the first is 0")
 
 

@@ -72,7 +72,8 @@ class Results:
         if not len(mine):  # no run yet
             return ["-"] * (1 + len(self.shown))
         first = mine.iloc[0]
-        failed = f"{first.failed:.4g} [{first.failed_low:.3g}, {first.failed_high:.3g}]"
+        share, low, high = (100.0 * first[name] for name in ("failed", "failed_low", "failed_high"))
+        failed = f"{share:.3g} % [{low:.3g}, {high:.3g}]"
         return [failed, *(f"{mine.q50.get(name, np.nan):.5g}" for name in self.shown)]
 
     def as_json(self) -> dict[str, Any]:
