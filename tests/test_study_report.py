@@ -1,13 +1,18 @@
 """A study's report, figures and words, from a small study and from numbers planted by hand."""
 
+import json
 import math
+import re
 import shutil
+import subprocess
+from html import escape, unescape
 
 import numpy as np
 import pytest
 from html_tree import tree
 from small_study import written
 from study_samples import claim, judged, study
+from test_report_chase import BROWSER, QUIET, WIDTHS, needs_browser
 
 from podusv_cli.process.extras import Extras
 from podusv_cli.scenario.sweep import Quantity
@@ -258,3 +263,47 @@ def test_the_table_on_the_terminal_has_failures_in_percent(whole):
     head, (row, *_) = whole.results.cells()
     assert head == ["law", "cell", "failed", "iae, median", "z_e_steady, median"]
     assert row[:3] == ["pid", "disturbance.scale = 0.5, start.r = 0.0", "85.7 % [42.1, 99.6]"]
+
+
+# --- in a browser
+
+PROBE = """
+<script>
+addEventListener("load", () => {
+  const told = {};
+  for (const frame of document.querySelectorAll("iframe")) {
+    const page = frame.contentDocument, width = frame.clientWidth;
+    const inside = (e) => e.closest(".wide, details:not([open]), svg");
+    told[frame.id] = [...page.querySelectorAll("body *")].filter((e) => !inside(e.parentElement))
+      .filter((e) => e.getBoundingClientRect().right > width + 0.5)
+      .map((e) => e.outerHTML.slice(0, 80));
+    told[frame.id].push(Math.max(0, page.documentElement.scrollWidth - width));
+    told[frame.id].push([...page.images].filter((image) => !image.naturalWidth).length);
+  }
+  const end = document.createElement("output");
+  end.id = "said";
+  end.textContent = JSON.stringify(told);
+  document.body.append(end);
+});
+</script>
+"""
+
+
+@needs_browser
+@pytest.mark.browser
+@pytest.mark.parametrize("kind", ["whole", "drawn"])
+def test_nothing_is_wider_than_the_page(kind, request, tmp_path):
+    page = (request.getfixturevalue(kind).folder / "report.html").read_text()
+    frames = "".join(
+        f'<iframe id="w{width}" width="{width}" height="900" srcdoc="{escape(page)}"></iframe>'
+        for width in WIDTHS
+    )
+    path = tmp_path / "frames.html"
+    path.write_text(f"<!doctype html><body>{PROBE}{frames}</body>")
+    words = (*QUIET, f"--user-data-dir={tmp_path}/browser", "--dump-dom", path.as_uri())
+    made = subprocess.run(
+        [str(BROWSER), *words], capture_output=True, text=True, timeout=120, check=True
+    )
+    said = re.search(r'<output id="said">(.*?)</output>', made.stdout, re.DOTALL)
+    assert said, made.stderr[-2000:]
+    assert json.loads(unescape(said[1])) == {f"w{width}": [0, 0] for width in WIDTHS}

@@ -198,8 +198,8 @@ def _heatmaps(results: Results) -> Iterator[Sketch]:
     down = [", ".join(map(as_yaml, values)) for values in product(*(grid[key] for key in rest))]
     for name in ("failed", *results.shown):
         panels = {law: _panel(results, law, name, len(across)) for law in results.runs.laws}
-        label = "share of failed draws [1]" if name == "failed" else _label(results, name)
-        what = label if name == "failed" else f"median of {name}"
+        label = "failed [1]" if name == "failed" else _label(results, name)
+        what = "share of failed draws" if name == "failed" else f"median of {name}"
         yield Sketch(
             f"grid-{name}",
             f"{what} in every cell of the grid: grey cells have a median that is a failure, or no "

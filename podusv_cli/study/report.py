@@ -15,7 +15,7 @@ from podusv_cli.scenario.phrases import as_yaml
 from podusv_cli.scenario.sweep import Sweep
 from podusv_cli.study.bars import bars
 from podusv_cli.study.keep import Kept
-from podusv_cli.study.results import Results
+from podusv_cli.study.results import Results, digits
 from podusv_cli.study.runs import Mask
 from podusv_cli.study.sittings import sittings
 from podusv_cli.study.unit import STATUSES
@@ -97,13 +97,13 @@ def _laws(results: Results) -> Iterator[tuple[str, str, str, str, list[str]]]:
         one, medians = rows.iloc[0], rows.set_index("metric").q50
         failed = f"{round(one.failed * one.n)} of {one.n}"
         share = f"{100 * one.failed_low:.3g} to {100 * one.failed_high:.3g} %"
-        yield law, cell, failed, share, [_digits(medians.get(name)) for name in results.shown]
-
-
-def _digits(number: Any) -> str:
-    if number is None or np.isnan(number):
-        return "-"
-    return "failed" if np.isinf(number) else f"{number:.4g}"
+        yield (
+            law,
+            cell,
+            failed,
+            share,
+            [digits(medians.get(name, np.nan)) for name in results.shown],
+        )
 
 
 def runs_that(results: Results, are: Any) -> Rows:
@@ -149,9 +149,9 @@ def _numbers(results: Results) -> list[list[str]]:
     rows: list[Any] = results.summary.to_dict("records")
     return [
         [one["law"], one["cell"], one["metric"], one["unit"],
-         *(_digits(one[q]) for q in ("q05", "q25", "q50")),
-         f"{_digits(one['q50_low'])} to {_digits(one['q50_high'])}",
-         *(_digits(one[q]) for q in ("q75", "q95"))]
+         *(digits(one[q]) for q in ("q05", "q25", "q50")),
+         f"{digits(one['q50_low'])} to {digits(one['q50_high'])}",
+         *(digits(one[q]) for q in ("q75", "q95"))]
         for one in rows if one["metric"] in results.shown
     ]  # fmt: skip
 

@@ -74,7 +74,7 @@ class Results:
         first = mine.iloc[0]
         share, low, high = (100.0 * first[name] for name in ("failed", "failed_low", "failed_high"))
         failed = f"{share:.3g} % [{low:.3g}, {high:.3g}]"
-        return [failed, *(f"{mine.q50.get(name, np.nan):.5g}" for name in self.shown)]
+        return [failed, *(digits(mine.q50.get(name, np.nan)) for name in self.shown)]
 
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints."""
@@ -83,6 +83,13 @@ class Results:
             "summary": self.summary.to_dict("records"),
             "claims": [one.as_json() for one in self.verdicts],
         }
+
+
+def digits(number: float) -> str:
+    """A metric over all draws; infinite is a failed run, not a number is none."""
+    if np.isnan(number):
+        return "-"
+    return "failed" if np.isinf(number) else f"{number:.5g}"
 
 
 def judged(plan: Plan, runs: Table) -> Results:
