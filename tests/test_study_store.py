@@ -121,7 +121,8 @@ def test_time_over_keeps_what_is_made(tmp_path, monkeypatch):
     store.open("now")
     clock = iter(range(10**6))
     monkeypatch.setattr(marching.time, "monotonic", lambda: float(next(clock)))
-    tally, whole = marching.march(store, lambda tally: None, workers=1, seconds=2.0)
+    engine = marching.Processes(store.plan, 1)
+    tally, whole = marching.march(store, lambda tally: None, engine, seconds=2.0)
     assert not whole
     assert 0 < tally.made < tally.wanted
     assert sum(int(mask.sum()) for mask in store.covered().values()) == tally.made

@@ -59,6 +59,12 @@ def run(
     shard: Annotated[
         str, typer.Option(help="A part of the study, as 3/20: for `podusv sweep merge`.")
     ] = "",
+    scheduler: Annotated[
+        str, typer.Option(help="Dask scheduler whose workers compute, as tcp://host:8786.")
+    ] = "",
+    allow_mixed: Annotated[
+        bool, typer.Option(help="Its workers may compute other bits than this machine.")
+    ] = False,
     figures: options.Figures = True,
     as_json: options.AsJson = False,
     quiet: options.Quiet = False,
@@ -75,9 +81,11 @@ def run(
     with StudyLine(wanted=not (quiet or as_json)) as line:
         request = workflow.Request(
             changes, out, seconds(until), workers, part_of(shard), sys.argv, plugin or (), figures,
-            line.say,
+            scheduler, allow_mixed, line.say,
         )  # fmt: skip
         done = workflow.run(Path(config), request, line.tell)
+    for refused in done.refused:
+        echo(f"warning: {refused}", err=True)
     _tell(done, as_json=as_json, quiet=quiet)
     broken = done.results.broken if done.results else 0
     raise typer.Exit(SOME_FAILED if broken else 0)

@@ -169,14 +169,15 @@ def _work(job: Job, pipe: Connection, inherited: Iterable[Connection]) -> None:
         end.close()
     # A broken pipe means that the parent has ended.
     with interrupts_caught() as interrupts, interrupts_deferred(), suppress(BrokenPipeError):
-        outcome = _outcome(job, pipe.send, interrupts)
+        outcome = outcome_of(job, pipe.send, interrupts)
         try:
             pipe.send(outcome)
         except (AttributeError, TypeError, PicklingError) as error:
             pipe.send(Outcome(failure=f"its result cannot be sent: {error}"))
 
 
-def _outcome(job: Job, progress: Progress, interrupts: Interrupts) -> Outcome:
+def outcome_of(job: Job, progress: Progress, interrupts: Interrupts) -> Outcome:
+    """Run a job; its result, or why it has none."""
     try:
         return Outcome(job(progress))
     except BrokenPipeError:

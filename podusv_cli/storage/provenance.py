@@ -36,7 +36,7 @@ def collect(
             "system": platform.system(),
             "release": platform.release(),
             "machine": platform.machine(),
-            "processor": _processor(),
+            "processor": processor(),
             "libc": " ".join(platform.libc_ver()).strip() or None,
         },
         "plugins": [plugin.as_json() for plugin in plugins],
@@ -84,7 +84,7 @@ def _git(folder: Path, *words: str) -> str | None:
     return done.stdout.strip()
 
 
-def _processor() -> str | None:
+def processor() -> str | None:
     """The processor's model, None if unknown."""
     with suppress(OSError), open("/proc/cpuinfo", encoding="utf-8", errors="replace") as file:
         for line in file:

@@ -49,12 +49,12 @@ class Comparison:
         self._stores.append(store)
         for new in store.results():
             place, rows = (new.unit.law, new.unit.cell), slice(new.unit.first, new.unit.draws.stop)
-            digests, origins = self._digests[place][rows], self._origins[place][rows]
-            found = _digests(new)
-            other = (origins != NOWHERE) & (digests != found)
+            known, origins = self._digests[place][rows], self._origins[place][rows]
+            found = digests(new)
+            other = (origins != NOWHERE) & (known != found)
             if other.any():
                 self._refuse(new, other, self._stores[origins[np.argmax(other)]])
-            digests[:], origins[:] = found, len(self._stores) - 1
+            known[:], origins[:] = found, len(self._stores) - 1
 
     def _refuse(self, new: UnitResult, other: Mask, earlier: Store) -> None:
         unit, folder = new.unit, self._stores[-1].folder
@@ -69,7 +69,7 @@ class Comparison:
         )
 
 
-def _digests(result: UnitResult) -> Any:
+def digests(result: UnitResult) -> Any:
     """A digest of each run of a unit; NaN is one number, whatever its bits."""
     columns = [*(result.metrics[name] for name in sorted(result.metrics)), result.until]
     table = np.column_stack([*columns, result.status])

@@ -1,4 +1,4 @@
-"""Simulating all units of a plan that are not there yet, in processes of one machine."""
+"""Simulating all units of a plan that are not there yet, in processes of one machine or of many."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import count
-from typing import Self
+from typing import Any, Protocol, Self
 
 import numpy as np
 
@@ -57,6 +57,43 @@ class Tally:
 
 
 Tell = Callable[[Tally], None]
+Units = Iterator[tuple[int, Unit]]  # numbered; after the last, there may be more
+Done = Callable[[int, Outcome], None]
+
+
+class Engine(Protocol):
+    """Where units are made."""
+
+    def __call__(self, units: Units, done: Done) -> bool:
+        """Take units as workers become free, and tell the outcome of each by its number.
+
+        `done` may add units to those that are still to be taken. The result of an outcome is that
+        of `timed`. False after an interrupt; units under way have no outcome then.
+        """
+
+    def told(self) -> dict[str, Any]:
+        """What a study's provenance has to say about the workers."""
+
+
+@dataclass(frozen=True)
+class Processes:
+    """Units are made in processes of this machine."""
+
+    plan: Plan
+    count: int = 0  # one a core
+
+    def __call__(self, units: Units, done: Done) -> bool:
+        """As Engine says."""
+        # `map` asks again after the last unit, as units may be halved; a generator would not.
+        return run_each(map(self._job, units), done, workers=self.count or available_workers())
+
+    def _job(self, numbered: tuple[int, Unit]) -> tuple[int, Job]:
+        number, unit = numbered
+        return number, partial(timed, self.plan, unit)
+
+    def told(self) -> dict[str, Any]:
+        """Nothing: the workers are those of the machine."""
+        return {}
 
 
 class Driver:
@@ -74,18 +111,18 @@ class Driver:
         self._seconds = 0.0  # of computing a run, so far the longest average of a unit
         self.failure: Outcome | None = None
 
-    def __iter__(self) -> Iterator[tuple[int, Job]]:
-        """The jobs; more may come while units are under way."""
+    def __iter__(self) -> Units:
+        """The units; more may come while some are under way."""
         return self
 
-    def __next__(self) -> tuple[int, Job]:
-        """The next unit as a job."""
+    def __next__(self) -> tuple[int, Unit]:
+        """The next unit, with its number."""
         unit = self._next()
         if unit is None:
             raise StopIteration
         number = next(self._numbers)
         self._units[number] = unit
-        return number, partial(_timed, self.plan, unit)
+        return number, unit
 
     def unmade(self) -> list[tuple[str, int]]:
         """Laws and cells of which runs are missing."""
@@ -132,7 +169,7 @@ class Driver:
         self._tell(self.tally)
 
 
-def _timed(plan: Plan, unit: Unit, progress: Callable[[float], None]) -> tuple[UnitResult, float]:
+def timed(plan: Plan, unit: Unit, progress: Callable[[float], None]) -> tuple[UnitResult, float]:
     """A unit, and the processor time that it took [s]."""
     began = time.process_time()
     result = make(plan, unit)
@@ -145,7 +182,7 @@ def shard(draws: int, number: int, count: int) -> slice:
 
 
 def march(
-    store: Store, tell: Tell, *, workers: int = 0, seconds: float = math.inf, part: Part = (1, 1)
+    store: Store, tell: Tell, engine: Engine, *, seconds: float = math.inf, part: Part = (1, 1)
 ) -> tuple[Tally, bool]:
     """Simulate what is missing, for so many seconds at most; how far it is, and if it is whole.
 
@@ -155,7 +192,7 @@ def march(
     driver = Driver(store, tell, time.monotonic() + seconds, part)
     for law, cell in driver.unmade():
         prepare(store.plan, law, cell)  # before the fork, so that no process compiles it again
-    finished = run_each(driver, driver.done, workers=workers or available_workers())
+    finished = engine(driver, driver.done)
     if driver.failure:
         raise PodusvError(driver.failure.failure)
     if not finished:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from podusv_cli.core.plugins import Plugin
@@ -41,9 +42,10 @@ class Sitting:
             (folder / manifest.NAME).unlink(missing_ok=True)
         self._write()
 
-    def end(self, runs: int) -> None:
-        """Note that it made so many runs and is over. Raises StorageError."""
-        self._origin |= provenance.times(self._started, datetime.now(UTC)) | {"runs": runs}
+    def end(self, runs: int, told: Mapping[str, Any] = MappingProxyType({})) -> None:
+        """Note how many runs it made, and what else is told of it. Raises StorageError."""
+        times = provenance.times(self._started, datetime.now(UTC))
+        self._origin |= {**times, "runs": runs, **told}
         self._write()
 
     def _write(self) -> None:

@@ -6,7 +6,8 @@ import math
 import os
 import shlex
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
@@ -27,8 +28,9 @@ from podusv_cli.study import outputs
 from podusv_cli.study.check import sweep_faults
 from podusv_cli.study.joining import join, missing
 from podusv_cli.study.keep import found
-from podusv_cli.study.march import Part, Tally, Tell, march
+from podusv_cli.study.march import Engine, Part, Processes, Tally, Tell, march
 from podusv_cli.study.plan import plan
+from podusv_cli.study.remote import Recipe
 from podusv_cli.study.results import Results, judged
 from podusv_cli.study.sittings import Sitting
 from podusv_cli.study.store import Store
@@ -52,6 +54,8 @@ class Request:
     argv: Sequence[str] = ()
     plugins: Sequence[str] = ()
     figures: bool = True
+    scheduler: str = ""  # of a Dask cluster, as tcp://host:port
+    mixed: bool = False  # whether its workers may compute other bits than this machine
     say: Callable[[str], None] = lambda text: None  # what is done after the last run
 
 
@@ -65,6 +69,7 @@ class Swept:
     missing: tuple[Missing, ...] = ()  # of figures, report and kept logs
     missing_runs: tuple[str, ...] = ()  # after a merge, in words
     part_is_whole: bool = False  # the runs of a shard are made, others are missing
+    refused: tuple[str, ...] = ()  # workers of a cluster that got no units, and why
 
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints."""
@@ -74,7 +79,7 @@ class Swept:
         missing = [str(one) for one in self.missing]
         return {
             "format": 1, "status": status, "folder": str(self.folder), **counts, **told,
-            "missing": missing,
+            "missing": missing, "missing_runs": self.missing_runs, "refused": self.refused,
         }  # fmt: skip
 
 
@@ -102,6 +107,23 @@ def run(config: Path, request: Request, tell: Tell) -> Swept:
     """
     started = datetime.now(UTC)
     store = _opened(config, request, started)
+    with _engine(store, request) as engine:
+        tally, whole = _marched(store, request, started, engine, tell)
+    refused = tuple(engine.told().get("refused", {}).values())
+    if whole and request.shard != WHOLE:
+        whole = _is_whole(store)
+        if not whole:
+            return Swept(store.folder, tally, part_is_whole=True, refused=refused)
+    if not whole:
+        return Swept(store.folder, tally, refused=refused)
+    store.write_runs()
+    return replace(_judged(store, request), refused=refused)
+
+
+def _marched(
+    store: Store, request: Request, started: datetime, engine: Engine, tell: Tell
+) -> tuple[Tally, bool]:
+    """Simulate what is missing, and note the sitting; how far it is, and if it is whole."""
     sitting = Sitting(store.folder, request.argv, started, store.plan.scenario.plugged)
     seen = Tally(0)
 
@@ -111,23 +133,24 @@ def run(config: Path, request: Request, tell: Tell) -> Swept:
         tell(tally)
 
     try:
-        tally, whole = march(
-            store, told, workers=request.workers, seconds=request.seconds, part=request.shard
-        )
+        return march(store, told, engine, seconds=request.seconds, part=request.shard)
     except KeyboardInterrupt as stop:
         again = f"podusv sweep run {shlex.quote(str(store.folder))}"
         made = f"the {seen.made} runs that are made" if seen.made else "all runs that were made"
         raise KeyboardInterrupt(f"interrupted; {made} are kept, continue with: {again}") from stop
     finally:
-        sitting.end(seen.made - seen.before)
-    if whole and request.shard != WHOLE:
-        whole = _is_whole(store)
-        if not whole:
-            return Swept(store.folder, tally, part_is_whole=True)
-    if not whole:
-        return Swept(store.folder, tally)
-    store.write_runs()
-    return _judged(store, request)
+        sitting.end(seen.made - seen.before, engine.told())
+
+
+def _engine(store: Store, request: Request) -> AbstractContextManager[Engine]:
+    """Where units are made: processes of this machine, or workers of a cluster."""
+    if not request.scheduler:
+        return nullcontext(Processes(store.plan, request.workers))
+    from podusv_cli.study.cluster import connected  # imports Dask
+
+    source = (store.folder / SCENARIO).absolute()
+    recipe = Recipe(source.read_text(encoding="utf-8"), str(source))
+    return connected(request.scheduler, recipe, store.seal, mixed=request.mixed)
 
 
 def _is_whole(store: Store) -> bool:

@@ -24,7 +24,7 @@ FILLING = ("write", "fsync")
 
 def one_by_one(jobs: Sequence[workers.Job], *more: object) -> list[workers.Outcome]:
     """The jobs of a comparison in this process, where their calls are counted."""
-    return [workers._outcome(job, lambda fraction: None, Interrupts()) for job in jobs]
+    return [workers.outcome_of(job, lambda fraction: None, Interrupts()) for job in jobs]
 
 
 @pytest.fixture
