@@ -1,0 +1,113 @@
+"""Studies on real Dask clusters: the bytes of a study that one process made."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from contextlib import ExitStack, contextmanager
+
+import pytest
+from small_study import TEXT, made, small
+
+from podusv_cli.core.errors import StorageError
+from podusv_cli.study.cluster import connected
+from podusv_cli.study.march import march
+from podusv_cli.study.remote import Recipe
+from podusv_cli.study.store import RUNS, Store
+
+distributed = pytest.importorskip("distributed", reason="Dask is not installed: podusv[cluster]")
+PATIENCE = 60.0  # s
+# So long that an interrupt comes before the end.
+LONG = TEXT.replace("duration: 1.0", "duration: 20.0").replace("draws: 40", "draws: 1000")
+DASK = [sys.executable, "-m", "dask"]
+
+
+@pytest.mark.slow
+def test_a_worker_that_is_killed_changes_no_byte(tmp_path):
+    whole = (made(tmp_path / "local").folder / RUNS).read_bytes()
+    store, killed = Store(tmp_path / "study", small()), []
+    store.open("now")
+
+    def tell(tally):
+        if not killed and tally.made > 8:
+            killed.append(next(iter(local.workers.values())).pid)
+            os.kill(killed[0], signal.SIGKILL)
+
+    recipe = Recipe(TEXT, "small.yaml")
+    with (
+        distributed.LocalCluster(2, threads_per_worker=1, dashboard_address=None) as local,
+        connected(local.scheduler_address, recipe, store.seal, mixed=False) as engine,
+    ):
+        _, finished = march(store, tell, engine)
+    assert finished
+    assert killed
+    store.write_runs()
+    assert (store.folder / RUNS).read_bytes() == whole
+
+
+@pytest.mark.slow
+def test_dask_as_a_user_starts_it_and_an_interrupt(tmp_path):
+    (tmp_path / "long.yaml").write_text(LONG)
+    with ExitStack() as stack:
+        place = tmp_path / "scheduler.json"
+        stack.enter_context(
+            background(*DASK, "scheduler", "--host", "127.0.0.1", "--port", "0",
+                       "--no-dashboard", "--scheduler-file", place)
+        )  # fmt: skip
+        until(place.exists)
+        address = json.loads(place.read_text())["address"]
+        for threads in ("1", "2"):
+            options = ("--nthreads", threads, "--no-dashboard", "--local-directory", tmp_path)
+            stack.enter_context(background(*DASK, "worker", address, *options))
+        with distributed.Client(address, set_as_default=False) as client:
+            client.wait_for_workers(2, timeout=PATIENCE)
+        with sweep(tmp_path, address) as first:
+            until(lambda: any((tmp_path / "study/units").glob("*.h5")))
+            first.send_signal(signal.SIGINT)
+            assert first.wait(PATIENCE) == 130
+        assert not (tmp_path / "study" / RUNS).exists()
+        with sweep(tmp_path, address) as second:
+            assert second.wait(PATIENCE) == 0
+        with sweep(tmp_path, "", "local") as alone:
+            assert alone.wait(PATIENCE) == 0
+    one, other = ((tmp_path / name / RUNS).read_bytes() for name in ("study", "local"))
+    assert one == other
+    sittings = json.loads((tmp_path / "study/provenance.json").read_text())["sittings"]
+    assert sum(one["runs"] for one in sittings) == 2000
+    assert sittings[0]["runs"] > 0
+    assert {len(one["workers"]) for one in sittings} <= {1, 2}
+
+
+@contextmanager
+def background(*command):
+    """A process in the background, ended at the end."""
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        yield process
+    finally:
+        process.terminate()
+        process.wait(PATIENCE)
+
+
+def sweep(folder, address, name="study"):
+    options = ("--scheduler", address, "--out", folder / name, "--no-figures")
+    command = (sys.executable, "-m", "podusv_cli", "sweep", "run", folder / "long.yaml")
+    return background(*command, *options)
+
+
+def until(happened):
+    end = time.monotonic() + PATIENCE
+    while not happened():
+        assert time.monotonic() < end, "nothing happens"
+        time.sleep(0.02)
+
+
+def test_no_scheduler_is_a_sentence(monkeypatch):
+    monkeypatch.setattr("podusv_cli.study.cluster.PATIENCE", 0.3)
+    with (
+        pytest.raises(StorageError, match=r"--scheduler tcp://127.0.0.1:9: no scheduler answers"),
+        connected("tcp://127.0.0.1:9", Recipe(TEXT, "small.yaml"), "", mixed=False),
+    ):
+        pass
