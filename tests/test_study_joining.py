@@ -15,6 +15,7 @@ from podusv_cli.study import store as stores
 from podusv_cli.study.joining import _machine, join, missing
 from podusv_cli.study.store import RUNS, Store
 from podusv_cli.workflows import sweep as workflow
+from podusv_cli.workflows.merge import merge
 
 SHARDS = 20
 
@@ -35,7 +36,7 @@ def whole(tmp_path_factory):
 
 
 def merged(folders, out):
-    return workflow.merge(folders, out, workflow.Request(figures=False))
+    return merge(folders, out, workflow.Request(figures=False))
 
 
 def test_twenty_shards_are_one_run_byte_for_byte(shards, whole, tmp_path):

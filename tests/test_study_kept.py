@@ -18,6 +18,7 @@ from podusv_cli.study import keep
 from podusv_cli.study.results import judged
 from podusv_cli.workflows import run as running
 from podusv_cli.workflows import sweep
+from podusv_cli.workflows.merge import merge
 
 VARIED = (
     "    start.psi: {angle: all}\n",
@@ -178,7 +179,7 @@ def test_every_sitting_is_kept(study, tmp_path):
     for number, part in enumerate(parts, 1):
         config = written(tmp_path / "small.yaml")
         run(config, part, overrides=["sweep.draws=4"], shard=(number, 2))
-    merged = sweep.merge(parts, tmp_path / "merged", sweep.Request(figures=False))
+    merged = merge(parts, tmp_path / "merged", sweep.Request(figures=False))
     told = json.loads((merged.folder / "provenance.json").read_text())["sittings"]
     assert [one["runs"] for one in told] == [4, 4, 0]
 

@@ -176,11 +176,12 @@ def merge(
     quiet: options.Quiet = False,
 ) -> None:
     """Join the runs of several folders of one study, as `--shard` makes them."""
-    from podusv_cli.workflows import sweep as workflow
+    from podusv_cli.workflows import merge as joining
+    from podusv_cli.workflows.sweep import Request
 
     with StudyLine(wanted=not (quiet or as_json)) as line:
-        request = workflow.Request(argv=sys.argv, figures=figures, say=line.say)
-        done = workflow.merge(studies, out, request)
+        request = Request(argv=sys.argv, figures=figures, say=line.say)
+        done = joining.merge(studies, out, request)
     _tell(done, as_json=as_json, quiet=quiet)
 
 

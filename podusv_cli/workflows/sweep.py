@@ -26,7 +26,6 @@ from podusv_cli.storage import files, manifest
 from podusv_cli.storage.run_folder import STUDY
 from podusv_cli.study import outputs
 from podusv_cli.study.check import sweep_faults
-from podusv_cli.study.joining import join, missing
 from podusv_cli.study.keep import found
 from podusv_cli.study.march import Engine, Part, Processes, Tally, Tell, march
 from podusv_cli.study.plan import plan
@@ -117,7 +116,7 @@ def run(config: Path, request: Request, tell: Tell) -> Swept:
     if not whole:
         return Swept(store.folder, tally, refused=refused)
     store.write_runs()
-    return replace(_judged(store, request), refused=refused)
+    return replace(answered(store, request), refused=refused)
 
 
 def _marched(
@@ -185,7 +184,7 @@ def _loaded(config: Path, request: Request) -> Loaded:
     return loaded
 
 
-def _judged(store: Store, request: Request) -> Swept:
+def answered(store: Store, request: Request) -> Swept:
     """Judge the runs that are there, and write everything about them.
 
     Tables and verdicts come first. An interrupt then costs figures and kept logs, nothing else.
@@ -249,32 +248,7 @@ def report(study: Path, request: Request) -> Swept:
         raise UsageError(f"{study} has no runs yet: podusv sweep run {study}")
     Sitting(study, request.argv, started, store.plan.scenario.plugged).end(0)
     store.write_runs()
-    return _judged(store, request)
-
-
-def merge(studies: Sequence[Path], out: Path, request: Request) -> Swept:
-    """Join the units of several folders of one study, and judge it where it is whole.
-
-    Raises UsageError where one holds another study, and StorageError where two have made the same
-    run with other numbers, as machines of another kind do.
-    """
-    if inside := [study for study in studies if study.resolve() == out.resolve()]:
-        raise UsageError(f"--out {out} is one of the studies, {inside[0]}; name another folder")
-    started, others = datetime.now(UTC), [stored(study) for study in studies]
-    most = max(others, key=lambda other: other.plan.sweep.draws)
-    store = Store(out, most.plan)
-    for other in others:
-        store.agree(other.folder, other.plan)
-    store.open(started.isoformat(timespec="seconds"))
-    sitting = Sitting(out, request.argv, started, store.plan.scenario.plugged, studies)
-    files.write_bytes(out / SCENARIO, (most.folder / SCENARIO).read_bytes())
-    join(store, others)
-    sitting.end(0)
-    tally = Tally.of(store.covered())
-    if tally.made < tally.wanted:
-        return Swept(out, tally, missing_runs=tuple(missing(store)))
-    store.write_runs()
-    return _judged(store, request)
+    return answered(store, request)
 
 
 def draw(study: Path, law: str, number: int, cell: int, out: Path | None) -> Path:

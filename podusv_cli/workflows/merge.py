@@ -1,0 +1,40 @@
+"""`podusv sweep merge`: the folders of one study joined into one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+
+from podusv_cli.core.errors import UsageError
+from podusv_cli.storage import files
+from podusv_cli.study.joining import join, missing
+from podusv_cli.study.march import Tally
+from podusv_cli.study.sittings import Sitting
+from podusv_cli.study.store import Store
+from podusv_cli.workflows.sweep import SCENARIO, Request, Swept, answered, stored
+
+
+def merge(studies: Sequence[Path], out: Path, request: Request) -> Swept:
+    """Join the units of several folders of one study, and judge it where it is whole.
+
+    Raises UsageError where one holds another study, and StorageError where two have made the same
+    run with other numbers, as machines of another kind do.
+    """
+    if inside := [study for study in studies if study.resolve() == out.resolve()]:
+        raise UsageError(f"--out {out} is one of the studies, {inside[0]}; name another folder")
+    started, others = datetime.now(UTC), [stored(study) for study in studies]
+    most = max(others, key=lambda other: other.plan.sweep.draws)
+    store = Store(out, most.plan)
+    for other in others:
+        store.agree(other.folder, other.plan)
+    store.open(started.isoformat(timespec="seconds"))
+    sitting = Sitting(out, request.argv, started, store.plan.scenario.plugged, studies)
+    files.write_bytes(out / SCENARIO, (most.folder / SCENARIO).read_bytes())
+    join(store, others)
+    sitting.end(0)
+    tally = Tally.of(store.covered())
+    if tally.made < tally.wanted:
+        return Swept(out, tally, missing_runs=tuple(missing(store)))
+    store.write_runs()
+    return answered(store, request)
