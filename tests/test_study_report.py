@@ -149,6 +149,23 @@ def test_a_figure_that_fails_costs_nothing_else(drawn, monkeypatch, tmp_path):
     assert not (tmp_path / "missing.json").exists()
 
 
+def test_an_interrupt_while_figures_are_drawn_costs_figures_alone(drawn, tmp_path, monkeypatch):
+    def interrupted(results, tracks, extras):
+        extras.interrupted = True
+        return {}, []
+
+    folder = tmp_path / "stopped"
+    shutil.copytree(drawn.folder, folder)
+    (folder / "summary.csv").unlink()
+    monkeypatch.setattr(pictures, "drawn", interrupted)
+    with pytest.raises(KeyboardInterrupt, match=f"podusv sweep report {folder}"):
+        sweep.report(folder, sweep.Request())
+    same = (drawn.folder / "summary.csv").read_bytes()
+    assert (folder / "summary.csv").read_bytes() == same
+    assert (folder / "report.html").exists()
+    assert not (folder / "manifest.json").exists()
+
+
 def test_the_heatmap_has_every_cell_in_its_place(whole):
     results = whole.results
     panel = pictures._panel(results, "pid", "iae", 2)
