@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_samples import commanded
+from command_samples import commanded, one_line
 from small_study import written
 
 from podusv_cli.core.errors import UsageError
@@ -200,3 +200,24 @@ def test_a_study_is_no_run(study, monkeypatch, capsys, tmp_path, command):
     assert f"{study.folder} is a study, not a run; name one of the runs that it keeps" in ended.err
     assert "podusv sweep draw" in ended.err
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["run", "small.yaml", "--until", "5x"], "write a number and s, min, h or d: 30min"),
+        (["run", "small.yaml", "--shard", "4/3"], "write its number and the count: 3/20"),
+        (["run", "small.yaml", "--out", "small.yaml"], "is a file; name a folder"),
+        (["run", "."], ". is not the folder of a study: it has no study.json"),
+        (["status", "nowhere"], "nowhere does not exist; it has to be the folder of a study"),
+        (["report", "small.yaml"], "small.yaml is a file, not the folder of a study"),
+        (["export", "nowhere", "--format", "xls"], "unknown format 'xls'"),
+    ],
+)
+def test_a_mistake_is_told_in_a_sentence(monkeypatch, capsys, tmp_path, words, told):
+    monkeypatch.chdir(tmp_path)
+    written(tmp_path / "small.yaml")
+    ended = commanded(monkeypatch, capsys)("sweep", *words)
+    assert (ended.code, ended.out) == (2, "")
+    assert told in one_line(ended.err)
+    assert [path.name for path in tmp_path.iterdir()] == ["small.yaml"]
