@@ -11,7 +11,7 @@ from podusv_cli.comparison.entries import Absent, Entry
 from podusv_cli.comparison.expressions import parse
 from podusv_cli.core.recording import Recording
 from podusv_cli.scenario.load import load_text
-from podusv_cli.scenario.model import Claim
+from podusv_cli.scenario.sections import Claim
 
 SCENARIO = """
 name: planted

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from podusv_cli.scenario.model import Claim
+from podusv_cli.scenario.sections import Claim
 from podusv_cli.study.claims import ParsedClaim, judge, parse
 from podusv_cli.study.verdict import StudyVerdict
 

@@ -15,7 +15,7 @@ from podusv_cli.comparison.expressions import Evaluation, parse, with_labels
 from podusv_cli.core.signal import Signal
 from podusv_cli.scenario.expressions import ExpressionError
 from podusv_cli.scenario.load import load
-from podusv_cli.scenario.model import Claim
+from podusv_cli.scenario.sections import Claim
 
 CORRECTED = Path(__file__).parent.parent / "configs/paper/corrected.yaml"
 

@@ -11,7 +11,8 @@ from pydantic.types import Strict
 from podusv_cli.core.component import Component
 from podusv_cli.scenario.explain import Row, UnknownKeyError, explain, kinds
 from podusv_cli.scenario.keys import BOUNDS, PATTERNS_IN_WORDS, limits, members, sections
-from podusv_cli.scenario.model import Claim, Scenario
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.sections import Claim
 
 
 def models(model: type[Component] = Scenario) -> Iterator[type[Component]]:

@@ -12,7 +12,8 @@ from scenario_samples import SOUND, loaded
 from podusv_cli.core.component import Component
 from podusv_cli.scenario.keys import limits, members, sections
 from podusv_cli.scenario.load import HEADING, load_resolved, load_text, resolved_yaml, values
-from podusv_cli.scenario.model import LABEL, Scenario
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.sections import LABEL
 from podusv_cli.scenario.sweep import Sweep
 from podusv_cli.scenario.yaml_text import read
 

@@ -17,7 +17,7 @@ from podusv_cli.metrics.table import CLOCKED, METRICS, metrics_with
 from podusv_cli.scenario import explain
 from podusv_cli.scenario.expressions import ExpressionError
 from podusv_cli.scenario.load import Loaded
-from podusv_cli.scenario.model import Claim
+from podusv_cli.scenario.sections import Claim
 
 Answer = Literal["reproduced", "not reproduced", "cannot tell"]
 ANSWERS: dict[bool | None, Answer] = {

@@ -15,8 +15,9 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from podusv_cli.core.component import Component, unit_of
-from podusv_cli.scenario import model
 from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.sections import NAME as PATTERN
+from podusv_cli.scenario.sections import NAME_IN_WORDS
 from podusv_cli.scenario.yaml_tree import Route
 
 NAME, NUMBER = "NAME", "NUMBER"  # stand for the names in a mapping, the positions in a list
@@ -24,7 +25,7 @@ MISSING = PydanticUndefined  # the default of a field that has none
 BOUNDS = {
     "gt": (">", "above"), "ge": (">=", "not below"), "lt": ("<", "below"), "le": ("<=", "not above")
 }  # fmt: skip
-PATTERNS_IN_WORDS = {model.NAME: model.NAME_IN_WORDS}
+PATTERNS_IN_WORDS = {PATTERN: NAME_IN_WORDS}
 NOUNS: dict[Any, tuple[str, str]] = {
     float: ("a number", "numbers"),
     int: ("a whole number", "whole numbers"),

@@ -13,8 +13,8 @@ from pathlib import Path
 from podusv_cli.core.component import Component, Presets
 from podusv_cli.core.plugins import ABSENT, Plugins
 from podusv_cli.scenario.keys import SCENARIO, Key
-from podusv_cli.scenario.model import NAME, NAME_IN_WORDS
 from podusv_cli.scenario.phrases import found, quoted, unknown
+from podusv_cli.scenario.sections import NAME, NAME_IN_WORDS
 from podusv_cli.scenario.shipped import PREFIX, relative_to
 from podusv_cli.scenario.yaml_text import MAX_NODES, read, read_text, resolve
 from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, Route, dotted, merge

@@ -14,8 +14,9 @@ from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import metrics_with
 from podusv_cli.scenario.expressions import ExpressionError
 from podusv_cli.scenario.load import values
-from podusv_cli.scenario.model import CLAIM, CLAIM_IN_WORDS, Scenario
+from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import did_you_mean, found, unknown
+from podusv_cli.scenario.sections import CLAIM, CLAIM_IN_WORDS
 from podusv_cli.scenario.sweep import Quantity, Sweep
 from podusv_cli.scenario.yaml_tree import Route, dotted, route
 from podusv_cli.study.claims import parse

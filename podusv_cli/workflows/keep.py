@@ -10,7 +10,8 @@ from podusv_cli.process.extras import Extras, Missing
 from podusv_cli.process.interrupts import interrupts_enabled
 from podusv_cli.process.workers import run_all
 from podusv_cli.scenario.load import resolved_yaml
-from podusv_cli.scenario.model import LONGEST_NAME, Scenario
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.sections import LONGEST_NAME
 from podusv_cli.storage.run_folder import LOGS
 from podusv_cli.study.draws import drawn, draws
 from podusv_cli.study.keep import Kept, Wanted, found, wanted

@@ -1,0 +1,112 @@
+"""The sections of a scenario that are plain settings, and the names that it may use."""
+
+from __future__ import annotations
+
+import re
+from typing import Literal
+
+from podusv_cli.core.component import Component, value
+
+LONGEST_NAME = 80  # letters
+NAME = rf"^[A-Za-z0-9][A-Za-z0-9_.-]{{0,{LONGEST_NAME - 1}}}$"
+NAME_IN_WORDS = (
+    "of letters, digits, '_', '.' and '-', starting with a letter or digit, at most 80 long"
+)
+LABEL = re.compile(r"[a-z][a-z0-9_]{0,29}")  # usable as a name in claims and as a folder
+LABEL_IN_WORDS = "a name here is at most 30 of a-z, 0-9 and _, starting with a letter"
+CLAIM = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,29}")
+CLAIM_IN_WORDS = (
+    "a claim's name is at most 30 of letters, digits, '_' and '-', starting with a letter"
+)
+
+
+class Start(Component):
+    """The vessel's state at t = 0."""
+
+    x: float = value(0.0, "m", "north")
+    y: float = value(0.0, "m", "east")
+    psi: float = value(0.0, "rad", "heading, from north towards east")
+    u: float = value(0.0, "m/s", "surge velocity")
+    v: float = value(0.0, "m/s", "sway velocity")
+    r: float = value(0.0, "rad/s", "yaw rate")
+
+
+class Simulation(Component):
+    """How the closed loop is integrated."""
+
+    step: float = value(0.01, "s", "step of the classical Runge-Kutta method", gt=0)
+    duration: float = value(310.0, "s", "simulated time, a whole number of steps", gt=0)
+    compiled: bool = value(True, "", "machine code, or (slowly, same result) plain Python")
+
+    @property
+    def outlier(self) -> str:
+        """The key, of step and duration, that is further from the usual."""
+        usual = Simulation()
+        longer, finer = self.duration / usual.duration, usual.step / self.step
+        return "simulation.duration" if longer > finer else "simulation.step"
+
+
+class Control(Component):
+    """When the law acts."""
+
+    period: float = value(
+        0.0, "s", "0: continuously; else the law is evaluated once a period, a whole number of "
+        "steps, and its output held", ge=0,
+    )  # fmt: skip
+    update: Literal["after", "before"] = value(
+        "after", "", "of sampled control: whether the law's memory (weights, integrals, filters) "
+        "takes a sample after the demand is formed from it, or before; it is integrated over a "
+        "period with the sample held",
+    )  # fmt: skip
+
+
+class Log(Component):
+    """What is written to log.h5."""
+
+    every: int = value(
+        1,
+        "steps",
+        "every n-th step is logged; metrics always see every step, claims about signals need 1",
+        ge=1,
+    )
+    monitor: bool = value(
+        True,
+        "",
+        "whether the Lyapunov function of the adaptive laws, its rate and its bounds are logged",
+    )
+    compress: bool = value(
+        False, "", "whether the log's arrays are compressed (gzip), which takes longer"
+    )
+
+
+class MetricSettings(Component):
+    """Windows and thresholds of the metrics."""
+
+    steady_fraction: float = value(
+        0.2, "", "the last part of the run that counts as settled", gt=0, le=1
+    )
+    settling_radius: float = value(
+        1.0, "m", "settled when the distance to the target stays below this", gt=0
+    )
+
+
+class Claim(Component):
+    """A published sentence, and how the runs are to decide on it."""
+
+    says: str = value(..., "", "the claim, in a sentence of your own")
+    source: str = value(..., "", "where it was published: section, figure, equation")
+    expect: str = value(..., "", "the claim as an expression over runs; see docs/claims.md")
+    given: str = value(
+        "", "", "a condition without which the claim has no meaning: if it fails, cannot tell"
+    )
+    tolerance: float = value(
+        0.05, "", "relative: how near `==` is, and how clear `<` and `>` have to be", ge=0, lt=1
+    )
+    remark: str = value("", "", "choices made where the source is silent")
+
+
+class Required(Component):
+    """What is required of a plug-in, a Python file or an installed package."""
+
+    version: str = value("", "", "the package's version; any where empty")
+    sha256: str = value("", "", "the digest of its text; any where empty")
