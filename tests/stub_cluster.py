@@ -68,6 +68,7 @@ class StubClient:
     waiting: list = field(default_factory=list)
     cancelled: list = field(default_factory=list)
     made: list = field(default_factory=list)  # of (worker, unit)
+    killers: list = field(default_factory=list)  # units that ended their worker
     submitted: int = 0
     released: int = 0
     most: int = 0  # tasks at a time
@@ -93,6 +94,7 @@ class StubClient:
             future.status = "cancelled"
         elif any(draw in self.deadly for unit in beside for draw in unit.draws):
             future.status, future.value = "error", KilledWorker("died")
+            self.killers.append(Unit(*future.args[2]))
         else:
             future.status, future.value = "finished", self._reply(future)
         callback(future)

@@ -76,7 +76,7 @@ class Cluster:
         self._threads, self._looked = dict[str, int](), -LOOK
         self._running, self._finished = dict[Any, Task](), SimpleQueue[Any]()
         self._again, self._suspects = deque[Task](), deque[Task]()
-        self._refused = dict[str, str]()
+        self._guilty, self._refused = list[Unit](), dict[str, str]()
         self._machines, self._made = dict[str, str](), dict[str, list[Unit]]()
 
     def check(self) -> None:
@@ -139,11 +139,20 @@ class Cluster:
     def _next(self, units: Units) -> Task | None:
         if self._again:
             return self._again.popleft()
+        if not self._suspects:
+            taken = next(units, None)
+            if not taken or not self._is_guilty(taken[1]):
+                return Task(*taken) if taken else None
+            self._suspects.append(Task(*taken, alone=True))
         # A unit whose worker died may only have been beside the one that killed it.
-        if self._suspects:
-            return None if self._running else self._suspects.popleft()
-        taken = next(units, None)
-        return Task(*taken) if taken else None
+        return None if self._running else self._suspects.popleft()
+
+    def _is_guilty(self, unit: Unit) -> bool:
+        """Whether it is part of a unit that killed its worker when nothing else was under way."""
+        return any(
+            (unit.law, unit.cell) == (found.law, found.cell) and unit.first in found.draws
+            for found in self._guilty
+        )
 
     def _submit(self, task: Task) -> None:
         future = self._client.submit(
@@ -190,6 +199,8 @@ class Cluster:
             if reply.worker:
                 self._machines[reply.worker] = reply.machine
                 self._made.setdefault(reply.worker, []).append(task.unit)
+            else:
+                self._guilty.append(task.unit)
             done(task.number, reply.outcome)
 
     def _look(self) -> None:

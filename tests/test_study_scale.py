@@ -1,0 +1,52 @@
+"""The driver of a study with thousands of units and 200 workers, none of which simulates."""
+
+import resource
+import time
+
+import pytest
+from small_study import small
+from stub_cluster import REPORT, StubClient
+from test_study_cluster import cluster, instant  # noqa: F401  # a fixture
+
+from podusv_cli.study.march import AIM, march
+from podusv_cli.study.store import Store
+
+WORKERS = [f"tcp://10.0.0.{number}:8786" for number in range(200)]
+
+
+def marched(folder, draws):
+    """A study whose units have 8 runs: the store, the stub, and what `march` said."""
+    plan = small(draws=draws)
+    client = StubClient(plan.metrics, dict.fromkeys(WORKERS, REPORT), seconds=AIM / 8)
+    store = Store(folder, plan)
+    store.open("now")
+    return store, client, march(store, lambda tally: None, cluster(client))
+
+
+def test_units_and_calls_are_as_many_as_they_have_to_be(tmp_path):
+    store, client, (tally, whole) = marched(tmp_path / "study", 2000)
+    assert whole
+    assert client.submitted == client.released == 500
+    assert client.most == 400  # two for each of 200 workers
+    assert client.looks <= 502  # once before each wait, here without a pause
+    assert len(list((store.folder / "units").iterdir())) == 500
+    assert tally.made == 4000
+
+
+@pytest.mark.benchmark
+def test_five_thousand_units_cost_little_time_and_memory(tmp_path):
+    began = time.process_time()
+    store, client, (tally, whole) = marched(tmp_path / "study", 20_000)
+    driver = time.process_time() - began
+    assert whole
+    assert client.submitted == 5000
+    began = time.perf_counter()
+    store.covered()
+    scan = time.perf_counter() - began
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    march_time = client.seconds * tally.made  # processor time of all workers
+    print(f"driver {driver:.1f} s of {march_time:.0f} s, peak {peak / 2**20:.0f} MB, {scan:.1f} s")
+    assert driver <= 0.01 * march_time
+    assert driver <= march_time / len(WORKERS)  # or the workers would wait for it
+    assert peak <= 250 * 2**20
+    assert scan <= 5.0
