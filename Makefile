@@ -23,10 +23,11 @@ PODS := kept dropped ideal no_anti_windup single
 ABLATIONS := ablation ablation_figures ablation_standoff ablation_gains ablation_gains_figures \
     ablation_gains_standoff ablation_pid
 TABLES := unknown:unknown_dynamics discrete:discrete_signals limits:period_limits learnt:learnt gains:fixed_gains
+STUDIES := hull_and_sea unknown_dynamics
 COMPARISONS := printed_compare figures_compare figures_compare_standoff corrected_compare
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce claim pod docs test test-all test-faults test-oldest test-newest dist bench lint types contracts clean
+.PHONY: help reproduce claim pod sweep docs test test-all test-faults test-oldest test-newest dist bench lint types contracts clean
 
 help: ## what can be made
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -65,6 +66,16 @@ pod: $(VENV)/run.done ## the laws behind a pod, into results/pod/
 docs: $(VENV)/dev.done ## the documentation as a site, into site/index.html
 	@$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet -c docs -d build/doctrees . site
 	@echo "open site/index.html; it needs no network"
+
+# Made beside the committed files, which a study would not write into, and laid over them when it is whole.
+sweep: $(VENV)/run.done ## the committed studies at full size, about half an hour on two cores
+	@for name in $(STUDIES); do \
+	    $(BIN)/podusv sweep run configs/studies/$$name.yaml --out results/.studies/$$name && \
+	    mkdir -p results/studies/$$name/figures && \
+	    (cd results/.studies/$$name && cp summary.csv pairs.csv sensitivity.csv claims.md claims.json ../../studies/$$name && \
+	        cp figures/*-iae.png ../../studies/$$name/figures) || exit 1; \
+	done
+	@echo "what was found: results/studies.md; every table and figure: results/.studies/*/report.html"
 
 test: lint types contracts ## lint, types, import contracts, all tests but the slow ones
 	@$(PYTEST)
