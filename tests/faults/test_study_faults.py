@@ -1,6 +1,7 @@
 """A study after killed processes and failed writes has the bytes of an undisturbed one."""
 
 import errno
+import math
 import os
 import random
 import signal
@@ -14,7 +15,8 @@ from small_study import TEXT, made, small
 from storage_samples import Saboteur, fails
 
 from podusv_cli.core.errors import StorageError
-from podusv_cli.study.store import RUNS
+from podusv_cli.storage import files
+from podusv_cli.study.store import RUNS, Store
 
 KILLS, WRITES = count(3, 200), count(4, 60)
 LONGER = TEXT.replace("duration: 1.0", "duration: 20.0").replace("draws: 40", "draws: 300")
@@ -93,27 +95,30 @@ def children_are_gone(group, patience=20.0):
     raise AssertionError("processes of a killed study go on")
 
 
-def test_a_full_disk_is_a_sentence_and_nothing_is_lost(whole, tmp_path, monkeypatch):
-    from podusv_cli.storage import files
-
-    real, budget = files._create, [40_000]
-
-    def limited(path, content):
-        budget[0] -= len(content)
-        if budget[0] < 0:
-            raise OSError(errno.ENOSPC, "full")
-        return real(path, content)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(files, "_create", limited)
+def test_a_full_disk_is_a_sentence_and_nothing_is_lost(whole, tmp_path):
+    """The disk is full before the first unit is whole, halfway, and before the last file."""
+    needed, kept = written_within(tmp_path / "roomy", math.inf), []
+    for share in (0.05, 0.6, 0.95):
+        folder = tmp_path / str(share)
         with pytest.raises(StorageError, match="the disk is full"):
-            made(tmp_path / "study")
-    kept = small().sweep.draws * 2
-    assert 0 < sum(int(m.sum()) for m in made_so_far(tmp_path / "study").values()) < kept
-    assert content(made(tmp_path / "study")) == content(whole)
+            written_within(folder, share * needed)
+        kept.append(sum(int(m.sum()) for m in Store(folder, small()).covered().values()))
+        assert content(made(folder)) == content(whole)
+    draws = small().sweep.draws
+    assert kept == [0, draws, 2 * draws]
 
 
-def made_so_far(folder):
-    from podusv_cli.study.store import Store
+def written_within(folder, room):
+    """Bytes that a study writes on a disk with so much room."""
+    real, written = files._create, [0]
 
-    return Store(folder, small()).covered()
+    def limited(path, bytes_):
+        if written[0] + len(bytes_) > room:
+            raise OSError(errno.ENOSPC, "full")
+        written[0] += len(bytes_)
+        return real(path, bytes_)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(files, "_create", limited)
+        made(folder)
+    return written[0]
