@@ -34,7 +34,7 @@ help: ## what can be made
 
 # Exit code 4: diverged, as it must. Exit code 3: some of the runs diverged; in figures_compare they must.
 reproduce: $(VENV)/run.done ## the paper, claim by claim, into results/paper/
-	@echo "$(words printed_from_zero $(COMPARISONS)) steps, about two minutes on two cores:"
+	@echo "$(words printed_from_zero $(COMPARISONS)) steps, two to eight minutes on two cores:"
 	@rm -f results/paper.log
 	@$(STEP) run paper printed_from_zero 4
 	@for name in $(COMPARISONS); do \

@@ -5,6 +5,7 @@ import math
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,9 +14,11 @@ from command_samples import Said
 from conftest import PACKAGE, VESSELS, example, kinds
 from findings_samples import CONFIGS, PLAIN, log, scene
 
+from podusv_cli.controllers.base import Controller
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.recording import Recording
 from podusv_cli.findings.finding import finding_kinds, merged, postflight, preflight
+from podusv_cli.findings.outcome import saturated
 from podusv_cli.findings.proof import argument, input_rank
 from podusv_cli.scenario.load import load
 from podusv_cli.scenario.model import Scenario
@@ -40,7 +43,7 @@ def test_findings_come_in_the_order_of_the_scenario_s_sections():
     ]
     assert sections == sorted(sections)
     assert {kind.when for kind in finding_kinds().values()} == {"before", "after"}
-    assert len(finding_kinds()) == 26
+    assert len(finding_kinds()) == 27
 
 
 def test_every_code_is_documented_with_its_meaning():
@@ -114,8 +117,35 @@ def test_long_saturation_is_told_with_its_times():
     assert f"{limited.mean():.1%} of the run" in text
     assert "consider anti_windup: auxiliary" in text
     (text,) = told("saturated", tight, "controller.anti_windup=auxiliary")
-    assert "anti_windup is on" in text
+    assert "its memory does not wind up" in text
     assert told("saturated", "actuator={kind: saturated, surge_limit: 1e6, yaw_limit: 1e6}") == []
+
+
+def test_what_helps_against_windup_is_what_the_law_has():
+    scenario, out = scene().alone(), changed(log(), saturated=np.ones_like(log()["z_e"]))
+
+    def advice(**own):
+        quiet = {"slots": lambda: (1,), "wants_loads": lambda: False}
+        law = SimpleNamespace(**quiet | own)
+        (text,) = saturated.search(SimpleNamespace(controller=law), out)
+        return text
+
+    assert "anti_windup" not in advice(against_windup=Controller.against_windup)
+    assert "after_saturation" in advice(against_windup=Controller.against_windup)
+    assert "no memory" in advice(slots=tuple)
+    (text,) = saturated.search(scenario, out)
+    assert text.endswith("consider anti_windup: auxiliary")
+
+
+def test_a_vessel_that_ends_further_away_than_it_started_is_told_with_both_distances():
+    lost = ("controller={kind: pid, K_Pu: 0, K_Iu: 0, K_Du: 0}", "simulation.duration=60")
+    (text,) = told("moves-away", *lost)
+    out = log(*lost)
+    late = out["time"] >= 48.0
+    assert f"starts {out['z_e'][0]:.3g} m" in text
+    assert f"is {out['z_e'][late].mean():.3g} m away" in text
+    assert told("moves-away") == []
+    assert told("moves-away", "controller={kind: pid}", "start={x: 0.0, y: 0.0}") == []
 
 
 def test_nothing_is_told_about_a_run_without_rows():

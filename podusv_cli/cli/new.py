@@ -33,4 +33,6 @@ def new(
     echo(f"wrote {', '.join(others)} and {last}")
     for word, command in zip(("next", "then"), written.commands, strict=False):
         echo(f"{word}: {command}")
+    if len(written.commands) > 1:
+        echo("the test needs pytest: pip install pytest")
     echo(f"edit {written.files[0]}")

@@ -49,6 +49,9 @@ class Controller(Component):
 
     signals: ClassVar[tuple[Signal, ...]] = ()
 
+    # What a finding advises where a saturated actuator winds the law's memory up
+    against_windup: ClassVar[str] = "tell it the loads that act (wants_loads, after_saturation)"
+
     @property
     def label(self) -> str:
         """The law's kind."""

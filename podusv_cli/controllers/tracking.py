@@ -6,7 +6,7 @@ Shared by all laws that steer towards the target by distance and bearing.
 from __future__ import annotations
 
 import math
-from typing import Any, Literal, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
@@ -144,6 +144,8 @@ def hold(t: float, x: Vector, memory: Vector, target: Vector, k: Any) -> None:
 
 class TrackingController(Controller):
     """Options of the errors and virtual controls, the same for every law that uses them."""
+
+    against_windup: ClassVar[str] = "consider anti_windup: auxiliary"
 
     k_ze: float = value(0.1, "1/s", "gain of the distance in (21)", ge=0)
     k_psie: float = value(0.1, "1/s", "gain of the heading error in (30)", ge=0)

@@ -8,19 +8,16 @@ from functools import partial
 import numpy as np
 
 from podusv_cli.controllers.base import Approach
-from podusv_cli.core.finding import FindingKind, Sentences, after, before, rows_where, times_of
+from podusv_cli.core.finding import FindingKind, Sentences, before
 from podusv_cli.core.kernel import bundle
-from podusv_cli.core.recording import Recording
 from podusv_cli.findings.finding import Case
 from podusv_cli.findings.reference import FASTEST, drift, median
-from podusv_cli.scenario.model import Scenario
 from podusv_cli.vessels.plant import sway_force
 
 RUNAWAY = 1.0  # in target speeds; with faster sway a hull may circle the target
 BESIDE = 1e-9  # s; distance from a break at which the target is evaluated on either side
 STABLE = 2.785  # step over time constant up to which RK4 is stable
 AHEAD = 0.5  # excess surge force, as a fraction of the largest one needed
-LONG = 0.02  # fraction of the run; shorter saturation is no finding
 DELIVERED = 0.999  # fraction of the demand that counts as all of it
 BREAKS = {  # what jumps: offset in TARGET, unit
     "position": (0, "m"),
@@ -218,28 +215,4 @@ def stiff_actuator(case: Case) -> Sentences:
             f"the actuator's lag of {lag:g} s is too short for RK4 with {step:g} s: it would "
             f"not settle on what is commanded; take a step below {STABLE * lag:.2g} s, or a "
             "longer lag"
-        )
-
-
-@after(
-    "saturated", about="actuator", meaning="the actuator limited the law for long",
-    condition=f"limited during more than {LONG:.0%} of the run",
-    remedy="take anti_windup: auxiliary where it is off, smaller gains, or a stronger actuator",
-)  # fmt: skip
-def saturated(scenario: Scenario, log: Recording) -> Sentences:
-    """The actuator limits the law during a considerable part of the run."""
-    if "saturated" not in log:
-        return
-    limited = rows_where(log, lambda part: part["saturated"] > 0.5)
-    fraction = float(limited.mean())
-    if fraction > LONG:
-        consequence = (
-            "anti_windup is on: saturation does not wind up the law's adaptation or integrators"
-            if scenario.controller.wants_loads()
-            else "while saturated, the law's adaptation and integrators wind up; consider "
-            "anti_windup: auxiliary"
-        )
-        yield (
-            f"the actuator limits the law during {fraction:.1%} of the run, "
-            f"{times_of(log, limited)}; {consequence}"
         )

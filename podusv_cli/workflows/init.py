@@ -18,6 +18,7 @@ from podusv_cli.scenario.yaml_text import read
 from podusv_cli.storage import files
 
 SCHEMA = "podusv.schema.json"
+FIRST = ("paper/corrected", "own_vessel", "paper/corrected_compare", "studies/hull_and_sea")
 EDITOR_LINE = re.compile(r"^# yaml-language-server: .*$", re.MULTILINE)
 
 
@@ -31,13 +32,14 @@ class Begun:
 
 
 def starting_points() -> dict[str, str]:
-    """Every shipped scenario that is meant to be run, and its description.
+    """Every shipped scenario that is meant to be run, and its description; `FIRST` come first.
 
     A file without a description of its own is one that others extend.
     """
     nodes = {name: read(_text(name), name, []) for name in shipped.names()}
     described = {name: node.get("description") for name, node in nodes.items() if node}
-    return {_short(name): str(text) for name, text in described.items() if text}
+    points = {_short(name): str(text) for name, text in described.items() if text}
+    return {name: points[name] for name in dict.fromkeys((*FIRST, *points))}
 
 
 def init(name: str, out: Path | None = None) -> Begun:

@@ -1,0 +1,56 @@
+"""Findings about how a run went, whatever its law: limited by the actuator, or lost."""
+
+from __future__ import annotations
+
+from podusv_cli.core.finding import Sentences, after, rows_where, times_of
+from podusv_cli.core.recording import Recording
+from podusv_cli.scenario.model import Scenario
+
+LONG = 0.02  # fraction of the run; shorter saturation is no finding
+
+
+@after(
+    "saturated", about="actuator",
+    meaning=f"the actuator limits the law for over {LONG:.0%} of the run",
+    condition=f"limited during more than {LONG:.0%} of the run",
+    remedy="switch anti-windup on where it is off, or take smaller gains or a stronger actuator",
+)  # fmt: skip
+def saturated(scenario: Scenario, log: Recording) -> Sentences:
+    """The actuator limits the law during a considerable part of the run."""
+    if "saturated" not in log:
+        return
+    limited = rows_where(log, lambda part: part["saturated"] > 0.5)
+    fraction = float(limited.mean())
+    if fraction > LONG:
+        yield (
+            f"the actuator limits the law during {fraction:.1%} of the run, "
+            f"{times_of(log, limited)}; {_windup(scenario)}"
+        )
+
+
+def _windup(scenario: Scenario) -> str:
+    law = scenario.controller
+    if not law.slots():
+        return "the law has no memory that could wind up"
+    if law.wants_loads():
+        return "the law is told the loads that act, so its memory does not wind up"
+    return f"while limited, the law's adaptation and integrators wind up; {law.against_windup}"
+
+
+@after(
+    "moves-away", about="controller", meaning="the vessel ends further away than it started",
+    condition="the mean distance over the steady window exceeds that at the start by a hull length",
+    remedy="check signs and units of the law and of the nominal vessel",
+)  # fmt: skip
+def moves_away(scenario: Scenario, log: Recording) -> Sentences:
+    """The law does not track: the distance to the target has grown over the run."""
+    late = rows_where(log, lambda part: part["time"] >= scenario.steady_from())
+    if not late.any():
+        return
+    start, end = float(log["z_e"][0]), float(log["z_e"][late].mean())
+    if end > start + scenario.vessel.length:
+        yield (
+            f"the vessel starts {start:.3g} m from the target and is {end:.3g} m away from it at "
+            f"the end (mean over the steady window): {scenario.controller.label} does not track; "
+            "check signs and units of the law and of what it is told about the vessel"
+        )
