@@ -13,8 +13,10 @@ from scipy.interpolate import CubicSpline
 
 from podusv_cli.paths.base import Path
 from podusv_cli.paths.circle import Circle
+from podusv_cli.paths.figure_eight import FigureEight
 from podusv_cli.paths.line import Line
 from podusv_cli.paths.line_circle import LineCircle
+from podusv_cli.paths.sinusoid import Sinusoid
 from podusv_cli.paths.waypoints import Waypoints
 
 POINTS = ((0.0, 0.0), (5.0, 1.0), (8.0, 6.0), (8.0, 12.0), (3.0, 15.0))
@@ -28,6 +30,10 @@ PATHS: dict[str, Any] = {name: example(kind) for name, kind in kinds("paths").it
     "port circle": Circle(turn="port", x=3.0, angle=1.0),
     "oblique line": Line(course=2.0, x=1.0, y=-4.0),
     "bends": Waypoints(points=POINTS),
+    "corners": Waypoints(points=POINTS, legs="straight"),
+    "a point on a straight leg": Waypoints(points=((0, 0), (5, 0), (9, 0)), legs="straight"),
+    "corners and a stop": Waypoints(points=POINTS, legs="straight", after="stop"),
+    "oblique sine": Sinusoid(course=2.0, x=1.0, y=-4.0),
     "two points": Waypoints(points=POINTS[:2]),
     "a stop": Waypoints(points=POINTS, after="stop"),
     "a loop": Waypoints(points=POINTS, after="loop"),
@@ -173,3 +179,42 @@ def test_two_points_make_a_line():
 def test_points_without_a_way_are_refused(points):
     with pytest.raises(ValidationError):
         Waypoints(points=points)
+
+
+def test_a_sine_stays_within_its_amplitude_and_returns_to_its_axis_every_half_wavelength():
+    path = Sinusoid(x=2.0, y=1.0, course=0.7, speed=0.4, amplitude=2.5, wavelength=20.0)
+    seen = path.targets(np.linspace(0.0, 100.0, 4001))[:, :2] - (2.0, 1.0)
+    along, across = seen @ (np.cos(0.7), np.sin(0.7)), seen @ (-np.sin(0.7), np.cos(0.7))
+    np.testing.assert_allclose(along, 0.4 * np.linspace(0.0, 100.0, 4001), atol=1e-12)
+    assert np.abs(across).max() == pytest.approx(2.5, rel=1e-6)
+    np.testing.assert_allclose(across[::1000], 0.0, atol=1e-12)
+    assert across[500] > 0  # to starboard first
+
+
+def test_a_figure_eight_is_the_lemniscate_of_gerono_with_the_stated_speeds():
+    path = FigureEight(x=3.0, y=-2.0, length=20.0, breadth=8.0, period=120.0)
+    seen = path.targets(np.linspace(0.0, 120.0, 4801))
+    north, east = (seen[:, 0] - 3.0) / 10.0, (seen[:, 1] + 2.0) / 4.0
+    np.testing.assert_allclose(east**2, 4 * north**2 * (1 - north**2), atol=1e-12)
+    speed, rate = np.hypot(*seen[:, 2:4].T), 2 * math.pi / 120.0
+    assert speed[0] == pytest.approx(rate * math.hypot(10.0, 8.0))
+    assert speed[1200] == pytest.approx(rate * 8.0)
+    assert np.ptp(seen[:, :2], axis=0) == pytest.approx([20.0, 8.0], rel=1e-5)
+
+
+def test_straight_legs_pass_every_point_at_the_given_speed():
+    path = Waypoints(points=POINTS, speed=0.4, legs="straight")
+    knots = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(POINTS, axis=0).T))]) / 0.4
+    np.testing.assert_allclose(path.targets(knots)[:, :2], POINTS, atol=1e-12)
+    between = path.targets(np.linspace(0.0, 0.999 * knots[-1], 101))
+    np.testing.assert_allclose(np.hypot(*between[:, 2:4].T), 0.4, rtol=1e-12)
+
+
+def test_a_square_has_a_corner_at_each_point_the_first_included():
+    square = Waypoints(
+        points=((0, 0), (8, 0), (8, 8), (0, 8)), speed=0.5, legs="straight", after="loop"
+    )
+    assert [known.time for known in square.breaks()] == pytest.approx([16.0, 32.0, 48.0, 64.0])
+    assert {known.what for known in square.breaks()} == {"velocity"}
+    before, after = square.targets((63.9999, 64.0001))[:, 2:4]
+    np.testing.assert_allclose([before, after], [[0.0, -0.5], [0.5, 0.0]], atol=1e-12)

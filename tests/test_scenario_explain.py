@@ -155,7 +155,9 @@ def test_a_key_says_everything_that_its_field_says():
 
 def test_kinds_in_which_a_key_is_the_same_share_a_row():
     rows = explain("path.speed")
-    assert [row.kinds for row in rows] == [("circle", "line"), ("line_circle",), ("waypoints",)]
+    assert [row.kinds for row in rows] == [
+        ("circle", "line"), ("line_circle",), ("sinusoid",), ("waypoints",)
+    ]  # fmt: skip
 
 
 def test_a_default_is_what_the_section_has_when_it_is_left_out():

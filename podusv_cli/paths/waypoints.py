@@ -1,4 +1,4 @@
-"""A smooth path through given points."""
+"""A path through given points, smooth or with corners."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.paths.base import Break, Path, Point
 
+ALIGNED = 1e-9  # of the speed; a smaller change of velocity is rounding
 LOOP = 2.0  # the place of "loop" among the choices of `after`, as kernels know it
 
 
@@ -32,7 +33,8 @@ def _segment(t: float, count: int, table: Vector) -> int:
 class Waypoints(Path):
     """A natural cubic spline through the points, in the time that chords at `speed` would take.
 
-    Position, velocity and acceleration are continuous, so the speed varies a little in bends.
+    Position, velocity and acceleration are continuous, so the speed varies a little in bends. With
+    `legs: straight` the target goes along the chords at `speed`, and its velocity jumps at corners.
     After the last point the target goes straight on with the speed it has there, or stops, or goes
     back to the first point and round again.
     """
@@ -46,6 +48,9 @@ class Waypoints(Path):
         (), "m", "list of [x, y], at least two, neighbours apart", strict=False
     )
     speed: float = value(0.5, "m/s", "speed along the chords between the points", gt=0)
+    legs: Literal["spline", "straight"] = value(
+        "spline", "", "between the points: a smooth spline, or straight lines with corners"
+    )
     after: Literal["continue", "stop", "loop"] = value(
         "continue", "", "after the last point: straight on, a stop, or from there to the first "
         "point and round again",
@@ -72,8 +77,19 @@ class Waypoints(Path):
         return float(self._knots()[-1]) if self.after == "continue" else math.inf
 
     def breaks(self) -> tuple[Break, ...]:
-        """The stop at the last point."""
-        return (Break(float(self._knots()[-1]), "velocity"),) if self.after == "stop" else ()
+        """The corners, and the stop at the last point; of a loop those of the first round."""
+        corners = self._corners() if self.legs == "straight" else ()
+        stop = (float(self._knots()[-1]),) if self.after == "stop" else ()
+        return tuple(Break(time, "velocity") for time in (*corners, *stop))
+
+    def _corners(self) -> tuple[float, ...]:
+        """When the target passes from a leg to one of another direction [s]."""
+        legs, knots = np.diff(self._course(), axis=0), self._knots()
+        velocities = legs / np.diff(knots)[:, None]
+        if self.after == "loop":  # the last leg is followed by the first
+            velocities = np.vstack([velocities, velocities[:1]])
+        turns = np.abs(np.diff(velocities, axis=0)).max(axis=1) > ALIGNED * self.speed
+        return tuple(knots[1:][: len(turns)][turns].tolist())
 
     def _course(self) -> Vector:
         """The points that the spline goes through; a loop ends where it begins."""
@@ -94,16 +110,26 @@ class Waypoints(Path):
 
     def table(self) -> Vector:
         """The knots, then eight coefficients a knot: cubic in x and in y, highest power first."""
-        from scipy.interpolate import CubicSpline
-
-        knots, ends = self._knots(), "periodic" if self.after == "loop" else "natural"
-        spline = CubicSpline(knots, self._course(), bc_type=ends)
-        velocity = np.zeros(2) if self.after == "stop" else spline(knots[-1], 1)
-        last = np.concatenate([[0, 0], velocity, spline(knots[-1])])
-        cubic = np.vstack(
-            [spline.c.transpose(1, 2, 0).reshape(-1, 8), last[[0, 1, 2, 4, 0, 1, 3, 5]]]
+        knots, cubic = self._knots(), self._cubic()
+        end = cubic(knots[-1])
+        velocity = np.zeros(2) if self.after == "stop" else cubic(knots[-1], 1)
+        last = np.concatenate([[0, 0], velocity, end])
+        rows = np.vstack(
+            [cubic.c.transpose(1, 2, 0).reshape(-1, 8), last[[0, 1, 2, 4, 0, 1, 3, 5]]]
         )
-        return np.concatenate([knots, cubic.ravel()])
+        return np.concatenate([knots, rows.ravel()])
+
+    def _cubic(self) -> Any:
+        """Piecewise cubic polynomials of the time through the points."""
+        from scipy.interpolate import CubicSpline, PPoly
+
+        knots, course = self._knots(), self._course()
+        if self.legs == "straight":
+            slopes = np.diff(course, axis=0) / np.diff(knots)[:, None]
+            nothing = np.zeros_like(slopes)
+            return PPoly(np.stack([nothing, nothing, slopes, course[:-1]]), knots)
+        ends = "periodic" if self.after == "loop" else "natural"
+        return CubicSpline(knots, course, bc_type=ends)
 
     @staticmethod
     @kernel
