@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import pytest
 from annotated_types import Ge, Gt, Le, Lt
 from command_samples import commanded
+from conftest import kinds as components
 from known_signals import ABOUT
 from pydantic.types import Strict
 
@@ -83,14 +84,16 @@ def test_every_key_is_explained_by_its_path_and_by_its_route(route, path):
 def test_without_a_key_the_sections_are_explained():
     assert [row.key for row in explain()] == ["extends", *Scenario.model_fields]
     law = next(row for row in explain() if row.key == "controller")
-    assert (law.type, law.choices) == ("kinds", ("adaptive_neural", "backstepping", "dsc", "pid"))
+    assert (law.type, law.choices) == ("kinds", tuple(components("controllers")))
 
 
 def test_a_section_with_kinds_is_explained_kind_by_kind():
     head, *rest = explain("controller")
     assert head.key == "controller"
     assert [row.key for row in rest] == [f"controller.{kind}" for kind in head.choices]
-    assert all("k_ze" in row.choices and row.meaning for row in rest)
+    laws = components("controllers").values()
+    assert [row.choices for row in rest] == [tuple(law.model_fields) for law in laws]
+    assert all(row.meaning for row in rest)
 
 
 def test_a_kind_is_explained_key_by_key():
@@ -150,7 +153,8 @@ def test_a_key_says_everything_that_its_field_says():
     (fraction,) = explain("metrics.steady_fraction")
     assert fraction.range == "> 0, <= 1"
     (kind,) = explain("controller.kind")
-    assert (kind.default, kind.choices) == ("required", fold.kinds)
+    assert (kind.default, kind.choices) == ("required", tuple(components("controllers")))
+    assert fold.kinds == ("adaptive_neural", "backstepping", "dsc", "pid")
 
 
 def test_kinds_in_which_a_key_is_the_same_share_a_row():

@@ -1,0 +1,115 @@
+"""Steers the velocity vector, not the bow: constant-bearing guidance with observed loads.
+
+Guidance: M. Breivik and T. I. Fossen, constant-bearing guidance for target tracking (2006 to 2010).
+The wanted velocity is the target's plus an approach along the line of sight that the vessel can
+reach. The bow is turned until the velocity that results, with the sway that the hull settles to,
+is the wanted one. docs/laws.md has the derivation and what is proved.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar, Literal, NamedTuple
+
+from podusv_cli.controllers.observer import B_R, B_U, B_V, ObservingController, observe
+from podusv_cli.core.component import value
+from podusv_cli.core.elementary import cos_sin
+from podusv_cli.core.kernel import Vector, kernel
+from podusv_cli.core.kinematics import direction
+from podusv_cli.core.signal import Signal
+from podusv_cli.vessels.plant import surge_force, sway_force, yaw_moment
+
+SLOWEST = 0.05  # m/s; the least speed at which the law approaches
+
+
+class Wanted(NamedTuple):
+    """The wanted velocity V_c in the body frame, its surge acceleration and its turn."""
+
+    a: float  # surge part of V_c [m/s]
+    b: float  # sway part of V_c [m/s]
+    A_a: float  # surge part of its rate A [m/s2]
+    turn: float  # rate of the direction of V_c [rad/s], limited
+
+
+@kernel
+def guidance(x: Vector, target: Vector, k: Any) -> Wanted:
+    """V_c = p_d' + kappa e and its rate; |V_c| stays below U wherever the target allows it."""
+    cos_psi, sin_psi = cos_sin(x[2])
+    e_x, e_y = target[0] - x[0], target[1] - x[1]
+    squared = e_x * e_x + e_y * e_y
+    per = 1.0 / math.sqrt(squared) if squared > 0.0 else 0.0
+    along = (target[2] * e_x + target[3] * e_y) * per
+    across = (target[2] * e_y - target[3] * e_x) * per
+    s_max = max(math.sqrt(max(k.U * k.U - across * across, 0.0)) - along, SLOWEST)
+    slope = (k.k_p / s_max) * (k.k_p / s_max)
+    q2 = 1.0 / (1.0 + slope * squared)
+    kappa = k.k_p * math.sqrt(q2)
+
+    rate_x = target[2] - (x[3] * cos_psi - x[4] * sin_psi)
+    rate_y = target[3] - (x[3] * sin_psi + x[4] * cos_psi)
+    fall = kappa * q2 * slope * (e_x * rate_x + e_y * rate_y)
+    V_x, V_y = target[2] + kappa * e_x, target[3] + kappa * e_y
+    A_x, A_y = target[4] + kappa * rate_x - fall * e_x, target[5] + kappa * rate_y - fall * e_y
+    turn = (V_x * A_y - V_y * A_x) / max(V_x * V_x + V_y * V_y, k.V_m * k.V_m)
+    return Wanted(
+        V_x * cos_psi + V_y * sin_psi, V_y * cos_psi - V_x * sin_psi, A_x * cos_psi + A_y * sin_psi,
+        min(max(turn, -k.chi_m), k.chi_m),
+    )  # fmt: skip
+
+
+class VelocityVector(ObservingController):
+    """Turns the vector of velocity over ground to the target and keeps it there."""
+
+    kind: Literal["velocity_vector"] = "velocity_vector"
+    signals: ClassVar[tuple[Signal, ...]] = (
+        Signal("u_d", "m/s", "wanted surge velocity"),
+        Signal("r_d", "rad/s", "wanted yaw rate"),
+        Signal("v_s", "m/s", "sway velocity that the hull settles to, predicted"),
+        Signal(
+            "chi_e", "rad", "angle that the velocity vector has to turn by", r"\chi_e", wrapped=True
+        ),
+    )
+    k_p: float = value(0.5, "1/s", "gain of the distance, near the target", gt=0)
+    U: float = value(1.25, "m/s", "largest wanted speed, about 1.2 times that at full thrust", gt=0)
+    k_psi: float = value(1.3, "1/s", "gain of the angle", gt=0)
+    r_m: float = value(1.4, "rad/s", "yaw rate that a large angle approaches", gt=0)
+    k_u: float = value(0.75, "1/s", "gain of the surge velocity", gt=0)
+    k_r: float = value(1.3, "1/s", "gain of the yaw rate", gt=0)
+    T_v: float = value(5.0, "s", "time over which the sway velocity is predicted", ge=0)
+    V_m: float = value(0.1, "m/s", "speed below which a direction counts for less", gt=0)
+    chi_m: float = value(0.3, "rad/s", "largest turn of the wanted velocity used ahead", gt=0)
+    a_m: float = value(1.0, "m/s2", "largest wanted acceleration used ahead", gt=0)
+    N_m: float = value(2.5, "N m", "moment beyond which surge yields to yaw", gt=0)
+
+    def gains(self) -> tuple[tuple[str, float, float], ...]:
+        """With the parts of A and of the angle's rate that act on the velocities."""
+        surge, yaw = self.k_u + self.k_p, self.k_r + self.k_psi
+        return ("k_u", surge, self.omega_u), ("k_r", yaw, self.omega_r)
+
+    @staticmethod
+    @kernel
+    def law(
+        t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
+        tau: Vector, rate: Vector, signals: Vector, work: Vector,
+    ) -> None:  # fmt: skip
+        """Yaw first: turn the velocity vector; surge as far as it points the right way."""
+        a, b, A_a, turn = guidance(x, target, k)
+        u, v, r = x[3], x[4], x[5]
+        v_s = v + k.T_v * (sway_force(a, v, turn, k) + memory[B_V]) / k.m22
+        w = b - v_s
+        speed = math.sqrt(a * a + w * w)
+        chi_e = direction(a, w)
+        g = k.k_psi * min(1.0, speed * speed / (k.V_m * k.V_m))
+        bend = k.k_psi * chi_e / k.r_m
+        sigma = 1.0 / math.sqrt(1.0 + bend * bend)
+        r_d = g * chi_e * sigma + turn
+        yaw = g * sigma * sigma * sigma * (turn - r) + k.k_r * (r_d - r)
+        tau[1] = k.m33 * yaw - yaw_moment(u, v, r, k) - memory[B_R]
+
+        forward = a / speed if a > 0.0 and speed > 0.0 else 1.0
+        F = forward * k.N_m / max(abs(tau[1]), k.N_m)
+        u_d = a * F
+        ahead = min(max((A_a + r * b) * F, -k.a_m), k.a_m)
+        tau[0] = k.m11 * (ahead + k.k_u * (u_d - u)) - surge_force(u, v, r, k) - memory[B_U]
+        signals[0], signals[1], signals[2], signals[3] = u_d, r_d, v_s, chi_e
+        observe(x, memory, tau, k, rate)

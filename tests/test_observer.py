@@ -1,0 +1,100 @@
+"""The extended state observer: what it finds, how fast, and that limits do not disturb it."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy as sp
+from conftest import NONLINEAR, ask, corrected, run, situations
+
+from podusv_cli.actuators.saturated import Saturated
+from podusv_cli.controllers.observer import OBSERVED, ObservingController
+from podusv_cli.controllers.velocity_loop import Axis
+from podusv_cli.controllers.velocity_vector import VelocityVector
+from podusv_cli.core.kernel import bundle
+from podusv_cli.core.registry import kinds
+from podusv_cli.disturbances.harmonic import Harmonic, HarmonicDisturbance
+from podusv_cli.vessels.plant import plant
+
+MEANS = (0.4, -0.3, 0.2)
+STEADY = HarmonicDisturbance(
+    b_u=Harmonic(mean=MEANS[0]), b_v=Harmonic(mean=MEANS[1]), b_r=Harmonic(mean=MEANS[2])
+)
+OBSERVING = list(kinds("podusv_cli.controllers", ObservingController).values())
+
+
+@pytest.mark.parametrize("kind", OBSERVING)
+def test_limits_do_not_disturb_the_observer(kind):
+    # With the true model b_hat answers a constant load b as b (1 - (1 + omega t) e^(-omega t)),
+    # whatever the actuator makes of the demand: nothing winds up.
+    law = kind()
+    out = run(corrected(controller=law, actuator=Saturated(), disturbance=STEADY), 12.0, step=0.005)
+    assert out["saturated"].mean() > 0.5
+    for name, omega, mean in zip(
+        "uvr", (law.omega_u, law.omega_v, law.omega_r), MEANS, strict=True
+    ):
+        wt = omega * out["time"]
+        known = mean * (1.0 - (1.0 + wt) * np.exp(-wt))
+        np.testing.assert_allclose(out[f"b_obs_{name}"], known, atol=1e-5)
+        np.testing.assert_allclose(out[f"b_obs_{name}"][-1], mean, atol=1e-5)
+
+
+def test_without_the_loads_that_act_it_would_wind_up():
+    class Deaf(VelocityVector):
+        def wants_loads(self) -> bool:
+            return False
+
+    tight = Saturated(surge_limit=2.0)
+    told = run(corrected(controller=VelocityVector(), actuator=tight, disturbance=STEADY), 8.0)
+    deaf = run(corrected(controller=Deaf(), actuator=tight, disturbance=STEADY), 8.0)
+    assert abs(told["b_obs_u"]).max() < 0.41
+    assert abs(deaf["b_obs_u"]).max() > 2.0
+
+
+@pytest.mark.parametrize("kind", OBSERVING)
+def test_its_rates_are_those_of_the_vessel_and_a_double_pole(kind):
+    law = kind()
+    omega = np.array([law.omega_u, law.omega_v, law.omega_r])
+    m = np.array([NONLINEAR.m11, NONLINEAR.m22, NONLINEAR.m33])
+    k, rate = bundle(law.constants_with(NONLINEAR)), np.zeros(6)
+    for at in situations(law, 50):
+        found = ask(law, *at, NONLINEAR)
+        tau = np.array([found.tau[0], 0.7, 0.5 * found.tau[1]])  # what an actuator made of it
+        law.after_saturation(1.0, at.memory, found.tau, tau, k, law.table(), found.rate)
+        plant(at.x, tau, at.memory[3:], bundle(NONLINEAR.constants()), rate)
+        error = at.x[3:] - at.memory[:3]
+        np.testing.assert_allclose(found.rate[:3], rate[3:] + 2 * omega * error, rtol=1e-11)
+        np.testing.assert_allclose(found.rate[3:], m * omega**2 * error, rtol=1e-12)
+
+
+def test_the_pole_is_double():
+    s, omega, m = sp.symbols("s omega m", positive=True)
+    error = sp.Matrix([[-2 * omega, 1 / m], [-m * omega**2, 0]])
+    assert sp.expand((s * sp.eye(2) - error).det() - (s + omega) ** 2) == 0
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("kind", OBSERVING)
+def test_its_loops_are_the_law_s_own(kind, axis):
+    """The rates of (nu, nu_hat, b_hat/m) by central differences, on the target."""
+    law, at, inertia = kind(), (3, 5)[axis], (NONLINEAR.m11, NONLINEAR.m33)[axis]
+    k, target = bundle(NONLINEAR.constants()), np.array([0.0, 0.0, 0.4, 0.0, 0.0, 0.0])
+    axes = (Axis("surge", NONLINEAR.m11, NONLINEAR.m11, 0.0),) * 2
+
+    def rates(d: Any) -> Any:
+        x, memory, rate = np.zeros(6), np.zeros(6), np.zeros(6)
+        x[3] = memory[0] = 0.4
+        x[at] += d[0]
+        memory[[at - 3, at]] += d[1], d[2] * inertia
+        found = ask(law, x, memory, target, NONLINEAR)
+        plant(x, np.array([found.tau[0], 0.0, found.tau[1]]), np.zeros(3), k, rate)
+        return np.array([rate[at], found.rate[at - 3], found.rate[at] / inertia])
+
+    steps = 1e-6 * np.eye(3)
+    measured = np.transpose([(rates(d) - rates(-d)) / 2e-6 for d in steps])
+    loop = law.velocity_loops(axes, np.zeros(3))[axis]
+    np.testing.assert_allclose(loop.matrix, measured, atol=1e-6)
+
+
+def test_what_it_observes_is_logged_with_units():
+    assert [signal.unit for signal in OBSERVED] == ["m/s", "m/s", "rad/s", "N", "N", "N m"]
