@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 import sys
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -81,7 +82,7 @@ def run(
     with StudyLine(wanted=not (quiet or as_json)) as line:
         request = workflow.Request(
             changes, out, seconds(until), workers, part_of(shard), sys.argv, plugin or (), figures,
-            scheduler, allow_mixed, line.say,
+            scheduler, allow_mixed, line.say, None if quiet or as_json else partial(echo, err=True),
         )  # fmt: skip
         done = workflow.run(Path(config), request, line.tell)
     for refused in done.refused:

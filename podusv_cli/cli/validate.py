@@ -57,16 +57,18 @@ def validate(
 
 def _tell_study(loaded: Loaded, sweep: Sweep) -> None:
     """How many runs the study has, and which of its draws the scenario cannot take."""
-    from podusv_cli.study.cells import cells
-    from podusv_cli.study.check import singles, sweep_faults
+    from podusv_cli.process.workers import available_workers
+    from podusv_cli.study.check import singles
+    from podusv_cli.study.estimate import estimate, pilot
     from podusv_cli.study.invalid import invalid_draws
+    from podusv_cli.study.plan import plan
 
-    made = cells(loaded, sweep_faults)
-    runs = [one for cell in made for one in singles(cell.scenario).values()]
-    laws, draws = len(runs) // len(made), sweep.draws
+    made = plan(loaded)
+    runs = [one for cell in made.cells for one in singles(cell.scenario).values()]
+    draws, places = sweep.draws, [(law, cell.index) for law in made.laws for cell in made.cells]
     echo(
-        f"runs of the study: {len(runs) * draws:,} "
-        f"(laws: {laws}, cells: {len(made)}, draws: {draws:,})"
+        f"runs of the study: {len(places) * draws:,} "
+        f"(laws: {len(made.laws)}, cells: {len(made.cells)}, draws: {draws:,})"
     )
     checked = min(draws, MOST_CHECKED)
     invalid = invalid_draws(runs, sweep, checked)
@@ -74,6 +76,8 @@ def _tell_study(loaded: Loaded, sweep: Sweep) -> None:
     more = "" if checked == draws else "; the others were not checked"
     first = f"; draw {invalid.first}: {invalid.reason}" if invalid.count else ""
     echo(f"{share}{more}{first}")
+    need = estimate(made, pilot(made), dict.fromkeys(places, draws), available_workers())
+    echo(*need.in_words())
 
 
 def _explain(loaded: Loaded) -> None:

@@ -217,6 +217,11 @@ class Cluster:
                 self._again.append(self._running.pop(future))
                 self._client.cancel([future])
 
+    @property
+    def workers(self) -> int:
+        """The threads of all workers that there are now."""
+        return max(1, sum(self._threads.values()))
+
     def told(self) -> dict[str, Any]:
         """Which worker made which units, and which workers were refused."""
         workers = [

@@ -57,6 +57,7 @@ class Tally:
 
 
 Tell = Callable[[Tally], None]
+Gaps = dict[tuple[str, int], int]  # how many runs, by law and cell
 Units = Iterator[tuple[int, Unit]]  # numbered; after the last, there may be more
 Done = Callable[[int, Outcome], None]
 
@@ -70,6 +71,10 @@ class Engine(Protocol):
         `done` may add units to those that are still to be taken. The result of an outcome is that
         of `timed`. False after an interrupt; units under way have no outcome then.
         """
+
+    @property
+    def workers(self) -> int:
+        """How many units are made at a time."""
 
     def told(self) -> dict[str, Any]:
         """What a study's provenance has to say about the workers."""
@@ -85,7 +90,12 @@ class Processes:
     def __call__(self, units: Units, done: Done) -> bool:
         """As Engine says."""
         # `map` asks again after the last unit, as units may be halved; a generator would not.
-        return run_each(map(self._job, units), done, workers=self.count or available_workers())
+        return run_each(map(self._job, units), done, workers=self.workers)
+
+    @property
+    def workers(self) -> int:
+        """As asked for, or one a core."""
+        return self.count or available_workers()
 
     def _job(self, numbered: tuple[int, Unit]) -> tuple[int, Job]:
         number, unit = numbered
@@ -124,9 +134,9 @@ class Driver:
         self._units[number] = unit
         return number, unit
 
-    def unmade(self) -> list[tuple[str, int]]:
-        """Laws and cells of which runs are missing."""
-        return [key for key, ranges in self._gaps.items() if ranges]
+    def missing(self) -> Gaps:
+        """How many runs of each law and cell are missing, without those of which none is."""
+        return {key: sum(map(len, ranges)) for key, ranges in self._gaps.items() if ranges}
 
     def _next(self) -> Unit | None:
         if self._halves:
@@ -182,16 +192,21 @@ def shard(draws: int, number: int, count: int) -> slice:
 
 
 def march(
-    store: Store, tell: Tell, engine: Engine, *, seconds: float = math.inf, part: Part = (1, 1)
-) -> tuple[Tally, bool]:
+    store: Store, tell: Tell, engine: Engine, *, seconds: float = math.inf, part: Part = (1, 1),
+    begin: Callable[[Gaps], None] = lambda missing: None,
+) -> tuple[Tally, bool]:  # fmt: skip
     """Simulate what is missing, for so many seconds at most; how far it is, and if it is whole.
+
+    `begin` is told what is missing before the first run.
 
     Every unit is on the disk before the next is handed out. Raises PodusvError where a unit cannot
     be made at all or not be written, KeyboardInterrupt after an interrupt; what is made is kept.
     """
     driver = Driver(store, tell, time.monotonic() + seconds, part)
-    for law, cell in driver.unmade():
+    missing = driver.missing()
+    for law, cell in missing:
         prepare(store.plan, law, cell)  # before the fork, so that no process compiles it again
+    begin(missing)
     finished = engine(driver, driver.done)
     if driver.failure:
         raise PodusvError(driver.failure.failure)

@@ -30,6 +30,7 @@ SEAL = "sha256"  # of all other arrays, in the order of the file
 Known = Mapping[str, Metric]
 BLOCK = 2**22  # bytes hashed at a time
 ROWS = 4096  # runs read at a time
+HEAD = 1200  # bytes of what the file says of an array, roughly
 
 
 @dataclass(frozen=True)
@@ -93,6 +94,12 @@ def _lay_out(
         layout.write_to(out)
         out.truncate(max(layout.size, *(at + _size(k, s) for at, k, s in places.values())))
     return places
+
+
+def bytes_of(shape: tuple[int, int, int], metrics: int, drawn: int) -> int:
+    """Roughly the size of a table of so many laws, cells and draws."""
+    of_a_run = 8 * (metrics + 1) + 1  # with `until` and `status`
+    return int(np.prod(shape)) * of_a_run + shape[2] * (4 + 8 * drawn) + HEAD * (metrics + 2)
 
 
 def _size(kind: Any, shape: tuple[int, ...]) -> int:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from podusv_cli.core.kernel import Vector
 from podusv_cli.engine.batch import Lazily, simulate_many
 from podusv_cli.engine.check import check_law
+from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import ClosedLoop, marcher
 from podusv_cli.study.draws import drawn, draws
 from podusv_cli.study.plan import Plan, watching
@@ -68,10 +69,16 @@ def prepare(plan: Plan, law: str, cell: int) -> None:
     marcher(loop, watching(scenario), compiled=True)
 
 
-def make(plan: Plan, unit: Unit, progress: Callable[[float], None] | None = None) -> UnitResult:
-    """Simulate a unit, run after run. Raises KeyboardInterrupt, and then nothing is kept."""
+def make(
+    plan: Plan, unit: Unit, progress: Callable[[float], None] | None = None,
+    grid: TimeGrid | None = None,
+) -> UnitResult:  # fmt: skip
+    """Simulate a unit, run after run, over the scenario's instants or those of another grid.
+
+    Raises KeyboardInterrupt, and then nothing is kept.
+    """
     scenario = plan.single(unit.law, unit.cell)
-    grid, seeing = scenario.time_grid(), watching(scenario)
+    grid, seeing = grid or scenario.time_grid(), watching(scenario)
     numbers, vary = list(draws(plan.sweep, unit.first, unit.count)), plan.sweep.vary
 
     def loop(position: int) -> ClosedLoop:

@@ -26,9 +26,10 @@ from podusv_cli.storage import files, manifest
 from podusv_cli.storage.run_folder import STUDY
 from podusv_cli.study import outputs
 from podusv_cli.study.check import sweep_faults
+from podusv_cli.study.estimate import estimate, pilot
 from podusv_cli.study.keep import found
-from podusv_cli.study.march import Engine, Part, Processes, Tally, Tell, march
-from podusv_cli.study.plan import plan
+from podusv_cli.study.march import Engine, Gaps, Part, Processes, Tally, Tell, march
+from podusv_cli.study.plan import Plan, plan
 from podusv_cli.study.remote import Recipe
 from podusv_cli.study.results import Results, judged
 from podusv_cli.study.sittings import Sitting
@@ -56,6 +57,7 @@ class Request:
     scheduler: str = ""  # of a Dask cluster, as tcp://host:port
     mixed: bool = False  # whether its workers may compute other bits than this machine
     say: Callable[[str], None] = lambda text: None  # what is done after the last run
+    begin: Callable[..., None] | None = None  # is told what the missing runs need
 
 
 @dataclass(frozen=True)
@@ -132,13 +134,23 @@ def _marched(
         tell(tally)
 
     try:
-        return march(store, told, engine, seconds=request.seconds, part=request.shard)
+        return march(
+            store, told, engine, seconds=request.seconds, part=request.shard,
+            begin=partial(_announce, store.plan, request, engine.workers),
+        )  # fmt: skip
     except KeyboardInterrupt as stop:
         again = f"podusv sweep run {shlex.quote(str(store.folder))}"
         made = f"the {seen.made} runs that are made" if seen.made else "all runs that were made"
         raise KeyboardInterrupt(f"interrupted; {made} are kept, continue with: {again}") from stop
     finally:
         sitting.end(seen.made - seen.before, engine.told())
+
+
+def _announce(made: Plan, request: Request, workers: int, missing: Gaps) -> None:
+    """Tell what the missing runs need, where somebody wants to know."""
+    if request.begin and missing:
+        need = estimate(made, pilot(made), missing, workers, figures=request.figures)
+        request.begin(*need.in_words())
 
 
 def _engine(store: Store, request: Request) -> AbstractContextManager[Engine]:
