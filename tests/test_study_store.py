@@ -1,8 +1,10 @@
 """A study's folder: the same bytes however the runs were made, and nothing that is made is lost."""
 
+import io
 import os
 import shutil
 
+import h5py
 import numpy as np
 import pytest
 from small_study import made, small
@@ -13,7 +15,8 @@ from podusv_cli.study import march as marching
 from podusv_cli.study import unit as units
 from podusv_cli.study.draws import drawn, draws
 from podusv_cli.study.plan import watching
-from podusv_cli.study.store import RUNS, UNITS, Store
+from podusv_cli.study.store import BLOCK, RUNS, UNITS, Store, encoded, read, undamaged
+from podusv_cli.study.unit import Unit, UnitResult
 
 
 @pytest.fixture(scope="module")
@@ -126,3 +129,38 @@ def test_time_over_keeps_what_is_made(tmp_path, monkeypatch):
     assert not whole
     assert 0 < tally.made < tally.wanted
     assert sum(int(mask.sum()) for mask in store.covered().values()) == tally.made
+
+
+def test_a_unit_with_any_other_byte_is_damaged(tmp_path):
+    store = made(tmp_path / "study", part=(1, 5))
+    path = next((store.folder / UNITS).glob("pid-*"))
+    sound = path.read_bytes()
+    there = store.covered()["pid", 0].sum()
+    places = [*range(0, BLOCK, 7), *np.linspace(BLOCK, len(sound) - 1, 40).astype(int)]
+    spoilt = [sound[:at] + bytes([sound[at] ^ 1]) + sound[at + 1 :] for at in places]
+    for content in (b"", sound[:-9], sound[:300], sound + b"0", *spoilt):
+        path.write_bytes(content)
+        assert read(path, store.seal) is None
+        assert store.covered()["pid", 0].sum() == 0 < there
+    path.write_bytes(sound)
+    assert store.covered()["pid", 0].sum() == there
+
+
+def test_a_unit_is_counted_without_hdf5(tmp_path, monkeypatch):
+    store = made(tmp_path / "study", part=(1, 5))
+    opened = []
+    monkeypatch.setattr(h5py, "File", lambda *given, **options: opened.append(given))
+    assert sum(int(mask.sum()) for mask in store.covered().values()) == 16
+    assert all(given[0] == store.folder / RUNS for given in opened)
+
+
+@pytest.mark.parametrize("law", ["pid", "ä" * 400])
+def test_a_unit_of_any_name_is_read_as_it_was(law):
+    numbers = np.array([1.5, np.nan])
+    unit = Unit(law, 3, 70, 2)
+    result = UnitResult(unit, {"iae": numbers}, np.array([0, 1], np.uint8), numbers, ("", "ü"))
+    content = encoded(result, "seal")
+    assert undamaged(content, "seal") == unit
+    assert undamaged(content, "other") is None
+    with h5py.File(io.BytesIO(content), "r") as file:
+        assert file["table"].shape == (2, 2)
