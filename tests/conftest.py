@@ -48,6 +48,7 @@ POD: dict[str, float] = {
 REQUIRED: dict[str, dict[str, Any]] = {
     "waypoints": {"points": ((0.0, 0.0), (10.0, 1.0), (18.0, 6.0), (20.0, 15.0))},
     "pod": {"pods": (POD,)},
+    "schedule": {"rows": "0, 1, 0\n200, 2, 0.5\n"},
 }
 # Slow enough an adaptation for a law that is evaluated only now and then.
 GENTLE = AdaptiveNeural(Gamma_u=1.0, Gamma_r=1.0, gamma_u=10.0, gamma_r=10.0)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 import typer
+from conftest import kinds
 from scenario_samples import SOUND, write
 
 import podusv_cli
@@ -112,7 +113,7 @@ def test_explain_shows_the_sections_without_a_key(podusv):
         "vessel", "nominal", "start", "path", "disturbance", "actuator", "controller", "simulation",
         "control", "log", "metrics", "sweep",
     ]  # fmt: skip
-    assert "    kinds: circle, line, line_circle, waypoints\n" in out
+    assert f"    kinds: {', '.join(kinds('paths'))}\n" in out
 
 
 @pytest.mark.parametrize("columns", ["20", "40", "300"])

@@ -1,6 +1,7 @@
 """Sentences about values: what must be, what was found, what was probably meant."""
 
 import pytest
+from conftest import kinds
 from scenario_samples import SOUND, VESSEL_NAMES, told
 
 from podusv_cli.scenario.model import Scenario
@@ -8,6 +9,8 @@ from podusv_cli.vessels.vessel import Vessel
 
 KEYS = ", ".join(Scenario.model_fields)
 VESSEL_KEYS = ", ".join(Vessel.model_fields)
+PATHS, LAWS = [*kinds("paths")], [*kinds("controllers")]
+A_PATH, A_LAW = (f"{', '.join(known[:-1])} or {known[-1]}" for known in (PATHS, LAWS))
 NUMBER = "step: must be a number above 0 [s], found"
 TRUTH = "compiled: must be true or false, found"
 NETWORK = "    network:\n      "
@@ -130,24 +133,24 @@ def test_a_wrong_section_is_one_sentence_at_its_place(text, says):
             "{kind: line}",
             "{kind: lin}",
             "2:14: path.kind: unknown kind 'lin'; did you mean 'line'? "
-            "(allowed: circle, line, line_circle, waypoints)",
+            f"(allowed: {', '.join(PATHS)})",
         ),
         (
             "{kind: line}",
-            "{speed: 1}",
-            "2:7: path.kind: missing (allowed: circle, line, line_circle, waypoints)",
+            "{radius: 1}",
+            f"2:7: path.kind: missing (allowed: {', '.join(PATHS)}); radius belongs to kind circle",
         ),
         (
             "{kind: pid}",
-            "{k_ze: 0.1, K_Pu: 60}",
-            "5:13: controller.kind: missing (allowed: adaptive_neural, backstepping, dsc, pid); "
+            "{K_Pu: 60}",
+            f"5:13: controller.kind: missing (allowed: {', '.join(LAWS)}); "
             "K_Pu belongs to kind pid",
         ),
         (
             "{kind: line}",
             "line",
-            "2:7: path: must be a mapping of keys with kind circle, line, line_circle or "
-            "waypoints, found 'line'; write {kind: line}",
+            f"2:7: path: must be a mapping of keys with kind {A_PATH}, found 'line'; "
+            "write {kind: line}",
         ),
         (
             "{kind: line}",
@@ -229,12 +232,10 @@ def test_what_is_missing_is_told_at_the_file():
     assert told("description: nothing else\n") == [
         "a.yaml: vessel.preset: missing (allowed: " + VESSEL_NAMES + "); a vessel without one "
         "needs length, beam, m, I_z",
-        "a.yaml: path: missing; must be a mapping of keys with kind circle, line, line_circle or "
-        "waypoints",
+        f"a.yaml: path: missing; must be a mapping of keys with kind {A_PATH}",
         "a.yaml: disturbance: missing; must be a mapping of keys with kind harmonic or none",
         "a.yaml: actuator: missing; must be a mapping of keys with kind ideal, pod or saturated",
-        "a.yaml: controller: missing; must be a mapping of keys with kind adaptive_neural, "
-        "backstepping, dsc or pid",
+        f"a.yaml: controller: missing; must be a mapping of keys with kind {A_LAW}",
     ]
 
 

@@ -12,6 +12,7 @@ from podusv_cli.core.escaping import lines
 if TYPE_CHECKING:
     from jinja2 import Environment
 
+MOST_LINES = 3  # of a text that is shown as it is
 POWERS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -79,9 +80,11 @@ def flat(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]
 
 
 def value_text(value: Any) -> str:
-    """A value of a scenario as text, with all digits; a dash for None."""
+    """A value of a scenario as text, with all digits; a dash for None, a count for many lines."""
     if isinstance(value, (list, tuple)):
         return " ".join(map(value_text, value))
+    if isinstance(value, str) and value.count("\n") > MOST_LINES:
+        return f"{len(value.splitlines()):,} lines"
     if value is None:
         return "-"
     text = f"{value:g}" if isinstance(value, float) else str(value)

@@ -9,25 +9,12 @@ import numpy as np
 from pydantic import model_validator
 
 from podusv_cli.core.component import value
+from podusv_cli.core.interpolation import segment
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.paths.base import Break, Path, Point
 
 ALIGNED = 1e-9  # of the speed; a smaller change of velocity is rounding
 LOOP = 2.0  # the place of "loop" among the choices of `after`, as kernels know it
-
-
-@kernel
-def _segment(t: float, count: int, table: Vector) -> int:
-    """Index of the last of `count` knots at or before t, by bisection; 0 before the first."""
-    low = 0
-    high = count
-    while high - low > 1:
-        middle = (low + high) // 2
-        if table[middle] <= t:
-            low = middle
-        else:
-            high = middle
-    return low
 
 
 class Waypoints(Path):
@@ -138,7 +125,7 @@ class Waypoints(Path):
         count = int(k.count)
         if k.after == LOOP:
             t -= k.period * math.floor(t / k.period)
-        i = _segment(t, count, table)
+        i = segment(t, count, table)
         s = t - table[i]
         for axis in range(2):
             c = count + 8 * i + 4 * axis

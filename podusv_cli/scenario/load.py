@@ -18,7 +18,7 @@ from podusv_cli.scenario.layers import composed
 from podusv_cli.scenario.messages import Check, check
 from podusv_cli.scenario.model import Scenario, scenario_class
 from podusv_cli.scenario.phrases import found
-from podusv_cli.scenario.presets import complete, stands_in, with_rows
+from podusv_cli.scenario.presets import complete, stands_in, with_contents
 from podusv_cli.scenario.yaml_text import MAX_NODES, read, read_text, resolve
 from podusv_cli.scenario.yaml_tree import (
     Fault,
@@ -187,7 +187,7 @@ def tree_yaml(loaded: Loaded) -> str:
     It has what that extends and what was set, and nothing that is filled in: `nominal` follows the
     vessel, and the laws follow `controller`, as before.
     """
-    root = with_rows(loaded.root, keys_of(type(loaded.scenario)), [])
+    root = with_contents(loaded.root, keys_of(type(loaded.scenario)), [])
     return yaml_text({"name": loaded.scenario.name} | plain(root))
 
 

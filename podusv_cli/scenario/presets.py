@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 from importlib.resources import files
@@ -13,21 +12,19 @@ from pathlib import Path
 from podusv_cli.core.component import Component, Presets
 from podusv_cli.core.plugins import ABSENT, Plugins
 from podusv_cli.scenario.keys import SCENARIO, Key
+from podusv_cli.scenario.named_files import with_files
 from podusv_cli.scenario.phrases import found, quoted, unknown
 from podusv_cli.scenario.sections import NAME, NAME_IN_WORDS
-from podusv_cli.scenario.shipped import PREFIX, relative_to
-from podusv_cli.scenario.yaml_text import MAX_NODES, read, read_text, resolve
-from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, Route, dotted, merge
+from podusv_cli.scenario.shipped import PREFIX
+from podusv_cli.scenario.yaml_text import read
+from podusv_cli.scenario.yaml_tree import Fault, Node, Route, dotted, merge
 from podusv_cli.vessels.vessel import COEFFICIENTS, VESSELS, Vessel
 
-MAX_POINTS = MAX_NODES // 4  # a point is three values, and the resolved scenario has to be readable
-MOST_FAULTS = 10  # in one file of points
 # Sections whose entries have names of the user's; one that is null takes out an inherited one.
 NAMED: tuple[Route, ...] = (
     ("controllers",), ("claims",), ("sweep", "vary"), ("sweep", "grid"), ("sweep", "claims"),
 )  # fmt: skip
 BESIDE_NAMED = {named[:end] for named in NAMED for end in range(len(named) + 1)}
-HEADER = re.compile(r'\s*"?(?!nan|inf)[a-z]', re.IGNORECASE)
 
 
 @cache
@@ -89,16 +86,23 @@ def _sections(root: Node, top: Key, faults: list[Fault]) -> Node:
         if model.presets:
             filled = _over_preset(given, name, model.presets, top.scenario.plugged, faults)
             root = root.with_entry(name, filled)
-    return with_rows(root, top, faults)
+    return with_contents(root, top, faults)
 
 
-def with_rows(root: Node, top: Key, faults: list[Fault]) -> Node:
-    """The tree with the rows of CSV files in place of the files' names."""
+def with_contents(root: Node, top: Key, faults: list[Fault]) -> Node:
+    """The tree with what files hold in place of the files' names."""
     for name, given, model in _of_kinds(root, top):
-        for keys in model.rows_of.items():
-            given = _rows_in(given, name, keys, faults)
-        root = root.with_entry(name, given)
-    return root
+        root = root.with_entry(name, with_files(given, name, model, faults))
+    several, default = root.mapping.get("controllers"), root.mapping.get("controller")
+    if not several or not several.mapping:
+        return root
+    laws = dict(several.mapping)
+    for label, own in laws.items():
+        kind = own.get("kind") or (default.get("kind") if default else None)
+        law = top.keys["controller"].kinds.get(str(kind))
+        if law and own.mapping:
+            laws[label] = with_files(own, f"controllers.{label}", law.model, faults)
+    return root.with_entry("controllers", replace(several, content=laws))
 
 
 def _of_kinds(root: Node, top: Key) -> list[tuple[str, Node, type[Component]]]:
@@ -217,24 +221,6 @@ def _over_preset(
     return replace(wrong, faulty=True)
 
 
-def _rows_in(given: Node, section: str, keys: tuple[str, str], faults: list[Fault]) -> Node:
-    """The rows of the CSV file that one key names, under the other key in place of the name."""
-    key, rows_key = keys
-    file = given.mapping.get(key)
-    if not file or not isinstance(file.content, str):
-        return given
-    if given.get(rows_key):
-        text = f"give either {key} or {rows_key}, not both"
-        faults.append(Fault(file.mark, f"{section}.{key}", text))
-        return given
-    name = relative_to(file.mark.source if file.mark.line else "", file.content)
-    before = len(faults)
-    text = read_text(name, file.mark, f"{section}.{key}", faults) or ""
-    rows = Node(tuple(_rows(text, name, faults)), Mark(name), faulty=len(faults) > before)
-    rest = {name: entry for name, entry in given.mapping.items() if name != key}
-    return replace(given, content=rest | {rows_key: rows}, faulty=given.faulty or rows.faulty)
-
-
 def _controllers(root: Node, top: Key) -> Node:
     """Each of `controllers` over those keys of `controller` that its kind has too.
 
@@ -262,35 +248,3 @@ def _over_base(base: Node, own: Node, top: Key) -> Node:
         return own
     shared = {key: part for key, part in base.mapping.items() if key in law.keys}
     return merge(replace(base, content=shared), own, by_kind=False)
-
-
-def _rows(text: str, name: str, faults: list[Fault]) -> Iterator[Node]:
-    """A node for every line `x,y`; a first line of words is a header, # starts a comment."""
-    lines = [line.partition("#")[0] for line in text.removeprefix("\ufeff").splitlines()]
-    filled = [(number, line) for number, line in enumerate(lines, 1) if line.strip()]
-    if filled and all(HEADER.match(cell) for cell in filled[0][1].split(",")):
-        del filled[0]
-    if len(filled) > MAX_POINTS:
-        faults.append(Fault(Mark(name), "", f"more than {MAX_POINTS:,} points"))
-        return
-    most = len(faults) + MOST_FAULTS
-    for number, line in filled:
-        row = _row(line, Mark(name, number, 1), faults)
-        if len(faults) > most:
-            return
-        yield row
-
-
-def _row(line: str, mark: Mark, faults: list[Fault]) -> Node:
-    cells = [cell.strip().strip('"') for cell in line.split(",")]
-    numbers = [resolve(cell) for cell in cells]
-    wrong = [isinstance(n, (str, bool)) or n is None for n in numbers]
-    # The line is not shown: the file may be one that the user may not read.
-    if len(numbers) != 2:
-        text = f"must be two numbers x,y [m], found {len(numbers)} between commas"
-        faults.append(Fault(mark, "", text))
-    elif any(wrong):
-        place = ("first", "second")[wrong.index(True)]
-        faults.append(Fault(mark, "", f"must be two numbers x,y [m]; the {place} is no number"))
-    pairs = zip(numbers, cells, strict=True)
-    return Node(tuple(Node(number, mark, text=cell) for number, cell in pairs), mark)

@@ -1,0 +1,89 @@
+"""What fields of a scenario take from files beside it: the pairs in a CSV file, or a whole text."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import partial
+
+from podusv_cli.core.component import Component
+from podusv_cli.scenario.shipped import relative_to
+from podusv_cli.scenario.yaml_text import MAX_NODES, read_text, resolve, text_node
+from podusv_cli.scenario.yaml_tree import Fault, Mark, Node
+
+MAX_POINTS = MAX_NODES // 4  # a point is three values, and the resolved scenario has to be readable
+MOST_FAULTS = 10  # in one file of points
+HEADER = re.compile(r'\s*"?(?!nan|inf)[a-z]', re.IGNORECASE)
+
+Form = Callable[[str, str, list[Fault]], Node]  # of a file's text and name
+
+
+def with_files(given: Node, section: str, model: type[Component], faults: list[Fault]) -> Node:
+    """A section of class `model` with what its files hold in place of their names."""
+    forms: dict[str, tuple[str, Form]] = {k: (rows, _points) for k, rows in model.rows_of.items()}
+    for key, taker in model.texts_of.items():
+        forms[key] = taker, partial(_whole, f"{section}.{key}")
+    for key, (taker, form) in forms.items():
+        given = _read_in(given, section, key, taker, form, faults)
+    return given
+
+
+def _read_in(
+    given: Node, section: str, key: str, taker: str, form: Form, faults: list[Fault]
+) -> Node:  # fmt: skip
+    """The content of the file that one key names, under the key `taker` in place of the name."""
+    file = given.mapping.get(key)
+    if not file or not isinstance(file.content, str):
+        return given
+    if given.get(taker):
+        text = f"give either {key} or {taker}, not both"
+        faults.append(Fault(file.mark, f"{section}.{key}", text))
+        return given
+    name = relative_to(file.mark.source if file.mark.line else "", file.content)
+    before = len(faults)
+    content = form(read_text(name, file.mark, f"{section}.{key}", faults) or "", name, faults)
+    content = replace(content, faulty=len(faults) > before)
+    rest = {name: entry for name, entry in given.mapping.items() if name != key}
+    return replace(given, content=rest | {taker: content}, faulty=given.faulty or content.faulty)
+
+
+def _whole(key: str, text: str, name: str, faults: list[Fault]) -> Node:
+    lines = text.removeprefix("\ufeff").replace("\r\n", "\n")
+    return text_node(lines, Mark(name), key, faults, text=lines)
+
+
+def _points(text: str, name: str, faults: list[Fault]) -> Node:
+    return Node(tuple(_rows(text, name, faults)), Mark(name))
+
+
+def _rows(text: str, name: str, faults: list[Fault]) -> Iterator[Node]:
+    """A node for every line `x,y`; a first line of words is a header, # starts a comment."""
+    lines = [line.partition("#")[0] for line in text.removeprefix("\ufeff").splitlines()]
+    filled = [(number, line) for number, line in enumerate(lines, 1) if line.strip()]
+    if filled and all(HEADER.match(cell) for cell in filled[0][1].split(",")):
+        del filled[0]
+    if len(filled) > MAX_POINTS:
+        faults.append(Fault(Mark(name), "", f"more than {MAX_POINTS:,} points"))
+        return
+    most = len(faults) + MOST_FAULTS
+    for number, line in filled:
+        row = _row(line, Mark(name, number, 1), faults)
+        if len(faults) > most:
+            return
+        yield row
+
+
+def _row(line: str, mark: Mark, faults: list[Fault]) -> Node:
+    cells = [cell.strip().strip('"') for cell in line.split(",")]
+    numbers = [resolve(cell) for cell in cells]
+    wrong = [isinstance(n, (str, bool)) or n is None for n in numbers]
+    # The line is not shown: the file may be one that the user may not read.
+    if len(numbers) != 2:
+        text = f"must be two numbers x,y [m], found {len(numbers)} between commas"
+        faults.append(Fault(mark, "", text))
+    elif any(wrong):
+        place = ("first", "second")[wrong.index(True)]
+        faults.append(Fault(mark, "", f"must be two numbers x,y [m]; the {place} is no number"))
+    pairs = zip(numbers, cells, strict=True)
+    return Node(tuple(Node(number, mark, text=cell) for number, cell in pairs), mark)
