@@ -39,7 +39,7 @@ from podusv_cli.figures.drawing import dressed
 from podusv_cli.figures.sheet import Sheet
 from podusv_cli.figures.style import house_style, image
 from podusv_cli.metrics.metric import Metric
-from podusv_cli.metrics.table import observer
+from podusv_cli.metrics.table import metrics_with, observer
 from podusv_cli.paths.base import TARGET
 from podusv_cli.paths.base import Path as AnyPath
 from podusv_cli.paths.line import Line
@@ -160,7 +160,9 @@ def gathered_number(metric: Metric, compiled: bool) -> float:
     """The metric of a short run."""
     loop, grid = loop_with(Pid()), TimeGrid(STEP, STEPS)
     alone = Plugin(metric.name, f"{id(metric)}", offers=(("metrics", metric),))
-    seeing = observer(loop, grid, steady_fraction=0.2, settling_radius=1.0, plugins=(alone,))
+    seeing = observer(
+        loop, grid, steady_fraction=0.2, settling_radius=1.0, known=metrics_with((alone,))
+    )
     run = simulate(loop, grid, observer=seeing, compiled=compiled)
     assert run.seen is not None
     return seeing.summary(run.seen)[metric.name]

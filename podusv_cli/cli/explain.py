@@ -39,6 +39,7 @@ def explain(
     """
     from podusv_cli.findings.finding import finding_kinds
     from podusv_cli.metrics.table import metrics_with
+    from podusv_cli.metrics.windows import called
     from podusv_cli.scenario.explain import UnknownKeyError
     from podusv_cli.scenario.explain import explain as rows
     from podusv_cli.scenario.plugins import on_hand
@@ -47,8 +48,8 @@ def explain(
     findings, metrics = finding_kinds(plugins), metrics_with(plugins)
     if key in findings:
         _echo_finding(findings[key])
-    elif key in metrics:
-        echo_entry(key, metrics[key].meaning, facts=f"metric [{metrics[key].unit}]")
+    elif metric := called(key or "", metrics):
+        echo_entry(key or "", metric.meaning, facts=f"metric [{metric.unit}]")
     else:
         try:
             found = rows(key, (*findings, *metrics), plugins)

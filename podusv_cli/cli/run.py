@@ -65,7 +65,8 @@ def _report(done: Finished, verbose: bool) -> None:
     for name, unit in done.units.items():
         if name in done.metrics and done.status == "finished":
             number = done.metrics[name]
-            shown = "never" if name == "settling_time" and math.isnan(number) else f"{number:.6g}"
+            never = name.startswith("settling_time") and math.isnan(number)
+            shown = "never" if never else f"{number:.6g}"
             echo(f"{name:<18} {shown:>12} {unit if shown != 'never' else ''}".rstrip())
     if verbose:
         for name, seconds in done.timing.items():

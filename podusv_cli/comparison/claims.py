@@ -13,7 +13,7 @@ from podusv_cli.comparison.expressions import Evaluation, parse, with_labels
 from podusv_cli.core.errors import ScenarioError
 from podusv_cli.core.escaping import markdown, markdown_cell, markdown_code
 from podusv_cli.metrics.metric import Metric
-from podusv_cli.metrics.table import CLOCKED, METRICS, metrics_with
+from podusv_cli.metrics.table import CLOCKED, METRICS
 from podusv_cli.scenario import explain
 from podusv_cli.scenario.expressions import ExpressionError
 from podusv_cli.scenario.load import Loaded
@@ -90,7 +90,7 @@ def parse_claims(loaded: Loaded) -> list[ParsedClaim]:
     """The claims of a scenario. Raises ScenarioError with a line for each invalid one."""
     scenario, claims, faults = loaded.scenario, [], []
     signals = {signal.name: signal for signal in explain.signals(scenario.plugged)}
-    metrics = metrics_with(scenario.plugged)
+    metrics = scenario.known_metrics()
     for single in scenario.singles().values():
         signals |= single.about()
     for name, claim in scenario.claims.items():

@@ -89,7 +89,10 @@ class Entry:
 def metrics_of(entries: Sequence[Entry]) -> dict[str, Metric]:
     """All metrics that podusv or a run's plug-ins know, and those that only a run's files name."""
     plugins = dict.fromkeys(plugin for entry in entries for plugin in entry.scenario.plugged)
-    known = metrics_with(tuple(plugins))
+    settings = [entry.scenario.metrics for entry in entries]
+    windows = {name: ends for one in settings for name, ends in one.windows.items()}
+    radii = {name: radius for one in settings for name, radius in one.radii.items()}
+    known = metrics_with(tuple(plugins), (tuple(windows.items()), tuple(radii.items())))
     names = dict.fromkeys(name for entry in entries for name in entry.run.metrics)
     return known | {name: Metric(name, "", UNKNOWN) for name in names if name not in known}
 

@@ -15,7 +15,6 @@ import pandas as pd
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
-from podusv_cli.metrics.table import metrics_with
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import unknown
 from podusv_cli.theory import derived
@@ -103,7 +102,7 @@ class Run:
 
     def _repr_html_(self) -> str:
         """The trajectory beside the metrics, what was warned of above."""
-        known = metrics_with(self.scenario.plugged)
+        known = self.scenario.known_metrics()
         rows = {n: f"{x:.5g} {known[n].unit}" for n, x in self.numbers.items() if n in known}
         table = pd.Series(rows, name=self.label, dtype=str).to_frame().to_html(border=0)
         lines = [repr(self), self.message, *self.warnings]

@@ -8,6 +8,7 @@ from typing import Any
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.engine.layout import DISTANCE
 from podusv_cli.metrics.metric import Accumulator, Layout, Metric, Result, add, gathered, ratio
+from podusv_cli.metrics.windows import settled_from
 
 # Positions of the gathered numbers: integrals over the run, and over the steady window.
 TIME, ABSOLUTE, ERROR, SQUARE, TIMED, INTEGRALS = range(6)
@@ -65,8 +66,7 @@ def _rmse(seen: Vector, step: float) -> float:
 
 
 def _settling_time(seen: Vector, step: float) -> float:
-    inside_from = float(seen[OUTSIDE]) + step if seen[OUTSIDE] >= 0.0 else 0.0
-    return inside_from if inside_from < seen[NOW] + 0.5 * step else math.nan
+    return settled_from(seen[OUTSIDE], seen[NOW], step)
 
 
 def _rms(position: int) -> Result:

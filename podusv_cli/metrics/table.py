@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
 
@@ -16,13 +16,17 @@ from podusv_cli.core.plugins import Plugins
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import ClosedLoop, Observer
 from podusv_cli.metrics.metric import Accumulator, Layout, Metric, close_integrals
+from podusv_cli.metrics.windows import NONE, Radii, Windows, named
 
 
 @cache
-def metrics_with(plugins: Plugins) -> dict[str, Metric]:
-    """All metrics by name, in the order of tables, with those of these plug-ins."""
+def metrics_with(plugins: Plugins, own: tuple[Windows, Radii] = NONE) -> dict[str, Metric]:
+    """All metrics by name, in the order of tables, with those of these plug-ins.
+
+    `own` are the windows and radii that a scenario names.
+    """
     found = registry.named("podusv_cli.metrics", Metric, plugins).values()
-    return {m.name: m for m in sorted(found, key=lambda m: m.place)}
+    return {m.name: m for m in sorted((*found, *named(*own).values()), key=lambda m: m.place)}
 
 
 METRICS = metrics_with(())
@@ -66,7 +70,7 @@ class Metrics(Observer):
 
     parts: Parts = ()
     step: float = 0.0
-    plugins: Plugins = ()
+    known: Mapping[str, Metric] = field(default_factory=dict)
 
     def summary(self, seen: Vector, failed: Failed | None = None) -> dict[str, float]:
         """Metrics by name; NaN where a run ended before one is defined.
@@ -81,7 +85,7 @@ class Metrics(Observer):
             for (part, _), numbers in zip(self.parts, np.split(seen, ends), strict=True)
         }
         numbers: dict[str, float] = {}
-        for metric in metrics_with(self.plugins).values():
+        for metric in self.known.values():
             if metric.accumulator in own:
                 try:
                     number = float(metric.result(own[metric.accumulator], self.step))
@@ -105,12 +109,11 @@ class Metrics(Observer):
 
 def observer(
     loop: ClosedLoop, grid: TimeGrid, *, steady_fraction: float, settling_radius: float,
-    plugins: Plugins = (),
+    known: Mapping[str, Metric] = METRICS,
 ) -> Metrics:  # fmt: skip
-    """The observer of all metrics that this loop has, those of plug-ins included."""
+    """The observer of those of the known metrics that this loop has."""
     layout = Layout(loop, loop.layout(grid), grid.last_part(steady_fraction), settling_radius)
-    known = metrics_with(plugins).values()
-    accumulators = {m.accumulator: m.name for m in known if m.accumulator}
+    accumulators = {m.accumulator: m.name for m in known.values() if m.accumulator}
     parts: Parts = ()
     constants: dict[str, float] = {}
     for part, metric in accumulators.items():
@@ -126,4 +129,4 @@ def observer(
                 what = f"has another constant {name!r} than another metric"
                 raise LawError(f"metric {metric}: its accumulator {what}; give it another name")
     size = sum(size for _, size in parts)
-    return Metrics(_watch(parts), constants, size, parts, grid.step, plugins)
+    return Metrics(_watch(parts), constants, size, parts, grid.step, known)

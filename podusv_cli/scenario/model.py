@@ -19,7 +19,8 @@ from podusv_cli.core.signal import Signal
 from podusv_cli.disturbances.base import Disturbance
 from podusv_cli.engine.grid import TimeGrid, whole_steps
 from podusv_cli.engine.simulate import ClosedLoop
-from podusv_cli.metrics.table import Metrics, observer
+from podusv_cli.metrics.metric import Metric
+from podusv_cli.metrics.table import Metrics, metrics_with, observer
 from podusv_cli.paths.base import Path
 from podusv_cli.scenario.sections import (
     CLAIM,
@@ -157,10 +158,14 @@ class Scenario(Component):
     def observer(self, grid: TimeGrid | None = None) -> Metrics:
         """What gathers the numbers of all metrics, over another grid than the run's where given."""
         return observer(
-            self.closed_loop(), grid or self.time_grid(), plugins=self.plugged,
+            self.closed_loop(), grid or self.time_grid(), known=self.known_metrics(),
             steady_fraction=self.metrics.steady_fraction,
             settling_radius=self.metrics.settling_radius,
         )  # fmt: skip
+
+    def known_metrics(self) -> dict[str, Metric]:
+        """All metrics by name, with those of plug-ins, and of windows and radii named here."""
+        return metrics_with(self.plugged, self.metrics.named())
 
     def steady_from(self) -> float:
         """When the part of the run begins that counts as settled [s]."""
@@ -169,7 +174,7 @@ class Scenario(Component):
     def conflicts(self) -> list[tuple[str, str]]:
         """Key and message for every pair of values that contradict each other."""
         return [*self._defaults(), *self._unanswered()] or [
-            *self._times(), *self._samples(), *self._names(), *self._signals()
+            *self._times(), *self._samples(), *self._names(), *self._windows(), *self._signals()
         ]  # fmt: skip
 
     def _defaults(self) -> Conflicts:
@@ -232,6 +237,19 @@ class Scenario(Component):
                 self.model_copy(update={"controller": law}).about()
             except LawError as error:
                 yield key, str(error)
+
+    def _windows(self) -> Conflicts:
+        for name, (start, end) in self.metrics.windows.items():
+            if not LABEL.fullmatch(name):
+                yield f"metrics.windows.{name}", LABEL_IN_WORDS
+            if not 0 <= start < end:
+                text = f"must start at 0 s or later and end after that, found {start:g} to {end:g}"
+                yield f"metrics.windows.{name}", text
+        for name, radius in self.metrics.radii.items():
+            if not LABEL.fullmatch(name):
+                yield f"metrics.radii.{name}", LABEL_IN_WORDS
+            if radius <= 0:
+                yield f"metrics.radii.{name}", f"must be above 0 m, found {radius:g}"
 
     def _names(self) -> Conflicts:
         for label in self.controllers:

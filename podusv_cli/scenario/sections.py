@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import re
-from typing import Literal
+from typing import Annotated, Literal
+
+from pydantic import Field
 
 from podusv_cli.core.component import Component, value
+from podusv_cli.metrics.windows import Radii, Windows
 
 LONGEST_NAME = 80  # letters
 NAME = rf"^[A-Za-z0-9][A-Za-z0-9_.-]{{0,{LONGEST_NAME - 1}}}$"
@@ -18,6 +21,9 @@ CLAIM = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,29}")
 CLAIM_IN_WORDS = (
     "a claim's name is at most 30 of letters, digits, '_' and '-', starting with a letter"
 )
+
+
+Window = Annotated[tuple[float, float], Field(strict=False)]  # from and to [s]
 
 
 class Start(Component):
@@ -88,6 +94,17 @@ class MetricSettings(Component):
     settling_radius: float = value(
         1.0, "m", "settled when the distance to the target stays below this", gt=0
     )
+    windows: dict[str, Window] = value(
+        {}, "s", "parts of the run as [from, to], by name: `line` adds the metrics error_line_rms "
+        "and error_line_max",
+    )  # fmt: skip
+    radii: dict[str, float] = value(
+        {}, "m", "further settling radii, by name: `near` adds the metric settling_time_near"
+    )
+
+    def named(self) -> tuple[Windows, Radii]:
+        """Windows and radii, as metrics take them."""
+        return tuple(self.windows.items()), tuple(self.radii.items())
 
 
 class Claim(Component):

@@ -11,7 +11,6 @@ import numpy as np
 from podusv_cli.core.component import Component
 from podusv_cli.engine.simulate import Observer, entries
 from podusv_cli.metrics.metric import Metric
-from podusv_cli.metrics.table import metrics_with
 from podusv_cli.scenario.expressions import ExpressionError
 from podusv_cli.scenario.load import values
 from podusv_cli.scenario.model import Scenario
@@ -176,7 +175,7 @@ def _by(others: list[str]) -> str:
 
 def _metrics(scenario: Scenario) -> dict[str, Metric]:
     """The metrics that are gathered during a run."""
-    return {n: m for n, m in metrics_with(scenario.plugged).items() if m.accumulator}
+    return {n: m for n, m in scenario.known_metrics().items() if m.accumulator}
 
 
 def _keep(scenario: Scenario, sweep: Sweep) -> Faults:

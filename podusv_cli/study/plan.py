@@ -15,7 +15,7 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.engine import closed_loop
 from podusv_cli.engine.object_cache import ingredients
 from podusv_cli.engine.simulate import entries
-from podusv_cli.metrics.table import Metrics, metrics_with, observer
+from podusv_cli.metrics.table import Metrics
 from podusv_cli.scenario.load import Loaded, values
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sweep import Sweep
@@ -50,7 +50,7 @@ class Plan:
         """The names of the metrics that a law of the study has during a run, in their order."""
         loops = [watching(self.single(law, cell.index)) for law in self.laws for cell in self.cells]
         found = {name for one in loops for name in one.summary(np.full(one.size, np.nan))}
-        return tuple(name for name in metrics_with(self.scenario.plugged) if name in found)
+        return tuple(name for name in self.scenario.known_metrics() if name in found)
 
     def single(self, law: str, cell: int) -> Scenario:
         """The scenario of one law in one cell."""
@@ -92,11 +92,7 @@ def kernels(scenario: Scenario) -> str:
 
 def watching(scenario: Scenario) -> Metrics:
     """The observer of a law's metrics."""
-    return observer(
-        scenario.closed_loop(), scenario.time_grid(),
-        steady_fraction=scenario.metrics.steady_fraction,
-        settling_radius=scenario.metrics.settling_radius, plugins=scenario.plugged,
-    )  # fmt: skip
+    return scenario.observer()
 
 
 def digest(identity: Mapping[str, Any]) -> str:

@@ -11,7 +11,6 @@ import numpy as np
 import pandas as pd
 
 from podusv_cli.metrics.metric import Metric
-from podusv_cli.metrics.table import metrics_with
 from podusv_cli.study import claims, summary, verdict
 from podusv_cli.study.plan import Plan
 from podusv_cli.study.runs_file import Table
@@ -35,7 +34,7 @@ class Results:
     @cached_property
     def known(self) -> dict[str, Metric]:
         """All metrics, with those of plug-ins."""
-        return metrics_with(self.plan.scenario.plugged)
+        return self.plan.scenario.known_metrics()
 
     @cached_property
     def broken(self) -> int:
@@ -94,7 +93,7 @@ def digits(number: float) -> str:
 
 def judged(plan: Plan, runs: Table) -> Results:
     """All tables and verdicts of a study's runs."""
-    sweep, known = plan.sweep, metrics_with(plan.scenario.plugged)
+    sweep, known = plan.sweep, plan.scenario.known_metrics()
     parsed = [
         claims.ParsedClaim(name, claim, claims.parse(claim.expect, plan.laws, known))
         for name, claim in sweep.claims.items()

@@ -26,7 +26,6 @@ import h5py
 import numpy as np
 
 from podusv_cli.core.errors import StorageError, UsageError
-from podusv_cli.metrics.table import metrics_with
 from podusv_cli.storage import files, json_files
 from podusv_cli.storage.run_folder import STUDY
 from podusv_cli.study import runs_file
@@ -107,7 +106,7 @@ class Store:
 
     def write_runs(self) -> None:
         """Put every run into runs.h5, and remove the units. Raises StorageError."""
-        plan, known = self.plan, metrics_with(self.plan.scenario.plugged)
+        plan, known = self.plan, self.plan.scenario.known_metrics()
         header = runs_file.Header(
             plan.scenario.name, self.seal, plan.laws, [cell.label for cell in plan.cells],
             plan.sweep.draws, table(plan.sweep, 0, plan.sweep.draws),
@@ -119,8 +118,8 @@ class Store:
 
     def runs(self) -> runs_file.Table:
         """The runs of a study that has runs.h5. Raises StorageError."""
-        sweep, plugins = self.plan.sweep, self.plan.scenario.plugged
-        return runs_file.Table(self.folder / RUNS, sweep.success, metrics_with(plugins))
+        known = self.plan.scenario.known_metrics()
+        return runs_file.Table(self.folder / RUNS, self.plan.sweep.success, known)
 
     def _earlier(self) -> Iterator[runs_file.Table]:
         """runs.h5, if it is there, undamaged and of this study."""

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from podusv_cli.metrics.table import metrics_with
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.verification.dop853 import Dop853Result, integrate, why_skipped
 from podusv_cli.verification.ranking import Ranking, ranking
@@ -111,7 +110,7 @@ def verify(
         label: check(one, progress and partial(progress, label))
         for label, one in scenario.singles().items()
     }
-    rankings, metrics = {}, metrics_with(scenario.plugged)
+    rankings, metrics = {}, scenario.known_metrics()
     for name in metrics:
         of_runs = {label: r.estimates[name] for label, r in runs.items() if name in r.estimates}
         rank = ranking(of_runs)

@@ -23,7 +23,6 @@ from podusv_cli.engine.simulate import marcher, simulate
 from podusv_cli.findings.finding import postflight
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.operations import operations
-from podusv_cli.metrics.table import metrics_with
 from podusv_cli.process.extras import Extras, Missing
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.process.workers import Outcome
@@ -168,7 +167,7 @@ def execute(
     return Finished(
         final, recording.controller, status, message, metrics, watch.total(),
         warnings=warnings, missing=tuple(extras.missing),
-        units={name: m.unit for name, m in metrics_with(task.scenario.plugged).items()},
+        units={name: m.unit for name, m in task.scenario.known_metrics().items()},
     )  # fmt: skip
 
 
@@ -272,7 +271,7 @@ def _write(
     status = {"status": recording.status, "controller": recording.controller}
     told = [finding.as_json() for finding in warnings]
     writer.add_json("metrics.json", {**status, "metrics": metrics, "warnings": told})
-    known = metrics_with(task.scenario.plugged)
+    known = task.scenario.known_metrics()
     rows = [f"{name},{metrics[name]!r},{m.unit}" for name, m in known.items() if name in metrics]
     writer.add("metrics.csv", "\n".join(["metric,value,unit", *rows, ""]).encode())
 

@@ -1,0 +1,117 @@
+"""Metrics that a scenario names: the error over a window of the path, settling to a radius."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+from podusv_cli.core.kernel import Vector, kernel, specialise
+from podusv_cli.engine.layout import DISTANCE
+from podusv_cli.metrics.metric import Accumulator, Metric, Result
+
+NAMED = "<name>"  # stands for a scenario's word in the name of a metric
+NEAR = 1e-9  # s; an instant this near to an end of a window belongs to it
+FROM, TO, RADIUS = math.inf, math.inf, 0.0  # placeholders of one window [s] and one radius [m]
+LENGTH, SQUARE, LARGEST, NOW, LAST, WINDOW = range(6)
+OUTSIDE, ENDS, SETTLING = range(3)
+
+Windows = tuple[tuple[str, tuple[float, float]], ...]  # from and to [s]
+Radii = tuple[tuple[str, float], ...]  # m
+NONE: tuple[Windows, Radii] = ((), ())
+
+
+@kernel
+def window(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
+    """Gather z_e^2 from one instant to the next, both in the window, and the largest z_e."""
+    z_e = row[DISTANCE]
+    if t >= FROM - NEAR and t <= TO + NEAR:
+        if t > 0.0 and seen[NOW] >= FROM - NEAR:
+            seen[LENGTH] += t - seen[NOW]
+            seen[SQUARE] += 0.5 * (t - seen[NOW]) * (z_e * z_e + seen[LAST] * seen[LAST])
+        seen[LARGEST] = max(seen[LARGEST], z_e)
+    seen[NOW], seen[LAST] = t, z_e
+
+
+@kernel
+def outside(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
+    """Gather when z_e was last beyond the radius, and the last instant."""
+    if t == 0.0:
+        seen[OUTSIDE] = -1.0  # not outside so far
+    if row[DISTANCE] > RADIUS:
+        seen[OUTSIDE] = t
+    seen[ENDS] = t
+
+
+def settled_from(outside: float, now: float, step: float) -> float:
+    """The first instant after the last one outside [s]; NaN where that is the last of the run."""
+    inside_from = float(outside) + step if outside >= 0.0 else 0.0
+    return inside_from if inside_from < now + 0.5 * step else math.nan
+
+
+ERROR_RMS = Metric(
+    f"error_{NAMED}_rms", "m", "rms of z_e over a window that `metrics.windows` names",
+    place=2, counts_standoff=True,
+)  # fmt: skip
+ERROR_MAX = Metric(
+    f"error_{NAMED}_max", "m", "largest z_e in a window that `metrics.windows` names",
+    place=2, counts_standoff=True,
+)  # fmt: skip
+SETTLED = Metric(
+    f"settling_time_{NAMED}", "s", "time from which z_e stays within a radius of `metrics.radii`",
+    place=2, happens=True, counts_standoff=True,
+)  # fmt: skip
+
+
+def _over(to: float, number: Callable[[Vector], float]) -> Result:
+    """A number of a window; NaN for a run that ended before it."""
+    return lambda seen, step: number(seen) if seen[NOW] >= to - NEAR else math.nan
+
+
+def _rms(seen: Vector) -> float:
+    return math.sqrt(seen[SQUARE] / seen[LENGTH]) if seen[LENGTH] else math.nan
+
+
+def _named(template: Metric, name: str, meaning: str, of: Accumulator, result: Result) -> Metric:
+    return replace(
+        template, name=template.name.replace(NAMED, name), meaning=meaning, accumulator=of,
+        result=result,
+    )  # fmt: skip
+
+
+def _of_window(name: str, start: float, to: float) -> tuple[Metric, Metric]:
+    watch = specialise(window, f"window_{name}", FROM=start, TO=to)
+    of = Accumulator(watch, lambda layout: WINDOW, lambda layout: {})
+    where = f"z_e from {start:g} s to {to:g} s"
+    largest = _over(to, lambda seen: float(seen[LARGEST]))
+    return (
+        _named(ERROR_RMS, name, f"rms of {where}", of, _over(to, _rms)),
+        _named(ERROR_MAX, name, f"largest {where}", of, largest),
+    )
+
+
+def _of_radius(name: str, radius: float) -> Metric:
+    watch = specialise(outside, f"outside_{name}", RADIUS=radius)
+    of = Accumulator(watch, lambda layout: SETTLING, lambda layout: {})
+    meaning = f"time from which z_e stays within {radius:g} m"
+    return _named(
+        SETTLED, name, meaning, of, lambda seen, step: settled_from(seen[OUTSIDE], seen[ENDS], step)
+    )
+
+
+@cache  # an accumulator's numbers are found by the accumulator itself
+def named(windows: Windows, radii: Radii) -> dict[str, Metric]:
+    """The metrics of these windows and radii, by name."""
+    found = [metric for name, ends in windows for metric in _of_window(name, *ends)]
+    found += [_of_radius(name, radius) for name, radius in radii]
+    return {metric.name: metric for metric in found}
+
+
+def called(name: str, known: Mapping[str, Metric]) -> Metric | None:
+    """The metric of this name, of which a scenario may have chosen a part; None for no metric."""
+    word = "[a-z][a-z0-9_]*"
+    fits = (m for m in known.values() if re.fullmatch(m.name.replace(NAMED, word), name))
+    return known.get(name) or next(fits, None)
