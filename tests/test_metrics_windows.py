@@ -13,7 +13,7 @@ from podusv_cli.core.errors import ScenarioError
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import simulate
 from podusv_cli.metrics.table import METRICS, metrics_with, observer
-from podusv_cli.metrics.windows import called
+from podusv_cli.metrics.windows import NAMED, called
 from podusv_cli.scenario.load import load_text
 from podusv_cli.study.expressions import parse_success
 
@@ -94,7 +94,7 @@ def test_metrics_of_windows_stand_beside_the_other_errors_and_only_where_they_ar
     assert names.index("iae") < place < names.index("effort_u")
     assert not [name for name in METRICS if "bend" in name]
     plain = load_text(SCENARIO, "plain.yaml").scenario
-    assert list(plain.known_metrics()) == list(METRICS)
+    assert list(plain.known_metrics()) == [name for name in METRICS if NAMED not in name]
     got = plain.observer()
     assert not [n for n in got.summary(np.full(got.size, np.nan)) if n.startswith("error_")]
 
@@ -111,6 +111,8 @@ def test_claims_and_studies_know_the_metrics_of_windows_and_no_others():
     assert parse_success("error_line_rms < 1", known) is not None
     with pytest.raises(ScenarioError, match=r"error_line_rms"):
         parse_claims(named("{circle: [150, 310]}"))
+    with pytest.raises(ScenarioError, match=r"error_NAME_rms"):
+        parse_claims(named("{line: [60, 100]}", "a.error_NAME_rms < 1"))
 
 
 @pytest.mark.parametrize(

@@ -109,6 +109,9 @@ def possible(data: dict[str, Any]) -> Scenario:
         if "network" in law:
             low, high, widths = (-1.0, -1.0, -1.0), (1.0, 2.0, 0.5), (1.0, 2.0, 3.0)
             law["network"].update(low=low, high=high, widths=widths)
+    windows, radii = data["metrics"]["windows"], data["metrics"]["radii"]
+    windows.update({name: (abs(start), abs(start) + 1.0) for name, (start, _) in windows.items()})
+    radii.update({name: abs(radius) + 0.1 for name, radius in radii.items()})
     try:
         return Scenario.model_validate(data)
     except ValidationError:

@@ -13,7 +13,7 @@ from podusv_cli.core.kernel import Vector, kernel, specialise
 from podusv_cli.engine.layout import DISTANCE
 from podusv_cli.metrics.metric import Accumulator, Metric, Result
 
-NAMED = "<name>"  # stands for a scenario's word in the name of a metric
+NAMED = "NAME"  # stands for a scenario's word in the name of a metric
 NEAR = 1e-9  # s; an instant this near to an end of a window belongs to it
 FROM, TO, RADIUS = math.inf, math.inf, 0.0  # placeholders of one window [s] and one radius [m]
 LENGTH, SQUARE, LARGEST, NOW, LAST, WINDOW = range(6)

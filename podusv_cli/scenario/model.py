@@ -21,6 +21,7 @@ from podusv_cli.engine.grid import TimeGrid, whole_steps
 from podusv_cli.engine.simulate import ClosedLoop
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import Metrics, metrics_with, observer
+from podusv_cli.metrics.windows import NAMED
 from podusv_cli.paths.base import Path
 from podusv_cli.scenario.sections import (
     CLAIM,
@@ -165,7 +166,8 @@ class Scenario(Component):
 
     def known_metrics(self) -> dict[str, Metric]:
         """All metrics by name, with those of plug-ins, and of windows and radii named here."""
-        return metrics_with(self.plugged, self.metrics.named())
+        known = metrics_with(self.plugged, self.metrics.named())
+        return {name: metric for name, metric in known.items() if NAMED not in name}
 
     def steady_from(self) -> float:
         """When the part of the run begins that counts as settled [s]."""
@@ -174,7 +176,7 @@ class Scenario(Component):
     def conflicts(self) -> list[tuple[str, str]]:
         """Key and message for every pair of values that contradict each other."""
         return [*self._defaults(), *self._unanswered()] or [
-            *self._times(), *self._samples(), *self._names(), *self._windows(), *self._signals()
+            *self._times(), *self._samples(), *self._names(), *self.metrics.conflicts(), *self._signals()
         ]  # fmt: skip
 
     def _defaults(self) -> Conflicts:
@@ -237,19 +239,6 @@ class Scenario(Component):
                 self.model_copy(update={"controller": law}).about()
             except LawError as error:
                 yield key, str(error)
-
-    def _windows(self) -> Conflicts:
-        for name, (start, end) in self.metrics.windows.items():
-            if not LABEL.fullmatch(name):
-                yield f"metrics.windows.{name}", LABEL_IN_WORDS
-            if not 0 <= start < end:
-                text = f"must start at 0 s or later and end after that, found {start:g} to {end:g}"
-                yield f"metrics.windows.{name}", text
-        for name, radius in self.metrics.radii.items():
-            if not LABEL.fullmatch(name):
-                yield f"metrics.radii.{name}", LABEL_IN_WORDS
-            if radius <= 0:
-                yield f"metrics.radii.{name}", f"must be above 0 m, found {radius:g}"
 
     def _names(self) -> Conflicts:
         for label in self.controllers:

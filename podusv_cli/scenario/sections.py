@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -105,6 +106,20 @@ class MetricSettings(Component):
     def named(self) -> tuple[Windows, Radii]:
         """Windows and radii, as metrics take them."""
         return tuple(self.windows.items()), tuple(self.radii.items())
+
+    def conflicts(self) -> Iterator[tuple[str, str]]:
+        """Key and message for every name, window and radius that cannot be."""
+        for section, names in (("windows", self.windows), ("radii", self.radii)):
+            for name in names:
+                if not LABEL.fullmatch(name):
+                    yield f"metrics.{section}.{name}", LABEL_IN_WORDS
+        for name, (start, end) in self.windows.items():
+            if not 0 <= start < end:
+                text = f"must start at 0 s or later and end after that, found {start:g} to {end:g}"
+                yield f"metrics.windows.{name}", text
+        for name, radius in self.radii.items():
+            if radius <= 0:
+                yield f"metrics.radii.{name}", f"must be above 0 m, found {radius:g}"
 
 
 class Claim(Component):
