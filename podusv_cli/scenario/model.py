@@ -176,7 +176,8 @@ class Scenario(Component):
     def conflicts(self) -> list[tuple[str, str]]:
         """Key and message for every pair of values that contradict each other."""
         return [*self._defaults(), *self._unanswered()] or [
-            *self._times(), *self._samples(), *self._names(), *self.metrics.conflicts(), *self._signals()
+            *self._times(), *self._samples(), *self._names(), *self.metrics.conflicts(),
+            *self._signals(),
         ]  # fmt: skip
 
     def _defaults(self) -> Conflicts:
