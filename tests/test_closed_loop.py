@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import GENTLE, SMOOTH_START, corrected, example, kinds, last_state, run
+from conftest import GENTLE, PAPER, SMOOTH_START, corrected, example, kinds, last_state, run
 from scipy.integrate import solve_ivp
 
 from podusv_cli.actuators.saturated import Saturated
@@ -16,6 +16,8 @@ from podusv_cli.paths.circle import Circle
 from podusv_cli.paths.line import Line
 
 every_law = pytest.mark.parametrize("kind", kinds("controllers").values(), ids=kinds("controllers"))
+
+FAST = dict.fromkeys(("adaptive_neural", "dsc", "backstepping", "pid"), 0.002)  # s
 
 
 def smooth(law: Any) -> ClosedLoop:
@@ -34,8 +36,12 @@ def order(ends: list[Vector]) -> float:
 
 @every_law
 def test_the_loop_is_integrated_at_fourth_order(kind):
-    # The weights' loop turns at up to 90 rad/s: larger steps are not in the asymptotic range.
-    ends = [end(smooth(example(kind)), 0.002 / 2**i) for i in range(4)]
+    # The weights' loop turns at up to 90 rad/s: larger steps are not in the asymptotic range. At
+    # such steps errors of the other laws are rounding. The vessel `paper` has no |v| v, which has
+    # no second derivative where sway changes its sign.
+    step = FAST.get(kind.model_fields["kind"].default, 0.04)
+    loop = corrected(controller=example(kind), vessel=PAPER, path=Line(), start=SMOOTH_START)
+    ends = [end(loop, step / 2**i) for i in range(4)]
     assert order(ends) == pytest.approx(4.0, abs=0.2)
 
 

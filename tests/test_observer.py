@@ -20,6 +20,7 @@ MEANS = (0.4, -0.3, 0.2)
 STEADY = HarmonicDisturbance(
     b_u=Harmonic(mean=MEANS[0]), b_v=Harmonic(mean=MEANS[1]), b_r=Harmonic(mean=MEANS[2])
 )
+SPEED = {"VelocityVector": 0.4, "Adrc": 0.0}  # of the target, at which a law gives its loops
 OBSERVING = list(kinds("podusv_cli.controllers", ObservingController).values())
 
 
@@ -61,10 +62,10 @@ def test_its_rates_are_those_of_the_vessel_and_a_double_pole(kind):
         found = ask(law, *at, NONLINEAR)
         tau = np.array([found.tau[0], 0.7, 0.5 * found.tau[1]])  # what an actuator made of it
         law.after_saturation(1.0, at.memory, found.tau, tau, k, law.table(), found.rate)
-        plant(at.x, tau, at.memory[3:], bundle(NONLINEAR.constants()), rate)
+        plant(at.x, tau, at.memory[3:6], bundle(NONLINEAR.constants()), rate)
         error = at.x[3:] - at.memory[:3]
         np.testing.assert_allclose(found.rate[:3], rate[3:] + 2 * omega * error, rtol=1e-11)
-        np.testing.assert_allclose(found.rate[3:], m * omega**2 * error, rtol=1e-12)
+        np.testing.assert_allclose(found.rate[3:6], m * omega**2 * error, rtol=1e-12)
 
 
 def test_the_pole_is_double():
@@ -77,13 +78,14 @@ def test_the_pole_is_double():
 @pytest.mark.parametrize("kind", OBSERVING)
 def test_its_loops_are_the_law_s_own(kind, axis):
     """The rates of (nu, nu_hat, b_hat/m) by central differences, on the target."""
+    speed = SPEED[kind.__name__]
     law, at, inertia = kind(), (3, 5)[axis], (NONLINEAR.m11, NONLINEAR.m33)[axis]
-    k, target = bundle(NONLINEAR.constants()), np.array([0.0, 0.0, 0.4, 0.0, 0.0, 0.0])
+    k, target = bundle(NONLINEAR.constants()), np.array([0.0, 0.0, speed, 0.0, 0.0, 0.0])
     axes = (Axis("surge", NONLINEAR.m11, NONLINEAR.m11, 0.0),) * 2
 
     def rates(d: Any) -> Any:
-        x, memory, rate = np.zeros(6), np.zeros(6), np.zeros(6)
-        x[3] = memory[0] = 0.4
+        x, rate = np.array([0.0, 0.0, 0.0, speed, 0.0, 0.0]), np.zeros(6)
+        memory = law.start(x, target, NONLINEAR)
         x[at] += d[0]
         memory[[at - 3, at]] += d[1], d[2] * inertia
         found = ask(law, x, memory, target, NONLINEAR)

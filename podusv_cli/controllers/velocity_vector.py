@@ -1,9 +1,7 @@
 """Steers the velocity vector, not the bow: constant-bearing guidance with observed loads.
 
-Guidance: M. Breivik and T. I. Fossen, constant-bearing guidance for target tracking (2006 to 2010).
-The wanted velocity is the target's plus an approach along the line of sight that the vessel can
-reach. The bow is turned until the velocity that results, with the sway that the hull settles to,
-is the wanted one. docs/laws.md has the derivation and what is proved.
+The bow is turned until the velocity that results, with the sway that the hull settles to, is the
+wanted one. Source: ours. docs/laws.md has the derivation and what is proved.
 """
 
 from __future__ import annotations
@@ -11,6 +9,7 @@ from __future__ import annotations
 import math
 from typing import Any, ClassVar, Literal, NamedTuple
 
+from podusv_cli.controllers.constant_bearing import Moving, approach, turn_rate
 from podusv_cli.controllers.observer import B_R, B_U, B_V, ObservingController, observe
 from podusv_cli.core.component import value
 from podusv_cli.core.elementary import cos_sin
@@ -18,8 +17,6 @@ from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.kinematics import direction
 from podusv_cli.core.signal import Signal
 from podusv_cli.vessels.plant import surge_force, sway_force, yaw_moment
-
-SLOWEST = 0.05  # m/s; the least speed at which the law approaches
 
 
 class Wanted(NamedTuple):
@@ -33,27 +30,16 @@ class Wanted(NamedTuple):
 
 @kernel
 def guidance(x: Vector, target: Vector, k: Any) -> Wanted:
-    """V_c = p_d' + kappa e and its rate; |V_c| stays below U wherever the target allows it."""
+    """V_c and its rate, as the hull sees them."""
     cos_psi, sin_psi = cos_sin(x[2])
-    e_x, e_y = target[0] - x[0], target[1] - x[1]
-    squared = e_x * e_x + e_y * e_y
-    per = 1.0 / math.sqrt(squared) if squared > 0.0 else 0.0
-    along = (target[2] * e_x + target[3] * e_y) * per
-    across = (target[2] * e_y - target[3] * e_x) * per
-    s_max = max(math.sqrt(max(k.U * k.U - across * across, 0.0)) - along, SLOWEST)
-    slope = (k.k_p / s_max) * (k.k_p / s_max)
-    q2 = 1.0 / (1.0 + slope * squared)
-    kappa = k.k_p * math.sqrt(q2)
-
     rate_x = target[2] - (x[3] * cos_psi - x[4] * sin_psi)
     rate_y = target[3] - (x[3] * sin_psi + x[4] * cos_psi)
-    fall = kappa * q2 * slope * (e_x * rate_x + e_y * rate_y)
-    V_x, V_y = target[2] + kappa * e_x, target[3] + kappa * e_y
-    A_x, A_y = target[4] + kappa * rate_x - fall * e_x, target[5] + kappa * rate_y - fall * e_y
-    turn = (V_x * A_y - V_y * A_x) / max(V_x * V_x + V_y * V_y, k.V_m * k.V_m)
+    e = Moving(target[0] - x[0], target[1] - x[1], rate_x, rate_y)
+    V = approach(e, Moving(target[2], target[3], target[4], target[5]), k)
     return Wanted(
-        V_x * cos_psi + V_y * sin_psi, V_y * cos_psi - V_x * sin_psi, A_x * cos_psi + A_y * sin_psi,
-        min(max(turn, -k.chi_m), k.chi_m),
+        V.x * cos_psi + V.y * sin_psi, V.y * cos_psi - V.x * sin_psi,
+        V.rate_x * cos_psi + V.rate_y * sin_psi,
+        min(max(turn_rate(V, k.V_m), -k.chi_m), k.chi_m),
     )  # fmt: skip
 
 

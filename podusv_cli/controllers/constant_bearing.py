@@ -1,0 +1,50 @@
+"""Constant-bearing guidance with an approach speed that a vessel can reach.
+
+Source: M. Breivik and T. I. Fossen, constant-bearing guidance for target tracking (2006 to 2010).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from podusv_cli.core.kernel import kernel
+
+SLOWEST = 0.05  # m/s; the least speed at which a law approaches
+
+
+class Moving(NamedTuple):
+    """A vector over ground and its rate, both north and east."""
+
+    x: float
+    y: float
+    rate_x: float
+    rate_y: float
+
+
+@kernel
+def approach(e: Moving, V_d: Moving, k: Any) -> Moving:
+    """V_c = p_d' + kappa e and its rate; |V_c| stays below U if the target is slower.
+
+    `e` is where the target is from here [m], `V_d` its velocity [m/s].
+    """
+    squared = e.x * e.x + e.y * e.y
+    per = 1.0 / math.sqrt(squared) if squared > 0.0 else 0.0
+    along = (V_d.x * e.x + V_d.y * e.y) * per
+    across = (V_d.x * e.y - V_d.y * e.x) * per
+    s_max = max(math.sqrt(max(k.U * k.U - across * across, 0.0)) - along, SLOWEST)
+    slope = (k.k_p / s_max) * (k.k_p / s_max)
+    q2 = 1.0 / (1.0 + slope * squared)
+    kappa = k.k_p * math.sqrt(q2)
+    fall = kappa * q2 * slope * (e.x * e.rate_x + e.y * e.rate_y)
+    return Moving(
+        V_d.x + kappa * e.x, V_d.y + kappa * e.y,
+        V_d.rate_x + kappa * e.rate_x - fall * e.x, V_d.rate_y + kappa * e.rate_y - fall * e.y,
+    )  # fmt: skip
+
+
+@kernel
+def turn_rate(v: Moving, slowest: float) -> float:
+    """Rate of the direction of a velocity [rad/s]; below `slowest` [m/s] it counts for less."""
+    speed2 = max(v.x * v.x + v.y * v.y, slowest * slowest)
+    return (v.x * v.rate_y - v.y * v.rate_x) / speed2
