@@ -24,8 +24,8 @@ from podusv_cli.cli.sweep import sweep
 
 # NAME is the function NAME of cli/NAME.py
 COMMANDS = (
-    "init", "run", "compare", "rerun", "diff", "plot", "validate", "verify", "explain", "list",
-    "schema", "new",
+    "init", "run", "compare", "rerun", "diff", "plot", "validate", "verify", "optimum", "explain",
+    "list", "schema", "new",
 )  # fmt: skip
 
 FIRST_STEPS = """\

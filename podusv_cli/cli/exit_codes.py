@@ -27,7 +27,7 @@ MEANINGS = {
     1: "a bug in podusv",
     2: "wrong usage or scenario",
     3: "some of several runs failed (`compare`) or figures (`plot`), a number is not converged "
-    "(`verify`), or runs differ (`rerun`, `diff`)",
+    "(`verify`, `optimum`), or runs differ (`rerun`, `diff`)",
     4: "the simulation diverged; what was computed is kept",
     5: "input or output failed",
     129: "the terminal was closed",

@@ -46,6 +46,12 @@ class StorageError(PodusvError):
     exit_code = 5
 
 
+class NotConvergedError(PodusvError):
+    """A computation that did not come to a number that could be relied on."""
+
+    exit_code = 3
+
+
 class LawError(PodusvError):
     """A law, or another component, that does not keep to its declaration or fails when asked."""
 

@@ -8,6 +8,8 @@ never ask for its length.
 
 from __future__ import annotations
 
+import builtins
+import dis
 from collections import namedtuple
 from collections.abc import Callable, Mapping
 from functools import cache
@@ -52,6 +54,25 @@ def with_globals(function: Any, name: str, **replaced: Any) -> Any:
     copy.__module__ = function.__module__
     copy.__doc__ = function.__doc__
     return copy
+
+
+def transplanted(function: Any, parts: Mapping[Any, Any]) -> Any:
+    """A copy of a kernel, and of all kernels it calls, with other objects in place of some.
+
+    `parts` says what stands for a kernel, a module or a builtin. So the copy computes with other
+    things than numbers.
+    """
+    code = dis.get_instructions(function)
+    named = {part.argval for part in code if part.opname == "LOAD_GLOBAL"}
+    replaced = {}
+    for name in named:
+        found = function.__globals__.get(name, getattr(builtins, name, None))
+        other = next((new for old, new in parts.items() if old is found), None)
+        if other is not None:
+            replaced[name] = other
+        elif is_kernel(found):
+            replaced[name] = transplanted(found, parts)
+    return with_globals(function, function.__name__, **replaced)
 
 
 def specialise(function: Any, name: str, **parts: Any) -> Any:

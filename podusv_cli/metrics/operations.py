@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dis
 import math
 import operator
 from collections.abc import Callable
@@ -12,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from podusv_cli.core.kernel import bundle, is_kernel, scratch, with_globals
+from podusv_cli.core.kernel import bundle, scratch, transplanted
 from podusv_cli.core.recording import Recording
 from podusv_cli.engine.replay import logged_rows
 from podusv_cli.engine.simulate import STATE, ClosedLoop
@@ -54,15 +53,7 @@ class Tally:
 
     def kernel(self, function: Any) -> Any:
         """The kernel, and all that it calls, with arithmetic that counts."""
-        code = dis.get_instructions(function)
-        named = {part.argval for part in code if part.opname == "LOAD_GLOBAL"}
-        names = {name: function.__globals__.get(name) for name in named}
-        replaced = {name: self.kernel(part) for name, part in names.items() if is_kernel(part)}
-        replaced |= {name: self for name, part in names.items() if part is math}
-        replaced |= {
-            name: partial(np.empty, dtype=object) for name, part in names.items() if part is scratch
-        }
-        return with_globals(function, function.__name__, **replaced)
+        return transplanted(function, {math: self, scratch: partial(np.empty, dtype=object)})
 
 
 @dataclass(eq=False, slots=True)

@@ -35,7 +35,11 @@ def default_folder(root: Path, name: str, resolved_yaml: str) -> Path:
     """
     stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
     digest = hashlib.sha256(resolved_yaml.encode()).hexdigest()[:8]
-    folder = root / name / f"{stamp}-{digest}"
+    return free_folder(root / name / f"{stamp}-{digest}")
+
+
+def free_folder(folder: Path) -> Path:
+    """The folder, or where that is taken the same name with a number appended."""
     return next(path for path in _numbered(folder) if not os.path.lexists(path))
 
 

@@ -1,0 +1,101 @@
+"""`podusv optimum`: the best that any law could do in a scenario."""
+
+from __future__ import annotations
+
+import sys
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from podusv_cli.cli import options
+from podusv_cli.cli.run import EXIT_CODES
+from podusv_cli.cli.terminal import Warnings, echo, echo_result, echo_table
+
+if TYPE_CHECKING:
+    from podusv_cli.workflows.optimum import Optimum
+
+
+class Minimise(StrEnum):
+    """The integrals that can be minimised."""
+
+    iae = "iae"
+    ise = "ise"
+
+
+def optimum(
+    config: options.Config,
+    assign: options.Assignments = None,
+    minimise: Annotated[
+        Minimise, typer.Option(help="Integral of the distance to the target, or of its square.")
+    ] = Minimise.iae,
+    step: Annotated[
+        float, typer.Option(min=1e-3, help="Step of the finest of three grids [s].")
+    ] = 0.1,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder for the results.", show_default="results/<name>/optimum"),
+    ] = None,
+    force: options.Force = False,
+    figures: options.Figures = True,
+    as_json: options.AsJson = False,
+    allow_large: options.AllowLarge = False,
+    quiet: options.Quiet = False,
+    plugin: options.Plugins = None,
+    controller: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME", help="Which of `controllers` to begin with.", show_default=False
+        ),
+    ] = "",
+) -> None:
+    """Find the motion of least error, knowing everything beforehand, and repeat it as a run.
+
+    Uses the scenario's vessel, actuator limits, disturbance, path and start; its law gives the
+    first guess only. The run can be compared and plotted like any other. Needs CasADi
+    (podusv[optimum]).
+    """
+    from podusv_cli.cli.progress import progress_bars
+    from podusv_cli.workflows import optimum as workflow  # heavy imports only when they are needed
+    from podusv_cli.workflows.run import Request
+
+    warned = Warnings(quiet)
+    request = Request(
+        assign or (), out, force, figures, sys.argv, warned, allow_large, plugin or (),
+        controller=controller,
+    )  # fmt: skip
+    try:
+        with progress_bars(wanted=not (quiet or as_json)) as bars:
+            done = workflow.optimum(Path(config), request, minimise.value, step, bars)
+    except KeyboardInterrupt:
+        text = f"{config}: interrupted before the optimum was found; nothing was written"
+        raise KeyboardInterrupt(text) from None
+    echo_result(done, lambda: _report(done), as_json=as_json, quiet=quiet)
+    for finding in done.run.warnings:
+        warned(finding)
+    for text in (done.run.message, *(part.traced for part in done.run.missing)):
+        if text:
+            echo(f"{config}: {text}", err=True)
+    raise typer.Exit(EXIT_CODES[done.run.status])
+
+
+def _report(done: Optimum) -> None:
+    from podusv_cli.optimum.collocation import TOLERANCE
+
+    name, unit = done.minimised, done.run.units[done.minimised]
+    rows = [
+        [f"{s.step:.4g} s", f"{s.integral:.7g}", str(s.iterations), f"{s.seconds:.1f} s"]
+        for s in done.stages
+    ]
+    echo_table(["step", f"{name} [{unit}]", "iterations", "time"], rows)
+    echo(f"a local optimum, to IPOPT's tolerance of {TOLERANCE:g}; another law as first guess may")
+    echo("lead to a lower one")
+    if name in done.run.metrics and done.departures:
+        away = done.departures
+        echo(
+            f"repeated by podusv: {name} {done.run.metrics[name]:.7g} {unit}; at most "
+            f"{away['position']:.2g} m from the optimum, where the feedback that holds it there "
+            f"added at most {away['feedback_u']:.2g} N and {away['feedback_r']:.2g} N m"
+        )
+    echo(f"{done.run.status}: {done.run.folder}")

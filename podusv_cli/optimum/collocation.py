@@ -1,0 +1,227 @@
+"""Direct collocation: the motion as unknowns on a time grid, solved by IPOPT through CasADi.
+
+Hermite-Simpson in its compressed form, with demands on straight lines between the grid's times; see
+Kelly, An introduction to trajectory optimization, SIAM Review 59 (2017), section 4. The plant is
+podusv's own kernel, evaluated on symbols.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from podusv_cli.core.elementary import cos_sin
+from podusv_cli.core.errors import NotConvergedError, UsageError
+from podusv_cli.core.kernel import Vector, bundle, transplanted
+from podusv_cli.optimum.problem import Motion, Problem
+from podusv_cli.process.interrupts import interrupts_caught, interrupts_deferred
+from podusv_cli.vessels.plant import plant
+from podusv_cli.vessels.vessel import Vessel
+
+TOLERANCE = 1e-8  # of IPOPT
+MOST_ITERATIONS = 1000
+GRIDS = 3  # each with half the step of the one before
+# The distance |e| has no slope at 0: it becomes sqrt(e^2 + s^2) - s with ever smaller s [m].
+SMOOTHED = {"iae": (0.3, 0.03, 1e-3, 1e-4), "ise": (0.0,)}
+BARRIER = 1e-4  # IPOPT's parameter where it starts from an optimum of another grid or smoothing
+WARM = {
+    "ipopt.warm_start_init_point": "yes",
+    "ipopt.warm_start_bound_push": 1e-6, "ipopt.warm_start_mult_bound_push": 1e-6,
+}  # fmt: skip
+STATES, UNKNOWNS = 6, 8
+Tell = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Stage:
+    """The optimum on one grid: its step [s], its integral without smoothing, and the work done."""
+
+    step: float
+    integral: float
+    iterations: int
+    seconds: float
+    motion: Motion
+
+
+def casadi() -> Any:
+    """The module casadi. Raises UsageError where it is not installed."""
+    try:
+        import casadi
+    except ImportError:
+        raise UsageError("podusv optimum needs CasADi: pip install 'podusv[optimum]'") from None
+    return casadi
+
+
+def dynamics(vessel: Vessel) -> Any:
+    """A CasADi function: the rate of the state (x, y, psi, u, v, r) under demand and load."""
+    ca = casadi()
+    kernel = transplanted(plant, {cos_sin: lambda a: (ca.cos(a), ca.sin(a)), float: lambda x: x})
+    x, demand, b = ca.SX.sym("x", STATES), ca.SX.sym("demand", 2), ca.SX.sym("b", 3)
+    rate: list[Any] = [0.0] * STATES
+    tau = [demand[0], 0.0, demand[1]]
+    kernel(ca.vertsplit(x), tau, ca.vertsplit(b), bundle(vessel.constants()), rate)
+    return ca.Function("dynamics", [x, demand, b], [ca.vertcat(*rate)])
+
+
+def refined(problem: Problem, guess: Motion, step: float, tell: Tell | None) -> Iterator[Stage]:
+    """The optimum on each of the grids, the last with this step or a little less.
+
+    Raises NotConvergedError. An interrupt ends the solver at its next iteration.
+    """
+    finest = 2 ** (GRIDS - 1)
+    count = max(1, int(np.ceil(problem.duration / step / finest - 1e-9)))
+    smoothed = SMOOTHED[problem.minimised]
+    for grid in range(GRIDS):
+        began, iterations = time.perf_counter(), 0
+        n, told = count * 2**grid, partial(_tell, tell, grid)
+        program = _Program(problem, n, told, fresh=grid == 0)
+        guess = guess.at(program.times)
+        for eps in smoothed:
+            guess = program.solved(guess, eps)
+            iterations += program.iterations
+        smoothed = smoothed[-2:]
+        seconds = time.perf_counter() - began
+        yield Stage(program.step, program.integral(guess), iterations, seconds, guess)
+
+
+def _tell(tell: Tell | None, grid: int, iterations: int) -> None:
+    if tell:  # nobody knows how many iterations there will be
+        tell("solving", (grid + iterations / (iterations + 50.0)) / GRIDS)
+
+
+class _Program:
+    """The nonlinear program of one grid of `n` equal steps."""
+
+    def __init__(
+        self, problem: Problem, n: int, told: Callable[[int], None], *, fresh: bool
+    ) -> None:
+        ca = casadi()
+        self.step = problem.duration / n
+        self.times: Vector = self.step * np.arange(n + 1, dtype=np.float64)
+        self.problem, self.n, self.told, self.iterations = problem, n, told, 0
+        between = self.times[:-1] + 0.5 * self.step
+        self._loads = [problem.loads(times.tolist()).T for times in (self.times, between)]
+        self._places = [problem.places(times.tolist()).T for times in (self.times, between)]
+        self._segment = _segment(problem, self.step)
+        w, eps = ca.MX.sym("w", UNKNOWNS * (n + 1)), ca.MX.sym("eps")
+        every = ca.reshape(w, UNKNOWNS, n + 1)
+        gaps, cost, _ = self._segment.map(n)(
+            every[:, :-1], every[:, 1:], *_thirds(*self._loads), *_thirds(*self._places),
+            ca.repmat(eps, 1, n),
+        )  # fmt: skip
+        self._nlp = {"x": w, "p": eps, "f": ca.sum2(cost), "g": ca.vec(gaps)}
+        self._warm: dict[str, Any] = {} if fresh else {"ipopt.mu_init": BARRIER}
+        self._multipliers: dict[str, Any] = {}
+
+    def solved(self, guess: Motion, eps: float) -> Motion:
+        """The optimum with this smoothing [m], from a guess on the grid."""
+        ca = casadi()
+        low, high = self._bounds()
+        own = {"ipopt.print_level": 0, "ipopt.sb": "yes", "print_time": False}
+        own |= {"ipopt.tol": TOLERANCE, "ipopt.max_iter": MOST_ITERATIONS}
+        with interrupts_caught() as here, interrupts_deferred():
+            watch = _watch(UNKNOWNS * (self.n + 1), STATES * self.n, self._look(here))
+            options = own | {"iteration_callback": watch} | self._warm
+            solver = ca.nlpsol("optimum", "ipopt", self._nlp, options)
+            start = np.hstack([guess.states, guess.demands]).clip(low, high).ravel()
+            found = solver(
+                x0=start, p=eps, lbx=low.ravel(), ubx=high.ravel(), lbg=0.0, ubg=0.0,
+                **self._multipliers,
+            )  # fmt: skip
+        told = solver.stats()
+        if not told["success"]:
+            raise NotConvergedError(
+                f"IPOPT found no optimum with a step of {self.step:g} s: {told['return_status']}; "
+                "try another --step, or another law for the first guess"
+            )
+        self.iterations = int(told["iter_count"])
+        self._warm = {"ipopt.mu_init": BARRIER, **WARM}
+        self._multipliers = {"lam_g0": found["lam_g"], "lam_x0": found["lam_x"]}
+        rows = np.array(found["x"]).reshape(self.n + 1, UNKNOWNS).clip(low, high)
+        return Motion(self.times, rows[:, :STATES], rows[:, STATES:])
+
+    def integral(self, motion: Motion) -> float:
+        """The integral of the distance or of its square, by Simpson's rule."""
+        rows = np.hstack([motion.states, motion.demands]).T
+        _, _, half = self._segment.map(self.n)(
+            rows[:, :-1], rows[:, 1:], *_thirds(*self._loads), *_thirds(*self._places), 0.0
+        )
+        distances = [
+            np.hypot(*(places - self._places[i]))
+            for i, places in enumerate((motion.states.T[:2], np.array(half)))
+        ]
+        ends, middle = (d if self.problem.minimised == "iae" else d**2 for d in distances)
+        return float(self.step / 6.0 * (ends[:-1] + 4.0 * middle + ends[1:]).sum())
+
+    def _bounds(self) -> tuple[Vector, Vector]:
+        """The least and the largest of every unknown; the first state is given."""
+        low = np.full((self.n + 1, UNKNOWNS), -np.inf)
+        low[:, STATES:] = -np.array(self.problem.loop.actuator.limits())
+        high = -low
+        low[0, :STATES] = high[0, :STATES] = self.problem.loop.start
+        return low, high
+
+    def _look(self, here: Any) -> Callable[[], bool]:
+        """A function for every iteration: tells of it, and whether an interrupt waits."""
+
+        def look() -> bool:
+            self.iterations += 1
+            self.told(self.iterations)
+            return bool(here.number)
+
+        return look
+
+
+def _thirds(ends: Vector, middle: Vector) -> tuple[Vector, Vector, Vector]:
+    """The columns at a segment's beginning, middle and end."""
+    return ends[:, :-1], middle, ends[:, 1:]
+
+
+def _segment(problem: Problem, h: float) -> Any:
+    """A CasADi function of one segment: its gaps, its share of the integral, its middle place."""
+    ca, rate = casadi(), dynamics(problem.loop.vessel)
+    before, after = ca.SX.sym("before", UNKNOWNS), ca.SX.sym("after", UNKNOWNS)
+    loads = [ca.SX.sym(f"b{i}", 3) for i in range(3)]
+    places = [ca.SX.sym(f"d{i}", 2) for i in range(3)]
+    eps = ca.SX.sym("eps")
+    x0, x1 = before[:STATES], after[:STATES]
+    f0, f1 = rate(x0, before[STATES:], loads[0]), rate(x1, after[STATES:], loads[2])
+    half = (x0 + x1) / 2.0 + h / 8.0 * (f0 - f1)
+    demand = (before[STATES:] + after[STATES:]) / 2.0
+    gaps = x1 - x0 - h / 6.0 * (f0 + 4.0 * rate(half, demand, loads[1]) + f1)
+    squares = [ca.sumsqr(x[:2] - d) for x, d in zip((x0, half, x1), places, strict=True)]
+    if problem.minimised == "iae":
+        squares = [ca.sqrt(square + eps**2) - eps for square in squares]
+    cost = h / 6.0 * (squares[0] + 4.0 * squares[1] + squares[2])
+    return ca.Function("segment", [before, after, *loads, *places, eps], [gaps, cost, half[:2]])
+
+
+def _watch(unknowns: int, gaps: int, look: Callable[[], bool]) -> Any:
+    """A CasADi callback that IPOPT calls after every iteration; `look` says whether to stop."""
+    ca: Any = casadi()
+    sizes = {"f": 1, "x": unknowns, "lam_x": unknowns, "g": gaps, "lam_g": gaps}
+
+    class Watch(ca.Callback):  # type: ignore[misc]
+        def __init__(self) -> None:
+            ca.Callback.__init__(self)
+            self.construct("watch", {})
+
+        def get_n_in(self) -> int:
+            return int(ca.nlpsol_n_out())
+
+        def get_n_out(self) -> int:
+            return 1
+
+        def get_sparsity_in(self, i: int) -> Any:
+            size = sizes.get(ca.nlpsol_out(i), 0)
+            return ca.Sparsity.dense(size) if size else ca.Sparsity(0, 0)
+
+        def eval(self, arguments: Any) -> list[float]:
+            return [float(look())]
+
+    return Watch()

@@ -1,0 +1,59 @@
+"""A motion as a schedule: its demand, and the gains that hold a vessel to it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from podusv_cli.core.kernel import Vector
+from podusv_cli.optimum.collocation import STATES, casadi, dynamics
+from podusv_cli.optimum.problem import Motion, Problem
+
+BANDWIDTH = 1.0  # rad/s, about that with which the vessel is held to the motion
+MOST_ROWS = 3500  # that fit into a resolved scenario
+HEADER = "t, tau_u, tau_r, x, y, psi, u, v, r, then the gains of tau_u and tau_r"
+
+
+def schedule(problem: Problem, motion: Motion) -> str:
+    """The rows of the law `schedule` that repeats the motion."""
+    gains = _gains(problem, motion).reshape(len(motion.times), -1)
+    every = -(-len(motion.times) // MOST_ROWS)
+    chosen = sorted({*range(0, len(motion.times), every), len(motion.times) - 1})
+    rows = np.column_stack([motion.times, motion.demands, motion.states])
+    lines = (
+        ", ".join([*(f"{x:.10g}" for x in rows[i]), *(f"{x:.4g}" for x in gains[i])])
+        for i in chosen
+    )
+    return "\n".join([HEADER, *lines, ""])
+
+
+def _gains(problem: Problem, motion: Motion) -> Vector:
+    """The gains of the linear-quadratic regulator along the motion, (2, 6) at each of its times.
+
+    From the end backwards, over matrices that are discretised by the trapezoidal rule. The weights
+    are 1 for every state, and for a demand what makes 1 m or 1 rad worth an acceleration of
+    BANDWIDTH squared.
+    """
+    vessel, h = problem.loop.vessel, float(motion.times[1] - motion.times[0])
+    weight = np.diag([vessel.m11**-2, vessel.m33**-2]) / BANDWIDTH**4
+    one = np.eye(STATES)
+    cost, gains = one, np.zeros((len(motion.times), 2, STATES))
+    for i, (A, B) in reversed(list(enumerate(zip(*_slopes(problem, motion), strict=True)))):
+        left = np.linalg.inv(one - 0.5 * h * A)
+        A_h, B_h = left @ (one + 0.5 * h * A), left @ (h * B)
+        gains[i] = np.linalg.solve(h * weight + B_h.T @ cost @ B_h, B_h.T @ cost @ A_h)
+        cost = h * one + A_h.T @ cost @ (A_h - B_h @ gains[i])
+    return gains
+
+
+def _slopes(problem: Problem, motion: Motion) -> tuple[Vector, Vector]:
+    """The rates' derivatives by state and by demand at each of the motion's times."""
+    ca, rate = casadi(), dynamics(problem.loop.vessel)
+    arguments: list[Any] = [ca.SX.sym(f"a{i}", size) for i, size in enumerate((STATES, 2, 3))]
+    both = ca.jacobian(rate(*arguments), ca.vertcat(*arguments[:2]))
+    found = ca.Function("slopes", arguments, [both]).map(len(motion.times))(
+        motion.states.T, motion.demands.T, problem.loads(motion.times.tolist()).T
+    )
+    columns = np.array(found).reshape(STATES, len(motion.times), STATES + 2).transpose(1, 0, 2)
+    return columns[:, :, :STATES], columns[:, :, STATES:]

@@ -1,0 +1,87 @@
+"""What is to be minimised, for which scenario; and what the solver cannot take."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from podusv_cli.core.errors import UsageError
+from podusv_cli.core.kernel import Vector, bundle
+from podusv_cli.engine.simulate import ClosedLoop
+from podusv_cli.scenario.model import Scenario
+
+Minimised = Literal["iae", "ise"]
+
+
+@dataclass(frozen=True)
+class Motion:
+    """States (a row of x, y, psi, u, v, r each) and demands (tau_u, tau_r) at these times [s]."""
+
+    times: Vector
+    states: Vector
+    demands: Vector
+
+    def at(self, times: Vector) -> Motion:
+        """The motion at other times, on straight lines between its own."""
+
+        def between(rows: Vector) -> Vector:
+            return np.column_stack([np.interp(times, self.times, column) for column in rows.T])
+
+        return Motion(times, between(self.states), between(self.demands))
+
+
+@dataclass(frozen=True)
+class Problem:
+    """The integral that is minimised over the motions of a closed loop's vessel."""
+
+    loop: ClosedLoop
+    duration: float
+    minimised: Minimised
+
+    def loads(self, times: Sequence[float]) -> Vector:
+        """The disturbance (b_u, b_v, b_r) at each of these times, a row each."""
+        disturbance = self.loop.disturbance
+        k, table = bundle(disturbance.constants()), disturbance.table()
+        rows = np.zeros((len(times), 3))
+        for t, row in zip(times, rows, strict=True):
+            disturbance.evaluate(t, np.zeros(6), k, table, row)
+        return rows
+
+    def places(self, times: Sequence[float]) -> Vector:
+        """Where the target is at each of these times, a row each."""
+        return self.loop.path.targets(times)[:, :2]
+
+
+def problem(scenario: Scenario, minimised: Minimised) -> Problem:
+    """The problem of a scenario. Raises UsageError for one that cannot be solved here."""
+    loop = scenario.closed_loop()
+    kinds = {
+        "disturbance": (
+            loop.disturbance.of_time,
+            "loads that depend on time alone (a disturbance that does declares `of_time`)",
+        ),
+        "actuator": (
+            _passes_on(loop),
+            "actuators that deliver the demand up to constant limits: ideal, saturated",
+        ),
+    }
+    for key, (fits, known) in kinds.items():
+        if not fits:
+            kind = getattr(loop, key).kind
+            raise UsageError(
+                f"{scenario.name}: {key}.kind: {kind} does not fit; podusv optimum knows {known}"
+            )
+    return Problem(loop, scenario.simulation.duration, minimised)
+
+
+def _passes_on(loop: ClosedLoop) -> bool:
+    """Whether the actuator has no state, and delivers demands within its limits as they are."""
+    actuator = loop.actuator
+    if actuator.states:
+        return False
+    half = 0.5 * np.minimum(actuator.limits(), 1.0)
+    given = actuator.settled(np.zeros(len(loop.start)), half)
+    return bool(np.allclose(given, [half[0], 0.0, half[1]], rtol=1e-12, atol=0.0))

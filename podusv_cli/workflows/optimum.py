@@ -1,0 +1,122 @@
+"""`podusv optimum`: the motion that minimises a scenario's error, repeated as a run of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from podusv_cli.controllers.schedule import Schedule
+from podusv_cli.core.errors import UsageError
+from podusv_cli.engine.check import check_law
+from podusv_cli.engine.simulate import STATE, simulate
+from podusv_cli.findings.finding import preflight, unknown_codes
+from podusv_cli.optimum import collocation
+from podusv_cli.optimum.collocation import Stage
+from podusv_cli.optimum.feedback import schedule
+from podusv_cli.optimum.problem import Minimised, Motion, Problem, problem
+from podusv_cli.scenario.limits import estimate, limits
+from podusv_cli.scenario.load import load, resolved_yaml
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.sections import Control
+from podusv_cli.storage.run_folder import RunWriter, free_folder, open_run
+from podusv_cli.workflows.execute import Finished, Task, check_figures, execute
+from podusv_cli.workflows.run import DRAWN, RESULTS, Request, single
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """An optimum on ever finer grids, and the run that repeats the last of them.
+
+    `departures` are the largest differences between run and optimum: of the position [m], and what
+    the feedback added in surge [N] and yaw [N m].
+    """
+
+    minimised: Minimised
+    stages: Sequence[Stage]
+    run: Finished
+    departures: dict[str, float]
+
+    @property
+    def folder(self) -> Path:
+        """Where the run lies."""
+        return self.run.folder
+
+    def as_json(self) -> dict[str, Any]:
+        """What `--json` prints of it."""
+        stages = [
+            {"step": s.step, "integral": s.integral, "iterations": s.iterations, "s": s.seconds}
+            for s in self.stages
+        ]
+        return {
+            **self.run.as_json(), "minimised": self.minimised, "grids": stages,
+            "tolerance": collocation.TOLERANCE, "departures": self.departures,
+        }  # fmt: skip
+
+
+def optimum(
+    config: Path, request: Request, minimised: Minimised, step: float,
+    progress: Progress | None = None,
+) -> Optimum:  # fmt: skip
+    """Find the optimum of a scenario from a run of its law, and write a run that repeats it.
+
+    `step` [s] is that of the finest grid. Raises UsageError without CasADi and for a scenario that
+    it cannot take, ScenarioError, LawError, NotConvergedError, StorageError.
+    """
+    collocation.casadi()
+    checks = (unknown_codes, limits(request.allow_large))
+    loaded = load(config, request.overrides, checks, request.plugins)
+    scenario = single(loaded, request.controller)
+    wanted = problem(scenario, minimised)
+    check_figures(scenario)
+    target = request.out or free_folder(RESULTS / scenario.name / "optimum")
+    with RunWriter(target, force=request.force, needed=estimate(scenario).needed):
+        pass  # a place that cannot be written to is told before anything is computed
+    stages = list(collocation.refined(wanted, _guess(scenario), step, progress))
+    repeated = _repeating(scenario, wanted, stages[-1].motion)
+    task = Task(
+        repeated, resolved_yaml(repeated), target, request.force, request.out is not None,
+        DRAWN if request.figures else (), request.argv, "optimum", preflight(repeated),
+    )  # fmt: skip
+    done = execute(task, progress and (lambda fraction: progress("repeating", fraction)))
+    return Optimum(minimised, stages, done, _departures(done.folder, stages[-1].motion))
+
+
+def _guess(scenario: Scenario) -> Motion:
+    """The run of the scenario's law. Raises LawError, UsageError where it diverges."""
+    loop = scenario.closed_loop()
+    check_law(loop)
+    log = simulate(loop, scenario.time_grid(), compiled=scenario.simulation.compiled)
+    if log.status == "interrupted":
+        raise KeyboardInterrupt
+    if log.status != "finished":
+        raise UsageError(
+            f"{scenario.name}: the search begins from a run of {log.controller}, which "
+            f"{log.message}; choose another law, as with --set controller.kind=pid"
+        )
+    states, demands = ([log[name] for name in names] for names in (STATE, ("tau_u", "tau_r")))
+    return Motion(log["time"], np.column_stack(states), np.column_stack(demands))
+
+
+def _repeating(scenario: Scenario, wanted: Problem, motion: Motion) -> Scenario:
+    """The scenario with the optimum in place of its law, which acts continuously."""
+    law = Schedule(rows=schedule(wanted, motion), minimises=wanted.minimised)
+    told = f"A motion of least {wanted.minimised}, found by podusv optimum."
+    changes = {"controller": law, "control": Control(), "description": told}
+    return scenario.model_copy(update=changes)
+
+
+def _departures(folder: Path, motion: Motion) -> dict[str, float]:
+    """How far the run of a folder is from the motion that it repeats, at most."""
+    log = open_run(folder).recording
+    if not len(log["time"]):
+        return {}
+    away = [np.interp(motion.times, log["time"], log[name]) for name in ("x", "y")]
+    position = np.hypot(away[0] - motion.states[:, 0], away[1] - motion.states[:, 1])
+    added = {name: float(abs(log[name]).max()) for name in ("feedback_u", "feedback_r")}
+    return {"position": float(position.max()), **added}

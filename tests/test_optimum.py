@@ -1,0 +1,243 @@
+"""`podusv optimum`: a motion that Pontryagin's principle gives, the plant on symbols, refusals."""
+
+import json
+import math
+import os
+import signal
+import sys
+from fractions import Fraction
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import pytest
+from command_samples import BASE
+from conftest import VESSELS
+
+from podusv_cli.core.component import Component
+from podusv_cli.core.errors import NotConvergedError, UsageError
+from podusv_cli.core.kernel import bundle, kernel, transplanted
+from podusv_cli.disturbances.base import Disturbance
+from podusv_cli.optimum import collocation
+from podusv_cli.optimum.problem import Motion, problem
+from podusv_cli.process.interrupts import interrupts_caught
+from podusv_cli.scenario.load import load, load_text
+from podusv_cli.storage.run_folder import open_run
+from podusv_cli.vessels.plant import plant
+
+REASON = "CasADi is not installed: podusv[optimum]"
+# A target ahead that keeps its distance: between them only the thrust acts. Yawing would help, as
+# turning abeam brakes without any force (the added mass is larger there), so the limit forbids it.
+CHASE = """
+vessel: {preset: paper, X_u: 0.0}
+path: {kind: line, x: 2.0, speed: 0.5}
+disturbance: {kind: none}
+actuator: {kind: saturated, surge_limit: 8.0, yaw_limit: 1e-6}
+start: {u: 0.5}
+simulation: {duration: 5.0}
+controller: {kind: pid, K_Pu: 100.0}
+"""
+
+
+def switching(distance: float, a: float, duration: float) -> tuple[float, float]:
+    """When to reverse full thrust so that the integral of |e| is least, and the time of e = 0.
+
+    With e'' = -a or a, e(0) = distance and e'(0) = 0. The costate of e' at t is the integral of
+    (s - t) sign(e(s)) from t to the end. It is zero at the switch where
+    (t_c - t)^2 = (T - t)^2/2, with e > 0 before t_c and e < 0 after it.
+    """
+
+    def caught(t: float) -> float:
+        return 2.0 * t - math.sqrt(2.0 * t * t - 2.0 * distance / a)
+
+    low, high = math.sqrt(distance / a) * (1 + 1e-12), math.sqrt(2.0 * distance / a)
+    for _ in range(200):
+        t = 0.5 * (low + high)
+        late = (math.sqrt(2.0) - 1.0) * t - math.sqrt(2.0) * caught(t) + duration > 0.0
+        low, high = (low, t) if late else (t, high)
+    return t, caught(t)
+
+
+def test_full_thrust_is_reversed_when_pontryagin_says_so():
+    pytest.importorskip("casadi", reason=REASON)
+    chase = load_text(CHASE, "a.yaml").scenario
+    a = 8.0 / chase.vessel.m11
+    t_s, t_c = switching(2.0, a, 5.0)
+    t = np.linspace(0.0, 5.0, 100_001)
+    e = np.where(t < t_s, 2 - a * t**2 / 2, 2 + a * (t - 2 * t_s) ** 2 / 2 - a * t_s**2)
+    assert 0.0 < t_s < t_c < 5.0
+    assert (e[t < t_c - 1e-3] > 0).all()
+    assert (e[t > t_c + 1e-3] < 0).all()  # what was assumed
+    guess = Motion(np.array([0.0, 5.0]), np.zeros((2, 6)), np.zeros((2, 2)))
+    *_, finest = collocation.refined(problem(chase, "iae"), guess, 0.05, None)
+    known = np.trapezoid(abs(e), t)
+    assert finest.integral == pytest.approx(known, rel=1e-4)
+    surge = finest.motion.demands[:, 0]
+    away = abs(finest.motion.times - t_s) > 0.06  # the step in which it is reversed
+    np.testing.assert_allclose(
+        surge[away], np.where(finest.motion.times < t_s, 8, -8)[away], atol=0.05
+    )
+
+
+def test_the_plant_on_symbols_is_the_plant():
+    pytest.importorskip("casadi", reason=REASON)
+    random = np.random.default_rng(3)
+    for vessel in VESSELS.values():
+        rate = collocation.dynamics(vessel)
+        for _ in range(20):
+            x, tau, b = random.normal(0, 1, 6), random.normal(0, 5, 3), random.normal(0, 1, 3)
+            tau[1] = 0.0
+            expected = np.zeros(6)
+            plant(x, tau, b, bundle(vessel.constants()), expected)
+            np.testing.assert_allclose(
+                np.array(rate(x, tau[[0, 2]], b)).ravel(), expected, rtol=1e-12, atol=1e-13
+            )
+
+
+@kernel
+def third(x):
+    return float(x) / 3.0
+
+
+@kernel
+def arithmetic(x):
+    return third(x) + math.sqrt(x)
+
+
+def test_a_kernel_is_transplanted_with_all_that_it_calls():
+    class Roots:
+        def sqrt(self, x):
+            return x / 2
+
+    found = transplanted(arithmetic, {math: Roots(), float: Fraction})
+    assert found(Fraction(1)) == Fraction(1) / 3.0 + Fraction(1, 2)
+    other = transplanted(arithmetic, {third: lambda x: -x, math: Roots()})
+    assert other(4.0) == -2.0
+    assert arithmetic(9.0) == 6.0  # as it was
+
+
+SHORT = BASE.replace("duration: 1.0", "duration: 8.0").replace("none", "harmonic")
+
+
+def test_the_command_writes_a_run_that_is_repeated_and_beats_the_law(podusv):
+    pytest.importorskip("casadi", reason=REASON)
+    Path("a.yaml").write_text(SHORT)
+    words = ("optimum", "a.yaml", "--step", "0.2", "--no-figures", "--json")
+    told = json.loads(podusv(*words, "--set", "control.period=0.1").out)
+    assert told["run"] == str(Path("results/a/optimum"))
+    assert told["metrics"]["iae"] == pytest.approx(told["grids"][-1]["integral"], rel=2e-3)
+    assert [grid["step"] for grid in told["grids"]] == pytest.approx([0.8, 0.4, 0.2])
+    assert told["departures"]["position"] < 0.01
+    assert podusv("run", "a.yaml", "--no-figures", "--out", "law").code == 0
+    assert told["metrics"]["iae"] < 0.96 * open_run(Path("law")).metrics["iae"]
+    assert podusv("rerun", "results/a/optimum").code == 0
+    repeated = load("results/a/optimum/resolved.yaml").scenario
+    assert repeated.controller.minimises == "iae"
+    assert repeated.control.period == 0.0  # it acts continuously, whatever the law does
+
+
+def test_grids_and_departures_are_told_and_a_second_optimum_has_a_name_of_its_own(podusv):
+    pytest.importorskip("casadi", reason=REASON)
+    Path("a.yaml").write_text(SHORT)
+    Path("results/a/optimum").mkdir(parents=True)
+    words = ("--minimise", "ise", "--step", "1", "--no-figures", "--set", "simulation.duration=4")
+    said = podusv("optimum", "a.yaml", *words)
+    assert said.code == 0, said.err
+    head, *grids = (line.split() for line in said.out.splitlines()[:4])
+    assert head == ["step", "ise", "[m2", "s]", "iterations", "time"]
+    assert [grid[:2] for grid in grids] == [["4", "s"], ["2", "s"], ["1", "s"]]
+    assert "a local optimum" in said.out
+    assert "repeated by podusv: ise" in said.out
+    assert said.out.splitlines()[-1] == f"finished: {Path('results/a/optimum-2')}"
+
+
+def test_the_square_has_an_optimum_of_its_own():
+    pytest.importorskip("casadi", reason=REASON)
+    scenario = load_text(SHORT, "a.yaml").scenario
+    guess = Motion(np.array([0.0, 8.0]), np.zeros((2, 6)), np.zeros((2, 2)))
+    found = {
+        name: [*collocation.refined(problem(scenario, name), guess, 0.4, None)][-1].motion
+        for name in ("iae", "ise")
+    }
+    places = problem(scenario, "iae").places(found["iae"].times)
+    away = {name: np.hypot(*(m.states[:, :2] - places).T) for name, m in found.items()}
+    for power, best, other in ((1, "iae", "ise"), (2, "ise", "iae")):
+        assert (away[best] ** power).sum() < (away[other] ** power).sum()
+
+
+def test_without_casadi_a_sentence_says_what_to_install(podusv, monkeypatch):
+    monkeypatch.setitem(sys.modules, "casadi", None)
+    Path("a.yaml").write_text(SHORT)
+    said = podusv("optimum", "a.yaml")
+    assert (said.code, said.out) == (2, "")
+    assert said.err == "podusv optimum needs CasADi: pip install 'podusv[optimum]'\n"
+    assert not Path("results").exists()
+
+
+class Leaning(Disturbance):
+    """A load that depends on the state, or does not say that it does not."""
+
+    kind: Literal["leaning"] = "leaning"
+
+
+def replaced(**parts: Component):
+    return load_text(SHORT, "a.yaml").scenario.model_copy(update=parts)
+
+
+def test_what_the_solver_cannot_take_is_refused_in_a_sentence():
+    pods = load_text(SHORT.replace("{kind: saturated}", "{kind: pod, preset: otter}"), "a.yaml")
+    with pytest.raises(UsageError) as raised:
+        problem(pods.scenario, "iae")
+    assert str(raised.value) == (
+        "a: actuator.kind: pod does not fit; podusv optimum knows actuators that deliver the "
+        "demand up to constant limits: ideal, saturated"
+    )
+    with pytest.raises(UsageError, match=r"a: disturbance\.kind: leaning does not fit"):
+        problem(replaced(disturbance=Leaning()), "iae")
+
+
+def test_an_interrupt_ends_the_solver_at_its_next_iteration():
+    pytest.importorskip("casadi", reason=REASON)
+    wanted = problem(load_text(SHORT, "a.yaml").scenario, "iae")
+    guess = Motion(np.array([0.0, 8.0]), np.zeros((2, 6)), np.zeros((2, 2)))
+    told = []
+
+    def interrupt(what: str, fraction: float) -> None:
+        told.append(fraction)
+        if len(told) == 3:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    with interrupts_caught(), pytest.raises(KeyboardInterrupt):
+        list(collocation.refined(wanted, guess, 0.4, interrupt))
+    assert 3 <= len(told) <= 4
+
+
+def test_a_solver_that_does_not_converge_is_told_and_nothing_is_written(podusv, monkeypatch):
+    pytest.importorskip("casadi", reason=REASON)
+    monkeypatch.setattr(collocation, "MOST_ITERATIONS", 1)
+    Path("a.yaml").write_text(SHORT)
+    said = podusv("optimum", "a.yaml", "--step", "0.5")
+    assert said.code == NotConvergedError.exit_code == 3
+    assert said.err.startswith("IPOPT found no optimum with a step of 2 s: Maximum_Iterations")
+    assert not list(Path().glob("results/a/*"))
+
+
+def test_a_law_that_diverges_is_no_beginning(podusv):
+    pytest.importorskip("casadi", reason=REASON)
+    Path("a.yaml").write_text(SHORT)
+    said = podusv(
+        "optimum", "a.yaml", "--set", "controller.K_Pu=1e9", "--set", "actuator.kind=ideal"
+    )
+    assert said.code == 2
+    assert "a: the search begins from a run of pid, which diverged at" in said.err
+
+
+def test_a_taken_place_is_told_before_anything_is_computed(podusv, monkeypatch):
+    pytest.importorskip("casadi", reason=REASON)
+    monkeypatch.setattr(collocation, "refined", None)
+    Path("a.yaml").write_text(SHORT)
+    Path("there").mkdir()
+    Path("there/mine").write_text("")
+    said = podusv("optimum", "a.yaml", "--out", "there")
+    assert said.code == 5
+    assert "there exists and is not a finished run folder" in said.err
