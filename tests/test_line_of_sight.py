@@ -1,0 +1,229 @@
+"""Laws with line-of-sight guidance: their frame, what is derived, and what they promise."""
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy as sp
+from conftest import NONLINEAR, ask, corrected, run, situations
+
+from podusv_cli.actuators.saturated import Saturated
+from podusv_cli.controllers.alos import CRAB, Alos, learning
+from podusv_cli.controllers.guidance import course_frame
+from podusv_cli.controllers.los_pid import LosPid
+from podusv_cli.controllers.velocity_loop import Axis
+from podusv_cli.core.kernel import bundle
+from podusv_cli.core.kinematics import wrap
+from podusv_cli.core.recording import Recording
+from podusv_cli.disturbances.harmonic import Harmonic, HarmonicDisturbance
+from podusv_cli.paths.circle import Circle
+from podusv_cli.paths.line import Line
+
+STEADY = HarmonicDisturbance(b_u=Harmonic(mean=0.5), b_v=Harmonic(mean=0.5), b_r=Harmonic(mean=0.5))
+WRONG = NONLINEAR.model_copy(update={"m": 20.0, "X_u": -1.5, "Y_vv": -20.0, "N_r": -1.0})
+LEARNING = [Alos(), Alos(learns="integral")]
+LAWS = [LosPid(), *LEARNING]
+
+
+@cache
+def task(law: Any) -> Recording:
+    """The paper's task, corrected, within its limits."""
+    return run(corrected(controller=law, actuator=Saturated()), 310.0)
+
+
+def steady(law: Any, path: Any, nominal: Any = NONLINEAR, duration: float = 250.0) -> Recording:
+    loop = corrected(
+        controller=law, actuator=Saturated(), disturbance=STEADY, path=path, nominal=nominal
+    )
+    return run(loop, duration)
+
+
+# --- the frame
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.kind)
+def test_the_frame_is_that_of_the_target_s_velocity(law):
+    k = bundle(law.constants_with(NONLINEAR))
+    for x, _, target in situations(law, 100):
+        at = course_frame(x, target, k)
+        course = np.angle(target[2] + 1j * target[3])
+        gap = (target[0] - x[0] + 1j * (target[1] - x[1])) * np.exp(-1j * course)
+        assert at.along == pytest.approx(gap.real, abs=1e-9)
+        assert at.across == pytest.approx(-gap.imag, abs=1e-9)
+        assert np.exp(1j * (x[2] - course)) == pytest.approx(at.cos_off + 1j * at.sin_off)
+
+
+def test_the_rate_of_the_error_across_is_its_derivative():
+    t = sp.Symbol("t")
+    x, y, x_d, y_d = (sp.Function(name)(t) for name in ("x", "y", "x_d", "y_d"))
+    course = sp.atan2(y_d.diff(t), x_d.diff(t))
+    across = (x_d - x) * sp.sin(course) - (y_d - y) * sp.cos(course)
+    names = "x0 y0 xd0 yd0 x1 y1 xd1 yd1 xd2 yd2"
+    numbers = sp.symbols(names)
+    places = [x, y, x_d, y_d]
+    swaps = [(f.diff(t, 2), n) for f, n in zip((x_d, y_d), numbers[8:], strict=True)]
+    swaps += [(f.diff(t), n) for f, n in zip(places, numbers[4:8], strict=True)]
+    swaps += list(zip(places, numbers[:4], strict=True))
+    rate = sp.lambdify(numbers, across.diff(t).subs(swaps))
+    k = bundle({**LosPid(chi_m=1e9).constants_with(NONLINEAR)})
+    for state, _, target in situations(LosPid(), 100):
+        over_ground = (state[3] + 1j * state[4]) * np.exp(1j * state[2])
+        velocity = (over_ground.real, over_ground.imag)
+        expected = rate(*state[:2], *target[:2], *velocity, *target[2:])
+        assert course_frame(state, target, k).across_rate == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_target_at_rest_is_chased_along_the_line_of_sight():
+    k = bundle(LosPid().constants_with(NONLINEAR))
+    at = course_frame(np.zeros(6), np.array([3.0, 4.0, 0, 0, 0, 0]), k)
+    assert (at.along, at.across) == pytest.approx((5.0, 0.0))
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.kind)
+def test_port_and_starboard_are_alike(law):
+    mirror, flip = np.array([1, -1, -1, 1, -1, -1.0]), np.array([1, -1, 1, -1, 1, -1.0])
+    parts = [signal for signal, _ in law.slots()]
+    own = np.array([1.0 if s.name in ("force_i", "u_hat", "b_obs_u") else -1.0 for s in parts])
+    for x, memory, target in situations(law, 30):
+        one = ask(law, x, memory, target, NONLINEAR)
+        other = ask(law, x * mirror, memory * own, target * flip, NONLINEAR)
+        np.testing.assert_allclose(other.tau, one.tau * [1, -1], rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(other.rate, one.rate * own, rtol=1e-9, atol=1e-9)
+        assert wrap(other.signals["psi_r"] + one.signals["psi_r"]) == pytest.approx(0, abs=1e-9)
+
+
+# --- los_pid
+
+
+def test_the_loops_have_all_poles_at_minus_omega():
+    s, w = sp.symbols("s w", positive=True)
+    speed = sp.Matrix([[-2 * w, 1], [-(w**2), 0]])
+    heading = sp.Matrix([[-3 * w, -3 * w**2, 1], [1, 0, 0], [0, -(w**3), 0]])
+    assert sp.expand((s * sp.eye(2) - speed).det() - (s + w) ** 2) == 0
+    assert sp.expand((s * sp.eye(3) - heading).det() - (s + w) ** 3) == 0
+    law = LosPid(omega_u=0.7, omega_psi=1.1)
+    axes = (Axis("surge", 25.8, 25.8, 0.0), Axis("yaw", 2.76, 2.76, 0.0))
+    for loop, matrix, omega in zip(
+        law.velocity_loops(axes, np.zeros(3)), (speed, heading), (0.7, 1.1), strict=True
+    ):
+        np.testing.assert_allclose(loop.matrix, np.array(matrix.subs(w, omega), float), atol=1e-12)
+
+
+def test_the_demand_is_that_of_the_loops():
+    """Derivatives of demand and integrals by the velocities, and by the heading."""
+    law, x, target = LosPid(), np.zeros(6), np.array([5.0, 0, 0.5, 0, 0, 0])
+    target[0] = 0.0  # on the target
+    x[3] = 0.5
+    surge, yaw = law.velocity_loops((Axis("surge", 1, 1, 0.0),) * 2, np.zeros(3))
+    inertia = np.repeat([NONLINEAR.m11, NONLINEAR.m33], 2)
+
+    def out(at: int, d: float) -> Any:
+        state = x.copy()
+        state[at] += d
+        found = ask(law, state, np.zeros(2), target, NONLINEAR)
+        return np.transpose([found.tau, found.rate]).ravel() / inertia
+
+    by_u, by_psi, by_r = ((out(at, 1e-6) - out(at, -1e-6)) / 2e-6 for at in (3, 2, 5))
+    np.testing.assert_allclose(by_u[:2], surge.matrix[:, 0], atol=1e-6)
+    np.testing.assert_allclose(by_r[2], yaw.matrix[0, 0], atol=1e-6)
+    np.testing.assert_allclose(by_psi[2:], [yaw.matrix[0, 1], yaw.matrix[2, 1]], atol=1e-6)
+
+
+def test_a_steady_cross_load_leaves_the_lookahead_times_the_tangent_of_the_crab_angle():
+    law = LosPid()
+    out = steady(law, Line(speed=0.5, course=0.3))
+    end = {name: out[name][-1] for name in ("along", "across", "u", "v", "psi")}
+    crab = np.arctan2(end["v"], end["u"])
+    assert end["across"] == pytest.approx(law.lookahead * np.tan(crab), rel=1e-6)
+    assert abs(end["across"]) > 0.2
+    assert abs(end["along"]) < 1e-6
+
+
+def test_without_the_loads_that_act_the_integrals_wind_up():
+    class Deaf(LosPid):
+        def wants_loads(self) -> bool:
+            return False
+
+    told, deaf = (
+        run(corrected(controller=kind(), actuator=Saturated(surge_limit=3.0)), 60.0)
+        for kind in (LosPid, Deaf)
+    )
+    assert abs(deaf["force_i"]).max() > 3 * 3.0
+    assert deaf["z_e"].max() > told["z_e"].max()
+    late = told["time"] > 40
+    assert deaf["z_e"][late].mean() > told["z_e"][late].mean()
+
+
+# --- alos
+
+
+def test_the_adapted_angle_makes_the_lyapunov_function_fall():
+    """V = D sqrt(D^2 + y^2) + U e^2/(2 gamma): V' = -U D y^2/(D^2 + y^2) for small e."""
+    y, e = sp.symbols("y e", real=True)
+    D, U, gamma = sp.symbols("D U gamma", positive=True)
+    y_rate = U * (-y + D * e) / sp.sqrt(D**2 + y**2)  # U sin(e - atan(y/D)) to first order in e
+    exact = U * sp.sin(e - sp.atan(y / D))
+    assert sp.simplify(sp.diff(exact, e).subs(e, 0) - sp.diff(y_rate, e)) == 0
+    e_rate = -gamma * D**2 * y / (D**2 + y**2)  # of the true less the learnt angle
+    V = D * sp.sqrt(D**2 + y**2) + U * e**2 / (2 * gamma)
+    fall = sp.diff(V, y) * y_rate + sp.diff(V, e) * e_rate
+    assert sp.simplify(fall + U * D * y**2 / (D**2 + y**2)) == 0
+    k = bundle(Alos().constants_with(NONLINEAR))
+    for across in (-30.0, -0.4, 0.1, 5.0):
+        known = -e_rate.subs({D: k.lookahead, y: across, gamma: k.gamma})
+        assert learning(across, 0.1, 0.0, k)[0] == pytest.approx(float(known), rel=1e-12)
+
+
+def test_the_integral_is_that_of_its_source():
+    k = bundle(Alos(learns="integral").constants_with(NONLINEAR))
+    y, shift, D = 0.7, -0.3, k.lookahead
+    expected = k.sigma * D * y / ((y + shift) ** 2 + D**2)
+    assert learning(y, 0.0, shift, k) == (0.0, pytest.approx(expected))
+
+
+@pytest.mark.parametrize("path", [Line(speed=0.5, course=0.3), Circle(radius=16.67, speed=0.5)])
+@pytest.mark.parametrize("law", LEARNING, ids=["adaptive", "integral"])
+def test_constant_loads_leave_no_offset_whatever_the_law_was_told(law, path):
+    for nominal in (NONLINEAR, WRONG):
+        assert steady(law, path, nominal)["z_e"][-1] < 1e-5
+
+
+@pytest.mark.parametrize("law", LEARNING, ids=["adaptive", "integral"])
+def test_what_it_learns_does_not_wind_up_on_a_long_approach(law):
+    """A start 10 m beside the line: no larger angle than the cross load needs, and a little."""
+    out = task(law)
+    true = np.arctan2(out["v"], out["u"])[(out["time"] > 60)]
+    assert abs(out["crab"]).max() < 2 * abs(true).max()
+    assert abs(out["offset"]).max() < 2 * law.lookahead
+
+
+def test_the_learnt_angle_stays_within_its_limit():
+    law = Alos(crab_m=0.05)
+    out = steady(law, Line(speed=0.5, course=0.3), duration=100.0)
+    assert abs(out["crab"]).max() < 0.05 + 1e-3
+    assert abs(out["crab"]).max() > 0.049
+    k = bundle(law.constants_with(NONLINEAR))
+    assert learning(1.0, 0.05, 0.0, k)[0] == 0.0
+    assert learning(-1.0, 0.05, 0.0, k)[0] < 0.0
+
+
+def test_memory_begins_with_the_observer():
+    names = [signal.name for signal, _ in Alos().slots()]
+    assert names[CRAB:] == ["crab", "offset"]
+
+
+# --- what they reach on the paper's task
+
+
+def rms(out: Recording, start: float, end: float = np.inf) -> float:
+    return float(np.sqrt(np.mean(out["z_e"][(out["time"] >= start) & (out["time"] <= end)] ** 2)))
+
+
+@pytest.mark.parametrize("law", LEARNING, ids=["adaptive", "integral"])
+def test_learning_the_crab_angle_is_worth_several_times_the_error_on_the_line(law):
+    plain, learnt = task(LAWS[0]), task(law)
+    assert rms(plain, 60, 100) > 0.3
+    assert rms(learnt, 60, 100) < 0.06
+    assert rms(learnt, 150) < 0.1
+    assert rms(learnt, 150) < 0.6 * rms(plain, 150)
