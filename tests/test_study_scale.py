@@ -1,7 +1,10 @@
 """The driver of a study with thousands of units and 200 workers, none of which simulates."""
 
 import resource
+import subprocess
+import sys
 import time
+from pathlib import Path
 
 import pytest
 from small_study import small
@@ -50,3 +53,25 @@ def test_five_thousand_units_cost_little_time_and_memory(tmp_path):
     assert driver <= march_time / len(WORKERS)  # or the workers would wait for it
     assert peak <= 250 * 2**20
     assert scan <= 5.0
+
+
+@pytest.mark.benchmark
+def test_a_million_runs(tmp_path):
+    script = Path(__file__).with_name("million_runs.py")
+    megabytes, seconds = {}, {}
+    for part in ("units", "runs", "report"):
+        command = [sys.executable, script, tmp_path / "study", part]
+        said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+        megabytes[part], seconds[part] = map(float, said.split())
+    print(f"memory {megabytes} MB, processor time {seconds} s")
+    assert max(megabytes["units"], megabytes["runs"]) <= 250
+    assert megabytes["report"] <= 300
+    assert seconds["report"] <= 60
+
+
+def test_a_worker_loads_nothing_large_that_it_does_not_need():
+    """They take 30 to 70 MB each, of 150 that a worker may have."""
+    large = {"scipy.stats", "pandas", "matplotlib", "jinja2"}
+    script = f"import sys, podusv_cli.study.remote; print({large} & set(sys.modules))"
+    command = [sys.executable, "-c", script]
+    assert subprocess.run(command, capture_output=True, text=True, check=True).stdout == "set()\n"

@@ -17,7 +17,7 @@ STUDIES = 2000
 
 
 def rank_correlation(x: np.ndarray, y: np.ndarray) -> float:
-    return st.rank_correlations({"x": st.ranks(x)}, y)["x"]
+    return st.rank_correlations({"x": st.standard(x)}, y)["x"]
 
 
 def binomial(k: int, n: int, p: float) -> float:

@@ -1,5 +1,6 @@
 """A study's folder: the same bytes however the runs were made, and nothing that is made is lost."""
 
+import errno
 import io
 import os
 import shutil
@@ -12,9 +13,11 @@ from small_study import made, small
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.engine.simulate import simulate
 from podusv_cli.study import march as marching
+from podusv_cli.study import runs_file, runs_writer
 from podusv_cli.study import unit as units
 from podusv_cli.study.draws import drawn, draws
 from podusv_cli.study.plan import watching
+from podusv_cli.study.results import judged
 from podusv_cli.study.store import BLOCK, RUNS, UNITS, Store, encoded, read, undamaged
 from podusv_cli.study.unit import Unit, UnitResult
 
@@ -164,3 +167,30 @@ def test_a_unit_of_any_name_is_read_as_it_was(law):
     assert undamaged(content, "other") is None
     with h5py.File(io.BytesIO(content), "r") as file:
         assert file["table"].shape == (2, 2)
+
+
+def test_a_full_disk_while_the_table_is_filled_keeps_the_units(whole, tmp_path, monkeypatch):
+    store, real, wrote = made(tmp_path / "study", part=(1, 9)), runs_writer.write_at, []
+    units_there = sorted((store.folder / UNITS).iterdir())
+    assert units_there
+
+    def limited(out, place, content):
+        wrote.append(place)
+        if len(wrote) == 30:
+            raise OSError(errno.ENOSPC, "full")
+        real(out, place, content)
+
+    monkeypatch.setattr(runs_writer, "write_at", limited)
+    with pytest.raises(StorageError, match=r"cannot write .*runs.h5: the disk is full"):
+        store.write_runs()
+    assert sorted((store.folder / UNITS).iterdir()) == units_there
+    assert not list(store.folder.glob("*runs.h5*"))
+    monkeypatch.undo()
+    assert content(made(store.folder)) == content(whole)
+
+
+def test_success_is_evaluated_once_for_each_law(whole, monkeypatch):
+    runs, real, times = whole.runs(), runs_file.succeeded, []
+    monkeypatch.setattr(runs_file, "succeeded", lambda *given: (times.append(1), real(*given))[1])
+    judged(whole.plan, runs)
+    assert len(times) == 2

@@ -79,7 +79,7 @@ class LogLayout(io.RawIOBase):
         out.truncate(self.size)
         for page, content in sorted(self._pages.items()):
             start = page * self.PAGE
-            _write_at(out, start, memoryview(content)[: max(0, self.size - start)])
+            write_at(out, start, memoryview(content)[: max(0, self.size - start)])
 
     def write(self, content: Any) -> int:
         """Write the content at the current position."""
@@ -214,10 +214,11 @@ def text(words: str) -> np.ndarray[tuple[()], np.dtype[np.bytes_]]:
 def _write_rows(out: BinaryIO, place: int, array: Vector, rows: slice) -> None:
     part = np.ascontiguousarray(array[rows], dtype="<f8")
     if part.size:
-        _write_at(out, place + rows.start * part[0].nbytes, part.reshape(-1).data.cast("B"))
+        write_at(out, place + rows.start * part[0].nbytes, part.reshape(-1).data.cast("B"))
 
 
-def _write_at(out: BinaryIO, place: int, content: memoryview) -> None:
+def write_at(out: BinaryIO, place: int, content: memoryview | bytes) -> None:
+    """Write all of it at a place of an unbuffered file. Raises OSError."""
     out.seek(place)
     while content:
         content = content[out.write(content) :]

@@ -17,7 +17,6 @@ from warnings import catch_warnings
 import numpy as np
 import numpy.typing as npt
 from pydantic import ValidationError
-from scipy.stats import qmc
 
 from podusv_cli.core.component import Component
 from podusv_cli.core.errors import PodusvError
@@ -100,6 +99,8 @@ def _random(sweep: Sweep, first: int, count: int, stream: str) -> dict[str, Vect
 
 def _sobol(sweep: Sweep, first: int, count: int, stream: str) -> dict[str, Vector]:
     """Sobol' points, each dimension shifted by the quantity's own digits."""
+    from scipy.stats import qmc  # takes 60 MB
+
     if not sweep.vary:
         return {}
     sequence = qmc.Sobol(len(sweep.vary), scramble=False, bits=SOBOL_BITS)

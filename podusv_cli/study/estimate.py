@@ -12,7 +12,7 @@ import numpy as np
 from podusv_cli.core.quantities import bytes_in_words, time_in_words
 from podusv_cli.process.workers import run_all
 from podusv_cli.scenario.limits import estimate as size_of_run
-from podusv_cli.study import runs_file
+from podusv_cli.study import runs_writer
 from podusv_cli.study.plan import Plan
 from podusv_cli.study.unit import Unit, make, prepare
 
@@ -128,7 +128,7 @@ def estimate(
         runs=sum(missing.values()), workers=workers,
         march=sum(count * paces[place] for place, count in missing.items() if place in paces),
         after=(report + each * logs[0], report + each * logs[1]),
-        table=runs_file.bytes_of(shape, len(plan.metrics), len(plan.sweep.vary)),
+        table=runs_writer.bytes_of(shape, len(plan.metrics), len(plan.sweep.vary)),
         kept=(logs[0], logs[1]), others=(others[0], others[1]),
         untimed=tuple(sorted({law for law, cell in missing if (law, cell) not in paces})),
     )  # fmt: skip

@@ -180,7 +180,7 @@ def _limited(
     runs, found = results.runs, dict[str, Vector]()
     rest = ast.BoolOp(ast.And(), [ast.Name(FINISHED), *others])
     for law in runs.laws:
-        read = {metric: runs.metric(law, metric) for metric in runs.metrics}
+        read = {metric: runs.metric(law, metric) for metric in runs.asked}
         held = succeeded(rest, read, runs.finished(law), results.known)[cell]
         values = np.where(held, runs.metric(law, name)[cell], np.inf)
         found[law] = values[runs.done(law)[cell]]

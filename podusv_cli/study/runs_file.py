@@ -1,12 +1,10 @@
-"""runs.h5: every run of a study in one table, written without holding it in memory."""
+"""runs.h5: every run of a study in one table; `runs_writer` writes it."""
 
 from __future__ import annotations
 
 import ast
 import hashlib
-import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -18,9 +16,6 @@ from podusv_cli.core.errors import StorageError
 from podusv_cli.core.kernel import Vector
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import METRICS
-from podusv_cli.process.temporary_names import temporary_name
-from podusv_cli.storage.files import new_file, storage_errors
-from podusv_cli.storage.log import FILE, UNDATED, LogLayout, describe
 from podusv_cli.study.expressions import FINISHED, parse_success, succeeded
 from podusv_cli.study.runs import Mask
 from podusv_cli.study.unit import BROKEN, MISSING, STATUSES, Codes, Unit, UnitResult
@@ -28,142 +23,15 @@ from podusv_cli.study.unit import BROKEN, MISSING, STATUSES, Codes, Unit, UnitRe
 AXES = ("law", "cell", "draw")
 SEAL = "sha256"  # of all other arrays, in the order of the file
 Known = Mapping[str, Metric]
-BLOCK = 2**22  # bytes hashed at a time
-ROWS = 4096  # runs read at a time
-HEAD = 1200  # bytes of what the file says of an array, roughly
+DRAWN = "drawn"  # the group of drawn quantities
+ROWS = 4096  # runs read or written at a time
 
 
-@dataclass(frozen=True)
-class Header:
-    """What the table is about: labels of the axes, the identity, what was drawn, and metrics."""
-
-    title: str
-    identity: str
-    laws: Sequence[str]
-    cells: Sequence[str]
-    wanted: int  # draws of each cell
-    draws: Mapping[str, Any]
-    metrics: Mapping[str, Metric]
-
-    @property
-    def shape(self) -> tuple[int, int, int]:
-        """Of every array of runs."""
-        return len(self.laws), len(self.cells), self.wanted
-
-
-def write(path: Path, header: Header, results: Sequence[UnitResult] | Any) -> None:
-    """Write the table, in place of an older one. `results` can be gone through more than once.
-
-    Raises StorageError; the older table is then still there.
-    """
-    part = path.with_name(temporary_name())
-    try:
-        causes = {
-            (header.laws.index(r.unit.law), r.unit.cell, r.unit.first + i): cause
-            for r in results for i, cause in enumerate(r.causes) if cause
-        }  # fmt: skip
-        places = _lay_out(part, header, dict(sorted(causes.items())))
-        with storage_errors(f"cannot write {path}"):
-            _fill(part, header, places, results)
-            os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)
-
-
-def _lay_out(
-    part: Path, header: Header, causes: Mapping[tuple[int, int, int], str]
-) -> dict[str, tuple[int, Any, tuple[int, ...]]]:
-    """Make the file with everything but the runs; offset, type and shape of the arrays of runs."""
-    layout = LogLayout()
-    with h5py.File(layout, "w", **FILE, **UNDATED) as file:
-        facts = {"title": header.title, "identity": header.identity, "status": " ".join(STATUSES)}
-        describe(file, facts)
-        scales = [_labels(file, "law", header.laws), _labels(file, "cell", header.cells)]
-        scales.append(_labels(file, "draw", np.arange(header.shape[2], dtype=np.int32)))
-        for name, numbers in header.draws.items():
-            file.create_dataset(f"drawn/{name}", data=_column(numbers))
-        file.create_dataset("failed_run", data=np.array(list(causes), np.int64).reshape(-1, 3))
-        file.create_dataset("failed_cause", data=_labelled(list(causes.values()) or [""]))
-        kinds: dict[str, Any] = {"status": np.uint8, "until": np.float64}
-        kinds |= dict.fromkeys(header.metrics, np.float64)
-        places = {n: _room(file, n, kind, header.shape, scales) for n, kind in kinds.items()}
-        for name, metric in header.metrics.items():
-            describe(file[name], {"units": metric.unit, "long_name": metric.meaning})
-        places[SEAL] = _room(file, SEAL, np.uint8, (64,), ())
-    with new_file(part, layout.size) as out:
-        layout.write_to(out)
-        out.truncate(max(layout.size, *(at + _size(k, s) for at, k, s in places.values())))
-    return places
-
-
-def bytes_of(shape: tuple[int, int, int], metrics: int, drawn: int) -> int:
-    """Roughly the size of a table of so many laws, cells and draws."""
-    of_a_run = 8 * (metrics + 1) + 1  # with `until` and `status`
-    return int(np.prod(shape)) * of_a_run + shape[2] * (4 + 8 * drawn) + HEAD * (metrics + 2)
-
-
-def _size(kind: Any, shape: tuple[int, ...]) -> int:
-    return int(np.dtype(kind).itemsize * np.prod(shape))
-
-
-def _room(
-    file: h5py.File, name: str, kind: Any, shape: tuple[int, ...], scales: Sequence[h5py.Dataset]
-) -> tuple[int, Any, tuple[int, ...]]:
-    """An array whose numbers podusv writes; its offset, type and shape."""
-    made = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
-    made.set_obj_track_times(False)
-    made.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
-    made.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
-    space, little = h5py.h5s.create_simple(shape), np.dtype(kind).newbyteorder("<")
-    made = h5py.h5d.create(file.id, name.encode(), h5py.h5t.py_create(little), space, made)
-    dataset = h5py.Dataset(made)
-    for position, scale in enumerate(scales):
-        dataset.dims[position].attach_scale(scale)
-    return made.get_offset(), little, shape
-
-
-def _labels(file: h5py.File, axis: str, labels: Any) -> h5py.Dataset:
-    content = _labelled(labels) if isinstance(labels[0], str) else labels
-    scale = file.create_dataset(axis, data=content)
-    scale.make_scale(axis)
-    return scale
-
-
-def _labelled(words: Sequence[str]) -> Any:
-    return np.array([str(word).encode() for word in words])
-
-
-def _column(drawn: Any) -> Any:
-    """A drawn quantity as HDF5 takes it: numbers, or words where any of the values is one."""
-    values = np.array(drawn.tolist()) if drawn.dtype.kind == "O" else drawn
-    return _labelled(values.tolist()) if values.dtype.kind == "U" else values
-
-
-def _fill(part: Path, header: Header, places: Mapping[str, Any], results: Iterable[Any]) -> None:
-    arrays = {
-        name: np.memmap(part, kind, "r+", offset, shape)
-        for name, (offset, kind, shape) in places.items()
-    }
-    seal = arrays.pop(SEAL)
-    for name, array in arrays.items():
-        array[...] = MISSING if name == "status" else np.nan
-    for result in results:
-        unit = result.unit
-        rows = (header.laws.index(unit.law), unit.cell, slice(unit.first, unit.first + unit.count))
-        arrays["status"][rows], arrays["until"][rows] = result.status, result.until
-        for name, numbers in result.metrics.items():
-            arrays[name][rows] = numbers
-    seal[...] = np.frombuffer(_digest(arrays.values()).encode(), np.uint8)
-    for array in (*arrays.values(), seal):
-        array.flush()
-
-
-def _digest(arrays: Iterable[Any]) -> str:
+def digest(pieces: Iterable[Any]) -> str:
+    """A digest of the bytes of arrays, given piece by piece."""
     found = hashlib.sha256()
-    for array in arrays:
-        flat = array.reshape(-1).view(np.uint8)
-        for start in range(0, len(flat), BLOCK):
-            found.update(flat[start : start + BLOCK])
+    for piece in pieces:
+        found.update(piece)
     return found.hexdigest()
 
 
@@ -172,7 +40,7 @@ class Table:
 
     def __init__(self, path: Path, success: str = FINISHED, known: Known = METRICS) -> None:
         """`success` is the expression for a run's. Raises StorageError for a damaged file."""
-        self.path, self._known = path, known
+        self.path, self._known, self._successes = path, known, dict[str, Mask]()
         self._success = parse_success(success, known)
         try:
             self._file = h5py.File(path, "r")
@@ -185,14 +53,14 @@ class Table:
 
     def check(self) -> None:
         """Raises StorageError where a number is not as it was written."""
-        arrays = (self._file[name][()] for name in ("status", "until", *self.metrics))
-        if _digest(arrays) != bytes(self._file[SEAL][()]).decode():
+        arrays = (self._file[name] for name in ("status", "until", *self.metrics))
+        if digest(law for array in arrays for law in array) != bytes(self._file[SEAL][()]).decode():
             raise StorageError(f"cannot read {self.path}: its numbers were altered")
 
     @cached_property
     def metrics(self) -> tuple[str, ...]:
         """The names of the metrics."""
-        own = {*AXES, "status", "until", "drawn", "failed_run", "failed_cause", SEAL}
+        own = {*AXES, "status", "until", DRAWN, "failed_run", "failed_cause", SEAL}
         return tuple(name for name in self._file if name not in own)
 
     def metric(self, law: str, name: str) -> Vector:
@@ -222,9 +90,12 @@ class Table:
         return np.isin(self.status(law), [STATUSES.index(word) for word in BROKEN])
 
     def success(self, law: str) -> Mask:
-        """Whether a run was a success."""
-        read = {name: self.metric(law, name) for name in self.asked}
-        return succeeded(self._success, read, self.finished(law), self._known)
+        """Whether a run was a success. Kept, as all tables and claims ask again and again."""
+        if law not in self._successes:
+            read = {name: self.metric(law, name) for name in self.asked}
+            found = succeeded(self._success, read, self.finished(law), self._known)
+            self._successes[law] = np.ascontiguousarray(found)
+        return self._successes[law]
 
     def failed(self, law: str) -> Mask:
         """Whether a run has a result and is no success."""
@@ -236,7 +107,7 @@ class Table:
         used = {part.id for part in ast.walk(self._success) if isinstance(part, ast.Name)}
         return [name for name in self._known if name in used]
 
-    @cached_property
+    @property
     def drawn(self) -> dict[str, Any]:
         """The drawn quantities, one entry a draw."""
         found: dict[str, Any] = {}
@@ -246,8 +117,8 @@ class Table:
                 content = thing[()]
                 found[name] = np.char.decode(content) if content.dtype.kind == "S" else content
 
-        if "drawn" in self._file:
-            self._file["drawn"].visititems(note)
+        if DRAWN in self._file:
+            self._file[DRAWN].visititems(note)
         return found
 
     @cached_property

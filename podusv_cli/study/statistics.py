@@ -193,22 +193,27 @@ def ranks(values: Vector) -> Vector:
     return np.asarray((np.cumsum(counts) - (counts - 1) / 2.0)[places])
 
 
+def standard(values: Vector) -> Vector:
+    """Ranks, shifted and scaled so that the sum of products of two is their correlation.
+
+    NaN where the values do not vary.
+    """
+    centred = ranks(values) - (len(values) + 1) / 2.0
+    length = np.sqrt(centred @ centred)
+    return centred / length if length > 0.0 else np.full(len(values), nan)
+
+
 def rank_correlations(quantities: Mapping[str, Vector], metric: Vector) -> dict[str, float]:
-    """Spearman's rank correlation of a metric with the ranks of every quantity; see `ranks`.
+    """Spearman's rank correlation of a metric with every quantity, given as `standard` makes it.
 
     Of the draws where the metric is known; NaN where one of the two does not vary.
     """
     known = ~np.isnan(metric)
-    y, whole = ranks(metric[known]), bool(known.all())
+    y, whole = standard(metric[known]), bool(known.all())
     return {
-        name: _correlation(x if whole else ranks(x[known]), y) for name, x in quantities.items()
+        name: float((x if whole else standard(x[known])) @ y) if len(y) else nan
+        for name, x in quantities.items()
     }
-
-
-def _correlation(x: Vector, y: Vector) -> float:
-    if not len(x) or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
-        return nan
-    return float(np.corrcoef(x, y)[0, 1])
 
 
 def by_chance(n: int, level: float) -> float:

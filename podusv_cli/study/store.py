@@ -19,6 +19,7 @@ import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +29,7 @@ import numpy as np
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.storage import files, json_files
 from podusv_cli.storage.run_folder import STUDY
-from podusv_cli.study import runs_file
+from podusv_cli.study import runs_file, runs_writer
 from podusv_cli.study.draws import table
 from podusv_cli.study.plan import Plan, digest, disagreements
 from podusv_cli.study.runs import Mask
@@ -107,12 +108,12 @@ class Store:
     def write_runs(self) -> None:
         """Put every run into runs.h5, and remove the units. Raises StorageError."""
         plan, known = self.plan, self.plan.scenario.known_metrics()
-        header = runs_file.Header(
+        header = runs_writer.Header(
             plan.scenario.name, self.seal, plan.laws, [cell.label for cell in plan.cells],
-            plan.sweep.draws, table(plan.sweep, 0, plan.sweep.draws),
+            plan.sweep.draws, partial(table, plan.sweep),
             {name: known[name] for name in plan.metrics},
         )  # fmt: skip
-        runs_file.write(self.folder / RUNS, header, _Again(self.results))
+        runs_writer.write(self.folder / RUNS, header, _Again(self.results))
         for path in (self.folder / UNITS).glob("*.h5"):
             path.unlink()
 

@@ -66,7 +66,8 @@ def sensitivity(
          "n": len(values), "correlation": correlation,
          "by_chance": statistics.by_chance(len(values), level)}
         for law in runs.laws for cell in range(len(runs.cells))
-        for ranked in [{q: statistics.ranks(numbers[q][runs.done(law)[cell]]) for q in numbers}]
+        for done in [runs.done(law)[cell]]
+        for ranked in [{q: statistics.standard(values[done]) for q, values in numbers.items()}]
         for name, values in _columns(runs, law, cell, metrics)
         for quantity, correlation in statistics.rank_correlations(ranked, values).items()
     ]  # fmt: skip
