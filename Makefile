@@ -27,7 +27,7 @@ STUDIES := hull_and_sea unknown_dynamics
 COMPARISONS := printed_compare figures_compare figures_compare_standoff corrected_compare
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce claim pod sweep docs test test-all test-faults test-oldest test-newest dist bench lint types contracts clean
+.PHONY: help reproduce claim pod sweep bench-laws docs test test-all test-faults test-oldest test-newest dist bench lint types contracts clean
 
 help: ## what can be made
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -62,6 +62,11 @@ pod: $(VENV)/run.done ## the laws behind a pod, into results/pod/
 	@rm -f results/pod.log
 	@for name in $(PODS); do $(STEP) compare pod $$name 0 || exit 1; done
 	@echo "what was found: results/pod.md; every table and figure: results/pod/*/report.html"
+
+bench-laws: $(VENV)/run.done ## all laws over standard tasks, into results/bench/
+	@$(BIN)/podusv bench --force --out results/.bench && mkdir -p results/bench && \
+	    cp results/.bench/leaderboard.md results/.bench/runs.csv results/bench
+	@echo "what was found: results/bench.md; the page: results/.bench/report.html"
 
 docs: $(VENV)/dev.done ## the documentation as a site, into site/index.html
 	@$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet -c docs -d build/doctrees . site

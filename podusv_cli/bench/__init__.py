@@ -1,0 +1,1 @@
+"""The bench: all laws over standard tasks, vessels and conditions, with ranks and failures."""

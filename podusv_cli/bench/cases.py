@@ -1,0 +1,103 @@
+"""The cases of a bench: every task with every vessel in every condition, as scenarios of all laws.
+
+A bench is a folder with `laws.yaml`, `tasks/`, `vessels/` and `conditions/`. Each file is a layer
+of a scenario. A condition that differs between vessels is a folder with a file for each of them.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+
+from podusv_cli.core.errors import UsageError
+from podusv_cli.scenario import shipped
+from podusv_cli.scenario.load import load_text
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.phrases import unknown
+
+LAWS = "laws.yaml"
+AXES = ("vessels", "tasks", "conditions")  # folders, in the order in which cases are numbered
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What of a bench is to be run: its folder, files with further laws, changes, and choices.
+
+    An empty choice means all; `overrides` are such as `simulation.step=0.005`.
+    """
+
+    folder: Path
+    laws: Sequence[Path] = ()
+    overrides: Sequence[str] = ()
+    chosen: Mapping[str, Sequence[str]] | None = None  # names by axis
+
+
+@dataclass(frozen=True)
+class Case:
+    """A task with a vessel in a condition, and a scenario for each law by its label."""
+
+    vessel: str
+    task: str
+    condition: str
+    laws: Mapping[str, Scenario]
+
+    @property
+    def place(self) -> tuple[str, str, str]:
+        """Vessel, task, condition."""
+        return self.vessel, self.task, self.condition
+
+
+def shipped_bench() -> Path:
+    """The folder of the bench that comes with podusv."""
+    return shipped.folder() / "bench"
+
+
+def cases(wanted: Wanted) -> Iterator[Case]:
+    """All cases, one by one. Raises UsageError for a folder or a name, ScenarioError for a file."""
+    vessels, tasks, conditions = (_chosen(wanted, axis) for axis in AXES)
+    for vessel, task, condition in product(vessels, tasks, conditions):
+        layers = [
+            wanted.folder / LAWS,
+            tasks[task],
+            vessels[vessel],
+            _for_vessel(conditions[condition], vessel),
+            *wanted.laws,
+        ]
+        names = json.dumps([str(layer.absolute()) for layer in layers])
+        text = (
+            f"extends: {names}\nname: {task}-{condition}-{vessel}\n"
+            f"description: {task}, {condition}, {vessel}\n"
+        )
+        loaded = load_text(
+            text, str(wanted.folder / f"{task}, {condition}, {vessel}"), wanted.overrides
+        )
+        yield Case(vessel, task, condition, loaded.scenario.singles())
+
+
+def _chosen(wanted: Wanted, axis: str) -> dict[str, Path]:
+    """Files, or folders of conditions, by name."""
+    if not (wanted.folder / axis).is_dir():
+        raise UsageError(
+            f"{wanted.folder} is no bench: it has no folder {axis}; a bench has {LAWS} and the "
+            f"folders {', '.join(AXES)}"
+        )
+    paths = sorted((wanted.folder / axis).iterdir())
+    known = {path.stem: path for path in paths if path.suffix == ".yaml" or path.is_dir()}
+    names = (wanted.chosen or {}).get(axis) or known
+    for name in names:
+        if name not in known:
+            raise UsageError(unknown(f"{axis.rstrip('s')} {name!r}", name, known))
+    return {name: known[name] for name in names}
+
+
+def _for_vessel(condition: Path, vessel: str) -> Path:
+    """The condition's file for a vessel. Raises UsageError where it has none."""
+    if condition.suffix == ".yaml":
+        return condition
+    path = condition / f"{vessel}.yaml"
+    if not path.is_file():
+        raise UsageError(f"{condition} has no file for the vessel {vessel}: write {path}")
+    return path

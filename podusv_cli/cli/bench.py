@@ -1,0 +1,74 @@
+"""`podusv bench`: all laws over standard tasks."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from podusv_cli.cli import options
+from podusv_cli.cli.terminal import echo, echo_result, echo_table
+
+if TYPE_CHECKING:
+    from podusv_cli.workflows.bench import Benched
+
+SOME_CRASHED = 3
+Names = Annotated[list[str] | None, typer.Option(metavar="NAME", help="Only this; repeatable.")]
+
+
+def bench(
+    folder: Annotated[
+        Path | None,
+        typer.Argument(
+            help="Folder with laws, tasks, vessels, conditions.", show_default="podusv's"
+        ),
+    ] = None,
+    laws: Annotated[
+        list[Path] | None,
+        typer.Option(help="Scenario with further `controllers`; repeatable.", show_default=False),
+    ] = None,
+    task: Names = None,
+    vessel: Names = None,
+    condition: Names = None,
+    assign: options.Assignments = None,
+    out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("results/bench"),
+    force: options.Force = False,
+    workers: Annotated[
+        int, typer.Option(min=0, help="Processes at a time.", show_default="one a core")
+    ] = 0,
+    figures: options.Figures = True,
+    as_json: options.AsJson = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Run every law over every task, vessel and condition, and write a leaderboard.
+
+    A law of your own takes part by --laws FILE, a scenario with `controllers` (and `plugins`).
+    Exit code 3 where a law crashed; laws that diverge or miss their target are results.
+    """
+    from podusv_cli.bench.cases import Wanted, shipped_bench  # heavy imports only when needed
+    from podusv_cli.cli.progress import progress_bars
+    from podusv_cli.workflows import bench as workflow
+
+    chosen = {"tasks": task or (), "vessels": vessel or (), "conditions": condition or ()}
+    wanted = Wanted(folder or shipped_bench(), laws or (), assign or (), chosen)
+    request = workflow.Request(out, force, figures, workers, sys.argv)
+    with progress_bars(wanted=not (quiet or as_json)) as bars:
+        done = workflow.bench(wanted, request, bars)
+    echo_result(done, lambda: _report(done), as_json=as_json, quiet=quiet)
+    for lack in done.missing:
+        echo(lack, err=True)
+    raise typer.Exit(SOME_CRASHED if done.crashed else 0)
+
+
+def _report(done: Benched) -> None:
+    from podusv_cli.bench.page import number
+
+    rows = [
+        [str(law), f"{row.mean_rank:.2f}", f"{row.failed:.0f} of {row.cases:.0f}",
+         number(row.median_ratio), f"{100 * row.close:.0f} %"]
+        for law, row in done.board.iterrows()
+    ]  # fmt: skip
+    echo_table(["law", "mean rank", "failed", "median IAE / best", "within 10 %"], rows)
+    echo(f"{len(done.runs)} runs: {done.folder / 'report.html'}")

@@ -1,0 +1,141 @@
+"""`podusv bench`: a folder of laws, tasks, vessels and conditions in, a leaderboard out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from podusv_cli.bench import page, standing
+from podusv_cli.bench.cases import Case, Wanted, cases
+from podusv_cli.bench.runs import BenchRun, crashed, play, warm_up
+from podusv_cli.pages.page import Picture
+from podusv_cli.process.extras import Extras
+from podusv_cli.process.interrupts import interrupts_deferred
+from podusv_cli.process.workers import Outcome, run_all
+from podusv_cli.storage import provenance
+from podusv_cli.storage.run_folder import RunWriter
+
+Progress = Callable[[str, float], None]
+RUNS, BOARD, REPORT, ORIGIN = "runs.csv", "leaderboard.md", "report.html", "provenance.json"
+DIGITS = "%.6g"
+
+
+@dataclass(frozen=True)
+class Request:
+    """The options of `podusv bench`; see its help."""
+
+    out: Path
+    force: bool = False
+    figures: bool = True
+    workers: int = 0
+    argv: Sequence[str] = ()
+
+
+@dataclass(frozen=True)
+class Benched:
+    """A finished bench: its folder, a row for each run, and what could not be made."""
+
+    folder: Path
+    runs: pd.DataFrame
+    missing: tuple[str, ...] = ()
+
+    @property
+    def board(self) -> pd.DataFrame:
+        """The leaderboard, a row for each law."""
+        return standing.leaderboard(self.runs)
+
+    @property
+    def crashed(self) -> int:
+        """Runs of laws that raised or hung."""
+        return int((self.runs.status == "crashed").sum())
+
+    def as_json(self) -> dict[str, Any]:
+        """What `--json` prints."""
+        board = self.board.astype(object).where(self.board.notna(), None)
+        return {
+            "format": 1, "folder": str(self.folder), "runs": len(self.runs),
+            "leaderboard": board.reset_index().to_dict("records"), "missing": self.missing,
+        }  # fmt: skip
+
+
+def bench(wanted: Wanted, request: Request, progress: Progress | None = None) -> Benched:
+    """Simulate every law in every case and write the leaderboard.
+
+    Raises UsageError, ScenarioError, LawError before anything is simulated, StorageError, and
+    KeyboardInterrupt; then nothing is written.
+    """
+    started, every, extras = datetime.now(UTC), list(cases(wanted)), Extras()
+    with RunWriter(request.out, force=request.force) as writer:
+        for case in every:
+            warm_up(case)
+        runs = list(_simulated(every, request, progress))
+        made = standing.table(runs)
+        with interrupts_deferred():
+            draw = (lambda: _drawn(runs, made)) if request.figures else list
+            figures: list[Picture] = extras.attempt("figures", draw) or []
+            plugins = dict.fromkeys(
+                p for case in every for law in case.laws.values() for p in law.plugged
+            )
+            origin = provenance.collect(request.argv, started, datetime.now(UTC), plugins)
+            _write(writer, made, figures, origin)
+            writer.add_missing(extras)
+            return Benched(writer.finish("finished"), made, tuple(map(str, extras.missing)))
+
+
+def _simulated(
+    every: Sequence[Case], request: Request, progress: Progress | None
+) -> Iterator[BenchRun]:
+    def advance(position: int, fraction: float) -> None:
+        if progress:
+            progress("cases", (position + fraction) / len(every))
+
+    jobs = [partial(_play, case) for case in every]
+    outcomes = run_all(jobs, advance, request.workers)
+    if any(outcome.interrupted for outcome in outcomes):
+        raise KeyboardInterrupt("interrupted; nothing was written")
+    for case, outcome in zip(every, outcomes, strict=True):
+        yield from outcome.result or _lost(case, outcome)
+
+
+def _play(case: Case, tell: Callable[[float], None]) -> list[BenchRun]:
+    runs = play(case)
+    tell(1.0)
+    return runs
+
+
+def _lost(case: Case, outcome: Outcome) -> list[BenchRun]:
+    """All laws of a case whose process ended."""
+    return [crashed(case, law, outcome.failure) for law in case.laws]
+
+
+def _drawn(runs: Sequence[BenchRun], made: pd.DataFrame) -> list[Picture]:
+    from podusv_cli.bench.figures import profiles, tracks  # matplotlib is slow to import
+    from podusv_cli.figures.style import house_style, image
+
+    laws = list(standing.leaderboard(made).index)
+    with house_style():
+        caption = "performance profiles: share of all cases by ratio to the best law's IAE"
+        drawn = [Picture("profiles", caption, image(profiles(made), "svg"))]
+        for vessel in dict.fromkeys(run.place[0] for run in runs):
+            shown = [run for run in runs if run.place[0] == vessel]
+            caption = f"tracks of {vessel}; path grey, failed runs orange, all conditions; north up"
+            svg = image(tracks(shown, laws), "svg")
+            drawn.append(Picture(f"tracks-{vessel}", caption, svg))
+    return drawn
+
+
+def _write(
+    writer: RunWriter, made: pd.DataFrame, figures: Sequence[Picture], origin: dict[str, Any]
+) -> None:
+    writer.add(RUNS, made.to_csv(index=False, lineterminator="\n", float_format=DIGITS).encode())
+    writer.add(BOARD, page.as_markdown(made).encode())
+    writer.add(REPORT, page.page(made, figures, origin).encode())
+    writer.add_json(ORIGIN, origin)
+    for figure in figures:
+        writer.add(f"figures/{figure.name}.svg", figure.svg)

@@ -1,0 +1,194 @@
+"""The bench: cases from layers, ranks and ratios by hand, failures contained, laws of one's own."""
+
+import json
+import math
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from plugin_samples import LAW
+
+from podusv_cli.bench.cases import AXES, Case, Wanted, cases, shipped_bench
+from podusv_cli.bench.page import as_markdown, page
+from podusv_cli.bench.runs import FAILED, BenchRun, play
+from podusv_cli.bench.standing import leaderboard, middle, profile, table
+from podusv_cli.core.errors import ScenarioError, UsageError
+from podusv_cli.scenario.load import load_text
+
+LAYERS = {
+    "laws.yaml": "vessel: {preset: paper_nonlinear}\n"
+    "controllers: {pid: {kind: pid}, li: {kind: backstepping}}\n"
+    "simulation: {step: 0.02, duration: 2.0}\nmetrics: {settling_radius: 30.0}\n"
+    "start: {x: -10.0, y: -10.0}\nactuator: {kind: saturated}\n",
+    "tasks/line.yaml": "path: {kind: line}\n",
+    "tasks/circle.yaml": "path: {kind: circle}\n",
+    "vessels/model.yaml": "{}\n",
+    "vessels/otter.yaml": "vessel: {preset: otter}\n",
+    "conditions/calm.yaml": "disturbance: {kind: none}\n",
+    "conditions/told/model.yaml": "extends: ../calm.yaml\n"
+    "nominal: {preset: paper_nonlinear, m: 30.0}\n",
+    "conditions/told/otter.yaml": "extends: ../calm.yaml\nnominal: {preset: otter, m: 60.0}\n",
+}
+
+
+@pytest.fixture
+def bench(tmp_path):
+    folder = tmp_path / "bench"
+    for name, text in LAYERS.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text)
+    return folder
+
+
+def made_up(law, task, iae, status="finished"):
+    numbers = {"iae": iae, "z_e_steady": 0.1 * iae}
+    return BenchRun(("ship", task, "calm"), law, status, "", numbers, np.zeros((2, 4)))
+
+
+RUNS = [
+    made_up("a", "one", 10.0), made_up("b", "one", 12.0), made_up("c", "one", 30.0, "diverged"),
+    made_up("a", "two", 8.0, FAILED), made_up("b", "two", 4.0), made_up("c", "two", 4.2),
+    made_up("a", "three", 5.0), made_up("b", "three", 5.0), made_up("c", "three", 1.0, "crashed"),
+]  # fmt: skip
+
+
+def test_ratios_are_to_the_best_law_that_reached_its_target_and_failures_share_the_last_ranks():
+    made = table(RUNS).set_index(["task", "law"])
+    assert made.ratio["one"].tolist() == [1.0, 1.2, math.inf]
+    assert made.ratio["two"].tolist() == pytest.approx([math.inf, 1.0, 1.05])
+    assert made["rank"]["one"].tolist() == [1.0, 2.0, 3.0]
+    assert made["rank"]["two"].tolist() == [3.0, 1.0, 2.0]
+    assert made["rank"]["three"].tolist() == [1.5, 1.5, 3.0]
+
+
+def test_the_leaderboard_counts_what_the_table_has():
+    board = leaderboard(table(RUNS))
+    assert board.index.tolist() == ["b", "a", "c"]
+    assert board.failed.tolist() == [0, 1, 2]
+    assert board.mean_rank.tolist() == pytest.approx([4.5 / 3, 5.5 / 3, 8.0 / 3])
+    assert board.median_ratio.tolist() == [1.0, 1.0, math.inf]
+    assert board.close.tolist() == pytest.approx([2 / 3, 2 / 3, 1 / 3])
+
+
+def test_a_case_that_no_law_does_has_no_best_law():
+    made = table([made_up("a", "one", 10.0, FAILED), made_up("b", "one", 12.0, "diverged")])
+    assert made.ratio.tolist() == [math.inf, math.inf]
+    assert made["rank"].tolist() == [1.5, 1.5]
+    assert "✗" in as_markdown(made)
+
+
+def test_half_the_failures_make_an_infinite_median():
+    assert middle([1.0, math.inf]) == math.inf
+    assert middle([1.0, 2.0, math.inf]) == 2.0
+
+
+def test_a_profile_ends_at_the_share_of_cases_that_the_law_does():
+    ratios = np.array([0.99, 1.0, 1.05, 1.2, 1e9])
+    assert profile(table(RUNS), "b", ratios).tolist() == pytest.approx([0, 2 / 3, 2 / 3, 1, 1])
+    assert profile(table(RUNS), "c", ratios).tolist() == pytest.approx([0, 0, 1 / 3, 1 / 3, 1 / 3])
+
+
+def test_cases_are_every_task_with_every_vessel_in_every_condition(bench):
+    found = {case.place: case for case in cases(Wanted(bench))}
+    names = (("model", "otter"), ("circle", "line"), ("calm", "told"))
+    assert list(found) == list(product(*names))
+    told = found["otter", "line", "told"].laws["li"]
+    assert (told.vessel.m, told.nominal.m) == (55.0, 60.0)
+    assert told.path.kind == "line"
+    assert found["model", "circle", "calm"].laws["pid"].disturbance.kind == "none"
+
+
+def test_choices_and_changes_are_taken(bench):
+    chosen = {"tasks": ["line"], "vessels": ["otter"], "conditions": ["told"]}
+    (case,) = cases(Wanted(bench, overrides=["simulation.duration=3"], chosen=chosen))
+    assert case.place == ("otter", "line", "told")
+    assert case.laws["pid"].simulation.duration == 3.0
+
+
+@pytest.mark.parametrize(
+    ("chosen", "told"),
+    [
+        ({"tasks": ["lime"]}, "unknown task 'lime'; did you mean 'line'?"),
+        ({"vessels": ["boat"]}, "unknown vessel 'boat'"),
+    ],
+)
+def test_an_unknown_name_is_told_with_those_that_there_are(bench, chosen, told):
+    with pytest.raises(UsageError, match=told.replace("?", r"\?")):
+        list(cases(Wanted(bench, chosen=chosen)))
+
+
+def test_a_folder_without_tasks_and_a_condition_without_its_vessel_are_told(bench, tmp_path):
+    with pytest.raises(UsageError, match="it has no folder vessels"):
+        list(cases(Wanted(tmp_path)))
+    (bench / "conditions/told/otter.yaml").unlink()
+    with pytest.raises(UsageError, match="no file for the vessel otter"):
+        list(cases(Wanted(bench)))
+
+
+def test_a_mistake_in_a_layer_is_told_with_its_file_and_line(bench):
+    (bench / "tasks/line.yaml").write_text("path: {kind: lime}\n")
+    with pytest.raises(ScenarioError, match=r"line\.yaml:1:14: path\.kind"):
+        list(cases(Wanted(bench)))
+
+
+def test_a_law_that_fails_is_a_row_and_costs_no_other(bench):
+    text = f"extends: {json.dumps(str(bench / 'laws.yaml'))}\nname: x\npath: {{kind: line}}\n"
+    far = load_text(text, "x", ["metrics.settling_radius=0.001", "disturbance={kind: none}"])
+    wild = ["controllers.pid.K_Pu=1e9", "actuator={kind: ideal}", "disturbance={kind: none}"]
+    laws = {
+        "far": far.scenario.singles()["li"],
+        "wild": load_text(text, "x", wild).scenario.singles()["pid"],
+        "good": load_text(text, "x", ["disturbance={kind: none}"]).scenario.singles()["pid"],
+    }
+    found = {run.law: run for run in play(Case("ship", "line", "calm", laws))}
+    assert {law: run.status for law, run in found.items()} == {
+        "far": FAILED, "wild": "diverged", "good": "finished",
+    }  # fmt: skip
+    assert found["wild"].cause.startswith("diverged at t = ")
+    assert ";" not in found["wild"].cause
+    assert "m away over the steady window" in found["far"].cause
+    alone = laws["good"].observer()
+    assert set(found["good"].metrics) == set(alone.summary(np.zeros(alone.size)))
+    assert found["good"].track[0].tolist() == [-10.0, -10.0, 0.0, 0.0]
+
+
+def test_the_command_writes_table_board_and_page_and_takes_a_law_of_one_s_own(bench, podusv):
+    (bench.parent / "my_law.py").write_text(LAW)
+    own = bench.parent / "own.yaml"
+    own.write_text("plugins: [my_law.py]\ncontrollers: {mine: {kind: cross_track}}\n")
+    said = podusv("bench", str(bench), "--laws", str(own), "--out", "out", "--condition", "calm")
+    assert said.code == 0, said.err
+    assert "12 runs: out/report.html" in said.out
+    runs = pd.read_csv("out/runs.csv")
+    assert sorted(set(runs.law)) == ["li", "mine", "pid"]
+    assert len(runs) == 12
+    assert runs.groupby(["vessel", "task"])["rank"].sum().tolist() == [6.0] * 4
+    written = Path("out/report.html").read_text()
+    for part in ("<td>mine</td>", "Case by case", "data:image/svg+xml", "otter"):
+        assert part in written
+    again = podusv("bench", str(bench), "--out", "out")
+    assert again.code == 5
+    assert "--force replaces it" in again.err
+
+
+def test_text_of_users_is_escaped_on_the_page():
+    made = table([made_up("<b>", "one", 10.0)])
+    assert "<td><b></td>" not in page(made, [], {"argv": "<i>"})
+    assert "&lt;i&gt;" in page(made, [], {"argv": "<i>"})
+
+
+def test_every_file_of_the_shipped_bench_makes_a_case_that_is_valid():
+    folder = shipped_bench()
+    names = {axis: sorted(p.stem for p in (folder / axis).iterdir()) for axis in AXES}
+    assert len(names["tasks"]) >= 8
+    assert len(names["conditions"]) == 5
+    every = {"vessels": names["vessels"], "tasks": ["line"], "conditions": names["conditions"]}
+    tasks = {"vessels": ["otter"], "conditions": ["calm"]}
+    made = [*cases(Wanted(folder, chosen=every)), *cases(Wanted(folder, chosen=tasks))]
+    assert {case.task for case in made} == set(names["tasks"])
+    for case in made:
+        for law in case.laws.values():
+            assert not law.conflicts()
+            assert law.metrics.settling_radius == 2.0
