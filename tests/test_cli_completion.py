@@ -74,7 +74,7 @@ def test_commands_and_options_are_offered_and_nothing_heavy_is_imported(
         ("podusv verify a.yaml --set vessel.preset=ot", {"vessel.preset=otter"}),
         ("podusv compare a.yaml --set log.mon", {"log.monitor=true", "log.monitor=false"}),
         ("podusv plot x --figure sta", {"stability"}),
-        ("podusv explain ia", {"iae", "iae_e"}),
+        ("podusv explain ia", {"iae", "iae_e", "iae_of_optimum"}),
         ("podusv explain near-t", {"near-target"}),
         ("podusv explain controller.pid.K_P", {"controller.pid.K_Pu", "controller.pid.K_Pr"}),
         ("podusv init pod/k", {"pod/kept"}),

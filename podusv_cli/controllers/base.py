@@ -100,6 +100,10 @@ class Controller(Component):
         """How a law that points at the target drives towards it; None for any other law."""
         return None
 
+    def optimum_of(self) -> str:
+        """The metric that its motion minimises among all motions of the task; empty for laws."""
+        return ""
+
     def lyapunov(self) -> Any:
         """The law itself where (46) is its Lyapunov function, see `theory.monitor`; else None."""
         return None

@@ -92,6 +92,10 @@ class Schedule(Controller):
             raise ValueError("the times of the schedule do not increase from line to line")
         return self
 
+    def optimum_of(self) -> str:
+        """What `minimises` says."""
+        return "" if self.minimises == "nothing" else self.minimises
+
     def constants(self) -> dict[str, float]:
         """The fields' choices, how many rows there are, and how many numbers in each of them."""
         rows, columns = _rows(self.rows).shape

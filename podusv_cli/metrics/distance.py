@@ -84,6 +84,15 @@ ise = Metric(
     "ise", "m2 s", "integral of z_e^2", OF, gathered(SQUARE), 1, counts_standoff=True,
     symbol=r"\int z_e^2\,\mathrm{d}t",
 )  # fmt: skip
+iae_of_optimum = Metric(
+    "iae_of_optimum", "1", "iae over that of the optimum of the same task", place=1,
+    counts_standoff=True,
+)  # fmt: skip
+ise_of_optimum = Metric(
+    "ise_of_optimum", "1", "ise over that of the optimum of the same task", place=1,
+    counts_standoff=True,
+)  # fmt: skip
+OF_OPTIMUM = {"iae": iae_of_optimum, "ise": ise_of_optimum}  # known to comparisons only
 itae = Metric(
     "itae", "m s2", "integral of t z_e", OF, gathered(TIMED), 1, counts_standoff=True,
     symbol=r"\int t\,z_e\,\mathrm{d}t",

@@ -18,14 +18,23 @@ HEADER = "t, tau_u, tau_r, x, y, psi, u, v, r, then the gains of tau_u and tau_r
 def schedule(problem: Problem, motion: Motion) -> str:
     """The rows of the law `schedule` that repeats the motion."""
     gains = _gains(problem, motion).reshape(len(motion.times), -1)
-    every = -(-len(motion.times) // MOST_ROWS)
-    chosen = sorted({*range(0, len(motion.times), every), len(motion.times) - 1})
+    chosen = _chosen(motion.demands)
     rows = np.column_stack([motion.times, motion.demands, motion.states])
     lines = (
         ", ".join([*(f"{x:.10g}" for x in rows[i]), *(f"{x:.4g}" for x in gains[i])])
         for i in chosen
     )
     return "\n".join([HEADER, *lines, ""])
+
+
+def _chosen(demands: Vector) -> list[int]:
+    """The rows that a schedule has: all, or every so many and those where the demand bends most."""
+    last, half = len(demands) - 1, MOST_ROWS // 2
+    if last < MOST_ROWS:
+        return list(range(last + 1))
+    bends = abs(np.diff(demands, 2, axis=0))
+    sharpest = np.argsort((bends / bends.max(axis=0).clip(1e-300)).sum(axis=1))[-half:] + 1
+    return sorted({*range(0, last, -(-last // half)), *sharpest.tolist(), last})
 
 
 def _gains(problem: Problem, motion: Motion) -> Vector:

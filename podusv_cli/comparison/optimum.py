@@ -1,0 +1,44 @@
+"""Runs held against an optimum of the same task, where one of the compared runs is one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from podusv_cli.comparison.entries import Entry
+from podusv_cli.metrics.distance import OF_OPTIMUM
+from podusv_cli.process.extras import Extras, Missing
+
+TASK = ("vessel", "start", "path", "disturbance", "actuator")
+
+
+def related(entries: Sequence[Entry], extras: Extras) -> list[Entry]:
+    """The entries, each with its ratio to the optimum among them that has the same task.
+
+    A run of another task has no ratio; `extras` says what differs.
+    """
+    found = list(entries)
+    for metric, ratio in OF_OPTIMUM.items():
+        optima = [e for e in entries if e.scenario.controller.optimum_of() == metric]
+        for i, entry in enumerate(found):
+            same = [other for other in optima if not any(_other(entry, other))]
+            if same:
+                least = min(other.metric(metric) for other in same)
+                cost = {**entry.cost, ratio.name: entry.metric(metric) / least}
+                found[i] = replace(entry, cost=cost)
+            elif optima:
+                what = ", ".join(_other(entry, optima[0]))
+                why = f"the optimum {optima[0].label} has another {what}"
+                extras.missing.append(Missing(f"{ratio.name} of {entry.label}", why))
+    return found
+
+
+def _other(entry: Entry, other: Entry) -> Iterator[str]:
+    """The keys of the task in which the two differ."""
+    one, two = entry.scenario, other.scenario
+    for key in TASK:
+        numbers = key == "vessel" and one.vessel.constants() == two.vessel.constants()
+        if not numbers and getattr(one, key) != getattr(two, key):
+            yield key
+    if one.simulation.duration != two.simulation.duration:
+        yield "simulation.duration"
