@@ -179,14 +179,12 @@ def test_the_heatmap_has_every_cell_in_its_place(whole):
 
 def test_a_study_with_runs_missing_is_preliminary(whole, tmp_path):
     config = written(tmp_path / "small.yaml")
-    sweep.run(
-        config,
-        sweep.Request(("sweep.draws=6",), tmp_path / "s", workers=1, shard=(1, 2)),
-        lambda t: None,
-    )
+    request = sweep.Request(("sweep.draws=6",), tmp_path / "s", workers=1, shard=(1, 2))
+    sweep.run(config, request, lambda tally: None)
     done = sweep.report(tmp_path / "s", sweep.Request(figures=False))
     answer = section(tree((tmp_path / "s" / "report.html").read_text()), "answer")
-    assert "Preliminary: 6 of 12 runs are made" in answer.text
+    assert "Preliminary: 3 of 6 draws that all 2 laws have." in answer.text
+    assert "6 of 12 runs are made" in answer.text
     assert done.results.made == 6
 
 

@@ -124,6 +124,8 @@ def _report(done: Swept) -> None:
             echo(line)
         echo(f"study: {done.folder}")
         return
+    if done.results.preliminary:
+        echo(f"{done.results.preliminary}; {_next(done)}")
     echo_table(*done.results.cells())
     for v in done.results.verdicts:
         echo_entry(v.name, v.claim.says, v.evidence(), facts=v.verdict)

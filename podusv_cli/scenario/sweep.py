@@ -108,3 +108,8 @@ class Sweep(Component):
     level: float = value(0.95, "", "confidence of all intervals", gt=0.5, lt=1)
     keep: Keep = value(Keep(), "", "runs of which a full run folder is wanted")
     claims: dict[str, StudyClaim] = value({}, "", "what the study is to judge, by name")
+
+    @property
+    def independent(self) -> bool:
+        """Whether draws are independent, which all intervals need."""
+        return self.design == "random"

@@ -190,6 +190,13 @@ def _keep(scenario: Scenario, sweep: Sweep) -> Faults:
 
 
 def _claims(scenario: Scenario, sweep: Sweep) -> Faults:
+    if sweep.claims and not sweep.independent:
+        remedy = f"`claims: {{{next(iter(sweep.claims))}: null}}`"
+        yield (
+            ("sweep", "design"),
+            "Sobol' points are not independent, so the intervals that judge claims do not hold for "
+            f"them; write design: random, or take out each claim, as in {remedy}",
+        )
     metrics, laws = _metrics(scenario), tuple(singles(scenario))
     try:
         parse_success(sweep.success, metrics)

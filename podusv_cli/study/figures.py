@@ -136,7 +136,9 @@ def correlations(sensitivity: pd.DataFrame, columns: int = 1) -> Figure:
     for place, law in enumerate(table.columns):
         at = np.arange(len(table)) + (place - (count - 1) / 2) * 0.8 / count
         axes.barh(at, table[law], 0.7 / count, color=look(place)[0], label=escaping.figure(law))
-    axes.axvspan(-chance, chance, color="#E4E4E4", linewidth=0.0, zorder=0.0, label="by chance")
+    if np.isfinite(chance):
+        look_of_chance: dict[str, Any] = {"color": "#E4E4E4", "linewidth": 0.0, "zorder": 0.0}
+        axes.axvspan(-chance, chance, label="by chance", **look_of_chance)
     axes.axvline(0.0, **TARGET_LOOK)
     axes.set_yticks(range(len(table)), [escaping.figure(name) for name in table.index])
     axes.set_ylim(len(table) - 0.4, -0.6)

@@ -85,7 +85,7 @@ def export(runs: Table, path: Path) -> None:
 
 
 def _frame(runs: Table, law: str, cell: int) -> pd.DataFrame:
-    done = runs.done(law)[cell]
+    done = runs.tried(law)[cell]
     drawn = {name: values[done] for name, values in runs.drawn.items()}
     words = np.array(STATUSES)[runs.status(law)[cell][done]]
     numbers = {name: runs.metric(law, name)[cell][done] for name in runs.metrics}

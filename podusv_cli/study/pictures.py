@@ -113,17 +113,20 @@ def _met(results: Results, name: str, cell: int) -> dict[str, Vector]:
     }  # fmt: skip
 
 
+def _bands(level: float) -> str:
+    return "" if np.isnan(level) else f"; the bands are {100 * level:g} % intervals of each share"
+
+
 def _distribution(results: Results, name: str, cell: int) -> Iterator[Sketch]:
     from podusv_cli.study.figures import distributions
 
-    values, level = _met(results, name, cell), results.plan.sweep.level
+    values, level = _met(results, name, cell), results.level
     if values:
         yield Sketch(
             _named(f"distribution-{name}", results, cell),
             f"distribution of {name} over all draws{_at(results, cell)}: "
             f"{results.known[name].meaning}; a curve that is higher has smaller values, and one "
-            f"that ends below 100 % has failed runs; the bands are {100 * level:g} % intervals of "
-            "each share",
+            f"that ends below 100 % has failed runs{_bands(level)}",
             partial(distributions, values, _label(results, name), level, COLUMNS),
         )
 
@@ -131,14 +134,14 @@ def _distribution(results: Results, name: str, cell: int) -> Iterator[Sketch]:
 def _ratios(results: Results, name: str) -> Iterator[Sketch]:
     from podusv_cli.study.figures import ratios
 
-    pairs, cells = results.pairs, results.runs.cells[:MOST_CELLS]
+    pairs, cells, level = results.pairs, results.runs.cells[:MOST_CELLS], results.level
     if len(pairs) and len(rows := pairs[(pairs.metric == name) & pairs.cell.isin(cells)]):
         yield Sketch(
             f"ratios-{name}",
-            f"ratio of {name} between two laws in the same draw: its median with a "
-            f"{100 * results.plan.sweep.level:g} % interval; below 1, the law named first has the "
-            f"smaller value; wins are draws in which a law is better by more than "
-            f"{100 * float(rows.margin.iloc[0]):g} %",
+            f"ratio of {name} between two laws in the same draw: its median"
+            f"{'' if np.isnan(level) else f' with a {100 * level:g} % interval'}; below 1, the law "
+            f"named first has the smaller value; wins are draws in which a law is better by more "
+            f"than {100 * float(rows.margin.iloc[0]):g} %",
             partial(ratios, rows, COLUMNS),
         )
 
@@ -146,13 +149,13 @@ def _ratios(results: Results, name: str) -> Iterator[Sketch]:
 def _failures(results: Results, cell: int) -> Iterator[Sketch]:
     from podusv_cli.study.figures import failure_rates
 
-    level = results.plan.sweep.level
+    level = results.level
     for name, threshold, values in _thresholds(results, cell):
         yield Sketch(
             _named(f"failures-{name}", results, cell),
             f"failed draws{_at(results, cell)} if success asked for another threshold of {name}: "
             f"the vertical line is the study's own, {threshold:g}; each curve ends at the share of "
-            f"runs that fail whatever the threshold; bands are {100 * level:g} % intervals",
+            f"runs that fail whatever the threshold{_bands(level)}",
             partial(failure_rates, values, _label(results, name), threshold, level, COLUMNS),
         )
 
@@ -225,12 +228,14 @@ def _correlations(results: Results, name: str, cell: int) -> Iterator[Sketch]:
     if not len(table):
         return
     rows = table[(table.metric == name) & (table.cell == results.runs.cells[cell])]
+    by_chance = "; the band is what quantities without influence reach by chance"
+    by_chance = "" if np.isnan(results.level) else by_chance
     if rows.correlation.notna().any():
         yield Sketch(
             _named(f"sensitivity-{name}", results, cell),
             f"what {name} depends on{_at(results, cell)}: rank correlation with the drawn "
-            "quantities that matter most to any law; the band is what quantities without influence "
-            "reach by chance; correlations see rising and falling influence only",
+            f"quantities that matter most to any law{by_chance}; correlations see rising and "
+            "falling influence only",
             partial(correlations, rows, COLUMNS),
         )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -60,7 +60,6 @@ def page(
         scenario=plan.scenario,
         sweep=plan.sweep,
         several=len(results.runs.cells) > 1,
-        preliminary=results.made < results.wanted,
         answers=_answers(results.verdicts),
         claims=[(v, [*bars(p, v)]) for p, v in zip(results.parsed, results.verdicts, strict=True)],
         laws=list(_laws(results)),
@@ -96,7 +95,7 @@ def _laws(results: Results) -> Iterator[tuple[str, str, str, str, list[str]]]:
         law, cell = map(str, at)
         one, medians = rows.iloc[0], rows.set_index("metric").q50
         failed = f"{round(one.failed * one.n)} of {one.n}"
-        share = f"{100 * one.failed_low:.3g} to {100 * one.failed_high:.3g} %"
+        share = _interval(100 * one.failed_low, 100 * one.failed_high, "{:.3g}".format, " %")
         yield (
             law,
             cell,
@@ -141,7 +140,14 @@ def _short_of(results: Results, law: str, cell: int, draw: int) -> str:
 def _pairs(results: Results) -> list[Any]:
     """The rows of the shown metrics, in their order."""
     rows: list[Any] = results.pairs.to_dict("records")
+    for row in rows:
+        row["interval"] = _interval(row["ratio_low"], row["ratio_high"], "{:.4g}".format)
     return [row for name in results.shown for row in rows if row["metric"] == name]
+
+
+def _interval(low: float, high: float, words: Callable[[float], str], unit: str = "") -> str:
+    """Both ends, or `-` where there is no interval."""
+    return f"{words(low)} to {words(high)}{unit}" if low == low else "-"
 
 
 def _numbers(results: Results) -> list[list[str]]:
@@ -150,7 +156,7 @@ def _numbers(results: Results) -> list[list[str]]:
     return [
         [one["law"], one["cell"], one["metric"], one["unit"],
          *(digits(one[q]) for q in ("q05", "q25", "q50")),
-         f"{digits(one['q50_low'])} to {digits(one['q50_high'])}",
+         _interval(one["q50_low"], one["q50_high"], digits),
          *(digits(one[q]) for q in ("q75", "q95"))]
         for one in rows if one["metric"] in results.shown
     ]  # fmt: skip

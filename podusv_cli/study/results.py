@@ -44,12 +44,27 @@ class Results:
     @cached_property
     def made(self) -> int:
         """How many runs there are."""
-        return sum(int(np.sum(self.runs.done(law))) for law in self.runs.laws)
+        return sum(int(np.sum(self.runs.tried(law))) for law in self.runs.laws)
+
+    @property
+    def preliminary(self) -> str:
+        """How many draws the answer is about, in words; "" where none is missing."""
+        if self.made == self.wanted:
+            return ""
+        draws, laws = int(np.sum(self.runs.common, axis=1).min()), len(self.runs.laws)
+        cells = " of each cell" if len(self.runs.cells) > 1 else ""
+        of = f"that all {laws} laws have" if laws > 1 else "that are made"
+        return f"preliminary: {draws:,} of {self.runs.wanted:,} draws{cells} {of}"
 
     @property
     def wanted(self) -> int:
         """How many runs were asked for."""
         return len(self.runs.laws) * len(self.runs.cells) * self.runs.wanted
+
+    @property
+    def level(self) -> float:
+        """The confidence of all intervals; NaN where the draws allow none."""
+        return self.plan.sweep.level if self.plan.sweep.independent else np.nan
 
     @property
     def shown(self) -> list[str]:
@@ -72,12 +87,13 @@ class Results:
             return ["-"] * (1 + len(self.shown))
         first = mine.iloc[0]
         share, low, high = (100.0 * first[name] for name in ("failed", "failed_low", "failed_high"))
-        failed = f"{share:.3g} % [{low:.3g}, {high:.3g}]"
+        failed = f"{share:.3g} %" + (f" [{low:.3g}, {high:.3g}]" if low == low else "")
         return [failed, *(digits(mine.q50.get(name, np.nan)) for name in self.shown)]
 
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints."""
         return {
+            "preliminary": self.preliminary,
             "broken": self.broken,
             "summary": self.summary.to_dict("records"),
             "claims": [one.as_json() for one in self.verdicts],
@@ -98,9 +114,12 @@ def judged(plan: Plan, runs: Table) -> Results:
         claims.ParsedClaim(name, claim, claims.parse(claim.expect, plan.laws, known))
         for name, claim in sweep.claims.items()
     ]
-    return Results(
-        plan, runs, summary.summary(runs, sweep.level, known),
-        summary.pairs(runs, MARGIN, sweep.level, known),
+    tables = (
+        summary.summary(runs, sweep.level, known), summary.pairs(runs, MARGIN, sweep.level, known),
         summary.sensitivity(runs, runs.drawn, sweep.level, known),
-        parsed, claims.judge(parsed, runs, sweep.level, known),
     )  # fmt: skip
+    laws, pairs, sensitivity = (
+        table if sweep.independent else summary.without_intervals(table) for table in tables
+    )
+    verdicts = claims.judge(parsed, runs, sweep.level, known)
+    return Results(plan, runs, laws, pairs, sensitivity, parsed, verdicts)

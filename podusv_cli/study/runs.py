@@ -37,7 +37,7 @@ class Runs(Protocol):
         """A metric of every run; NaN where the run has none of this name."""
 
     def done(self, law: str) -> Mask:
-        """Whether the run was tried at all; the arrays mean nothing where it was not."""
+        """Whether the run was tried and is to count; the arrays mean nothing where it was not."""
 
     def finished(self, law: str) -> Mask:
         """Whether the run reached its end."""

@@ -77,9 +77,18 @@ class Table:
         """The time that every run of a law reached [s]."""
         return np.asarray(self._file["until"][self.laws.index(law)])
 
-    def done(self, law: str) -> Mask:
+    def tried(self, law: str) -> Mask:
         """Whether a run was tried."""
         return np.not_equal(self.status(law), MISSING)
+
+    @cached_property
+    def common(self) -> Mask:
+        """The draws (cell, draw) that all laws were tried on."""
+        return np.asarray(np.logical_and.reduce([self.tried(law) for law in self.laws]))
+
+    def done(self, law: str) -> Mask:
+        """The same for every law, so that an unfinished study compares them on the same draws."""
+        return self.common
 
     def finished(self, law: str) -> Mask:
         """Whether a run reached its end."""

@@ -141,7 +141,7 @@ class Store:
         }
         for earlier in self._earlier():
             for (law, cell), mask in there.items():
-                mask[: earlier.wanted] = earlier.done(law)[cell]
+                mask[: earlier.wanted] = earlier.tried(law)[cell]
         for path in (self.folder / UNITS).glob("*.h5"):
             if unit := undamaged(_content(path), self.seal):
                 there[unit.law, unit.cell][unit.first : unit.draws.stop] = True

@@ -74,6 +74,12 @@ def sensitivity(
     return pd.DataFrame(rows)
 
 
+def without_intervals(frame: pd.DataFrame) -> pd.DataFrame:
+    """The table with nothing in all columns that need independent draws."""
+    ends = [c for c in frame.columns if c.endswith(("_low", "_high")) or c == "by_chance"]
+    return frame.assign(**dict.fromkeys(ends, np.nan))
+
+
 def as_csv(frame: pd.DataFrame) -> str:
     """A table as CSV with six significant digits; an infinite number is `inf`, an unknown empty."""
     text = frame.map(lambda cell: escaping.csv(cell) if isinstance(cell, str) else cell)

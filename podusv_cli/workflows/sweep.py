@@ -260,6 +260,11 @@ def report(study: Path, request: Request) -> Swept:
         raise UsageError(f"{study} has no runs yet: podusv sweep run {study}")
     Sitting(study, request.argv, started, store.plan.scenario.plugged).end(0)
     store.write_runs()
+    if not store.runs().common.any():
+        raise UsageError(
+            f"no draw in {study} has runs of all laws yet, so they cannot be compared; continue: "
+            f"podusv sweep run {study}"
+        )
     return answered(store, request)
 
 
