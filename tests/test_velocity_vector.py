@@ -170,3 +170,30 @@ def test_port_and_starboard_are_alike():
         other = ask(LAW, x * mirror, memory * np.array([1, -1, -1] * 2), target * flip, NONLINEAR)
         np.testing.assert_allclose(other.tau, one.tau * [1, -1], rtol=1e-9, atol=1e-9)
         assert wrap(other.signals["chi_e"] + one.signals["chi_e"]) == pytest.approx(0, abs=1e-9)
+
+
+@pytest.mark.parametrize(("ahead", "heading"), [(15.0, 0.0), (10.0, -0.7)])
+def test_ahead_of_the_target_it_backs_up_instead_of_turning_twice(ahead, heading):
+    turned, backed = (
+        run(
+            corrected(
+                controller=VelocityVector(astern=choice), actuator=Saturated(),
+                start=(ahead, -1.0, heading, 0.0, 0.0, 0.0),
+            ),
+            60.0,
+        )
+        for choice in ("never", "shorter")
+    )  # fmt: skip
+    assert abs(turned["psi"]).max() > np.pi / 2 > abs(backed["psi"]).max()
+    assert backed["u"].min() < -0.3
+    iae = [np.trapezoid(out["z_e"], out["time"]) for out in (turned, backed)]
+    assert iae[1] < 0.95 * iae[0]
+
+
+def test_with_its_bow_against_the_target_s_course_it_turns_at_once():
+    start = (15.0, 0.0, 2.5, 0.0, 0.0, 0.0)
+    turned, backed = (
+        run(corrected(controller=VelocityVector(astern=choice), start=start), 20.0)
+        for choice in ("never", "shorter")
+    )
+    np.testing.assert_array_equal(turned["x"], backed["x"])

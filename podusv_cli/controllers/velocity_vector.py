@@ -18,6 +18,8 @@ from podusv_cli.core.kinematics import direction
 from podusv_cli.core.signal import Signal
 from podusv_cli.vessels.plant import surge_force, sway_force, yaw_moment
 
+SHORTER = 1.0
+
 
 class Wanted(NamedTuple):
     """The wanted velocity V_c in the body frame, its surge acceleration and its turn."""
@@ -26,6 +28,7 @@ class Wanted(NamedTuple):
     b: float  # sway part of V_c [m/s]
     A_a: float  # surge part of its rate A [m/s2]
     turn: float  # rate of the direction of V_c [rad/s], limited
+    backward: bool  # whether V_c points against the target's course, and the bow does not
 
 
 @kernel
@@ -40,6 +43,7 @@ def guidance(x: Vector, target: Vector, k: Any) -> Wanted:
         V.x * cos_psi + V.y * sin_psi, V.y * cos_psi - V.x * sin_psi,
         V.rate_x * cos_psi + V.rate_y * sin_psi,
         min(max(turn_rate(V, k.V_m), -k.chi_m), k.chi_m),
+        V.x * target[2] + V.y * target[3] < 0.0 < target[2] * cos_psi + target[3] * sin_psi,
     )  # fmt: skip
 
 
@@ -65,6 +69,10 @@ class VelocityVector(ObservingController):
     V_m: float = value(0.1, "m/s", "speed below which a direction counts for less", gt=0)
     chi_m: float = value(0.3, "rad/s", "largest turn of the wanted velocity used ahead", gt=0)
     a_m: float = value(1.0, "m/s2", "largest wanted acceleration used ahead", gt=0)
+    astern: Literal["never", "shorter"] = value(
+        "shorter", "", "what a vessel ahead of the target does: turns round, and again when it is "
+        "there (never), or backs up if its bow points to the target's course (shorter)",
+    )  # fmt: skip
     N_m: float = value(2.5, "N m", "moment beyond which surge yields to yaw", gt=0)
 
     def gains(self) -> tuple[tuple[str, float, float], ...]:
@@ -79,12 +87,14 @@ class VelocityVector(ObservingController):
         tau: Vector, rate: Vector, signals: Vector, work: Vector,
     ) -> None:  # fmt: skip
         """Yaw first: turn the velocity vector; surge as far as it points the right way."""
-        a, b, A_a, turn = guidance(x, target, k)
+        wanted = guidance(x, target, k)
+        a, b, A_a, turn = wanted.a, wanted.b, wanted.A_a, wanted.turn
         u, v, r = x[3], x[4], x[5]
         v_s = v + k.T_v * (sway_force(a, v, turn, k) + memory[B_V]) / k.m22
         w = b - v_s
         speed = math.sqrt(a * a + w * w)
-        chi_e = direction(a, w)
+        side = -1.0 if wanted.backward and a < 0.0 and k.astern == SHORTER else 1.0
+        chi_e = direction(side * a, side * w)
         g = k.k_psi * min(1.0, speed * speed / (k.V_m * k.V_m))
         bend = k.k_psi * chi_e / k.r_m
         sigma = 1.0 / math.sqrt(1.0 + bend * bend)
@@ -92,7 +102,7 @@ class VelocityVector(ObservingController):
         yaw = g * sigma * sigma * sigma * (turn - r) + k.k_r * (r_d - r)
         tau[1] = k.m33 * yaw - yaw_moment(u, v, r, k) - memory[B_R]
 
-        forward = a / speed if a > 0.0 and speed > 0.0 else 1.0
+        forward = side * a / speed if side * a > 0.0 and speed > 0.0 else 1.0
         F = forward * k.N_m / max(abs(tau[1]), k.N_m)
         u_d = a * F
         ahead = min(max((A_a + r * b) * F, -k.a_m), k.a_m)
