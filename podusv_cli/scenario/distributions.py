@@ -20,6 +20,7 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.core.portable import exponential, standard_normal
 
 LEAST = 1e-6  # the share of a distribution that `within` has to leave
+LARGEST = 2**53  # whole number: all up to this are exact as floats
 HALVINGS = 60  # of (0, 1), until nothing is left between two numbers
 Interval = tuple[float, float]
 Numbers = npt.NDArray[Any]  # floats, whole numbers, or Python objects
@@ -114,6 +115,8 @@ def _corners(name: str, corners: tuple[float, ...]) -> None:
 def _some(name: str, values: tuple[Any, ...]) -> None:
     if not values:
         raise ValueError(f"{name}: is empty; write the values to choose from")
+    if any(isinstance(one, int) and abs(one) >= 2**63 for one in values):
+        raise ValueError(f"{name}: whole numbers must lie between -2^63 and 2^63; write 1e20")
 
 
 def _uniform(bounds: Interval, u: Vector) -> Numbers:
@@ -143,6 +146,12 @@ def _place(count: int, u: Vector) -> npt.NDArray[np.int64]:
     return np.minimum((u * count).astype(np.int64), count - 1)
 
 
+def _whole(name: str, bounds: tuple[int, int]) -> None:
+    if max(map(abs, bounds)) > LARGEST:
+        raise ValueError(f"{name}: whole numbers must lie between -2^53 and 2^53")
+    _ordered(name, bounds)
+
+
 def _angle(word: str, u: Vector) -> Numbers:
     return math.pi * (1.0 - 2.0 * u)
 
@@ -162,7 +171,7 @@ WAYS: dict[str, tuple[Callable[[str, Any], None], Callable[[Any, Vector], Number
     "lognormal": (_sound, _at),
     "triangular": (_corners, _triangular),
     "choice": (_some, _choice),
-    "integers": (_ordered, _integers),
+    "integers": (_whole, _integers),
     "angle": (_sound, _angle),
 }
 
