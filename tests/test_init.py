@@ -14,7 +14,7 @@ from podusv_cli.scenario.schema import schema_text
 from podusv_cli.workflows.init import FIRST, SCHEMA, starting_points
 
 CONFIGS = ROOT / "configs"
-TELLING = ("own_vessel", "paper/figures_compare", "pod/vessels/otter")  # one of each kind
+TELLING = ("own_vessel", "paper/figures_compare", "pod/vessels/otter", "studies/hull_and_sea")
 
 
 @pytest.fixture
@@ -117,7 +117,8 @@ def test_a_copy_anywhere_is_the_same_scenario(podusv, name):
     assert text.count("\n") == (CONFIGS / f"{name}.yaml").read_text().count("\n")
     (schema,) = re.findall(r"^# yaml-language-server: \$schema=(.*)$", text, re.MULTILINE)
     assert (copy.parent / schema).read_text() == schema_text(tuple(finding_kinds()))
-    command = "compare" if load(copy).scenario.controllers else "run"
+    scenario = load(copy).scenario
+    command = "sweep run" if scenario.sweep else "compare" if scenario.controllers else "run"
     assert said.out.splitlines()[-1] == f"next: podusv {command} {copy}"
 
 
@@ -146,6 +147,7 @@ def test_an_unknown_starting_point_is_a_line_with_those_that_there_are(podusv):
     assert said.err.startswith(
         "unknown starting point 'paper/corected'; did you mean 'paper/corrected'? (allowed: paper"
     )
+    assert re.search(r"(, \S+){4} and \d+ more, see podusv init\)$", said.err)
     assert said.err.count("\n") == 1
     assert not list(Path().iterdir())
 

@@ -70,7 +70,7 @@ IN_VARY = [
     ("vessel.m: @{times: {choice: [1, big]}}", "times: needs numbers, choice has 'big'"),
     ("vessel.m: @{choice: []}", "choice: is empty"),
     (
-        f"vessel.m: @{{times: {{choice: [1, {10**30}]}}}}",
+        f"vessel.m: {{times: @{{choice: [1, {10**30}]}}}}",
         "numbers must lie between -2^63 and 2^63",
     ),
     (f"vessel.m: @{{integers: [1, {10**20}]}}", "integers: whole numbers must lie between -2^53"),

@@ -40,5 +40,4 @@ def init(
         return
     begun = workflow.init(name, out)
     echo(f"wrote {begun.config}, and {begun.schema} for editors")
-    command = "compare" if begun.compares else "run"
-    echo(f"next: {shlex.join(['podusv', command, str(begun.config)])}")
+    echo(f"next: {shlex.join(['podusv', *begun.command, str(begun.config)])}")

@@ -42,7 +42,13 @@ def command(function: object) -> object:
 
 @command
 def run(
-    config: options.Config,
+    config: Annotated[
+        str,
+        typer.Argument(
+            metavar="CONFIG|STUDY",
+            help="A scenario (a YAML file or podusv:NAME.yaml), or the folder of a study.",
+        ),
+    ],
     assign: options.Assignments = None,
     out: Annotated[
         Path | None,

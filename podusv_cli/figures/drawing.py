@@ -117,4 +117,4 @@ def check_names(
     for what, names, known in (("figure", figures, tuple(sheets)), ("format", formats, FORMATS)):
         for name in names:
             if name not in known:
-                raise UsageError(unknown(f"{what} {name!r}", name, known))
+                raise UsageError(unknown(f"{what} {name!r}", name, known, "podusv list"))

@@ -45,7 +45,7 @@ def unknown_codes(scenario: Scenario) -> list[tuple[str, str]]:
     """Key and sentence for every unknown code in `silence`; a check for `load`."""
     codes = tuple(finding_kinds(scenario.plugged))
     return [
-        (f"silence[{place}]", unknown(f"finding {code!r}", code, codes))
+        (f"silence[{place}]", unknown(f"finding {code!r}", code, codes, "podusv list"))
         for place, code in enumerate(scenario.silence)
         if code not in codes
     ]

@@ -154,7 +154,7 @@ def figure(runs: Mapping[str, Run], name: str, columns: int = 2) -> Figure:
 
     known = figures_of(run.scenario for run in runs.values())
     if name not in known:
-        raise UsageError(unknown(f"figure {name!r}", name, known))
+        raise UsageError(unknown(f"figure {name!r}", name, known, "podusv list"))
     shown = dressed([(label, run.recording, run.scenario) for label, run in runs.items()])
     if not shown or not known[name].fits(shown):
         wanted = ", ".join(known[name].signals)

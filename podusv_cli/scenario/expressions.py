@@ -47,7 +47,7 @@ def known(name: str, names: Collection[str], what: str) -> str:
     """The name, if it is one of these. Raises ExpressionError with the nearest that is."""
     if name in names:
         return name
-    raise ExpressionError(unknown(f"{what} {name!r}", name, sorted(names)))
+    raise ExpressionError(unknown(f"{what} {name!r}", name, sorted(names), "podusv list"))
 
 
 def function(node: ast.Call) -> str:

@@ -8,6 +8,8 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 from typing import Any
 
+MOST, NEAREST = 12, 5  # words that a message lists; of more than that, so many
+
 
 def quoted(text: str) -> str:
     """The text in quotes on one line, cut where it is long."""
@@ -44,10 +46,17 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
     return f"; did you mean '{close[0]}'?" if close else ""
 
 
-def unknown(what: str, word: str, known: Iterable[str]) -> str:
-    """`unknown key; did you mean 'length'? (allowed: ...)`."""
+def unknown(what: str, word: str, known: Iterable[str], listed: str = "") -> str:
+    """`unknown key; did you mean 'length'? (allowed: ...)`.
+
+    Of many words the nearest, if there is a command that lists all of them.
+    """
     words = list(known)
-    return f"unknown {what}{did_you_mean(word, words)} (allowed: {', '.join(words)})"
+    told = ", ".join(words)
+    if listed and len(words) > MOST:
+        near = get_close_matches(word, words, n=NEAREST, cutoff=0.0)
+        told = f"{', '.join(near)} and {len(words) - len(near)} more, see {listed}"
+    return f"unknown {what}{did_you_mean(word, words)} (allowed: {told})"
 
 
 # Text that looks like a value of another type, and how to write that value.

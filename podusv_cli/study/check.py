@@ -182,7 +182,10 @@ def _keep(scenario: Scenario, sweep: Sweep) -> Faults:
     metrics = _metrics(scenario)
     for name in sweep.keep.worst:
         if name not in metrics:
-            yield ("sweep", "keep", "worst", name), unknown(f"metric {name!r}", name, metrics)
+            yield (
+                ("sweep", "keep", "worst", name),
+                unknown(f"metric {name!r}", name, metrics, "podusv list"),
+            )
     for place, draw in enumerate(sweep.keep.draws):
         if not 0 <= draw < sweep.draws:
             text = f"there is no draw {draw}; they are 0 to {sweep.draws - 1}"

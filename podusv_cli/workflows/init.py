@@ -12,6 +12,7 @@ from podusv_cli.findings.finding import finding_kinds
 from podusv_cli.scenario import shipped
 from podusv_cli.scenario.layers import extended_files
 from podusv_cli.scenario.load import load_text
+from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import unknown
 from podusv_cli.scenario.schema import TITLE, schema_text
 from podusv_cli.scenario.yaml_text import read
@@ -24,11 +25,11 @@ EDITOR_LINE = re.compile(r"^# yaml-language-server: .*$", re.MULTILINE)
 
 @dataclass(frozen=True)
 class Begun:
-    """A scenario file that was written, the schema beside it, and whether it compares laws."""
+    """A scenario file that was written, the schema beside it, and the words of its command."""
 
     config: Path
     schema: Path
-    compares: bool
+    command: tuple[str, ...]
 
 
 def starting_points() -> dict[str, str]:
@@ -50,7 +51,7 @@ def init(name: str, out: Path | None = None) -> Begun:
     """
     known = starting_points()
     if _short(name) not in known:
-        raise UsageError(unknown(f"starting point {name!r}", _short(name), known))
+        raise UsageError(unknown(f"starting point {name!r}", _short(name), known, "podusv init"))
     source = f"{shipped.PREFIX}{_short(name)}.yaml"
     config = out or Path(f"{_short(name)}.yaml".rpartition("/")[2])
     schema = config.with_name(SCHEMA)
@@ -64,7 +65,14 @@ def init(name: str, out: Path | None = None) -> Begun:
     plugins = installed()
     known_to_editors = schema_text(tuple(finding_kinds(plugins)), plugins)
     files.write_all({config: text.encode(), schema: known_to_editors.encode()})
-    return Begun(config, schema, bool(scenario.controllers))
+    return Begun(config, schema, _command(scenario))
+
+
+def _command(scenario: Scenario) -> tuple[str, ...]:
+    """What a scenario is made for: a study, a comparison or a run."""
+    if scenario.sweep:
+        return ("sweep", "run")
+    return ("compare",) if scenario.controllers else ("run",)
 
 
 def own_copy(source: str) -> str:
