@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 import sympy as sp
-from conftest import NONLINEAR, SMOOTH_START, ask, corrected, run, situations
+from conftest import NONLINEAR, SMOOTH_START, ask, corrected, run, situations, target_at
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -19,6 +19,7 @@ from podusv_cli.disturbances.calm import Calm
 from podusv_cli.disturbances.harmonic import Harmonic, HarmonicDisturbance
 from podusv_cli.paths.circle import Circle
 from podusv_cli.paths.line import Line
+from podusv_cli.paths.line_circle import LineCircle
 from podusv_cli.vessels.plant import sway_force
 
 LAW = VelocityVector()
@@ -197,3 +198,16 @@ def test_with_its_bow_against_the_target_s_course_it_turns_at_once():
         for choice in ("never", "shorter")
     )
     np.testing.assert_array_equal(turned["x"], backed["x"])
+
+
+def test_the_settled_error_is_within_the_bound_of_the_cascade():
+    """e' = -kappa e + d with d = V_c - p', so |e| <= sup |d|/kappa once the start is forgotten."""
+    out, state = task(), ("x", "y", "psi", "u", "v", "r")
+    late = np.flatnonzero(out["time"] > 150)[::10]
+    path, largest = LineCircle(), 0.0
+    for i in late:
+        x = np.array([out[name][i] for name in state])
+        found = guidance(x, target_at(path, out["time"][i]), K)
+        largest = max(largest, float(np.hypot(found.a - x[3], found.b - x[4])))
+    bound = largest / (0.99 * LAW.k_p)  # kappa is k_p but for 1 % within 0.1 m
+    assert 0.1 * bound < within(out, 150).max() <= bound
