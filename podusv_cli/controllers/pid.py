@@ -9,10 +9,11 @@ import numpy as np
 from pydantic import model_validator
 
 from podusv_cli.controllers.base import Slots, each
+from podusv_cli.controllers.crab import observe_sway, take_aim
 from podusv_cli.controllers.tracking import HELD, TRACKED, Tracking, TrackingController, track
 from podusv_cli.controllers.velocity_loop import Axis, Loop
 from podusv_cli.core.component import value
-from podusv_cli.core.kernel import Vector, bundle, kernel
+from podusv_cli.core.kernel import Vector, bundle, kernel, scratch
 from podusv_cli.core.signal import Signal
 from podusv_cli.vessels.vessel import Vessel
 
@@ -74,15 +75,16 @@ class Pid(TrackingController):
 
     def slots(self) -> Slots:
         """Held direction, integrals and lagged errors."""
-        return HELD + each(MEMORY)
+        return HELD + each(MEMORY) + self.swaying()
 
     def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
         """Integrals at zero, lagged errors at zero or at the error."""
         memory = super().start(x, target, nominal)
         if self.lag_start == "error":
-            k, seen = bundle(self.constants_with(nominal)), np.array(memory)
+            constants, seen = self.constants_with(nominal), np.array(memory)
+            k = bundle(constants)
             self.sample(0.0, x, seen, target, k, self.table())
-            e = track(x, seen, target, k)
+            e = track(x, seen, self.aim(x, memory, target, constants), k)
             u_d, r_d = reference(e, target, k)
             memory[[LAG_U, LAG_R]] = u_d - x[3], r_d - x[5]
         return memory
@@ -120,9 +122,12 @@ class Pid(TrackingController):
         tau: Vector, rate: Vector, signals: Vector, work: Vector,
     ) -> None:  # fmt: skip
         """tau = K_P e + K_I integral + K_D (e - lag)/T_d on both axes."""
-        e = track(x, memory, target, k)
+        aim = scratch(6)
+        take_aim(x, memory, target, k, aim)
+        e = track(x, memory, aim, k)
         u_d, r_d = reference(e, target, k)
         u_p, r_p = u_d - x[3], r_d - x[5]
+        observe_sway(x, memory, target, k, rate)
         rate[0] = rate[1] = 0.0
         rate[INTEGRAL_U], rate[INTEGRAL_R] = u_p, r_p
         rate[LAG_U] = (u_p - memory[LAG_U]) / k.T_d

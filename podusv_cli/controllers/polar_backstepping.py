@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Literal, Self
 import numpy as np
 
 from podusv_cli.controllers.base import Slots, each
+from podusv_cli.controllers.crab import observe_sway, take_aim
 from podusv_cli.controllers.network import (
     CENTER,
     WIDTH,
@@ -24,7 +25,7 @@ from podusv_cli.controllers.tracking import HELD, TRACKED, Tracking, TrackingCon
 from podusv_cli.controllers.velocity_loop import AdaptedBound, Axis, Loop
 from podusv_cli.core.component import value
 from podusv_cli.core.derived import difference
-from podusv_cli.core.kernel import Vector, bundle, kernel, tail
+from podusv_cli.core.kernel import Vector, bundle, kernel, scratch, tail
 from podusv_cli.core.signal import Signal
 from podusv_cli.vessels.vessel import Vessel
 
@@ -112,10 +113,12 @@ def polar_backstepping(
     phi = work
     activate(x, k, table, phi, tail(work, count))
     f_hat_u, f_hat_r = weigh(count, W_hat_u, phi), weigh(count, W_hat_r, phi)
-    e = track(x, memory, target, k)
+    aim = scratch(6)
+    take_aim(x, memory, target, k, aim)
+    e = track(x, memory, aim, k)
     s = 2.0 * k.coupling - 1.0
 
-    beta_u, beta_u_dot = surge(e, x, target, tail(memory, filtered), tail(rate, filtered), k)
+    beta_u, beta_u_dot = surge(e, x, aim, tail(memory, filtered), tail(rate, filtered), k)
     xi_u, xi_r = compensation(memory, k, rate)
     u_e = x[3] - beta_u
     u_c = u_e - xi_u
@@ -123,7 +126,7 @@ def polar_backstepping(
         -k.k_ue * u_e - k.m11 * f_hat_u - memory[B_HAT_U] * lemma(u_c, k)
         + k.m11 * beta_u_dot + s * e.z_e * e.cos_e
     )  # fmt: skip
-    beta_r, beta_r_dot = yaw(e, x, target, tail(memory, filtered), tail(rate, filtered), k, tau[0])
+    beta_r, beta_r_dot = yaw(e, x, aim, tail(memory, filtered), tail(rate, filtered), k, tau[0])
     r_e = x[5] - beta_r
     r_c = r_e - xi_r
     tau[1] = (
@@ -131,6 +134,7 @@ def polar_backstepping(
         + k.m33 * beta_r_dot + s * e.psi_e
     )  # fmt: skip
 
+    observe_sway(x, memory, target, k, rate)
     rate[0] = rate[1] = 0.0
     rate[B_HAT_U] = k.gamma_u * (u_c * lemma(u_c, k) - k.sigma_bu * (memory[B_HAT_U] - k.b_hat_u0))
     rate[B_HAT_R] = k.gamma_r * (r_c * lemma(r_c, k) - k.sigma_br * (memory[B_HAT_R] - k.b_hat_r0))
@@ -174,7 +178,8 @@ class PolarBackstepping(TrackingController):
         """Held direction, bounds, weights, the filter's output, and what anti-windup needs."""
         count = self.network.count
         learnt = each(BOUNDS) + each(W_HAT, count)
-        return HELD + learnt + self.filtered() + (each(SHORTFALL) if self.wants_loads() else ())
+        shortfall = each(SHORTFALL) if self.wants_loads() else ()
+        return HELD + learnt + self.filtered() + self.swaying() + shortfall
 
     def filtered(self) -> Slots:
         """The filter's output, where there is a filter."""
@@ -227,9 +232,9 @@ class PolarBackstepping(TrackingController):
             for axis, b, (key, k, Gamma, sigma) in zip(axes, bounds, gains, strict=True)
         ]  # fmt: skip
 
-    def lyapunov(self) -> Self:
-        """This law: the paper's proof is about the whole family."""
-        return self
+    def lyapunov(self) -> Self | None:
+        """This law: the paper's proof is about the whole family, with the standoff as it is."""
+        return None if self.swaying() else self
 
     def workspace(self) -> int:
         """The nodes' outputs and their factors."""
@@ -266,9 +271,10 @@ class FilteredBackstepping(PolarBackstepping):
         """The filter at zero or settled on the virtual control."""
         memory = super().start(x, target, nominal)
         if self.filter_start == "alpha":
-            k, seen = bundle(self.constants_with(nominal)), np.array(memory)
+            constants, seen = self.constants_with(nominal), np.array(memory)
+            k = bundle(constants)
             self.sample(0.0, x, seen, target, k, self.table())
-            e = track(x, seen, target, k)
+            e = track(x, seen, self.aim(x, memory, target, constants), k)
             at = WEIGHTS + 2 * self.network.count
             memory[at : at + 2] = e.alpha_u, e.alpha_r
         return memory

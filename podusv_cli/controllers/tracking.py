@@ -6,15 +6,17 @@ Shared by all laws that steer towards the target by distance and bearing.
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
+from pydantic import model_validator
 
-from podusv_cli.controllers.base import Approach, Controller
+from podusv_cli.controllers.base import Approach, Controller, Slots, each
+from podusv_cli.controllers.crab import SWAY, take_aim
 from podusv_cli.core.component import value
 from podusv_cli.core.derived import difference
 from podusv_cli.core.elementary import cos_sin
-from podusv_cli.core.kernel import Vector, kernel
+from podusv_cli.core.kernel import Vector, bundle, kernel, scratch
 from podusv_cli.core.kinematics import direction, wrap
 from podusv_cli.core.signal import Signal
 
@@ -155,6 +157,13 @@ class TrackingController(Controller):
         "distance that is kept to the target; 0 as printed, where z_e = 0 is singular",
         ge=0,
     )
+    standoff_reference: Literal["line_of_sight", "crab"] = value(
+        "line_of_sight", "", "where the standoff lies: behind the target on the line of sight, or "
+        "along the heading that holds the path, so that the vessel comes to the target itself",
+    )  # fmt: skip
+    omega_v: float = value(
+        2.0, "rad/s", "bandwidth of the sway load's observer, for standoff_reference: crab", gt=0
+    )
     hold_below: float = value(
         0.0, "m", "distance below which the direction of the target is held; 0 as printed", ge=0
     )
@@ -179,9 +188,26 @@ class TrackingController(Controller):
         "nothing as printed, or the shortfall is taken out of what it learns from",
     )  # fmt: skip
 
+    @model_validator(mode="after")
+    def _aims(self) -> Self:
+        if self.standoff_reference == "crab" and self.standoff <= 0:
+            raise ValueError("standoff_reference: crab needs a standoff above 0")
+        return self
+
     def approach(self) -> Approach:
-        """k_ze, from the standoff on, see (21)."""
-        return Approach(self.k_ze, self.standoff)
+        """k_ze, from the standoff on, see (21); a crab standoff keeps no distance."""
+        return Approach(self.k_ze, 0.0 if self.swaying() else self.standoff)
+
+    def swaying(self) -> Slots:
+        """The part of the memory that knows the sway load, where the standoff needs it."""
+        return each(SWAY) if self.standoff_reference == "crab" else ()
+
+    def constants(self) -> dict[str, float]:
+        """The fields' numbers, and where that part is in the memory (0 for nowhere)."""
+        at, slots = 0, self.slots() if self.swaying() else ()
+        if slots:
+            at = sum(size for _, size in slots[: slots.index((SWAY[0], 1))])
+        return super().constants() | {"crab_at": float(at)}
 
     def wants_loads(self) -> bool:
         """With anti-windup only."""
@@ -196,11 +222,22 @@ class TrackingController(Controller):
     @kernel
     def sample(t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector) -> None:
         """Take the target's direction for the difference and for holding."""
-        hold(t, x, memory, target, k)
+        aim = scratch(6)
+        take_aim(x, memory, target, k, aim)
+        hold(t, x, memory, aim, k)
 
     def start(self, x: Vector, target: Vector, nominal: Any) -> Vector:
         """All zero but the held direction: to the target, or its course where it is right here."""
-        memory = np.zeros(sum(size for _, size in self.slots()))
-        x_e, y_e = target[:2] - x[:2]
+        memory, k = np.zeros(sum(size for _, size in self.slots())), self.constants_with(nominal)
+        if self.swaying():
+            memory[int(k["crab_at"])] = x[4]
+        x_e, y_e = self.aim(x, memory, target, k)[:2] - x[:2]
         memory[PSI_D_HELD] = direction(x_e, y_e) if x_e or y_e else direction(*target[2:4])
         return memory
+
+    @staticmethod
+    def aim(x: Vector, memory: Vector, target: Vector, k: dict[str, float]) -> Vector:
+        """What the law points at, as `take_aim` has it."""
+        found = np.zeros(6)
+        take_aim(x, memory, target, bundle(k), found)
+        return found
