@@ -214,16 +214,26 @@ class _Runs:
     def _contained(
         self, position: int, make: Callable[[], T], invalid: tuple[type[Exception], ...] = ()
     ) -> T | None:
-        """What is made for a run; an exception is that run's end and no other's."""
-        try:
-            with interrupts_enabled():
-                return make()
-        except invalid as error:
-            self._batch.refuse(position, "invalid", str(error))
-        except KeyboardInterrupt:
-            raise
-        except BaseException as error:  # a law may raise anything
-            self._batch.refuse(position, "crashed", in_a_line(error))
+        """What is made for a run; an exception, or no end at all, is that run's and no other's."""
+        found: list[T] = []
+
+        def noted() -> int:
+            found.append(make())
+            return len(found)
+
+        work = Work(noted)  # a law's `start` may never return
+        with interrupts_enabled():
+            work.finish()
+        if found:
+            return found[0]
+        if isinstance(work.error, KeyboardInterrupt):
+            raise work.error
+        if isinstance(work.error, invalid):
+            self._batch.refuse(position, "invalid", str(work.error))
+        elif work.error:
+            self._batch.refuse(position, "crashed", in_a_line(work.error))
+        else:
+            self._batch.refuse(position, "hung", f"before the first instant: {work.fault()}")
         return None
 
     def _wait(self) -> None:
