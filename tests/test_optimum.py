@@ -14,6 +14,7 @@ import pytest
 from command_samples import BASE
 from conftest import VESSELS
 
+from podusv_cli.controllers.pid import Pid
 from podusv_cli.core.component import Component
 from podusv_cli.core.errors import NotConvergedError, UsageError
 from podusv_cli.core.kernel import bundle, kernel, transplanted
@@ -24,6 +25,7 @@ from podusv_cli.process.interrupts import interrupts_caught
 from podusv_cli.scenario.load import load, load_text
 from podusv_cli.storage.run_folder import open_run
 from podusv_cli.vessels.plant import plant
+from podusv_cli.workflows import optimum
 
 REASON = "CasADi is not installed: podusv[optimum]"
 # A target ahead that keeps its distance: between them only the thrust acts. Yawing would help, as
@@ -69,14 +71,12 @@ def test_full_thrust_is_reversed_when_pontryagin_says_so():
     assert (e[t < t_c - 1e-3] > 0).all()
     assert (e[t > t_c + 1e-3] < 0).all()  # what was assumed
     guess = Motion(np.array([0.0, 5.0]), np.zeros((2, 6)), np.zeros((2, 2)))
-    *_, finest = collocation.refined(problem(chase, "iae"), guess, 0.05, None)
+    stages, motion = collocation.searched(problem(chase, "iae"), {"rest": guess}, 0.05)
     known = np.trapezoid(abs(e), t)
-    assert finest.integral == pytest.approx(known, rel=1e-4)
-    surge = finest.motion.demands[:, 0]
-    away = abs(finest.motion.times - t_s) > 0.06  # the step in which it is reversed
-    np.testing.assert_allclose(
-        surge[away], np.where(finest.motion.times < t_s, 8, -8)[away], atol=0.05
-    )
+    assert stages[-1].integral == pytest.approx(known, rel=1e-4)
+    surge = motion.demands[:, 0]
+    away = abs(motion.times - t_s) > 0.06  # the step in which it is reversed
+    np.testing.assert_allclose(surge[away], np.where(motion.times < t_s, 8, -8)[away], atol=0.05)
 
 
 def test_the_plant_on_symbols_is_the_plant():
@@ -126,7 +126,11 @@ def test_the_command_writes_a_run_that_is_repeated_and_beats_the_law(podusv):
     told = json.loads(podusv(*words, "--set", "control.period=0.1").out)
     assert told["run"] == str(Path("results/a/optimum"))
     assert told["metrics"]["iae"] == pytest.approx(told["grids"][-1]["integral"], rel=2e-3)
-    assert [grid["step"] for grid in told["grids"]] == pytest.approx([0.8, 0.4, 0.2])
+    assert [grid["step"] for grid in told["grids"]] == pytest.approx([0.8, 0.8, 0.4, 0.2])
+    starts = [grid["start"] for grid in told["grids"]]
+    assert starts[:2] == ["pid", "velocity_vector"]
+    better = min(told["grids"][:2], key=lambda grid: grid["integral"])
+    assert starts[2:] == [better["start"]] * 2
     assert told["departures"]["position"] < 0.01
     assert podusv("run", "a.yaml", "--no-figures", "--out", "law").code == 0
     assert told["metrics"]["iae"] < 0.96 * open_run(Path("law")).metrics["iae"]
@@ -143,9 +147,9 @@ def test_grids_and_departures_are_told_and_a_second_optimum_has_a_name_of_its_ow
     words = ("--minimise", "ise", "--step", "1", "--no-figures", "--set", "simulation.duration=4")
     said = podusv("optimum", "a.yaml", *words)
     assert said.code == 0, said.err
-    head, *grids = (line.split() for line in said.out.splitlines()[:4])
-    assert head == ["step", "ise", "[m2", "s]", "iterations", "time"]
-    assert [grid[:2] for grid in grids] == [["4", "s"], ["2", "s"], ["1", "s"]]
+    head, *grids = (line.split() for line in said.out.splitlines()[:5])
+    assert head == ["from", "a", "run", "of", "step", "ise", "[m2", "s]", "iterations", "time"]
+    assert [grid[1:3] for grid in grids] == [["4", "s"], ["4", "s"], ["2", "s"], ["1", "s"]]
     assert "a local optimum" in said.out
     assert "repeated by podusv: ise" in said.out
     assert said.out.splitlines()[-1] == f"finished: {Path('results/a/optimum-2')}"
@@ -156,7 +160,7 @@ def test_the_square_has_an_optimum_of_its_own():
     scenario = load_text(SHORT, "a.yaml").scenario
     guess = Motion(np.array([0.0, 8.0]), np.zeros((2, 6)), np.zeros((2, 2)))
     found = {
-        name: [*collocation.refined(problem(scenario, name), guess, 0.4, None)][-1].motion
+        name: collocation.searched(problem(scenario, name), {"rest": guess}, 0.4)[1]
         for name in ("iae", "ise")
     }
     places = problem(scenario, "iae").places(found["iae"].times)
@@ -208,7 +212,7 @@ def test_an_interrupt_ends_the_solver_at_its_next_iteration():
             os.kill(os.getpid(), signal.SIGINT)
 
     with interrupts_caught(), pytest.raises(KeyboardInterrupt):
-        list(collocation.refined(wanted, guess, 0.4, interrupt))
+        collocation.searched(wanted, {"rest": guess}, 0.4, interrupt)
     assert 3 <= len(told) <= 4
 
 
@@ -218,23 +222,50 @@ def test_a_solver_that_does_not_converge_is_told_and_nothing_is_written(podusv, 
     Path("a.yaml").write_text(SHORT)
     said = podusv("optimum", "a.yaml", "--step", "0.5")
     assert said.code == NotConvergedError.exit_code == 3
-    assert said.err.startswith("IPOPT found no optimum with a step of 2 s: Maximum_Iterations")
+    assert said.err.startswith("IPOPT found no optimum with a step of 2 s in ")
     assert not list(Path().glob("results/a/*"))
 
 
-def test_a_law_that_diverges_is_no_beginning(podusv):
+WILD = ("--set", "controller.K_Pu=1e9", "--set", "actuator.kind=ideal")
+
+
+def test_a_law_that_diverges_is_no_beginning(podusv, monkeypatch):
     pytest.importorskip("casadi", reason=REASON)
+    begun = []
+
+    def stop(problem, guesses, *rest):
+        begun.extend(guesses)
+        raise NotConvergedError("enough")
+
+    monkeypatch.setattr(collocation, "searched", stop)
     Path("a.yaml").write_text(SHORT)
-    said = podusv(
-        "optimum", "a.yaml", "--set", "controller.K_Pu=1e9", "--set", "actuator.kind=ideal"
-    )
+    assert podusv("optimum", "a.yaml", *WILD).code == 3
+    assert begun == ["velocity_vector"]
+    monkeypatch.setattr(optimum, "BESIDE", Pid(K_Pu=1e9))
+    said = podusv("optimum", "a.yaml", *WILD)
     assert said.code == 2
-    assert "a: the search begins from a run of pid, which diverged at" in said.err
+    assert "a: the search begins from runs of laws, and all of these diverge (pid: div" in said.err
+
+
+def test_every_law_of_a_comparison_is_a_beginning_unless_one_is_chosen(podusv, monkeypatch):
+    pytest.importorskip("casadi", reason=REASON)
+    begun = []
+
+    def stop(problem, guesses, *rest):
+        begun.append([*guesses])
+        raise NotConvergedError("enough")
+
+    monkeypatch.setattr(collocation, "searched", stop)
+    Path("a.yaml").write_text(SHORT + "controllers: {stiff: {K_Pu: 200.0}, soft: {K_Pu: 5.0}}\n")
+    podusv("optimum", "a.yaml")
+    podusv("optimum", "a.yaml", "--controller", "soft")
+    assert begun[0] == ["stiff", "soft", "velocity_vector"]
+    assert begun[1] == ["pid", "velocity_vector"]
 
 
 def test_a_taken_place_is_told_before_anything_is_computed(podusv, monkeypatch):
     pytest.importorskip("casadi", reason=REASON)
-    monkeypatch.setattr(collocation, "refined", None)
+    monkeypatch.setattr(collocation, "searched", None)
     Path("a.yaml").write_text(SHORT)
     Path("there").mkdir()
     Path("there/mine").write_text("")

@@ -46,15 +46,15 @@ def optimum(
     controller: Annotated[
         str,
         typer.Option(
-            metavar="NAME", help="Which of `controllers` to begin with.", show_default=False
+            metavar="NAME", help="Which of `controllers` to begin from.", show_default=False
         ),
     ] = "",
 ) -> None:
     """Find the motion of least error, knowing everything beforehand, and repeat it as a run.
 
-    Uses the scenario's vessel, actuator limits, disturbance, path and start; its law gives the
-    first guess only. The run can be compared and plotted like any other. Needs CasADi
-    (podusv[optimum]).
+    Uses the scenario's vessel, actuator limits, disturbance, path and start. The search begins from
+    runs of its laws and of velocity_vector, which have no further part in it. The result can be
+    compared and plotted like any other run. Needs CasADi (podusv[optimum]).
     """
     from podusv_cli.cli.progress import progress_bars
     from podusv_cli.workflows import optimum as workflow  # heavy imports only when they are needed
@@ -85,12 +85,12 @@ def _report(done: Optimum) -> None:
 
     name, unit = done.minimised, done.run.units[done.minimised]
     rows = [
-        [f"{s.step:.4g} s", f"{s.integral:.7g}", str(s.iterations), f"{s.seconds:.1f} s"]
+        [s.start, f"{s.step:.4g} s", f"{s.integral:.7g}", str(s.iterations), f"{s.seconds:.1f} s"]
         for s in done.stages
     ]
-    echo_table(["step", f"{name} [{unit}]", "iterations", "time"], rows)
-    echo(f"a local optimum, to IPOPT's tolerance of {TOLERANCE:g}; another law as first guess may")
-    echo("lead to a lower one")
+    echo_table(["from a run of", "step", f"{name} [{unit}]", "iterations", "time"], rows)
+    echo(f"a local optimum, to IPOPT's tolerance of {TOLERANCE:g}; a search from the run of")
+    echo("another law in `controllers` may lead to a lower one")
     if name in done.run.metrics and done.departures:
         away = done.departures
         echo(

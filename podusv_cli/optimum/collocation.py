@@ -7,10 +7,12 @@ podusv's own kernel, evaluated on symbols.
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -39,13 +41,17 @@ Tell = Callable[[str, float], None]
 
 @dataclass(frozen=True)
 class Stage:
-    """The optimum on one grid: its step [s], its integral without smoothing, and the work done."""
+    """An optimum on one grid: what the search began from, the grid's step [s], and the work done.
 
+    `integral` is without smoothing; NaN, with no motion, where IPOPT did not converge.
+    """
+
+    start: str
     step: float
     integral: float
     iterations: int
     seconds: float
-    motion: Motion
+    motion: Motion | None = None
 
 
 def casadi() -> Any:
@@ -68,42 +74,72 @@ def dynamics(vessel: Vessel) -> Any:
     return ca.Function("dynamics", [x, demand, b], [ca.vertcat(*rate)])
 
 
-def refined(problem: Problem, guess: Motion, step: float, tell: Tell | None) -> Iterator[Stage]:
-    """The optimum on each of the grids, the last with this step or a little less.
+def searched(
+    problem: Problem, guesses: Mapping[str, Motion], step: float, tell: Tell | None = None
+) -> tuple[list[Stage], Motion]:
+    """Optima on the coarsest grid from every guess, then of the best on finer grids; the last.
 
-    Raises NotConvergedError. An interrupt ends the solver at its next iteration.
+    The finest has this step or a little less. Raises NotConvergedError. An interrupt ends the
+    solver at its next iteration.
     """
     finest = 2 ** (GRIDS - 1)
-    count = max(1, int(np.ceil(problem.duration / step / finest - 1e-9)))
-    smoothed = SMOOTHED[problem.minimised]
-    for grid in range(GRIDS):
-        began, iterations = time.perf_counter(), 0
-        n, told = count * 2**grid, partial(_tell, tell, grid)
-        program = _Program(problem, n, told, fresh=grid == 0)
-        guess = guess.at(program.times)
-        for eps in smoothed:
-            guess = program.solved(guess, eps)
+    n = max(1, int(np.ceil(problem.duration / step / finest - 1e-9)))
+    count = len(guesses) + GRIDS - 1
+    stages: list[Stage] = []
+    for start, guess in guesses.items():
+        told = partial(_tell, tell, len(stages), count)
+        stages.append(_solved(_Program(problem, n, told), start, guess))
+    best = min(stages, key=lambda stage: (stage.motion is None, stage.integral))
+    for grid in range(1, GRIDS):
+        told = partial(_tell, tell, len(stages), count)
+        program = _Program(problem, n * 2**grid, told, warm={"ipopt.mu_init": BARRIER})
+        best = _solved(program, best.start, _found(best))
+        stages.append(best)
+    return stages, _found(best)
+
+
+def _found(stage: Stage) -> Motion:
+    """The stage's motion. Raises NotConvergedError."""
+    if stage.motion is None:
+        raise NotConvergedError(
+            f"IPOPT found no optimum with a step of {stage.step:g} s in {stage.iterations} "
+            "iterations; try another --step, or a scenario with more laws in `controllers`"
+        )
+    return stage.motion
+
+
+def _solved(program: _Program, start: str, guess: Motion) -> Stage:
+    """The optimum on a program's grid, smoothed less and less."""
+    began, iterations, motion = time.perf_counter(), 0, guess.at(program.times)
+    smoothed = SMOOTHED[program.problem.minimised]
+    try:
+        for eps in smoothed[-2:] if program.warm else smoothed:
+            motion = program.solved(motion, eps)
             iterations += program.iterations
-        smoothed = smoothed[-2:]
-        seconds = time.perf_counter() - began
-        yield Stage(program.step, program.integral(guess), iterations, seconds, guess)
+    except NotConvergedError:
+        iterations += program.iterations
+        return Stage(start, program.step, math.nan, iterations, time.perf_counter() - began)
+    seconds = time.perf_counter() - began
+    return Stage(start, program.step, program.integral(motion), iterations, seconds, motion)
 
 
-def _tell(tell: Tell | None, grid: int, iterations: int) -> None:
+def _tell(tell: Tell | None, stage: int, count: int, iterations: int) -> None:
     if tell:  # nobody knows how many iterations there will be
-        tell("solving", (grid + iterations / (iterations + 50.0)) / GRIDS)
+        tell("solving", (stage + iterations / (iterations + 50.0)) / count)
 
 
 class _Program:
     """The nonlinear program of one grid of `n` equal steps."""
 
     def __init__(
-        self, problem: Problem, n: int, told: Callable[[int], None], *, fresh: bool
-    ) -> None:
+        self, problem: Problem, n: int, told: Callable[[int], None],
+        warm: Mapping[str, Any] = MappingProxyType({}),
+    ) -> None:  # fmt: skip
         ca = casadi()
         self.step = problem.duration / n
         self.times: Vector = self.step * np.arange(n + 1, dtype=np.float64)
         self.problem, self.n, self.told, self.iterations = problem, n, told, 0
+        self.warm = dict(warm)  # IPOPT's options where the guess is nearly an optimum
         between = self.times[:-1] + 0.5 * self.step
         self._loads = [problem.loads(times.tolist()).T for times in (self.times, between)]
         self._places = [problem.places(times.tolist()).T for times in (self.times, between)]
@@ -115,7 +151,6 @@ class _Program:
             ca.repmat(eps, 1, n),
         )  # fmt: skip
         self._nlp = {"x": w, "p": eps, "f": ca.sum2(cost), "g": ca.vec(gaps)}
-        self._warm: dict[str, Any] = {} if fresh else {"ipopt.mu_init": BARRIER}
         self._multipliers: dict[str, Any] = {}
 
     def solved(self, guess: Motion, eps: float) -> Motion:
@@ -126,7 +161,7 @@ class _Program:
         own |= {"ipopt.tol": TOLERANCE, "ipopt.max_iter": MOST_ITERATIONS}
         with interrupts_caught() as here, interrupts_deferred():
             watch = _watch(UNKNOWNS * (self.n + 1), STATES * self.n, self._look(here))
-            options = own | {"iteration_callback": watch} | self._warm
+            options = own | {"iteration_callback": watch} | self.warm
             solver = ca.nlpsol("optimum", "ipopt", self._nlp, options)
             start = np.hstack([guess.states, guess.demands]).clip(low, high).ravel()
             found = solver(
@@ -134,13 +169,10 @@ class _Program:
                 **self._multipliers,
             )  # fmt: skip
         told = solver.stats()
-        if not told["success"]:
-            raise NotConvergedError(
-                f"IPOPT found no optimum with a step of {self.step:g} s: {told['return_status']}; "
-                "try another --step, or another law for the first guess"
-            )
         self.iterations = int(told["iter_count"])
-        self._warm = {"ipopt.mu_init": BARRIER, **WARM}
+        if not told["success"]:
+            raise NotConvergedError(f"IPOPT: {told['return_status']}")
+        self.warm = {"ipopt.mu_init": BARRIER, **WARM}
         self._multipliers = {"lam_g0": found["lam_g"], "lam_x0": found["lam_x"]}
         rows = np.array(found["x"]).reshape(self.n + 1, UNKNOWNS).clip(low, high)
         return Motion(self.times, rows[:, :STATES], rows[:, STATES:])

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from podusv_cli.controllers.schedule import Schedule
+from podusv_cli.controllers.velocity_vector import VelocityVector
 from podusv_cli.core.errors import UsageError
+from podusv_cli.core.recording import Recording
 from podusv_cli.engine.check import check_law
-from podusv_cli.engine.simulate import STATE, simulate
+from podusv_cli.engine.simulate import STATE, ClosedLoop, simulate
 from podusv_cli.findings.finding import preflight, unknown_codes
 from podusv_cli.optimum import collocation
 from podusv_cli.optimum.collocation import Stage
@@ -26,12 +28,13 @@ from podusv_cli.storage.run_folder import RunWriter, free_folder, open_run
 from podusv_cli.workflows.execute import Finished, Task, check_figures, execute
 from podusv_cli.workflows.run import DRAWN, RESULTS, Request, single
 
+BESIDE = VelocityVector()  # a law from which the search begins, too: it turns the bow into the load
 Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)
 class Optimum:
-    """An optimum on ever finer grids, and the run that repeats the last of them.
+    """Optima from several beginnings and on finer grids, and the run that repeats the last one.
 
     `departures` are the largest differences between run and optimum: of the position [m], and what
     the feedback added in surge [N] and yaw [N m].
@@ -50,9 +53,12 @@ class Optimum:
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints of it."""
         stages = [
-            {"step": s.step, "integral": s.integral, "iterations": s.iterations, "s": s.seconds}
+            {
+                "start": s.start, "step": s.step, "integral": s.integral,
+                "iterations": s.iterations, "s": s.seconds,
+            }
             for s in self.stages
-        ]
+        ]  # fmt: skip
         return {
             **self.run.as_json(), "minimised": self.minimised, "grids": stages,
             "tolerance": collocation.TOLERANCE, "departures": self.departures,
@@ -71,34 +77,53 @@ def optimum(
     collocation.casadi()
     checks = (unknown_codes, limits(request.allow_large))
     loaded = load(config, request.overrides, checks, request.plugins)
-    scenario = single(loaded, request.controller)
+    scenario = single(loaded, request.controller) if request.controller else loaded.scenario
     wanted = problem(scenario, minimised)
     check_figures(scenario)
     target = request.out or free_folder(RESULTS / scenario.name / "optimum")
     with RunWriter(target, force=request.force, needed=estimate(scenario).needed):
         pass  # a place that cannot be written to is told before anything is computed
-    stages = list(collocation.refined(wanted, _guess(scenario), step, progress))
-    repeated = _repeating(scenario, wanted, stages[-1].motion)
+    guesses = _guesses(scenario, wanted)
+    stages, motion = collocation.searched(wanted, guesses, step, progress)
+    repeated = _repeating(scenario, wanted, motion)
     task = Task(
         repeated, resolved_yaml(repeated), target, request.force, request.out is not None,
         DRAWN if request.figures else (), request.argv, "optimum", preflight(repeated),
     )  # fmt: skip
     done = execute(task, progress and (lambda fraction: progress("repeating", fraction)))
-    return Optimum(minimised, stages, done, _departures(done.folder, stages[-1].motion))
+    return Optimum(minimised, stages, done, _departures(done.folder, motion))
 
 
-def _guess(scenario: Scenario) -> Motion:
-    """The run of the scenario's law. Raises LawError, UsageError where it diverges."""
-    loop = scenario.closed_loop()
+def _guesses(scenario: Scenario, wanted: Problem) -> dict[str, Motion]:
+    """Runs of the scenario's laws, and of velocity_vector, from which the search may begin.
+
+    A law that diverges is left out. Raises LawError, and UsageError where all diverge.
+    """
+    laws = {label: one.controller for label, one in scenario.singles().items()}
+    if not any(law.label == BESIDE.label for law in laws.values()):
+        laws[BESIDE.label] = BESIDE
+    runs = {
+        label: _run(scenario, replace(wanted.loop, controller=law)) for label, law in laws.items()
+    }
+    ended = {label: run for label, run in runs.items() if run.status == "finished"}
+    if not ended:
+        label, run = next(iter(runs.items()))
+        raise UsageError(
+            f"{scenario.name}: the search begins from runs of laws, and all of these diverge "
+            f"({label}: {run.message}); choose another law, as with --set controller.kind=pid"
+        )
+    return {label: _motion(run) for label, run in ended.items()}
+
+
+def _run(scenario: Scenario, loop: ClosedLoop) -> Recording:
     check_law(loop)
     log = simulate(loop, scenario.time_grid(), compiled=scenario.simulation.compiled)
     if log.status == "interrupted":
         raise KeyboardInterrupt
-    if log.status != "finished":
-        raise UsageError(
-            f"{scenario.name}: the search begins from a run of {log.controller}, which "
-            f"{log.message}; choose another law, as with --set controller.kind=pid"
-        )
+    return log
+
+
+def _motion(log: Recording) -> Motion:
     states, demands = ([log[name] for name in names] for names in (STATE, ("tau_u", "tau_r")))
     return Motion(log["time"], np.column_stack(states), np.column_stack(demands))
 
@@ -108,7 +133,7 @@ def _repeating(scenario: Scenario, wanted: Problem, motion: Motion) -> Scenario:
     law = Schedule(rows=schedule(wanted, motion), minimises=wanted.minimised)
     told = f"A motion of least {wanted.minimised}, found by podusv optimum."
     changes = {"controller": law, "control": Control(), "description": told}
-    return scenario.model_copy(update=changes)
+    return scenario.alone().model_copy(update=changes)
 
 
 def _departures(folder: Path, motion: Motion) -> dict[str, float]:
