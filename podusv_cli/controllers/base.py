@@ -25,6 +25,16 @@ class Approach(NamedTuple):
     standoff: float  # m
 
 
+class Trial(NamedTuple):
+    """A manoeuvring trial: when it begins [s], and the change of heading that reverses it [rad].
+
+    `switch` is 0 where nothing is reversed.
+    """
+
+    execute: float
+    switch: float = 0.0
+
+
 class Controller(Component):
     """A law from (state, target) to a demand (tau_u [N], tau_r [N m]).
 
@@ -103,6 +113,10 @@ class Controller(Component):
     def optimum_of(self) -> str:
         """The metric that its motion minimises among all motions of the task; empty for laws."""
         return ""
+
+    def trial(self) -> Trial | None:
+        """The manoeuvring trial that this is, for the metrics of trials; None for a law."""
+        return None
 
     def lyapunov(self) -> Any:
         """The law itself where (46) is its Lyapunov function, see `theory.monitor`; else None."""

@@ -45,7 +45,7 @@ def _windup(scenario: Scenario) -> str:
 def moves_away(scenario: Scenario, log: Recording) -> Sentences:
     """The law does not track: the distance to the target has grown over the run."""
     late = rows_where(log, lambda part: part["time"] >= scenario.steady_from())
-    if not late.any():
+    if not late.any() or scenario.controller.trial():
         return
     start, end = float(log["z_e"][0]), float(log["z_e"][late].mean())
     if end > start + scenario.vessel.length:

@@ -1,0 +1,139 @@
+"""Manoeuvring trials beside scipy's integration of the plant, and what they are made of."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from podusv_cli.core.kernel import bundle
+from podusv_cli.process.extras import Extras
+from podusv_cli.scenario.load import load_text
+from podusv_cli.scenario.shipped import file_of
+from podusv_cli.vessels.plant import plant
+from podusv_cli.workflows.execute import Stopwatch, simulated, summary
+
+LEVER, EXECUTE = 0.499, 20.0
+IDEAL = ["actuator={kind: ideal}", f"controller.execute={EXECUTE}", "simulation.duration=80"]
+OTTER = ["vessel.preset=otter", "controller.thrust=60"]
+
+
+def done(name, *sets):
+    """Scenario, recording and metrics of a shipped trial."""
+    text = f"extends: podusv:trials/{name}.yaml\nname: trial\n"
+    scenario = load_text(text, "trial.yaml", sets).scenario.alone()
+    recording = simulated(scenario, Stopwatch())
+    return scenario, recording, summary(scenario, recording, Extras())
+
+
+def slope(scenario, angle):
+    """The plant's rate under the steered thrust, at a fixed angle [rad]."""
+    k, thrust = bundle(scenario.vessel.constants()), scenario.controller.thrust
+    tau = np.array([thrust * math.cos(angle), 0.0, thrust * LEVER * math.sin(angle)])
+
+    def rate(t, x):
+        out = np.zeros(6)
+        plant(x, tau, np.zeros(3), k, out)
+        return out
+
+    return rate
+
+
+def crossing(state, change, sign=1.0):
+    """An event of scipy: the heading has changed by so much."""
+
+    def event(t, x):
+        return sign * (x[2] - state[2]) - change
+
+    event.terminal, event.direction = True, 1.0
+    return event
+
+
+def integrated(scenario, angle, state, event, seconds=60.0):
+    found = solve_ivp(
+        slope(scenario, angle), (0.0, seconds), state, events=event, rtol=1e-10, atol=1e-12
+    )
+    return found.y[:, -1]
+
+
+def approach(scenario):
+    start = np.array([0.0, 0.0, 0.0, 0.5, 0.0, 0.0])
+    return integrated(scenario, 0.0, start, None, EXECUTE)
+
+
+@pytest.mark.parametrize(
+    ("preset", "thrust"), [("cybership2", 1.5), ("paper_nonlinear", 1.5), ("otter", 60.0)]
+)
+def test_a_turning_circle_is_that_of_an_independent_integration(preset, thrust):
+    vessel = [f"vessel.preset={preset}", f"controller.thrust={thrust}"]
+    scenario, _, found = done("turning_circle", *IDEAL, *vessel)
+    begun, angle = approach(scenario), math.radians(35.0)
+    quarter = integrated(scenario, angle, begun, crossing(begun, 0.5 * math.pi))
+    half = integrated(scenario, angle, begun, crossing(begun, math.pi))
+    # The engine sees the turn at the next instant, 0.01 s later at most: 1 cm at 1 m/s.
+    assert found["advance"] == pytest.approx(quarter[0] - begun[0], abs=0.01)
+    assert found["transfer"] == pytest.approx(quarter[1], abs=0.01)
+    assert found["tactical_diameter"] == pytest.approx(half[1], abs=0.01)
+
+
+def test_the_turning_diameter_is_that_of_the_circle_at_the_end():
+    _, log, found = done("turning_circle", *IDEAL)
+    late = log["time"] > 60.0
+    x, y = log["x"][late], log["y"][late]
+    columns = np.column_stack([x, y, np.ones_like(x)])
+    a, b, c = np.linalg.lstsq(columns, x * x + y * y, rcond=None)[0]
+    diameter = 2.0 * math.sqrt(c + 0.25 * (a * a + b * b))
+    assert found["turning_diameter"] == pytest.approx(diameter, rel=1e-3)
+
+
+def test_overshoots_of_a_zigzag_are_those_of_an_independent_integration():
+    degrees = math.radians(20.0)
+    scenario, log, found = done("zigzag_20", *IDEAL, *OTTER)
+    begun = approach(scenario)
+    state, overshoots = begun, []
+    for leg in range(3):
+        side = 1.0 if leg % 2 == 0 else -1.0
+        if leg:
+            peak = integrated(scenario, side * degrees, state, turning(-side))
+            overshoots.append(-side * (peak[2] - begun[2]) - degrees)
+        state = integrated(scenario, side * degrees, state, crossing(begun, degrees, side))
+    assert [found["overshoot_1"], found["overshoot_2"]] == pytest.approx(overshoots, abs=0.01)
+    sides = np.sign(log["delta_s"][log["time"] >= EXECUTE])
+    assert set(sides.tolist()) == {1.0, -1.0}
+
+
+def turning(side):
+    """An event of scipy: the yaw rate towards this side has come to zero."""
+
+    def event(t, x):
+        return -side * x[5]
+
+    event.terminal, event.direction = True, 1.0
+    return event
+
+
+def test_a_trial_that_does_not_get_so_far_has_no_number():
+    _, _, found = done("turning_circle", *IDEAL, "simulation.duration=21")
+    assert math.isnan(found["advance"])
+    assert math.isnan(found["tactical_diameter"])
+    _, _, short = done("zigzag_20", *IDEAL, "simulation.duration=21")
+    assert math.isnan(short["overshoot_1"])
+
+
+def test_only_trials_have_the_metrics_of_trials():
+    _, _, turn = done("turning_circle", *IDEAL)
+    _, _, zigzag = done("zigzag_20", *IDEAL)
+    assert "advance" in turn
+    assert "advance" not in zigzag
+    assert "overshoot_1" in zigzag
+    assert "overshoot_1" not in turn
+    law = load_text("extends: podusv:own_vessel.yaml\nname: x\n", "x.yaml").scenario.alone()
+    assert not {"advance", "overshoot_1"} & set(law.observer().summary(np.ones(200)))
+
+
+def test_behind_pods_the_thrust_turns_by_the_angle_and_pushes_the_stern_aside():
+    _, log, _ = done("turning_circle", "simulation.duration=70")
+    late = log["time"] > 65.0
+    assert np.abs(log["delta"][late]) == pytest.approx(math.radians(35.0), abs=0.02)
+    assert np.all(log["tau_v"][late] < 0.0)  # to port, so that the bow turns to starboard
+    assert file_of("podusv:trials/turning_circle.yaml").endswith("turning_circle.yaml")
