@@ -12,6 +12,8 @@ from podusv_cli.actuators.saturated import Saturated
 from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
 from podusv_cli.controllers.backstepping import Backstepping
 from podusv_cli.controllers.pid import Pid
+from podusv_cli.controllers.turning_circle import TurningCircle
+from podusv_cli.controllers.zigzag import Zigzag
 from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.engine.grid import TimeGrid
@@ -210,9 +212,11 @@ def test_every_metric_is_computed_and_documented(limited):
     log, got = limited
     (cost,) = law_costs([(corrected(), log)])
     _, of_pods = gathered(corrected(actuator=example(Pods)), steps=10)
+    trials = (corrected(controller=TurningCircle()), corrected(controller=Zigzag()))
+    of_trials = {name for trial in trials for name in gathered(trial, steps=10)[1]}
     always = {name for name in METRICS if NAMED not in name}
     compared = {metric.name for metric in distance.OF_OPTIMUM.values()}  # known to comparisons only
-    assert always == set(got | cost | operations(corrected(), log) | of_pods) | compared
+    assert always == set(got | cost | operations(corrected(), log) | of_pods) | compared | of_trials
     assert set(of_pods) > set(got)
     assert all(metric.unit and metric.meaning for metric in METRICS.values())
 
