@@ -83,7 +83,7 @@ def test_the_plant_on_symbols_is_the_plant():
     pytest.importorskip("casadi", reason=REASON)
     random = np.random.default_rng(3)
     for vessel in VESSELS.values():
-        rate = collocation.dynamics(vessel)
+        rate = collocation.dynamics(bundle(vessel.constants()))
         for _ in range(20):
             x, tau, b = random.normal(0, 1, 6), random.normal(0, 5, 3), random.normal(0, 1, 3)
             tau[1] = 0.0

@@ -23,7 +23,6 @@ from podusv_cli.core.kernel import Vector, bundle, transplanted
 from podusv_cli.optimum.problem import Motion, Problem
 from podusv_cli.process.interrupts import interrupts_caught, interrupts_deferred
 from podusv_cli.vessels.plant import plant
-from podusv_cli.vessels.vessel import Vessel
 
 TOLERANCE = 1e-8  # of IPOPT
 MOST_ITERATIONS = 1000
@@ -63,14 +62,17 @@ def casadi() -> Any:
     return casadi
 
 
-def dynamics(vessel: Vessel) -> Any:
-    """A CasADi function: the rate of the state (x, y, psi, u, v, r) under demand and load."""
+def dynamics(k: Any) -> Any:
+    """A CasADi function: the rate of the state (x, y, psi, u, v, r) under demand and load.
+
+    `k` has the coefficients of the vessel.
+    """
     ca = casadi()
     kernel = transplanted(plant, {cos_sin: lambda a: (ca.cos(a), ca.sin(a)), float: lambda x: x})
     x, demand, b = ca.SX.sym("x", STATES), ca.SX.sym("demand", 2), ca.SX.sym("b", 3)
     rate: list[Any] = [0.0] * STATES
     tau = [demand[0], 0.0, demand[1]]
-    kernel(ca.vertsplit(x), tau, ca.vertsplit(b), bundle(vessel.constants()), rate)
+    kernel(ca.vertsplit(x), tau, ca.vertsplit(b), k, rate)
     return ca.Function("dynamics", [x, demand, b], [ca.vertcat(*rate)])
 
 
@@ -216,7 +218,7 @@ def _thirds(ends: Vector, middle: Vector) -> tuple[Vector, Vector, Vector]:
 
 def _segment(problem: Problem, h: float) -> Any:
     """A CasADi function of one segment: its gaps, its share of the integral, its middle place."""
-    ca, rate = casadi(), dynamics(problem.loop.vessel)
+    ca, rate = casadi(), dynamics(bundle(problem.loop.vessel.constants()))
     before, after = ca.SX.sym("before", UNKNOWNS), ca.SX.sym("after", UNKNOWNS)
     loads = [ca.SX.sym(f"b{i}", 3) for i in range(3)]
     places = [ca.SX.sym(f"d{i}", 2) for i in range(3)]

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from podusv_cli.core.kernel import Vector
+from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.optimum.collocation import STATES, casadi, dynamics
 from podusv_cli.optimum.problem import Motion, Problem
 
@@ -58,7 +58,7 @@ def _gains(problem: Problem, motion: Motion) -> Vector:
 
 def _slopes(problem: Problem, motion: Motion) -> tuple[Vector, Vector]:
     """The rates' derivatives by state and by demand at each of the motion's times."""
-    ca, rate = casadi(), dynamics(problem.loop.vessel)
+    ca, rate = casadi(), dynamics(bundle(problem.loop.vessel.constants()))
     arguments: list[Any] = [ca.SX.sym(f"a{i}", size) for i, size in enumerate((STATES, 2, 3))]
     both = ca.jacobian(rate(*arguments), ca.vertcat(*arguments[:2]))
     found = ca.Function("slopes", arguments, [both]).map(len(motion.times))(
