@@ -41,7 +41,7 @@ class Impatient(SimpleQueue):
 
 
 def cluster(client, mixed=False):
-    made = Cluster(client, Recipe("text", "source"), Terms(REPORT, mixed))
+    made = Cluster(client, Recipe("text"), Terms(REPORT, mixed))
     made._finished = Impatient()
     made._finished.client = client
     return made

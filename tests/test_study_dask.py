@@ -17,15 +17,19 @@ from podusv_cli.study.march import march
 from podusv_cli.study.remote import Recipe
 from podusv_cli.study.store import RUNS, Store
 
-distributed = pytest.importorskip("distributed", reason="Dask is not installed: podusv[cluster]")
 PATIENCE = 60.0  # s
 # So long that an interrupt comes before the end.
 LONG = TEXT.replace("duration: 1.0", "duration: 20.0").replace("draws: 40", "draws: 1000")
 DASK = [sys.executable, "-m", "dask"]
 
 
+@pytest.fixture
+def distributed():
+    return pytest.importorskip("distributed", reason="Dask is not installed: podusv[cluster]")
+
+
 @pytest.mark.slow
-def test_a_worker_that_is_killed_changes_no_byte(tmp_path):
+def test_a_worker_that_is_killed_changes_no_byte(distributed, tmp_path):
     whole = (made(tmp_path / "local").folder / RUNS).read_bytes()
     store, killed = Store(tmp_path / "study", small()), []
     store.open("now")
@@ -35,7 +39,7 @@ def test_a_worker_that_is_killed_changes_no_byte(tmp_path):
             killed.append(next(iter(local.workers.values())).pid)
             os.kill(killed[0], signal.SIGKILL)
 
-    recipe = Recipe(TEXT, "small.yaml")
+    recipe = Recipe(TEXT)
     with (
         distributed.LocalCluster(2, threads_per_worker=1, dashboard_address=None) as local,
         connected(local.scheduler_address, recipe, store.seal, mixed=False) as engine,
@@ -48,7 +52,7 @@ def test_a_worker_that_is_killed_changes_no_byte(tmp_path):
 
 
 @pytest.mark.slow
-def test_dask_as_a_user_starts_it_and_an_interrupt(tmp_path):
+def test_dask_as_a_user_starts_it_and_an_interrupt(distributed, tmp_path):
     (tmp_path / "long.yaml").write_text(LONG)
     with ExitStack() as stack:
         place = tmp_path / "scheduler.json"
@@ -81,9 +85,10 @@ def test_dask_as_a_user_starts_it_and_an_interrupt(tmp_path):
 
 
 @contextmanager
-def background(*command):
+def background(*command, cwd=None):
     """A process in the background, ended at the end."""
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    process = subprocess.Popen(command, cwd=cwd, **silent)
     try:
         yield process
     finally:
@@ -104,10 +109,10 @@ def until(happened):
         time.sleep(0.02)
 
 
-def test_no_scheduler_is_a_sentence(monkeypatch):
+def test_no_scheduler_is_a_sentence(distributed, monkeypatch):
     monkeypatch.setattr("podusv_cli.study.cluster.PATIENCE", 0.3)
     with (
         pytest.raises(StorageError, match=r"--scheduler tcp://127.0.0.1:9: no scheduler answers"),
-        connected("tcp://127.0.0.1:9", Recipe(TEXT, "small.yaml"), "", mixed=False),
+        connected("tcp://127.0.0.1:9", Recipe(TEXT), "", mixed=False),
     ):
         pass

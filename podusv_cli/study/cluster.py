@@ -47,7 +47,7 @@ def connected(address: str, recipe: Recipe, identity: str, *, mixed: bool) -> It
     scheduler.
     """
     with _client(address) as client:
-        ours = remote.report(recipe.text, recipe.source) | {"the study": identity}
+        ours = remote.report(recipe.text, recipe.plugins) | {"the study": identity}
         cluster = Cluster(client, recipe, Terms(ours, mixed))
         cluster.check()
         yield cluster
@@ -87,9 +87,9 @@ class Cluster:
                 "the scheduler has no workers yet; start one with `dask worker ADDRESS "
                 "--nthreads 1`, and run it again"
             )
-        text, source = self._recipe.text, self._recipe.source
+        text, plugins = self._recipe.text, self._recipe.plugins
         reports = {
-            worker: self._client.submit(remote.report, text, source, workers=[worker], pure=False)
+            worker: self._client.submit(remote.report, text, plugins, workers=[worker], pure=False)
             for worker in sorted(self._threads)
         }
         end = time.monotonic() + REPORTING
@@ -156,7 +156,7 @@ class Cluster:
 
     def _submit(self, task: Task) -> None:
         future = self._client.submit(
-            remote.made, self._recipe.text, self._recipe.source, astuple(task.unit),
+            remote.made, self._recipe.text, self._recipe.plugins, astuple(task.unit),
             self._terms.expected, mixed=self._terms.mixed, pure=False,
             workers=sorted(task.allowed) if task.allowed else None,
         )  # fmt: skip

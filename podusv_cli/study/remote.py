@@ -11,6 +11,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from importlib.metadata import version
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import podusv_cli
 from podusv_cli.process.interrupts import Interrupts
@@ -27,19 +29,30 @@ CANARY = 2  # draws of each law, of which every worker has to compute the same b
 PACKAGES = ("numpy", "numba", "llvmlite")
 BITS = "the bits of "  # and a law
 Report = dict[str, str]
+Plugins = tuple[tuple[str, str], ...]  # name and text of each file
 
 
 @dataclass(frozen=True)
 class Recipe:
-    """A study as text; `source` is where the names of files in it start."""
+    """A study as text, and its plug-in files by name."""
 
     text: str
-    source: str
+    plugins: Plugins = ()
 
 
 @lru_cache(PLANS)
+def _placed(recipe: Recipe) -> tuple[Plan, TemporaryDirectory[str]]:
+    """The plan, and the folder that its plug-ins were read from; gone when it is forgotten."""
+    folder = TemporaryDirectory(prefix="podusv-")
+    for name, text in recipe.plugins:
+        place = Path(folder.name, name)
+        place.parent.mkdir(exist_ok=True)
+        place.write_text(text, encoding="utf-8")
+    return plan(load_text(recipe.text, str(Path(folder.name, "scenario.yaml")))), folder
+
+
 def _plan(recipe: Recipe) -> Plan:
-    return plan(load_text(recipe.text, recipe.source))
+    return _placed(recipe)[0]
 
 
 @lru_cache(PLANS)
@@ -57,9 +70,9 @@ def _report(recipe: Recipe) -> Report:
     return told
 
 
-def report(text: str, source: str) -> Report:
+def report(text: str, plugins: Plugins) -> Report:
     """Versions, digests of all kernels and of the study, and digests of the bits of some runs."""
-    return dict(_report(Recipe(text, source)))
+    return dict(_report(Recipe(text, plugins)))
 
 
 @dataclass(frozen=True)
@@ -105,14 +118,14 @@ class Reply:
 
 
 def made(
-    text: str, source: str, unit: tuple[str, int, int, int], expected: str, *, mixed: bool
+    text: str, plugins: Plugins, unit: tuple[str, int, int, int], expected: str, *, mixed: bool
 ) -> Reply:
     """Make a unit (law, cell, first draw, number of draws), on a worker."""
     from distributed import get_worker
 
-    told, outcome = report(text, source), None
+    told, outcome = report(text, plugins), None
     if digest(firm(told, mixed=mixed)) == expected:
-        job = partial(timed, _plan(Recipe(text, source)), Unit(*unit))
+        job = partial(timed, _plan(Recipe(text, plugins)), Unit(*unit))
         outcome = outcome_of(job, lambda fraction: None, Interrupts())
     machine = f"{processor()} ({' '.join(platform.libc_ver())})"
     return Reply(get_worker().address, machine, told, outcome)

@@ -36,6 +36,7 @@ from podusv_cli.study.runs import Mask
 from podusv_cli.study.unit import Unit, UnitResult
 
 UNITS, RUNS = "units", "runs.h5"
+SCENARIO = "scenario.yaml"  # whole: it refers to no other file but plug-ins beside it
 FORMAT = 1
 SEAL = "sha256"
 BLOCK = 512  # bytes of the smallest user block of HDF5
@@ -75,6 +76,13 @@ class Store:
         files.make_folder(self.folder)
         files.write_bytes(self.folder / STUDY, json_files.encode(content))
         files.make_folder(self.folder / UNITS)
+
+    def write_scenario(self, text: str) -> None:
+        """Write the scenario, which refers to nothing outside the folder, and its plug-ins."""
+        contents = {SCENARIO: text, **self.plan.scenario.plugin_files()}
+        for name, content in contents.items():
+            files.make_folder((self.folder / name).parent)
+            files.write_bytes(self.folder / name, content.encode())
 
     def agree(self, folder: Path, other: Plan) -> None:
         """Raise UsageError where another folder holds another study, naming what is different."""

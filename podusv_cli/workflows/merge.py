@@ -7,12 +7,11 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from podusv_cli.core.errors import UsageError
-from podusv_cli.storage import files
 from podusv_cli.study.joining import join, missing
 from podusv_cli.study.march import Tally
 from podusv_cli.study.sittings import Sitting
-from podusv_cli.study.store import Store
-from podusv_cli.workflows.sweep import SCENARIO, Request, Swept, answered, stored
+from podusv_cli.study.store import SCENARIO, Store
+from podusv_cli.workflows.sweep import Request, Swept, answered, stored
 
 
 def merge(studies: Sequence[Path], out: Path, request: Request) -> Swept:
@@ -30,7 +29,7 @@ def merge(studies: Sequence[Path], out: Path, request: Request) -> Swept:
         store.agree(other.folder, other.plan)
     store.open(started.isoformat(timespec="seconds"))
     sitting = Sitting(out, request.argv, started, store.plan.scenario.plugged, studies)
-    files.write_bytes(out / SCENARIO, (most.folder / SCENARIO).read_bytes())
+    store.write_scenario((most.folder / SCENARIO).read_text(encoding="utf-8"))
     join(store, others)
     sitting.end(0)
     tally = Tally.of(store.covered())

@@ -33,11 +33,10 @@ from podusv_cli.study.plan import Plan, plan
 from podusv_cli.study.remote import Recipe
 from podusv_cli.study.results import Results, judged
 from podusv_cli.study.sittings import Sitting
-from podusv_cli.study.store import Store
+from podusv_cli.study.store import SCENARIO, Store
 from podusv_cli.workflows.keep import alone, keep
 from podusv_cli.workflows.run import RESULTS
 
-SCENARIO = "scenario.yaml"  # whole: it refers to no other file
 FORMATS = ("csv", "parquet")
 WHOLE: Part = (1, 1)  # the only shard
 
@@ -159,8 +158,8 @@ def _engine(store: Store, request: Request) -> AbstractContextManager[Engine]:
         return nullcontext(Processes(store.plan, request.workers))
     from podusv_cli.study.cluster import connected  # imports Dask
 
-    source = (store.folder / SCENARIO).absolute()
-    recipe = Recipe(source.read_text(encoding="utf-8"), str(source))
+    text = (store.folder / SCENARIO).read_text(encoding="utf-8")
+    recipe = Recipe(text, tuple(store.plan.scenario.plugin_files().items()))
     return connected(request.scheduler, recipe, store.seal, mixed=request.mixed)
 
 
@@ -181,7 +180,7 @@ def _opened(config: Path, request: Request, started: datetime) -> Store:
     folder = request.out or (config if given else RESULTS / f"{loaded.scenario.name}-sweep")
     store = Store(folder, plan(loaded))
     store.open(started.isoformat(timespec="seconds"))
-    files.write_bytes(store.folder / SCENARIO, tree_yaml(loaded).encode())
+    store.write_scenario(tree_yaml(loaded))
     return store
 
 
@@ -281,6 +280,9 @@ def draw(study: Path, law: str, number: int, cell: int, out: Path | None) -> Pat
         raise UsageError(f"--draw {number}: there is no such draw; they are numbered 0 to {last}")
     one = alone(made, law, cell, number)
     path = out or Path(f"{one.name}.yaml")
+    of_study, files_ = partial(os.path.relpath, start=path.parent), one.plugin_files()
+    named = {of_study(study / n) if n in files_ else n: p for n, p in one.plugins.items()}
+    one = one.model_copy(update={"plugins": named})
     if path.exists():
         raise UsageError(f"{path} exists already; name another file with --out")
     at = f", cell {cell} ({made.cells[cell].label})" if len(made.cells) > 1 else ""

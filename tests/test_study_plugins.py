@@ -1,0 +1,89 @@
+"""A study of a law from a file: its folder has all that is needed, wherever it is looked at."""
+
+import json
+from contextlib import ExitStack
+
+import numpy as np
+import pytest
+from plugin_samples import LAW
+from small_study import TEXT
+from test_study_dask import DASK, PATIENCE, background, until
+
+from podusv_cli.study import remote
+from podusv_cli.study.joining import digests
+from podusv_cli.study.remote import Recipe
+from podusv_cli.study.store import RUNS
+from podusv_cli.study.unit import Unit, make
+from podusv_cli.workflows import run as running
+from podusv_cli.workflows import sweep
+from podusv_cli.workflows.merge import merge
+
+MINE = "plugins: [laws/my_law.py]\ncontrollers:\n  mine: {kind: cross_track}\n"
+
+
+def swept(config, folder, **options):
+    request = sweep.Request(out=folder, workers=1, figures=False, **options)
+    return sweep.run(config, request, lambda tally: None)
+
+
+@pytest.fixture
+def config(tmp_path):
+    """A scenario with a law in a file beside it."""
+    (tmp_path / "own/laws").mkdir(parents=True)
+    (tmp_path / "own/laws/my_law.py").write_text(LAW)
+    (tmp_path / "own/mine.yaml").write_text(TEXT.replace("controllers:\n", MINE))
+    return tmp_path / "own/mine.yaml"
+
+
+def test_a_study_keeps_its_plugin(config, tmp_path, monkeypatch):
+    study = swept(config, tmp_path / "study", overrides=["sweep.draws=8"]).folder
+    first = (study / RUNS).read_bytes()
+    config.parent.rename(tmp_path / "gone")
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    assert sweep.report(study, sweep.Request(figures=False)).results.made == 24
+    assert sweep.run(
+        study, sweep.Request(("sweep.draws=16",), figures=False), lambda tally: None
+    ).results
+    assert (study / RUNS).read_bytes() != first
+    drawn = sweep.draw(study, "mine", 3, 0, None)
+    alone = running.run(drawn, running.Request(figures=()))
+    table = sweep.stored(study).runs()
+    assert alone.metrics["iae"] == table.metric("mine", "iae")[0, 3]
+    merged = merge([study], tmp_path / "merged", sweep.Request(figures=False))
+    assert (merged.folder / RUNS).read_bytes() == (study / RUNS).read_bytes()
+
+
+def test_a_worker_needs_no_file_of_a_plugin(config, tmp_path, monkeypatch):
+    """It gets the text, and makes the same bits."""
+    study = swept(config, tmp_path / "study", overrides=["sweep.draws=8"]).folder
+    text, unit = (study / sweep.SCENARIO).read_text(), Unit("mine", 0, 0, 4)
+    store = sweep.stored(study)
+    recipe = Recipe(text, tuple(store.plan.scenario.plugin_files().items()))
+    ours = digests(make(store.plan, unit))
+    study.rename(tmp_path / "gone")
+    theirs = digests(make(remote._plan(recipe), unit))
+    assert np.array_equal(ours, theirs)
+    assert remote.report(recipe.text, recipe.plugins)["the study"] == store.seal
+
+
+@pytest.mark.slow
+def test_workers_of_dask_in_another_folder(config, tmp_path):
+    distributed = pytest.importorskip("distributed", reason="Dask is not installed")
+    place, elsewhere = tmp_path / "scheduler.json", tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    with ExitStack() as stack:
+        stack.enter_context(
+            background(*DASK, "scheduler", "--host", "127.0.0.1", "--port", "0",
+                       "--no-dashboard", "--scheduler-file", place)
+        )  # fmt: skip
+        until(place.exists)
+        address = json.loads(place.read_text())["address"]
+        stack.enter_context(
+            background(*DASK, "worker", address, "--nthreads", "1", "--no-dashboard", cwd=elsewhere)
+        )
+        with distributed.Client(address, set_as_default=False) as client:
+            client.wait_for_workers(1, timeout=PATIENCE)
+        spread = swept(config, tmp_path / "spread", scheduler=address).folder
+    alone = swept(config, tmp_path / "alone").folder
+    assert (spread / RUNS).read_bytes() == (alone / RUNS).read_bytes()
