@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -27,6 +28,14 @@ def alone(plan: Plan, law: str, cell: int, draw: int) -> Scenario:
     one = drawn(plan.single(law, cell), plan.sweep.vary, numbers)
     end = f"-{Wanted(law, cell, draw, '').name}"
     return one.model_copy(update={"name": f"{one.name[: LONGEST_NAME - len(end)]}{end}"})
+
+
+def seen_from(place: Path, study: Path, one: Scenario) -> Scenario:
+    """A scenario of a study, with its plug-in files named as in another folder."""
+    kept = one.plugin_files()
+    names = {name: os.path.relpath(study / name, place) for name in kept}
+    plugins = {names.get(name, name): required for name, required in one.plugins.items()}
+    return one.model_copy(update={"plugins": plugins})
 
 
 def keep(

@@ -34,7 +34,7 @@ from podusv_cli.study.remote import Recipe
 from podusv_cli.study.results import Results, judged
 from podusv_cli.study.sittings import Sitting
 from podusv_cli.study.store import SCENARIO, Store
-from podusv_cli.workflows.keep import alone, keep
+from podusv_cli.workflows.keep import alone, keep, seen_from
 from podusv_cli.workflows.run import RESULTS
 
 FORMATS = ("csv", "parquet")
@@ -280,9 +280,7 @@ def draw(study: Path, law: str, number: int, cell: int, out: Path | None) -> Pat
         raise UsageError(f"--draw {number}: there is no such draw; they are numbered 0 to {last}")
     one = alone(made, law, cell, number)
     path = out or Path(f"{one.name}.yaml")
-    of_study, files_ = partial(os.path.relpath, start=path.parent), one.plugin_files()
-    named = {of_study(study / n) if n in files_ else n: p for n, p in one.plugins.items()}
-    one = one.model_copy(update={"plugins": named})
+    one = seen_from(path.parent, study, one)
     if path.exists():
         raise UsageError(f"{path} exists already; name another file with --out")
     at = f", cell {cell} ({made.cells[cell].label})" if len(made.cells) > 1 else ""
