@@ -17,12 +17,22 @@ from podusv_cli.core.kinematics import wrap
 from podusv_cli.core.recording import Recording
 from podusv_cli.disturbances.calm import Calm
 from podusv_cli.disturbances.harmonic import Harmonic, HarmonicDisturbance
+from podusv_cli.findings.finding import preflight
 from podusv_cli.paths.circle import Circle
 from podusv_cli.paths.line import Line
 from podusv_cli.paths.line_circle import LineCircle
+from podusv_cli.scenario.load import load_text
 from podusv_cli.vessels.plant import sway_force
 
 LAW = VelocityVector()
+SAMPLED = """
+extends: podusv:paper/base.yaml
+vessel: {{preset: paper_nonlinear}}
+path: {{reading: velocity}}
+actuator: {{kind: saturated}}
+controllers: {{mine: {{kind: velocity_vector}}}}
+control: {{period: {period}}}
+"""
 K = bundle(LAW.constants_with(NONLINEAR))
 STEADY = HarmonicDisturbance(b_u=Harmonic(mean=0.5), b_v=Harmonic(mean=0.5), b_r=Harmonic(mean=0.5))
 
@@ -211,3 +221,13 @@ def test_the_settled_error_is_within_the_bound_of_the_cascade():
         largest = max(largest, float(np.hypot(found.a - x[3], found.b - x[4])))
     bound = largest / (0.99 * LAW.k_p)  # kappa is k_p but for 1 % within 0.1 m
     assert 0.1 * bound < within(out, 150).max() <= bound
+
+
+@pytest.mark.parametrize(("period", "grows"), [(50, False), (80, True)])
+def test_the_period_that_its_loops_carry_is_the_one_that_the_run_carries(period, grows):
+    """0.5 s and 0.8 s: what `sampled-loop` tells before a run, and the run."""
+    scenario = load_text(SAMPLED.format(period=period / 100), "a.yaml").scenario
+    codes = [finding.code for finding in preflight(scenario)]
+    assert ("sampled-loop" in codes) is grows
+    worst = float(within(task(hold_every=period), 150).max())
+    assert (worst > 0.2) is grows
