@@ -63,6 +63,10 @@ def test_every_fault_is_that_of_its_run(study):
         assert set(runs.status(law)[0]) == {0}
 
 
+def test_the_exit_code_of_a_report_says_so(podusv, study):
+    assert podusv("sweep", "report", study.folder, "--no-figures", "--quiet").code == 3
+
+
 def test_the_report_tells_them(study):
     page = tree((study.folder / "report.html").read_text())
     (failures,) = page.all("section", id="failures")

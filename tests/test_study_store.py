@@ -2,13 +2,14 @@
 
 import errno
 import io
+import json
 import os
 import shutil
 
 import h5py
 import numpy as np
 import pytest
-from small_study import made, small
+from small_study import made, small, written
 
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.engine.simulate import simulate
@@ -20,6 +21,7 @@ from podusv_cli.study.plan import watching
 from podusv_cli.study.results import judged
 from podusv_cli.study.store import BLOCK, RUNS, UNITS, Store, encoded, read, undamaged
 from podusv_cli.study.unit import Unit, UnitResult
+from podusv_cli.workflows import sweep
 
 
 @pytest.fixture(scope="module")
@@ -187,6 +189,22 @@ def test_a_full_disk_while_the_table_is_filled_keeps_the_units(whole, tmp_path, 
     assert not list(store.folder.glob("*runs.h5*"))
     monkeypatch.undo()
     assert content(made(store.folder)) == content(whole)
+
+
+def test_times_of_all_sittings_are_added_up(tmp_path):
+    config = written(tmp_path / "small.yaml")
+    for wanted in (8, 24):
+        request = sweep.Request(
+            (f"sweep.draws={wanted}",), tmp_path / "s", workers=1, figures=False
+        )
+        sweep.run(config, request, lambda tally: None)
+    told = json.loads((tmp_path / "s/timing.json").read_text())
+    assert [one["runs"] for one in told["sittings"]] == [16, 32]
+    for law in ("pid", "li"):
+        found = told["laws"][law]
+        assert found["runs"] == 24
+        assert found["ms_a_run"] == pytest.approx(1e3 * found["processor_s"] / 24)
+        assert found["processor_s"] > 0.0
 
 
 def test_success_is_evaluated_once_for_each_law(whole, monkeypatch):

@@ -94,8 +94,6 @@ def run(
     for refused in done.refused:
         echo(f"warning: {refused}", err=True)
     _tell(done, as_json=as_json, quiet=quiet)
-    broken = done.results.broken if done.results else 0
-    raise typer.Exit(SOME_FAILED if broken else 0)
 
 
 def seconds(text: str) -> float:
@@ -117,10 +115,12 @@ def part_of(text: str) -> tuple[int, int]:
 
 
 def _tell(done: Swept, *, as_json: bool, quiet: bool) -> None:
-    """Print a study, and on stderr what of it could not be made."""
+    """Print a study, and on stderr what of it could not be made; exit with 3 for broken runs."""
     echo_result(done, lambda: _report(done), as_json=as_json, quiet=quiet)
     for part in done.missing:
         echo(part.traced, err=True)
+    if done.results and done.results.broken:
+        raise typer.Exit(SOME_FAILED)
 
 
 def _report(done: Swept) -> None:

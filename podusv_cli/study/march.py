@@ -38,12 +38,19 @@ class Tally:
     failed: int = 0
     began: float = field(default_factory=time.monotonic)
     before: int = 0  # runs that were there already
+    computed: dict[str, float] = field(default_factory=dict)  # processor time by law [s]
+    ran: dict[str, int] = field(default_factory=dict)  # runs by law of which this is the time
 
     @classmethod
     def of(cls, there: Mapping[tuple[str, int], Mask]) -> Self:
         """That of a study in which these runs are there."""
         made = sum(int(mask.sum()) for mask in there.values())
         return cls(sum(map(len, there.values())), made, before=made)
+
+    def note(self, unit: Unit, seconds: float) -> None:
+        """Enter the processor time of a unit."""
+        self.computed[unit.law] = self.computed.get(unit.law, 0.0) + seconds
+        self.ran[unit.law] = self.ran.get(unit.law, 0) + unit.count
 
     @property
     def rate(self) -> float:
@@ -164,6 +171,7 @@ class Driver:
         if outcome.result:
             result, seconds = outcome.result
             self._seconds = max(self._seconds, seconds / unit.count)
+            self.tally.note(unit, seconds)
             self._keep(result)
         elif outcome.killed and unit.count > 1:
             self._halves.extend(unit.halves())

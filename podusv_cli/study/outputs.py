@@ -18,6 +18,7 @@ from podusv_cli.study import pictures, report, summary, verdict
 from podusv_cli.study.keep import Kept, tracks
 from podusv_cli.study.results import Results
 from podusv_cli.study.runs_file import Table
+from podusv_cli.study.sittings import timing
 from podusv_cli.study.unit import STATUSES
 
 FIGURES, REPORT = "figures", "report.html"
@@ -32,6 +33,7 @@ def write_tables(folder: Path, results: Results) -> None:
         "sensitivity.csv": summary.as_csv(results.sensitivity).encode(),
         "claims.json": encode(told),
         "claims.md": verdict.as_markdown(results.verdicts).encode(),
+        "timing.json": encode(timing(folder)),
     }
     files.write_all({folder / name: content for name, content in contents.items()})
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
@@ -18,6 +19,21 @@ def sittings(folder: Path) -> list[dict[str, Any]]:
     """The sittings of a study so far, the oldest first. Raises StorageError."""
     path = folder / NAME
     return list(json_files.read(path).get("sittings", [])) if path.exists() else []
+
+
+def timing(folder: Path) -> dict[str, Any]:
+    """How long the runs of each law took, over all sittings. Raises StorageError."""
+    every = sittings(folder)
+    runs, seconds = Counter[str](), Counter[str]()
+    for one in every:
+        runs.update(one.get("timed_runs", {}))
+        seconds.update(one.get("processor_s", {}))
+    laws = {
+        law: {"runs": n, "processor_s": seconds[law], "ms_a_run": 1e3 * seconds[law] / n}
+        for law, n in runs.items()
+    }
+    keys = ("started", "duration_s", "runs")
+    return {"format": 1, "laws": laws, "sittings": [{k: one[k] for k in keys} for one in every]}
 
 
 class Sitting:

@@ -142,7 +142,8 @@ def _marched(
         made = f"the {seen.made} runs that are made" if seen.made else "all runs that were made"
         raise KeyboardInterrupt(f"interrupted; {made} are kept, continue with: {again}") from stop
     finally:
-        sitting.end(seen.made - seen.before, engine.told())
+        timed = {"processor_s": seen.computed, "timed_runs": seen.ran}
+        sitting.end(seen.made - seen.before, {**timed, **engine.told()})
 
 
 def _announce(made: Plan, request: Request, workers: int, missing: Gaps) -> None:
