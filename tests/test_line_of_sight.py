@@ -10,7 +10,7 @@ from conftest import NONLINEAR, ask, corrected, run, situations
 
 from podusv_cli.actuators.saturated import Saturated
 from podusv_cli.controllers.alos import CRAB, Alos, learning
-from podusv_cli.controllers.guidance import course_frame
+from podusv_cli.controllers.guidance import course_frame, line_of_sight, wanted_speed
 from podusv_cli.controllers.los_pid import LosPid
 from podusv_cli.controllers.velocity_loop import Axis
 from podusv_cli.core.kernel import bundle
@@ -54,30 +54,65 @@ def test_the_frame_is_that_of_the_target_s_velocity(law):
         assert np.exp(1j * (x[2] - course)) == pytest.approx(at.cos_off + 1j * at.sin_off)
 
 
-def test_the_rate_of_the_error_across_is_its_derivative():
+def test_the_rates_of_the_errors_are_their_derivatives():
     t = sp.Symbol("t")
     x, y, x_d, y_d = (sp.Function(name)(t) for name in ("x", "y", "x_d", "y_d"))
     course = sp.atan2(y_d.diff(t), x_d.diff(t))
     across = (x_d - x) * sp.sin(course) - (y_d - y) * sp.cos(course)
+    along = (x_d - x) * sp.cos(course) + (y_d - y) * sp.sin(course)
+    k = bundle(LosPid(chi_m=1e9).constants_with(NONLINEAR))
+    ahead = sp.sqrt(k.lookahead**2 + sp.Max(along, 0) ** 2)
+    sight = -sp.atan2(across + 0.1, ahead)
     names = "x0 y0 xd0 yd0 x1 y1 xd1 yd1 xd2 yd2"
     numbers = sp.symbols(names)
     places = [x, y, x_d, y_d]
     swaps = [(f.diff(t, 2), n) for f, n in zip((x_d, y_d), numbers[8:], strict=True)]
     swaps += [(f.diff(t), n) for f, n in zip(places, numbers[4:8], strict=True)]
     swaps += list(zip(places, numbers[:4], strict=True))
-    rate = sp.lambdify(numbers, across.diff(t).subs(swaps))
-    k = bundle({**LosPid(chi_m=1e9).constants_with(NONLINEAR)})
+    rates = [one.diff(t).subs(swaps) for one in (along, across, sight)]
+    rate = sp.lambdify(numbers, rates, ["numpy", {"Heaviside": np.heaviside}])
     for state, _, target in situations(LosPid(), 100):
         over_ground = (state[3] + 1j * state[4]) * np.exp(1j * state[2])
         velocity = (over_ground.real, over_ground.imag)
         expected = rate(*state[:2], *target[:2], *velocity, *target[2:])
-        assert course_frame(state, target, k).across_rate == pytest.approx(expected, rel=1e-9)
+        at = course_frame(state, target, k)
+        found = (at.along_rate, at.across_rate, line_of_sight(at, 0.1, 0.0, k)[1])
+        assert found == pytest.approx(expected, rel=1e-9)
 
 
 def test_a_target_at_rest_is_chased_along_the_line_of_sight():
     k = bundle(LosPid().constants_with(NONLINEAR))
     at = course_frame(np.zeros(6), np.array([3.0, 4.0, 0, 0, 0, 0]), k)
     assert (at.along, at.across) == pytest.approx((5.0, 0.0))
+
+
+def test_far_behind_the_line_of_sight_is_that_to_the_target_and_near_it_to_the_lookahead():
+    k = bundle(LosPid().constants_with(NONLINEAR))
+    D = k.lookahead
+    for behind, across, ahead in ((30.0, 40.0, 30.0), (0.0, 1.0, D), (-5.0, 1.0, D)):
+        x, target = np.array([0, across, 0, 0, 0, 0.0]), np.array([behind, 0, 1, 0, 0, 0.0])
+        angle, _ = line_of_sight(course_frame(x, target, k), 0.0, 0.0, k)
+        assert angle == pytest.approx(-np.arctan2(across, ahead), rel=5e-3)
+
+
+def test_a_vessel_beside_its_target_comes_to_the_line_with_speed():
+    k = bundle(LosPid().constants_with(NONLINEAR))
+    target = np.array([0.0, 0, 0.5, 0, 0, 0])
+    speeds = []
+    for across, ahead in ((5.0, 3.0), (1.0, 3.0), (0.0, 0.0)):
+        x = np.array([ahead, across, -0.5 * np.pi, 0, 0, 0]) if across > 4 else np.zeros(6)
+        x[:2] = ahead, across
+        speeds.append(wanted_speed(x, course_frame(x, target, k), k))
+    assert speeds == pytest.approx([k.k_s * (5.0 - k.lookahead), k.U_min, 0.5])
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.kind)
+def test_a_target_on_a_circle_is_reached_from_far_outside(law):
+    """Steered by the target's tangent alone, a vessel as slow as this one goes off with it."""
+    path = Circle(radius=20.0, speed=0.45, turn="port")
+    start = (-14.4, 13.9, 1.3, 0.0, 0.0, 0.0)
+    out = run(corrected(controller=law, actuator=Saturated(), path=path, start=start), 150.0)
+    assert out["z_e"][out["time"] > 140].max() < 1.0
 
 
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law.kind)

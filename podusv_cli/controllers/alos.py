@@ -16,7 +16,13 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from podusv_cli.controllers.base import Slots, each
-from podusv_cli.controllers.guidance import STEERED, LineOfSight, course_frame, wanted_speed
+from podusv_cli.controllers.guidance import (
+    STEERED,
+    LineOfSight,
+    course_frame,
+    line_of_sight,
+    wanted_speed,
+)
 from podusv_cli.controllers.observer import B_R, B_U, ObservingController, observe
 from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, kernel
@@ -50,13 +56,13 @@ class Alos(LineOfSight, ObservingController):
 
     kind: Literal["alos"] = "alos"
     signals: ClassVar[tuple[Signal, ...]] = STEERED
-    lookahead: float = value(0.8, "m", "distance ahead on the path that the bow aims at", gt=0)
+    lookahead: float = value(0.7, "m", "distance ahead on the path that the bow aims at", gt=0)
     U: float = value(1.1, "m/s", "largest wanted surge velocity", gt=0)
     learns: Literal["adaptive", "integral"] = value(
         "adaptive", "", "how the crab angle is found: adapted as an angle (ALOS, Fossen 2023), or "
         "by an integral of the cross-track error (ILOS, Borhaug et al. 2008)",
     )  # fmt: skip
-    gamma: float = value(0.15, "rad/(m s)", "gain of the adapted angle", ge=0)
+    gamma: float = value(0.2, "rad/(m s)", "gain of the adapted angle", ge=0)
     crab_m: float = value(0.5, "rad", "largest adapted angle", gt=0)
     sigma: float = value(0.1, "m/s", "gain of the integral", ge=0)
     k_u: float = value(1.0, "1/s", "gain of the surge velocity", gt=0)
@@ -86,12 +92,12 @@ class Alos(LineOfSight, ObservingController):
         """Heading to the line of sight less the crab angle; speed along the course."""
         at = course_frame(x, target, k)
         u, v, r = x[3], x[4], x[5]
-        crab, shifted = memory[CRAB], at.across + memory[OFFSET]
-        crab_rate, offset_rate = learning(at.across, crab, memory[OFFSET], k)
-        psi_r = wrap(at.course - crab - math.atan2(shifted, k.lookahead))
-        slope = k.lookahead / (k.lookahead * k.lookahead + shifted * shifted)
+        crab, offset = memory[CRAB], memory[OFFSET]
+        crab_rate, offset_rate = learning(at.across, crab, offset, k)
+        sight, sight_rate = line_of_sight(at, offset, offset_rate, k)
+        psi_r = wrap(at.course - crab + sight)
         psi_e = wrap(psi_r - x[2])
-        turn = at.turn - crab_rate - slope * (at.across_rate + offset_rate)
+        turn = at.turn - crab_rate + sight_rate
         r_d = turn + k.k_psi * psi_e
         yaw = k.k_psi * (turn - r) + k.k_r * (r_d - r)
         tau[1] = k.m33 * yaw - yaw_moment(u, v, r, k) - memory[B_R]

@@ -31,6 +31,7 @@ class Frame(NamedTuple):
 
     along: float  # target ahead of the vessel [m]
     across: float  # vessel to the right of the course [m]
+    along_rate: float  # m/s
     across_rate: float  # m/s
     course: float  # rad
     turn: float  # rate of the course [rad/s], limited
@@ -51,15 +52,35 @@ def course_frame(x: Vector, target: Vector, k: Any) -> Frame:
     turn = (target[2] * target[5] - target[3] * target[4]) / max(speed * speed, k.V_m * k.V_m)
     turn = 0.0 if rests else min(max(turn, -k.chi_m), k.chi_m)
     along, across = e_x * cos_c + e_y * sin_c, e_x * sin_c - e_y * cos_c
+    along_rate = speed - x[3] * cos_off + x[4] * sin_off - turn * across
     across_rate = x[3] * sin_off + x[4] * cos_off + turn * along
-    return Frame(along, across, across_rate, course, turn, speed, cos_off, sin_off)
+    return Frame(along, across, along_rate, across_rate, course, turn, speed, cos_off, sin_off)
+
+
+@kernel
+def line_of_sight(at: Frame, offset: float, offset_rate: float, k: Any) -> tuple[float, float]:
+    """Angle [rad] from the course to the line of sight, and its rate.
+
+    It goes to the point of the line that lies the lookahead ahead, or at the target if that is
+    further. `offset` [m] is added to the distance across.
+    """
+    behind = max(at.along, 0.0)
+    ahead = math.sqrt(k.lookahead * k.lookahead + behind * behind)
+    across = at.across + offset
+    rate = ahead * (at.across_rate + offset_rate) - across * behind / ahead * at.along_rate
+    return -math.atan2(across, ahead), -rate / (ahead * ahead + across * across)
 
 
 @kernel
 def wanted_speed(x: Vector, at: Frame, k: Any) -> float:
-    """The surge velocity with which the speed along the course is the target's, plus k_s along."""
+    """The surge velocity with which the speed along the course is the target's, plus k_s along.
+
+    A vessel beside its target has to come to the line, at k_s times what lies across beyond the
+    lookahead.
+    """
     wanted = at.speed + k.k_s * at.along + x[4] * at.sin_off
-    return float(min(max(wanted / max(at.cos_off, STEEPEST), k.U_min), k.U))
+    least = max(k.U_min, k.k_s * (abs(at.across) - k.lookahead))
+    return float(min(max(wanted / max(at.cos_off, STEEPEST), least), k.U))
 
 
 class LineOfSight(Controller):

@@ -8,13 +8,18 @@ path. docs/laws.md has the equations.
 
 from __future__ import annotations
 
-import math
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from podusv_cli.controllers.base import Slots, each
-from podusv_cli.controllers.guidance import STEERED, LineOfSight, course_frame, wanted_speed
+from podusv_cli.controllers.guidance import (
+    STEERED,
+    LineOfSight,
+    course_frame,
+    line_of_sight,
+    wanted_speed,
+)
 from podusv_cli.controllers.velocity_loop import Axis, Loop
 from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, kernel
@@ -82,7 +87,8 @@ class LosPid(LineOfSight):
     ) -> None:  # fmt: skip
         """The heading is damped by the yaw rate itself; its integral holds a steady turn."""
         at = course_frame(x, target, k)
-        psi_r = wrap(at.course - math.atan2(at.across, k.lookahead))
+        sight, _ = line_of_sight(at, 0.0, 0.0, k)
+        psi_r = wrap(at.course + sight)
         u_d = wanted_speed(x, at, k)
         w_u, w_psi = k.omega_u, k.omega_psi
         u_e, psi_e = u_d - x[3], wrap(psi_r - x[2])
