@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-import ast
 import math
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
-from podusv_cli.comparison.tolerance import SIGNS
 from podusv_cli.study import statistics as st
 
 inf, nan = math.inf, math.nan
 STUDIES = 2000
-
-
-def rank_correlation(x: np.ndarray, y: np.ndarray) -> float:
-    return st.rank_correlations({"x": st.standard(x)}, y)["x"]
 
 
 def binomial(k: int, n: int, p: float) -> float:
@@ -194,43 +188,6 @@ def test_the_interval_of_a_win_rate_contains_the_truth() -> None:
     assert ((low <= 0.4) & (high >= 0.4)).mean() >= 0.94
 
 
-def test_unrelated_quantities_stay_within_what_chance_gives() -> None:
-    random = np.random.default_rng(8)
-    x, y = random.normal(size=(2, 500, 60))
-    y[y > 1.5] = inf
-    found = [abs(rank_correlation(*pair)) for pair in zip(x, y, strict=True)]
-    assert np.mean(np.array(found) <= st.by_chance(60, 0.95)) >= 0.93  # 500 studies: 0.95 - 2 sigma
-
-
-# pairs -------------------------------------------------------------------------------------------
-
-
-def test_pairs_count_wins_beyond_the_margin_and_both_failing_as_a_tie() -> None:
-    a = np.array([1.0, 1.0, 2.0, inf, inf, 1.0, nan])
-    b = np.array([2.0, 1.005, 1.0, inf, 1.0, inf, 1.0])
-    found = st.pairs(a, b, 0.01)
-    assert found == st.Pairs(n=7, wins=2, losses=2, both_failed=1, unknown=1)
-    assert found.ties == 2  # 1 against 1.005, and both failed
-    assert found.win_rate(0.95) == st.share(2, 7, 0.95, unknown=1)
-    assert found.loss_rate(0.95) == st.share(2, 7, 0.95, unknown=1)
-    assert st.pairs(a, b, 0.0).wins == 3
-
-
-def test_margins_are_those_of_the_claims_of_single_runs() -> None:
-    random = np.random.default_rng(9)
-    numbers = [*random.normal(size=8).tolist(), 1.0, 1.04, 0.0, inf, -inf]
-    for a in numbers:
-        for b in numbers:
-            assert st.below(a, b, 0.05) == (SIGNS[ast.Lt](a, b, 0.05) is True)
-            assert st.at_most(a, b, 0.05) == SIGNS[ast.LtE](a, b, 0.05)
-
-
-def test_ratios_of_failed_runs() -> None:
-    a, b = np.array([3.0, inf, 1.0, inf, 0.0, nan]), np.array([2.0, 1.0, inf, inf, 0.0, 1.0])
-    assert st.ratios(a, b)[:5].tolist() == [1.5, inf, 0.0, 1.0, 1.0]
-    assert math.isnan(st.ratios(a, b)[5])
-
-
 # draws needed ------------------------------------------------------------------------------------
 
 
@@ -298,22 +255,3 @@ def test_the_probability_that_any_null_is_decided_keeps_to_the_level(true_effect
         wrong += any(decided[round(0.05 / (1 - levels[i]))][k, i] for i in range(true_effects, 4))
     assert 0.02 < wrong / studies <= 0.05
     assert decided[1][:, true_effects:].any(axis=-1).mean() > 0.05  # without the correction
-
-
-# ranks -------------------------------------------------------------------------------------------
-
-
-def test_ranks_share_ties_and_failures_are_worst() -> None:
-    values = np.array([5.0, 1.0, inf, 5.0, inf])
-    assert st.ranks(values).tolist() == [2.5, 1.0, 4.5, 2.5, 4.5]
-
-
-def test_rank_correlation_of_known_rows() -> None:
-    x = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
-    assert rank_correlation(x, np.exp(x)) == pytest.approx(1.0)
-    assert rank_correlation(x, np.array([1.0, 2.0, 3.0, inf, inf])) > 0.97
-    # 1 - 6 sum(d^2) / (n (n^2 - 1)) with d = 1, 1, 0, 1, 1
-    assert rank_correlation(x, np.array([2.0, 1.0, 3.0, 5.0, 4.0])) == pytest.approx(0.8)
-    assert math.isnan(rank_correlation(x, np.ones(5)))
-    y = np.array([2.0, 1.0, nan, 5.0, 4.0])
-    assert rank_correlation(x, y) == pytest.approx(0.6)
