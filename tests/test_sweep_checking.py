@@ -66,6 +66,7 @@ IN_VARY = [
     ("path.reading: @{uniform: [1, 2]}", "uniform needs a number"),
     ("path.reading: @{choice: [velocity, fast]}", "path.reading = fast; must be literal,"),
     ("vessel.m: @{choice: [20, heavy]}", "vessel.m = heavy; must be a number above 0 [kg]"),
+    ("vessel.m: @{choice: [20, '\u202e']}", r"vessel.m = \u202e; must be a number above 0 [kg]"),
     ("vessel.m: @{uniform: [-3, -2]}", "must be a number above 0 [kg]"),
     ("vessel.m: @{times: {choice: [1, big]}}", "times: needs numbers, choice has 'big'"),
     ("vessel.m: @{choice: []}", "choice: is empty"),
@@ -292,7 +293,6 @@ def test_explain_and_the_messages_name_what_a_quantity_may_be() -> None:
     rows = {row.key: row for row in explain("sweep.vary")}
     assert rows["sweep.vary"].meaning.startswith("what is drawn, by key")
     assert rows["sweep.vary.NAME.uniform"].meaning.startswith("[low, high]")
-    # The places that messages name.
     assert explain("sweep.vary.vessel.m.normal.sigma")[0].meaning.startswith("its standard")
     assert explain("sweep.vary.actuator.pods[0].x")[0].type == "keys"
     (row,) = explain("sweep.level")

@@ -20,6 +20,7 @@ from pydantic import ValidationError
 
 from podusv_cli.core.component import Component
 from podusv_cli.core.errors import PodusvError
+from podusv_cli.core.escaping import visible
 from podusv_cli.core.kernel import Vector
 from podusv_cli.scenario.keys import Key, keys_of
 from podusv_cli.scenario.model import Scenario
@@ -42,8 +43,8 @@ class Number(NamedTuple):
     value: Any
 
     def __str__(self) -> str:
-        """The value."""
-        return f"{self.value:.6g}" if isinstance(self.value, float) else str(self.value)
+        """The value, on one line."""
+        return f"{self.value:.6g}" if isinstance(self.value, float) else visible(self.value)
 
 
 class DrawError(PodusvError):
