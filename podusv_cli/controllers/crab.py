@@ -75,24 +75,26 @@ def observe_sway(x: Vector, memory: Vector, target: Vector, k: Any, rate: Vector
 
 
 @kernel
-def take_aim(x: Vector, memory: Vector, target: Vector, k: Any, aim: Vector) -> None:
+def take_aim(x: Vector, memory: Vector, target: Vector, k: Any, room: Vector) -> Vector:
     """What the law points at: the target itself, or the standoff ahead along psi_c.
 
     psi_c is the course less the crab angle. The rate of its rate is taken to be zero. A target
     slower than SLOWEST is aimed at itself, the more the slower it is.
     """
-    for i in range(6):
-        aim[i] = target[i]
     if k.crab_at > 0.0:
+        for i in range(6):
+            room[i] = target[i]
         p = on_path(x, memory, target, k)
         speed2 = target[2] * target[2] + target[3] * target[3]
         ahead = k.standoff * min(1.0, speed2 / (p.speed * p.speed)) / p.speed
         sine = p.side * p.sine
         north = ahead * (target[2] * p.cosine + target[3] * sine)
         east = ahead * (target[3] * p.cosine - target[2] * sine)
-        aim[0] += north
-        aim[1] += east
-        aim[2] -= p.turn * east
-        aim[3] += p.turn * north
-        aim[4] -= p.turn * p.turn * north
-        aim[5] -= p.turn * p.turn * east
+        room[0] += north
+        room[1] += east
+        room[2] -= p.turn * east
+        room[3] += p.turn * north
+        room[4] -= p.turn * p.turn * north
+        room[5] -= p.turn * p.turn * east
+        return room
+    return target

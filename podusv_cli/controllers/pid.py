@@ -122,8 +122,7 @@ class Pid(TrackingController):
         tau: Vector, rate: Vector, signals: Vector, work: Vector,
     ) -> None:  # fmt: skip
         """tau = K_P e + K_I integral + K_D (e - lag)/T_d on both axes."""
-        aim = scratch(6)
-        take_aim(x, memory, target, k, aim)
+        aim = take_aim(x, memory, target, k, scratch(6))
         e = track(x, memory, aim, k)
         u_d, r_d = reference(e, target, k)
         u_p, r_p = u_d - x[3], r_d - x[5]

@@ -113,8 +113,7 @@ def polar_backstepping(
     phi = work
     activate(x, k, table, phi, tail(work, count))
     f_hat_u, f_hat_r = weigh(count, W_hat_u, phi), weigh(count, W_hat_r, phi)
-    aim = scratch(6)
-    take_aim(x, memory, target, k, aim)
+    aim = take_aim(x, memory, target, k, scratch(6))
     e = track(x, memory, aim, k)
     s = 2.0 * k.coupling - 1.0
 

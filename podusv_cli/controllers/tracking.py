@@ -222,8 +222,7 @@ class TrackingController(Controller):
     @kernel
     def sample(t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector) -> None:
         """Take the target's direction for the difference and for holding."""
-        aim = scratch(6)
-        take_aim(x, memory, target, k, aim)
+        aim = take_aim(x, memory, target, k, scratch(6))
         hold(t, x, memory, aim, k)
 
     def start(self, x: Vector, target: Vector, nominal: Any) -> Vector:
@@ -238,6 +237,4 @@ class TrackingController(Controller):
     @staticmethod
     def aim(x: Vector, memory: Vector, target: Vector, k: dict[str, float]) -> Vector:
         """What the law points at, as `take_aim` has it."""
-        found = np.zeros(6)
-        take_aim(x, memory, target, bundle(k), found)
-        return found
+        return take_aim(x, memory, target, bundle(k), np.zeros(6))
