@@ -21,9 +21,8 @@ SMALL = 0.62  # inches, the side of a small multiple
 MARGIN = 0.15  # of a path's extent, around a small multiple
 LOST = "#D55E00"
 SMALL_TEXT: dict[str, Any] = {"fontsize": 5.5}
-AROUND = {
-    "left": 0.1, "right": 0.995, "bottom": 0.01, "top": 0.95, "wspace": 0.06, "hspace": 0.06
-}  # fmt: skip
+NAMES = 0.75  # inches at the left, for the tasks
+APART = {"bottom": 0.01, "top": 0.95, "right": 0.995, "wspace": 0.06, "hspace": 0.06}
 
 
 def profiles(made: pd.DataFrame, columns: int = 2) -> Figure:
@@ -50,9 +49,11 @@ def profiles(made: pd.DataFrame, columns: int = 2) -> Figure:
 def tracks(runs: Sequence[BenchRun], laws: Sequence[str]) -> Figure:
     """Small multiples of one vessel: a row a task, a column a law, all conditions together."""
     tasks = list(dict.fromkeys(run.task for run in runs))
-    figure = Figure(figsize=(SMALL * (len(laws) + 1.2), SMALL * (len(tasks) + 0.5)))
+    width = SMALL * len(laws) + NAMES
+    figure = Figure(figsize=(width, SMALL * (len(tasks) + 0.5)))
     figure.set_layout_engine("none")
-    every = figure.subplots(len(tasks), len(laws), squeeze=False, gridspec_kw=AROUND)
+    places = {"left": NAMES / width, **APART}
+    every = figure.subplots(len(tasks), len(laws), squeeze=False, gridspec_kw=places)
     for task, row in zip(tasks, every, strict=True):
         for law, axes in zip(laws, row, strict=True):
             _small(axes, [run for run in runs if (run.task, run.law) == (task, law)])
