@@ -107,6 +107,7 @@ def test_every_section_of_a_scenario_is_looked_at():
     sections = {key.partition(".")[0] for key in OTHERWISE}
     rest = {
         "name", "description", "controller", "controllers", "claims", "silence", "plugins", "sweep",
+        "tune",
     }  # fmt: skip
     assert sections | rest == set(type(scenario()).model_fields)
 

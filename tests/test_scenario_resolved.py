@@ -15,6 +15,7 @@ from podusv_cli.scenario.load import HEADING, load_resolved, load_text, resolved
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sections import LABEL
 from podusv_cli.scenario.sweep import Sweep
+from podusv_cli.scenario.tune import Tune
 from podusv_cli.scenario.yaml_text import read
 
 LARGEST = 1e6  # inertia of more than this overflows where two are multiplied
@@ -26,6 +27,10 @@ SWEEP = {
     "vary": {"vessel.m": {"times": {"normal": {"sigma": 0.1, "within": (-0.5, 1e-3)}}}},
     "grid": {"path": ({"kind": "line", "x": (1, 2.5)}, None, True), "name": ("a: b", "")},
     "claims": {"S1": {"says": "#", "source": "ours", "expect": "share(a.iae < b.iae) > 0.5"}},
+}
+TUNE = {
+    "objective": ("median(iae)", "failures"),
+    "space": {"around": 10.0, "pid.K_Pu": {"log": (1e-3, 2.5)}, "fold": {"choice": ("none", 1)}},
 }
 
 
@@ -40,6 +45,8 @@ def contents(annotation: Any, found: dict[str, Any]) -> st.SearchStrategy[Any]:
     """Anything that a type allows within the field's limits."""
     if Sweep in sections(annotation).values():
         return st.sampled_from([None, SWEEP])
+    if Tune in sections(annotation).values():
+        return st.sampled_from([None, TUNE])
     if sections(annotation):
         return st.one_of(*(components(part) for part in sections(annotation).values()))
     simple = {
@@ -148,7 +155,7 @@ def test_keys_stand_in_the_order_of_the_fields_behind_the_kind():
     assert HEADING.count("\n") == 1
     node = read(text, "a.yaml", [])
     assert node is not None
-    assert [*node.mapping, "sweep"] == list(Scenario.model_fields)  # no run has a sweep
+    assert [*node.mapping, "sweep", "tune"] == list(Scenario.model_fields)  # no run has these
     law = list(node.mapping["controller"].mapping)
     assert law[:3] == ["kind", "k_ze", "k_psie"]
 

@@ -84,6 +84,12 @@ class StudyLine:
                 f"{tally.rate:.3g} a second", "Ctrl-C keeps what is done",
             )  # fmt: skip
 
+    def advance(self, tally: Tally, text: str) -> None:
+        """Show runs done, time left, and what is told of them."""
+        if time.monotonic() - self._last > PERIOD:
+            left = [f"{time_in_words(tally.left)} left"] if tally.made < tally.wanted else []
+            self._show(f"{tally.made} of {tally.wanted} runs", *left, text)
+
     def say(self, text: str) -> None:
         """Show what is being done now."""
         self._show(text)

@@ -11,6 +11,7 @@ from podusv_cli.cli.terminal import echo
 
 if TYPE_CHECKING:
     from podusv_cli.scenario.load import Loaded
+    from podusv_cli.scenario.model import Scenario
     from podusv_cli.scenario.sweep import Sweep
 
 MOST_CHECKED = 100_000  # draws, some seconds
@@ -39,8 +40,9 @@ def validate(
     from podusv_cli.scenario.limits import largest, limits
     from podusv_cli.scenario.load import load
     from podusv_cli.study.check import sweep_faults
+    from podusv_cli.tuning.check import tune_faults
 
-    checks = (unknown_codes, limits(allow_large), sweep_faults)
+    checks = (unknown_codes, limits(allow_large), sweep_faults, tune_faults)
     loaded = load(config, assign or (), checks, plugin or ())
     parse_claims(loaded)
     scenario = loaded.scenario
@@ -48,15 +50,20 @@ def validate(
     echo(f"{config}: ok ({scenario.name}, {laws}, {steps} steps)")
     echo(f"a run takes {largest(scenario)}")
     if scenario.sweep:
-        _tell_study(loaded, scenario.sweep)
+        paces = _tell_study(loaded, scenario.sweep)
+        if scenario.tune:
+            _tell_tuning(scenario, paces)
     for finding in preflight(scenario):
         echo(str(finding))
     if verbose:
         _explain(loaded)
 
 
-def _tell_study(loaded: Loaded, sweep: Sweep) -> None:
-    """How many runs the study has, and which of its draws the scenario cannot take."""
+def _tell_study(loaded: Loaded, sweep: Sweep) -> dict[str, float]:
+    """How many runs the study has, and which of its draws the scenario cannot take.
+
+    Returns the seconds of a run of every law.
+    """
     from podusv_cli.process.workers import available_workers
     from podusv_cli.study.check import singles
     from podusv_cli.study.estimate import estimate, pilot
@@ -76,8 +83,19 @@ def _tell_study(loaded: Loaded, sweep: Sweep) -> None:
     more = "" if checked == draws else "; the others were not checked"
     first = f"; draw {invalid.first}: {invalid.reason}" if invalid.count else ""
     echo(f"{share}{more}{first}")
-    need = estimate(made, pilot(made), dict.fromkeys(places, draws), available_workers())
+    paces = pilot(made)
+    need = estimate(made, paces, dict.fromkeys(places, draws), available_workers())
     echo(*need.in_words())
+    return {law: seconds for (law, _), seconds in paces.items()}
+
+
+def _tell_tuning(scenario: Scenario, paces: dict[str, float]) -> None:
+    """Which gains are searched, and how many runs and how much time that takes."""
+    from podusv_cli.process.workers import available_workers
+    from podusv_cli.tuning.plan import TunePlan
+
+    for line in TunePlan(scenario).in_words(paces, available_workers()):
+        echo(line)
 
 
 def _explain(loaded: Loaded) -> None:

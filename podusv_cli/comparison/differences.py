@@ -8,7 +8,7 @@ from typing import Any
 from podusv_cli.pages.page import flat, value_text
 
 PROSE = (".source", ".validity")
-IGNORED = ("name", "description", "controller", "controllers", "claims", "silence", "sweep")
+IGNORED = ("name", "description", "controller", "controllers", "claims", "silence", "sweep", "tune")
 
 
 def differences(

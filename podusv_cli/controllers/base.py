@@ -59,6 +59,9 @@ class Controller(Component):
 
     signals: ClassVar[tuple[Signal, ...]] = ()
 
+    # Fields that a search for gains leaves alone, although they are numbers above 0
+    no_gains: ClassVar[tuple[str, ...]] = ()
+
     # What a finding advises where a saturated actuator winds the law's memory up
     against_windup: ClassVar[str] = "tell it the loads that act (wants_loads, after_saturation)"
 

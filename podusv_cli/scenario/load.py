@@ -34,6 +34,7 @@ from podusv_cli.scenario.yaml_tree import (
 REFERENCES: tuple[Route, ...] = (("extends",), ("path", "file"))  # to other files
 # Values; several times those of one file, since a scenario may extend files with long lists.
 MOST_RESOLVED = 3 * MAX_NODES
+STUDIES = ("sweep", "tune")  # sections that only studies have
 HEADING = "# A complete scenario, every value written out; it runs again to the same log.\n"
 
 
@@ -163,9 +164,9 @@ def values(scenario: Scenario) -> dict[str, Any]:
 
 
 def _data(scenario: Scenario) -> dict[str, Any]:
-    """The scenario as plain data; `sweep` only where there is one, since runs have none."""
+    """The scenario as plain data; studies only where there are some, since runs have none."""
     data = scenario.model_dump()
-    return data if data["sweep"] is not None else {k: v for k, v in data.items() if k != "sweep"}
+    return {k: v for k, v in data.items() if k not in STUDIES or v is not None}
 
 
 def _leaves(data: dict[str, Any], above: Route) -> Iterator[tuple[Route, Any]]:

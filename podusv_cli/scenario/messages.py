@@ -143,6 +143,10 @@ def _impossible(root: Node, key: Key, complaint: Any) -> Iterator[Fault]:
 
 def _wrong(root: Node, key: Key, complaint: Any) -> Iterator[Fault]:
     node = follow(root, key.path)[-1]
+    if (
+        isinstance(node.content, dict) and key.section
+    ):  # that may be a number, too: what is in it is told
+        return
     what = found(node.content, node.text)
     yield Fault(
         node.mark, dotted(key.path), f"must be {key.wanted}, found {what}{_hint(node, key)}"

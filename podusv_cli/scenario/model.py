@@ -38,6 +38,7 @@ from podusv_cli.scenario.sections import (
     Start,
 )
 from podusv_cli.scenario.sweep import Sweep
+from podusv_cli.scenario.tune import Tune
 from podusv_cli.theory import monitor
 from podusv_cli.vessels.vessel import Vessel
 
@@ -96,6 +97,9 @@ class Scenario(Component):
     sweep: Sweep | None = value(
         None, "", "the study that `podusv sweep` makes of this scenario; see docs/studies.md"
     )
+    tune: Tune | None = value(
+        None, "", "how `podusv tune` searches for gains of the laws; see docs/tuning.md"
+    )
 
     def __reduce_ex__(self, protocol: SupportsIndex) -> str | tuple[Any, ...]:
         """Pickle by value where plug-ins made the class, which another process has to make anew."""
@@ -115,8 +119,10 @@ class Scenario(Component):
         return tuple(self.controllers) or (self.controller.label,)
 
     def alone(self) -> Scenario:
-        """The scenario of one run: `controller` only, without controllers, claims and sweep."""
-        return self.model_copy(update={"controllers": {}, "claims": {}, "sweep": None})
+        """The scenario of one run: `controller` only, without comparison and studies."""
+        return self.model_copy(
+            update={"controllers": {}, "claims": {}, "sweep": None, "tune": None}
+        )
 
     def singles(self) -> dict[str, Scenario]:
         """A scenario for each run of a comparison, by label, without controllers and claims."""

@@ -23,6 +23,7 @@ from podusv_cli.vessels.vessel import COEFFICIENTS, VESSELS, Vessel
 # Sections whose entries have names of the user's; one that is null takes out an inherited one.
 NAMED: tuple[Route, ...] = (
     ("controllers",), ("claims",), ("sweep", "vary"), ("sweep", "grid"), ("sweep", "claims"),
+    ("tune", "space"),
 )  # fmt: skip
 BESIDE_NAMED = {named[:end] for named in NAMED for end in range(len(named) + 1)}
 

@@ -16,7 +16,9 @@ QUANTITY = {
 NAMED_BY_KEYS = (
     ("sweep", "vary"),
     ("sweep", "grid"),
+    ("tune", "space"),
 )  # sections whose entries have names with dots
+RANGE = {"log", "around", "keep"}  # and some of the above: what a gain may be
 DISTRIBUTIONS = QUANTITY - {"keys"}
 
 
@@ -93,7 +95,7 @@ def whole_names(steps: Route) -> Route:
     if above not in NAMED_BY_KEYS:
         return steps
     # `seed` may be the end of a name.
-    ends = (i for i, step in enumerate(rest) if step in QUANTITY - {"seed"})
+    ends = (i for i, step in enumerate(rest) if step in (QUANTITY | RANGE) - {"seed"})
     end = next(ends, len(rest))
     return (*above, *filter(None, [dotted(rest[:end])]), *rest[end:])
 
@@ -180,4 +182,4 @@ def _another_kind(base: Node, top: Node) -> bool:
     if any(None not in pair and pair[0] != pair[1] for pair in pairs):
         return True
     ways = [set(node.mapping) - {"keys"} for node in (base, top)]
-    return all(way and way <= DISTRIBUTIONS for way in ways) and ways[0] != ways[1]
+    return all(way and way <= DISTRIBUTIONS | RANGE for way in ways) and ways[0] != ways[1]

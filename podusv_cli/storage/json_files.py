@@ -26,6 +26,11 @@ def encode(content: Mapping[str, Any]) -> bytes:
     return f"{escaping.json(text)}\n".encode()
 
 
+def plain(content: Mapping[str, Any]) -> dict[str, Any]:
+    """The content as JSON gives it back."""
+    return dict(json.loads(encode(content)))
+
+
 def _plain(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {str(key): _plain(inner) for key, inner in value.items()}

@@ -17,7 +17,14 @@ from podusv_cli.scenario.phrases import as_yaml
 from podusv_cli.scenario.yaml_tree import Fault, Node, find, merge, plain, route
 
 MOST = 1000  # cells
-FIXED = ("extends", "plugins", "sweep", "name", "claims")  # what no cell can have of its own
+FIXED = (
+    "extends",
+    "plugins",
+    "sweep",
+    "tune",
+    "name",
+    "claims",
+)  # what no cell can have of its own
 
 
 @dataclass(frozen=True)

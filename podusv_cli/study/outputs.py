@@ -49,8 +49,13 @@ def write_report(
     drawn, shown = dict[str, bytes](), list[Picture]()
     if figures:
         drawn, shown = pictures.drawn(results, tracks(kept, extras), extras)
-    _replace(folder / FIGURES, drawn)
     page = extras.made(REPORT, lambda: report.page(folder, results, kept, shown, extras.missing))
+    publish(folder, drawn, page, extras)
+
+
+def publish(folder: Path, drawn: dict[str, bytes], page: str | None, extras: Extras) -> None:
+    """Write figures, the report and what is missing, in place of earlier ones."""
+    _replace(folder / FIGURES, drawn)
     _replace(folder, {REPORT: (page or "").encode()} if page else {}, (REPORT,))
     missing = {MISSING: encode(extras.as_json())} if extras.missing else {}
     _replace(folder, missing, (MISSING,))

@@ -46,13 +46,20 @@ class Sketch:
 def drawn(
     results: Results, tracks: Sequence[Track], extras: Extras
 ) -> tuple[dict[str, bytes], list[Picture]]:
-    """All figures of a study, each in a process of its own: PNG by file name, and as pictures.
+    """All figures of a study, see `rendered`."""
+    return rendered(lambda: list(sketches(results, tracks)), extras)
+
+
+def rendered(
+    listed: Callable[[], list[Sketch]], extras: Extras
+) -> tuple[dict[str, bytes], list[Picture]]:
+    """Figures, each drawn in a process of its own: PNG by file name, and as pictures.
 
     A figure that cannot be drawn is missing among the `extras`.
     """
     files: dict[str, bytes] = {}
     pictures: list[Picture] = []
-    wanted = extras.made("the list of figures", lambda: list(sketches(results, tracks))) or []
+    wanted = extras.made("the list of figures", listed) or []
     outcomes = () if extras.interrupted else run_all([partial(_images, one) for one in wanted])
     for sketch, outcome in zip(wanted, outcomes, strict=bool(outcomes)):
         extras.interrupted |= outcome.interrupted

@@ -21,9 +21,10 @@ from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sweep import Sweep
 from podusv_cli.study.cells import Cell, cells
 from podusv_cli.study.check import sweep_faults
+from podusv_cli.study.draws import SWEEP
 
 # Sections of a scenario that change no number of a study.
-COSMETIC = ("name", "description", "log", "silence", "claims", "controllers", "sweep")
+COSMETIC = ("name", "description", "log", "silence", "claims", "controllers", "sweep", "tune")
 
 
 @dataclass(frozen=True)
@@ -32,6 +33,7 @@ class Plan:
 
     scenario: Scenario
     cells: tuple[Cell, ...]
+    stream: str = SWEEP  # of its draws
 
     @property
     def sweep(self) -> Sweep:
@@ -61,6 +63,8 @@ class Plan:
         """All that the numbers depend on, by dotted keys; two studies that agree can be joined."""
         sweep = self.sweep
         told: dict[str, Any] = {"sweep.seed": sweep.seed, "sweep.design": sweep.design}
+        if self.stream != SWEEP:
+            told["stream"] = self.stream
         for name, quantity in sweep.vary.items():
             told[f"sweep.vary.{name}"] = quantity.model_dump(exclude_defaults=True)
         for cell in self.cells:

@@ -97,8 +97,7 @@ class Store:
 
     def _identity(self) -> dict[str, Any]:
         """The identity as JSON gives it back."""
-        encoded = json_files.encode(self.plan.identity)
-        return dict(json.loads(encoded))
+        return json_files.plain(self.plan.identity)
 
     def write(self, result: UnitResult) -> None:
         """Keep the result of a unit. Raises StorageError."""
@@ -118,7 +117,7 @@ class Store:
         plan, known = self.plan, self.plan.scenario.known_metrics()
         header = runs_writer.Header(
             plan.scenario.name, self.seal, plan.laws, [cell.label for cell in plan.cells],
-            plan.sweep.draws, partial(table, plan.sweep),
+            plan.sweep.draws, partial(table, plan.sweep, stream=plan.stream),
             {name: known[name] for name in plan.metrics},
         )  # fmt: skip
         runs_writer.write(self.folder / RUNS, header, _Again(self.results))

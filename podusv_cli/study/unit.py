@@ -79,7 +79,7 @@ def make(
     """
     scenario = plan.single(unit.law, unit.cell)
     grid, seeing = grid or scenario.time_grid(), watching(scenario)
-    numbers, vary = list(draws(plan.sweep, unit.first, unit.count)), plan.sweep.vary
+    numbers, vary = list(draws(plan.sweep, unit.first, unit.count, plan.stream)), plan.sweep.vary
 
     def loop(position: int) -> ClosedLoop:
         return drawn(scenario, vary, numbers[position]).closed_loop()

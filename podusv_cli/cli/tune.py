@@ -1,0 +1,71 @@
+"""`podusv tune`: the same search for gains for every law."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from podusv_cli.cli import options
+from podusv_cli.cli.progress import StudyLine
+from podusv_cli.cli.terminal import echo, echo_result, echo_table
+
+if TYPE_CHECKING:
+    from podusv_cli.workflows.tune import Tuned
+
+
+def tune(
+    config: options.Config,
+    assign: options.Assignments = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder of the search.", show_default="results/<name>-tune"),
+    ] = None,
+    workers: Annotated[
+        int, typer.Option(min=0, help="Processes at a time.", show_default="one a core")
+    ] = 0,
+    figures: options.Figures = True,
+    as_json: options.AsJson = False,
+    quiet: options.Quiet = False,
+    plugin: options.Plugins = None,
+) -> None:
+    """Search gains for every law with the same number of runs, and compare before and after.
+
+    The key `tune` of the scenario describes the search. What is reported comes from draws that no
+    search has seen. Run it again to continue after an interrupt or with a larger budget. Needs
+    Optuna (podusv[tune]).
+    """
+    from podusv_cli.workflows import tune as workflow  # heavy imports only when needed
+
+    with StudyLine(wanted=not (quiet or as_json)) as line:
+        request = workflow.Request(
+            assign or (), out, workers, sys.argv, plugin or (), figures, line.say
+        )
+        done = workflow.tune(Path(config), request, line.advance)
+    echo_result(done, lambda: _report(done), as_json=as_json, quiet=quiet)
+    for part in done.missing:
+        echo(part.traced, err=True)
+
+
+def _report(done: Tuned) -> None:
+    from podusv_cli.tuning.report import interval, percent, ratio, spread
+
+    results = done.results
+    rows = [
+        [row["law"], f"{row['rank_before']} -> {row['rank_after']}",
+         interval(row, "objective_before"), interval(row, "objective_after"),
+         ratio(row) if row["runs"] else "-",
+         f"{percent(row, 'failed_before')} -> {percent(row, 'failed_after')}", spread(row)]
+        for row in results.laws.sort_values("rank_after").to_dict("records")
+    ]  # fmt: skip
+    first = results.shown[0] if results.shown else "metric"
+    head = ["law", "rank", "before", "after", f"{first}, after / before", "failed", "repeats"]
+    echo(f"{results.plan.tune.objectives[0]} on {results.plan.tune.validate} fresh draws:")
+    echo_table(head, rows)
+    for text in results.remarks():
+        echo(text)
+    echo(f"gains: {done.folder / 'tuned.yaml'}")
+    if (done.folder / "report.html").exists():
+        echo(f"report: {done.folder / 'report.html'}")

@@ -1,0 +1,1 @@
+"""`podusv tune`: an equal search for gains of every law."""

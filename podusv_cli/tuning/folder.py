@@ -1,0 +1,98 @@
+"""The folder of a search: what it is, and the scenario with the gains that were found."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from podusv_cli.core.errors import UsageError
+from podusv_cli.scenario.load import Loaded, tree_yaml, yaml_text
+from podusv_cli.scenario.sections import LONGEST_NAME
+from podusv_cli.storage import files, json_files
+from podusv_cli.study.plan import disagreements
+from podusv_cli.tuning import sampler, trials
+from podusv_cli.tuning.plan import TunePlan
+from podusv_cli.tuning.results import Results
+
+TUNE, SCENARIO, TUNED = "tune.json", "scenario.yaml", "tuned.yaml"
+FORMAT = 1
+DIFFERENT = 4  # keys that a message names
+
+
+def check(folder: Path) -> None:
+    """Raise UsageError where this is no folder of a search."""
+    if not (folder / TUNE).is_file():
+        raise UsageError(f"{folder} is not the folder of a search: it has no {TUNE}")
+
+
+def opened(folder: Path, plan: TunePlan, started: str) -> None:
+    """Make the folder, or check that it holds this very search, and note what is asked for.
+
+    Raises UsageError where it holds another search, naming what is different, and StorageError.
+    """
+    identity = json_files.plain({**plan.identity, "optuna": sampler.version()})
+    history: list[Any] = []
+    if (folder / TUNE).exists():
+        told = json_files.read(folder / TUNE)
+        _agree(folder, told.get("identity", {}), identity)
+        history = list(told.get("history", []))
+    elif folder.exists() and any(folder.iterdir()):
+        raise UsageError(f"{folder} is no search and not empty; name another with --out")
+    tune = plan.tune
+    asked = {
+        "budget": tune.budget, "repeats": tune.repeats, "validate": tune.validate,
+        "started": started,
+    }  # fmt: skip
+    content = {
+        "format": FORMAT, "name": plan.scenario.name, "laws": list(plan.laws),
+        "gains": {law: [gain.key for gain in found] for law, found in plan.gains.items()},
+        "identity": identity, "history": [*history, asked],
+    }  # fmt: skip
+    files.make_folder(folder / trials.FOLDER)
+    files.write_bytes(folder / TUNE, json_files.encode(content))
+
+
+def _agree(folder: Path, there: dict[str, Any], wanted: dict[str, Any]) -> None:
+    differing = disagreements(there, wanted)
+    if differing:
+        more = " and more" if len(differing) > DIFFERENT else ""
+        raise UsageError(
+            f"{folder} holds another search: {'; '.join(differing[:DIFFERENT])}{more}; name "
+            "another folder with --out"
+        )
+
+
+def write_scenario(folder: Path, loaded: Loaded) -> None:
+    """Write the searched scenario, with its plug-ins. Raises StorageError."""
+    texts = {SCENARIO: tree_yaml(loaded), **loaded.scenario.plugin_files()}
+    for name in texts:
+        files.make_folder((folder / name).parent)
+    files.write_all({folder / name: text.encode() for name, text in texts.items()})
+
+
+def tuned_yaml(results: Results) -> bytes:
+    """The scenario with the gains that were found, for `compare` and `sweep`."""
+    plan, scenario = results.plan, results.plan.scenario
+    several = bool(scenario.controllers)
+    laws = {
+        law: ({} if several else {"kind": own.label})
+        | (dict(results.winner(law).gains) if law in results.winners else {})
+        for law, own in plan.laws.items()
+    }
+    end = "-tuned"
+    told = {
+        "extends": SCENARIO,
+        "name": f"{scenario.name[: LONGEST_NAME - len(end)]}{end}",
+        "description": _told(results),
+        "controllers": {law: content for law, content in laws.items() if content},
+        "tune": None,
+    }
+    return f"# The gains that podusv tune found.\n{yaml_text(told)}".encode()
+
+
+def _told(results: Results) -> str:
+    tune = results.plan.tune
+    searches: Sequence[str] = [f"{tune.budget} runs", f"{tune.train} draws"]
+    what = " and ".join(tune.objectives)
+    return f"Gains that podusv tune found for least {what} ({', '.join(searches)})."

@@ -1,0 +1,135 @@
+"""What a search is to simulate: laws with their gains, draws of three streams, and its identity."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from podusv_cli.controllers.base import Controller
+from podusv_cli.core.errors import UsageError
+from podusv_cli.core.quantities import time_in_words
+from podusv_cli.metrics.metric import Metric
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.sweep import Keep
+from podusv_cli.scenario.tune import Tune
+from podusv_cli.study import plan as study
+from podusv_cli.study.cells import Cell
+from podusv_cli.study.check import singles
+from podusv_cli.study.expressions import parse_success, succeeded
+from podusv_cli.study.unit import STATUSES, UnitResult
+from podusv_cli.tuning.objective import Inequality, Runs, parse_inequality, parse_objective
+from podusv_cli.tuning.space import Gain, gains
+
+TRAIN, VALIDATE = "tune", "tune validation"  # streams of draws, beside a sweep's own
+# Settings that change no trial: more of them continues a search.
+OPEN = ("budget", "validate", "repeats")
+
+
+@dataclass(frozen=True)
+class TunePlan:
+    """A scenario with the keys `sweep` and `tune`."""
+
+    scenario: Scenario
+
+    @property
+    def tune(self) -> Tune:
+        """The settings of the search. Raises UsageError where the scenario has none."""
+        if self.scenario.tune is None:
+            raise UsageError(f"{self.scenario.name} has no key `tune`; see docs/tuning.md")
+        return self.scenario.tune
+
+    @cached_property
+    def laws(self) -> dict[str, Controller]:
+        """The laws that take part, by name."""
+        return {label: one.controller for label, one in singles(self.scenario).items()}
+
+    @cached_property
+    def gains(self) -> dict[str, tuple[Gain, ...]]:
+        """The gains of every law; none for a law that is kept as it is."""
+        return {
+            label: gains(one.controller, label, one, self.tune)
+            for label, one in singles(self.scenario).items()
+        }
+
+    @cached_property
+    def metrics(self) -> dict[str, Metric]:
+        """All metrics by name."""
+        return self.scenario.known_metrics()
+
+    @cached_property
+    def objectives(self) -> list[Any]:
+        """The trees of the objectives."""
+        return [parse_objective(text, self.metrics) for text in self.tune.objectives]
+
+    @cached_property
+    def inequalities(self) -> list[Inequality]:
+        """What has to hold."""
+        return [parse_inequality(text, self.metrics) for text in self.tune.subject_to]
+
+    @cached_property
+    def _success(self) -> Any:
+        assert self.scenario.sweep
+        return parse_success(self.scenario.sweep.success, self.metrics)
+
+    def runs_wanted(self) -> dict[str, tuple[int, int]]:
+        """For every law, the runs of the search and those on the draws for validation."""
+        tune = self.tune
+        return {
+            law: (tune.repeats * tune.budget, (1 + tune.repeats) * tune.validate)
+            if found else (0, tune.validate)
+            for law, found in self.gains.items()
+        }  # fmt: skip
+
+    def in_words(self, paces: Mapping[str, float], workers: int) -> Iterator[str]:
+        """The gains of every law, and what the search takes at these seconds a run."""
+        for law, found in self.gains.items():
+            if found:
+                names = ", ".join(gain.key for gain in found)
+                yield f"gains of {law} ({len(found)}): {names}"
+            else:
+                yield f"{law} has no gains and is kept as it is"
+        wanted, tune = self.runs_wanted(), self.tune
+        search, other = (sum(counts) for counts in zip(*wanted.values(), strict=True))
+        time = sum(sum(counts) * paces.get(law, 0.0) for law, counts in wanted.items()) / workers
+        cores = f"{workers} core{'s' if workers > 1 else ''}"
+        yield (
+            f"runs of the search: {search:,} (budget {tune.budget:,} for each law, repeats: "
+            f"{tune.repeats}); on draws for validation: {other:,}; about {time_in_words(time)} on "
+            f"{cores}"
+        )
+
+    def with_laws(self, laws: Mapping[str, Controller], stream: str, draws: int) -> study.Plan:
+        """The study of these laws by name, on draws of a stream."""
+        assert self.scenario.sweep
+        plain = {"laws": (), "draws": draws, "claims": {}, "keep": Keep()}
+        sweep = self.scenario.sweep.model_copy(update=plain)
+        scenario = self.scenario.model_copy(
+            update={
+                "controllers": dict(laws), "controller": next(iter(laws.values())),
+                "claims": {}, "tune": None, "sweep": sweep,
+            }
+        )  # fmt: skip
+        return study.Plan(scenario, (Cell(0, (), scenario),), stream)
+
+    def runs(self, results: list[UnitResult]) -> Runs:
+        """The runs of some units, in their order; failed is what the study calls no success."""
+        import numpy as np
+
+        names = dict.fromkeys(name for one in results for name in one.metrics)
+        blank = {id(one): np.full(one.unit.count, np.nan) for one in results}
+        metrics = {
+            name: np.concatenate([one.metrics.get(name, blank[id(one)]) for one in results])
+            for name in names
+        }
+        ended = np.concatenate([one.status == STATUSES.index("finished") for one in results])
+        return Runs(metrics, ~succeeded(self._success, metrics, ended, self.metrics))
+
+    @cached_property
+    def identity(self) -> dict[str, Any]:
+        """All that the trials depend on, by dotted keys."""
+        whole = self.with_laws(self.laws, TRAIN, self.tune.train)
+        told = {f"tune.{k}": v for k, v in self.tune.model_dump(exclude=set(OPEN)).items()}
+        assert self.scenario.sweep
+        return {**told, "sweep.success": self.scenario.sweep.success, **whole.identity}

@@ -1,0 +1,233 @@
+"""What a search found, as tables: gains, laws before and after, pairs of laws, every trial."""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from podusv_cli.study import statistics, summary
+from podusv_cli.study.runs_file import Table
+from podusv_cli.study.statistics import Interval
+from podusv_cli.tuning.objective import OfRuns, Runs, evaluate, named, share_of
+from podusv_cli.tuning.plan import TunePlan
+from podusv_cli.tuning.sampler import importances
+from podusv_cli.tuning.trials import FINISHED, Trial
+from podusv_cli.tuning.validation import View, chosen, repeated, tuned
+
+ALWAYS = ("iae", "z_e_steady")  # metrics that the tables have beside those of the objective
+MARGIN = 0.01  # relative, of pairs
+PARTS = 8  # of the trials; importances are computed without each, to see how sure they are
+FEWEST = 24  # trials that importances are computed from
+
+
+@dataclass(frozen=True)
+class Results:
+    """A finished search: its trials by law, a list for each repeat, and the runs on fresh draws."""
+
+    plan: TunePlan
+    trials: Mapping[str, Sequence[Sequence[Trial]]]
+    winners: Mapping[str, Sequence[Trial]]
+    runs: Table
+
+    @property
+    def level(self) -> float:
+        """Confidence of all intervals."""
+        assert self.plan.scenario.sweep
+        return self.plan.scenario.sweep.level
+
+    @property
+    def spent(self) -> dict[str, int]:
+        """The simulated runs of the search by law."""
+        return {
+            law: sum(trial.runs for repeat in repeats for trial in repeat)
+            for law, repeats in self.trials.items()
+        }
+
+    @cached_property
+    def shown(self) -> list[str]:
+        """The metrics of the tables."""
+        trees = [*self.plan.objectives, *(one.tree for one in self.plan.inequalities)]
+        told = [name for tree in trees for name in named(tree, self.plan.metrics)]
+        return [n for n in dict.fromkeys([*told, *ALWAYS]) if n in self.runs.metrics]
+
+    def after(self, law: str) -> str:
+        """The name of a law after the search, its own where it is kept as it is."""
+        return tuned(law) if law in self.winners else law
+
+    def winner(self, law: str) -> Trial:
+        """The trial whose gains are taken."""
+        return self.winners[law][chosen(self.winners[law])]
+
+    def met(self, name: str) -> Runs:
+        """The fresh runs of a law by the name of the table."""
+        metrics = {n: self.runs.metric(name, n)[0] for n in self.runs.metrics}
+        return Runs(metrics, ~self.runs.success(name)[0])
+
+    @cached_property
+    def laws(self) -> pd.DataFrame:
+        """Every law: failures and objective before and after on the fresh draws, and its ranks."""
+        table = pd.DataFrame([self._law(law) for law in self.plan.laws])
+        for when in ("before", "after"):
+            ranks = table[f"objective_{when}"].replace(np.inf, 1e300).rank(method="min")
+            table[f"rank_{when}"] = ranks.astype(int)
+        return table
+
+    def _law(self, law: str) -> dict[str, Any]:
+        told: dict[str, Any] = {"law": law, "runs": self.spent.get(law, 0)}
+        for when, name in (("before", law), ("after", self.after(law))):
+            runs = self.met(name)
+            failed = statistics.share(int(runs.failed.sum()), len(runs.failed), self.level)
+            told |= _interval(f"failed_{when}", failed)
+            told |= _interval(f"objective_{when}", self.objective(runs))
+        found = self.pairs
+        own = found[(found["when"] == "tuning") & (found.a == tuned(law))]
+        own = own[own.metric == self.shown[0]]
+        for end in ("ratio", "ratio_low", "ratio_high"):
+            told[end] = float(own[end].iloc[0]) if len(own) else 1.0
+        spread = [v for v in self.spread(law) if math.isfinite(v)]
+        told["repeats_low"], told["repeats_high"] = (
+            (min(spread), max(spread)) if spread else (math.nan, math.nan)
+        )
+        return told
+
+    def objective(self, runs: Runs) -> Interval:
+        """The first objective, with an interval where it is one quantile of one number."""
+        tree = self.plan.objectives[0]
+        found = evaluate(tree, runs, self.plan.metrics)
+        if not isinstance(tree, ast.Call):
+            return Interval(found, math.nan, math.nan)
+        values = OfRuns(self.plan.metrics, runs=runs).number(tree.args[0])
+        ends = statistics.quantile(
+            np.broadcast_to(values, runs.failed.shape), share_of(tree), self.level
+        )
+        return Interval(found, ends.low, ends.high)
+
+    def spread(self, law: str) -> list[float]:
+        """The objective on the fresh draws of every repeat's winner."""
+        names = set(self.runs.laws)
+        own = [repeated(law, repeat) for repeat in range(len(self.winners.get(law, ())))]
+        found = [tuned(law), *own] if law in self.winners else []
+        return [
+            evaluate(self.plan.objectives[0], self.met(name), self.plan.metrics)
+            for name in found if name in names
+        ]  # fmt: skip
+
+    @cached_property
+    def pairs(self) -> pd.DataFrame:
+        """Two laws in the same fresh draws: all before, all after, and each after and before."""
+        laws, known = list(self.plan.laws), self.plan.metrics
+        views = [
+            ("before", View(self.runs, {law: law for law in laws}, self.shown)),
+            ("after", View(self.runs, {law: self.after(law) for law in laws}, self.shown)),
+            *(
+                ("tuning", View(self.runs, {tuned(law): tuned(law), law: law}, self.shown))
+                for law in self.winners
+            ),
+        ]
+        tables = [
+            summary.pairs(view, MARGIN, self.level, known).assign(when=when) for when, view in views
+        ]
+        return pd.concat([one for one in tables if len(one)] or tables, ignore_index=True)
+
+    @cached_property
+    def gains(self) -> pd.DataFrame:
+        """Every gain: its range, the scenario's value, the found one, and those of all repeats."""
+        return pd.DataFrame(
+            [
+                {
+                    "law": law, "gain": gain.key, "low": gain.low, "high": gain.high,
+                    "before": gain.own, "after": self.winner(law).gains[gain.key],
+                    "at": gain.bound(self.winner(law).gains[gain.key]),
+                    "repeats": " ".join(str(t.gains[gain.key]) for t in self.winners[law]),
+                }
+                for law in self.winners for gain in self.plan.gains[law]
+            ],
+            columns=["law", "gain", "low", "high", "before", "after", "at", "repeats"],
+        )  # fmt: skip
+
+    @cached_property
+    def history(self) -> pd.DataFrame:
+        """Every trial in its order, with the best so far."""
+        return pd.DataFrame(
+            [row for law, all_ in self.trials.items() for repeat, found in enumerate(all_, 1)
+             for row in _history(law, repeat, found)]
+        )  # fmt: skip
+
+    @cached_property
+    def importance(self) -> pd.DataFrame:
+        """How much each gain matters, with the least and the most of repeats and of parts."""
+        rows = [
+            {"law": law, "gain": gain.key, **_range([one.get(gain.key, 0.0) for one in found])}
+            for law in self.trials for found in [list(self._importances(law))] if found
+            for gain in self.plan.gains[law]
+        ]  # fmt: skip
+        return pd.DataFrame(rows, columns=["law", "gain", "importance", "low", "high"])
+
+    def _importances(self, law: str) -> Iterator[dict[str, float]]:
+        """Of each repeat's trials without one part of them after the other."""
+        for trials in self.trials[law]:
+            for part in range(PARTS):
+                kept = [one for place, one in enumerate(trials) if place % PARTS != part]
+                if len(kept) >= FEWEST * (PARTS - 1) / PARTS:
+                    found = importances(
+                        self.plan.gains[law], [t.gains for t in kept], [t.values[0] for t in kept]
+                    )
+                    if found:
+                        yield found
+
+    def remarks(self) -> list[str]:
+        """What is worth a sentence."""
+        return [*self._kept(), *self._unsound(), *self._bounds()]
+
+    def _kept(self) -> Iterator[str]:
+        for law in self.plan.laws:
+            if law not in self.winners:
+                yield f"{law} has no gains, kept as it is"
+
+    def _unsound(self) -> Iterator[str]:
+        for law in self.winners:
+            trial = self.winner(law)
+            broken = [
+                one.text for one, over in zip(self.plan.inequalities, trial.excesses, strict=True)
+                if over > 0.0
+            ]  # fmt: skip
+            if broken:
+                yield f"{law}: no trial held {' and '.join(broken)} on the training draws"
+            elif not math.isfinite(trial.values[0]):
+                yield f"{law}: every trial failed on most draws; its gains mean nothing"
+
+    def _bounds(self) -> Iterator[str]:
+        for row in self.gains[self.gains["at"] != ""].to_dict("records"):
+            end = row["low"] if row["at"] == "lower" else row["high"]
+            yield f"{row['gain']} of {row['law']} is at the {row['at']} end of its range, {end:.4g}"
+
+
+def _interval(name: str, found: Interval) -> dict[str, Any]:
+    return {name: found.estimate, f"{name}_low": found.low, f"{name}_high": found.high}
+
+
+def _range(values: Sequence[float]) -> dict[str, float]:
+    return {"importance": float(np.mean(values)), "low": min(values), "high": max(values)}
+
+
+def _history(law: str, repeat: int, trials: Sequence[Trial]) -> Iterator[dict[str, Any]]:
+    spent, leader = 0, (math.inf, math.inf)
+    for trial in trials:
+        spent += trial.runs
+        if trial.status == FINISHED:
+            leader = min(leader, (trial.excess, trial.values[0]))
+        others = {f"objective_{i}": v for i, v in enumerate(trial.values[1:], 2)}
+        yield {
+            "law": law, "repeat": repeat, "trial": trial.number, "batch": trial.batch,
+            "status": trial.status, "runs": trial.runs, "spent": spent,
+            "objective": trial.values[0], **others, "failures": trial.failures,
+            "excess": trial.excess, "best": leader[1],
+            "gains": " ".join(f"{key}={number}" for key, number in trial.gains.items()),
+        }  # fmt: skip

@@ -1,0 +1,132 @@
+"""Found gains on fresh draws: the scenario's and the found ones of every law meet the same."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from podusv_cli.controllers.base import Controller
+from podusv_cli.core.kernel import Vector
+from podusv_cli.storage import files, json_files
+from podusv_cli.storage.run_folder import STUDY
+from podusv_cli.study.march import Processes, Tally, march
+from podusv_cli.study.plan import Plan, disagreements
+from podusv_cli.study.runs import Mask
+from podusv_cli.study.runs_file import Table
+from podusv_cli.study.store import RUNS, UNITS, Store
+from podusv_cli.tuning.plan import VALIDATE, TunePlan
+from podusv_cli.tuning.space import with_gains
+from podusv_cli.tuning.trials import Trial, best
+
+FOLDER = "validation"
+Winners = Mapping[str, Sequence[Trial]]  # by law, one for each repeat
+
+
+def tuned(law: str) -> str:
+    """The name of a law with the gains that were found; no law's own name has a space."""
+    return f"{law} tuned"
+
+
+def repeated(law: str, repeat: int) -> str:
+    """The name of a law with the gains that a repeat found."""
+    return f"{law} repeat {repeat + 1}"
+
+
+def chosen(winners: Sequence[Trial]) -> int:
+    """Which repeat found the gains that are taken: the best on the draws for training."""
+    numbered = [
+        Trial(place, 0, t.gains, t.runs, t.status, t.values, t.excesses, t.first, t.failures)
+        for place, t in enumerate(winners)
+    ]
+    return best(numbered).number
+
+
+def contestants(plan: TunePlan, winners: Winners) -> dict[str, Controller]:
+    """All laws that meet the fresh draws, by name: before, after, and those of other repeats."""
+    found: dict[str, Controller] = {}
+    for law, own in plan.laws.items():
+        found[law] = own
+        if law in winners:
+            first = chosen(winners[law])
+            for repeat, trial in enumerate(winners[law]):
+                name = tuned(law) if repeat == first else repeated(law, repeat)
+                made = with_gains(own, trial.gains)
+                assert made, "a trial that finished has gains that the law takes"
+                found[name] = made
+    return found
+
+
+def validate(
+    plan: TunePlan, winners: Winners, folder: Path, started: str, workers: int,
+    tell: Callable[[Tally], None],
+) -> Table:  # fmt: skip
+    """Simulate what is missing of the validation; its runs.
+
+    Raises PodusvError, StorageError and KeyboardInterrupt; finished units are kept.
+    """
+    made = plan.with_laws(contestants(plan, winners), VALIDATE, plan.tune.validate)
+    store = Store(folder / FOLDER, made)
+    _clear(store.folder, made)
+    store.open(started)
+    march(store, tell, Processes(made, workers))
+    store.write_runs()
+    return store.runs()
+
+
+def _clear(folder: Path, plan: Plan) -> None:
+    """Remove the runs of other gains, which an earlier sitting with a smaller budget found."""
+    if not (folder / STUDY).exists():
+        return
+    told: dict[str, Any] = json_files.read(folder / STUDY)
+    same = not disagreements(told.get("identity", {}), json_files.plain(plan.identity))
+    if same and told.get("draws", 0) <= plan.sweep.draws:
+        return
+    with files.storage_errors(f"cannot remove old runs in {folder}"):
+        for path in (folder / STUDY, folder / RUNS, *(folder / UNITS).glob("*.h5")):
+            path.unlink(missing_ok=True)
+
+
+@dataclass(frozen=True)
+class View:
+    """Some laws of a table under other names, and some of its metrics: the `Runs` of a study."""
+
+    table: Table
+    names: Mapping[str, str]  # the table's, by name here
+    metrics: Sequence[str]
+
+    @property
+    def laws(self) -> Sequence[str]:
+        """Names of the laws."""
+        return list(self.names)
+
+    @property
+    def cells(self) -> Sequence[str]:
+        """The only cell."""
+        return self.table.cells
+
+    @property
+    def wanted(self) -> int:
+        """Draws that were asked for."""
+        return self.table.wanted
+
+    def metric(self, law: str, name: str) -> Vector:
+        """A metric of every run."""
+        return self.table.metric(self.names[law], name)
+
+    def done(self, law: str) -> Mask:
+        """Whether a run was tried."""
+        return self.table.done(self.names[law])
+
+    def finished(self, law: str) -> Mask:
+        """Whether a run reached its end."""
+        return self.table.finished(self.names[law])
+
+    def success(self, law: str) -> Mask:
+        """Whether a run was a success."""
+        return self.table.success(self.names[law])
+
+    def broken(self, law: str) -> Mask:
+        """Whether a run crashed, hung or was invalid."""
+        return self.table.broken(self.names[law])

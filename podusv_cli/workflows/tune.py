@@ -1,0 +1,175 @@
+"""`podusv tune`: a scenario with the key `tune` in, gains for every law and their proof out."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from podusv_cli.core.errors import UsageError
+from podusv_cli.findings.finding import unknown_codes
+from podusv_cli.process.extras import Extras, Missing
+from podusv_cli.process.interrupts import interrupts_deferred
+from podusv_cli.scenario.limits import limits
+from podusv_cli.scenario.load import Loaded, load
+from podusv_cli.storage import files, manifest
+from podusv_cli.study.check import sweep_faults
+from podusv_cli.study.march import Tally
+from podusv_cli.study.sittings import Sitting
+from podusv_cli.study.unit import prepare
+from podusv_cli.tuning import folder as place
+from podusv_cli.tuning import outputs
+from podusv_cli.tuning.check import tune_faults
+from podusv_cli.tuning.march import march
+from podusv_cli.tuning.plan import TRAIN, TunePlan
+from podusv_cli.tuning.results import Results
+from podusv_cli.tuning.sampler import optuna
+from podusv_cli.tuning.search import Search
+from podusv_cli.tuning.trials import best
+from podusv_cli.tuning.validation import validate
+from podusv_cli.workflows.run import RESULTS
+
+Tell = Callable[[Tally, str], None]
+
+
+@dataclass(frozen=True)
+class Request:
+    """The options of `podusv tune`; see its help."""
+
+    overrides: Sequence[str] = ()
+    out: Path | None = None
+    workers: int = 0
+    argv: Sequence[str] = ()
+    plugins: Sequence[str] = ()
+    figures: bool = True
+    say: Callable[[str], None] = lambda text: None
+
+
+@dataclass(frozen=True)
+class Tuned:
+    """A finished search and its folder."""
+
+    folder: Path
+    results: Results
+    missing: tuple[Missing, ...] = ()  # of figures and report
+
+    def as_json(self) -> dict[str, Any]:
+        """What `--json` prints."""
+        results = self.results
+        return {
+            "format": 1, "status": "finished", "folder": str(self.folder),
+            "laws": results.laws.to_dict("records"),
+            "gains": {law: dict(results.winner(law).gains) for law in results.winners},
+            "remarks": results.remarks(), "missing": [str(one) for one in self.missing],
+        }  # fmt: skip
+
+
+def tune(config: Path, request: Request, tell: Tell) -> Tuned:
+    """Search gains for every law with equal budgets, and report them on fresh draws.
+
+    `config` is a scenario or the folder of a search. Raises ScenarioError, UsageError where the
+    folder holds another search or Optuna is not installed, StorageError, and KeyboardInterrupt;
+    every batch that was finished is kept.
+    """
+    started = datetime.now(UTC)
+    optuna()
+    loaded, folder = _loaded(config, request)
+    plan = TunePlan(loaded.scenario)
+    place.opened(folder, plan, started.isoformat(timespec="seconds"))
+    place.write_scenario(folder, loaded)
+    results = _simulated(plan, folder, request, started, tell)
+    return _written(results, folder, request)
+
+
+def _loaded(config: Path, request: Request) -> tuple[Loaded, Path]:
+    """The scenario, and the folder of the search."""
+    given = config.is_dir()
+    if given:
+        place.check(config)
+    if request.out and request.out.exists() and not request.out.is_dir():
+        raise UsageError(f"--out {request.out} is a file; name a folder")
+    checks = (unknown_codes, limits(allow_large=True), sweep_faults, tune_faults)
+    source = config / place.SCENARIO if given else config
+    loaded = load(source, request.overrides, checks, request.plugins)
+    if loaded.scenario.tune is None:
+        raise UsageError(
+            f"{config} has no key `tune`, which says how many runs a search has; see "
+            "docs/tuning.md, or start from one: podusv init studies/tune_small"
+        )
+    own = config if given else RESULTS / f"{loaded.scenario.name}-tune"
+    return loaded, request.out or own
+
+
+def _simulated(
+    plan: TunePlan, folder: Path, request: Request, started: datetime, tell: Tell
+) -> Results:
+    """Search and validate what is not there yet, and note the sitting."""
+    sitting = Sitting(folder, request.argv, started, plan.scenario.plugged)
+    made = {"search": 0, "validation": 0}
+
+    def searched(tally: Tally, searches: Sequence[Search]) -> None:
+        made["search"] = tally.made - tally.before
+        tell(tally, _leaders(searches))
+
+    def validated(tally: Tally) -> None:
+        made["validation"] = tally.made - tally.before
+        tell(tally, "found gains on fresh draws")
+
+    try:
+        searches = _searches(plan, folder)
+        for law in {search.law for search in searches}:  # before the fork
+            prepare(plan.with_laws({law: plan.laws[law]}, TRAIN, 1), law, 0)
+        march(searches, request.workers, searched)
+        trials = {law: [s.trials for s in searches if s.law == law] for law in plan.gains}
+        trials = {law: found for law, found in trials.items() if found}
+        winners = {law: [best(one) for one in found] for law, found in trials.items()}
+        stamp = started.isoformat(timespec="seconds")
+        runs = validate(plan, winners, folder, stamp, request.workers, validated)
+    except KeyboardInterrupt as stop:
+        again = f"podusv tune {shlex.quote(str(folder))}"
+        raise KeyboardInterrupt(
+            f"interrupted; all batches that were finished are kept, continue with: {again}"
+        ) from stop
+    finally:
+        sitting.end(sum(made.values()))
+    return Results(plan, trials, winners, runs)
+
+
+def _searches(plan: TunePlan, folder: Path) -> list[Search]:
+    """One for each law with gains and each repeat, all laws in turn."""
+    return [
+        Search(plan, law, repeat, folder)
+        for repeat in range(plan.tune.repeats)
+        for law, gains in plan.gains.items()
+        if gains
+    ]
+
+
+def _leaders(searches: Sequence[Search]) -> str:
+    """The best objective so far of every law, in words."""
+    found: dict[str, float] = {}
+    for search in searches:
+        if search.trials:
+            value = best(search.trials).values[0]
+            found[search.law] = min(value, found.get(search.law, value))
+    return "best so far: " + ", ".join(f"{law} {value:.4g}" for law, value in found.items())
+
+
+def _written(results: Results, folder: Path, request: Request) -> Tuned:
+    """Write the scenario and the tables, then figures and the report."""
+    with interrupts_deferred():
+        files.write_bytes(folder / place.TUNED, place.tuned_yaml(results))
+        outputs.write_tables(folder, results)
+        request.say("drawing figures and writing the report")
+        extras = Extras()
+        outputs.write_report(folder, results, extras, figures=request.figures)
+        if extras.interrupted:
+            raise KeyboardInterrupt(
+                "interrupted; gains and tables are whole, the rest is made by: "
+                f"podusv tune {shlex.quote(str(folder))}"
+            )
+        manifest.write(folder, "finished")
+        return Tuned(folder, results, tuple(extras.missing))

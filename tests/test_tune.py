@@ -1,0 +1,338 @@
+"""`podusv tune`: equal budgets, found optima, interrupted searches, outputs, mistakes."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import math
+import re
+
+import numpy as np
+import pandas as pd
+import pytest
+from tune_samples import planned, toy
+
+from podusv_cli.core.errors import UsageError
+from podusv_cli.scenario.load import load
+from podusv_cli.study.march import Tally
+from podusv_cli.tuning import sampler, trials
+from podusv_cli.tuning.march import march
+from podusv_cli.tuning.search import Search, _far
+from podusv_cli.tuning.trials import CUT, FINISHED, PRUNED, Trial, best, front
+from podusv_cli.workflows import tune as workflow
+
+# They have times, and the report the last sitting.
+MADE_ANEW = {"provenance.json", "manifest.json", "tune.json", "study.json", "report.html"}
+
+
+@pytest.fixture
+def optuna():
+    return pytest.importorskip("optuna", reason="the search needs Optuna: podusv[tune]")
+
+
+def tuned(folder, *changes, tell=lambda tally, text: None, workers=1, figures=False):
+    """A finished search in folder/out."""
+    request = workflow.Request(changes, folder / "out", workers, figures=figures)
+    return workflow.tune(toy(folder), request, tell)
+
+
+def contents(folder):
+    """The bytes of all files that do not tell of times."""
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and path.name not in MADE_ANEW
+    }
+
+
+def searched(folder, *changes):
+    """The trials of the toy law's searches, by the driver alone."""
+    plan = planned(folder, *changes)
+    (folder / trials.FOLDER).mkdir(exist_ok=True)
+    found = [Search(plan, "toy", repeat, folder) for repeat in range(plan.tune.repeats)]
+    march(found, 1, lambda tally, searches: None)
+    return found
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    pytest.importorskip("optuna", reason="the search needs Optuna: podusv[tune]")
+    folder = tmp_path_factory.mktemp("tune")
+    return tuned(folder, "tune.budget=160", workers=2, figures=True)
+
+
+def test_a_planted_optimum_is_found(done):
+    assert done.results.winner("toy").gains["gain"] == pytest.approx(3.0, rel=0.1)
+    (row,) = done.results.laws[done.results.laws.law == "toy"].to_dict("records")
+    assert row["objective_after"] < 1e-2 * row["objective_before"]
+    assert row["ratio_high"] < 0.05
+    assert (row["rank_before"], row["rank_after"]) == (2, 1)
+
+
+def test_every_search_spends_the_whole_budget_and_counts_pruned_trials(done):
+    for found in done.results.trials["toy"]:
+        assert sum(trial.runs for trial in found) == 160
+        counts = {s: [t.runs for t in found if t.status == s] for s in (FINISHED, PRUNED, CUT)}
+        assert set(counts[FINISHED]) == {4}
+        assert set(counts[PRUNED]) == {1}, "a quarter of the draws"
+    assert done.results.spent == {"toy": 320}
+
+
+def test_the_first_trial_has_the_published_gains(done):
+    for found in done.results.trials["toy"]:
+        assert found[0].gains == {"gain": 1.0, "other": 1.0}
+        assert found[0].status == FINISHED
+
+
+def test_repeats_differ(done):
+    first, second = done.results.trials["toy"]
+    assert [t.gains for t in first[1:]] != [t.gains for t in second[1:]]
+
+
+def test_a_law_without_gains_is_kept_and_reported(done):
+    (row,) = done.results.laws[done.results.laws.law == "bare"].to_dict("records")
+    assert row["objective_before"] == row["objective_after"]
+    assert row["runs"] == 0
+    assert "bare has no gains, kept as it is" in done.results.remarks()
+    assert "Bare has no gains, kept as it is." in (done.folder / "report.html").read_text()
+
+
+def test_the_found_scenario_extends_the_searched_one(done):
+    scenario = load(done.folder / "tuned.yaml").scenario
+    assert scenario.name == "toy-tuned"
+    assert scenario.tune is None
+    assert scenario.sweep
+    gains = done.results.winner("toy").gains
+    assert scenario.controllers["toy"].gain == gains["gain"]
+    assert scenario.controllers["bare"].label == "bare"
+
+
+def test_numbers_of_the_report_come_from_draws_that_no_search_has_seen(done):
+    drawn = done.results.runs.drawn["start.psi"]
+    plan = done.results.plan
+    from podusv_cli.study.draws import SWEEP, table
+    from podusv_cli.tuning.plan import TRAIN
+
+    others = [table(plan.scenario.sweep, 0, 500, s)["start.psi"] for s in (SWEEP, TRAIN)]
+    assert len(drawn) == plan.tune.validate
+    assert not set(drawn.tolist()) & {*others[0].tolist(), *others[1].tolist()}
+
+
+def test_the_found_gains_give_the_numbers_of_the_validation(done):
+    """One run of the validation again, by hand."""
+    from podusv_cli.study.unit import Unit, make
+    from podusv_cli.tuning.plan import VALIDATE
+
+    scenario = load(done.folder / "tuned.yaml").scenario
+    made = done.results.plan.with_laws({"toy": scenario.controllers["toy"]}, VALIDATE, 12)
+    again = make(made, Unit("toy", 0, 3, 1)).metrics["effort_u"][0]
+    assert again == done.results.runs.metric("toy tuned", "effort_u")[0, 3]
+
+
+def test_tables_have_a_row_for_every_law_gain_trial_and_pair(done):
+    read = {name: pd.read_csv(done.folder / f"{name}.csv") for name in ("laws", "gains", "history")}
+    assert list(read["laws"].law) == ["toy", "bare"]
+    assert list(read["gains"].gain) == ["gain", "other"]
+    assert len(read["history"]) == sum(len(found) for found in done.results.trials["toy"])
+    for _, rows in read["history"].groupby("repeat"):
+        assert rows.best.is_monotonic_decreasing
+        assert rows.spent.iloc[-1] == 160
+    pairs = pd.read_csv(done.folder / "validation.csv")
+    assert set(pairs["when"]) == {"before", "after", "tuning"}
+
+
+def test_the_gain_that_matters_is_the_important_one(done):
+    table = done.results.importance.set_index("gain")
+    assert table.importance["gain"] > 0.6 > 0.4 > table.importance["other"]
+    assert all(table.low <= table.importance)
+    assert all(table.importance <= table.high)
+
+
+def test_the_page_has_figures_and_no_broken_value(done):
+    page = (done.folder / "report.html").read_text()
+    assert page.count("<figure") == 5
+    assert not re.search(r">\s*nan\b|Undefined|\bNone<", page)
+    names = {path.stem for path in (done.folder / "figures").iterdir()}
+    assert names == {"validation", "history", "ratios", "importance", "slices-toy"}
+
+
+def test_a_search_in_parts_equals_one_in_one_go(optuna, tmp_path):
+    """Interrupted in the search, then in the validation; with other workers."""
+    whole = tuned(tmp_path / "whole", workers=2)
+
+    def stop(after):
+        def tell(tally, text):
+            if tally.made >= after:
+                raise KeyboardInterrupt
+
+        return tell
+
+    for after in (30, 90):
+        with pytest.raises(KeyboardInterrupt, match="continue with: podusv tune"):
+            tuned(tmp_path / "part", tell=stop(after))
+    kept = trials.read(tmp_path / "part" / "out", "toy-0")
+    assert 0 < sum(trial.runs for trial in kept) < 64
+
+    def fresh(tally: Tally, text: str) -> None:
+        if "fresh" in text and tally.made >= 12:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        tuned(tmp_path / "part", tell=fresh)
+    part = workflow.tune(
+        tmp_path / "part" / "out", workflow.Request(figures=False), lambda *_: None
+    )
+    assert contents(part.folder) == contents(whole.folder)
+
+
+def test_a_larger_budget_continues_as_if_it_had_been_asked_for_at_once(optuna, tmp_path):
+    searched(tmp_path / "parts", "tune.budget=45", "tune.repeats=1")
+    (parts,) = searched(tmp_path / "parts", "tune.budget=80", "tune.repeats=1")
+    (whole,) = searched(tmp_path / "whole", "tune.budget=80", "tune.repeats=1")
+    assert parts.trials == whole.trials
+    assert whole.spent == 80
+
+
+def test_what_is_kept_is_not_simulated_again(optuna, tmp_path, monkeypatch):
+    (first,) = searched(tmp_path, "tune.repeats=1")
+    from podusv_cli.tuning import march as module
+
+    monkeypatch.setattr(module, "timed", None)  # would fail in a worker
+    (again,) = searched(tmp_path, "tune.repeats=1")
+    assert again.trials == first.trials
+
+
+def test_another_search_in_the_folder_is_refused_with_what_differs(optuna, tmp_path):
+    tuned(tmp_path, "tune.repeats=1", "tune.budget=32")
+    with pytest.raises(UsageError, match=r"holds another search: tune.train: 4, not 5"):
+        tuned(tmp_path, "tune.repeats=1", "tune.train=5")
+
+
+def test_an_inequality_is_respected(optuna, tmp_path):
+    """The best gain is 3, and only gains up to about 1.6 hold the inequality."""
+    (free,) = searched(tmp_path / "free", "tune.repeats=1", "tune.budget=120")
+    (bound,) = searched(
+        tmp_path / "bound", "tune.repeats=1", "tune.budget=120",
+        "tune.subject_to=[median(effort_u) >= 0.4]",
+    )  # fmt: skip
+    assert best(free.trials).values[0] < 0.1
+    winner = best(bound.trials)
+    assert winner.excess == 0.0
+    assert 0.4 <= winner.values[0] < 0.7
+
+
+def test_two_objectives_give_a_front(optuna, tmp_path):
+    made = tuned(
+        tmp_path, "tune.objective=[median(effort_u), median(iae)]", "tune.repeats=1",
+        "tune.budget=120", figures=True,
+    )  # fmt: skip
+    (found,) = made.results.trials["toy"]
+    points = np.array(sorted(trial.values for trial in front(found)))
+    assert len(points) >= 2
+    assert (np.diff(points[:, 0]) > 0).all()
+    assert (np.diff(points[:, 1]) < 0).all()
+    assert made.results.winner("toy").values in [trial.values for trial in front(found)]
+    assert (made.folder / "figures" / "front.png").exists()
+    assert sum(trial.runs for trial in found) == 120
+
+
+def test_gains_that_the_law_refuses_fail_and_cost_no_simulation(optuna, tmp_path, monkeypatch):
+    from podusv_cli.tuning import search as module
+
+    real = module.with_gains
+    monkeypatch.setattr(
+        module, "with_gains", lambda law, new: real(law, new) if new["gain"] < 2 else None
+    )
+    (found,) = searched(tmp_path, "tune.repeats=1")
+    refused = [trial for trial in found.trials if trial.gains["gain"] >= 2]
+    assert refused
+    assert all(trial.failures == 1.0 and trial.values == (math.inf,) for trial in refused)
+    assert found.spent == 64
+    assert best(found.trials).gains["gain"] < 2
+
+
+def test_a_search_in_which_everything_fails_ends_and_says_so(optuna, tmp_path):
+    made = tuned(
+        tmp_path, "sweep.success=finished and effort_u < 0", "tune.repeats=1", "tune.budget=40"
+    )
+    assert made.results.winner("toy").gains["gain"] == 1.0
+    assert "toy: every trial failed on most draws; its gains mean nothing" in made.results.remarks()
+
+
+def test_the_command_prints_before_and_after(optuna, podusv, tmp_path):
+    code, out, _ = podusv(
+        "tune", str(toy(tmp_path)), "--set", "tune.budget=32", "--set", "tune.repeats=1",
+        "--out", str(tmp_path / "out"), "--no-figures",
+    )  # fmt: skip
+    assert code == 0
+    assert "median(effort_u) on 12 fresh draws:" in out
+    assert re.search(r"^toy +\d -> \d +1\.6 \[", out, re.MULTILINE)
+    told = json.loads((tmp_path / "out" / "tune.json").read_text())
+    assert told["gains"] == {"toy": ["gain", "other"], "bare": []}
+
+
+def test_without_optuna_the_command_says_how_to_get_it(podusv, tmp_path, monkeypatch):
+    def missing(name):
+        raise ImportError(name)
+
+    monkeypatch.setattr(sampler, "import_module", missing)
+    code, _, err = podusv("tune", str(toy(tmp_path)), "--out", str(tmp_path / "out"))
+    assert code == 2
+    assert "podusv tune needs Optuna: pip install 'podusv[tune]'" in err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_scenario_without_the_key_is_refused(optuna, podusv, tmp_path):
+    code, _, err = podusv("tune", str(toy(tmp_path)), "--set", "tune=null")
+    assert code == 2
+    assert "has no key `tune`" in err
+
+
+def made_up(number, value, *, excess=0.0, status=FINISHED, other=()):
+    return Trial(number, 0, {}, 4, status, (value, *other), (excess,), (value, *other), 0.0)
+
+
+def test_the_best_trial_holds_inequalities_first_and_is_finished():
+    found = [
+        made_up(0, 5.0), made_up(1, 1.0, excess=0.1), made_up(2, 0.5, status=PRUNED),
+        made_up(3, 4.0), made_up(4, 4.0),
+    ]  # fmt: skip
+    assert best(found).number == 3
+    assert best(found[1:2]).number == 1, "where none holds them, the nearest"
+
+
+def test_of_a_front_the_middle_is_taken():
+    found = [
+        made_up(0, 0.0, other=(10.0,)), made_up(1, 2.0, other=(2.0,)),
+        made_up(2, 10.0, other=(0.0,)), made_up(3, 3.0, other=(3.0,)),
+        made_up(4, -1.0, other=(-1.0,), excess=1.0),
+    ]  # fmt: skip
+    assert [trial.number for trial in front(found)] == [0, 1, 2]
+    assert best(found).number == 1
+
+
+def test_a_trial_is_far_worse_only_by_all_objectives():
+    assert _far((2.0,), (3.01,))
+    assert not _far((2.0,), (3.0,))
+    assert _far((2.0,), (math.inf,))
+    assert not _far((math.inf,), (math.inf,))
+    assert not _far((2.0, 2.0), (9.0, 2.5))
+
+
+def test_trials_read_back_with_infinite_numbers(tmp_path):
+    (tmp_path / trials.FOLDER).mkdir()
+    found = [
+        Trial(
+            0, 0, {"a": 0.1 + 0.2, "b": "word", "n": 3}, 4, FINISHED, (math.inf,), (), (1.0,), 1.0
+        )
+    ]
+    trials.write(tmp_path, "pid-0", found)
+    assert trials.read(tmp_path, "pid-0") == found
+    assert trials.read(tmp_path, "pid-1") == []
+
+
+def test_podusv_imports_optuna_in_one_place_only():
+    for name in ("check", "plan", "space", "objective", "trials", "results", "report", "search"):
+        source = importlib.import_module(f"podusv_cli.tuning.{name}").__file__
+        with open(source) as file:
+            assert "import optuna" not in file.read()

@@ -1,0 +1,190 @@
+"""The key `tune`: mistakes are told at their place, gains and their ranges are found."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from small_study import TEXT
+from tune_samples import faults, planned, toy
+
+from podusv_cli.metrics.table import METRICS
+from podusv_cli.scenario.load import load_text, resolved_yaml
+from podusv_cli.scenario.tune import Range
+from podusv_cli.scenario.yaml_tree import DISTRIBUTIONS, RANGE
+from podusv_cli.study.draws import SWEEP, table, words
+from podusv_cli.tuning.check import tune_faults
+from podusv_cli.tuning.objective import Runs, evaluate, excess, parse_inequality, parse_objective
+from podusv_cli.tuning.plan import TRAIN, VALIDATE, TunePlan
+
+TUNED = TEXT + "tune: {budget: 200, train: 4, validate: 10, space: {around: 10.0}}\n"
+
+
+def plan(*changes: str) -> TunePlan:
+    return TunePlan(load_text(TUNED, "a.yaml", changes, [tune_faults]).scenario)
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ("tune.budget=31", "31 runs are less than one batch of 8 gains with 4 draws each; give 32"),
+        ("tune.budgte=3", "unknown key; did you mean 'budget'?"),
+        ("tune.objective=median(iea)", "unknown metric 'iea'; did you mean"),
+        ("tune.objective=iae", "no statistic of all draws; write median(...)"),
+        ("tune.objective=1 + 2", "is a number, whatever the gains are"),
+        ("tune.objective=share(iae)", "unknown statistic 'share'"),
+        ("tune.objective=[median(iae), median(ise), failures]", "objective: one or two, found 3"),
+        ("tune.objective=median(iae < 3)", "write metrics by their names alone"),
+        ("tune.subject_to=[failures]", "compare one statistic with one number"),
+        ("tune.subject_to=[0.1 <= failures <= 0.2]", "compare one statistic with one number"),
+        ("tune.subject_to=[failures <= ise]", "not a plain number"),
+        ("tune.space.k_zee.log=[1, 2]", "unknown gain; did you mean 'k_ze'?"),
+        ("tune.space.pidd.K_Pu.log=[1, 2]", "unknown gain; did you mean 'pid.K_Pu'?"),
+        ("tune.space.K_Pu.log=[-1, 2]", "-1 is not above 0; write uniform: [low, high]"),
+        ("tune.space.K_Pu.log=[2, 1]", "log: 2 is not below 1"),
+        ("tune.space.K_Pu.uniform=[-2, 1]", "pid does not take K_Pu = -2.0"),
+        ("tune.space.K_Pu={}", "must have one of log, uniform"),
+        ("tune.space.K_Pu={log: [1, 2], keep: true}", "found log and keep"),
+        ("tune.space.hold_below.around=2", "hold_below of pid is 0.0; a factor needs"),
+        ("tune.space.reference.choice=[path]", "needs two different values"),
+        ("tune.space.reference.choice=[path, pahth]", "pid does not take reference = 'pahth'"),
+        ("tune.space.around=1", "must be a number above 1"),
+        ("tune.space.K_Pu=3.0", "is a number; write {log: [low, high]}, or keep: true"),
+        ("sweep.grid={vessel.m: [20, 30]}", "needs a study without a grid"),
+        ("sweep=null", "needs the key sweep"),
+    ],
+)  # fmt: skip
+def test_a_mistake_is_told_once_at_its_place(change, told):
+    found = faults(TUNED, change)
+    assert len(found) == 1 or change.startswith("tune.space.hold_below"), found
+    assert told in found[0]
+    assert found[0].startswith(f"--set {change}") or found[0].startswith("a.yaml:")
+
+
+def test_a_sound_search_has_no_faults_and_reads_back():
+    loaded = load_text(TUNED, "a.yaml", ["tune.space.pid.K_Pu.log=[1, 2]"], [tune_faults])
+    assert load_text(resolved_yaml(loaded.scenario), "b.yaml").scenario == loaded.scenario
+
+
+def test_another_range_replaces_an_inherited_one():
+    loaded = load_text(
+        TUNED, "a.yaml", ["tune.space.K_Pu.log=[1, 2]", "tune.space.T_d={uniform: [1, 2]}"]
+    )
+    space = loaded.scenario.tune.space
+    assert space["T_d"].given == ["uniform"]
+    assert set(space) == {"around", "K_Pu", "T_d"}
+    assert {*Range.model_fields} <= RANGE | DISTRIBUTIONS
+
+
+def test_around_covers_every_gain_and_stays_in_its_range():
+    found = {gain.key: gain for gain in plan().gains["pid"]}
+    assert {"K_Pu", "K_Ir", "T_d", "k_ze", "standoff"} <= set(found)
+    assert not {"difference_step", "hold_below", "kind", "reference"} & set(found)
+    assert (found["K_Pu"].low, found["K_Pu"].high) == (110.0, 11000.0)
+    assert all(gain.log and gain.low < gain.own < gain.high for gain in found.values())
+
+
+def test_a_key_may_be_kept_or_be_of_one_law():
+    found = plan("tune.space.standoff.keep=true", "tune.space.pid.k_ze.log=[0.01, 1]").gains
+    assert "standoff" not in {gain.key for gain in found["pid"]}
+    (ours,) = [gain for gain in found["pid"] if gain.key == "k_ze"]
+    (theirs,) = [gain for gain in found["li"] if gain.key == "k_ze"]
+    assert (ours.low, ours.high) == (0.01, 1.0)
+    assert (theirs.low, theirs.high) == (pytest.approx(0.01), pytest.approx(1.0))
+
+
+def test_without_around_only_named_keys_are_searched(tmp_path):
+    text = TUNED.replace("{around: 10.0}", "{K_Pu: {log: [100, 1000]}}")
+    found = TunePlan(load_text(text, "a.yaml", (), [tune_faults]).scenario).gains
+    assert [gain.key for gain in found["pid"]] == ["K_Pu"]
+    assert found["li"] == ()
+
+
+def test_a_law_without_numbers_has_no_gains(tmp_path):
+    made = planned(tmp_path)
+    assert [gain.key for gain in made.gains["toy"]] == ["gain", "other"]
+    assert made.gains["bare"] == ()
+    lines = list(made.in_words({"toy": 0.1, "bare": 0.1}, 2))
+    assert "bare has no gains and is kept as it is" in lines
+    assert lines[-1].startswith("runs of the search: 128 (budget 64 for each law, repeats: 2)")
+    assert made.runs_wanted() == {"toy": (128, 36), "bare": (0, 12)}
+
+
+def test_a_gain_is_tried_in_four_digits_within_its_range():
+    gain = next(gain for gain in plan().gains["pid"] if gain.key == "K_Pu")
+    assert gain.value(123.456789) == 123.5
+    assert gain.value(109.99999) == 110.0
+    assert (gain.bound(110.0), gain.bound(1100.0), gain.bound(10900.0)) == ("lower", "", "upper")
+
+
+RUNS = Runs(
+    {"iae": np.array([1.0, 2.0, 3.0, np.nan]), "tv_tau_u": np.array([4.0, 4.0, 8.0, 1.0])},
+    np.array([False, False, False, True]),
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "number"),
+    [
+        ("median(iae)", 2.0),
+        ("quantile(iae, 0.75)", 3.0),
+        ("quantile(iae, 0.95)", math.inf),
+        ("median(iae) + 0.5 * median(tv_tau_u)", 4.0),
+        ("median(iae / tv_tau_u)", 0.375),
+        ("failures", 0.25),
+        ("-failures * 4", -1.0),
+    ],
+)
+def test_a_failed_run_is_the_worst_of_every_statistic(text, number):
+    assert evaluate(parse_objective(text, METRICS), RUNS, METRICS) == number
+
+
+def test_what_nobody_knows_is_the_worst():
+    runs = Runs({"iae": np.full(4, np.nan)}, np.zeros(4, bool))
+    assert evaluate(parse_objective("median(iae)", METRICS), runs, METRICS) == math.inf
+    assert evaluate(parse_objective("median(iae) - median(iae)", METRICS), runs, METRICS) > 1e300
+
+
+@pytest.mark.parametrize(
+    ("text", "over"),
+    [
+        ("failures <= 0.25", 0.0),
+        ("failures <= 0.1", 1.5),
+        ("failures <= 0", 0.25),
+        ("median(iae) >= 4", 0.5),
+        ("median(iae) < 4", -0.5),
+        ("quantile(iae, 0.95) > 1", math.inf),
+    ],
+)
+def test_an_inequality_says_by_how_much_it_does_not_hold(text, over):
+    found = parse_inequality(text, METRICS)
+    assert excess(found, RUNS, METRICS) == pytest.approx(over)
+
+
+def test_training_validation_and_sweep_share_no_word():
+    streams = [words(3, "start.psi", 0, 2000, s).tolist() for s in (SWEEP, TRAIN, VALIDATE)]
+    assert len({word for stream in streams for word in stream}) == 6000
+
+
+def test_the_streams_reach_the_runs(tmp_path):
+    made = planned(tmp_path)
+    assert made.scenario.sweep
+    plans = [made.with_laws(made.laws, stream, 10) for stream in (TRAIN, VALIDATE)]
+    drawn = [table(one.sweep, 0, 10, one.stream)["start.psi"].tolist() for one in plans]
+    own = table(made.scenario.sweep, 0, 10)["start.psi"].tolist()
+    assert len({*drawn[0], *drawn[1], *own}) == 30
+    assert plans[0].identity["stream"] != plans[1].identity["stream"]
+
+
+def test_validate_tells_gains_runs_and_laws_without_gains(podusv, tmp_path):
+    code, out, _ = podusv("validate", str(toy(tmp_path)))
+    assert code == 0
+    assert "gains of toy (2): gain, other" in out
+    assert "bare has no gains and is kept as it is" in out
+    assert "runs of the search: 128" in out
+
+
+def test_a_comparison_ignores_the_search(tmp_path):
+    made = planned(tmp_path).scenario
+    assert all(one.tune is None and one.sweep is None for one in made.singles().values())
