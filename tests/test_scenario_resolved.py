@@ -112,7 +112,8 @@ def possible(data: dict[str, Any]) -> Scenario:
     if data["actuator"]["kind"] == "pod":
         data["actuator"].update(preset="otter")
     for law in (data["controller"], *data["controllers"].values()):
-        law.update(rate="analytic", hold_below=0.0)
+        if "rate" in law:
+            law.update(rate="analytic", hold_below=0.0)
         if "network" in law:
             low, high, widths = (-1.0, -1.0, -1.0), (1.0, 2.0, 0.5), (1.0, 2.0, 3.0)
             law["network"].update(low=low, high=high, widths=widths)
