@@ -112,8 +112,9 @@ def possible(data: dict[str, Any]) -> Scenario:
     if data["actuator"]["kind"] == "pod":
         data["actuator"].update(preset="otter")
     for law in (data["controller"], *data["controllers"].values()):
-        if "rate" in law:
-            law.update(rate="analytic", hold_below=0.0)
+        step = data["simulation"]["step"]
+        sampled = {"rate": "analytic", "hold_below": 0.0, "check_every": step}
+        law.update({key: value for key, value in sampled.items() if key in law})
         if "network" in law:
             low, high, widths = (-1.0, -1.0, -1.0), (1.0, 2.0, 0.5), (1.0, 2.0, 3.0)
             law["network"].update(low=low, high=high, widths=widths)

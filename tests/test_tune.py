@@ -234,6 +234,7 @@ def test_two_objectives_give_a_front(optuna, tmp_path):
     assert made.results.winner("toy").values in [trial.values for trial in front(found)]
     assert (made.folder / "figures" / "front.png").exists()
     assert sum(trial.runs for trial in found) == 120
+    assert "second_objective_after" in pd.read_csv(made.folder / "laws.csv").columns
 
 
 def test_gains_that_the_law_refuses_fail_and_cost_no_simulation(optuna, tmp_path, monkeypatch):

@@ -50,19 +50,21 @@ def tune(
 
 
 def _report(done: Tuned) -> None:
-    from podusv_cli.tuning.report import interval, percent, ratio, spread
+    from podusv_cli.tuning.report import intervals, percent, ratio, spread
 
     results = done.results
     rows = [
         [row["law"], f"{row['rank_before']} -> {row['rank_after']}",
-         interval(row, "objective_before"), interval(row, "objective_after"),
+         intervals(row, "before"), intervals(row, "after"),
          ratio(row) if row["runs"] else "-",
          f"{percent(row, 'failed_before')} -> {percent(row, 'failed_after')}", spread(row)]
         for row in results.laws.sort_values("rank_after").to_dict("records")
     ]  # fmt: skip
     first = results.shown[0] if results.shown else "metric"
     head = ["law", "rank", "before", "after", f"{first}, after / before", "failed", "repeats"]
-    echo(f"{results.plan.tune.objectives[0]} on {results.plan.tune.validate} fresh draws:")
+    echo(
+        f"{' and '.join(results.plan.tune.objectives)} on {results.plan.tune.validate} fresh draws:"
+    )
     echo_table(head, rows)
     for text in results.remarks():
         echo(text)

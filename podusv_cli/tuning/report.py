@@ -12,7 +12,7 @@ from podusv_cli.process.extras import Missing
 from podusv_cli.study.results import digits
 from podusv_cli.study.sittings import sittings
 from podusv_cli.study.words import in_words
-from podusv_cli.tuning.results import Results
+from podusv_cli.tuning.results import OBJECTIVES, Results
 
 FEW = 15  # pairs that are shown at once
 
@@ -54,14 +54,20 @@ def _laws(results: Results) -> Iterator[dict[str, Any]]:
     ordered: Any = results.laws.sort_values(["rank_after", "rank_before"]).to_dict("records")
     for row in ordered:
         yield row | {
-            "before": interval(row, "objective_before"), "after": interval(row, "objective_after"),
+            "before": intervals(row, "before"), "after": intervals(row, "after"),
             "failed": f"{percent(row, 'failed_before')}, then {percent(row, 'failed_after')}",
             "change": ratio(row) if row["runs"] else "-",
             "spread": spread(row),
         }  # fmt: skip
 
 
-def interval(row: Any, name: str) -> str:
+def intervals(row: Any, when: str) -> str:
+    """Every objective with its interval."""
+    names = [f"{name}_{when}" for name in OBJECTIVES]
+    return " and ".join(_interval(row, name) for name in names if name in row)
+
+
+def _interval(row: Any, name: str) -> str:
     """A number with its interval, where it has one."""
     estimate, low, high = (row[f"{name}{end}"] for end in ("", "_low", "_high"))
     if math.isnan(low):

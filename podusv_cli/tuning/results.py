@@ -22,6 +22,7 @@ from podusv_cli.tuning.trials import FINISHED, Trial
 from podusv_cli.tuning.validation import View, chosen, repeated, tuned
 
 ALWAYS = ("iae", "z_e_steady")  # metrics that the tables have beside those of the objective
+OBJECTIVES = ("objective", "second_objective")  # columns
 MARGIN = 0.01  # relative, of pairs
 PARTS = 8  # of the trials; importances are computed without each, to see how sure they are
 FEWEST = 24  # trials that importances are computed from
@@ -85,7 +86,8 @@ class Results:
             runs = self.met(name)
             failed = statistics.share(int(runs.failed.sum()), len(runs.failed), self.level)
             told |= _interval(f"failed_{when}", failed)
-            told |= _interval(f"objective_{when}", self.objective(runs))
+            for i, tree in enumerate(self.plan.objectives):
+                told |= _interval(f"{OBJECTIVES[i]}_{when}", self.objective(runs, tree))
         found = self.pairs
         own = found[(found["when"] == "tuning") & (found.a == tuned(law))]
         own = own[own.metric == self.shown[0]]
@@ -97,9 +99,8 @@ class Results:
         )
         return told
 
-    def objective(self, runs: Runs) -> Interval:
-        """The first objective, with an interval where it is one quantile of one number."""
-        tree = self.plan.objectives[0]
+    def objective(self, runs: Runs, tree: ast.expr) -> Interval:
+        """An objective, with an interval where it is one quantile of one number."""
         found = evaluate(tree, runs, self.plan.metrics)
         if not isinstance(tree, ast.Call):
             return Interval(found, math.nan, math.nan)
@@ -223,7 +224,7 @@ def _history(law: str, repeat: int, trials: Sequence[Trial]) -> Iterator[dict[st
         spent += trial.runs
         if trial.status == FINISHED:
             leader = min(leader, (trial.excess, trial.values[0]))
-        others = {f"objective_{i}": v for i, v in enumerate(trial.values[1:], 2)}
+        others = dict(zip(OBJECTIVES[1:], trial.values[1:], strict=False))
         yield {
             "law": law, "repeat": repeat, "trial": trial.number, "batch": trial.batch,
             "status": trial.status, "runs": trial.runs, "spent": spent,
