@@ -24,10 +24,11 @@ ABLATIONS := ablation ablation_figures ablation_standoff ablation_gains ablation
     ablation_gains_standoff ablation_pid
 TABLES := unknown:unknown_dynamics discrete:discrete_signals limits:period_limits learnt:learnt gains:fixed_gains
 STUDIES := hull_and_sea unknown_dynamics
+SEARCHES := phases hull network
 COMPARISONS := printed_compare figures_compare figures_compare_standoff corrected_compare
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce claim pod sweep bench-laws docs test test-all test-faults test-oldest test-newest dist bench lint types contracts clean
+.PHONY: help reproduce claim pod sweep tune bench-laws docs test test-all test-faults test-oldest test-newest dist bench lint types contracts clean
 
 help: ## what can be made
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -81,6 +82,15 @@ sweep: $(VENV)/run.done ## the committed studies at full size, about half an hou
 	        cp figures/*-iae.png ../../studies/$$name/figures) || exit 1; \
 	done
 	@echo "what was found: results/studies.md; every table and figure: results/.studies/*/report.html"
+
+tune: $(VENV)/dev.done ## the committed searches for gains, about half an hour on two cores
+	@for name in $(SEARCHES); do \
+	    $(BIN)/podusv tune configs/studies/tune_$$name.yaml --out results/.tuning/$$name && \
+	    mkdir -p results/tuning/$$name/figures && \
+	    (cd results/.tuning/$$name && cp laws.csv validation.csv gains.csv importance.csv ../../tuning/$$name && \
+	        cp figures/validation.png ../../tuning/$$name/figures) || exit 1; \
+	done
+	@echo "what was found: results/tuning.md; every table and figure: results/.tuning/*/report.html"
 
 test: lint types contracts ## lint, types, import contracts, all tests but the slow ones
 	@$(PYTEST)

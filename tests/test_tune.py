@@ -94,7 +94,7 @@ def test_a_law_without_gains_is_kept_and_reported(done):
     assert row["objective_before"] == row["objective_after"]
     assert row["runs"] == 0
     assert "bare has no gains, kept as it is" in done.results.remarks()
-    assert "Bare has no gains, kept as it is." in (done.folder / "report.html").read_text()
+    assert "<li>bare has no gains, kept as it is" in (done.folder / "report.html").read_text()
 
 
 def test_the_found_scenario_extends_the_searched_one(done):

@@ -127,7 +127,8 @@ def _gains(results: Results) -> Iterator[dict[str, Any]]:
         if share is not None and at in share.index:
             one = share.loc[at]
             told = f"{100 * one.importance:.0f} % [{100 * one.low:.0f}, {100 * one.high:.0f}]"
-        numbers = {name: value_text(row[name]) for name in ("before", "after", "low", "high")}
+        numbers = {name: value_text(row[name]) for name in ("before", "after")}
+        numbers |= {name: f"{row[name]:.4g}" for name in ("low", "high")}
         yield row | numbers | {"unit": units[row["law"]][row["gain"]], "share": told}
 
 

@@ -207,7 +207,7 @@ class Results:
     def _bounds(self) -> Iterator[str]:
         for row in self.gains[self.gains["at"] != ""].to_dict("records"):
             end = row["low"] if row["at"] == "lower" else row["high"]
-            yield f"{row['gain']} of {row['law']} is at the {row['at']} end of its range, {end:.4g}"
+            yield f"{row['law']}: {row['gain']} is at the {row['at']} end of its range, {end:.4g}"
 
 
 def _interval(name: str, found: Interval) -> dict[str, Any]:
