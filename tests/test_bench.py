@@ -79,6 +79,13 @@ def test_a_case_that_no_law_does_has_no_best_law():
     assert "✗" in as_markdown(made)
 
 
+def test_a_run_that_ended_early_has_not_settled():
+    lost = BenchRun(("ship", "one", "calm"), "a", "diverged", "", {}, np.zeros((2, 4)))
+    near = made_up("a", "two", 0.1)
+    assert leaderboard(table([lost, near])).settled.tolist() == [math.inf]
+    assert leaderboard(table([near])).settled.tolist() == pytest.approx([0.01])
+
+
 def test_half_the_failures_make_an_infinite_median():
     assert middle([1.0, math.inf]) == math.inf
     assert middle([1.0, 2.0, math.inf]) == 2.0
@@ -173,6 +180,40 @@ def test_the_command_writes_table_board_and_page_and_takes_a_law_of_one_s_own(be
     assert "--force replaces it" in again.err
 
 
+def test_a_law_that_ends_its_process_costs_no_other(bench, podusv):
+    # Plain Python may end its process; compiled code has no way to.
+    line = "        signals[0] = target[1] - x[1]\n"
+    assert line in LAW
+    text = LAW.replace(line, f"{line}        if t > 0.5:\n            import os; os._exit(9)\n")
+    (bench.parent / "my_law.py").write_text(text)
+    own = bench.parent / "own.yaml"
+    own.write_text(
+        "plugins: [my_law.py]\nsimulation: {compiled: false}\n"
+        "controllers: {mine: {kind: cross_track}}\n"
+    )
+    chosen = ("--condition", "calm", "--vessel", "model", "--task", "line", "--no-figures")
+    said = podusv("bench", str(bench), "--laws", str(own), "--out", "out", *chosen)
+    assert said.code == 3
+    status = pd.read_csv("out/runs.csv").set_index("law").status
+    assert status.to_dict() == {"pid": "finished", "li": "finished", "mine": "crashed"}
+
+
+def test_the_told_hulls_of_the_shipped_bench_are_a_quarter_off():
+    inertia = {"m", "I_z", "X_udot", "Y_vdot", "Y_rdot", "N_vdot", "N_rdot"}
+    for condition, of_inertia, of_damping in (
+        ("hull_light", 0.75, 1.25),
+        ("hull_heavy", 1.25, 0.75),
+    ):
+        chosen = {"tasks": ["line"], "conditions": [condition]}
+        for case in cases(Wanted(shipped_bench(), chosen=chosen)):
+            law = case.laws["pid"]
+            for name in inertia | {n for n in type(law.vessel).model_fields if "_" in n}:
+                true, told = getattr(law.vessel, name), getattr(law.nominal, name)
+                if isinstance(true, float) and name not in ("x_g",) and true:
+                    factor = of_inertia if name in inertia else of_damping
+                    assert told == pytest.approx(factor * true, rel=1e-5), (case.place, name)
+
+
 def test_text_of_users_is_escaped_on_the_page():
     made = table([made_up("<b>", "one", 10.0)])
     assert "<td><b></td>" not in page(made, [], {"argv": "<i>"})
@@ -183,7 +224,7 @@ def test_every_file_of_the_shipped_bench_makes_a_case_that_is_valid():
     folder = shipped_bench()
     names = {axis: sorted(p.stem for p in (folder / axis).iterdir()) for axis in AXES}
     assert len(names["tasks"]) >= 8
-    assert len(names["conditions"]) == 5
+    assert len(names["conditions"]) == 7
     every = {"vessels": names["vessels"], "tasks": ["line"], "conditions": names["conditions"]}
     tasks = {"vessels": ["otter"], "conditions": ["calm"]}
     made = [*cases(Wanted(folder, chosen=every)), *cases(Wanted(folder, chosen=tasks))]

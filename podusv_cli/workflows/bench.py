@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
@@ -17,7 +17,7 @@ from podusv_cli.bench.runs import BenchRun, crashed, play, warm_up
 from podusv_cli.pages.page import Picture
 from podusv_cli.process.extras import Extras
 from podusv_cli.process.interrupts import interrupts_deferred
-from podusv_cli.process.workers import Outcome, run_all
+from podusv_cli.process.workers import Outcome, Report, run_all
 from podusv_cli.storage import provenance
 from podusv_cli.storage.run_folder import RunWriter
 
@@ -95,23 +95,30 @@ def _simulated(
         if progress:
             progress("cases", (position + fraction) / len(every))
 
-    jobs = [partial(_play, case) for case in every]
-    outcomes = run_all(jobs, advance, request.workers)
+    outcomes = _run_all(every, request, advance)
+    for case, outcome in zip(every, outcomes, strict=True):
+        if outcome.result:
+            yield from outcome.result
+        else:  # its process ended: which law was it?
+            for law, one in case.laws.items():
+                (again,) = _run_all([replace(case, laws={law: one})], request)
+                yield from again.result or [crashed(case, law, again.failure)]
+
+
+def _run_all(
+    every: Sequence[Case], request: Request, advance: Report = lambda position, fraction: None
+) -> list[Outcome]:
+    """Play cases in processes of their own. Raises KeyboardInterrupt."""
+    outcomes = run_all([partial(_play, case) for case in every], advance, request.workers)
     if any(outcome.interrupted for outcome in outcomes):
         raise KeyboardInterrupt("interrupted; nothing was written")
-    for case, outcome in zip(every, outcomes, strict=True):
-        yield from outcome.result or _lost(case, outcome)
+    return outcomes
 
 
 def _play(case: Case, tell: Callable[[float], None]) -> list[BenchRun]:
     runs = play(case)
     tell(1.0)
     return runs
-
-
-def _lost(case: Case, outcome: Outcome) -> list[BenchRun]:
-    """All laws of a case whose process ended."""
-    return [crashed(case, law, outcome.failure) for law in case.laws]
 
 
 def _drawn(runs: Sequence[BenchRun], made: pd.DataFrame) -> list[Picture]:
