@@ -14,7 +14,7 @@ from podusv_cli.scenario.load import load, tree_yaml
 from podusv_cli.study.plan import plan
 from podusv_cli.study.store import Store
 from podusv_cli.study.unit import Unit, UnitResult
-from podusv_cli.workflows import sweep
+from podusv_cli.workflows import studies, sweep
 
 CONFIG = Path(__file__).parents[1] / "configs/studies/hull_and_sea.yaml"
 NO_LOGS = ["sweep.keep.failed=0", "sweep.keep.worst.iae=0", "sweep.keep.draws=[]"]
@@ -38,7 +38,7 @@ def units(folder: Path) -> None:
 
 
 def runs(folder: Path) -> None:
-    sweep.stored(folder).write_runs()
+    studies.stored(folder).write_runs()
 
 
 def report(folder: Path) -> None:

@@ -17,7 +17,7 @@ from podusv_cli.storage.run_folder import open_run
 from podusv_cli.study import keep
 from podusv_cli.study.results import judged
 from podusv_cli.workflows import run as running
-from podusv_cli.workflows import sweep
+from podusv_cli.workflows import studies, sweep
 from podusv_cli.workflows.merge import merge
 
 VARIED = (
@@ -118,7 +118,7 @@ def test_a_kept_run_that_cannot_be_made_costs_nothing_else(study, tmp_path):
 
 @pytest.mark.parametrize(("law", "cell", "number"), [("pid", 0, 5), ("li", 1, 3)])
 def test_a_drawn_scenario_gives_the_numbers_of_the_table(study, tmp_path, law, cell, number):
-    path = sweep.draw(study.folder, law, number, cell, tmp_path / "one.yaml")
+    path = studies.draw(study.folder, law, number, cell, tmp_path / "one.yaml")
     done = running.run(path, running.Request(out=tmp_path / "one", figures=False))
     told = {name: x if math.isfinite(x) else None for name, x in done.metrics.items()}
     assert same(told, table_of(study, law, cell, number))
@@ -127,17 +127,17 @@ def test_a_drawn_scenario_gives_the_numbers_of_the_table(study, tmp_path, law, c
 def test_drawn_scenarios_have_names_of_their_own(study, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     paths = [
-        sweep.draw(study.folder, law, 0, cell, None) for law in ("pid", "li") for cell in (0, 1)
+        studies.draw(study.folder, law, 0, cell, None) for law in ("pid", "li") for cell in (0, 1)
     ]
     assert [path.name for path in paths] == [
         f"small-{law}-{cell}-0.yaml" for law in ("pid", "li") for cell in (0, 1)
     ]
     assert len({line for p in paths for line in p.read_text().splitlines() if "name:" in line}) >= 4
     with pytest.raises(UsageError, match="exists already; name another file with --out"):
-        sweep.draw(study.folder, "pid", 0, 0, None)
+        studies.draw(study.folder, "pid", 0, 0, None)
     long = written(tmp_path / "long.yaml", ("name: small", f"name: {'n' * 80}"))
     run(long, tmp_path / "long", overrides=["sweep.draws=1"])
-    assert len(sweep.draw(tmp_path / "long", "pid", 0, 0, None).stem) == 80
+    assert len(studies.draw(tmp_path / "long", "pid", 0, 0, None).stem) == 80
 
 
 @pytest.mark.parametrize(
@@ -150,7 +150,7 @@ def test_drawn_scenarios_have_names_of_their_own(study, tmp_path, monkeypatch):
 )
 def test_a_draw_that_the_study_lacks_is_refused(study, law, number, cell, told):
     with pytest.raises(UsageError, match=told):
-        sweep.draw(study.folder, law, number, cell, Path("never.yaml"))
+        studies.draw(study.folder, law, number, cell, Path("never.yaml"))
 
 
 def test_a_finished_study_lists_all_its_files_and_one_being_continued_none(study, tmp_path):

@@ -15,7 +15,7 @@ from podusv_cli.study.remote import Recipe
 from podusv_cli.study.store import RUNS
 from podusv_cli.study.unit import Unit, make
 from podusv_cli.workflows import run as running
-from podusv_cli.workflows import sweep
+from podusv_cli.workflows import studies, sweep
 from podusv_cli.workflows.merge import merge
 
 MINE = "plugins: [laws/my_law.py]\ncontrollers:\n  mine: {kind: cross_track}\n"
@@ -46,9 +46,9 @@ def test_a_study_keeps_its_plugin(config, tmp_path, monkeypatch):
         study, sweep.Request(("sweep.draws=16",), figures=False), lambda tally: None
     ).results
     assert (study / RUNS).read_bytes() != first
-    drawn = sweep.draw(study, "mine", 3, 0, None)
+    drawn = studies.draw(study, "mine", 3, 0, None)
     alone = running.run(drawn, running.Request(figures=()))
-    table = sweep.stored(study).runs()
+    table = studies.stored(study).runs()
     assert alone.metrics["iae"] == table.metric("mine", "iae")[0, 3]
     merged = merge([study], tmp_path / "merged", sweep.Request(figures=False))
     assert (merged.folder / RUNS).read_bytes() == (study / RUNS).read_bytes()
@@ -58,7 +58,7 @@ def test_a_worker_needs_no_file_of_a_plugin(config, tmp_path, monkeypatch):
     """It gets the text, and makes the same bits."""
     study = swept(config, tmp_path / "study", overrides=["sweep.draws=8"]).folder
     text, unit = (study / sweep.SCENARIO).read_text(), Unit("mine", 0, 0, 4)
-    store = sweep.stored(study)
+    store = studies.stored(study)
     recipe = Recipe(text, tuple(store.plan.scenario.plugin_files().items()))
     ours = digests(make(store.plan, unit))
     study.rename(tmp_path / "gone")

@@ -9,19 +9,20 @@ import shutil
 import h5py
 import numpy as np
 import pytest
-from small_study import made, small, written
+from small_study import TEXT, made, small, written
 
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.engine.simulate import simulate
 from podusv_cli.study import march as marching
 from podusv_cli.study import runs_file, runs_writer
+from podusv_cli.study import store as stores
 from podusv_cli.study import unit as units
 from podusv_cli.study.draws import drawn, draws
 from podusv_cli.study.plan import watching
 from podusv_cli.study.results import judged
 from podusv_cli.study.store import BLOCK, RUNS, UNITS, Store, encoded, read, undamaged
 from podusv_cli.study.unit import Unit, UnitResult
-from podusv_cli.workflows import sweep
+from podusv_cli.workflows import studies, sweep
 
 
 @pytest.fixture(scope="module")
@@ -70,15 +71,7 @@ def test_shards_and_lost_units_come_to_the_same(whole, tmp_path):
     assert content(made(tmp_path / "shards")) == content(whole)
 
 
-def test_a_flipped_bit_is_noticed_everywhere(whole, tmp_path):
-    store = made(tmp_path / "units", part=(1, 9))
-    path = next((store.folder / UNITS).iterdir())
-    good = path.read_bytes()
-    assert len(list(store.results())) > 0
-    for place in range(len(good) - 1, len(good) - 2000, -97):
-        path.write_bytes(good[:place] + bytes([good[place] ^ 4]) + good[place + 1 :])
-        for result in store.results():
-            assert result.unit.law in ("pid", "li")  # another file, or one that means the same
+def test_a_flipped_bit_in_the_table_is_noticed(whole, tmp_path):
     shutil.copytree(whole.folder, tmp_path / "copy")
     runs = tmp_path / "copy" / RUNS
     altered = bytearray(runs.read_bytes())
@@ -86,6 +79,98 @@ def test_a_flipped_bit_is_noticed_everywhere(whole, tmp_path):
     runs.write_bytes(altered)
     with pytest.raises(StorageError, match="its numbers were altered"):
         replace_folder(whole, tmp_path / "copy").runs().check()
+
+
+def damaged(whole, folder):
+    """A copy of the study in which the end of runs.h5 is lost."""
+    shutil.copytree(whole.folder, folder)
+    (folder / RUNS).write_bytes(content(whole)[:-2000])
+    (folder / "scenario.yaml").write_text(TEXT)
+    return folder
+
+
+def test_a_damaged_table_is_refused_and_never_overwritten(whole, tmp_path):
+    folder = damaged(whole, tmp_path / "study")
+    before = (folder / RUNS).read_bytes()
+    request = sweep.Request(figures=False)
+    for command in (
+        lambda: sweep.run(folder, request, lambda tally: None),
+        lambda: sweep.report(folder, request),
+        lambda: studies.status(folder),
+        lambda: studies.export(folder, "csv", None),
+    ):
+        with pytest.raises(StorageError, match=r"runs.h5: damaged .*; restore the file, or move"):
+            command()
+    assert (folder / RUNS).read_bytes() == before
+    (folder / RUNS).unlink()
+    assert content(made(folder)) == content(whole)
+
+
+def test_export_notices_an_altered_number(whole, tmp_path):
+    folder = damaged(whole, tmp_path / "study")
+    altered = bytearray(content(whole))
+    altered[altered.index(np.float64(whole.runs().metric("li", "iae")[0, 3]).tobytes())] ^= 1
+    (folder / RUNS).write_bytes(altered)
+    with pytest.raises(StorageError, match="its numbers were altered; restore the file"):
+        studies.export(folder, "csv", None)
+    (folder / RUNS).unlink()
+    with pytest.raises(UsageError, match=r"has no runs.h5 yet: podusv sweep report"):
+        studies.export(folder, "csv", None)
+
+
+def test_a_table_of_another_study_is_not_overwritten(whole, tmp_path):
+    folder = damaged(whole, tmp_path / "study")
+    other = content(made(tmp_path / "other", seed=8, draws=1))
+    (folder / RUNS).write_bytes(other)
+    with pytest.raises(StorageError, match="its runs are of another study; restore the file"):
+        made(folder)
+    assert (folder / RUNS).read_bytes() == other
+
+
+def finishing(monkeypatch, act):
+    """Have `act` happen right after runs.h5 is written, as by another podusv."""
+    real = runs_writer.write
+    monkeypatch.setattr(runs_writer, "write", lambda *given: (real(*given), act())[0])
+
+
+def test_a_unit_that_comes_while_the_table_is_written_is_kept(whole, tmp_path, monkeypatch):
+    store = made(tmp_path / "study", part=(1, 2))
+    late = Unit("pid", 0, 20, 4)
+    finishing(monkeypatch, lambda: store.write(units.make(store.plan, late)))
+    store.write_runs()
+    assert store.covered()["pid", 0].sum() == 24
+    monkeypatch.undo()
+    assert content(made(store.folder)) == content(whole)
+    assert not list((store.folder / UNITS).iterdir())
+
+
+def test_a_whole_study_removes_only_units_that_it_read(tmp_path, monkeypatch):
+    store = made(tmp_path / "study", draws=8)
+    finishing(monkeypatch, lambda: (store.folder / UNITS / "late.h5").write_bytes(b"late"))
+    store.write_runs()
+    assert [path.name for path in (store.folder / UNITS).iterdir()] == ["late.h5"]
+
+
+def test_a_unit_that_cannot_be_read_is_an_error_and_not_missing(tmp_path, monkeypatch):
+    store = made(tmp_path / "study", part=(1, 5))
+    there = sorted((store.folder / UNITS).iterdir())
+
+    def fail(path):
+        raise OSError(errno.EIO, "Input/output error")
+
+    monkeypatch.setattr(stores.Path, "read_bytes", fail)
+    for act in (store.covered, store.write_runs, lambda: list(store.results())):
+        with pytest.raises(StorageError, match=r"cannot read .*units/.*: Input/output error"):
+            act()
+    assert sorted((store.folder / UNITS).iterdir()) == there
+
+
+def test_a_unit_that_is_gone_before_it_is_read_spoils_no_table(tmp_path, monkeypatch):
+    store = made(tmp_path / "study", part=(1, 5))
+    monkeypatch.setattr(stores, "read", lambda path, seal: None)
+    with pytest.raises(StorageError, match="another podusv removed or changed it meanwhile"):
+        store.write_runs()
+    assert not (store.folder / RUNS).exists()
 
 
 def replace_folder(store, folder):

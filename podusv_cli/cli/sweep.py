@@ -152,9 +152,9 @@ def _next(done: Swept) -> str:
 @command
 def status(study: Study, as_json: options.AsJson = False) -> None:
     """Say how far a study is: the runs of every law and cell that are made."""
-    from podusv_cli.workflows import sweep as workflow
+    from podusv_cli.workflows import studies
 
-    made = workflow.status(study)
+    made = studies.status(study)
     if as_json:
         echo_json({"format": 1, "folder": str(study), "made": made.as_json()})
         return
@@ -206,9 +206,9 @@ def draw(
     ] = None,
 ) -> None:
     """Write one run of a study as a scenario of its own, for `podusv run` and `compare`."""
-    from podusv_cli.workflows import sweep as workflow
+    from podusv_cli.workflows import studies
 
-    path = workflow.draw(study, law, number, cell, out)
+    path = studies.draw(study, law, number, cell, out)
     echo_path(path)
     echo(f"run it: podusv run {path}", err=True)
 
@@ -224,6 +224,6 @@ def export(
     ] = None,
 ) -> None:
     """Write all runs as one table: a row a run, with its draw, status and metrics."""
-    from podusv_cli.workflows import sweep as workflow
+    from podusv_cli.workflows import studies
 
-    echo_path(workflow.export(study, form, out))
+    echo_path(studies.export(study, form, out))

@@ -7,8 +7,8 @@
 runs.h5 holds one dataset a metric, `status` (a code, see its attribute), `until` [s] and causes; a
 unit has metrics and `until` as rows of `table`, whose attribute names them. Before that, in the
 user block that HDF5 leaves alone, are its facts in one line of JSON, with a digest of all bytes: so
-a unit is counted without HDF5, which takes ten times longer. Whatever is damaged or belongs to
-another identity is not read and not counted.
+a unit is counted without HDF5, which takes ten times longer. A unit that is damaged or belongs to
+another identity is not read and not counted; such a runs.h5 is an error, as it may be all there is.
 """
 
 from __future__ import annotations
@@ -16,6 +16,8 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import os
+import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
@@ -108,36 +110,69 @@ class Store:
         """Every undamaged unit of this study in the folder, and what runs.h5 has already."""
         for earlier in self._earlier():
             yield from earlier.results()
-        for path in sorted((self.folder / UNITS).glob("*.h5")):
+        for path in self._units():
             if result := read(path, self.seal):
                 yield result
 
+    def _units(self) -> list[Path]:
+        return sorted((self.folder / UNITS).glob("*.h5"))
+
     def write_runs(self) -> None:
-        """Put every run into runs.h5, and remove the units. Raises StorageError."""
+        """Put every run into runs.h5, and remove its units once no run is missing.
+
+        Another podusv may make units meanwhile, so only those that were read are removed. Raises
+        StorageError, also where one of them is gone before it was read.
+        """
+        paths = [path for path in self._units() if undamaged(_content(path), self.seal)]
+        self._write_table(lambda: self._these(paths))
+        if all(self.runs().tried(law).all() for law in self.plan.laws):
+            with files.storage_errors(f"cannot remove the files in {self.folder / UNITS}"):
+                for path in paths:
+                    path.unlink(missing_ok=True)
+
+    def _these(self, paths: Sequence[Path]) -> Iterator[UnitResult]:
+        """What runs.h5 has already, and these units."""
+        for earlier in self._earlier():
+            yield from earlier.results()
+        for path in paths:
+            result = read(path, self.seal)
+            if result is None:
+                raise StorageError(
+                    f"cannot read {path}: another podusv removed or changed it meanwhile; run the "
+                    "command again"
+                )
+            yield result
+
+    def _write_table(self, results: Callable[[], Iterator[UnitResult]]) -> None:
         plan, known = self.plan, self.plan.scenario.known_metrics()
         header = runs_writer.Header(
             plan.scenario.name, self.seal, plan.laws, [cell.label for cell in plan.cells],
             plan.sweep.draws, partial(table, plan.sweep, stream=plan.stream),
             {name: known[name] for name in plan.metrics},
         )  # fmt: skip
-        runs_writer.write(self.folder / RUNS, header, _Again(self.results))
-        for path in (self.folder / UNITS).glob("*.h5"):
-            path.unlink()
+        runs_writer.write(self.folder / RUNS, header, _Again(results))
 
     def runs(self) -> runs_file.Table:
-        """The runs of a study that has runs.h5. Raises StorageError."""
-        known = self.plan.scenario.known_metrics()
-        return runs_file.Table(self.folder / RUNS, self.plan.sweep.success, known)
+        """The runs of a study that has runs.h5. Raises StorageError, also for altered numbers."""
+        path = self.folder / RUNS
+        try:
+            found = runs_file.Table(
+                path, self.plan.sweep.success, self.plan.scenario.known_metrics()
+            )
+            found.check()
+            if found.identity != self.seal:
+                raise StorageError(f"cannot read {path}: its runs are of another study")
+        except StorageError as error:
+            raise StorageError(
+                f"{error}; restore the file, or move it away and simulate its runs again with: "
+                f"podusv sweep run {shlex.quote(str(self.folder))}"
+            ) from error
+        return found
 
     def _earlier(self) -> Iterator[runs_file.Table]:
-        """runs.h5, if it is there, undamaged and of this study."""
-        try:
-            earlier = runs_file.Table(self.folder / RUNS)
-            earlier.check()
-        except StorageError:
-            return
-        if earlier.identity == self.seal:
-            yield earlier
+        """runs.h5, if it is there. Raises StorageError where it is damaged or of another study."""
+        if os.path.lexists(self.folder / RUNS):
+            yield self.runs()
 
     def covered(self) -> dict[tuple[str, int], Mask]:
         """By law and cell, which of the wanted draws are there."""
@@ -149,7 +184,7 @@ class Store:
         for earlier in self._earlier():
             for (law, cell), mask in there.items():
                 mask[: earlier.wanted] = earlier.tried(law)[cell]
-        for path in (self.folder / UNITS).glob("*.h5"):
+        for path in self._units():
             if unit := undamaged(_content(path), self.seal):
                 there[unit.law, unit.cell][unit.first : unit.draws.stop] = True
         return there
@@ -224,8 +259,8 @@ def read(path: Path, seal: str) -> UnitResult | None:
 
 
 def _content(path: Path) -> bytes:
-    """A file's bytes; none where it cannot be read, as of a damaged one."""
-    with suppress(OSError):
+    """A file's bytes; none where another podusv removed it meanwhile. Raises StorageError."""
+    with files.storage_errors(f"cannot read {path}"), suppress(FileNotFoundError):
         return path.read_bytes()
     return b""
 

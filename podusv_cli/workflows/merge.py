@@ -11,7 +11,8 @@ from podusv_cli.study.joining import join, missing
 from podusv_cli.study.march import Tally
 from podusv_cli.study.sittings import Sitting
 from podusv_cli.study.store import SCENARIO, Store
-from podusv_cli.workflows.sweep import Request, Swept, answered, stored
+from podusv_cli.workflows.studies import stored
+from podusv_cli.workflows.sweep import Request, Swept, answered
 
 
 def merge(studies: Sequence[Path], out: Path, request: Request) -> Swept:

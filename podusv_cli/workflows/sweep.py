@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import shlex
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
@@ -14,16 +13,13 @@ from pathlib import Path
 from typing import Any
 
 from podusv_cli.core.errors import UsageError
-from podusv_cli.core.escaping import visible
 from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.process.extras import Extras, Missing
 from podusv_cli.process.interrupts import interrupts_deferred
 from podusv_cli.scenario.limits import limits
-from podusv_cli.scenario.load import Loaded, load, resolved_yaml, tree_yaml
-from podusv_cli.scenario.phrases import unknown
+from podusv_cli.scenario.load import Loaded, load, tree_yaml
 from podusv_cli.scenario.sweep import Keep
-from podusv_cli.storage import files, manifest
-from podusv_cli.storage.run_folder import STUDY
+from podusv_cli.storage import manifest
 from podusv_cli.study import outputs
 from podusv_cli.study.check import sweep_faults
 from podusv_cli.study.estimate import estimate, pilot
@@ -34,10 +30,10 @@ from podusv_cli.study.remote import Recipe
 from podusv_cli.study.results import Results, judged
 from podusv_cli.study.sittings import Sitting
 from podusv_cli.study.store import SCENARIO, Store
-from podusv_cli.workflows.keep import alone, keep, seen_from
+from podusv_cli.workflows.keep import keep
 from podusv_cli.workflows.run import RESULTS
+from podusv_cli.workflows.studies import check_study, stored
 
-FORMATS = ("csv", "parquet")
 WHOLE: Part = (1, 1)  # the only shard
 
 
@@ -81,21 +77,6 @@ class Swept:
             "format": 1, "status": status, "folder": str(self.folder), **counts, **told,
             "missing": missing, "missing_runs": self.missing_runs, "refused": self.refused,
         }  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Made:
-    """How many draws of every law and cell are made, of those wanted."""
-
-    wanted: int
-    rows: Sequence[tuple[str, str, int]]
-
-    def as_json(self) -> list[dict[str, Any]]:
-        """As plain data."""
-        return [
-            {"law": law, "cell": cell, "made": count, "wanted": self.wanted}
-            for law, cell, count in self.rows
-        ]
 
 
 def run(config: Path, request: Request, tell: Tell) -> Swept:
@@ -224,35 +205,6 @@ def answered(store: Store, request: Request) -> Swept:
         return Swept(store.folder, tally, results, tuple(extras.missing))
 
 
-def check_study(folder: Path) -> None:
-    """Raise UsageError where this is no folder of a study."""
-    if not os.path.lexists(folder):
-        raise UsageError(f"{folder} does not exist; it has to be the folder of a study")
-    if folder.is_file():
-        raise UsageError(
-            f"{folder} is a file, not the folder of a study; to make one of a scenario: "
-            "podusv sweep run SCENARIO"
-        )
-    if not (folder / STUDY).is_file():
-        raise UsageError(f"{folder} is not the folder of a study: it has no {STUDY}")
-
-
-def stored(study: Path) -> Store:
-    """The store of a study's folder. Raises UsageError where it is none."""
-    check_study(study)
-    return Store(study, plan(load(study / SCENARIO)))
-
-
-def status(study: Path) -> Made:
-    """How far a study is. Raises UsageError, StorageError."""
-    store = stored(study)
-    rows = [
-        (law, store.plan.cells[cell].label, int(there.sum()))
-        for (law, cell), there in store.covered().items()
-    ]
-    return Made(store.plan.sweep.draws, rows)
-
-
 def report(study: Path, request: Request) -> Swept:
     """Judge a study anew, of the runs that are there. Raises UsageError where there are none."""
     started, store = datetime.now(UTC), stored(study)
@@ -266,34 +218,3 @@ def report(study: Path, request: Request) -> Swept:
             f"podusv sweep run {study}"
         )
     return answered(store, request)
-
-
-def draw(study: Path, law: str, number: int, cell: int, out: Path | None) -> Path:
-    """Write the scenario of one run of a study. Raises UsageError, StorageError."""
-    made = stored(study).plan
-    if law not in made.laws:
-        raise UsageError(unknown(f"law {law!r}", law, made.laws))
-    if cell >= len(made.cells):
-        last = len(made.cells) - 1
-        raise UsageError(f"--cell {cell}: there is no such cell; they are numbered 0 to {last}")
-    if number >= made.sweep.draws:
-        last = made.sweep.draws - 1
-        raise UsageError(f"--draw {number}: there is no such draw; they are numbered 0 to {last}")
-    one = alone(made, law, cell, number)
-    path = out or Path(f"{one.name}.yaml")
-    one = seen_from(path.parent, study, one)
-    if path.exists():
-        raise UsageError(f"{path} exists already; name another file with --out")
-    at = f", cell {cell} ({made.cells[cell].label})" if len(made.cells) > 1 else ""
-    head = f"# Draw {number} of the study {visible(study)}, law {law}{visible(at)}.\n"
-    files.write_bytes(path, f"{head}{resolved_yaml(one)}".encode())
-    return path
-
-
-def export(study: Path, form: str, out: Path | None) -> Path:
-    """Write all runs as one table. Raises UsageError, StorageError."""
-    if form not in FORMATS:
-        raise UsageError(unknown(f"format {form!r}", form, FORMATS))
-    path = out or study / f"runs.{form}"
-    outputs.export(stored(study).runs(), path)
-    return path
