@@ -15,6 +15,7 @@ from tune_samples import planned, toy
 from podusv_cli.core.errors import UsageError
 from podusv_cli.scenario.load import load
 from podusv_cli.study.march import Tally
+from podusv_cli.tuning import folder as place
 from podusv_cli.tuning import sampler, trials
 from podusv_cli.tuning.march import march
 from podusv_cli.tuning.search import Search, _far
@@ -205,7 +206,15 @@ def test_what_is_kept_is_not_simulated_again(optuna, tmp_path, monkeypatch):
 def test_another_search_in_the_folder_is_refused_with_what_differs(optuna, tmp_path):
     tuned(tmp_path, "tune.repeats=1", "tune.budget=32")
     with pytest.raises(UsageError, match=r"holds another search: tune.train: 4, not 5"):
-        tuned(tmp_path, "tune.repeats=1", "tune.train=5")
+        tuned(tmp_path, "tune.repeats=1", "tune.budget=40", "tune.train=5")
+
+
+def test_a_smaller_budget_would_throw_trials_away_and_is_refused(optuna, tmp_path):
+    plan = planned(tmp_path / "toy")
+    place.opened(tmp_path / "out", plan, "now")
+    place.opened(tmp_path / "out", plan, "later")
+    with pytest.raises(UsageError, match="has a budget of 64 runs; ask for as many or more"):
+        place.opened(tmp_path / "out", planned(tmp_path / "toy", "tune.budget=40"), "now")
 
 
 def test_an_inequality_is_respected(optuna, tmp_path):

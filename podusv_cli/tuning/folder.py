@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from podusv_cli.core.errors import UsageError
 from podusv_cli.scenario.load import Loaded, tree_yaml, yaml_text
 from podusv_cli.scenario.sections import LONGEST_NAME
+from podusv_cli.scenario.tune import Tune
 from podusv_cli.storage import files, json_files
 from podusv_cli.study.plan import disagreements
 from podusv_cli.tuning import sampler, trials
@@ -37,6 +38,7 @@ def opened(folder: Path, plan: TunePlan, started: str) -> None:
         told = json_files.read(folder / TUNE)
         _agree(folder, told.get("identity", {}), identity)
         history = list(told.get("history", []))
+        _as_much(folder, history, plan.tune)
     elif folder.exists() and any(folder.iterdir()):
         raise UsageError(f"{folder} is no search and not empty; name another with --out")
     tune = plan.tune
@@ -60,6 +62,16 @@ def _agree(folder: Path, there: dict[str, Any], wanted: dict[str, Any]) -> None:
         raise UsageError(
             f"{folder} holds another search: {'; '.join(differing[:DIFFERENT])}{more}; name "
             "another folder with --out"
+        )
+
+
+def _as_much(folder: Path, history: Sequence[Mapping[str, Any]], tune: Tune) -> None:
+    """Raise UsageError where trials that are there would be thrown away."""
+    budget = max((one["budget"] for one in history), default=0)
+    if tune.budget < budget:
+        raise UsageError(
+            f"{folder} has a budget of {budget} runs; ask for as many or more, or name another "
+            "folder with --out"
         )
 
 
