@@ -85,3 +85,31 @@ def test_what_the_laws_are_told_hardly_matters():
     assert by[told].max() <= 0.04
     assert by[["surge_damping", "vessel.m"]].tolist() == [0.86, 0.49]
     assert round(found.by_chance.max(), 2) == 0.04
+
+
+def test_the_sentences_about_the_error_beyond_the_standoff_are_those_of_the_studies():
+    text = " ".join(PAGE.split())
+    hulls, told = (
+        table("pairs.csv", study).query("metric == 'iae_e'").set_index(["a", "b"]).loc["proposed"]
+        for study in ("hull_and_sea", "unknown_dynamics")
+    )
+    pid, li = hulls.loc["pid"], hulls.loc["li"]
+    assert f"better in {100 * pid.a_wins:.1f} % and worse in {100 * pid.b_wins:.1f} %" in text
+    assert f"by the error in {100 * li.b_wins:.1f} % and {100 * li.a_wins:.1f} %" in text
+    assert f"the errors {li.ratio:.3f} [{li.ratio_low:.3f}, {li.ratio_high:.3f}]" in text
+    assert (
+        f"{100 * (li.ratio - 1):.0f} % worse in the median" in (RESULTS / "README.md").read_text()
+    )
+    for law in ("no_adaptation", "li"):
+        one = told.loc[law]
+        assert f"{one.ratio:.3f} [{one.ratio_low:.3f}, {one.ratio_high:.3f}]" in text
+    assert f"with Li better in {100 * told.loc['li'].b_wins:.1f} %" in text
+    assert told.loc["pid"].a_wins == 1.0
+
+
+def test_the_told_mass_sets_peak_demand_and_settled_error():
+    found = table("sensitivity.csv", "unknown_dynamics").query("law == 'proposed'")
+    by = found.set_index(["metric", "quantity"])["correlation"]
+    told = " ".join(TOLD.split())
+    assert f"the peak demand ({by['peak_tau_u', 'nominal.m']:.2f})" in told
+    assert f"about a millimetre ({by['e_steady', 'nominal.m']:.2f})" in told
