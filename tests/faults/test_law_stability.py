@@ -1,4 +1,4 @@
-"""Eigenvalues of the closed loop about steady motion on a line, for vessels no law was told."""
+"""Eigenvalues of the closed loop about steady motion on lines and circles, told right and wrong."""
 
 from typing import Any
 
@@ -12,6 +12,7 @@ from podusv_cli.controllers.adrc import Adrc
 from podusv_cli.controllers.velocity_vector import VelocityVector
 from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.disturbances.harmonic import Harmonic, HarmonicDisturbance
+from podusv_cli.paths.circle import Circle
 from podusv_cli.paths.line import Line
 from podusv_cli.vessels.plant import plant, surge_force, sway_force, yaw_moment
 from podusv_cli.vessels.vessel import Vessel
@@ -21,6 +22,8 @@ STEADY = HarmonicDisturbance(
     b_u=Harmonic(mean=0.5), b_v=Harmonic(mean=0.5), b_r=Harmonic(mean=0.5)
 )  # fmt: skip
 CAREFUL = VelocityVector(omega_v=0.2)
+TURN = SPEED / 16.67  # rad/s; the paper's circle
+CYBERSHIP = VESSELS["cybership2"]
 DAMPING = ("X_u", "X_uu", "X_uuu"), ("Y_v", "Y_vv"), ("N_r", "N_rr")
 
 
@@ -36,46 +39,48 @@ def drawn(random: Any, spread: float = 0.3) -> Vessel:
     return v.model_copy(update=changes)
 
 
-def steady_velocity(k: Any) -> tuple[float, float]:
-    """(u, v) at which sway damping holds the load, at the target's speed; v by bisection."""
-    low, high = 0.0, SPEED
+def steady_velocity(k: Any, turn: float = 0.0) -> tuple[float, float]:
+    """(u, v) in balance across the bow, at the target's speed and turn; v by bisection."""
+    low, high = -0.9 * SPEED, SPEED
     for _ in range(60):
         v = 0.5 * (low + high)
         u = np.sqrt(SPEED**2 - v * v)
-        low, high = (v, high) if sway_force(u, v, 0.0, k) + LOAD[1] > 0 else (low, v)
+        low, high = (v, high) if sway_force(u, v, turn, k) + LOAD[1] > 0 else (low, v)
     return float(np.sqrt(SPEED**2 - low * low)), low
 
 
-def at_rest(law: Any, vessel: Vessel, told: Vessel) -> Vector:
-    """(x, memory) on the target, which goes north: nothing changes but the position."""
+def at_rest(law: Any, vessel: Vessel, told: Vessel, turn: float = 0.0) -> Vector:
+    """(x, memory) on the target, which goes north: in its frame nothing changes."""
     true, k = bundle(vessel.constants()), bundle(told.constants())
-    u, v = steady_velocity(true)
+    u, v = steady_velocity(true, turn)
     forces = surge_force, sway_force, yaw_moment
-    tau = [-(f(u, v, 0.0, true) + b) for f, b in zip(forces, LOAD, strict=True)]
+    tau = [-(f(u, v, turn, true) + b) for f, b in zip(forces, LOAD, strict=True)]
     tau[1] = 0.0
-    observed = [-(f(u, v, 0.0, k) + t) for f, t in zip(forces, tau, strict=True)]
-    x = np.array([0.0, 0.0, -np.arctan2(v, u), u, v, 0.0])
+    observed = [-(f(u, v, turn, k) + t) for f, t in zip(forces, tau, strict=True)]
+    x = np.array([0.0, 0.0, -np.arctan2(v, u), u, v, turn])
     memory = law.start(x, np.zeros(6), told)
     memory[3:6] = observed
     return np.concatenate([x, memory])
 
 
-def rates(law: Any, s: Vector, vessel: Vessel, told: Vessel) -> Vector:
-    """Of (x, memory), the position relative to the target."""
+def rates(law: Any, s: Vector, vessel: Vessel, told: Vessel, turn: float = 0.0) -> Vector:
+    """Of (x, memory) in the frame of the target: its position, its course, its turn [rad/s]."""
     x, memory, out = s[:6], s[6:], np.zeros(6)
-    found = ask(law, x, memory, np.array([0.0, 0.0, SPEED, 0.0, 0.0, 0.0]), told)
+    target = np.array([0.0, 0.0, SPEED, 0.0, 0.0, SPEED * turn])
+    found = ask(law, x, memory, target, told)
     tau = np.array([found.tau[0], 0.0, found.tau[1]])
     plant(x, tau, LOAD, bundle(vessel.constants()), out)
-    out[0] -= SPEED
+    out[:3] -= SPEED - turn * x[1], turn * x[0], turn
+    found.rate[6:] -= turn  # what adrc has behind the observer is a heading
     return np.concatenate([out, found.rate])
 
 
-def growth(law: Any, vessel: Vessel, told: Vessel = NONLINEAR) -> float:
+def growth(law: Any, vessel: Vessel, told: Vessel = NONLINEAR, turn: float = 0.0) -> float:
     """Largest real part of the eigenvalues [1/s]; checks that the state is one of rest."""
-    s, small = at_rest(law, vessel, told), 1e-6
-    assert abs(rates(law, s, vessel, told)).max() < 1e-9
+    s, small = at_rest(law, vessel, told, turn), 1e-6
+    assert abs(rates(law, s, vessel, told, turn)).max() < 1e-9
     columns = [
-        (rates(law, s + d, vessel, told) - rates(law, s - d, vessel, told)) / (2 * small)
+        (rates(law, s + d, vessel, told, turn) - rates(law, s - d, vessel, told, turn)) / 2e-6
         for d in small * np.eye(len(s))
     ]
     return float(np.linalg.eigvals(np.transpose(columns)).real.max())
@@ -117,11 +122,43 @@ def test_adrc_is_not_stable_on_all_of_them():
     assert 0.01 < bad / count(100, 1500) < 0.15
 
 
-@pytest.mark.parametrize(("law", "growing"), [(VelocityVector(), True), (CAREFUL, False)])
-def test_sway_that_answers_yaw_more_than_told_takes_a_slower_sway_observer(law, growing):
-    assert (growth(law, VESSELS["cybership2"]) > 0.0) is growing
-    assert growth(law, VESSELS["cybership2"], VESSELS["cybership2"]) < 0.0
-    assert growth(law, NONLINEAR) < 0.0
+@pytest.mark.parametrize(
+    ("law", "vessel", "told", "line", "starboard", "port"),
+    [
+        (VelocityVector(), NONLINEAR, NONLINEAR, -0.194, -0.182, -0.199),
+        (VelocityVector(), CYBERSHIP, CYBERSHIP, -0.131, 0.152, -0.137),
+        (CAREFUL, CYBERSHIP, CYBERSHIP, -0.131, 0.158, -0.139),
+        (VelocityVector(k_p=0.2), CYBERSHIP, CYBERSHIP, -0.116, -0.088, -0.114),
+        (VelocityVector(), CYBERSHIP, NONLINEAR, 0.267, 0.434, 0.117),
+        (CAREFUL, CYBERSHIP, NONLINEAR, -0.131, 0.107, -0.127),
+    ],
+)  # fmt: skip
+def test_the_eigenvalues_are_those_of_the_table(law, vessel, told, line, starboard, port):
+    """theory.md: on the line and on the paper's circle to either side."""
+    found = [growth(law, vessel, told, turn) for turn in (0.0, TURN, -TURN)]
+    assert found == pytest.approx([line, starboard, port], abs=6e-4)
+
+
+@pytest.mark.parametrize(
+    ("law", "turn", "lowest", "highest"),
+    [
+        (VelocityVector(), "starboard", 0.05, 0.1),
+        (CAREFUL, "starboard", 0.05, 0.1),
+        (VelocityVector(), "port", 0.0, 1e-4),
+        (VelocityVector(k_p=0.2), "starboard", 0.0, 1e-4),
+    ],
+)
+def test_a_known_hull_cycles_on_the_circle_where_an_eigenvalue_grows(law, turn, lowest, highest):
+    """CyberShip II told its own model, constant loads, from 1 m inside the circle."""
+    heading = np.pi / 2 if turn == "starboard" else -np.pi / 2
+    out = run(
+        corrected(
+            controller=law, vessel=CYBERSHIP, actuator=Saturated(), disturbance=STEADY,
+            path=Circle(radius=16.67, turn=turn), start=(15.67, 0.0, heading, 0.5, 0.0, 0.0),
+        ),
+        200.0, step=0.02,
+    )  # fmt: skip
+    assert lowest <= out["z_e"][out["time"] > 170].max() <= highest
 
 
 @pytest.mark.parametrize(
@@ -130,7 +167,7 @@ def test_sway_that_answers_yaw_more_than_told_takes_a_slower_sway_observer(law, 
 )
 def test_such_a_hull_cycles_also_where_no_eigenvalue_grows(omega_v, grows, lowest, highest):
     """At 0.5 rad/s a limit cycle stands beside the stable state: eigenvalues do not tell."""
-    law, vessel = VelocityVector(omega_v=omega_v), VESSELS["cybership2"]
+    law, vessel = VelocityVector(omega_v=omega_v), CYBERSHIP
     out = run(
         corrected(
             controller=law, vessel=vessel, nominal=NONLINEAR, actuator=Saturated(), path=Line(),
