@@ -1,5 +1,6 @@
 """The laws of a hand point: linearisation, zero dynamics, offsets, windup."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,10 @@ from podusv_cli.disturbances.harmonic import Harmonic, HarmonicDisturbance
 from podusv_cli.engine.simulate import ClosedLoop
 from podusv_cli.paths.circle import Circle
 from podusv_cli.paths.line import Line
+from podusv_cli.scenario.load import load
 from podusv_cli.vessels.plant import plant
+
+ROOT = Path(__file__).resolve().parent.parent
 
 STEADY = HarmonicDisturbance(
     b_u=Harmonic(mean=0.5), b_v=Harmonic(mean=0.5), b_r=Harmonic(mean=0.5)
@@ -71,9 +75,7 @@ def test_with_known_loads_what_the_hand_point_lacks_decays_at_k_v(reference):
     law = Adrc(reference=reference, U=50.0, k_v=0.7)
     k, vessel, small = bundle(law.constants_with(NONLINEAR)), bundle(NONLINEAR.constants()), 1e-5
     for at in situations(law, 50):
-        found, rate = ask(law, *at, NONLINEAR), np.zeros(6)
-        tau = np.array([found.tau[0], 0.0, found.tau[1]])
-        plant(at.x, tau, at.memory[3:6], vessel, rate)
+        rate = np.zeros(6)
         # The course of a target that turns is taken to go on turning, so let it go straight.
         target = np.array([*at.target[:4], 0.0, 0.0])
         found = ask(law, at.x, at.memory, target, NONLINEAR)
@@ -139,6 +141,41 @@ def test_they_track_the_paper_s_task_without_a_standoff(kind, iae, rms):
     assert np.trapezoid(out["z_e"], out["time"]) < iae
     for start, end in ((60, 100), (150, np.inf)):
         assert np.sqrt(np.mean(within(out, "z_e", start, end) ** 2)) < rms
+
+
+def test_held_for_a_tenth_of_a_second_hand_position_swings_for_more_than_a_minute():
+    """From the start, far away; `adrc` does not."""
+    for kind, swings in ((HandPosition, True), (Adrc, False)):
+        out = run(corrected(controller=kind(), actuator=Saturated()), 110.0, hold_every=10)
+        assert (within(out, "z_e", 60, 80).max() > 0.5) == swings
+        assert within(out, "z_e", 100).max() < 0.2
+
+
+@pytest.mark.parametrize(("hand", "answer"), [(0.3, 0.455), (0.163, 0.0), (0.1, -0.633)])
+def test_behind_a_thrust_at_the_stern_a_moment_moves_the_hand_point_less_or_backwards(hand, answer):
+    """w' = (l/m33 - 1/(a m22)) tau_r, as a part of l tau_r/m33, by the plant; a = 0.5 m."""
+    k, rates = bundle(NONLINEAR.constants()), []
+    for sway in (0.0, -1.0 / 0.5):
+        rate = np.zeros(6)
+        plant(np.zeros(6), np.array([0.0, sway, 1.0]), np.zeros(3), k, rate)
+        rates.append(rate[4] + hand * rate[5])
+    assert rates[1] / rates[0] == pytest.approx(answer, abs=5e-3)
+    lost = 1 - NONLINEAR.m33 / (hand * 0.5 * NONLINEAR.m22)
+    assert rates[1] / rates[0] == pytest.approx(lost, rel=1e-9)
+
+
+BEHIND_PODS = load(ROOT / "configs/pod/kept.yaml").scenario.actuator
+
+
+@pytest.mark.parametrize(
+    ("law", "least", "most"), [(Adrc(), 0.5, 2.0), (Adrc(hand=0.6, T_f=5.0), 0.005, 0.02)]
+)
+def test_behind_pods_a_longer_hand_point_is_needed(law, least, most):
+    loop = corrected(
+        controller=law, actuator=BEHIND_PODS, disturbance=STEADY, path=PATHS[1],
+        start=(15.67, 0.0, np.pi / 2, 0.5, 0.0, 0.0),
+    )  # fmt: skip
+    assert least < within(run(loop, 200.0, step=0.02), "z_e", 140).max() < most
 
 
 @pytest.mark.parametrize("axis", [0, 1])

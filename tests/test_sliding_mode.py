@@ -1,5 +1,6 @@
 """The law sliding_mode: its reaching laws, the bounds that they promise, and what it reaches."""
 
+import itertools
 from functools import cache
 from typing import Any
 
@@ -44,17 +45,50 @@ def rms(out: Recording, start: float, end: float) -> float:
 # --- the reaching laws
 
 
-def test_beyond_the_layer_the_surface_is_reached_in_finite_time_whatever_the_load():
-    """V = s^2/2: V' = -k_v s^2 - (eta - d) |s|, by the law itself on the worst constant load."""
+def against(s: Any) -> float:
+    """s . reach(s) of both axes, without loads."""
     k = constants(LAYER)
-    d = 0.5 * LAYER.eta
-    s, t, step = 0.8, 0.0, 1e-3
-    while s > LAYER.phi:
-        s += step * (d - reach(s, 0.0, k))
-        t += step
-    # s' = -k_v s - (eta - d) from 0.8: the time to 0
-    longest = np.log(1 + 0.8 * LAYER.k_v / (LAYER.eta - d)) / LAYER.k_v
-    assert t < longest
+    return float(sum(one * reach(one, 0.0, k) for one in s))
+
+
+@pytest.mark.parametrize("share", [0.3, 0.95])
+def test_the_missing_velocity_falls_as_the_bound_says_wherever_it_points(share):
+    """V = |s|^2/2 under the worst load of length D: V' beyond phi, and below it."""
+    eta, phi, k_v, D = LAYER.eta, LAYER.phi, LAYER.k_v, share * LAYER.eta
+    lengths = phi * np.concatenate([np.linspace(0.05, 3, 60), [20.0, 50.0]])
+    for length, angle in itertools.product(lengths, np.linspace(0, np.pi, 61)):
+        fall = D * length - against([length * np.cos(angle), length * np.sin(angle)])
+        beyond = -k_v * length**2 - (eta - D) * length
+        inside = D * length - (k_v + eta / phi) * length**2
+        assert fall <= (beyond if length >= phi else inside) + 1e-12
+
+
+def test_a_bound_of_each_axis_alone_would_not_be_enough():
+    """One axis in the layer, loads of 0.9 eta on both: V' is above what D = 0.9 eta says."""
+    eta, phi, k_v, D = LAYER.eta, LAYER.phi, LAYER.k_v, 0.9 * LAYER.eta
+    s = phi * np.array([1.5, 0.5])
+    length = float(np.hypot(*s))
+    assert D * s.sum() - against(s) > -k_v * length**2 - (eta - D) * length
+
+
+@pytest.mark.parametrize("share", [0.3, 0.9])
+def test_the_missing_velocity_comes_into_the_ball_of_the_bound_and_stays(share):
+    """Both axes, coupled by a yaw rate, with the load along s: the worst of its length."""
+    D = share * LAYER.eta
+    ball = 1.001 * D / (LAYER.k_v + LAYER.eta / LAYER.phi)
+    k, s, lengths, step = constants(LAYER), np.array([0.8, -0.3]), [], 1e-3
+    for _ in range(8000):
+        turned = 0.4 * np.array([s[1], -s[0]])
+        answer = np.array([reach(one, 0.0, k) for one in s])
+        s = s + step * (turned - answer + D * s / np.hypot(*s))
+        lengths.append(np.hypot(*s))
+    inside = np.array(lengths) <= ball
+    assert not inside[0]
+    assert inside[np.argmax(inside) :].all()
+    assert inside[-1]
+    # |s|' <= -(eta - D) - k_v |s| until phi
+    longest = np.log(1 + np.hypot(0.8, 0.3) * LAYER.k_v / (LAYER.eta - D)) / LAYER.k_v
+    assert step * np.argmax(np.array(lengths) < LAYER.phi) < longest
 
 
 @pytest.mark.parametrize("load", [-0.15, 0.02, 0.1])

@@ -1,6 +1,7 @@
 """The law velocity_vector: its guidance against sympy, what it promises, and what it reaches."""
 
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,10 +22,11 @@ from podusv_cli.findings.finding import preflight
 from podusv_cli.paths.circle import Circle
 from podusv_cli.paths.line import Line
 from podusv_cli.paths.line_circle import LineCircle
-from podusv_cli.scenario.load import load_text
+from podusv_cli.scenario.load import load, load_text
 from podusv_cli.vessels.plant import sway_force
 
 LAW = VelocityVector()
+ROOT = Path(__file__).resolve().parent.parent
 SAMPLED = """
 extends: podusv:paper/base.yaml
 vessel: {{preset: paper_nonlinear}}
@@ -122,6 +124,22 @@ def test_constant_loads_leave_no_offset(path):
             200.0,
         )
         assert within(out, 199.0).max() < 1e-9
+
+
+def test_behind_pods_it_stays_off_by_what_their_sway_force_makes_of_the_prediction():
+    """The observer leaves that force out, so Y + b_v = -tau_v, v_s = v - T_v tau_v/m22."""
+    pods = load(ROOT / "configs/pod/kept.yaml").scenario.actuator
+    out = run(
+        corrected(controller=LAW, actuator=pods, disturbance=STEADY, path=Line()), 200.0, step=0.02
+    )
+    assert within(out, 190).min() == pytest.approx(0.028, abs=5e-4)
+    assert within(out, 190).max() == pytest.approx(0.028, abs=5e-4)
+    last = {name: float(out[name][-1]) for name in ("u", "v", "r", "b_obs_v", "v_s", "tau_v")}
+    assert abs(last["tau_v"]) > 0.05
+    force = sway_force(last["u"], last["v"], last["r"], K) + last["b_obs_v"]
+    assert force == pytest.approx(-last["tau_v"], rel=1e-6)
+    predicted = last["v"] - LAW.T_v * last["tau_v"] / NONLINEAR.m22
+    assert last["v_s"] == pytest.approx(predicted, abs=2e-3)
 
 
 def test_at_rest_on_the_target_it_wants_what_the_observed_loads_take():
