@@ -88,12 +88,18 @@ def run(
     with StudyLine(wanted=not (quiet or as_json)) as line:
         request = workflow.Request(
             changes, out, seconds(until), workers, part_of(shard), sys.argv, plugin or (), figures,
-            scheduler, allow_mixed, line.say, None if quiet or as_json else partial(echo, err=True),
+            scheduler, allow_mixed, line.say, warn,
+            None if quiet or as_json else partial(echo, err=True),
         )  # fmt: skip
         done = workflow.run(Path(config), request, line.tell)
     for refused in done.refused:
-        echo(f"warning: {refused}", err=True)
+        warn(refused)
     _tell(done, as_json=as_json, quiet=quiet)
+
+
+def warn(text: str) -> None:
+    """Print a warning."""
+    echo(f"warning: {text}", err=True)
 
 
 def seconds(text: str) -> float:
@@ -154,7 +160,7 @@ def status(study: Study, as_json: options.AsJson = False) -> None:
     """Say how far a study is: the runs of every law and cell that are made."""
     from podusv_cli.workflows import studies
 
-    made = studies.status(study)
+    made = studies.status(study, warn)
     if as_json:
         echo_json({"format": 1, "folder": str(study), "made": made.as_json()})
         return
@@ -171,7 +177,7 @@ def report(
     from podusv_cli.workflows import sweep as workflow
 
     with StudyLine(wanted=not (quiet or as_json)) as line:
-        request = workflow.Request(argv=sys.argv, figures=figures, say=line.say)
+        request = workflow.Request(argv=sys.argv, figures=figures, say=line.say, warn=warn)
         done = workflow.report(study, request)
     _tell(done, as_json=as_json, quiet=quiet)
 
@@ -189,7 +195,7 @@ def merge(
     from podusv_cli.workflows.sweep import Request
 
     with StudyLine(wanted=not (quiet or as_json)) as line:
-        request = Request(argv=sys.argv, figures=figures, say=line.say)
+        request = Request(argv=sys.argv, figures=figures, say=line.say, warn=warn)
         done = joining.merge(studies, out, request)
     _tell(done, as_json=as_json, quiet=quiet)
 
@@ -226,4 +232,4 @@ def export(
     """Write all runs as one table: a row a run, with its draw, status and metrics."""
     from podusv_cli.workflows import studies
 
-    echo_path(studies.export(study, form, out))
+    echo_path(studies.export(study, form, out, warn))

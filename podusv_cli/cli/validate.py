@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from podusv_cli.scenario.model import Scenario
     from podusv_cli.scenario.sweep import Sweep
 
-MOST_CHECKED = 100_000  # draws, some seconds
-
 
 def validate(
     config: Config,
@@ -65,24 +63,17 @@ def _tell_study(loaded: Loaded, sweep: Sweep) -> dict[str, float]:
     Returns the seconds of a run of every law.
     """
     from podusv_cli.process.workers import available_workers
-    from podusv_cli.study.check import singles
     from podusv_cli.study.estimate import estimate, pilot
-    from podusv_cli.study.invalid import invalid_draws
+    from podusv_cli.study.invalid import check_draws
     from podusv_cli.study.plan import plan
 
     made = plan(loaded)
-    runs = [one for cell in made.cells for one in singles(cell.scenario).values()]
     draws, places = sweep.draws, [(law, cell.index) for law in made.laws for cell in made.cells]
     echo(
         f"runs of the study: {len(places) * draws:,} "
         f"(laws: {len(made.laws)}, cells: {len(made.cells)}, draws: {draws:,})"
     )
-    checked = min(draws, MOST_CHECKED)
-    invalid = invalid_draws(runs, sweep, checked)
-    share = f"invalid draws: {invalid.count:,} of {checked:,} ({invalid.count / checked:.2%})"
-    more = "" if checked == draws else "; the others were not checked"
-    first = f"; draw {invalid.first}: {invalid.reason}" if invalid.count else ""
-    echo(f"{share}{more}{first}")
+    echo(check_draws(made).in_words())
     paces = pilot(made)
     need = estimate(made, paces, dict.fromkeys(places, draws), available_workers())
     echo(*need.in_words())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, reduce
 from typing import Any, get_args
 
@@ -17,11 +17,14 @@ from podusv_cli.scenario.keys import BOUNDS, Key, limits
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sweep import Quantity, Sweep
 from podusv_cli.scenario.yaml_tree import route
+from podusv_cli.study.check import singles
 from podusv_cli.study.draws import Draw, DrawError, content, described, drawn, table
+from podusv_cli.study.plan import Plan
 
 COMPARED = {"gt": np.greater, "ge": np.greater_equal, "lt": np.less, "le": np.less_equal}
 # The kinds of numpy's types that a field of this type takes.
 TAKEN: dict[Any, str] = {float: "fiu", int: "iu"}
+MOST_CHECKED = 100_000  # draws, some seconds
 Mask = npt.NDArray[np.bool_]
 Table = Mapping[str, npt.NDArray[Any]]
 Vary = Mapping[str, Quantity]
@@ -34,6 +37,23 @@ class Invalid:
     count: int = 0
     first: int = 0
     reason: str = ""
+    checked: int = 0
+    wanted: int = 0
+
+    def in_words(self) -> str:
+        """How many draws are invalid, of those that were checked, and the first."""
+        share = self.count / max(1, self.checked)
+        more = "" if self.checked == self.wanted else "; the others were not checked"
+        first = f"; draw {self.first}: {self.reason}" if self.count else ""
+        return f"invalid draws: {self.count:,} of {self.checked:,} ({share:.2%}){more}{first}"
+
+
+def check_draws(made: Plan) -> Invalid:
+    """The draws of a study, or the first of very many, checked before any is simulated."""
+    runs = [one for cell in made.cells for one in singles(cell.scenario).values()]
+    checked = min(made.sweep.draws, MOST_CHECKED)
+    found = invalid_draws(runs, made.sweep, checked)
+    return replace(found, checked=checked, wanted=made.sweep.draws)
 
 
 def invalid_draws(scenarios: Sequence[Scenario], sweep: Sweep, count: int) -> Invalid:

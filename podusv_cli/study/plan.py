@@ -25,6 +25,7 @@ from podusv_cli.study.draws import SWEEP
 
 # Sections of a scenario that change no number of a study.
 COSMETIC = ("name", "description", "log", "silence", "claims", "controllers", "sweep", "tune")
+KERNELS = " kernels"  # ends the key of the digest of a law's compiled source
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,7 @@ class Plan:
                     if key.partition(".")[0] not in COSMETIC
                 }  # fmt: skip
                 told |= {f"{law}[{cell.index}].{key}": value for key, value in kept.items()}
-                told[f"{law}[{cell.index}] kernels"] = kernels(single)
+                told[f"{law}[{cell.index}]{KERNELS}"] = kernels(single)
         return told
 
 
@@ -105,11 +106,14 @@ def digest(identity: Mapping[str, Any]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
+def differing(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[str]:
+    """The keys that two identities have different values for."""
+    return [key for key in dict.fromkeys([*one, *other]) if one.get(key) != other.get(key)]
+
+
 def disagreements(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[str]:
     """Each key that two identities have different values for, with both values."""
-    keys = dict.fromkeys([*one, *other])
     return [
         f"{key}: {one.get(key, 'not there')}, not {other.get(key, 'not there')}"
-        for key in keys
-        if one.get(key) != other.get(key)
+        for key in differing(one, other)
     ]

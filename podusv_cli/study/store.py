@@ -23,6 +23,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import h5py
@@ -47,18 +48,34 @@ BLOCK = 512  # bytes of the smallest user block of HDF5
 class Store:
     """A study's folder."""
 
-    def __init__(self, folder: Path, plan: Plan) -> None:
-        """Nothing is read or written yet."""
-        self.folder, self.plan = folder, plan
-        self.seal = digest(plan.identity)
+    def __init__(
+        self, folder: Path, plan: Plan, kernels: Mapping[str, str] = MappingProxyType({})
+    ) -> None:
+        """`kernels` are digests in the runs' identity that are not those of this podusv."""
+        self.folder, self.plan, self.kernels = folder, plan, kernels
+        self.identity = {**plan.identity, **kernels}
+        self.seal = digest(self.identity)
 
-    def open(self, started: str) -> None:
+    @property
+    def remark(self) -> str:
+        """What a reader of the study has to know; "" where there is nothing."""
+        if not self.kernels:
+            return ""
+        laws = dict.fromkeys(key.rpartition("[")[0] for key in self.kernels)
+        return (
+            f"the runs in {self.folder} are of other kernels than those of this podusv (laws: "
+            f"{', '.join(laws)}); they are shown as they are, and no runs or logs are added"
+        )
+
+    def open(self, started: str, scenario: str = "") -> None:
         """Make the folder, or check that it holds this very study, and note what is asked for.
 
-        Raises UsageError where it holds another study, naming what is different, and StorageError.
+        `scenario` is the text of the scenario's file, where one is to be written. Raises UsageError
+        where it holds another study, naming what is different, and StorageError.
         """
         history: list[Any] = []
-        if (self.folder / STUDY).exists():
+        known = (self.folder / STUDY).exists()
+        if known:
             told = json_files.read(self.folder / STUDY)
             self._agree(self.folder, told.get("identity", {}))
             history = list(told.get("history", []))
@@ -75,31 +92,37 @@ class Store:
             "laws": self.plan.laws, "cells": [cell.label for cell in self.plan.cells],
             "identity": self._identity(), "history": [*history, asked],
         }  # fmt: skip
+        # With more draws in study.json than in the scenario, the study could not be continued. And
+        # without study.json, a folder that is not empty is no study.
+        if known and scenario:
+            self._write_scenario(scenario)
         files.make_folder(self.folder)
         files.write_bytes(self.folder / STUDY, json_files.encode(content))
         files.make_folder(self.folder / UNITS)
+        if scenario and not known:
+            self._write_scenario(scenario)
 
-    def write_scenario(self, text: str) -> None:
+    def _write_scenario(self, text: str) -> None:
         """Write the scenario, which refers to nothing outside the folder, and its plug-ins."""
         contents = {SCENARIO: text, **self.plan.scenario.plugin_files()}
         for name, content in contents.items():
             files.make_folder((self.folder / name).parent)
             files.write_bytes(self.folder / name, content.encode())
 
-    def agree(self, folder: Path, other: Plan) -> None:
+    def agree(self, other: Store) -> None:
         """Raise UsageError where another folder holds another study, naming what is different."""
-        self._agree(folder, Store(folder, other)._identity())
+        self._agree(other.folder, other._identity(), "leave it out")
 
-    def _agree(self, folder: Path, identity: Mapping[str, Any]) -> None:
-        if differing := disagreements(identity, self._identity()):
-            raise UsageError(
-                f"{folder} holds another study: {'; '.join(differing[:4])}"
-                f"{' and more' if len(differing) > 4 else ''}; name another folder with --out"
-            )
+    def _agree(
+        self, folder: Path, identity: Mapping[str, Any],
+        remedy: str = "name another folder with --out",
+    ) -> None:  # fmt: skip
+        if found := disagreements(identity, self._identity()):
+            raise UsageError(f"{folder} holds another study: {few(found)}; {remedy}")
 
     def _identity(self) -> dict[str, Any]:
         """The identity as JSON gives it back."""
-        return json_files.plain(self.plan.identity)
+        return json_files.plain(self.identity)
 
     def write(self, result: UnitResult) -> None:
         """Keep the result of a unit. Raises StorageError."""
@@ -156,9 +179,8 @@ class Store:
         """The runs of a study that has runs.h5. Raises StorageError, also for altered numbers."""
         path = self.folder / RUNS
         try:
-            found = runs_file.Table(
-                path, self.plan.sweep.success, self.plan.scenario.known_metrics()
-            )
+            known = self.plan.scenario.known_metrics()
+            found = runs_file.Table(path, self.plan.sweep.success, known)
             found.check()
             if found.identity != self.seal:
                 raise StorageError(f"cannot read {path}: its runs are of another study")
@@ -198,6 +220,11 @@ class _Again:
 
     def __iter__(self) -> Iterator[UnitResult]:
         return self.make()
+
+
+def few(texts: Sequence[str]) -> str:
+    """The first of several texts."""
+    return "; ".join(texts[:4]) + (" and more" if len(texts) > 4 else "")
 
 
 def _place(unit: Unit, plan: Plan) -> tuple[str, int, int, int]:

@@ -25,12 +25,14 @@ def merge(studies: Sequence[Path], out: Path, request: Request) -> Swept:
         raise UsageError(f"--out {out} is one of the studies, {inside[0]}; name another folder")
     started, others = datetime.now(UTC), [stored(study) for study in studies]
     most = max(others, key=lambda other: other.plan.sweep.draws)
-    store = Store(out, most.plan)
+    store = Store(out, most.plan, most.kernels)
     for other in others:
-        store.agree(other.folder, other.plan)
-    store.open(started.isoformat(timespec="seconds"))
+        store.agree(other)
+    if store.remark:
+        request.warn(store.remark)
+    text = (most.folder / SCENARIO).read_text(encoding="utf-8")
+    store.open(started.isoformat(timespec="seconds"), text)
     sitting = Sitting(out, request.argv, started, store.plan.scenario.plugged, studies)
-    store.write_scenario((most.folder / SCENARIO).read_text(encoding="utf-8"))
     join(store, others)
     sitting.end(0)
     tally = Tally.of(store.covered())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shlex
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,14 +13,19 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.core.escaping import visible
 from podusv_cli.scenario.load import load, resolved_yaml
 from podusv_cli.scenario.phrases import unknown
-from podusv_cli.storage import files
+from podusv_cli.storage import files, json_files
 from podusv_cli.storage.run_folder import STUDY
 from podusv_cli.study import outputs
-from podusv_cli.study.plan import plan
-from podusv_cli.study.store import RUNS, SCENARIO, Store
+from podusv_cli.study.plan import KERNELS, differing, disagreements, plan
+from podusv_cli.study.store import RUNS, SCENARIO, Store, few
 from podusv_cli.workflows.keep import alone, seen_from
 
 FORMATS = ("csv", "parquet")
+Warn = Callable[[str], None]
+
+
+def silent(text: str) -> None:
+    """Tell nobody."""
 
 
 @dataclass(frozen=True)
@@ -51,15 +56,30 @@ def check_study(folder: Path) -> None:
         raise UsageError(f"{folder} is not the folder of a study: it has no {STUDY}")
 
 
-def stored(study: Path) -> Store:
-    """The store of a study's folder. Raises UsageError where it is none."""
+def stored(study: Path, warn: Warn = silent) -> Store:
+    """The store of a study's folder, for reading.
+
+    Runs of other kernels than those of this podusv are no fault; `warn` is told of them. Raises
+    UsageError where the folder is no study, and where its scenario is not the one of its runs.
+    """
     check_study(study)
-    return Store(study, plan(load(study / SCENARIO)))
+    made = plan(load(study / SCENARIO))
+    told, ours = json_files.read(study / STUDY).get("identity", {}), json_files.plain(made.identity)
+    keys = differing(told, ours)
+    if any(key not in told or not key.endswith(KERNELS) for key in keys):
+        raise UsageError(
+            f"{study / SCENARIO} is not the scenario of the runs in {STUDY}: "
+            f"{few(disagreements(ours, told))}; restore the file, or use the podusv that made them"
+        )
+    store = Store(study, made, {key: told[key] for key in keys})
+    if store.remark:
+        warn(store.remark)
+    return store
 
 
-def status(study: Path) -> Made:
+def status(study: Path, warn: Warn = silent) -> Made:
     """How far a study is. Raises UsageError, StorageError."""
-    store = stored(study)
+    store = stored(study, warn)
     rows = [
         (law, store.plan.cells[cell].label, int(there.sum()))
         for (law, cell), there in store.covered().items()
@@ -89,12 +109,12 @@ def draw(study: Path, law: str, number: int, cell: int, out: Path | None) -> Pat
     return path
 
 
-def export(study: Path, form: str, out: Path | None) -> Path:
+def export(study: Path, form: str, out: Path | None, warn: Warn = silent) -> Path:
     """Write all runs as one table. Raises UsageError, StorageError."""
     if form not in FORMATS:
         raise UsageError(unknown(f"format {form!r}", form, FORMATS))
     path = out or study / f"runs.{form}"
-    store = stored(study)
+    store = stored(study, warn)
     if not (study / RUNS).exists():
         raise UsageError(
             f"{study} has no {RUNS} yet: podusv sweep report {shlex.quote(str(study))}"

@@ -23,6 +23,7 @@ from podusv_cli.storage import manifest
 from podusv_cli.study import outputs
 from podusv_cli.study.check import sweep_faults
 from podusv_cli.study.estimate import estimate, pilot
+from podusv_cli.study.invalid import check_draws
 from podusv_cli.study.keep import found
 from podusv_cli.study.march import Engine, Gaps, Part, Processes, Tally, Tell, march
 from podusv_cli.study.plan import Plan, plan
@@ -32,7 +33,7 @@ from podusv_cli.study.sittings import Sitting
 from podusv_cli.study.store import SCENARIO, Store
 from podusv_cli.workflows.keep import keep
 from podusv_cli.workflows.run import RESULTS
-from podusv_cli.workflows.studies import check_study, stored
+from podusv_cli.workflows.studies import Warn, check_study, silent, stored
 
 WHOLE: Part = (1, 1)  # the only shard
 
@@ -52,6 +53,7 @@ class Request:
     scheduler: str = ""  # of a Dask cluster, as tcp://host:port
     mixed: bool = False  # whether its workers may compute other bits than this machine
     say: Callable[[str], None] = lambda text: None  # what is done after the last run
+    warn: Warn = silent  # is told what is odd, and no error
     begin: Callable[..., None] | None = None  # is told what the missing runs need
 
 
@@ -128,7 +130,9 @@ def _marched(
 
 
 def _announce(made: Plan, request: Request, workers: int, missing: Gaps) -> None:
-    """Tell what the missing runs need, where somebody wants to know."""
+    """Warn of draws that the scenario cannot take, and tell what the missing runs need."""
+    if missing and (invalid := check_draws(made)).count:
+        request.warn(invalid.in_words())
     if request.begin and missing:
         need = estimate(made, pilot(made), missing, workers, figures=request.figures)
         request.begin(*need.in_words())
@@ -161,8 +165,7 @@ def _opened(config: Path, request: Request, started: datetime) -> Store:
     loaded = _loaded(config / SCENARIO if given else config, request)
     folder = request.out or (config if given else RESULTS / f"{loaded.scenario.name}-sweep")
     store = Store(folder, plan(loaded))
-    store.open(started.isoformat(timespec="seconds"))
-    store.write_scenario(tree_yaml(loaded))
+    store.open(started.isoformat(timespec="seconds"), tree_yaml(loaded))
     return store
 
 
@@ -192,7 +195,7 @@ def answered(store: Store, request: Request) -> Swept:
         )  # fmt: skip
         if results.plan.sweep.keep != Keep():
             request.say("making the logs that are kept")
-        kept = make() if whole else found(store.folder, results, extras)
+        kept = make() if whole and not store.kernels else found(store.folder, results, extras)
         request.say("drawing figures and writing the report")
         outputs.write_report(store.folder, results, kept, extras, figures=request.figures)
         if extras.interrupted:
@@ -207,7 +210,7 @@ def answered(store: Store, request: Request) -> Swept:
 
 def report(study: Path, request: Request) -> Swept:
     """Judge a study anew, of the runs that are there. Raises UsageError where there are none."""
-    started, store = datetime.now(UTC), stored(study)
+    started, store = datetime.now(UTC), stored(study, request.warn)
     if not Tally.of(store.covered()).made:
         raise UsageError(f"{study} has no runs yet: podusv sweep run {study}")
     Sitting(study, request.argv, started, store.plan.scenario.plugged).end(0)

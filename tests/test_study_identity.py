@@ -1,0 +1,131 @@
+"""What a study's runs are of: other kernels can be read, another scenario is refused."""
+
+import json
+import shutil
+
+import pytest
+from small_study import TEXT, made, written
+
+from podusv_cli.core.errors import UsageError
+from podusv_cli.study import plan as plans
+from podusv_cli.study import store as stores
+from podusv_cli.study.store import RUNS
+from podusv_cli.workflows import studies, sweep
+from podusv_cli.workflows.merge import merge
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    return placed(made(tmp_path_factory.mktemp("study") / "whole", draws=8), 8)
+
+
+def placed(store, draws=40):
+    """The folder of a study, with its scenario."""
+    text = TEXT.replace("draws: 40", f"draws: {draws}")
+    (store.folder / stores.SCENARIO).write_text(text)
+    return store.folder
+
+
+@pytest.fixture
+def updated(monkeypatch):
+    """From here on, podusv has other kernels."""
+    return lambda: monkeypatch.setattr(plans, "kernels", lambda scenario: "another digest")
+
+
+def test_runs_of_other_kernels_are_read_and_told(whole, tmp_path, updated, podusv):
+    before, table = (whole / RUNS).read_bytes(), tmp_path / "runs.csv"
+    updated()
+    folder = shutil.copytree(whole, tmp_path / "study")
+    for command, *options in (("status",), ("export", "--out", table), ("report", "--no-figures")):
+        said = podusv("sweep", command, folder, *options)
+        assert said.code == 0
+        assert f"warning: the runs in {folder} are of other kernels" in said.err
+        assert "(laws: pid, li)" in said.err
+    assert {count for _, _, count in studies.status(folder).rows} == {8}
+    assert len(table.read_text().splitlines()) == 1 + 2 * 8
+    assert (folder / RUNS).read_bytes() == before
+
+
+def test_runs_of_other_kernels_are_not_added_to(whole, updated):
+    updated()
+    with pytest.raises(UsageError, match=r"another study: pid\[0\] kernels: .*, not another dig"):
+        sweep.run(whole, sweep.Request(figures=False), lambda tally: None)
+
+
+def test_no_log_is_made_for_runs_of_other_kernels(whole, tmp_path, updated):
+    folder = shutil.copytree(whole, tmp_path / "study")
+    kept = TEXT.replace("draws: 40", "draws: 8\n  keep: {draws: [0]}")
+    (folder / stores.SCENARIO).write_text(kept)
+    updated()
+    sweep.report(folder, sweep.Request(figures=False))
+    assert not list(folder.glob("logs/*"))
+
+
+def test_shards_of_other_kernels_are_named_and_not_missing(tmp_path, updated):
+    one = placed(made(tmp_path / "one", part=(1, 2)))
+    updated()
+    two = placed(made(tmp_path / "two", part=(2, 2)))
+    with pytest.raises(UsageError, match=r"two holds another study: pid\[0\] kernels: .*leave it"):
+        merge([one, two], tmp_path / "all", sweep.Request(figures=False))
+    assert not (tmp_path / "all").exists()
+
+
+def test_shards_that_agree_are_joined_with_the_kernels_that_they_have(tmp_path, updated):
+    shards = [placed(made(tmp_path / f"{n}", part=(n, 2), draws=8), 8) for n in (1, 2)]
+    made(tmp_path / "one", draws=8)
+    updated()
+    warnings = []
+    merge(shards, tmp_path / "all", sweep.Request(figures=False, warn=warnings.append))
+    assert (tmp_path / "all" / RUNS).read_bytes() == (tmp_path / "one" / RUNS).read_bytes()
+    assert len(warnings) == 1
+
+
+def test_a_scenario_that_is_not_the_one_of_the_runs_is_refused(whole, tmp_path):
+    folder = shutil.copytree(whole, tmp_path / "study")
+    (folder / stores.SCENARIO).write_text(TEXT.replace("seed: 7", "seed: 8"))
+    for command in (studies.stored, studies.status):
+        with pytest.raises(UsageError, match=r"not the scenario .*: sweep.seed: 8, not 7; restore"):
+            command(folder)
+
+
+@pytest.mark.parametrize("nth", range(1, 5))
+def test_a_study_that_was_killed_while_its_draws_were_raised_goes_on(tmp_path, monkeypatch, nth):
+    config = written(tmp_path / "small.yaml", ("draws: 40", "draws: 4"))
+    folder, request = tmp_path / "study", sweep.Request(out=tmp_path / "study", figures=False)
+    sweep.run(config, request, lambda tally: None)
+    real, calls = stores.files.write_bytes, []
+
+    def killed(path, content):
+        calls.append(path)
+        if len(calls) == nth:
+            raise KeyboardInterrupt
+        real(path, content)
+
+    monkeypatch.setattr(stores.files, "write_bytes", killed)
+    more = sweep.Request(("sweep.draws=6",), folder, figures=False)
+    with pytest.raises(KeyboardInterrupt):
+        sweep.run(folder, more, lambda tally: None)
+    monkeypatch.undo()
+    done = sweep.run(folder, sweep.Request(figures=False), lambda tally: None)
+    asked = json.loads((folder / "study.json").read_text())["draws"]
+    assert done.tally.wanted == done.results.wanted == 2 * asked
+
+
+def test_invalid_draws_are_told_before_the_first_run(tmp_path):
+    config = written(
+        tmp_path / "small.yaml", ("uniform: [0.7, 1.3]", "normal: {mean: 1, sigma: 0.7}")
+    )
+    told, units = [], tmp_path / "study/units"
+
+    def warn(text):
+        told.append((text, len(list(units.iterdir()))))
+
+    request = sweep.Request(("sweep.draws=12",), units.parent, figures=False, warn=warn)
+    done = sweep.run(config, request, lambda tally: None)
+    runs = studies.stored(done.folder).runs()
+    count = int(runs.broken("pid").sum())
+    assert 0 < count < 12
+    ((text, there),) = told
+    assert text.startswith(f"invalid draws: {count} of 12 (")
+    assert "; draw " in text
+    assert there == 0
