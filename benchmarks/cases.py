@@ -18,6 +18,7 @@ from podusv_cli.scenario.model import Scenario
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENARIO = ROOT / "configs" / "paper" / "corrected.yaml"
+RIVALS = ROOT / "configs" / "laws" / "rivals.yaml"  # all laws on the same task
 
 LAWS = ("adaptive_neural", "dsc", "backstepping", "pid")
 
@@ -63,6 +64,15 @@ class Case:
 @cache
 def _scenario() -> Scenario:
     return load(SCENARIO).scenario
+
+
+def rivals() -> dict[str, ClosedLoop]:
+    """The closed loop of every law of `configs/laws/rivals.yaml`, by its name there."""
+    scenario = load(RIVALS).scenario
+    return {
+        name: replace(scenario.closed_loop(), controller=law)
+        for name, law in scenario.controllers.items()
+    }
 
 
 def grid(steps: int | None = None, log_every: int = 1) -> TimeGrid:

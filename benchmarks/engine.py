@@ -10,7 +10,7 @@ from time import process_time
 from typing import Any
 
 from benchmarks.c_program import agreement, timer
-from benchmarks.cases import CASES, LAWS, ROOT, SCENARIO, Case, grid, metrics_observer
+from benchmarks.cases import CASES, ROOT, SCENARIO, Case, grid, metrics_observer, rivals
 from benchmarks.timing import Timer, in_turns, quartiles, ratio, timed
 from podusv_cli.controllers.base import Controller
 from podusv_cli.controllers.network import Network
@@ -106,10 +106,16 @@ def _behind(name: str) -> ClosedLoop:
     return replace(USUAL.loop(), actuator=scenario.actuator)
 
 
-def law_costs(rounds: int = 15) -> dict[str, list[float]]:
-    """Time of one evaluation of every law [s], over states of its own run."""
-    cases = [Case(law, "" if law == "pid" else "27 grid") for law in LAWS]
-    runs = {case.label: (case.loop(), simulate(case.loop(), grid())) for case in cases}
-    replays = {label: replayer(loop, recording) for label, (loop, recording) in runs.items()}
+def law_costs(rounds: int = 15) -> dict[str, dict[str, list[float]]]:
+    """Time of one evaluation of every law [s], over states of its own run, and its ratio.
+
+    The ratio is to adaptive_neural with 27 nodes, round by round.
+    """
+    replays = {
+        name: replayer(loop, simulate(loop, grid(log_every=10))) for name, loop in rivals().items()
+    }
     times = in_turns(replays, rounds)
-    return {label: quartiles(1e-9 * values) for label, values in times.items()}
+    return {
+        name: {"seconds": quartiles(1e-9 * values), "ratio": ratio(times, name, USUAL.law)}
+        for name, values in times.items()
+    }

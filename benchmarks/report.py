@@ -72,7 +72,7 @@ def markdown(results: Results) -> str:
         BATCH,
         _batch(results["batch"]),
         "## One evaluation of a law\n",
-        table(["law", "ns"], ([law, spread(q, 1e9)] for law, q in results["law"].items())),
+        _laws(results["law"]),
         "## One step behind each actuator\n",
         table(
             ["actuator", "us"],
@@ -85,6 +85,13 @@ def markdown(results: Results) -> str:
         *_commands(results["commands"]),
     ]
     return "\n".join(sections)
+
+
+def _laws(costs: Results) -> str:
+    rows = (
+        [law, spread(found["seconds"], 1e9), spread(found["ratio"])] for law, found in costs.items()
+    )
+    return table(["law", "ns", "relative to adaptive_neural"], rows)
 
 
 def _ratios(beside_c: Results) -> str:

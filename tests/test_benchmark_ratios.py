@@ -8,8 +8,10 @@ import pytest
 from benchmarks.alternatives import python_alternatives
 from benchmarks.batch import batch_costs
 from benchmarks.c_program import TOLERANCE, agreement, build
-from benchmarks.cases import CASES, Case
+from benchmarks.cases import CASES, Case, rivals
 from benchmarks.engine import beside_c, growth
+from podusv_cli.controllers.base import Controller
+from podusv_cli.core.registry import kinds
 
 pytestmark = pytest.mark.benchmark
 ROUNDS = 9
@@ -70,3 +72,10 @@ def test_python_alternatives_are_slower_at_the_same_accuracy():
     assert np.isfinite(list(middle.values())).all()
     assert middle["solve_ivp"] >= 5 * middle["podusv"]
     assert middle["numpy"] >= 20 * middle["podusv"]
+
+
+def test_every_law_with_a_feedback_is_timed():
+    """A schedule and the manoeuvres of trials need no more than a few operations."""
+    known = kinds("podusv_cli.controllers", Controller)
+    untimed = {"schedule", "turning_circle", "zigzag"}
+    assert {loop.controller.kind for loop in rivals().values()} == set(known) - untimed
