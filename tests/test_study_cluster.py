@@ -143,7 +143,7 @@ def test_only_the_run_that_kills_is_blamed(tmp_path):
     for words in statuses(store).values():
         assert [i for i, word in enumerate(words) if word != "finished"] == [13]
         assert words[13] == "crashed"
-    assert store.runs().causes[0, 0, 13] == "the worker that made it ended, every time"
+    assert store.runs().causes[0, 0, 13] == marching.ENDED
     deadly = [unit for unit in client.killers if unit.law == "pid" and 13 in unit.draws]
     assert [unit.count for unit in deadly] == [8, 8, 4, 2, 1]  # again alone, then halved
 

@@ -26,7 +26,7 @@ HANGING = (
 )
 CAUSES = {
     -1.0: ("hung", "before the first instant: it is not over after 0.3 s of computing"),
-    -2.0: ("crashed", "its process ended with exit code -9, 2 times"),
+    -2.0: ("crashed", "it ended its process, each time that it was made"),
     -3.0: ("crashed", "KeyError: 'no gain for this start'"),
     -4.0: ("hung", "not over after 0.3 s of computing"),
 }

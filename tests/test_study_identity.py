@@ -3,13 +3,17 @@
 import json
 import shutil
 
+import h5py
 import pytest
-from small_study import TEXT, made, written
+from small_study import TEXT, made, small, written
 
-from podusv_cli.core.errors import UsageError
+from podusv_cli.core.errors import StorageError, UsageError
+from podusv_cli.process.workers import Outcome
 from podusv_cli.study import plan as plans
 from podusv_cli.study import store as stores
-from podusv_cli.study.store import RUNS
+from podusv_cli.study.march import ENDED, Driver
+from podusv_cli.study.store import RUNS, Store
+from podusv_cli.study.unit import Unit, crashed
 from podusv_cli.workflows import studies, sweep
 from podusv_cli.workflows.merge import merge
 
@@ -129,3 +133,50 @@ def test_invalid_draws_are_told_before_the_first_run(tmp_path):
     assert text.startswith(f"invalid draws: {count} of 12 (")
     assert "; draw " in text
     assert there == 0
+
+
+def placed_in(path, dataset):
+    """Where in runs.h5 the content of a dataset begins, and how long it is."""
+    with h5py.File(path, "r") as file:
+        return file[dataset].id.get_offset(), file[dataset].id.get_storage_size()
+
+
+@pytest.mark.parametrize(
+    "dataset", ["drawn/vessel.m", "drawn/start.psi", "failed_run", "failed_cause", "law", "draw"]
+)
+def test_every_array_of_the_table_is_sealed(tmp_path, dataset):
+    store = made(tmp_path / "study", draws=2)
+    store.write(crashed(Unit("pid", 0, 1, 1), store.plan.metrics, "it ended its process"))
+    store.write_runs()
+    table, (place, size) = store.folder / RUNS, placed_in(store.folder / RUNS, dataset)
+    sound = bytearray(table.read_bytes())
+    assert len(store.runs().causes) == 1
+    for at in (place, place + size - 1):
+        altered = sound.copy()
+        altered[at] ^= 1
+        table.write_bytes(altered)
+        with pytest.raises(StorageError, match=r"its numbers were altered|damaged"):
+            store.runs()
+    table.write_bytes(sound)
+    assert store.runs().causes == {(0, 0, 1): "it ended its process"}
+
+
+def test_a_table_of_the_first_format_is_read(whole, tmp_path):
+    folder = shutil.copytree(whole, tmp_path / "study")
+    with h5py.File(folder / RUNS, "r+") as file:
+        del file["sha256_rest"]
+    assert "sha256_rest" not in studies.stored(folder).runs().metrics
+    assert studies.status(folder).rows[0][2] == 8
+
+
+def test_a_run_that_ends_its_process_is_told_alike_by_every_engine(tmp_path):
+    store = Store(tmp_path / "study", small(draws=1))
+    store.open("now")
+    for end in ("exit code -9", "the worker ended"):
+        driver = Driver(store, lambda tally: None, float("inf"), (1, 1))
+        (number, unit), *_ = driver
+        driver.done(number, Outcome(failure=end, killed=True))
+        (result,) = store.results()
+        assert result.causes == (ENDED,)
+        assert driver.tally.ended == {f"{unit.law}[0] draw 0": end}
+        next(store.folder.glob("units/*")).unlink()

@@ -175,7 +175,6 @@ class Cluster:
         if future.status == "error":
             error = future.exception()
             killed = type(error).__name__ == KILLED
-            # Dask's words have a random key in them, and causes are part of runs.h5.
             words = "the worker that made it ended, every time" if killed else _words(error)
             return Reply("", "", {}, Outcome(failure=words, killed=killed))
         try:

@@ -24,6 +24,8 @@ from podusv_cli.study.unit import STATUSES, Unit, UnitResult, crashed, make, pre
 FIRST = 8  # draws of a unit before it is known how long a run takes
 AIM = 4.0  # s of computing that a unit is to take
 MOST = 4096  # draws of a unit
+# Causes are part of runs.h5, which has the same bytes whichever engine made it.
+ENDED = "it ended its process, each time that it was made; provenance.json tells how"
 
 
 Part = tuple[int, int]  # a shard: its number from 1, and how many there are
@@ -40,6 +42,7 @@ class Tally:
     before: int = 0  # runs that were there already
     computed: dict[str, float] = field(default_factory=dict)  # processor time by law [s]
     ran: dict[str, int] = field(default_factory=dict)  # runs by law of which this is the time
+    ended: dict[str, str] = field(default_factory=dict)  # runs that ended their process, and how
 
     @classmethod
     def of(cls, there: Mapping[tuple[str, int], Mask]) -> Self:
@@ -176,7 +179,8 @@ class Driver:
         elif outcome.killed and unit.count > 1:
             self._halves.extend(unit.halves())
         elif outcome.killed:
-            self._keep(crashed(unit, self.plan.metrics, outcome.failure))
+            self.tally.ended[f"{unit.law}[{unit.cell}] draw {unit.first}"] = outcome.failure
+            self._keep(crashed(unit, self.plan.metrics, ENDED))
         elif not outcome.interrupted:
             self.failure = outcome
 

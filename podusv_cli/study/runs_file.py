@@ -21,7 +21,9 @@ from podusv_cli.study.runs import Mask
 from podusv_cli.study.unit import BROKEN, MISSING, STATUSES, Codes, Unit, UnitResult
 
 AXES = ("law", "cell", "draw")
-SEAL = "sha256"  # of all other arrays, in the order of the file
+FAILED = ("failed_run", "failed_cause")  # which runs have a cause, and the causes
+SEAL = "sha256"  # of `status`, `until` and the metrics, in the order of the file
+SEAL_OF_THE_REST = "sha256_rest"  # of axes, causes and drawn quantities; the first tables have none
 Known = Mapping[str, Metric]
 DRAWN = "drawn"  # the group of drawn quantities
 ROWS = 4096  # runs read or written at a time
@@ -33,6 +35,21 @@ def digest(pieces: Iterable[Any]) -> str:
     for piece in pieces:
         found.update(piece)
     return found.hexdigest()
+
+
+def digest_of_the_rest(file: h5py.File) -> str:
+    """A digest of all that SEAL does not cover: names, types and content."""
+    names = [*AXES, *FAILED]
+    if DRAWN in file:
+        file[DRAWN].visititems(
+            lambda name, thing: (
+                names.append(f"{DRAWN}/{name}") if isinstance(thing, h5py.Dataset) else None
+            )
+        )
+    arrays = ((name, file[name][()]) for name in names)
+    return digest(
+        piece for name, a in arrays for piece in (f"{name} {a.dtype.str}\n".encode(), a.tobytes())
+    )
 
 
 class Table:
@@ -52,15 +69,22 @@ class Table:
             raise StorageError(f"cannot read {path}: damaged ({error})") from error
 
     def check(self) -> None:
-        """Raises StorageError where a number is not as it was written."""
-        arrays = (self._file[name] for name in ("status", "until", *self.metrics))
-        if digest(law for array in arrays for law in array) != bytes(self._file[SEAL][()]).decode():
+        """Raises StorageError where a number or a word is not as it was written."""
+        try:
+            arrays = (self._file[name] for name in ("status", "until", *self.metrics))
+            found = {SEAL: digest(law for array in arrays for law in array)}
+            if SEAL_OF_THE_REST in self._file:
+                found[SEAL_OF_THE_REST] = digest_of_the_rest(self._file)
+            same = all(bytes(self._file[name][()]) == own.encode() for name, own in found.items())
+        except (OSError, KeyError, ValueError, RuntimeError) as error:
+            raise StorageError(f"cannot read {self.path}: damaged ({error})") from error
+        if not same:
             raise StorageError(f"cannot read {self.path}: its numbers were altered")
 
     @cached_property
     def metrics(self) -> tuple[str, ...]:
         """The names of the metrics."""
-        own = {*AXES, "status", "until", DRAWN, "failed_run", "failed_cause", SEAL}
+        own = {*AXES, *FAILED, "status", "until", DRAWN, SEAL, SEAL_OF_THE_REST}
         return tuple(name for name in self._file if name not in own)
 
     def metric(self, law: str, name: str) -> Vector:

@@ -16,7 +16,14 @@ from podusv_cli.metrics.metric import Metric
 from podusv_cli.process.temporary_names import temporary_name
 from podusv_cli.storage.files import new_file, storage_errors
 from podusv_cli.storage.log import FILE, UNDATED, LogLayout, describe, write_at
-from podusv_cli.study.runs_file import DRAWN, ROWS, SEAL, digest
+from podusv_cli.study.runs_file import (
+    DRAWN,
+    ROWS,
+    SEAL,
+    SEAL_OF_THE_REST,
+    digest,
+    digest_of_the_rest,
+)
 from podusv_cli.study.unit import MISSING, STATUSES, UnitResult
 
 BLOCK = 2**20  # bytes written and read at a time
@@ -109,7 +116,8 @@ def _lay_out(
             places[name] = _room(file, name, kind, header.shape, scales)
         for name, metric in header.metrics.items():
             describe(file[name], {"units": metric.unit, "long_name": metric.meaning})
-        places[SEAL] = _room(file, SEAL, np.uint8, (64,), ())
+        for seal in (SEAL, SEAL_OF_THE_REST):
+            places[seal] = _room(file, seal, np.uint8, (64,), ())
     with new_file(part, layout.size) as out:
         layout.write_to(out)
         out.truncate(max(layout.size, *(room.end for room in places.values())))
@@ -161,7 +169,7 @@ def _fill(part: Path, header: Header, places: dict[str, Room], results: Iterable
     """Write the long arrays, piece by piece. (An array in memory that is the file would take as
     much memory, and a full disk would end the process.)
     """
-    seal = places.pop(SEAL)
+    seal, rest = places.pop(SEAL), places.pop(SEAL_OF_THE_REST)
     drawn = {name: places.pop(name) for name in list(places) if name.startswith(f"{DRAWN}/")}
     with part.open("r+b", buffering=0) as out:
         for first in range(0, header.wanted if drawn else 0, ROWS):
@@ -179,6 +187,9 @@ def _fill(part: Path, header: Header, places: dict[str, Room], results: Iterable
                 write_at(out, places[name].place(*at), places[name].content(numbers))
         found = digest(piece for room in places.values() for piece in _pieces(out, room))
         write_at(out, seal.offset, found.encode())
+        with h5py.File(part, "r") as file:
+            found = digest_of_the_rest(file)
+        write_at(out, rest.offset, found.encode())
         os.fsync(out.fileno())
 
 

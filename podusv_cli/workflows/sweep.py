@@ -126,7 +126,7 @@ def _marched(
         raise KeyboardInterrupt(f"interrupted; {made} are kept, continue with: {again}") from stop
     finally:
         timed = {"processor_s": seen.computed, "timed_runs": seen.ran}
-        sitting.end(seen.made - seen.before, {**timed, **engine.told()})
+        sitting.end(seen.made - seen.before, {**timed, "ended": seen.ended, **engine.told()})
 
 
 def _announce(made: Plan, request: Request, workers: int, missing: Gaps) -> None:
