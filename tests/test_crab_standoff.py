@@ -1,12 +1,12 @@
 """The standoff along the heading that holds the path: its derivation, and what it gives."""
 
-from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
 import sympy as sp
 from conftest import NONLINEAR, ask, corrected, run, situations
+from law_samples import STEADY, WRONG, rms, task
 from pydantic import ValidationError
 
 from podusv_cli.actuators.saturated import Saturated
@@ -16,15 +16,11 @@ from podusv_cli.controllers.crab import SWAY, observe_sway, on_path, take_aim
 from podusv_cli.controllers.dsc import DynamicSurface
 from podusv_cli.controllers.pid import Pid
 from podusv_cli.core.kernel import bundle
-from podusv_cli.core.recording import Recording
-from podusv_cli.disturbances.harmonic import Harmonic, HarmonicDisturbance
 from podusv_cli.paths.circle import Circle
 from podusv_cli.paths.line import Line
 from podusv_cli.vessels.plant import plant, sway_force
 
 KINDS = (AdaptiveNeural, DynamicSurface, Backstepping, Pid)
-STEADY = HarmonicDisturbance(b_u=Harmonic(mean=0.5), b_v=Harmonic(mean=0.5), b_r=Harmonic(mean=0.5))
-WRONG = NONLINEAR.model_copy(update={"m": 20.0, "X_u": -1.5, "Y_vv": -20.0, "N_r": -1.0})
 
 
 def crab(kind: Any, **fields: Any) -> Any:
@@ -33,16 +29,6 @@ def crab(kind: Any, **fields: Any) -> Any:
 
 def constants(law: Any, nominal: Any = NONLINEAR) -> Any:
     return bundle(law.constants_with(nominal))
-
-
-@cache
-def task(law: Any) -> Recording:
-    """The paper's task, corrected, within its limits."""
-    return run(corrected(controller=law, actuator=Saturated()), 310.0)
-
-
-def rms(out: Recording, start: float, end: float) -> float:
-    return float(np.sqrt(np.mean(out["z_e"][(out["time"] >= start) & (out["time"] <= end)] ** 2)))
 
 
 # --- where the law points

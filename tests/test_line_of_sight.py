@@ -1,12 +1,12 @@
 """Laws with line-of-sight guidance: their frame, what is derived, and what they promise."""
 
-from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
 import sympy as sp
 from conftest import NONLINEAR, ask, corrected, run, situations
+from law_samples import STEADY, WRONG, rms, task
 
 from podusv_cli.actuators.saturated import Saturated
 from podusv_cli.controllers.alos import CRAB, Alos, learning
@@ -16,20 +16,11 @@ from podusv_cli.controllers.velocity_loop import Axis
 from podusv_cli.core.kernel import bundle
 from podusv_cli.core.kinematics import wrap
 from podusv_cli.core.recording import Recording
-from podusv_cli.disturbances.harmonic import Harmonic, HarmonicDisturbance
 from podusv_cli.paths.circle import Circle
 from podusv_cli.paths.line import Line
 
-STEADY = HarmonicDisturbance(b_u=Harmonic(mean=0.5), b_v=Harmonic(mean=0.5), b_r=Harmonic(mean=0.5))
-WRONG = NONLINEAR.model_copy(update={"m": 20.0, "X_u": -1.5, "Y_vv": -20.0, "N_r": -1.0})
 LEARNING = [Alos(), Alos(learns="integral")]
 LAWS = [LosPid(), *LEARNING]
-
-
-@cache
-def task(law: Any) -> Recording:
-    """The paper's task, corrected, within its limits."""
-    return run(corrected(controller=law, actuator=Saturated()), 310.0)
 
 
 def steady(law: Any, path: Any, nominal: Any = NONLINEAR, duration: float = 250.0) -> Recording:
@@ -249,10 +240,6 @@ def test_memory_begins_with_the_observer():
 
 
 # --- what they reach on the paper's task
-
-
-def rms(out: Recording, start: float, end: float = np.inf) -> float:
-    return float(np.sqrt(np.mean(out["z_e"][(out["time"] >= start) & (out["time"] <= end)] ** 2)))
 
 
 @pytest.mark.parametrize("law", LEARNING, ids=["adaptive", "integral"])

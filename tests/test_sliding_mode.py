@@ -1,22 +1,20 @@
 """The law sliding_mode: its reaching laws, the bounds that they promise, and what it reaches."""
 
 import itertools
-from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
 import sympy as sp
 from conftest import NONLINEAR, ask, corrected, run, situations
+from law_samples import STEADY, WRONG, rms, task
 
 from podusv_cli.actuators.saturated import Saturated
 from podusv_cli.controllers.hand_point import hand_errors
 from podusv_cli.controllers.sliding_mode import SlidingMode, reach, twist
 from podusv_cli.controllers.velocity_loop import Axis
 from podusv_cli.core.kernel import bundle
-from podusv_cli.core.recording import Recording
 from podusv_cli.disturbances.calm import Calm
-from podusv_cli.disturbances.harmonic import Harmonic, HarmonicDisturbance
 from podusv_cli.paths.circle import Circle
 from podusv_cli.paths.line import Line
 from podusv_cli.vessels.plant import plant
@@ -24,22 +22,10 @@ from podusv_cli.vessels.plant import plant
 LAYER, TWIST = SlidingMode(), SlidingMode(reaching="super_twisting")
 LAWS = pytest.mark.parametrize("law", [LAYER, TWIST], ids=["layer", "twist"])
 PATHS = pytest.mark.parametrize("path", [Line(speed=0.5, course=0.3), Circle(radius=16.67)])
-STEADY = HarmonicDisturbance(b_u=Harmonic(mean=0.5), b_v=Harmonic(mean=0.5), b_r=Harmonic(mean=0.5))
-WRONG = NONLINEAR.model_copy(update={"m": 20.0, "X_u": -1.5, "Y_vv": -20.0, "N_r": -1.0})
 
 
 def constants(law: SlidingMode) -> Any:
     return bundle(law.constants_with(NONLINEAR))
-
-
-@cache
-def task(law: SlidingMode, **options: Any) -> Recording:
-    """The paper's task, corrected, within its limits."""
-    return run(corrected(controller=law, actuator=Saturated()), 310.0, **options)
-
-
-def rms(out: Recording, start: float, end: float) -> float:
-    return float(np.sqrt(np.mean(out["z_e"][(out["time"] >= start) & (out["time"] <= end)] ** 2)))
 
 
 # --- the reaching laws

@@ -10,6 +10,7 @@ import sympy as sp
 from conftest import NONLINEAR, SMOOTH_START, ask, corrected, run, situations, target_at
 from hypothesis import given
 from hypothesis import strategies as st
+from law_samples import STEADY, WRONG, rms, task
 
 from podusv_cli.actuators.saturated import Saturated
 from podusv_cli.controllers.velocity_vector import VelocityVector, guidance
@@ -17,7 +18,6 @@ from podusv_cli.core.kernel import bundle
 from podusv_cli.core.kinematics import wrap
 from podusv_cli.core.recording import Recording
 from podusv_cli.disturbances.calm import Calm
-from podusv_cli.disturbances.harmonic import Harmonic, HarmonicDisturbance
 from podusv_cli.findings.finding import preflight
 from podusv_cli.paths.circle import Circle
 from podusv_cli.paths.line import Line
@@ -36,21 +36,10 @@ controllers: {{mine: {{kind: velocity_vector}}}}
 control: {{period: {period}}}
 """
 K = bundle(LAW.constants_with(NONLINEAR))
-STEADY = HarmonicDisturbance(b_u=Harmonic(mean=0.5), b_v=Harmonic(mean=0.5), b_r=Harmonic(mean=0.5))
-
-
-@cache
-def task(**options: Any) -> Recording:
-    """The paper's task, corrected, within its limits."""
-    return run(corrected(controller=LAW, actuator=Saturated()), 310.0, **options)
 
 
 def within(out: Recording, start: float, end: float = np.inf) -> Any:
     return out["z_e"][(out["time"] >= start) & (out["time"] < end)]
-
-
-def rms(part: Any) -> float:
-    return float(np.sqrt(np.mean(part**2)))
 
 
 # --- guidance
@@ -115,8 +104,7 @@ def test_the_yaw_rate_s_rate_is_the_derivative_of_the_limited_angle():
 
 @pytest.mark.parametrize("path", [Line(speed=0.5, course=0.3), Circle(radius=16.67, speed=0.5)])
 def test_constant_loads_leave_no_offset(path):
-    told = NONLINEAR.model_copy(update={"m": 20.0, "X_u": -1.5, "Y_vv": -20.0, "N_r": -1.0})
-    for nominal in (NONLINEAR, told):
+    for nominal in (NONLINEAR, WRONG):
         out = run(
             corrected(
                 controller=LAW, actuator=Saturated(), disturbance=STEADY, path=path, nominal=nominal
@@ -162,19 +150,19 @@ def test_at_rest_on_the_target_it_wants_what_the_observed_loads_take():
 
 
 def test_it_reaches_its_goals_on_the_paper_s_task():
-    out = task()
+    out = task(LAW)
     assert np.trapezoid(out["z_e"], out["time"]) <= 217.0  # 1.05 of the optimum, 206.8
-    assert rms(within(out, 60, 100)) <= 0.015
-    assert rms(within(out, 150)) <= 0.015
+    assert rms(out, 60, 100) <= 0.015
+    assert rms(out, 150) <= 0.015
     assert within(out, 60).max() <= 0.025
     assert within(out, 29).max() <= 0.2
     assert abs(out["tau_u_cmd"]).max() <= 25.0
 
 
 def test_a_measurement_held_for_a_tenth_of_a_second_changes_less_than_a_millimetre():
-    held, free = task(hold_every=10), task()
+    held, free = task(LAW, hold_every=10), task(LAW)
     for start, end in ((60, 100), (150, np.inf)):
-        assert abs(rms(within(held, start, end)) - rms(within(free, start, end))) < 1e-3
+        assert abs(rms(held, start, end) - rms(free, start, end)) < 1e-3
     assert abs(within(held, 60).max() - within(free, 60).max()) < 1e-3
 
 
@@ -230,7 +218,7 @@ def test_with_its_bow_against_the_target_s_course_it_turns_at_once():
 
 def test_the_settled_error_is_within_the_bound_of_the_cascade():
     """e' = -kappa e + d with d = V_c - p', so |e| <= sup |d|/kappa once the start is forgotten."""
-    out, state = task(), ("x", "y", "psi", "u", "v", "r")
+    out, state = task(LAW), ("x", "y", "psi", "u", "v", "r")
     late = np.flatnonzero(out["time"] > 150)[::10]
     path, largest = LineCircle(), 0.0
     for i in late:
@@ -247,5 +235,5 @@ def test_the_period_that_its_loops_carry_is_the_one_that_the_run_carries(period,
     scenario = load_text(SAMPLED.format(period=period / 100), "a.yaml").scenario
     codes = [finding.code for finding in preflight(scenario)]
     assert ("sampled-loop" in codes) is grows
-    worst = float(within(task(hold_every=period), 150).max())
+    worst = float(within(task(LAW, hold_every=period), 150).max())
     assert (worst > 0.2) is grows

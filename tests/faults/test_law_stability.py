@@ -6,21 +6,18 @@ import numpy as np
 import pytest
 from conftest import NONLINEAR, VESSELS, ask, corrected, run
 from counts import count
+from law_samples import STEADY
 
 from podusv_cli.actuators.saturated import Saturated
 from podusv_cli.controllers.adrc import Adrc
 from podusv_cli.controllers.velocity_vector import VelocityVector
 from podusv_cli.core.kernel import Vector, bundle
-from podusv_cli.disturbances.harmonic import Harmonic, HarmonicDisturbance
 from podusv_cli.paths.circle import Circle
 from podusv_cli.paths.line import Line
 from podusv_cli.vessels.plant import plant, surge_force, sway_force, yaw_moment
 from podusv_cli.vessels.vessel import Vessel
 
 SPEED, LOAD = 0.5, np.array([0.5, 0.5, 0.5])  # m/s; N and N m
-STEADY = HarmonicDisturbance(
-    b_u=Harmonic(mean=0.5), b_v=Harmonic(mean=0.5), b_r=Harmonic(mean=0.5)
-)  # fmt: skip
 CAREFUL = VelocityVector(omega_v=0.2)
 TURN = SPEED / 16.67  # rad/s; the paper's circle
 CYBERSHIP = VESSELS["cybership2"]

@@ -1,0 +1,26 @@
+"""What tests of laws share: constant loads, a hull that is told wrong, the paper's task."""
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+from conftest import NONLINEAR, corrected, run
+
+from podusv_cli.actuators.saturated import Saturated
+from podusv_cli.core.recording import Recording
+from podusv_cli.disturbances.harmonic import Harmonic, HarmonicDisturbance
+
+MEAN = Harmonic(mean=0.5)
+STEADY = HarmonicDisturbance(b_u=MEAN, b_v=MEAN, b_r=MEAN)
+WRONG = NONLINEAR.model_copy(update={"m": 20.0, "X_u": -1.5, "Y_vv": -20.0, "N_r": -1.0})
+
+
+@cache
+def task(law: Any, **options: Any) -> Recording:
+    """The paper's task, corrected, within its limits."""
+    return run(corrected(controller=law, actuator=Saturated()), 310.0, **options)
+
+
+def rms(out: Recording, start: float, end: float = np.inf) -> float:
+    """Of the distance to the target [m], between two times [s]."""
+    return float(np.sqrt(np.mean(out["z_e"][(out["time"] >= start) & (out["time"] <= end)] ** 2)))
