@@ -14,6 +14,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 
 from podusv_cli.core import escaping
 from podusv_cli.core.kernel import Vector
@@ -148,5 +149,7 @@ def _slice(axes: Axes, gain: Gain, tried: pd.DataFrame, found: Any) -> None:
         axes.axvline(own, **{**TARGET_LOOK, "linestyle": "--"})
     if gain.log:
         axes.set_xscale("log")
+        axes.set_xlim(0.9 * min(gain.low, gain.own), 1.1 * max(gain.high, gain.own))
+        axes.xaxis.set_minor_formatter(NullFormatter())  # labels of minor ticks overlap
     axes.tick_params(labelsize=5.5)
     axes.set_xlabel(escaping.figure(gain.key), **SMALL)

@@ -42,7 +42,7 @@ def _of_searches(results: Results, objective: str) -> Iterator[Sketch]:
     yield Sketch(
         "history",
         f"best {objective} on the training draws so far, a curve for each repeat: the curves begin "
-        "with the scenario's gains; trials that break an inequality do not count",
+        "with the scenario's gains; one rises where a trial holds the inequalities better",
         partial(figures.history, results.history, objective, COLUMNS),
     )
     rows = results.pairs[(results.pairs["when"] == "tuning")]
