@@ -72,7 +72,9 @@ class StudyClaim(Component):
 
     says: str = value(..., "", "the claim, in a sentence of your own")
     source: str = value(..., "", "where it was published, or `ours`")
-    expect: str = value(..., "", "the claim as an expression over runs; see docs/studies.md")
+    expect: str = value(
+        ..., "", "the claim as an expression over all draws; see docs/study_claims.md"
+    )
     tolerance: float = value(
         0.0,
         "",

@@ -17,14 +17,7 @@ from podusv_cli.scenario.phrases import as_yaml
 from podusv_cli.scenario.yaml_tree import Fault, Node, find, merge, plain, route
 
 MOST = 1000  # cells
-FIXED = (
-    "extends",
-    "plugins",
-    "sweep",
-    "tune",
-    "name",
-    "claims",
-)  # what no cell can have of its own
+FIXED = ("extends", "plugins", "sweep", "tune", "name", "claims")  # the same in all cells
 
 
 @dataclass(frozen=True)
