@@ -113,6 +113,23 @@ def test_told_its_own_hull_it_is_stable_whichever_inertia_is_the_larger():
     assert all(growth(VelocityVector(), vessel, vessel) < 0.0 for vessel in vessels)
 
 
+def test_on_the_circle_to_starboard_its_own_model_does_not_help_a_hull_of_lighter_sway():
+    random, number = np.random.default_rng(6), count(100, 1500)
+    vessels = [drawn(random) for _ in range(number)]
+    grows = [vessel for vessel in vessels if growth(VelocityVector(), vessel, vessel, TURN) > 0.0]
+    assert 0.03 < len(grows) / number < 0.15
+    assert all(vessel.m11 > vessel.m22 for vessel in grows)
+    assert all(growth(VelocityVector(), vessel, vessel, -TURN) < 0.0 for vessel in grows)
+
+
+def test_hulls_of_heavier_sway_hardly_grow_on_the_circle():
+    random = np.random.default_rng(5)
+    vessels = [drawn(random) for _ in range(count(100, 2500))]
+    found = [growth(VelocityVector(), v, NONLINEAR, TURN) for v in vessels if v.m11 < v.m22]
+    assert max(found) < 0.05
+    assert np.mean(np.array(found) > 0.0) < 0.02
+
+
 def test_adrc_is_not_stable_on_all_of_them():
     """The hand point is short for a hull that turns, and damps sway, less than it was told."""
     bad, _ = unstable(Adrc(), count(100, 1500), heavier_sway=True)
