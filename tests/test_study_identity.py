@@ -180,3 +180,45 @@ def test_a_run_that_ends_its_process_is_told_alike_by_every_engine(tmp_path):
         assert result.causes == (ENDED,)
         assert driver.tally.ended == {f"{unit.law}[0] draw 0": end}
         next(store.folder.glob("units/*")).unlink()
+
+
+def told_as(folder, machine):
+    """Have the sittings of a study tell another processor."""
+    path = folder / "provenance.json"
+    content = json.loads(path.read_text())
+    for sitting in content["sittings"]:
+        sitting["platform"]["processor"] = machine
+    path.write_text(json.dumps(content))
+
+
+def test_runs_of_several_machines_are_told_before_more_are_added(tmp_path):
+    config, warnings = written(tmp_path / "small.yaml"), []
+
+    def run(draws):
+        changes = (f"sweep.draws={draws}",)
+        request = sweep.Request(changes, tmp_path / "s", figures=False, warn=warnings.append)
+        sweep.run(config, request, lambda tally: None)
+
+    run(2)
+    run(3)
+    assert not warnings
+    told_as(tmp_path / "s", "an abacus")
+    run(3)
+    assert not warnings  # nothing is added
+    run(4)
+    (told,) = warnings
+    assert "different machines or versions: an abacus (" in told
+
+
+def test_a_merge_tells_of_several_machines(tmp_path):
+    config, warnings = written(tmp_path / "small.yaml", ("draws: 40", "draws: 4")), []
+    shards = [tmp_path / f"{n}" for n in (1, 2)]
+    for number, folder in enumerate(shards, 1):
+        sweep.run(config, sweep.Request(out=folder, shard=(number, 2)), lambda tally: None)
+    request = sweep.Request(figures=False, warn=warnings.append)
+    merge(shards, tmp_path / "alike", request)
+    assert not warnings
+    told_as(shards[0], "an abacus")
+    merge(shards, tmp_path / "all", request)
+    (told,) = warnings
+    assert "different machines or versions: an abacus (" in told

@@ -61,7 +61,7 @@ def altered(folder, to, metric="iae", machine="another processor"):
     result.metrics[metric][-1] += 1e-9
     store.write(result)
     told = {
-        "platform": {"processor": machine, "libc": "glibc 2.0"}, "python": "3.11",
+        "platform": {"processor": machine, "libc": "glibc 2.0"}, "python": "3.11", "podusv": "0.1",
         "packages": {"numpy": "2.0", "numba": "0.61"}, "runs": 2,
     }  # fmt: skip
     (to / "provenance.json").write_text(json.dumps({"sittings": [told, told]}))
@@ -75,7 +75,10 @@ def test_other_numbers_are_refused_with_the_machines_and_nothing_is_written(shar
     told = str(error.value)
     assert told.startswith(f"{other}: draw 9 of li with other numbers than in {shards[4]} ")
     assert "(iae of draw 9)" in told
-    assert "was made on another processor (glibc 2.0, Python 3.11, numpy 2.0, numba 0.61)," in told
+    assert (
+        "was made on another processor (glibc 2.0, podusv 0.1, Python 3.11, numpy 2.0, numba 0.61),"
+        in told
+    )
     assert f"{shards[4]} on a machine that its provenance.json does not tell" in told
     assert not list((tmp_path / "all").glob("units/*"))
     with pytest.raises(StorageError, match="with other numbers than in"):

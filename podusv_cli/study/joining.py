@@ -100,19 +100,34 @@ def _run(result: UnitResult, draw: int) -> dict[str, Any]:
     return {name: array[row] for name, array in arrays.items()} | {"cause": result.causes[row]}
 
 
-def machines(folder: Path) -> str:
-    """On what the runs of a folder were made: processor, C library and versions."""
+def mixture(folder: Path) -> str:
+    """A warning where the runs of a folder were made on different machines or versions, else ""."""
+    found = _machines(folder)
+    return (
+        f"the runs in {folder} are made on different machines or versions: {' and '.join(found)}; "
+        "their numbers may differ in the last bits"
+        if len(found) > 1
+        else ""
+    )
+
+
+def _machines(folder: Path) -> list[str]:
     # A sitting that was killed has no end, and does not know how many runs it made.
     made = (one for one in sittings(folder) if one["runs"] or one["finished"] is None)
-    found = dict.fromkeys(map(_machine, made))
+    return list(dict.fromkeys(map(_machine, made)))
+
+
+def machines(folder: Path) -> str:
+    """On what the runs of a folder were made: processor, C library and versions."""
+    found = _machines(folder)
     return " and ".join(found) or f"a machine that its {NAME} does not tell"
 
 
 def _machine(sitting: Mapping[str, Any]) -> str:
     platform, packages = sitting["platform"], sitting["packages"]
     return (
-        f"{platform['processor']} ({platform['libc']}, Python {sitting['python']}, "
-        f"numpy {packages['numpy']}, numba {packages['numba']})"
+        f"{platform['processor']} ({platform['libc']}, podusv {sitting['podusv']}, "
+        f"Python {sitting['python']}, numpy {packages['numpy']}, numba {packages['numba']})"
     )
 
 

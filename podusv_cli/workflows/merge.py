@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from podusv_cli.core.errors import UsageError
-from podusv_cli.study.joining import join, missing
+from podusv_cli.study.joining import join, missing, mixture
 from podusv_cli.study.march import Tally
 from podusv_cli.study.sittings import Sitting
 from podusv_cli.study.store import SCENARIO, Store
@@ -35,6 +35,8 @@ def merge(studies: Sequence[Path], out: Path, request: Request) -> Swept:
     sitting = Sitting(out, request.argv, started, store.plan.scenario.plugged, studies)
     join(store, others)
     sitting.end(0)
+    if mixed := mixture(out):
+        request.warn(mixed)
     tally = Tally.of(store.covered())
     if tally.made < tally.wanted:
         return Swept(out, tally, missing_runs=tuple(missing(store)))

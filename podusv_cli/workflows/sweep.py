@@ -24,9 +24,10 @@ from podusv_cli.study import outputs
 from podusv_cli.study.check import sweep_faults
 from podusv_cli.study.estimate import estimate, pilot
 from podusv_cli.study.invalid import check_draws
+from podusv_cli.study.joining import mixture
 from podusv_cli.study.keep import found
 from podusv_cli.study.march import Engine, Gaps, Part, Processes, Tally, Tell, march
-from podusv_cli.study.plan import Plan, plan
+from podusv_cli.study.plan import plan
 from podusv_cli.study.remote import Recipe
 from podusv_cli.study.results import Results, judged
 from podusv_cli.study.sittings import Sitting
@@ -118,7 +119,7 @@ def _marched(
     try:
         return march(
             store, told, engine, seconds=request.seconds, part=request.shard,
-            begin=partial(_announce, store.plan, request, engine.workers),
+            begin=partial(_announce, store, request, engine.workers),
         )  # fmt: skip
     except KeyboardInterrupt as stop:
         again = f"podusv sweep run {shlex.quote(str(store.folder))}"
@@ -129,8 +130,11 @@ def _marched(
         sitting.end(seen.made - seen.before, {**timed, "ended": seen.ended, **engine.told()})
 
 
-def _announce(made: Plan, request: Request, workers: int, missing: Gaps) -> None:
-    """Warn of draws that the scenario cannot take, and tell what the missing runs need."""
+def _announce(store: Store, request: Request, workers: int, missing: Gaps) -> None:
+    """Warn of mixed machines and of invalid draws, and tell what the missing runs need."""
+    made = store.plan
+    if missing and (mixed := mixture(store.folder)):
+        request.warn(mixed)
     if missing and (invalid := check_draws(made)).count:
         request.warn(invalid.in_words())
     if request.begin and missing:
