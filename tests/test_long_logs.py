@@ -19,6 +19,7 @@ from podusv_cli.storage import log as log_file
 from podusv_cli.storage.files import disk_array
 from podusv_cli.workflows.execute import HELD, Task, execute
 
+GIVEN = {"schedule": ', rows: "0, 1, 0\\n200, 2, 0.5\\n"', "zigzag": ", check_every: 0.05"}
 LAWS = {f"{kind} {period}": (kind, period) for kind in kinds("controllers") for period in (0, 0.05)}
 SCENARIO = """
 vessel: {{preset: paper_nonlinear}}
@@ -53,7 +54,8 @@ def same_files(place: Path, text: str, **options: Any) -> None:
 @pytest.mark.parametrize("law", LAWS)
 def test_every_law_leaves_the_same_files(tmp_path, law):
     kind, period = LAWS[law]
-    text = SCENARIO.format(actuator="{kind: saturated}", law=kind, period=period, compiled="false")
+    law = kind + GIVEN.get(kind, "")
+    text = SCENARIO.format(actuator="{kind: saturated}", law=law, period=period, compiled="false")
     same_files(tmp_path, text)
 
 

@@ -30,7 +30,10 @@ VALUES = (
 )  # fmt: skip
 SHORT = "simulation.duration=0.5"
 EXTENDED = ("base.yaml", "claims.yaml", "ablation_laws.yaml")  # no scenarios in themselves
-PARTS = [ROOT / "configs/paper" / name for name in EXTENDED]
+PARTS = [
+    *(ROOT / "configs/paper" / name for name in EXTENDED),
+    *(ROOT / "configs/bench").rglob("*.yaml"),
+]
 MOST = count(16, 10**9)  # commands
 COMPARED, DRAWN = 100, 10  # one command in so many compares, or draws figures as well
 SECONDS = count(10**9, 10)  # of the processor; no test of `make test` takes the time
