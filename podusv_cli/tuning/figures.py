@@ -37,9 +37,16 @@ def before_and_after(laws: pd.DataFrame, label: str, columns: int = 2) -> Figure
         place = float(str(row))
         _ranged(axes, place - 0.16, law, "before", "none")
         _ranged(axes, place + 0.16, law, "after", look(1)[0])
+    for when, fill in (("before", "none"), ("after", look(1)[0])):
+        colour = look(1 if when == "after" else 0)[0]
+        axes.plot(
+            [], [], "o-", color=colour, markerfacecolor=fill, markersize=3.6, linewidth=1.2,
+            label=f"{when} the search",
+        )  # fmt: skip
     axes.set_yticks(range(len(ordered)), [escaping.figure(law) for law in ordered.law])
     axes.set_ylim(len(ordered) - 0.4, -0.6)
     axes.set_xlabel(escaping.figure(label))
+    legend(figure, columns)
     return figure
 
 
