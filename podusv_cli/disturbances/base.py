@@ -2,28 +2,61 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, ClassVar
 
 from podusv_cli.core.component import Component
 from podusv_cli.core.kernel import Vector
+from podusv_cli.core.signal import Signal
+from podusv_cli.vessels.vessel import Vessel
+
+# First-order motion in waves, which sensors see on top of the vessel's state. A disturbance that
+# has it declares these three among its `signals`, one behind the other.
+WAVE_MOTION = (
+    Signal("x_w", "m", "first-order wave motion, north"),
+    Signal("y_w", "m", "first-order wave motion, east"),
+    Signal("psi_w", "rad", "first-order wave motion in yaw", r"\psi_w"),
+)
 
 
 class Disturbance(Component):
     """A load on the hull in the body frame.
 
     `evaluate(t, x, k, table, b)` is a kernel that writes (b_u [N], b_v [N], b_r [N m]) at time
-    t [s] and state x = (x, y, psi, u, v, r) into `b`. One that does not look at x says so with
-    `of_time`, and is not asked twice for the same t.
+    t [s] and state x = (x, y, psi, u, v, r) into `b`, and behind them one number for each of its
+    `signals`. One that does not look at x says so with `of_time`, and is not asked twice for the
+    same t.
     """
 
     noun: ClassVar[str] = "disturbance"
 
     of_time: ClassVar[bool] = False
 
+    @property
+    def signals(self) -> tuple[Signal, ...]:
+        """What `evaluate` writes behind the load."""
+        return ()
+
     @staticmethod
     def evaluate(t: float, x: Vector, k: Any, table: Vector, b: Vector) -> None:
         """Write the load; every disturbance has its own."""
         raise NotImplementedError
+
+    def kernel_with(self, vessel: Vessel) -> Callable[..., None]:
+        """The kernel for constants of this vessel; the same function for every vessel."""
+        return self.evaluate
+
+    def constants_with(self, vessel: Vessel) -> dict[str, float]:
+        """Its constants `k`, with those of the simulated vessel that its load depends on."""
+        return self.constants()
+
+    def table_for(self, vessel: Vessel, duration: float) -> Vector:
+        """Its table, for this vessel and a run of this duration [s].
+
+        What is random in it is a function of (seed, time): a longer run starts with the same
+        numbers.
+        """
+        return self.table()
 
     def bounds(self) -> tuple[float, float, float] | None:
         """What |b_u| [N], |b_v| [N], |b_r| [N m] never exceed, at any time and state.

@@ -1,0 +1,95 @@
+"""Several disturbances at once: the sum of their loads, and all of their signals."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from podusv_cli.core.kernel import Vector, constants_type, kernel, scratch, tail
+from podusv_cli.core.signal import Signal
+from podusv_cli.disturbances.base import Disturbance
+from podusv_cli.vessels.vessel import Vessel
+
+
+class Part(NamedTuple):
+    """What the kernel of the sum has to know of a part."""
+
+    evaluate: Callable[..., None]
+    constants: tuple[str, ...]
+    signals: int
+
+
+class Total(Disturbance):
+    """The sum of several disturbances, which a scenario gives as a list."""
+
+    parts: tuple[Any, ...]
+
+    @property
+    def of_time(self) -> bool:  # type: ignore[override]
+        """Whether none of them looks at the state."""
+        return all(part.of_time for part in self.parts)
+
+    @property
+    def is_recorded(self) -> bool:  # type: ignore[override]
+        """Whether one of them is only values of a finished run."""
+        return any(part.is_recorded for part in self.parts)
+
+    @property
+    def signals(self) -> tuple[Signal, ...]:
+        """Those of all parts, in their order."""
+        return tuple(signal for part in self.parts for signal in part.signals)
+
+    def kernel_with(self, vessel: Vessel) -> Callable[..., None]:
+        """The kernel of the sum."""
+        return _sum(tuple(
+            Part(part.kernel_with(vessel), tuple(part.constants_with(vessel)), len(part.signals))
+            for part in self.parts
+        ))  # fmt: skip
+
+    def constants_with(self, vessel: Vessel) -> dict[str, float]:
+        """Those of all parts, each with the part's position in front."""
+        return {
+            f"part{i}_{name}": number
+            for i, part in enumerate(self.parts)
+            for name, number in part.constants_with(vessel).items()
+        }
+
+    def table_for(self, vessel: Vessel, duration: float) -> Vector:
+        """Where each part's table begins, then these tables."""
+        tables = [part.table_for(vessel, duration) for part in self.parts]
+        starts = np.cumsum([len(tables), *map(len, tables[:-1])]).astype(float)
+        return np.concatenate([starts, *tables])
+
+    def bounds(self) -> tuple[float, float, float] | None:
+        """The sum of the bounds, which the sum need not reach."""
+        each = [part.bounds() for part in self.parts]
+        if None in each:
+            return None
+        u, v, r = np.sum(each, axis=0).tolist()
+        return u, v, r
+
+
+@cache
+def _sum(parts: Sequence[Part]) -> Callable[..., None]:
+    """The kernel that adds up the loads of these parts.
+
+    Its source is written out, because compiled code cannot choose between functions.
+    """
+    scope: dict[str, Any] = {"scratch": scratch, "tail": tail}
+    lines = ["def evaluate(t, x, k, table, b):", "    b[0] = b[1] = b[2] = 0.0"]
+    behind = 3
+    for i, part in enumerate(parts):
+        scope |= {f"evaluate{i}": part.evaluate, f"Constants{i}": constants_type(part.constants)}
+        given = ", ".join(f"k.part{i}_{name}" for name in part.constants)
+        lines += [
+            f"    load{i} = scratch({3 + part.signals})",
+            f"    evaluate{i}(t, x, Constants{i}({given}), tail(table, int(table[{i}])), load{i})",
+            *(f"    b[{j}] += load{i}[{j}]" for j in range(3)),
+            *(f"    b[{behind + j}] = load{i}[{3 + j}]" for j in range(part.signals)),
+        ]
+        behind += part.signals
+    exec("\n".join(lines), scope)  # noqa: S102
+    return kernel(scope["evaluate"])  # type: ignore[no-any-return]

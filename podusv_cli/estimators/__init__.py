@@ -1,0 +1,1 @@
+"""From measurements to the state that the law works with."""

@@ -1,0 +1,67 @@
+"""What every estimator offers."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import numpy as np
+
+from podusv_cli.core.component import Component
+from podusv_cli.core.kernel import Vector
+from podusv_cli.core.signal import Signal
+from podusv_cli.vessels.vessel import Vessel
+
+ESTIMATE = (
+    Signal("x_hat", "m", "estimated position, north", r"\hat{x}"),
+    Signal("y_hat", "m", "estimated position, east", r"\hat{y}"),
+    Signal("psi_hat", "rad", "estimated heading, not wrapped", r"\hat{\psi}"),
+    Signal("u_hat", "m/s", "estimated surge velocity", r"\hat{u}"),
+    Signal("v_hat", "m/s", "estimated sway velocity", r"\hat{v}"),
+    Signal("r_hat", "rad/s", "estimated yaw rate", r"\hat{r}"),
+)
+
+
+class Estimator(Component):
+    """From measurements to the state that the law works with.
+
+    Its own state is part of the closed loop's, and its first six numbers are the estimate. Two
+    kernels move it. `correct(t, seen, state, k, table)` is called at every instant, after the
+    measurement: it may change the state where something was delivered. `follow(t, seen, tau,
+    state, k, table, rate)` writes the state's rate, between the instants too; `tau` are the loads
+    (surge, sway, yaw) that the actuator produces. `seen` is laid out as in `sensors.base`.
+    """
+
+    noun: ClassVar[str] = "estimator"
+
+    @property
+    def states(self) -> tuple[Signal, ...]:
+        """Every number of its state, in order; the estimate first."""
+        return ESTIMATE
+
+    @staticmethod
+    def correct(t: float, seen: Vector, state: Vector, k: Any, table: Vector) -> None:
+        """Take what was delivered at this instant into the state."""
+        raise NotImplementedError
+
+    @staticmethod
+    def follow(
+        t: float, seen: Vector, tau: Vector, state: Vector, k: Any, table: Vector, rate: Vector
+    ) -> None:
+        """Write the rate of the state."""
+        raise NotImplementedError
+
+    def needs(self) -> tuple[bool, ...]:
+        """Which of x, y, psi, u, v, r have to be measured."""
+        return (True,) * len(ESTIMATE)
+
+    def constants_with(self, nominal: Vessel) -> dict[str, float]:
+        """Its constants `k`, with those of the vessel that the law is told about."""
+        return nominal.constants() | self.constants()
+
+    def start(self, x: Vector, nominal: Vessel) -> Vector:
+        """Its state at t = 0, where the vessel's state is x: the truth, and zeros behind it."""
+        return np.concatenate([x, np.zeros(len(self.states) - len(ESTIMATE))])
+
+    def shortest_lag(self) -> float:
+        """The smallest time constant of its continuous part [s]; infinite without one."""
+        return float("inf")

@@ -1,0 +1,1 @@
+"""What the law sees of the vessel."""

@@ -1,0 +1,66 @@
+"""What every kind of measurement offers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, ClassVar
+
+import numpy as np
+
+from podusv_cli.core.component import Component
+from podusv_cli.core.kernel import Vector
+from podusv_cli.core.signal import STATE, Signal
+
+# Where `seen` has, for each of the six quantities of the vessel's state: the value that was
+# delivered last, whether one was delivered at this instant, whether it is measured at all.
+VALUE, FRESH, KNOWN, OWN = 0, len(STATE), 2 * len(STATE), 3 * len(STATE)
+
+
+class Measurement(Component):
+    """What is measured of the vessel's state, and how well.
+
+    `sense(t, instant, x, b, k, table, seen)` is a kernel that is called at every instant of the
+    run: at time t [s], the instant's number, the true state x = (x, y, psi, u, v, r) and the
+    disturbance's numbers b. It updates `seen`: six values, six marks of those delivered at this
+    instant, six marks of those measured at all, then whatever it has to remember.
+    """
+
+    noun: ClassVar[str] = "measurement"
+
+    is_exact: ClassVar[bool] = False  # the law is given the state itself, and nothing is called
+
+    @property
+    def signals(self) -> tuple[Signal, ...]:
+        """The measured values that are logged, in the order of the state."""
+        return ()
+
+    @staticmethod
+    def sense(
+        t: float, instant: float, x: Vector, b: Vector, k: Any, table: Vector, seen: Vector
+    ) -> None:
+        """Update what is seen; every kind that is not exact has its own."""
+        raise NotImplementedError
+
+    def measured(self) -> tuple[bool, ...]:
+        """Which of x, y, psi, u, v, r are measured."""
+        return (True,) * len(STATE)
+
+    def constants_with(self, step: float, motion: int) -> dict[str, float]:
+        """Its constants `k`, for a run with this step [s].
+
+        `motion` is where `b` has the wave motion (x_w, y_w, psi_w) that sensors see; 0: nowhere.
+        """
+        return self.constants()
+
+    def table_for(self, step: float, steps: int) -> Vector:
+        """Its table, for a run of so many steps; noise is a function of seed and sample."""
+        return self.table()
+
+    def first(self, start: Vector, step: float) -> Vector:
+        """What is seen before anything has been delivered: the state at the start."""
+        marks = np.concatenate([np.zeros(len(STATE)), np.array(self.measured(), float)])
+        return np.concatenate([start, marks])
+
+    def conflicts(self, step: float) -> Iterator[tuple[str, str]]:
+        """Key below `measurement` and message for what does not fit the step [s]."""
+        return iter(())
