@@ -12,7 +12,8 @@ from benchmarks.cases import Case, grid, metrics_observer
 from benchmarks.timing import in_turns, quartiles, timed
 from podusv_cli.engine.batch import simulate_many
 from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.simulate import ClosedLoop, Observer, simulate
+from podusv_cli.engine.loop import ClosedLoop, Observer
+from podusv_cli.engine.simulate import simulate
 from podusv_cli.engine.variants import variants
 from podusv_cli.process.workers import available_workers
 

@@ -11,7 +11,7 @@ from podusv_cli.controllers.base import Controller
 from podusv_cli.controllers.network import Network
 from podusv_cli.core.registry import kinds
 from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.simulate import ClosedLoop
+from podusv_cli.engine.loop import ClosedLoop
 from podusv_cli.metrics.table import Metrics, observer
 from podusv_cli.scenario.load import load
 from podusv_cli.scenario.model import Scenario

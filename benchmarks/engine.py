@@ -15,8 +15,9 @@ from benchmarks.timing import Timer, in_turns, quartiles, ratio, timed
 from podusv_cli.controllers.base import Controller
 from podusv_cli.controllers.network import Network
 from podusv_cli.engine.grid import TimeGrid
+from podusv_cli.engine.loop import ClosedLoop
 from podusv_cli.engine.replay import replayer
-from podusv_cli.engine.simulate import ClosedLoop, simulate
+from podusv_cli.engine.simulate import simulate
 from podusv_cli.scenario.limits import estimate
 from podusv_cli.scenario.load import load
 

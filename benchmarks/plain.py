@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
-from podusv_cli.engine.simulate import ClosedLoop
+from podusv_cli.engine.loop import ClosedLoop
 
 Array = npt.NDArray[np.float64]
 

@@ -34,7 +34,8 @@ from podusv_cli.disturbances.base import Disturbance
 from podusv_cli.disturbances.calm import Calm
 from podusv_cli.engine.check import check_law
 from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.simulate import ClosedLoop, simulate
+from podusv_cli.engine.loop import ClosedLoop
+from podusv_cli.engine.simulate import simulate
 from podusv_cli.figures.drawing import dressed
 from podusv_cli.figures.sheet import Sheet
 from podusv_cli.figures.style import house_style, image

@@ -28,7 +28,8 @@ from podusv_cli.disturbances.base import Disturbance
 from podusv_cli.disturbances.calm import Calm
 from podusv_cli.disturbances.harmonic import HarmonicDisturbance
 from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.simulate import STATE, ClosedLoop, simulate
+from podusv_cli.engine.loop import STATE, ClosedLoop
+from podusv_cli.engine.simulate import simulate
 from podusv_cli.paths.base import TARGET, Path
 from podusv_cli.paths.line import Line
 from podusv_cli.paths.line_circle import LineCircle

@@ -26,7 +26,8 @@ from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.engine import signatures
 from podusv_cli.engine.batch import Batch, Lazily, simulate_many
 from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.simulate import STATE, ClosedLoop, simulate
+from podusv_cli.engine.loop import STATE, ClosedLoop
+from podusv_cli.engine.simulate import simulate
 from podusv_cli.engine.variants import variants
 from podusv_cli.metrics.table import observer
 from podusv_cli.paths.waypoints import Waypoints

@@ -24,7 +24,8 @@ from podusv_cli.actuators.ideal import Ideal
 from podusv_cli.controllers.pid import Pid
 from podusv_cli.disturbances.calm import Calm
 from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.simulate import ClosedLoop, simulate
+from podusv_cli.engine.loop import ClosedLoop
+from podusv_cli.engine.simulate import simulate
 from podusv_cli.paths.line import Line
 from podusv_cli.vessels.vessel import Vessel
 

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ValidationError
 from podusv_cli.controllers.base import Controller
 from podusv_cli.core import registry
 from podusv_cli.core.kernel import Vector, bundle, is_kernel
-from podusv_cli.engine.simulate import names
+from podusv_cli.engine.loop import names
 from podusv_cli.paths.base import TARGET
 from podusv_cli.scenario.explain import signals
 from podusv_cli.vessels.vessel import COEFFICIENTS, Vessel

@@ -32,7 +32,8 @@ from podusv_cli.core.recording import Recording
 from podusv_cli.disturbances.calm import Calm
 from podusv_cli.disturbances.harmonic import HarmonicDisturbance
 from podusv_cli.engine.grid import TimeGrid, whole_steps
-from podusv_cli.engine.simulate import STATE, ClosedLoop, Observer, simulate
+from podusv_cli.engine.loop import STATE, ClosedLoop, Observer
+from podusv_cli.engine.simulate import simulate
 
 
 def same(one: Recording, other: Recording) -> bool:

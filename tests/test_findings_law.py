@@ -107,7 +107,7 @@ def test_the_linearised_loops_are_those_of_the_whole_closed_loop(law):
     """Their eigenvalues are among the largest of the closed loop's, differentiated numerically."""
     start = "start={x: -8, y: -4, psi: 0.4, u: 0.5, v: 0.05, r: 0.02}"
     scenario = scene(*law, start, "disturbance={kind: none}")
-    slope, s = continuous(scenario.closed_loop(), compiled=False)
+    slope, s = continuous(scenario.closed_loop(), 1.0, compiled=False)
     columns = []
     for i in range(len(s)):
         shift = np.zeros_like(s)

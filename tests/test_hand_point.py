@@ -16,7 +16,7 @@ from podusv_cli.controllers.hand_position import HandPosition
 from podusv_cli.controllers.velocity_loop import Axis
 from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.disturbances.calm import Calm
-from podusv_cli.engine.simulate import ClosedLoop
+from podusv_cli.engine.loop import ClosedLoop
 from podusv_cli.paths.circle import Circle
 from podusv_cli.paths.line import Line
 from podusv_cli.scenario.load import load

@@ -12,9 +12,10 @@ import pytest
 from counting import counted
 from scenario_samples import loaded
 
+from podusv_cli.core.random_words import in_unit_interval
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sweep import Quantity, Sweep
-from podusv_cli.study.draws import DrawError, _open, drawn, draws, seeds, table, uniforms, words
+from podusv_cli.study.draws import DrawError, drawn, draws, seeds, table, uniforms, words
 
 VARY = """
 sweep:
@@ -74,7 +75,7 @@ def test_draws_are_those_of_the_first_release() -> None:
 
 def test_uniform_draws_never_reach_the_ends() -> None:
     """Of 53 bits, u + 1/2 would round to 1 where all are set."""
-    ends = _open(np.array([0, 2**64 - 1], np.uint64))
+    ends = in_unit_interval(np.array([0, 2**64 - 1], np.uint64))
     assert ends.tolist() == [2.0**-53, 1 - 2.0**-53]
 
 

@@ -30,8 +30,8 @@ from podusv_cli.core.recording import Recording
 from podusv_cli.disturbances.harmonic import HarmonicDisturbance
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.layout import Plan
+from podusv_cli.engine.loop import STATE, ClosedLoop, by_name, names
 from podusv_cli.engine.replay import rates_replay
-from podusv_cli.engine.simulate import STATE, ClosedLoop, by_name, names
 from podusv_cli.paths.circle import Circle
 from podusv_cli.paths.line import Line
 from podusv_cli.theory.ideal_weights import unloaded_accelerations

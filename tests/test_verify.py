@@ -140,15 +140,15 @@ def test_dop853_is_skipped_with_a_reason(overrides, reason):
 
 def test_the_continuous_loop_is_the_engines():
     loop = corrected()
-    fast, start = continuous(loop)
-    slow, same = continuous(loop, compiled=False)
+    fast, start = continuous(loop, 1.0)
+    slow, same = continuous(loop, 1.0, compiled=False)
     np.testing.assert_array_equal(start, same)
     np.testing.assert_allclose(fast(1.5, start), slow(1.5, start), rtol=1e-12)
     step = run(loop, 1e-6, 1e-6)
     rate = fast(0.0, start)
     np.testing.assert_allclose(step["u"][1] - step["u"][0], rate[3] * 1e-6, rtol=0.02)
     with pytest.raises(ValueError, match="takes samples"):
-        continuous(corrected(controller=AdaptiveNeural(rate="difference")))
+        continuous(corrected(controller=AdaptiveNeural(rate="difference")), 1.0)
     with pytest.raises(ArithmeticError, match="not finite"):
         fast(math.inf, start)
 

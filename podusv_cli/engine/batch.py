@@ -19,8 +19,9 @@ from podusv_cli.core.escaping import visible
 from podusv_cli.core.kernel import LANES, Vector, whole_lanes
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.layout import Plan, Wires
+from podusv_cli.engine.loop import STATE, ClosedLoop, Observer, entries, wire
 from podusv_cli.engine.march import Bell, Ending, Work
-from podusv_cli.engine.simulate import STATE, ClosedLoop, Observer, entries, marcher, why, wire
+from podusv_cli.engine.simulate import marcher, why
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.process.workers import available_workers
 
@@ -130,7 +131,7 @@ class Common:
     def run(self, position: int, loop: ClosedLoop, advance: Callable[..., int]) -> BatchRun:
         """A run that is ready to start."""
         plan, grid = self.structure[0], self.grid
-        wires = _apart(wire(loop, plan, self.observer))
+        wires = _apart(wire(loop, plan, self.observer, grid))
         function = partial(advance, 0, grid.steps + 1, grid.step, wires, plan)
         return BatchRun(position, loop, wires, Work(function, wires.under_way, self.bell))
 

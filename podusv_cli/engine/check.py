@@ -17,8 +17,8 @@ from podusv_cli.core.component import called
 from podusv_cli.core.errors import LawError, in_a_line
 from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.core.signal import NAME, Signal
+from podusv_cli.engine.loop import ClosedLoop
 from podusv_cli.engine.march import Work
-from podusv_cli.engine.simulate import ClosedLoop
 
 PROVENANCE = "provenance"  # is a group in every log
 UNWRITTEN = -1.234567890123e-290  # no law writes just this

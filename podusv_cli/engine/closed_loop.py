@@ -1,8 +1,9 @@
 """The closed loop as kernels: right-hand side, RK4 step, and the march along the time grid.
 
-State s: the vessel's (x, y, psi, u, v, r), then the actuator's states, then the law's memory.
-Row: target, distance to it, law's signals, demand, tau, b, actuator's signals; offsets are in
-`Plan`.
+State s: the vessel's (x, y, psi, u, v, r), the actuator's states, the estimator's, the law's
+memory.
+Row: target, distance to it, law's signals, demand, tau, b and the disturbance's signals,
+actuator's signals, measured values; offsets are in `Plan`.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from podusv_cli.engine.layout import (
     Wires,
     shifted,
 )
-from podusv_cli.engine.sampled import sample_and_hold
+from podusv_cli.engine.sampled import perceive, sample_and_hold
 from podusv_cli.vessels.plant import plant
 from podusv_cli.vessels.vessel import COEFFICIENTS
 
@@ -40,19 +41,21 @@ named_wires, named_plan = unpacker(Wires._fields), unpacker(Plan._fields)
 def rates(
     t: float, s: Vector, ds: Vector,
     path: Function, disturbance: Function, law: Function, actuator: Function, after: Function,
-    c: Wires, n: Plan, again: bool,
+    follow: Function, c: Wires, n: Plan, again: bool, loaded: bool,
 ) -> None:  # fmt: skip
     """Right-hand side of the closed loop at time t; leaves all signals in the row.
 
     `again`: the evaluation before was at this very t, so what depends on time alone is in the row.
+    `loaded`: the disturbance at this t and s is in the row.
     """
     row = c.row
     demand, tau, b = tail(row, n.demand), tail(row, n.tau), tail(row, n.b)
     memory, memory_rate = tail(s, n.memory), tail(ds, n.memory)
+    given = tail(s, n.estimate)  # the state that the law is given
     p, table, work = c.law, c.law_table, c.work
     if not again:
         path(t, c.path, c.path_table, row)
-    if not (again and n.load_of_time == 1):
+    if not (loaded or (again and n.load_of_time == 1)):
         disturbance(t, s, c.disturbance, c.disturbance_table, b)
     if n.hold_every > 0 and n.update_first > 0:
         for i in range(n.states - n.memory):
@@ -64,13 +67,17 @@ def rates(
             tail(held, HELD_DEMAND), memory_rate, tail(held, HELD_SIGNALS), work,
         )  # fmt: skip
     else:
-        law(t, s, memory, row, p, table, demand, memory_rate, tail(row, n.signals), work)
+        law(t, given, memory, row, p, table, demand, memory_rate, tail(row, n.signals), work)
     actuator(
         t, s, tail(s, 6), demand, c.actuator, c.actuator_table,
         tau, tail(ds, 6), tail(row, n.flags),
     )  # fmt: skip
     if n.wants_loads > 0 and not (n.hold_every > 0 and n.update_first > 0):
         after(t, memory, demand, tau, p, table, memory_rate)
+    if n.measured > 0:
+        follow(
+            t, c.sensed, tau, given, c.estimator, c.estimator_table, tail(ds, n.estimate)
+        )  # fmt: skip
     plant(s, tau, b, coefficients(c.vessel), ds)
 
 
@@ -85,7 +92,7 @@ def measure(s: Vector, row: Vector) -> None:
 def step(
     t: float, h: float,
     path: Function, disturbance: Function, law: Function, actuator: Function, after: Function,
-    c: Wires, n: Plan,
+    follow: Function, c: Wires, n: Plan,
 ) -> None:  # fmt: skip
     """Classical RK4 from t to t + h; the first stage has been evaluated already."""
     s, count = c.s, n.states
@@ -93,11 +100,11 @@ def step(
     k2, k3, k4 = tail(k1, count), tail(k1, 2 * count), tail(k1, 3 * count)
     y = tail(k1, 4 * count)
     shifted(count, s, 0.5 * h, k1, y)
-    rates(t + 0.5 * h, y, k2, path, disturbance, law, actuator, after, c, n, False)
+    rates(t + 0.5 * h, y, k2, path, disturbance, law, actuator, after, follow, c, n, False, False)
     shifted(count, s, 0.5 * h, k2, y)
-    rates(t + 0.5 * h, y, k3, path, disturbance, law, actuator, after, c, n, True)
+    rates(t + 0.5 * h, y, k3, path, disturbance, law, actuator, after, follow, c, n, True, False)
     shifted(count, s, h, k3, y)
-    rates(t + h, y, k4, path, disturbance, law, actuator, after, c, n, False)
+    rates(t + h, y, k4, path, disturbance, law, actuator, after, follow, c, n, False, False)
     for i in range(count):
         s[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
 
@@ -126,15 +133,21 @@ def write_row(k: int, t: float, c: Wires, n: Plan) -> None:
 @kernel
 def instant(
     k: int, first: int, h: float, path: Function, disturbance: Function, law: Function,
-    sample: Function, actuator: Function, after: Function, observe: Function, c: Wires, n: Plan,
+    sample: Function, actuator: Function, after: Function, measurement: Function,
+    correct: Function, follow: Function, observe: Function, c: Wires, n: Plan,
 ) -> bool:  # fmt: skip
-    """Sample, evaluate, observe and log instant k; whether all its numbers are finite."""
+    """Measure, sample, evaluate, observe and log instant k; whether all its numbers are finite."""
     t = k * h
     c.under_way[0] = k
     again = k > first and t == (k - 1) * h + h  # where the last stage of the step before was
+    if n.measured > 0:
+        perceive(k, t, disturbance, measurement, correct, c, n)
     if n.sample_every > 0 or n.hold_every > 0:
         sample_and_hold(k, t, h, path, law, sample, after, c, n)
-    rates(t, c.s, c.stages, path, disturbance, law, actuator, after, c, n, again)
+    loaded = n.measured > 0
+    rates(
+        t, c.s, c.stages, path, disturbance, law, actuator, after, follow, c, n, again, loaded
+    )  # fmt: skip
     measure(c.s, c.row)
     if not (finite(n.states, c.s) and finite(n.columns, c.row)):
         return False
@@ -148,7 +161,8 @@ def instant(
 @kernel
 def advance(
     path: Function, disturbance: Function, law: Function, sample: Function, actuator: Function,
-    after: Function, observe: Function, first: int, last: int, h: float, wires: Any, plan: Any,
+    after: Function, measurement: Function, correct: Function, follow: Function, observe: Function,
+    first: int, last: int, h: float, wires: Any, plan: Any,
 ) -> int:  # fmt: skip
     """March over the instants first .. last - 1.
 
@@ -158,29 +172,34 @@ def advance(
     for k in range(first, last):
         if c.under_way[STOP] != 0.0:
             return k
-        if not instant(k, first, h, path, disturbance, law, sample, actuator, after, observe, c, n):
+        if not instant(
+            k, first, h, path, disturbance, law, sample, actuator, after, measurement, correct,
+            follow, observe, c, n,
+        ):  # fmt: skip
             return k
         if k < n.steps:
-            step(k * h, h, path, disturbance, law, actuator, after, c, n)
+            step(k * h, h, path, disturbance, law, actuator, after, follow, c, n)
     return last
 
 
 def advance_plainly(
     path: Function, disturbance: Function, law: Function, sample: Function, actuator: Function,
-    after: Function, observe: Function, first: int, last: int, h: float, c: Wires, n: Plan,
+    after: Function, measurement: Function, correct: Function, follow: Function, observe: Function,
+    first: int, last: int, h: float, c: Wires, n: Plan,
 ) -> int:  # fmt: skip
     """`advance` as plain Python, whose `math` raises where machine code gives no number."""
     for k in range(first, last):
         try:
             if c.under_way[STOP] != 0.0 or not instant(
-                k, first, h, path, disturbance, law, sample, actuator, after, observe, c, n
-            ):
+                k, first, h, path, disturbance, law, sample, actuator, after, measurement, correct,
+                follow, observe, c, n,
+            ):  # fmt: skip
                 return k
         except (ArithmeticError, ValueError):
             return k
         try:
             if k < n.steps:
-                step(k * h, h, path, disturbance, law, actuator, after, c, n)
+                step(k * h, h, path, disturbance, law, actuator, after, follow, c, n)
         except (ArithmeticError, ValueError):
             c.s[:] = math.nan
     return last
@@ -207,14 +226,17 @@ def evaluate_all(
 @kernel
 def rates_along(
     path: Function, disturbance: Function, law: Function, actuator: Function, after: Function,
-    count: int, logged: Vector, out: Vector, wires: Any, plan: Any,
+    follow: Function, count: int, logged: Vector, out: Vector, wires: Any, plan: Any,
 ) -> None:  # fmt: skip
     """For each of `count` logged rows of t, s: the rates of s, then the row, into `out`."""
     c, n = named_wires(wires), named_plan(plan)
     for i in range(count):
         here = tail(logged, i * (1 + n.states))
         there = tail(out, i * (n.states + n.columns))
-        rates(here[0], tail(here, 1), there, path, disturbance, law, actuator, after, c, n, False)
+        rates(
+            here[0], tail(here, 1), there, path, disturbance, law, actuator, after, follow, c, n,
+            False, False,
+        )  # fmt: skip
         measure(tail(here, 1), c.row)
         for j in range(n.columns):
             there[n.states + j] = c.row[j]

@@ -8,22 +8,26 @@ import numpy as np
 
 from podusv_cli.core.kernel import Vector
 from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.simulate import ClosedLoop, Observer, marcher, wire
+from podusv_cli.engine.loop import ClosedLoop, Observer, wire
+from podusv_cli.engine.simulate import marcher
 
 Slope = Callable[[float, Vector], Vector]
 
 
-def continuous(loop: ClosedLoop, *, compiled: bool = True) -> tuple[Slope, Vector]:
-    """f(t, s) and s(0); s is the vessel's state, the actuator's, the law's memory.
+def continuous(loop: ClosedLoop, duration: float, *, compiled: bool = True) -> tuple[Slope, Vector]:
+    """f(t, s) for t up to `duration` [s], and s(0).
 
-    f raises ArithmeticError where a number is not finite. Raises ValueError for a law that takes
-    samples, which is no ordinary differential equation.
+    s is the vessel's state, the actuator's, the law's memory. f raises ArithmeticError where a
+    number is not finite. Raises ValueError for a law that takes samples and for measurements,
+    which are no ordinary differential equations.
     """
+    if loop.measured:
+        raise ValueError("a law that works with measurements has no continuous right-hand side")
     if loop.controller.sample_period() > 0:
         raise ValueError("a law that takes samples has no continuous right-hand side")
     grid = TimeGrid(1.0, 1, log_every=2)
     plan = loop.layout(grid)
-    wires = wire(loop, plan, Observer())
+    wires = wire(loop, plan, Observer(), TimeGrid(duration, 1))
     march = marcher(loop, Observer(), compiled)
 
     def slope(t: float, s: Vector) -> Vector:

@@ -14,17 +14,20 @@ class Plan(NamedTuple):
     """Sizes, offsets and periods of a closed loop, all whole numbers."""
 
     states: int  # length of s
+    estimate: int  # offset in s of the state that the law is given; 0: the true state
     memory: int  # offset of the law's memory in s
     signals: int  # offsets in the row
     demand: int
     tau: int
     b: int
     flags: int
+    sensed: int
     columns: int  # length of the row
     steps: int
     log_every: int
     hold_every: int  # 0: the law acts continuously
     sample_every: int  # 0: the law takes no samples
+    measured: int  # 1: the law is given an estimate from measurements
     update_first: int  # 1: a held law's memory takes a sample before the demand is formed
     load_of_time: int  # 1: the disturbance depends on time alone
     wants_loads: int  # 1: the law is told which loads really act
@@ -46,11 +49,16 @@ class Wires(NamedTuple):
     law_table: Vector
     actuator: Vector
     actuator_table: Vector
+    measurement: Vector
+    measurement_table: Vector
+    estimator: Vector
+    estimator_table: Vector
     vessel: Vector
     observer: Vector
     s: Vector
     row: Vector
     stages: Vector  # four rates and one intermediate state
+    sensed: Vector  # what was measured, see `sensors.base`
     held: Vector  # t, x, target of the last sample; demand and signals that nobody reads
     work: Vector
     seen: Vector  # the observer's

@@ -13,7 +13,7 @@ from podusv_cli.core.recording import Recording
 from podusv_cli.engine import closed_loop, signatures
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.layout import Plan, Wires
-from podusv_cli.engine.simulate import STATE, ClosedLoop, Observer, by_name, entries, names, wire
+from podusv_cli.engine.loop import STATE, ClosedLoop, Observer, by_name, entries, names, wire
 
 
 def logged_rows(loop: ClosedLoop, recording: Recording, most: int) -> Vector:
@@ -75,7 +75,7 @@ def rates_replay(
     plan = loop.layout(grid)._replace(hold_every=0)
     labels, split, about = names(loop), 1 + plan.states, loop.about()
     state = list(dict.fromkeys(labels[:split]))
-    wires = wire(loop, plan, Observer())
+    wires = wire(loop, plan, Observer(), grid)
     run = _rates_runner(loop, compiled)
 
     def replayed(recording: Recording) -> Replayed:

@@ -1,4 +1,4 @@
-"""Sampled control: what happens at the instants of samples only."""
+"""What happens at instants only: measurements, and the samples of sampled control."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from podusv_cli.engine.layout import (
     Wires,
     shifted,
 )
+from podusv_cli.sensors.base import KNOWN
 
 
 @kernel
@@ -22,7 +23,7 @@ def held_rates(
     """Rates of the law's memory with the sample at t held, and the loads of the period before."""
     row, held = c.row, c.held
     law(
-        t, c.s, memory, row, c.law, c.law_table, tail(held, HELD_DEMAND), rate,
+        t, tail(c.s, n.estimate), memory, row, c.law, c.law_table, tail(held, HELD_DEMAND), rate,
         tail(held, HELD_SIGNALS), c.work,
     )  # fmt: skip
     if n.wants_loads > 0:
@@ -54,20 +55,40 @@ def sample_and_hold(
     c: Wires, n: Plan,
 ) -> None:  # fmt: skip
     """What happens at instants only: the law's own samples, and the hold of sampled control."""
-    s, row, held = c.s, c.row, c.held
-    memory = tail(s, n.memory)
+    given, row, held = tail(c.s, n.estimate), c.row, c.held
+    memory = tail(c.s, n.memory)
     p, table = c.law, c.law_table
     path(t, c.path, c.path_table, row)
     if n.sample_every > 0 and k % n.sample_every == 0:
-        sample(t, s, memory, row, p, table)
+        sample(t, given, memory, row, p, table)
     if n.hold_every > 0 and k % n.hold_every == 0:
         if n.update_first > 0 and k > 0:
             update(t, h, law, after, c, n)
         held[0] = t
         for i in range(6):
-            held[HELD_X + i] = s[i]
+            held[HELD_X + i] = given[i]
             held[HELD_TARGET + i] = row[i]
         law(
-            t, s, memory, row, p, table, tail(row, n.demand), tail(c.stages, n.memory),
+            t, given, memory, row, p, table, tail(row, n.demand), tail(c.stages, n.memory),
             tail(row, n.signals), c.work,
         )  # fmt: skip
+
+
+@kernel
+def perceive(
+    k: int, t: float, disturbance: Function, measurement: Function, correct: Function,
+    c: Wires, n: Plan,
+) -> None:  # fmt: skip
+    """Measure at instant k, and take what is delivered into the estimate.
+
+    Leaves the disturbance at t in the row, and the measured values behind the other signals.
+    """
+    b, sensed, measured = tail(c.row, n.b), c.sensed, tail(c.row, n.sensed)
+    disturbance(t, c.s, c.disturbance, c.disturbance_table, b)
+    measurement(t, float(k), c.s, b, c.measurement, c.measurement_table, sensed)
+    correct(t, sensed, tail(c.s, n.estimate), c.estimator, c.estimator_table)
+    logged = 0
+    for i in range(6):
+        if sensed[KNOWN + i] != 0.0:
+            measured[logged] = sensed[i]
+            logged += 1

@@ -17,9 +17,10 @@ import numpy as np
 from podusv_cli.core.kernel import Vector, unpacker
 
 NUMBER, WHOLE = c_double, c_int64
+NUMBERS = ("t", "instant", "weight")
 VECTOR = POINTER(NUMBER)
-# The arguments of every part, in the order in which the loop takes the parts. The time t and an
-# instant's weight in an integral [s] are numbers, all others vectors.
+# The arguments of every part, in the order in which the loop takes the parts. The time t, an
+# instant's position and its weight in an integral [s] are numbers, all others vectors.
 SIGNATURES = {
     "path": "t p table target",
     "disturbance": "t x p table b",
@@ -27,13 +28,16 @@ SIGNATURES = {
     "sample": "t x memory target p table",
     "actuator": "t x state demand p table tau rate signals",
     "after_saturation": "t memory demand tau p table rate",
+    "measurement": "t instant x b p table seen",
+    "correct": "t seen state p table",
+    "follow": "t seen tau state p table rate",
     "observer": "t weight s row p seen",
 }
 PROTOTYPES: dict[str, Any] = {
-    part: CFUNCTYPE(None, *(NUMBER if a in ("t", "weight") else VECTOR for a in arguments.split()))
+    part: CFUNCTYPE(None, *(NUMBER if a in NUMBERS else VECTOR for a in arguments.split()))
     for part, arguments in SIGNATURES.items()
 }
-RIGHT_HAND_SIDE = ("path", "disturbance", "law", "actuator", "after_saturation")
+RIGHT_HAND_SIDE = ("path", "disturbance", "law", "actuator", "after_saturation", "follow")
 ADVANCE = CFUNCTYPE(
     WHOLE, *PROTOTYPES.values(), WHOLE, WHOLE, NUMBER, POINTER(VECTOR), POINTER(WHOLE)
 )

@@ -10,7 +10,7 @@ import numpy as np
 
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.engine.layout import Plan
-from podusv_cli.engine.simulate import ClosedLoop
+from podusv_cli.engine.loop import ClosedLoop
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ import numpy as np
 
 from podusv_cli.core.kernel import bundle, scratch, transplanted
 from podusv_cli.core.recording import Recording
+from podusv_cli.engine.loop import STATE, ClosedLoop
 from podusv_cli.engine.replay import logged_rows
-from podusv_cli.engine.simulate import STATE, ClosedLoop
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.paths.base import TARGET
 

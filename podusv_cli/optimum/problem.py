@@ -10,7 +10,7 @@ import numpy as np
 
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector, bundle
-from podusv_cli.engine.simulate import ClosedLoop
+from podusv_cli.engine.loop import ClosedLoop
 from podusv_cli.scenario.model import Scenario
 
 Minimised = Literal["iae", "ise"]
@@ -43,12 +43,12 @@ class Problem:
 
     def loads(self, times: Sequence[float]) -> Vector:
         """The disturbance (b_u, b_v, b_r) at each of these times, a row each."""
-        disturbance = self.loop.disturbance
-        k, table = bundle(disturbance.constants()), disturbance.table()
-        rows = np.zeros((len(times), 3))
+        sea, vessel = self.loop.disturbance, self.loop.vessel
+        k, table = bundle(sea.constants_with(vessel)), sea.table_for(vessel, self.duration)
+        rows, evaluate = np.zeros((len(times), 3 + len(sea.signals))), sea.kernel_with(vessel)
         for t, row in zip(times, rows, strict=True):
-            disturbance.evaluate(t, np.zeros(6), k, table, row)
-        return rows
+            evaluate(t, np.zeros(6), k, table, row)
+        return rows[:, :3]
 
     def places(self, times: Sequence[float]) -> Vector:
         """Where the target is at each of these times, a row each."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from functools import cache
 from types import GenericAlias
-from typing import TYPE_CHECKING, Any, ClassVar, SupportsIndex
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, SupportsIndex, TypeVar
 
-from pydantic import create_model
+from pydantic import Field, create_model
 
 from podusv_cli.actuators.base import Actuator
 from podusv_cli.controllers.base import Controller
@@ -17,8 +17,11 @@ from podusv_cli.core.plugins import Plugins, from_file, installed
 from podusv_cli.core.registry import any_of
 from podusv_cli.core.signal import Signal
 from podusv_cli.disturbances.base import Disturbance
+from podusv_cli.disturbances.total import Total
 from podusv_cli.engine.grid import TimeGrid, whole_steps
-from podusv_cli.engine.simulate import ClosedLoop
+from podusv_cli.engine.loop import ClosedLoop
+from podusv_cli.estimators.base import Estimator
+from podusv_cli.estimators.none import NoEstimator
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import Metrics, metrics_with, observer
 from podusv_cli.metrics.windows import NAMED
@@ -39,6 +42,8 @@ from podusv_cli.scenario.sections import (
 )
 from podusv_cli.scenario.sweep import Sweep
 from podusv_cli.scenario.tune import Tune
+from podusv_cli.sensors.base import Measurement
+from podusv_cli.sensors.exact import Exact
 from podusv_cli.theory import monitor
 from podusv_cli.vessels.vessel import Vessel
 
@@ -46,14 +51,20 @@ if TYPE_CHECKING:
     AnyActuator = Actuator
     AnyController = Controller
     AnyDisturbance = Disturbance
+    AnyEstimator = Estimator
+    AnyMeasurement = Measurement
     AnyPath = Path
 else:
     AnyActuator = any_of("podusv_cli.actuators", Actuator)
     AnyController = any_of("podusv_cli.controllers", Controller)
     AnyDisturbance = any_of("podusv_cli.disturbances", Disturbance)
+    AnyEstimator = any_of("podusv_cli.estimators", Estimator)
+    AnyMeasurement = any_of("podusv_cli.sensors", Measurement)
     AnyPath = any_of("podusv_cli.paths", Path)
 
 
+Part = TypeVar("Part")
+Several = Annotated[tuple[Part, ...], Field(min_length=1, strict=False)]
 Conflicts = Iterator[tuple[str, str]]  # key and message
 MOST_INSTANTS = 2**53  # that are distinct numbers
 
@@ -73,8 +84,14 @@ class Scenario(Component):
     )
     start: Start = value(Start(), "", "state at t = 0")
     path: AnyPath = value(..., "", "how the target moves")
-    disturbance: AnyDisturbance = value(..., "", "what the sea does")
+    disturbance: AnyDisturbance | Several[AnyDisturbance] = value(
+        ..., "", "what the sea does; those of a list add up"
+    )
     actuator: AnyActuator = value(..., "", "from the law's demand to the load on the hull")
+    measurement: AnyMeasurement = value(Exact(), "", "what is measured of the vessel's state")
+    estimator: AnyEstimator = value(
+        NoEstimator(), "", "from measurements to the state that the law works with"
+    )
     controller: AnyController = value(..., "", "the law")
     controllers: dict[str, AnyController] = value(
         {},
@@ -141,15 +158,21 @@ class Scenario(Component):
 
     def can_run(self) -> bool:
         """Whether none of its parts is only values of a finished run."""
-        parts = (self.path, self.disturbance, self.actuator, self.controller)
+        loop = self.closed_loop()
+        parts = (
+            loop.path, loop.disturbance, loop.actuator, loop.measurement, loop.estimator,
+            loop.controller,
+        )  # fmt: skip
         return not any(part.is_recorded for part in parts)
 
     def closed_loop(self) -> ClosedLoop:
-        """The closed loop of vessel, path, disturbance, actuator and controller."""
-        start = self.start
+        """The closed loop of vessel, path, disturbance, actuator, measurement and law."""
+        start, sea = self.start, self.disturbance
         return ClosedLoop(
-            vessel=self.vessel, nominal=self.nominal, path=self.path, disturbance=self.disturbance,
+            vessel=self.vessel, nominal=self.nominal, path=self.path,
+            disturbance=Total(parts=sea) if isinstance(sea, tuple) else sea,
             actuator=self.actuator, controller=self.controller,
+            measurement=self.measurement, estimator=self.estimator,
             start=(start.x, start.y, start.psi, start.u, start.v, start.r),
         )  # fmt: skip
 
@@ -188,10 +211,20 @@ class Scenario(Component):
 
     def _defaults(self) -> Conflicts:
         """Parts whose classes have a default that they do not allow themselves."""
-        others = {"path": self.path, "disturbance": self.disturbance, "actuator": self.actuator}
+        others = {
+            "path": self.path, "actuator": self.actuator, "measurement": self.measurement,
+            "estimator": self.estimator, **self.disturbances(),
+        }  # fmt: skip
         for key, part in {**others, **self.laws()}.items():
             if told := wrong_default(part):
                 yield key, f"{called(part)}: {told}"
+
+    def disturbances(self) -> dict[str, Disturbance]:
+        """The disturbance, or each of several, by its key."""
+        sea = self.disturbance
+        if not isinstance(sea, tuple):
+            return {"disturbance": sea}
+        return {f"disturbance.{i}": part for i, part in enumerate(sea)}
 
     def _unanswered(self) -> Conflicts:
         """Laws that fail when they are asked what they declare: their own fault, whatever it is."""
@@ -267,9 +300,12 @@ def scenario_class(plugins: Plugins) -> type[Scenario]:
     if not plugins:
         return Scenario
     law: Any = any_of("podusv_cli.controllers", Controller, plugins)
+    sea: Any = any_of("podusv_cli.disturbances", Disturbance, plugins)
     annotations: dict[str, Any] = {
         "path": any_of("podusv_cli.paths", Path, plugins),
-        "disturbance": any_of("podusv_cli.disturbances", Disturbance, plugins),
+        "disturbance": sea | Several[sea],
+        "measurement": any_of("podusv_cli.sensors", Measurement, plugins),
+        "estimator": any_of("podusv_cli.estimators", Estimator, plugins),
         "actuator": any_of("podusv_cli.actuators", Actuator, plugins),
         "controller": law,
         "controllers": GenericAlias(dict, (str, law)),

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from podusv_cli.core.component import Component
-from podusv_cli.engine.simulate import Observer, entries
+from podusv_cli.engine.loop import Observer, entries
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.scenario.expressions import ExpressionError
 from podusv_cli.scenario.load import values

@@ -1,16 +1,13 @@
 """Draws: the numbers of a study's runs, and a scenario with one draw's numbers in it.
 
-Every quantity has a stream of its own, and draw i of it is the first word of block i. So a draw
-depends on the study's seed, the stream, the quantity's name and i, and on nothing else: not on
+Every quantity has a stream of its own (`core.random_words`). So a draw depends on the study's seed, the stream, the quantity's name and i, and on nothing else: not on
 other quantities, on how many draws there are, or on who asks for which of them.
 """
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
 from functools import lru_cache, reduce
-from hashlib import sha256
 from typing import Any, NamedTuple
 from warnings import catch_warnings
 
@@ -18,19 +15,18 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import ValidationError
 
+from podusv_cli.core import random_words
 from podusv_cli.core.component import Component
 from podusv_cli.core.errors import PodusvError
 from podusv_cli.core.escaping import visible
 from podusv_cli.core.kernel import Vector
+from podusv_cli.core.random_words import Words, in_unit_interval
 from podusv_cli.scenario.keys import Key, keys_of
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sweep import Quantity, Sweep
 from podusv_cli.scenario.yaml_tree import Route, dotted, route
 
 Draw = Mapping[str, float | int | str]  # by quantity
-Words = npt.NDArray[np.uint64]
-BLOCK = 4  # words of Philox that share a counter
-BITS = 52  # of a word: more, and u + 1/2 would round to 1
 SEED_BITS = 53  # so that a seed is exact as a float, too
 SOBOL_BITS = 32  # of a point, the most that scipy goes forward by; the shift has more
 SWEEP = "sweep"  # the stream of a sweep's own draws
@@ -55,19 +51,12 @@ class DrawError(PodusvError):
 
 def words(seed: int, quantity: str, first: int, count: int, stream: str = SWEEP) -> Words:
     """The random words of draws first, first + 1, ... of a quantity."""
-    text = json.dumps([seed, stream, quantity])
-    key = int.from_bytes(sha256(text.encode()).digest()[:16], "little")
-    generator = np.random.Philox(key=key).advance(first)
-    return np.asarray(generator.random_raw(BLOCK * count)[::BLOCK])
+    return random_words.words((seed, stream, quantity), first, count)
 
 
 def uniforms(seed: int, quantity: str, first: int, count: int, stream: str = SWEEP) -> Vector:
     """Draws of a quantity, uniform in (0, 1) without the ends."""
-    return _open(words(seed, quantity, first, count, stream))
-
-
-def _open(drawn: Words) -> Vector:
-    return np.asarray(((drawn >> np.uint64(64 - BITS)) + 0.5) * 2.0**-BITS, float)
+    return in_unit_interval(words(seed, quantity, first, count, stream))
 
 
 def seeds(seed: int, quantity: str, first: int, count: int, stream: str = SWEEP) -> Words:
@@ -111,7 +100,7 @@ def _sobol(sweep: Sweep, first: int, count: int, stream: str) -> dict[str, Vecto
         points = (sequence.random(count) * 2.0**SOBOL_BITS).astype(np.uint64)
     shifts = [words(sweep.seed, name, 0, 1, f"{stream} shift") for name in sweep.vary]
     return {
-        name: _open((points[:, i] << np.uint64(64 - SOBOL_BITS)) ^ shift)
+        name: in_unit_interval((points[:, i] << np.uint64(64 - SOBOL_BITS)) ^ shift)
         for i, (name, shift) in enumerate(zip(sweep.vary, shifts, strict=True))
     }
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from podusv_cli.core.errors import UsageError
 from podusv_cli.engine import closed_loop
+from podusv_cli.engine.loop import entries
 from podusv_cli.engine.object_cache import ingredients
-from podusv_cli.engine.simulate import entries
 from podusv_cli.metrics.table import Metrics
 from podusv_cli.scenario.load import Loaded, values
 from podusv_cli.scenario.model import Scenario

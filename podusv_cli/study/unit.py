@@ -12,7 +12,8 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.engine.batch import Lazily, simulate_many
 from podusv_cli.engine.check import check_law
 from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.simulate import ClosedLoop, marcher
+from podusv_cli.engine.loop import ClosedLoop
+from podusv_cli.engine.simulate import marcher
 from podusv_cli.study.draws import drawn, draws
 from podusv_cli.study.plan import Plan, watching
 

@@ -15,8 +15,8 @@ from podusv_cli.controllers.network import Network
 from podusv_cli.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
+from podusv_cli.engine.loop import ClosedLoop
 from podusv_cli.engine.replay import Replayed
-from podusv_cli.engine.simulate import ClosedLoop
 
 MOST_ROWS = 2000  # of a run that the fit uses, evenly spread
 MOST_NUMBERS = 2_000_000  # rows times nodes of the fit

@@ -14,8 +14,8 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Allocate, Recording, blocks, largest
 from podusv_cli.core.signal import Signal, by_name
 from podusv_cli.engine.grid import TimeGrid
+from podusv_cli.engine.loop import ClosedLoop
 from podusv_cli.engine.replay import Replayed, rates_replay
-from podusv_cli.engine.simulate import ClosedLoop
 from podusv_cli.theory import bounds, ideal_weights
 from podusv_cli.theory.lyapunov import TERMS, V_DOT, V, lyapunov, norms, remainders
 from podusv_cli.theory.rates import error_rates

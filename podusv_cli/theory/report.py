@@ -10,7 +10,7 @@ import numpy as np
 
 from podusv_cli.core.recording import largest
 from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.simulate import ClosedLoop
+from podusv_cli.engine.loop import ClosedLoop
 from podusv_cli.theory.bounds import Bound, Condition
 from podusv_cli.theory.monitor import Monitored, Window
 

@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from podusv_cli.controllers.base import Controller
-from podusv_cli.engine.simulate import Observer, entries
+from podusv_cli.engine.loop import Observer, entries
 from podusv_cli.scenario.keys import limits
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import did_you_mean

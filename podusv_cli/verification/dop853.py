@@ -60,9 +60,10 @@ def integrate(scenario: Scenario, progress: Progress | None = None) -> Dop853Res
     """Integrate a scenario for which `why_skipped` has no reason; the IAE is one more state."""
     from scipy.integrate import DOP853  # slow to import
 
-    slope, start = continuous(scenario.closed_loop(), compiled=scenario.simulation.compiled)
-    f, s, evaluations, shown = _with_iae(scenario, slope), np.append(start, 0.0), 0, 0.0
     duration = scenario.time_grid().steps * scenario.simulation.step
+    compiled = scenario.simulation.compiled
+    slope, start = continuous(scenario.closed_loop(), duration, compiled=compiled)
+    f, s, evaluations, shown = _with_iae(scenario, slope), np.append(start, 0.0), 0, 0.0
     for begin, end in _pieces(scenario, duration):
         solver = DOP853(f, begin, s, end, rtol=TOLERANCE, atol=TOLERANCE)
         while solver.status == "running":

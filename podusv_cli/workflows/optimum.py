@@ -14,7 +14,8 @@ from podusv_cli.controllers.velocity_vector import VelocityVector
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.recording import Recording
 from podusv_cli.engine.check import check_law
-from podusv_cli.engine.simulate import STATE, ClosedLoop, simulate
+from podusv_cli.engine.loop import STATE, ClosedLoop
+from podusv_cli.engine.simulate import simulate
 from podusv_cli.findings.finding import preflight, unknown_codes
 from podusv_cli.optimum import collocation
 from podusv_cli.optimum.collocation import Stage

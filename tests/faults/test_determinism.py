@@ -25,7 +25,8 @@ from podusv_cli.comparison.run_difference import CLOCKED
 from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
 from podusv_cli.controllers.backstepping import Backstepping
 from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.simulate import ClosedLoop, simulate
+from podusv_cli.engine.loop import ClosedLoop
+from podusv_cli.engine.simulate import simulate
 from podusv_cli.metrics.table import observer
 from podusv_cli.paths.line_circle import LineCircle
 from podusv_cli.process.workers import run_all

@@ -18,7 +18,8 @@ from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.registry import kinds
 from podusv_cli.core.signal import Signal
 from podusv_cli.engine.check import check_law
-from podusv_cli.engine.simulate import ClosedLoop, Observer, marcher
+from podusv_cli.engine.loop import ClosedLoop, Observer
+from podusv_cli.engine.simulate import marcher
 from podusv_cli.vessels.vessel import Vessel
 
 

@@ -1,0 +1,43 @@
+"""Random numbers that are functions of names and a position, and of nothing else.
+
+Number i of a stream is the first word of block i of a counter-based generator (Philox), whose key
+is a digest of the stream's names. So it does not depend on who asks for it, in which order, or for
+how many.
+"""
+
+from __future__ import annotations
+
+import json
+from hashlib import sha256
+
+import numpy as np
+import numpy.typing as npt
+
+from podusv_cli.core.kernel import Vector
+from podusv_cli.core.portable import standard_normal
+
+Words = npt.NDArray[np.uint64]
+BLOCK = 4  # words of Philox that share a counter
+BITS = 52  # of a word: more, and u + 1/2 would round to 1
+
+
+def words(stream: tuple[int | str, ...], first: int, count: int) -> Words:
+    """The random words number first, first + 1, ... of the stream with these names."""
+    key = int.from_bytes(sha256(json.dumps(stream).encode()).digest()[:16], "little")
+    generator = np.random.Philox(key=key).advance(first)
+    return np.asarray(generator.random_raw(BLOCK * count)[::BLOCK])
+
+
+def in_unit_interval(drawn: Words) -> Vector:
+    """A number in (0, 1), without the ends, for each word."""
+    return np.asarray(((drawn >> np.uint64(64 - BITS)) + 0.5) * 2.0**-BITS, float)
+
+
+def uniforms(stream: tuple[int | str, ...], first: int, count: int) -> Vector:
+    """Numbers first, first + 1, ... of a stream, uniform in (0, 1) without the ends."""
+    return in_unit_interval(words(stream, first, count))
+
+
+def normals(stream: tuple[int | str, ...], first: int, count: int) -> Vector:
+    """Numbers first, first + 1, ... of a stream, standard normal; the same on every machine."""
+    return standard_normal(uniforms(stream, first, count))

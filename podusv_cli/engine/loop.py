@@ -1,0 +1,248 @@
+"""The closed loop as values: its parts, the layout of its vectors, and their contents."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from podusv_cli.actuators.base import Actuator
+from podusv_cli.controllers.base import Controller
+from podusv_cli.core import signal
+from podusv_cli.core.component import called
+from podusv_cli.core.kernel import Vector, kernel
+from podusv_cli.core.recording import Allocate
+from podusv_cli.core.signal import LOOP, Signal
+from podusv_cli.disturbances.base import WAVE_MOTION, Disturbance
+from podusv_cli.engine.grid import TimeGrid, whole_steps
+from podusv_cli.engine.layout import HELD_SIGNALS, Plan, Wires
+from podusv_cli.estimators.base import Estimator
+from podusv_cli.estimators.none import NoEstimator
+from podusv_cli.paths.base import TARGET, Path
+from podusv_cli.sensors.base import Measurement
+from podusv_cli.sensors.exact import Exact
+from podusv_cli.vessels.vessel import Vessel
+
+STATE = tuple(state.name for state in signal.STATE)
+DEMAND = ("tau_u_cmd", "tau_r_cmd")
+LOADS = ("tau_u", "tau_v", "tau_r", "b_u", "b_v", "b_r")
+
+
+@kernel
+def _see_nothing(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
+    pass
+
+
+@kernel
+def _no_sample(t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector) -> None:
+    pass
+
+
+@kernel
+def _ignore_loads(
+    t: float, memory: Vector, demand: Vector, tau: Vector, k: Any, table: Vector, rate: Vector
+) -> None:
+    pass
+
+
+@kernel
+def _no_measurement(
+    t: float, instant: float, x: Vector, b: Vector, k: Any, table: Vector, seen: Vector
+) -> None:
+    pass
+
+
+@kernel
+def _no_correction(t: float, seen: Vector, state: Vector, k: Any, table: Vector) -> None:
+    pass
+
+
+@kernel
+def _no_estimate(
+    t: float, seen: Vector, tau: Vector, state: Vector, k: Any, table: Vector, rate: Vector
+) -> None:
+    pass
+
+
+@dataclass(frozen=True)
+class Observer:
+    """A kernel `watch(t, weight, s, row, k, seen)` that sees every instant, and its constants."""
+
+    watch: Callable[..., None] = _see_nothing
+    constants: dict[str, float] = field(default_factory=lambda: {"nothing": 0.0})
+    size: int = 1
+
+
+@dataclass(frozen=True)
+class ClosedLoop:
+    """Everything that moves, as values; `nominal` is the vessel that the law is told about."""
+
+    vessel: Vessel
+    nominal: Vessel
+    path: Path
+    disturbance: Disturbance
+    actuator: Actuator
+    controller: Controller
+    start: tuple[float, float, float, float, float, float]
+    measurement: Measurement = field(default_factory=Exact)
+    estimator: Estimator = field(default_factory=NoEstimator)
+
+    @property
+    def measured(self) -> bool:
+        """Whether the law is given an estimate from measurements, and not the state itself."""
+        return not self.measurement.is_exact
+
+    def estimated(self) -> tuple[Signal, ...]:
+        """The estimator's states; none where the law is given the state itself."""
+        return self.estimator.states if self.measured else ()
+
+    def first_memory(self) -> Vector:
+        """The law's memory at t = 0."""
+        with np.errstate(all="ignore"):  # a start beyond all numbers is for the run to tell
+            return self.controller.start(np.array(self.start), self.first_target(), self.nominal)
+
+    def first_target(self) -> Vector:
+        """Where the target is at t = 0."""
+        return np.asarray(self.path.targets([0.0])[0])
+
+    def about(self) -> dict[str, Signal]:
+        """Every signal that the loop logs, by name. Raises LawError where two have one name."""
+        law, actuator = self.controller, self.actuator
+        own = (partial(called, actuator), (*actuator.states, *actuator.signals))
+        loop = (lambda: "the closed loop", LOOP)
+        others = (
+            (partial(called, self.disturbance), self.disturbance.signals),
+            (partial(called, self.measurement), self.measurement.signals),
+            (partial(called, self.estimator), self.estimated()),
+        )
+        return signal.by_name((loop, (partial(called, law), law.declared()), own, *others))
+
+    def layout(self, grid: TimeGrid) -> Plan:
+        """Sizes and offsets of the loop on this grid."""
+        law, actuator = self.controller, self.actuator
+        estimate = len(STATE) + len(actuator.states)
+        memory, load = estimate + len(self.estimated()), 3 + len(self.disturbance.signals)
+        sizes = [
+            len(TARGET) + 1, len(law.signals), len(DEMAND), 3, load, len(actuator.signals),
+            len(self.measurement.signals),
+        ]  # fmt: skip
+        signals, demand, tau, b, flags, sensed, columns = np.cumsum(sizes).tolist()
+        return Plan(
+            states=memory + sum(size for _, size in law.slots()),
+            estimate=estimate if self.measured else 0, memory=memory,
+            signals=signals, demand=demand, tau=tau, b=b, flags=flags, sensed=sensed,
+            columns=columns,
+            steps=grid.steps, log_every=grid.log_every, hold_every=grid.hold_every,
+            sample_every=_sample_steps(law.sample_period(), grid),
+            measured=int(self.measured), update_first=int(grid.update_first),
+            load_of_time=int(self.disturbance.of_time), wants_loads=int(law.wants_loads()),
+        )  # fmt: skip
+
+
+def _sample_steps(period: float, grid: TimeGrid) -> int:
+    count = whole_steps(period, grid.step)
+    if count is None or (period > 0 and count == 0):
+        raise ValueError(
+            f"the law samples every {period:g} s, no whole number of steps of {grid.step:g} s"
+        )
+    if grid.hold_every and count % grid.hold_every:
+        held = grid.hold_every * grid.step
+        raise ValueError(
+            f"the law samples every {period:g} s, no whole number of the {held:g} s for which "
+            "its measurement is held"
+        )
+    return count
+
+
+def entries(loop: ClosedLoop, observer: Observer) -> Iterator[tuple[str, Any, tuple[str, ...]]]:
+    """Name, kernel and constants' names of every part, in the order the loop takes them."""
+    law, path, disturbance, actuator = loop.controller, loop.path, loop.disturbance, loop.actuator
+    constants = tuple(law.constants_with(loop.nominal))
+    sample = law.sample if law.sample_period() > 0 else _no_sample
+    after_saturation = law.after_saturation if law.wants_loads() else _ignore_loads
+    yield "path", path.evaluate, tuple(path.constants())
+    loads = tuple(disturbance.constants_with(loop.vessel))
+    yield "disturbance", disturbance.kernel_with(loop.vessel), loads
+    yield "law", law.law, constants
+    yield "sample", sample, constants
+    yield "actuator", actuator.drive, tuple(actuator.constants())
+    yield "after_saturation", after_saturation, constants
+    yield from _seeing(loop)
+    yield "observer", observer.watch, tuple(observer.constants)
+
+
+def _seeing(loop: ClosedLoop) -> Iterator[tuple[str, Any, tuple[str, ...]]]:
+    """What `entries` has of measurement and estimator."""
+    measurement, estimator = loop.measurement, loop.estimator
+    sense = measurement.sense if loop.measured else _no_measurement
+    correct = estimator.correct if loop.measured else _no_correction
+    follow = estimator.follow if loop.measured else _no_estimate
+    yield "measurement", sense, tuple(measurement.constants_with(1.0, 0))
+    constants = tuple(estimator.constants_with(loop.nominal))
+    yield "correct", correct, constants
+    yield "follow", follow, constants
+
+
+def wire(
+    loop: ClosedLoop, plan: Plan, observer: Observer, grid: TimeGrid, rows: int = 1,
+    allocate: Allocate = np.empty,
+) -> Wires:  # fmt: skip
+    """The loop's vectors, ready for the march to begin, with room for this many logged rows."""
+
+    def numbers(constants: dict[str, float]) -> Vector:
+        return np.array(list(constants.values()) or [0.0])
+
+    law, path, disturbance, actuator = loop.controller, loop.path, loop.disturbance, loop.actuator
+    measurement, estimator = loop.measurement, loop.estimator
+    start, estimate = np.array(loop.start), np.zeros(0)
+    if loop.measured:
+        estimate = estimator.start(start, loop.nominal)
+    return Wires(
+        path=numbers(path.constants()), path_table=path.table(),
+        disturbance=numbers(disturbance.constants_with(loop.vessel)),
+        disturbance_table=disturbance.table_for(loop.vessel, grid.steps * grid.step),
+        law=numbers(law.constants_with(loop.nominal)), law_table=law.table(),
+        actuator=numbers(actuator.constants()), actuator_table=actuator.table(),
+        measurement=numbers(measurement.constants_with(grid.step, _wave_motion(disturbance))),
+        measurement_table=measurement.table_for(grid.step, grid.steps),
+        estimator=numbers(estimator.constants_with(loop.nominal)),
+        estimator_table=estimator.table(),
+        vessel=numbers(loop.vessel.constants()), observer=numbers(observer.constants),
+        s=np.concatenate([start, actuator.rest(), estimate, loop.first_memory()]),
+        row=np.zeros(plan.columns), stages=np.zeros(5 * plan.states),
+        sensed=measurement.first(start, grid.step),
+        held=np.zeros(HELD_SIGNALS + len(law.signals)),
+        work=np.zeros(law.workspace()), seen=np.zeros(observer.size), under_way=np.zeros(2),
+        log=allocate(rows * plan.width),
+    )  # fmt: skip
+
+
+def _wave_motion(disturbance: Disturbance) -> int:
+    """Where a disturbance writes the motion in waves that sensors see; 0 where it has none."""
+    signals = disturbance.signals
+    return 3 + signals.index(WAVE_MOTION[0]) if WAVE_MOTION[0] in signals else 0
+
+
+def names(loop: ClosedLoop) -> list[str]:
+    """Names of a logged row's columns: time, state, row; a slot of size n has n columns."""
+    law, actuator = loop.controller, loop.actuator
+    slots = [part for part, size in law.slots() for _ in range(size)]
+    states = [part.name for part in (*actuator.states, *loop.estimated(), *slots)]
+    parts = (law, loop.disturbance, actuator, loop.measurement)
+    own, sea, others, seen = ([part.name for part in owner.signals] for owner in parts)
+    return ["time", *STATE, *states, *TARGET, "z_e", *own, *DEMAND, *LOADS, *sea, *others, *seen]
+
+
+def by_name(labels: list[str], table: Vector, about: Mapping[str, Signal]) -> dict[str, Vector]:
+    """A table's columns by name; those of a vector together, shape (rows, size)."""
+    vectors = {name for name, part in about.items() if part.axes}
+    columns: dict[str, list[int]] = {}
+    for column, name in enumerate(labels):
+        columns.setdefault(name, []).append(column)
+    return {
+        name: table[:, at[0] : at[-1] + 1] if name in vectors else table[:, at[0]]
+        for name, at in columns.items()
+    }
