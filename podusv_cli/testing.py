@@ -258,8 +258,8 @@ def _path(path: Any, t: float, x: Vector, target: Vector, random: Any) -> list[V
 
 
 def _sea(sea: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vector]:
-    out = np.full(3, np.nan)
-    sea.evaluate(t, x, bundle(sea.constants()), sea.table(), out)
+    out, hull = np.full(3 + len(sea.signals), np.nan), _vessel()
+    sea.evaluate(t, x, bundle(sea.constants_with(hull)), sea.table_for(hull, t), out)
     return [out]
 
 

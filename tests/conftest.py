@@ -100,10 +100,11 @@ def _numbers(path: Path) -> tuple[Any, Vector]:
 
 def load_at(disturbance: Disturbance, t: float, x: Vector | None = None) -> Vector:
     """(b_u, b_v, b_r) at time t [s]."""
-    b = np.full(3, np.nan)
+    b = np.full(3 + len(disturbance.signals), np.nan)
     state = np.zeros(6) if x is None else x
-    disturbance.evaluate(t, state, bundle(disturbance.constants()), disturbance.table(), b)
-    return b
+    k, table = disturbance.constants_with(NONLINEAR), disturbance.table_for(NONLINEAR, 400.0)
+    disturbance.kernel_with(NONLINEAR)(t, state, bundle(k), table, b)
+    return b[:3]
 
 
 class Answer(NamedTuple):

@@ -56,11 +56,12 @@ class Call:
     def _shape(
         self, room: str, component: Any, at: Any, random: Any
     ) -> tuple[list[Any], list[int]]:
+        if room == "disturbances":
+            k, table = component.constants_with(NONLINEAR), component.table_for(NONLINEAR, 300.0)
+            return [at.x, bundle(k), table], [3 + len(component.signals)]
         k, table = bundle(component.constants()), component.table()
         if room == "paths":
             return [k, table], [6]
-        if room == "disturbances":
-            return [at.x, k, table], [3]
         if room == "actuators":
             count = len(component.states)
             state = component.rest() + random.normal(0, 0.1, count)

@@ -29,9 +29,10 @@ from podusv_cli.controllers.backstepping import Backstepping
 from podusv_cli.controllers.pid import Pid
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.recording import Recording
+from podusv_cli.core.steps import whole_steps
 from podusv_cli.disturbances.calm import Calm
 from podusv_cli.disturbances.harmonic import HarmonicDisturbance
-from podusv_cli.engine.grid import TimeGrid, whole_steps
+from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.loop import STATE, ClosedLoop, Observer
 from podusv_cli.engine.simulate import simulate
 

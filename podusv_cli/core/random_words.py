@@ -8,6 +8,7 @@ how many.
 from __future__ import annotations
 
 import json
+import math
 from hashlib import sha256
 
 import numpy as np
@@ -36,6 +37,19 @@ def in_unit_interval(drawn: Words) -> Vector:
 def uniforms(stream: tuple[int | str, ...], first: int, count: int) -> Vector:
     """Numbers first, first + 1, ... of a stream, uniform in (0, 1) without the ends."""
     return in_unit_interval(words(stream, first, count))
+
+
+def gauss_markov(stream: tuple[int | str, ...], count: int, lag: float) -> Vector:
+    """A first-order Gauss-Markov process of variance 1, from its steady distribution on.
+
+    `lag` is the time between two of its numbers in time constants. The steps are exact for any
+    lag: x+ = exp(-lag) x + sqrt(1 - exp(-2 lag)) n.
+    """
+    kept, process = math.exp(-lag), normals(stream, 0, count)
+    process[1:] *= math.sqrt(1.0 - kept * kept)
+    for i in range(1, count):
+        process[i] += kept * process[i - 1]
+    return process
 
 
 def normals(stream: tuple[int | str, ...], first: int, count: int) -> Vector:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, ClassVar
 
 from podusv_cli.core.component import Component
@@ -42,6 +42,10 @@ class Disturbance(Component):
         """Write the load; every disturbance has its own."""
         raise NotImplementedError
 
+    def each(self) -> tuple[Disturbance, ...]:
+        """Itself; of a sum, its parts."""
+        return (self,)
+
     def kernel_with(self, vessel: Vessel) -> Callable[..., None]:
         """The kernel for constants of this vessel; the same function for every vessel."""
         return self.evaluate
@@ -57,6 +61,10 @@ class Disturbance(Component):
         numbers.
         """
         return self.table()
+
+    def conflicts(self, vessel: Vessel, step: float) -> Iterator[tuple[str, str]]:
+        """Key below `disturbance` and message for what does not fit the vessel or the step [s]."""
+        return iter(())
 
     def bounds(self) -> tuple[float, float, float] | None:
         """What |b_u| [N], |b_v| [N], |b_r| [N m] never exceed, at any time and state.

@@ -42,6 +42,10 @@ class Total(Disturbance):
         """Those of all parts, in their order."""
         return tuple(signal for part in self.parts for signal in part.signals)
 
+    def each(self) -> tuple[Disturbance, ...]:
+        """Its parts."""
+        return self.parts
+
     def kernel_with(self, vessel: Vessel) -> Callable[..., None]:
         """The kernel of the sum."""
         return _sum(tuple(

@@ -1,4 +1,4 @@
-"""Time as whole numbers of steps."""
+"""The instants of a run."""
 
 from __future__ import annotations
 
@@ -6,15 +6,6 @@ import math
 from dataclasses import dataclass
 
 ROUNDED = 1e-6  # steps; more than rounding can make of a whole number of them
-
-
-def whole_steps(duration: float, step: float) -> int | None:
-    """How many steps make `duration` (both in s), or None where it is no whole number of them."""
-    steps = duration / step
-    if not math.isfinite(steps):
-        return None
-    count = round(steps)
-    return count if abs(count * step - duration) <= 1e-9 * max(duration, step) else None
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,9 @@ from podusv_cli.core.component import called
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.recording import Allocate
 from podusv_cli.core.signal import LOOP, Signal
+from podusv_cli.core.steps import whole_steps
 from podusv_cli.disturbances.base import WAVE_MOTION, Disturbance
-from podusv_cli.engine.grid import TimeGrid, whole_steps
+from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.layout import HELD_SIGNALS, Plan, Wires
 from podusv_cli.estimators.base import Estimator
 from podusv_cli.estimators.none import NoEstimator
@@ -114,7 +115,7 @@ class ClosedLoop:
         own = (partial(called, actuator), (*actuator.states, *actuator.signals))
         loop = (lambda: "the closed loop", LOOP)
         others = (
-            (partial(called, self.disturbance), self.disturbance.signals),
+            *((partial(called, part), part.signals) for part in self.disturbance.each()),
             (partial(called, self.measurement), self.measurement.signals),
             (partial(called, self.estimator), self.estimated()),
         )

@@ -15,10 +15,11 @@ from podusv_cli.core.component import Component, called, value, wrong_default
 from podusv_cli.core.errors import LawError, in_a_line
 from podusv_cli.core.plugins import Plugins, from_file, installed
 from podusv_cli.core.registry import any_of
-from podusv_cli.core.signal import Signal
+from podusv_cli.core.signal import STATE, Signal
+from podusv_cli.core.steps import fitting, misfit, whole_steps
 from podusv_cli.disturbances.base import Disturbance
 from podusv_cli.disturbances.total import Total
-from podusv_cli.engine.grid import TimeGrid, whole_steps
+from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.loop import ClosedLoop
 from podusv_cli.estimators.base import Estimator
 from podusv_cli.estimators.none import NoEstimator
@@ -206,7 +207,7 @@ class Scenario(Component):
         """Key and message for every pair of values that contradict each other."""
         return [*self._defaults(), *self._unanswered()] or [
             *self._times(), *self._samples(), *self._names(), *self.metrics.conflicts(),
-            *self._signals(),
+            *self._signals(), *self._seeing(),
         ]  # fmt: skip
 
     def _defaults(self) -> Conflicts:
@@ -253,11 +254,8 @@ class Scenario(Component):
             yield key, f"{count}; no more than {MOST_INSTANTS:.2g} have times of their own"
             return
         for key, time in times.items():
-            if time and not whole_steps(time, step):
-                yield (
-                    key,
-                    f"{time:g} s is no whole number of steps of {step:g} s{_near(time, step)}",
-                )
+            if time and (told := misfit(time, step)):
+                yield key, told
 
     def _samples(self) -> Conflicts:
         period = self.control.period
@@ -265,7 +263,23 @@ class Scenario(Component):
             sample = law.sample_period()
             if period and sample and not whole_steps(sample, period):
                 text = f"{sample:g} s is no whole number of control periods of {period:g} s"
-                yield f"{key}.difference_step", text + _near(sample, period)
+                yield f"{key}.difference_step", text + fitting(sample, period)
+
+    def _seeing(self) -> Conflicts:
+        """What does not fit the step or the vessel, and an estimator without what it needs."""
+        step = self.simulation.step
+        for at, part in self.disturbances().items():
+            yield from ((f"{at}.{key}", text) for key, text in part.conflicts(self.vessel, step))
+        for key, text in self.measurement.conflicts(step):
+            yield f"measurement.{key}", text
+        if self.measurement.is_exact and self.estimator != NoEstimator():
+            text = "has nothing to estimate where the law sees the true state"
+            yield "estimator", f"{text}; add `measurement: {{kind: sensors}}`"
+        pairs = zip(STATE, self.estimator.needs(), self.measurement.measured(), strict=True)
+        lacking = [state.name for state, needed, known in pairs if needed and not known]
+        if lacking:
+            text = f"needs {', '.join(lacking)} measured; give a sensor, or an estimator that can"
+            yield "estimator", f"{text} do without"
 
     def about(self) -> dict[str, Signal]:
         """Every signal of the run's log by name. Raises LawError where two have one name."""
@@ -325,9 +339,3 @@ def _unpickled(
     if open_choice:
         made = made.model_copy(update={"controller": next(iter(made.controllers.values()))})
     return made
-
-
-def _near(time: float, step: float) -> str:
-    """A hint with the next smaller time that fits."""
-    count = time / step
-    return f"; try {max(1, int(count)) * step:.10g}" if count < 1e12 else ""

@@ -1,7 +1,8 @@
 """Draws: the numbers of a study's runs, and a scenario with one draw's numbers in it.
 
-Every quantity has a stream of its own (`core.random_words`). So a draw depends on the study's seed, the stream, the quantity's name and i, and on nothing else: not on
-other quantities, on how many draws there are, or on who asks for which of them.
+Every quantity has a stream of its own (`core.random_words`). So a draw depends on the study's seed,
+the stream, the quantity's name and i, and on nothing else: not on other quantities, on how many
+draws there are, or on who asks for which of them.
 """
 
 from __future__ import annotations
@@ -143,21 +144,33 @@ def _inside(whole: Any, step: str | int) -> Any:
 
 def described(scenario: Scenario, steps: Route) -> Key:
     """What the models say of a key that the scenario has."""
-    section, *rest = steps
-    kind = getattr(getattr(scenario, str(section)), "kind", None)
-    return keys_of(type(scenario)).follow((section, *([kind] if kind else []), *rest))[0]
+    way: list[str | int] = []
+    for end, step in enumerate(steps, 1):
+        kind = getattr(content(scenario, steps[:end]), "kind", None)
+        way += [step, kind] if kind else [step]
+    return keys_of(type(scenario)).follow(tuple(way))[0]
 
 
 def _section(scenario: Scenario, section: str, new: Mapping[Route, Number]) -> Any:
     """A section with new values at these places, checked by its own model."""
     old = getattr(scenario, section)
-    data = old.model_dump()
+    if not isinstance(old, tuple):
+        return _part(scenario, (section,), old, new)
+    each = [{steps[1:]: n for steps, n in new.items() if steps[0] == i} for i in range(len(old))]
+    return tuple(
+        _part(scenario, (section, i), part, own) if own else part
+        for i, (part, own) in enumerate(zip(old, each, strict=True))
+    )
+
+
+def _part(scenario: Scenario, at: Route, old: Component, new: Mapping[Route, Number]) -> Component:
+    data: Any = old.model_dump()
     for place, number in new.items():
         data = _with(data, place, number.value)
     try:
         return type(old).model_validate(data)
     except ValidationError as error:
-        raise DrawError(_sentence(scenario, section, new, error)) from error
+        raise DrawError(_sentence(scenario, at, new, error)) from error
 
 
 def _with(whole: Any, steps: Route, new: Any) -> Any:
@@ -172,15 +185,15 @@ def _with(whole: Any, steps: Route, new: Any) -> Any:
 
 
 def _sentence(
-    scenario: Scenario, section: str, new: Mapping[Route, Number], error: ValidationError
+    scenario: Scenario, at: Route, new: Mapping[Route, Number], error: ValidationError
 ) -> str:
     """The first complaint, as a sentence with quantity, key, value and range."""
     complaint = error.errors(include_url=False)[0]
     place = next((steps for steps in new if complaint["loc"][: len(steps)] == steps), None)
     if place is None:
         reason = complaint.get("ctx", {}).get("error", complaint["msg"])
-        numbers = ", ".join(f"{dotted((section, *s))} = {x}" for s, x in new.items())
-        return f"{section}: {reason}, with {numbers}"
-    key = described(scenario, (section, *place))
+        numbers = ", ".join(f"{dotted((*at, *s))} = {x}" for s, x in new.items())
+        return f"{dotted(at)}: {reason}, with {numbers}"
+    key = described(scenario, (*at, *place))
     found = f"sweep.vary.{new[place].quantity}: {dotted(key.path)} = {new[place]}"
     return f"{found}; must be {key.wanted}"
