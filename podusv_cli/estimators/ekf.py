@@ -101,7 +101,10 @@ def wanderings(k: Any, q: Vector) -> None:
 
 
 class ExtendedKalmanFilter(Estimator):
-    """The estimate with the least mean square error, as far as the model is right."""
+    """The estimate with the least mean square error, as far as the model is right.
+
+    The standard deviations are by default those of the measurement `sensors`.
+    """
 
     kind: Literal["ekf"] = "ekf"
     bias: bool = value(True, "", "whether it estimates a load, too")
@@ -113,10 +116,10 @@ class ExtendedKalmanFilter(Estimator):
     sigma_b: float = value(1.0, "N", "standard deviation of the force at the start", ge=0)
     sigma_b_psi: float = value(0.5, "N m", "standard deviation of the moment at the start", ge=0)
     sigma_p: float = value(0.02, "m", "standard deviation of a measured position, each axis", gt=0)
-    sigma_psi: float = value(0.01, "rad", "standard deviation of a measured heading", gt=0)
+    sigma_psi: float = value(0.005, "rad", "standard deviation of a measured heading", gt=0)
     sigma_u: float = value(0.02, "m/s", "standard deviation of a measured surge velocity", gt=0)
     sigma_v: float = value(0.02, "m/s", "standard deviation of a measured sway velocity", gt=0)
-    sigma_r: float = value(0.01, "rad/s", "standard deviation of a measured yaw rate", gt=0)
+    sigma_r: float = value(0.002, "rad/s", "standard deviation of a measured yaw rate", gt=0)
 
     @property
     def states(self) -> tuple[Signal, ...]:
