@@ -11,14 +11,22 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.core.signal import Signal
 from podusv_cli.vessels.vessel import Vessel
 
+# Not `u_hat`: laws with an observer of their own log that.
 ESTIMATE = (
-    Signal("x_hat", "m", "estimated position, north", r"\hat{x}"),
-    Signal("y_hat", "m", "estimated position, east", r"\hat{y}"),
-    Signal("psi_hat", "rad", "estimated heading, not wrapped", r"\hat{\psi}"),
-    Signal("u_hat", "m/s", "estimated surge velocity", r"\hat{u}"),
-    Signal("v_hat", "m/s", "estimated sway velocity", r"\hat{v}"),
-    Signal("r_hat", "rad/s", "estimated yaw rate", r"\hat{r}"),
+    Signal("x_est", "m", "estimated position, north"),
+    Signal("y_est", "m", "estimated position, east"),
+    Signal("psi_est", "rad", "estimated heading, not wrapped", r"\psi_{est}"),
+    Signal("u_est", "m/s", "estimated surge velocity"),
+    Signal("v_est", "m/s", "estimated sway velocity"),
+    Signal("r_est", "rad/s", "estimated yaw rate"),
 )
+# What the nominal vessel does not explain, as two of the estimators know it.
+LOADS = (
+    Signal("b_est_x", "N", "estimated load, north", r"b_{est,x}"),
+    Signal("b_est_y", "N", "estimated load, east", r"b_{est,y}"),
+    Signal("b_est_psi", "N m", "estimated load, about the vertical", r"b_{est,\psi}"),
+)
+POSE_ALONE = (True, True, True, False, False, False)  # x, y, psi have to be measured
 
 
 class Estimator(Component):
