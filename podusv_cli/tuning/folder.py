@@ -27,32 +27,51 @@ def check(folder: Path) -> None:
         raise UsageError(f"{folder} is not the folder of a search: it has no {TUNE}")
 
 
-def opened(folder: Path, plan: TunePlan, started: str) -> None:
+def opened(folder: Path, plan: TunePlan, started: str, scenario: Mapping[str, str]) -> None:
     """Make the folder, or check that it holds this very search, and note what is asked for.
 
-    Raises UsageError where it holds another search, naming what is different, and StorageError.
+    `scenario` has the texts of the scenario and its plug-ins by the names of their files. Raises
+    UsageError where the folder holds another search, naming what is different, and StorageError.
     """
-    identity = json_files.plain({**plan.identity, "optuna": sampler.version()})
-    history: list[Any] = []
-    if (folder / TUNE).exists():
-        told = json_files.read(folder / TUNE)
-        _agree(folder, told.get("identity", {}), identity)
-        history = list(told.get("history", []))
-        _as_much(folder, history, plan.tune)
-    elif folder.exists() and any(folder.iterdir()):
+    known = (folder / TUNE).exists()
+    if not known and not files.is_empty(folder):
         raise UsageError(f"{folder} is no search and not empty; name another with --out")
+    identity = json_files.plain({**plan.identity, "optuna": sampler.version()})
+    history = _history(folder, identity, plan.tune) if known else []
+    content = json_files.encode(_content(plan, identity, history, started))
+    # With a larger budget in tune.json than in the scenario, the search could not be continued. And
+    # without tune.json, a folder that is not empty is no search.
+    if known:
+        _write_scenario(folder, scenario)
+    files.make_folder(folder)
+    files.write_bytes(folder / TUNE, content)
+    files.make_folder(folder / trials.FOLDER)
+    if not known:
+        _write_scenario(folder, scenario)
+
+
+def _history(folder: Path, identity: dict[str, Any], tune: Tune) -> list[Any]:
+    """What was asked for so far. Raises UsageError where this is not the search to continue."""
+    told = json_files.read(folder / TUNE)
+    _agree(folder, told.get("identity", {}), identity)
+    history = list(told.get("history", []))
+    _as_much(folder, history, tune)
+    return history
+
+
+def _content(
+    plan: TunePlan, identity: dict[str, Any], history: Sequence[Any], started: str
+) -> dict[str, Any]:
     tune = plan.tune
     asked = {
         "budget": tune.budget, "repeats": tune.repeats, "validate": tune.validate,
         "started": started,
     }  # fmt: skip
-    content = {
+    return {
         "format": FORMAT, "name": plan.scenario.name, "laws": list(plan.laws),
         "gains": {law: [gain.key for gain in found] for law, found in plan.gains.items()},
         "identity": identity, "history": [*history, asked],
     }  # fmt: skip
-    files.make_folder(folder / trials.FOLDER)
-    files.write_bytes(folder / TUNE, json_files.encode(content))
 
 
 def _agree(folder: Path, there: dict[str, Any], wanted: dict[str, Any]) -> None:
@@ -75,9 +94,12 @@ def _as_much(folder: Path, history: Sequence[Mapping[str, Any]], tune: Tune) -> 
         )
 
 
-def write_scenario(folder: Path, loaded: Loaded) -> None:
-    """Write the searched scenario, with its plug-ins. Raises StorageError."""
-    texts = {SCENARIO: tree_yaml(loaded), **loaded.scenario.plugin_files()}
+def scenario_texts(loaded: Loaded) -> dict[str, str]:
+    """The scenario and its plug-ins, by the names of their files in the folder."""
+    return {SCENARIO: tree_yaml(loaded), **loaded.scenario.plugin_files()}
+
+
+def _write_scenario(folder: Path, texts: Mapping[str, str]) -> None:
     for name in texts:
         files.make_folder((folder / name).parent)
     files.write_all({folder / name: text.encode() for name, text in texts.items()})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -76,7 +77,10 @@ def validate(
 
 
 def _clear(folder: Path, plan: Plan) -> None:
-    """Remove the runs of other gains, which an earlier sitting with a smaller budget found."""
+    """Remove the runs of other gains, which an earlier sitting with a smaller budget found.
+
+    study.json goes last, because a folder without it that is not empty is no study.
+    """
     if not (folder / STUDY).exists():
         return
     told: dict[str, Any] = json_files.read(folder / STUDY)
@@ -84,7 +88,9 @@ def _clear(folder: Path, plan: Plan) -> None:
     if same and told.get("draws", 0) <= plan.sweep.draws:
         return
     with files.storage_errors(f"cannot remove old runs in {folder}"):
-        for path in (folder / STUDY, folder / RUNS, *(folder / UNITS).glob("*.h5")):
+        if (folder / UNITS).exists():
+            shutil.rmtree(folder / UNITS)
+        for path in (folder / RUNS, folder / STUDY):
             path.unlink(missing_ok=True)
 
 

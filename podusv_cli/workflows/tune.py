@@ -78,8 +78,8 @@ def tune(config: Path, request: Request, tell: Tell) -> Tuned:
     optuna()
     loaded, folder = _loaded(config, request)
     plan = TunePlan(loaded.scenario)
-    place.opened(folder, plan, started.isoformat(timespec="seconds"))
-    place.write_scenario(folder, loaded)
+    stamp = started.isoformat(timespec="seconds")
+    place.opened(folder, plan, stamp, place.scenario_texts(loaded))
     results = _simulated(plan, folder, request, started, tell)
     return _written(results, folder, request)
 
