@@ -93,7 +93,8 @@ def test_the_found_gains_give_the_numbers_of_the_validation(done):
     from podusv_cli.tuning.plan import VALIDATE
 
     scenario = load(done.folder / "tuned.yaml").scenario
-    made = done.results.plan.with_laws({"toy": scenario.controllers["toy"]}, VALIDATE, 12)
+    gains = {key: getattr(scenario.controllers["toy"], key) for key in ("gain", "other")}
+    made = done.results.plan.variant({"toy": ("toy", gains)}, VALIDATE, 12)
     again = make(made, Unit("toy", 0, 3, 1)).metrics["effort_u"][0]
     assert again == done.results.runs.metric("toy tuned", "effort_u")[0, 3]
 

@@ -170,7 +170,10 @@ def test_training_validation_and_sweep_share_no_word():
 def test_the_streams_reach_the_runs(tmp_path):
     made = planned(tmp_path)
     assert made.scenario.sweep
-    plans = [made.with_laws(made.laws, stream, 10) for stream in (TRAIN, VALIDATE)]
+    plans = [
+        made.variant({law: (law, {}) for law in made.laws}, stream, 10)
+        for stream in (TRAIN, VALIDATE)
+    ]
     drawn = [table(one.sweep, 0, 10, one.stream)["start.psi"].tolist() for one in plans]
     own = table(made.scenario.sweep, 0, 10)["start.psi"].tolist()
     assert len({*drawn[0], *drawn[1], *own}) == 30

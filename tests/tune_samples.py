@@ -3,11 +3,12 @@
 from pathlib import Path
 
 from podusv_cli.scenario.load import load, load_text
+from podusv_cli.study.march import Processes
 from podusv_cli.study.unit import prepare
 from podusv_cli.tuning import trials
 from podusv_cli.tuning.check import tune_faults
 from podusv_cli.tuning.march import march
-from podusv_cli.tuning.plan import TRAIN, TunePlan
+from podusv_cli.tuning.plan import TunePlan
 from podusv_cli.tuning.search import Search
 from podusv_cli.workflows import tune as workflow
 
@@ -136,11 +137,11 @@ def contents(folder):
     }
 
 
-def searched(folder, *changes):
+def searched(folder, *changes, engine=None):
     """The trials of the toy law's searches, by the driver alone."""
     plan = planned(folder, *changes)
     (folder / trials.FOLDER).mkdir(exist_ok=True)
     found = [Search(plan, "toy", repeat, folder) for repeat in range(plan.tune.repeats)]
-    prepare(plan.with_laws({"toy": plan.laws["toy"]}, TRAIN, 1), "toy", 0)  # before the fork
-    march(found, 1, lambda tally, searches: None)
+    prepare(plan.base, "toy", 0)  # before the fork
+    march(found, engine or Processes(1), lambda tally, searches: None)
     return found

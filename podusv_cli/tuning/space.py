@@ -14,6 +14,7 @@ from podusv_cli.scenario.keys import limits
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import did_you_mean
 from podusv_cli.scenario.tune import AROUND, Range, Tune
+from podusv_cli.study.plan import changed
 
 DIGITS = 4  # of a gain that is tried, so that a scenario shows all of them
 BOUNDARY = 0.02  # of a range: a gain that is nearer to an end is at its bound
@@ -111,7 +112,7 @@ def _structure(scenario: Scenario, law: Controller) -> tuple[Any, ...]:
 def with_gains(law: Controller, new: Mapping[str, Any]) -> Controller | None:
     """The law with other gains; None where it refuses them."""
     try:
-        return type(law).model_validate(law.model_dump() | dict(new))
+        return changed(law, new)
     except ValidationError:
         return None
 
