@@ -185,9 +185,11 @@ def test_the_command_prints_before_and_after(optuna, podusv, tmp_path):
     )  # fmt: skip
     assert code == 0
     assert "median(effort_u) on 12 fresh draws:" in out
-    assert re.search(r"^toy +\d -> \d +1\.6 \[", out, re.MULTILINE)
+    assert re.search(r"^toy +\d -> \d +1\.6\d+ \[", out, re.MULTILINE)
     told = json.loads((tmp_path / "out" / "tune.json").read_text())
     assert told["gains"] == {"toy": ["gain", "other"], "bare": []}
+    assert told["idle"] == {"toy": ["unread"]}
+    assert "toy: unread changed no run and was not searched" in out
 
 
 def test_without_optuna_the_command_says_how_to_get_it(podusv, tmp_path, monkeypatch):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from types import MappingProxyType
 
 import pytest
 from tune_samples import contents, planned, searched, tuned
@@ -53,14 +54,19 @@ def at_every_call(work):
     pytest.fail(f"more than {MOST} calls")
 
 
+def opened(out, plan, texts=MappingProxyType({})):
+    """Begin a search in a folder, or continue it."""
+    place.write(out, plan, place.known(out, plan), "now", texts)
+
+
 def test_a_search_opens_again_wherever_it_was_killed(tmp_path, monkeypatch):
     monkeypatch.setattr(sampler, "version", lambda: "1")
     small, large = planned(tmp_path), planned(tmp_path, "tune.budget=80")
     out = tmp_path / "out"
     for plan in (small, large):
         text = {place.SCENARIO: f"budget: {plan.tune.budget}\n"}
-        at_every_call(lambda plan=plan, text=text: place.opened(out, plan, "now", text))
-        place.opened(out, plan, "now", text)
+        at_every_call(lambda plan=plan, text=text: opened(out, plan, text))
+        opened(out, plan, text)
         assert (out / place.SCENARIO).read_text() == text[place.SCENARIO]
         assert {path.name for path in out.iterdir()} == {
             place.TUNE, place.SCENARIO, trials.FOLDER
@@ -143,17 +149,17 @@ def test_what_is_kept_is_not_simulated_again(optuna, tmp_path):
 
 def test_another_search_in_the_folder_is_refused_with_what_differs(tmp_path, monkeypatch):
     monkeypatch.setattr(sampler, "version", lambda: "1")
-    place.opened(tmp_path / "out", planned(tmp_path), "now", {})
+    opened(tmp_path / "out", planned(tmp_path))
     with pytest.raises(UsageError, match=r"holds another search: tune.train: 4, not 5"):
-        place.opened(tmp_path / "out", planned(tmp_path, "tune.train=5"), "now", {})
+        opened(tmp_path / "out", planned(tmp_path, "tune.train=5"))
     monkeypatch.setattr(sampler, "version", lambda: "2")
     with pytest.raises(UsageError, match=r"holds another search: optuna: 1, not 2"):
-        place.opened(tmp_path / "out", planned(tmp_path), "now", {})
+        opened(tmp_path / "out", planned(tmp_path))
 
 
 def test_a_smaller_budget_would_throw_trials_away_and_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(sampler, "version", lambda: "1")
     for _ in range(2):
-        place.opened(tmp_path / "out", planned(tmp_path), "now", {})
+        opened(tmp_path / "out", planned(tmp_path))
     with pytest.raises(UsageError, match="has a budget of 64 runs; ask for as many or more"):
-        place.opened(tmp_path / "out", planned(tmp_path, "tune.budget=40"), "now", {})
+        opened(tmp_path / "out", planned(tmp_path, "tune.budget=40"))

@@ -37,7 +37,8 @@ class Toy(Controller):
 
     kind: Literal["toy"] = "toy"
     gain: float = value(1.0, "1", "best at 3", gt=0)
-    other: float = value(1.0, "1", "without influence", gt=0)
+    other: float = value(1.0, "1", "with a small influence", gt=0)
+    unread: float = value(1.0, "1", "without influence", gt=0)
     signals: ClassVar[tuple[Signal, ...]] = (MISS,)
 
     def slots(self):
@@ -50,7 +51,7 @@ class Toy(Controller):
     @kernel
     def law(t, x, memory, target, k, table, tau, rate, signals, work):
         signals[0] = k.gain - BEST
-        tau[0], tau[1] = 0.5 * (k.gain - BEST) * (k.gain - BEST), 0.0
+        tau[0], tau[1] = 0.5 * (k.gain - BEST) * (k.gain - BEST) + 1e-4 * k.other, 0.0
         rate[0] = 0.0
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -32,6 +32,7 @@ class TunePlan:
     """A scenario with the keys `sweep` and `tune`."""
 
     scenario: Scenario
+    idle: Mapping[str, Sequence[str]] = field(default_factory=dict)  # change no run, by law
 
     @property
     def tune(self) -> Tune:
@@ -49,9 +50,12 @@ class TunePlan:
     def gains(self) -> dict[str, tuple[Gain, ...]]:
         """The gains of every law; none for a law that is kept as it is."""
         return {
-            label: gains(one.controller, label, one, self.tune)
+            label: tuple(
+                gain for gain in gains(one.controller, label, one, self.tune)
+                if gain.key not in self.idle.get(label, ())
+            )
             for label, one in singles(self.scenario).items()
-        }
+        }  # fmt: skip
 
     @cached_property
     def metrics(self) -> dict[str, Metric]:
@@ -90,6 +94,7 @@ class TunePlan:
                 yield f"gains of {law} ({len(found)}): {names}"
             else:
                 yield f"{law} has no gains and is kept as it is"
+        yield "gains that change no run are left out when the search begins"
         wanted, tune = self.runs_wanted(), self.tune
         search, other = (sum(counts) for counts in zip(*wanted.values(), strict=True))
         time = sum(sum(counts) * paces.get(law, 0.0) for law, counts in wanted.items()) / workers

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -54,13 +55,24 @@ class Gain:
         near = {"lower": place, "upper": 1.0 - place}
         return next((end for end, away in near.items() if away < BOUNDARY), "")
 
+    @property
+    def ends(self) -> tuple[Any, ...]:
+        """The ends of its range, or all words."""
+        return self.words or (self.value(self.low), self.value(self.high))
+
     def place(self, number: float) -> float:
         """Where a number is between the ends, from 0 to 1, on the scale of the search."""
-        from math import log
-
         if self.log:
-            return log(number / self.low) / log(self.high / self.low)
+            return math.log(number / self.low) / math.log(self.high / self.low)
         return (number - self.low) / (self.high - self.low)
+
+    def at(self, place: float) -> Any:
+        """What is at a place between the ends, the reverse of `place`; or one of the words."""
+        if self.words:
+            return self.words[int(place * len(self.words))]
+        if self.log:
+            return self.value(self.low * (self.high / self.low) ** place)
+        return self.value(self.low + place * (self.high - self.low))
 
 
 def gains(law: Controller, label: str, scenario: Scenario, tune: Tune) -> tuple[Gain, ...]:

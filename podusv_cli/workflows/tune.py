@@ -27,6 +27,7 @@ from podusv_cli.study.unit import prepare
 from podusv_cli.tuning import folder as place
 from podusv_cli.tuning import outputs
 from podusv_cli.tuning.check import tune_faults
+from podusv_cli.tuning.idle import find_idle
 from podusv_cli.tuning.march import march
 from podusv_cli.tuning.plan import TunePlan
 from podusv_cli.tuning.results import Results
@@ -86,8 +87,10 @@ def tune(config: Path, request: Request, tell: Tell) -> Tuned:
     optuna()
     loaded, folder = _loaded(config, request)
     plan = TunePlan(loaded.scenario)
+    told = place.known(folder, plan)
+    plan = replace(plan, idle=told["idle"] if told else _idle(plan, request))
     stamp = started.isoformat(timespec="seconds")
-    place.opened(folder, plan, stamp, place.scenario_texts(loaded))
+    place.write(folder, plan, told, stamp, place.scenario_texts(loaded))
     with _engine(plan, folder, request) as found:
         results = _simulated(plan, folder, request, started, found, tell)
     refused = tuple(found.told().get("refused", {}).values())
@@ -130,8 +133,7 @@ def _simulated(
 
     try:
         searches = _searches(plan, folder)
-        for law in {search.law for search in searches}:  # before the fork
-            prepare(plan.base, law, 0)
+        _prepare(plan)
         march(searches, engine, searched)
         trials = {law: [s.trials for s in searches if s.law == law] for law in plan.gains}
         trials = {law: found for law, found in trials.items() if found}
@@ -146,6 +148,20 @@ def _simulated(
     finally:
         sitting.end(sum(made.values()), engine.told())
     return Results(plan, trials, winners, runs)
+
+
+def _prepare(plan: TunePlan) -> None:
+    """Have all laws with gains compiled, before the fork. Raises LawError."""
+    for law, gains in plan.gains.items():
+        if gains:
+            prepare(plan.base, law, 0)
+
+
+def _idle(plan: TunePlan, request: Request) -> dict[str, tuple[str, ...]]:
+    """The gains that change no run."""
+    request.say("looking for gains that change nothing")
+    _prepare(plan)
+    return find_idle(plan, request.workers)
 
 
 def _engine(plan: TunePlan, folder: Path, request: Request) -> AbstractContextManager[Engine]:
