@@ -29,10 +29,11 @@ from podusv_cli.tuning import outputs
 from podusv_cli.tuning.check import tune_faults
 from podusv_cli.tuning.idle import find_idle
 from podusv_cli.tuning.march import march
-from podusv_cli.tuning.plan import TunePlan
+from podusv_cli.tuning.plan import TRAIN, TunePlan
 from podusv_cli.tuning.results import Results
 from podusv_cli.tuning.sampler import optuna
 from podusv_cli.tuning.search import Search
+from podusv_cli.tuning.space import with_gains
 from podusv_cli.tuning.trials import best
 from podusv_cli.tuning.validation import validate
 from podusv_cli.workflows.run import RESULTS
@@ -151,10 +152,15 @@ def _simulated(
 
 
 def _prepare(plan: TunePlan) -> None:
-    """Have all laws with gains compiled, before the fork. Raises LawError."""
+    """Have all laws with gains compiled, with all of their options, before the fork.
+
+    Raises LawError.
+    """
     for law, gains in plan.gains.items():
-        if gains:
-            prepare(plan.base, law, 0)
+        options = [{gain.key: word} for gain in gains for word in gain.words]
+        for new in options or [{}] if gains else []:
+            if with_gains(plan.laws[law], new):
+                prepare(plan.variant({law: (law, new)}, TRAIN, 1), law, 0)
 
 
 def _idle(plan: TunePlan, request: Request) -> dict[str, tuple[str, ...]]:
