@@ -39,7 +39,7 @@ def made(folder: Path, workers=1, part=(1, 1), **changes):
     """The store of the study, simulated into a folder; runs.h5 where it is whole."""
     store = Store(folder, small(**changes))
     store.open("now")
-    _, whole = march(store, lambda tally: None, Processes(store.plan, workers), part=part)
+    _, whole = march(store, lambda tally: None, Processes(workers), part=part)
     if whole and part == (1, 1):
         store.write_runs()
     return store

@@ -100,7 +100,7 @@ class StubClient:
         callback(future)
 
     def _reply(self, future):
-        _, _, place, expected = future.args
+        _, _, place, expected, _ = future.args
         workers = future.options["workers"] or list(self.reports)
         worker, unit = workers[len(self.made) % len(workers)], Unit(*place)
         told = self.reports[worker]

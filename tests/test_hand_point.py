@@ -58,6 +58,37 @@ def test_surge_and_yaw_push_the_hand_point_along_and_across_the_bow():
     assert sp.simplify(pushed - known) == sp.zeros(2, 1)
 
 
+def test_behind_a_pod_a_moment_moves_the_hand_point_less_or_the_other_way():
+    l, a, m22, m33, tau = sp.symbols("l a m22 m33 tau", positive=True)  # noqa: E741
+    across = -tau / a / m22 + l * tau / m33  # v' + l r' with the sway force -tau/a
+    assert sp.simplify(across - (l / m33 - 1 / (a * m22)) * tau) == 0
+    assert sp.simplify(across.subs(l, m33 / (a * m22))) == 0
+    ship = {a: 0.499, m22: NONLINEAR.m22, m33: NONLINEAR.m33}
+    assert (across / tau).subs(ship | {l: 0.3}) < 0.5 * 0.3 / NONLINEAR.m33
+
+
+def test_moved_exactly_behind_a_pod_the_hand_point_leaves_a_heading_that_needs_speed():
+    """m22 v' + m33 r'/a has no moment in it; the hand point moves north at V, linearised."""
+    l, a, m11, m22, m33, d, d_r, V = sp.symbols("l a m11 m22 m33 d d_r V", positive=True)  # noqa: E741
+    psi, r = sp.symbols("psi r")
+    u, w = V * sp.cos(psi), -V * sp.sin(psi)
+    v, w_rate = w - l * r, -V * sp.cos(psi) * r
+    forces = -m11 * u * r - d * v + ((m11 - m22) * u * v - d_r * r) / a
+    r_rate = (m22 * w_rate - forces) / (m22 * l - m33 / a)
+    matrix = sp.Matrix([r, r_rate]).jacobian([psi, r]).subs({psi: 0, r: 0})
+    need = (m22 - m11) * V + d * l + ((m22 - m11) * V * l - d_r) / a
+    assert sp.simplify(matrix.trace() + need / (m22 * l - m33 / a)) == 0
+    ship = {
+        m11: NONLINEAR.m11,
+        m22: NONLINEAR.m22,
+        d: -NONLINEAR.Y_v,
+        d_r: -NONLINEAR.N_r,
+        a: 0.499,
+    }
+    slowest = [float(sp.solve(need.subs(ship | {l: ahead}), V)[0]) for ahead in (0.3, 1.0)]
+    np.testing.assert_allclose(slowest, [0.28, 0.12], atol=0.005)
+
+
 def missing(x: Vector, psi_f: float, target: Vector, k: Any) -> Vector:
     """What the hand point lacks, north and east."""
     h = hand_errors(x, psi_f, target, k)

@@ -214,7 +214,7 @@ def test_time_over_keeps_what_is_made(tmp_path, monkeypatch):
     store.open("now")
     clock = iter(range(10**6))
     monkeypatch.setattr(marching.time, "monotonic", lambda: float(next(clock)))
-    engine = marching.Processes(store.plan, 1)
+    engine = marching.Processes(1)
     tally, whole = marching.march(store, lambda tally: None, engine, seconds=2.0)
     assert not whole
     assert 0 < tally.made < tally.wanted

@@ -10,49 +10,17 @@ import re
 import numpy as np
 import pandas as pd
 import pytest
-from tune_samples import planned, toy
+from tune_samples import searched, toy, tuned
 
-from podusv_cli.core.errors import UsageError
 from podusv_cli.scenario.load import load
-from podusv_cli.study.march import Tally
-from podusv_cli.tuning import folder as place
 from podusv_cli.tuning import sampler, trials
-from podusv_cli.tuning.march import march
-from podusv_cli.tuning.search import Search, _far
+from podusv_cli.tuning.search import _far
 from podusv_cli.tuning.trials import CUT, FINISHED, PRUNED, Trial, best, front
-from podusv_cli.workflows import tune as workflow
-
-# They have times, and the report the last sitting.
-MADE_ANEW = {"provenance.json", "manifest.json", "tune.json", "study.json", "report.html"}
 
 
 @pytest.fixture
 def optuna():
     return pytest.importorskip("optuna", reason="the search needs Optuna: podusv[tune]")
-
-
-def tuned(folder, *changes, tell=lambda tally, text: None, workers=1, figures=False):
-    """A finished search in folder/out."""
-    request = workflow.Request(changes, folder / "out", workers, figures=figures)
-    return workflow.tune(toy(folder), request, tell)
-
-
-def contents(folder):
-    """The bytes of all files that do not tell of times."""
-    return {
-        str(path.relative_to(folder)): path.read_bytes()
-        for path in sorted(folder.rglob("*"))
-        if path.is_file() and path.name not in MADE_ANEW
-    }
-
-
-def searched(folder, *changes):
-    """The trials of the toy law's searches, by the driver alone."""
-    plan = planned(folder, *changes)
-    (folder / trials.FOLDER).mkdir(exist_ok=True)
-    found = [Search(plan, "toy", repeat, folder) for repeat in range(plan.tune.repeats)]
-    march(found, 1, lambda tally, searches: None)
-    return found
 
 
 @pytest.fixture(scope="module")
@@ -125,7 +93,8 @@ def test_the_found_gains_give_the_numbers_of_the_validation(done):
     from podusv_cli.tuning.plan import VALIDATE
 
     scenario = load(done.folder / "tuned.yaml").scenario
-    made = done.results.plan.with_laws({"toy": scenario.controllers["toy"]}, VALIDATE, 12)
+    gains = {key: getattr(scenario.controllers["toy"], key) for key in ("gain", "other")}
+    made = done.results.plan.variant({"toy": ("toy", gains)}, VALIDATE, 12)
     again = make(made, Unit("toy", 0, 3, 1)).metrics["effort_u"][0]
     assert again == done.results.runs.metric("toy tuned", "effort_u")[0, 3]
 
@@ -155,66 +124,6 @@ def test_the_page_has_figures_and_no_broken_value(done):
     assert not re.search(r">\s*nan\b|Undefined|\bNone<", page)
     names = {path.stem for path in (done.folder / "figures").iterdir()}
     assert names == {"validation", "history", "ratios", "importance", "slices-toy"}
-
-
-def test_a_search_in_parts_equals_one_in_one_go(optuna, tmp_path):
-    """Interrupted in the search, then in the validation; with other workers."""
-    whole = tuned(tmp_path / "whole", workers=2)
-
-    def stop(after):
-        def tell(tally, text):
-            if tally.made >= after:
-                raise KeyboardInterrupt
-
-        return tell
-
-    for after in (30, 90):
-        with pytest.raises(KeyboardInterrupt, match="continue with: podusv tune"):
-            tuned(tmp_path / "part", tell=stop(after))
-    kept = trials.read(tmp_path / "part" / "out", "toy-0")
-    assert 0 < sum(trial.runs for trial in kept) < 64
-
-    def fresh(tally: Tally, text: str) -> None:
-        if "fresh" in text and tally.made >= 12:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        tuned(tmp_path / "part", tell=fresh)
-    part = workflow.tune(
-        tmp_path / "part" / "out", workflow.Request(figures=False), lambda *_: None
-    )
-    assert contents(part.folder) == contents(whole.folder)
-
-
-def test_a_larger_budget_continues_as_if_it_had_been_asked_for_at_once(optuna, tmp_path):
-    searched(tmp_path / "parts", "tune.budget=45", "tune.repeats=1")
-    (parts,) = searched(tmp_path / "parts", "tune.budget=80", "tune.repeats=1")
-    (whole,) = searched(tmp_path / "whole", "tune.budget=80", "tune.repeats=1")
-    assert parts.trials == whole.trials
-    assert whole.spent == 80
-
-
-def test_what_is_kept_is_not_simulated_again(optuna, tmp_path, monkeypatch):
-    (first,) = searched(tmp_path, "tune.repeats=1")
-    from podusv_cli.tuning import march as module
-
-    monkeypatch.setattr(module, "timed", None)  # would fail in a worker
-    (again,) = searched(tmp_path, "tune.repeats=1")
-    assert again.trials == first.trials
-
-
-def test_another_search_in_the_folder_is_refused_with_what_differs(optuna, tmp_path):
-    tuned(tmp_path, "tune.repeats=1", "tune.budget=32")
-    with pytest.raises(UsageError, match=r"holds another search: tune.train: 4, not 5"):
-        tuned(tmp_path, "tune.repeats=1", "tune.budget=40", "tune.train=5")
-
-
-def test_a_smaller_budget_would_throw_trials_away_and_is_refused(optuna, tmp_path):
-    plan = planned(tmp_path / "toy")
-    place.opened(tmp_path / "out", plan, "now")
-    place.opened(tmp_path / "out", plan, "later")
-    with pytest.raises(UsageError, match="has a budget of 64 runs; ask for as many or more"):
-        place.opened(tmp_path / "out", planned(tmp_path / "toy", "tune.budget=40"), "now")
 
 
 def test_an_inequality_is_respected(optuna, tmp_path):
@@ -276,9 +185,11 @@ def test_the_command_prints_before_and_after(optuna, podusv, tmp_path):
     )  # fmt: skip
     assert code == 0
     assert "median(effort_u) on 12 fresh draws:" in out
-    assert re.search(r"^toy +\d -> \d +1\.6 \[", out, re.MULTILINE)
+    assert re.search(r"^toy +\d -> \d +1\.6\d+ \[", out, re.MULTILINE)
     told = json.loads((tmp_path / "out" / "tune.json").read_text())
     assert told["gains"] == {"toy": ["gain", "other"], "bare": []}
+    assert told["idle"] == {"toy": ["unread"]}
+    assert "toy: unread changed no run and was not searched" in out
 
 
 def test_without_optuna_the_command_says_how_to_get_it(podusv, tmp_path, monkeypatch):

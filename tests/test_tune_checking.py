@@ -103,7 +103,7 @@ def test_without_around_only_named_keys_are_searched(tmp_path):
 
 def test_a_law_without_numbers_has_no_gains(tmp_path):
     made = planned(tmp_path)
-    assert [gain.key for gain in made.gains["toy"]] == ["gain", "other"]
+    assert [gain.key for gain in made.gains["toy"]] == ["gain", "other", "unread"]
     assert made.gains["bare"] == ()
     lines = list(made.in_words({"toy": 0.1, "bare": 0.1}, 2))
     assert "bare has no gains and is kept as it is" in lines
@@ -170,7 +170,10 @@ def test_training_validation_and_sweep_share_no_word():
 def test_the_streams_reach_the_runs(tmp_path):
     made = planned(tmp_path)
     assert made.scenario.sweep
-    plans = [made.with_laws(made.laws, stream, 10) for stream in (TRAIN, VALIDATE)]
+    plans = [
+        made.variant({law: (law, {}) for law in made.laws}, stream, 10)
+        for stream in (TRAIN, VALIDATE)
+    ]
     drawn = [table(one.sweep, 0, 10, one.stream)["start.psi"].tolist() for one in plans]
     own = table(made.scenario.sweep, 0, 10)["start.psi"].tolist()
     assert len({*drawn[0], *drawn[1], *own}) == 30
@@ -180,7 +183,7 @@ def test_the_streams_reach_the_runs(tmp_path):
 def test_validate_tells_gains_runs_and_laws_without_gains(podusv, tmp_path):
     code, out, _ = podusv("validate", str(toy(tmp_path)))
     assert code == 0
-    assert "gains of toy (2): gain, other" in out
+    assert "gains of toy (3): gain, other, unread" in out
     assert "bare has no gains and is kept as it is" in out
     assert "runs of the search: 128" in out
 

@@ -1,5 +1,6 @@
 """The law velocity_vector: its guidance against sympy, what it promises, and what it reaches."""
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from conftest import NONLINEAR, SMOOTH_START, ask, corrected, run, situations, t
 from hypothesis import given
 from hypothesis import strategies as st
 from law_samples import STEADY, WRONG, rms, task
+from test_pod import pods
 
 from podusv_cli.actuators.saturated import Saturated
 from podusv_cli.controllers.velocity_vector import VelocityVector, guidance
@@ -116,9 +118,9 @@ def test_constant_loads_leave_no_offset(path):
 
 def test_behind_pods_it_stays_off_by_what_their_sway_force_makes_of_the_prediction():
     """The observer leaves that force out, so Y + b_v = -tau_v, v_s = v - T_v tau_v/m22."""
-    pods = load(ROOT / "configs/pod/kept.yaml").scenario.actuator
+    two = load(ROOT / "configs/pod/kept.yaml").scenario.actuator
     out = run(
-        corrected(controller=LAW, actuator=pods, disturbance=STEADY, path=Line()), 200.0, step=0.02
+        corrected(controller=LAW, actuator=two, disturbance=STEADY, path=Line()), 200.0, step=0.02
     )
     assert within(out, 190).min() == pytest.approx(0.028, abs=5e-4)
     assert within(out, 190).max() == pytest.approx(0.028, abs=5e-4)
@@ -128,6 +130,23 @@ def test_behind_pods_it_stays_off_by_what_their_sway_force_makes_of_the_predicti
     assert force == pytest.approx(-last["tau_v"], rel=1e-6)
     predicted = last["v"] - LAW.T_v * last["tau_v"] / NONLINEAR.m22
     assert last["v_s"] == pytest.approx(predicted, abs=2e-3)
+
+
+def test_what_the_lever_adds_is_the_force_that_no_moment_of_a_pod_changes():
+    """With tau_v = -tau_r/a the point m33/(a m22) ahead moves across as if there were no moment."""
+    a, m22, m33, Y, f_r, b_v, b_r, tau_r = sp.symbols("a m22 m33 Y f_r b_v b_r tau_r")
+    v_rate, r_rate = (Y + b_v - tau_r / a) / m22, (f_r + b_r + tau_r) / m33
+    force = Y + b_v + (f_r + b_r) / a
+    assert sp.simplify(m22 * (v_rate + m33 / (a * m22) * r_rate) - force) == 0
+
+
+@pytest.mark.parametrize("path", [Line(speed=0.5), Circle(radius=16.67, speed=0.5)])
+def test_told_the_lever_it_leaves_no_offset_behind_a_pod_that_turns(path):
+    told, pod = VelocityVector(thrust_lever=0.499), pods({"angle_limit": 1.2})
+    loop = corrected(controller=told, actuator=pod, disturbance=STEADY, path=path)
+    x, y = target_at(path, 0.0)[:2].tolist()
+    out = run(replace(loop, start=(x - 1.0, y, *loop.start[2:])), 200.0, step=0.02)
+    assert within(out, 195).max() < 1e-6
 
 
 def test_at_rest_on_the_target_it_wants_what_the_observed_loads_take():

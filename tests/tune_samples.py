@@ -3,8 +3,17 @@
 from pathlib import Path
 
 from podusv_cli.scenario.load import load, load_text
+from podusv_cli.study.march import Processes
+from podusv_cli.study.unit import prepare
+from podusv_cli.tuning import trials
 from podusv_cli.tuning.check import tune_faults
+from podusv_cli.tuning.march import march
 from podusv_cli.tuning.plan import TunePlan
+from podusv_cli.tuning.search import Search
+from podusv_cli.workflows import tune as workflow
+
+# They have times, and the report the last sitting.
+MADE_ANEW = {"provenance.json", "manifest.json", "tune.json", "study.json", "report.html"}
 
 LAW = '''"""A law whose tau_u varies by its distance from a known gain."""
 
@@ -28,7 +37,8 @@ class Toy(Controller):
 
     kind: Literal["toy"] = "toy"
     gain: float = value(1.0, "1", "best at 3", gt=0)
-    other: float = value(1.0, "1", "without influence", gt=0)
+    other: float = value(1.0, "1", "with a small influence", gt=0)
+    unread: float = value(1.0, "1", "without influence", gt=0)
     signals: ClassVar[tuple[Signal, ...]] = (MISS,)
 
     def slots(self):
@@ -41,7 +51,7 @@ class Toy(Controller):
     @kernel
     def law(t, x, memory, target, k, table, tau, rate, signals, work):
         signals[0] = k.gain - BEST
-        tau[0], tau[1] = 0.5 * (k.gain - BEST) * (k.gain - BEST), 0.0
+        tau[0], tau[1] = 0.5 * (k.gain - BEST) * (k.gain - BEST) + 1e-4 * k.other, 0.0
         rate[0] = 0.0
 
 
@@ -111,3 +121,28 @@ def faults(text: str, *changes: str) -> list[str]:
     except ScenarioError as error:
         return [str(fault) for fault in error.faults]
     return []
+
+
+def tuned(folder, *changes, tell=lambda tally, text: None, workers=1, figures=False):
+    """A finished search in folder/out."""
+    request = workflow.Request(changes, folder / "out", workers, figures=figures)
+    return workflow.tune(toy(folder), request, tell)
+
+
+def contents(folder):
+    """The bytes of all files that do not tell of times."""
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and path.name not in MADE_ANEW
+    }
+
+
+def searched(folder, *changes, engine=None):
+    """The trials of the toy law's searches, by the driver alone."""
+    plan = planned(folder, *changes)
+    (folder / trials.FOLDER).mkdir(exist_ok=True)
+    found = [Search(plan, "toy", repeat, folder) for repeat in range(plan.tune.repeats)]
+    prepare(plan.base, "toy", 0)  # before the fork
+    march(found, engine or Processes(1), lambda tally, searches: None)
+    return found

@@ -66,12 +66,8 @@ def run(
     shard: Annotated[
         str, typer.Option(help="A part of the study, as 3/20: for `podusv sweep merge`.")
     ] = "",
-    scheduler: Annotated[
-        str, typer.Option(help="Dask scheduler whose workers compute, as tcp://host:8786.")
-    ] = "",
-    allow_mixed: Annotated[
-        bool, typer.Option(help="Its workers may compute other bits than this machine.")
-    ] = False,
+    scheduler: options.Scheduler = "",
+    allow_mixed: options.AllowMixed = False,
     figures: options.Figures = True,
     as_json: options.AsJson = False,
     quiet: options.Quiet = False,

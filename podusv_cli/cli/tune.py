@@ -26,6 +26,8 @@ def tune(
     workers: Annotated[
         int, typer.Option(min=0, help="Processes at a time.", show_default="one a core")
     ] = 0,
+    scheduler: options.Scheduler = "",
+    allow_mixed: options.AllowMixed = False,
     figures: options.Figures = True,
     as_json: options.AsJson = False,
     quiet: options.Quiet = False,
@@ -41,9 +43,12 @@ def tune(
 
     with StudyLine(wanted=not (quiet or as_json)) as line:
         request = workflow.Request(
-            assign or (), out, workers, sys.argv, plugin or (), figures, line.say
-        )
+            assign or (), out, workers, sys.argv, plugin or (), figures, line.say, scheduler,
+            allow_mixed,
+        )  # fmt: skip
         done = workflow.tune(Path(config), request, line.advance)
+    for refused in done.refused:
+        echo(f"warning: {refused}", err=True)
     echo_result(done, lambda: _report(done), as_json=as_json, quiet=quiet)
     for part in done.missing:
         echo(part.traced, err=True)

@@ -11,7 +11,7 @@ from typing import Any, ClassVar, Literal, NamedTuple
 
 from podusv_cli.controllers.constant_bearing import Moving, approach, turn_rate
 from podusv_cli.controllers.observer import B_R, B_U, B_V, ObservingController, observe
-from podusv_cli.core.component import value
+from podusv_cli.core.component import Positive, value
 from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.kinematics import direction
@@ -47,6 +47,18 @@ def guidance(x: Vector, target: Vector, k: Any) -> Wanted:
     )  # fmt: skip
 
 
+@kernel
+def settled_sway(v: float, a: float, turn: float, memory: Vector, k: Any) -> float:
+    """The sway velocity T_v ahead, at the wanted surge velocity and turn.
+
+    With a thrust lever the steady moment -(f_r + b_r) brings the sway force (f_r + b_r)/lever.
+    """
+    across = sway_force(a, v, turn, k) + memory[B_V]
+    if k.thrust_lever > 0.0:
+        across += (yaw_moment(a, v, turn, k) + memory[B_R]) / k.thrust_lever
+    return float(v + k.T_v * across / k.m22)
+
+
 class VelocityVector(ObservingController):
     """Turns the vector of velocity over ground to the target and keeps it there."""
 
@@ -59,6 +71,7 @@ class VelocityVector(ObservingController):
             "chi_e", "rad", "angle that the velocity vector has to turn by", r"\chi_e", wrapped=True
         ),
     )
+    no_gains: ClassVar[tuple[str, ...]] = ("thrust_lever",)  # where the pods are
     k_p: float = value(0.5, "1/s", "gain of the distance, near the target", gt=0)
     U: float = value(1.25, "m/s", "largest wanted speed, about 1.2 times that at full thrust", gt=0)
     k_psi: float = value(1.3, "1/s", "gain of the angle", gt=0)
@@ -72,6 +85,10 @@ class VelocityVector(ObservingController):
     astern: Literal["never", "shorter"] = value(
         "shorter", "", "what a vessel ahead of the target does: turns round, and again when it is "
         "there (never), or backs up if its bow points to the target's course (shorter)",
+    )  # fmt: skip
+    thrust_lever: Positive | None = value(
+        None, "m", "distance behind the origin at which the pods turn, whose sway force makes the "
+        "moment; none where the moment comes without a sway force",
     )  # fmt: skip
     N_m: float = value(2.5, "N m", "moment beyond which surge yields to yaw", gt=0)
 
@@ -90,7 +107,7 @@ class VelocityVector(ObservingController):
         wanted = guidance(x, target, k)
         a, b, A_a, turn = wanted.a, wanted.b, wanted.A_a, wanted.turn
         u, v, r = x[3], x[4], x[5]
-        v_s = v + k.T_v * (sway_force(a, v, turn, k) + memory[B_V]) / k.m22
+        v_s = settled_sway(v, a, turn, memory, k)
         w = b - v_s
         speed = math.sqrt(a * a + w * w)
         side = -1.0 if wanted.backward and a < 0.0 and k.astern == SHORTER else 1.0

@@ -140,6 +140,16 @@ def disk_array(folder: Path, size: int) -> Vector:
         return np.memmap(file, np.float64, "r+", shape=size).view(np.ndarray)
 
 
+def is_empty(folder: Path) -> bool:
+    """Whether a folder is missing or holds nothing but what killed processes left unfinished.
+
+    Their files are removed. Raises StorageError.
+    """
+    remove_abandoned_files(folder)
+    with storage_errors(f"cannot read {folder}"):
+        return not folder.exists() or not any(folder.iterdir())
+
+
 def make_folder(path: Path) -> None:
     """Make a folder and its parents, if missing. Raises StorageError."""
     with storage_errors(f"cannot make the folder {path}"):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import astuple, dataclass, replace
 from queue import Empty, SimpleQueue
 from typing import Any
@@ -18,7 +18,8 @@ from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.process.workers import Outcome
 from podusv_cli.study import remote
-from podusv_cli.study.march import Done, Units
+from podusv_cli.study.march import Done, Engine, Processes, Units
+from podusv_cli.study.plan import Variant
 from podusv_cli.study.remote import Recipe, Reply, Terms
 from podusv_cli.study.unit import Unit
 
@@ -31,12 +32,25 @@ KILLED = "KilledWorker"  # Dask's exception for a task whose worker died, time a
 
 @dataclass(frozen=True)
 class Task:
-    """A unit, the workers that may make it (None: all), and whether nothing else is under way."""
+    """A unit of a study or of a variant of it, and the terms of its making.
+
+    `allowed` are the workers that may make it (None: all); `alone` that nothing else is under way.
+    """
 
     number: int
+    variant: Variant | None
     unit: Unit
     allowed: frozenset[str] | None = None
     alone: bool = False
+
+
+def engine(
+    scheduler: str, workers: int, recipe: Recipe, identity: str, *, mixed: bool
+) -> AbstractContextManager[Engine]:
+    """Where units are made: processes of this machine, or the workers of a scheduler, if any."""
+    if not scheduler:
+        return nullcontext(Processes(workers))
+    return connected(scheduler, recipe, identity, mixed=mixed)
 
 
 @contextmanager
@@ -76,8 +90,8 @@ class Cluster:
         self._threads, self._looked = dict[str, int](), -LOOK
         self._running, self._finished = dict[Any, Task](), SimpleQueue[Any]()
         self._again, self._suspects = deque[Task](), deque[Task]()
-        self._guilty, self._refused = list[Unit](), dict[str, str]()
-        self._machines, self._made = dict[str, str](), dict[str, list[Unit]]()
+        self._guilty, self._refused = list[Task](), dict[str, str]()
+        self._machines, self._made = dict[str, str](), dict[str, list[Task]]()
 
     def check(self) -> None:
         """Raise UsageError where a worker computes with something else, or where there is none."""
@@ -141,23 +155,30 @@ class Cluster:
             return self._again.popleft()
         if not self._suspects:
             taken = next(units, None)
-            if not taken or not self._is_guilty(taken[1]):
-                return Task(*taken) if taken else None
-            self._suspects.append(Task(*taken, alone=True))
+            if not taken:
+                return None
+            number, plan, unit = taken
+            task = Task(number, plan.variant, unit)
+            if not self._is_guilty(task):
+                return task
+            self._suspects.append(replace(task, alone=True))
         # A unit whose worker died may only have been beside the one that killed it.
         return None if self._running else self._suspects.popleft()
 
-    def _is_guilty(self, unit: Unit) -> bool:
+    def _is_guilty(self, task: Task) -> bool:
         """Whether it is part of a unit that killed its worker when nothing else was under way."""
+        unit, at = task.unit, (task.variant, task.unit.law, task.unit.cell)
         return any(
-            (unit.law, unit.cell) == (found.law, found.cell) and unit.first in found.draws
+            at == (found.variant, found.unit.law, found.unit.cell)
+            and unit.first in found.unit.draws
             for found in self._guilty
         )
 
     def _submit(self, task: Task) -> None:
         future = self._client.submit(
             remote.made, self._recipe.text, self._recipe.plugins, astuple(task.unit),
-            self._terms.expected, mixed=self._terms.mixed, pure=False,
+            self._terms.expected, astuple(task.variant) if task.variant else None,
+            mixed=self._terms.mixed, pure=False,
             workers=sorted(task.allowed) if task.allowed else None,
         )  # fmt: skip
         self._running[future] = task
@@ -199,9 +220,9 @@ class Cluster:
         else:
             if reply.worker:
                 self._machines[reply.worker] = reply.machine
-                self._made.setdefault(reply.worker, []).append(task.unit)
+                self._made.setdefault(reply.worker, []).append(task)
             else:
-                self._guilty.append(task.unit)
+                self._guilty.append(task)
             done(task.number, reply.outcome)
 
     def _look(self) -> None:
@@ -222,11 +243,15 @@ class Cluster:
         return max(1, sum(self._threads.values()))
 
     def told(self) -> dict[str, Any]:
-        """Which worker made which units, and which workers were refused."""
+        """Which worker made how many runs, of the study which ones, and who was refused."""
         workers = [
-            {"worker": worker, "machine": self._machines[worker], "units": list(_joined(units))}
-            for worker, units in self._made.items()
-        ]
+            {
+                "worker": worker, "machine": self._machines[worker],
+                "runs": sum(task.unit.count for task in tasks),
+                "units": list(_joined(task.unit for task in tasks if task.variant is None)),
+            }
+            for worker, tasks in self._made.items()
+        ]  # fmt: skip
         return {"workers": workers, "refused": self._refused}
 
 

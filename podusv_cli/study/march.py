@@ -68,7 +68,8 @@ class Tally:
 
 Tell = Callable[[Tally], None]
 Gaps = dict[tuple[str, int], int]  # how many runs, by law and cell
-Units = Iterator[tuple[int, Unit]]  # numbered; after the last, there may be more
+# Numbered, with the study that each is of; after the last, there may be more.
+Units = Iterator[tuple[int, Plan, Unit]]
 Done = Callable[[int, Outcome], None]
 
 
@@ -94,7 +95,6 @@ class Engine(Protocol):
 class Processes:
     """Units are made in processes of this machine."""
 
-    plan: Plan
     count: int = 0  # one a core
 
     def __call__(self, units: Units, done: Done) -> bool:
@@ -107,9 +107,9 @@ class Processes:
         """As asked for, or one a core."""
         return self.count or available_workers()
 
-    def _job(self, numbered: tuple[int, Unit]) -> tuple[int, Job]:
-        number, unit = numbered
-        return number, partial(timed, self.plan, unit)
+    def _job(self, numbered: tuple[int, Plan, Unit]) -> tuple[int, Job]:
+        number, plan, unit = numbered
+        return number, partial(timed, plan, unit)
 
     def told(self) -> dict[str, Any]:
         """Nothing: the workers are those of the machine."""
@@ -135,14 +135,14 @@ class Driver:
         """The units; more may come while some are under way."""
         return self
 
-    def __next__(self) -> tuple[int, Unit]:
+    def __next__(self) -> tuple[int, Plan, Unit]:
         """The next unit, with its number."""
         unit = self._next()
         if unit is None:
             raise StopIteration
         number = next(self._numbers)
         self._units[number] = unit
-        return number, unit
+        return number, self.plan, unit
 
     def missing(self) -> Gaps:
         """How many runs of each law and cell are missing, without those of which none is."""

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from podusv_cli.controllers.base import Controller
 from podusv_cli.core.errors import UsageError
 from podusv_cli.engine import closed_loop
 from podusv_cli.engine.loop import entries
@@ -18,7 +19,7 @@ from podusv_cli.engine.object_cache import ingredients
 from podusv_cli.metrics.table import Metrics
 from podusv_cli.scenario.load import Loaded, values
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.sweep import Sweep
+from podusv_cli.scenario.sweep import Keep, Sweep
 from podusv_cli.study.cells import Cell, cells
 from podusv_cli.study.check import sweep_faults
 from podusv_cli.study.draws import SWEEP
@@ -29,12 +30,24 @@ KERNELS = " kernels"  # ends the key of the digest of a law's compiled source
 
 
 @dataclass(frozen=True)
+class Variant:
+    """Laws of a study with other numbers, on draws of another stream; text and numbers alone.
+
+    `laws` holds for each its name, the name of the study's law, and its numbers that are others.
+    """
+
+    stream: str
+    draws: int
+    laws: tuple[tuple[str, str, tuple[tuple[str, Any], ...]], ...]
+
+
+@dataclass(frozen=True)
 class Plan:
     """A scenario with its key `sweep`, in cells."""
 
     scenario: Scenario
     cells: tuple[Cell, ...]
-    stream: str = SWEEP  # of its draws
+    variant: Variant | None = None  # which one of the study it is, if any
 
     @property
     def sweep(self) -> Sweep:
@@ -42,6 +55,11 @@ class Plan:
         if self.scenario.sweep is None:
             raise UsageError(f"{self.scenario.name} has no key `sweep`; see docs/studies.md")
         return self.scenario.sweep
+
+    @property
+    def stream(self) -> str:
+        """The stream of its draws."""
+        return self.variant.stream if self.variant else SWEEP
 
     @property
     def laws(self) -> tuple[str, ...]:
@@ -78,6 +96,24 @@ class Plan:
                 told |= {f"{law}[{cell.index}].{key}": value for key, value in kept.items()}
                 told[f"{law}[{cell.index}]{KERNELS}"] = kernels(single)
         return told
+
+    def varied(self, variant: Variant) -> Plan:
+        """The variant of this study, which has no grid. Raises ValidationError."""
+        own = self.scenario.singles()
+        laws = {name: changed(own[law].controller, dict(new)) for name, law, new in variant.laws}
+        plain = {"laws": (), "draws": variant.draws, "claims": {}, "keep": Keep()}
+        scenario = self.scenario.model_copy(
+            update={
+                "controllers": laws, "controller": next(iter(laws.values())), "claims": {},
+                "tune": None, "sweep": self.sweep.model_copy(update=plain),
+            }
+        )  # fmt: skip
+        return Plan(scenario, (Cell(0, (), scenario),), variant)
+
+
+def changed(law: Controller, new: Mapping[str, Any]) -> Controller:
+    """The law with other numbers. Raises ValidationError where it refuses them."""
+    return type(law).model_validate(law.model_dump() | dict(new))
 
 
 def plan(loaded: Loaded) -> Plan:

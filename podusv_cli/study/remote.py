@@ -13,6 +13,7 @@ from functools import lru_cache, partial
 from importlib.metadata import version
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import podusv_cli
 from podusv_cli.process.interrupts import Interrupts
@@ -21,7 +22,7 @@ from podusv_cli.scenario.load import load_text
 from podusv_cli.storage.provenance import processor
 from podusv_cli.study.joining import digests
 from podusv_cli.study.march import timed
-from podusv_cli.study.plan import Plan, digest, plan
+from podusv_cli.study.plan import Plan, Variant, digest, plan
 from podusv_cli.study.unit import Unit, make
 
 PLANS = 2  # plans that a worker keeps
@@ -53,6 +54,11 @@ def _placed(recipe: Recipe) -> tuple[Plan, TemporaryDirectory[str]]:
 
 def _plan(recipe: Recipe) -> Plan:
     return _placed(recipe)[0]
+
+
+@lru_cache(PLANS)
+def _variant(recipe: Recipe, told: tuple[Any, ...]) -> Plan:
+    return _plan(recipe).varied(Variant(*told))
 
 
 @lru_cache(PLANS)
@@ -118,14 +124,16 @@ class Reply:
 
 
 def made(
-    text: str, plugins: Plugins, unit: tuple[str, int, int, int], expected: str, *, mixed: bool
-) -> Reply:
-    """Make a unit (law, cell, first draw, number of draws), on a worker."""
+    text: str, plugins: Plugins, unit: tuple[str, int, int, int], expected: str,
+    variant: tuple[Any, ...] | None = None, *, mixed: bool,
+) -> Reply:  # fmt: skip
+    """Make a unit (law, cell, first draw, number of draws) of a study or a variant, on a worker."""
     from distributed import get_worker
 
-    told, outcome = report(text, plugins), None
+    told, outcome, recipe = report(text, plugins), None, Recipe(text, plugins)
     if digest(firm(told, mixed=mixed)) == expected:
-        job = partial(timed, _plan(Recipe(text, plugins)), Unit(*unit))
+        plan = _variant(recipe, variant) if variant else _plan(recipe)
+        job = partial(timed, plan, Unit(*unit))
         outcome = outcome_of(job, lambda fraction: None, Interrupts())
     machine = f"{processor()} ({' '.join(platform.libc_ver())})"
     return Reply(get_worker().address, machine, told, outcome)

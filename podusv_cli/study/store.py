@@ -84,7 +84,7 @@ class Store:
                     f"{self.folder} has {told['draws']} draws; ask for as many or more, or name "
                     "another folder with --out"
                 )
-        elif self.folder.exists() and any(self.folder.iterdir()):
+        elif not files.is_empty(self.folder):
             raise UsageError(f"{self.folder} is no study and not empty; name another with --out")
         asked = {"draws": self.plan.sweep.draws, "started": started}
         content = {

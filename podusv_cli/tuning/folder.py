@@ -17,7 +17,7 @@ from podusv_cli.tuning.plan import TunePlan
 from podusv_cli.tuning.results import Results
 
 TUNE, SCENARIO, TUNED = "tune.json", "scenario.yaml", "tuned.yaml"
-FORMAT = 1
+FORMAT = 2
 DIFFERENT = 4  # keys that a message names
 
 
@@ -27,32 +27,57 @@ def check(folder: Path) -> None:
         raise UsageError(f"{folder} is not the folder of a search: it has no {TUNE}")
 
 
-def opened(folder: Path, plan: TunePlan, started: str) -> None:
-    """Make the folder, or check that it holds this very search, and note what is asked for.
+def known(folder: Path, plan: TunePlan) -> dict[str, Any]:
+    """What tune.json says of this very search; nothing where the folder is missing or empty.
 
-    Raises UsageError where it holds another search, naming what is different, and StorageError.
+    Raises UsageError where the folder holds something else, naming what is different.
     """
-    identity = json_files.plain({**plan.identity, "optuna": sampler.version()})
-    history: list[Any] = []
-    if (folder / TUNE).exists():
-        told = json_files.read(folder / TUNE)
-        _agree(folder, told.get("identity", {}), identity)
-        history = list(told.get("history", []))
-        _as_much(folder, history, plan.tune)
-    elif folder.exists() and any(folder.iterdir()):
-        raise UsageError(f"{folder} is no search and not empty; name another with --out")
+    if not (folder / TUNE).exists():
+        if not files.is_empty(folder):
+            raise UsageError(f"{folder} is no search and not empty; name another with --out")
+        return {}
+    told = json_files.read(folder / TUNE)
+    _agree(folder, told.get("identity", {}), _identity(plan))
+    _as_much(folder, told["history"], plan.tune)
+    return told
+
+
+def write(
+    folder: Path, plan: TunePlan, told: Mapping[str, Any], started: str, texts: Mapping[str, str]
+) -> None:
+    """Note what is asked for, after what is `known` of the search.
+
+    `texts` has the scenario and its plug-ins by the names of their files. Raises StorageError.
+    """
+    content = json_files.encode(_content(plan, told.get("history", []), started))
+    # With a larger budget in tune.json than in the scenario, the search could not be continued. And
+    # without tune.json, a folder that is not empty is no search.
+    if told:
+        _write_scenario(folder, texts)
+    files.make_folder(folder)
+    files.write_bytes(folder / TUNE, content)
+    files.make_folder(folder / trials.FOLDER)
+    if not told:
+        _write_scenario(folder, texts)
+
+
+def _identity(plan: TunePlan) -> dict[str, Any]:
+    told = {"format of tune.json": FORMAT, "optuna": sampler.version(), **plan.identity}
+    return json_files.plain(told)
+
+
+def _content(plan: TunePlan, history: Sequence[Any], started: str) -> dict[str, Any]:
     tune = plan.tune
     asked = {
         "budget": tune.budget, "repeats": tune.repeats, "validate": tune.validate,
         "started": started,
     }  # fmt: skip
-    content = {
+    return {
         "format": FORMAT, "name": plan.scenario.name, "laws": list(plan.laws),
         "gains": {law: [gain.key for gain in found] for law, found in plan.gains.items()},
-        "identity": identity, "history": [*history, asked],
+        "idle": {law: list(keys) for law, keys in plan.idle.items()},
+        "identity": _identity(plan), "history": [*history, asked],
     }  # fmt: skip
-    files.make_folder(folder / trials.FOLDER)
-    files.write_bytes(folder / TUNE, json_files.encode(content))
 
 
 def _agree(folder: Path, there: dict[str, Any], wanted: dict[str, Any]) -> None:
@@ -75,9 +100,12 @@ def _as_much(folder: Path, history: Sequence[Mapping[str, Any]], tune: Tune) -> 
         )
 
 
-def write_scenario(folder: Path, loaded: Loaded) -> None:
-    """Write the searched scenario, with its plug-ins. Raises StorageError."""
-    texts = {SCENARIO: tree_yaml(loaded), **loaded.scenario.plugin_files()}
+def scenario_texts(loaded: Loaded) -> dict[str, str]:
+    """The scenario and its plug-ins, by the names of their files in the folder."""
+    return {SCENARIO: tree_yaml(loaded), **loaded.scenario.plugin_files()}
+
+
+def _write_scenario(folder: Path, texts: Mapping[str, str]) -> None:
     for name in texts:
         files.make_folder((folder / name).parent)
     files.write_all({folder / name: text.encode() for name, text in texts.items()})

@@ -1,4 +1,4 @@
-"""Simulating what all searches ask for, in processes of this machine.
+"""Simulating what all searches ask for, in processes of this machine or by workers of a cluster.
 
 Searches do not depend on each other, so units of all of them are made side by side.
 """
@@ -7,12 +7,11 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Sequence
-from functools import partial
 
 from podusv_cli.core.errors import PodusvError
-from podusv_cli.process.workers import Job, Outcome, run_each
+from podusv_cli.process.workers import Outcome
 from podusv_cli.study import plan as study
-from podusv_cli.study.march import Tally, timed
+from podusv_cli.study.march import Engine, Tally
 from podusv_cli.study.unit import Unit, UnitResult, crashed
 from podusv_cli.tuning.search import Search
 
@@ -37,17 +36,17 @@ class Driver:
         self.tally = Tally(budget, spent, before=spent)
 
     def __iter__(self) -> Driver:
-        """The jobs; more may come while some are under way."""
+        """The units; more may come while some are under way."""
         return self
 
-    def __next__(self) -> tuple[int, Job]:
-        """The next job, with its number."""
+    def __next__(self) -> tuple[int, study.Plan, Unit]:
+        """The next unit, with its number and its study."""
         if self.failure or not self._waiting:
             raise StopIteration
         search, asked = self._waiting.popleft()
         self._number += 1
         self._busy[self._number] = search, asked
-        return self._number, partial(timed, asked[1], asked[2])
+        return self._number, asked[1], asked[2]
 
     def done(self, number: int, outcome: Outcome) -> None:
         """Give a search the result of a unit; runs of a process that ended are crashed."""
@@ -69,21 +68,16 @@ class Driver:
         self._waiting.extend((search, asked) for asked in units)
 
 
-def march(searches: Sequence[Search], workers: int, tell: Tell) -> Tally:
+def march(searches: Sequence[Search], engine: Engine, tell: Tell) -> Tally:
     """Bring all searches to the end of their budget.
 
     Every batch is on the disk before the next of its search is asked for. Raises PodusvError where
     a unit cannot be made at all, KeyboardInterrupt after an interrupt; finished batches are kept.
     """
     driver = Driver(searches, tell)
-    # `map` asks again after the last job, as searches go on; a generator would not.
-    finished = run_each(map(_same, driver), driver.done, workers=workers)
+    finished = engine(driver, driver.done)
     if driver.failure:
         raise PodusvError(driver.failure)
     if not finished:
         raise KeyboardInterrupt
     return driver.tally
-
-
-def _same(job: tuple[int, Job]) -> tuple[int, Job]:
-    return job

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -12,7 +12,6 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.core.quantities import time_in_words
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.sweep import Keep
 from podusv_cli.scenario.tune import Tune
 from podusv_cli.study import plan as study
 from podusv_cli.study.cells import Cell
@@ -25,6 +24,7 @@ from podusv_cli.tuning.space import Gain, gains
 TRAIN, VALIDATE = "tune", "tune validation"  # streams of draws, beside a sweep's own
 # Settings that change no trial: more of them continues a search.
 OPEN = ("budget", "validate", "repeats")
+Named = tuple[str, Mapping[str, Any]]  # a law of the scenario, and its numbers that are others
 
 
 @dataclass(frozen=True)
@@ -32,6 +32,7 @@ class TunePlan:
     """A scenario with the keys `sweep` and `tune`."""
 
     scenario: Scenario
+    idle: Mapping[str, Sequence[str]] = field(default_factory=dict)  # change no run, by law
 
     @property
     def tune(self) -> Tune:
@@ -49,9 +50,12 @@ class TunePlan:
     def gains(self) -> dict[str, tuple[Gain, ...]]:
         """The gains of every law; none for a law that is kept as it is."""
         return {
-            label: gains(one.controller, label, one, self.tune)
+            label: tuple(
+                gain for gain in gains(one.controller, label, one, self.tune)
+                if gain.key not in self.idle.get(label, ())
+            )
             for label, one in singles(self.scenario).items()
-        }
+        }  # fmt: skip
 
     @cached_property
     def metrics(self) -> dict[str, Metric]:
@@ -90,6 +94,7 @@ class TunePlan:
                 yield f"gains of {law} ({len(found)}): {names}"
             else:
                 yield f"{law} has no gains and is kept as it is"
+        yield "gains that change no run are left out when the search begins"
         wanted, tune = self.runs_wanted(), self.tune
         search, other = (sum(counts) for counts in zip(*wanted.values(), strict=True))
         time = sum(sum(counts) * paces.get(law, 0.0) for law, counts in wanted.items()) / workers
@@ -100,18 +105,15 @@ class TunePlan:
             f"{cores}"
         )
 
-    def with_laws(self, laws: Mapping[str, Controller], stream: str, draws: int) -> study.Plan:
-        """The study of these laws by name, on draws of a stream."""
-        assert self.scenario.sweep
-        plain = {"laws": (), "draws": draws, "claims": {}, "keep": Keep()}
-        sweep = self.scenario.sweep.model_copy(update=plain)
-        scenario = self.scenario.model_copy(
-            update={
-                "controllers": dict(laws), "controller": next(iter(laws.values())),
-                "claims": {}, "tune": None, "sweep": sweep,
-            }
-        )  # fmt: skip
-        return study.Plan(scenario, (Cell(0, (), scenario),), stream)
+    @cached_property
+    def base(self) -> study.Plan:
+        """The scenario's own study, which all others are variants of."""
+        return study.Plan(self.scenario, (Cell(0, (), self.scenario),))
+
+    def variant(self, laws: Mapping[str, Named], stream: str, draws: int) -> study.Plan:
+        """The study of laws by their new names, on draws of a stream."""
+        told = tuple((name, law, tuple(new.items())) for name, (law, new) in laws.items())
+        return self.base.varied(study.Variant(stream, draws, told))
 
     def runs(self, results: list[UnitResult]) -> Runs:
         """The runs of some units, in their order; failed is what the study calls no success."""
@@ -129,7 +131,7 @@ class TunePlan:
     @cached_property
     def identity(self) -> dict[str, Any]:
         """All that the trials depend on, by dotted keys."""
-        whole = self.with_laws(self.laws, TRAIN, self.tune.train)
+        whole = self.variant({law: (law, {}) for law in self.laws}, TRAIN, self.tune.train)
         told = {f"tune.{k}": v for k, v in self.tune.model_dump(exclude=set(OPEN)).items()}
         assert self.scenario.sweep
         return {**told, "sweep.success": self.scenario.sweep.success, **whole.identity}

@@ -185,12 +185,17 @@ class Results:
 
     def remarks(self) -> list[str]:
         """What is worth a sentence."""
-        return [*self._kept(), *self._unsound(), *self._bounds()]
+        return [*self._kept(), *self._idle(), *self._unsound(), *self._bounds()]
 
     def _kept(self) -> Iterator[str]:
         for law in self.plan.laws:
             if law not in self.winners:
                 yield f"{law} has no gains, kept as it is"
+
+    def _idle(self) -> Iterator[str]:
+        for law, keys in self.plan.idle.items():
+            if keys:
+                yield f"{law}: {', '.join(keys)} changed no run and was not searched"
 
     def _unsound(self) -> Iterator[str]:
         for law in self.winners:

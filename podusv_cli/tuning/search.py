@@ -98,8 +98,8 @@ class Search:
         ]
 
     def _attempt(self, gains: dict[str, object], draws: int) -> Attempt:
-        law = with_gains(self.plan.laws[self.law], gains)
-        made = self.plan.with_laws({self.law: law}, TRAIN, draws) if law else None
+        taken = with_gains(self.plan.laws[self.law], gains)
+        made = self.plan.variant({self.law: (self.law, gains)}, TRAIN, draws) if taken else None
         return Attempt(gains, draws, made, [])
 
     def _known(self) -> list[Trial] | None:

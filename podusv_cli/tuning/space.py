@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -14,6 +15,7 @@ from podusv_cli.scenario.keys import limits
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import did_you_mean
 from podusv_cli.scenario.tune import AROUND, Range, Tune
+from podusv_cli.study.plan import changed
 
 DIGITS = 4  # of a gain that is tried, so that a scenario shows all of them
 BOUNDARY = 0.02  # of a range: a gain that is nearer to an end is at its bound
@@ -53,13 +55,24 @@ class Gain:
         near = {"lower": place, "upper": 1.0 - place}
         return next((end for end, away in near.items() if away < BOUNDARY), "")
 
+    @property
+    def ends(self) -> tuple[Any, ...]:
+        """The ends of its range, or all words."""
+        return self.words or (self.value(self.low), self.value(self.high))
+
     def place(self, number: float) -> float:
         """Where a number is between the ends, from 0 to 1, on the scale of the search."""
-        from math import log
-
         if self.log:
-            return log(number / self.low) / log(self.high / self.low)
+            return math.log(number / self.low) / math.log(self.high / self.low)
         return (number - self.low) / (self.high - self.low)
+
+    def at(self, place: float) -> Any:
+        """What is at a place between the ends, the reverse of `place`; or one of the words."""
+        if self.words:
+            return self.words[int(place * len(self.words))]
+        if self.log:
+            return self.value(self.low * (self.high / self.low) ** place)
+        return self.value(self.low + place * (self.high - self.low))
 
 
 def gains(law: Controller, label: str, scenario: Scenario, tune: Tune) -> tuple[Gain, ...]:
@@ -111,7 +124,7 @@ def _structure(scenario: Scenario, law: Controller) -> tuple[Any, ...]:
 def with_gains(law: Controller, new: Mapping[str, Any]) -> Controller | None:
     """The law with other gains; None where it refuses them."""
     try:
-        return type(law).model_validate(law.model_dump() | dict(new))
+        return changed(law, new)
     except ValidationError:
         return None
 

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from podusv_cli.controllers.base import Controller
 from podusv_cli.core.kernel import Vector
 from podusv_cli.storage import files, json_files
 from podusv_cli.storage.run_folder import STUDY
-from podusv_cli.study.march import Processes, Tally, march
+from podusv_cli.study.march import Engine, Tally, march
 from podusv_cli.study.plan import Plan, disagreements
 from podusv_cli.study.runs import Mask
 from podusv_cli.study.runs_file import Table
 from podusv_cli.study.store import RUNS, UNITS, Store
-from podusv_cli.tuning.plan import VALIDATE, TunePlan
-from podusv_cli.tuning.space import with_gains
+from podusv_cli.tuning.plan import VALIDATE, Named, TunePlan
 from podusv_cli.tuning.trials import Trial, best
 
 FOLDER = "validation"
@@ -43,40 +42,40 @@ def chosen(winners: Sequence[Trial]) -> int:
     return best(numbered).number
 
 
-def contestants(plan: TunePlan, winners: Winners) -> dict[str, Controller]:
+def contestants(plan: TunePlan, winners: Winners) -> dict[str, Named]:
     """All laws that meet the fresh draws, by name: before, after, and those of other repeats."""
-    found: dict[str, Controller] = {}
-    for law, own in plan.laws.items():
-        found[law] = own
+    found: dict[str, Named] = {}
+    for law in plan.laws:
+        found[law] = law, {}
         if law in winners:
             first = chosen(winners[law])
             for repeat, trial in enumerate(winners[law]):
-                name = tuned(law) if repeat == first else repeated(law, repeat)
-                made = with_gains(own, trial.gains)
-                assert made, "a trial that finished has gains that the law takes"
-                found[name] = made
+                found[tuned(law) if repeat == first else repeated(law, repeat)] = law, trial.gains
     return found
 
 
 def validate(
-    plan: TunePlan, winners: Winners, folder: Path, started: str, workers: int,
+    plan: TunePlan, winners: Winners, folder: Path, started: str, engine: Engine,
     tell: Callable[[Tally], None],
 ) -> Table:  # fmt: skip
     """Simulate what is missing of the validation; its runs.
 
     Raises PodusvError, StorageError and KeyboardInterrupt; finished units are kept.
     """
-    made = plan.with_laws(contestants(plan, winners), VALIDATE, plan.tune.validate)
+    made = plan.variant(contestants(plan, winners), VALIDATE, plan.tune.validate)
     store = Store(folder / FOLDER, made)
     _clear(store.folder, made)
     store.open(started)
-    march(store, tell, Processes(made, workers))
+    march(store, tell, engine)
     store.write_runs()
     return store.runs()
 
 
 def _clear(folder: Path, plan: Plan) -> None:
-    """Remove the runs of other gains, which an earlier sitting with a smaller budget found."""
+    """Remove the runs of other gains, which an earlier sitting with a smaller budget found.
+
+    study.json goes last, because a folder without it that is not empty is no study.
+    """
     if not (folder / STUDY).exists():
         return
     told: dict[str, Any] = json_files.read(folder / STUDY)
@@ -84,7 +83,9 @@ def _clear(folder: Path, plan: Plan) -> None:
     if same and told.get("draws", 0) <= plan.sweep.draws:
         return
     with files.storage_errors(f"cannot remove old runs in {folder}"):
-        for path in (folder / STUDY, folder / RUNS, *(folder / UNITS).glob("*.h5")):
+        if (folder / UNITS).exists():
+            shutil.rmtree(folder / UNITS)
+        for path in (folder / RUNS, folder / STUDY):
             path.unlink(missing_ok=True)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
@@ -22,11 +22,12 @@ from podusv_cli.scenario.sweep import Keep
 from podusv_cli.storage import manifest
 from podusv_cli.study import outputs
 from podusv_cli.study.check import sweep_faults
+from podusv_cli.study.cluster import engine
 from podusv_cli.study.estimate import estimate, pilot
 from podusv_cli.study.invalid import check_draws
 from podusv_cli.study.joining import mixture
 from podusv_cli.study.keep import found
-from podusv_cli.study.march import Engine, Gaps, Part, Processes, Tally, Tell, march
+from podusv_cli.study.march import Engine, Gaps, Part, Tally, Tell, march
 from podusv_cli.study.plan import plan
 from podusv_cli.study.remote import Recipe
 from podusv_cli.study.results import Results, judged
@@ -91,9 +92,9 @@ def run(config: Path, request: Request, tell: Tell) -> Swept:
     """
     started = datetime.now(UTC)
     store = _opened(config, request, started)
-    with _engine(store, request) as engine:
-        tally, whole = _marched(store, request, started, engine, tell)
-    refused = tuple(engine.told().get("refused", {}).values())
+    with _engine(store, request) as found:
+        tally, whole = _marched(store, request, started, found, tell)
+    refused = tuple(found.told().get("refused", {}).values())
     if whole and request.shard != WHOLE:
         whole = _is_whole(store)
         if not whole:
@@ -143,14 +144,10 @@ def _announce(store: Store, request: Request, workers: int, missing: Gaps) -> No
 
 
 def _engine(store: Store, request: Request) -> AbstractContextManager[Engine]:
-    """Where units are made: processes of this machine, or workers of a cluster."""
-    if not request.scheduler:
-        return nullcontext(Processes(store.plan, request.workers))
-    from podusv_cli.study.cluster import connected  # imports Dask
-
+    """Where units are made."""
     text = (store.folder / SCENARIO).read_text(encoding="utf-8")
     recipe = Recipe(text, tuple(store.plan.scenario.plugin_files().items()))
-    return connected(request.scheduler, recipe, store.seal, mixed=request.mixed)
+    return engine(request.scheduler, request.workers, recipe, store.seal, mixed=request.mixed)
 
 
 def _is_whole(store: Store) -> bool:

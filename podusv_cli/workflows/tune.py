@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -17,17 +18,22 @@ from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Loaded, load
 from podusv_cli.storage import files, manifest
 from podusv_cli.study.check import sweep_faults
-from podusv_cli.study.march import Tally
+from podusv_cli.study.cluster import engine
+from podusv_cli.study.march import Engine, Tally
+from podusv_cli.study.plan import digest
+from podusv_cli.study.remote import Recipe
 from podusv_cli.study.sittings import Sitting
 from podusv_cli.study.unit import prepare
 from podusv_cli.tuning import folder as place
 from podusv_cli.tuning import outputs
 from podusv_cli.tuning.check import tune_faults
+from podusv_cli.tuning.idle import find_idle
 from podusv_cli.tuning.march import march
 from podusv_cli.tuning.plan import TRAIN, TunePlan
 from podusv_cli.tuning.results import Results
 from podusv_cli.tuning.sampler import optuna
 from podusv_cli.tuning.search import Search
+from podusv_cli.tuning.space import with_gains
 from podusv_cli.tuning.trials import best
 from podusv_cli.tuning.validation import validate
 from podusv_cli.workflows.run import RESULTS
@@ -46,6 +52,8 @@ class Request:
     plugins: Sequence[str] = ()
     figures: bool = True
     say: Callable[[str], None] = lambda text: None
+    scheduler: str = ""  # of a Dask cluster, as tcp://host:port
+    mixed: bool = False  # whether its workers may compute other bits than this machine
 
 
 @dataclass(frozen=True)
@@ -55,6 +63,7 @@ class Tuned:
     folder: Path
     results: Results
     missing: tuple[Missing, ...] = ()  # of figures and report
+    refused: tuple[str, ...] = ()  # workers of a cluster that got no units, and why
 
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints."""
@@ -64,6 +73,7 @@ class Tuned:
             "laws": results.laws.to_dict("records"),
             "gains": {law: dict(results.winner(law).gains) for law in results.winners},
             "remarks": results.remarks(), "missing": [str(one) for one in self.missing],
+            "refused": self.refused,
         }  # fmt: skip
 
 
@@ -78,10 +88,14 @@ def tune(config: Path, request: Request, tell: Tell) -> Tuned:
     optuna()
     loaded, folder = _loaded(config, request)
     plan = TunePlan(loaded.scenario)
-    place.opened(folder, plan, started.isoformat(timespec="seconds"))
-    place.write_scenario(folder, loaded)
-    results = _simulated(plan, folder, request, started, tell)
-    return _written(results, folder, request)
+    told = place.known(folder, plan)
+    plan = replace(plan, idle=told["idle"] if told else _idle(plan, request))
+    stamp = started.isoformat(timespec="seconds")
+    place.write(folder, plan, told, stamp, place.scenario_texts(loaded))
+    with _engine(plan, folder, request) as found:
+        results = _simulated(plan, folder, request, started, found, tell)
+    refused = tuple(found.told().get("refused", {}).values())
+    return replace(_written(results, folder, request), refused=refused)
 
 
 def _loaded(config: Path, request: Request) -> tuple[Loaded, Path]:
@@ -104,7 +118,7 @@ def _loaded(config: Path, request: Request) -> tuple[Loaded, Path]:
 
 
 def _simulated(
-    plan: TunePlan, folder: Path, request: Request, started: datetime, tell: Tell
+    plan: TunePlan, folder: Path, request: Request, started: datetime, engine: Engine, tell: Tell
 ) -> Results:
     """Search and validate what is not there yet, and note the sitting."""
     sitting = Sitting(folder, request.argv, started, plan.scenario.plugged)
@@ -120,22 +134,48 @@ def _simulated(
 
     try:
         searches = _searches(plan, folder)
-        for law in {search.law for search in searches}:  # before the fork
-            prepare(plan.with_laws({law: plan.laws[law]}, TRAIN, 1), law, 0)
-        march(searches, request.workers, searched)
+        _prepare(plan)
+        march(searches, engine, searched)
         trials = {law: [s.trials for s in searches if s.law == law] for law in plan.gains}
         trials = {law: found for law, found in trials.items() if found}
         winners = {law: [best(one) for one in found] for law, found in trials.items()}
         stamp = started.isoformat(timespec="seconds")
-        runs = validate(plan, winners, folder, stamp, request.workers, validated)
+        runs = validate(plan, winners, folder, stamp, engine, validated)
     except KeyboardInterrupt as stop:
         again = f"podusv tune {shlex.quote(str(folder))}"
         raise KeyboardInterrupt(
             f"interrupted; all batches that were finished are kept, continue with: {again}"
         ) from stop
     finally:
-        sitting.end(sum(made.values()))
+        sitting.end(sum(made.values()), engine.told())
     return Results(plan, trials, winners, runs)
+
+
+def _prepare(plan: TunePlan) -> None:
+    """Have all laws with gains compiled, with all of their options, before the fork.
+
+    Raises LawError.
+    """
+    for law, gains in plan.gains.items():
+        options = [{gain.key: word} for gain in gains for word in gain.words]
+        for new in options or [{}] if gains else []:
+            if with_gains(plan.laws[law], new):
+                prepare(plan.variant({law: (law, new)}, TRAIN, 1), law, 0)
+
+
+def _idle(plan: TunePlan, request: Request) -> dict[str, tuple[str, ...]]:
+    """The gains that change no run."""
+    request.say("looking for gains that change nothing")
+    _prepare(plan)
+    return find_idle(plan, request.workers)
+
+
+def _engine(plan: TunePlan, folder: Path, request: Request) -> AbstractContextManager[Engine]:
+    """Where trials and fresh draws are simulated."""
+    text = (folder / place.SCENARIO).read_text(encoding="utf-8")
+    recipe = Recipe(text, tuple(plan.scenario.plugin_files().items()))
+    seal = digest(plan.base.identity)
+    return engine(request.scheduler, request.workers, recipe, seal, mixed=request.mixed)
 
 
 def _searches(plan: TunePlan, folder: Path) -> list[Search]:

@@ -1,0 +1,165 @@
+"""A search that was interrupted, killed or given a larger budget goes on as if nothing was."""
+
+from __future__ import annotations
+
+import os
+from types import MappingProxyType
+
+import pytest
+from tune_samples import contents, planned, searched, tuned
+
+from podusv_cli.core.errors import UsageError
+from podusv_cli.study.store import RUNS, UNITS, Store
+from podusv_cli.tuning import folder as place
+from podusv_cli.tuning import sampler, trials
+from podusv_cli.tuning.plan import VALIDATE
+from podusv_cli.tuning.trials import FINISHED, Trial
+from podusv_cli.tuning.validation import FOLDER, _clear, contestants
+from podusv_cli.workflows import tune as workflow
+
+MOST = 40  # calls after which a process is killed at the latest
+CALLS = ("replace", "mkdir", "unlink", "rmdir", "open")
+
+
+def killed(work, nth):
+    """Do some work in a process that ends at the nth call that changes a folder; whether it did."""
+    child = os.fork()
+    if child:
+        return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 9
+    left = [nth]
+
+    def ends(real):
+        def call(*given, **more):
+            left[0] -= 1
+            if left[0] <= 0:
+                os._exit(9)
+            return real(*given, **more)
+
+        return call
+
+    for name in CALLS:
+        setattr(os, name, ends(getattr(os, name)))
+    try:
+        work()
+    finally:
+        os._exit(0)
+
+
+def at_every_call(work):
+    """Kill the work at its first call, begin again and kill it at its second, until it is done."""
+    for nth in range(1, MOST):
+        if not killed(work, nth):
+            assert nth > 2, "no call was watched"
+            return
+    pytest.fail(f"more than {MOST} calls")
+
+
+def opened(out, plan, texts=MappingProxyType({})):
+    """Begin a search in a folder, or continue it."""
+    place.write(out, plan, place.known(out, plan), "now", texts)
+
+
+def test_a_search_opens_again_wherever_it_was_killed(tmp_path, monkeypatch):
+    monkeypatch.setattr(sampler, "version", lambda: "1")
+    small, large = planned(tmp_path), planned(tmp_path, "tune.budget=80")
+    out = tmp_path / "out"
+    for plan in (small, large):
+        text = {place.SCENARIO: f"budget: {plan.tune.budget}\n"}
+        at_every_call(lambda plan=plan, text=text: opened(out, plan, text))
+        opened(out, plan, text)
+        assert (out / place.SCENARIO).read_text() == text[place.SCENARIO]
+        assert {path.name for path in out.iterdir()} == {
+            place.TUNE, place.SCENARIO, trials.FOLDER
+        }  # fmt: skip
+
+
+def validation(folder, gain):
+    """The store of the fresh draws for a gain that was found."""
+    found = Trial(0, 0, {"gain": gain}, 4, FINISHED, (1.0,), (), (1.0,), 0.0)
+    plan = planned(folder)
+    made = plan.variant(contestants(plan, {"toy": [found]}), VALIDATE, 12)
+    return Store(folder / FOLDER, made)
+
+
+def test_runs_of_other_gains_are_replaced_wherever_that_was_killed(tmp_path):
+    earlier, later = validation(tmp_path, 2.0), validation(tmp_path, 3.0)
+    earlier.open("now")
+    for name in (RUNS, f"{UNITS}/toy-0-0-8.h5"):
+        (earlier.folder / name).write_bytes(b"of other gains")
+
+    def begin():
+        _clear(later.folder, later.plan)
+        later.open("later")
+
+    at_every_call(begin)
+    begin()
+    assert {path.name for path in later.folder.iterdir()} == {"study.json", UNITS}
+    assert not list((later.folder / UNITS).iterdir())
+
+
+@pytest.fixture
+def optuna():
+    return pytest.importorskip("optuna", reason="the search needs Optuna: podusv[tune]")
+
+
+def test_a_search_in_parts_equals_one_in_one_go(optuna, tmp_path):
+    """Interrupted in the search, then in the validation; with other workers."""
+    whole = tuned(tmp_path / "whole", workers=2)
+
+    def stop(after):
+        def tell(tally, text):
+            if tally.made >= after:
+                raise KeyboardInterrupt
+
+        return tell
+
+    for after in (30, 90):
+        with pytest.raises(KeyboardInterrupt, match="continue with: podusv tune"):
+            tuned(tmp_path / "part", tell=stop(after))
+    kept = trials.read(tmp_path / "part" / "out", "toy-0")
+    assert 0 < sum(trial.runs for trial in kept) < 64
+
+    def fresh(tally, text):
+        if "fresh" in text and tally.made >= 12:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        tuned(tmp_path / "part", tell=fresh)
+    part = workflow.tune(
+        tmp_path / "part" / "out", workflow.Request(figures=False), lambda *_: None
+    )
+    assert contents(part.folder) == contents(whole.folder)
+
+
+def test_a_larger_budget_continues_as_if_it_had_been_asked_for_at_once(optuna, tmp_path):
+    """The last trial of the smaller budget is cut, and the larger one finds other gains."""
+    first = tuned(tmp_path / "parts", "tune.budget=34", "tune.repeats=1").results.winner("toy")
+    parts = tuned(tmp_path / "parts", "tune.budget=64", "tune.repeats=1")
+    whole = tuned(tmp_path / "whole", "tune.budget=64", "tune.repeats=1")
+    assert first.gains != whole.results.winner("toy").gains
+    assert contents(parts.folder) == contents(whole.folder)
+    assert parts.results.spent == {"toy": 64}
+
+
+def test_what_is_kept_is_not_simulated_again(optuna, tmp_path):
+    (first,) = searched(tmp_path, "tune.repeats=1")
+    (again,) = searched(tmp_path, "tune.repeats=1", engine=lambda units, done: not list(units))
+    assert again.trials == first.trials
+
+
+def test_another_search_in_the_folder_is_refused_with_what_differs(tmp_path, monkeypatch):
+    monkeypatch.setattr(sampler, "version", lambda: "1")
+    opened(tmp_path / "out", planned(tmp_path))
+    with pytest.raises(UsageError, match=r"holds another search: tune.train: 4, not 5"):
+        opened(tmp_path / "out", planned(tmp_path, "tune.train=5"))
+    monkeypatch.setattr(sampler, "version", lambda: "2")
+    with pytest.raises(UsageError, match=r"holds another search: optuna: 1, not 2"):
+        opened(tmp_path / "out", planned(tmp_path))
+
+
+def test_a_smaller_budget_would_throw_trials_away_and_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(sampler, "version", lambda: "1")
+    for _ in range(2):
+        opened(tmp_path / "out", planned(tmp_path))
+    with pytest.raises(UsageError, match="has a budget of 64 runs; ask for as many or more"):
+        opened(tmp_path / "out", planned(tmp_path, "tune.budget=40"))
