@@ -70,9 +70,10 @@ def rates_replay(
 ) -> Callable[[Recording], Replayed]:
     """A function that gives the loop's right-hand side at every row of a recording of it.
 
-    Control is taken as continuous, also where the run's was sampled.
+    Control is taken as continuous, also where the run's was sampled. The rates of an estimator are
+    left out: they depend on measurements, which the loop's state does not hold.
     """
-    plan = loop.layout(grid)._replace(hold_every=0)
+    plan = loop.layout(grid)._replace(hold_every=0, measured=0)
     labels, split, about = names(loop), 1 + plan.states, loop.about()
     state = list(dict.fromkeys(labels[:split]))
     wires = wire(loop, plan, Observer(), grid)
@@ -80,7 +81,7 @@ def rates_replay(
 
     def replayed(recording: Recording) -> Replayed:
         logged = np.column_stack([recording[name] for name in state])
-        out = np.empty((len(logged), plan.states + plan.columns))
+        out = np.zeros((len(logged), plan.states + plan.columns))
         run(len(logged), logged.ravel(), out.reshape(-1), wires, plan)
         return Replayed(
             by_name(labels[1:split], out[:, : plan.states], about),

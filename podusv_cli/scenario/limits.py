@@ -71,8 +71,8 @@ class Size:
 def estimate(scenario: Scenario) -> Size:
     """The size of the run with `controller`, counted without allocating its arrays."""
     grid, law = scenario.time_grid(), scenario.controller
-    loop, sampled = scenario.closed_loop(), scenario.control.period > 0
-    monitored = len(monitor.signals(loop, sampled=sampled)) if scenario.log.monitor else 0
+    loop = scenario.closed_loop()
+    monitored = len(monitor.signals(loop, sampled=scenario.sampled)) if scenario.log.monitor else 0
     columns = len(names(loop)) - len(TARGET[2:]) + monitored
     content = grid.rows * columns * NUMBER
     step = STEP + MEMORY * sum(size for _, size in law.slots())

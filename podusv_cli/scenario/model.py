@@ -7,7 +7,7 @@ from functools import cache
 from types import GenericAlias
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, SupportsIndex, TypeVar
 
-from pydantic import Field, create_model
+from pydantic import Discriminator, Field, Tag, create_model
 
 from podusv_cli.actuators.base import Actuator
 from podusv_cli.controllers.base import Controller
@@ -65,7 +65,12 @@ else:
 
 
 Part = TypeVar("Part")
-Several = Annotated[tuple[Part, ...], Field(min_length=1, strict=False)]
+# The tags keep pydantic from telling what is wrong with a part once as a part and once as a list.
+Summands = Annotated[
+    Annotated[Part, Tag("one")]
+    | Annotated[tuple[Part, ...], Field(min_length=1, strict=False), Tag("several")],
+    Discriminator(lambda given: "several" if isinstance(given, (list, tuple)) else "one"),
+]
 Conflicts = Iterator[tuple[str, str]]  # key and message
 MOST_INSTANTS = 2**53  # that are distinct numbers
 
@@ -85,7 +90,7 @@ class Scenario(Component):
     )
     start: Start = value(Start(), "", "state at t = 0")
     path: AnyPath = value(..., "", "how the target moves")
-    disturbance: AnyDisturbance | Several[AnyDisturbance] = value(
+    disturbance: Summands[AnyDisturbance] = value(
         ..., "", "what the sea does; those of a list add up"
     )
     actuator: AnyActuator = value(..., "", "from the law's demand to the load on the hull")
@@ -283,8 +288,13 @@ class Scenario(Component):
 
     def about(self) -> dict[str, Signal]:
         """Every signal of the run's log by name. Raises LawError where two have one name."""
-        loop, sampled = self.closed_loop(), self.control.period > 0
-        return monitor.about(loop, sampled=sampled) if self.log.monitor else loop.about()
+        loop = self.closed_loop()
+        return monitor.about(loop, sampled=self.sampled) if self.log.monitor else loop.about()
+
+    @property
+    def sampled(self) -> bool:
+        """Whether the law acts on samples: its own, or those of sensors."""
+        return self.control.period > 0 or not self.measurement.is_exact
 
     def _signals(self) -> Conflicts:
         several = {f"controllers.{label}": law for label, law in self.controllers.items()}
@@ -317,7 +327,7 @@ def scenario_class(plugins: Plugins) -> type[Scenario]:
     sea: Any = any_of("podusv_cli.disturbances", Disturbance, plugins)
     annotations: dict[str, Any] = {
         "path": any_of("podusv_cli.paths", Path, plugins),
-        "disturbance": sea | Several[sea],
+        "disturbance": Summands[sea],
         "measurement": any_of("podusv_cli.sensors", Measurement, plugins),
         "estimator": any_of("podusv_cli.estimators", Estimator, plugins),
         "actuator": any_of("podusv_cli.actuators", Actuator, plugins),

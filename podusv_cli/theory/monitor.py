@@ -113,12 +113,13 @@ def monitored(
     """Add V, its terms, V' and its bounds to a fresh recording; None for a law without V.
 
     V uses the disturbance's bound, and weights fitted to this run (`theory.ideal_weights`). With
-    sampled control there is no V' and no bound of V, since the law acts on old measurements.
+    sampled control or sensors there is no V' and no bound of V: the law acts on measurements.
     `allocate` makes the arrays for the added signals.
     """
     law, count = loop.controller.lyapunov(), len(recording["time"])
     if law is None or not count:
         return None
+    sampled = grid.hold_every > 0 or loop.measured
     with np.errstate(all="ignore"):  # numbers of a diverging run overflow
         replayed = rates_replay(loop, grid, compiled=compiled)
         chosen = recording.part(ideal_weights.rows_to_fit(count, law.network.count))
@@ -131,10 +132,9 @@ def monitored(
                 if name not in traces:
                     traces[name] = allocate(count)
                 traces[name][rows] = part
-        observed = _Observer(loop, law, recording, traces, ideal, b, grid.hold_every == 0)
+        observed = _Observer(loop, law, recording, traces, ideal, b, not sampled)
         starts = (0.0, grid.last_part(steady_fraction))
         windows = dict(zip(WINDOWS, map(observed.window, starts), strict=True))
-    sampled = grid.hold_every > 0
     logged = [signal.name for signal in signals(loop, sampled=sampled)]
     extended = replace(
         recording,
