@@ -9,8 +9,8 @@ from podusv_cli.vessels.vessel import Vessel
 
 KEYS = ", ".join(Scenario.model_fields)
 VESSEL_KEYS = ", ".join(Vessel.model_fields)
-PATHS, LAWS = [*kinds("paths")], [*kinds("controllers")]
-A_PATH, A_LAW = (f"{', '.join(known[:-1])} or {known[-1]}" for known in (PATHS, LAWS))
+PATHS, LAWS, SEAS = ([*kinds(room)] for room in ("paths", "controllers", "disturbances"))
+A_PATH, A_LAW, A_SEA = (f"{', '.join(known[:-1])} or {known[-1]}" for known in (PATHS, LAWS, SEAS))
 NUMBER = "step: must be a number above 0 [s], found"
 TRUTH = "compiled: must be true or false, found"
 NETWORK = "    network:\n      "
@@ -233,7 +233,8 @@ def test_what_is_missing_is_told_at_the_file():
         "a.yaml: vessel.preset: missing (allowed: " + VESSEL_NAMES + "); a vessel without one "
         "needs length, beam, m, I_z",
         f"a.yaml: path: missing; must be a mapping of keys with kind {A_PATH}",
-        "a.yaml: disturbance: missing; must be a mapping of keys with kind harmonic or none",
+        f"a.yaml: disturbance: missing; must be a mapping of keys with kind {A_SEA} or a list of "
+        "these",
         "a.yaml: actuator: missing; must be a mapping of keys with kind ideal, pod or saturated",
         f"a.yaml: controller: missing; must be a mapping of keys with kind {A_LAW}",
     ]

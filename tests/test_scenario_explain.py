@@ -7,6 +7,7 @@ from annotated_types import Ge, Gt, Le, Lt
 from command_samples import commanded
 from conftest import kinds as components
 from known_signals import ABOUT
+from pydantic import Discriminator
 from pydantic.types import Strict
 
 from podusv_cli.core.component import Component
@@ -63,7 +64,9 @@ def test_every_field_has_a_meaning_a_unit_and_limits_that_can_be_put_in_words(mo
         assert isinstance(field.json_schema_extra["unit"], str)
     said = limits(field)
     for data in field.metadata:
-        known = isinstance(data, (Gt, Ge, Lt, Le, Strict)) or hasattr(data, "pattern")
+        known = isinstance(data, (Gt, Ge, Lt, Le, Strict, Discriminator)) or hasattr(
+            data, "pattern"
+        )
         assert known, f"{data} is in no message, explanation or range"
     assert set(said) <= {*BOUNDS, "pattern"}
     assert said.get("pattern") in {None, *PATTERNS_IN_WORDS}
@@ -131,7 +134,7 @@ def test_a_key_of_an_item_is_found_by_the_place_that_messages_name():
 def test_a_kind_is_explained_by_its_name_alone():
     assert explain("pid") == explain("controller.pid")
     heads = [row.key for row in explain("none") if row.type == "keys"]
-    assert heads == ["disturbance.none"]
+    assert heads == ["disturbance.none", "estimator.none"]
 
 
 def test_a_key_says_everything_that_its_field_says():
@@ -199,7 +202,8 @@ def test_an_unknown_key_is_told_with_what_was_probably_meant(key, hint):
 
 
 def test_every_kind_has_a_summary():
-    assert set(kinds()) == {"path", "disturbance", "actuator", "controller"}
+    sections = {"path", "disturbance", "actuator", "measurement", "estimator", "controller"}
+    assert set(kinds()) == sections
     for summaries in kinds().values():
         assert all(len(summary) > 8 and summary.endswith(".") for summary in summaries.values())
 

@@ -222,8 +222,17 @@ def either(words: tuple[str, ...] | list[str]) -> str:
 def noun(annotation: Any, *, plural: bool = False) -> str:
     """What a value is: `a list of 3 numbers`."""
     parts = sections(annotation)
-    others = [_one(member, plural) for member in members(annotation) if not _is_component(member)]
+    others = [
+        "a list of these" if parts and _is_list_of(parts, member) else _one(member, plural)
+        for member in members(annotation)
+        if not _is_component(member)
+    ]
     return either([*([_mapping(parts, plural)] if parts else []), *others])
+
+
+def _is_list_of(parts: dict[str, type[Component]], annotation: Any) -> bool:
+    """Whether this is a list of the components that a value may also be itself."""
+    return get_origin(annotation) is tuple and sections(get_args(annotation)[0]) == parts
 
 
 def _mapping(parts: dict[str, type[Component]], plural: bool) -> str:

@@ -67,8 +67,7 @@ else:
 Part = TypeVar("Part")
 # The tags keep pydantic from telling what is wrong with a part once as a part and once as a list.
 Summands = Annotated[
-    Annotated[Part, Tag("one")]
-    | Annotated[tuple[Part, ...], Field(min_length=1, strict=False), Tag("several")],
+    Annotated[Part, Tag("one")] | Annotated[tuple[Part, ...], Field(strict=False), Tag("several")],
     Discriminator(lambda given: "several" if isinstance(given, (list, tuple)) else "one"),
 ]
 Conflicts = Iterator[tuple[str, str]]  # key and message
@@ -210,7 +209,7 @@ class Scenario(Component):
 
     def conflicts(self) -> list[tuple[str, str]]:
         """Key and message for every pair of values that contradict each other."""
-        return [*self._defaults(), *self._unanswered()] or [
+        return [*self._defaults(), *self._unanswered(), *self._summands()] or [
             *self._times(), *self._samples(), *self._names(), *self.metrics.conflicts(),
             *self._signals(), *self._seeing(),
         ]  # fmt: skip
@@ -231,6 +230,18 @@ class Scenario(Component):
         if not isinstance(sea, tuple):
             return {"disturbance": sea}
         return {f"disturbance.{i}": part for i, part in enumerate(sea)}
+
+    def _summands(self) -> Conflicts:
+        """A list of no disturbance, and one with two that log the same."""
+        parts = self.disturbances()
+        if not parts:
+            yield "disturbance", "is an empty list; for calm water write {kind: none}"
+        first: dict[Signal, str] = {}
+        for key, part in parts.items():
+            taken = [first.setdefault(signal, key) for signal in part.signals]
+            if taken and taken[0] != key:
+                text = f"logs {part.signals[0].name}, as {taken[0]} does; keep one of them"
+                yield key, text
 
     def _unanswered(self) -> Conflicts:
         """Laws that fail when they are asked what they declare: their own fault, whatever it is."""
@@ -327,7 +338,7 @@ def scenario_class(plugins: Plugins) -> type[Scenario]:
     sea: Any = any_of("podusv_cli.disturbances", Disturbance, plugins)
     annotations: dict[str, Any] = {
         "path": any_of("podusv_cli.paths", Path, plugins),
-        "disturbance": Summands[sea],
+        "disturbance": Summands[sea],  # type: ignore[misc]
         "measurement": any_of("podusv_cli.sensors", Measurement, plugins),
         "estimator": any_of("podusv_cli.estimators", Estimator, plugins),
         "actuator": any_of("podusv_cli.actuators", Actuator, plugins),

@@ -79,10 +79,17 @@ def _converted(schema: dict[str, Any]) -> dict[str, Any]:
     if "oneOf" in made:
         # Without its kind, which the file below may give, a section fits more than one.
         made["anyOf"] = made.pop("oneOf")
+    if "anyOf" in made:
+        made["anyOf"] = [one for part in made["anyOf"] for one in _choices(part)]
     if "$ref" in made and len(made) > 1:
         # Draft-07 ignores whatever stands beside a reference.
         made["allOf"] = [{"$ref": made.pop("$ref")}]
     return made
+
+
+def _choices(part: dict[str, Any]) -> list[dict[str, Any]]:
+    """What a choice consists of, where it is only a choice again; else itself."""
+    return part["anyOf"] if list(part) == ["anyOf"] else [part]
 
 
 def _inside(word: str, part: Any) -> Any:
