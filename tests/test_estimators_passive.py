@@ -1,4 +1,4 @@
-"""The passive observer: the published gain rule, positive realness, convergence, the wave filter."""
+"""The passive observer: published gain rule, positive realness, convergence, wave filter."""
 
 from typing import Any, Literal
 
