@@ -20,12 +20,13 @@ K_4 and K_3 = omega_b K_4 are free there, with 1/T_b << omega_b < omega_0 < omeg
 omega_c omega_v times the inertia, the mean of surge and sway for the position; so the velocities
 are corrected at about the rate omega_v.
 
-Two things are not the paper's. f is the nominal vessel's damping and Coriolis force as it is, not
-linear damping alone, since vessels here move. And w is not the measurement itself but a prediction
-of it: w is put to the measured value at each delivery, and w' = R(w_psi) nu_est + the wave model's
-velocity until the next (I. Karafyllis and C. Kravaris, IEEE Trans. Automatic Control 54 (2009)).
-With the last value held in its place the estimate would be half the time between deliveries behind.
-While nothing is delivered e dies away, and the nominal vessel under the load found so far is left.
+Two things are not the paper's. With `model: full`, f is the nominal vessel's whole damping and
+Coriolis force; the paper has linear damping alone, for vessels that hardly move, and proves
+convergence for it. And w is not the measurement itself but a prediction of it: w is put to the
+measured value at each delivery, and w' = R(w_psi) nu_est + the wave model's velocity until the next
+(I. Karafyllis and C. Kravaris, IEEE Trans. Automatic Control 54 (2009)). With the last value held
+in its place the estimate would be half the time between deliveries behind. While nothing is
+delivered e dies away, and the nominal vessel under the load found so far is left.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ from podusv_cli.core.kinematics import wrap
 from podusv_cli.core.signal import Signal
 from podusv_cli.estimators.base import ESTIMATE, LOADS, POSE_ALONE, Estimator
 from podusv_cli.sensors.base import FRESH, VALUE
-from podusv_cli.vessels.plant import plant
+from podusv_cli.vessels.plant import plant, surge_force, sway_force, yaw_moment
 from podusv_cli.vessels.vessel import Vessel
 
 # Where the state has the parts of three numbers each that are behind the estimate.
@@ -74,15 +75,27 @@ def axis(i: int, drift: float, e: float, gain: float, state: Vector, k: Any, rat
     rate[SEEN + i] = drift + swell
 
 
+@kernel
+def simplified(state: Vector, k: Any, b: Vector) -> None:
+    """Add to the load what leaves linear damping alone of the nominal vessel's forces."""
+    u, v, r = state[3], state[4], state[5]
+    b[0] += k.X_u * u - surge_force(u, v, r, k)
+    b[1] += k.Y_v * v + k.Y_r * r - sway_force(u, v, r, k)
+    b[2] += k.N_v * v + k.N_r * r - yaw_moment(u, v, r, k)
+
+
 class PassiveObserver(Estimator):
     """Slow motion, wave motion and slow loads from the measured pose (Fossen and Strand 1999)."""
 
     kind: Literal["passive_observer"] = "passive_observer"
+    model: Literal["full", "linear"] = value(
+        "full", "", "the nominal vessel with all its forces, or with linear damping alone"
+    )
     omega_0: float = value(6.0, "rad/s", "frequency of the waves as the vessel meets them", gt=0)
     lambda_w: float = value(0.1, "", "damping of the wave model", gt=0)
     zeta_n: float = value(1.0, "", "damping of the wave filter; equal to lambda_w: no filter", gt=0)
     omega_c: float = value(8.0, "rad/s", "cut-off frequency of the position", gt=0)
-    omega_v: float = value(1.0, "rad/s", "rate at which velocities are corrected", gt=0)
+    omega_v: float = value(2.0, "rad/s", "rate at which velocities are corrected", gt=0)
     omega_b: float = value(0.25, "rad/s", "rate at which loads are found", gt=0)
     T_b: float = value(1000.0, "s", "time constant with which a load is forgotten", gt=0)
 
@@ -143,6 +156,8 @@ class PassiveObserver(Estimator):
         b[0] = cosine * north + sine * east
         b[1] = cosine * east - sine * north
         b[2] = state[LOAD + 2] + k.K_4_psi * e_psi
+        if k.model != 0.0:
+            simplified(state, k, b)
         plant(state, tau, b, k, rate)
         u, v = state[3], state[4]
         axis(0, cosine * u - sine * v, e_x, k.K_3, state, k, rate)
