@@ -180,7 +180,7 @@ class Waves(Disturbance):
     )
     drift_arm: float = value(0.0, "m", "where the drift force in sway acts, ahead of the origin")
     seed: int = value(
-        1, "", "of rates, phases, directions; two waves in a list need two", ge=0, lt=2**63
+        1, "", "of rates, phases and directions", ge=0, lt=2**63
     )  # fmt: skip
 
     @model_validator(mode="after")
@@ -194,7 +194,7 @@ class Waves(Disturbance):
         if not kept >= LEAST:
             raise ValueError(
                 f"between lowest {self.lowest:g} and highest {self.highest:g} the spectrum has "
-                f"{100 * kept:.2g} % of its energy, and must have {100 * LEAST:g} % or more; 0.5 "
+                f"{100 * kept:.1f} % of its energy, and must have {100 * LEAST:g} % or more; 0.5 "
                 "and 4 keep nearly all"
             )
         return self

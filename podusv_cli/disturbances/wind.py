@@ -93,10 +93,7 @@ class Wind(Disturbance):
     )
     highest: float = value(0.5, "Hz", "largest frequency of a gust", gt=0)
     density: float = value(1.225, "kg/m3", "density of the air", gt=0)
-    seed: int = value(
-        1, "", "of rates and phases of the gusts; winds in one list need their own", ge=0,
-        lt=2**63,
-    )  # fmt: skip
+    seed: int = value(1, "", "of rates and phases of the gusts", ge=0, lt=2**63)
 
     @model_validator(mode="after")
     def _blows(self) -> Self:
