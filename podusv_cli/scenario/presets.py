@@ -95,8 +95,8 @@ def with_contents(root: Node, top: Key, faults: list[Fault]) -> Node:
     """The tree with what files hold in place of the files' names."""
     for name, given, model in _of_kinds(root, top):
         root = root.with_entry(name, with_files(given, name, model, faults))
-    for name, given, item in _lists(root, top):
-        parts = tuple(_listed(part, f"{name}[{i}]", item, faults) for i, part in enumerate(given))
+    for name, parts, item in _lists(root, top):
+        parts = tuple(_listed(part, f"{name}[{i}]", item, faults) for i, part in enumerate(parts))
         root = root.with_entry(name, replace(root.mapping[name], content=parts))
     several, default = root.mapping.get("controllers"), root.mapping.get("controller")
     if not several or not several.mapping:
