@@ -1,4 +1,28 @@
-"""Waves: the motion that sensors see, and the load by which they drive the vessel off."""
+"""Waves: the motion that sensors see, and the load by which they drive the vessel off.
+
+On the phase omega t - k (x cos beta + y sin beta) + eps of every component the vessel's own
+position acts, with k = omega^2/g of deep water: so a vessel under way meets the waves at their
+encounter frequency.
+
+First-order motion. At the surface, water moves on circles of the wave's amplitude a: by
+a sin(phase) in the direction beta in which the wave travels. A hull much shorter than the wave
+goes with it. A longer one feels the mean over its length L and beam B, and turns with the slope
+of its sway along the hull, -a k cos(gamma) sin(gamma) cos(phase), gamma = beta - psi. With
+stations that count as a bell of the same second moment as a box, L^2/12, mean and slope both
+get the factor e^-q, q = k^2 (L^2 cos^2 gamma + B^2 sin^2 gamma)/24. The factor here is
+(1 + q/2)^-2, the same for long waves and quicker; in head sea with waves as long as the hull it
+is 0.30, the mean over a box 0, over a parabolic waterline 0.30. This is motion in long waves:
+no resonance, no heave, roll or pitch, no first-order load. The motion is added to what sensors
+see, and the vessel's state goes on without it.
+
+Second-order drift. Radiation stress rho g a^2/4 presses with incoming and reflected waves (a
+and R a) from one side, with what passes from the other; as no energy is lost, the difference is
+rho g (R a)^2/2 a metre (Maruo 1960). A hull is taken as a box: ends of width B against waves
+from ahead or astern, sides of length L against the rest, so that X = c_u cos(gamma)
+|cos(gamma)| a^2 with c_u = rho g R_u^2 B/2, and Y likewise with L. Newman's approximation of
+the products of two waves makes the load c |sum of a |cos(gamma)| e^(i phase)|^2, which changes
+slowly. R does not depend on the frequency here; a real hull reflects hardly any long waves.
+"""
 
 from __future__ import annotations
 
@@ -124,28 +148,8 @@ def _short_crested(t: float, x: Vector, k: Any, table: Vector, b: Vector) -> Non
 class Waves(Disturbance):
     """Irregular waves as a sum of cosines: motion for the sensors, and slow drift as a load.
 
-    On the phase omega t - k (x cos beta + y sin beta) + eps of every component the vessel's own
-    position acts, with k = omega^2/g of deep water: so a vessel under way meets the waves at their
-    encounter frequency.
-
-    First-order motion. At the surface, water moves on circles of the wave's amplitude a: by
-    a sin(phase) in the direction beta in which the wave travels. A hull much shorter than the wave
-    goes with it. A longer one feels the mean over its length L and beam B, and turns with the slope
-    of its sway along the hull, -a k cos(gamma) sin(gamma) cos(phase), gamma = beta - psi. With
-    stations that count as a bell of the same second moment as a box, L^2/12, mean and slope both
-    get the factor e^-q, q = k^2 (L^2 cos^2 gamma + B^2 sin^2 gamma)/24. The factor here is
-    (1 + q/2)^-2, the same for long waves and quicker; in head sea with waves as long as the hull it
-    is 0.30, the mean over a box 0, over a parabolic waterline 0.30. This is motion in long waves:
-    no resonance, no heave, roll or pitch, no first-order load. The motion is added to what sensors
-    see, and the vessel's state goes on without it.
-
-    Second-order drift. Radiation stress rho g a^2/4 presses with incoming and reflected waves (a
-    and R a) from one side, with what passes from the other; as no energy is lost, the difference is
-    rho g (R a)^2/2 a metre (Maruo 1960). A hull is taken as a box: ends of width B against waves
-    from ahead or astern, sides of length L against the rest, so that X = c_u cos(gamma)
-    |cos(gamma)| a^2 with c_u = rho g R_u^2 B/2, and Y likewise with L. Newman's approximation of
-    the products of two waves makes the load c |sum of a |cos(gamma)| e^(i phase)|^2, which changes
-    slowly. R does not depend on the frequency here; a real hull reflects hardly any long waves.
+    Motion is that of the water, filtered over the hull; drift has one coefficient per axis, from
+    the share of the waves that the hull reflects. Long waves, no resonance, no heave, roll, pitch.
     """
 
     kind: Literal["waves"] = "waves"
