@@ -49,6 +49,9 @@ POD: dict[str, float] = {
 REQUIRED: dict[str, dict[str, Any]] = {
     "waypoints": {"points": ((0.0, 0.0), (10.0, 1.0), (18.0, 6.0), (20.0, 15.0))},
     "pod": {"pods": (POD,)},
+    "wind": {"speed": 8.0},
+    "waves": {"height": 0.1, "period": 1.5},
+    "file": {"rows": "0, 1, 0.5, 0\n10, -1, 0.2, 0.1\n"},
     "schedule": {"rows": "0, 1, 0\n200, 2, 0.5\n"},
 }
 # Slow enough an adaptation for a law that is evaluated only now and then.

@@ -5,9 +5,14 @@ import math
 import numpy as np
 import pytest
 from conftest import example, kinds, load_at
+from pydantic import ValidationError
+from scenario_samples import SOUND, write
 
 from podusv_cli.disturbances.calm import Calm
+from podusv_cli.disturbances.file import FromFile
 from podusv_cli.disturbances.harmonic import Harmonic, HarmonicDisturbance
+from podusv_cli.disturbances.step import Step
+from podusv_cli.scenario.load import load
 
 # sin and cos are 0 or +-1 at these times, except where the numbers are written out.
 BY_HAND = [
@@ -100,3 +105,52 @@ def test_what_claims_to_depend_on_time_alone_does(kind):
     for t in random.uniform(0, 300, 20):
         loads = [load_at(sea, t, random.normal(0, 5, 6)) for _ in range(3)]
         np.testing.assert_array_equal(loads, [loads[0]] * 3)
+
+
+def test_a_step_sets_in_at_its_time_and_grows_along_its_ramp():
+    at_once = Step(time=3.0, b_u=2.0, b_v=-1.0, b_r=0.5)
+    for t, share in ((0.0, 0.0), (2.999, 0.0), (3.0, 1.0), (100.0, 1.0)):
+        np.testing.assert_array_equal(load_at(at_once, t), np.array([2.0, -1.0, 0.5]) * share)
+    ramped = Step(time=3.0, ramp=4.0, b_u=2.0)
+    for t, share in ((3.0, 0.0), (4.0, 0.25), (6.0, 0.75), (7.0, 1.0), (50.0, 1.0)):
+        assert load_at(ramped, t)[0] == 2.0 * share
+    assert at_once.bounds() == (2.0, 1.0, 0.5)
+
+
+RECORD = "t, b_u, b_v, b_r\n1, 2, 0, 0  # at first\n3, 4, -1, 0.5\n4, 0, 0, 0\n"
+
+
+def test_a_record_is_straight_between_its_rows_and_held_beyond_them():
+    sea = FromFile(rows=RECORD)
+    for t, expected in (
+        (0.0, [2, 0, 0]), (1.0, [2, 0, 0]), (2.0, [3, -0.5, 0.25]), (3.0, [4, -1, 0.5]),
+        (3.5, [2, -0.5, 0.25]), (4.0, [0, 0, 0]), (99.0, [0, 0, 0]),
+    ):  # fmt: skip
+        np.testing.assert_allclose(load_at(sea, t), expected, atol=1e-15)
+    assert sea.bounds() == (4.0, 1.0, 0.5)
+
+
+def test_a_record_is_read_from_a_file_beside_the_scenario(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write("gust.csv", RECORD)
+    write("a.yaml", SOUND.replace("{kind: none}", "{kind: file, file: gust.csv}"))
+    assert load("a.yaml").scenario.disturbance == FromFile(rows=RECORD)
+    write("a.yaml", SOUND.replace("{kind: none}", "[{kind: none}, {kind: file, file: gust.csv}]"))
+    assert load("a.yaml").scenario.disturbance[1] == FromFile(rows=RECORD)
+
+
+@pytest.mark.parametrize(
+    ("rows", "says"),
+    [
+        ("", "the record needs at least two lines, has 0"),
+        ("0,1,1\n1,2,3\n", "line 1 of the record has 3 numbers; every line must have 4 (t, b_u, "
+         "b_v, b_r)"),
+        ("0,1,1,0\n1,s3cret,2,0\n", "the record holds something that is no number"),
+        ("0,1,1,0\n0,1,2,0\n", "the times of the record do not increase from line to line"),
+    ],
+)  # fmt: skip
+def test_a_wrong_record_is_told_in_a_sentence_that_repeats_none_of_it(rows, says):
+    with pytest.raises(ValidationError) as told:
+        FromFile(rows=rows)
+    assert says in str(told.value)
+    assert "s3cret" not in told.value.errors()[0]["msg"]

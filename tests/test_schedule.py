@@ -10,8 +10,9 @@ from pydantic import ValidationError
 from scenario_samples import SOUND, findings
 
 from podusv_cli.controllers.pid import Pid
-from podusv_cli.controllers.schedule import LARGEST, Schedule
+from podusv_cli.controllers.schedule import Schedule
 from podusv_cli.core.kernel import bundle
+from podusv_cli.core.timed_rows import LARGEST
 from podusv_cli.pages.page import value_text
 from podusv_cli.scenario.load import load, resolved_yaml
 

@@ -15,11 +15,12 @@ from podusv_cli.core.interpolation import cubic, linear, segment
 from podusv_cli.core.kernel import Vector, kernel, tail
 from podusv_cli.core.kinematics import wrap
 from podusv_cli.core.signal import Signal
+from podusv_cli.core.timed_rows import timed_rows
 from podusv_cli.vessels.vessel import Vessel
 
 TIMED, STATES = 3, 6  # numbers of a row: time and demand; then the state, then the gains
 WITH_MOTION = TIMED + STATES + 2 * STATES
-LARGEST = 900_000  # characters: the resolved scenario, which has the rows, must be readable
+LAYOUTS = {TIMED: "t, tau_u, tau_r", WITH_MOTION: "and the state, and twelve gains"}
 HOLD = 1.0  # the place of "hold" among the choices of `between`, as kernels know it
 # Where a row of the table has these, behind the demand: state and its rate, gains (surge, yaw).
 STATE, GAINS = 2, 2 + 2 * STATES
@@ -29,26 +30,8 @@ FEEDBACK_R = Signal("feedback_r", "N m", "yaw moment that departures from the mo
 
 @lru_cache(maxsize=4)  # one schedule is read a dozen times in a run
 def _rows(text: str) -> Vector:
-    """The numbers in lines with commas, the heading continuous.
-
-    # starts a comment, and a first line of words is a header. Raises ValueError, which does not
-    repeat the text: a file may hold what its reader may not see.
-    """
-    lines = [line.partition("#")[0].strip() for line in text.removeprefix("\ufeff").splitlines()]
-    filled = [(number, line.split(",")) for number, line in enumerate(lines, 1) if line]
-    if filled and filled[0][1][0].strip(' "')[:1].isalpha():
-        del filled[0]
-    for number, cells in filled:
-        if len(cells) not in (TIMED, WITH_MOTION) or len(cells) != len(filled[0][1]):
-            raise ValueError(
-                f"line {number} of the schedule has {len(cells)} numbers; every line must have "
-                f"{TIMED} (t, tau_u, tau_r) or {WITH_MOTION} (and the state, and twelve gains)"
-            )
-    try:
-        numbers = np.array([cells for _, cells in filled], dtype=float)
-    except ValueError:
-        raise ValueError("the schedule holds something that is no number") from None
-    rows = numbers.reshape(len(filled), len(filled[0][1]) if filled else TIMED)
+    """The numbers in lines with commas, the heading continuous. Raises ValueError."""
+    rows = timed_rows(text, "the schedule", LAYOUTS)
     if rows.shape[1] == WITH_MOTION:
         rows[:, TIMED + 2] = np.unwrap(rows[:, TIMED + 2])
     rows.flags.writeable = False
@@ -81,15 +64,7 @@ class Schedule(Controller):
 
     @model_validator(mode="after")
     def _usable(self) -> Self:
-        if len(self.rows) > LARGEST:
-            raise ValueError(f"the schedule is longer than {LARGEST:,} characters; leave rows out")
-        rows = _rows(self.rows)
-        if len(rows) < 2:
-            raise ValueError(f"the schedule needs at least two lines, has {len(rows)}")
-        if not np.all(np.isfinite(rows)):
-            raise ValueError("the schedule holds a number that is not finite")
-        if np.any(np.diff(rows[:, 0]) <= 0.0):
-            raise ValueError("the times of the schedule do not increase from line to line")
+        _rows(self.rows)
         return self
 
     def optimum_of(self) -> str:

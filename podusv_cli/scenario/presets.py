@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 from importlib.resources import files
@@ -94,6 +95,9 @@ def with_contents(root: Node, top: Key, faults: list[Fault]) -> Node:
     """The tree with what files hold in place of the files' names."""
     for name, given, model in _of_kinds(root, top):
         root = root.with_entry(name, with_files(given, name, model, faults))
+    for name, parts, item in _lists(root, top):
+        parts = tuple(_listed(part, f"{name}[{i}]", item, faults) for i, part in enumerate(parts))
+        root = root.with_entry(name, replace(root.mapping[name], content=parts))
     several, default = root.mapping.get("controllers"), root.mapping.get("controller")
     if not several or not several.mapping:
         return root
@@ -104,6 +108,20 @@ def with_contents(root: Node, top: Key, faults: list[Fault]) -> Node:
         if law and own.mapping:
             laws[label] = with_files(own, f"controllers.{label}", law.model, faults)
     return root.with_entry("controllers", replace(several, content=laws))
+
+
+def _lists(root: Node, top: Key) -> Iterator[tuple[str, tuple[Node, ...], Key]]:
+    """Name and content of every list of sections, and what the models say of one of them."""
+    for name, key in top.keys.items():
+        given, item = root.mapping.get(name), key.item(0)
+        if given and isinstance(given.content, tuple) and item and item.kinds:
+            yield name, given.content, item
+
+
+def _listed(part: Node, name: str, item: Key, faults: list[Fault]) -> Node:
+    """One section of a list with what its files hold."""
+    known = item.kinds.get(str(part.get("kind"))) if part.mapping else None
+    return with_files(part, name, known.model, faults) if known else part
 
 
 def _of_kinds(root: Node, top: Key) -> list[tuple[str, Node, type[Component]]]:

@@ -7,6 +7,7 @@ from typing import Any, Self
 from pydantic import model_validator
 
 from podusv_cli.core.component import Component, Presets, value
+from podusv_cli.vessels.windage import Windage
 
 VESSELS = Presets("podusv_cli.vessels", "vessel", "vessel file")
 INERTIA = ("m11", "m22", "m23", "m32", "m33")
@@ -54,6 +55,9 @@ class Vessel(Component):
     N_r: float = _damping("kg m2/s", "yaw, linear", le=0)
     N_vr: float = _damping("kg m", "yaw, times |v|r")
     N_rr: float = _damping("kg m2", "yaw, times |r|r")
+    windage: Windage | None = value(
+        None, "", "what the wind acts on; without it the vessel is in no wind"
+    )
 
     @model_validator(mode="after")
     def _possible(self) -> Self:
@@ -92,8 +96,8 @@ class Vessel(Component):
         return self.I_z - self.N_rdot
 
     def constants(self) -> dict[str, float]:
-        """The fields' numbers and the entries of the mass matrix (5)."""
-        return super().constants() | {name: getattr(self, name) for name in INERTIA}
+        """The fields' numbers and the entries of the mass matrix (5), without the windage."""
+        return {name: float(getattr(self, name)) for name in COEFFICIENTS}
 
 
 # The names of a vessel's constants, the same for every vessel and in the same order.

@@ -1,0 +1,159 @@
+"""Spectra of waves and gusts, and sums of cosines that have them.
+
+All spectra are one-sided: their integral is the variance. What is drawn is a function of seed and
+component, and only plain arithmetic is used, so that all numbers have the same bits on every
+machine.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import cache
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from podusv_cli.core.elementary import cos_sin
+from podusv_cli.core.kernel import Vector
+from podusv_cli.core.portable import exponential, logarithm
+from podusv_cli.core.random_words import uniforms
+
+GRAVITY = 9.81  # m/s2
+WATER = 1025.0  # kg/m3, sea water
+SMALLEST = -700.0  # below, e^x is nothing
+SAMPLES = 16  # of a spectrum in every bin
+NORSOK_N = 0.468
+HARRIS_LENGTH = 1800.0  # m
+SHARES = np.linspace(0.0, 1.0, 513)  # of the way from -pi/2 to pi/2
+Period = Literal["peak", "mean", "zero_crossing"]
+Density = Callable[[Vector], Vector]
+
+
+class Cosines(NamedTuple):
+    """amplitude cos(rate t + phase), one entry a component; rates in rad/s."""
+
+    rate: Vector
+    amplitude: Vector
+    phase: Vector
+
+
+def _power(x: Vector, exponent: float) -> Vector:
+    return exponential(np.maximum(exponent * logarithm(x), SMALLEST))
+
+
+def jonswap(rate: Vector, height: float, peak: float, gamma: float) -> Vector:
+    """Density [m2 s] of the surface elevation at `rate` [rad/s].
+
+    `height` is the significant height [m], `peak` the rate of the peak [rad/s]. With gamma = 1 it
+    is the ITTC's modified Pierson-Moskowitz spectrum A rate^-5 exp(-B rate^-4) with B = 1.25
+    peak^4 and A = B height^2 / 4, which for periods of the peak is 1948 and 487: the published
+    1949 and 487 are these, rounded. Seen in cybergalactic/MSS, waveSpectrum.m, types 3 to 5 and 7
+    (after DNV-RP-C205): alpha = (5/16) height^2 peak^4 / g^2, sigma 0.07 below and 0.09 above the
+    peak, and the factor 1 - 0.287 ln gamma, which keeps the height.
+    """
+    ratio = peak / rate
+    fourth = ratio * ratio * ratio * ratio
+    smooth = 0.3125 * height * height * fourth / rate
+    smooth = smooth * exponential(np.maximum(-1.25 * fourth, SMALLEST))
+    away = (rate - peak) / (np.where(rate <= peak, 0.07, 0.09) * peak)
+    log_gamma = float(logarithm(np.array([gamma]))[0])
+    bell = exponential(np.maximum(-0.5 * away * away, SMALLEST))
+    return np.asarray((1.0 - 0.287 * log_gamma) * smooth * exponential(log_gamma * bell))
+
+
+@cache
+def peak_period(gamma: float, period: Period) -> float:
+    """The peak's period as a multiple of another period of the same sea, by moments m_n.
+
+    Mean: 2 pi m0/m1. Zero-crossing: 2 pi sqrt(m0/m2).
+    """
+    if period == "peak":
+        return 1.0
+    edges = exponential(np.linspace(math.log(0.3), math.log(300.0), 4001))
+    rate, width = (edges[1:] + edges[:-1]) / 2.0, np.diff(edges)
+    energy = jonswap(rate, 4.0, 1.0, gamma) * width
+    m0, m1, m2 = (math.fsum(moment) for moment in (energy, energy * rate, energy * rate * rate))
+    return m1 / m0 if period == "mean" else math.sqrt(m2 / m0)
+
+
+def norsok(frequency: Vector, speed: float, height: float) -> Vector:
+    """Density [m2/s2/Hz] of the wind's speed at `frequency` [Hz], `height` [m] above the sea.
+
+    `speed` is the mean over an hour 10 m above the sea [m/s]. Froya spectrum of NORSOK N-003; seen
+    in the crate ndspec 0.1.1, froya.rs, and in a second program, which agree.
+    """
+    z, u = np.array([height / 10.0]), np.array([speed / 10.0])
+    x = 172.0 * frequency * _power(z, 2.0 / 3.0) * _power(u, -0.75)
+    scale = 320.0 * u * u * _power(z, 0.45)
+    return np.asarray(scale * _power(1.0 + _power(x, NORSOK_N), -5.0 / (3.0 * NORSOK_N)))
+
+
+def harris(frequency: Vector, speed: float, drag: float) -> Vector:
+    """Density [m2/s2/Hz] of the wind's speed at `frequency` [Hz], the same at every height.
+
+    `speed` is the mean 10 m above the sea [m/s], `drag` the surface's drag coefficient. Seen in a
+    public program with NORSOK's spectrum beside it; both are those of Fossen's handbook.
+    """
+    x = HARRIS_LENGTH * frequency / speed
+    return np.asarray(4.0 * drag * HARRIS_LENGTH * speed * _power(2.0 + x * x, -5.0 / 6.0))
+
+
+def in_bins(density: Density, edges: Vector) -> Vector:
+    """The variance in each bin between neighbouring edges."""
+    width = np.diff(edges)
+    samples = (density(edges[:-1] + (i + 0.5) / SAMPLES * width) for i in range(SAMPLES))
+    return np.asarray(sum(samples) * width / SAMPLES)
+
+
+def cosines(variance: Vector, edges: Vector, seed: int, stream: str) -> Cosines:
+    """One component a bin: its rate uniform in the bin, its phase uniform in a turn.
+
+    Its amplitude is sqrt(2 variance), so that the sum has the variance of all bins together. Rates
+    that are drawn have no common period, so the sum does not repeat itself.
+    """
+    count = len(variance)
+    inside = uniforms((seed, stream, "rate"), 0, count)
+    rate = edges[:-1] + np.diff(edges) * inside
+    phase = 2.0 * math.pi * uniforms((seed, stream, "phase"), 0, count)
+    return Cosines(rate, np.sqrt(2.0 * variance), phase)
+
+
+def even_edges(low: float, high: float, count: int) -> Vector:
+    """Edges of `count` bins of one width."""
+    return np.linspace(low, high, count + 1)
+
+
+def growing_edges(low: float, high: float, count: int) -> Vector:
+    """Edges of `count` bins, each wider than the one before by the same factor."""
+    ends = logarithm(np.array([low, high]))
+    return exponential(np.linspace(ends[0], ends[1], count + 1))
+
+
+def directions(spreading: int, count: int, seed: int, stream: str) -> Vector:
+    """Departures of `count` components from the mean direction [rad].
+
+    Their density is cos^(2 spreading) within a quarter turn to either side; spreading 0: none.
+    With spreading 1 it is that of cybergalactic/MSS, waveDirectionalSpectrum.m.
+    """
+    if spreading == 0:
+        return np.zeros(count)
+    angles = math.pi * (SHARES - 0.5)
+    shares = _shares(spreading)
+    drawn = uniforms((seed, stream, "direction"), 0, count)
+    i = np.searchsorted(shares, drawn, side="right") - 1
+    part = (drawn - shares[i]) / (shares[i + 1] - shares[i])
+    return np.asarray(angles[i] + part * (angles[i + 1] - angles[i]))
+
+
+@cache
+def _shares(spreading: int) -> Vector:
+    """The share of cos^(2 spreading) up to each of the angles, by Simpson's rule."""
+    fine = math.pi * (np.linspace(0.0, 1.0, 2 * len(SHARES) - 1) - 0.5)
+    base = np.maximum([cos_sin(angle)[0] for angle in fine.tolist()], 0.0)
+    density = np.ones_like(base)
+    for _ in range(2 * spreading):
+        density = density * base
+    parts = density[:-2:2] + 4.0 * density[1::2] + density[2::2]
+    shares = np.concatenate([[0.0], np.cumsum(parts)])
+    return np.asarray(shares / shares[-1])

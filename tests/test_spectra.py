@@ -1,0 +1,141 @@
+"""Spectra have their published values; sums of cosines have the spectra that they are made of."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from podusv_cli.disturbances import spectra
+
+PEAK = 1.3
+FINE = np.geomspace(0.2, 60.0, 20_001) * PEAK
+
+
+def moment(n, gamma):
+    density = spectra.jonswap(FINE, 2.0, PEAK, gamma)
+    return float(np.trapezoid(density * FINE**n, FINE))
+
+
+@pytest.mark.parametrize(("gamma", "within"), [(1.0, 2e-4), (3.3, 2e-3), (5.0, 2e-3)])
+def test_the_significant_height_is_four_standard_deviations(gamma, within):
+    """The factor 1 - 0.287 ln gamma is a fit, as published."""
+    assert 4.0 * math.sqrt(moment(0, gamma)) == pytest.approx(2.0, rel=within)
+
+
+@pytest.mark.parametrize(
+    ("period", "A", "B"),
+    [("peak", 487.0, 1949.0), ("mean", 173.0, 691.0), ("zero_crossing", 123.0, 495.0)],
+)
+def test_the_ittc_spectrum_is_the_published_one(period, A, B):
+    """A Hs^2/T^4 rate^-5 exp(-B/T^4 rate^-4), whose constants are rounded to three digits."""
+    T = 2.0 * math.pi / PEAK / spectra.peak_period(1.0, period)
+    rates = np.linspace(0.7, 4.0, 50) * PEAK
+    published = A * 4.0 / T**4 * rates**-5.0 * np.exp(-B / T**4 * rates**-4.0)
+    np.testing.assert_allclose(spectra.jonswap(rates, 2.0, PEAK, 1.0), published, rtol=0.013)
+
+
+@pytest.mark.parametrize("gamma", [1.0, 3.3, 7.0])
+def test_periods_are_those_of_the_moments(gamma):
+    mean, crossing = (spectra.peak_period(gamma, one) for one in ("mean", "zero_crossing"))
+    assert moment(1, gamma) / moment(0, gamma) / PEAK == pytest.approx(mean, rel=1e-3)
+    found = math.sqrt(moment(2, gamma) / moment(0, gamma)) / PEAK
+    assert found == pytest.approx(crossing, rel=2e-3)
+
+
+def test_the_ittc_periods_are_the_published_shares_of_the_peak_s():
+    assert 1.0 / spectra.peak_period(1.0, "zero_crossing") == pytest.approx(0.710, abs=5e-4)
+    assert 1.0 / spectra.peak_period(1.0, "mean") == pytest.approx(0.772, abs=1e-3)
+
+
+def test_the_peak_of_jonswap_is_gamma_times_that_of_the_ittc_spectrum():
+    at, factor = np.array([PEAK]), 1.0 - 0.287 * math.log(3.3)
+    high, low = (spectra.jonswap(at, 2.0, PEAK, gamma)[0] for gamma in (3.3, 1.0))
+    assert high / low == pytest.approx(3.3 * factor, rel=1e-12)
+    assert low == pytest.approx(0.3125 * 4.0 / PEAK * math.exp(-1.25), rel=1e-12)
+
+
+def test_wind_spectra_by_hand():
+    f = np.array([1.0 / 172.0])
+    half = 2.0 ** (-5.0 / (3.0 * 0.468))  # where x = 1
+    assert spectra.norsok(f, 10.0, 10.0)[0] == pytest.approx(320.0 * half, rel=1e-12)
+    at = np.array([0.05])
+    x = 172.0 * 0.05 * 2.0 ** (2.0 / 3.0) * 1.5**-0.75
+    expected = 320.0 * 1.5**2 * 2.0**0.45 * (1.0 + x**0.468) ** (-5.0 / (3.0 * 0.468))
+    assert spectra.norsok(at, 15.0, 20.0)[0] == pytest.approx(expected, rel=1e-12)
+    x = 1800.0 * 0.05 / 15.0
+    expected = 4.0 * 0.003 * 1800.0 * 15.0 / (2.0 + x * x) ** (5.0 / 6.0)
+    assert spectra.harris(at, 15.0, 0.003)[0] == pytest.approx(expected, rel=1e-12)
+
+
+EDGES = spectra.even_edges(0.5 * PEAK, 4.0 * PEAK, 100)
+
+
+def variance():
+    return spectra.in_bins(lambda rate: spectra.jonswap(rate, 2.0, PEAK, 3.3), EDGES)
+
+
+def test_every_bin_has_its_energy_and_one_rate():
+    made = spectra.cosines(variance(), EDGES, 5, "test")
+    assert np.all((EDGES[:-1] < made.rate) & (made.rate < EDGES[1:]))
+    assert np.all((made.phase > 0.0) & (made.phase < 2.0 * math.pi))
+    for i in (3, 20, 70):
+        energy = quad(
+            lambda w: spectra.jonswap(np.array([w]), 2.0, PEAK, 3.3)[0], EDGES[i], EDGES[i + 1]
+        )
+        assert made.amplitude[i] ** 2 / 2.0 == pytest.approx(energy[0], rel=2e-3)
+    assert 4.0 * math.sqrt(np.sum(made.amplitude**2) / 2.0) == pytest.approx(2.0, rel=4e-3)
+
+
+def test_bins_that_grow_do_so_by_one_factor():
+    edges = spectra.growing_edges(0.002, 0.5, 30)
+    np.testing.assert_allclose(edges[[0, -1]], [0.002, 0.5], rtol=1e-12)
+    np.testing.assert_allclose(edges[1:] / edges[:-1], 250.0 ** (1 / 30), rtol=1e-12)
+
+
+def test_numbers_belong_to_seed_stream_and_component():
+    one, again = (spectra.cosines(variance(), EDGES, 5, "test") for _ in range(2))
+    for mine, same in zip(one, again, strict=True):
+        np.testing.assert_array_equal(mine, same)
+    for other in (
+        spectra.cosines(variance(), EDGES, 6, "test"),
+        spectra.cosines(variance(), EDGES, 5, "wind"),
+    ):
+        assert np.all(other.phase != one.phase)
+        assert np.all(other.rate != one.rate)
+    fewer = spectra.cosines(variance()[:10], EDGES[:11], 5, "test")
+    np.testing.assert_array_equal(fewer.phase, one.phase[:10])
+
+
+def test_a_long_realisation_has_the_spectrum_it_was_made_of():
+    """Energies of bands by a periodogram of 2.3 h; moments of a Gaussian process."""
+    made = spectra.cosines(variance(), EDGES, 5, "test")
+    t = 0.25 * np.arange(2**15)
+    zeta = sum(a * np.cos(w * t + e) for w, a, e in zip(*made, strict=True))
+    assert abs(zeta.mean()) < 1e-3
+    assert zeta.var() == pytest.approx(0.25, rel=0.02)  # Hs^2/16
+    power = np.abs(np.fft.rfft(zeta * np.hanning(len(t)))) ** 2
+    rates = 2.0 * math.pi * np.fft.rfftfreq(len(t), 0.25)
+    share = power / power.sum()
+    for low, high in ((0, 10), (10, 14), (14, 18), (18, 40), (40, 100)):
+        inside = (rates >= EDGES[low]) & (rates < EDGES[high])
+        band = np.linspace(EDGES[low], EDGES[high], 2001)
+        energy = np.trapezoid(spectra.jonswap(band, 2.0, PEAK, 3.3), band) / 0.25
+        assert share[inside].sum() == pytest.approx(energy, rel=0.02)
+    kurtosis = np.mean((zeta / zeta.std()) ** 4)
+    assert 2.7 < kurtosis < 3.3
+
+
+@pytest.mark.parametrize("spreading", [1, 2, 10])
+def test_directions_have_the_spread_that_was_asked_for(spreading):
+    away = spectra.directions(spreading, 20_000, 3, "test")
+    assert np.abs(away).max() < math.pi / 2
+    assert abs(away.mean()) < 5.0 * away.std() / math.sqrt(20_000)
+    norm = quad(lambda m: math.cos(m) ** (2 * spreading), -math.pi / 2, math.pi / 2)[0]
+    for end in (-0.5, 0.1, 0.6):
+        share = quad(lambda m: math.cos(m) ** (2 * spreading), -math.pi / 2, end)[0] / norm
+        assert np.mean(away < end) == pytest.approx(share, abs=0.015)
+
+
+def test_long_crested_waves_have_one_direction():
+    assert not spectra.directions(0, 10, 3, "test").any()

@@ -1,0 +1,229 @@
+"""Waves: what the kernels add up, the encounter, first-order motion, drift, and what is refused."""
+
+import math
+
+import numpy as np
+import pytest
+from conftest import NONLINEAR, Constant, adrift, run
+from scenario_samples import SOUND, told
+
+from podusv_cli.core.kernel import bundle
+from podusv_cli.disturbances import waves
+from podusv_cli.disturbances.spectra import GRAVITY, WATER
+from podusv_cli.disturbances.total import Total
+from podusv_cli.disturbances.waves import Waves
+from podusv_cli.disturbances.wind import Wind
+
+SHORT = NONLINEAR.model_copy(update={"length": 1e-3, "beam": 1e-3})
+SOUTHWARD = math.pi  # waves that come from the south go north
+
+
+def asked(sea, vessel=NONLINEAR, kernel=None):
+    """A function of t and x that evaluates the kernel."""
+    k, table = bundle(sea.constants_with(vessel)), sea.table_for(vessel, 300.0)
+    kernel = kernel or sea.kernel_with(vessel)
+
+    def at(t, x):
+        b = np.full(7, np.nan)
+        kernel(t, np.array(x, float), k, table, b)
+        return b
+
+    return at
+
+
+def one(**given):
+    """A regular wave, or nearly so: one component in a narrow band about the peak."""
+    chosen = {"components": 1, "lowest": 0.98, "highest": 1.02, "gamma": 7.0}
+    return Waves(**{"height": 3.0, "period": 2.0} | chosen | given)
+
+
+def component(sea):
+    """Rate [rad/s], wave number [1/m] and amplitude [m] of the first one."""
+    table = sea.table()
+    count = len(table) // 6
+    return 2.0 * math.pi * table[0], table[2 * count], table[3 * count]
+
+
+def by_hand(sea, vessel, t, x):
+    """Elevation and first-order motion by the formulas of the docstring, in complex numbers."""
+    turns, phase, number, a, c, s = sea.table().reshape(6, -1)
+    beta, psi = np.arctan2(s, c), x[2]
+    way = x[0] * np.cos(beta) + x[1] * np.sin(beta)
+    z = a * np.exp(1j * (2 * math.pi * (turns * t + phase) - number * way))
+    along, across = np.cos(beta - psi), np.sin(beta - psi)
+    q = ((vessel.length * along) ** 2 + (vessel.beam * across) ** 2) * number**2 / 24.0
+    felt = z / (1.0 + q / 2.0) ** 2
+    motion = [np.sum(felt.imag * np.cos(beta)), np.sum(felt.imag * np.sin(beta))]
+    turned = -np.sum(felt.real * number * along * across)
+    squares = [
+        abs(np.sum(z * np.maximum(w, 0.0))) ** 2 - abs(np.sum(z * np.maximum(-w, 0.0))) ** 2
+        for w in (along, across)
+    ]
+    push = 0.5 * WATER * GRAVITY * np.array([0.3**2 * vessel.beam, 0.3**2 * vessel.length])
+    return np.array([*(push * squares), 0.0, *motion, turned, np.sum(z.real)])
+
+
+@pytest.mark.parametrize("spreading", [0, 2])
+def test_the_kernels_add_up_what_the_docstring_says(spreading):
+    sea = Waves(height=0.3, period=1.8, direction=0.8, components=21, spreading=spreading)
+    at, random = asked(sea), np.random.default_rng(3)
+    for _ in range(5):
+        t, x = random.uniform(0, 300), random.normal(0, 3, 6)
+        np.testing.assert_allclose(at(t, x), by_hand(sea, NONLINEAR, t, x), rtol=1e-6, atol=1e-7)
+
+
+def test_both_kernels_agree_on_waves_of_one_direction():
+    sea = Waves(height=0.3, period=1.8, direction=0.8, components=10)
+    long, short = asked(sea), asked(sea, kernel=waves._short_crested)
+    for t in (0.0, 17.3):
+        x = (3.0, -4.0, 0.4, 0.5, 0.1, 0.0)
+        np.testing.assert_allclose(long(t, x), short(t, x), rtol=1e-9, atol=1e-12)
+
+
+def test_the_table_has_the_waves_of_the_spectrum():
+    sea = Waves(height=0.8, period=4.0, period_is="zero_crossing", spectrum="ittc")
+    turns, _, number, a, c, s = sea.table().reshape(6, -1)[:, :100]
+    rate = 2.0 * math.pi * turns
+    assert 4.0 * math.sqrt(np.sum(a**2) / 2.0) == pytest.approx(0.8, rel=5e-3)
+    m0, m2 = np.sum(a**2), np.sum(a**2 * rate**2)
+    assert 2.0 * math.pi * math.sqrt(m0 / m2) == pytest.approx(4.0, rel=0.05)  # cut off at the top
+    np.testing.assert_allclose(number, rate**2 / GRAVITY, rtol=1e-14)
+    np.testing.assert_allclose([c, s], np.tile([[-1.0], [0.0]], 100), atol=1e-15)  # from the north
+
+
+@pytest.mark.parametrize(("psi", "u"), [(0.0, 1.5), (math.pi, 1.5), (math.pi / 3, 2.0)])
+def test_a_vessel_under_way_meets_the_waves_at_the_encounter_frequency(psi, u):
+    """rate - rate^2/g U cos(angle between course and travel), by zero crossings of 30 waves."""
+    sea = one(direction=SOUTHWARD)
+    rate, _, _ = component(sea)
+    met = abs(rate - rate**2 / GRAVITY * u * math.cos(psi))
+    at, t = asked(sea), np.linspace(0.0, 60.0 * math.pi / met, 600)
+    here = [(u * math.cos(psi) * s, u * math.sin(psi) * s, psi, u, 0, 0) for s in t]
+    zeta = np.array([at(s, x)[6] for s, x in zip(t, here, strict=True)])
+    up = np.flatnonzero((zeta[:-1] < 0) & (zeta[1:] >= 0))
+    crossings = t[up] - zeta[up] * (t[up + 1] - t[up]) / (zeta[up + 1] - zeta[up])
+    assert 2.0 * math.pi / np.diff(crossings).mean() == pytest.approx(met, rel=1e-4)
+
+
+def test_a_short_hull_goes_round_with_the_water():
+    """Under a crest water moves on in the wave's direction, in a trough back, as far as high."""
+    sea = one(direction=SOUTHWARD)
+    rate, _, a = component(sea)
+    at, h = asked(sea, SHORT), 1e-3
+    for t in np.linspace(0.0, 2.0, 9):
+        x = (2.0, 5.0, 0.3, 0, 0, 0)
+        velocity = (at(t + h, x)[3:5] - at(t - h, x)[3:5]) / (2 * h)
+        here = at(t, x)
+        np.testing.assert_allclose(velocity, [rate * here[6], 0.0], atol=1e-4 * a * rate)
+        assert here[3] ** 2 + here[6] ** 2 == pytest.approx(a * a, rel=1e-6)
+
+
+def test_yaw_is_the_slope_of_the_sway_along_the_hull():
+    sea = one(direction=0.4)
+    at, h = asked(sea, SHORT), 1e-4
+    for psi in (0.0, 1.0, -2.0):
+        ahead, aside = np.array([math.cos(psi), math.sin(psi)]), [-math.sin(psi), math.cos(psi)]
+        bow, stern = (at(1.3, (*(s * ahead), psi, 0, 0, 0))[3:5] @ np.array(aside) for s in (h, -h))
+        assert at(1.3, (0, 0, psi, 0, 0, 0))[5] == pytest.approx((bow - stern) / (2 * h), rel=1e-4)
+
+
+def test_a_long_hull_hardly_feels_short_waves():
+    sea = one(direction=SOUTHWARD, period=0.4, height=0.1)  # a quarter of a metre long
+    _, number, a = component(sea)
+    assert number * NONLINEAR.length > 25.0
+    at = asked(sea)
+    assert max(abs(at(t, np.zeros(6))[3]) for t in np.linspace(0, 0.4, 9)) < 0.01 * a
+    long = one(direction=SOUTHWARD, period=5.0)
+    slow, size = asked(long), component(long)[2]
+    assert max(slow(t, np.zeros(6))[3] for t in np.linspace(0, 5, 50)) == pytest.approx(
+        size, rel=0.01
+    )
+
+
+def test_regular_waves_push_with_a_constant_force():
+    """Half of rho g a^2, times the reflected share squared, times the width that they meet."""
+    sea = one(direction=0.0, reflection_u=0.6, reflection_v=0.5, drift_arm=0.2)
+    at, square = asked(sea), component(sea)[2] ** 2
+    X = 0.5 * WATER * GRAVITY * 0.36 * NONLINEAR.beam * square
+    Y = 0.5 * WATER * GRAVITY * 0.25 * NONLINEAR.length * square
+    for t in (0.0, 0.7, 33.0):
+        np.testing.assert_allclose(at(t, np.zeros(6))[:3], [-X, 0, 0], rtol=1e-8, atol=1e-9)
+        from_port = at(t, (1, 2, math.pi / 2, 0, 0, 0))[:3]
+        np.testing.assert_allclose(from_port, [0, Y, 0.2 * Y], rtol=1e-8, atol=1e-9)
+        astern = at(t, (1, 2, math.pi, 0, 0, 0))[:3]
+        np.testing.assert_allclose(astern, [X, 0, 0], rtol=1e-8, atol=1e-9)
+
+
+def test_irregular_waves_push_on_average_with_twice_the_variance():
+    sea = Waves(height=0.4, period=2.0, components=16, reflection_u=0.5)
+    at = asked(sea)
+    pushed = [at(t, np.zeros(6))[0] for t in np.arange(0.0, 900.0, 0.7)]
+    c_u = 0.5 * WATER * GRAVITY * 0.25 * NONLINEAR.beam
+    m0 = np.sum(sea.table().reshape(6, -1)[3] ** 2) / 2.0
+    assert np.mean(pushed) == pytest.approx(-2.0 * m0 * c_u, rel=0.05)
+    assert max(pushed) <= 0.0
+    assert np.std(pushed) == pytest.approx(2.0 * m0 * c_u, rel=0.25)  # of an exponential law
+
+
+def test_the_two_sides_of_a_hull_are_alike():
+    sea = Waves(height=0.4, period=2.0, components=9)
+    at = asked(sea)
+    for psi in (0.3, 1.2, 2.7):
+        one_side, other = (at(5.0, (1, 0, sign * psi, 0, 0, 0)) for sign in (1, -1))
+        mirrored = one_side * [1, -1, -1, 1, 1, -1, 1]
+        np.testing.assert_allclose(other, mirrored, rtol=1e-9, atol=1e-12)
+
+
+def test_a_factor_on_the_motion_leaves_sea_and_load():
+    given = {"height": 0.4, "period": 2.0, "components": 9, "direction": 0.5}
+    full, half = (asked(Waves(motion=f, **given))(3.0, np.ones(6)) for f in (1.0, 0.5))
+    np.testing.assert_allclose(half, full * [1, 1, 1, 0.5, 0.5, 0.5, 1], rtol=1e-12)
+
+
+SEA = Total(
+    parts=(
+        Waves(height=0.05, period=1.0, components=20, direction=0.7),
+        Wind(speed=3.0, at=1.0, gusts="norsok", components=10, direction=0.7),
+    )
+)
+
+
+@pytest.mark.parametrize("spreading", [0, 1])
+def test_machine_code_computes_what_plain_python_does(spreading):
+    first = SEA.parts[0].model_copy(update={"spreading": spreading})
+    loop = adrift(disturbance=Total(parts=(first, SEA.parts[1])), controller=Constant(surge=2.0))
+    fast, slow = (run(loop, 0.3, compiled=compiled) for compiled in (True, False))
+    for name in ("b_u", "b_v", "b_r", "x_w", "y_w", "psi_w", "zeta", "V_w", "beta_w", "x", "psi"):
+        np.testing.assert_array_equal(fast[name], slow[name])
+
+
+def test_halving_the_step_changes_the_integration_error_only():
+    loop = adrift(disturbance=SEA, controller=Constant(surge=2.0, yaw=0.3))
+    ends = []
+    for step in (0.04, 0.02, 0.01):
+        last = run(loop, 8.0, step)
+        ends.append(np.array([last[name][-1] for name in ("x", "y", "psi")]))
+    order = math.log2(np.abs(ends[0] - ends[1]).max() / np.abs(ends[1] - ends[2]).max())
+    assert 3.3 < order < 5.5
+
+
+def test_a_longer_run_begins_with_the_same_waves():
+    sea = SEA.parts[0]
+    np.testing.assert_array_equal(sea.table_for(SHORT, 1.0), sea.table_for(NONLINEAR, 1e5))
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ("height: 0, period: 2", "disturbance.height"),
+        ("height: 1, period: 0", "disturbance.period"),
+        ("height: 1, period: 2, components: 0", "disturbance.components"),
+        ("height: 1, period: 2, seed: -1", "disturbance.seed"),
+        ("height: 1, period: 2, lowest: 3, highest: 2", "lowest 3 must be below highest 2"),
+        ("height: 1, period: 2, lowest: 0.01, highest: 0.2", "has 0.0 % of its energy"),
+        ("height: 1, period: 0.05", "waves up to 502.7 rad/s (4 times the peak's 125.7) are too"),
+    ],
+)
+def test_what_cannot_be_is_told_in_a_sentence(given, says):
+    lines = told(SOUND.replace("{kind: none}", f"{{kind: waves, {given}}}"))
+    assert len([line for line in lines if says in line]) == 1
