@@ -12,6 +12,7 @@ from podusv_cli.actuators.allocation import allocate, speeds
 from podusv_cli.actuators.allocation_qp import MOST_PODS
 from podusv_cli.actuators.allocation_single import within
 from podusv_cli.actuators.base import SATURATION, Actuator
+from podusv_cli.actuators.command import Failure
 from podusv_cli.actuators.propeller import (
     ANGLE,
     DELTA,
@@ -79,6 +80,12 @@ class Pod(Component):
         ]  # fmt: skip
 
 
+class PodFailure(Failure):
+    """A pod's loss of thrust at a time."""
+
+    pod: int = value(..., "", "the pod that fails, from 0", ge=0)
+
+
 @kernel
 def act(state: Vector, gains: Vector, k: Any, table: Vector, tau: Vector, thrusts: Vector) -> None:
     """Loads (9) of all pods as they stand, and the thrust of each."""
@@ -137,6 +144,7 @@ class Pods(Actuator):
         "turns", "", "what n counts: turns a second, logged as n, or parts of full speed, "
         "logged as n_part; units of the pods' numbers with s for n then go without",
     )  # fmt: skip
+    failure: PodFailure | None = value(None, "", "a pod's loss of thrust at a time")
     pods: tuple[Pod, ...] = value(..., "", "every pod; in place of the preset's", strict=False)
     priority: Literal["yaw", "surge"] = value(
         "yaw", "", "what is met first when surge force and yaw moment cannot both be had"
@@ -172,6 +180,15 @@ class Pods(Actuator):
             raise ValueError(
                 "has only fixed propellers side by side at the same y, which cannot make surge "
                 "force and yaw moment apart from each other; place them at different y"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _there(self) -> Self:
+        if self.failure and self.failure.pod >= len(self.pods):
+            raise ValueError(
+                f"has no pod {self.failure.pod} that could fail: its {len(self.pods)} are counted "
+                f"from 0, so that failure.pod is at most {len(self.pods) - 1}"
             )
         return self
 
@@ -256,6 +273,22 @@ class Pods(Actuator):
             for change in small * np.eye(2)
         ]
         return np.array(columns).T
+
+    @staticmethod
+    @kernel
+    def lose(state: Vector, k: Any, table: Vector, tau: Vector, signals: Vector) -> None:
+        """Take the lost part of the pod's thrust off the loads; allocation and power are as before.
+
+        The pod's angle is as before, too.
+        """
+        count, i = int(k.count), int(k.failure_pod)
+        thrusts, pod = tail(signals, FLAGS + 2 * count), tail(table, i * WIDTH)
+        lost = (1.0 - k.failure_effectiveness) * thrusts[i]
+        along, across = lost * math.cos(state[count + i]), lost * math.sin(state[count + i])
+        thrusts[i] -= lost
+        tau[0] -= along
+        tau[1] -= 0.0 if k.neglect_sway_force > 0.0 else across
+        tau[2] -= pod[X] * across - pod[Y] * along
 
     @staticmethod
     @kernel
