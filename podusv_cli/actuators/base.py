@@ -82,6 +82,11 @@ class Actuator(Component):
         """What `drive_with` writes into `signals`."""
         return (*GIVEN, *self.signals) if self.command else self.signals
 
+    @property
+    def is_relayed(self) -> bool:
+        """Whether it has a command path or a failure."""
+        return bool(self.command or self.failure)
+
     def delay(self) -> float:
         """How long the law's demand takes to the actuator [s]."""
         return self.command.delay if self.command else 0.0

@@ -245,6 +245,7 @@ class Scenario(Component):
         times = {
             "simulation.duration": self.simulation.duration,
             "control.period": self.control.period,
+            "actuator.command.delay": self.actuator.delay(),
             **{f"{key}.difference_step": law.sample_period() for key, law in self.laws().items()},
         }
         if max(times.values()) / step > MOST_INSTANTS:

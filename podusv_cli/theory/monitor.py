@@ -87,7 +87,7 @@ def signals(loop: ClosedLoop, *, sampled: bool) -> tuple[Signal, ...]:
     law = loop.controller.lyapunov()
     if law is None:
         return ()
-    rate = () if sampled else (V_DOT,)
+    rate = () if sampled or loop.actuator.delay() > 0 else (V_DOT,)
     return (V, *rate, *TERMS, *(ERRORS if law.filtered() else ()), *NETWORKS)
 
 
@@ -113,7 +113,7 @@ def monitored(
     """Add V, its terms, V' and its bounds to a fresh recording; None for a law without V.
 
     V uses the disturbance's bound, and weights fitted to this run (`theory.ideal_weights`). With
-    sampled control there is no V' and no bound of V, since the law acts on old measurements.
+    sampled control or a delay there is no V' and no bound of V, since old measurements act.
     `allocate` makes the arrays for the added signals.
     """
     law, count = loop.controller.lyapunov(), len(recording["time"])
@@ -131,7 +131,8 @@ def monitored(
                 if name not in traces:
                     traces[name] = allocate(count)
                 traces[name][rows] = part
-        observed = _Observer(loop, law, recording, traces, ideal, b, grid.hold_every == 0)
+        at_once = grid.hold_every == 0 and not loop.actuator.delay()
+        observed = _Observer(loop, law, recording, traces, ideal, b, at_once)
         starts = (0.0, grid.last_part(steady_fraction))
         windows = dict(zip(WINDOWS, map(observed.window, starts), strict=True))
     sampled = grid.hold_every > 0
