@@ -11,7 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 from podusv_cli.core.kernel import Vector, kernel, tail
-from podusv_cli.engine.grid import TimeGrid, whole_steps
+from podusv_cli.core.steps import whole_steps
+from podusv_cli.engine.grid import TimeGrid
 
 STAGES = 4  # of a step of RK4
 # In the vector `relay`: the place of the next demand, how many are under way, what the actuator is

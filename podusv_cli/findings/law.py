@@ -11,7 +11,14 @@ from podusv_cli.actuators.base import SATURATION
 from podusv_cli.controllers.velocity_loop import Cause, Loop
 from podusv_cli.core.finding import FindingKind, Sentences, before
 from podusv_cli.findings.finding import Case
-from podusv_cli.findings.stability import bursts, delay_margin, delayed_growth, loops, rk4_growth, sampled_growth
+from podusv_cli.findings.stability import (
+    bursts,
+    delay_margin,
+    delayed_growth,
+    loops,
+    rk4_growth,
+    sampled_growth,
+)
 
 UNSTABLE = 1.0 + 1e-6
 # by the cause that a law gives: what is too fast, which loop that is, and what should be smaller
