@@ -7,8 +7,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from podusv_cli.core.component import Component
-from podusv_cli.core.kernel import Vector, bundle
+from podusv_cli.actuators.command import GIVEN, Command, Drive, Failure, commanded, failing
+from podusv_cli.core.component import Component, value
+from podusv_cli.core.kernel import Vector, bundle, kernel
 from podusv_cli.core.signal import Signal
 
 SMALL = 1e-3  # of a demand or a state, for finite differences
@@ -26,9 +27,17 @@ class Actuator(Component):
 
     `states` and `signals` declare every number; the numbers of one vector have the same signal,
     which has an axis.
+
+    Every actuator has a `command` path and a `failure`, none by default. They lie around `drive`:
+    `drive_with` and `signals_with` are with them, all other methods are about the healthy actuator
+    alone.
     """
 
     noun: ClassVar[str] = "actuator"
+    command: Command | None = value(
+        None, "", "how the law's demand reaches the actuator; at once and as it is by default"
+    )
+    failure: Failure | None = value(None, "", "loss of effectiveness at a time")
 
     @property
     def states(self) -> tuple[Signal, ...]:
@@ -47,6 +56,40 @@ class Actuator(Component):
     ) -> None:  # fmt: skip
         """Write loads, rates and signals; every actuator has its own."""
         raise NotImplementedError
+
+    @staticmethod
+    @kernel
+    def lose(state: Vector, k: Any, table: Vector, tau: Vector, signals: Vector) -> None:
+        """Leave a part of the loads and signals that `drive` wrote, once the actuator has failed.
+
+        By default `k.failure_effectiveness` times the loads.
+        """
+        for i in range(3):
+            tau[i] *= k.failure_effectiveness
+
+    def drive_with(self) -> Drive:
+        """`drive` with command path and failure; `drive` itself where it has neither.
+
+        Its `demand` has a third number, when the present step began [s].
+        """
+        drive: Drive = self.drive
+        if self.failure:
+            drive = failing(drive, self.lose)
+        return commanded(drive) if self.command else drive
+
+    @property
+    def signals_with(self) -> tuple[Signal, ...]:
+        """What `drive_with` writes into `signals`."""
+        return (*GIVEN, *self.signals) if self.command else self.signals
+
+    @property
+    def is_relayed(self) -> bool:
+        """Whether it has a command path or a failure."""
+        return bool(self.command or self.failure)
+
+    def delay(self) -> float:
+        """How long the law's demand takes to the actuator [s]."""
+        return self.command.delay if self.command else 0.0
 
     def rest(self) -> Vector:
         """The state at the start of a run."""

@@ -12,6 +12,7 @@ from podusv_cli.actuators.allocation import allocate, speeds
 from podusv_cli.actuators.allocation_qp import MOST_PODS
 from podusv_cli.actuators.allocation_single import within
 from podusv_cli.actuators.base import SATURATION, Actuator
+from podusv_cli.actuators.one_pod import Pod, PodFailure
 from podusv_cli.actuators.propeller import (
     ANGLE,
     DELTA,
@@ -33,7 +34,7 @@ from podusv_cli.actuators.propeller import (
     speed_gain,
     thrust,
 )
-from podusv_cli.core.component import Component, Presets, value
+from podusv_cli.core.component import Presets, value
 from podusv_cli.core.kernel import Vector, bundle, kernel, scratch, tail
 from podusv_cli.core.signal import Signal
 
@@ -42,41 +43,6 @@ NEARLY = 1.0 - 1e-9
 ROUNDS = 20  # until speeds and angles agree
 STRONGEST = 1e15  # N, N m; beside it a demand of 1 is lost in rounding
 SMALL = 1e-3  # of what the pods can do, for finite differences
-
-
-class Pod(Component):
-    """One propeller and the pod that turns it.
-
-    `n` counts turns a second, or parts of full speed where the actuator's `counts` says so; units
-    with s for it then go without.
-    """
-
-    x: float = value(..., "m", "position ahead of the body origin; negative at the stern")
-    y: float = value(0.0, "m", "position to starboard of the body origin")
-    T_nn: float = value(..., "N s2", "thrust over |n|n ahead, at rest", gt=0)
-    T_nn_astern: float = value(..., "N s2", "thrust over |n|n astern, at rest", gt=0)
-    T_nV: float = value(0.0, "N s2/m", "change of thrust over |n| times speed", ge=0)
-    n_max: float = value(..., "1/s", "largest propeller speed ahead", gt=0)
-    n_max_astern: float = value(..., "1/s", "largest propeller speed astern", ge=0)
-    n_rate: float = value(..., "1/s2", "fastest change of the propeller's speed", gt=0)
-    n_lag: float = value(..., "s", "time constant of the propeller's speed", gt=0)
-    angle_limit: float = value(
-        math.radians(35.0), "rad", "largest angle, both ways; 0 for a fixed propeller",
-        ge=0, le=0.5 * math.pi,
-    )  # fmt: skip
-    angle_rate: float = value(..., "rad/s", "fastest change of the angle", gt=0)
-    angle_lag: float = value(..., "s", "time constant of the angle", gt=0)
-    power_nnn: float | None = value(
-        None, "W s3", "power over |n|^3; without it neither power nor energy is logged", ge=0
-    )
-
-    def numbers(self) -> list[float]:
-        """The pod's row in the actuator's table, see `propeller`."""
-        return [
-            self.x, self.y, self.T_nn, self.T_nn_astern, self.T_nV, self.n_max, self.n_max_astern,
-            self.angle_limit, self.n_rate, self.angle_rate, self.n_lag, self.angle_lag,
-            self.power_nnn or 0.0,
-        ]  # fmt: skip
 
 
 @kernel
@@ -137,6 +103,7 @@ class Pods(Actuator):
         "turns", "", "what n counts: turns a second, logged as n, or parts of full speed, "
         "logged as n_part; units of the pods' numbers with s for n then go without",
     )  # fmt: skip
+    failure: PodFailure | None = value(None, "", "a pod's loss of thrust at a time")
     pods: tuple[Pod, ...] = value(..., "", "every pod; in place of the preset's", strict=False)
     priority: Literal["yaw", "surge"] = value(
         "yaw", "", "what is met first when surge force and yaw moment cannot both be had"
@@ -172,6 +139,15 @@ class Pods(Actuator):
             raise ValueError(
                 "has only fixed propellers side by side at the same y, which cannot make surge "
                 "force and yaw moment apart from each other; place them at different y"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _there(self) -> Self:
+        if self.failure and self.failure.pod >= len(self.pods):
+            raise ValueError(
+                f"has no pod {self.failure.pod} that could fail: its {len(self.pods)} are counted "
+                f"from 0, so that failure.pod is at most {len(self.pods) - 1}"
             )
         return self
 
@@ -256,6 +232,22 @@ class Pods(Actuator):
             for change in small * np.eye(2)
         ]
         return np.array(columns).T
+
+    @staticmethod
+    @kernel
+    def lose(state: Vector, k: Any, table: Vector, tau: Vector, signals: Vector) -> None:
+        """Take the lost part of the pod's thrust off the loads; allocation and power are as before.
+
+        The pod's angle is as before, too.
+        """
+        count, i = int(k.count), int(k.failure_pod)
+        thrusts, pod = tail(signals, FLAGS + 2 * count), tail(table, i * WIDTH)
+        lost = (1.0 - k.failure_effectiveness) * thrusts[i]
+        along, across = lost * math.cos(state[count + i]), lost * math.sin(state[count + i])
+        thrusts[i] -= lost
+        tau[0] -= along
+        tau[1] -= 0.0 if k.neglect_sway_force > 0.0 else across
+        tau[2] -= pod[X] * across - pod[Y] * along
 
     @staticmethod
     @kernel

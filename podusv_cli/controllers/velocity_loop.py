@@ -70,6 +70,11 @@ class Loop:
         return rows
 
     @property
+    def growth(self) -> float:
+        """Largest real part of an eigenvalue [1/s]."""
+        return float(np.linalg.eigvals(self.matrix).real.max())
+
+    @property
     def fastest(self) -> float:
         """Largest eigenvalue's magnitude [1/s]."""
         return float(np.abs(np.linalg.eigvals(self.matrix)).max())

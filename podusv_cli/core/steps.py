@@ -22,6 +22,6 @@ def misfit(time: float, step: float) -> str:
 
 
 def fitting(time: float, step: float) -> str:
-    """A hint with the next smaller time that fits."""
+    """A hint with the nearest time that fits; the smaller one in the middle of two."""
     count = time / step
-    return f"; try {max(1, int(count)) * step:.10g}" if count < 1e12 else ""
+    return f"; try {max(1, math.ceil(count - 0.5)) * step:.10g}" if count < 1e12 else ""

@@ -140,6 +140,6 @@ def _check_axes(loop: ClosedLoop) -> None:
 def _shapes(loop: ClosedLoop) -> Iterator[tuple[Signal, tuple[int, ...]]]:
     """The signals that may be vectors, each with its shape at an instant."""
     law, actuator = loop.controller, loop.actuator
-    for part, count in (*law.slots(), *Counter((*actuator.states, *actuator.signals)).items()):
+    for part, count in (*law.slots(), *Counter((*actuator.states, *actuator.signals_with)).items()):
         yield part, (count,) if part.axes or count > 1 else ()
     yield from ((part, array.shape) for part, array in law.fixed_signals().items())

@@ -24,6 +24,7 @@ from podusv_cli.engine.layout import (
     Wires,
     shifted,
 )
+from podusv_cli.engine.relay import BEGAN, GIVEN, begin_step, pass_on
 from podusv_cli.engine.sampled import perceive, sample_and_hold
 from podusv_cli.vessels.plant import plant
 from podusv_cli.vessels.vessel import COEFFICIENTS
@@ -68,8 +69,12 @@ def rates(
         )  # fmt: skip
     else:
         law(t, given, memory, row, p, table, demand, memory_rate, tail(row, n.signals), work)
+    wanted = demand
+    if n.relayed > 0:
+        pass_on(demand, c.relay)
+        wanted = tail(c.relay, GIVEN)
     actuator(
-        t, s, tail(s, 6), demand, c.actuator, c.actuator_table,
+        t, s, tail(s, 6), wanted, c.actuator, c.actuator_table,
         tau, tail(ds, 6), tail(row, n.flags),
     )  # fmt: skip
     if n.wants_loads > 0 and not (n.hold_every > 0 and n.update_first > 0):
@@ -140,6 +145,8 @@ def instant(
     t = k * h
     c.under_way[0] = k
     again = k > first and t == (k - 1) * h + h  # where the last stage of the step before was
+    if n.relayed > 0:
+        begin_step(k, t, c.relay)
     if n.measured > 0:
         perceive(k, t, disturbance, measurement, correct, c, n)
     if n.sample_every > 0 or n.hold_every > 0:
@@ -233,6 +240,8 @@ def rates_along(
     for i in range(count):
         here = tail(logged, i * (1 + n.states))
         there = tail(out, i * (n.states + n.columns))
+        if n.relayed > 0:
+            c.relay[BEGAN] = here[0]
         rates(
             here[0], tail(here, 1), there, path, disturbance, law, actuator, after, follow, c, n,
             False, False,

@@ -18,13 +18,15 @@ def continuous(loop: ClosedLoop, duration: float, *, compiled: bool = True) -> t
     """f(t, s) for t up to `duration` [s], and s(0).
 
     s is the vessel's state, the actuator's, the law's memory. f raises ArithmeticError where a
-    number is not finite. Raises ValueError for a law that takes samples and for measurements,
-    which are no ordinary differential equations.
+    number is not finite. Raises ValueError for a law that takes samples, for measurements and for
+    a delay, which are no ordinary differential equations.
     """
     if loop.measured:
         raise ValueError("a law that works with measurements has no continuous right-hand side")
     if loop.controller.sample_period() > 0:
         raise ValueError("a law that takes samples has no continuous right-hand side")
+    if loop.actuator.delay() > 0:
+        raise ValueError("an actuator with a delay has no continuous right-hand side")
     grid = TimeGrid(1.0, 1, log_every=2)
     plan = loop.layout(grid)
     wires = wire(loop, plan, Observer(), TimeGrid(duration, 1))

@@ -31,6 +31,7 @@ class Plan(NamedTuple):
     update_first: int  # 1: a held law's memory takes a sample before the demand is formed
     load_of_time: int  # 1: the disturbance depends on time alone
     wants_loads: int  # 1: the law is told which loads really act
+    relayed: int  # 1: the actuator has a command path or a failure
 
     @property
     def width(self) -> int:
@@ -59,6 +60,7 @@ class Wires(NamedTuple):
     row: Vector
     stages: Vector  # four rates and one intermediate state
     sensed: Vector  # what was measured, see `sensors.base`
+    relay: Vector  # demands on their way to the actuator, see `engine.relay`
     held: Vector  # t, x, target of the last sample; demand and signals that nobody reads
     work: Vector
     seen: Vector  # the observer's

@@ -20,6 +20,7 @@ from podusv_cli.core.steps import whole_steps
 from podusv_cli.disturbances.base import WAVE_MOTION, Disturbance
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.layout import HELD_SIGNALS, Plan, Wires
+from podusv_cli.engine.relay import relay
 from podusv_cli.estimators.base import Estimator
 from podusv_cli.estimators.none import NoEstimator
 from podusv_cli.paths.base import TARGET, Path
@@ -96,6 +97,11 @@ class ClosedLoop:
         """Whether the law is given an estimate from measurements, and not the state itself."""
         return not self.measurement.is_exact
 
+    @property
+    def at_once(self) -> bool:
+        """Whether the true state acts on the actuator through the law without delay."""
+        return not self.measured and self.actuator.delay() == 0.0
+
     def estimated(self) -> tuple[Signal, ...]:
         """The estimator's states; none where the law is given the state itself."""
         return self.estimator.states if self.measured else ()
@@ -112,7 +118,7 @@ class ClosedLoop:
     def about(self) -> dict[str, Signal]:
         """Every signal that the loop logs, by name. Raises LawError where two have one name."""
         law, actuator = self.controller, self.actuator
-        own = (partial(called, actuator), (*actuator.states, *actuator.signals))
+        own = (partial(called, actuator), (*actuator.states, *actuator.signals_with))
         loop = (lambda: "the closed loop", LOOP)
         others = (
             *((partial(called, part), part.signals) for part in self.disturbance.each()),
@@ -127,7 +133,7 @@ class ClosedLoop:
         estimate = len(STATE) + len(actuator.states)
         memory, load = estimate + len(self.estimated()), 3 + len(self.disturbance.signals)
         sizes = [
-            len(TARGET) + 1, len(law.signals), len(DEMAND), 3, load, len(actuator.signals),
+            len(TARGET) + 1, len(law.signals), len(DEMAND), 3, load, len(actuator.signals_with),
             len(self.measurement.signals),
         ]  # fmt: skip
         signals, demand, tau, b, flags, sensed, columns = np.cumsum(sizes).tolist()
@@ -140,6 +146,7 @@ class ClosedLoop:
             sample_every=_sample_steps(law.sample_period(), grid),
             measured=int(self.measured), update_first=int(grid.update_first),
             load_of_time=int(self.disturbance.of_time), wants_loads=int(law.wants_loads()),
+            relayed=int(actuator.is_relayed),
         )  # fmt: skip
 
 
@@ -169,7 +176,7 @@ def entries(loop: ClosedLoop, observer: Observer) -> Iterator[tuple[str, Any, tu
     yield "disturbance", disturbance.kernel_with(loop.vessel), loads
     yield "law", law.law, constants
     yield "sample", sample, constants
-    yield "actuator", actuator.drive, tuple(actuator.constants())
+    yield "actuator", actuator.drive_with(), tuple(actuator.constants())
     yield "after_saturation", after_saturation, constants
     yield from _seeing(loop)
     yield "observer", observer.watch, tuple(observer.constants)
@@ -215,7 +222,7 @@ def wire(
         s=np.concatenate([start, actuator.rest(), estimate, loop.first_memory()]),
         row=np.zeros(plan.columns), stages=np.zeros(5 * plan.states),
         sensed=measurement.first(start, grid.step),
-        held=np.zeros(HELD_SIGNALS + len(law.signals)),
+        relay=relay(actuator.delay(), grid), held=np.zeros(HELD_SIGNALS + len(law.signals)),
         work=np.zeros(law.workspace()), seen=np.zeros(observer.size), under_way=np.zeros(2),
         log=allocate(rows * plan.width),
     )  # fmt: skip
@@ -232,8 +239,10 @@ def names(loop: ClosedLoop) -> list[str]:
     law, actuator = loop.controller, loop.actuator
     slots = [part for part, size in law.slots() for _ in range(size)]
     states = [part.name for part in (*actuator.states, *loop.estimated(), *slots)]
-    parts = (law, loop.disturbance, actuator, loop.measurement)
-    own, sea, others, seen = ([part.name for part in owner.signals] for owner in parts)
+    parts = (
+        law.signals, loop.disturbance.signals, actuator.signals_with, loop.measurement.signals
+    )  # fmt: skip
+    own, sea, others, seen = ([part.name for part in signals] for signals in parts)
     return ["time", *STATE, *states, *TARGET, "z_e", *own, *DEMAND, *LOADS, *sea, *others, *seen]
 
 

@@ -14,6 +14,7 @@ from podusv_cli.engine import closed_loop, signatures
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.layout import Plan, Wires
 from podusv_cli.engine.loop import STATE, ClosedLoop, Observer, by_name, entries, names, wire
+from podusv_cli.engine.relay import COUNT
 
 
 def logged_rows(loop: ClosedLoop, recording: Recording, most: int) -> Vector:
@@ -70,13 +71,15 @@ def rates_replay(
 ) -> Callable[[Recording], Replayed]:
     """A function that gives the loop's right-hand side at every row of a recording of it.
 
-    Control is taken as continuous, also where the run's was sampled. The rates of an estimator are
-    left out: they depend on measurements, which the loop's state does not hold.
+    Control is taken as continuous, also where the run's was sampled, and as without delay. The
+    rates of an estimator are left out: they depend on measurements, which the loop's
+    state does not hold.
     """
     plan = loop.layout(grid)._replace(hold_every=0, measured=0)
     labels, split, about = names(loop), 1 + plan.states, loop.about()
     state = list(dict.fromkeys(labels[:split]))
     wires = wire(loop, plan, Observer(), grid)
+    wires.relay[COUNT] = 0.0
     run = _rates_runner(loop, compiled)
 
     def replayed(recording: Recording) -> Replayed:

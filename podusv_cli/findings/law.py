@@ -5,11 +5,20 @@ from __future__ import annotations
 import math
 from functools import partial
 
+import numpy as np
+
 from podusv_cli.actuators.base import SATURATION
 from podusv_cli.controllers.velocity_loop import Cause, Loop
 from podusv_cli.core.finding import FindingKind, Sentences, before
 from podusv_cli.findings.finding import Case
-from podusv_cli.findings.stability import bursts, loops, rk4_growth, sampled_growth
+from podusv_cli.findings.stability import (
+    bursts,
+    delay_margin,
+    delayed_growth,
+    loops,
+    rk4_growth,
+    sampled_growth,
+)
 
 UNSTABLE = 1.0 + 1e-6
 # by the cause that a law gives: what is too fast, which loop that is, and what should be smaller
@@ -78,6 +87,26 @@ def _sampled(cause: Cause) -> FindingKind:
 
 stiff_adaptation, stiff_derivative, stiff_loop = map(_stiff, LOOPS)
 sampled_adaptation, sampled_derivative, sampled_loop = map(_sampled, LOOPS)
+
+
+@before(
+    "delayed-loop", about="actuator.command", meaning="a velocity loop too fast for the delay",
+    condition="a velocity loop of the law, stable without the delay, grows with it",
+    remedy="take a shorter delay, or smaller gains",
+)  # fmt: skip
+def delayed_loop(case: Case) -> Sentences:
+    """The delay of the actuator's command makes a velocity loop of the law unstable."""
+    delay = case.scenario.actuator.delay()
+    reported: set[str] = set()
+    for nu in (case.first_velocity, case.reference.working) if delay else ():
+        for loop in loops(case.scenario, nu):
+            stable = np.isfinite(loop.matrix).all() and loop.growth < 0.0
+            if stable and loop.axis not in reported and delayed_growth(loop, delay) > 0.0:
+                reported.add(loop.axis)
+                yield (
+                    f"the {loop.axis} {loop.name} grows with a delay of {delay:g} s; take a delay "
+                    f"below {delay_margin(loop, delay):.2g} s, or a smaller {loop.key}"
+                )
 
 
 @before(

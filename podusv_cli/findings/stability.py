@@ -9,6 +9,7 @@ from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.vessels.plant import surge_force, yaw_moment
 
+NODES = 20  # of the demand on its way to the actuator
 BURST_STEPS = 20  # steps within which the error of a start that is too stiff grows
 BURST = 2.0  # growth of the error that counts
 
@@ -55,6 +56,43 @@ def _updated_first(loop: Loop, step: float, count: int) -> float:
     period[0] = through[0, 1] * loop.feedback
     period[0, 0] += through[0, 0]
     return _radius(period @ updated)
+
+
+def delayed_growth(loop: Loop, delay: float) -> float:
+    """Largest real part [1/s] of the loop's roots where the law's output acts after a delay [s].
+
+    e' = -d e + g . (e, m) a delay before. The roots are eigenvalues of the derivative along the
+    demand's way, collocated at Chebyshev's points (Breda, Maset, Vermiglio, SIAM J. Sci. Comput.
+    27, 2005).
+    """
+    n, now, late = len(loop.matrix), loop.matrix.copy(), np.zeros_like(loop.matrix)
+    now[0] -= loop.feedback
+    late[0] = loop.feedback
+    rates = np.kron(2.0 / delay * _chebyshev(NODES), np.eye(n))
+    rates[:n] = 0.0
+    rates[:n, :n], rates[:n, -n:] = now, late
+    if not np.isfinite(rates).all():
+        return np.inf
+    return float(np.linalg.eigvals(rates).real.max())
+
+
+def delay_margin(loop: Loop, most: float) -> float:
+    """The shortest delay [s] below `most`, which is too long, that makes the loop grow."""
+    low, high = 0.0, most
+    for _ in range(30):
+        middle = 0.5 * (low + high)
+        grows = delayed_growth(loop, middle) > 0.0
+        low, high = (low, middle) if grows else (middle, high)
+    return high
+
+
+def _chebyshev(count: int) -> Vector:
+    """The matrix of derivatives at cos(j pi/count), j = 0 .. count (Trefethen 2000, cheb.m)."""
+    x = np.cos(np.pi * np.arange(count + 1) / count)
+    c = np.where(np.arange(count + 1) % 2, -1.0, 1.0)
+    c[[0, -1]] *= 2.0
+    D = np.outer(c, 1.0 / c) / (np.subtract.outer(x, x) + np.eye(count + 1))
+    return np.asarray(D - np.diag(D.sum(axis=1)))
 
 
 def _rk4(matrix: Vector, step: float) -> Vector:

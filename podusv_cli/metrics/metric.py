@@ -24,7 +24,7 @@ class Layout:
 
     def column(self, signal: str) -> int:
         """Column of an actuator's signal, of a vector its first number; -1 if there is none."""
-        names = [part.name for part in self.loop.actuator.signals]
+        names = [part.name for part in self.loop.actuator.signals_with]
         return self.plan.flags + names.index(signal) if signal in names else -1
 
 

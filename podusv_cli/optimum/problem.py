@@ -68,6 +68,11 @@ def problem(scenario: Scenario, minimised: Minimised) -> Problem:
             "actuators that deliver the demand up to constant limits: ideal, saturated",
         ),
     }
+    if loop.actuator.is_relayed:
+        raise UsageError(
+            f"{scenario.name}: actuator has a command or a failure; podusv optimum knows actuators "
+            "without them: leave actuator.command and actuator.failure out"
+        )
     for key, (fits, known) in kinds.items():
         if not fits:
             kind = getattr(loop, key).kind

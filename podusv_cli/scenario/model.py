@@ -261,6 +261,7 @@ class Scenario(Component):
         times = {
             "simulation.duration": self.simulation.duration,
             "control.period": self.control.period,
+            "actuator.command.delay": self.actuator.delay(),
             **{f"{key}.difference_step": law.sample_period() for key, law in self.laws().items()},
         }
         if max(times.values()) / step > MOST_INSTANTS:
@@ -304,8 +305,8 @@ class Scenario(Component):
 
     @property
     def sampled(self) -> bool:
-        """Whether the law acts on samples: its own, or those of sensors."""
-        return self.control.period > 0 or not self.measurement.is_exact
+        """Whether old measurements act: with sampled control, with sensors and with a delay."""
+        return self.control.period > 0 or not self.closed_loop().at_once
 
     def _signals(self) -> Conflicts:
         several = {f"controllers.{label}": law for label, law in self.controllers.items()}

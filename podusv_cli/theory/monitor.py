@@ -113,13 +113,13 @@ def monitored(
     """Add V, its terms, V' and its bounds to a fresh recording; None for a law without V.
 
     V uses the disturbance's bound, and weights fitted to this run (`theory.ideal_weights`). With
-    sampled control or sensors there is no V' and no bound of V: the law acts on measurements.
+    sampled control, sensors or a delay there is no V' and no bound of V: old measurements act.
     `allocate` makes the arrays for the added signals.
     """
     law, count = loop.controller.lyapunov(), len(recording["time"])
     if law is None or not count:
         return None
-    sampled = grid.hold_every > 0 or loop.measured
+    sampled = grid.hold_every > 0 or not loop.at_once
     with np.errstate(all="ignore"):  # numbers of a diverging run overflow
         replayed = rates_replay(loop, grid, compiled=compiled)
         chosen = recording.part(ideal_weights.rows_to_fit(count, law.network.count))

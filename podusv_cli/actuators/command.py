@@ -1,0 +1,158 @@
+"""What any actuator may have around it: a command path with delay and dead zone, and a failure.
+
+From the law to the hull: the demand is delayed (by the engine, `engine.layout`), rounded to its
+resolution, goes through the dead zone, and is what the actuator is given. Where the actuator has
+failed, a part of its loads is left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+from podusv_cli.core.component import Component, value
+from podusv_cli.core.finding import Sentences, before
+from podusv_cli.core.kernel import Vector, kernel, scratch, specialise, tail
+from podusv_cli.core.signal import Signal
+
+Drive = Callable[..., None]
+
+GIVEN = (
+    Signal("tau_u_in", "N", "surge force that the actuator is given", r"\tau_{u,\mathrm{in}}"),
+    Signal("tau_r_in", "N m", "yaw moment that the actuator is given", r"\tau_{r,\mathrm{in}}"),
+)
+WHOLE = 1.5 * 2.0**52  # a number below 2^51 that is added to it, and taken off, is rounded
+LARGEST = 2.0**51
+
+
+class Command(Component):
+    """How the law's demand reaches the actuator: delayed, rounded, and with a dead zone."""
+
+    delay: float = value(
+        0.0, "s", "time from the law to the actuator, a whole number of steps; the demand is zero "
+        "until the first command arrives", ge=0,
+    )  # fmt: skip
+    resolution_u: float = value(
+        0.0, "N", "the surge force is rounded to the nearest multiple of this; 0: not rounded", ge=0
+    )
+    resolution_r: float = value(
+        0.0, "N m", "the yaw moment is rounded to the nearest multiple of this; 0: not rounded",
+        ge=0,
+    )  # fmt: skip
+    dead_zone_u: float = value(
+        0.0, "N", "a surge force up to this gives nothing, a larger one what is above it", ge=0
+    )
+    dead_zone_r: float = value(
+        0.0, "N m", "a yaw moment up to this gives nothing, a larger one what is above it", ge=0
+    )
+
+
+class Failure(Component):
+    """A loss of effectiveness at a time."""
+
+    time: float = value(
+        ..., "s", "when the effectiveness is lost: with the first step that begins then or later",
+        ge=0,
+    )  # fmt: skip
+    effectiveness: float = value(
+        0.0, "", "the part of the loads (of a pod: of its thrust) that is left", ge=0, le=1
+    )
+
+
+@kernel
+def rounded(demand: float, resolution: float) -> float:
+    """The nearest multiple of the resolution, of two the even one; as it is for resolution 0."""
+    if resolution > 0.0:
+        count = demand / resolution
+        if abs(count) < LARGEST:
+            return ((count + WHOLE) - WHOLE) * resolution
+    return demand
+
+
+@kernel
+def beyond(demand: float, zone: float) -> float:
+    """What is beyond the dead zone, which starts at zero; what is no number stays so."""
+    if abs(demand) <= zone:
+        return 0.0
+    return demand - zone if demand > 0.0 else demand + zone
+
+
+def _inner(
+    t: float, x: Vector, state: Vector, demand: Vector, k: Any, table: Vector,
+    tau: Vector, rate: Vector, signals: Vector,
+) -> None:  # fmt: skip
+    """Stands for an actuator's `drive`."""
+
+
+def _lost(state: Vector, k: Any, table: Vector, tau: Vector, signals: Vector) -> None:
+    """Stands for an actuator's `lose`."""
+
+
+def _commanded(
+    t: float, x: Vector, state: Vector, demand: Vector, k: Any, table: Vector,
+    tau: Vector, rate: Vector, signals: Vector,
+) -> None:  # fmt: skip
+    """`drive` with the demand rounded and the dead zone taken off; its signals come first."""
+    given = scratch(3)
+    given[0] = beyond(rounded(demand[0], k.command_resolution_u), k.command_dead_zone_u)
+    given[1] = beyond(rounded(demand[1], k.command_resolution_r), k.command_dead_zone_r)
+    given[2] = demand[2]
+    signals[0], signals[1] = given[0], given[1]
+    _inner(t, x, state, given, k, table, tau, rate, tail(signals, 2))
+
+
+def _failing(
+    t: float, x: Vector, state: Vector, demand: Vector, k: Any, table: Vector,
+    tau: Vector, rate: Vector, signals: Vector,
+) -> None:  # fmt: skip
+    """`drive`, and what is left of its loads in steps that begin after the failure."""
+    _inner(t, x, state, demand, k, table, tau, rate, signals)
+    if demand[2] >= k.failure_time:
+        _lost(state, k, table, tau, signals)
+
+
+@cache
+def commanded(drive: Drive) -> Drive:
+    """A kernel with the command path before `drive`; the same one for the same kernel."""
+    made: Drive = specialise(_commanded, f"{drive.__qualname__}_commanded", _inner=drive)
+    return made
+
+
+@cache
+def failing(drive: Drive, lose: Drive) -> Drive:
+    """A kernel with the failure behind `drive`; the same one for the same kernels."""
+    made: Drive = specialise(
+        _failing, f"{drive.__qualname__}_failing", _inner=drive, _lost=lose
+    )  # fmt: skip
+    return made
+
+
+@before(
+    "late-failure", about="actuator.failure", meaning="the failure never happens",
+    condition="the failure's time is not before the end of the run",
+    remedy="let the failure happen earlier, or simulate longer",
+)  # fmt: skip
+def late_failure(case: Any) -> Sentences:
+    """The run ends before the actuator fails."""
+    failure, end = case.scenario.actuator.failure, case.scenario.simulation.duration
+    if failure and failure.time >= end:
+        yield (
+            f"the failure at {failure.time:g} s never happens, since the run ends at {end:g} s; "
+            "take an earlier time, or simulate longer"
+        )
+
+
+@before(
+    "late-command", about="actuator.command", meaning="no command reaches the actuator",
+    condition="the delay is not shorter than the run",
+    remedy="take a shorter delay, or simulate longer",
+)  # fmt: skip
+def late_command(case: Any) -> Sentences:
+    """The run ends before the first command arrives."""
+    delay, end = case.scenario.actuator.delay(), case.scenario.simulation.duration
+    if delay >= end:
+        yield (
+            f"with a delay of {delay:g} s no command reaches the actuator in the {end:g} s of the "
+            "run; take a shorter delay, or simulate longer"
+        )
