@@ -36,9 +36,13 @@ from podusv_cli.engine.check import check_law
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.loop import ClosedLoop
 from podusv_cli.engine.simulate import simulate
+from podusv_cli.estimators.base import Estimator
 from podusv_cli.figures.drawing import dressed
 from podusv_cli.figures.sheet import Sheet
 from podusv_cli.figures.style import house_style, image
+from podusv_cli.measurements.base import Measurement
+from podusv_cli.measurements.exact import Exact
+from podusv_cli.measurements.sensors import Sensors
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import metrics_with, observer
 from podusv_cli.paths.base import TARGET
@@ -63,6 +67,7 @@ controller: {kind: pid}
 ROOMS: dict[str, tuple[str, type[Component]]] = {
     "controllers": ("controller", Controller), "paths": ("path", AnyPath),
     "disturbances": ("disturbance", Disturbance), "actuators": ("actuator", Actuator),
+    "measurements": ("measurement", Measurement), "estimators": ("estimator", Estimator),
 }  # fmt: skip
 
 
@@ -213,7 +218,8 @@ def _vessel() -> Vessel:
 def loop_with(component: Component) -> ClosedLoop:
     """A closed loop of podusv's own parts, with this one in its place."""
     parts: dict[str, Any] = {
-        "path": Line(), "disturbance": Calm(), "actuator": Ideal(), "controller": Pid()
+        "path": Line(), "disturbance": Calm(), "actuator": Ideal(), "controller": Pid(),
+        "measurement": Sensors() if isinstance(component, Estimator) else Exact(),
     }  # fmt: skip
     place = next(name for name, base in ROOMS.values() if isinstance(component, base))
     return ClosedLoop(
@@ -238,7 +244,7 @@ def evaluated(component: Component, seed: int) -> list[Vector]:
     for base, call in CALLS:
         if isinstance(component, base):
             return call(component, t, x, target, random)
-    raise TypeError(f"{component_kind(component)} is no law, path, disturbance or actuator")
+    raise TypeError(f"{component_kind(component)} is no part of a closed loop")
 
 
 def _law(law: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vector]:
@@ -271,4 +277,23 @@ def _actuator(actuator: Any, t: float, x: Vector, target: Vector, random: Any) -
     return outputs
 
 
-CALLS = ((Controller, _law), (AnyPath, _path), (Disturbance, _sea), (Actuator, _actuator))
+def _measurement(sensors: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vector]:
+    seen = sensors.first(x, STEP)
+    k, table = bundle(sensors.constants_with(STEP, 0)), sensors.table_for(STEP, STEPS)
+    sensors.sense(t, float(random.integers(STEPS)), x, np.zeros(3), k, table, seen)
+    return [seen]
+
+
+def _estimator(estimator: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vector]:
+    state, k = estimator.start(x, _vessel()), bundle(estimator.constants_with(_vessel()))
+    seen = np.concatenate([x + random.normal(0.0, 0.1, 6), np.ones(12)])
+    tau, rate, table = random.normal(0.0, 5.0, 3), np.full(len(state), np.nan), estimator.table()
+    estimator.correct(t, seen, state, k, table)
+    estimator.follow(t, seen, tau, state, k, table, rate)
+    return [state, rate]
+
+
+CALLS = (
+    (Controller, _law), (AnyPath, _path), (Disturbance, _sea), (Actuator, _actuator),
+    (Measurement, _measurement), (Estimator, _estimator),
+)  # fmt: skip

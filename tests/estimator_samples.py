@@ -13,7 +13,7 @@ from podusv_cli.core.signal import Signal
 from podusv_cli.disturbances.base import Disturbance
 from podusv_cli.disturbances.calm import Calm
 from podusv_cli.estimators.base import ESTIMATE, Estimator
-from podusv_cli.sensors.base import FRESH, Measurement
+from podusv_cli.measurements.base import FRESH, Measurement
 
 STATE = ("x", "y", "psi", "u", "v", "r")
 MEASURED = tuple(Signal(f"{name}_m", "", "measured") for name in STATE)

@@ -14,7 +14,7 @@ from podusv_cli.estimators.ekf import ExtendedKalmanFilter
 from podusv_cli.estimators.low_pass import LowPass
 from podusv_cli.estimators.none import NoEstimator
 from podusv_cli.estimators.passive_observer import PassiveObserver
-from podusv_cli.sensors.sensors import Sensors
+from podusv_cli.measurements.sensors import Sensors
 
 EVERY = list(kinds("podusv_cli.estimators", Estimator).values())
 MODELS = [PassiveObserver, ExtendedKalmanFilter]  # those that know the vessel

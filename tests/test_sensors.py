@@ -8,8 +8,8 @@ from conftest import Constant, adrift, corrected, run
 
 from podusv_cli.core.signal import STATE
 from podusv_cli.disturbances.total import Total
-from podusv_cli.sensors.base import FRESH, KNOWN, VALUE
-from podusv_cli.sensors.sensors import Sensor, Sensors, rounded
+from podusv_cli.measurements.base import FRESH, KNOWN, VALUE
+from podusv_cli.measurements.sensors import Sensor, Sensors, rounded
 
 H = 0.01
 PERFECT = Sensor(period=H)

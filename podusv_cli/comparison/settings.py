@@ -14,8 +14,8 @@ from podusv_cli.scenario.presets import preset_file, preset_names
 from podusv_cli.scenario.yaml_tree import plain
 
 SECTIONS = (
-    "vessel", "nominal", "start", "path", "disturbance", "actuator", "simulation", "control",
-    "metrics",
+    "vessel", "nominal", "start", "path", "disturbance", "actuator", "measurement", "estimator",
+    "simulation", "control", "metrics",
 )  # fmt: skip
 WHICH = ("kind", "preset")  # are told although they equal the default or preset
 
@@ -48,7 +48,11 @@ def changed(scenario: Scenario) -> list[Setting]:
 
 def parts(scenario: Scenario) -> dict[str, Component]:
     """The sections that a run depends on, controllers apart; `nominal` if it is not the vessel."""
-    sections = {name: getattr(scenario, name) for name in SECTIONS}
+    sections = {
+        f"{name}{step and f'.{step[:-1]}'}": part
+        for name in SECTIONS
+        for step, part in _inside(getattr(scenario, name)).items()
+    }
     if scenario.nominal == scenario.vessel:
         del sections["nominal"]
     return sections

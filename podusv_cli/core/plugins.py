@@ -24,7 +24,8 @@ from podusv_cli.core.errors import LawError, in_a_line
 from podusv_cli.core.escaping import visible
 
 ROOMS = (
-    "controllers", "paths", "disturbances", "actuators", "vessels", "metrics", "figures", "findings"
+    "controllers", "paths", "disturbances", "actuators", "measurements", "estimators", "vessels",
+    "metrics", "figures", "findings",
 )  # fmt: skip
 GROUPS = tuple(f"podusv.{room}" for room in ROOMS)
 MODULES = "podusv_plugins"  # what the modules of files are called: podusv_plugins.my_law_1a2b3c4d

@@ -59,7 +59,7 @@ class Wires(NamedTuple):
     s: Vector
     row: Vector
     stages: Vector  # four rates and one intermediate state
-    sensed: Vector  # what was measured, see `sensors.base`
+    sensed: Vector  # what was measured, see `measurements.base`
     relay: Vector  # demands on their way to the actuator, see `engine.relay`
     held: Vector  # t, x, target of the last sample; demand and signals that nobody reads
     work: Vector

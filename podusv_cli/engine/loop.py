@@ -23,9 +23,9 @@ from podusv_cli.engine.layout import HELD_SIGNALS, Plan, Wires
 from podusv_cli.engine.relay import relay
 from podusv_cli.estimators.base import Estimator
 from podusv_cli.estimators.none import NoEstimator
+from podusv_cli.measurements.base import Measurement
+from podusv_cli.measurements.exact import Exact
 from podusv_cli.paths.base import TARGET, Path
-from podusv_cli.sensors.base import Measurement
-from podusv_cli.sensors.exact import Exact
 from podusv_cli.vessels.vessel import Vessel
 
 STATE = tuple(state.name for state in signal.STATE)

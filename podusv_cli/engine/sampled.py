@@ -13,7 +13,7 @@ from podusv_cli.engine.layout import (
     Wires,
     shifted,
 )
-from podusv_cli.sensors.base import KNOWN
+from podusv_cli.measurements.base import KNOWN
 
 
 @kernel

@@ -36,7 +36,7 @@ class Estimator(Component):
     kernels move it. `correct(t, seen, state, k, table)` is called at every instant, after the
     measurement: it may change the state where something was delivered. `follow(t, seen, tau,
     state, k, table, rate)` writes the state's rate, between the instants too; `tau` are the loads
-    (surge, sway, yaw) that the actuator produces. `seen` is laid out as in `sensors.base`.
+    (surge, sway, yaw) that the actuator produces. `seen` is laid out as in `measurements.base`.
     """
 
     noun: ClassVar[str] = "estimator"

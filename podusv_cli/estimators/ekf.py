@@ -31,7 +31,7 @@ from podusv_cli.core.kinematics import wrap
 from podusv_cli.core.signal import Signal
 from podusv_cli.estimators.base import ESTIMATE, LOADS, POSE_ALONE, Estimator
 from podusv_cli.estimators.slopes import slopes
-from podusv_cli.sensors.base import FRESH, VALUE
+from podusv_cli.measurements.base import FRESH, VALUE
 from podusv_cli.vessels.plant import plant
 from podusv_cli.vessels.vessel import Vessel
 

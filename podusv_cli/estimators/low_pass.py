@@ -24,7 +24,7 @@ from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.kinematics import wrap
 from podusv_cli.estimators.base import POSE_ALONE, Estimator
-from podusv_cli.sensors.base import KNOWN, VALUE
+from podusv_cli.measurements.base import KNOWN, VALUE
 
 
 @kernel

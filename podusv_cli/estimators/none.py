@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.estimators.base import Estimator
-from podusv_cli.sensors.base import FRESH
+from podusv_cli.measurements.base import FRESH
 
 
 class NoEstimator(Estimator):

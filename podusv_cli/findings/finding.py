@@ -20,7 +20,9 @@ from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import unknown
 
 # A kind of finding may be in the file of the component that it is about.
-PACKAGES = ("findings", "paths", "disturbances", "actuators", "controllers")
+PACKAGES = (
+    "findings", "paths", "disturbances", "actuators", "measurements", "estimators", "controllers"
+)  # fmt: skip
 
 
 @cache

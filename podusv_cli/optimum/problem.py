@@ -75,7 +75,8 @@ def problem(scenario: Scenario, minimised: Minimised) -> Problem:
         )
     for key, (fits, known) in kinds.items():
         if not fits:
-            kind = getattr(loop, key).kind
+            parts = getattr(loop, key).each() if key == "disturbance" else (getattr(loop, key),)
+            kind = ", ".join(part.kind for part in parts)
             raise UsageError(
                 f"{scenario.name}: {key}.kind: {kind} does not fit; podusv optimum knows {known}"
             )

@@ -9,8 +9,9 @@ from itertools import islice
 from podusv_cli.core.quantities import bytes_in_words, time_in_words
 from podusv_cli.engine.loop import names
 from podusv_cli.paths.base import TARGET
+from podusv_cli.scenario.conflicts import Conflicts
 from podusv_cli.scenario.messages import Check
-from podusv_cli.scenario.model import Conflicts, Scenario
+from podusv_cli.scenario.model import Scenario
 from podusv_cli.theory import monitor
 
 NUMBER = 8  # bytes

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from functools import cache
 from types import GenericAlias
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, SupportsIndex, TypeVar
@@ -11,27 +11,25 @@ from pydantic import Discriminator, Field, Tag, create_model
 
 from podusv_cli.actuators.base import Actuator
 from podusv_cli.controllers.base import Controller
-from podusv_cli.core.component import Component, called, value, wrong_default
-from podusv_cli.core.errors import LawError, in_a_line
+from podusv_cli.core.component import Component, value
 from podusv_cli.core.plugins import Plugins, from_file, installed
 from podusv_cli.core.registry import any_of
-from podusv_cli.core.signal import STATE, Signal
-from podusv_cli.core.steps import fitting, misfit, whole_steps
+from podusv_cli.core.signal import Signal
+from podusv_cli.core.steps import whole_steps
 from podusv_cli.disturbances.base import Disturbance
 from podusv_cli.disturbances.total import Total
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.loop import ClosedLoop
 from podusv_cli.estimators.base import Estimator
 from podusv_cli.estimators.none import NoEstimator
+from podusv_cli.measurements.base import Measurement
+from podusv_cli.measurements.exact import Exact
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import Metrics, metrics_with, observer
 from podusv_cli.metrics.windows import NAMED
 from podusv_cli.paths.base import Path
+from podusv_cli.scenario.conflicts import conflicts
 from podusv_cli.scenario.sections import (
-    CLAIM,
-    CLAIM_IN_WORDS,
-    LABEL,
-    LABEL_IN_WORDS,
     NAME,
     Claim,
     Control,
@@ -43,8 +41,6 @@ from podusv_cli.scenario.sections import (
 )
 from podusv_cli.scenario.sweep import Sweep
 from podusv_cli.scenario.tune import Tune
-from podusv_cli.sensors.base import Measurement
-from podusv_cli.sensors.exact import Exact
 from podusv_cli.theory import monitor
 from podusv_cli.vessels.vessel import Vessel
 
@@ -60,7 +56,7 @@ else:
     AnyController = any_of("podusv_cli.controllers", Controller)
     AnyDisturbance = any_of("podusv_cli.disturbances", Disturbance)
     AnyEstimator = any_of("podusv_cli.estimators", Estimator)
-    AnyMeasurement = any_of("podusv_cli.sensors", Measurement)
+    AnyMeasurement = any_of("podusv_cli.measurements", Measurement)
     AnyPath = any_of("podusv_cli.paths", Path)
 
 
@@ -70,8 +66,6 @@ Summands = Annotated[
     Annotated[Part, Tag("one")] | Annotated[tuple[Part, ...], Field(strict=False), Tag("several")],
     Discriminator(lambda given: "several" if isinstance(given, (list, tuple)) else "one"),
 ]
-Conflicts = Iterator[tuple[str, str]]  # key and message
-MOST_INSTANTS = 2**53  # that are distinct numbers
 
 
 class Scenario(Component):
@@ -209,20 +203,7 @@ class Scenario(Component):
 
     def conflicts(self) -> list[tuple[str, str]]:
         """Key and message for every pair of values that contradict each other."""
-        return [*self._defaults(), *self._unanswered(), *self._summands()] or [
-            *self._times(), *self._samples(), *self._names(), *self.metrics.conflicts(),
-            *self._signals(), *self._seeing(),
-        ]  # fmt: skip
-
-    def _defaults(self) -> Conflicts:
-        """Parts whose classes have a default that they do not allow themselves."""
-        others = {
-            "path": self.path, "actuator": self.actuator, "measurement": self.measurement,
-            "estimator": self.estimator, **self.disturbances(),
-        }  # fmt: skip
-        for key, part in {**others, **self.laws()}.items():
-            if told := wrong_default(part):
-                yield key, f"{called(part)}: {told}"
+        return conflicts(self)
 
     def disturbances(self) -> dict[str, Disturbance]:
         """The disturbance, or each of several, by its key."""
@@ -231,72 +212,10 @@ class Scenario(Component):
             return {"disturbance": sea}
         return {f"disturbance.{i}": part for i, part in enumerate(sea)}
 
-    def _summands(self) -> Conflicts:
-        """A list of no disturbance, and one with two that log the same."""
-        parts = self.disturbances()
-        if not parts:
-            yield "disturbance", "is an empty list; for calm water write {kind: none}"
-        first: dict[Signal, str] = {}
-        for key, part in parts.items():
-            taken = [first.setdefault(signal, key) for signal in part.signals]
-            if taken and taken[0] != key:
-                text = f"logs {part.signals[0].name}, as {taken[0]} does; keep one of them"
-                yield key, text
-
-    def _unanswered(self) -> Conflicts:
-        """Laws that fail when they are asked what they declare: their own fault, whatever it is."""
-        for key, law in self.laws().items():
-            try:
-                law.sample_period(), law.declared()
-            except Exception as error:
-                yield key, f"{called(law)}: asked what it logs, {in_a_line(error)}"
-
     def laws(self) -> dict[str, Controller]:
         """`controller` and all `controllers`, by their keys."""
         several = {f"controllers.{label}": law for label, law in self.controllers.items()}
         return {"controller": self.controller} | several
-
-    def _times(self) -> Conflicts:
-        step = self.simulation.step
-        times = {
-            "simulation.duration": self.simulation.duration,
-            "control.period": self.control.period,
-            "actuator.command.delay": self.actuator.delay(),
-            **{f"{key}.difference_step": law.sample_period() for key, law in self.laws().items()},
-        }
-        if max(times.values()) / step > MOST_INSTANTS:
-            key, time = max(times.items(), key=lambda item: item[1])
-            key = self.simulation.outlier if key == "simulation.duration" else key
-            count = f"{time:g} s in steps of {step:g} s are {time / step:.3g} steps"
-            yield key, f"{count}; no more than {MOST_INSTANTS:.2g} have times of their own"
-            return
-        for key, time in times.items():
-            if time and (told := misfit(time, step)):
-                yield key, told
-
-    def _samples(self) -> Conflicts:
-        period = self.control.period
-        for key, law in self.laws().items():
-            sample = law.sample_period()
-            if period and sample and not whole_steps(sample, period):
-                text = f"{sample:g} s is no whole number of control periods of {period:g} s"
-                yield f"{key}.difference_step", text + fitting(sample, period)
-
-    def _seeing(self) -> Conflicts:
-        """What does not fit the step or the vessel, and an estimator without what it needs."""
-        step = self.simulation.step
-        for at, part in self.disturbances().items():
-            yield from ((f"{at}.{key}", text) for key, text in part.conflicts(self.vessel, step))
-        for key, text in self.measurement.conflicts(step):
-            yield f"measurement.{key}", text
-        if self.measurement.is_exact and self.estimator != NoEstimator():
-            text = "has nothing to estimate where the law sees the true state"
-            yield "estimator", f"{text}; add `measurement: {{kind: sensors}}`"
-        pairs = zip(STATE, self.estimator.needs(), self.measurement.measured(), strict=True)
-        lacking = [state.name for state, needed, known in pairs if needed and not known]
-        if lacking:
-            text = f"needs {', '.join(lacking)} measured; give a sensor, or an estimator that can"
-            yield "estimator", f"{text} do without"
 
     def about(self) -> dict[str, Signal]:
         """Every signal of the run's log by name. Raises LawError where two have one name."""
@@ -307,24 +226,6 @@ class Scenario(Component):
     def sampled(self) -> bool:
         """Whether old measurements act: with sampled control, with sensors and with a delay."""
         return self.control.period > 0 or not self.closed_loop().at_once
-
-    def _signals(self) -> Conflicts:
-        several = {f"controllers.{label}": law for label, law in self.controllers.items()}
-        for key, law in (several or {"controller": self.controller}).items():
-            try:
-                self.model_copy(update={"controller": law}).about()
-            except LawError as error:
-                yield key, str(error)
-
-    def _names(self) -> Conflicts:
-        for label in self.controllers:
-            if not LABEL.fullmatch(label):
-                yield f"controllers.{label}", LABEL_IN_WORDS
-            if label == "figures":
-                yield (f"controllers.{label}", "is the folder of the figures; take another name")
-        for name in self.claims:
-            if not CLAIM.fullmatch(name):
-                yield f"claims.{name}", CLAIM_IN_WORDS
 
 
 @cache
@@ -340,7 +241,7 @@ def scenario_class(plugins: Plugins) -> type[Scenario]:
     annotations: dict[str, Any] = {
         "path": any_of("podusv_cli.paths", Path, plugins),
         "disturbance": Summands[sea],  # type: ignore[misc]
-        "measurement": any_of("podusv_cli.sensors", Measurement, plugins),
+        "measurement": any_of("podusv_cli.measurements", Measurement, plugins),
         "estimator": any_of("podusv_cli.estimators", Estimator, plugins),
         "actuator": any_of("podusv_cli.actuators", Actuator, plugins),
         "controller": law,

@@ -15,6 +15,8 @@ from podusv_cli.core.component import Component, Recorded, value
 from podusv_cli.core.errors import LawError, ScenarioError
 from podusv_cli.core.plugins import ABSENT, Plugin, Plugins, digest, from_file, installed
 from podusv_cli.disturbances.base import Disturbance
+from podusv_cli.estimators.base import Estimator
+from podusv_cli.measurements.base import Measurement
 from podusv_cli.paths.base import Path
 from podusv_cli.scenario.keys import keys_of
 from podusv_cli.scenario.model import Scenario, scenario_class
@@ -28,7 +30,8 @@ from podusv_cli.vessels.vessel import VESSELS
 KEY = "plugins"
 FOLDER = "plugins"  # of a run, where its plug-in files are
 BASES: dict[str, type[Component]] = {
-    "path": Path, "disturbance": Disturbance, "actuator": Actuator, "controller": Controller
+    "path": Path, "disturbance": Disturbance, "actuator": Actuator, "measurement": Measurement,
+    "estimator": Estimator, "controller": Controller,
 }  # fmt: skip
 
 
@@ -202,7 +205,10 @@ def _stand_ins(root: Node, known: type[Scenario]) -> Plugins:
 
 def _components(root: Node) -> Iterator[tuple[str, Node]]:
     """Section and node of every component that a scenario has."""
-    yield from ((name, root.mapping[name]) for name in BASES if name in root.mapping)
+    for name in BASES:
+        node = root.mapping.get(name)
+        each = node.content if node and isinstance(node.content, tuple) else (node,)
+        yield from ((name, one) for one in each if one)
     several = root.mapping.get("controllers")
     yield from (("controller", node) for node in (several.mapping.values() if several else ()))
 

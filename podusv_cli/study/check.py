@@ -23,7 +23,10 @@ from podusv_cli.study.draws import DrawError, content, described, drawn
 from podusv_cli.study.expressions import parse_success
 
 # The sections that may differ between the runs of a cell.
-DRAWN = ("vessel", "nominal", "start", "path", "disturbance", "actuator", "controller")
+DRAWN = (
+    "vessel", "nominal", "start", "path", "disturbance", "actuator", "measurement", "estimator",
+    "controller",
+)  # fmt: skip
 TRIED = np.array([2.0**-30, 0.5, 1.0 - 2.0**-30])  # shares at which a distribution is tried
 MOST_TRIED = 50  # values of a choice
 Faults = Iterator[tuple[Route, str]]

@@ -15,7 +15,7 @@ from podusv_cli.core.kernel import Vector, kernel, tail
 from podusv_cli.core.random_words import gauss_markov, normals, uniforms
 from podusv_cli.core.signal import STATE, Signal
 from podusv_cli.core.steps import misfit
-from podusv_cli.sensors.base import FRESH, OWN, Measurement
+from podusv_cli.measurements.base import FRESH, OWN, Measurement
 
 MEASURED = tuple(
     Signal(f"{state.name}_m", state.unit, f"measured: {state.meaning}", rf"{state.symbol}_m")

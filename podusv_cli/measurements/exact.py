@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
-from podusv_cli.sensors.base import Measurement
+from podusv_cli.measurements.base import Measurement
 
 
 class Exact(Measurement):

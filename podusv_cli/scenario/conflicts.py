@@ -1,0 +1,125 @@
+"""What contradicts itself in a scenario whose values are right one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from podusv_cli.core.component import called, wrong_default
+from podusv_cli.core.errors import LawError, in_a_line
+from podusv_cli.core.signal import STATE, Signal
+from podusv_cli.core.steps import fitting, misfit, whole_steps
+from podusv_cli.estimators.none import NoEstimator
+from podusv_cli.scenario.sections import CLAIM, CLAIM_IN_WORDS, LABEL, LABEL_IN_WORDS
+
+if TYPE_CHECKING:
+    from podusv_cli.scenario.model import Scenario
+
+Conflicts = Iterator[tuple[str, str]]  # key and message
+MOST_INSTANTS = 2**53  # that are distinct numbers
+
+
+def conflicts(scenario: Scenario) -> list[tuple[str, str]]:
+    """Key and message for every pair of values that contradict each other."""
+    return [*_defaults(scenario), *_unanswered(scenario), *_summands(scenario)] or [
+        *_times(scenario), *_samples(scenario), *_names(scenario), *scenario.metrics.conflicts(),
+        *_signals(scenario), *_seeing(scenario),
+    ]  # fmt: skip
+
+
+def _defaults(scenario: Scenario) -> Conflicts:
+    """Parts whose classes have a default that they do not allow themselves."""
+    others = {
+        "path": scenario.path, "actuator": scenario.actuator, "measurement": scenario.measurement,
+        "estimator": scenario.estimator, **scenario.disturbances(),
+    }  # fmt: skip
+    for key, part in {**others, **scenario.laws()}.items():
+        if told := wrong_default(part):
+            yield key, f"{called(part)}: {told}"
+
+
+def _summands(scenario: Scenario) -> Conflicts:
+    """A list of no disturbance, and one with two that log the same."""
+    parts = scenario.disturbances()
+    if not parts:
+        yield "disturbance", "is an empty list; for calm water write {kind: none}"
+    first: dict[Signal, str] = {}
+    for key, part in parts.items():
+        taken = [first.setdefault(signal, key) for signal in part.signals]
+        if taken and taken[0] != key:
+            text = f"logs {part.signals[0].name}, as {taken[0]} does; keep one of them"
+            yield key, text
+
+
+def _unanswered(scenario: Scenario) -> Conflicts:
+    """Laws that fail when they are asked what they declare: their own fault, whatever it is."""
+    for key, law in scenario.laws().items():
+        try:
+            law.sample_period(), law.declared()
+        except Exception as error:
+            yield key, f"{called(law)}: asked what it logs, {in_a_line(error)}"
+
+
+def _times(scenario: Scenario) -> Conflicts:
+    step = scenario.simulation.step
+    times = {
+        "simulation.duration": scenario.simulation.duration,
+        "control.period": scenario.control.period,
+        "actuator.command.delay": scenario.actuator.delay(),
+        **{f"{key}.difference_step": law.sample_period() for key, law in scenario.laws().items()},
+    }
+    if max(times.values()) / step > MOST_INSTANTS:
+        key, time = max(times.items(), key=lambda item: item[1])
+        key = scenario.simulation.outlier if key == "simulation.duration" else key
+        count = f"{time:g} s in steps of {step:g} s are {time / step:.3g} steps"
+        yield key, f"{count}; no more than {MOST_INSTANTS:.2g} have times of their own"
+        return
+    for key, time in times.items():
+        if time and (told := misfit(time, step)):
+            yield key, told
+
+
+def _samples(scenario: Scenario) -> Conflicts:
+    period = scenario.control.period
+    for key, law in scenario.laws().items():
+        sample = law.sample_period()
+        if period and sample and not whole_steps(sample, period):
+            text = f"{sample:g} s is no whole number of control periods of {period:g} s"
+            yield f"{key}.difference_step", text + fitting(sample, period)
+
+
+def _seeing(scenario: Scenario) -> Conflicts:
+    """What does not fit the step or the vessel, and an estimator without what it needs."""
+    step = scenario.simulation.step
+    for at, part in scenario.disturbances().items():
+        yield from ((f"{at}.{key}", text) for key, text in part.conflicts(scenario.vessel, step))
+    for key, text in scenario.measurement.conflicts(step):
+        yield f"measurement.{key}", text
+    if scenario.measurement.is_exact and scenario.estimator != NoEstimator():
+        text = "has nothing to estimate where the law sees the true state"
+        yield "estimator", f"{text}; add `measurement: {{kind: sensors}}`"
+    pairs = zip(STATE, scenario.estimator.needs(), scenario.measurement.measured(), strict=True)
+    lacking = [state.name for state, needed, known in pairs if needed and not known]
+    if lacking:
+        text = f"needs {', '.join(lacking)} measured; give a sensor, or an estimator that can"
+        yield "estimator", f"{text} do without"
+
+
+def _signals(scenario: Scenario) -> Conflicts:
+    several = {f"controllers.{label}": law for label, law in scenario.controllers.items()}
+    for key, law in (several or {"controller": scenario.controller}).items():
+        try:
+            scenario.model_copy(update={"controller": law}).about()
+        except LawError as error:
+            yield key, str(error)
+
+
+def _names(scenario: Scenario) -> Conflicts:
+    for label in scenario.controllers:
+        if not LABEL.fullmatch(label):
+            yield f"controllers.{label}", LABEL_IN_WORDS
+        if label == "figures":
+            yield (f"controllers.{label}", "is the folder of the figures; take another name")
+    for name in scenario.claims:
+        if not CLAIM.fullmatch(name):
+            yield f"claims.{name}", CLAIM_IN_WORDS
