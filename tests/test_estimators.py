@@ -2,18 +2,20 @@
 
 import numpy as np
 import pytest
-from conftest import PAPER, Constant, corrected, example, run
+from conftest import NONLINEAR, PAPER, Constant, corrected, example, run
 from estimator_samples import ESTIMATED, Steady, Taken, delivered, errors, sailed
 
 from podusv_cli.actuators.saturated import Saturated
 from podusv_cli.controllers.base import Controller
 from podusv_cli.controllers.velocity_vector import VelocityVector
+from podusv_cli.core.kernel import is_kernel
 from podusv_cli.core.registry import kinds
 from podusv_cli.estimators.base import Estimator
 from podusv_cli.estimators.ekf import ExtendedKalmanFilter
 from podusv_cli.estimators.low_pass import LowPass
 from podusv_cli.estimators.none import NoEstimator
 from podusv_cli.estimators.passive_observer import PassiveObserver
+from podusv_cli.scenario.explain import signals
 from podusv_cli.measurements.sensors import Sensors
 
 EVERY = list(kinds("podusv_cli.estimators", Estimator).values())
@@ -39,6 +41,29 @@ def test_no_law_logs_a_name_that_an_estimator_logs(kind):
     for law in kinds("podusv_cli.controllers", Controller).values():
         loop = corrected(controller=example(law), measurement=Taken(), estimator=kind())
         assert {part.name for part in kind().states} <= set(loop.about())
+
+
+@pytest.mark.parametrize("kind", EVERY)
+def test_it_writes_every_rate_and_changes_nothing_that_it_reads(kind):
+    estimator, random = kind(), np.random.default_rng(1)
+    seen, state, k = delivered(estimator, random.normal(size=6), random.normal(size=6))
+    tau, rate = random.normal(size=3), np.full(len(state), np.nan)
+    read = [part.copy() for part in (seen, tau, state)]
+    estimator.follow(0.0, seen, tau, state, k, estimator.table(), rate)
+    assert np.isfinite(rate).all()
+    assert all(map(np.array_equal, read, (seen, tau, state)))
+    estimator.correct(0.0, seen, state, k, estimator.table())
+    np.testing.assert_array_equal(seen, read[0])
+    assert is_kernel(kind.follow)
+    assert is_kernel(kind.correct)
+
+
+@pytest.mark.parametrize("kind", EVERY)
+def test_its_constants_hide_none_of_the_vessel_s_and_its_signals_are_explained(kind):
+    own, vessel = kind().constants(), NONLINEAR.constants()
+    assert not set(own) & set(vessel)
+    assert kind().constants_with(NONLINEAR).items() >= {**own, **vessel}.items()
+    assert set(kind().states) <= set(signals())
 
 
 @pytest.mark.parametrize("kind", [LowPass, *MODELS])
