@@ -54,4 +54,4 @@ def pass_on(demand: Vector, relay: Vector) -> None:
         place = tail(relay, DEMANDS + 2 * at)
         relay[GIVEN], relay[GIVEN + 1] = place[0], place[1]
         place[0], place[1] = demand[0], demand[1]
-        relay[NEXT] = 0 if at + 1 >= int(relay[COUNT]) else at + 1
+        relay[NEXT] = at + 1
