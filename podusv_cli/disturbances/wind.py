@@ -23,7 +23,7 @@ STREAM = "wind"
 # number by number.
 GROUP = 2 * LANES
 LEVER = 0.18  # of the yaw moment, by Blendermann
-SPEED = Signal("V_w", "m/s", "wind speed with gusts, against the direction that it comes from")
+SPEED = Signal("V_w", "m/s", "wind speed at the height where it acts, with gusts")
 FROM = Signal("beta_w", "rad", "direction that the wind comes from", r"\beta_w")
 
 
