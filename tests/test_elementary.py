@@ -10,7 +10,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from numba import njit
 
-from podusv_cli.core.elementary import cos_sin, exponential
+from podusv_cli.core.elementary import cos_sin, cos_sin_of_turns, exponential
 from podusv_cli.core.kernel import Vector
 from podusv_cli.disturbances.harmonic import Harmonic, HarmonicDisturbance
 from podusv_cli.engine import compile_numba
@@ -73,7 +73,21 @@ def test_a_disturbance_of_which_no_phase_is_known_ends_the_run():
     assert (out.status, len(out["time"])) == ("diverged", 1)
 
 
-@pytest.mark.parametrize("function", [exponential, cos_sin])
+@given(turns=st.floats(-1e5, 1e5))
+@example(turns=0.5)
+@example(turns=-0.25)
+@example(turns=12345.5)
+def test_a_wave_is_right_to_nine_places(turns):
+    angle = 2.0 * math.pi * math.remainder(turns, 1.0)
+    assert cos_sin_of_turns(turns) == pytest.approx((math.cos(angle), math.sin(angle)), abs=5e-10)
+
+
+@pytest.mark.parametrize("turns", [1e16, -1e20, 1e308, math.inf, math.nan])
+def test_a_wave_of_which_no_phase_is_known_is_no_number(turns):
+    assert all(math.isnan(number) for number in cos_sin_of_turns(turns))
+
+
+@pytest.mark.parametrize("function", [exponential, cos_sin, cos_sin_of_turns])
 def test_machine_code_gives_the_same_bits(function):
     numbers = -np.random.default_rng(3).exponential(20.0, 2000)
     numbers = np.append(numbers, [-1e15, -1e17, -1e308])

@@ -15,7 +15,7 @@ from podusv_cli.core.kernel import kernel
 
 ROUND = 1.5 * 2.0**52  # added and taken away again it leaves the nearest whole number
 SMALLEST = -708.0  # below, e^x is no normal number any more
-LARGEST_ANGLE = 1e15  # rad; beyond, neighbouring numbers are too far apart to be directions
+LARGEST_ANGLE = 1e15  # rad, turns; beyond, neighbouring numbers are too far apart to be directions
 LOG2_E = 1.0 / math.log(2.0)
 # Long constants in parts, all but the last so short that a whole number times it is exact.
 LN2 = (float.fromhex("0x1.62e42feep-1"), float.fromhex("0x1.a39ef35793c76p-33"))
@@ -86,8 +86,9 @@ def cos_sin_of_turns(turns: float) -> tuple[float, float]:
     """Cosine and sine of an angle in whole turns, to 5e-10: enough for one wave of many.
 
     It takes two thirds of the time of `cos_sin`: an angle in turns is reduced without rounding, and
-    both series of the half angle are short.
+    both series of the half angle are short. Beyond 1e15 turns there are none.
     """
+    turns = turns if abs(turns) <= LARGEST_ANGLE else math.nan
     f = turns - ((turns + ROUND) - ROUND)
     q = f * f
     q2 = q * q

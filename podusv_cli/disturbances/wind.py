@@ -11,7 +11,7 @@ from pydantic import model_validator
 
 from podusv_cli.core.component import value
 from podusv_cli.core.elementary import cos_sin, cos_sin_of_turns
-from podusv_cli.core.kernel import LANES, Vector, kernel, scratch, whole_lanes
+from podusv_cli.core.kernel import LANES, Vector, kernel, scratch
 from podusv_cli.core.kinematics import direction
 from podusv_cli.core.signal import Signal
 from podusv_cli.disturbances import spectra
@@ -19,24 +19,29 @@ from podusv_cli.disturbances.base import Disturbance
 from podusv_cli.vessels.vessel import Vessel
 
 STREAM = "wind"
+# Components are added up in two registers' width: the compiler writes out a loop over one of them
+# number by number.
+GROUP = 2 * LANES
 LEVER = 0.18  # of the yaw moment, by Blendermann
-SPEED = Signal("V_w", "m/s", "wind speed with gusts, against the direction that it comes from")
+SPEED = Signal("V_w", "m/s", "wind speed at the height where it acts, with gusts")
 FROM = Signal("beta_w", "rad", "direction that the wind comes from", r"\beta_w")
 
 
 @kernel
 def _gust(t: float, count: int, table: Vector) -> float:
-    """The sum of all components, by eight partial sums."""
-    sums = scratch(LANES)
-    for j in range(LANES):
+    """The sum of all components, by sixteen partial sums, in groups of four."""
+    sums = scratch(GROUP)
+    for j in range(GROUP):
         sums[j] = 0.0
-    for block in range(count // LANES):
-        for j in range(LANES):
-            i = block * LANES + j
+    for block in range(count // GROUP):
+        for j in range(GROUP):
+            i = block * GROUP + j
             c, _ = cos_sin_of_turns(table[i] * t + table[count + i])
             sums[j] += table[2 * count + i] * c
-    low, high = (sums[0] + sums[1]) + (sums[2] + sums[3]), (sums[4] + sums[5]) + (sums[6] + sums[7])
-    return float(low + high)
+    total = 0.0
+    for j in range(0, GROUP, 4):
+        total += (sums[j] + sums[j + 1]) + (sums[j + 2] + sums[j + 3])
+    return total
 
 
 @kernel
@@ -126,10 +131,14 @@ class Wind(Disturbance):
             return np.zeros(1)
         edges = spectra.growing_edges(self.lowest, self.highest, self.components)
         drawn = spectra.cosines(spectra.in_bins(self._density, edges), edges, self.seed, STREAM)
-        rows = np.zeros((3, whole_lanes(self.components)))
+        rows = np.zeros((3, self._lanes))
         phase = drawn.phase / (2.0 * math.pi)
         rows[:, : self.components] = drawn.rate, phase, drawn.amplitude
         return rows.ravel()
+
+    @property
+    def _lanes(self) -> int:
+        return -(-self.components // GROUP) * GROUP
 
     def _density(self, frequency: Vector) -> Vector:
         if self.gusts == "norsok":
@@ -147,7 +156,7 @@ class Wind(Disturbance):
         return vessel.windage.constants() | {
             "length": vessel.length, "mean": self.mean, "density": self.density,
             "direction": self.direction, "c_from": float(c), "s_from": float(s),
-            "lanes": 0.0 if self.gusts == "none" else float(whole_lanes(self.components)),
+            "lanes": 0.0 if self.gusts == "none" else float(self._lanes),
         }  # fmt: skip
 
     def conflicts(self, vessel: Vessel, step: float) -> Iterator[tuple[str, str]]:
