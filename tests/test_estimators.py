@@ -15,8 +15,8 @@ from podusv_cli.estimators.ekf import ExtendedKalmanFilter
 from podusv_cli.estimators.low_pass import LowPass
 from podusv_cli.estimators.none import NoEstimator
 from podusv_cli.estimators.passive_observer import PassiveObserver
-from podusv_cli.scenario.explain import signals
 from podusv_cli.measurements.sensors import Sensors
+from podusv_cli.scenario.explain import signals
 
 EVERY = list(kinds("podusv_cli.estimators", Estimator).values())
 MODELS = [PassiveObserver, ExtendedKalmanFilter]  # those that know the vessel

@@ -66,6 +66,7 @@ Summands = Annotated[
     Annotated[Part, Tag("one")] | Annotated[tuple[Part, ...], Field(strict=False), Tag("several")],
     Discriminator(lambda given: "several" if isinstance(given, (list, tuple)) else "one"),
 ]
+DISTURBANCE = "what the sea does; those of a list add up"
 
 
 class Scenario(Component):
@@ -83,9 +84,7 @@ class Scenario(Component):
     )
     start: Start = value(Start(), "", "state at t = 0")
     path: AnyPath = value(..., "", "how the target moves")
-    disturbance: Summands[AnyDisturbance] = value(
-        ..., "", "what the sea does; those of a list add up"
-    )
+    disturbance: Summands[AnyDisturbance] = value(..., "", DISTURBANCE)
     actuator: AnyActuator = value(..., "", "from the law's demand to the load on the hull")
     measurement: AnyMeasurement = value(Exact(), "", "what is measured of the vessel's state")
     estimator: AnyEstimator = value(
@@ -250,6 +249,8 @@ def scenario_class(plugins: Plugins) -> type[Scenario]:
     fields: dict[str, Any] = {
         name: (annotation, Scenario.model_fields[name]) for name, annotation in annotations.items()
     }
+    # The field of the class above also has the tags of its own summands.
+    fields["disturbance"] = (annotations["disturbance"], value(..., "", DISTURBANCE))
     made = create_model("Scenario", __base__=Scenario, __doc__=Scenario.__doc__, **fields)
     made.plugged = plugins
     return made
