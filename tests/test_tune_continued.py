@@ -8,7 +8,7 @@ from types import MappingProxyType
 import pytest
 from tune_samples import contents, planned, searched, tuned
 
-from podusv_cli.core.errors import UsageError
+from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.study.store import RUNS, UNITS, Store
 from podusv_cli.tuning import folder as place
 from podusv_cli.tuning import sampler, trials
@@ -163,3 +163,13 @@ def test_a_smaller_budget_would_throw_trials_away_and_is_refused(tmp_path, monke
         opened(tmp_path / "out", planned(tmp_path))
     with pytest.raises(UsageError, match="has a budget of 64 runs; ask for as many or more"):
         opened(tmp_path / "out", planned(tmp_path, "tune.budget=40"))
+
+
+def test_trials_of_other_gains_than_are_asked_for_are_not_thrown_away(optuna, tmp_path):
+    (first,) = searched(tmp_path, "tune.repeats=1", "tune.budget=32")
+    path = tmp_path / trials.FOLDER / "toy-0.json"
+    other = path.read_text().replace(str(first.trials[1].gains["gain"]), "7.125")
+    path.write_text(other)
+    with pytest.raises(StorageError, match="batch 0 of toy-0 has other gains than this machine"):
+        searched(tmp_path, "tune.repeats=1", "tune.budget=64")
+    assert path.read_text() == other

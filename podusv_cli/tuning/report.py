@@ -88,7 +88,7 @@ def ratio(row: Any) -> str:
 def spread(row: Any) -> str:
     """The least and the largest objective of the repeats' winners."""
     low, high = row["repeats_low"], row["repeats_high"]
-    return "-" if math.isnan(low) else f"{digits(low)} to {digits(high)}"
+    return "-" if math.isnan(low) or low == high else f"{digits(low)} to {digits(high)}"
 
 
 def _pairs(results: Results) -> Iterator[dict[str, Any]]:

@@ -15,7 +15,7 @@ import pandas as pd
 from podusv_cli.study import statistics, summary
 from podusv_cli.study.runs_file import Table
 from podusv_cli.study.statistics import Interval
-from podusv_cli.tuning.objective import OfRuns, Runs, evaluate, named, share_of
+from podusv_cli.tuning.objective import OfRuns, Runs, evaluate, named, numbers_of, share_of
 from podusv_cli.tuning.plan import TunePlan
 from podusv_cli.tuning.sampler import importances
 from podusv_cli.tuning.trials import FINISHED, Trial
@@ -104,10 +104,8 @@ class Results:
         found = evaluate(tree, runs, self.plan.metrics)
         if not isinstance(tree, ast.Call):
             return Interval(found, math.nan, math.nan)
-        values = OfRuns(self.plan.metrics, runs=runs).number(tree.args[0])
-        ends = statistics.quantile(
-            np.broadcast_to(values, runs.failed.shape), share_of(tree), self.level
-        )
+        values = numbers_of(tree, OfRuns(self.plan.metrics, runs=runs))
+        ends = statistics.quantile(values, share_of(tree), self.level)
         return Interval(found, ends.low, ends.high)
 
     def spread(self, law: str) -> list[float]:
