@@ -163,8 +163,8 @@ def _drawn(runs: Sequence[BenchRun], made: pd.DataFrame) -> list[Picture]:
         for vessel in dict.fromkeys(run.place[0] for run in runs):
             shown = [run for run in runs if run.place[0] == vessel]
             caption = f"tracks of {vessel}; path grey, failed runs orange, all conditions; north up"
-            svg = image(tracks(shown, laws), "svg")
-            drawn.append(Picture(f"tracks-{vessel}", caption, svg))
+            png = image(tracks(shown, laws), "png")  # as outlines, 3000 tracks take 8 MB
+            drawn.append(Picture(f"tracks-{vessel}", caption, png, form="png"))
     return drawn
 
 
@@ -179,7 +179,7 @@ def _write(
         writer.add(OPTIMA, _csv(optima.table(found)))
     writer.add_json(ORIGIN, origin)
     for figure in figures:
-        writer.add(f"figures/{figure.name}.svg", figure.svg)
+        writer.add(f"figures/{figure.name}.{figure.form}", figure.file)
 
 
 def _csv(rows: pd.DataFrame) -> bytes:
