@@ -5,7 +5,8 @@ Cases that differ only in what laws are told, or how often they are asked, have 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -14,12 +15,13 @@ import pandas as pd
 
 from podusv_cli.bench.cases import Case
 from podusv_cli.bench.runs import BenchRun
-from podusv_cli.core.errors import UsageError
+from podusv_cli.core.errors import NotConvergedError, UsageError
 from podusv_cli.engine.simulate import simulate
 from podusv_cli.optimum import collocation
-from podusv_cli.optimum.problem import Motion, problem
+from podusv_cli.optimum.collocation import Stage
+from podusv_cli.optimum.problem import Motion, Problem, problem
 
-STEP = 0.4  # s, of the finest of the grids: within 0.1 % of the optimum where this was looked at
+STEPS = (0.4, 0.2)  # s, of the finest of three grids; the next where IPOPT finds nothing
 BEGINNINGS = 2  # how many laws the search begins from: the best of the case
 TASK = {"vessel", "start", "path", "disturbance", "actuator", "simulation"}
 
@@ -80,12 +82,21 @@ def least(of: Wanted, tell: Callable[[float], None]) -> Least:
         law: Motion.of(simulate(one.closed_loop(), one.time_grid()))
         for law, one in scenarios.items()
     }
-    stages, _ = collocation.searched(
-        problem(scenarios[of.laws[0]], "iae"), guesses, STEP, lambda _, fraction: tell(fraction)
-    )
+    stages = _searched(problem(scenarios[of.laws[0]], "iae"), guesses, tell)
     before, last = next(reversed(list(pairwise(stages))))
     lowered = before.integral - last.integral
     return Least(places, last.integral, last.step, float(np.nan_to_num(lowered)), last.start)
+
+
+def _searched(
+    asked: Problem, guesses: Mapping[str, Motion], tell: Callable[[float], None]
+) -> list[Stage]:
+    """Optima on ever finer grids. Raises NotConvergedError."""
+    *first, last = STEPS
+    for step in first:
+        with suppress(NotConvergedError):
+            return collocation.searched(asked, guesses, step, lambda _, part: tell(part))[0]
+    return collocation.searched(asked, guesses, last, lambda _, part: tell(part))[0]
 
 
 def table(found: Iterable[Least]) -> pd.DataFrame:
