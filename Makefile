@@ -24,7 +24,7 @@ ABLATIONS := ablation ablation_figures ablation_standoff ablation_gains ablation
     ablation_gains_standoff ablation_pid
 TABLES := unknown:unknown_dynamics discrete:discrete_signals limits:period_limits learnt:learnt gains:fixed_gains
 STUDIES := hull_and_sea unknown_dynamics rivals
-SEARCHES := phases hull network
+SEARCHES := phases hull network sliding
 COMPARISONS := printed_compare figures_compare figures_compare_standoff corrected_compare
 
 .DEFAULT_GOAL := help

@@ -7,10 +7,12 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
+import typer
 
 import podusv_cli
 from podusv_cli import cli
@@ -42,6 +44,7 @@ class Said(NamedTuple):
 
 
 Command = Callable[..., Said]
+COMMAND_LINE = cache(typer.main.get_command)  # made of all signatures, which takes its time
 
 
 def commanded(
@@ -49,6 +52,7 @@ def commanded(
 ) -> Command:
     """The command line in this process, on a terminal that wide."""
     monkeypatch.setenv("COLUMNS", str(columns))
+    monkeypatch.setattr(typer.main, "get_command", COMMAND_LINE)
 
     def run(*words: Any) -> Said:
         monkeypatch.setattr(sys, "argv", ["podusv", *map(str, words)])

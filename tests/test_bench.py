@@ -11,9 +11,10 @@ import pytest
 from plugin_samples import LAW
 
 from podusv_cli.bench.cases import AXES, Case, Wanted, cases, shipped_bench
+from podusv_cli.bench.optima import Least, wanted
 from podusv_cli.bench.page import as_markdown, page
 from podusv_cli.bench.runs import FAILED, BenchRun, play
-from podusv_cli.bench.standing import leaderboard, middle, profile, table
+from podusv_cli.bench.standing import leaderboard, middle, profile, table, with_optima
 from podusv_cli.core.errors import ScenarioError, UsageError
 from podusv_cli.scenario.load import load_text
 
@@ -173,7 +174,7 @@ def test_the_command_writes_table_board_and_page_and_takes_a_law_of_one_s_own(be
     assert len(runs) == 12
     assert runs.groupby(["vessel", "task"])["rank"].sum().tolist() == [6.0] * 4
     written = Path("out/report.html").read_text()
-    for part in ("<td>mine</td>", "Case by case", "data:image/svg+xml", "otter"):
+    for part in ("<td>mine</td>", "Case by case", "data:image/svg+xml", "data:image/png", "otter"):
         assert part in written
     again = podusv("bench", str(bench), "--out", "out")
     assert again.code == 5
@@ -233,3 +234,52 @@ def test_every_file_of_the_shipped_bench_makes_a_case_that_is_valid():
         for law in case.laws.values():
             assert not law.conflicts()
             assert law.metrics.settling_radius == 2.0
+
+
+# --- optima
+
+
+def test_ratios_to_the_optimum_are_those_of_the_cases_that_have_one():
+    two = Least([("ship", "two", "calm")], 3.2, 0.2, 0.01, "b")
+    made = with_optima(table(RUNS), [two]).set_index(["task", "law"])
+    assert made.of_optimum["two"].tolist() == pytest.approx([math.inf, 1.25, 1.3125])
+    assert made.of_optimum["one"].isna().all()
+    board = leaderboard(made.reset_index())
+    assert board.of_optimum[["a", "b", "c"]].tolist() == pytest.approx([math.inf, 1.25, 1.3125])
+    assert "| median of IAE / optimum |" in as_markdown(made.reset_index())
+    written = page(made.reset_index(), [], {}, [two])
+    assert "up to 0.01 m s from it. 1 of 3 cases have one" in " ".join(written.split())
+
+
+def test_cases_that_differ_in_what_laws_know_share_an_optimum_and_pods_have_none():
+    chosen = {"tasks": ["line"], "vessels": ["revolt"]}
+    every = list(cases(Wanted(shipped_bench(), chosen=chosen)))
+    done = [
+        BenchRun(case.place, law, "finished", "", {"iae": iae}, np.zeros((2, 4)))
+        for case in every
+        for law, iae in (("li", 9.0), ("pid", 5.0), ("dsc", 7.0))
+    ]
+    found, refused = wanted(every, done)
+    shared = {"sea", "hull_light", "hull_heavy", "hull_other", "sampled"}
+    assert [{case.condition for case in one.cases} for one in found] == [{"calm"}, shared]
+    assert [list(one.laws) for one in found] == [["pid", "dsc"]] * 2
+    assert len(refused) == 1
+    assert "actuator.kind: pod does not fit" in refused[0]
+
+
+def test_the_command_finds_optima(bench, podusv):
+    pytest.importorskip("casadi", reason="the optimum needs CasADi")
+    pod = "extends: calm.yaml\nactuator: {kind: pod, preset: cybership2_pod}\n"
+    (bench / "conditions/pod.yaml").write_text(pod)
+    chosen = ("--vessel", "model", "--task", "line", "--no-figures")
+    said = podusv("bench", str(bench), "--out", "out", "--optimum", *chosen)
+    assert said.code == 0, said.err
+    assert "an optimum for some cases could not be made: actuator.kind: pod" in said.err
+    assert "median of IAE / optimum" in said.out
+    optima = pd.read_csv("out/optima.csv")
+    assert optima.condition.tolist() == ["calm", "told"]  # what is told does not matter
+    assert optima.optimum.nunique() == 1
+    runs = pd.read_csv("out/runs.csv").set_index("condition")
+    assert (runs.of_optimum[["calm", "told"]] > 1.0).all()
+    assert runs.optimum["calm"].iloc[0] == optima.optimum[0]
+    assert runs.optimum["pod"].isna().all()

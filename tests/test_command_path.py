@@ -32,7 +32,7 @@ from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, bundle, is_kernel, kernel
 from podusv_cli.engine.continuous import continuous
 from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.simulate import ClosedLoop
+from podusv_cli.engine.loop import ClosedLoop
 from podusv_cli.paths.line import Line
 
 every_kind = pytest.mark.parametrize("kind", kinds("actuators").values(), ids=kinds("actuators"))

@@ -1,5 +1,6 @@
 """What every registered component promises, asked of each by being registered."""
 
+import inspect
 import math
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -11,6 +12,8 @@ from conftest import NONLINEAR, PACKAGE, ROOMS, VESSELS, corrected, example, kin
 from pydantic import BaseModel, ValidationError
 
 from podusv_cli.controllers.base import Controller
+from podusv_cli.controllers.manoeuvre import Manoeuvre
+from podusv_cli.controllers.schedule import Schedule
 from podusv_cli.core import registry
 from podusv_cli.core.kernel import Vector, bundle, is_kernel
 from podusv_cli.engine.loop import names
@@ -208,3 +211,17 @@ def test_the_registry_is_sorted_and_leaves_out_what_has_no_kind():
         assert list(found) == sorted(found)
         assert base not in found.values()
         assert all(kind.model_fields["kind"].default == name for name, kind in found.items())
+
+
+FEEDBACK = [
+    kind for kind in kinds("controllers").values() if not issubclass(kind, Manoeuvre | Schedule)
+]
+
+
+@pytest.mark.parametrize("kind", FEEDBACK, ids=lambda kind: kind.__name__)
+def test_the_file_of_a_law_tells_its_source_what_is_proved_and_what_stops_windup(kind):
+    module = inspect.getmodule(kind)
+    told = " ".join(module.__doc__.split())
+    for word in ("Source", "Proved", "Not proved:", "Anti-windup:"):
+        assert word in told, word
+    assert len(inspect.getsource(module).splitlines()) <= 150

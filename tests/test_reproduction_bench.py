@@ -2,11 +2,13 @@
 
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
 from podusv_cli.bench.cases import AXES, shipped_bench
 from podusv_cli.bench.page import as_markdown
+from podusv_cli.scenario.load import load_text
 
 RESULTS = Path(__file__).parents[1] / "results"
 PAGE = (RESULTS / "bench.md").read_text()
@@ -65,3 +67,59 @@ def test_the_ranks_by_condition_are_those_of_the_runs(law, condition, told):
     ranks = RUNS[(RUNS.law == law) & (RUNS.condition == condition)]["rank"]
     assert f"{ranks.mean():.1f}" == told
     assert told in PAGE
+
+
+# --- tuned gains
+
+TUNED = pd.read_csv(RESULTS / "bench" / "tuned_runs.csv")
+RENAMED = {"adaptive_neural": "proposed", "adaptive_crab": "proposed_crab", "backstepping": "li"}
+
+
+def test_the_tuned_laws_have_the_gains_that_were_found():
+    every = load_text(
+        "extends: [podusv:bench/laws.yaml, podusv:bench/vessels/paper_nonlinear.yaml, "
+        "podusv:bench/tasks/line.yaml, podusv:bench/conditions/sea.yaml, podusv:bench/tuned.yaml]\n"
+        "name: x\n",
+        "x",
+    ).scenario.controllers
+    gains = pd.read_csv(RESULTS / "tuning" / "hull" / "gains.csv")
+    for law, found in gains.groupby("law"):
+        tuned = every[f"{RENAMED.get(law, law)}_tuned"]
+        assert {name: getattr(tuned, name) for name in found.gain} == pytest.approx(
+            dict(zip(found.gain, found.after, strict=True))
+        )
+    assert gains.law.nunique() == sum(name.endswith("_tuned") for name in every)
+
+
+def test_the_table_of_tuned_gains_is_that_of_the_runs():
+    table = as_markdown(TUNED)
+    assert table == (RESULTS / "bench" / "tuned.md").read_text()
+    assert table in PAGE
+    untuned = TUNED[~TUNED.law.str.endswith("_tuned")].set_index(["task", "condition", "law"])
+    same = RUNS[RUNS.vessel == "paper_nonlinear"].set_index(["task", "condition", "law"])
+    assert untuned.iae.equals(same.iae)
+    done = TUNED.iae.where(TUNED.status == "finished", np.inf)
+    best = done.groupby([TUNED.task, TUNED.condition]).transform("min")
+    np.testing.assert_allclose(TUNED.ratio, done / best, rtol=1e-5)
+
+
+@pytest.mark.parametrize(("law", "told"), [("proposed", 35), ("dsc", 41), ("li", 38)])
+def test_what_the_paper_s_laws_gain_is_what_the_page_says(law, told):
+    place = ["task", "condition"]
+    before, after = (
+        TUNED[(TUNED.law == name) & (TUNED.status == "finished")].set_index(place).iae
+        for name in (law, f"{law}_tuned")
+    )
+    assert round(100 * (1 - (after / before).median())) == told
+    assert f"`{law}` {told} %" in WORDS
+
+
+def test_behind_pods_and_at_rest_tuned_laws_fail_where_the_page_says():
+    lost = TUNED[TUNED.status != "finished"]
+    pods = lost[lost.condition == "pod"].groupby("law").size()
+    assert pods[["adrc_tuned", "dsc_tuned", "li_tuned", "adrc", "hand_position"]].tolist() == [
+        8, 8, 8, 2, 7,
+    ]  # fmt: skip
+    assert not {"hand_position_tuned", "dsc", "li"} & set(pods.index)
+    assert set(lost[lost.law == "proposed_crab_tuned"].task) == {"station"}
+    assert len(lost[lost.law == "proposed_crab_tuned"]) == 7

@@ -12,7 +12,7 @@ from podusv_cli.tuning.plan import TunePlan
 
 ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "results" / "tuning.md").read_text()
-CASES = ("hull", "network", "phases")
+CASES = ("hull", "network", "phases", "sliding")
 RANGED = r"(\S+ \[\S+ \S+\])"
 ROW = rf"^\| (\w+) \| (\d+) \| (\d+) \| {RANGED} \| {RANGED} \| {RANGED} \|$"
 

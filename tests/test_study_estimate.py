@@ -4,12 +4,13 @@ import os
 import signal
 
 import pytest
-from small_study import made, small, written
+from small_study import small, written
+from stub_cluster import invented
 
 from podusv_cli.study import estimate as estimating
 from podusv_cli.study.estimate import estimate, pilot
-from podusv_cli.study.store import RUNS
-from podusv_cli.study.unit import make
+from podusv_cli.study.store import RUNS, Store
+from podusv_cli.study.unit import Unit, make
 from podusv_cli.workflows import sweep
 
 PACES = {("pid", 0): 0.25, ("li", 0): 0.5}  # s a run
@@ -51,7 +52,11 @@ def test_the_disk_is_what_was_said_within_30_percent(tmp_path):
 
 
 def test_the_table_of_a_large_study_is_what_was_said(tmp_path):
-    store = made(tmp_path / "study", draws=2000)
+    store = Store(tmp_path / "study", small(draws=2000))
+    store.open("now")
+    for law in store.plan.laws:
+        store.write(invented(Unit(law, 0, 0, 2000), store.plan.metrics))
+    store.write_runs()
     said = estimate(store.plan, PACES, {}, 1).table
     assert said == pytest.approx((store.folder / RUNS).stat().st_size, rel=0.05)
 

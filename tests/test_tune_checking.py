@@ -134,6 +134,14 @@ RUNS = Runs(
         ("median(iae / tv_tau_u)", 0.375),
         ("failures", 0.25),
         ("-failures * 4", -1.0),
+        ("-median(iae)", -1.0),
+        ("-quantile(iae, 0.25)", math.inf),
+        ("median(-iae)", -2.0),
+        ("quantile(-iae, 0.95)", math.inf),
+        ("10 - median(iae)", 9.0),
+        ("-2 * median(iae)", -2.0),
+        ("12 / median(iae)", 12.0),
+        ("12 / -median(iae)", -6.0),
     ],
 )
 def test_a_failed_run_is_the_worst_of_every_statistic(text, number):
@@ -152,9 +160,11 @@ def test_what_nobody_knows_is_the_worst():
         ("failures <= 0.25", 0.0),
         ("failures <= 0.1", 1.5),
         ("failures <= 0", 0.25),
-        ("median(iae) >= 4", 0.5),
+        ("median(iae) >= 4", 0.75),
+        ("quantile(iae, 0.75) >= 2", 0.0),
+        ("quantile(iae, 0.25) >= 1", math.inf),
         ("median(iae) < 4", -0.5),
-        ("quantile(iae, 0.95) > 1", math.inf),
+        ("quantile(iae, 0.95) > 1", -2.0),
     ],
 )
 def test_an_inequality_says_by_how_much_it_does_not_hold(text, over):

@@ -8,7 +8,7 @@ from types import MappingProxyType
 import pytest
 from tune_samples import contents, planned, searched, tuned
 
-from podusv_cli.core.errors import UsageError
+from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.study.store import RUNS, UNITS, Store
 from podusv_cli.tuning import folder as place
 from podusv_cli.tuning import sampler, trials
@@ -18,6 +18,7 @@ from podusv_cli.tuning.validation import FOLDER, _clear, contestants
 from podusv_cli.workflows import tune as workflow
 
 MOST = 40  # calls after which a process is killed at the latest
+ONCE = "tune.repeats=1"
 CALLS = ("replace", "mkdir", "unlink", "rmdir", "open")
 
 
@@ -102,9 +103,15 @@ def optuna():
     return pytest.importorskip("optuna", reason="the search needs Optuna: podusv[tune]")
 
 
-def test_a_search_in_parts_equals_one_in_one_go(optuna, tmp_path):
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A search in one go."""
+    pytest.importorskip("optuna", reason="the search needs Optuna: podusv[tune]")
+    return tuned(tmp_path_factory.mktemp("whole"), ONCE, workers=2)
+
+
+def test_a_search_in_parts_equals_one_in_one_go(whole, tmp_path):
     """Interrupted in the search, then in the validation; with other workers."""
-    whole = tuned(tmp_path / "whole", workers=2)
 
     def stop(after):
         def tell(tally, text):
@@ -113,9 +120,9 @@ def test_a_search_in_parts_equals_one_in_one_go(optuna, tmp_path):
 
         return tell
 
-    for after in (30, 90):
+    for after in (20, 50):
         with pytest.raises(KeyboardInterrupt, match="continue with: podusv tune"):
-            tuned(tmp_path / "part", tell=stop(after))
+            tuned(tmp_path / "part", ONCE, tell=stop(after))
     kept = trials.read(tmp_path / "part" / "out", "toy-0")
     assert 0 < sum(trial.runs for trial in kept) < 64
 
@@ -124,18 +131,17 @@ def test_a_search_in_parts_equals_one_in_one_go(optuna, tmp_path):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        tuned(tmp_path / "part", tell=fresh)
+        tuned(tmp_path / "part", ONCE, tell=fresh)
     part = workflow.tune(
         tmp_path / "part" / "out", workflow.Request(figures=False), lambda *_: None
     )
     assert contents(part.folder) == contents(whole.folder)
 
 
-def test_a_larger_budget_continues_as_if_it_had_been_asked_for_at_once(optuna, tmp_path):
+def test_a_larger_budget_continues_as_if_it_had_been_asked_for_at_once(whole, tmp_path):
     """The last trial of the smaller budget is cut, and the larger one finds other gains."""
-    first = tuned(tmp_path / "parts", "tune.budget=34", "tune.repeats=1").results.winner("toy")
-    parts = tuned(tmp_path / "parts", "tune.budget=64", "tune.repeats=1")
-    whole = tuned(tmp_path / "whole", "tune.budget=64", "tune.repeats=1")
+    first = tuned(tmp_path / "parts", "tune.budget=34", ONCE).results.winner("toy")
+    parts = tuned(tmp_path / "parts", ONCE)
     assert first.gains != whole.results.winner("toy").gains
     assert contents(parts.folder) == contents(whole.folder)
     assert parts.results.spent == {"toy": 64}
@@ -163,3 +169,13 @@ def test_a_smaller_budget_would_throw_trials_away_and_is_refused(tmp_path, monke
         opened(tmp_path / "out", planned(tmp_path))
     with pytest.raises(UsageError, match="has a budget of 64 runs; ask for as many or more"):
         opened(tmp_path / "out", planned(tmp_path, "tune.budget=40"))
+
+
+def test_trials_of_other_gains_than_are_asked_for_are_not_thrown_away(optuna, tmp_path):
+    (first,) = searched(tmp_path, "tune.repeats=1", "tune.budget=32")
+    path = tmp_path / trials.FOLDER / "toy-0.json"
+    other = path.read_text().replace(str(first.trials[1].gains["gain"]), "7.125")
+    path.write_text(other)
+    with pytest.raises(StorageError, match="batch 0 of toy-0 has other gains than this machine"):
+        searched(tmp_path, "tune.repeats=1", "tune.budget=64")
+    assert path.read_text() == other

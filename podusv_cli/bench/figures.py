@@ -22,7 +22,10 @@ MARGIN = 0.15  # of a path's extent, around a small multiple
 LOST = "#D55E00"
 SMALL_TEXT: dict[str, Any] = {"fontsize": 5.5}
 NAMES = 0.75  # inches at the left, for the tasks
-APART = {"bottom": 0.01, "top": 0.95, "right": 0.995, "wspace": 0.06, "hspace": 0.06}
+DPI = 150.0  # as in a page of 1300 points
+TITLES = 0.28  # inches at the top, for the laws
+LONGEST = 12  # letters of a law's name in one line
+APART = {"bottom": 0.01, "right": 0.995, "wspace": 0.06, "hspace": 0.06}
 
 
 def profiles(made: pd.DataFrame, columns: int = 2) -> Figure:
@@ -49,18 +52,26 @@ def profiles(made: pd.DataFrame, columns: int = 2) -> Figure:
 def tracks(runs: Sequence[BenchRun], laws: Sequence[str]) -> Figure:
     """Small multiples of one vessel: a row a task, a column a law, all conditions together."""
     tasks = list(dict.fromkeys(run.task for run in runs))
-    width = SMALL * len(laws) + NAMES
-    figure = Figure(figsize=(width, SMALL * (len(tasks) + 0.5)))
+    width, height = SMALL * len(laws) + NAMES, SMALL * len(tasks) + TITLES
+    figure = Figure(figsize=(width, height), dpi=DPI)
     figure.set_layout_engine("none")
-    places = {"left": NAMES / width, **APART}
+    places = {"left": NAMES / width, "top": 1.0 - TITLES / height, **APART}
     every = figure.subplots(len(tasks), len(laws), squeeze=False, gridspec_kw=places)
     for task, row in zip(tasks, every, strict=True):
         for law, axes in zip(laws, row, strict=True):
             _small(axes, [run for run in runs if (run.task, run.law) == (task, law)])
         row[0].set_ylabel(escaping.figure(task), **SMALL_TEXT, rotation=0, ha="right", va="center")
     for law, axes in zip(laws, every[0], strict=True):
-        axes.set_title(escaping.figure(law), **SMALL_TEXT, pad=2.0)
+        axes.set_title(_folded(law), **SMALL_TEXT, pad=2.0)
     return figure
+
+
+def _folded(law: str) -> str:
+    """A law's name as text of a figure; a long one in two lines."""
+    first, _, rest = law.partition("_")
+    if not rest or len(law) <= LONGEST:
+        return escaping.figure(law)
+    return f"{escaping.figure(first)}_\n{escaping.figure(rest)}"
 
 
 def _small(axes: Axes, runs: Sequence[BenchRun]) -> None:

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
+from podusv_cli.bench.optima import Least
 from podusv_cli.bench.standing import PLACE, leaderboard
 from podusv_cli.core.escaping import markdown
 from podusv_cli.pages.page import Picture, environment, flat, value_text
@@ -16,6 +17,7 @@ FIRST = 60  # failures that the page lists
 DARKEST = 10.0  # times the best law's IAE
 PALE, DARK = (236, 244, 250), (8, 64, 112)  # red, green, blue
 CROSS = "✗"
+HEADINGS = ("law", "mean rank", "failed", "median of IAE / best", "within 10 % of the best")
 
 
 class Cell(NamedTuple):
@@ -28,37 +30,57 @@ class Cell(NamedTuple):
 
 
 def page(
-    made: pd.DataFrame, figures: Sequence[Picture], provenance: Mapping[str, Any]
+    made: pd.DataFrame, figures: Sequence[Picture], provenance: Mapping[str, Any],
+    optima: Sequence[Least] = (),
 ) -> str:  # fmt: skip
-    """The page; `made` is `standing.table` of all runs."""
+    """The page; `made` is `standing.table` of all runs, `with_optima` where there are any."""
     board = leaderboard(made)
     failed = made[made.status != "finished"]
     counts = {f"{name}s": made[name].nunique() for name in PLACE}
     return environment("podusv_cli.bench").get_template("bench.html.j2").render(
         title=f"Bench of {len(board)} laws",
-        board=list(board.iterrows()),
+        board=[(str(law), told(row), row.settled) for law, row in board.iterrows()],
+        headings=headings(board),
         counts=counts | {"cases": len(made) // len(board), "runs": len(made)},
         heat=list(_heat(made, list(board.index))),
         failures=failed[[*PLACE, "law", "status", "cause"]].to_numpy().tolist()[:FIRST],
         more=max(0, len(failed) - FIRST),
         figures=figures,
         provenance=[(key, value_text(value)) for key, value in flat(provenance)],
-        number=number,
+        optima=_grids(optima) if optima else None,
     )  # fmt: skip
 
 
 def as_markdown(made: pd.DataFrame) -> str:
     """The leaderboard as a table."""
-    head = (
-        "| law | mean rank | failed | median of IAE / best | within 10 % of the best |\n"
-        "|---|---|---|---|---|\n"
-    )
-    rows = (
-        f"| {markdown(str(law))} | {row.mean_rank:.2f} | {row.failed:.0f} of {row.cases:.0f} | "
-        f"{number(row.median_ratio)} | {100 * row.close:.0f} % |\n"
-        for law, row in leaderboard(made).iterrows()
-    )
-    return head + "".join(rows)
+    board = leaderboard(made)
+    head = headings(board)
+    rows = ([markdown(str(law)), *told(row)] for law, row in board.iterrows())
+    lines = [" | ".join(row) for row in (head, *rows)]
+    return f"| {lines[0]} |\n|{'---|' * len(head)}\n" + "".join(f"| {row} |\n" for row in lines[1:])
+
+
+def _grids(optima: Sequence[Least]) -> dict[str, Any]:
+    """What the page says of the optima: the finest grid's step, its effect, and their cases."""
+    return {
+        "step": f"{max(found.step for found in optima):.2g}",
+        "lowered": f"{max(abs(found.lowered) for found in optima):.1g}",
+        "count": sum(len(found.places) for found in optima),
+    }
+
+
+def headings(board: pd.DataFrame) -> list[str]:
+    """Of the leaderboard; the last where optima were found."""
+    return [*HEADINGS, *(["median of IAE / optimum"] if "of_optimum" in board else [])]
+
+
+def told(row: Any) -> list[str]:
+    """A law's row of the leaderboard below these headings, but for the law's name."""
+    texts = [
+        f"{row.mean_rank:.2f}", f"{row.failed:.0f} of {row.cases:.0f}", number(row.median_ratio),
+        f"{100 * row.close:.0f} %",
+    ]  # fmt: skip
+    return [*texts, *([number(row.of_optimum)] if "of_optimum" in row else [])]
 
 
 def number(ratio: float) -> str:
@@ -67,10 +89,10 @@ def number(ratio: float) -> str:
 
 
 def _heat(made: pd.DataFrame, laws: Sequence[str]) -> Iterator[tuple[str, list[Any]]]:
-    """For every vessel the rows of its table: task, condition, a cell for each law, best IAE."""
+    """For every vessel the rows of its table: task, condition, a cell a law, least IAE."""
     for vessel, cases in made.groupby("vessel", sort=False):
         rows = [
-            (task, condition, _cells(case, laws), _best(case))
+            (task, condition, _cells(case, laws), _least(case))
             for (task, condition), case in cases.groupby(["task", "condition"], sort=False)
         ]
         yield str(vessel), rows
@@ -89,6 +111,9 @@ def _cell(ratio: float, why: str) -> Cell:
     return Cell(number(ratio), f"rgb{tuple(mixed)}", "#fff" if depth > 0.45 else "#1b1f24", "")
 
 
-def _best(case: pd.DataFrame) -> str:
+def _least(case: pd.DataFrame) -> list[str]:
+    """IAE of the best law, and of the optimum where the table has it."""
     good = case.iae[case.status == "finished"]
-    return f"{good.min():.4g}" if len(good) else CROSS
+    optimum = case.optimum.iloc[0] if "optimum" in case else None
+    numbers = [good.min() if len(good) else math.inf, *([] if optimum is None else [optimum])]
+    return [f"{iae:.4g}" if math.isfinite(iae) else CROSS for iae in numbers]

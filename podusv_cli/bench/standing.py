@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import pandas as pd
 
+from podusv_cli.bench.optima import Least
 from podusv_cli.bench.runs import BenchRun
 from podusv_cli.core.kernel import Vector
 
@@ -35,12 +36,23 @@ def table(runs: Iterable[BenchRun]) -> pd.DataFrame:
     return made
 
 
+def with_optima(made: pd.DataFrame, optima: Sequence[Least]) -> pd.DataFrame:
+    """The table with `optimum` [m s], NaN where there is none, and `of_optimum`, IAE over it.
+
+    `of_optimum` is inf for a failed run.
+    """
+    iae = {place: found.iae for found in optima for place in found.places}
+    least = [iae.get(place, np.nan) for place in made[PLACE].itertuples(index=False, name=None)]
+    counted = made.iae.where(made.status == "finished", np.inf)
+    return made.assign(optimum=least, of_optimum=counted / least)
+
+
 def leaderboard(made: pd.DataFrame) -> pd.DataFrame:
     """A row for each law, the best first: by mean rank over all cases.
 
     `close` is the share of cases in which the law's IAE is within 10 % of the best. `median_ratio`
     and `settled`, the distance over the steady window [m], are medians, with a run that failed or
-    ended early as inf.
+    ended early as inf; so is `of_optimum`, if the table has it, over cases with an optimum.
     """
     laws = made.groupby("law", sort=False)
     board = pd.DataFrame(
@@ -53,6 +65,8 @@ def leaderboard(made: pd.DataFrame) -> pd.DataFrame:
             "settled": laws.z_e_steady.agg(lambda z_e: middle(z_e.fillna(np.inf))),
         }
     )
+    if "of_optimum" in made:
+        board["of_optimum"] = laws.of_optimum.agg(lambda ratio: middle(ratio.dropna()))
     return board.sort_values("mean_rank", kind="stable")
 
 

@@ -39,6 +39,9 @@ def bench(
         int, typer.Option(min=0, help="Processes at a time.", show_default="one a core")
     ] = 0,
     figures: options.Figures = True,
+    optimum: Annotated[
+        bool, typer.Option("--optimum", help="Find the optimum of each case; a minute or two each.")
+    ] = False,
     as_json: options.AsJson = False,
     quiet: options.Quiet = False,
 ) -> None:
@@ -53,7 +56,7 @@ def bench(
 
     chosen = {"tasks": task or (), "vessels": vessel or (), "conditions": condition or ()}
     wanted = Wanted(folder or shipped_bench(), laws or (), assign or (), chosen)
-    request = workflow.Request(out, force, figures, workers, sys.argv)
+    request = workflow.Request(out, force, figures, workers, sys.argv, optimum)
     with progress_bars(wanted=not (quiet or as_json)) as bars:
         done = workflow.bench(wanted, request, bars)
     echo_result(done, lambda: _report(done), as_json=as_json, quiet=quiet)
@@ -63,12 +66,8 @@ def bench(
 
 
 def _report(done: Benched) -> None:
-    from podusv_cli.bench.page import number
+    from podusv_cli.bench.page import headings, told
 
-    rows = [
-        [str(law), f"{row.mean_rank:.2f}", f"{row.failed:.0f} of {row.cases:.0f}",
-         number(row.median_ratio), f"{100 * row.close:.0f} %"]
-        for law, row in done.board.iterrows()
-    ]  # fmt: skip
-    echo_table(["law", "mean rank", "failed", "median IAE / best", "within 10 %"], rows)
+    board = done.board
+    echo_table(headings(board), [[str(law), *told(row)] for law, row in board.iterrows()])
     echo(f"{len(done.runs)} runs: {done.folder / 'report.html'}")

@@ -1,4 +1,9 @@
-"""The paper's law: adaptive neural backstepping with a neural shunting model, (22) and (31)."""
+"""The paper's law: adaptive neural backstepping with a neural shunting model, (22) and (31).
+
+Source: the paper. Proved: all errors are ultimately bounded where the gain conditions hold, which
+docs/theory.md checks along every run. Not proved: any limit of the actuator, sampling, and the
+option `standoff_reference: crab`. Anti-windup: `anti_windup: auxiliary`, outside the proof.
+"""
 
 from __future__ import annotations
 

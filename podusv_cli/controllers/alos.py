@@ -1,11 +1,15 @@
 """Line of sight that learns the crab angle, so that it stays on the path in a cross load.
 
-`adaptive` is ALOS: T. I. Fossen, "An adaptive line-of-sight (ALOS) guidance law for path following
-of aircraft and marine craft", IEEE Trans. Control Systems Technology (2023). `integral` is ILOS:
-E. Borhaug, A. Pavlov and K. Y. Pettersen, "Integral LOS control for path following of underactuated
-marine surface vessels in the presence of constant ocean currents", IEEE CDC (2008). The speed that
-follows the target, and the autopilot with observed loads, are podusv's. docs/laws.md has the
-equations.
+Source of `adaptive`, ALOS: T. I. Fossen, "An adaptive line-of-sight (ALOS) guidance law for path
+following of aircraft and marine craft", IEEE Trans. Control Systems Technology 31 (2023),
+2887-2894. Of `integral`, ILOS: E. Borhaug, A. Pavlov and K. Y. Pettersen, "Integral LOS control for
+path following of underactuated marine surface vessels in the presence of constant ocean currents",
+IEEE CDC (2008), 4984-4991. The speed that follows the target, and the autopilot with observed
+loads, are podusv's.
+
+Proved, for a heading that is exact and a constant crab angle: the cross-track error tends to 0. Not
+proved: the autopilot together with the guidance, and any limit. Anti-windup: the observer is told
+the loads that act; what is learnt grows slowly far from the line. docs/laws.md has the equations.
 """
 
 from __future__ import annotations

@@ -1,8 +1,13 @@
 """Full backstepping: the same law with analytic derivatives of the virtual control.
 
-Stands for the comparison law of the paper's reference [25], whose text podusv does not have; it is
-therefore called Li-type. Derivatives use the nominal vessel with m23 r^2 and all its damping, of
-which (12) has less, but without disturbance, sway force and inertia coupling between sway and yaw.
+Source: stands for the comparison law of the paper's reference [25], whose text podusv does not
+have; it is therefore called Li-type. Derivatives use the nominal vessel with m23 r^2 and all its
+damping, of which (12) has less, but without disturbance, sway force and inertia coupling between
+sway and yaw.
+
+Proved: as for `adaptive_neural`, without filter errors (docs/theory.md). Not proved: any limit of
+the actuator, and corners, where the derivative jumps. Anti-windup: `anti_windup: auxiliary`,
+outside the proof.
 """
 
 from __future__ import annotations

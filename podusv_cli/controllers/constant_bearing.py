@@ -1,6 +1,8 @@
 """Constant-bearing guidance with an approach speed that a vessel can reach.
 
-Source: M. Breivik and T. I. Fossen, constant-bearing guidance for target tracking (2006 to 2010).
+Source: M. Breivik and T. I. Fossen, "Guidance laws for planar motion control", IEEE CDC (2008),
+570-577: the target's velocity plus U_a |e|/sqrt(|e|^2 + D^2) towards it. Here U_a = s_max changes
+with the target's velocity, and D = s_max/k_p.
 """
 
 from __future__ import annotations

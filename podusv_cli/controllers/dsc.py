@@ -1,4 +1,9 @@
-"""Dynamic surface control: the same law with a first-order filter of the virtual control."""
+"""Dynamic surface control: the same law with a first-order filter of the virtual control.
+
+Source: the paper's reference [26], as the paper describes it. Proved: as for `adaptive_neural`,
+with 1/T in place of the shunting model's rate (docs/theory.md). Not proved: any limit of the
+actuator, and sampling. Anti-windup: `anti_windup: auxiliary`, outside the proof.
+"""
 
 from __future__ import annotations
 

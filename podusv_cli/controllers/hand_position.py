@@ -2,8 +2,13 @@
 
 Source: C. Paliotta, E. Lefeber, K. Y. Pettersen, J. Pinto, M. Costa and J. T. de Figueiredo Borges
 de Sousa, "Trajectory tracking and path following for underactuated marine vehicles", IEEE Trans.
-Control Systems Technology 27 (2019). Changed here: the approach speed is limited, the integral acts
-in the body frame, and the origin may come to the target instead of the hand point.
+Control Systems Technology 27 (2019); not checked against the original. Changed here: the approach
+speed is limited, the integral acts in the body frame, and the origin may come to the target instead
+of the hand point.
+
+Proved: without loads or with constant ones, off the limits, the hand point comes to its target if
+the loop settles. Not proved: the heading with `reference: origin`, and any limit. Anti-windup:
+back-calculation. docs/laws.md has the derivation.
 """
 
 from __future__ import annotations

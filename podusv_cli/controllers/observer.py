@@ -5,8 +5,9 @@ For each axis, with inertia m, nominal Coriolis and damping force f and the load
     nu_hat' = (tau + f + b_hat)/m + 2 omega (nu - nu_hat),   b_hat' = m omega^2 (nu - nu_hat).
 
 Both poles are at -omega. Source: J. Han, "From PID to active disturbance rejection control", IEEE
-Trans. Industrial Electronics 56 (2009); linear, and tuned by omega alone, after Z. Gao, "Scaling
-and bandwidth-parameterization based controller tuning", American Control Conference (2003).
+Trans. Industrial Electronics 56 (2009), 900-906; linear, and tuned by omega alone, after Z. Gao,
+"Scaling and bandwidth-parameterization based controller tuning", American Control Conference
+(2003), 4989-4996.
 
 The observer is the only integrator of a law that uses it. It is told the loads that act, so it
 does not wind up while the actuator limits the demand.

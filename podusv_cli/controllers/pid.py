@@ -1,4 +1,9 @@
-"""PID on the velocity errors, the paper's reference [35]."""
+"""PID on the velocity errors.
+
+Source: the paper's reference [35], as the paper describes it; docs/model.md has the equations.
+Proved: nothing. Not proved: stability together with the guidance, which keeps its standoff.
+Anti-windup: back-calculation, with `anti_windup: auxiliary`.
+"""
 
 from __future__ import annotations
 

@@ -1,11 +1,16 @@
 """Sliding modes of the hand point: it resists loads whose bound alone is known.
 
-First order with a boundary layer: J.-J. E. Slotine and W. Li, "Applied Nonlinear Control" (1991),
-with the reaching law of W. Gao and J. C. Hung, "Variable structure control of nonlinear systems: a
-new approach", IEEE Trans. Industrial Electronics 40 (1993). Super-twisting: A. Levant, "Sliding
-order and sliding accuracy in sliding mode control", Int. J. Control 58 (1993). On surface vessels:
-H. Ashrafiuon, K. R. Muske, L. C. McNinch and R. A. Soltan, IEEE Trans. Industrial Electronics 55
-(2008). The surface is podusv's: the velocity that the hand point lacks.
+Source of the first order with a boundary layer: J.-J. E. Slotine and W. Li, "Applied Nonlinear
+Control" (1991; not checked against the original), with the reaching law of W. Gao and J. C. Hung,
+"Variable structure control of nonlinear systems: a new approach", IEEE Trans. Industrial
+Electronics 40 (1993), 45-55. Super-twisting: A. Levant, "Sliding order and sliding accuracy in
+sliding mode control", Int. J. Control 58 (1993), 1247-1263. On surface vessels: H. Ashrafiuon,
+K. R. Muske, L. C. McNinch and R. A. Soltan, IEEE Trans. Industrial Electronics 55 (2008; not
+checked against the original). The surface is podusv's: the velocity that the hand point lacks.
+
+Proved, off the limits: the hand point's missing velocity comes into a ball that docs/laws.md gives.
+Not proved: super-twisting on two coupled axes, the heading, and pods. Anti-windup: the first order
+has no memory; super-twisting learns the less, the more the actuator falls short.
 """
 
 from __future__ import annotations

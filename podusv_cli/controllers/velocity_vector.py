@@ -1,7 +1,11 @@
 """Steers the velocity vector, not the bow: constant-bearing guidance with observed loads.
 
 The bow is turned until the velocity that results, with the sway that the hull settles to, is the
-wanted one. Source: ours. docs/laws.md has the derivation and what is proved.
+wanted one. Source: ours, on the guidance of Breivik and Fossen (see `constant_bearing`).
+
+Proved: no offset in a steady state off the limits, whatever vessel it was told; the position error
+is bounded if the velocity error is. Not proved: that it comes to the steady state; docs/theory.md
+has eigenvalues, docs/laws.md the derivation. Anti-windup: the observer is told the loads that act.
 """
 
 from __future__ import annotations

@@ -10,7 +10,8 @@ import numpy as np
 
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector, bundle
-from podusv_cli.engine.loop import ClosedLoop
+from podusv_cli.core.recording import Recording
+from podusv_cli.engine.loop import STATE, ClosedLoop
 from podusv_cli.scenario.model import Scenario
 
 Minimised = Literal["iae", "ise"]
@@ -23,6 +24,12 @@ class Motion:
     times: Vector
     states: Vector
     demands: Vector
+
+    @classmethod
+    def of(cls, log: Recording) -> Motion:
+        """The motion of a run."""
+        states, demands = ([log[name] for name in names] for names in (STATE, ("tau_u", "tau_r")))
+        return cls(log["time"], np.column_stack(states), np.column_stack(demands))
 
     def at(self, times: Vector) -> Motion:
         """The motion at other times, on straight lines between its own."""

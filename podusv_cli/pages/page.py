@@ -17,17 +17,19 @@ POWERS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 class Picture(NamedTuple):
-    """A figure of a report: what it shows, where one of its kind was published, and its SVG."""
+    """A figure of a report: what it shows, its file, and where one of its kind was published."""
 
     name: str
     caption: str
-    svg: bytes
+    file: bytes
     source: str = ""
+    form: str = "svg"  # or png
 
     @property
     def data(self) -> str:
         """The picture as an address; inline markup of several figures would share its names."""
-        return f"data:image/svg+xml;base64,{base64.b64encode(self.svg).decode()}"
+        media = {"svg": "svg+xml"}.get(self.form, self.form)
+        return f"data:image/{media};base64,{base64.b64encode(self.file).decode()}"
 
     @property
     def title(self) -> str:

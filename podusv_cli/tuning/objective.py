@@ -3,7 +3,8 @@
 median(iae) + 0.1 * quantile(tv_tau_u, 0.95)      what is to be small
 failures <= 0.05                                  what has to hold
 
-A failed run counts as the worst, and so does a number that nobody knows.
+A failed run counts as the worst, and so does a number that nobody knows: as infinite where more is
+worse, and as minus infinite where less is.
 """
 
 from __future__ import annotations
@@ -28,6 +29,8 @@ EXAMPLE, INEQUALITY = "median(iae)", "failures <= 0.05"
 FAILURES, MEDIAN, QUANTILE = "failures", "median", "quantile"
 STATISTICS = (MEDIAN, QUANTILE)
 UPWARD = (ast.Gt, ast.GtE)
+SCALING = (ast.Mult, ast.Div)  # a negative part turns round what the other means
+FALLING = (ast.Sub, ast.Div)  # the more of the second part, the less of the whole
 
 
 class Runs(NamedTuple):
@@ -99,46 +102,65 @@ def named(tree: ast.expr, metrics: Mapping[str, Metric]) -> list[str]:
 def _names(tree: ast.expr, metrics: Mapping[str, Metric]) -> list[str]:
     """What an expression is about, found by evaluating it on a single made-up run."""
     walk = OfRuns(metrics, runs=Runs({name: np.ones(1) for name in metrics}, np.zeros(1, bool)))
-    _evaluated(tree, walk)
+    _evaluated(tree, walk, math.inf)
     return walk.names
 
 
-def evaluate(tree: ast.expr, runs: Runs, metrics: Mapping[str, Metric]) -> float:
-    """The number of an objective; infinite where it is the worst or not known."""
+def evaluate(
+    tree: ast.expr, runs: Runs, metrics: Mapping[str, Metric], worst: float = math.inf
+) -> float:
+    """The number of an objective; infinite where it is the worst or not known.
+
+    `worst` is minus infinity where less is worse.
+    """
     with np.errstate(all="ignore"):
-        found = float(_evaluated(tree, OfRuns(metrics, runs=runs)))
+        found = float(_evaluated(tree, OfRuns(metrics, runs=runs), worst))
     return found if math.isfinite(found) else math.inf
 
 
 def excess(one: Inequality, runs: Runs, metrics: Mapping[str, Metric]) -> float:
     """By how much an inequality does not hold, relative to its bound; 0 or less where it holds."""
-    found = evaluate(one.tree, runs, metrics)
+    found = evaluate(one.tree, runs, metrics, -math.inf if one.upward else math.inf)
     over = one.bound - found if one.upward and math.isfinite(found) else found - one.bound
     return over / (abs(one.bound) or 1.0)
 
 
-def _evaluated(node: ast.expr, walk: OfRuns) -> Any:
+def _evaluated(node: ast.expr, walk: OfRuns, worst: float) -> Any:
     match node:
         case ast.Constant():
             return np.float64(literal(node))
         case ast.UnaryOp(op=ast.USub(), operand=part):
-            return -_evaluated(part, walk)
+            return -_evaluated(part, walk, -worst)
         case ast.BinOp(left=left, right=right, op=sign) if type(sign) in ARITHMETIC:
-            return ARITHMETIC[type(sign)](_evaluated(left, walk), _evaluated(right, walk))
+            first = -worst if isinstance(sign, SCALING) and _is_negative(right) else worst
+            second = -worst if isinstance(sign, SCALING) and _is_negative(left) else worst
+            second = -second if isinstance(sign, FALLING) else second
+            parts = _evaluated(left, walk, first), _evaluated(right, walk, second)
+            return ARITHMETIC[type(sign)](*parts)
         case ast.BinOp():
             refuse(node, "calculate with + - * / only")
         case ast.Name(id=name) if name == FAILURES:
             walk.names.append(FAILURES)
             return np.float64(np.mean(walk.runs.failed))
         case ast.Call():
-            return _quantile(node, walk)
+            return _quantile(node, walk, worst)
     refuse(node, f"no statistic of all draws; write median(...), quantile(..., 0.95) or {FAILURES}")
 
 
-def _quantile(call: ast.Call, walk: OfRuns) -> Any:
+def _is_negative(node: ast.expr) -> bool:
+    """Whether a factor has a minus; statistics count as positive."""
+    return isinstance(node, ast.UnaryOp)
+
+
+def _quantile(call: ast.Call, walk: OfRuns, worst: float) -> Any:
     share = share_of(call)
+    return statistics.quantile(numbers_of(call, walk, worst), share, 0.5).estimate
+
+
+def numbers_of(call: ast.Call, walk: OfRuns, worst: float = math.inf) -> Vector:
+    """What a statistic is of: a number of each run, the worst where it failed or is not known."""
     values = np.broadcast_to(walk.number(call.args[0]), walk.runs.failed.shape)
-    return statistics.quantile(np.where(np.isnan(values), math.inf, values), share, 0.5).estimate
+    return np.where(walk.runs.failed | np.isnan(values), worst, values)
 
 
 def share_of(call: ast.Call) -> float:

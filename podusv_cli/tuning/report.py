@@ -88,7 +88,7 @@ def ratio(row: Any) -> str:
 def spread(row: Any) -> str:
     """The least and the largest objective of the repeats' winners."""
     low, high = row["repeats_low"], row["repeats_high"]
-    return "-" if math.isnan(low) else f"{digits(low)} to {digits(high)}"
+    return "-" if math.isnan(low) or low == high else f"{digits(low)} to {digits(high)}"
 
 
 def _pairs(results: Results) -> Iterator[dict[str, Any]]:
@@ -128,8 +128,12 @@ def _gains(results: Results) -> Iterator[dict[str, Any]]:
             one = share.loc[at]
             told = f"{100 * one.importance:.0f} % [{100 * one.low:.0f}, {100 * one.high:.0f}]"
         numbers = {name: value_text(row[name]) for name in ("before", "after")}
-        numbers |= {name: f"{row[name]:.4g}" for name in ("low", "high")}
+        numbers |= {name: _end(row[name]) for name in ("low", "high")}
         yield row | numbers | {"unit": units[row["law"]][row["gain"]], "share": told}
+
+
+def _end(number: float) -> str:
+    return "-" if math.isnan(number) else f"{number:.4g}"
 
 
 def _unit(field: Any) -> str:

@@ -15,9 +15,10 @@ import pandas as pd
 from podusv_cli.study import statistics, summary
 from podusv_cli.study.runs_file import Table
 from podusv_cli.study.statistics import Interval
-from podusv_cli.tuning.objective import OfRuns, Runs, evaluate, named, share_of
+from podusv_cli.tuning.objective import OfRuns, Runs, evaluate, named, numbers_of, share_of
 from podusv_cli.tuning.plan import TunePlan
 from podusv_cli.tuning.sampler import importances
+from podusv_cli.tuning.space import Gain
 from podusv_cli.tuning.trials import FINISHED, Trial
 from podusv_cli.tuning.validation import View, chosen, repeated, tuned
 
@@ -104,10 +105,8 @@ class Results:
         found = evaluate(tree, runs, self.plan.metrics)
         if not isinstance(tree, ast.Call):
             return Interval(found, math.nan, math.nan)
-        values = OfRuns(self.plan.metrics, runs=runs).number(tree.args[0])
-        ends = statistics.quantile(
-            np.broadcast_to(values, runs.failed.shape), share_of(tree), self.level
-        )
+        values = numbers_of(tree, OfRuns(self.plan.metrics, runs=runs))
+        ends = statistics.quantile(values, share_of(tree), self.level)
         return Interval(found, ends.low, ends.high)
 
     def spread(self, law: str) -> list[float]:
@@ -143,7 +142,7 @@ class Results:
         return pd.DataFrame(
             [
                 {
-                    "law": law, "gain": gain.key, "low": gain.low, "high": gain.high,
+                    "law": law, "gain": gain.key, **_ends(gain),
                     "before": gain.own, "after": self.winner(law).gains[gain.key],
                     "at": gain.bound(self.winner(law).gains[gain.key]),
                     "repeats": " ".join(str(t.gains[gain.key]) for t in self.winners[law]),
@@ -195,7 +194,7 @@ class Results:
     def _idle(self) -> Iterator[str]:
         for law, keys in self.plan.idle.items():
             if keys:
-                yield f"{law}: {', '.join(keys)} changed no run and was not searched"
+                yield f"{law}: not searched, as no run depends on it: {', '.join(keys)}"
 
     def _unsound(self) -> Iterator[str]:
         for law in self.winners:
@@ -213,6 +212,12 @@ class Results:
         for row in self.gains[self.gains["at"] != ""].to_dict("records"):
             end = row["low"] if row["at"] == "lower" else row["high"]
             yield f"{row['law']}: {row['gain']} is at the {row['at']} end of its range, {end:.4g}"
+
+
+def _ends(gain: Gain) -> dict[str, float]:
+    """The ends of a range; words have none."""
+    low, high = (math.nan, math.nan) if gain.words else (gain.low, gain.high)
+    return {"low": low, "high": high}
 
 
 def _interval(name: str, found: Interval) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from podusv_cli.core.errors import StorageError
 from podusv_cli.study import plan as study
 from podusv_cli.study.unit import STATUSES, Unit, UnitResult
 from podusv_cli.tuning import trials
@@ -82,10 +83,19 @@ class Search:
         while (left := self.plan.tune.budget - self.spent) > 0:
             self._ask(left)
             kept = self._known()
-            if kept is None:
-                return self._units(min(self.first, self._attempts[0].draws)) or self._next()
-            self._told(kept)
+            if kept is not None:
+                self._told(kept)
+            elif units := self._first_units():
+                return units
         return []
+
+    def _first_units(self) -> list[tuple[int, study.Plan, Unit]]:
+        """The first units of a batch; none where the law refuses all gains, and the batch ends."""
+        draws = self._attempts[0].draws
+        found = self._units(min(self.first, draws)) or self._units(draws)
+        if not found:
+            self._end()
+        return found
 
     def _ask(self, left: int) -> None:
         """As many trials as the budget has whole ones for; the last one is cut to what is left."""
@@ -103,11 +113,21 @@ class Search:
         return Attempt(gains, draws, made, [])
 
     def _known(self) -> list[Trial] | None:
-        """The trials of this batch in the file, if they are of the gains and draws asked for."""
+        """The trials of this batch in the file; none for a batch that a smaller budget cut.
+
+        Raises StorageError where the file has other gains than those asked for.
+        """
         kept = [trial for trial in self._kept if trial.batch == self._batch]
-        asked = [(one.gains, one.draws == self.plan.tune.train) for one in self._attempts]
-        found = [(dict(trial.gains), trial.status != CUT) for trial in kept]
-        return kept if found == asked else None
+        whole = [one.draws == self.plan.tune.train for one in self._attempts]
+        if [trial.status != CUT for trial in kept] != whole:
+            return None
+        if [dict(trial.gains) for trial in kept] != [one.gains for one in self._attempts]:
+            raise StorageError(
+                f"{self._folder / trials.FOLDER}: batch {self._batch} of {self.name} has other "
+                "gains than this machine asks for; continue the search on the machine that it "
+                "began on, or name another folder with --out"
+            )
+        return kept
 
     def _units(self, until: int) -> list[tuple[int, study.Plan, Unit]]:
         """The units that take every attempt to so many draws; those refused fail at once."""
@@ -138,10 +158,13 @@ class Search:
         more = self._units(self._attempts[0].draws)
         if more:
             return more
-        made = list(self._made())
-        self._told(made)
-        trials.write(self._folder, self.name, self.trials)
+        self._end()
         return self.begin()
+
+    def _end(self) -> None:
+        """Keep the trials of a batch."""
+        self._told(list(self._made()))
+        trials.write(self._folder, self.name, self.trials)
 
     def _is_over(self, one: Attempt) -> bool:
         """Whether a trial is pruned: a sound one of earlier batches is far better by all."""

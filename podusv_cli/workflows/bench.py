@@ -11,11 +11,13 @@ from typing import Any
 
 import pandas as pd
 
-from podusv_cli.bench import page, standing
+from podusv_cli.bench import optima, page, standing
 from podusv_cli.bench.cases import Case, Wanted, cases
+from podusv_cli.bench.optima import Least
 from podusv_cli.bench.runs import BenchRun, crashed, play, warm_up
+from podusv_cli.optimum.collocation import casadi
 from podusv_cli.pages.page import Picture
-from podusv_cli.process.extras import Extras
+from podusv_cli.process.extras import Extras, Missing
 from podusv_cli.process.interrupts import interrupts_deferred
 from podusv_cli.process.workers import Outcome, Report, run_all
 from podusv_cli.storage import provenance
@@ -23,6 +25,7 @@ from podusv_cli.storage.run_folder import RunWriter
 
 Progress = Callable[[str, float], None]
 RUNS, BOARD, REPORT, ORIGIN = "runs.csv", "leaderboard.md", "report.html", "provenance.json"
+OPTIMA = "optima.csv"
 DIGITS = "%.6g"
 
 
@@ -35,6 +38,7 @@ class Request:
     figures: bool = True
     workers: int = 0
     argv: Sequence[str] = ()
+    optimum: bool = False
 
 
 @dataclass(frozen=True)
@@ -67,15 +71,19 @@ class Benched:
 def bench(wanted: Wanted, request: Request, progress: Progress | None = None) -> Benched:
     """Simulate every law in every case and write the leaderboard.
 
-    Raises UsageError, ScenarioError, LawError before anything is simulated, StorageError, and
-    KeyboardInterrupt; then nothing is written.
+    Raises UsageError (without CasADi, too, if optima are wanted), ScenarioError, LawError before
+    anything is simulated, StorageError, and KeyboardInterrupt; then nothing is written.
     """
+    if request.optimum:
+        casadi()
     started, every, extras = datetime.now(UTC), list(cases(wanted)), Extras()
     with RunWriter(request.out, force=request.force) as writer:
         for case in every:
             warm_up(case)
         runs = list(_simulated(every, request, progress))
         made = standing.table(runs)
+        found = list(_solved(every, runs, request, progress, extras)) if request.optimum else []
+        made = standing.with_optima(made, found) if found else made
         with interrupts_deferred():
             draw = (lambda: _drawn(runs, made)) if request.figures else list
             figures: list[Picture] = extras.attempt("figures", draw) or []
@@ -83,7 +91,7 @@ def bench(wanted: Wanted, request: Request, progress: Progress | None = None) ->
                 p for case in every for law in case.laws.values() for p in law.plugged
             )
             origin = provenance.collect(request.argv, started, datetime.now(UTC), plugins)
-            _write(writer, made, figures, origin)
+            _write(writer, made, figures, origin, found)
             writer.add_missing(extras)
             return Benched(writer.finish("finished"), made, tuple(map(str, extras.missing)))
 
@@ -103,6 +111,29 @@ def _simulated(
             for law, one in case.laws.items():
                 (again,) = _run_all([replace(case, laws={law: one})], request)
                 yield from again.result or [crashed(case, law, again.failure)]
+
+
+def _solved(
+    every: Sequence[Case], runs: Sequence[BenchRun], request: Request, progress: Progress | None,
+    extras: Extras,
+) -> Iterator[Least]:  # fmt: skip
+    """The optima of all cases; what has none is added to `extras`."""
+    wanted, refused = optima.wanted(every, runs)
+    extras.missing += [Missing("an optimum for some cases", why) for why in refused]
+
+    def advance(position: int, fraction: float) -> None:
+        if progress:
+            progress("optima", (position + fraction) / len(wanted))
+
+    outcomes = run_all([partial(optima.least, one) for one in wanted], advance, request.workers)
+    for one, outcome in zip(wanted, outcomes, strict=True):
+        if outcome.interrupted:
+            raise KeyboardInterrupt("interrupted; nothing was written")
+        if outcome.result:
+            yield outcome.result
+        else:
+            place = ", ".join(one.cases[0].place)
+            extras.missing.append(Missing(f"the optimum of {place}", outcome.failure))
 
 
 def _run_all(
@@ -132,17 +163,24 @@ def _drawn(runs: Sequence[BenchRun], made: pd.DataFrame) -> list[Picture]:
         for vessel in dict.fromkeys(run.place[0] for run in runs):
             shown = [run for run in runs if run.place[0] == vessel]
             caption = f"tracks of {vessel}; path grey, failed runs orange, all conditions; north up"
-            svg = image(tracks(shown, laws), "svg")
-            drawn.append(Picture(f"tracks-{vessel}", caption, svg))
+            png = image(tracks(shown, laws), "png")  # as outlines, 3000 tracks take 8 MB
+            drawn.append(Picture(f"tracks-{vessel}", caption, png, form="png"))
     return drawn
 
 
 def _write(
-    writer: RunWriter, made: pd.DataFrame, figures: Sequence[Picture], origin: dict[str, Any]
-) -> None:
-    writer.add(RUNS, made.to_csv(index=False, lineterminator="\n", float_format=DIGITS).encode())
+    writer: RunWriter, made: pd.DataFrame, figures: Sequence[Picture], origin: dict[str, Any],
+    found: Sequence[Least],
+) -> None:  # fmt: skip
+    writer.add(RUNS, _csv(made))
     writer.add(BOARD, page.as_markdown(made).encode())
-    writer.add(REPORT, page.page(made, figures, origin).encode())
+    writer.add(REPORT, page.page(made, figures, origin, found).encode())
+    if found:
+        writer.add(OPTIMA, _csv(optima.table(found)))
     writer.add_json(ORIGIN, origin)
     for figure in figures:
-        writer.add(f"figures/{figure.name}.svg", figure.svg)
+        writer.add(f"figures/{figure.name}.{figure.form}", figure.file)
+
+
+def _csv(rows: pd.DataFrame) -> bytes:
+    return rows.to_csv(index=False, lineterminator="\n", float_format=DIGITS).encode()

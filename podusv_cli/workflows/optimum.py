@@ -14,7 +14,7 @@ from podusv_cli.controllers.velocity_vector import VelocityVector
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.recording import Recording
 from podusv_cli.engine.check import check_law
-from podusv_cli.engine.loop import STATE, ClosedLoop
+from podusv_cli.engine.loop import ClosedLoop
 from podusv_cli.engine.simulate import simulate
 from podusv_cli.findings.finding import preflight, unknown_codes
 from podusv_cli.optimum import collocation
@@ -113,7 +113,7 @@ def _guesses(scenario: Scenario, wanted: Problem) -> dict[str, Motion]:
             f"{scenario.name}: the search begins from runs of laws, and all of these diverge "
             f"({label}: {run.message}); choose another law, as with --set controller.kind=pid"
         )
-    return {label: _motion(run) for label, run in ended.items()}
+    return {label: Motion.of(run) for label, run in ended.items()}
 
 
 def _run(scenario: Scenario, loop: ClosedLoop) -> Recording:
@@ -122,11 +122,6 @@ def _run(scenario: Scenario, loop: ClosedLoop) -> Recording:
     if log.status == "interrupted":
         raise KeyboardInterrupt
     return log
-
-
-def _motion(log: Recording) -> Motion:
-    states, demands = ([log[name] for name in names] for names in (STATE, ("tau_u", "tau_r")))
-    return Motion(log["time"], np.column_stack(states), np.column_stack(demands))
 
 
 def _repeating(scenario: Scenario, wanted: Problem, motion: Motion) -> Scenario:

@@ -17,8 +17,9 @@ from storage_samples import Saboteur, fails
 from podusv_cli.core.errors import StorageError
 from podusv_cli.storage import files
 from podusv_cli.study.store import RUNS, Store
+from podusv_cli.workflows import sweep
 
-KILLS, WRITES = count(3, 200), count(4, 60)
+KILLS, WRITES = count(2, 200), count(4, 60)
 LONGER = TEXT.replace("duration: 1.0", "duration: 20.0").replace("draws: 40", "draws: 300")
 
 
@@ -60,9 +61,10 @@ def sabotaged(folder, nth, code):
 
 
 def test_killed_at_any_time_it_goes_on_where_it_was(tmp_path):
-    (tmp_path / "small.yaml").write_text(LONGER)
-    undisturbed = started(tmp_path, "undisturbed")
-    assert undisturbed.wait(120) == 0
+    config = tmp_path / "small.yaml"
+    config.write_text(LONGER)
+    undisturbed = sweep.Request(out=tmp_path / "undisturbed", figures=False)
+    sweep.run(config, undisturbed, lambda tally: None)
     chance = random.Random(5)
     for _ in range(KILLS):
         process = started(tmp_path, "killed")
