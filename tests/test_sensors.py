@@ -134,7 +134,7 @@ def test_times_that_do_not_fit_the_step_are_told():
     assert set(told) == {"position.period", "heading.delay"}
     assert "try 0.01" in told["position.period"]
     backwards = Sensors(heading=Sensor(outages=((3.0, 2.0),)))
-    assert "found [3, 2]" in dict(backwards.conflicts(H))["heading.outages.0"]
+    assert "found [3, 2]" in dict(backwards.conflicts(H))["heading.outages[0]"]
 
 
 def test_the_layout_of_what_is_seen():

@@ -71,7 +71,7 @@ class Sensor(Component):
         for i, (start, end) in enumerate(self.outages):
             if not 0.0 <= start <= end:
                 text = f"must be [from, to] with 0 <= from <= to, found [{start:g}, {end:g}]"
-                yield f"outages.{i}", text
+                yield f"outages[{i}]", text
 
 
 class Sensors(Measurement):

@@ -209,7 +209,7 @@ class Scenario(Component):
         sea = self.disturbance
         if not isinstance(sea, tuple):
             return {"disturbance": sea}
-        return {f"disturbance.{i}": part for i, part in enumerate(sea)}
+        return {f"disturbance[{i}]": part for i, part in enumerate(sea)}
 
     def laws(self) -> dict[str, Controller]:
         """`controller` and all `controllers`, by their keys."""
