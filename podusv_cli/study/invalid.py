@@ -98,8 +98,9 @@ class Part:
 
     def _surely_taken(self, given: Table) -> Any:
         """A mask of draws within all ranges; False where the section checks more than ranges."""
-        model: Any = type(getattr(self.scenario, self.section))
-        if not _has_ranges_only(model):
+        own = getattr(self.scenario, self.section)
+        parts = own if isinstance(own, tuple) else (own,)
+        if not all(_has_ranges_only(type(part)) for part in parts):
             return np.bool_(False)
         masks = [
             _in_range(
