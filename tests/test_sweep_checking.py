@@ -302,12 +302,12 @@ def test_explain_and_the_messages_name_what_a_quantity_may_be() -> None:
 def test_a_quantity_of_one_of_several_disturbances():
     """It is drawn, checked against its range, and leaves the others as they are."""
     several = BASE.replace("{kind: harmonic}", "[{kind: step}, {kind: current, speed: 0.5}]")
-    sweep = '  draws: 5\n  vary: {flow: {keys: ["disturbance[1].speed"], uniform: [%s, 1]}}\n'
-    scenario = load_text(several + sweep % 0.1, "a.yaml", checks=[sweep_faults]).scenario
+    sweep = '  draws: 5\n  vary: {flow: {keys: ["disturbance[1].speed"], uniform: [%s, %s]}}\n'
+    scenario = load_text(several + sweep % (0.1, 1), "a.yaml", checks=[sweep_faults]).scenario
     each = [drawn(scenario, scenario.sweep.vary, draw) for draw in draws(scenario.sweep, 0, 5)]
     speeds = [one.disturbance[1].speed for one in each]
     assert len(set(speeds)) == 5
     assert all(0.1 < speed < 1.0 for speed in speeds)
     assert {one.disturbance[0] for one in each} == {scenario.disturbance[0]}
     with pytest.raises(ScenarioError, match=re.escape("disturbance[1].speed")):
-        load_text(several + sweep % -1, "a.yaml", checks=[sweep_faults])
+        load_text(several + sweep % (-2, -1), "a.yaml", checks=[sweep_faults])
