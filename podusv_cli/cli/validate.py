@@ -48,8 +48,11 @@ def validate(
     echo(f"{config}: ok ({scenario.name}, {laws}, {steps} steps)")
     echo(f"a run takes {largest(scenario)}")
     if scenario.sweep:
+        if scenario.tune:
+            echo("as a study, by podusv sweep:")
         paces = _tell_study(loaded, scenario.sweep)
         if scenario.tune:
+            echo("as a search, by podusv tune:")
             _tell_tuning(scenario, paces)
     for finding in preflight(scenario):
         echo(str(finding))
