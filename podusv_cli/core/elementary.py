@@ -8,6 +8,7 @@ in plain Python.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -25,6 +26,18 @@ QUARTER = (
     float.fromhex("0x1.3198a2e037073p-69"),
 )
 E = tuple(1.0 / math.factorial(n) for n in range(18))  # coefficients of all three series
+
+
+@kernel
+def bits(number: float) -> Any:
+    """The 64 bits of a number, as a whole number."""
+    return np.float64(number).view(np.int64)
+
+
+@kernel
+def of_bits(whole: Any) -> float:
+    """The number with these bits."""
+    return np.int64(whole).view(np.float64)  # type: ignore[no-any-return]
 
 
 @kernel
@@ -46,7 +59,7 @@ def exponential(x: float) -> float:
     high = _cubic(r, r2, E[10], E[11], E[12], E[13])
     series = 1.0 + (r + r2 * (low + r4 * (middle + r4 * high)))
     # The last bits of z are n; in the place of the exponent they make 2^n.
-    power = np.int64((np.float64(z).view(np.int64) + 1023) << 52).view(np.float64)
+    power = of_bits((bits(z) + 1023) << 52)
     return 0.0 if x < SMALLEST else series * power
 
 
@@ -66,7 +79,7 @@ def cos_sin(angle: float) -> tuple[float, float]:
     even = _cubic(q, q2, E[2], E[4], E[6], E[8]) + q4 * _cubic(q, q2, E[10], E[12], E[14], E[16])
     odd = _cubic(q, q2, E[3], E[5], E[7], E[9]) + q4 * _cubic(q, q2, E[11], E[13], E[15], E[17])
     cosine, sine = 1.0 + q * even, r + r * q * odd
-    quarters = np.float64(z).view(np.int64)  # its last two bits count quarter turns
+    quarters = bits(z)  # its last two bits count quarter turns
     if quarters & 1:
         cosine, sine = -sine, cosine
     return (-cosine, -sine) if quarters & 2 else (cosine, sine)

@@ -47,6 +47,12 @@ def scratch(count: int) -> Vector:
     return np.empty(count)
 
 
+@kernel
+def shared(number: float) -> float:
+    """A number that is the same in all runs that march side by side."""
+    return number
+
+
 def with_globals(function: Any, name: str, **replaced: Any) -> Any:
     """A copy of `function`, called `name`, that sees `replaced` in place of its globals."""
     copy = FunctionType(function.__code__, {**function.__globals__, **replaced}, name)
