@@ -12,7 +12,7 @@ from pydantic import model_validator
 from podusv_cli.core.component import Component, value
 from podusv_cli.core.derived import Derived, norm
 from podusv_cli.core.elementary import exponential
-from podusv_cli.core.kernel import Vector, kernel, tail, whole_lanes
+from podusv_cli.core.kernel import Vector, filled, kernel, tail, whole_lanes
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import Signal
 
@@ -142,11 +142,11 @@ class Network(Component):
 
 
 @kernel
-def _evaluate(x: Vector, count: int, table: Vector, out: Vector) -> None:
+def _evaluate(x: Vector, count: int, needed: int, table: Vector, out: Vector) -> None:
     u, v, r = x[3], x[4], x[5]
     c_u, c_v, c_r = table, tail(table, count), tail(table, 2 * count)
     e_u, e_v, e_r = tail(table, 3 * count), tail(table, 4 * count), tail(table, 5 * count)
-    for i in range(count):
+    for i in range(filled(count, needed)):
         du, dv, dr = u - c_u[i], v - c_v[i], r - c_r[i]
         out[i] = exponential(-e_u[i] * du * du - e_v[i] * dv * dv - e_r[i] * dr * dr)
 
@@ -159,7 +159,7 @@ def activate(x: Vector, k: Any, table: Vector, phi: Vector, work: Vector) -> Non
     less.
     """
     along, plane = int(k.network_along), int(k.network_plane)
-    _evaluate(x, int(k.network_bells), table, work)
+    _evaluate(x, int(k.network_bells), along + plane, table, work)
     for i in range(along):
         for j in range(plane):
             phi[i * plane + j] = work[plane + i] * work[j]

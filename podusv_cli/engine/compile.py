@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import re
 from functools import cache
+from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from podusv_cli.core.errors import LawError
-from podusv_cli.engine import object_cache, signatures
+from podusv_cli.engine import lane_doors, object_cache, signatures
+from podusv_cli.engine.lane_march import advance_lanes
 from podusv_cli.process.interrupts import interrupts_deferred
 
 RULES = (
@@ -40,23 +42,43 @@ def entry(part: str, inner: Any, names: tuple[str, ...]) -> Any:
 
 
 @cache
+def lane_entry(part: str, inner: Any, names: tuple[str, ...], alike: frozenset[str]) -> Any:
+    """The same with a run in every lane; constants in `alike` are the same in all of them.
+
+    Raises TypeError for a kernel that cannot go another way in every lane.
+    """
+    label = f"lanes_{part}_entry_{inner.__module__}_{inner.__qualname__}"
+    bound = lane_doors.bind(part, inner, names, alike)
+    return compiled(bound, lane_doors.PROTOTYPES[part], label, "lane_numba")
+
+
+@cache
+def lane_routine() -> Any:
+    """The compiled march of a run in every lane."""
+    return compiled(advance_lanes, lane_doors.ADVANCE_LANES, "", "lane_numba")
+
+
+@cache
 def routine(function: Any, prototype: Any) -> Any:
     """A compiled kernel of the engine itself."""
     return compiled(function, prototype)
 
 
-def compiled(function: Any, prototype: Any, label: str = "") -> Any:
+def compiled(
+    function: Any, prototype: Any, label: str = "", compiler: str = "compile_numba"
+) -> Any:
     """The kernel as a compiled C function with this ctypes prototype.
+
+    `compiler` is the module that makes its object code, imported only where there is none yet.
 
     Raises TypeError for a kernel that needs more than arithmetic and the mathematical library.
     """
     name = f"{label or function.__qualname__}_{object_cache.fingerprint(function)}"
 
     def compile_now() -> object_cache.Code:
-        from podusv_cli.engine import compile_numba
-
         # The compiler would swallow an interrupt, so interrupts wait for it, a second or two.
         with interrupts_deferred():
-            return compile_numba.object_code(function, prototype)
+            made = import_module(f"podusv_cli.engine.{compiler}").object_code(function, prototype)
+            return cast(object_cache.Code, made)
 
     return object_cache.stored(prototype, re.sub(r"\W", "_", name), compile_now)

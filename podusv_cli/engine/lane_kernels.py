@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from podusv_cli.core import kernel
+from podusv_cli.engine.lane_doors import has_source
 
 ON, RESULT = "lanes_on", "lanes_result"  # the lanes that a kernel is called in, and its result
 
@@ -39,11 +40,6 @@ def rewritten(function: Any, words: dict[str, Any], plain: Collection[Any]) -> A
     result = made[code.name]
     result.__qualname__, result.__module__ = function.__qualname__, function.__module__
     return result
-
-
-def has_source(function: Any) -> bool:
-    """Whether a kernel is from a file; those that podusv writes out itself have no branches."""
-    return not function.__code__.co_filename.startswith("<")
 
 
 def _source(function: Any) -> ast.FunctionDef:

@@ -1,47 +1,72 @@
-"""The march of several runs side by side, a run in every lane."""
+"""The march of several runs side by side, a run in every lane.
+
+These kernels are for lanes only, so they are compiled as they are written. Their words stand for
+those of `lane_parts`.
+"""
 
 from __future__ import annotations
 
 from typing import Any
 
 from podusv_cli.core.kernel import LANES, Vector, kernel, tail
-from podusv_cli.engine.closed_loop import (
-    finite,
-    measure,
-    named_plan,
-    named_wires,
-    rates,
-    step,
-)
+from podusv_cli.engine.closed_loop import finite, measure, named_plan, named_wires, rates, step
 from podusv_cli.engine.layout import STOP, Function
 from podusv_cli.engine.sampled import sample_and_hold
 
-REACHED = STOP + 1  # in `under_way`: by lane the instants that a run reached, or -1
+REACHED = STOP + 1  # in `under_way`: how many instants each lane reached, below 0 while it marches
 EVERY = None  # the mask of all lanes
 
 
-def lanes_not(mask: Any) -> Any: ...
-def lanes_and(one: Any, other: Any) -> Any: ...
-def lanes_any(mask: Any) -> Any: ...
-def lane_true(mask: Any, lane: int) -> Any: ...
-def lane_numbers(vector: Any) -> Any: ...
+@kernel
+def lanes_and(one: Any, other: Any) -> Any:
+    """Where both masks are true."""
+    raise NotImplementedError
 
 
 @kernel
-def bury(k: int, lost: Any, under_way: Vector, s: Vector, row: Vector, seen: Vector,
-         states: int, columns: int, size: int, ends: Vector) -> int:
+def lanes_not(mask: Any) -> Any:
+    """Where a mask is not true."""
+    raise NotImplementedError
+
+
+@kernel
+def lanes_any(mask: Any) -> bool:
+    """Whether a mask is true in any lane."""
+    raise NotImplementedError
+
+
+@kernel
+def lane_true(mask: Any, lane: int) -> bool:
+    """Whether a mask is true in this lane."""
+    raise NotImplementedError
+
+
+@kernel
+def lane_numbers(vector: Vector) -> Vector:
+    """A vector's numbers one by one: the first number of every lane, then the second, ..."""
+    raise NotImplementedError
+
+
+@kernel
+def copy_lane(lane: int, count: int, vector: Any, out: Vector) -> None:
+    """The numbers of one lane."""
+    numbers = lane_numbers(vector)
+    for i in range(count):
+        out[i] = numbers[i * LANES + lane]
+
+
+@kernel
+def end_lanes(k: int, lost: Any, c: Any, n: Any, size: int, under_way: Vector, ends: Vector) -> int:
+    """Keep state, row and observer's numbers of lanes that end here; how many lanes go on."""
     living = 0
     for lane in range(LANES):
         if under_way[REACHED + lane] < 0.0:
             if lane_true(lost, lane):
                 under_way[REACHED + lane] = k
-                out = tail(ends, lane * (states + columns + size))
-                for i in range(states):
-                    out[i] = lane_numbers(s)[i * LANES + lane]
-                for i in range(columns):
-                    out[states + i] = lane_numbers(row)[i * LANES + lane]
-                for i in range(size):
-                    out[states + columns + i] = lane_numbers(seen)[i * LANES + lane]
+                out = tail(ends, lane * (n.states + n.columns + size))
+                copy_lane(lane, n.states, c.s, out)
+                copy_lane(lane, n.columns, c.row, tail(out, n.states))
+                copy_lane(lane, size, c.seen, tail(out, n.states + n.columns))
             else:
                 living += 1
     return living
@@ -53,24 +78,30 @@ def advance_lanes(
     after: Function, observe: Function, first: int, last: int, h: float, wires: Any, plan: Any,
     size: int, under_way: Vector, ends: Vector,
 ) -> int:  # fmt: skip
+    """`closed_loop.advance` for all lanes, without a log.
+
+    A lane whose numbers are not finite goes on without an effect on the others. Returns the first
+    instant that was not begun, or at which no lane was left, or `last`.
+    """
     c, n = named_wires(wires), named_plan(plan)
     for k in range(first, last):
         if under_way[STOP] != 0.0:
             return k
         under_way[0] = k
         t = k * h
-        again = k > first and t == (k - 1) * h + h
+        again = k > first and t == (k - 1) * h + h  # see `closed_loop.instant`
         if n.sample_every > 0 or n.hold_every > 0:
             sample_and_hold(EVERY, k, t, h, path, law, sample, after, c, n)
         rates(EVERY, t, c.s, c.stages, path, disturbance, law, actuator, after, c, n, again)
         measure(EVERY, c.s, c.row)
-        good = lanes_and(finite(EVERY, n.states, c.s), finite(EVERY, n.columns, c.row))
-        lost = lanes_not(good)
+        lost = lanes_not(
+            lanes_and(finite(EVERY, n.states, c.s), finite(EVERY, n.columns, c.row))
+        )
         if lanes_any(lost):
-            if bury(k, lost, under_way, c.s, c.row, c.seen, n.states, n.columns, size, ends) == 0:
+            if end_lanes(k, lost, c, n, size, under_way, ends) == 0:
                 return k
         weight = 0.5 * h if k == 0 or k == n.steps else h
         observe(t, weight, c.s, c.row, c.observer, c.seen)
         if k < n.steps:
-            step(EVERY, k * h, h, path, disturbance, law, actuator, after, c, n)
+            step(EVERY, t, h, path, disturbance, law, actuator, after, c, n)
     return last

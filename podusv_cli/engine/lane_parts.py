@@ -16,6 +16,7 @@ from numba.extending import intrinsic
 
 from podusv_cli.core import elementary, kernel
 from podusv_cli.core.kernel import LANES
+from podusv_cli.engine import lane_march
 from podusv_cli.engine.lane_types import BOOL, FLOAT, IR, WHOLE, LanesType, intrinsic_call, lanes_of
 
 VECTOR: Any = types.CPointer(FLOAT)  # type: ignore[no-untyped-call]
@@ -234,6 +235,8 @@ def lanes_store(typing: Any, mask: Any, vector: Any, index: Any, number: Any) ->
 @intrinsic
 def lanes_first(typing: Any, number: Any) -> Any:
     """The number of the first lane, where it is the same in all."""
+    if not isinstance(number, LanesType):
+        return number(number), lambda c, b, s, args: args[0]
 
     def code(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return builder.extract_element(args[0], ir.IntType(32)(0))
@@ -275,6 +278,11 @@ def _scratch(typing: Any, count: Any) -> Any:
         return cgutils.alloca_once(builder, IR[FLOAT], count.literal_value)  # type: ignore[no-untyped-call]
 
     return VECTOR(count), code
+
+
+@intrinsic
+def _filled(typing: Any, whole: Any, count: Any) -> Any:
+    return types.int64(types.int64, types.int64), lambda c, b, s, args: args[1]
 
 
 def _bitwise(from_lanes: Any, to_lanes: Any) -> Any:
@@ -338,7 +346,11 @@ def _extreme(sign: str) -> Any:
 # What stands for kernels that are no arithmetic.
 PRIMITIVES = {
     kernel.tail: _tail, kernel.scratch: _scratch, kernel.shared: lanes_first,
+    kernel.filled: _filled,
     elementary.bits: _bitwise(FLOAT, WHOLE), elementary.of_bits: _bitwise(WHOLE, FLOAT),
+    lane_march.lanes_and: lanes_and, lane_march.lanes_not: lanes_not,
+    lane_march.lanes_any: lanes_any, lane_march.lane_true: lane_true,
+    lane_march.lane_numbers: lane_numbers,
 }  # fmt: skip
 WORDS = {
     word.__name__: word

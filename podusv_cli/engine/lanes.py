@@ -1,0 +1,147 @@
+"""Runs side by side: the vectors of several runs as one, a run in every lane.
+
+What compiled code for lanes takes and gives, without numba. A number of a vector is `LANES` numbers
+in memory, one of every run, so that a register holds them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from podusv_cli.core.kernel import LANES, Vector
+from podusv_cli.engine import lane_doors, signatures
+from podusv_cli.engine.grid import TimeGrid
+from podusv_cli.engine.lane_march import REACHED
+from podusv_cli.engine.layout import Plan, Wires
+from podusv_cli.engine.march import Ending
+from podusv_cli.engine.simulate import ClosedLoop, Observer, entries
+
+NUMBER = 8  # bytes
+FEWEST = 3  # runs; fewer take no longer alone
+MARCHING = -1.0  # stands for the instants that a lane has reached
+
+
+def alike(loop: ClosedLoop, observer: Observer) -> dict[str, frozenset[str]]:
+    """By part the constants that all lanes have to share: choices, sizes and positions."""
+    law, names = loop.controller, {part: names for part, _, names in entries(loop, observer)}
+    chosen = {
+        "path": loop.path.choices(), "disturbance": loop.disturbance.choices(),
+        "actuator": loop.actuator.choices(), "law": law.choices(), "sample": law.choices(),
+        "after_saturation": law.choices(), "observer": frozenset(names["observer"]),
+    }  # fmt: skip
+    whole = {
+        part: lane_doors.whole_numbers(inner) for part, inner, _ in entries(loop, observer)
+    }
+    shared = whole["law"] | whole["sample"] | whole["after_saturation"]
+    whole |= dict.fromkeys(("law", "sample", "after_saturation"), shared)
+    return {part: (chosen[part] | whole[part]) & set(names[part]) for part in names}
+
+
+def marcher(loop: ClosedLoop, observer: Observer) -> Callable[..., int]:
+    """The compiled march of runs like this loop, side by side.
+
+    Raises TypeError where a part cannot go another way in every lane.
+    """
+    from podusv_cli.engine import compile  # only what marches side by side needs it
+
+    shared = alike(loop, observer)
+    doors = [compile.lane_entry(*part, shared[part[0]]) for part in entries(loop, observer)]
+    march = compile.lane_routine()
+
+    def compiled_march(
+        last: int, h: float, vectors: list[Vector], plan: Plan, under_way: Vector, ends: Vector
+    ) -> int:
+        pointers = (lane_doors.LANE_VECTOR * len(vectors))(
+            *(vector.ctypes.data_as(lane_doors.LANE_VECTOR) for vector in vectors)
+        )
+        return int(
+            march(
+                *doors, 0, last, h, pointers, signatures.whole_numbers(plan),
+                len(vectors[Wires._fields.index("seen")]) // LANES,
+                signatures.pointer(under_way), signatures.pointer(ends),
+            )
+        )  # fmt: skip
+
+    return compiled_march
+
+
+def kind(wires: Wires, loop: ClosedLoop, observer: Observer) -> tuple[Any, ...]:
+    """What runs have to have in common to march side by side: the constants that are alike."""
+    shared = alike(loop, observer)
+    parts = {part: names for part, _, names in entries(loop, observer)}
+    vectors = {
+        "path": wires.path, "disturbance": wires.disturbance, "law": wires.law,
+        "actuator": wires.actuator,
+    }  # fmt: skip
+    return tuple(
+        float(number)
+        for part, vector in vectors.items()
+        for name, number in zip(parts[part], vector, strict=False)
+        if name in shared[part]
+    )
+
+
+def _room(count: int) -> Vector:
+    """Zeros that begin at a whole register."""
+    room = np.zeros(count + LANES)
+    return room[-(room.ctypes.data // NUMBER) % LANES :][:count]
+
+
+def _side_by_side(vectors: Sequence[Vector]) -> Vector:
+    """One vector of several, a lane each; the lanes that are left repeat the first."""
+    room = _room(LANES * max(map(len, vectors)))
+    for lane in range(LANES):
+        vector = vectors[lane if lane < len(vectors) else 0]
+        room[lane::LANES][: len(vector)] = vector
+    return room
+
+
+@dataclass(frozen=True, eq=False)
+class Lanes:
+    """Runs that march side by side; `runs` are their vectors, which get what the march ends with."""
+
+    runs: Sequence[Wires]
+    vectors: list[Vector]
+    plan: Plan
+    under_way: Vector
+    ends: Vector
+
+    @classmethod
+    def of(cls, runs: Sequence[Wires], plan: Plan) -> Lanes:
+        """Side by side, ready for the march."""
+        size = plan.states + plan.columns + len(runs[0].seen)
+        under_way = np.zeros(REACHED + LANES)
+        under_way[REACHED : REACHED + len(runs)] = MARCHING
+        vectors = [_side_by_side(several) for several in zip(*runs, strict=True)]
+        return cls(runs, vectors, plan, under_way, np.zeros(LANES * size))
+
+    def march(self, advance: Callable[..., int], grid: TimeGrid) -> Callable[[], int]:
+        """A function that marches over the grid."""
+        last = grid.steps + 1
+        return partial(
+            advance, last, grid.step, self.vectors, self.plan, self.under_way, self.ends
+        )
+
+    def endings(self, reached: int, last: int) -> list[Ending]:
+        """How each run ended, where the march stopped at `reached`; its vectors are filled in."""
+        return [self._ending(lane, reached, last) for lane in range(len(self.runs))]
+
+    def _ending(self, lane: int, reached: int, last: int) -> Ending:
+        wires, ended = self.runs[lane], self.under_way[REACHED + lane]
+        vectors = Wires(*self.vectors)
+        kept = [vector[lane::LANES] for vector in (vectors.s, vectors.row, vectors.seen)]
+        if ended != MARCHING:
+            kept = np.split(
+                self.ends.reshape(LANES, -1)[lane], np.cumsum([len(part) for part in kept])[:-1]
+            )
+        wires.s[:], wires.row[:], wires.seen[:] = (
+            part[: len(own)] for part, own in zip(kept, (wires.s, wires.row, wires.seen), strict=True)
+        )
+        if ended != MARCHING:
+            return Ending(int(ended), "diverged")
+        return Ending(reached, "finished" if reached == last else "interrupted")
