@@ -6,6 +6,7 @@ numba is slow to import, so it is imported only for code that is not on the disk
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -16,6 +17,7 @@ from podusv_cli.engine import lane_doors, object_cache, signatures
 from podusv_cli.engine.lane_march import advance_lanes
 from podusv_cli.process.interrupts import interrupts_deferred
 
+LANES_BY = "lane_numba"  # what compiles kernels for lanes
 RULES = (
     "a kernel is marked with @kernel, reads and writes numbers of vectors one by one (x[2], "
     "tau[0] = ...), calls math.sin and the like and other kernels, and allocates, prints and "
@@ -47,15 +49,29 @@ def lane_entry(part: str, inner: Any, names: tuple[str, ...], alike: frozenset[s
 
     Raises TypeError for a kernel that cannot go another way in every lane.
     """
-    label = f"lanes_{part}_entry_{inner.__module__}_{inner.__qualname__}"
-    bound = lane_doors.bind(part, inner, names, alike)
-    return compiled(bound, lane_doors.PROTOTYPES[part], label, "lane_numba")
+    return compiled(*_lane_door(part, inner, names, alike), LANES_BY)
 
 
 @cache
 def lane_routine() -> Any:
     """The compiled march of a run in every lane."""
-    return compiled(advance_lanes, lane_doors.ADVANCE_LANES, "", "lane_numba")
+    return compiled(advance_lanes, lane_doors.ADVANCE_LANES, "", LANES_BY)
+
+
+def has_lanes(parts: Sequence[tuple[str, Any, tuple[str, ...], frozenset[str]]]) -> bool:
+    """Whether all of these parts are compiled for lanes, and the march."""
+    doors = [_lane_door(*part) for part in parts]
+    pieces = [(function, label) for function, _, label in doors]
+    return all(
+        object_cache.is_kept(_name(*piece)) for piece in (*pieces, (advance_lanes, ""))
+    )
+
+
+def _lane_door(
+    part: str, inner: Any, names: tuple[str, ...], alike: frozenset[str]
+) -> tuple[Any, Any, str]:
+    label = f"lanes_{part}_entry_{inner.__module__}_{inner.__qualname__}"
+    return lane_doors.bind(part, inner, names, alike), lane_doors.PROTOTYPES[part], label
 
 
 @cache
@@ -73,12 +89,15 @@ def compiled(
 
     Raises TypeError for a kernel that needs more than arithmetic and the mathematical library.
     """
-    name = f"{label or function.__qualname__}_{object_cache.fingerprint(function)}"
-
     def compile_now() -> object_cache.Code:
         # The compiler would swallow an interrupt, so interrupts wait for it, a second or two.
         with interrupts_deferred():
             made = import_module(f"podusv_cli.engine.{compiler}").object_code(function, prototype)
             return cast(object_cache.Code, made)
 
-    return object_cache.stored(prototype, re.sub(r"\W", "_", name), compile_now)
+    return object_cache.stored(prototype, _name(function, label), compile_now)
+
+
+def _name(function: Any, label: str) -> str:
+    name = f"{label or function.__qualname__}_{object_cache.fingerprint(function)}"
+    return re.sub(r"\W", "_", name)

@@ -10,6 +10,7 @@ from typing import Any
 from numba import njit, types
 
 from podusv_cli.core import kernel
+from podusv_cli.core.errors import in_a_line
 from podusv_cli.engine import compile_numba, lane_march
 from podusv_cli.engine.lane_doors import has_source
 from podusv_cli.engine.lane_kernels import rewritten
@@ -22,11 +23,14 @@ PLAIN = {*PRIMITIVES, *AS_WRITTEN}
 
 
 def object_code(function: Any, prototype: Any) -> Code:
-    """Object code of a kernel for lanes and all kernels it calls.
+    """Object code of a kernel for lanes and all kernels it calls, or why there is none.
 
-    Raises TypeError for a kernel that cannot go another way in every lane.
+    numba may raise anything where a kernel does what its types for lanes have no code for.
     """
-    return compile_numba.translated(function, _for_lanes, _signature(prototype))
+    try:
+        return compile_numba.translated(function, _for_lanes, _signature(prototype))
+    except Exception as error:
+        return Code("", in_a_line(error).encode())
 
 
 @cache

@@ -6,7 +6,8 @@ in memory, one of every run, so that a register holds them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -23,6 +24,7 @@ from podusv_cli.engine.simulate import ClosedLoop, Observer, entries
 
 NUMBER = 8  # bytes
 FEWEST = 3  # runs; fewer take no longer alone
+WORTH = 20_000_000  # instants of a batch, from which on compiling takes less than it gains
 MARCHING = -1.0  # stands for the instants that a lane has reached
 
 
@@ -70,10 +72,19 @@ def marcher(loop: ClosedLoop, observer: Observer) -> Callable[..., int]:
     return compiled_march
 
 
-def kind(wires: Wires, loop: ClosedLoop, observer: Observer) -> tuple[Any, ...]:
-    """What runs have to have in common to march side by side: the constants that are alike."""
+def is_compiled(loop: ClosedLoop, observer: Observer) -> bool:
+    """Whether the march of runs like this loop is on the disk, or in memory."""
+    from podusv_cli.engine import compile
+
     shared = alike(loop, observer)
-    parts = {part: names for part, _, names in entries(loop, observer)}
+    return compile.has_lanes([(*part, shared[part[0]]) for part in entries(loop, observer)])
+
+
+def kind(
+    wires: Wires, loop: ClosedLoop, observer: Observer, shared: Mapping[str, frozenset[str]]
+) -> tuple[float, ...]:
+    """The constants of a run that are alike in runs side by side."""
+    names = {part: names for part, _, names in entries(loop, observer)}
     vectors = {
         "path": wires.path, "disturbance": wires.disturbance, "law": wires.law,
         "actuator": wires.actuator,
@@ -81,7 +92,7 @@ def kind(wires: Wires, loop: ClosedLoop, observer: Observer) -> tuple[Any, ...]:
     return tuple(
         float(number)
         for part, vector in vectors.items()
-        for name, number in zip(parts[part], vector, strict=False)
+        for name, number in zip(names[part], vector, strict=False)
         if name in shared[part]
     )
 
@@ -145,3 +156,52 @@ class Lanes:
         if ended != MARCHING:
             return Ending(int(ended), "diverged")
         return Ending(reached, "finished" if reached == last else "interrupted")
+
+
+class Sorter:
+    """Sorts the runs of a batch by what they have to have in common to march side by side."""
+
+    def __init__(self, observer: Observer, instants: int, wanted: bool | None) -> None:
+        """`instants` are those of all runs; `wanted` says whether to march side by side at all."""
+        self.advance: Callable[..., int] | None = None
+        self._observer, self._instants, self._wanted = observer, instants, wanted
+        self._alike: dict[str, frozenset[str]] = {}
+        self._waiting: dict[tuple[float, ...], list[Any]] = {}
+        self._chosen = False
+
+    def choose(self, loop: ClosedLoop) -> None:
+        """Decide, by the first loop, whether runs march side by side."""
+        if not self._chosen:
+            self._chosen = True
+            if self._wanted or (self._wanted is None and self._is_worth(loop)):
+                with suppress(TypeError):  # `why_alone` tells why
+                    self.advance = marcher(loop, self._observer)
+                    self._alike = alike(loop, self._observer)
+
+    def _is_worth(self, loop: ClosedLoop) -> bool:
+        return self._instants >= WORTH or is_compiled(loop, self._observer)
+
+    def sorted(self, wires: Wires, loop: ClosedLoop, run: Any) -> list[Any]:
+        """The runs to start now that this one is ready."""
+        if not self.advance:
+            return [run]
+        waiting = self._waiting.setdefault(kind(wires, loop, self._observer, self._alike), [])
+        waiting.append(run)
+        if len(waiting) < LANES:
+            return []
+        ready = waiting.copy()
+        waiting.clear()
+        return ready
+
+    def rest(self) -> list[list[Any]]:
+        """The runs that still wait for others."""
+        return [runs for runs in self._waiting.values() if runs]
+
+
+def why_alone(loop: ClosedLoop, observer: Observer) -> str:
+    """Why runs like this loop cannot march side by side; empty where they can."""
+    try:
+        marcher(loop, observer)
+    except TypeError as error:
+        return str(error)
+    return ""
