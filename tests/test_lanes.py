@@ -11,7 +11,6 @@ import pytest
 from podusv_cli.actuators.ideal import Ideal
 from podusv_cli.actuators.saturated import Saturated
 from podusv_cli.controllers.base import Controller
-from podusv_cli.controllers.network import Network
 from podusv_cli.core.registry import kinds
 from podusv_cli.engine.batch import Batch, simulate_many
 from podusv_cli.engine.grid import TimeGrid

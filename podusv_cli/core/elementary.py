@@ -55,7 +55,7 @@ def bits(number: float) -> Any:
 @kernel
 def of_bits(whole: Any) -> float:
     """The number with these bits."""
-    return np.int64(whole).view(np.float64)  # type: ignore[no-any-return]
+    return np.int64(whole).view(np.float64)
 
 
 @kernel

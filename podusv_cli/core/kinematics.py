@@ -20,8 +20,11 @@ def wrap(angle: float) -> float:
 
 @kernel
 def direction(x: float, y: float) -> float:
-    """Angle [rad] of the vector (x, y) from the x axis, in [-pi, pi]; 0 where both are 0."""
-    return arctangent(y, x)
+    """Angle [rad] of the vector (x, y) from the x axis, in [-pi, pi]; 0 where both are 0.
+
+    Adding 0.0 takes the sign of a zero away.
+    """
+    return arctangent(y + 0.0, x + 0.0)
 
 
 @kernel

@@ -12,7 +12,6 @@ from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import LANES, Vector, filled, kernel, scratch, whole_lanes
 from podusv_cli.disturbances.base import Disturbance
 
-
 WAVES = 6  # a sine and a cosine on every axis
 
 

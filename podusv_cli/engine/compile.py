@@ -62,9 +62,7 @@ def has_lanes(parts: Sequence[tuple[str, Any, tuple[str, ...], frozenset[str]]])
     """Whether all of these parts are compiled for lanes, and the march."""
     doors = [_lane_door(*part) for part in parts]
     pieces = [(function, label) for function, _, label in doors]
-    return all(
-        object_cache.is_kept(_name(*piece)) for piece in (*pieces, (advance_lanes, ""))
-    )
+    return all(object_cache.is_kept(_name(*piece)) for piece in (*pieces, (advance_lanes, "")))
 
 
 def _lane_door(
@@ -89,6 +87,7 @@ def compiled(
 
     Raises TypeError for a kernel that needs more than arithmetic and the mathematical library.
     """
+
     def compile_now() -> object_cache.Code:
         # The compiler would swallow an interrupt, so interrupts wait for it, a second or two.
         with interrupts_deferred():

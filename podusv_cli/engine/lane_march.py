@@ -1,6 +1,6 @@
 """The march of several runs side by side, a run in every lane.
 
-These kernels are for lanes only, so they are compiled as they are written. Their words stand for
+These kernels are for lanes only, so their branches stay as they are written. Their words stand for
 those of `lane_parts`.
 """
 
@@ -14,7 +14,6 @@ from podusv_cli.engine.layout import STOP, Function
 from podusv_cli.engine.sampled import sample_and_hold
 
 REACHED = STOP + 1  # in `under_way`: how many instants each lane reached, below 0 while it marches
-EVERY = None  # the mask of all lanes
 
 
 @kernel
@@ -91,17 +90,14 @@ def advance_lanes(
         t = k * h
         again = k > first and t == (k - 1) * h + h  # see `closed_loop.instant`
         if n.sample_every > 0 or n.hold_every > 0:
-            sample_and_hold(EVERY, k, t, h, path, law, sample, after, c, n)
-        rates(EVERY, t, c.s, c.stages, path, disturbance, law, actuator, after, c, n, again)
-        measure(EVERY, c.s, c.row)
-        lost = lanes_not(
-            lanes_and(finite(EVERY, n.states, c.s), finite(EVERY, n.columns, c.row))
-        )
-        if lanes_any(lost):
-            if end_lanes(k, lost, c, n, size, under_way, ends) == 0:
-                return k
+            sample_and_hold(k, t, h, path, law, sample, after, c, n)
+        rates(t, c.s, c.stages, path, disturbance, law, actuator, after, c, n, again)
+        measure(c.s, c.row)
+        lost = lanes_not(lanes_and(finite(n.states, c.s), finite(n.columns, c.row)))
+        if lanes_any(lost) and end_lanes(k, lost, c, n, size, under_way, ends) == 0:
+            return k
         weight = 0.5 * h if k == 0 or k == n.steps else h
         observe(t, weight, c.s, c.row, c.observer, c.seen)
         if k < n.steps:
-            step(EVERY, t, h, path, disturbance, law, actuator, after, c, n)
+            step(t, h, path, disturbance, law, actuator, after, c, n)
     return last

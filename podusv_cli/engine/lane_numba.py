@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-call"
 """Object code of kernels for lanes by numba."""
 
 from __future__ import annotations
@@ -8,13 +9,14 @@ from functools import cache
 from typing import Any
 
 from numba import njit, types
+from numba.core.typing.ctypes_utils import from_ctypes
 
 from podusv_cli.core import kernel
 from podusv_cli.core.errors import in_a_line
 from podusv_cli.engine import compile_numba, lane_march
-from podusv_cli.engine.lane_doors import has_source
-from podusv_cli.engine.lane_kernels import rewritten
+from podusv_cli.engine.lane_kernels import everywhere, rewritten
 from podusv_cli.engine.lane_parts import PRIMITIVES, WORDS
+from podusv_cli.engine.lane_source import has_source
 from podusv_cli.engine.lane_types import FLOAT
 from podusv_cli.engine.object_cache import Code
 
@@ -43,8 +45,11 @@ def inlined(function: Any) -> Any:
 
 def _for_lanes(function: Any) -> Any:
     """A copy of the kernel for lanes whose globals have numba functions in place of kernels."""
-    written = function in AS_WRITTEN or not has_source(function)
-    made = function if written else rewritten(function, WORDS, PLAIN)
+    made = function
+    if function in AS_WRITTEN:
+        made = everywhere(function, PLAIN)
+    elif has_source(function):
+        made = rewritten(function, WORDS, PLAIN)
     outer = made.__globals__
     named = {i.argval for i in dis.get_instructions(function) if i.opname == "LOAD_GLOBAL"}
     inner = {name: inlined(outer[name]) for name in named if kernel.is_kernel(outer.get(name))}
@@ -58,6 +63,6 @@ def _signature(prototype: Any) -> Any:
 def _type(kind: Any) -> Any:
     if kind and issubclass(kind, ctypes._CFuncPtr):  # type: ignore[attr-defined]
         return types.ExternalFunctionPointer(_signature(kind), ctypes.addressof)
-    if kind and issubclass(kind, ctypes._Pointer):  # type: ignore[attr-defined]
-        return types.CPointer(_type(kind._type_))  # type: ignore[no-untyped-call]
-    return FLOAT if kind and issubclass(kind, ctypes.Array) else compile_numba.from_ctypes(kind)
+    if kind and issubclass(kind, ctypes._Pointer):
+        return types.CPointer(_type(kind._type_))
+    return FLOAT if kind and issubclass(kind, ctypes.Array) else from_ctypes(kind)

@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-call,misc,attr-defined,untyped-decorator"
 """numba's types for a number of every lane, and the LLVM code of what kernels do with them.
 
 `LANES_FLOAT` is one float a lane, in vector registers; `LANES_WHOLE` a whole number, `LANES_BOOL`
@@ -91,7 +92,7 @@ def _operation(function: Any, arity: int, result: Any = None) -> None:
     """Let numba know `function` of floats; `result` is the type, by default the same."""
 
     @infer_global(function)
-    class Template(AbstractTemplate):  # type: ignore[misc]
+    class Template(AbstractTemplate):
         key = function
 
         def generic(self, args: Any, kws: Any) -> Any:
@@ -111,13 +112,13 @@ def _lower(function: Any, kind: Any, arity: int, emit: Any) -> None:
     lower_builtin(function, *[kind] * arity)(code)
 
 
-FLOATS = {
+FLOATS: dict[Any, Any] = {
     operator.add: lambda b, x, y: b.fadd(x, y),
     operator.sub: lambda b, x, y: b.fsub(x, y),
     operator.mul: lambda b, x, y: b.fmul(x, y),
     operator.truediv: lambda b, x, y: b.fdiv(x, y),
 }
-WHOLES = {
+WHOLES: dict[Any, Any] = {
     operator.add: lambda b, x, y: b.add(x, y),
     operator.sub: lambda b, x, y: b.sub(x, y),
     operator.mul: lambda b, x, y: b.mul(x, y),
@@ -125,7 +126,7 @@ WHOLES = {
     operator.or_: lambda b, x, y: b.or_(x, y),
     operator.lshift: lambda b, x, y: b.shl(x, y),
 }
-COMPARISONS = {
+COMPARISONS: dict[Any, str] = {
     operator.lt: "<", operator.le: "<=", operator.gt: ">", operator.ge: ">=", operator.eq: "==",
     operator.ne: "!=",
 }  # fmt: skip
@@ -182,15 +183,18 @@ def _library(function: Any, arity: int) -> None:
         return each_lane(context, builder, function, args)
 
 
-for _function in (
-    math.sin, math.cos, math.tan, math.asin, math.acos, math.atan, math.exp, math.log, math.sinh,
-    math.cosh, math.tanh, math.log10,
-):  # fmt: skip
+ONE: tuple[Any, ...] = (
+    math.sin, math.cos, math.tan, math.asin, math.acos, math.atan, math.exp, math.log,
+    math.sinh, math.cosh, math.tanh, math.log10,
+)  # fmt: skip
+TWO: tuple[Any, ...] = (math.atan2, math.hypot, math.pow, math.copysign)
+LLVM: dict[Any, str] = {math.sqrt: "sqrt", math.fabs: "fabs", abs: "fabs"}
+for _function in ONE:
     _library(_function, 1)
-for _function in (math.atan2, math.hypot, math.pow, math.copysign):
+for _function in TWO:
     _library(_function, 2)
-for _function, _name in {math.sqrt: "sqrt", math.fabs: "fabs", abs: "fabs"}.items():
+for _function, _llvm in LLVM.items():
     _operation(_function, 1)
-    _lower(_function, FLOAT, 1, lambda b, x, name=_name: intrinsic_call(b, name, x))
+    _lower(_function, FLOAT, 1, lambda b, x, name=_llvm: intrinsic_call(b, name, x))
 _operation(math.isnan, 1, BOOL)
 _lower(math.isnan, FLOAT, 1, lambda b, x: b.fcmp_unordered("uno", x, x))

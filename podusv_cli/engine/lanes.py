@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from podusv_cli.core.kernel import LANES, Vector
-from podusv_cli.engine import lane_doors, signatures
+from podusv_cli.engine import lane_doors, lane_source, signatures
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.lane_march import REACHED
 from podusv_cli.engine.layout import Plan, Wires
@@ -36,9 +36,7 @@ def alike(loop: ClosedLoop, observer: Observer) -> dict[str, frozenset[str]]:
         "actuator": loop.actuator.choices(), "law": law.choices(), "sample": law.choices(),
         "after_saturation": law.choices(), "observer": frozenset(names["observer"]),
     }  # fmt: skip
-    whole = {
-        part: lane_doors.whole_numbers(inner) for part, inner, _ in entries(loop, observer)
-    }
+    whole = {part: lane_source.whole_numbers(inner) for part, inner, _ in entries(loop, observer)}
     shared = whole["law"] | whole["sample"] | whole["after_saturation"]
     whole |= dict.fromkeys(("law", "sample", "after_saturation"), shared)
     return {part: (chosen[part] | whole[part]) & set(names[part]) for part in names}
@@ -114,7 +112,7 @@ def _side_by_side(vectors: Sequence[Vector]) -> Vector:
 
 @dataclass(frozen=True, eq=False)
 class Lanes:
-    """Runs that march side by side; `runs` are their vectors, which get what the march ends with."""
+    """Runs that march side by side. `runs` are their own vectors, which get the result."""
 
     runs: Sequence[Wires]
     vectors: list[Vector]
@@ -134,9 +132,7 @@ class Lanes:
     def march(self, advance: Callable[..., int], grid: TimeGrid) -> Callable[[], int]:
         """A function that marches over the grid."""
         last = grid.steps + 1
-        return partial(
-            advance, last, grid.step, self.vectors, self.plan, self.under_way, self.ends
-        )
+        return partial(advance, last, grid.step, self.vectors, self.plan, self.under_way, self.ends)
 
     def endings(self, reached: int, last: int) -> list[Ending]:
         """How each run ended, where the march stopped at `reached`; its vectors are filled in."""
@@ -151,7 +147,8 @@ class Lanes:
                 self.ends.reshape(LANES, -1)[lane], np.cumsum([len(part) for part in kept])[:-1]
             )
         wires.s[:], wires.row[:], wires.seen[:] = (
-            part[: len(own)] for part, own in zip(kept, (wires.s, wires.row, wires.seen), strict=True)
+            part[: len(own)]
+            for part, own in zip(kept, (wires.s, wires.row, wires.seen), strict=True)
         )
         if ended != MARCHING:
             return Ending(int(ended), "diverged")
