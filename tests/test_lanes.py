@@ -15,9 +15,11 @@ from podusv_cli.core.registry import kinds
 from podusv_cli.engine.batch import Batch, simulate_many
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.lanes import why_alone
-from podusv_cli.engine.simulate import ClosedLoop
+from podusv_cli.engine.march import Work
+from podusv_cli.engine.simulate import ClosedLoop, Observer
 from podusv_cli.engine.variants import variants
 from podusv_cli.metrics.table import observer
+from podusv_cli.paths.waypoints import Waypoints
 from podusv_cli.scenario.load import load
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -77,3 +79,70 @@ def test_runs_side_by_side_have_the_bits_that_they_have_alone(
     same(together, alone)
     assert {"finished", "diverged"} <= set(alone.status)
     assert len(set(alone.reached)) > 2
+
+
+def test_options_of_a_law_and_of_its_sampling_march_side_by_side() -> None:
+    """Held directions, samples, the observer of the sway load, anti-windup, a held demand."""
+    law = kinds("podusv_cli.controllers", Controller)["dsc"]
+    controller = law.model_validate(
+        {
+            "rate": "difference",
+            "hold_below": 0.8,
+            "standoff_reference": "crab",
+            "anti_windup": "auxiliary",
+            "difference_step": 0.02,
+        }
+    )
+    base = replace(loop("dsc"), controller=controller, actuator=Saturated())
+    near = variants(base, {"start.x": np.linspace(-0.9, 0.9, COUNT)})
+    together, alone = both([*near, *scattered(base, 3)], TimeGrid(0.01, 300, hold_every=2))
+    same(together, alone)
+
+
+def test_runs_of_another_choice_march_beside_their_like() -> None:
+    """A choice is the same in all runs side by side, so these are sorted by it."""
+    bases = [loop("pid").controller.model_copy(update={"fold": f}) for f in ("joint", "none")]
+    loops = [
+        replace(one, controller=bases[i % 2]) for i, one in enumerate(scattered(loop("pid"), 5))
+    ]
+    same(*both(loops))
+
+
+def test_what_cannot_march_side_by_side_marches_alone_and_says_why() -> None:
+    """A path through points looks for its leg in a loop."""
+    path = Waypoints(points=((0.0, 0.0), (5.0, 1.0), (9.0, -2.0)))
+    base = replace(loop("pid"), path=path)
+    why = why_alone(base, Observer())
+    assert "waypoints.py" in why
+    assert "for runs to march side by side, a kernel has no loop" in why
+    same(*both(scattered(base, 1), TimeGrid(0.01, 20)))
+
+
+def test_an_interrupt_keeps_all_runs_that_marched_side_by_side() -> None:
+    """The user interrupts when the first eight are done."""
+
+    def press(fraction: float) -> None:
+        raise KeyboardInterrupt
+
+    loops = [loop("pid")] * 20
+    batch = simulate_many(
+        loops, TimeGrid(0.01, 20_000), workers=1, progress=press, side_by_side=True
+    )
+    assert batch.status.tolist() == ["finished"] * 8 + ["interrupted"] * 12
+    assert np.isnan(batch.state[8:]).any(axis=1).sum() >= 4  # those that never began
+
+
+def test_runs_that_hang_side_by_side_are_made_again_one_by_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """So that one that hangs costs no other its result."""
+    hangs = Work.hangs
+
+    def wide(work: Work) -> bool:
+        return len(work._under_way) > 2 or hangs(work)
+
+    loops = scattered(loop("pid"), 9)
+    grid = TimeGrid(0.01, 2_000)
+    alone = simulate_many(loops, grid, side_by_side=False)
+    monkeypatch.setattr(Work, "hangs", wide)
+    same(simulate_many(loops, grid, side_by_side=True), alone)

@@ -237,6 +237,7 @@ class _Runs:
             return
         for run, ending in zip(thread.runs, thread.endings(False), strict=True):
             self._batch.note(run, ending, self._grid)
+        for _ in thread.runs:
             self._count()
 
     def _count(self) -> None:

@@ -24,6 +24,11 @@ from podusv_cli.engine.simulate import ClosedLoop, Observer, entries
 
 NUMBER = 8  # bytes
 FEWEST = 3  # runs; fewer take no longer alone
+RULES = (
+    "for runs to march side by side, a kernel has no loop that ends early or at another time in "
+    "every run (while, break, return in a loop), takes no whole number from a run's own numbers, "
+    "and calls of math only functions of floats"
+)
 WORTH = 20_000_000  # instants of a batch, from which on compiling takes less than it gains
 MARCHING = -1.0  # stands for the instants that a lane has reached
 
@@ -195,10 +200,16 @@ class Sorter:
         return [runs for runs in self._waiting.values() if runs]
 
 
+def prepare(loop: ClosedLoop, observer: Observer, instants: int) -> None:
+    """Compile the march of runs like this loop, if so many instants in all are worth it."""
+    if instants >= WORTH:
+        why_alone(loop, observer)
+
+
 def why_alone(loop: ClosedLoop, observer: Observer) -> str:
     """Why runs like this loop cannot march side by side; empty where they can."""
     try:
         marcher(loop, observer)
     except TypeError as error:
-        return str(error)
+        return f"{error}; {RULES}"
     return ""

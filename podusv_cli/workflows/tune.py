@@ -160,10 +160,11 @@ def _prepare(plan: TunePlan) -> None:
     Raises LawError.
     """
     for law, gains in plan.gains.items():
+        runs = sum(plan.runs_wanted()[law])
         options = [{gain.key: word} for gain in gains for word in gain.words]
         for new in options or [{}] if gains else []:
             if with_gains(plan.laws[law], new):
-                prepare(plan.variant({law: (law, new)}, TRAIN, 1), law, 0)
+                prepare(plan.variant({law: (law, new)}, TRAIN, 1), law, 0, runs)
 
 
 def _idle(plan: TunePlan, request: Request) -> dict[str, tuple[str, ...]]:
