@@ -155,7 +155,7 @@ class _Runs:
         """Make a run, and have it march alone, or wait for others to march beside it."""
         run = self._made(position)
         if run:
-            self._together(self._lanes.sorted(run.wires, run.loop, run))
+            self._together(self._lanes.sorted(run.wires, run))
         else:
             self._count()
 

@@ -6,7 +6,7 @@ in memory, one of every run, so that a register holds them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
@@ -83,21 +83,14 @@ def is_compiled(loop: ClosedLoop, observer: Observer) -> bool:
     return compile.has_lanes([(*part, shared[part[0]]) for part in entries(loop, observer)])
 
 
-def kind(
-    wires: Wires, loop: ClosedLoop, observer: Observer, shared: Mapping[str, frozenset[str]]
-) -> tuple[float, ...]:
-    """The constants of a run that are alike in runs side by side."""
+def places(loop: ClosedLoop, observer: Observer) -> list[tuple[int, list[int]]]:
+    """Where the constants that are alike lie: positions of vectors in `Wires`, and in these."""
+    shared = alike(loop, observer)
     names = {part: names for part, _, names in entries(loop, observer)}
-    vectors = {
-        "path": wires.path, "disturbance": wires.disturbance, "law": wires.law,
-        "actuator": wires.actuator,
-    }  # fmt: skip
-    return tuple(
-        float(number)
-        for part, vector in vectors.items()
-        for name, number in zip(names[part], vector, strict=False)
-        if name in shared[part]
-    )
+    return [
+        (Wires._fields.index(part), [i for i, n in enumerate(names[part]) if n in shared[part]])
+        for part in ("path", "disturbance", "law", "actuator")
+    ]
 
 
 def _room(count: int) -> Vector:
@@ -167,7 +160,7 @@ class Sorter:
         """`instants` are those of all runs; `wanted` says whether to march side by side at all."""
         self.advance: Callable[..., int] | None = None
         self._observer, self._instants, self._wanted = observer, instants, wanted
-        self._alike: dict[str, frozenset[str]] = {}
+        self._places: list[tuple[int, list[int]]] = []
         self._waiting: dict[tuple[float, ...], list[Any]] = {}
         self._chosen = False
 
@@ -178,16 +171,17 @@ class Sorter:
             if self._wanted or (self._wanted is None and self._is_worth(loop)):
                 with suppress(TypeError):  # `why_alone` tells why
                     self.advance = marcher(loop, self._observer)
-                    self._alike = alike(loop, self._observer)
+                    self._places = places(loop, self._observer)
 
     def _is_worth(self, loop: ClosedLoop) -> bool:
         return self._instants >= WORTH or is_compiled(loop, self._observer)
 
-    def sorted(self, wires: Wires, loop: ClosedLoop, run: Any) -> list[Any]:
+    def sorted(self, wires: Wires, run: Any) -> list[Any]:
         """The runs to start now that this one is ready."""
         if not self.advance:
             return [run]
-        waiting = self._waiting.setdefault(kind(wires, loop, self._observer, self._alike), [])
+        kind = tuple(float(wires[at][i]) for at, inside in self._places for i in inside)
+        waiting = self._waiting.setdefault(kind, [])
         waiting.append(run)
         if len(waiting) < LANES:
             return []
