@@ -30,7 +30,7 @@ def batch_costs(rounds: int = 7) -> dict[str, Any]:
     """By number of steps: time of one run [s] alone and in a batch, and what the batch costs.
 
     The cost is the time of N runs on all cores over N / cores times that of a single one; that in
-    processor time does not see whether the cores were free. Runs side by side are compared with runs
+    processor time does not see whether the cores were free. Runs side by side are related to those
     of a batch one by one. All runs gather metrics, none logs.
     """
     return {str(steps): _costs(steps, rounds) for steps in STEPS}

@@ -23,7 +23,7 @@ from podusv_cli.paths.waypoints import Waypoints
 from podusv_cli.scenario.load import load
 
 ROOT = Path(__file__).resolve().parent.parent
-LAWS = ("adaptive_neural", "dsc", "backstepping", "pid")
+SLOW = [pytest.param(law, marks=pytest.mark.slow) for law in ("dsc", "backstepping")]
 GRID = TimeGrid(0.01, 400)
 COUNT = 11  # a whole bundle, and one with lanes left over
 SCENARIO = load(ROOT / "configs" / "paper" / "corrected.yaml").scenario
@@ -66,7 +66,7 @@ def same(one: Batch, other: Batch) -> None:
     np.testing.assert_array_equal(one.seen, other.seen)
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", ["adaptive_neural", "pid", *SLOW])
 @pytest.mark.parametrize("actuator", [Ideal(), Saturated()])
 def test_runs_side_by_side_have_the_bits_that_they_have_alone(
     law: str, actuator: Ideal | Saturated
@@ -81,6 +81,7 @@ def test_runs_side_by_side_have_the_bits_that_they_have_alone(
     assert len(set(alone.reached)) > 2
 
 
+@pytest.mark.slow  # the compiler takes half a minute
 def test_options_of_a_law_and_of_its_sampling_march_side_by_side() -> None:
     """Held directions, samples, the observer of the sway load, anti-windup, a held demand."""
     law = kinds("podusv_cli.controllers", Controller)["dsc"]
