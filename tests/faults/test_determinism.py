@@ -1,6 +1,6 @@
 """The same scenario gives the same bits: again, elsewhere, beside others, compiled or not.
 
-Between processors one thing is left: sine, cosine and arctangent of the C library, which come in
+Between processors one thing is left: sine, cosine and tangent of the C library, which come in
 several versions. Those are held to a bound.
 """
 
