@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,6 +28,19 @@ SLOW = [pytest.param(law, marks=pytest.mark.slow) for law in ("dsc", "backsteppi
 GRID = TimeGrid(0.01, 400)
 COUNT = 11  # a whole bundle, and one with lanes left over
 SCENARIO = load(ROOT / "configs" / "paper" / "corrected.yaml").scenario
+
+
+STUDY = """
+vessel: {preset: paper_nonlinear}
+path: {kind: waypoints, points: [[0, 0], [5, 1]]}
+disturbance: {kind: none}
+actuator: {kind: ideal}
+controller: {kind: pid}
+controllers: {a: {}}
+start: {x: -1.0, y: -1.0}
+simulation: {duration: 1.0}
+sweep: {draws: 4, vary: {vessel.m: {uniform: [50.0, 60.0]}}}
+"""
 
 
 def loop(law: str) -> ClosedLoop:
@@ -117,6 +131,21 @@ def test_what_cannot_march_side_by_side_marches_alone_and_says_why() -> None:
     assert "waypoints.py" in why
     assert "for runs to march side by side, a kernel has no loop" in why
     same(*both(scattered(base, 1), TimeGrid(0.01, 20)))
+
+
+def test_the_law_that_podusv_new_writes_marches_side_by_side(podusv: Any) -> None:
+    """An author begins with a law that does."""
+    assert podusv("new", "law", "our_own").code == 0
+    written = load(Path("our_own.yaml")).scenario.singles()["our_own"]
+    assert why_alone(written.closed_loop(), Observer()) == ""
+
+
+def test_validate_says_which_runs_of_a_study_march_side_by_side(podusv: Any) -> None:
+    """And why the others do not."""
+    Path("a.yaml").write_text(STUDY)
+    said = podusv("validate", "a.yaml", "-v").out
+    assert "a: runs march one by one: TypeError" in said
+    assert "waypoints.py" in said
 
 
 def test_an_interrupt_keeps_all_runs_that_marched_side_by_side() -> None:
