@@ -166,12 +166,13 @@ def activate(x: Vector, k: Any, table: Vector, phi: Vector, work: Vector) -> Non
 
 
 @kernel
-def weigh(count: int, weights: Vector, phi: Vector) -> float:
-    """Network output W . Phi (15)."""
-    total = 0.0
+def weigh(count: int, W_u: Vector, W_r: Vector, phi: Vector) -> tuple[float, float]:
+    """Outputs W . Phi (15) of both networks."""
+    f_u = f_r = 0.0
     for i in range(count):
-        total += weights[i] * phi[i]
-    return total
+        f_u += W_u[i] * phi[i]
+        f_r += W_r[i] * phi[i]
+    return f_u, f_r
 
 
 @kernel
