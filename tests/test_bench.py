@@ -140,6 +140,11 @@ def test_a_law_s_python_file_in_place_of_a_scenario_is_told(bench):
         list(cases(Wanted(bench, laws=[Path("my_law.py")])))
 
 
+def test_a_long_name_may_be_broken_in_the_head_of_the_case_table():
+    made = table([made_up("hand_position", "one", 10.0)])
+    assert '<th class="number">hand_<wbr>position</th>' in page(made, [], {})
+
+
 def test_a_median_over_failures_is_a_cross_on_the_page():
     made = table([made_up("a", "one", 10.0), made_up("b", "one", 12.0, FAILED)])
     assert "inf" not in page(made.assign(z_e_steady=math.nan), [], {}).partition("Case by case")[0]
