@@ -31,7 +31,8 @@ def batch_costs(rounds: int = 7) -> dict[str, Any]:
     """By number of steps: time of one run [s] alone and in a batch, and what the batch costs.
 
     The cost is the time of N runs on all cores over N / cores times that of a single one; that in
-    processor time does not see whether the cores were free. All runs gather metrics, none logs.
+    processor time does not see whether the cores were free. Runs side by side are related to those
+    of a batch one by one. All runs gather metrics, none logs.
     """
     return {str(steps): _costs(steps, rounds) for steps in STEPS}
 
@@ -43,13 +44,15 @@ def _costs(steps: int, rounds: int) -> dict[str, Any]:
     scales = {"disturbance.scale": np.linspace(0.5, 1.5, count)}
     loops = variants(CASE.loop(), scales)
     watching = metrics_observer(loops[0], over)
-    many = partial(simulate_many, loops, over, observer=watching)
+    many = partial(simulate_many, loops, over, observer=watching, side_by_side=False)
+    abreast = partial(simulate_many, loops, over, observer=watching, side_by_side=True)
     singly = partial(_one_by_one, loops, over, watching)
     timers = {
         "alone": timed(singly, 1),
         "batch": timed(many, 1),
         "alone, processor": timed(singly, 1, process_time),
         "batch, processor": timed(many, 1, process_time),
+        "side by side, processor": timed(abreast, 1, process_time),
     }
     times = in_turns(timers, rounds)
     return {
@@ -58,4 +61,5 @@ def _costs(steps: int, rounds: int) -> dict[str, Any]:
         "seconds": {name: quartiles(values / count) for name, values in times.items()},
         "cost": quartiles(times["batch"] * cores / times["alone"]),
         "processor cost": quartiles(times["batch, processor"] / times["alone, processor"]),
+        "side by side": quartiles(times["side by side, processor"] / times["batch, processor"]),
     }

@@ -118,12 +118,13 @@ def _batch(batch: Results) -> str:
             steps,
             f"{found['runs']} on {found['cores']}",
             *(spread(found["seconds"][name], 1e3) for name in ("alone", "batch")),
-            *(spread(found[name]) for name in ("cost", "processor cost")),
+            *(spread(found[name]) for name in ("cost", "processor cost", "side by side")),
         ]
         for steps, found in batch.items()
     )
     header = ["steps", "runs on cores", "ms a run alone", "ms a run in the batch"]
-    return table([*header, "cost", "cost in processor time"], rows)
+    costs = ["cost", "cost in processor time", "processor time side by side"]
+    return table([*header, *costs], rows)
 
 
 def _growth(growth: Results) -> list[str]:

@@ -223,7 +223,10 @@ def test_a_law_that_raises_before_the_run_ends_that_run() -> None:
     assert batch.cause[1].startswith("ZeroDivisionError: float division by zero (test_batch.py")
 
 
-def test_lazy_loops_are_made_when_their_runs_begin_and_not_kept() -> None:
+@pytest.mark.parametrize(("side_by_side", "limit"), [(False, 6), (True, 26)])
+def test_lazy_loops_are_made_when_their_runs_begin_and_not_kept(
+    side_by_side: bool, limit: int
+) -> None:
     alive: weakref.WeakSet[Any] = weakref.WeakSet()
     most = 0
 
@@ -235,9 +238,11 @@ def test_lazy_loops_are_made_when_their_runs_begin_and_not_kept() -> None:
         return corrected(controller=law)
 
     like = corrected(controller=Pid())
-    batch = simulate_many(Lazily(50, make), TimeGrid(0.01, 10), workers=2, like=like)
+    batch = simulate_many(
+        Lazily(50, make), TimeGrid(0.01, 10), workers=2, like=like, side_by_side=side_by_side
+    )
     assert set(batch.status) == {"finished"}
-    assert most <= 6  # two runs, the next one, and what has not been collected
+    assert most <= limit  # two threads' runs, the next ones, and what has not been collected
 
 
 def test_an_interrupt_while_a_loop_is_made_keeps_what_is_done() -> None:

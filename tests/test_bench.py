@@ -135,6 +135,21 @@ def test_a_folder_without_tasks_and_a_condition_without_its_vessel_are_told(benc
         list(cases(Wanted(bench)))
 
 
+def test_a_law_s_python_file_in_place_of_a_scenario_is_told(bench):
+    with pytest.raises(UsageError, match=r"my_law.py is Python; write a YAML file with `plugins:"):
+        list(cases(Wanted(bench, laws=[Path("my_law.py")])))
+
+
+def test_a_long_name_may_be_broken_in_the_head_of_the_case_table():
+    made = table([made_up("hand_position", "one", 10.0)])
+    assert '<th class="number">hand_<wbr>position</th>' in page(made, [], {})
+
+
+def test_a_median_over_failures_is_a_cross_on_the_page():
+    made = table([made_up("a", "one", 10.0), made_up("b", "one", 12.0, FAILED)])
+    assert "inf" not in page(made.assign(z_e_steady=math.nan), [], {}).partition("Case by case")[0]
+
+
 def test_a_mistake_in_a_layer_is_told_with_its_file_and_line(bench):
     (bench / "tasks/line.yaml").write_text("path: {kind: lime}\n")
     with pytest.raises(ScenarioError, match=r"line\.yaml:1:14: path\.kind"):

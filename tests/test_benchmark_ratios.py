@@ -62,6 +62,7 @@ def test_the_cost_of_a_step_does_not_depend_on_how_many_there_are():
 def test_many_runs_cost_what_their_steps_cost():
     whole = batch_costs()["31000"]
     assert whole["processor cost"][1] <= 1.05
+    assert whole["side by side"][1] <= 0.35
     # Other programs take cores away; they do not give any.
     assert whole["cost"][0] <= 1.05
 

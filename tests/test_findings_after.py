@@ -116,6 +116,12 @@ def test_long_saturation_is_told_with_its_times():
     assert told("saturated", "actuator={kind: saturated, surge_limit: 1e6, yaw_limit: 1e6}") == []
 
 
+def test_a_law_without_integral_is_not_told_that_it_winds_up():
+    tight = ("controller={kind: sliding_mode}", "actuator={kind: saturated, surge_limit: 2.0}")
+    (text,) = told("saturated", *tight)
+    assert "its memory does not wind up" in text
+
+
 def test_what_helps_against_windup_is_what_the_law_has():
     scenario, out = scene().alone(), changed(log(), saturated=np.ones_like(log()["z_e"]))
 

@@ -11,6 +11,7 @@ from command_samples import ROOT
 from plugin_samples import LAW
 
 from podusv_cli import testing
+from podusv_cli.storage.run_folder import open_run
 
 
 def pytest_of(test: str) -> str:
@@ -40,6 +41,21 @@ def test_what_is_written_runs_and_passes_its_own_test(podusv, what):
     assert f"{PASSED[what]} passed" in pytest_of("test_our_own.py")
     assert podusv("explain", "our_own", "--plugin", "our_own.py").code == 0
     assert "  our_own" in podusv("list", "--plugin", "our_own.py").out
+
+
+def test_the_law_that_is_written_tells_its_standoff_and_does_not_wind_up(podusv):
+    podusv("new", "law", "our_own")
+    changes = (
+        "actuator={kind: saturated, surge_limit: 0.5, yaw_limit: 2.5}",
+        "simulation.duration=30",
+    )
+    options = ("--controller", "our_own", "--no-figures", "--out", "r")
+    said = podusv("run", "our_own.yaml", "--set", changes[0], "--set", changes[1], *options)
+    assert said.code == 0
+    assert "its memory does not wind up" in said.err
+    out = open_run(Path("r"))
+    assert out.metrics["iae_e"] < out.metrics["iae"] - 10.0  # 30 s with a standoff of 1 m
+    assert abs(out.recording["integral_e"]).max() < 60.0
 
 
 def test_a_vessel_is_written_with_a_task(podusv):

@@ -109,7 +109,6 @@ def test_super_twisting_takes_a_load_that_grows_below_its_bound():
 
 def test_a_load_is_not_learnt_with_the_first_order_and_not_while_the_actuator_falls_short():
     assert twist(0.3, constants(LAYER)) == 0.0
-    assert not LAYER.wants_loads()
     for x, memory, target in situations(TWIST, 20):
         found, k = ask(TWIST, x, memory, target, NONLINEAR), constants(TWIST)
         full, tau = found.rate.copy(), np.array([found.tau[0], 0.0, found.tau[1]])

@@ -15,6 +15,7 @@ from tune_samples import searched, toy, tuned
 from podusv_cli.scenario.load import load
 from podusv_cli.tuning import sampler, trials
 from podusv_cli.tuning.pictures import sketches
+from podusv_cli.tuning.remarks import remarks
 from podusv_cli.tuning.search import _far
 from podusv_cli.tuning.trials import CUT, FINISHED, PRUNED, Trial, best, front
 
@@ -56,6 +57,10 @@ def test_the_first_trial_has_the_published_gains(done):
         assert found[0].status == FINISHED
 
 
+def test_an_objective_is_told_with_its_unit(done):
+    assert done.results.label(0) == "median(effort_u) [N2 s]"
+
+
 def test_repeats_differ(done):
     first, second = done.results.trials["toy"]
     assert [t.gains for t in first[1:]] != [t.gains for t in second[1:]]
@@ -65,7 +70,7 @@ def test_a_law_without_gains_is_kept_and_reported(done):
     (row,) = done.results.laws[done.results.laws.law == "bare"].to_dict("records")
     assert row["objective_before"] == row["objective_after"]
     assert row["runs"] == 0
-    assert "bare has no gains, kept as it is" in done.results.remarks()
+    assert "bare has no gains, kept as it is" in remarks(done.results)
     assert "<li>bare has no gains, kept as it is" in (done.folder / "report.html").read_text()
 
 
@@ -176,15 +181,16 @@ def test_a_search_in_which_everything_fails_ends_and_says_so(optuna, tmp_path):
         tmp_path, "sweep.success=finished and effort_u < 0", "tune.repeats=1", "tune.budget=40"
     )
     assert made.results.winner("toy").gains["gain"] == 1.0
-    assert "toy: every trial failed on most draws; its gains mean nothing" in made.results.remarks()
+    assert "toy: every trial failed on most draws; its gains mean nothing" in remarks(made.results)
 
 
 def test_the_command_prints_before_and_after(optuna, podusv, tmp_path):
-    code, out, _ = podusv(
+    code, out, err = podusv(
         "tune", str(toy(tmp_path)), "--set", "tune.budget=32", "--set", "tune.repeats=1",
         "--out", str(tmp_path / "out"), "--no-figures",
     )  # fmt: skip
     assert code == 0
+    assert err.startswith("runs of the search: 32 (budget 32 for each law, repeats: 1); on draws")
     assert "median(effort_u) on 12 fresh draws:" in out
     assert re.search(r"^toy +\d -> \d +1\.6\d+ \[", out, re.MULTILINE)
     told = json.loads((tmp_path / "out" / "tune.json").read_text())

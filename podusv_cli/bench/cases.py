@@ -57,6 +57,12 @@ def shipped_bench() -> Path:
 
 def cases(wanted: Wanted) -> Iterator[Case]:
     """All cases, one by one. Raises UsageError for a folder or a name, ScenarioError for a file."""
+    for path in wanted.laws:
+        if path.suffix == ".py":
+            raise UsageError(
+                f"{path} is Python; write a YAML file with `plugins: [{path.name}]` and the law "
+                "under `controllers`, and give that file to --laws"
+            )
     vessels, tasks, conditions = (_chosen(wanted, axis) for axis in AXES)
     for vessel, task, condition in product(vessels, tasks, conditions):
         layers = [

@@ -16,7 +16,7 @@ from podusv_cli.core import escaping
 from podusv_cli.core.kernel import Vector
 from podusv_cli.figures.style import legend, look, new_figure
 
-WORST = 10.0  # times the best law's IAE; the end of the profile's axis
+WORST = 4.0  # times the best law's IAE; the end of the profile's axis
 SMALL = 0.62  # inches, the side of a small multiple
 MARGIN = 0.15  # of a path's extent, around a small multiple
 LOST = "#D55E00"
@@ -43,7 +43,7 @@ def profiles(made: pd.DataFrame, columns: int = 2) -> Figure:
         xlim=(1.0, WORST), ylim=(0.0, 101.0), ylabel="cases [%]",
         xlabel="IAE over that of the best law of the case, at most",
     )  # fmt: skip
-    axes.set_xticks([1, 2, 5, 10], ["1", "2", "5", "10"])
+    axes.set_xticks([1, 1.2, 1.5, 2, 3, 4], ["1", "1.2", "1.5", "2", "3", "4"])
     axes.minorticks_off()
     legend(figure, columns)
     return figure

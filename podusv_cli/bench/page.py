@@ -39,7 +39,7 @@ def page(
     counts = {f"{name}s": made[name].nunique() for name in PLACE}
     return environment("podusv_cli.bench").get_template("bench.html.j2").render(
         title=f"Bench of {len(board)} laws",
-        board=[(str(law), told(row), row.settled) for law, row in board.iterrows()],
+        board=[(str(law), told(row), number(row.settled)) for law, row in board.iterrows()],
         headings=headings(board),
         counts=counts | {"cases": len(made) // len(board), "runs": len(made)},
         heat=list(_heat(made, list(board.index))),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -44,7 +45,7 @@ def tune(
     with StudyLine(wanted=not (quiet or as_json)) as line:
         request = workflow.Request(
             assign or (), out, workers, sys.argv, plugin or (), figures, line.say, scheduler,
-            allow_mixed,
+            allow_mixed, (lambda text: None) if quiet or as_json else partial(echo, err=True),
         )  # fmt: skip
         done = workflow.tune(Path(config), request, line.advance)
     for refused in done.refused:
@@ -55,6 +56,7 @@ def tune(
 
 
 def _report(done: Tuned) -> None:
+    from podusv_cli.tuning.remarks import remarks
     from podusv_cli.tuning.report import intervals, percent, ratio, spread
 
     results = done.results
@@ -71,7 +73,7 @@ def _report(done: Tuned) -> None:
         f"{' and '.join(results.plan.tune.objectives)} on {results.plan.tune.validate} fresh draws:"
     )
     echo_table(head, rows)
-    for text in results.remarks():
+    for text in remarks(results):
         echo(text)
     echo(f"gains: {done.folder / 'tuned.yaml'}")
     if (done.folder / "report.html").exists():

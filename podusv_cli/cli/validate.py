@@ -48,12 +48,17 @@ def validate(
     echo(f"{config}: ok ({scenario.name}, {laws}, {steps} steps)")
     echo(f"a run takes {largest(scenario)}")
     if scenario.sweep:
+        if scenario.tune:
+            echo("as a study, by podusv sweep:")
         paces = _tell_study(loaded, scenario.sweep)
         if scenario.tune:
+            echo("as a search, by podusv tune:")
             _tell_tuning(scenario, paces)
     for finding in preflight(scenario):
         echo(str(finding))
     if verbose:
+        if scenario.sweep:
+            _tell_marches(scenario)
         _explain(loaded)
 
 
@@ -87,6 +92,16 @@ def _tell_tuning(scenario: Scenario, paces: dict[str, float]) -> None:
 
     for line in TunePlan(scenario).in_words(paces, available_workers()):
         echo(line)
+
+
+def _tell_marches(scenario: Scenario) -> None:
+    """Which laws' runs march side by side, and why the others do not."""
+    from podusv_cli.engine.lanes import why_alone
+    from podusv_cli.study.plan import watching
+
+    for law, single in scenario.singles().items():
+        why = why_alone(single.closed_loop(), watching(single))
+        echo(f"{law}: runs march {f'one by one: {why}' if why else 'side by side'}")
 
 
 def _explain(loaded: Loaded) -> None:

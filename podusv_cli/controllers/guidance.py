@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from podusv_cli.controllers.base import Controller
 from podusv_cli.core.component import value
-from podusv_cli.core.elementary import cos_sin
+from podusv_cli.core.elementary import arctangent, cos_sin
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.kinematics import direction
 from podusv_cli.core.signal import Signal
@@ -68,7 +68,7 @@ def line_of_sight(at: Frame, offset: float, offset_rate: float, k: Any) -> tuple
     ahead = math.sqrt(k.lookahead * k.lookahead + behind * behind)
     across = at.across + offset
     rate = ahead * (at.across_rate + offset_rate) - across * behind / ahead * at.along_rate
-    return -math.atan2(across, ahead), -rate / (ahead * ahead + across * across)
+    return -arctangent(across, ahead), -rate / (ahead * ahead + across * across)
 
 
 @kernel

@@ -12,7 +12,7 @@ from pydantic import model_validator
 from podusv_cli.core.component import Component, value
 from podusv_cli.core.derived import Derived, norm
 from podusv_cli.core.elementary import exponential
-from podusv_cli.core.kernel import Vector, kernel, tail, whole_lanes
+from podusv_cli.core.kernel import Vector, filled, kernel, tail, whole_lanes
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import Signal
 
@@ -142,11 +142,11 @@ class Network(Component):
 
 
 @kernel
-def _evaluate(x: Vector, count: int, table: Vector, out: Vector) -> None:
+def _evaluate(x: Vector, count: int, needed: int, table: Vector, out: Vector) -> None:
     u, v, r = x[3], x[4], x[5]
     c_u, c_v, c_r = table, tail(table, count), tail(table, 2 * count)
     e_u, e_v, e_r = tail(table, 3 * count), tail(table, 4 * count), tail(table, 5 * count)
-    for i in range(count):
+    for i in range(filled(count, needed)):
         du, dv, dr = u - c_u[i], v - c_v[i], r - c_r[i]
         out[i] = exponential(-e_u[i] * du * du - e_v[i] * dv * dv - e_r[i] * dr * dr)
 
@@ -159,19 +159,20 @@ def activate(x: Vector, k: Any, table: Vector, phi: Vector, work: Vector) -> Non
     less.
     """
     along, plane = int(k.network_along), int(k.network_plane)
-    _evaluate(x, int(k.network_bells), table, work)
+    _evaluate(x, int(k.network_bells), along + plane, table, work)
     for i in range(along):
         for j in range(plane):
             phi[i * plane + j] = work[plane + i] * work[j]
 
 
 @kernel
-def weigh(count: int, weights: Vector, phi: Vector) -> float:
-    """Network output W . Phi (15)."""
-    total = 0.0
+def weigh(count: int, W_u: Vector, W_r: Vector, phi: Vector) -> tuple[float, float]:
+    """Outputs W . Phi (15) of both networks."""
+    f_u = f_r = 0.0
     for i in range(count):
-        total += weights[i] * phi[i]
-    return total
+        f_u += W_u[i] * phi[i]
+        f_r += W_r[i] * phi[i]
+    return f_u, f_r
 
 
 @kernel

@@ -112,7 +112,7 @@ def polar_backstepping(
     filtered = WEIGHTS + 2 * count
     phi = work
     activate(x, k, table, phi, tail(work, count))
-    f_hat_u, f_hat_r = weigh(count, W_hat_u, phi), weigh(count, W_hat_r, phi)
+    f_hat_u, f_hat_r = weigh(count, W_hat_u, W_hat_r, phi)
     aim = take_aim(x, memory, target, k, scratch(6))
     e = track(x, memory, aim, k)
     s = 2.0 * k.coupling - 1.0

@@ -72,8 +72,8 @@ class SlidingMode(HandController):
         return np.array([0.0, 0.0, x[2]])
 
     def wants_loads(self) -> bool:
-        """Where something is learnt, for anti-windup."""
-        return self.reaching == "super_twisting"
+        """Always, for anti-windup; the first order has nothing that could wind up."""
+        return True
 
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
         """Within the boundary layer at rest: nu' = -gain nu + z, z' = -(lambda_2/phi) nu."""

@@ -48,6 +48,10 @@ class Component(BaseModel):
         """
         return dict(_numbers(self))
 
+    def choices(self) -> frozenset[str]:
+        """Names of those constants that are choices or whole numbers."""
+        return frozenset(_choices(self))
+
     def table(self) -> Vector:
         """Numbers whose count depends on the scenario (nodes, waypoints); one zero where none."""
         return np.zeros(1)
@@ -75,6 +79,15 @@ def _numbers(component: Component) -> Iterator[tuple[str, float]]:
             yield name, float(get_args(field.annotation).index(content))
         elif {float, Positive} & set(get_args(field.annotation)):
             yield name, math.nan
+
+
+def _choices(component: Component) -> Iterator[str]:
+    for name, field in type(component).model_fields.items():
+        content = getattr(component, name)
+        if isinstance(content, Component):
+            yield from (f"{name}_{inner}" for inner in content.choices())
+        elif isinstance(content, (bool, int)) or get_origin(field.annotation) is Literal:
+            yield name
 
 
 def value(default: Any, unit: str, meaning: str, **limits: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Exponential, cosine and sine in plain arithmetic.
+"""Exponential, cosine, sine and direction in plain arithmetic.
 
 The library's functions are calls, one number at a time. These are merged into the loops that use
 them, which then work on several numbers at once, and they give the same bits on every machine and
@@ -8,6 +8,7 @@ in plain Python.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -33,7 +34,37 @@ HALF_COSINE = (
     0.9999999997799046, -4.934802137078845, 4.0587091595567815, -1.3352120030552643,
     0.23493731383698158, -0.024396324381933496,
 )  # fmt: skip
+QUARTER_PI = (0.25 * math.pi, 0.25 * float.fromhex("0x1.1a62633145c07p-53"))  # and what it lacks
+STEEPEST = math.sqrt(2.0) - 1.0  # tangent of an eighth of half a turn
+# atan(z) = z + z w (A[0] + A[1] w + ...) for w = z^2: interpolated at Chebyshev's points of
+# 0 <= w <= STEEPEST^2, to 1e-18 of z.
+A = (
+    float.fromhex("-0x1.5555555555555p-2"),
+    float.fromhex("0x1.9999999999953p-3"),
+    float.fromhex("-0x1.249249248d7eep-3"),
+    float.fromhex("0x1.c71c71c304b68p-4"),
+    float.fromhex("-0x1.745d165df3f95p-4"),
+    float.fromhex("0x1.3b1392d9e785cp-4"),
+    float.fromhex("-0x1.110e880a7a521p-4"),
+    float.fromhex("0x1.e19a13b9fc6dfp-5"),
+    float.fromhex("-0x1.ac7a938b69c94p-5"),
+    float.fromhex("0x1.74ddd408bb4c2p-5"),
+    float.fromhex("-0x1.1b33b923aa956p-5"),
+    float.fromhex("0x1.0ad36a455caffp-6"),
+)
 E = tuple(1.0 / math.factorial(n) for n in range(18))  # coefficients of all three series
+
+
+@kernel
+def bits(number: float) -> Any:
+    """The 64 bits of a number, as a whole number."""
+    return np.float64(number).view(np.int64)
+
+
+@kernel
+def of_bits(whole: Any) -> float:
+    """The number with these bits."""
+    return np.int64(whole).view(np.float64)
 
 
 @kernel
@@ -55,7 +86,7 @@ def exponential(x: float) -> float:
     high = _cubic(r, r2, E[10], E[11], E[12], E[13])
     series = 1.0 + (r + r2 * (low + r4 * (middle + r4 * high)))
     # The last bits of z are n; in the place of the exponent they make 2^n.
-    power = np.int64((np.float64(z).view(np.int64) + 1023) << 52).view(np.float64)
+    power = of_bits((bits(z) + 1023) << 52)
     return 0.0 if x < SMALLEST else series * power
 
 
@@ -75,7 +106,7 @@ def cos_sin(angle: float) -> tuple[float, float]:
     even = _cubic(q, q2, E[2], E[4], E[6], E[8]) + q4 * _cubic(q, q2, E[10], E[12], E[14], E[16])
     odd = _cubic(q, q2, E[3], E[5], E[7], E[9]) + q4 * _cubic(q, q2, E[11], E[13], E[15], E[17])
     cosine, sine = 1.0 + q * even, r + r * q * odd
-    quarters = np.float64(z).view(np.int64)  # its last two bits count quarter turns
+    quarters = bits(z)  # its last two bits count quarter turns
     if quarters & 1:
         cosine, sine = -sine, cosine
     return (-cosine, -sine) if quarters & 2 else (cosine, sine)
@@ -102,3 +133,28 @@ def cos_sin_of_turns(turns: float) -> tuple[float, float]:
     )
     twice = sine + sine
     return 1.0 - twice * sine, twice * cosine
+
+
+@kernel
+def arctangent(y: float, x: float) -> float:
+    """Angle [rad] of the vector (x, y) from the x axis, to three units in the last place.
+
+    In [-pi, pi]; 0 where both are 0. It has the sign of y, and the library's `atan2` has it too.
+    """
+    across, along = abs(y), abs(x)
+    steep = across > along
+    short, long = (along, across) if steep else (across, along)
+    # Beyond an eighth of half a turn the angle is measured from a quarter of it.
+    beyond = short > STEEPEST * long
+    above, below = (short - long, short + long) if beyond else (short, long)
+    z = above / (below if below > 0.0 else 1.0)
+    w = z * z
+    w2 = w * w
+    w4 = w2 * w2
+    low, middle = _cubic(w, w2, A[0], A[1], A[2], A[3]), _cubic(w, w2, A[4], A[5], A[6], A[7])
+    series = low + w4 * (middle + w4 * _cubic(w, w2, A[8], A[9], A[10], A[11]))
+    angle = z + z * (w * series)
+    angle = QUARTER_PI[0] + (QUARTER_PI[1] + angle) if beyond else angle
+    angle = 2.0 * QUARTER_PI[0] - (angle - 2.0 * QUARTER_PI[1]) if steep else angle
+    angle = 4.0 * QUARTER_PI[0] - (angle - 4.0 * QUARTER_PI[1]) if x < 0.0 else angle
+    return -angle if y < 0.0 else angle

@@ -47,6 +47,21 @@ def scratch(count: int) -> Vector:
     return np.empty(count)
 
 
+@kernel
+def shared(number: float) -> float:
+    """A number that is the same in all runs that march side by side."""
+    return number
+
+
+@kernel
+def filled(whole: int, count: int) -> int:
+    """How many rounds a loop over `count` numbers takes that are filled up to `whole` registers.
+
+    All of them where a register holds several rounds; where it holds several runs, `count`.
+    """
+    return whole
+
+
 def with_globals(function: Any, name: str, **replaced: Any) -> Any:
     """A copy of `function`, called `name`, that sees `replaced` in place of its globals."""
     copy = FunctionType(function.__code__, {**function.__globals__, **replaced}, name)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from podusv_cli.core.elementary import cos_sin
+from podusv_cli.core.elementary import arctangent, cos_sin
 from podusv_cli.core.kernel import Vector, kernel
 
 
@@ -22,9 +22,9 @@ def wrap(angle: float) -> float:
 def direction(x: float, y: float) -> float:
     """Angle [rad] of the vector (x, y) from the x axis, in [-pi, pi]; 0 where both are 0.
 
-    Of -0.0 alone `atan2` makes half a turn: adding 0.0 takes the sign of a zero away.
+    Adding 0.0 takes the sign of a zero away.
     """
-    return math.atan2(y + 0.0, x + 0.0)
+    return arctangent(y + 0.0, x + 0.0)
 
 
 @kernel

@@ -9,8 +9,10 @@ import numpy as np
 
 from podusv_cli.core.component import Component, value
 from podusv_cli.core.elementary import cos_sin
-from podusv_cli.core.kernel import LANES, Vector, kernel, scratch, whole_lanes
+from podusv_cli.core.kernel import LANES, Vector, filled, kernel, scratch, whole_lanes
 from podusv_cli.disturbances.base import Disturbance
+
+WAVES = 6  # a sine and a cosine on every axis
 
 
 class Wave(NamedTuple):
@@ -74,14 +76,14 @@ class HarmonicDisturbance(Disturbance):
 
     def constants(self) -> dict[str, float]:
         """The fields' numbers, and the length of the table's rows."""
-        return super().constants() | {"waves": float(whole_lanes(6))}
+        return super().constants() | {"waves": float(whole_lanes(WAVES))}
 
     def table(self) -> Vector:
         """Rates of the waves, their cosines, their sines: three rows, the sines of (52) first."""
         axes = (self.b_u.waves(), self.b_v.waves(), self.b_r.waves())
         waves = [sine for sine, _ in axes] + [cosine for _, cosine in axes]
-        rows = np.zeros((3, whole_lanes(6)))
-        rows[:, :6] = np.transpose(waves) + 0.0  # no -0.0
+        rows = np.zeros((3, whole_lanes(WAVES)))
+        rows[:, :WAVES] = np.transpose(waves) + 0.0  # no -0.0
         return rows.ravel()
 
     def bounds(self) -> tuple[float, float, float]:
@@ -94,7 +96,7 @@ class HarmonicDisturbance(Disturbance):
     def evaluate(t: float, x: Vector, k: Any, table: Vector, b: Vector) -> None:
         """Equation (52), scaled."""
         waves, count = scratch(LANES), int(k.waves)
-        for i in range(count):
+        for i in range(filled(count, WAVES)):
             cosine, sine = cos_sin(table[i] * t)
             waves[i] = table[count + i] * cosine + table[2 * count + i] * sine
         b[0] = k.scale * (k.b_u_mean + waves[0] + waves[3])

@@ -1,32 +1,33 @@
-"""Many runs at once, each in a thread, as many at a time as there are cores.
+"""Many runs at once: side by side where that is possible, as many at a time as there are cores.
 
-The compiled march releases the interpreter's lock, so threads are enough. The compiled code is that
-of `simulate`. No log is kept; a run's observer gathers what is wanted of it.
+The compiled march releases the interpreter's lock, so threads are enough. A thread marches over
+several runs side by side (`lanes`), or over one with the compiled code of `simulate`. No log is
+kept; a run's observer gathers what is wanted of it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
-from typing import Any, Protocol, TypeVar
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from podusv_cli.core.errors import PodusvError, in_a_line
 from podusv_cli.core.escaping import visible
-from podusv_cli.core.kernel import LANES, Vector, whole_lanes
+from podusv_cli.core.kernel import Vector
+from podusv_cli.engine.batch_threads import BatchRun, Common, Thread
 from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.layout import Plan, Wires
-from podusv_cli.engine.loop import STATE, ClosedLoop, Observer, entries, wire
-from podusv_cli.engine.march import Bell, Ending, Work
-from podusv_cli.engine.simulate import marcher, why
+from podusv_cli.engine.lanes import FEWEST, Sorter
+from podusv_cli.engine.loop import STATE, ClosedLoop, Observer
+from podusv_cli.engine.march import Ending, Work
+from podusv_cli.engine.simulate import why
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.process.workers import available_workers
 
 T = TypeVar("T")
-NUMBER = 8  # bytes; LANES numbers are a cache line
 
 
 class Loops(Protocol):
@@ -90,52 +91,6 @@ class Batch:
         self.status[position], self.cause[position] = status, visible(" ".join(cause.split()))
 
 
-@dataclass(frozen=True, eq=False)
-class BatchRun:
-    """One run of a batch."""
-
-    position: int
-    loop: ClosedLoop
-    wires: Wires
-    work: Work
-
-
-@dataclass(frozen=True)
-class Common:
-    """What the runs of a batch share: the structure of one of their loops, and its march."""
-
-    like: ClosedLoop
-    grid: TimeGrid
-    observer: Observer
-    bell: Bell = field(default_factory=Bell)
-
-    @cached_property
-    def structure(self) -> tuple[Plan, list[Any]]:
-        """The layout, and the kernels with the names of their constants."""
-        return self.like.layout(self.grid), list(entries(self.like, self.observer))
-
-    @cached_property
-    def advance(self) -> Callable[..., int]:
-        """The compiled march."""
-        return marcher(self.like, self.observer, True)
-
-    def check(self, loop: ClosedLoop) -> None:
-        """Raise ValueError for a loop of another structure."""
-        found, wanted = Common(loop, self.grid, self.observer).structure, self.structure
-        if found != wanted:
-            raise ValueError(
-                f"it has another structure than the batch: {_kinds(loop)} with {found[0]}, not "
-                f"{_kinds(self.like)} with {wanted[0]}; runs of one batch differ in numbers only"
-            )
-
-    def run(self, position: int, loop: ClosedLoop, advance: Callable[..., int]) -> BatchRun:
-        """A run that is ready to start."""
-        plan, grid = self.structure[0], self.grid
-        wires = _apart(wire(loop, plan, self.observer, grid))
-        function = partial(advance, 0, grid.steps + 1, grid.step, wires, plan)
-        return BatchRun(position, loop, wires, Work(function, wires.under_way, self.bell))
-
-
 def simulate_many(
     loops: Loops,
     grid: TimeGrid,
@@ -144,6 +99,7 @@ def simulate_many(
     workers: int = 0,
     progress: Callable[[float], None] | None = None,
     like: ClosedLoop | None = None,
+    side_by_side: bool | None = None,
 ) -> Batch:
     """Integrate loops of one structure over the grid, `workers` at a time (0: one a core).
 
@@ -151,13 +107,16 @@ def simulate_many(
     loop that can be made. Every run gives the bits that `simulate` gives, whatever the number of
     workers and however the others end; `Batch` says how a run may end. `progress` is called with
     the fraction of runs done. KeyboardInterrupt stops all runs at once and keeps what is done.
-    Raises LawError where a kernel cannot be compiled.
+    `side_by_side` says whether runs may share a march; by default they do where the code for it is
+    compiled already or the batch is worth it. It changes no bit. Raises LawError where a kernel
+    cannot be compiled.
     """
     observer = observer or Observer()
     grid = replace(grid, log_every=grid.steps + 1)  # one row, for the first instant
     batch = _blank(len(loops), observer)
     with interrupts_deferred():
-        _Runs(loops, grid, batch, observer, like, progress).march(workers or available_workers())
+        runs = _Runs(loops, grid, batch, observer, like, progress, side_by_side)
+        runs.march(workers or available_workers())
     return batch
 
 
@@ -166,12 +125,14 @@ class _Runs:
 
     def __init__(
         self, loops: Loops, grid: TimeGrid, batch: Batch, observer: Observer,
-        like: ClosedLoop | None, progress: Callable[[float], None] | None,
+        like: ClosedLoop | None, progress: Callable[[float], None] | None, lanes: bool | None,
     ) -> None:  # fmt: skip
         self._loops, self._grid, self._batch, self._observer = loops, grid, batch, observer
         self._common = Common(like, grid, observer) if like else None
         self._progress = progress or (lambda fraction: None)
-        self._busy: list[BatchRun] = []
+        self._lanes = Sorter(observer, len(loops) * (grid.steps + 1), lanes)
+        self._ready: list[Thread] = []
+        self._busy: list[Thread] = []
         self._over = 0
 
     def march(self, workers: int) -> None:
@@ -179,22 +140,42 @@ class _Runs:
         try:
             for position in range(len(self._loops)):
                 self._begin(position)
-                while len(self._busy) >= workers:
+                self._start(workers, self._wait)
+            for runs in self._lanes.rest():
+                self._together(runs)
+            while self._ready or self._busy:
+                self._start(workers, self._wait)
+                if self._busy:
                     self._wait()
-            while self._busy:
-                self._wait()
         except KeyboardInterrupt:
             pass
         finally:
             self._stop()
 
     def _begin(self, position: int) -> None:
+        """Make a run, and have it march alone, or wait for others to march beside it."""
         run = self._made(position)
         if run:
-            run.work.start()
-            self._busy.append(run)
+            self._together(self._lanes.sorted(run.wires, run))
         else:
             self._count()
+
+    def _together(self, runs: list[BatchRun]) -> None:
+        """Have runs march side by side, or one by one where that takes no longer."""
+        assert self._common is not None
+        if len(runs) >= FEWEST and self._lanes.advance:
+            self._ready.append(self._common.together(runs, self._lanes.advance))
+        else:
+            self._ready += map(self._common.alone, runs)
+
+    def _start(self, workers: int, wait: Callable[[], None]) -> None:
+        """Start all threads that are ready, and wait while there are enough."""
+        while self._ready:
+            thread = self._ready.pop(0)
+            thread.work.start()
+            self._busy.append(thread)
+            while len(self._busy) >= workers:
+                wait()
 
     def _made(self, position: int) -> BatchRun | None:
         """The run, or None and an entry of why there is none."""
@@ -209,8 +190,10 @@ class _Runs:
         if found is None:
             return None
         loop, self._common = found
-        make = partial(self._common.run, position, loop, self._common.advance)
-        return self._contained(position, make)
+        self._lanes.choose(loop)
+        if not self._lanes.advance:
+            self._common.advance  # noqa: B018  a kernel that cannot be compiled ends the batch
+        return self._contained(position, partial(self._common.run, position, loop))
 
     def _contained(
         self, position: int, make: Callable[[], T], invalid: tuple[type[Exception], ...] = ()
@@ -238,12 +221,24 @@ class _Runs:
         return None
 
     def _wait(self) -> None:
-        """Wait a moment for a run to end, and enter those that have, or that hang."""
+        """Wait a moment for a thread to end, and enter the runs of those that have, or hang."""
         with interrupts_enabled():
             self._busy[0].work.wait()  # any of them rings the bell
-        for run in [run for run in self._busy if run.work.over or run.work.hangs()]:
-            self._busy.remove(run)
-            self._batch.note(run, run.work.ending(self._grid.steps + 1), self._grid)
+        for thread in [thread for thread in self._busy if thread.work.over or thread.work.hangs()]:
+            self._busy.remove(thread)
+            self._enter(thread)
+
+    def _enter(self, thread: Thread) -> None:
+        """Enter how the runs of a thread ended; which of several hangs, shows each alone."""
+        if thread.work.result is None and len(thread.runs) > 1:
+            thread.work.stop()
+            assert self._common is not None
+            again = [self._common.run(run.position, run.loop) for run in thread.runs]
+            self._ready += map(self._common.alone, again)
+            return
+        for run, ending in zip(thread.runs, thread.endings(False), strict=True):
+            self._batch.note(run, ending, self._grid)
+        for _ in thread.runs:
             self._count()
 
     def _count(self) -> None:
@@ -251,10 +246,14 @@ class _Runs:
         self._progress(self._over / len(self._loops))
 
     def _stop(self) -> None:
-        for run in self._busy:
-            run.work.stop()
-        for run in self._busy:
-            self._batch.note(run, run.work.interrupted(self._grid.steps + 1), self._grid)
+        stopped = [thread for thread in self._busy if not thread.work.over]
+        for thread in stopped:
+            thread.work.stop()
+        for thread in self._busy:
+            if thread in stopped:
+                thread.work.stopped()
+            for run, ending in zip(thread.runs, thread.endings(thread in stopped), strict=True):
+                self._batch.note(run, ending, self._grid)
 
 
 def _blank(count: int, observer: Observer) -> Batch:
@@ -263,22 +262,3 @@ def _blank(count: int, observer: Observer) -> Batch:
         reached=np.zeros(count, np.int64), state=np.full((count, len(STATE)), np.nan),
         seen=np.full((count, observer.size), np.nan),
     )  # fmt: skip
-
-
-def _kinds(loop: ClosedLoop) -> str:
-    parts = (loop.path, loop.disturbance, loop.actuator, loop.controller)
-    return ", ".join(type(part).__name__ for part in parts)
-
-
-def _apart(wires: Wires) -> Wires:
-    """The vectors in memory of their own, each from a new cache line on.
-
-    Cores that write to one line wait for each other.
-    """
-    ends = np.cumsum([0, *(whole_lanes(len(vector)) for vector in wires)]).tolist()
-    room = np.zeros(ends[-1] + LANES)
-    room = room[-(room.ctypes.data // NUMBER) % LANES :]
-    own = [room[at : at + len(v)] for at, v in zip(ends, wires, strict=False)]
-    for vector, content in zip(own, wires, strict=True):
-        vector[:] = content
-    return Wires(*own)

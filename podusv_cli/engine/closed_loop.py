@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from podusv_cli.core.kernel import Vector, kernel, tail, unpacker
+from podusv_cli.core.kernel import Vector, kernel, shared, tail, unpacker
 from podusv_cli.engine.layout import (
     DISTANCE,
     HELD_DEMAND,
@@ -64,7 +64,7 @@ def rates(
     elif n.hold_every > 0:
         held = c.held
         law(
-            held[0], tail(held, HELD_X), memory, tail(held, HELD_TARGET), p, table,
+            shared(held[0]), tail(held, HELD_X), memory, tail(held, HELD_TARGET), p, table,
             tail(held, HELD_DEMAND), memory_rate, tail(held, HELD_SIGNALS), work,
         )  # fmt: skip
     else:

@@ -53,9 +53,14 @@ def object_code(function: Any, prototype: Any) -> Code:
 
     Raises TypeError for a kernel that needs more than arithmetic and the mathematical library.
     """
+    return translated(function, _with_inlined, _signature(prototype))
+
+
+def translated(function: Any, prepare: Any, signature: Any) -> Code:
+    """Object code of what `prepare` makes of a kernel, with this signature of numba's types."""
     linecache.checkcache()  # numba shows lines from there; a file may have been edited meanwhile
     try:
-        compiled = cfunc(_signature(prototype), **OPTIONS)(_with_inlined(function))
+        compiled = cfunc(signature, **OPTIONS)(prepare(function))
     except NumbaError as error:
         raise TypeError(_in_short(str(error))) from error
     module = llvm.parse_assembly(compiled.inspect_llvm())

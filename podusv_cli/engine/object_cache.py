@@ -31,7 +31,10 @@ MARKS = (b"@kernel", b"specialise(", b"with_globals(")
 
 
 class Code(NamedTuple):
-    """Object code, and the name in it of the function to call."""
+    """Object code, and the name in it of the function to call.
+
+    Without a name it is the reason why there is no object code, so that it is not tried again.
+    """
 
     symbol: str
     content: bytes
@@ -47,7 +50,15 @@ def stored(prototype: Any, name: str, translate: Callable[[], Code]) -> Any:
         if path:
             with suppress(OSError):  # a full disk costs the next process its time, no more
                 _write(path, code)
+    if not code.symbol:
+        raise TypeError(code.content.decode())
     return _loaded(prototype, code)
+
+
+def is_kept(name: str) -> bool:
+    """Whether a piece of this name is on the disk."""
+    folder = code_folder.code_folder(source_digest())
+    return bool(folder and (folder / f"{name}.code").exists())
 
 
 def target() -> Any:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from podusv_cli.core.elementary import arctangent
 from podusv_cli.core.kernel import bundle, scratch, transplanted
 from podusv_cli.core.recording import Recording
 from podusv_cli.engine.loop import STATE, ClosedLoop
@@ -52,8 +53,12 @@ class Tally:
         return np.array([self.number(number) for number in np.ravel(numbers)], dtype=object)
 
     def kernel(self, function: Any) -> Any:
-        """The kernel, and all that it calls, with arithmetic that counts."""
-        return transplanted(function, {math: self, scratch: partial(np.empty, dtype=object)})
+        """The kernel, and all that it calls, with arithmetic that counts.
+
+        A direction counts as one operation, as the functions of the module math do.
+        """
+        parts = {math: self, scratch: partial(np.empty, dtype=object)}
+        return transplanted(function, parts | {arctangent: partial(self.apply, math.atan2)})
 
 
 @dataclass(eq=False, slots=True)

@@ -72,10 +72,7 @@ def explain(
         return [EXTENDS]
     place = tuple(NUMBER if str(step).isdecimal() else step for step in whole_names(route(name)))
     keys = top.follow(place) if place else []
-    named = [key for key in top.all() if key.name == name]
-    found = _with_contents(keys) or [
-        *_signals(name, plugins), *_with_contents(named), *_presets(name, top)
-    ]  # fmt: skip
+    found = _with_contents(keys) or _named(name, top, plugins)
     if not found:
         known = [*names(plugins), *others]
         raise UnknownKeyError(f"{name}: no such name{did_you_mean(name, known)}")
@@ -147,6 +144,12 @@ def signals(plugins: Plugins = ()) -> tuple[Signal, ...]:
 def _signals(name: str, plugins: Plugins) -> list[Row]:
     found = [signal for signal in signals(plugins) if signal.name == name]
     return [Row(name, signal.meaning, "signal", signal.unit) for signal in found]
+
+
+def _named(name: str, top: Key, plugins: Plugins) -> list[Row]:
+    """Whatever has this name, wherever it is: signals, keys, kinds, presets."""
+    keys = [key for key in top.all() if key.name == name]
+    return [*_signals(name, plugins), *_with_contents(keys), *_presets(name, top)]
 
 
 def _presets(name: str, top: Key) -> list[Row]:

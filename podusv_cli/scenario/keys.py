@@ -159,7 +159,7 @@ class Key:
                 )
         return None
 
-    @property
+    @cached_property
     def item_keys(self) -> list[Key]:
         """The keys that all items of a list, or all entries of a mapping, have in common."""
         items = [self.item(step) for step in (NAME, NUMBER)]

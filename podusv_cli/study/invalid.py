@@ -100,7 +100,7 @@ class Part:
         """A mask of draws within all ranges; False where the section checks more than ranges."""
         own = getattr(self.scenario, self.section)
         parts = own if isinstance(own, tuple) else (own,)
-        if not all(_has_ranges_only(type(part)) for part in parts):
+        if not all(map(_has_ranges_only, map(type, parts))):
             return np.bool_(False)
         masks = [
             _in_range(

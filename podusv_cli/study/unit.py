@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from podusv_cli.core.kernel import Vector
+from podusv_cli.engine import lanes
 from podusv_cli.engine.batch import Lazily, simulate_many
 from podusv_cli.engine.check import check_law
 from podusv_cli.engine.grid import TimeGrid
@@ -62,12 +63,17 @@ class UnitResult:
     causes: tuple[str, ...]
 
 
-def prepare(plan: Plan, law: str, cell: int) -> None:
-    """Check a law, and have its march compiled and loaded. Raises LawError."""
+def prepare(plan: Plan, law: str, cell: int, runs: int = 0) -> None:
+    """Check a law, and have its march compiled and loaded. Raises LawError.
+
+    `runs` is how many runs of it there will be, by default those of the plan.
+    """
     scenario = plan.single(law, cell)
-    loop = scenario.closed_loop()
+    loop, seeing = scenario.closed_loop(), watching(scenario)
     check_law(loop)
-    marcher(loop, watching(scenario), compiled=True)
+    marcher(loop, seeing, compiled=True)
+    runs = runs or plan.sweep.draws * len(plan.cells)
+    lanes.prepare(loop, seeing, runs * scenario.time_grid().steps)
 
 
 def make(

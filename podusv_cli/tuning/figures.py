@@ -119,7 +119,7 @@ def importance(table: pd.DataFrame, columns: int = 2) -> Figure:
 
 def slices(
     tried: pd.DataFrame, gains: Sequence[Gain], found: Mapping[str, Any], label: str,
-    columns: int = 2,
+    units: Mapping[str, str], columns: int = 2,
 ) -> Figure:  # fmt: skip
     """A panel for each gain of a law, a point for each trial."""
     across = min(len(gains), ACROSS)
@@ -130,6 +130,8 @@ def slices(
     shown = values[np.isfinite(values)]
     for gain, axes in zip(gains, panels.ravel(), strict=False):
         _slice(axes, gain, tried, found[gain.key])
+        unit = f" [{units[gain.key]}]" if units[gain.key] not in ("", "1") else ""
+        axes.set_xlabel(escaping.figure(f"{gain.key}{unit}"), **SMALL)
     if len(shown):
         low, start = float(shown.min()), float(values[0])
         top = (
@@ -159,4 +161,3 @@ def _slice(axes: Axes, gain: Gain, tried: pd.DataFrame, found: Any) -> None:
         axes.set_xlim(0.9 * min(gain.low, gain.own), 1.1 * max(gain.high, gain.own))
         axes.xaxis.set_minor_formatter(NullFormatter())  # labels of minor ticks overlap
     axes.tick_params(labelsize=5.5)
-    axes.set_xlabel(escaping.figure(gain.key), **SMALL)

@@ -12,6 +12,7 @@ from podusv_cli.pages.page import Picture
 from podusv_cli.process.extras import Extras
 from podusv_cli.study.pictures import COLUMNS, Sketch, rendered
 from podusv_cli.tuning.results import Results
+from podusv_cli.tuning.space import units_of
 from podusv_cli.tuning.trials import front
 
 
@@ -29,7 +30,7 @@ def sketches(results: Results) -> Iterator[Sketch]:
         "validation",
         f"{objective} on the fresh draws, before (hollow) and after the search (filled), with "
         f"{100 * results.level:g} % intervals",
-        partial(figures.before_and_after, results.laws, objective, COLUMNS),
+        partial(figures.before_and_after, results.laws, results.label(0), COLUMNS),
     )
     if results.winners:
         yield from _of_searches(results, objective)
@@ -43,7 +44,7 @@ def _of_searches(results: Results, objective: str) -> Iterator[Sketch]:
         "history",
         f"best {objective} on the training draws so far, a curve for each repeat: the curves begin "
         "with the scenario's gains; one rises where a trial holds the inequalities better",
-        partial(figures.history, results.history, objective, COLUMNS),
+        partial(figures.history, results.history, results.label(0), COLUMNS),
     )
     rows = results.pairs[(results.pairs["when"] == "tuning")]
     rows = rows[rows.metric == (results.shown[0])]
@@ -77,12 +78,12 @@ def _front(results: Results) -> Sketch:
     }
     taken = {law: results.winner(law).values for law in results.winners}
     first = {law: all_[0][0].values for law, all_ in results.trials.items()}
-    labels = results.plan.tune.objectives
+    labels = results.label(0), results.label(1)
     return Sketch(
         "front",
         "Pareto front of the training draws: trials that no other trial of the law is better than "
         "in both objectives; a star is what was taken, a cross are the scenario's gains",
-        partial(figures.pareto, points, taken, first, (labels[0], labels[1]), COLUMNS),
+        partial(figures.pareto, points, taken, first, labels, COLUMNS),
     )
 
 
@@ -98,9 +99,10 @@ def _slices(results: Results, law: str, objective: str) -> Sketch:
     return Sketch(
         f"slices-{law}",
         f"every trial of {law} by each of its gains: {objective} over the draws that the trial "
-        "met; the full line is the gain that was found, the broken one the scenario's",
+        "met, a colour for each repeat; the full line is the gain that was found, the broken one "
+        "the scenario's",
         partial(
-            figures.slices, tried, results.plan.gains[law], results.winner(law).gains, objective,
-            COLUMNS,
+            figures.slices, tried, results.plan.gains[law], results.winner(law).gains,
+            results.label(0), units_of(results.plan.laws[law]), COLUMNS,
         ),
     )  # fmt: skip

@@ -24,6 +24,8 @@ from podusv_cli.tuning.space import Gain, gains
 TRAIN, VALIDATE = "tune", "tune validation"  # streams of draws, beside a sweep's own
 # Settings that change no trial: more of them continues a search.
 OPEN = ("budget", "validate", "repeats")
+# Rough costs [s]: of a trial for Optuna, processes and files; of what comes before and after.
+TRIAL, AROUND = 0.1, 10.0
 Named = tuple[str, Mapping[str, Any]]  # a law of the scenario, and its numbers that are others
 
 
@@ -91,18 +93,29 @@ class TunePlan:
         for law, found in self.gains.items():
             if found:
                 names = ", ".join(gain.key for gain in found)
-                yield f"gains of {law} ({len(found)}): {names}"
+                yield f"gains of {law} ({len(found)}): {names}{self._few(len(found))}"
             else:
                 yield f"{law} has no gains and is kept as it is"
         yield "gains that change no run are left out when the search begins"
         wanted, tune = self.runs_wanted(), self.tune
-        search, other = (sum(counts) for counts in zip(*wanted.values(), strict=True))
-        time = sum(sum(counts) * paces.get(law, 0.0) for law, counts in wanted.items()) / workers
+        time = sum(sum(counts) * paces.get(law, 0.0) for law, counts in wanted.items())
+        time += TRIAL * sum(search for search, _ in wanted.values()) / tune.train
         cores = f"{workers} core{'s' if workers > 1 else ''}"
-        yield (
+        yield f"{self.size}; about {time_in_words(time / workers + AROUND)} on {cores}"
+
+    def _few(self, gains: int) -> str:
+        """What to say of a budget that is small for so many gains."""
+        whole = self.tune.budget // self.tune.train
+        return f"; a budget of {whole} trials on all draws is few for them" if whole < gains else ""
+
+    @property
+    def size(self) -> str:
+        """How many runs there are, in words."""
+        search, other = (sum(n) for n in zip(*self.runs_wanted().values(), strict=True))
+        tune = self.tune
+        return (
             f"runs of the search: {search:,} (budget {tune.budget:,} for each law, repeats: "
-            f"{tune.repeats}); on draws for validation: {other:,}; about {time_in_words(time)} on "
-            f"{cores}"
+            f"{tune.repeats}); on draws for validation: {other:,}"
         )
 
     @cached_property

@@ -12,7 +12,9 @@ from podusv_cli.process.extras import Missing
 from podusv_cli.study.results import digits
 from podusv_cli.study.sittings import sittings
 from podusv_cli.study.words import in_words
+from podusv_cli.tuning.remarks import remarks
 from podusv_cli.tuning.results import OBJECTIVES, Results
+from podusv_cli.tuning.space import units_of
 
 FEW = 15  # pairs that are shown at once
 
@@ -32,7 +34,7 @@ def page(
         tune=plan.tune,
         objectives=" and ".join(plan.tune.objectives),
         laws=list(_laws(results)),
-        remarks=results.remarks(),
+        remarks=remarks(results),
         pairs=list(_pairs(results)),
         few=FEW,
         metric=results.shown[0] if results.shown else "",
@@ -115,10 +117,7 @@ def _turned(before: Any, after: Any) -> str:
 
 
 def _gains(results: Results) -> Iterator[dict[str, Any]]:
-    units = {
-        law: {name: _unit(field) for name, field in type(own).model_fields.items()}
-        for law, own in results.plan.laws.items()
-    }
+    units = {law: units_of(own) for law, own in results.plan.laws.items()}
     share = results.importance.set_index(["law", "gain"]) if len(results.importance) else None
     rows: Any = results.gains.to_dict("records")
     for row in rows:
@@ -134,9 +133,3 @@ def _gains(results: Results) -> Iterator[dict[str, Any]]:
 
 def _end(number: float) -> str:
     return "-" if math.isnan(number) else f"{number:.4g}"
-
-
-def _unit(field: Any) -> str:
-    from podusv_cli.core.component import unit_of
-
-    return unit_of(field)

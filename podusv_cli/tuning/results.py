@@ -182,36 +182,13 @@ class Results:
                     if found:
                         yield found
 
-    def remarks(self) -> list[str]:
-        """What is worth a sentence."""
-        return [*self._kept(), *self._idle(), *self._unsound(), *self._bounds()]
-
-    def _kept(self) -> Iterator[str]:
-        for law in self.plan.laws:
-            if law not in self.winners:
-                yield f"{law} has no gains, kept as it is"
-
-    def _idle(self) -> Iterator[str]:
-        for law, keys in self.plan.idle.items():
-            if keys:
-                yield f"{law}: not searched, as no run depends on it: {', '.join(keys)}"
-
-    def _unsound(self) -> Iterator[str]:
-        for law in self.winners:
-            trial = self.winner(law)
-            broken = [
-                one.text for one, over in zip(self.plan.inequalities, trial.excesses, strict=True)
-                if over > 0.0
-            ]  # fmt: skip
-            if broken:
-                yield f"{law}: no trial held {' and '.join(broken)} on the training draws"
-            elif not math.isfinite(trial.values[0]):
-                yield f"{law}: every trial failed on most draws; its gains mean nothing"
-
-    def _bounds(self) -> Iterator[str]:
-        for row in self.gains[self.gains["at"] != ""].to_dict("records"):
-            end = row["low"] if row["at"] == "lower" else row["high"]
-            yield f"{row['law']}: {row['gain']} is at the {row['at']} end of its range, {end:.4g}"
+    def label(self, place: int) -> str:
+        """An objective with its unit, where it is a statistic of one metric."""
+        text, tree = self.plan.tune.objectives[place], self.plan.objectives[place]
+        match tree:
+            case ast.Call(args=[ast.Name(id=name), *_]) if unit := self.plan.metrics[name].unit:
+                return f"{text} [{unit}]"
+        return text
 
 
 def _ends(gain: Gain) -> dict[str, float]:

@@ -10,6 +10,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from podusv_cli.controllers.base import Controller
+from podusv_cli.core.component import unit_of
 from podusv_cli.engine.loop import Observer, entries
 from podusv_cli.scenario.keys import limits
 from podusv_cli.scenario.model import Scenario
@@ -88,6 +89,11 @@ def gains(law: Controller, label: str, scenario: Scenario, tune: Tune) -> tuple[
         if wanted is not None:
             found += _of(wanted, key, content, type(law).model_fields[key])
     return tuple(found)
+
+
+def units_of(law: Controller) -> dict[str, str]:
+    """The unit of each number of a law."""
+    return {key: unit_of(field) for key, field in type(law).model_fields.items()}
 
 
 def keys(law: Controller) -> list[str]:

@@ -30,6 +30,7 @@ from podusv_cli.tuning.check import tune_faults
 from podusv_cli.tuning.idle import find_idle
 from podusv_cli.tuning.march import march
 from podusv_cli.tuning.plan import TRAIN, TunePlan
+from podusv_cli.tuning.remarks import remarks
 from podusv_cli.tuning.results import Results
 from podusv_cli.tuning.sampler import optuna
 from podusv_cli.tuning.search import Search
@@ -54,6 +55,7 @@ class Request:
     say: Callable[[str], None] = lambda text: None
     scheduler: str = ""  # of a Dask cluster, as tcp://host:port
     mixed: bool = False  # whether its workers may compute other bits than this machine
+    begin: Callable[[str], None] = lambda text: None  # is told what the search is to simulate
 
 
 @dataclass(frozen=True)
@@ -72,7 +74,7 @@ class Tuned:
             "format": 1, "status": "finished", "folder": str(self.folder),
             "laws": results.laws.to_dict("records"),
             "gains": {law: dict(results.winner(law).gains) for law in results.winners},
-            "remarks": results.remarks(), "missing": [str(one) for one in self.missing],
+            "remarks": remarks(results), "missing": [str(one) for one in self.missing],
             "refused": self.refused,
         }  # fmt: skip
 
@@ -92,6 +94,7 @@ def tune(config: Path, request: Request, tell: Tell) -> Tuned:
     plan = replace(plan, idle=told["idle"] if told else _idle(plan, request))
     stamp = started.isoformat(timespec="seconds")
     place.write(folder, plan, told, stamp, place.scenario_texts(loaded))
+    request.begin(f"{plan.size}; in {folder}")
     with _engine(plan, folder, request) as found:
         results = _simulated(plan, folder, request, started, found, tell)
     refused = tuple(found.told().get("refused", {}).values())
@@ -157,10 +160,11 @@ def _prepare(plan: TunePlan) -> None:
     Raises LawError.
     """
     for law, gains in plan.gains.items():
+        runs = sum(plan.runs_wanted()[law])
         options = [{gain.key: word} for gain in gains for word in gain.words]
         for new in options or [{}] if gains else []:
             if with_gains(plan.laws[law], new):
-                prepare(plan.variant({law: (law, new)}, TRAIN, 1), law, 0)
+                prepare(plan.variant({law: (law, new)}, TRAIN, 1), law, 0, runs)
 
 
 def _idle(plan: TunePlan, request: Request) -> dict[str, tuple[str, ...]]:

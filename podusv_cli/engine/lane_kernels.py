@@ -1,0 +1,252 @@
+"""Kernels rewritten so that every lane goes its own way through their branches.
+
+A kernel is a plain function of floats. For lanes its source is rewritten: a branch is taken where
+any lane takes it, and stores and assignments in it act in those lanes only (if-conversion).
+"""
+
+from __future__ import annotations
+
+import ast
+import copy
+from collections.abc import Collection
+from typing import Any
+
+from podusv_cli.engine.lane_expressions import ON, Expressions, takes_mask
+from podusv_cli.engine.lane_source import NotForLanes, source
+from podusv_cli.engine.lane_syntax import call, found, name_of, reads, returns, set_to, tailed
+
+RESULT = "lanes_result"
+
+
+def rewritten(function: Any, words: dict[str, Any], plain: Collection[Any]) -> Any:
+    """The kernel with the lanes in which it acts as its first argument.
+
+    `words` are the functions that it is written in; kernels in `plain` know nothing of lanes.
+    """
+    node = copy.deepcopy(source(function))
+    return _made(function, _Rewriter(node, function.__globals__, plain).function(), words)
+
+
+def everywhere(function: Any, plain: Collection[Any]) -> Any:
+    """A kernel that is written for lanes, which calls other kernels in all lanes."""
+    node = copy.deepcopy(source(function))
+    for part in ast.walk(node):
+        if isinstance(part, ast.Call) and takes_mask(found(part.func, function.__globals__), plain):
+            part.args.insert(0, ast.Constant(None))
+    node.args = _arguments(node, [])
+    node.decorator_list, node.returns = [], None
+    return _made(function, node, {})
+
+
+def _arguments(node: ast.FunctionDef, first: list[str]) -> ast.arguments:
+    names = [*first, *(argument.arg for argument in node.args.args)]
+    return ast.arguments([], [ast.arg(name) for name in names], None, [], [], None, [])
+
+
+def _made(function: Any, node: ast.FunctionDef, words: dict[str, Any]) -> Any:
+    module = ast.fix_missing_locations(ast.Module([node], []))
+    scope: dict[str, Any] = {**function.__globals__, **words}
+    exec(compile(module, function.__code__.co_filename, "exec"), scope)  # noqa: S102
+    made = scope[node.name]
+    made.__qualname__, made.__module__ = function.__qualname__, function.__module__
+    return made
+
+
+class _Rewriter(Expressions):
+    """One kernel's source while it is rewritten."""
+
+    def function(self) -> ast.FunctionDef:
+        """The kernel."""
+        node = self.node
+        body = tailed(node.body[1:] if ast.get_docstring(node) is not None else node.body)
+        several = returns(body[:-1]) or not body or not isinstance(body[-1], ast.Return)
+        values = [n.value for b in body for n in ast.walk(b) if isinstance(n, ast.Return)]
+        written = self.block(body) or [ast.Pass()]
+        if several and any(values):
+            written.append(ast.Return(name_of(RESULT)))
+        node.args, node.body = _arguments(node, [ON]), written
+        node.decorator_list, node.returns = [], None
+        return node
+
+    def block(self, nodes: list[ast.stmt]) -> list[ast.stmt]:
+        """Statements, one after another."""
+        written: list[ast.stmt] = []
+        for node in nodes:
+            written += self.statement(node)
+        return written
+
+    def statement(self, node: ast.stmt) -> list[ast.stmt]:
+        """What one statement becomes."""
+        outer, self.before = self.before, []
+        write = getattr(self, f"on_{type(node).__name__}", None)
+        if write is None:
+            raise NotForLanes(f"line {node.lineno}: {type(node).__name__} is not for lanes")
+        made = write(node)
+        made, self.before = [*self.before, *made], outer
+        for part in made:
+            ast.copy_location(part, node)
+        return [ast.fix_missing_locations(part) for part in made]
+
+    def on_Pass(self, node: ast.Pass) -> list[ast.stmt]:
+        return []
+
+    def on_Expr(self, node: ast.Expr) -> list[ast.stmt]:
+        return [ast.Expr(self.expression(node.value))]
+
+    def on_Return(self, node: ast.Return) -> list[ast.stmt]:
+        if node.value is None:
+            return []
+        value = self.expression(node.value)
+        if self.branch is None:
+            return [ast.Return(value)]
+        return [self.kept(RESULT, value)]
+
+    def kept(self, name: str, value: ast.expr) -> ast.stmt:
+        """An assignment in the lanes of the branch."""
+        if self.branch is None:
+            made = value
+        elif name in self.known:
+            made = call("lanes_assign", name_of(self.mask), value, name_of(name))
+        else:
+            self.check(name)
+            made = call("lanes_lift", name_of(self.mask), value)
+        self.known.add(name)
+        return set_to(name, made)
+
+    def check(self, name: str) -> None:
+        """Refuse a variable that a branch sets first and that outlives it in a loop.
+
+        Lanes that do not take the branch would lose what they have of the round before.
+        """
+        own = reads(self.branch, name) if self.branch else 0
+        if self.loops and not name.startswith("lanes_") and reads(self.node, name) > own:
+            raise NotForLanes(f"{name} is set in a branch within a loop; set it before the loop")
+
+    def on_AugAssign(self, node: ast.AugAssign) -> list[ast.stmt]:
+        old = copy.deepcopy(node.target)
+        old.ctx = ast.Load()
+        return self.on_Assign(ast.Assign([node.target], ast.BinOp(old, node.op, node.value)))
+
+    def on_Assign(self, node: ast.Assign) -> list[ast.stmt]:
+        if len(node.targets) == 1:
+            return self.to(node.targets[0], node.value)
+        name = self.fresh("value")
+        made: list[ast.stmt] = [set_to(name, self.expression(node.value))]
+        for target in node.targets:
+            made += self.into(target, name_of(name))
+        return made
+
+    def to(self, target: ast.expr, value: ast.expr) -> list[ast.stmt]:
+        """An assignment of an expression as it was written."""
+        if not isinstance(target, ast.Tuple):
+            return self.into(target, self.expression(value))
+        if self.branch is None and all(isinstance(t, ast.Name) for t in target.elts):
+            self.known |= {t.id for t in target.elts if isinstance(t, ast.Name)}
+            return [ast.Assign([target], self.expression(value))]
+        names = [self.fresh("value") for _ in target.elts]
+        made: list[ast.stmt] = []
+        if isinstance(value, ast.Tuple):
+            for name, part in zip(names, value.elts, strict=True):
+                made.append(set_to(name, self.expression(part)))
+        else:
+            several = ast.Tuple([ast.Name(n, ast.Store()) for n in names], ast.Store())
+            made.append(ast.Assign([several], self.expression(value)))
+        for name, part in zip(names, target.elts, strict=True):
+            made += self.into(part, name_of(name))
+        return made
+
+    def into(self, target: ast.expr, value: ast.expr) -> list[ast.stmt]:
+        """An assignment of a rewritten expression."""
+        if isinstance(target, ast.Name):
+            return [self.kept(target.id, value)]
+        if not isinstance(target, ast.Subscript):
+            raise NotForLanes(f"line {target.lineno}: an assignment to {ast.unparse(target)}")
+        place = [self.expression(target.value), self.expression(target.slice)]
+        return [ast.Expr(call("lanes_store", name_of(self.mask), *place, value))]
+
+    def on_For(self, node: ast.For) -> list[ast.stmt]:
+        self.unbroken(node)
+        over = self.expression(node.iter)
+        self.known |= {n.id for n in ast.walk(node.target) if isinstance(n, ast.Name)}
+        return [ast.For(node.target, over, self.rounds(node.body), [])]
+
+    def on_While(self, node: ast.While) -> list[ast.stmt]:
+        self.unbroken(node)
+        test = self.expression(node.test)
+        if self.before:
+            raise NotForLanes(f"line {node.lineno}: a loop with a choice in its condition")
+        return [ast.While(call("lanes_same", test), self.rounds(node.body), [])]
+
+    def rounds(self, nodes: list[ast.stmt]) -> list[ast.stmt]:
+        """The statements of a loop."""
+        self.loops += 1
+        written = self.block(nodes)
+        self.loops -= 1
+        return written
+
+    def unbroken(self, loop: ast.For | ast.While) -> None:
+        """Refuse a loop that may end early."""
+        leaves = any(isinstance(part, (ast.Break, ast.Continue)) for part in ast.walk(loop))
+        if leaves or loop.orelse:
+            raise NotForLanes(f"line {loop.lineno}: a loop with break, continue or else")
+
+    def on_If(self, node: ast.If) -> list[ast.stmt]:
+        condition = self.fresh("condition")
+        made: list[ast.stmt] = [set_to(condition, self.expression(node.test))]
+        outer = self.branch
+        self.branch = outer or node
+        made += self.lanes(node.body, condition, "lanes_if")
+        made += self.lanes(node.orelse, condition, "lanes_else")
+        self.branch = outer
+        return made
+
+    def lanes(self, nodes: list[ast.stmt], condition: str, word: str) -> list[ast.stmt]:
+        """Statements that run where any lane takes the branch."""
+        if not nodes:
+            return []
+        mask, outer = self.fresh("mask"), self.mask
+        made: list[ast.stmt] = [set_to(mask, call(word, name_of(outer), name_of(condition)))]
+        if all(map(self.cheap_statement, nodes)):
+            for node in nodes:
+                made += self.picked(node, mask)
+            return made
+        self.mask = mask
+        inner = self.block(nodes)
+        self.mask = outer
+        return [*made, ast.If(call("lanes_any", name_of(mask)), inner or [ast.Pass()], [])]
+
+    def cheap_statement(self, node: ast.stmt) -> bool:
+        """Whether a statement may as well run in all lanes: it sets known variables, no more."""
+        if isinstance(node, ast.Return):
+            return node.value is not None and RESULT in self.known and self.cheap(node.value)
+        if not isinstance(node, ast.Assign) or len(node.targets) != 1:
+            return False
+        target = node.targets[0]
+        names = target.elts if isinstance(target, ast.Tuple) else [target]
+        known = all(isinstance(n, ast.Name) and n.id in self.known for n in names)
+        return (
+            known
+            and self.cheap(node.value)
+            and (len(names) == 1 or isinstance(node.value, ast.Tuple))
+        )
+
+    def picked(self, node: ast.stmt, mask: str) -> list[ast.stmt]:
+        """A cheap statement without a branch."""
+        if isinstance(node, ast.Return):
+            node = set_to(RESULT, node.value)  # type: ignore[arg-type]
+        target = node.targets[0]  # type: ignore[attr-defined]
+        value = node.value  # type: ignore[attr-defined]
+        pairs = (
+            list(zip(target.elts, value.elts, strict=True))
+            if isinstance(target, ast.Tuple)
+            else [(target, value)]
+        )
+        names = [self.fresh("value") for _ in pairs]
+        made: list[ast.stmt] = [
+            set_to(name, self.expression(v)) for name, (_, v) in zip(names, pairs, strict=True)
+        ]
+        for name, (t, _) in zip(names, pairs, strict=True):
+            made.append(
+                set_to(t.id, call("lanes_pick", name_of(mask), name_of(name), name_of(t.id)))
+            )
+        return made

@@ -1,0 +1,81 @@
+"""The source of kernels, for what is made of it."""
+
+from __future__ import annotations
+
+import ast
+import dis
+import linecache
+from collections.abc import Iterator
+from functools import cache
+from types import CodeType
+from typing import Any
+
+from podusv_cli.core.kernel import is_kernel
+
+
+class NotForLanes(TypeError):
+    """A kernel that cannot be rewritten for lanes."""
+
+
+def has_source(function: Any) -> bool:
+    """Whether a kernel is from a file; those that podusv writes out itself have no branches."""
+    return not function.__code__.co_filename.startswith("<")
+
+
+def source(function: Any) -> ast.FunctionDef:
+    """A kernel as it was written. Raises NotForLanes where the file is another one by now."""
+    code = function.__code__
+    nodes, codes = _functions("".join(linecache.getlines(code.co_filename)), code.co_filename)
+    place = code.co_name, code.co_firstlineno
+    found = codes.get(place)
+    if found is None or (found.co_code, found.co_names) != (code.co_code, code.co_names):
+        raise NotForLanes("its source is not that of what is loaded")
+    return nodes[place]
+
+
+@cache
+def _functions(text: str, filename: str) -> tuple[dict[Any, ast.FunctionDef], dict[Any, CodeType]]:
+    """Every function of a file by name and first line, as source and as byte code."""
+    tree = ast.parse(text)
+    functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+    nodes = {
+        (node.name, min([node.lineno, *(d.lineno for d in node.decorator_list)])): node
+        for node in functions
+    }
+    codes: dict[Any, CodeType] = {}
+    waiting = [compile(text, filename, "exec")]
+    while waiting:
+        code = waiting.pop()
+        codes[code.co_name, code.co_firstlineno] = code
+        waiting += [part for part in code.co_consts if isinstance(part, CodeType)]
+    return nodes, codes
+
+
+@cache
+def whole_numbers(function: Any) -> frozenset[str]:
+    """Constants that a kernel, or one that it calls, makes whole numbers of: `int(k.count)`."""
+    return frozenset(_whole_numbers(function, set()))
+
+
+def _whole_numbers(function: Any, done: set[Any]) -> Iterator[str]:
+    if function in done:
+        return
+    done.add(function)
+    if not has_source(function):
+        return
+    for node in ast.walk(source(function)):
+        if (
+            isinstance(node, ast.Call)
+            and isinstance(node.func, ast.Name)
+            and node.func.id == "int"
+            and isinstance(node.args[0], ast.Attribute)
+        ):
+            yield node.args[0].attr
+    for instruction in dis.get_instructions(function):
+        called = (
+            function.__globals__.get(instruction.argval)
+            if instruction.opname == "LOAD_GLOBAL"
+            else None
+        )
+        if is_kernel(called):
+            yield from _whole_numbers(called, done)

@@ -1,0 +1,178 @@
+"""Runs side by side: every run has the bits that it has alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from podusv_cli.actuators.ideal import Ideal
+from podusv_cli.actuators.saturated import Saturated
+from podusv_cli.controllers.base import Controller
+from podusv_cli.core.registry import kinds
+from podusv_cli.engine.batch import Batch, simulate_many
+from podusv_cli.engine.grid import TimeGrid
+from podusv_cli.engine.lanes import why_alone
+from podusv_cli.engine.loop import ClosedLoop, Observer
+from podusv_cli.engine.march import Work
+from podusv_cli.engine.variants import variants
+from podusv_cli.metrics.table import observer
+from podusv_cli.paths.waypoints import Waypoints
+from podusv_cli.scenario.load import load
+
+ROOT = Path(__file__).resolve().parent.parent
+SLOW = [pytest.param(law, marks=pytest.mark.slow) for law in ("dsc", "backstepping")]
+GRID = TimeGrid(0.01, 400)
+COUNT = 11  # a whole bundle, and one with lanes left over
+SCENARIO = load(ROOT / "configs" / "paper" / "corrected.yaml").scenario
+
+
+STUDY = """
+vessel: {preset: paper_nonlinear}
+path: {kind: waypoints, points: [[0, 0], [5, 1]]}
+disturbance: {kind: none}
+actuator: {kind: ideal}
+controller: {kind: pid}
+controllers: {a: {}}
+start: {x: -1.0, y: -1.0}
+simulation: {duration: 1.0}
+sweep: {draws: 4, vary: {vessel.m: {uniform: [50.0, 60.0]}}}
+"""
+
+
+def loop(law: str) -> ClosedLoop:
+    """The task of the paper with a law."""
+    kind = kinds("podusv_cli.controllers", Controller)[law]
+    return replace(SCENARIO.closed_loop(), controller=kind())
+
+
+def scattered(base: ClosedLoop, seed: int) -> list[ClosedLoop]:
+    """Random starts, vessels and seas, of which some saturate, fold and diverge."""
+    draws = np.random.default_rng(seed)
+    return variants(
+        base,
+        {
+            "start.x": draws.uniform(-5.0, 5.0, COUNT),
+            "start.psi": draws.uniform(-3.0, 3.0, COUNT),
+            "start.u": np.where(np.arange(COUNT) % 4 == 1, 1e150, draws.uniform(0, 1, COUNT)),
+            "vessel.m": draws.uniform(15.0, 40.0, COUNT),
+            "disturbance.scale": np.where(np.arange(COUNT) % 5 == 2, 3e5, 1.0),
+        },
+    )
+
+
+def both(loops: list[ClosedLoop], grid: TimeGrid = GRID) -> tuple[Batch, Batch]:
+    """The batch side by side and run by run."""
+    watching = observer(loops[0], grid, steady_fraction=0.2, settling_radius=1.0)
+    alone = simulate_many(loops, grid, observer=watching, side_by_side=False)
+    return simulate_many(loops, grid, observer=watching, side_by_side=True), alone
+
+
+def same(one: Batch, other: Batch) -> None:
+    """The same bits everywhere."""
+    assert one.status.tolist() == other.status.tolist()
+    assert one.cause.tolist() == other.cause.tolist()
+    assert one.reached.tolist() == other.reached.tolist()
+    np.testing.assert_array_equal(one.state, other.state)
+    np.testing.assert_array_equal(one.seen, other.seen)
+
+
+@pytest.mark.parametrize("law", ["adaptive_neural", "pid", *SLOW])
+@pytest.mark.parametrize("actuator", [Ideal(), Saturated()])
+def test_runs_side_by_side_have_the_bits_that_they_have_alone(
+    law: str, actuator: Ideal | Saturated
+) -> None:
+    """Also those that diverge, at different instants."""
+    base = replace(loop(law), actuator=actuator)
+    watching = observer(base, GRID, steady_fraction=0.2, settling_radius=1.0)
+    assert why_alone(base, watching) == ""
+    together, alone = both(scattered(base, 7))
+    same(together, alone)
+    assert {"finished", "diverged"} <= set(alone.status)
+    assert len(set(alone.reached)) > 2
+
+
+@pytest.mark.slow  # the compiler takes half a minute
+def test_options_of_a_law_and_of_its_sampling_march_side_by_side() -> None:
+    """Held directions, samples, the observer of the sway load, anti-windup, a held demand."""
+    law = kinds("podusv_cli.controllers", Controller)["dsc"]
+    controller = law.model_validate(
+        {
+            "rate": "difference",
+            "hold_below": 0.8,
+            "standoff_reference": "crab",
+            "anti_windup": "auxiliary",
+            "difference_step": 0.02,
+        }
+    )
+    base = replace(loop("dsc"), controller=controller, actuator=Saturated())
+    near = variants(base, {"start.x": np.linspace(-0.9, 0.9, COUNT)})
+    together, alone = both([*near, *scattered(base, 3)], TimeGrid(0.01, 300, hold_every=2))
+    same(together, alone)
+
+
+def test_runs_of_another_choice_march_beside_their_like() -> None:
+    """A choice is the same in all runs side by side, so these are sorted by it."""
+    bases = [loop("pid").controller.model_copy(update={"fold": f}) for f in ("joint", "none")]
+    loops = [
+        replace(one, controller=bases[i % 2]) for i, one in enumerate(scattered(loop("pid"), 5))
+    ]
+    same(*both(loops))
+
+
+def test_what_cannot_march_side_by_side_marches_alone_and_says_why() -> None:
+    """A path through points looks for its leg in a loop."""
+    path = Waypoints(points=((0.0, 0.0), (5.0, 1.0), (9.0, -2.0)))
+    base = replace(loop("pid"), path=path)
+    why = why_alone(base, Observer())
+    assert "waypoints.py" in why
+    assert "for runs to march side by side, a kernel has no loop" in why
+    same(*both(scattered(base, 1), TimeGrid(0.01, 20)))
+
+
+def test_the_law_that_podusv_new_writes_marches_side_by_side(podusv: Any) -> None:
+    """An author begins with a law that does."""
+    assert podusv("new", "law", "our_own").code == 0
+    written = load(Path("our_own.yaml")).scenario.singles()["our_own"]
+    assert why_alone(written.closed_loop(), Observer()) == ""
+
+
+def test_validate_says_which_runs_of_a_study_march_side_by_side(podusv: Any) -> None:
+    """And why the others do not."""
+    Path("a.yaml").write_text(STUDY)
+    said = podusv("validate", "a.yaml", "-v").out
+    assert "a: runs march one by one: TypeError" in said
+    assert "waypoints.py" in said
+
+
+def test_an_interrupt_keeps_all_runs_that_marched_side_by_side() -> None:
+    """The user interrupts when the first eight are done."""
+
+    def press(fraction: float) -> None:
+        raise KeyboardInterrupt
+
+    loops = [loop("pid")] * 20
+    batch = simulate_many(
+        loops, TimeGrid(0.01, 20_000), workers=1, progress=press, side_by_side=True
+    )
+    assert batch.status.tolist() == ["finished"] * 8 + ["interrupted"] * 12
+    assert np.isnan(batch.state[8:]).any(axis=1).sum() >= 4  # those that never began
+
+
+def test_runs_that_hang_side_by_side_are_made_again_one_by_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """So that one that hangs costs no other its result."""
+    hangs = Work.hangs
+
+    def wide(work: Work) -> bool:
+        return len(work._under_way) > 2 or hangs(work)
+
+    loops = scattered(loop("pid"), 9)
+    grid = TimeGrid(0.01, 2_000)
+    alone = simulate_many(loops, grid, side_by_side=False)
+    monkeypatch.setattr(Work, "hangs", wide)
+    same(simulate_many(loops, grid, side_by_side=True), alone)

@@ -1,0 +1,50 @@
+"""Sentences about a finished search: who is best, and what a reader has to beware of."""
+
+from types import SimpleNamespace
+
+import pandas as pd
+import pytest
+
+from podusv_cli.tuning import remarks
+from podusv_cli.tuning.trials import CUT, FINISHED
+
+
+def pairs(ratio, low, high):
+    row = {"when": "after", "metric": "iae", "a": "pid", "b": "li", "ratio": ratio}
+    return pd.DataFrame([row | {"ratio_low": low, "ratio_high": high}])
+
+
+@pytest.mark.parametrize(
+    ("ratio", "ends", "says"),
+    [
+        (0.9, (0.8, 0.95), "pid and li is 0.900 [0.800, 0.950]: pid is better in the typical draw"),
+        (1.1, (1.05, 1.2), "li is better in the typical draw"),
+        (1.0, (0.9, 1.1), "neither is better in the typical draw"),
+    ],
+)
+def test_the_answer_tells_the_least_objective_and_who_wins_in_the_same_draw(ratio, ends, says):
+    results = SimpleNamespace(
+        laws=pd.DataFrame({"law": ["li", "pid", "dsc"], "objective_after": [3.0, 2.0, 9.0]}),
+        pairs=pairs(ratio, *ends), shown=["iae"],
+        plan=SimpleNamespace(tune=SimpleNamespace(objectives=["median(iae)"])),
+    )  # fmt: skip
+    (text,) = remarks._answer(results)
+    assert text.startswith("pid has the least median(iae) after the search; in the same draw")
+    assert text.endswith(says)
+
+
+def test_a_repeat_that_is_better_on_fresh_draws_than_the_one_taken_is_told():
+    results = SimpleNamespace(winners={"pid": [], "li": []})
+    results.spread = {"pid": [3.0, 2.0], "li": [2.0, 2.01]}.get
+    (text,) = remarks._overfitted(results)
+    assert text.startswith("pid: the repeat that is best on the training draws has 3 on the fresh")
+
+
+def test_a_search_with_fewer_whole_trials_than_gains_is_told():
+    trials = [SimpleNamespace(status=status) for status in (FINISHED, FINISHED, CUT)]
+    results = SimpleNamespace(
+        winners={"pid": [], "li": []}, trials={"pid": [trials], "li": [trials]},
+        plan=SimpleNamespace(gains={"pid": (1, 2, 3), "li": (1, 2)}),
+    )  # fmt: skip
+    (text,) = remarks._few(results)
+    assert text.startswith("pid: a search finished 2 trials for 3 gains")
