@@ -1,4 +1,4 @@
-"""Exponential, cosine, sine and arctangent: against the library's, and the same bits compiled or not."""
+"""Elementary functions: against the library's, and the same bits compiled or not."""
 
 import math
 from typing import Any
