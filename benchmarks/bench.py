@@ -16,6 +16,7 @@ from benchmarks.c_program import build
 from benchmarks.commands import commands
 from benchmarks.engine import actuators, all_beside_c, growth, law_costs, log_megabytes
 from benchmarks.report import markdown
+from benchmarks.side_by_side import side_by_side_costs
 from benchmarks.timing import machine
 
 HERE = Path(__file__).parent
@@ -37,6 +38,7 @@ PARTS: dict[str, Callable[[], Any]] = {
     "beside_c": beside_c,
     "growth": growth,
     "batch": batch_costs,
+    "side_by_side": side_by_side_costs,
     "log_megabytes": log_megabytes,
     "law": law_costs,
     "actuators": actuators,

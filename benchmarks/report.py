@@ -30,6 +30,11 @@ column.
 """
 
 
+SIDE_BY_SIDE = """
+`benchmarks/side_by_side.c` marches eight runs of adaptive_neural with 27 nodes as structure of
+arrays, with -O3 and without -ffast-math, and integrates the distance only. All integrals agree to
+1e-9 relative. podusv is timed with all that Python does for a run, in processor time.
+"""
 BATCH = """\
 `simulate_many` beside `simulate` for one loop after another: adaptive_neural with 27 nodes, another
 disturbance in every run, all metrics, no log. The cost is the time of N runs over N / cores times
@@ -71,6 +76,8 @@ def markdown(results: Results) -> str:
         "## Many runs at once\n",
         BATCH,
         _batch(results["batch"]),
+        SIDE_BY_SIDE,
+        _side_by_side(results["side_by_side"]),
         "## One evaluation of a law\n",
         _laws(results["law"]),
         "## One step behind each actuator\n",
@@ -125,6 +132,15 @@ def _batch(batch: Results) -> str:
     header = ["steps", "runs on cores", "ms a run alone", "ms a run in the batch"]
     costs = ["cost", "cost in processor time", "processor time side by side"]
     return table([*header, *costs], rows)
+
+
+def _side_by_side(found: Results) -> str:
+    ours = [["podusv, all metrics", spread(found["seconds"]["podusv"], 1e3), ""]]
+    others = [
+        [name, spread(found["seconds"][name], 1e3), spread(relative)]
+        for name, relative in found["ratios"].items()
+    ]
+    return table(["eight runs side by side", "ms a run", "podusv / C"], [*ours, *others])
 
 
 def _growth(growth: Results) -> list[str]:

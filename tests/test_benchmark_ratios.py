@@ -10,6 +10,7 @@ from benchmarks.batch import batch_costs
 from benchmarks.c_program import TOLERANCE, agreement, build
 from benchmarks.cases import CASES, Case, rivals
 from benchmarks.engine import beside_c, growth
+from benchmarks.side_by_side import side_by_side_costs
 from podusv_cli.controllers.base import Controller
 from podusv_cli.core.registry import kinds
 
@@ -65,6 +66,11 @@ def test_many_runs_cost_what_their_steps_cost():
     assert whole["side by side"][1] <= 0.35
     # Other programs take cores away; they do not give any.
     assert whole["cost"][0] <= 1.05
+
+
+def test_runs_side_by_side_beside_plain_c_that_marches_so():
+    relative = side_by_side_costs(3)["ratios"]  # raises where results differ
+    assert max(median for _, median, _ in relative.values()) <= 2.0
 
 
 def test_python_alternatives_are_slower_at_the_same_accuracy():

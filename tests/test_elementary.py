@@ -1,4 +1,4 @@
-"""Exponential, cosine and sine: against the library's, and the same bits compiled or not."""
+"""Elementary functions: against the library's, and the same bits compiled or not."""
 
 import math
 from typing import Any
@@ -10,8 +10,9 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from numba import njit
 
-from podusv_cli.core.elementary import cos_sin, cos_sin_of_turns, exponential
+from podusv_cli.core.elementary import arctangent, cos_sin, cos_sin_of_turns, exponential
 from podusv_cli.core.kernel import Vector
+from podusv_cli.core.kinematics import direction
 from podusv_cli.disturbances.harmonic import Harmonic, HarmonicDisturbance
 from podusv_cli.engine import compile_numba
 
@@ -93,3 +94,20 @@ def test_machine_code_gives_the_same_bits(function):
     numbers = np.append(numbers, [-1e15, -1e17, -1e308])
     plain = np.array([function(float(x)) for x in numbers])
     np.testing.assert_array_equal(compiled(function, numbers), plain)
+
+
+@given(x=st.floats(-1e150, 1e150), y=st.floats(-1e150, 1e150))
+def test_directions_are_right_to_three_units_in_the_last_place(x, y):
+    wanted = math.atan2(y + 0.0, x + 0.0)
+    if abs(wanted) < 1e-300:  # no normal number
+        assert abs(direction(x, y) - wanted) < 1e-300
+    else:
+        assert abs(direction(x, y) - wanted) <= 3.0 * math.ulp(wanted)
+
+
+def test_directions_on_the_axes_are_exact():
+    ends = (-1.0, -0.0, 0.0, 1.0)
+    for x in ends:
+        for y in ends:
+            assert direction(x, y) == math.atan2(y + 0.0, x + 0.0)
+    assert math.isnan(arctangent(math.nan, 1.0))

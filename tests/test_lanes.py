@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import importlib.util
+import linecache
+import math
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,9 +16,13 @@ import pytest
 from podusv_cli.actuators.ideal import Ideal
 from podusv_cli.actuators.saturated import Saturated
 from podusv_cli.controllers.base import Controller
+from podusv_cli.core.kernel import LANES, Vector, kernel
 from podusv_cli.core.registry import kinds
+from podusv_cli.engine import compile
 from podusv_cli.engine.batch import Batch, simulate_many
 from podusv_cli.engine.grid import TimeGrid
+from podusv_cli.engine.lane_doors import LANE_VECTOR
+from podusv_cli.engine.lane_source import OtherSource, source
 from podusv_cli.engine.lanes import why_alone
 from podusv_cli.engine.loop import ClosedLoop, Observer
 from podusv_cli.engine.march import Work
@@ -131,6 +139,91 @@ def test_what_cannot_march_side_by_side_marches_alone_and_says_why() -> None:
     assert "waypoints.py" in why
     assert "for runs to march side by side, a kernel has no loop" in why
     same(*both(scattered(base, 1), TimeGrid(0.01, 20)))
+
+
+TEXT = """
+from podusv_cli.core.kernel import kernel
+
+@kernel
+def twice(x):
+    return x + x
+"""
+
+
+@kernel
+def signed(x: float, limit: float, out: Vector) -> float:
+    """Branches, returns from within them and a loop that changes what they set."""
+    if x < 0.0:
+        out[0] = -1.0
+        return -limit
+    rest, count = x, 0.0
+    for _ in range(3):
+        if rest > limit and not rest > 2.0 * limit:
+            rest -= limit
+            count += 1.0
+        elif rest > limit:
+            rest = rest / 2.0 if count == 0.0 else math.sqrt(rest)
+    out[0] = count if count > 0.0 else rest
+    if math.isnan(rest):
+        return 7.0
+    return min(rest, limit)
+
+
+@kernel
+def watch(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
+    """An observer that branches on the runs' numbers, and on one that they share."""
+    if s[1] > 0.0:
+        seen[1] += 1.0
+        if 0.0 < s[0] <= 2.0 * k.limit or t > 5.0:
+            seen[0] = signed(s[0], k.limit, row)
+        else:
+            seen[2], seen[3] = s[0], s[1]
+    elif k.limit > 0.5:
+        seen[0] = max(signed(-s[0], k.limit, row), math.atan2(s[0], s[1]))
+
+
+@pytest.mark.parametrize("t", [0.0, 6.0])
+def test_every_lane_goes_its_own_way_through_branches(t: float) -> None:
+    """As the kernel does in plain Python, number by number."""
+    side_by_side = compile.lane_entry("observer", watch, ("limit",), frozenset({"limit"}))
+    draws = np.random.default_rng(4)
+    for _ in range(20):
+        s, row, seen = draws.normal(0.0, 2.0, (3, 4, LANES))
+        limit = np.full((1, LANES), draws.uniform(0.2, 1.0))
+        s[0, :2] = np.nan, 0.0
+        wanted_row, wanted = row.copy(), seen.copy()
+        for lane in range(LANES):
+            own = [np.ascontiguousarray(part[:, lane]) for part in (s, wanted_row, wanted)]
+            watch(t, 1.0, *own[:2], SimpleNamespace(limit=limit[0, lane]), own[2])
+            wanted_row[:, lane], wanted[:, lane] = own[1], own[2]
+        rooms = [aligned(part) for part in (s, row, limit, seen)]
+        side_by_side(t, 1.0, *(room.ctypes.data_as(LANE_VECTOR) for room in rooms))
+        np.testing.assert_array_equal(rooms[1], wanted_row.ravel())
+        np.testing.assert_array_equal(rooms[3], wanted.ravel())
+
+
+def aligned(content: Vector) -> Vector:
+    """A copy that begins at a whole register."""
+    room = np.zeros(content.size + LANES)
+    room = room[-(room.ctypes.data // 8) % LANES :][: content.size]
+    room[:] = content.ravel()
+    return room
+
+
+def test_a_file_that_was_edited_is_not_rewritten(tmp_path: Path) -> None:
+    """Its kernel may be another one by now than the one that is loaded."""
+    path = tmp_path / "edited.py"
+    path.write_text(TEXT)
+    spec = importlib.util.spec_from_file_location("edited", path)
+    assert spec
+    assert spec.loader
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    assert source(module.twice).name == "twice"
+    path.write_text(TEXT.replace("x + x", "x - x"))
+    linecache.checkcache()
+    with pytest.raises(OtherSource, match=r"edited.py was edited since twice was loaded"):
+        source(module.twice)
 
 
 def test_the_law_that_podusv_new_writes_marches_side_by_side(podusv: Any) -> None:

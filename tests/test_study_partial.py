@@ -59,7 +59,7 @@ def test_laws_advance_together(tmp_path):
     store = Store(tmp_path / "study", small(draws=1000, grid="{disturbance.scale: [0.5, 1]}"))
     driver = Driver(store, lambda tally: None, float("inf"), (1, 1))
     reached = dict.fromkeys(driver.missing(), 0)
-    for _, (_, unit) in zip(range(100), driver, strict=False):
+    for _, (_, _, unit) in zip(range(100), driver, strict=False):
         reached[unit.law, unit.cell] = unit.first + unit.count
         assert max(reached.values()) - min(reached.values()) <= unit.count
 

@@ -16,7 +16,7 @@ from podusv_cli.core.errors import in_a_line
 from podusv_cli.engine import compile_numba, lane_march
 from podusv_cli.engine.lane_kernels import everywhere, rewritten
 from podusv_cli.engine.lane_parts import PRIMITIVES, WORDS
-from podusv_cli.engine.lane_source import has_source
+from podusv_cli.engine.lane_source import OtherSource, has_source
 from podusv_cli.engine.lane_types import FLOAT
 from podusv_cli.engine.object_cache import Code
 
@@ -27,10 +27,13 @@ PLAIN = {*PRIMITIVES, *AS_WRITTEN}
 def object_code(function: Any, prototype: Any) -> Code:
     """Object code of a kernel for lanes and all kernels it calls, or why there is none.
 
-    numba may raise anything where a kernel does what its types for lanes have no code for.
+    numba may raise anything where a kernel does what its types for lanes have no code for. Raises
+    TypeError where that need not be so the next time.
     """
     try:
         return compile_numba.translated(function, _for_lanes, _signature(prototype))
+    except (OtherSource, MemoryError, OSError) as error:
+        raise TypeError(in_a_line(error)) from error
     except Exception as error:
         return Code("", in_a_line(error).encode())
 

@@ -17,19 +17,23 @@ class NotForLanes(TypeError):
     """A kernel that cannot be rewritten for lanes."""
 
 
+class OtherSource(TypeError):
+    """A kernel whose file was edited since it was loaded."""
+
+
 def has_source(function: Any) -> bool:
     """Whether a kernel is from a file; those that podusv writes out itself have no branches."""
     return not function.__code__.co_filename.startswith("<")
 
 
 def source(function: Any) -> ast.FunctionDef:
-    """A kernel as it was written. Raises NotForLanes where the file is another one by now."""
+    """A kernel as it was written. Raises OtherSource where the file is another one by now."""
     code = function.__code__
     nodes, codes = _functions("".join(linecache.getlines(code.co_filename)), code.co_filename)
     place = code.co_name, code.co_firstlineno
     found = codes.get(place)
     if found is None or (found.co_code, found.co_names) != (code.co_code, code.co_names):
-        raise NotForLanes("its source is not that of what is loaded")
+        raise OtherSource(f"{code.co_filename} was edited since {code.co_name} was loaded")
     return nodes[place]
 
 
