@@ -4,25 +4,31 @@ import math
 
 import numpy as np
 import pytest
-from conftest import VESSELS, Constant, adrift, run
+from conftest import POD, VESSELS, Constant, adrift, run
 from scipy.stats import norm
 
+from podusv_cli.actuators.pod import Pod, Pods
 from podusv_cli.core.random_words import gauss_markov
 from podusv_cli.disturbances.current import Current
+from podusv_cli.disturbances.total import Total
+from podusv_cli.disturbances.waves import Waves
 
 SPEED, DIRECTION = 0.3, 0.8
 WATER = SPEED * np.array([math.cos(DIRECTION), math.sin(DIRECTION)])
 TURN = Constant(surge=2.0, yaw=0.3)
+# Waves that no load comes of, whose signals stand before the current's.
+SWELL = Waves(height=0.1, period=1.5, components=8, reflection_u=0.0, reflection_v=0.0)
 HEAVY = Constant(surge=400.0, yaw=200.0)
 
 
-def drifted(form, vessel):
+def drifted(form, vessel, beside=(), **others):
     """Positions and headings of a turning hull in a current, and in calm water."""
     start = (0.0, 0.0, 0.4, 0.0, 0.0, 0.0)
     c, s = math.cos(start[2]), math.sin(start[2])
     with_water = (*start[:3], c * WATER[0] + s * WATER[1], c * WATER[1] - s * WATER[0], 0.0)
-    sea = Current(speed=SPEED, direction=DIRECTION, form=form)
-    parts = {"vessel": VESSELS[vessel], "controller": HEAVY if vessel == "milliampere" else TURN}
+    sea = Total(parts=(*beside, Current(speed=SPEED, direction=DIRECTION, form=form)))
+    law = HEAVY if vessel == "milliampere" or others else TURN
+    parts = {"vessel": VESSELS[vessel], "controller": law} | others
     moving = run(adrift(disturbance=sea, start=with_water, **parts), 40.0)
     calm = run(adrift(start=start, **parts), 40.0)
     return tuple(np.column_stack([one[n] for n in ("x", "y", "psi")]) for one in (moving, calm))
@@ -36,6 +42,21 @@ def test_seen_from_the_water_a_hull_moves_as_in_calm_water(vessel):
     assert np.abs(calm[-1, 2] - calm[0, 2]) > 1.0, "the hull has to turn for this to say anything"
     np.testing.assert_allclose(moving[:, :2] - np.outer(time, WATER), calm[:, :2], atol=1e-9)
     np.testing.assert_allclose(moving[:, 2], calm[:, 2], atol=1e-9)
+
+
+@pytest.mark.parametrize(("form", "others"), [("physical", ()), ("printed", (SWELL,))])
+def test_pods_turn_in_the_water_and_not_over_ground(form, others):
+    """Propellers at full speed, whose thrust depends on the advance speed.
+
+    Their limits make kinks within steps, where the method of integration is of first order.
+    """
+    twin = [{"y": -0.078, "T_nV": 0.075}, {"y": 0.078, "T_nV": 0.075}]
+    drive = Pods(pods=tuple(Pod(**POD | own) for own in twin), thrust_form=form)
+    moving, calm = drifted("irrotational", "cybership2", others, actuator=drive)
+    time = 0.01 * np.arange(len(calm))
+    assert np.hypot(*calm[-1, :2]) > 1.0
+    np.testing.assert_allclose(moving[:, :2] - np.outer(time, WATER), calm[:, :2], atol=1e-6)
+    np.testing.assert_allclose(moving[:, 2], calm[:, 2], atol=1e-6)
 
 
 def test_without_the_acceleration_a_turning_hull_feels_the_ground():

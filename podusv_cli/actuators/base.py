@@ -21,9 +21,10 @@ class Actuator(Component):
     """What turns a demand (tau_u, tau_r) into loads on the hull.
 
     `drive(t, x, state, demand, k, table, tau, rate, signals)` is a kernel: from the vessel's state
-    x, the actuator's own `state` and the `demand` (tau_u [N], tau_r [N m]) it writes the loads
-    (tau_u, tau_v, tau_r) into `tau`, the rate of its state into `rate`, and one number for each
-    of its `signals`. Limits act here, inside the right-hand side.
+    x, whose u and v are relative to the water, the actuator's own `state` and the `demand` (tau_u
+    [N], tau_r [N m]) it writes the loads (tau_u, tau_v, tau_r) into `tau`, the rate of its state
+    into `rate`, and one number for each of its `signals`. Limits act here, inside the right-hand
+    side.
 
     `states` and `signals` declare every number; the numbers of one vector have the same signal,
     which has an axis.

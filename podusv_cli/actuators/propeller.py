@@ -49,6 +49,7 @@ def speed_gain(x: Vector, pod: Vector, delta: float, k: Any) -> float:
 
     The physical form loses thrust with the advance speed V_a, the water's speed along the
     propeller's axis at the pod; the printed (8) gains with the vessel's speed V, both ways alike.
+    Both are through the water: an actuator's x is so.
     """
     if k.thrust_form == PHYSICAL:
         ahead, aside = x[3] - pod[Y] * x[5], x[4] + pod[X] * x[5]

@@ -18,6 +18,15 @@ WAVE_MOTION = (
     Signal("psi_w", "rad", "first-order wave motion in yaw", r"\psi_w"),
 )
 
+# The velocity of the water, which actuators are told of. A disturbance that has it declares these
+# two among its `signals`, one behind the other.
+FLOW = (
+    Signal("V_c", "m/s", "speed of the current"),
+    Signal(
+        "beta_c", "rad", "direction that the current flows to", r"\beta_c", wrapped=True
+    ),
+)  # fmt: skip
+
 
 class Disturbance(Component):
     """A load on the hull in the body frame.

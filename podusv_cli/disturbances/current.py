@@ -14,12 +14,9 @@ from podusv_cli.core.kernel import Vector, kernel, tail
 from podusv_cli.core.random_words import gauss_markov
 from podusv_cli.core.signal import Signal
 from podusv_cli.core.steps import misfit
-from podusv_cli.disturbances.base import Disturbance
+from podusv_cli.disturbances.base import FLOW, Disturbance
 from podusv_cli.vessels.plant import surge_force, sway_force, yaw_moment
 from podusv_cli.vessels.vessel import Vessel
-
-V_C = Signal("V_c", "m/s", "speed of the current")
-BETA_C = Signal("beta_c", "rad", "direction that the current flows to", r"\beta_c", wrapped=True)
 
 
 class Current(Disturbance):
@@ -51,7 +48,7 @@ class Current(Disturbance):
     @property
     def signals(self) -> tuple[Signal, ...]:
         """Speed and direction."""
-        return V_C, BETA_C
+        return FLOW
 
     def constants_with(self, vessel: Vessel) -> dict[str, float]:
         """Its constants, and the coefficients of the hull."""

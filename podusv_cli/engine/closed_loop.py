@@ -11,7 +11,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from podusv_cli.core.kernel import Vector, kernel, shared, tail, unpacker
+from podusv_cli.core.elementary import cos_sin
+from podusv_cli.core.kernel import Vector, kernel, scratch, shared, tail, unpacker
 from podusv_cli.engine.layout import (
     DISTANCE,
     HELD_DEMAND,
@@ -36,6 +37,31 @@ LARGEST = 1e300
 coefficients = unpacker(COEFFICIENTS)
 # Machine code gets both as bare numbers, one by the other.
 named_wires, named_plan = unpacker(Wires._fields), unpacker(Plan._fields)
+
+
+@kernel
+def through_water(s: Vector, flow: Vector, x: Vector) -> None:
+    """x = the vessel's state with (u, v) relative to water that flows at (V_c, beta_c)."""
+    cosine, sine = cos_sin(flow[1] - s[2])
+    for i in range(6):
+        x[i] = s[i]
+    x[3] -= flow[0] * cosine
+    x[4] -= flow[0] * sine
+
+
+@kernel
+def drive(
+    t: float, s: Vector, ds: Vector, demand: Vector, actuator: Function, c: Wires, n: Plan
+) -> None:
+    """The actuator's loads, rates and signals, from the vessel's motion through the water."""
+    row, x = c.row, s
+    if n.flow > 0:
+        x = scratch(6)
+        through_water(s, tail(row, n.flow), x)
+    actuator(
+        t, x, tail(s, 6), demand, c.actuator, c.actuator_table,
+        tail(row, n.tau), tail(ds, 6), tail(row, n.flags),
+    )  # fmt: skip
 
 
 @kernel
@@ -73,10 +99,7 @@ def rates(
     if n.relayed > 0:
         pass_on(demand, c.relay)
         wanted = tail(c.relay, GIVEN)
-    actuator(
-        t, s, tail(s, 6), wanted, c.actuator, c.actuator_table,
-        tau, tail(ds, 6), tail(row, n.flags),
-    )  # fmt: skip
+    drive(t, s, ds, wanted, actuator, c, n)
     if n.wants_loads > 0 and not (n.hold_every > 0 and n.update_first > 0):
         after(t, memory, demand, tau, p, table, memory_rate)
     if n.measured > 0:

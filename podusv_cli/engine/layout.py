@@ -20,6 +20,7 @@ class Plan(NamedTuple):
     demand: int
     tau: int
     b: int
+    flow: int  # offset in the row of the current's speed and direction; 0: the water is at rest
     flags: int
     sensed: int
     columns: int  # length of the row

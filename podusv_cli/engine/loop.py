@@ -17,7 +17,7 @@ from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.recording import Allocate
 from podusv_cli.core.signal import LOOP, Signal
 from podusv_cli.core.steps import whole_steps
-from podusv_cli.disturbances.base import WAVE_MOTION, Disturbance
+from podusv_cli.disturbances.base import FLOW, WAVE_MOTION, Disturbance
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.layout import HELD_SIGNALS, Plan, Wires
 from podusv_cli.engine.relay import relay
@@ -140,8 +140,8 @@ class ClosedLoop:
         return Plan(
             states=memory + sum(size for _, size in law.slots()),
             estimate=estimate if self.measured else 0, memory=memory,
-            signals=signals, demand=demand, tau=tau, b=b, flags=flags, sensed=sensed,
-            columns=columns,
+            signals=signals, demand=demand, tau=tau, b=b, flow=_flow(self.disturbance, b),
+            flags=flags, sensed=sensed, columns=columns,
             steps=grid.steps, log_every=grid.log_every, hold_every=grid.hold_every,
             sample_every=_sample_steps(law.sample_period(), grid),
             measured=int(self.measured), update_first=int(grid.update_first),
@@ -226,6 +226,12 @@ def wire(
         work=np.zeros(law.workspace()), seen=np.zeros(observer.size), under_way=np.zeros(2),
         log=allocate(rows * plan.width),
     )  # fmt: skip
+
+
+def _flow(disturbance: Disturbance, b: int) -> int:
+    """Where the row has the current, with the load at `b`; 0 where the water is at rest."""
+    signals = disturbance.signals
+    return b + 3 + signals.index(FLOW[0]) if FLOW[0] in signals else 0
 
 
 def _wave_motion(disturbance: Disturbance) -> int:
