@@ -23,7 +23,7 @@ PODS := kept dropped ideal no_anti_windup single
 ABLATIONS := ablation ablation_figures ablation_standoff ablation_gains ablation_gains_figures \
     ablation_gains_standoff ablation_pid
 TABLES := unknown:unknown_dynamics discrete:discrete_signals limits:period_limits learnt:learnt gains:fixed_gains
-STUDIES := hull_and_sea unknown_dynamics rivals
+STUDIES := hull_and_sea unknown_dynamics rivals sea_state_2 sea_state_4 sea_state_6
 SEARCHES := phases hull network sliding
 COMPARISONS := printed_compare figures_compare figures_compare_standoff corrected_compare
 

@@ -14,7 +14,7 @@ from benchmarks.alternatives import plain_engine, python_alternatives
 from benchmarks.batch import batch_costs
 from benchmarks.c_program import build
 from benchmarks.commands import commands
-from benchmarks.engine import actuators, all_beside_c, growth, law_costs, log_megabytes
+from benchmarks.engine import actuators, all_beside_c, growth, law_costs, log_megabytes, seas
 from benchmarks.report import markdown
 from benchmarks.side_by_side import side_by_side_costs
 from benchmarks.timing import machine
@@ -42,6 +42,7 @@ PARTS: dict[str, Callable[[], Any]] = {
     "log_megabytes": log_megabytes,
     "law": law_costs,
     "actuators": actuators,
+    "seas": seas,
     "plain_engine": plain_engine,
     "alternatives": python_alternatives,
     "commands": commands,

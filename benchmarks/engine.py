@@ -20,6 +20,7 @@ from podusv_cli.engine.replay import replayer
 from podusv_cli.engine.simulate import simulate
 from podusv_cli.scenario.limits import estimate
 from podusv_cli.scenario.load import load
+from podusv_cli.scenario.model import Scenario
 
 ROUNDS = 7
 STEPS = (1_000, 3_100, 10_000, 31_000, 100_000)
@@ -99,6 +100,38 @@ def actuators(rounds: int = ROUNDS) -> dict[str, list[float]]:
     loops = {label: _behind(name) for label, name in acting.items()}
     sparse = grid(log_every=10)
     return _a_step({label: (loop, sparse) for label, loop in loops.items()}, rounds)
+
+
+def seas(rounds: int = ROUNDS) -> dict[str, list[float]]:
+    """Time of a run in a sea over that of the same run in calm water, round by round.
+
+    The sea has a current, wind with 50 components and long-crested waves with 100.
+    """
+    parts = (
+        {"kind": "current", "speed": 0.06, "speed_std": 0.02},
+        {"kind": "wind", "speed": 1.0, "gusts": "norsok", "components": 50},
+        {"kind": "waves", "height": 0.027, "period": 0.8, "components": 100},
+    )
+    sea = {"disturbance": parts}
+    sensors = {"measurement": {"kind": "sensors"}}
+    told = {
+        "calm": {"disturbance": {"kind": "none"}}, "sea": sea, "sea, sensors": sea | sensors,
+        **{f"sea, sensors, {kind}": sea | sensors | {"estimator": {"kind": kind}}
+           for kind in ("low_pass", "passive_observer", "ekf")},
+    }  # fmt: skip
+    base = load(ROOT / "configs" / "paper" / "corrected.yaml").scenario
+    loops = {label: _changed(base, new).closed_loop() for label, new in told.items()}
+    over = grid(log_every=10)
+    timers = {
+        label: timed(partial(simulate, loop, over), clock=process_time)
+        for label, loop in loops.items()
+    }
+    times = in_turns(timers, rounds)
+    return {label: ratio(times, label, "calm") for label in loops}
+
+
+def _changed(scenario: Scenario, new: dict[str, Any]) -> Scenario:
+    return Scenario.model_validate(scenario.alone().model_dump() | new)
 
 
 def _behind(name: str) -> ClosedLoop:

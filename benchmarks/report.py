@@ -85,6 +85,11 @@ def markdown(results: Results) -> str:
             ["actuator", "us"],
             ([name, spread(q, 1e6)] for name, q in results["actuators"].items()),
         ),
+        "## A run in a sea, beside one in calm water\n",
+        table(
+            ["run", "of the time in calm water"],
+            ([name, spread(q)] for name, q in results["seas"].items() if name != "calm"),
+        ),
         "## Without compiled code\n",
         _plain(results["plain_engine"]),
         _alternatives(results["alternatives"]),

@@ -110,8 +110,8 @@ def test_explain_shows_everything_about_a_key(podusv):
 def test_explain_shows_the_sections_without_a_key(podusv):
     out = podusv("explain").out
     assert [line for line in out.splitlines() if line in Scenario.model_fields] == [
-        "vessel", "nominal", "start", "path", "disturbance", "actuator", "controller", "simulation",
-        "control", "log", "metrics", "sweep", "tune",
+        "vessel", "nominal", "start", "path", "disturbance", "actuator", "measurement", "estimator",
+        "controller", "simulation", "control", "log", "metrics", "sweep", "tune",
     ]  # fmt: skip
     assert f"    kinds: {', '.join(kinds('paths'))}\n" in out
 

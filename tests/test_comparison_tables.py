@@ -107,9 +107,16 @@ def test_every_section_of_a_scenario_is_looked_at():
     sections = {key.partition(".")[0] for key in OTHERWISE}
     rest = {
         "name", "description", "controller", "controllers", "claims", "silence", "plugins", "sweep",
-        "tune",
+        "tune", "measurement", "estimator",
     }  # fmt: skip
     assert sections | rest == set(type(scenario()).model_fields)
+
+
+def test_sensors_and_an_estimator_are_a_difference():
+    seeing = scenario("measurement={kind: sensors}", "estimator={kind: ekf}")
+    found = differences({"a": scenario().model_dump(), "b": seeing.model_dump()})
+    assert found["measurement.kind"] == {"a": "exact", "b": "sensors"}
+    assert found["estimator.kind"] == {"a": "none", "b": "ekf"}
 
 
 @pytest.mark.parametrize("key", ["name=b", "description=b", "controller.K_Pu=3"])

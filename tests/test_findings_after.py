@@ -38,7 +38,7 @@ def test_findings_come_in_the_order_of_the_scenario_s_sections():
     ]
     assert sections == sorted(sections)
     assert {kind.when for kind in finding_kinds().values()} == {"before", "after"}
-    assert len(finding_kinds()) == 27
+    assert len(finding_kinds()) == 30
 
 
 def test_every_code_is_documented_with_its_meaning():
