@@ -251,7 +251,8 @@ def test_an_interrupt_while_a_loop_is_made_keeps_what_is_done() -> None:
             raise KeyboardInterrupt
         return corrected()
 
-    batch = simulate_many(Lazily(5, make), TimeGrid(0.01, 10), workers=1)
+    grid, loops = TimeGrid(0.01, 10), Lazily(5, make)
+    batch = simulate_many(loops, grid, workers=1, side_by_side=False)  # else they wait for others
     assert batch.status.tolist() == ["finished"] * 3 + ["interrupted"] * 2
 
 

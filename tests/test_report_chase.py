@@ -193,7 +193,7 @@ def seen(tmp_path_factory):
     wide = {f"a_long_label_of_a_run_{i}": FRAME["a"] for i in range(8)}
     html = page(
         chase=chase.chase(runs()), theories={"a": theory(2.5, True)},
-        table=FRAME.assign(**wide), figures=[ERRORS._replace(svg=SVG)] * 4,
+        table=FRAME.assign(**wide), figures=[ERRORS._replace(file=SVG)] * 4,
         provenance={"argv": ["podusv", "x" * 300]}, title="long" * 60,
         scenario=scenario().model_copy(update={"description": "word/" * 90}),
     )  # fmt: skip

@@ -174,7 +174,7 @@ def test_a_run_that_ends_its_process_is_told_alike_by_every_engine(tmp_path):
     store.open("now")
     for end in ("exit code -9", "the worker ended"):
         driver = Driver(store, lambda tally: None, float("inf"), (1, 1))
-        (number, unit), *_ = driver
+        (number, _, unit), *_ = driver
         driver.done(number, Outcome(failure=end, killed=True))
         (result,) = store.results()
         assert result.causes == (ENDED,)
