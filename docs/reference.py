@@ -58,7 +58,7 @@ def pictures() -> Iterable[tuple[str, bytes]]:
 
 KINDS = {
     "controller": "Control laws", "path": "Paths", "disturbance": "Disturbances",
-    "actuator": "Actuators",
+    "actuator": "Actuators", "measurement": "Measurements", "estimator": "Estimators",
 }  # fmt: skip
 
 

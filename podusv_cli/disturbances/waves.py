@@ -153,8 +153,8 @@ class Waves(Disturbance):
     """
 
     kind: Literal["waves"] = "waves"
-    height: float = value(..., "m", "significant wave height Hs", gt=0)
-    period: float = value(..., "s", "period of the waves, see `period_is`", gt=0)
+    height: float = value(..., "m", "significant wave height Hs", ge=1e-6, le=1e3)
+    period: float = value(..., "s", "period of the waves, see `period_is`", ge=1e-3, le=1e4)
     period_is: spectra.Period = value(
         "peak", "", "which period: of the spectrum's peak, mean (T1), or zero-crossing (Tz)"
     )
