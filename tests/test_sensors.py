@@ -4,12 +4,16 @@ import math
 
 import numpy as np
 import pytest
-from conftest import Constant, adrift, corrected, run
+from conftest import NONLINEAR, Constant, adrift, corrected, run
 
+from podusv_cli.core.errors import LawError
 from podusv_cli.core.signal import STATE
+from podusv_cli.disturbances.current import Current
+from podusv_cli.disturbances.harmonic import HarmonicDisturbance
 from podusv_cli.disturbances.total import Total
+from podusv_cli.estimators.none import NoEstimator
 from podusv_cli.measurements.base import FRESH, KNOWN, VALUE
-from podusv_cli.measurements.sensors import Sensor, Sensors, rounded
+from podusv_cli.measurements.sensors import ERRORS, HEAD, Sensor, Sensors, rounded
 
 H = 0.01
 PERFECT = Sensor(period=H)
@@ -40,6 +44,12 @@ def test_a_sample_is_held_and_comes_after_its_delay():
     np.testing.assert_array_equal(log["psi_m"], log["psi"])
 
 
+def _errors(table, quantity, count):
+    """The errors of a quantity's samples, from where the table's head says that they begin."""
+    begin = int(table[HEAD * quantity + ERRORS])
+    return table[begin : begin + count]
+
+
 def errors_of(sensor, count=40_000):
     return sensor.errors((3, "measurement", "heading"), 1, count)[0]
 
@@ -64,6 +74,9 @@ def test_lost_samples_are_a_share_and_outages_are_times():
     assert abs(gone.mean() - 0.3) < 5.0 * math.sqrt(0.21 / len(gone))
     gone = np.isnan(errors_of(Sensor(period=0.5, outages=((10.0, 12.0), (20.0, 20.4))), 100))
     assert np.flatnonzero(gone).tolist() == [20, 21, 22, 23, 24, 40]
+    gone = np.isnan(errors_of(Sensor(period=0.1, outages=((0.3, 0.7),)), 20))
+    assert np.flatnonzero(gone).tolist() == [3, 4, 5, 6, 7], "ends count, whatever 3 * 0.1 is"
+    assert np.isnan(errors_of(Sensor(outages=((0.0, 0.0),)), 5)).tolist() == [True] + [False] * 4
 
 
 def test_an_outage_leaves_the_last_value():
@@ -87,9 +100,10 @@ def test_errors_do_not_depend_on_the_other_sensors_or_on_the_length_of_the_run()
     logs = [run(adrift(measurement=one, **CIRCLE), time) for time in (1.0, 2.0)]
     np.testing.assert_array_equal(logs[1]["psi_m"][:101], logs[0]["psi_m"])
     found = run(adrift(measurement=one), 1.0)["psi_m"]
-    lesser = other.table_for(H, 100)
+    heading = [_errors(each.table_for(H, 100), 2, 51) for each in (one, other)]
+    np.testing.assert_array_equal(*heading)
+    assert heading[0].std() > 0.05
     assert len(found) == 101
-    assert np.isin(one.table_for(H, 100)[-60:], lesser).any()
 
 
 def test_the_axes_of_one_sensor_have_errors_of_their_own():
@@ -128,6 +142,41 @@ def test_sensors_and_sampled_control_work_together():
     assert set(np.flatnonzero(np.diff(log["tau_u_cmd"])) % 10) == {9}
 
 
+class Forgetful(Sensors):
+    """Sensors for a test that declare no signals."""
+
+    @property
+    def signals(self):
+        """None, although all is measured."""
+        return ()
+
+
+class Short(NoEstimator):
+    """An estimator for a test that starts with too little."""
+
+    def start(self, x, nominal):
+        """One number less."""
+        return x[:5]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"measurement": Forgetful()}, "declares 0 signals, and measures 6"),
+        ({"measurement": Sensors(), "estimator": Short()}, "starts with 5 numbers and declares 6"),
+    ],
+)
+def test_what_would_write_beyond_its_vectors_is_refused(wrong, said):
+    with pytest.raises(LawError, match=said):
+        run(adrift(**wrong), 0.1)
+
+
+def test_a_part_of_a_sum_keeps_its_choices_apart_from_those_of_others():
+    total = Total(parts=(Current(), HarmonicDisturbance()))
+    assert "part0_form" in total.choices() & set(total.constants_with(NONLINEAR))
+    assert "form" not in total.choices()
+
+
 def test_times_that_do_not_fit_the_step_are_told():
     odd = sensors(position=Sensor(period=0.015), heading=Sensor(delay=0.004))
     told = dict(odd.conflicts(H))
@@ -142,4 +191,3 @@ def test_the_layout_of_what_is_seen():
     np.testing.assert_array_equal(first[VALUE : VALUE + 6], np.arange(6.0))
     np.testing.assert_array_equal(first[FRESH : FRESH + 6], 0.0)
     np.testing.assert_array_equal(first[KNOWN : KNOWN + 6], [1, 1, 1, 0, 0, 1])
-    assert Total(parts=()).signals == ()

@@ -67,6 +67,11 @@ class Total(Disturbance):
         starts = np.cumsum([len(tables), *map(len, tables[:-1])]).astype(float)
         return np.concatenate([starts, *tables])
 
+    def choices(self) -> frozenset[str]:
+        """Those of all parts, named as the constants are."""
+        each = ((i, name) for i, part in enumerate(self.parts) for name in part.choices())
+        return frozenset(f"part{i}_{name}" for i, name in each)
+
     def bounds(self) -> tuple[float, float, float] | None:
         """The sum of the bounds, which the sum need not reach."""
         each = [part.bounds() for part in self.parts]

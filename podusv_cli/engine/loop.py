@@ -13,6 +13,7 @@ from podusv_cli.actuators.base import Actuator
 from podusv_cli.controllers.base import Controller
 from podusv_cli.core import signal
 from podusv_cli.core.component import called
+from podusv_cli.core.errors import LawError
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.recording import Allocate
 from podusv_cli.core.signal import LOOP, Signal
@@ -23,7 +24,7 @@ from podusv_cli.engine.layout import HELD_SIGNALS, Plan, Wires
 from podusv_cli.engine.relay import relay
 from podusv_cli.estimators.base import Estimator
 from podusv_cli.estimators.none import NoEstimator
-from podusv_cli.measurements.base import Measurement
+from podusv_cli.measurements.base import KNOWN, OWN, Measurement
 from podusv_cli.measurements.exact import Exact
 from podusv_cli.paths.base import TARGET, Path
 from podusv_cli.vessels.vessel import Vessel
@@ -102,6 +103,26 @@ class ClosedLoop:
         """Whether the true state acts on the actuator through the law without delay."""
         return not self.measured and self.actuator.delay() == 0.0
 
+    def check_seeing(self) -> None:
+        """Raise LawError for a measurement or an estimator that is not what it declares.
+
+        In compiled code it would write beyond its vectors.
+        """
+        measurement, start = self.measurement, np.array(self.start)
+        known, first = measurement.measured(), measurement.first(start, 1.0)
+        marks = first[KNOWN:OWN].tolist() == [float(one) for one in known]
+        if len(known) != len(STATE) or not marks or len(measurement.signals) != sum(known):
+            what = f"{len(measurement.signals)} signals, and measures {sum(known)} of {len(STATE)}"
+            raise LawError(
+                f"{called(measurement)}: it declares {what}; `first` has to say the same"
+            )
+        states, begun = len(self.estimator.states), len(self.estimator.start(start, self.nominal))
+        if not begun == states >= len(STATE):
+            raise LawError(
+                f"{called(self.estimator)}: it starts with {begun} numbers and declares {states} "
+                f"states; both have to be the same, {len(STATE)} or more"
+            )
+
     def estimated(self) -> tuple[Signal, ...]:
         """The estimator's states; none where the law is given the state itself."""
         return self.estimator.states if self.measured else ()
@@ -117,6 +138,8 @@ class ClosedLoop:
 
     def about(self) -> dict[str, Signal]:
         """Every signal that the loop logs, by name. Raises LawError where two have one name."""
+        if self.measured:
+            self.check_seeing()
         law, actuator = self.controller, self.actuator
         own = (partial(called, actuator), (*actuator.states, *actuator.signals_with))
         loop = (lambda: "the closed loop", LOOP)

@@ -27,6 +27,8 @@ UNITS = "m, rad, m/s or rad/s"
 # `seen` for their delivery, and how many can.
 PERIOD, DELAY, RESOLUTION, ERRORS, WAITING, ROOM, HEAD = range(7)
 
+ROUNDED = 1e-9  # of a sample
+
 Span = Annotated[tuple[float, float], Field(strict=False)]
 
 
@@ -50,9 +52,13 @@ class Sensor(Component):
         """Errors of the first samples, shape (quantities, count); NaN for a lost sample."""
         each = [self._error((*stream, i), count) for i in range(quantities)]
         lost = uniforms((*stream, "lost"), 0, count) < self.lost
-        at = np.arange(count) * self.period
-        for start, end in self.outages:
-            lost |= (at >= start) & (at <= end)
+        sample = np.arange(count)
+        for start, end in self.outages:  # in samples, since 3 * 0.1 is more than 0.3
+            first, last = (
+                math.floor(at / self.period + rest)
+                for at, rest in ((start, -ROUNDED), (end, ROUNDED))
+            )
+            lost |= (sample > first) & (sample <= last)
         return np.where(lost, np.nan, each)
 
     def _error(self, stream: tuple[int | str, ...], count: int) -> Vector:
