@@ -13,8 +13,6 @@ from conftest import (
     Constant,
     adrift,
     corrected,
-    example,
-    kinds,
     last_state,
     run,
 )
@@ -22,21 +20,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import lambertw
 
-from podusv_cli.actuators.base import Actuator
 from podusv_cli.actuators.command import Command, Failure
 from podusv_cli.actuators.ideal import Ideal
 from podusv_cli.actuators.pod import Pods
 from podusv_cli.controllers.pid import Pid
 from podusv_cli.controllers.velocity_vector import VelocityVector
 from podusv_cli.core.component import value
-from podusv_cli.core.kernel import Vector, bundle, is_kernel, kernel
+from podusv_cli.core.kernel import Vector, bundle, kernel
 from podusv_cli.engine.continuous import continuous
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.loop import ClosedLoop
 from podusv_cli.paths.line import Line
 
-every_kind = pytest.mark.parametrize("kind", kinds("actuators").values(), ids=kinds("actuators"))
-PATH = Command(delay=0.2, dead_zone_u=0.3, dead_zone_r=0.05, resolution_u=0.1, resolution_r=0.02)
 START = (0.0, 0.0, 0.0, 0.4, 0.0, 0.0)
 K = 60.0  # kg/s, of `Brake`
 
@@ -57,30 +52,6 @@ class Brake(Constant):
         """The demand."""
         tau[0] = k.k * (k.u_d - x[3])
         tau[1] = 0.0
-
-
-class Half(Actuator):
-    """An actuator as a plug-in may bring it: it gives half of the demand, with a lag."""
-
-    kind: Literal["half"] = "half"
-    lag: float = value(0.5, "s", "time constant", gt=0)
-
-    @property
-    def states(self):
-        """The force."""
-        from podusv_cli.core.signal import Signal
-
-        return (Signal("force", "N", "force of the test's actuator"),)
-
-    @staticmethod
-    @kernel
-    def drive(
-        t: float, x: Vector, state: Vector, demand: Vector, k: Any, table: Vector,
-        tau: Vector, rate: Vector, signals: Vector,
-    ) -> None:  # fmt: skip
-        """Half of the surge force only."""
-        rate[0] = (0.5 * demand[0] - state[0]) / k.lag
-        tau[0], tau[1], tau[2] = state[0], 0.0, 0.0
 
 
 def braked(delay: float, **parts: Any) -> ClosedLoop:
@@ -281,64 +252,6 @@ def test_the_sway_force_of_a_pod_that_failed_is_lost_with_its_thrust():
     for name in ("tau_u", "tau_v", "tau_r", "thrust"):
         np.testing.assert_array_equal(out[name], 0.0)
     assert np.abs(out["delta"][-1]).max() > 0.1
-
-
-@pytest.mark.parametrize("kind", [Half, *kinds("actuators").values()])
-@pytest.mark.parametrize("parts", [("command",), ("failure",), ("command", "failure")])
-def test_every_actuator_takes_both_and_computes_the_same_bits_either_way(kind, parts):
-    actuator = staged(kind, parts)
-    loop = corrected(actuator=actuator, controller=Pid(), path=Line(), start=SMOOTH_START)
-    machine, plain = (run(loop, 1.0, compiled=compiled) for compiled in (True, False))
-    assert machine.status == "finished"
-    assert ("tau_u_in" in machine.signals) == ("command" in parts)
-    for name in plain.signals:
-        np.testing.assert_array_equal(machine[name], plain[name], err_msg=name)
-
-
-def staged(kind: Any, parts: tuple[str, ...]) -> Any:
-    """An actuator of this kind with these parts around it."""
-    pod = {"pod": 0} if kind is Pods else {}
-    given = {"command": PATH, "failure": {"time": 0.5, "effectiveness": 0.5, **pod}}
-    return kind.model_validate(
-        example(kind).model_dump() | {name: given[name] for name in parts}, strict=False
-    )
-
-
-@every_kind
-def test_without_them_the_kernel_is_the_actuator_s_own(kind):
-    actuator = example(kind)
-    assert actuator.drive_with() is kind.drive
-    assert actuator.signals_with == actuator.signals
-    assert not {name for name in actuator.constants() if name.startswith(("command", "failure"))}
-
-
-@every_kind
-def test_equal_kinds_have_the_same_kernel(kind):
-    for parts in (("command",), ("failure",), ("command", "failure")):
-        one, other = staged(kind, parts), staged(kind, parts)
-        assert one.drive_with() is other.drive_with()
-        assert is_kernel(one.drive_with())
-
-
-@every_kind
-@pytest.mark.parametrize("demand", [(math.nan, 0.5), (0.5, math.nan), (math.inf, math.inf)])
-def test_a_demand_that_is_no_number_is_not_hidden(kind, demand):
-    actuator = staged(kind, ("command", "failure"))
-    tau, signals = np.full(3, np.nan), np.full(len(actuator.signals_with), np.nan)
-    rate, k = np.full(len(actuator.states), np.nan), bundle(actuator.constants())
-    asked = np.array([*demand, 0.0])
-    with np.errstate(invalid="ignore"):
-        actuator.drive_with()(
-            0.0, np.zeros(6), actuator.rest(), asked, k, actuator.table(), tau, rate, signals
-        )
-    assert not np.isfinite(signals[:2]).all()
-
-
-@every_kind
-def test_what_the_healthy_actuator_can_do_is_as_before(kind):
-    plain, actuator = example(kind), staged(kind, ("command", "failure"))
-    assert actuator.limits() == plain.limits()
-    np.testing.assert_array_equal(actuator.input_matrix(), plain.input_matrix())
 
 
 def test_a_law_that_asks_is_told_the_loads_that_act():
