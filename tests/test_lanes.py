@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from plugin_samples import LAW
+from plugin_samples import SCENARIO as SCENARIO_OF_LAW
 
 from podusv_cli.actuators.ideal import Ideal
 from podusv_cli.actuators.saturated import Saturated
@@ -224,6 +226,18 @@ def test_a_file_that_was_edited_is_not_rewritten(tmp_path: Path) -> None:
     linecache.checkcache()
     with pytest.raises(OtherSource, match=r"edited.py was edited since twice was loaded"):
         source(module.twice)
+
+
+def test_a_plug_in_whose_file_is_gone_marches_side_by_side(tmp_path: Path) -> None:
+    """A study keeps the text of its plug-ins, so it needs none of their files."""
+    (tmp_path / "laws").mkdir()
+    law, config = tmp_path / "laws/my_law.py", tmp_path / "mine.yaml"
+    law.write_text(f"{LAW}# {tmp_path}\n")  # so that no other test has loaded it
+    config.write_text(SCENARIO_OF_LAW)
+    written = load(config).scenario.singles()["cross_track"]
+    law.unlink()
+    linecache.checkcache()
+    assert why_alone(written.closed_loop(), Observer()) == ""
 
 
 def test_the_law_that_podusv_new_writes_marches_side_by_side(podusv: Any) -> None:

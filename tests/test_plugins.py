@@ -37,6 +37,16 @@ def test_a_file_s_law_runs_compiled_and_its_run_says_which_file(podusv):
     assert Path("r/plugins/my_law.py").read_text() == LAW
 
 
+def test_each_of_two_equal_files_is_named_where_it_lies(podusv):
+    for folder in ("one", "two"):
+        Path(folder).mkdir()
+        shutil.move("laws", folder) if put() else None
+        shutil.move("a.yaml", folder)
+    for folder in ("one", "two"):
+        (plugin,) = load(f"{folder}/a.yaml").scenario.plugged
+        assert plugin.path == str(Path(folder, "laws/my_law.py").resolve())
+
+
 def test_a_file_is_named_on_the_command_line_too(podusv):
     text = SCENARIO.replace("plugins: [laws/my_law.py]\n", "")
     shutil.move("laws/my_law.py", "own.py") if put(text) else None
@@ -127,7 +137,8 @@ def test_scenarios_of_one_process_know_only_their_own_files(tmp_path, monkeypatc
     assert load_text(BASE, "b.yaml").scenario.plugged == ()
     with pytest.raises(Exception, match="unknown kind 'cross_track'"):
         load_text(SCENARIO.replace("plugins: [laws/my_law.py]\n", ""), "a.yaml")
-    assert type(own) is scenario_class((from_file("elsewhere/my_law.py", LAW),))
+    ((_, module),) = from_file("elsewhere/my_law.py", LAW).offers
+    assert type(own.controller) is module.CrossTrack
     assert scenario_class(()) is Scenario
 
 

@@ -28,6 +28,7 @@ ROOMS = (
     "metrics", "figures", "findings",
 )  # fmt: skip
 GROUPS = tuple(f"podusv.{room}" for room in ROOMS)
+TEXT = "__text__"  # where a module of a file keeps its text; the file may be edited or gone
 MODULES = "podusv_plugins"  # what the modules of files are called: podusv_plugins.my_law_1a2b3c4d
 
 _ONE_AT_A_TIME = RLock()
@@ -126,6 +127,7 @@ def _module(name: str, path: str, text: str) -> ModuleType:
 def _executed(whole: str, path: str, text: str) -> ModuleType:
     module = ModuleType(whole)
     module.__file__ = str(Path(path).resolve())
+    vars(module)[TEXT] = text
     sys.modules[whole] = module  # where pydantic looks up annotations, and inspect the source
     try:
         exec(compile(text, module.__file__, "exec", dont_inherit=True), vars(module))  # noqa: S102

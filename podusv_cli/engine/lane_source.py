@@ -10,6 +10,7 @@ from functools import cache
 from types import CodeType
 from typing import Any
 
+from podusv_cli.core import plugins
 from podusv_cli.core.kernel import is_kernel
 
 
@@ -29,12 +30,18 @@ def has_source(function: Any) -> bool:
 def source(function: Any) -> ast.FunctionDef:
     """A kernel as it was written. Raises OtherSource where the file is another one by now."""
     code = function.__code__
-    nodes, codes = _functions("".join(linecache.getlines(code.co_filename)), code.co_filename)
+    nodes, codes = _functions(_text(function), code.co_filename)
     place = code.co_name, code.co_firstlineno
     found = codes.get(place)
     if found is None or (found.co_code, found.co_names) != (code.co_code, code.co_names):
         raise OtherSource(f"{code.co_filename} was edited since {code.co_name} was loaded")
     return nodes[place]
+
+
+def _text(function: Any) -> str:
+    """The whole text that a kernel is from. A plug-in's is kept; its file may be gone."""
+    kept: str | None = function.__globals__.get(plugins.TEXT)
+    return "".join(linecache.getlines(function.__code__.co_filename)) if kept is None else kept
 
 
 @cache

@@ -172,8 +172,8 @@ class Sorter:
         """Decide, by the first loop, whether runs march side by side."""
         if not self._chosen:
             self._chosen = True
-            if self._wanted or (self._wanted is None and self._is_worth(loop)):
-                with suppress(TypeError):  # `why_alone` tells why
+            with suppress(TypeError):  # `why_alone` tells why
+                if self._wanted or (self._wanted is None and self._is_worth(loop)):
                     self.advance = marcher(loop, self._observer)
                     self._places = places(loop, self._observer)
 

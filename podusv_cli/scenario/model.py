@@ -227,14 +227,17 @@ class Scenario(Component):
         return self.control.period > 0 or not self.closed_loop().at_once
 
 
-@cache
 def scenario_class(plugins: Plugins) -> type[Scenario]:
     """The class of scenarios that know the components of these plug-ins, too.
 
     Raises LawError where two components have one kind.
     """
-    if not plugins:
-        return Scenario
+    # Plug-ins of equal texts are equal, but provenance names the place of each.
+    return _class(plugins, tuple(plugin.path for plugin in plugins)) if plugins else Scenario
+
+
+@cache
+def _class(plugins: Plugins, _places: tuple[str, ...]) -> type[Scenario]:
     law: Any = any_of("podusv_cli.controllers", Controller, plugins)
     sea: Any = any_of("podusv_cli.disturbances", Disturbance, plugins)
     annotations: dict[str, Any] = {
