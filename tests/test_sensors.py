@@ -6,11 +6,15 @@ import numpy as np
 import pytest
 from conftest import NONLINEAR, Constant, adrift, corrected, run
 
+from podusv_cli.controllers.velocity_vector import VelocityVector
 from podusv_cli.core.errors import LawError
 from podusv_cli.core.signal import STATE
 from podusv_cli.disturbances.current import Current
 from podusv_cli.disturbances.harmonic import HarmonicDisturbance
+from podusv_cli.disturbances.step import Step
 from podusv_cli.disturbances.total import Total
+from podusv_cli.disturbances.waves import Waves
+from podusv_cli.estimators.ekf import ExtendedKalmanFilter
 from podusv_cli.estimators.none import NoEstimator
 from podusv_cli.measurements.base import FRESH, KNOWN, VALUE
 from podusv_cli.measurements.sensors import ERRORS, HEAD, Sensor, Sensors, rounded
@@ -42,6 +46,18 @@ def test_a_sample_is_held_and_comes_after_its_delay():
     expected = np.where(taken >= 0, log["x"][np.maximum(taken, 0)], log["x"][0])
     np.testing.assert_array_equal(log["x_m"], expected)
     np.testing.assert_array_equal(log["psi_m"], log["psi"])
+
+
+@pytest.mark.parametrize("spreading", [0, 2])
+def test_sensors_see_the_waves_motion_on_top_of_each_quantity(spreading):
+    """Also where the waves are not the first disturbance of a list, and a part follows them."""
+    sea = Waves(height=0.05, period=1.0, components=8, direction=0.7, spreading=spreading)
+    whole = Total(parts=(HarmonicDisturbance(), Current(speed=0.1), sea, Step(b_v=0.5)))
+    log = run(adrift(measurement=sensors(), disturbance=whole, **CIRCLE), 2.0)
+    for state in STATE:
+        moved = log[f"{state.name}_w"]
+        assert np.ptp(moved) > 1e-3
+        np.testing.assert_array_equal(log[f"{state.name}_m"], log[state.name] + moved)
 
 
 def _errors(table, quantity, count):
@@ -184,6 +200,26 @@ def test_times_that_do_not_fit_the_step_are_told():
     assert "try 0.01" in told["position.period"]
     backwards = Sensors(heading=Sensor(outages=((3.0, 2.0),)))
     assert "found [3, 2]" in dict(backwards.conflicts(H))["heading.outages[0]"]
+
+
+def test_a_loop_rides_through_an_outage_and_lost_samples():
+    """With every third position lost and none for 4 s the law goes on by the filter's prediction.
+
+    Where the estimate holds the last position the law takes the vessel for standing.
+    """
+    gone = Sensor(period=0.1, noise=0.01, lost=0.3, outages=((70.0, 74.0),))
+    away = {}
+    for estimator in (ExtendedKalmanFilter(sigma_p=0.01), NoEstimator()):
+        loop = corrected(
+            controller=VelocityVector(), measurement=sensors(position=gone), estimator=estimator
+        )
+        log = run(loop, 80.0)
+        fresh = np.flatnonzero(np.diff(log["x_m"])) + 1
+        assert not np.any((fresh >= 7000) & (fresh <= 7400))
+        taken = np.count_nonzero(fresh < 7000)
+        assert abs(taken / 700 - 0.7) < 5.0 * math.sqrt(0.21 / 700)
+        away[estimator.kind] = log["z_e"][6000:].max()
+    assert 4.0 * away["ekf"] < 0.8 < away["none"]
 
 
 def test_the_layout_of_what_is_seen():

@@ -9,12 +9,15 @@ from scenario_samples import SOUND, told
 
 from podusv_cli.core.kernel import bundle
 from podusv_cli.disturbances import waves
+from podusv_cli.disturbances.base import WAVE_MOTION
 from podusv_cli.disturbances.spectra import GRAVITY, WATER
 from podusv_cli.disturbances.total import Total
 from podusv_cli.disturbances.waves import Waves
 from podusv_cli.disturbances.wind import Wind
 
 SHORT = NONLINEAR.model_copy(update={"length": 1e-3, "beam": 1e-3})
+MOTION = tuple(signal.name for signal in WAVE_MOTION)
+VELOCITY, ZETA = (6, 7, 8), 9  # of what a kernel writes
 SOUTHWARD = math.pi  # waves that come from the south go north
 
 
@@ -24,7 +27,7 @@ def asked(sea, vessel=NONLINEAR, kernel=None):
     kernel = kernel or sea.kernel_with(vessel)
 
     def at(t, x):
-        b = np.full(7, np.nan)
+        b = np.full(10, np.nan)
         kernel(t, np.array(x, float), k, table, b)
         return b
 
@@ -69,14 +72,15 @@ def test_the_kernels_add_up_what_the_docstring_says(spreading):
     at, random = asked(sea), np.random.default_rng(3)
     for _ in range(5):
         t, x = random.uniform(0, 300), random.normal(0, 3, 6)
-        np.testing.assert_allclose(at(t, x), by_hand(sea, NONLINEAR, t, x), rtol=1e-6, atol=1e-7)
+        found = np.delete(at(t, x), VELOCITY)
+        np.testing.assert_allclose(found, by_hand(sea, NONLINEAR, t, x), rtol=1e-6, atol=1e-7)
 
 
 def test_both_kernels_agree_on_waves_of_one_direction():
     sea = Waves(height=0.3, period=1.8, direction=0.8, components=10)
     long, short = asked(sea), asked(sea, kernel=waves._short_crested)
     for t in (0.0, 17.3):
-        x = (3.0, -4.0, 0.4, 0.5, 0.1, 0.0)
+        x = (3.0, -4.0, 0.4, 0.5, 0.1, 0.2)
         np.testing.assert_allclose(long(t, x), short(t, x), rtol=1e-9, atol=1e-12)
 
 
@@ -99,7 +103,7 @@ def test_a_vessel_under_way_meets_the_waves_at_the_encounter_frequency(psi, u):
     met = abs(rate - rate**2 / GRAVITY * u * math.cos(psi))
     at, t = asked(sea), np.linspace(0.0, 60.0 * math.pi / met, 600)
     here = [(u * math.cos(psi) * s, u * math.sin(psi) * s, psi, u, 0, 0) for s in t]
-    zeta = np.array([at(s, x)[6] for s, x in zip(t, here, strict=True)])
+    zeta = np.array([at(s, x)[ZETA] for s, x in zip(t, here, strict=True)])
     up = np.flatnonzero((zeta[:-1] < 0) & (zeta[1:] >= 0))
     crossings = t[up] - zeta[up] * (t[up + 1] - t[up]) / (zeta[up + 1] - zeta[up])
     assert 2.0 * math.pi / np.diff(crossings).mean() == pytest.approx(met, rel=1e-4)
@@ -114,8 +118,8 @@ def test_a_short_hull_goes_round_with_the_water():
         x = (2.0, 5.0, 0.3, 0, 0, 0)
         velocity = (at(t + h, x)[3:5] - at(t - h, x)[3:5]) / (2 * h)
         here = at(t, x)
-        np.testing.assert_allclose(velocity, [rate * here[6], 0.0], atol=1e-4 * a * rate)
-        assert here[3] ** 2 + here[6] ** 2 == pytest.approx(a * a, rel=1e-6)
+        np.testing.assert_allclose(velocity, [rate * here[ZETA], 0.0], atol=1e-4 * a * rate)
+        assert here[3] ** 2 + here[ZETA] ** 2 == pytest.approx(a * a, rel=1e-6)
 
 
 def test_yaw_is_the_slope_of_the_sway_along_the_hull():
@@ -170,14 +174,15 @@ def test_the_two_sides_of_a_hull_are_alike():
     at = asked(sea)
     for psi in (0.3, 1.2, 2.7):
         one_side, other = (at(5.0, (1, 0, sign * psi, 0, 0, 0)) for sign in (1, -1))
-        mirrored = one_side * [1, -1, -1, 1, 1, -1, 1]
+        mirrored = one_side * [1, -1, -1, 1, 1, -1, 1, -1, -1, 1]
         np.testing.assert_allclose(other, mirrored, rtol=1e-9, atol=1e-12)
 
 
 def test_a_factor_on_the_motion_leaves_sea_and_load():
     given = {"height": 0.4, "period": 2.0, "components": 9, "direction": 0.5}
     full, half = (asked(Waves(motion=f, **given))(3.0, np.ones(6)) for f in (1.0, 0.5))
-    np.testing.assert_allclose(half, full * [1, 1, 1, 0.5, 0.5, 0.5, 1], rtol=1e-12)
+    half, full = (np.delete(b, VELOCITY[:2]) for b in (half, full))  # of axes that yaw with it
+    np.testing.assert_allclose(half, full * [1, 1, 1, 0.5, 0.5, 0.5, 0.5, 1], rtol=1e-12)
 
 
 SEA = Total(
@@ -193,7 +198,7 @@ def test_machine_code_computes_what_plain_python_does(spreading):
     first = SEA.parts[0].model_copy(update={"spreading": spreading})
     loop = adrift(disturbance=Total(parts=(first, SEA.parts[1])), controller=Constant(surge=2.0))
     fast, slow = (run(loop, 0.3, compiled=compiled) for compiled in (True, False))
-    for name in ("b_u", "b_v", "b_r", "x_w", "y_w", "psi_w", "zeta", "V_w", "beta_w", "x", "psi"):
+    for name in ("b_u", "b_v", "b_r", *MOTION, "zeta", "V_w", "beta_w", "x", "psi"):
         np.testing.assert_array_equal(fast[name], slow[name])
 
 
@@ -205,6 +210,28 @@ def test_halving_the_step_changes_the_integration_error_only():
         ends.append(np.array([last[name][-1] for name in ("x", "y", "psi")]))
     order = math.log2(np.abs(ends[0] - ends[1]).max() / np.abs(ends[1] - ends[2]).max())
     assert 3.3 < order < 5.5
+
+
+def sensed(at, t, x):
+    """The pose that sensors see, without errors."""
+    return x[:3] + at(t, x)[3:6]
+
+
+@pytest.mark.parametrize("spreading", [0, 2])
+def test_sensors_of_velocity_see_the_rate_of_what_sensors_of_pose_see(spreading):
+    """By differences along the motion, in the axes of the hull that yaws with the waves."""
+    sea = Waves(height=0.3, period=1.8, direction=0.8, components=21, spreading=spreading)
+    at, random, h = asked(sea), np.random.default_rng(5), 1e-3
+    for _ in range(5):
+        t, x = random.uniform(0, 300), random.normal(0, 1, 6)
+        c, s = math.cos(x[2]), math.sin(x[2])
+        moving = np.array([c * x[3] - s * x[4], s * x[3] + c * x[4], x[5], 0, 0, 0])
+        ends = [sensed(at, t + e, x + e * moving) for e in (h, -h)]
+        north, east, r = (ends[0] - ends[1]) / (2 * h)
+        heading = sensed(at, t, x)[2]
+        c, s = math.cos(heading), math.sin(heading)
+        expected = [c * north + s * east, c * east - s * north, r]
+        np.testing.assert_allclose(x[3:] + at(t, x)[6:9], expected, atol=2e-5)
 
 
 def test_a_longer_run_begins_with_the_same_waves():

@@ -10,12 +10,15 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.core.signal import Signal
 from podusv_cli.vessels.vessel import Vessel
 
-# First-order motion in waves, which sensors see on top of the vessel's state. A disturbance that
-# has it declares these three among its `signals`, one behind the other.
+# First-order motion in waves and its velocity, which sensors see on top of the vessel's state. A
+# disturbance that has it declares these six among its `signals`, one behind the other.
 WAVE_MOTION = (
     Signal("x_w", "m", "first-order wave motion, north"),
     Signal("y_w", "m", "first-order wave motion, east"),
     Signal("psi_w", "rad", "first-order wave motion in yaw", r"\psi_w"),
+    Signal("u_w", "m/s", "velocity of the first-order wave motion, surge"),
+    Signal("v_w", "m/s", "velocity of the first-order wave motion, sway"),
+    Signal("r_w", "rad/s", "yaw rate of the first-order wave motion"),
 )
 
 # The velocity of the water, which actuators are told of. A disturbance that has it declares these

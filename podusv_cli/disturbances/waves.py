@@ -15,6 +15,12 @@ is 0.30, the mean over a box 0, over a parabolic waterline 0.30. This is motion 
 no resonance, no heave, roll or pitch, no first-order load. The motion is added to what sensors
 see, and the vessel's state goes on without it.
 
+Its velocity. Sensors of velocity see the rate of what sensors of position see, in the axes of the
+hull that yaws with the waves: R(psi + psi_w)^T (R(psi) (u, v) + (x_w, y_w)') and r + psi_w'. What
+this adds to (u, v, r) is (u_w, v_w, r_w). The rates are those of the sums, component by component:
+a phase runs with omega_e = omega - k (u cos gamma + v sin gamma), and gamma with -r, by which the
+factor changes as (1 + q/2)^-2 (-q'/(1 + q/2)), q' = k^2 (L^2 - B^2) r cos gamma sin gamma/12.
+
 Second-order drift. Radiation stress rho g a^2/4 presses with incoming and reflected waves (a
 and R a) from one side, with what passes from the other; as no energy is lost, the difference is
 rho g (R a)^2/2 a metre (Maruo 1960). A hull is taken as a box: ends of width B against waves
@@ -45,7 +51,7 @@ STREAM = "waves"
 LEAST = 0.01  # of the spectrum's energy that the cut-offs must leave
 ELEVATION = Signal("zeta", "m", "elevation of the sea where the vessel is", r"\zeta")
 TURN = 2.0 * math.pi
-LONG_ROOM, SHORT_ROOM = 4 * LANES, 12 * LANES  # eight partial sums each of 4 and of 12 sums
+LONG_ROOM, SHORT_ROOM = 6 * LANES, 15 * LANES  # eight partial sums each of 6 and of 15 sums
 
 
 @kernel
@@ -71,6 +77,15 @@ def _square(sums: Vector, which: int) -> float:
 
 
 @kernel
+def _hull_axes(north: float, east: float, x: Vector, b: Vector) -> None:
+    """b[6], b[7] = u_w, v_w of the rate (north, east) of the motion, with psi_w in b[5]."""
+    c, s = cos_sin(b[5])
+    c_psi, s_psi = cos_sin(x[2] + b[5])
+    b[6] = (c - 1.0) * x[3] + s * x[4] + c_psi * north + s_psi * east
+    b[7] = (c - 1.0) * x[4] - s * x[3] + c_psi * east - s_psi * north
+
+
+@kernel
 def _long_crested(t: float, x: Vector, k: Any, table: Vector, b: Vector) -> None:
     """Drift load, first-order motion, elevation, of waves that all go in one direction."""
     count = int(k.lanes)
@@ -79,6 +94,8 @@ def _long_crested(t: float, x: Vector, k: Any, table: Vector, b: Vector) -> None
     s_gamma = c_psi * k.s_beta - s_psi * k.c_beta
     way = (k.c_beta * x[0] + k.s_beta * x[1]) / TURN
     slow = k.long2 * c_gamma * c_gamma + k.wide2 * s_gamma * s_gamma
+    both, speed = c_gamma * s_gamma, (c_gamma * x[3] + s_gamma * x[4]) / TURN
+    turning = 4.0 * (k.long2 - k.wide2) * both * x[5] / TURN
     sums = scratch(LONG_ROOM)
     _cleared(LONG_ROOM, sums)
     for block in range(count // LANES):
@@ -86,19 +103,27 @@ def _long_crested(t: float, x: Vector, k: Any, table: Vector, b: Vector) -> None
             i = block * LANES + j
             number, a = table[2 * count + i], table[3 * count + i]
             c, s = cos_sin_of_turns(table[i] * t + table[count + i] - number * way)
-            whole = 1.0 + slow * number * number
-            c, s, felt = a * c, a * s, 1.0 / (whole * whole)
+            square = number * number
+            part = 1.0 / (1.0 + slow * square)
+            c, s = a * c, a * s
+            c_felt, s_felt = c * part * part, s * part * part
+            met, fading = table[i] - number * speed, turning * square * part
             sums[j] += c
             sums[8 + j] += s
-            sums[16 + j] += s * felt
-            sums[24 + j] += c * felt * number
+            sums[16 + j] += s_felt
+            sums[24 + j] += c_felt * number
+            sums[32 + j] += c_felt * met - s_felt * fading
+            sums[40 + j] -= (s_felt * met + c_felt * fading) * number
     envelope, moved = _square(sums, 0), k.motion * _added(sums, 2)
     b[0] = k.drift_u * c_gamma * abs(c_gamma) * envelope
     b[1] = k.drift_v * s_gamma * abs(s_gamma) * envelope
     b[2] = k.drift_arm * b[1]
     b[3], b[4] = moved * k.c_beta, moved * k.s_beta
     b[5] = -k.motion * c_gamma * s_gamma * _added(sums, 3)
-    b[6] = _added(sums, 0)
+    rate, turned = k.motion * TURN * _added(sums, 4), s_gamma * s_gamma - c_gamma * c_gamma
+    _hull_axes(rate * k.c_beta, rate * k.s_beta, x, b)
+    b[8] = -k.motion * (both * TURN * _added(sums, 5) + turned * x[5] * _added(sums, 3))
+    b[9] = _added(sums, 0)
 
 
 @kernel
@@ -110,6 +135,7 @@ def _short_crested(t: float, x: Vector, k: Any, table: Vector, b: Vector) -> Non
     count = int(k.lanes)
     c_psi, s_psi = cos_sin(x[2])
     north, east = x[0] / TURN, x[1] / TURN
+    turning = 4.0 * (k.long2 - k.wide2) * x[5]
     sums = scratch(SHORT_ROOM)
     _cleared(SHORT_ROOM, sums)
     for block in range(count // LANES):
@@ -121,8 +147,13 @@ def _short_crested(t: float, x: Vector, k: Any, table: Vector, b: Vector) -> Non
             c, s = cos_sin_of_turns(table[i] * t + table[count + i] - number * way)
             c_gamma, s_gamma = c_psi * c_beta + s_psi * s_beta, c_psi * s_beta - s_psi * c_beta
             slow = k.long2 * c_gamma * c_gamma + k.wide2 * s_gamma * s_gamma
-            whole = 1.0 + slow * number * number
-            c, s, felt = a * c, a * s, 1.0 / (whole * whole)
+            square, both = number * number, c_gamma * s_gamma
+            part = 1.0 / (1.0 + slow * square)
+            c, s, felt = a * c, a * s, part * part
+            met = TURN * table[i] - number * (c_gamma * x[3] + s_gamma * x[4])
+            fading = turning * both * square * part
+            rate, fall = (c * met - s * fading) * felt, (s * met + c * fading) * felt
+            turned = (s_gamma - c_gamma) * (s_gamma + c_gamma) * x[5] * c * felt
             ahead, astern = max(c_gamma, 0.0), max(-c_gamma, 0.0)
             right, left = max(s_gamma, 0.0), max(-s_gamma, 0.0)
             sums[j] += c
@@ -137,12 +168,17 @@ def _short_crested(t: float, x: Vector, k: Any, table: Vector, b: Vector) -> Non
             sums[72 + j] += right * s
             sums[80 + j] += left * c
             sums[88 + j] += left * s
+            sums[96 + j] += rate * c_beta
+            sums[104 + j] += rate * s_beta
+            sums[112 + j] += (turned - fall * both) * number
     b[0] = k.drift_u * (_square(sums, 4) - _square(sums, 6))
     b[1] = k.drift_v * (_square(sums, 8) - _square(sums, 10))
     b[2] = k.drift_arm * b[1]
     b[3], b[4] = k.motion * _added(sums, 1), k.motion * _added(sums, 2)
     b[5] = -k.motion * _added(sums, 3)
-    b[6] = _added(sums, 0)
+    _hull_axes(k.motion * _added(sums, 12), k.motion * _added(sums, 13), x, b)
+    b[8] = -k.motion * _added(sums, 14)
+    b[9] = _added(sums, 0)
 
 
 class Waves(Disturbance):
@@ -206,7 +242,7 @@ class Waves(Disturbance):
 
     @property
     def signals(self) -> tuple[Signal, ...]:
-        """First-order motion, and the elevation."""
+        """First-order motion, its velocity, and the elevation."""
         return (*WAVE_MOTION, ELEVATION)
 
     @property

@@ -48,7 +48,8 @@ class Measurement(Component):
     def constants_with(self, step: float, motion: int) -> dict[str, float]:
         """Its constants `k`, for a run with this step [s].
 
-        `motion` is where `b` has the wave motion (x_w, y_w, psi_w) that sensors see; 0: nowhere.
+        `motion` is where `b` has the wave motion that sensors see on top of each of the six
+        quantities of the state; 0: nowhere.
         """
         return self.constants()
 

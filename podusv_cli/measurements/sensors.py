@@ -83,8 +83,8 @@ class Sensor(Component):
 class Sensors(Measurement):
     """GNSS, compass, speed log and gyro, each with a rate and errors of its own.
 
-    Until the first delivery the law is given the state at the start. Position and heading contain
-    the first-order motion of `disturbance.kind: waves`; velocities do not.
+    Until the first delivery the law is given the state at the start. All contain the first-order
+    motion of `disturbance.kind: waves`.
     """
 
     kind: Literal["sensors"] = "sensors"
@@ -156,7 +156,7 @@ class Sensors(Measurement):
             waiting, room = tail(seen, int(head[WAITING])), int(head[ROOM])
             seen[FRESH + i] = 0.0
             if period > 0 and now % period == 0:
-                moved = b[int(k.motion) + i] if k.motion > 0.0 and i < 3 else 0.0
+                moved = b[int(k.motion) + i] if k.motion > 0.0 else 0.0
                 sample = x[i] + moved + table[int(head[ERRORS]) + now // period]
                 waiting[now // period % room] = rounded(sample, head[RESOLUTION])
             if period > 0 and due >= 0 and due % period == 0:
