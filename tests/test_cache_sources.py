@@ -112,6 +112,7 @@ def test_every_file_that_makes_a_kernel_is_in_the_digest():
         assert any(mark in path.read_bytes() for mark in object_cache.MARKS), path
 
 
+@pytest.mark.slow
 def test_loading_takes_no_compiler_and_a_run_no_tables_or_plots(tmp_path):
     script = """
 import sys

@@ -44,6 +44,7 @@ def test_a_diverging_run_is_exit_code_3_and_hides_no_other(podusv):
     assert manifest.check(Path("x")).status == "finished"
 
 
+@pytest.mark.slow
 def test_runs_that_differ_in_more_are_warned_of_by_key(podusv):
     write("a.yaml", BASE)
     write("b.yaml", BASE.replace("y: -2.0", "y: -3.0"))
@@ -80,6 +81,7 @@ def test_quiet_is_the_folder_alone(podusv):
     assert podusv(write("two.yaml", TWO), "--out", "x", "-q") == (0, "x\n", "")
 
 
+@pytest.mark.slow
 def test_finished_folders_and_a_scenario_mix(podusv):
     podusv(write("two.yaml", TWO), "--out", "x")
     said = podusv("x", "x/soft", write("one.yaml", BASE), "--out", "y", "--json")
@@ -93,6 +95,7 @@ def test_finished_folders_and_a_scenario_mix(podusv):
 # --- claims of several scenarios
 
 
+@pytest.mark.slow
 def test_claims_speak_of_their_own_scenarios_runs(podusv):
     """The second scenario's `stiff` and `soft` are swapped, and run under other names."""
     swapped = BASE + "controllers: {soft: {K_Pu: 200.0}, stiff: {K_Pu: 5.0}}\n"
@@ -116,6 +119,7 @@ def test_claims_reach_runs_that_are_named_after_their_scenario(podusv):
     assert list(found["C1"]["numbers"]) == ["my-a.peak_tau_u", "max(my-a.u, 0, 1)"]
 
 
+@pytest.mark.slow
 def test_claims_are_not_about_finished_runs_of_the_same_name(podusv):
     config = write("two.yaml", TWO + claim("C1", "soft.peak_tau_u < 100"))
     podusv(config, "--out", "old", "--set", "controllers.soft.K_Pu=900")
@@ -124,6 +128,7 @@ def test_claims_are_not_about_finished_runs_of_the_same_name(podusv):
     assert list(found["C1"]["numbers"]) == ["soft_2.peak_tau_u"]
 
 
+@pytest.mark.slow
 def test_claims_of_the_same_name_keep_apart(podusv):
     write("a.yaml", TWO + claim("C1", "finished(soft)"))
     write("b.yaml", TWO + claim("C1", "not finished(soft)"))
@@ -146,6 +151,7 @@ def test_cannot_tell_says_why(podusv):
 # --- what is refused
 
 
+@pytest.mark.slow
 def test_what_is_compared_is_not_overwritten(podusv):
     podusv(write("two.yaml", TWO), "--out", "x")
     before = manifest.check(Path("x"))
@@ -203,6 +209,7 @@ FIVE = BASE.replace("duration: 1.0", "duration: 0.1, compiled: false") + (
 )
 
 
+@pytest.mark.slow
 def test_five_runs_are_tables_below_each_other_on_a_narrow_terminal(podusv, monkeypatch):
     config = write("five.yaml", FIVE)
     whole = podusv(config, "--out", "x").out.splitlines()

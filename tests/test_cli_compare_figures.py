@@ -33,6 +33,7 @@ def figures_of_report(folder: str) -> int:
     return len(set(re.findall(r"data:image/svg\+xml;base64,([^\"]+)", page)))
 
 
+@pytest.mark.slow
 def test_only_what_is_asked_for_is_drawn_and_what_cannot_be_is_told(podusv, monkeypatch):
     monkeypatch.setattr(execute, "_drawn", lambda *given: {})  # of each run
     config = write("two.yaml", FIGURED)
@@ -45,6 +46,7 @@ def test_only_what_is_asked_for_is_drawn_and_what_cannot_be_is_told(podusv, monk
     assert figures_of_report("x") == 1
 
 
+@pytest.mark.slow
 def test_figures_are_png_and_the_report_has_them_all_the_same(podusv, monkeypatch):
     monkeypatch.setattr(execute, "_drawn", lambda *given: {})
     config = write("two.yaml", FIGURED)

@@ -66,6 +66,7 @@ def test_commands_and_options_are_offered_and_nothing_heavy_is_imported(
     assert HEAVY & set(ast.literal_eval(modules)) <= {"pydantic"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("typed", "offered"),
     [

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import pytest
 from findings_samples import CONFIGS
 
 from podusv_cli.scenario.load import load
@@ -26,6 +27,7 @@ def two() -> Scenario:
     return load("two.yaml").scenario
 
 
+@pytest.mark.slow
 def test_the_command_shows_tables_and_rankings_and_leaves_nothing(podusv):
     two()
     before = sorted(Path().iterdir())
@@ -44,6 +46,7 @@ def test_the_command_shows_tables_and_rankings_and_leaves_nothing(podusv):
     assert sorted(Path().iterdir()) == before
 
 
+@pytest.mark.slow
 def test_only_an_earlier_verification_is_replaced_without_force(podusv, monkeypatch):
     scenario = Path("two.yaml")
     two()
@@ -88,6 +91,7 @@ def test_a_file_that_comes_while_it_computes_is_spared_and_the_numbers_are_print
     assert Path("v.json").read_text() == "mine"
 
 
+@pytest.mark.slow
 def test_what_is_not_converged_ends_with_3_and_is_named(podusv):
     two()
     coarse = podusv("verify", "two.yaml", "--set", "simulation={step: 0.1, duration: 4}")

@@ -61,6 +61,7 @@ def test_run_takes_the_one_controller_and_says_what_it_left(config, tmp_path):
     assert not alone.claims
 
 
+@pytest.mark.slow
 def test_runs_of_a_comparison_keep_their_order(done):
     parts = members.from_folder(done.folder)
     assert [part.label for part in parts] == ["fast", "slow", "pid"]

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pandas as pd
+import pytest
 from comparison_samples import Folder, scenario
 from known_signals import ABOUT
 
@@ -27,6 +28,7 @@ def test_names_are_told_apart():
     assert members.numbered(["figures", "unit"], outputs.RESERVED) == ["figures_2", "unit_2"]
 
 
+@pytest.mark.slow
 def test_drawing_is_progress_too():
     seen = []
     t = np.linspace(0, 1, 5)

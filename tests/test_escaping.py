@@ -133,6 +133,7 @@ def made(podusv: Command, names: tuple[str, str]) -> tuple[str, str]:
     return names
 
 
+@pytest.mark.slow
 def test_no_command_lets_a_folders_name_through(podusv):
     one, other = made(podusv, (f"=a{COLOUR}\n{TURNED}", f"-b\x9b{TURNED}"))
     for words in (

@@ -187,6 +187,7 @@ def test_a_figure_whose_signals_no_run_has_is_not_drawn():
     assert names == ["velocities.png"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["png", pytest.param("pdf", marks=pytest.mark.slow), "svg"])
 def test_the_same_runs_give_the_same_bytes_without_a_date(two, form):
     first, second = (dict(draw(two, ["errors"], (form,)))[f"errors.{form}"] for _ in range(2))

@@ -79,6 +79,7 @@ def test_a_run_that_has_ended_stays_pale_where_it_was():
     assert axes.patches[0].get_alpha() == 1.0
 
 
+@pytest.mark.slow
 def test_a_film_has_a_picture_for_every_frame_and_the_same_bytes_twice(two, monkeypatch):
     monkeypatch.setattr(animation, "FRAMES", 4)
     first, second = animation.animate(two), animation.animate(two)

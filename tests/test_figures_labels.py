@@ -28,6 +28,7 @@ def runs(tmp_path_factory):
     return dressed([(label, part.run.recording, part.scenario) for label, part in parts])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[pytest.mark.slow] * (name not in QUICK)) for name in FIGURES]
 )

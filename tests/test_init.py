@@ -122,6 +122,7 @@ def test_a_copy_anywhere_is_the_same_scenario(podusv, name):
     assert said.out.splitlines()[-1] == f"next: podusv {command} {copy}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["own_vessel", "paper/printed", "pod/vessels/otter"])
 def test_a_copy_is_called_as_the_file(podusv, name):
     assert podusv("init", name).code == 0

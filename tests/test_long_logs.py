@@ -51,6 +51,7 @@ def same_files(place: Path, text: str, **options: Any) -> None:
     assert all(held[name] == mapped[name] for name in held)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS)
 def test_every_law_leaves_the_same_files(tmp_path, law):
     kind, period = LAWS[law]
@@ -180,6 +181,7 @@ def test_what_cannot_be_written_is_an_error_in_one_line(tmp_path, case):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere memory cannot be limited so")
 def test_a_run_takes_far_less_memory_than_its_log(tmp_path):
     law = {"law": "adaptive_neural", "period": 0, "compiled": "true"}

@@ -47,6 +47,7 @@ def test_a_comparison_has_its_law_path_vessel_metric_and_figure(place):
     assert own["package"] == "my-lab"
 
 
+@pytest.mark.slow
 def test_commands_list_explain_and_draw_it(place):
     listed = podusv(place, "list")
     for name in ("los", "lawn", "skiff", "largest_east"):
@@ -56,6 +57,7 @@ def test_commands_list_explain_and_draw_it(place):
     assert "identical" in podusv(place, "rerun", "c/los")
 
 
+@pytest.mark.slow
 def test_another_state_of_the_package_is_not_taken_for_the_one_that_was_used(place):
     law = place / "site/my_lab/los.py"
     text = law.read_text()
@@ -67,6 +69,7 @@ def test_another_state_of_the_package_is_not_taken_for_the_one_that_was_used(pla
         law.write_text(text)
 
 
+@pytest.mark.slow
 def test_its_runs_are_looked_at_where_it_is_not_installed(place, podusv):
     assert podusv("plot", place / "c", "--figure", "errors", "--out", "p").code == 0
     said = podusv("compare", place / "c/los", place / "c/far", "--out", "d", "--no-figures")

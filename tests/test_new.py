@@ -89,6 +89,7 @@ def own(runs, columns):
 """
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("here")
 @pytest.mark.parametrize(
     ("text", "found"),
@@ -146,6 +147,7 @@ def test_a_sound_law_keeps_the_contract():
     assert failures(LAW) == []
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("here")
 @pytest.mark.parametrize("line", WRONG)
 def test_a_mistake_breaks_the_contract(line):

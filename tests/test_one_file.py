@@ -193,6 +193,7 @@ def podusv(place: Path, *words: str, code: int = 0) -> str:
     return done.stdout + done.stderr
 
 
+@pytest.mark.slow
 def test_every_command_knows_what_one_file_brings(place):
     said = podusv(place, "run", "a.yaml", "--json", "--out", "r", "-q", "--no-figures")
     run, _ = json.JSONDecoder().raw_decode(said)
@@ -214,6 +215,7 @@ def test_every_command_knows_what_one_file_brings(place):
     podusv(place, "diff", "c/one", "c/other", code=3)
 
 
+@pytest.mark.slow
 def test_everything_is_listed_and_explained(place):
     listed = podusv(place, "list")
     kinds = ("cross_track", "still", "steady", "lagging", "barge")

@@ -60,6 +60,7 @@ def switching(distance: float, a: float, duration: float) -> tuple[float, float]
     return t, caught(t)
 
 
+@pytest.mark.slow
 def test_full_thrust_is_reversed_when_pontryagin_says_so():
     pytest.importorskip("casadi", reason=REASON)
     chase = load_text(CHASE, "a.yaml").scenario
@@ -155,6 +156,7 @@ def test_grids_and_departures_are_told_and_a_second_optimum_has_a_name_of_its_ow
     assert said.out.splitlines()[-1] == f"finished: {Path('results/a/optimum-2')}"
 
 
+@pytest.mark.slow
 def test_the_square_has_an_optimum_of_its_own():
     pytest.importorskip("casadi", reason=REASON)
     scenario = load_text(SHORT, "a.yaml").scenario

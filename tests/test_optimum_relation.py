@@ -51,6 +51,7 @@ def test_of_two_optima_the_lower_counts(podusv):
     assert ratios["best"] == 1.0 < ratios["worse"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "what"),
     [

@@ -77,6 +77,7 @@ def words(path):
     return [part.partition(" -->")[0] for part in path.read_text().split("<!-- ")[1:]]
 
 
+@pytest.mark.slow
 def test_finished_runs_are_drawn_again_in_every_format(one, other, tmp_path):
     drawn = plot(one, other, out=tmp_path / "new", formats=("png", "pdf"))
     assert drawn.files == [tmp_path / "new" / f"velocities.{form}" for form in ("png", "pdf")]
@@ -129,6 +130,7 @@ def test_runs_of_one_name_and_scenario_are_told_apart_by_their_folders(place, on
     assert {"first/pid", "third/pid"} < set(words(path))
 
 
+@pytest.mark.slow
 def test_a_folder_that_nobody_named_goes_by_its_scenario(place, one, tmp_path):
     stamped = keep(place / "20260102T030405Z-0123abcd", pid(), scenario("mine"))
     (path,) = plot(one, stamped, out=tmp_path).files
@@ -140,6 +142,7 @@ def test_a_run_given_twice_is_drawn_once(one, tmp_path):
     assert words(path).count("pid") == 1
 
 
+@pytest.mark.slow
 def test_a_new_drawing_replaces_an_old_one_and_says_so(one, other, tmp_path):
     (path,) = plot(one, out=tmp_path).files
     before = path.read_bytes()
@@ -160,12 +163,14 @@ def test_files_of_a_finished_run_are_never_replaced(one, tmp_path):
         plot(one, out=link, figures=("errors",), formats=("png",))
 
 
+@pytest.mark.slow
 def test_differences_beyond_the_controller_are_told(one, place, tmp_path):
     longer = keep(place / "longer", pid(), scenario(duration=200.0))
     drawn = plot(one, longer, out=tmp_path)
     assert drawn.differences == {"simulation.duration": {"pid": 100.0, "longer": 200.0}}
 
 
+@pytest.mark.slow
 def test_the_film_is_a_file_beside_the_figures(one, tmp_path, monkeypatch):
     monkeypatch.setattr(animation, "FRAMES", 3)
     drawn = plot(one, out=tmp_path, animate=True)
@@ -187,6 +192,7 @@ def command(*arguments, cwd):
     return subprocess.run(call, cwd=cwd, capture_output=True, text=True, env=os.environ)
 
 
+@pytest.mark.slow
 def test_the_command_prints_files_and_warns_beside_them(one, place, stillborn, tmp_path):
     brief = keep(place / "brief", pid(end=40.0), scenario(duration=40.0))
     (tmp_path / "figures").mkdir()

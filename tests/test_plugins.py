@@ -86,6 +86,7 @@ def test_a_run_repeats_itself_without_the_original(podusv):
     assert podusv("diff", "moved", "again").code == 0
 
 
+@pytest.mark.slow
 def test_a_finished_run_is_looked_at_without_reading_its_file(podusv):
     podusv("compare", put(TWO), "--out", "c", *QUIET)
     trap = LAW + '\nfrom pathlib import Path\nPath("touched").touch()\n'

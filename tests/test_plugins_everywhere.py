@@ -65,6 +65,7 @@ def test_a_class_of_a_plug_in_may_have_the_name_of_one_of_podusv() -> None:
     assert "otter" in own["properties"]["preset"]["enum"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("typed", "offered"),
     [

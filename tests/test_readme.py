@@ -116,6 +116,7 @@ MISTAKES = {  # what is replaced in the page's law
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_a_mistake_in_a_law_gets_the_message_of_the_page(
     mistake: str, podusv: Command, monkeypatch: pytest.MonkeyPatch

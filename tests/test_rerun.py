@@ -150,6 +150,7 @@ def compared(tmp_path):
     return compare.compare([config], request).folder
 
 
+@pytest.mark.slow
 def test_every_run_of_a_comparison_is_repeated(compared, tmp_path, podusv):
     said = podusv("rerun", compared, "--out", tmp_path / "kept")
     assert said.code == 0

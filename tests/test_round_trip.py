@@ -44,6 +44,7 @@ def named(parts: dict[str, Any]) -> str:
     return "-".join(part.get("preset") or part["kind"] for part in parts.values())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "parts",
     [pytest.param(s, marks=[pytest.mark.slow] * (i > 3)) for i, s in enumerate(scenarios())],

@@ -21,11 +21,13 @@ def of_two_files(tmp_path, monkeypatch):
     return load("a.yaml").scenario
 
 
+@pytest.mark.slow
 def test_a_scenario_of_several_long_files_is_read_back(of_two_files):
     text = resolved_yaml(of_two_files)
     assert load_resolved(text, "resolved.yaml") == of_two_files
 
 
+@pytest.mark.slow
 def test_the_manifest_of_many_runs_is_read_back(tmp_path):
     entry = manifest.FileEntry(sha256="a" * 64, bytes=10**9)
     names = ("scenario.yaml", "resolved.yaml", "log.h5", "metrics.json", "metrics.csv",

@@ -143,6 +143,7 @@ def in_a_child(work: Callable[[], object]) -> None:
     os.waitpid(child, 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lost", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_killed_at_any_step_the_old_run_or_the_new_one_comes_back(final, lost, exchanging):
     """`lost`: somebody deletes the folder before the next run clears up; no half of one appears.

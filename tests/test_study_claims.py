@@ -128,6 +128,7 @@ def test_a_planted_winner_is_found_and_its_opposite_refuted() -> None:
     assert found.as_json()["needed"] is None
 
 
+@pytest.mark.slow
 def test_laws_of_the_same_distribution_are_told_apart_no_more_often_than_the_level() -> None:
     random = np.random.default_rng(3)
     a, b = random.random((2, STUDIES, 60))

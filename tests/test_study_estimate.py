@@ -92,6 +92,7 @@ def test_a_law_that_ends_its_process_is_named(monkeypatch):
     assert "without li, which ended its process" in need.in_words()[0]
 
 
+@pytest.mark.slow
 def test_both_commands_tell_it(podusv, tmp_path):
     config = written(tmp_path / "small.yaml")
     said = podusv("validate", config)

@@ -97,6 +97,7 @@ def test_the_same_study_gives_the_same_picture_whatever_it_is_made_of() -> None:
     assert picture() == picture()
 
 
+@pytest.mark.slow
 def test_statistics_and_claims_of_studies_import_no_matplotlib() -> None:
     code = (
         "import sys, podusv_cli.study.claims, podusv_cli.study.summary; "

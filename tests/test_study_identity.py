@@ -92,6 +92,7 @@ def test_a_scenario_that_is_not_the_one_of_the_runs_is_refused(whole, tmp_path):
             command(folder)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("nth", range(1, 5))
 def test_a_study_that_was_killed_while_its_draws_were_raised_goes_on(tmp_path, monkeypatch, nth):
     config = written(tmp_path / "small.yaml", ("draws: 40", "draws: 4"))
@@ -141,6 +142,7 @@ def placed_in(path, dataset):
         return file[dataset].id.get_offset(), file[dataset].id.get_storage_size()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "dataset", ["drawn/vessel.m", "drawn/start.psi", "failed_run", "failed_cause", "law", "draw"]
 )
@@ -191,6 +193,7 @@ def told_as(folder, machine):
     path.write_text(json.dumps(content))
 
 
+@pytest.mark.slow
 def test_runs_of_several_machines_are_told_before_more_are_added(tmp_path):
     config, warnings = written(tmp_path / "small.yaml"), []
 
@@ -210,6 +213,7 @@ def test_runs_of_several_machines_are_told_before_more_are_added(tmp_path):
     assert "different machines or versions: an abacus (" in told
 
 
+@pytest.mark.slow
 def test_a_merge_tells_of_several_machines(tmp_path):
     config, warnings = written(tmp_path / "small.yaml", ("draws: 40", "draws: 4")), []
     shards = [tmp_path / f"{n}" for n in (1, 2)]

@@ -45,6 +45,7 @@ def test_twenty_shards_are_one_run_byte_for_byte(shards, whole, tmp_path):
     assert (tmp_path / "all" / RUNS).read_bytes() == whole
 
 
+@pytest.mark.slow
 def test_runs_that_two_folders_have_alike_are_no_clash(shards, whole, tmp_path):
     merged(shards[:12], tmp_path / "first")
     merged([*shards[9:], tmp_path / "first"], tmp_path / "all")

@@ -57,6 +57,7 @@ def same(metrics, table):
     return all(metrics[name] == (x if math.isfinite(x) else None) for name, x in table.items())
 
 
+@pytest.mark.slow
 def test_kept_runs_are_those_asked_for(study):
     runs, names = study.results.runs, {path.name for path in (study.folder / "logs").iterdir()}
     wanted = keep.wanted(study.results)
@@ -167,6 +168,7 @@ def test_a_finished_study_lists_all_its_files_and_one_being_continued_none(study
     assert manifest.check(folder).status == "interrupted"
 
 
+@pytest.mark.slow
 def test_every_sitting_is_kept(study, tmp_path):
     folder = tmp_path / "sittings"
     shutil.copytree(study.folder, folder)

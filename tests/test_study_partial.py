@@ -25,6 +25,7 @@ def partial_study(folder, **ranges):
     return store
 
 
+@pytest.mark.slow
 def test_an_unfinished_study_compares_laws_on_the_draws_that_all_have(podusv, tmp_path):
     store = partial_study(tmp_path, pid=[(0, 20)], li=[(8, 20)])
     done = sweep.report(store.folder, sweep.Request(figures=False))
@@ -75,6 +76,7 @@ def test_claims_on_sobol_points_are_refused(tmp_path):
     assert not (tmp_path / "study").exists()
 
 
+@pytest.mark.slow
 def test_sobol_points_have_no_intervals(podusv, tmp_path):
     success = "  success: finished and iae <= 0.215\n"
     config = written(tmp_path / "small.yaml", SOBOL, (CLAIMS, success))

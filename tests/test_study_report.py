@@ -53,6 +53,7 @@ def section(told, name):
     return found
 
 
+@pytest.mark.slow
 def test_the_answer_comes_first(whole, told):
     assert [part.attributes["id"] for part in told.all("section")] == [
         "answer", "claims", "failures", "numbers", "varied", "provenance",
@@ -130,6 +131,7 @@ def test_a_study_with_a_grid_has_figures_of_cells_and_of_the_grid(whole):
     assert len({*names}) == len(names)
 
 
+@pytest.mark.slow
 def test_a_figure_that_fails_costs_nothing_else(drawn, monkeypatch, tmp_path):
     def broken(*args, **kwargs):
         raise ArithmeticError("no such curve")

@@ -26,6 +26,7 @@ def marched(folder, draws):
     return store, client, march(store, lambda tally: None, cluster(client))
 
 
+@pytest.mark.slow
 def test_units_and_calls_are_as_many_as_they_have_to_be(tmp_path):
     store, client, (tally, whole) = marched(tmp_path / "study", 2000)
     assert whole
@@ -69,6 +70,7 @@ def test_a_million_runs(tmp_path):
     assert seconds["report"] <= 60
 
 
+@pytest.mark.slow
 def test_a_worker_loads_nothing_large_that_it_does_not_need():
     """They take 30 to 70 MB each, of 150 that a worker may have."""
     large = {"scipy.stats", "pandas", "matplotlib", "jinja2"}

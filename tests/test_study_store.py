@@ -52,6 +52,7 @@ def test_workers_change_no_byte(whole, tmp_path):
     assert content(made(tmp_path / "two", workers=2)) == content(whole)
 
 
+@pytest.mark.slow
 def test_raising_the_draws_keeps_what_is_there(whole, tmp_path):
     few = made(tmp_path / "grown", draws=13)
     before = few.runs().metric("li", "iae")
@@ -62,6 +63,7 @@ def test_raising_the_draws_keeps_what_is_there(whole, tmp_path):
         made(tmp_path / "grown", draws=39)
 
 
+@pytest.mark.slow
 def test_shards_and_lost_units_come_to_the_same(whole, tmp_path):
     for number in (2, 3, 1):
         store = made(tmp_path / "shards", part=(number, 3))
@@ -189,6 +191,7 @@ def test_words_and_claims_do_not_make_another_study(whole):
     assert small(seed=8).identity != whole.plan.identity
 
 
+@pytest.mark.slow
 def test_a_run_that_kills_its_process_is_found(tmp_path, monkeypatch):
     real = units.drawn
 
@@ -276,6 +279,7 @@ def test_a_full_disk_while_the_table_is_filled_keeps_the_units(whole, tmp_path, 
     assert content(made(store.folder)) == content(whole)
 
 
+@pytest.mark.slow
 def test_times_of_all_sittings_are_added_up(tmp_path):
     config = written(tmp_path / "small.yaml")
     for wanted in (8, 24):

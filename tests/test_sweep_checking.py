@@ -276,6 +276,7 @@ def test_sections_with_checks_of_their_own_are_known() -> None:
     assert found == {"start": True, "disturbance": True, "vessel": False, "controller": False}
 
 
+@pytest.mark.slow
 def test_validate_tells_the_size_of_the_study(podusv: Command, tmp_path: Path) -> None:
     file = tmp_path / "a.yaml"
     grid = "  draws: 1500\n  grid: {disturbance.scale: [0.5, 1, 2]}\n"

@@ -134,6 +134,7 @@ def test_the_page_has_figures_and_no_broken_value(done):
     assert names == {"validation", "history", "ratios", "importance", "slices-toy"}
 
 
+@pytest.mark.slow
 def test_an_inequality_is_respected(done, tmp_path):
     """The best gain is 3, and only gains up to about 1.6 hold the inequality."""
     changes = ("tune.repeats=1", "tune.budget=120", "tune.subject_to=[median(effort_u) >= 0.4]")
@@ -144,6 +145,7 @@ def test_an_inequality_is_respected(done, tmp_path):
     assert 0.4 <= winner.values[0] < 0.7
 
 
+@pytest.mark.slow
 def test_two_objectives_give_a_front(optuna, tmp_path):
     made = tuned(
         tmp_path, "tune.objective=[median(effort_u), median(iae)]", "tune.repeats=1",
@@ -161,6 +163,7 @@ def test_two_objectives_give_a_front(optuna, tmp_path):
     assert "second_objective_after" in pd.read_csv(made.folder / "laws.csv").columns
 
 
+@pytest.mark.slow
 def test_gains_that_the_law_refuses_fail_and_cost_no_simulation(optuna, tmp_path, monkeypatch):
     from podusv_cli.tuning import search as module
 
@@ -176,6 +179,7 @@ def test_gains_that_the_law_refuses_fail_and_cost_no_simulation(optuna, tmp_path
     assert best(found.trials).gains["gain"] < 2
 
 
+@pytest.mark.slow
 def test_a_search_in_which_everything_fails_ends_and_says_so(optuna, tmp_path):
     made = tuned(
         tmp_path, "sweep.success=finished and effort_u < 0", "tune.repeats=1", "tune.budget=40"
@@ -184,6 +188,7 @@ def test_a_search_in_which_everything_fails_ends_and_says_so(optuna, tmp_path):
     assert "toy: every trial failed on most draws; its gains mean nothing" in remarks(made.results)
 
 
+@pytest.mark.slow
 def test_the_command_prints_before_and_after(optuna, podusv, tmp_path):
     code, out, err = podusv(
         "tune", str(toy(tmp_path)), "--set", "tune.budget=32", "--set", "tune.repeats=1",

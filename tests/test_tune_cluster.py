@@ -85,6 +85,7 @@ def on_cluster(folder, address, *changes):
     return workflow.tune(toy(folder), request, lambda tally, text: None)
 
 
+@pytest.mark.slow
 def test_a_cluster_gives_the_bytes_of_this_machine(near, tmp_path):
     far = on_cluster(tmp_path / "far", "near", *SMALL)
     here = tuned(tmp_path / "here", *SMALL)

@@ -60,6 +60,7 @@ def opened(out, plan, texts=MappingProxyType({})):
     place.write(out, plan, place.known(out, plan), "now", texts)
 
 
+@pytest.mark.slow
 def test_a_search_opens_again_wherever_it_was_killed(tmp_path, monkeypatch):
     monkeypatch.setattr(sampler, "version", lambda: "1")
     small, large = planned(tmp_path), planned(tmp_path, "tune.budget=80")
@@ -138,6 +139,7 @@ def test_a_search_in_parts_equals_one_in_one_go(whole, tmp_path):
     assert contents(part.folder) == contents(whole.folder)
 
 
+@pytest.mark.slow
 def test_a_larger_budget_continues_as_if_it_had_been_asked_for_at_once(whole, tmp_path):
     """The last trial of the smaller budget is cut, and the larger one finds other gains."""
     first = tuned(tmp_path / "parts", "tune.budget=34", ONCE).results.winner("toy")
@@ -147,6 +149,7 @@ def test_a_larger_budget_continues_as_if_it_had_been_asked_for_at_once(whole, tm
     assert parts.results.spent == {"toy": 64}
 
 
+@pytest.mark.slow
 def test_what_is_kept_is_not_simulated_again(optuna, tmp_path):
     (first,) = searched(tmp_path, "tune.repeats=1")
     (again,) = searched(tmp_path, "tune.repeats=1", engine=lambda units, done: not list(units))
@@ -171,6 +174,7 @@ def test_a_smaller_budget_would_throw_trials_away_and_is_refused(tmp_path, monke
         opened(tmp_path / "out", planned(tmp_path, "tune.budget=40"))
 
 
+@pytest.mark.slow
 def test_trials_of_other_gains_than_are_asked_for_are_not_thrown_away(optuna, tmp_path):
     (first,) = searched(tmp_path, "tune.repeats=1", "tune.budget=32")
     path = tmp_path / trials.FOLDER / "toy-0.json"

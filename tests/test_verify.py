@@ -93,6 +93,7 @@ def smooth():
     return check(scene(*SMOOTH))
 
 
+@pytest.mark.slow
 def test_a_smooth_scenario_is_of_fourth_order_and_converged(smooth):
     assert smooth.estimates[POSITION].order == pytest.approx(4.0, abs=0.4)
     assert smooth.unconverged(0.01) == []

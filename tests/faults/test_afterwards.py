@@ -95,6 +95,7 @@ def test_json_and_a_complete_run_say_what_is_missing(podusv, monkeypatch):
     assert told.startswith(f"the metrics {BUG}")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", AFTER_RUNS)
 def test_a_comparison_keeps_its_runs(podusv, monkeypatch, what):
     draw_quickly(monkeypatch)

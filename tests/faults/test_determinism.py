@@ -164,6 +164,7 @@ WITHOUT_FMA = {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX512F,-AVX2,-AVX,-FMA,-FMA
 BOUND = 1e-12  # of a signal's peak; 3e-16 was seen over the whole 310 s of corrected.yaml
 
 
+@pytest.mark.slow
 @INTEL
 def test_a_c_library_that_rounds_otherwise_stays_within_the_bound(tmp_path):
     """The corrected loop forgets a last bit. A loop at its singularity does not; see the docs."""

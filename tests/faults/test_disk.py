@@ -39,6 +39,7 @@ def podusv(beside_old_results):
     return beside_old_results
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("limit", LIMITS)
 @pytest.mark.parametrize(("made", "words"), few(WRITING), ids=str)
 def test_past_the_file_size_limit(podusv, made, words, limit):
@@ -124,6 +125,7 @@ def test_stdout_that_takes_nothing(podusv, made, words):
     assert not left_over()
 
 
+@pytest.mark.slow
 @needs_full
 @pytest.mark.parametrize("unbuffered", ["", "1"][: count(1, 2)])
 @pytest.mark.parametrize("streams", ["out", "err", "out err"])

@@ -49,6 +49,7 @@ WAYS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WAYS)
 def test_a_law_that_fails_on_the_way_leaves_its_log(podusv, law, name):
     compiled, last, says = WAYS[name]
@@ -107,6 +108,7 @@ def test_what_a_law_raises_is_not_taken_for_the_end_of_its_thread():
     assert out.message.startswith("diverged at t = 0 s: SystemExit: 7 (test_divergence.py, line ")
 
 
+@pytest.mark.slow
 def test_in_a_batch_one_law_that_does_not_return_costs_no_other_run(law, monkeypatch):
     class Stubborn(Constant):
         law = staticmethod(faulty_laws.slow_when_told)

@@ -51,6 +51,7 @@ def test_nothing_finished_leaves_nothing(podusv, monkeypatch):
     assert [path.name for path in Path().iterdir()] == ["two.yaml"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("number", "code", "times"), [(signal.SIGINT, 130, 3), (signal.SIGTERM, 143, 1)]
 )
@@ -72,6 +73,7 @@ def test_an_interrupted_comparison_keeps_what_it_has(podusv, number, code, times
     assert not list(Path().glob(".x*"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("number", "code"), MOSTLY_SIGINT)
 def test_an_interrupt_while_drawing_costs_the_figures_only(podusv, number, code):
     config = write("two.yaml", TWO)

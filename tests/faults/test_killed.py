@@ -67,6 +67,7 @@ def attempts(work: Callable[[], object], seeds: range) -> list[Callable[[], obje
     return [*at_calls, *at_times]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("made", "words"), few(COMMANDS), ids=str)
 def test_old_or_new_and_the_next_one_clears_up(podusv, before, made, words):
     old, work = files(before), partial(podusv, *words)

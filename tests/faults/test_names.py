@@ -61,6 +61,7 @@ def test_labels_cannot_differ_in_case_alone(podusv, labels):
     assert f"controllers.{labels[0]}" in said.err
 
 
+@pytest.mark.slow
 def test_scenarios_whose_names_differ_in_case_alone_get_folders_of_their_own(podusv):
     write("Ship.yaml", BASE)
     write("other.yaml", BASE + "name: ship\n")

@@ -14,6 +14,7 @@ from contextlib import redirect_stderr, redirect_stdout
 from multiprocessing import get_context
 from typing import Any, NamedTuple
 
+import pytest
 import yaml
 from command_samples import ROOT
 from counts import count
@@ -125,6 +126,7 @@ def fault(found: Found) -> str:
     return f"{found.seconds:.1f} s" if found.seconds > SECONDS else ""
 
 
+@pytest.mark.slow
 def test_no_number_ends_in_a_traceback(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     every = list(tries())

@@ -77,6 +77,7 @@ def to_write(path: object, flags: int, *mode: int) -> int:
     return flags & (os.O_CREAT | os.O_DIRECTORY)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("error", "lasting"), [(errno.EIO, False), (errno.ENOSPC, True)])
 @pytest.mark.parametrize(("made", "words"), few(COMMANDS), ids=str)
 def test_it_is_a_line_and_nothing_is_lost(podusv, before, made, words, error, lasting):

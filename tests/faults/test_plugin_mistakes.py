@@ -108,6 +108,7 @@ OTHERS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", OTHERS)
 def test_mistakes_in_metrics_figures_and_findings_cost_no_run(podusv, name):
     text, code, words = OTHERS[name]

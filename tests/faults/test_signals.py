@@ -84,6 +84,7 @@ def ended(process: object, number: signal.Signals, times: int = 1) -> tuple[int,
     return (code if code >= 0 else 128 - code), out, err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("module", "number", "code"),
     [("typer", *SIGNALS[1]), ("h5py", *SIGNALS[0]), ("pandas", *SIGNALS[1])],
@@ -139,6 +140,7 @@ def test_a_lost_terminal_ends_a_comparison_and_keeps_it():
     assert manifest.check(Path("x/short")).status == "finished"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("ignored", "code"), [(False, 129), (True, 0)])
 def test_a_hangup_ends_it_but_not_under_nohup(ignored, code):
     patches = 'patch(execute, "simulate", lambda old, *given, **more: old(*given, **more))'
@@ -153,6 +155,7 @@ def test_a_hangup_ends_it_but_not_under_nohup(ignored, code):
     assert manifest.check(Path("x")).status == ("finished" if ignored else "interrupted")
 
 
+@pytest.mark.slow
 @INTERRUPTS
 def test_twice_ends_what_does_not_listen_and_its_workers(number, code):
     patches = """

@@ -32,6 +32,7 @@ def content(store):
     return (store.folder / RUNS).read_bytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("error", [errno.EIO, errno.ENOSPC])
 def test_after_a_failed_write_the_study_goes_on(whole, tmp_path, error):
     """The n-th call that writes, names or syncs fails; what was whole before is still there."""
@@ -60,6 +61,7 @@ def sabotaged(folder, nth, code):
     return bool(calls)
 
 
+@pytest.mark.slow
 def test_killed_at_any_time_it_goes_on_where_it_was(tmp_path):
     config = tmp_path / "small.yaml"
     config.write_text(LONGER)
@@ -97,6 +99,7 @@ def children_are_gone(group, patience=20.0):
     raise AssertionError("processes of a killed study go on")
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_a_sentence_and_nothing_is_lost(whole, tmp_path):
     """The disk is full before the first unit is whole, halfway, and before the last file."""
     needed, kept = written_within(tmp_path / "roomy", math.inf), []

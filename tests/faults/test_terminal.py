@@ -40,6 +40,7 @@ def podusv(*words: str, extra: Mapping[str, str] | None = None, **streams: Any) 
     )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [pytest.param(("nope",), marks=pytest.mark.slow), RUN])
 def test_closed_streams_are_as_good_as_dev_null(words):
     """Also no file of the run gets the number of a stream, and messages with it."""
@@ -56,6 +57,7 @@ def test_closed_streams_are_as_good_as_dev_null(words):
         assert podusv("diff", "x", "x", capture_output=True).returncode == 0
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not FULL.exists(), reason="there is no /dev/full")
 @pytest.mark.parametrize(
     ("words", "unbuffered"), [(("list",), ""), (("--version",), "1"), (("run", "--help"), "")]
@@ -68,6 +70,7 @@ def test_a_full_disk_behind_stdout_is_a_line(words, unbuffered):
     assert done.stderr == "podusv: [Errno 28] No space left on device\n"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("unbuffered", ["", "1"])
 def test_a_disk_that_fills_up_behind_stdout_is_a_line(unbuffered):
     """Half of the text is there, and it is known."""
@@ -84,6 +87,7 @@ def test_a_disk_that_fills_up_behind_stdout_is_a_line(unbuffered):
     assert (done.returncode, done.stderr) == (5, "podusv: [Errno 27] File too large\n")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [("schema",), ("validate", "a.yaml", "-v")])
 def test_a_reader_that_leaves_ends_it_quietly(words):
     reading, writing = os.pipe()
@@ -93,6 +97,7 @@ def test_a_reader_that_leaves_ends_it_quietly(words):
     assert (done.returncode, done.stderr) == (141, b"")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "extra"),
     [(("list",), {"LC_ALL": "C", "PYTHONUTF8": "0"}), (("schema",), PLAIN[0]), (RUN, {})],
@@ -130,6 +135,7 @@ def _read(terminal: int) -> bytes:
         return b""
 
 
+@pytest.mark.slow
 def test_a_plain_terminal_gets_no_codes_and_another_one_does():
     for extra in PLAIN[1:]:
         assert ESCAPE not in on_a_terminal(extra, "list")

@@ -43,6 +43,7 @@ def is_whole(run: Path) -> bool:
     return not manifest.foreign(run, manifest.check(run))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [COMPARE, (*RUN, "--force")], ids=" ".join)
 def test_without_a_name_each_gets_a_folder_of_its_own(podusv, monkeypatch, words):
     """Also in the same second."""
@@ -63,6 +64,7 @@ class Clock(datetime):
         return cls(2026, 1, 1, 12, tzinfo=tz)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [RUN, ("rerun", "both")], ids=" ".join)
 def test_of_those_that_want_one_name_one_gets_it(podusv, words):
     said = at_once(podusv, *[(*words, "--out", "new")] * 3)

@@ -30,6 +30,7 @@ def worker_of(parent: int, but: int = 0) -> int:
     raise AssertionError("there is no worker")
 
 
+@pytest.mark.slow
 def test_a_worker_killed_twice_is_reported_and_the_others_finish(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names = [write("a.yaml", BASE), write("long.yaml", LONG), write("b.yaml", BASE)]

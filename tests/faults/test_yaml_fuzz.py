@@ -190,6 +190,7 @@ def check(folder: Path, name: Path, data: bytes) -> str:
     return said
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("tidy")
 def test_spoilt_scenarios_are_told_and_nothing_else(tmp_path):
     whole = verdict(CONFIGS / "paper" / "corrected.yaml")  # imports and tables are made once
@@ -240,6 +241,7 @@ TOLD_OF_SWEEPS = (
 )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("tidy")
 def test_spoilt_sweeps_are_told_and_nothing_else(tmp_path: Path) -> None:
     shutil.copytree(CONFIGS, tmp_path / "configs")
