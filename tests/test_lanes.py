@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib.util
 import linecache
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -30,7 +30,6 @@ from podusv_cli.engine.loop import ClosedLoop, Observer
 from podusv_cli.engine.march import Work
 from podusv_cli.engine.variants import variants
 from podusv_cli.metrics.table import observer
-from podusv_cli.paths.waypoints import Waypoints
 from podusv_cli.scenario.load import load
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -41,12 +40,12 @@ SCENARIO = load(ROOT / "configs" / "paper" / "corrected.yaml").scenario
 
 
 STUDY = """
+plugins: [my_law.py]
 vessel: {preset: paper_nonlinear}
-path: {kind: waypoints, points: [[0, 0], [5, 1]]}
+path: {kind: line}
 disturbance: {kind: none}
 actuator: {kind: ideal}
-controller: {kind: pid}
-controllers: {a: {}}
+controllers: {a: {kind: cross_track}, b: {kind: pid}}
 start: {x: -1.0, y: -1.0}
 simulation: {duration: 1.0}
 sweep: {draws: 4, vary: {vessel.m: {uniform: [50.0, 60.0]}}}
@@ -86,8 +85,13 @@ def same(one: Batch, other: Batch) -> None:
     assert one.status.tolist() == other.status.tolist()
     assert one.cause.tolist() == other.cause.tolist()
     assert one.reached.tolist() == other.reached.tolist()
-    np.testing.assert_array_equal(one.state, other.state)
-    np.testing.assert_array_equal(one.seen, other.seen)
+    np.testing.assert_array_equal(bits(one.state), bits(other.state))
+    np.testing.assert_array_equal(bits(one.seen), bits(other.seen))
+
+
+def bits(numbers: Vector) -> Any:
+    """The bits of numbers, zeros with their sign; what is no number is all the same."""
+    return np.where(np.isnan(numbers), np.nan, numbers).view(np.int64)
 
 
 @pytest.mark.parametrize("law", ["adaptive_neural", "pid", *SLOW])
@@ -133,14 +137,27 @@ def test_runs_of_another_choice_march_beside_their_like() -> None:
     same(*both(loops))
 
 
+@dataclass(frozen=True)
+class Mean:
+    """An observer whose count is another one in every run."""
+
+    @staticmethod
+    @kernel
+    def watch(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
+        """A loop over as many numbers as the state says."""
+        for i in range(1 + int(s[0] * s[0]) % 3):
+            seen[0] += row[i]
+
+
 def test_what_cannot_march_side_by_side_marches_alone_and_says_why() -> None:
-    """A path through points looks for its leg in a loop."""
-    path = Waypoints(points=((0.0, 0.0), (5.0, 1.0), (9.0, -2.0)))
-    base = replace(loop("pid"), path=path)
-    why = why_alone(base, Observer())
-    assert "waypoints.py" in why
-    assert "for runs to march side by side, a kernel has no loop" in why
-    same(*both(scattered(base, 1), TimeGrid(0.01, 20)))
+    """A loop over a count that is another one in every run."""
+    base, watching = loop("pid"), Observer(Mean.watch)
+    why = why_alone(base, watching)
+    assert "test_lanes.py" in why
+    assert "for runs to march side by side, a kernel loops over a count" in why
+    loops, grid = scattered(base, 1), TimeGrid(0.01, 20)
+    alone = simulate_many(loops, grid, observer=watching, side_by_side=False)
+    same(simulate_many(loops, grid, observer=watching, side_by_side=True), alone)
 
 
 TEXT = """
@@ -247,12 +264,35 @@ def test_the_law_that_podusv_new_writes_marches_side_by_side(podusv: Any) -> Non
     assert why_alone(written.closed_loop(), Observer()) == ""
 
 
+WHILE = """        rest = signals[0]
+        while rest > 1.0:
+            rest *= 0.5
+        tau[1] += rest
+"""
+COUNTING = """        for i in range(int(x[0] * x[0])):
+            tau[0] += 0.0 * i
+"""
+
+
 def test_validate_says_which_runs_of_a_study_march_side_by_side(podusv: Any) -> None:
     """And why the others do not."""
+    Path("my_law.py").write_text(LAW + COUNTING)
     Path("a.yaml").write_text(STUDY)
     said = podusv("validate", "a.yaml", "-v").out
-    assert "a: runs march one by one: TypeError" in said
-    assert "waypoints.py" in said
+    assert "b: runs march side by side" in said
+    assert "a: runs march one by one: No implementation" in said
+    assert "(my_law.py, line 44: for i in range(int(x[0] * x[0])):); for runs to" in said
+
+
+def test_a_law_with_a_while_marches_side_by_side(podusv: Any) -> None:
+    """It ends at another time in every run."""
+    Path("my_law.py").write_text(LAW + WHILE)
+    Path("a.yaml").write_text(STUDY)
+    base = load(Path("a.yaml")).scenario.singles()["a"].closed_loop()
+    loops = variants(base, {"start.y": np.linspace(-30.0, 50.0, COUNT)})
+    together, alone = both(loops, TimeGrid(0.01, 50))
+    same(together, alone)
+    assert why_alone(base, Observer()) == ""
 
 
 def test_an_interrupt_keeps_all_runs_that_marched_side_by_side() -> None:

@@ -58,6 +58,10 @@ class Disturbance(Component):
         """Itself; of a sum, its parts."""
         return (self,)
 
+    def constant_of(self, position: int, name: str) -> str:
+        """What `constants_with` calls this constant of the part at this position of `each`."""
+        return name
+
     def kernel_with(self, vessel: Vessel) -> Callable[..., None]:
         """The kernel for constants of this vessel; the same function for every vessel."""
         return self.evaluate
@@ -84,3 +88,7 @@ class Disturbance(Component):
         None where that is unknown. The load need not reach its bounds.
         """
         return None
+
+    def alike_in_table(self) -> list[int]:
+        """Places in the table that all runs side by side have to share; its kernel's `shared`."""
+        return []

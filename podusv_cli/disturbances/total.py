@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from podusv_cli.core.kernel import Vector, constants_type, kernel, scratch, tail
+from podusv_cli.core.kernel import Vector, constants_type, kernel, scratch, shared, tail
+from podusv_cli.core.plugins import TEXT
 from podusv_cli.core.signal import Signal
 from podusv_cli.disturbances.base import Disturbance
 from podusv_cli.vessels.vessel import Vessel
@@ -46,6 +47,10 @@ class Total(Disturbance):
         """Its parts."""
         return self.parts
 
+    def constant_of(self, position: int, name: str) -> str:
+        """The part's position in front."""
+        return f"part{position}_{name}"
+
     def kernel_with(self, vessel: Vessel) -> Callable[..., None]:
         """The kernel of the sum."""
         return _sum(tuple(
@@ -56,7 +61,7 @@ class Total(Disturbance):
     def constants_with(self, vessel: Vessel) -> dict[str, float]:
         """Those of all parts, each with the part's position in front."""
         return {
-            f"part{i}_{name}": number
+            self.constant_of(i, name): number
             for i, part in enumerate(self.parts)
             for name, number in part.constants_with(vessel).items()
         }
@@ -67,10 +72,16 @@ class Total(Disturbance):
         starts = np.cumsum([len(tables), *map(len, tables[:-1])]).astype(float)
         return np.concatenate([starts, *tables])
 
+    def alike_in_table(self) -> list[int]:
+        """Where the parts' tables begin. Raises TypeError for a part with places of its own."""
+        if any(part.alike_in_table() for part in self.parts):
+            raise TypeError("a part of the list has places in its table that runs have to share")
+        return list(range(len(self.parts)))
+
     def choices(self) -> frozenset[str]:
         """Those of all parts, named as the constants are."""
         each = ((i, name) for i, part in enumerate(self.parts) for name in part.choices())
-        return frozenset(f"part{i}_{name}" for i, name in each)
+        return frozenset(self.constant_of(*place) for place in each)
 
     def bounds(self) -> tuple[float, float, float] | None:
         """The sum of the bounds, which the sum need not reach."""
@@ -87,7 +98,7 @@ def _sum(parts: Sequence[Part]) -> Callable[..., None]:
 
     Its source is written out, because compiled code cannot choose between functions.
     """
-    scope: dict[str, Any] = {"scratch": scratch, "tail": tail}
+    scope: dict[str, Any] = {"scratch": scratch, "tail": tail, "shared": shared}
     lines = ["def evaluate(t, x, k, table, b):", "    b[0] = b[1] = b[2] = 0.0"]
     behind = 3
     for i, part in enumerate(parts):
@@ -95,10 +106,12 @@ def _sum(parts: Sequence[Part]) -> Callable[..., None]:
         given = ", ".join(f"k.part{i}_{name}" for name in part.constants)
         lines += [
             f"    load{i} = scratch({3 + part.signals})",
-            f"    evaluate{i}(t, x, Constants{i}({given}), tail(table, int(table[{i}])), load{i})",
+            f"    begin{i} = int(shared(table[{i}]))",
+            f"    evaluate{i}(t, x, Constants{i}({given}), tail(table, begin{i}), load{i})",
             *(f"    b[{j}] += load{i}[{j}]" for j in range(3)),
             *(f"    b[{behind + j}] = load{i}[{3 + j}]" for j in range(part.signals)),
         ]
         behind += part.signals
-    exec("\n".join(lines), scope)  # noqa: S102
+    scope[TEXT] = "\n".join(lines)
+    exec(compile(scope[TEXT], "sum of disturbances", "exec"), scope)  # noqa: S102
     return kernel(scope["evaluate"])  # type: ignore[no-any-return]

@@ -23,29 +23,32 @@ from podusv_cli.engine.object_cache import Code, target
 # Kernels are inlined: to pass a law's constants to another function takes as long as the law.
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": False, "forceinline": True}
 INNER = OPTIONS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # called by kernels only
-NUMBER = types.float64
-VECTOR: Any = types.CPointer(NUMBER)  # type: ignore[no-untyped-call]
 
 
-# An intrinsic gives numba the signature of `kernel.tail` or `kernel.scratch`, and its LLVM code.
-@intrinsic
-def _tail(typing: Any, vector: Any, start: Any) -> Any:
+# An intrinsic gives numba the signature of a primitive of `core.kernel`, and its LLVM code.
+def tail_of(typing: Any, vector: Any, start: Any) -> Any:
+    """`kernel.tail`."""
+
     def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return builder.gep(arguments[0], [arguments[1]])
 
     return vector(vector, types.int64), code
 
 
-@intrinsic(prefer_literal=True)
-def _scratch(typing: Any, count: Any) -> Any:
-    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        number = context.get_value_type(NUMBER)
-        return cgutils.alloca_once(builder, number, count.literal_value)  # type: ignore[no-untyped-call]
+def scratch_of(number: Any) -> Any:
+    """`kernel.scratch` with room for numbers of this type."""
 
-    return VECTOR(count), code
+    def typed(typing: Any, count: Any) -> Any:
+        def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            kind, size = context.get_value_type(number), count.literal_value
+            return cgutils.alloca_once(builder, kind, size)  # type: ignore[no-untyped-call]
+
+        return types.CPointer(number)(count), code  # type: ignore[no-untyped-call]
+
+    return intrinsic(prefer_literal=True)(typed)
 
 
-PRIMITIVES = {kernel.tail: _tail, kernel.scratch: _scratch}
+PRIMITIVES = {kernel.tail: intrinsic(tail_of), kernel.scratch: scratch_of(types.float64)}
 
 
 def object_code(function: Any, prototype: Any) -> Code:

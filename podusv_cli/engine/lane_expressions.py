@@ -6,6 +6,7 @@ from __future__ import annotations
 import ast
 import copy
 from collections.abc import Collection
+from functools import partial, reduce
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from podusv_cli.core import kernel
 from podusv_cli.engine.lane_source import NotForLanes, has_source
 from podusv_cli.engine.lane_syntax import call, found, name_of, set_to
 
+EXTREMES = ("min", "max")
 ON = "lanes_on"  # the lanes that a kernel is called in
 
 
@@ -31,8 +33,9 @@ class Expressions:
         """Of a kernel that sees these globals."""
         self.node, self.scope, self.plain = node, scope, plain
         self.known = {argument.arg for argument in node.args.args}  # variables that are set
-        self.branch: ast.If | None = None  # the outermost one that is under way
-        self.loops = 0  # that are under way
+        self.apart = False  # whether it may act in some of the lanes only
+        self.loops: list[ast.For | ast.While] = []  # that are under way
+        self.going: list[str] = []  # and the lanes that each of them is under way in
         self.count = 0
         self.before: list[ast.stmt] = []  # what has to run before the statement under way
         self.mask = ON
@@ -66,12 +69,49 @@ class Expressions:
                 setattr(made, name, new)
         return made
 
+    def of_Subscript(self, node: ast.Subscript) -> ast.expr:
+        if self.is_fixed(node.slice):
+            return self.of_parts(node)
+        place = self.expression(node.value), self.expression(node.slice)
+        return call("lanes_load", name_of(self.mask), *place)
+
+    def is_fixed(self, index: ast.expr) -> bool:
+        """Whether an index is a number that is written out, or a module's."""
+        if isinstance(index, ast.Name):
+            return index.id not in self.known and isinstance(self.scope.get(index.id), int)
+        return isinstance(index, ast.Constant)
+
     def of_BoolOp(self, node: ast.BoolOp) -> ast.expr:
+        first_look_up = next((i for i, v in enumerate(node.values) if i and self.looks_up(v)), 0)
+        if first_look_up:
+            return self.expression(ast.copy_location(self.short(node, first_look_up), node))
         word = "lanes_and" if isinstance(node.op, ast.And) else "lanes_or"
-        first, *others = map(self.expression, node.values)
-        for other in others:
+        first, *rest = map(self.expression, node.values)
+        for other in rest:
             first = call(word, first, other)
         return first
+
+    def looks_up(self, node: ast.expr) -> bool:
+        """Whether an expression reads a place that only the lanes that need it may know."""
+        return any(
+            isinstance(part, ast.Subscript) and not self.is_fixed(part.slice)
+            for part in ast.walk(node)
+        )
+
+    def short(self, node: ast.BoolOp, count: int) -> ast.expr:
+        """A choice that evaluates all but `count` values in the lanes that need them."""
+        first, rest = (
+            values[0] if len(values) == 1 else ast.BoolOp(node.op, values)
+            for values in (node.values[:count], node.values[count:])
+        )
+        if isinstance(node.op, ast.And):
+            return ast.IfExp(first, rest, ast.Constant(False))
+        return ast.IfExp(first, ast.Constant(True), rest)
+
+    def of_BinOp(self, node: ast.BinOp) -> ast.expr:
+        if isinstance(node.op, ast.Pow):
+            return call("lanes_power", self.expression(node.left), self.expression(node.right))
+        return self.of_parts(node)
 
     def of_UnaryOp(self, node: ast.UnaryOp) -> ast.expr:
         if isinstance(node.op, ast.Not):
@@ -101,6 +141,11 @@ class Expressions:
         arguments = list(map(self.expression, node.args))
         local = isinstance(node.func, ast.Name) and node.func.id in self.known
         called = None if local else found(node.func, self.scope)
+        name = node.func.id if isinstance(node.func, ast.Name) and not local else ""
+        if name in EXTREMES:
+            return reduce(partial(call, name), arguments)
+        if name == "bool":
+            return call("lanes_not", call("lanes_not", *arguments))
         if takes_mask(called, self.plain):
             arguments.insert(0, name_of(self.mask))
         if isinstance(node.func, ast.Attribute) and called in (np.ceil, np.floor):

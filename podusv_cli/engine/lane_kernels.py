@@ -11,11 +11,13 @@ import copy
 from collections.abc import Collection
 from typing import Any
 
-from podusv_cli.engine.lane_expressions import ON, Expressions, takes_mask
+from podusv_cli.engine.lane_expressions import ON, takes_mask
+from podusv_cli.engine.lane_loops import Loops, Returns, note_outer_reads
 from podusv_cli.engine.lane_source import NotForLanes, source
-from podusv_cli.engine.lane_syntax import call, found, name_of, reads, returns, set_to, tailed
+from podusv_cli.engine.lane_syntax import call, found, leaves, name_of, set_to, tailed
 
 RESULT = "lanes_result"
+RETURN = (ast.Return,)
 
 
 def rewritten(function: Any, words: dict[str, Any], plain: Collection[Any]) -> Any:
@@ -52,14 +54,17 @@ def _made(function: Any, node: ast.FunctionDef, words: dict[str, Any]) -> Any:
     return made
 
 
-class _Rewriter(Expressions):
+class _Rewriter(Loops):
     """One kernel's source while it is rewritten."""
 
     def function(self) -> ast.FunctionDef:
         """The kernel."""
         node = self.node
+        Returns().function(node)
+        ast.fix_missing_locations(node)
+        note_outer_reads(node)
         body = tailed(node.body[1:] if ast.get_docstring(node) is not None else node.body)
-        several = returns(body[:-1]) or not body or not isinstance(body[-1], ast.Return)
+        several = leaves(body[:-1], RETURN) or not body or not isinstance(body[-1], RETURN)
         values = [n.value for b in body for n in ast.walk(b) if isinstance(n, ast.Return)]
         written = self.block(body) or [ast.Pass()]
         if several and any(values):
@@ -97,30 +102,22 @@ class _Rewriter(Expressions):
         if node.value is None:
             return []
         value = self.expression(node.value)
-        if self.branch is None:
+        if not self.apart:
             return [ast.Return(value)]
         return [self.kept(RESULT, value)]
 
     def kept(self, name: str, value: ast.expr) -> ast.stmt:
-        """An assignment in the lanes of the branch."""
-        if self.branch is None:
+        """An assignment in the lanes that are under way."""
+        if not self.apart:
             made = value
         elif name in self.known:
             made = call("lanes_assign", name_of(self.mask), value, name_of(name))
         else:
-            self.check(name)
+            if not name.startswith("lanes_"):
+                self.check(name)
             made = call("lanes_lift", name_of(self.mask), value)
         self.known.add(name)
         return set_to(name, made)
-
-    def check(self, name: str) -> None:
-        """Refuse a variable that a branch sets first and that outlives it in a loop.
-
-        Lanes that do not take the branch would lose what they have of the round before.
-        """
-        own = reads(self.branch, name) if self.branch else 0
-        if self.loops and not name.startswith("lanes_") and reads(self.node, name) > own:
-            raise NotForLanes(f"{name} is set in a branch within a loop; set it before the loop")
 
     def on_AugAssign(self, node: ast.AugAssign) -> list[ast.stmt]:
         old = copy.deepcopy(node.target)
@@ -140,7 +137,7 @@ class _Rewriter(Expressions):
         """An assignment of an expression as it was written."""
         if not isinstance(target, ast.Tuple):
             return self.into(target, self.expression(value))
-        if self.branch is None and all(isinstance(t, ast.Name) for t in target.elts):
+        if not self.apart and all(isinstance(t, ast.Name) for t in target.elts):
             self.known |= {t.id for t in target.elts if isinstance(t, ast.Name)}
             return [ast.Assign([target], self.expression(value))]
         names = [self.fresh("value") for _ in target.elts]
@@ -164,40 +161,13 @@ class _Rewriter(Expressions):
         place = [self.expression(target.value), self.expression(target.slice)]
         return [ast.Expr(call("lanes_store", name_of(self.mask), *place, value))]
 
-    def on_For(self, node: ast.For) -> list[ast.stmt]:
-        self.unbroken(node)
-        over = self.expression(node.iter)
-        self.known |= {n.id for n in ast.walk(node.target) if isinstance(n, ast.Name)}
-        return [ast.For(node.target, over, self.rounds(node.body), [])]
-
-    def on_While(self, node: ast.While) -> list[ast.stmt]:
-        self.unbroken(node)
-        test = self.expression(node.test)
-        if self.before:
-            raise NotForLanes(f"line {node.lineno}: a loop with a choice in its condition")
-        return [ast.While(call("lanes_same", test), self.rounds(node.body), [])]
-
-    def rounds(self, nodes: list[ast.stmt]) -> list[ast.stmt]:
-        """The statements of a loop."""
-        self.loops += 1
-        written = self.block(nodes)
-        self.loops -= 1
-        return written
-
-    def unbroken(self, loop: ast.For | ast.While) -> None:
-        """Refuse a loop that may end early."""
-        leaves = any(isinstance(part, (ast.Break, ast.Continue)) for part in ast.walk(loop))
-        if leaves or loop.orelse:
-            raise NotForLanes(f"line {loop.lineno}: a loop with break, continue or else")
-
     def on_If(self, node: ast.If) -> list[ast.stmt]:
         condition = self.fresh("condition")
         made: list[ast.stmt] = [set_to(condition, self.expression(node.test))]
-        outer = self.branch
-        self.branch = outer or node
+        outer, self.apart = self.apart, True
         made += self.lanes(node.body, condition, "lanes_if")
         made += self.lanes(node.orelse, condition, "lanes_else")
-        self.branch = outer
+        self.apart = outer
         return made
 
     def lanes(self, nodes: list[ast.stmt], condition: str, word: str) -> list[ast.stmt]:

@@ -8,21 +8,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from podusv_cli.core.kernel import LANES, Vector, kernel, specialise, tail
+from podusv_cli.core.kernel import LANES, Vector, kernel, tail
 from podusv_cli.engine.closed_loop import finite, measure, named_plan, named_wires, rates, step
 from podusv_cli.engine.layout import STOP, Function
-from podusv_cli.engine.sampled import sample_and_hold
+from podusv_cli.engine.relay import begin_step
+from podusv_cli.engine.sampled import perceive, sample_and_hold
 
 REACHED = STOP + 1  # in `under_way`: how many instants each lane reached, below 0 while it marches
-
-
-@kernel
-def _pass_nothing_on(demand: Vector, relay: Vector) -> None:
-    """A run with a command path marches alone, see `lanes.marcher`."""
-
-
-lane_rates = specialise(rates, "lane_rates", pass_on=_pass_nothing_on)
-lane_step = specialise(step, "lane_step", rates=lane_rates)
 
 
 @kernel
@@ -87,7 +79,7 @@ def advance_lanes(
     first: int, last: int, h: float, wires: Any, plan: Any, size: int, under_way: Vector,
     ends: Vector,
 ) -> int:  # fmt: skip
-    """`closed_loop.advance` for all lanes, without a log, measurements and command paths.
+    """`closed_loop.advance` for all lanes, without a log.
 
     A lane whose numbers are not finite goes on without an effect on the others. Returns the first
     instant that was not begun, or at which no lane was left, or `last`.
@@ -99,10 +91,15 @@ def advance_lanes(
         under_way[0] = k
         t = k * h
         again = k > first and t == (k - 1) * h + h  # see `closed_loop.instant`
+        if n.relayed > 0:
+            begin_step(k, t, c.relay)
+        if n.measured > 0:
+            perceive(k, t, disturbance, measurement, correct, c, n)
         if n.sample_every > 0 or n.hold_every > 0:
             sample_and_hold(k, t, h, path, law, sample, after, c, n)
-        lane_rates(
-            t, c.s, c.stages, path, disturbance, law, actuator, after, follow, c, n, again, False
+        loaded = n.measured > 0
+        rates(
+            t, c.s, c.stages, path, disturbance, law, actuator, after, follow, c, n, again, loaded
         )  # fmt: skip
         measure(c.s, c.row)
         lost = lanes_not(lanes_and(finite(n.states, c.s), finite(n.columns, c.row)))
@@ -111,5 +108,5 @@ def advance_lanes(
         weight = 0.5 * h if k == 0 or k == n.steps else h
         observe(t, weight, c.s, c.row, c.observer, c.seen)
         if k < n.steps:
-            lane_step(t, h, path, disturbance, law, actuator, after, follow, c, n)
+            step(t, h, path, disturbance, law, actuator, after, follow, c, n)
     return last

@@ -61,9 +61,15 @@ def _select(
 
 
 def _lift(kind: Any, into_lanes: bool) -> Any:
-    """The type of a value that may differ from lane to lane; floats always may."""
+    """The type of a variable with this first value; floats may always differ from lane to lane."""
+    if isinstance(kind, types.BaseTuple):  # a tuple's type cannot become another one later
+        return _tuple_like(kind, [_part(part, into_lanes) for part in kind])
+    return _part(kind, False)
+
+
+def _part(kind: Any, into_lanes: bool) -> Any:
     if isinstance(kind, types.BaseTuple):
-        return _tuple_like(kind, [_lift(part, into_lanes) for part in kind])
+        return _lift(kind, into_lanes)
     kind = types.unliteral(kind)
     wanted = lanes_of(kind)
     return wanted if wanted is not None and (into_lanes or wanted is FLOAT) else kind
@@ -207,8 +213,8 @@ def lanes_any(typing: Any, mask: Any) -> Any:
 
 
 @intrinsic
-def lanes_same(typing: Any, condition: Any) -> Any:
-    """A condition that has to be the same in all lanes."""
-    if isinstance(condition, LanesType):
-        raise TypingError("a loop ends at another time in every lane")
-    return types.boolean(condition), lambda c, b, s, args: _truth(c, b, condition, args[0])
+def lanes_start(typing: Any, mask: Any) -> Any:
+    """The lanes in which a loop begins, that may end at another time in every lane."""
+    if isinstance(mask, types.NoneType):
+        return types.boolean(mask), lambda c, b, sig, args: cgutils.true_bit
+    return mask(mask), lambda c, b, sig, args: args[0]

@@ -34,6 +34,8 @@ def object_code(function: Any, prototype: Any) -> Code:
         return compile_numba.translated(function, _for_lanes, _signature(prototype))
     except (OtherSource, MemoryError, OSError) as error:
         raise TypeError(in_a_line(error)) from error
+    except TypeError as error:  # says what and where
+        return Code("", " ".join(str(error).split()).encode())
     except Exception as error:
         return Code("", in_a_line(error).encode())
 

@@ -3,18 +3,19 @@
 
 from __future__ import annotations
 
+import operator
 from typing import Any
 
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
 from numba.core.errors import TypingError
 from numba.extending import intrinsic
 
 from podusv_cli.core import elementary, kernel
+from podusv_cli.core.kernel import LANES
 from podusv_cli.engine import lane_march
+from podusv_cli.engine.compile_numba import scratch_of
 from podusv_cli.engine.lane_masks import (
-    all_lanes,
     joined,
     lanes_and,
     lanes_any,
@@ -25,30 +26,20 @@ from podusv_cli.engine.lane_masks import (
     lanes_not,
     lanes_or,
     lanes_pick,
-    lanes_same,
+    lanes_start,
     mask_of,
 )
-from podusv_cli.engine.lane_types import BOOL, FLOAT, IR, WHOLE, LanesType, intrinsic_call
-
-VECTOR: Any = types.CPointer(FLOAT)
-
-
-@intrinsic
-def lanes_store(typing: Any, mask: Any, vector: Any, index: Any, number: Any) -> Any:
-    """`vector[index] = number` in the lanes of the mask."""
-    if not isinstance(vector, types.CPointer) or not isinstance(index, types.Integer):
-        raise TypingError(f"{vector}[{index}] = {number}")
-    kind = vector.dtype
-
-    def code(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        at = builder.gep(args[1], [args[2]])
-        new = context.cast(builder, args[3], number, kind)
-        if not all_lanes(mask):
-            new = builder.select(args[0], new, builder.load(at))
-        builder.store(new, at)
-        return context.get_dummy_value()
-
-    return types.none(mask, vector, index, number), code
+from podusv_cli.engine.lane_places import lanes_load, lanes_store, lanes_tail, lanes_whole
+from podusv_cli.engine.lane_types import (
+    BOOL,
+    FLOAT,
+    IR,
+    WHOLE,
+    LanesType,
+    each_lane,
+    intrinsic_call,
+    lanes_of,
+)
 
 
 @intrinsic
@@ -81,22 +72,6 @@ def lane_numbers(typing: Any, vector: Any) -> Any:
         return builder.bitcast(args[0], ir.DoubleType().as_pointer())
 
     return types.CPointer(types.float64)(vector), code
-
-
-@intrinsic
-def _tail(typing: Any, vector: Any, start: Any) -> Any:
-    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.gep(arguments[0], [arguments[1]])
-
-    return vector(vector, types.int64), code
-
-
-@intrinsic(prefer_literal=True)
-def _scratch(typing: Any, count: Any) -> Any:
-    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return cgutils.alloca_once(builder, IR[FLOAT], count.literal_value)
-
-    return VECTOR(count), code
 
 
 @intrinsic
@@ -145,6 +120,35 @@ def _converted(context: Any, builder: Any, given: Any, value: Any, kind: Any) ->
     return context.cast(builder, value, given, kind)
 
 
+@intrinsic(prefer_literal=True)
+def _power(typing: Any, number: Any, exponent: Any) -> Any:
+    """`number ** exponent`, as numba has it: by products where the exponent is written out."""
+    if mask_of(number, exponent) is not BOOL:
+        plain = typing.resolve_function_type(operator.pow, (number, exponent), {})
+        return plain, lambda c, b, s, args: c.get_function(operator.pow, plain)(b, args)
+    if isinstance(exponent, types.IntegerLiteral) and number is FLOAT:
+        return FLOAT(number, exponent), lambda c, b, s, args: _product(
+            b, args[0], exponent.literal_value
+        )
+    if not {lanes_of(number), lanes_of(exponent)} == {FLOAT}:
+        raise TypingError(f"{number} ** {exponent}")
+
+    def code(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        both = [context.cast(builder, v, k, FLOAT) for v, k in zip(args, sig.args, strict=True)]
+        return each_lane(context, builder, operator.pow, both)
+
+    return FLOAT(number, exponent), code
+
+
+def _product(builder: Any, number: Any, exponent: int) -> Any:
+    result = ir.Constant(IR[FLOAT], [1.0] * LANES)
+    for place in range(exponent.bit_length()):
+        if exponent >> place & 1:
+            result = builder.fmul(result, number)
+        number = builder.fmul(number, number)
+    return result
+
+
 def _extreme(sign: str) -> Any:
     """min or max as Python has it: the first of the two unless the second is beyond it."""
 
@@ -169,7 +173,7 @@ def _extreme(sign: str) -> Any:
 
 # What stands for kernels that are no arithmetic.
 PRIMITIVES = {
-    kernel.tail: _tail, kernel.scratch: _scratch, kernel.shared: lanes_first,
+    kernel.tail: lanes_tail, kernel.scratch: scratch_of(FLOAT), kernel.shared: lanes_first,
     kernel.filled: _filled,
     elementary.bits: _bitwise(FLOAT, WHOLE), elementary.of_bits: _bitwise(WHOLE, FLOAT),
     lane_march.lanes_and: lanes_and, lane_march.lanes_not: lanes_not,
@@ -179,7 +183,8 @@ PRIMITIVES = {
 WORDS: dict[str, Any] = {
     "lanes_lift": lanes_lift, "lanes_assign": lanes_assign, "lanes_pick": lanes_pick,
     "lanes_and": lanes_and, "lanes_or": lanes_or, "lanes_not": lanes_not, "lanes_if": lanes_if,
-    "lanes_else": lanes_else, "lanes_any": lanes_any, "lanes_same": lanes_same,
-    "lanes_store": lanes_store, "lanes_ceil": _rounded("ceil"), "lanes_floor": _rounded("floor"),
-    "min": _extreme("<"), "max": _extreme(">"), "float": _float,
+    "lanes_else": lanes_else, "lanes_any": lanes_any, "lanes_start": lanes_start,
+    "lanes_load": lanes_load, "lanes_store": lanes_store, "int": lanes_whole,
+    "lanes_ceil": _rounded("ceil"), "lanes_floor": _rounded("floor"),
+    "lanes_power": _power, "min": _extreme("<"), "max": _extreme(">"), "float": _float,
 }  # fmt: skip

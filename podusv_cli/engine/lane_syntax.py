@@ -7,8 +7,6 @@ import copy
 from collections.abc import Mapping
 from typing import Any
 
-from podusv_cli.engine.lane_source import NotForLanes
-
 
 def call(name: str, *arguments: ast.expr) -> ast.Call:
     """`name(arguments)`."""
@@ -25,35 +23,48 @@ def set_to(name: str, value: ast.expr) -> ast.Assign:
     return ast.Assign([ast.Name(name, ast.Store())], value)
 
 
-def returns(nodes: list[ast.stmt]) -> bool:
-    """Whether one of these statements may return."""
-    return any(isinstance(part, ast.Return) for node in nodes for part in ast.walk(node))
+LOOPS = (ast.For, ast.While)
+OUT_OF_LOOP = (ast.Break, ast.Continue)
+Kinds = tuple[type[ast.stmt], ...]
 
 
-def ends(nodes: list[ast.stmt]) -> bool:
-    """Whether these statements always return."""
+def leaves(nodes: list[ast.stmt], kinds: Kinds) -> bool:
+    """Whether one of these statements may be one of these kinds; `break` is its own loop's."""
+    return any(_leaves(node, kinds) for node in nodes)
+
+
+def _leaves(node: ast.stmt, kinds: Kinds) -> bool:
+    if isinstance(node, LOOPS) and kinds == OUT_OF_LOOP:
+        return False
+    inside = (*getattr(node, "body", []), *getattr(node, "orelse", []))
+    return isinstance(node, kinds) or leaves(list(inside), kinds)
+
+
+def ends(nodes: list[ast.stmt], kinds: Kinds) -> bool:
+    """Whether these statements always end in one of these kinds."""
     if not nodes:
         return False
     last = nodes[-1]
-    return isinstance(last, ast.Return) or (
-        isinstance(last, ast.If) and ends(last.body) and ends(last.orelse)
+    return isinstance(last, kinds) or (
+        isinstance(last, ast.If) and ends(last.body, kinds) and ends(last.orelse, kinds)
     )
 
 
-def tailed(nodes: list[ast.stmt]) -> list[ast.stmt]:
-    """The same statements with every `return` at the end of a branch."""
+def tailed(nodes: list[ast.stmt], kinds: Kinds = (ast.Return,)) -> list[ast.stmt]:
+    """The same statements with every `return`, or what else leaves, at the end of a branch."""
     for i, node in enumerate(nodes):
-        if isinstance(node, ast.Return):
+        if isinstance(node, kinds):
             return nodes[: i + 1]
-        if isinstance(node, ast.If) and returns([node]):
-            rest = nodes[i + 1 :]
-            branches = [
-                tailed(b if ends(b) else [*b, *copy.deepcopy(rest)])
-                for b in (node.body, node.orelse)
-            ]
-            return [*nodes[:i], ast.If(node.test, *branches)]
-        if isinstance(node, (ast.For, ast.While)) and returns([node]):
-            raise NotForLanes("it returns from within a loop")
+        if not _leaves(node, kinds):
+            continue
+        assert isinstance(node, ast.If)  # loops are not returned from any more, see `lane_loops`
+        rest = nodes[i + 1 :]
+        branches = [
+            tailed(b if ends(b, kinds) else [*b, *copy.deepcopy(rest)], kinds)
+            for b in (node.body, node.orelse)
+        ]
+        made = ast.copy_location(ast.If(node.test, *branches), node)
+        return [*nodes[:i], made]
     return nodes
 
 

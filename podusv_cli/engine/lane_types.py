@@ -31,8 +31,9 @@ class LanesType(types.Type):
         super().__init__(name=f"lanes({scalar})")
 
     def can_convert_from(self, typingctx: Any, other: Any) -> Any:
-        """From a scalar only."""
-        return Conversion.safe if isinstance(other, self.accepts) else None
+        """From a scalar, and from whole numbers to floats."""
+        whole = self.scalar == types.float64 and other is WHOLE
+        return Conversion.safe if whole or isinstance(other, self.accepts) else None
 
 
 FLOAT = LanesType(types.float64, (types.Float, types.Integer))
@@ -75,9 +76,11 @@ def splat(builder: Any, number: Any) -> Any:
 
 @lower_cast(types.Any, LanesType)
 def cast_to_lanes(context: Any, builder: Any, given: Any, wanted: Any, number: Any) -> Any:
-    """A scalar into every lane."""
+    """A scalar into every lane, or a whole number of every lane as a float."""
     if given == wanted:
         return number
+    if isinstance(given, LanesType):
+        return builder.sitofp(number, IR[wanted])
     scalar = context.cast(builder, number, given, wanted.scalar)
     if wanted is BOOL:
         scalar = builder.trunc(scalar, ir.IntType(1)) if scalar.type.width != 1 else scalar
@@ -125,6 +128,7 @@ WHOLES: dict[Any, Any] = {
     operator.and_: lambda b, x, y: b.and_(x, y),
     operator.or_: lambda b, x, y: b.or_(x, y),
     operator.lshift: lambda b, x, y: b.shl(x, y),
+    operator.rshift: lambda b, x, y: b.ashr(x, y),
 }
 COMPARISONS: dict[Any, str] = {
     operator.lt: "<", operator.le: "<=", operator.gt: ">", operator.ge: ">=", operator.eq: "==",
@@ -164,10 +168,10 @@ def intrinsic_call(builder: Any, name: str, x: Any) -> Any:
     return builder.call(cgutils.get_or_insert_function(builder.module, kind, full), [x])
 
 
-def each_lane(context: Any, builder: Any, function: Any, args: Any) -> Any:
-    """A function of the mathematical library, called lane by lane."""
-    code = context.get_function(function, signature(types.float64, *[types.float64] * len(args)))
-    result = ir.Constant(IR[FLOAT], ir.Undefined)
+def each_lane(context: Any, builder: Any, function: Any, args: Any, kind: Any = FLOAT) -> Any:
+    """numba's function of scalars, lane by lane."""
+    code = context.get_function(function, signature(kind.scalar, *[kind.scalar] * len(args)))
+    result = ir.Constant(IR[kind], ir.Undefined)
     for lane in range(LANES):
         at = ir.IntType(32)(lane)
         own = [builder.extract_element(a, at) for a in args]
@@ -175,17 +179,21 @@ def each_lane(context: Any, builder: Any, function: Any, args: Any) -> Any:
     return result
 
 
+def _by_lane(function: Any, arity: int, kind: Any = FLOAT) -> None:
+    @lower_builtin(function, *[kind] * arity)
+    def code(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return each_lane(context, builder, function, args, kind)
+
+
 def _library(function: Any, arity: int) -> None:
     _operation(function, arity, FLOAT)
-
-    @lower_builtin(function, *[FLOAT] * arity)
-    def code(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return each_lane(context, builder, function, args)
+    _by_lane(function, arity)
 
 
 ONE: tuple[Any, ...] = (
     math.sin, math.cos, math.tan, math.asin, math.acos, math.atan, math.exp, math.log,
-    math.sinh, math.cosh, math.tanh, math.log10,
+    math.sinh, math.cosh, math.tanh, math.log10, math.log1p, math.expm1, math.asinh, math.acosh,
+    math.atanh, math.erf, math.radians, math.degrees,
 )  # fmt: skip
 TWO: tuple[Any, ...] = (math.atan2, math.hypot, math.pow, math.copysign)
 LLVM: dict[Any, str] = {math.sqrt: "sqrt", math.fabs: "fabs", abs: "fabs"}
@@ -196,5 +204,26 @@ for _function in TWO:
 for _function, _llvm in LLVM.items():
     _operation(_function, 1)
     _lower(_function, FLOAT, 1, lambda b, x, name=_llvm: intrinsic_call(b, name, x))
+for _function in (operator.mod, operator.floordiv):
+    _operation(_function, 2)
+    _by_lane(_function, 2, FLOAT)
+    _by_lane(_function, 2, WHOLE)
+for _function, _llvm in {math.floor: "floor", math.ceil: "ceil", math.trunc: "trunc"}.items():
+    _operation(_function, 1, WHOLE)
+    _lower(
+        _function, FLOAT, 1,
+        lambda b, x, name=_llvm: b.fptosi(intrinsic_call(b, name, x), IR[WHOLE]),
+    )  # fmt: skip
 _operation(math.isnan, 1, BOOL)
 _lower(math.isnan, FLOAT, 1, lambda b, x: b.fcmp_unordered("uno", x, x))
+_operation(math.isinf, 1, BOOL)
+_operation(math.isfinite, 1, BOOL)
+_INFINITE = ir.Constant(IR[FLOAT], [math.inf] * LANES)
+_lower(
+    math.isinf, FLOAT, 1,
+    lambda b, x: b.fcmp_ordered("==", intrinsic_call(b, "fabs", x), _INFINITE),
+)  # fmt: skip
+_lower(
+    math.isfinite, FLOAT, 1,
+    lambda b, x: b.fcmp_ordered("<", intrinsic_call(b, "fabs", x), _INFINITE),
+)  # fmt: skip

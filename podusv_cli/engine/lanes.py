@@ -21,13 +21,16 @@ from podusv_cli.engine.lane_march import REACHED
 from podusv_cli.engine.layout import Plan, Wires
 from podusv_cli.engine.loop import ClosedLoop, Observer, entries
 from podusv_cli.engine.march import Ending
+from podusv_cli.engine.relay import COUNT
+from podusv_cli.measurements.base import KNOWN, OWN
 
 NUMBER = 8  # bytes
 FEWEST = 3  # runs; fewer take no longer alone
 RULES = (
-    "for runs to march side by side, a kernel has no loop that ends early or at another time in "
-    "every run (while, break, return in a loop), takes no whole number from a run's own numbers, "
-    "and calls of math only functions of floats"
+    "for runs to march side by side, a kernel loops over a count that is the same in all runs "
+    "(`while`, `break` and `return` may end a loop at another time in every run), sets before a "
+    "loop what a later round reads, and gives arguments by position; lanes(int64) is a whole "
+    "number that may be another one in every run"
 )
 WORTH = 20_000_000  # instants of a batch, from which on compiling takes less than it gains
 MARCHING = -1.0  # stands for the instants that a lane has reached
@@ -40,11 +43,17 @@ def alike(loop: ClosedLoop, observer: Observer) -> dict[str, frozenset[str]]:
         "path": loop.path.choices(), "disturbance": loop.disturbance.choices(),
         "actuator": loop.actuator.choices(), "law": law.choices(), "sample": law.choices(),
         "after_saturation": law.choices(), "observer": frozenset(names["observer"]),
-        "measurement": frozenset(), "correct": frozenset(), "follow": frozenset(),
+        "measurement": loop.measurement.choices(), "correct": loop.estimator.choices(),
+        "follow": loop.estimator.choices(),
     }  # fmt: skip
     whole = {part: lane_source.whole_numbers(inner) for part, inner, _ in entries(loop, observer)}
-    shared = whole["law"] | whole["sample"] | whole["after_saturation"]
-    whole |= dict.fromkeys(("law", "sample", "after_saturation"), shared)
+    whole["disturbance"] = frozenset(
+        loop.disturbance.constant_of(i, name)
+        for i, part in enumerate(loop.disturbance.each())
+        for name in lane_source.whole_numbers(part.kernel_with(loop.vessel))
+    )
+    for one in (("law", "sample", "after_saturation"), ("correct", "follow")):  # of one component
+        whole |= dict.fromkeys(one, frozenset().union(*(whole[part] for part in one)))
     return {part: (chosen[part] | whole[part]) & set(names[part]) for part in names}
 
 
@@ -54,9 +63,6 @@ def marcher(loop: ClosedLoop, observer: Observer) -> Callable[..., int]:
     Raises TypeError where a part cannot go another way in every lane.
     """
     from podusv_cli.engine import compile  # only what marches side by side needs it
-
-    if loop.measured or loop.actuator.is_relayed:
-        raise TypeError("runs with sensors, or with actuator.command or failure, march alone")
 
     shared = alike(loop, observer)
     doors = [compile.lane_entry(*part, shared[part[0]]) for part in entries(loop, observer)]
@@ -88,13 +94,21 @@ def is_compiled(loop: ClosedLoop, observer: Observer) -> bool:
 
 
 def places(loop: ClosedLoop, observer: Observer) -> list[tuple[int, list[int]]]:
-    """Where the constants that are alike lie: positions of vectors in `Wires`, and in these."""
+    """Where the numbers that are alike lie: positions of vectors in `Wires`, and in these."""
     shared = alike(loop, observer)
     names = {part: names for part, _, names in entries(loop, observer)}
-    return [
-        (Wires._fields.index(part), [i for i, n in enumerate(names[part]) if n in shared[part]])
-        for part in ("path", "disturbance", "law", "actuator")
-    ]
+    names["estimator"], shared["estimator"] = names["correct"], shared["correct"]
+    found = {
+        part: [i for i, n in enumerate(names[part]) if n in shared[part]]
+        for part in ("path", "disturbance", "law", "actuator", "measurement", "estimator")
+    }
+    found |= {
+        "disturbance_table": loop.disturbance.alike_in_table(),
+        "measurement_table": loop.measurement.alike_in_table(),
+        "sensed": list(range(KNOWN, OWN)) if loop.measured else [],
+        "relay": [COUNT],
+    }
+    return [(Wires._fields.index(vector), inside) for vector, inside in found.items()]
 
 
 def _room(count: int) -> Vector:
@@ -174,8 +188,8 @@ class Sorter:
             self._chosen = True
             with suppress(TypeError):  # `why_alone` tells why
                 if self._wanted or (self._wanted is None and self._is_worth(loop)):
-                    self.advance = marcher(loop, self._observer)
                     self._places = places(loop, self._observer)
+                    self.advance = marcher(loop, self._observer)
 
     def _is_worth(self, loop: ClosedLoop) -> bool:
         return self._instants >= WORTH or is_compiled(loop, self._observer)
@@ -207,6 +221,7 @@ def prepare(loop: ClosedLoop, observer: Observer, instants: int) -> None:
 def why_alone(loop: ClosedLoop, observer: Observer) -> str:
     """Why runs like this loop cannot march side by side; empty where they can."""
     try:
+        places(loop, observer)
         marcher(loop, observer)
     except TypeError as error:
         return f"{error}; {RULES}"

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from podusv_cli.core.kernel import Vector, kernel, tail
+from podusv_cli.core.kernel import Vector, kernel, shared, tail
 from podusv_cli.core.steps import whole_steps
 from podusv_cli.engine.grid import TimeGrid
 
@@ -41,16 +41,17 @@ def relay(delay: float, grid: TimeGrid) -> Vector:
 def begin_step(k: int, t: float, relay: Vector) -> None:
     """Note that step k begins at time t."""
     relay[BEGAN] = t
-    if relay[COUNT] > 0.0:
-        relay[NEXT] = STAGES * k % int(relay[COUNT])
+    count = shared(relay[COUNT])
+    if count > 0.0:
+        relay[NEXT] = STAGES * k % int(count)
 
 
 @kernel
 def pass_on(demand: Vector, relay: Vector) -> None:
     """Take this stage's demand, and give the actuator that of the same stage a delay before."""
     relay[GIVEN], relay[GIVEN + 1] = demand[0], demand[1]
-    if relay[COUNT] > 0.0:
-        at = int(relay[NEXT])
+    if shared(relay[COUNT]) > 0.0:
+        at = int(shared(relay[NEXT]))
         place = tail(relay, DEMANDS + 2 * at)
         relay[GIVEN], relay[GIVEN + 1] = place[0], place[1]
         place[0], place[1] = demand[0], demand[1]

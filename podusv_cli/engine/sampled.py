@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from podusv_cli.core.kernel import Vector, kernel, tail
+from podusv_cli.core.kernel import Vector, kernel, shared, tail
 from podusv_cli.engine.layout import (
     HELD_DEMAND,
     HELD_SIGNALS,
@@ -89,6 +89,6 @@ def perceive(
     correct(t, sensed, tail(c.s, n.estimate), c.estimator, c.estimator_table)
     logged = 0
     for i in range(6):
-        if sensed[KNOWN + i] != 0.0:
+        if shared(sensed[KNOWN + i]) != 0.0:
             measured[logged] = sensed[i]
             logged += 1

@@ -57,6 +57,10 @@ class Measurement(Component):
         """Its table, for a run of so many steps; noise is a function of seed and sample."""
         return self.table()
 
+    def alike_in_table(self) -> list[int]:
+        """Places in the table that all runs side by side have to share; its kernel's `shared`."""
+        return []
+
     def first(self, start: Vector, step: float) -> Vector:
         """What is seen before anything has been delivered: the state at the start."""
         marks = np.concatenate([np.zeros(len(STATE)), np.array(self.measured(), float)])

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from podusv_cli.core.component import Component, value
 from podusv_cli.core.elementary import ROUND
-from podusv_cli.core.kernel import Vector, kernel, tail
+from podusv_cli.core.kernel import Vector, kernel, shared, tail
 from podusv_cli.core.random_words import gauss_markov, normals, uniforms
 from podusv_cli.core.signal import STATE, Signal
 from podusv_cli.core.steps import misfit
@@ -133,6 +133,11 @@ class Sensors(Measurement):
                 errors.append(row)
         return np.concatenate([*heads, *errors]).astype(float)
 
+    def alike_in_table(self) -> list[int]:
+        """All of the heads but the resolutions."""
+        heads = range(HEAD * len(STATE))
+        return [place for place in heads if place % HEAD != RESOLUTION]
+
     def first(self, start: Vector, step: float) -> Vector:
         """The start, and room for the samples that wait for their delivery."""
         rooms = [_steps(one, step)[2] * n for one, n in self.instruments().values() if one]
@@ -152,12 +157,12 @@ class Sensors(Measurement):
         """Sample what is due, with its error; deliver what has waited long enough."""
         for i in range(6):
             head, now = tail(table, HEAD * i), int(instant)
-            period, due = int(head[PERIOD]), now - int(head[DELAY])
-            waiting, room = tail(seen, int(head[WAITING])), int(head[ROOM])
+            period, due = int(shared(head[PERIOD])), now - int(shared(head[DELAY]))
+            waiting, room = tail(seen, int(shared(head[WAITING]))), int(shared(head[ROOM]))
             seen[FRESH + i] = 0.0
             if period > 0 and now % period == 0:
                 moved = b[int(k.motion) + i] if k.motion > 0.0 else 0.0
-                sample = x[i] + moved + table[int(head[ERRORS]) + now // period]
+                sample = x[i] + moved + table[int(shared(head[ERRORS])) + now // period]
                 waiting[now // period % room] = rounded(sample, head[RESOLUTION])
             if period > 0 and due >= 0 and due % period == 0:
                 sample = waiting[due // period % room]
