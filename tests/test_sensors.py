@@ -1,6 +1,7 @@
 """Sensors: when a sample is taken and delivered, and the errors that it has."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -14,6 +15,8 @@ from podusv_cli.disturbances.harmonic import HarmonicDisturbance
 from podusv_cli.disturbances.step import Step
 from podusv_cli.disturbances.total import Total
 from podusv_cli.disturbances.waves import Waves
+from podusv_cli.engine.batch import simulate_many
+from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.estimators.ekf import ExtendedKalmanFilter
 from podusv_cli.estimators.none import NoEstimator
 from podusv_cli.measurements.base import FRESH, KNOWN, VALUE
@@ -137,7 +140,7 @@ def test_machine_code_computes_what_plain_python_does():
 
 
 def test_what_is_not_measured_is_not_logged():
-    log = run(adrift(measurement=sensors(yaw_rate=None)), 0.1)
+    log = run(adrift(measurement=sensors(yaw_rate=None), estimator=ExtendedKalmanFilter()), 0.1)
     assert "r_m" not in log.signals
     assert "psi_m" in log.signals
 
@@ -185,6 +188,31 @@ class Short(NoEstimator):
 def test_what_would_write_beyond_its_vectors_is_refused(wrong, said):
     with pytest.raises(LawError, match=said):
         run(adrift(**wrong), 0.1)
+    done = simulate_many([adrift(**wrong)], TimeGrid(H, 10))
+    assert list(done.status) == ["invalid"]
+    assert said in done.cause[0]
+
+
+ODD = Sensor(period=0.015)
+SWELL = Waves(height=0.1, period=0.05)
+MISFITS = (
+    ({"measurement": sensors(position=ODD)}, "measurement.position.period: 0.015 s is no whole"),
+    ({"disturbance": SWELL}, "disturbance.highest: waves up to"),
+    ({"disturbance": Total(parts=(Current(), SWELL))}, "disturbance.parts[1].highest: waves up to"),
+    (
+        {"measurement": sensors(yaw_rate=None), "estimator": NoEstimator()},
+        "estimator: needs r measured",
+    ),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(("wrong", "said"), MISFITS)
+def test_a_loop_that_is_put_together_is_checked_like_a_scenario(wrong, said):
+    with pytest.raises(LawError, match=re.escape(said)):
+        run(adrift(**wrong), 0.1)
+    done = simulate_many([adrift(**wrong)], TimeGrid(H, 10))
+    assert list(done.status) == ["invalid"]
+    assert said in done.cause[0]
 
 
 def test_a_part_of_a_sum_keeps_its_choices_apart_from_those_of_others():

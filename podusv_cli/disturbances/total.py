@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -82,6 +82,11 @@ class Total(Disturbance):
         """Those of all parts, named as the constants are."""
         each = ((i, name) for i, part in enumerate(self.parts) for name in part.choices())
         return frozenset(self.constant_of(*place) for place in each)
+
+    def conflicts(self, vessel: Vessel, step: float) -> Iterator[tuple[str, str]]:
+        """Those of all parts, with the part's position in front of the key."""
+        for i, part in enumerate(self.parts):
+            yield from ((f"parts[{i}].{key}", text) for key, text in part.conflicts(vessel, step))
 
     def bounds(self) -> tuple[float, float, float] | None:
         """The sum of the bounds, which the sum need not reach."""

@@ -61,7 +61,8 @@ class Common:
         return marcher(self.like, self.observer, True)
 
     def check(self, loop: ClosedLoop) -> None:
-        """Raise ValueError for a loop of another structure."""
+        """Raise ValueError for a loop of another structure, LawError for parts that do not fit."""
+        loop.check_fit(self.grid.step)
         found, wanted = Common(loop, self.grid, self.observer).structure, self.structure
         if found != wanted:
             raise ValueError(

@@ -108,6 +108,8 @@ class ClosedLoop:
 
         In compiled code it would write beyond its vectors.
         """
+        if not self.measured:
+            return
         measurement, start = self.measurement, np.array(self.start)
         known, first = measurement.measured(), measurement.first(start, 1.0)
         marks = first[KNOWN:OWN].tolist() == [float(one) for one in known]
@@ -122,6 +124,22 @@ class ClosedLoop:
                 f"{called(self.estimator)}: it starts with {begun} numbers and declares {states} "
                 f"states; both have to be the same, {len(STATE)} or more"
             )
+
+    def check_fit(self, step: float) -> None:
+        """Raise LawError for parts that do not fit each other, the vessel or the step [s].
+
+        Scenarios are checked when they are loaded; this is for loops that are put together.
+        """
+        self.check_seeing()
+        parts = {
+            "disturbance": self.disturbance.conflicts(self.vessel, step),
+            "measurement": self.measurement.conflicts(step),
+        }
+        told = [f"{part}.{key}: {text}" for part, found in parts.items() for key, text in found]
+        if lacking := self.estimator.lacking(self.measurement.measured()):
+            told.append(f"estimator: {lacking}")
+        if told:
+            raise LawError("; ".join(told))
 
     def estimated(self) -> tuple[Signal, ...]:
         """The estimator's states; none where the law is given the state itself."""
@@ -138,8 +156,7 @@ class ClosedLoop:
 
     def about(self) -> dict[str, Signal]:
         """Every signal that the loop logs, by name. Raises LawError where two have one name."""
-        if self.measured:
-            self.check_seeing()
+        self.check_seeing()
         law, actuator = self.controller, self.actuator
         own = (partial(called, actuator), (*actuator.states, *actuator.signals_with))
         loop = (lambda: "the closed loop", LOOP)

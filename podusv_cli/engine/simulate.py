@@ -50,6 +50,7 @@ def simulate(
     `allocate` gives the room for the logged rows; the recording's signals are views of it.
     """
     observer, about = observer or Observer(), loop.about()
+    loop.check_fit(grid.step)
     plan = loop.layout(grid)
     wires, last = wire(loop, plan, observer, grid, grid.rows, allocate), plan.steps + 1
     advance = partial(marcher(loop, observer, compiled), 0, last, grid.step, wires, plan)

@@ -8,7 +8,7 @@ import numpy as np
 
 from podusv_cli.core.component import Component
 from podusv_cli.core.kernel import Vector
-from podusv_cli.core.signal import Signal
+from podusv_cli.core.signal import STATE, Signal
 from podusv_cli.vessels.vessel import Vessel
 
 # Not `u_hat`: laws with an observer of their own log that.
@@ -61,6 +61,15 @@ class Estimator(Component):
     def needs(self) -> tuple[bool, ...]:
         """Which of x, y, psi, u, v, r have to be measured."""
         return (True,) * len(ESTIMATE)
+
+    def lacking(self, measured: tuple[bool, ...]) -> str:
+        """What it needs and is not measured, in a sentence; else empty."""
+        pairs = zip(STATE, self.needs(), measured, strict=True)
+        missing = [state.name for state, needed, known in pairs if needed and not known]
+        if not missing:
+            return ""
+        text = f"needs {', '.join(missing)} measured; give a sensor, or an estimator that can"
+        return f"{text} do without"
 
     def constants_with(self, nominal: Vessel) -> dict[str, float]:
         """Its constants `k`, with those of the vessel that the law is told about."""

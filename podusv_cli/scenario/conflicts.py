@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from podusv_cli.core.component import called, wrong_default
 from podusv_cli.core.errors import LawError, in_a_line
-from podusv_cli.core.signal import STATE, Signal
+from podusv_cli.core.signal import Signal
 from podusv_cli.core.steps import fitting, misfit, whole_steps
 from podusv_cli.estimators.none import NoEstimator
 from podusv_cli.scenario.sections import CLAIM, CLAIM_IN_WORDS, LABEL, LABEL_IN_WORDS
@@ -98,11 +98,8 @@ def _seeing(scenario: Scenario) -> Conflicts:
     if scenario.measurement.is_exact and scenario.estimator != NoEstimator():
         text = "has nothing to estimate where the law sees the true state"
         yield "estimator", f"{text}; add `measurement: {{kind: sensors}}`"
-    pairs = zip(STATE, scenario.estimator.needs(), scenario.measurement.measured(), strict=True)
-    lacking = [state.name for state, needed, known in pairs if needed and not known]
-    if lacking:
-        text = f"needs {', '.join(lacking)} measured; give a sensor, or an estimator that can"
-        yield "estimator", f"{text} do without"
+    if told := scenario.estimator.lacking(scenario.measurement.measured()):
+        yield "estimator", told
 
 
 def _signals(scenario: Scenario) -> Conflicts:
