@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -49,10 +48,8 @@ from podusv_cli.paths.base import TARGET
 from podusv_cli.paths.base import Path as AnyPath
 from podusv_cli.paths.line import Line
 from podusv_cli.scenario.load import load_text
-from podusv_cli.scenario.presets import preset_file
-from podusv_cli.scenario.yaml_tree import plain
+from podusv_cli.testing_seeing import ESTIMATOR_CHECKS, MEASUREMENT_CHECKS, usual_vessel
 from podusv_cli.theory import derived
-from podusv_cli.vessels.vessel import VESSELS, Vessel
 
 Check = Callable[[Any], None]
 STATES = 50  # random ones
@@ -80,14 +77,20 @@ def contract(file: Path, fields: Mapping[str, Mapping[str, Any]] | None = None) 
     import pytest  # which only tests need
 
     own = plugins.from_file(str(file), file.read_text("utf-8"))
-    made = [(one, component_kind(one), CHECKS) for one in components(own, fields or {})]
+    made = [(one, component_kind(one), checks(one)) for one in components(own, fields or {})]
     made += [(one, one.name, METRIC_CHECKS) for one in _members(own, "metrics", Metric)]
     made += [(one, one.name, FIGURE_CHECKS) for one in _members(own, "figures", Sheet)]
     return [
         pytest.param(check, part, id=f"{name}-{check.__name__}")
-        for part, name, checks in made
-        for check in checks
+        for part, name, asked in made
+        for check in asked
     ]
+
+
+def checks(component: Component) -> tuple[Check, ...]:
+    """All checks of a component."""
+    more = ((Measurement, MEASUREMENT_CHECKS), (Estimator, ESTIMATOR_CHECKS))
+    return CHECKS + tuple(one for base, own in more if isinstance(component, base) for one in own)
 
 
 def _members(own: Plugin, room: str, kind: type[Any]) -> list[Any]:
@@ -209,12 +212,6 @@ def _compare(one: Recording, other: Recording, *, rtol: float, atol: float) -> N
         )
 
 
-@cache
-def _vessel() -> Vessel:
-    node = preset_file(VESSELS, "paper_nonlinear", [])
-    return Vessel(**{**(plain(node) if node else {}), "preset": "paper_nonlinear"})
-
-
 def loop_with(component: Component) -> ClosedLoop:
     """A closed loop of podusv's own parts, with this one in its place."""
     parts: dict[str, Any] = {
@@ -223,7 +220,7 @@ def loop_with(component: Component) -> ClosedLoop:
     }  # fmt: skip
     place = next(name for name, base in ROOMS.values() if isinstance(component, base))
     return ClosedLoop(
-        vessel=_vessel(), nominal=_vessel(), start=(-5.0, -2.0, 0.1, 0.3, 0.0, 0.0),
+        vessel=usual_vessel(), nominal=usual_vessel(), start=(-5.0, -2.0, 0.1, 0.3, 0.0, 0.0),
         **parts | {place: component},
     )  # fmt: skip
 
@@ -248,7 +245,7 @@ def evaluated(component: Component, seed: int) -> list[Vector]:
 
 
 def _law(law: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vector]:
-    memory, k = law.start(x, target, _vessel()), bundle(law.constants_with(_vessel()))
+    memory, k = law.start(x, target, usual_vessel()), bundle(law.constants_with(usual_vessel()))
     memory = memory + random.normal(0.0, 0.1, len(memory))
     outputs = [np.full(size, np.nan) for size in (2, len(memory), len(law.signals))]
     if law.sample_period() > 0:
@@ -264,7 +261,7 @@ def _path(path: Any, t: float, x: Vector, target: Vector, random: Any) -> list[V
 
 
 def _sea(sea: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vector]:
-    out, hull = np.full(3 + len(sea.signals), np.nan), _vessel()
+    out, hull = np.full(3 + len(sea.signals), np.nan), usual_vessel()
     sea.evaluate(t, x, bundle(sea.constants_with(hull)), sea.table_for(hull, t), out)
     return [out]
 
@@ -285,7 +282,7 @@ def _measurement(sensors: Any, t: float, x: Vector, target: Vector, random: Any)
 
 
 def _estimator(estimator: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vector]:
-    state, k = estimator.start(x, _vessel()), bundle(estimator.constants_with(_vessel()))
+    state, k = estimator.start(x, usual_vessel()), bundle(estimator.constants_with(usual_vessel()))
     seen = np.concatenate([x + random.normal(0.0, 0.1, 6), np.ones(12)])
     tau, rate, table = random.normal(0.0, 5.0, 3), np.full(len(state), np.nan), estimator.table()
     estimator.correct(t, seen, state, k, table)

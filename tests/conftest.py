@@ -30,6 +30,8 @@ from podusv_cli.disturbances.harmonic import HarmonicDisturbance
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.loop import STATE, ClosedLoop
 from podusv_cli.engine.simulate import simulate
+from podusv_cli.estimators.base import Estimator
+from podusv_cli.measurements.base import Measurement
 from podusv_cli.paths.base import TARGET, Path
 from podusv_cli.paths.line import Line
 from podusv_cli.paths.line_circle import LineCircle
@@ -39,6 +41,7 @@ from podusv_cli.vessels.vessel import Vessel
 PACKAGE = File(podusv_cli.__file__).parent
 ROOMS: dict[str, Any] = {
     "paths": Path, "disturbances": Disturbance, "actuators": Actuator, "controllers": Controller,
+    "measurements": Measurement, "estimators": Estimator,
 }  # fmt: skip
 # CyberShip II's two propellers as one that turns, on the centre line.
 POD: dict[str, float] = {

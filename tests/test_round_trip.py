@@ -26,6 +26,10 @@ def registered() -> dict[str, list[dict[str, Any]]]:
         for room, section in SECTIONS.items()
     }
     found["path"].append({"kind": "waypoints", "file": "points.csv"})
+    exact, sensors = found["measurement"]  # of which the first leaves nothing to estimate
+    found["measurement"] = [
+        exact if estimator["kind"] == "none" else sensors for estimator in found["estimator"]
+    ]
     pods, vessels = (with_presets()[key][1] for key in ("actuator.pod", "vessel"))
     found["actuator"] += [{"kind": "pod", "preset": name} for name in preset_names(pods)]
     found["vessel"] = [{"preset": name} for name in preset_names(vessels)]

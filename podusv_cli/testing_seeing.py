@@ -1,0 +1,187 @@
+"""Contract tests for measurements and estimators; `podusv_cli.testing.contract` includes them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from podusv_cli.core.kernel import Vector, bundle
+from podusv_cli.core.signal import STATE
+from podusv_cli.estimators.base import Estimator
+from podusv_cli.measurements.base import FRESH, KNOWN, OWN, VALUE, Measurement
+from podusv_cli.scenario.presets import preset_file
+from podusv_cli.scenario.yaml_tree import plain
+from podusv_cli.vessels.vessel import VESSELS, Vessel
+
+SIX = len(STATE)
+BEYOND = -1.234567890123e-290  # behind every vector; nobody writes just this
+MARGIN = 8
+STEP, STEPS = 0.01, 1000
+PATIENCE = 5.0  # s, in which an estimate has to come to what is measured
+NEAR = 0.4  # of the way there; also rad, m/s and rad/s
+
+
+@cache
+def usual_vessel() -> Vessel:
+    """The vessel of all contract tests."""
+    node = preset_file(VESSELS, "paper_nonlinear", [])
+    return Vessel(**{**(plain(node) if node else {}), "preset": "paper_nonlinear"})
+
+
+def guarded(numbers: Vector) -> Vector:
+    """The numbers, and behind them room that must not be written."""
+    return np.concatenate([numbers, np.full(MARGIN, BEYOND)])
+
+
+def kept(vector: Vector) -> bool:
+    """Whether what is behind the numbers is as it was."""
+    return bool((vector[-MARGIN:] == BEYOND).all())
+
+
+def pose_at(t: float) -> Vector:
+    """A vessel that moves in every quantity."""
+    rates, places = np.linspace(0.3, 0.8, SIX), np.arange(1.0, SIX + 1.0)
+    return np.sin(rates * t + places) * [9.0, 9.0, 3.0, 1.0, 0.3, 0.5]
+
+
+def watched(sensors: Measurement, steps: int = STEPS, table_of: int = STEPS) -> list[Vector]:
+    """What is seen at each instant, while nothing else is written."""
+    k = bundle(sensors.constants_with(STEP, 0))
+    table = sensors.table_for(STEP, table_of)
+    seen, given, before = guarded(sensors.first(pose_at(0.0), STEP)), np.zeros(3), table.copy()
+    rows = []
+    for instant in range(steps):
+        x = pose_at(instant * STEP)
+        sensors.sense(instant * STEP, float(instant), x, given, k, table, seen)
+        assert kept(seen), f"at instant {instant} it writes behind `seen`"
+        assert (x == pose_at(instant * STEP)).all(), "it changes the true state"
+        assert not given.any(), "it changes the disturbance"
+        rows.append(seen[:-MARGIN].copy())
+    np.testing.assert_array_equal(table, before, "it changes its table")
+    return rows
+
+
+def marks_what_it_delivers(sensors: Measurement) -> None:
+    """Marks are 0 or 1, a value changes only where it is marked, all that is measured comes."""
+    rows, known = np.array(watched(sensors)), np.array(sensors.measured(), float)
+    values, fresh = rows[:, VALUE:FRESH], rows[:, FRESH:KNOWN]
+    assert np.isin(fresh, (0.0, 1.0)).all(), "a mark of delivery is neither 0 nor 1"
+    assert (rows[:, KNOWN:OWN] == known).all(), "the marks of what is measured change"
+    changed = np.diff(values, axis=0) != 0.0
+    for i, state in enumerate(STATE):
+        unmarked = np.flatnonzero(changed[:, i] & (fresh[1:, i] == 0.0))
+        assert not len(unmarked), f"{state.name} changes at instant {unmarked[:1] + 1} unmarked"
+        came = bool(fresh[:, i].any())
+        assert came == bool(known[i]), f"{state.name}: measured {known[i]:g}, delivered {came}"
+
+
+def measures_the_vessel(sensors: Measurement) -> None:
+    """What is delivered follows the true state, or it measures something else."""
+    rows = np.array(watched(sensors))
+    true = np.array([pose_at(instant * STEP) for instant in range(STEPS)])
+    for i, state in enumerate(STATE):
+        came = rows[:, FRESH + i] == 1.0
+        if came.sum() > 2:
+            told = np.corrcoef(rows[came, i], true[came, i])[0, 1]
+            assert told > 0.5, f"{state.name}: correlation {told:.2g} with the truth"
+
+
+def errs_alike_in_a_longer_run(sensors: Measurement) -> None:
+    """Errors are functions of seed and sample, the same again and in a run of twice the length."""
+    first, again, longer = (watched(sensors, STEPS, n) for n in (STEPS, STEPS, 2 * STEPS))
+    np.testing.assert_array_equal(first, again, "the same run again")
+    np.testing.assert_array_equal(first, longer, "a run of twice the length")
+
+
+class Asked:
+    """An estimator's kernels with vectors of the declared sizes, from the state x."""
+
+    def __init__(self, estimator: Estimator, x: Vector) -> None:
+        """Begin at x."""
+        nominal = usual_vessel()
+        self.estimator, self.table = estimator, estimator.table()
+        self.k = bundle(estimator.constants_with(nominal))
+        self.state = guarded(estimator.start(x, nominal))
+        self.rate = np.full(len(self.state), np.nan)
+        self.rate[-MARGIN:] = BEYOND
+
+    def step(self, t: float, seen: Vector, tau: Vector) -> Vector:
+        """Correct, follow, and go on by a step by Euler's method; the new estimate."""
+        given = seen.copy(), tau.copy()
+        self.estimator.correct(t, seen, self.state, self.k, self.table)
+        corrected = self.state.copy()
+        self.estimator.follow(t, seen, tau, self.state, self.k, self.table, self.rate)
+        for one, before, what in zip((seen, tau), given, ("seen", "tau"), strict=True):
+            np.testing.assert_array_equal(one, before, f"it changes {what}")
+        np.testing.assert_array_equal(self.state, corrected, "`follow` changes the state")
+        assert kept(self.state), "`correct` writes behind the state"
+        assert kept(self.rate), "`follow` writes behind the rate"
+        written = self.rate[:-MARGIN]
+        assert np.isfinite(written).all(), "a rate is left unwritten, or is no finite number"
+        self.state[:-MARGIN] += STEP * written
+        return self.state[:SIX]
+
+
+def delivery(x: Vector, known: tuple[bool, ...], fresh: float) -> Vector:
+    """What a measurement hands over: values, marks of delivery, marks of what is measured."""
+    marks = np.array(known, float)
+    return np.concatenate([np.where(known, x, 0.0), fresh * marks, marks])
+
+
+def starts_at_the_truth(estimator: Estimator) -> None:
+    """The estimate at t = 0 is the true state, and all numbers of the state are finite."""
+    x = pose_at(0.0)
+    state = estimator.start(x, usual_vessel())
+    assert len(state) == len(estimator.states) >= SIX
+    np.testing.assert_array_equal(state[:SIX], x)
+    assert np.isfinite(state).all()
+
+
+def waits_for_a_delivery(estimator: Estimator) -> None:
+    """`correct` leaves the state where nothing was delivered."""
+    asked, seen = Asked(estimator, pose_at(0.0)), delivery(pose_at(9.0), ALL, 0.0)
+    before = asked.state.copy()
+    estimator.correct(1.0, seen, asked.state, asked.k, asked.table)
+    np.testing.assert_array_equal(asked.state, before, "nothing was delivered")
+
+
+def comes_to_what_is_measured(estimator: Estimator) -> None:
+    """At rest beside the place where it starts, with all measured or no more than it needs."""
+    for known in (ALL, estimator.needs()):
+        away = np.array([0.4, -0.3, 0.2, 0.0, 0.0, 0.0])
+        found = settled(Asked(estimator, np.zeros(SIX)), away, known)
+        left = np.abs(found - away)
+        assert (left[:3] <= NEAR * np.abs(away[:3])).all(), f"pose off by {left[:3]}"
+        assert (left[3:] <= NEAR).all(), f"at rest with velocities {found[3:]}"
+
+
+def takes_headings_by_the_nearest_turn(estimator: Estimator) -> None:
+    """A measured heading that is a whole turn away is no error."""
+    turned = np.array([0.0, 0.0, 2.0 * math.pi, 0.0, 0.0, 0.0])
+    found = settled(Asked(estimator, np.zeros(SIX)), turned, ALL)
+    off = math.remainder(found[2], 2.0 * math.pi)
+    assert abs(off) < NEAR, f"heading off by {off:.3g} rad"
+    assert abs(found[5]) < NEAR, f"it yaws with {found[5]:.3g} rad/s"
+
+
+def settled(asked: Asked, place: Vector, known: tuple[bool, ...]) -> Vector:
+    """The estimate after `PATIENCE` with x = `place` measured at 10 Hz."""
+    new, old = (delivery(place, known, fresh) for fresh in (1.0, 0.0))
+    tau, steps = np.zeros(3), round(PATIENCE / STEP)
+    for i in range(steps):
+        found = asked.step(i * STEP, old if i % 10 else new, tau)
+    return found
+
+
+ALL = (True,) * SIX
+MEASUREMENT_CHECKS: tuple[Callable[[Any], None], ...] = (
+    marks_what_it_delivers, measures_the_vessel, errs_alike_in_a_longer_run,
+)  # fmt: skip
+ESTIMATOR_CHECKS: tuple[Callable[[Any], None], ...] = (
+    starts_at_the_truth, waits_for_a_delivery, comes_to_what_is_measured,
+    takes_headings_by_the_nearest_turn,
+)  # fmt: skip
