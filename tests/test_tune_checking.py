@@ -29,6 +29,7 @@ def plan(*changes: str) -> TunePlan:
     ("change", "told"),
     [
         ("tune.budget=31", "31 runs are less than one batch of 8 gains with 4 draws each; give 32"),
+        ("sweep.design=sobol", "sobol points have no intervals, which a comparison needs; write"),
         ("tune.budgte=3", "unknown key; did you mean 'budget'?"),
         ("tune.objective=median(iea)", "unknown metric 'iea'; did you mean"),
         ("tune.objective=iae", "no statistic of all draws; write median(...)"),
@@ -116,6 +117,8 @@ def test_a_gain_is_tried_in_four_digits_within_its_range():
     assert gain.value(123.456789) == 123.5
     assert gain.value(109.99999) == 110.0
     assert (gain.bound(110.0), gain.bound(1100.0), gain.bound(10900.0)) == ("lower", "", "upper")
+    # The scenario's own value, the first trial, may lie outside.
+    assert (gain.bound(0.0), gain.bound(99.0), gain.bound(20000.0)) == ("", "", "")
 
 
 RUNS = Runs(

@@ -166,12 +166,20 @@ def test_another_search_in_the_folder_is_refused_with_what_differs(tmp_path, mon
         opened(tmp_path / "out", planned(tmp_path))
 
 
-def test_a_smaller_budget_would_throw_trials_away_and_is_refused(tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("fewer", "told"),
+    [
+        ("tune.budget=40", r"has budget: 64 \(runs\); ask for as many or more"),
+        ("tune.repeats=1", r"has repeats: 2 \(searches\)"),
+        ("tune.validate=11", r"has validate: 12 \(fresh draws\)"),
+    ],
+)
+def test_less_would_throw_runs_away_and_is_refused(tmp_path, monkeypatch, fewer, told):
     monkeypatch.setattr(sampler, "version", lambda: "1")
     for _ in range(2):
         opened(tmp_path / "out", planned(tmp_path))
-    with pytest.raises(UsageError, match="has a budget of 64 runs; ask for as many or more"):
-        opened(tmp_path / "out", planned(tmp_path, "tune.budget=40"))
+    with pytest.raises(UsageError, match=told):
+        opened(tmp_path / "out", planned(tmp_path, fewer))
 
 
 @pytest.mark.slow

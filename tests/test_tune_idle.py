@@ -8,6 +8,7 @@ import pytest
 from small_study import TEXT
 from tune_samples import planned
 
+from podusv_cli.core.errors import PodusvError
 from podusv_cli.scenario.load import load_text
 from podusv_cli.tuning import idle as module
 from podusv_cli.tuning.check import tune_faults
@@ -47,6 +48,12 @@ def test_a_number_that_an_option_leaves_unread_is_idle(changes, found):
 def test_a_law_that_ends_its_process_has_no_idle_gains(tmp_path, monkeypatch):
     monkeypatch.setattr(module, "make", lambda plan, unit: os._exit(1))
     assert find_idle(planned(tmp_path), 1) == {"toy": ()}
+
+
+def test_an_error_of_a_run_is_not_taken_for_gains_that_all_matter(tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "make", lambda plan, unit: 1 / 0)
+    with pytest.raises(PodusvError, match="ZeroDivisionError"):
+        find_idle(planned(tmp_path), 1)
 
 
 def test_the_points_are_in_the_space_and_begin_with_the_scenario(tmp_path):

@@ -40,11 +40,27 @@ def test_a_repeat_that_is_better_on_fresh_draws_than_the_one_taken_is_told():
     assert text.startswith("pid: the repeat that is best on the training draws has 3 on the fresh")
 
 
-def test_a_search_with_fewer_whole_trials_than_gains_is_told():
-    trials = [SimpleNamespace(status=status) for status in (FINISHED, FINISHED, CUT)]
+def test_a_search_with_fewer_than_ten_whole_trials_for_each_gain_is_told():
+    trials = [SimpleNamespace(status=status) for status in (*[FINISHED] * 20, *[CUT] * 20)]
     results = SimpleNamespace(
         winners={"pid": [], "li": []}, trials={"pid": [trials], "li": [trials]},
         plan=SimpleNamespace(gains={"pid": (1, 2, 3), "li": (1, 2)}),
     )  # fmt: skip
     (text,) = remarks._few(results)
-    assert text.startswith("pid: a search finished 2 trials for 3 gains")
+    assert text.startswith("pid: a search finished 20 trials for 3 gains")
+
+
+def test_an_inequality_that_holds_in_training_only_is_told():
+    row = {"when": "after", "inequality": "quantile(tv_tau_u, 0.95) <= 20", "value": 23.25}
+    results = SimpleNamespace(
+        limits=pd.DataFrame(
+            [
+                row | {"law": "pid", "holds": False, "held_in_training": True},
+                row | {"law": "li", "holds": False, "held_in_training": False},
+                row | {"law": "dsc", "holds": True, "held_in_training": True},
+            ]
+        )
+    )
+    (text,) = remarks._beyond(results)
+    assert text.startswith("pid: quantile(tv_tau_u, 0.95) <= 20 held on the training draws; on the")
+    assert text.endswith("it is 23.25")

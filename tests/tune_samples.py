@@ -97,13 +97,11 @@ tune:
 """
 
 
-def toy(folder: Path, *changes: str) -> Path:
-    """The scenario of the search in a folder, with its plug-in; a change is `key=value`."""
+def toy(folder: Path) -> Path:
+    """The scenario of the search in a folder, with its plug-in."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "toy.py").write_text(LAW)
     (folder / "toy.yaml").write_text(TEXT)
-    if changes:  # written out, as commands take them by --set
-        load(folder / "toy.yaml", changes, [tune_faults])
     return folder / "toy.yaml"
 
 

@@ -91,13 +91,14 @@ def _agree(folder: Path, there: dict[str, Any], wanted: dict[str, Any]) -> None:
 
 
 def _as_much(folder: Path, history: Sequence[Mapping[str, Any]], tune: Tune) -> None:
-    """Raise UsageError where trials that are there would be thrown away."""
-    budget = max((one["budget"] for one in history), default=0)
-    if tune.budget < budget:
-        raise UsageError(
-            f"{folder} has a budget of {budget} runs; ask for as many or more, or name another "
-            "folder with --out"
-        )
+    """Raise UsageError where runs that are there would be thrown away."""
+    for key, unit in (("budget", "runs"), ("repeats", "searches"), ("validate", "fresh draws")):
+        there = max((one[key] for one in history), default=0)
+        if getattr(tune, key) < there:
+            raise UsageError(
+                f"{folder} has {key}: {there} ({unit}); ask for as many or more, or name another "
+                "folder with --out"
+            )
 
 
 def scenario_texts(loaded: Loaded) -> dict[str, str]:

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from podusv_cli.core.errors import PodusvError
 from podusv_cli.process.workers import Progress, run_all
 from podusv_cli.study.draws import uniforms
 from podusv_cli.study.unit import Unit, UnitResult, make
@@ -29,12 +30,15 @@ def find_idle(plan: TunePlan, workers: int) -> dict[str, tuple[str, ...]]:
     """The keys of the idle gains of every law that has gains.
 
     The runs are made in processes of their own. Of a law that ends its process, none is idle.
-    Raises KeyboardInterrupt.
+    Raises KeyboardInterrupt, and PodusvError where a run cannot be made at all.
     """
     laws = [law for law, found in plan.gains.items() if found]
     outcomes = run_all([partial(_of_law, plan, law) for law in laws], workers=workers)
     if any(one.interrupted for one in outcomes):
         raise KeyboardInterrupt
+    for one in outcomes:
+        if one.failure and not one.killed:
+            raise PodusvError(one.failure)
     return {law: one.result or () for law, one in zip(laws, outcomes, strict=True)}
 
 

@@ -10,14 +10,14 @@ from podusv_cli.study.outputs import publish
 from podusv_cli.study.summary import as_csv
 from podusv_cli.tuning.results import Results
 
-TABLES = ("laws", "validation", "gains", "importance", "history")
+TABLES = ("laws", "limits", "validation", "gains", "importance", "history")
 
 
 def write_tables(folder: Path, results: Results) -> None:
     """Write all tables. Raises StorageError."""
     tables = {
-        "laws": results.laws, "validation": results.pairs, "gains": results.gains,
-        "importance": results.importance, "history": results.history,
+        "laws": results.laws, "limits": results.limits, "validation": results.pairs,
+        "gains": results.gains, "importance": results.importance, "history": results.history,
     }  # fmt: skip
     files.write_all({folder / f"{name}.csv": as_csv(t).encode() for name, t in tables.items()})
 

@@ -26,7 +26,13 @@ TRAIN, VALIDATE = "tune", "tune validation"  # streams of draws, beside a sweep'
 OPEN = ("budget", "validate", "repeats")
 # Rough costs [s]: of a trial for Optuna, processes and files; of what comes before and after.
 TRIAL, AROUND = 0.1, 10.0
+ENOUGH = 10  # whole trials for each gain; with fewer, repeats end in different places
 Named = tuple[str, Mapping[str, Any]]  # a law of the scenario, and its numbers that are others
+
+
+def is_few(trials: int, gains: int) -> bool:
+    """Whether so many trials on all draws are few for so many gains."""
+    return trials < ENOUGH * gains
 
 
 @dataclass(frozen=True)
@@ -106,7 +112,8 @@ class TunePlan:
     def _few(self, gains: int) -> str:
         """What to say of a budget that is small for so many gains."""
         whole = self.tune.budget // self.tune.train
-        return f"; a budget of {whole} trials on all draws is few for them" if whole < gains else ""
+        few = is_few(whole, gains)
+        return f"; a budget of {whole} trials on all draws is few for them" if few else ""
 
     @property
     def size(self) -> str:

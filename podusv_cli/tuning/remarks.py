@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
+from podusv_cli.tuning.plan import ENOUGH, is_few
 from podusv_cli.tuning.results import MARGIN, Results
 from podusv_cli.tuning.trials import FINISHED
 
@@ -14,7 +15,7 @@ def remarks(results: Results) -> list[str]:
     """The answer first, then what it hangs on, and what a user may want to change."""
     return [
         *_answer(results), *_kept(results), *_idle(results), *_unsound(results), *_few(results),
-        *_overfitted(results), *_bounds(results),
+        *_overfitted(results), *_beyond(results), *_bounds(results),
     ]  # fmt: skip
 
 
@@ -73,10 +74,10 @@ def _few(results: Results) -> Iterator[str]:
     for law in results.winners:
         whole = min(sum(t.status == FINISHED for t in one) for one in results.trials[law])
         gains = len(results.plan.gains[law])
-        if whole < gains:
+        if is_few(whole, gains):
             yield (
-                f"{law}: a search finished {whole} trials for {gains} gains, which is few; give a "
-                "larger tune.budget"
+                f"{law}: a search finished {whole} trials for {gains} gains, which is few (fewer "
+                f"than {ENOUGH} each); give a larger tune.budget"
             )
 
 
@@ -88,6 +89,18 @@ def _overfitted(results: Results) -> Iterator[str]:
                 f"{law}: the repeat that is best on the training draws has {taken:.4g} on the "
                 f"fresh ones, another {min(others):.4g}; more draws for training (tune.train) may "
                 "help"
+            )
+
+
+def _beyond(results: Results) -> Iterator[str]:
+    """Inequalities that gains hold on the training draws, and not on the fresh ones."""
+    table = results.limits
+    after: Any = table[table["when"] == "after"].to_dict("records")
+    for row in after:
+        if row["held_in_training"] and not row["holds"]:
+            yield (
+                f"{row['law']}: {row['inequality']} held on the training draws; on the fresh ones "
+                f"it is {row['value']:.4g}"
             )
 
 

@@ -15,7 +15,16 @@ import pandas as pd
 from podusv_cli.study import statistics, summary
 from podusv_cli.study.runs_file import Table
 from podusv_cli.study.statistics import Interval
-from podusv_cli.tuning.objective import OfRuns, Runs, evaluate, named, numbers_of, share_of
+from podusv_cli.tuning.objective import (
+    Inequality,
+    OfRuns,
+    Runs,
+    evaluate,
+    excess,
+    named,
+    numbers_of,
+    share_of,
+)
 from podusv_cli.tuning.plan import TunePlan
 from podusv_cli.tuning.sampler import importances
 from podusv_cli.tuning.space import Gain
@@ -79,7 +88,17 @@ class Results:
         for when in ("before", "after"):
             ranks = table[f"objective_{when}"].replace(np.inf, 1e300).rank(method="min")
             table[f"rank_{when}"] = ranks.astype(int)
+            table[f"better_than_{when}"] = [self._better_than(law, when) for law in table.law]
         return table
+
+    def _better_than(self, law: str, when: str) -> int:
+        """How many laws this one is better than in the typical draw, the whole interval of it."""
+        found = self.pairs
+        if not len(found):
+            return 0
+        found = found[(found["when"] == when) & (found.metric == self.shown[0])]
+        ahead = (found.a == law) & (found.ratio_high < 1.0)
+        return int((ahead | (found.b == law) & (found.ratio_low > 1.0)).sum())
 
     def _law(self, law: str) -> dict[str, Any]:
         told: dict[str, Any] = {"law": law, "runs": self.spent.get(law, 0)}
@@ -108,6 +127,26 @@ class Results:
         values = numbers_of(tree, OfRuns(self.plan.metrics, runs=runs))
         ends = statistics.quantile(values, share_of(tree), self.level)
         return Interval(found, ends.low, ends.high)
+
+    @cached_property
+    def limits(self) -> pd.DataFrame:
+        """Every inequality on the fresh draws, before and after, for every law."""
+        return pd.DataFrame(
+            [
+                {"law": law, "when": when, "inequality": one.text, **self._limit(one, name),
+                 "held_in_training": law in self.winners and self.winner(law).excesses[i] <= 0.0}
+                for law in self.plan.laws
+                for when, name in (("before", law), ("after", self.after(law)))
+                for i, one in enumerate(self.plan.inequalities)
+            ],
+            columns=["law", "when", "inequality", "value", "value_low", "value_high", "holds",
+                     "held_in_training"],
+        )  # fmt: skip
+
+    def _limit(self, one: Inequality, name: str) -> dict[str, Any]:
+        runs = self.met(name)
+        holds = excess(one, runs, self.plan.metrics) <= 0.0
+        return {**_interval("value", self.objective(runs, one.tree)), "holds": holds}
 
     def spread(self, law: str) -> list[float]:
         """The objective on the fresh draws of every repeat's winner."""

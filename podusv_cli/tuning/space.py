@@ -49,8 +49,11 @@ class Gain:
         return number in self.words if self.words else self.low <= number <= self.high
 
     def bound(self, number: Any) -> str:
-        """The end of the range that a value is at, in words; "" where it is at none."""
-        if self.words or self.high == self.low:
+        """The end of the range that a value is at, in words; "" where it is at none.
+
+        The scenario's own value may lie outside.
+        """
+        if self.words or not self.low <= number <= self.high or self.high == self.low:
             return ""
         place = self.place(number)
         near = {"lower": place, "upper": 1.0 - place}

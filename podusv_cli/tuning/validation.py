@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -35,11 +35,7 @@ def repeated(law: str, repeat: int) -> str:
 
 def chosen(winners: Sequence[Trial]) -> int:
     """Which repeat found the gains that are taken: the best on the draws for training."""
-    numbered = [
-        Trial(place, 0, t.gains, t.runs, t.status, t.values, t.excesses, t.first, t.failures)
-        for place, t in enumerate(winners)
-    ]
-    return best(numbered).number
+    return best([replace(trial, number=place) for place, trial in enumerate(winners)]).number
 
 
 def contestants(plan: TunePlan, winners: Winners) -> dict[str, Named]:
