@@ -23,12 +23,13 @@ PODS := kept dropped ideal no_anti_windup single
 ABLATIONS := ablation ablation_figures ablation_standoff ablation_gains ablation_gains_figures \
     ablation_gains_standoff ablation_pid
 TABLES := unknown:unknown_dynamics discrete:discrete_signals limits:period_limits learnt:learnt gains:fixed_gains
+SEAS := exact sensors sensors_alone current state_3 state_5 state_6 pods delay thruster_failure dead_zone
 STUDIES := hull_and_sea unknown_dynamics rivals sea_state_2 sea_state_4 sea_state_6
 SEARCHES := phases hull network sliding
 COMPARISONS := printed_compare figures_compare figures_compare_standoff corrected_compare
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce claim pod sweep tune bench-laws docs test test-all test-faults test-oldest test-newest dist bench lint types contracts clean
+.PHONY: help reproduce claim pod sea sweep tune bench-laws docs test test-all test-faults test-oldest test-newest dist bench lint types contracts clean
 
 help: ## what can be made
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -63,6 +64,13 @@ pod: $(VENV)/run.done ## the laws behind a pod, into results/pod/
 	@rm -f results/pod.log
 	@for name in $(PODS); do $(STEP) compare pod $$name 0 || exit 1; done
 	@echo "what was found: results/pod.md; every table and figure: results/pod/*/report.html"
+
+sea: $(VENV)/run.done ## single runs in a sea and through sensors, into results/sea/
+	@echo "$(words $(SEAS)) steps, about five minutes on two cores:"
+	@rm -f results/sea.log
+	@for name in $(SEAS); do $(STEP) compare sea $$name 0 || exit 1; done
+	@$(BIN)/python results/sea.py > results/.table && mv results/.table results/sea/loads.csv
+	@echo "what was found: results/sea.md; every table and figure: results/sea/*/report.html"
 
 bench-laws: $(VENV)/run.done ## all laws over standard tasks, into results/bench/
 	@$(BIN)/podusv bench --force --out results/.bench && mkdir -p results/bench && \

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# One step of `make reproduce` and `make pod`: runs a scenario and prints a line with the time it took.
+# One step of `make reproduce`, `make pod` and `make sea`: runs a scenario and prints a line with the time it took.
 #
 #   results/step.sh run|compare FOLDER NAME CODE
 #

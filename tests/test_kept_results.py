@@ -47,6 +47,8 @@ def test_what_is_committed_of_a_comparison_comes_out_the_same_every_time(
         committed = {name for name in names if kept(f"{place}/{name}")}
         assert {"comparison.csv", "comparison.md", "comparison.tex"} <= committed
         assert not committed & moved
+    assert {n for n in names if kept(f"results/sea/x/{n}")} == {"comparison.csv", "claims.json"}
+    assert not {"comparison.csv", "claims.json"} & moved
 
 
 def test_git_tracks_nothing_that_it_would_not_keep():

@@ -1,10 +1,14 @@
-"""results/sea.md tells what the committed studies of sea states found."""
+"""results/sea.md tells what the committed studies and comparisons found."""
 
 import re
 from pathlib import Path
 
 import pandas as pd
 import pytest
+from test_reproduction import rerun, untimed
+
+from podusv_cli.scenario.load import load
+from podusv_cli.workflows import compare, run
 
 ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "results" / "sea.md").read_text()
@@ -59,3 +63,107 @@ def test_a_law_told_of_the_loads_fails_more_often_with_more_positions():
         failed = [table.loc[(p, "proposed_anti_windup", "iae")].failed for p in PERIODS]
         assert failed == sorted(failed, reverse=True)
         assert failed[0] > failed[-1]
+
+
+def single(name):
+    """The committed comparison of single runs."""
+    return pd.read_csv(ROOT / "results/sea" / name / "comparison.csv", index_col=0)
+
+
+NAMES = re.search(r"^SEAS := (.*)$", (ROOT / "Makefile").read_text(), re.M).group(1).split()
+SINGLE = {name: single(name) for name in NAMES}
+WORDS = " ".join(PAGE.split())
+
+
+def number(name, law, metric):
+    return float(SINGLE[name].loc[metric, law])
+
+
+@pytest.mark.parametrize("law", ["proposed", "dsc", "li", "pid", "velocity_vector"])
+def test_what_sensors_cost_is_as_in_the_comparisons(law):
+    true, *seen = (number(n, law, "tv_tau_u") for n in ("exact", "sensors", "sensors_alone"))
+    place = 2 if law in LAWS[:4] else 1
+    told = [f"{true:.2f}", *(f"{n:_.0f}".replace("_", " ") for n in seen)]
+    assert [re.sub(r"^(\d) (\d{3})$", r"\1\2", cell) for cell in row(law, place)] == told
+
+
+@pytest.mark.parametrize("law", ["proposed", "dsc", "li", "pid", "velocity_vector"])
+def test_what_actuators_cost_is_as_in_the_comparisons(law):
+    names = ("pods", "delay", "thruster_failure", "dead_zone")
+    told = [
+        f"{1000 * number(name, law, 'error_after_rms'):.0f} mm, "
+        f"{100 * number(name, law, 'saturated_fraction'):.0f} %"
+        if law in SINGLE[name]
+        else "-"
+        for name in names
+    ]
+    assert row(law, -1) == told
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_states_3_and_5_are_told_as_committed(law):
+    three, five = (1000 * number(f"state_{n}", law, "error_after_max") for n in (3, 5))
+    assert f"`{law}` {three:.0f} and {five:.0f}" in WORDS
+
+
+def test_the_loads_are_those_of_the_logs():
+    loads = pd.read_csv(ROOT / "results/sea/loads.csv", index_col="run")
+    u, v, r = loads.T.values
+    for sentence, at in (
+        ("Its rms loads after 100 s are {:.2f} N, {:.2f} N and {:.2f} N m in surge", 0),
+        ("sea state 6 they are {:.2f} N, {:.2f} N and {:.2f} N m;", 1),
+        ("the current alone makes {:.2f} N, {:.2f} N and {:.2f} N m of that", 2),
+    ):
+        assert sentence.format(u[at], v[at], r[at]) in WORDS
+    assert list(loads.index) == ["exact", "state_6", "current"]
+
+
+def test_what_is_said_of_remark_8_is_as_in_the_tables():
+    demand = {
+        (name, law): number(name, law, "tv_tau_u")
+        for name in ("sensors", "sensors_alone")
+        for law in ("proposed", "dsc", "li")
+    }
+    filtered = 1.0 - demand["sensors", "proposed"] / demand["sensors", "li"]
+    alone = demand["sensors_alone", "proposed"] / demand["sensors_alone", "li"] - 1.0
+    medians = [
+        1.0 - STUDIES[2].loc[(p, "proposed", "tv_tau_u")].q50 / li.q50
+        for p in PERIODS
+        for li in [STUDIES[2].loc[(p, "li", "tv_tau_u")]]
+    ]
+    low, high = (100 * f(medians) for f in (min, max))
+    assert f"the variation is {100 * filtered:.0f} % smaller where the measurements" in WORDS
+    assert f"the medians of sea state 2 it is {low:.0f} to {high:.0f} % smaller" in WORDS
+    assert f"no difference is seen ({100 * alone:.0f} % larger, one run)" in WORDS
+    ratios = [
+        demand[name, "dsc"] / demand[name, "proposed"] for name in ("sensors", "sensors_alone")
+    ]
+    assert max(abs(ratio - 1.0) for ratio in ratios) < 0.02
+
+
+def test_a_dead_zone_costs_what_is_told():
+    ideal, dead = (number(name, "proposed", "tv_tau_u") for name in ("exact", "dead_zone"))
+    assert f"the demand's variation grows from {ideal:.0f} to {dead:.0f} N" in WORDS
+    off = [number(name, "proposed", "error_after_rms") for name in ("exact", "dead_zone")]
+    assert off[1] == pytest.approx(off[0], rel=1e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
+def test_the_committed_comparison_is_what_comes_out(name, tmp_path, monkeypatch):
+    monkeypatch.setattr(compare, "law_costs", untimed)
+    request = run.Request(out=tmp_path / name, figures=False)
+    compare.compare([ROOT / f"configs/sea/{name}.yaml"], request)
+    found = pd.read_csv(tmp_path / name / "comparison.csv", index_col=0)
+    pd.testing.assert_frame_equal(found, SINGLE[name], rtol=1e-6)
+
+
+def test_one_committed_run_is_what_comes_out():
+    """The one that a rounding error does not drive apart: no noise, no limit in the loop."""
+    law = load(ROOT / "configs/sea/delay.yaml").scenario.singles()["velocity_vector"]
+    found = rerun(law).run.metrics
+    committed = SINGLE["delay"].velocity_vector.astype(float)
+    common = [name for name in committed.index if name in found]
+    assert {"iae", "tv_tau_u", "saturated_fraction"} <= set(common)
+    for name in common:
+        assert found[name] == pytest.approx(committed[name], rel=1e-6, nan_ok=True), name
