@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from conftest import example, kinds, load_at
 from pydantic import ValidationError
-from scenario_samples import SOUND, write
+from scenario_samples import SOUND, findings, write
 
 from podusv_cli.disturbances.calm import Calm
 from podusv_cli.disturbances.file import FromFile
@@ -130,6 +130,29 @@ def test_a_record_is_straight_between_its_rows_and_held_beyond_them():
     assert sea.bounds() == (4.0, 1.0, 0.5)
 
 
+def test_the_header_says_which_column_is_which():
+    for head in ("b_u,b_v,b_r,t", '"b_u [N]", b_v [N] ,b_r [N m],t [s]', "# load\nb_u,b_v,b_r,t"):
+        sea = FromFile(rows=f"{head}\n2,0,0,1\n4,-1,0.5,3\n")
+        np.testing.assert_array_equal(load_at(sea, 3.0), [4, -1, 0.5])
+
+
+def test_a_wrong_record_is_told_with_its_file_and_a_missing_one_by_its_key(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "sub").mkdir()
+    write("sub/gust.csv", "t,b_u,b_v,b_r\n0,0,0,0\nO,0,5,0\n")
+    for sea in ("{kind: file, file: gust.csv}", "[{kind: file, file: gust.csv}]"):
+        write("sub/a.yaml", SOUND.replace("{kind: none}", sea))
+        (said,) = findings("sub/a.yaml")
+        assert said.startswith("sub/gust.csv: disturbance")
+        assert said.endswith("rows: line 3, column 1 of the record is no number")
+    write("a.yaml", SOUND.replace("{kind: none}", "{kind: file}"))
+    (said,) = findings("a.yaml")
+    assert "disturbance: file is missing; name a CSV file" in said
+    write("sub/a.yaml", SOUND.replace("{kind: none}", "{kind: file, file: none.csv}"))
+    (said,) = findings("sub/a.yaml")
+    assert said.endswith(f"no such file or directory; looked in {tmp_path / 'sub'}")
+
+
 def test_a_record_is_read_from_a_file_beside_the_scenario(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write("gust.csv", RECORD)
@@ -143,10 +166,24 @@ def test_a_record_is_read_from_a_file_beside_the_scenario(tmp_path, monkeypatch)
     ("rows", "says"),
     [
         ("", "the record needs at least two lines, has 0"),
-        ("0,1,1\n1,2,3\n", "line 1 of the record has 3 numbers; every line must have 4 (t, b_u, "
-         "b_v, b_r)"),
-        ("0,1,1,0\n1,s3cret,2,0\n", "the record holds something that is no number"),
-        ("0,1,1,0\n0,1,2,0\n", "the times of the record do not increase from line to line"),
+        ("0,1,1\n1,2,3\n", "line 1 of the record has 3; every line must have 4 (t, b_u, b_v, b_r)"),
+        ("0;1;1;0\n1;2;3;0\n", "line 1 of the record has 1 value; separate values by commas: "
+         "every line must have 4 (t, b_u, b_v, b_r)"),
+        ("t,b_u,b_v,b_r\n0;1;1;0\n1;2;3;0\n", "line 2 of the record has 1 value; separate "
+         "values by commas: every line must have 4"),
+        ("0,1,1,0\n\n1,s3cret,2,0\n", "line 3, column 2 of the record is no number"),
+        ("0,s3cret,5,0\n1,1,2,0\n", "line 1, column 2 of the record is no number"),
+        ("O,0,5,0\n1,1,2,0\n2,1,2,0\n", "line 1, column 1 of the record is no number"),
+        ("0,1,1,0\n1,1,,0\n", "line 2, column 3 of the record is no number"),
+        ("0,1,1,0\n1,1,nan,0\n", "line 2, column 3 of the record is not a finite number"),
+        ("0,1,1,0\n0,1,2,0\n", "line 2 of the record: its time is not after that of the line "
+         "before"),
+        ("s3cret,b_u,b_v\n0,0,0,0\n1,1,1,1\n", "line 1 of the record names columns that are not "
+         "t [s], b_u [N], b_v [N], b_r [N m] (in any order, units may be left out): column 1 is "),
+        ("t,b_u,b_v,s3cret\n0,0,0,0\n1,1,1,1\n", "column 4 is none of these"),
+        ("t,b_u [kN],b_v,b_r\n0,0,0,0\n1,1,1,1\n", "column 2 is none of these"),
+        ("t,b_u,b_u,b_r\n0,0,0,0\n1,1,1,1\n", "one is missing or twice"),
+        ("t,b_u,b_v\n0,0,0,0\n1,1,1,1\n", "one is missing or twice"),
     ],
 )  # fmt: skip
 def test_a_wrong_record_is_told_in_a_sentence_that_repeats_none_of_it(rows, says):

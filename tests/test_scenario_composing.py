@@ -77,7 +77,8 @@ def test_a_fault_of_the_base_is_told_at_the_base():
 def test_a_missing_base_is_told_at_the_key_and_alone():
     write("child.yaml", "description: x\nextends: nope.yaml\nlog: {evry: 1}\n")
     assert findings("child.yaml") == [
-        "child.yaml:2:10: extends: 'nope.yaml' cannot be read: no such file or directory",
+        "child.yaml:2:10: extends: 'nope.yaml' cannot be read: no such file or directory; "
+        f"looked in {Path.cwd()}",
         "child.yaml:3:7: log.evry: unknown key; did you mean 'every'? "
         "(allowed: every, monitor, compress)",
     ]
@@ -113,7 +114,8 @@ def test_of_several_bases_the_later_goes_over_the_earlier():
 def test_each_of_several_bases_is_a_file_name():
     write("a.yaml", "extends: [none.yaml, 3]\n")
     assert findings("a.yaml") == [
-        "a.yaml:1:11: extends: 'none.yaml' cannot be read: no such file or directory",
+        "a.yaml:1:11: extends: 'none.yaml' cannot be read: no such file or directory; "
+        f"looked in {Path.cwd()}",
         "a.yaml:1:22: extends: must be a file name, found 3",
     ]
 

@@ -146,6 +146,12 @@ def test_a_file_saved_by_a_spreadsheet_is_read():
     assert load("a.yaml").scenario.path.points == ((0.0, 0.0), (3.0, 4.0))
 
 
+def test_the_header_of_a_route_says_which_column_is_which():
+    write("route.csv", "# route\ny [m],x [m]\n0,1\n3,4\n")
+    write("a.yaml", with_route())
+    assert load("a.yaml").scenario.path.points == ((1.0, 0.0), (4.0, 3.0))
+
+
 @pytest.mark.parametrize(
     ("rows", "says"),
     [
@@ -158,6 +164,11 @@ def test_a_file_saved_by_a_spreadsheet_is_read():
         ("0,0\n017,1\n", ["route.csv:2:1: must be two numbers x,y [m]; the first is no number"]),
         ("0,0\n1,\n", ["route.csv:2:1: must be two numbers x,y [m]; the second is no number"]),
         ("0,0\n1e999,1\n", ["route.csv:2:1: path.points[1][0]: must be a number, found 1e999"]),
+        ("O,5\n1,1\n2,2\n", ["route.csv:1:1: must be two numbers x,y [m]; the first is no number"]),
+        ("lat,lon\n0,0\n1,1\n", [
+            "route.csv:1:1: line 1 of the file names columns that are not x [m], y [m] (in any "
+            "order, units may be left out): column 1 is none of these",
+        ]),
         ("x,y\n0,0\n", ["a.yaml:2:7: path: needs at least two points, has 1"]),
         ("0,0\n0,0\n", ["a.yaml:2:7: path: two neighbouring points are the same"]),
         ("", ["a.yaml:2:7: path: needs at least two points, has 0"]),
@@ -178,7 +189,8 @@ def test_faults_of_a_route_end_before_they_fill_the_screen():
 def test_a_missing_route_is_told_at_the_key():
     write("a.yaml", with_route())
     assert findings("a.yaml") == [
-        "a.yaml:2:31: path.file: 'route.csv' cannot be read: no such file or directory"
+        "a.yaml:2:31: path.file: 'route.csv' cannot be read: no such file or directory; "
+        f"looked in {os.getcwd()}"
     ]
 
 

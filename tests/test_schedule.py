@@ -124,18 +124,29 @@ def test_one_of_several_laws_may_have_a_schedule():
     [
         ("", "the schedule needs at least two lines, has 0"),
         ("0,1,1\n", "the schedule needs at least two lines, has 1"),
-        ("0,1,1\n1,2\n", "line 2 of the schedule has 2 numbers; every line must have 3 (t, tau_u, "
-         "tau_r) or 21 (and the state, and twelve gains)"),
-        ("t,a,b\n0,1,1\n1,s3cret,2\n", "the schedule holds something that is no number"),
-        ("0,1,1\n1,nan,2\n", "the schedule holds a number that is not finite"),
-        ("0,1,1\n0,1,2\n", "the times of the schedule do not increase from line to line"),
+        ("0,1,1\n1,2\n", "line 2 of the schedule has 2; every line must have 3 (t, tau_u, tau_r) "
+         "or 21 (t, tau_u, tau_r, x, y, psi, u, v, r, then the gains of tau_u and tau_r)"),
+        ("t,tau_u,tau_r\n0,1,1\n1,s3cret,2\n", "line 3, column 2 of the schedule is no number"),
+        ("0,1,1\n1,nan,2\n", "line 2, column 2 of the schedule is not a finite number"),
+        ("0,1,1\n0,1,2\n", "line 2 of the schedule: its time is not after that of the line before"),
+        ("t,tau_r,s3cret\n0,1,1\n1,1,2\n", "line 1 of the schedule names columns that are not t "
+         "[s], tau_u [N], tau_r [N m] (in any order, units may be left out): column 3 is none of "
+         "these"),
     ],
 )  # fmt: skip
 def test_a_wrong_schedule_is_told_in_a_sentence_that_repeats_none_of_it(text, says):
     write("demand.csv", text)
     write("a.yaml", with_schedule())
     (said,) = findings("a.yaml")
-    assert said.endswith(f"controller: {says}")
+    assert said == f"demand.csv: controller.rows: {says}"
+
+
+def test_a_header_of_a_motion_names_the_columns_up_to_the_gains():
+    row = ",".join(["1"] * 20)
+    head = "t, tau_u, tau_r, x, y, psi, u, v, r, then the gains of tau_u and tau_r"
+    Schedule(rows=f"{head}\n0,{row}\n1,{row}\n")
+    with pytest.raises(ValidationError, match="line 1 of the schedule names columns in another or"):
+        Schedule(rows=f"{head.replace('u, v', 'v, u')}\n0,{row}\n1,{row}\n")
 
 
 def test_a_schedule_that_the_resolved_scenario_could_not_hold_is_refused():

@@ -7,7 +7,7 @@ from functools import lru_cache
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import field_validator, model_validator
 
 from podusv_cli.controllers.base import Controller
 from podusv_cli.core.component import value
@@ -20,7 +20,9 @@ from podusv_cli.vessels.vessel import Vessel
 
 TIMED, STATES = 3, 6  # numbers of a row: time and demand; then the state, then the gains
 WITH_MOTION = TIMED + STATES + 2 * STATES
-LAYOUTS = {TIMED: "t, tau_u, tau_r", WITH_MOTION: "and the state, and twelve gains"}
+DEMAND = ("t [s]", "tau_u [N]", "tau_r [N m]")
+MOTION = ("x [m]", "y [m]", "psi [rad]", "u [m/s]", "v [m/s]", "r [rad/s]")
+LAYOUTS = {TIMED: DEMAND, WITH_MOTION: (*DEMAND, *MOTION, "then the gains of tau_u and tau_r")}
 HOLD = 1.0  # the place of "hold" among the choices of `between`, as kernels know it
 # Where a row of the table has these, behind the demand: state and its rate, gains (surge, yaw).
 STATE, GAINS = 2, 2 + 2 * STATES
@@ -62,9 +64,16 @@ class Schedule(Controller):
         "nothing", "", "the metric of which the motion is an optimum, where it is one"
     )
 
+    @field_validator("rows")
+    @classmethod
+    def _readable(cls, rows: str) -> str:
+        _rows(rows)
+        return rows
+
     @model_validator(mode="after")
-    def _usable(self) -> Self:
-        _rows(self.rows)
+    def _given(self) -> Self:
+        if not self.rows:
+            raise ValueError("file is missing; name a CSV file with columns t, tau_u, tau_r")
         return self
 
     def optimum_of(self) -> str:

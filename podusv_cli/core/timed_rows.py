@@ -2,46 +2,125 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from typing import NamedTuple
 
 import numpy as np
 
 from podusv_cli.core.kernel import Vector
 
 LARGEST = 900_000  # characters: the resolved scenario, which has the rows, must be readable
+Layouts = Mapping[int, Sequence[str]]  # by count: the columns' names, as `b_u [N]`
 
 
-def timed_rows(text: str, noun: str, layouts: Mapping[int, str]) -> Vector:
-    """The rows, each with as many numbers as one of `layouts`, which says what they are.
+class Line(NamedTuple):
+    """A line of the text with its number from 1, cut at its commas."""
 
-    # starts a comment, and a first line of words is a header. `noun` is what the text is called.
-    Raises ValueError, which does not repeat the text: a file may hold what its reader may not see.
+    number: int
+    cells: list[str]
+
+
+def timed_rows(text: str, noun: str, layouts: Layouts) -> Vector:
+    """The rows, each with as many numbers as one of `layouts`, in the order of its columns.
+
+    The names in a header say which column is which. `noun` is what the text is called. Raises
+    ValueError, which does not repeat the text: a file may hold what its reader may not see.
     """
     if len(text) > LARGEST:
         raise ValueError(f"{noun} is longer than {LARGEST:,} characters; leave rows out")
-    rows = _numbers(text, noun, layouts)
-    if len(rows) < 2:
-        raise ValueError(f"{noun} needs at least two lines, has {len(rows)}")
-    if not np.all(np.isfinite(rows)):
-        raise ValueError(f"{noun} holds a number that is not finite")
-    if np.any(np.diff(rows[:, 0]) <= 0.0):
-        raise ValueError(f"the times of {noun} do not increase from line to line")
+    header, lines = lines_of(text)
+    if len(lines) < 2:
+        raise ValueError(f"{noun} needs at least two lines, has {len(lines)}")
+    _counted(lines, noun, layouts)
+    rows = _numbers(lines, noun)
+    if header:
+        rows = _in_order(rows, columns(header, layouts[rows.shape[1]], noun), header, noun)
+    late = np.flatnonzero(np.diff(rows[:, 0]) <= 0.0)
+    if late.size:
+        number = lines[late[0] + 1].number
+        raise ValueError(f"line {number} of {noun}: its time is not after that of the line before")
     return rows
 
 
-def _numbers(text: str, noun: str, layouts: Mapping[int, str]) -> Vector:
+def lines_of(text: str) -> tuple[Line | None, list[Line]]:
+    """The header, which is a first line of several cells without any number, and all other lines.
+
+    # starts a comment.
+    """
     lines = [line.partition("#")[0].strip() for line in text.removeprefix("\ufeff").splitlines()]
-    filled = [(number, line.split(",")) for number, line in enumerate(lines, 1) if line]
-    if filled and filled[0][1][0].strip(' "')[:1].isalpha():
-        del filled[0]
-    for number, cells in filled:
-        if len(cells) not in layouts or len(cells) != len(filled[0][1]):
-            wanted = " or ".join(f"{count} ({what})" for count, what in layouts.items())
-            raise ValueError(
-                f"line {number} of {noun} has {len(cells)} numbers; every line must have {wanted}"
-            )
+    filled = [Line(number, _cells(line)) for number, line in enumerate(lines, 1) if line]
+    if filled and len(filled[0].cells) > 1 and not any(map(_is_number, filled[0].cells)):
+        return filled[0], filled[1:]
+    return None, filled
+
+
+def _cells(line: str) -> list[str]:
+    return [cell.strip(' \t"') for cell in line.split(",")]
+
+
+def _is_number(cell: str) -> bool:
+    """Whether a cell is a number, which may be infinite or undefined."""
+    with suppress(ValueError):
+        float(cell)
+        return True
+    return False
+
+
+def _counted(lines: list[Line], noun: str, layouts: Layouts) -> None:
+    for number, cells in lines:
+        if len(cells) not in layouts or len(cells) != len(lines[0].cells):
+            wanted = " or ".join(f"{n} ({_listed(names)})" for n, names in layouts.items())
+            found = "1 value; separate values by commas:" if len(cells) == 1 else f"{len(cells)};"
+            raise ValueError(f"line {number} of {noun} has {found} every line must have {wanted}")
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(name.partition(" [")[0] for name in names)
+
+
+def _numbers(lines: list[Line], noun: str) -> Vector:
     try:
-        numbers = np.array([cells for _, cells in filled], dtype=float)
+        rows = np.array([cells for _, cells in lines], dtype=float)
     except ValueError:
-        raise ValueError(f"{noun} holds something that is no number") from None
-    return numbers.reshape(len(filled), len(filled[0][1]) if filled else next(iter(layouts)))
+        raise ValueError(_wrong_cell(lines, noun)) from None
+    if not np.all(np.isfinite(rows)):
+        row, column = np.argwhere(~np.isfinite(rows))[0].tolist()
+        where = f"line {lines[row].number}, column {column + 1} of {noun}"
+        raise ValueError(f"{where} is not a finite number")
+    return rows
+
+
+def _wrong_cell(lines: list[Line], noun: str) -> str:
+    places = ((number, i, cell) for number, cells in lines for i, cell in enumerate(cells, 1))
+    number, column, _ = next(place for place in places if not _is_number(place[2]))
+    return f"line {number}, column {column} of {noun} is no number"
+
+
+def _in_order(rows: Vector, order: list[int], header: Line, noun: str) -> Vector:
+    """The rows with their columns in this order; behind a header that does not name each, as is."""
+    if order == sorted(order):
+        return rows
+    if len(order) != rows.shape[1]:
+        raise ValueError(f"line {header.number} of {noun} names columns in another order")
+    return rows[:, order]
+
+
+def columns(header: Line, names: Sequence[str], noun: str) -> list[int]:
+    """Where the header has these columns. A name stands with its unit, `b_u [N]`, or without.
+
+    Raises ValueError where one is missing, unknown or given twice.
+    """
+    cells = [" ".join(cell.split()) for cell in header.cells]
+    places = [next((i for i, c in enumerate(cells) if c in _forms(n)), None) for n in names]
+    known = {form for name in names for form in _forms(name)}
+    strange = [i for i, cell in enumerate(cells, 1) if cell not in known]
+    if None in places or len(cells) != len(names):
+        found = f"column {strange[0]} is none of these" if strange else "one is missing or twice"
+        told = f"line {header.number} of {noun} names columns that are not {', '.join(names)}"
+        raise ValueError(f"{told} (in any order, units may be left out): {found}")
+    return [place for place in places if place is not None]
+
+
+def _forms(name: str) -> tuple[str, str]:
+    return name, name.partition(" [")[0]

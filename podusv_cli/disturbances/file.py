@@ -6,7 +6,7 @@ from functools import lru_cache
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import field_validator, model_validator
 
 from podusv_cli.core.component import value
 from podusv_cli.core.interpolation import linear, segment
@@ -14,7 +14,7 @@ from podusv_cli.core.kernel import Vector, kernel, tail
 from podusv_cli.core.timed_rows import timed_rows
 from podusv_cli.disturbances.base import Disturbance
 
-LAYOUTS = {4: "t, b_u, b_v, b_r"}
+LAYOUTS = {4: ("t [s]", "b_u [N]", "b_v [N]", "b_r [N m]")}
 
 
 @lru_cache(maxsize=4)  # one record is read a dozen times in a run
@@ -38,9 +38,16 @@ class FromFile(Disturbance):
     file: str | None = value(None, "", "CSV file beside the scenario; its text is read into `rows`")
     rows: str = value("", "", "lines of t [s], b_u [N], b_v [N], b_r [N m], times increasing")
 
+    @field_validator("rows")
+    @classmethod
+    def _readable(cls, rows: str) -> str:
+        _rows(rows)
+        return rows
+
     @model_validator(mode="after")
-    def _usable(self) -> Self:
-        _rows(self.rows)
+    def _given(self) -> Self:
+        if not self.rows:
+            raise ValueError("file is missing; name a CSV file with columns t, b_u, b_v, b_r")
         return self
 
     def constants(self) -> dict[str, float]:

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 
 from podusv_cli.core.component import Component
+from podusv_cli.core.timed_rows import Line, columns, lines_of
 from podusv_cli.scenario.shipped import relative_to
 from podusv_cli.scenario.yaml_text import MAX_NODES, read_text, resolve, text_node
 from podusv_cli.scenario.yaml_tree import Fault, Mark, Node
 
 MAX_POINTS = MAX_NODES // 4  # a point is three values, and the resolved scenario has to be readable
 MOST_FAULTS = 10  # in one file of points
-HEADER = re.compile(r'\s*"?(?!nan|inf)[a-z]', re.IGNORECASE)
+COLUMNS = ("x [m]", "y [m]")
 
 Form = Callable[[str, str, list[Fault]], Node]  # of a file's text and name
 
@@ -58,25 +58,27 @@ def _points(text: str, name: str, faults: list[Fault]) -> Node:
 
 
 def _rows(text: str, name: str, faults: list[Fault]) -> Iterator[Node]:
-    """A node for every line `x,y`; a first line of words is a header, # starts a comment."""
-    lines = [line.partition("#")[0] for line in text.removeprefix("\ufeff").splitlines()]
-    filled = [(number, line) for number, line in enumerate(lines, 1) if line.strip()]
-    if filled and all(HEADER.match(cell) for cell in filled[0][1].split(",")):
-        del filled[0]
+    """A node for every line: x and y, in the order of the header where there is one."""
+    header, filled = lines_of(text)
+    try:
+        order = columns(header, COLUMNS, "the file") if header else [0, 1]
+    except ValueError as error:
+        faults.append(Fault(Mark(name, header.number if header else 1, 1), "", str(error)))
+        return
     if len(filled) > MAX_POINTS:
         faults.append(Fault(Mark(name), "", f"more than {MAX_POINTS:,} points"))
         return
     most = len(faults) + MOST_FAULTS
-    for number, line in filled:
-        row = _row(line, Mark(name, number, 1), faults)
+    for line in filled:
+        row = _row(line, Mark(name, line.number, 1), faults)
         if len(faults) > most:
             return
-        yield row
+        cells = row.content
+        yield replace(row, content=tuple(cells[i] for i in order if i < len(cells)))
 
 
-def _row(line: str, mark: Mark, faults: list[Fault]) -> Node:
-    cells = [cell.strip().strip('"') for cell in line.split(",")]
-    numbers = [resolve(cell) for cell in cells]
+def _row(line: Line, mark: Mark, faults: list[Fault]) -> Node:
+    numbers = [resolve(cell) for cell in line.cells]
     wrong = [isinstance(n, (str, bool)) or n is None for n in numbers]
     # The line is not shown: the file may be one that the user may not read.
     if len(numbers) != 2:
@@ -85,5 +87,5 @@ def _row(line: str, mark: Mark, faults: list[Fault]) -> Node:
     elif any(wrong):
         place = ("first", "second")[wrong.index(True)]
         faults.append(Fault(mark, "", f"must be two numbers x,y [m]; the {place} is no number"))
-    pairs = zip(numbers, cells, strict=True)
+    pairs = zip(numbers, line.cells, strict=True)
     return Node(tuple(Node(number, mark, text=cell) for number, cell in pairs), mark)

@@ -65,7 +65,10 @@ def read_text(path: str, mark: Mark, key: str, faults: list[Fault]) -> str | Non
             data = file.read(MAX_BYTES + 1)
     except (OSError, ValueError) as error:
         reason = str((isinstance(error, OSError) and error.strerror) or error)
-        faults.append(Fault(mark, key, f"{named}cannot be read: {reason[:1].lower()}{reason[1:]}"))
+        reason = reason[:1].lower() + reason[1:]
+        if named and isinstance(error, FileNotFoundError):
+            reason += f"; looked in {os.path.dirname(os.path.abspath(path))}"
+        faults.append(Fault(mark, key, f"{named}cannot be read: {reason}"))
         return None
     if len(data) > MAX_BYTES:
         faults.append(Fault(mark, key, f"{named}is larger than {MAX_BYTES:,} bytes"))
