@@ -28,9 +28,10 @@ from podusv_cli.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.core.kernel import Vector, bundle, kernel
 from podusv_cli.core.recording import Recording
 from podusv_cli.disturbances.harmonic import HarmonicDisturbance
+from podusv_cli.engine.columns import by_name, names
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.layout import Plan
-from podusv_cli.engine.loop import STATE, ClosedLoop, by_name, names
+from podusv_cli.engine.loop import STATE, ClosedLoop
 from podusv_cli.engine.replay import rates_replay
 from podusv_cli.paths.circle import Circle
 from podusv_cli.paths.line import Line

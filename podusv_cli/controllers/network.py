@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Any, Self
 
 import numpy as np
@@ -130,15 +131,21 @@ class Network(Component):
 
         Those in the plane come first. One that does not depend on a velocity has no exponent there.
         """
-        along, plane = self.factors
-        centers, exponents = rows = np.zeros((2, 3, self.bells))
-        centers[:, :plane] = self.center_array()[:plane].T
-        exponents[:, :plane] = 1.0 / (2.0 * self.width_array()[:, None] ** 2)
-        if not self.centers:
-            line = slice(plane, plane + along)
-            centers[0, line], exponents[0, line] = self.axes()[0], exponents[0, 0]
-            exponents[0, :plane] = 0.0
-        return rows.ravel()
+        return _table(self)
+
+
+@lru_cache(maxsize=4)  # the runs of a batch mostly have one network, and a run asks three times
+def _table(network: Network) -> Vector:
+    along, plane = network.factors
+    centers, exponents = rows = np.zeros((2, 3, network.bells))
+    centers[:, :plane] = network.center_array()[:plane].T
+    exponents[:, :plane] = 1.0 / (2.0 * network.width_array()[:, None] ** 2)
+    if not network.centers:
+        line = slice(plane, plane + along)
+        centers[0, line], exponents[0, line] = network.axes()[0], exponents[0, 0]
+        exponents[0, :plane] = 0.0
+    rows.flags.writeable = False
+    return rows.ravel()
 
 
 @kernel

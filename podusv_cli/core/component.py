@@ -6,6 +6,7 @@ import inspect
 import math
 from collections.abc import Iterator
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, get_args, get_origin
 
@@ -66,18 +67,38 @@ class Recorded(Component):
     is_recorded: ClassVar[bool] = True
 
 
+class _Field(NamedTuple):
+    """What `constants` has to know of a field: its choices of words; whether it may be absent."""
+
+    name: str
+    choices: tuple[Any, ...]
+    may_be_absent: bool
+
+
+@cache
+def _fields(kind: type[Component]) -> tuple[_Field, ...]:
+    return tuple(
+        _Field(
+            name,
+            get_args(field.annotation) if get_origin(field.annotation) is Literal else (),
+            bool({float, Positive} & set(get_args(field.annotation))),
+        )
+        for name, field in kind.model_fields.items()
+    )
+
+
 def _numbers(component: Component) -> Iterator[tuple[str, float]]:
-    for name, field in type(component).model_fields.items():
+    for name, choices, may_be_absent in _fields(type(component)):
         content = getattr(component, name)
-        if isinstance(content, Component):
+        if isinstance(content, (bool, int, float)):
+            yield name, float(content)
+        elif isinstance(content, Component):
             yield from (
                 (f"{name}_{inner}", number) for inner, number in content.constants().items()
             )
-        elif isinstance(content, (bool, int, float)):
-            yield name, float(content)
-        elif get_origin(field.annotation) is Literal and name != "kind":
-            yield name, float(get_args(field.annotation).index(content))
-        elif {float, Positive} & set(get_args(field.annotation)):
+        elif choices and name != "kind":
+            yield name, float(choices.index(content))
+        elif may_be_absent:
             yield name, math.nan
 
 

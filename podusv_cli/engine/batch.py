@@ -120,6 +120,10 @@ def simulate_many(
     return batch
 
 
+class InvalidLoop(Exception):
+    """There cannot be such a loop, or it has another structure than the batch."""
+
+
 class _Runs:
     """The runs of a batch while they are made."""
 
@@ -133,7 +137,7 @@ class _Runs:
         self._lanes = Sorter(observer, len(loops) * (grid.steps + 1), lanes)
         self._ready: list[Thread] = []
         self._busy: list[Thread] = []
-        self._over = 0
+        self._over, self._settled = 0, False
 
     def march(self, workers: int) -> None:
         """March over all runs; an interrupt or an error stops those that are under way."""
@@ -179,25 +183,36 @@ class _Runs:
 
     def _made(self, position: int) -> BatchRun | None:
         """The run, or None and an entry of why there is none."""
-
-        def checked() -> tuple[ClosedLoop, Common]:
-            loop = self._loops[position]
-            common = self._common or Common(loop, self._grid, self._observer)
-            common.check(loop)
-            return loop, common
-
-        found = self._contained(position, checked, invalid=(PodusvError, ValueError))
-        if found is None:
+        if self._settled:
+            return self._contained(position, partial(self._run, position))
+        loop = self._contained(position, partial(self._checked, position))
+        if loop is None:
             return None
-        loop, self._common = found
+        self._settle(loop)
+        return self._contained(position, partial(self._run, position, loop))
+
+    def _settle(self, loop: ClosedLoop) -> None:
+        """Have the march compiled, by the first loop."""
+        common = self._common = self._common or Common(loop, self._grid, self._observer)
         self._lanes.choose(loop)
         if not self._lanes.advance:
-            self._common.advance  # noqa: B018  a kernel that cannot be compiled ends the batch
-        return self._contained(position, partial(self._common.run, position, loop))
+            common.advance  # noqa: B018  a kernel that cannot be compiled ends the batch
+        self._settled = True
 
-    def _contained(
-        self, position: int, make: Callable[[], T], invalid: tuple[type[Exception], ...] = ()
-    ) -> T | None:
+    def _run(self, position: int, loop: ClosedLoop | None = None) -> BatchRun:
+        assert self._common is not None
+        return self._common.run(position, loop or self._checked(position))
+
+    def _checked(self, position: int) -> ClosedLoop:
+        """The loop of a run."""
+        try:
+            loop = self._loops[position]
+            (self._common or Common(loop, self._grid, self._observer)).check(loop)
+        except (PodusvError, ValueError) as error:
+            raise InvalidLoop(str(error)) from error
+        return loop
+
+    def _contained(self, position: int, make: Callable[[], T]) -> T | None:
         """What is made for a run; an exception, or no end at all, is that run's and no other's."""
         found: list[T] = []
 
@@ -212,7 +227,7 @@ class _Runs:
             return found[0]
         if isinstance(work.error, KeyboardInterrupt):
             raise work.error
-        if isinstance(work.error, invalid):
+        if isinstance(work.error, InvalidLoop):
             self._batch.refuse(position, "invalid", str(work.error))
         elif work.error:
             self._batch.refuse(position, "crashed", in_a_line(work.error))

@@ -15,6 +15,7 @@ from podusv_cli.engine.lanes import Lanes
 from podusv_cli.engine.layout import Plan, Wires
 from podusv_cli.engine.loop import ClosedLoop, Observer, entries, wire
 from podusv_cli.engine.march import Bell, Ending, Work
+from podusv_cli.engine.recent import Recent
 from podusv_cli.engine.simulate import marcher
 
 NUMBER = 8  # bytes; LANES numbers are a cache line
@@ -49,11 +50,15 @@ class Common:
     grid: TimeGrid
     observer: Observer
     bell: Bell = field(default_factory=Bell)
+    recall: Recent = field(default_factory=Recent)
 
     @cached_property
     def structure(self) -> tuple[Plan, list[Any]]:
         """The layout, and the kernels with the names of their constants."""
-        return self.like.layout(self.grid), list(entries(self.like, self.observer))
+        return self._structure_of(self.like)
+
+    def _structure_of(self, loop: ClosedLoop) -> tuple[Plan, list[Any]]:
+        return loop.layout(self.grid), list(entries(loop, self.observer, self.recall))
 
     @cached_property
     def advance(self) -> Callable[..., int]:
@@ -63,7 +68,7 @@ class Common:
     def check(self, loop: ClosedLoop) -> None:
         """Raise ValueError for a loop of another structure, LawError for parts that do not fit."""
         loop.check_fit(self.grid.step)
-        found, wanted = Common(loop, self.grid, self.observer).structure, self.structure
+        found, wanted = self._structure_of(loop), self.structure
         if found != wanted:
             raise ValueError(
                 f"it has another structure than the batch: {_kinds(loop)} with {found[0]}, not "
@@ -72,7 +77,8 @@ class Common:
 
     def run(self, position: int, loop: ClosedLoop) -> BatchRun:
         """A run that is ready to start."""
-        wires = wire(loop, self.structure[0], self.observer, self.grid)
+        plan = self.structure[0]
+        wires = wire(loop, plan, self.observer, self.grid, recall=self.recall)
         return BatchRun(position, loop, _apart(wires))
 
     def alone(self, run: BatchRun) -> Thread:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -21,6 +21,7 @@ from podusv_cli.core.steps import whole_steps
 from podusv_cli.disturbances.base import FLOW, WAVE_MOTION, Disturbance
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.layout import HELD_SIGNALS, Plan, Wires
+from podusv_cli.engine.recent import Recall, call
 from podusv_cli.engine.relay import relay
 from podusv_cli.estimators.base import Estimator
 from podusv_cli.estimators.none import NoEstimator
@@ -68,6 +69,9 @@ def _no_estimate(
     t: float, seen: Vector, tau: Vector, state: Vector, k: Any, table: Vector, rate: Vector
 ) -> None:
     pass
+
+
+AT_START = (0.0,)  # s
 
 
 @dataclass(frozen=True)
@@ -145,14 +149,15 @@ class ClosedLoop:
         """The estimator's states; none where the law is given the state itself."""
         return self.estimator.states if self.measured else ()
 
-    def first_memory(self) -> Vector:
+    def first_memory(self, recall: Recall = call) -> Vector:
         """The law's memory at t = 0."""
+        target = np.asarray(recall(self.path.targets, AT_START)[0])
         with np.errstate(all="ignore"):  # a start beyond all numbers is for the run to tell
-            return self.controller.start(np.array(self.start), self.first_target(), self.nominal)
+            return self.controller.start(np.array(self.start), target, self.nominal)
 
     def first_target(self) -> Vector:
         """Where the target is at t = 0."""
-        return np.asarray(self.path.targets([0.0])[0])
+        return np.asarray(self.path.targets(AT_START)[0])
 
     def about(self) -> dict[str, Signal]:
         """Every signal that the loop logs, by name. Raises LawError where two have one name."""
@@ -205,61 +210,65 @@ def _sample_steps(period: float, grid: TimeGrid) -> int:
     return count
 
 
-def entries(loop: ClosedLoop, observer: Observer) -> Iterator[tuple[str, Any, tuple[str, ...]]]:
+def entries(
+    loop: ClosedLoop, observer: Observer, recall: Recall = call
+) -> Iterator[tuple[str, Any, tuple[str, ...]]]:
     """Name, kernel and constants' names of every part, in the order the loop takes them."""
     law, path, disturbance, actuator = loop.controller, loop.path, loop.disturbance, loop.actuator
-    constants = tuple(law.constants_with(loop.nominal))
+    constants = tuple(recall(law.constants_with, loop.nominal))
     sample = law.sample if law.sample_period() > 0 else _no_sample
     after_saturation = law.after_saturation if law.wants_loads() else _ignore_loads
-    yield "path", path.evaluate, tuple(path.constants())
-    loads = tuple(disturbance.constants_with(loop.vessel))
+    yield "path", path.evaluate, tuple(recall(path.constants))
+    loads = tuple(recall(disturbance.constants_with, loop.vessel))
     yield "disturbance", disturbance.kernel_with(loop.vessel), loads
     yield "law", law.law, constants
     yield "sample", sample, constants
-    yield "actuator", actuator.drive_with(), tuple(actuator.constants())
+    yield "actuator", actuator.drive_with(), tuple(recall(actuator.constants))
     yield "after_saturation", after_saturation, constants
-    yield from _seeing(loop)
+    yield from _seeing(loop, recall)
     yield "observer", observer.watch, tuple(observer.constants)
 
 
-def _seeing(loop: ClosedLoop) -> Iterator[tuple[str, Any, tuple[str, ...]]]:
+def _seeing(loop: ClosedLoop, recall: Recall) -> Iterator[tuple[str, Any, tuple[str, ...]]]:
     """What `entries` has of measurement and estimator."""
     measurement, estimator = loop.measurement, loop.estimator
     sense = measurement.sense if loop.measured else _no_measurement
     correct = estimator.correct if loop.measured else _no_correction
     follow = estimator.follow if loop.measured else _no_estimate
-    yield "measurement", sense, tuple(measurement.constants_with(1.0, 0))
-    constants = tuple(estimator.constants_with(loop.nominal))
+    yield "measurement", sense, tuple(recall(measurement.constants_with, 1.0, 0))
+    constants = tuple(recall(estimator.constants_with, loop.nominal))
     yield "correct", correct, constants
     yield "follow", follow, constants
 
 
 def wire(
     loop: ClosedLoop, plan: Plan, observer: Observer, grid: TimeGrid, rows: int = 1,
-    allocate: Allocate = np.empty,
+    allocate: Allocate = np.empty, recall: Recall = call,
 ) -> Wires:  # fmt: skip
     """The loop's vectors, ready for the march to begin, with room for this many logged rows."""
 
-    def numbers(constants: dict[str, float]) -> Vector:
-        return np.array(list(constants.values()) or [0.0])
+    def numbers(constants: Callable[..., dict[str, float]], *given: Any) -> Vector:
+        return np.array(list(recall(constants, *given).values()) or [0.0])
 
     law, path, disturbance, actuator = loop.controller, loop.path, loop.disturbance, loop.actuator
     measurement, estimator = loop.measurement, loop.estimator
     start, estimate = np.array(loop.start), np.zeros(0)
     if loop.measured:
         estimate = estimator.start(start, loop.nominal)
+    duration, motion = grid.steps * grid.step, _wave_motion(disturbance)
     return Wires(
-        path=numbers(path.constants()), path_table=path.table(),
-        disturbance=numbers(disturbance.constants_with(loop.vessel)),
-        disturbance_table=disturbance.table_for(loop.vessel, grid.steps * grid.step),
-        law=numbers(law.constants_with(loop.nominal)), law_table=law.table(),
-        actuator=numbers(actuator.constants()), actuator_table=actuator.table(),
-        measurement=numbers(measurement.constants_with(grid.step, _wave_motion(disturbance))),
-        measurement_table=measurement.table_for(grid.step, grid.steps),
-        estimator=numbers(estimator.constants_with(loop.nominal)),
-        estimator_table=estimator.table(),
-        vessel=numbers(loop.vessel.constants()), observer=numbers(observer.constants),
-        s=np.concatenate([start, actuator.rest(), estimate, loop.first_memory()]),
+        path=numbers(path.constants), path_table=recall(path.table),
+        disturbance=numbers(disturbance.constants_with, loop.vessel),
+        disturbance_table=recall(disturbance.table_for, loop.vessel, duration),
+        law=numbers(law.constants_with, loop.nominal), law_table=recall(law.table),
+        actuator=numbers(actuator.constants), actuator_table=recall(actuator.table),
+        measurement=numbers(measurement.constants_with, grid.step, motion),
+        measurement_table=recall(measurement.table_for, grid.step, grid.steps),
+        estimator=numbers(estimator.constants_with, loop.nominal),
+        estimator_table=recall(estimator.table),
+        vessel=numbers(loop.vessel.constants),
+        observer=np.array(list(observer.constants.values()) or [0.0]),
+        s=np.concatenate([start, recall(actuator.rest), estimate, loop.first_memory(recall)]),
         row=np.zeros(plan.columns), stages=np.zeros(5 * plan.states),
         sensed=measurement.first(start, grid.step),
         relay=relay(actuator.delay(), grid), held=np.zeros(HELD_SIGNALS + len(law.signals)),
@@ -278,27 +287,3 @@ def _wave_motion(disturbance: Disturbance) -> int:
     """Where a disturbance writes the motion in waves that sensors see; 0 where it has none."""
     signals = disturbance.signals
     return 3 + signals.index(WAVE_MOTION[0]) if WAVE_MOTION[0] in signals else 0
-
-
-def names(loop: ClosedLoop) -> list[str]:
-    """Names of a logged row's columns: time, state, row; a slot of size n has n columns."""
-    law, actuator = loop.controller, loop.actuator
-    slots = [part for part, size in law.slots() for _ in range(size)]
-    states = [part.name for part in (*actuator.states, *loop.estimated(), *slots)]
-    parts = (
-        law.signals, loop.disturbance.signals, actuator.signals_with, loop.measurement.signals
-    )  # fmt: skip
-    own, sea, others, seen = ([part.name for part in signals] for signals in parts)
-    return ["time", *STATE, *states, *TARGET, "z_e", *own, *DEMAND, *LOADS, *sea, *others, *seen]
-
-
-def by_name(labels: list[str], table: Vector, about: Mapping[str, Signal]) -> dict[str, Vector]:
-    """A table's columns by name; those of a vector together, shape (rows, size)."""
-    vectors = {name for name, part in about.items() if part.axes}
-    columns: dict[str, list[int]] = {}
-    for column, name in enumerate(labels):
-        columns.setdefault(name, []).append(column)
-    return {
-        name: table[:, at[0] : at[-1] + 1] if name in vectors else table[:, at[0]]
-        for name, at in columns.items()
-    }

@@ -11,9 +11,10 @@ import numpy as np
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
 from podusv_cli.engine import closed_loop, signatures
+from podusv_cli.engine.columns import by_name, names
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.layout import Plan, Wires
-from podusv_cli.engine.loop import STATE, ClosedLoop, Observer, by_name, entries, names, wire
+from podusv_cli.engine.loop import STATE, ClosedLoop, Observer, entries, wire
 from podusv_cli.engine.relay import COUNT
 
 
