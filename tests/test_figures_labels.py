@@ -13,7 +13,10 @@ from podusv_cli.workflows.members import from_folder
 
 # An odd and an even number of $, what they would enclose, and what a legend would leave out.
 ODD = ["_a$x^{2$b \\frac{ 3$", "$\\undefined$\udcff\x1b[31m\n"]
-SCENARIO = SOUND.replace("kind: ideal", "kind: pod, preset: otter").replace("pid", "dsc")
+SCENARIO = SOUND.replace("kind: ideal", "kind: pod, preset: otter").replace("pid", "dsc").replace(
+    "{kind: none}", "[{kind: wind, speed: 1.0}, {kind: current, speed: 0.1}]"
+)  # fmt: skip
+SCENARIO += "measurement: {kind: sensors}\n"
 QUICK = ("errors", "trajectory", "pods")
 BRIEF = "name: x\nsimulation: {step: 0.01, duration: 0.1, compiled: false}\n"
 

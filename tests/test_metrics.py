@@ -18,6 +18,8 @@ from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import simulate
+from podusv_cli.estimators.none import NoEstimator
+from podusv_cli.measurements.sensors import Sensors
 from podusv_cli.metrics import distance
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.metric import close_integrals
@@ -87,6 +89,29 @@ def test_metrics_follow_their_definitions(limited):
     expected["settling_time"] = t[log["z_e"] > 2.0][-1] + 0.01
     assert {name: got[name] for name in expected} == pytest.approx(expected, rel=1e-12)
     assert 0 < got["saturated_fraction"] < 1
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_errors_of_the_estimate_follow_their_definitions(compiled):
+    loop = corrected(measurement=Sensors(), estimator=NoEstimator())
+    log, got = gathered(loop, steps=300, compiled=compiled)
+    t = log["time"]
+    error = {name: log[f"{name}_est"] - log[name] for name in ("x", "y", "psi", "u", "v", "r")}
+
+    def rms(*names):
+        square = sum(error[name] ** 2 for name in names)
+        assert square.any()
+        return pytest.approx(np.sqrt(np.trapezoid(square, t) / t[-1]), rel=1e-12)
+
+    assert got["estimate_position_rms"] == rms("x", "y")
+    assert got["estimate_heading_rms"] == rms("psi")
+    assert got["estimate_velocity_rms"] == rms("u", "v")
+    assert got["estimate_yaw_rate_rms"] == rms("r")
+
+
+def test_a_run_without_sensors_has_no_errors_of_an_estimate(limited):
+    _, got = limited
+    assert not [name for name in got if name.startswith("estimate_")]
 
 
 def cut():
@@ -214,9 +239,12 @@ def test_every_metric_is_computed_and_documented(limited):
     _, of_pods = gathered(corrected(actuator=example(Pods)), steps=10)
     trials = (corrected(controller=TurningCircle()), corrected(controller=Zigzag()))
     of_trials = {name for trial in trials for name in gathered(trial, steps=10)[1]}
+    seeing = corrected(measurement=Sensors(), estimator=NoEstimator())
+    of_estimates = set(gathered(seeing, steps=10)[1])
     always = {name for name in METRICS if NAMED not in name}
     compared = {metric.name for metric in distance.OF_OPTIMUM.values()}  # known to comparisons only
-    assert always == set(got | cost | operations(corrected(), log) | of_pods) | compared | of_trials
+    simulated = set(got | cost | operations(corrected(), log) | of_pods) | of_estimates | of_trials
+    assert always == simulated | compared
     assert set(of_pods) > set(got)
     assert all(metric.unit and metric.meaning for metric in METRICS.values())
 

@@ -16,6 +16,7 @@ from podusv_cli.figures.style import Shown
 
 THIN: dict[str, Any] = {"linewidth": 0.5, "alpha": 0.6}
 MARK: dict[str, Any] = {"markersize": 3.2, "markerfacecolor": "white", "markeredgewidth": 0.7}
+COMMON: dict[str, str] = {"color": "#444444", "linestyle": "-", "label": "all runs"}
 CUT: dict[str, Any] = {"marker": "x", "markersize": 5.0, "markeredgewidth": 1.2, "zorder": 5.0}
 TALL = 20.0  # a peak this many times the usual values gets a logarithmic axis
 DECADES = 4  # at most, on the logarithmic axis of runs that finished
@@ -63,12 +64,31 @@ def draw_signal(
             draw_curve(axes, curve, fitted=run in fitted, **thin)
 
 
-def draw_run(axes: Axes, run: Shown, curve: tuple[Vector, Vector], *, fitted: bool) -> None:
-    """Plot a curve over time as the run's own, with its markers.
+def draw_shared(axes: Axes, runs: Sequence[Shown], name: str) -> None:
+    """Plot a signal over time, once where all runs have the same."""
+    having = [run for run in runs if run.has(name)]
+    longest = max(having, key=lambda run: run.end)
+    if len(runs) > 1 and all(_same(run, longest, name) for run in having):
+        draw_curve(axes, longest.during(name, None), fitted=True, **COMMON)
+    else:
+        draw_signal(axes, runs, name)
+
+
+def _same(run: Shown, longest: Shown, name: str) -> bool:
+    """Whether a run has the same signal as another, as long as it lasts."""
+    t, y = run.during(name, None)
+    other = np.interp(t, *longest.during(name, None))
+    return bool(np.allclose(y, other, rtol=1e-6, atol=1e-6 * float(np.ptp(other))))
+
+
+def draw_run(
+    axes: Axes, run: Shown, curve: tuple[Vector, Vector], *, fitted: bool, **look: Any
+) -> None:
+    """Plot a curve over time as the run's own, with its markers, and what else its look has.
 
     A run that did not finish has an x below the instant of its end; the curve may end anywhere.
     """
-    mark(draw_curve(axes, curve, fitted=fitted, **run.look), run)
+    mark(draw_curve(axes, curve, fitted=fitted, **run.look, **look), run)
     if not run.whole and len(curve[0]) and curve[0][-1] == run.end:
         below = axes.get_xaxis_transform()
         axes.plot([run.end], [0.0], transform=below, clip_on=False, color=run.color, **CUT)

@@ -9,13 +9,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from podusv_cli.core.kernel import Vector
-from podusv_cli.figures.curves import draw_curve, draw_signal
+from podusv_cli.figures.curves import draw_shared
 from podusv_cli.figures.panels import grid
 from podusv_cli.figures.sheet import figure
-from podusv_cli.figures.style import Shown, axis_label, legend
+from podusv_cli.figures.style import Shown, about, axis_label, legend
 
 SEA = ("b_u", "b_v", "b_r")
-COMMON: dict[str, str] = {"color": "#444444", "linestyle": "-", "label": "all runs"}
 
 
 @figure(
@@ -28,28 +27,13 @@ def loads(runs: Sequence[Shown], columns: int) -> Figure:
     limited = [run for run in runs if run.has("saturated")]
     figure, panels = grid(len(sea) + bool(limited), columns)
     for axes, name in zip(panels, sea, strict=False):
-        _disturbance(axes, runs, name)
+        draw_shared(axes, runs, name)
         axes.set_ylabel(axis_label(runs, name))
+        axes.set_title(about(runs, name).meaning)
     if limited:
         _limits(panels[-1], limited)
     legend(figure, columns)
     return figure
-
-
-def _disturbance(axes: Axes, runs: Sequence[Shown], name: str) -> None:
-    having = [run for run in runs if run.has(name)]
-    longest = max(having, key=lambda run: run.end)
-    if len(runs) > 1 and all(_same(run, longest, name) for run in having):
-        draw_curve(axes, longest.during(name, None), fitted=True, **COMMON)
-    else:
-        draw_signal(axes, runs, name)
-
-
-def _same(run: Shown, longest: Shown, name: str) -> bool:
-    """Whether a run has the same signal as another, as long as it lasts."""
-    t, y = run.during(name, None)
-    other = np.interp(t, *longest.during(name, None))
-    return bool(np.allclose(y, other, rtol=1e-6, atol=1e-6 * float(np.ptp(other))))
 
 
 def _limits(axes: Axes, runs: Sequence[Shown]) -> None:

@@ -45,6 +45,10 @@ class Measurement(Component):
         """Which of x, y, psi, u, v, r are measured."""
         return (True,) * len(STATE)
 
+    def outages_of_each(self) -> tuple[tuple[tuple[float, float], ...], ...]:
+        """Times [from, to] [s] without samples, of each of x, y, psi, u, v, r."""
+        return ((),) * len(STATE)
+
     def constants_with(self, step: float, motion: int) -> dict[str, float]:
         """Its constants `k`, for a run with this step [s].
 

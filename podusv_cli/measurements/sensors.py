@@ -109,6 +109,11 @@ class Sensors(Measurement):
         """Which of x, y, psi, u, v, r have a sensor."""
         return tuple(bool(one) for one, count in self.instruments().values() for _ in range(count))
 
+    def outages_of_each(self) -> tuple[tuple[Span, ...], ...]:
+        """Those of the sensors."""
+        sensors = self.instruments().values()
+        return tuple(one.outages if one else () for one, count in sensors for _ in range(count))
+
     @property
     def signals(self) -> tuple[Signal, ...]:
         """What is measured, as it was delivered last."""

@@ -279,7 +279,13 @@ def _write(
 def _drawn(task: Task, recording: Recording, extras: Extras) -> dict[str, bytes]:
     if not task.figures:
         return {}
-    from podusv_cli.figures.drawing import draw_in_parallel, dressed  # matplotlib is slow to import
+    from podusv_cli.figures.drawing import (  # matplotlib is slow to import
+        draw_in_parallel,
+        dressed,
+        figures_of,
+    )
 
     shown = dressed([(task.label or recording.controller, recording, task.scenario)])
-    return draw_in_parallel(shown, task.figures, ("png",), extras)
+    known = figures_of([task.scenario])
+    fitting = [name for name in task.figures if known[name].fits(shown)]
+    return draw_in_parallel(shown, fitting, ("png",), extras)

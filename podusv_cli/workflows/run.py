@@ -17,7 +17,9 @@ from podusv_cli.storage.run_folder import default_folder
 from podusv_cli.workflows.execute import Finished, Progress, Stopwatch, Task, check_figures, execute
 
 RESULTS = Path("results")
-DRAWN = ("controls", "trajectory", "errors")  # the one that takes longest first
+# The figures that take longest first; `sea` and `estimates` for runs that have waves, wind, current
+# or sensors
+DRAWN = ("estimates", "controls", "sea", "trajectory", "errors")
 
 
 @dataclass(frozen=True)
