@@ -16,7 +16,7 @@ from podusv_cli.controllers.manoeuvre import Manoeuvre
 from podusv_cli.controllers.schedule import Schedule
 from podusv_cli.core import registry
 from podusv_cli.core.kernel import Vector, bundle, is_kernel
-from podusv_cli.engine.loop import names
+from podusv_cli.engine.columns import names
 from podusv_cli.measurements.exact import Exact
 from podusv_cli.paths.base import TARGET
 from podusv_cli.scenario.explain import signals
