@@ -3,11 +3,15 @@
 import numpy as np
 import pytest
 from conftest import NONLINEAR, adrift, corrected, load_at, run
+from scenario_samples import SOUND, told
 
 from podusv_cli.core.errors import LawError
+from podusv_cli.core.kernel import bundle
 from podusv_cli.disturbances.current import Current
 from podusv_cli.disturbances.harmonic import Harmonic, HarmonicDisturbance
 from podusv_cli.disturbances.total import Total
+from podusv_cli.disturbances.waves import Waves
+from podusv_cli.measurements.sensors import Sensor, Sensors
 
 SEA = HarmonicDisturbance()
 MORE = HarmonicDisturbance(b_u=Harmonic(mean=3.0), scale=0.5)
@@ -38,6 +42,45 @@ def test_machine_code_computes_what_plain_python_does():
 def test_two_currents_are_one_too_many():
     with pytest.raises(LawError, match="V_c"):
         corrected(disturbance=Total(parts=(FLOW, Current(seed=2)))).about()
+
+
+def test_swell_and_a_wind_sea_add_up():
+    """Their signals are those of both; what is of second order in psi_w is not."""
+    swell, wind_sea = (
+        Waves(height=h, period=p, direction=d, components=8, seed=s, motion=0.1)
+        for h, p, d, s in ((0.05, 2.0, 0.3, 1), (0.03, 0.9, 2.0, 2))
+    )
+    both = Total(parts=(swell, SEA, FLOW, wind_sea))
+    names = [signal.name for signal in both.signals]
+    assert len(names) == len(set(names)) == 7 + 2
+    assert set(corrected(disturbance=both).about()) >= set(names)
+    wanted = Total(parts=(SEA, FLOW, swell)), wind_sea
+    loads = [all_of(part, 12.3) for part in (both, *wanted)]
+    for name in ("b_u", "b_v", "b_r", *names):
+        parts = loads[1][name] + loads[2].get(name, 0.0)
+        assert loads[0][name] == pytest.approx(parts, rel=1e-12), name
+    log = run(
+        adrift(disturbance=both, measurement=Sensors(position=Sensor(period=0.01))),
+        0.2,
+        compiled=False,
+    )
+    np.testing.assert_allclose(log["x_m"], log["x"] + log["x_w"], rtol=0, atol=1e-15)
+
+
+def all_of(part, t):
+    """Load and signals by name."""
+    b = np.full(3 + len(part.signals), np.nan)
+    k, table = bundle(part.constants_with(NONLINEAR)), part.table_for(NONLINEAR, 400.0)
+    part.kernel_with(NONLINEAR)(t, STATE, k, table, b)
+    names = ("b_u", "b_v", "b_r", *(signal.name for signal in part.signals))
+    return dict(zip(names, b.tolist(), strict=True))
+
+
+def test_a_scenario_may_have_two_seas_and_not_two_currents():
+    seas = "[{kind: waves, height: 0.05, period: 2}, {kind: waves, height: 0.03, period: 1}]"
+    assert not told(SOUND.replace("{kind: none}", seas))
+    (line,) = told(SOUND.replace("{kind: none}", "[{kind: current}, {kind: current}]"))
+    assert "disturbance[1]: logs V_c, as disturbance[0] does; keep one of them" in line
 
 
 def test_a_bound_is_the_sum_of_bounds_or_unknown():

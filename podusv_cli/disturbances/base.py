@@ -44,6 +44,9 @@ class Disturbance(Component):
 
     of_time: ClassVar[bool] = False
 
+    # Whether several of this kind may be in a list, and their signals add up as their loads do.
+    adds_up: ClassVar[bool] = False
+
     @property
     def signals(self) -> tuple[Signal, ...]:
         """What `evaluate` writes behind the load."""
@@ -53,6 +56,10 @@ class Disturbance(Component):
     def evaluate(t: float, x: Vector, k: Any, table: Vector, b: Vector) -> None:
         """Write the load; every disturbance has its own."""
         raise NotImplementedError
+
+    def told(self) -> Iterator[tuple[Disturbance, tuple[Signal, ...]]]:
+        """Each of its parts, with the signals that are logged because of it."""
+        yield self, self.signals
 
     def each(self) -> tuple[Disturbance, ...]:
         """Itself; of a sum, its parts."""

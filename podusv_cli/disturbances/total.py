@@ -20,7 +20,7 @@ class Part(NamedTuple):
 
     evaluate: Callable[..., None]
     constants: tuple[str, ...]
-    signals: int
+    places: tuple[int, ...]  # of its signals among those of the sum
 
 
 class Total(Disturbance):
@@ -40,8 +40,23 @@ class Total(Disturbance):
 
     @property
     def signals(self) -> tuple[Signal, ...]:
-        """Those of all parts, in their order."""
-        return tuple(signal for part in self.parts for signal in part.signals)
+        """Those of all parts, in their order; once where several parts add up to one."""
+        return tuple(signal for _, signals in self.told() for signal in signals)
+
+    def told(self) -> Iterator[tuple[Disturbance, tuple[Signal, ...]]]:
+        """Each part, with those of its signals that no part before it shares."""
+        before: set[Signal] = set()
+        for part in self.parts:
+            yield part, tuple(s for s in part.signals if not (part.adds_up and s in before))
+            before |= set(part.signals)
+
+    def _places(self) -> Iterator[tuple[int, ...]]:
+        """Where each part's signals are among those of the sum."""
+        known, behind = self.signals, 0
+        for part, own in self.told():
+            new = {signal: behind + i for i, signal in enumerate(own)}
+            yield tuple(new.get(s, known.index(s)) for s in part.signals)
+            behind += len(own)
 
     def each(self) -> tuple[Disturbance, ...]:
         """Its parts."""
@@ -54,8 +69,8 @@ class Total(Disturbance):
     def kernel_with(self, vessel: Vessel) -> Callable[..., None]:
         """The kernel of the sum."""
         return _sum(tuple(
-            Part(part.kernel_with(vessel), tuple(part.constants_with(vessel)), len(part.signals))
-            for part in self.parts
+            Part(part.kernel_with(vessel), tuple(part.constants_with(vessel)), places)
+            for part, places in zip(self.parts, self._places(), strict=True)
         ))  # fmt: skip
 
     def constants_with(self, vessel: Vessel) -> dict[str, float]:
@@ -105,18 +120,21 @@ def _sum(parts: Sequence[Part]) -> Callable[..., None]:
     """
     scope: dict[str, Any] = {"scratch": scratch, "tail": tail, "shared": shared}
     lines = ["def evaluate(t, x, k, table, b):", "    b[0] = b[1] = b[2] = 0.0"]
-    behind = 3
+    written: set[int] = set()
     for i, part in enumerate(parts):
         scope |= {f"evaluate{i}": part.evaluate, f"Constants{i}": constants_type(part.constants)}
         given = ", ".join(f"k.part{i}_{name}" for name in part.constants)
         lines += [
-            f"    load{i} = scratch({3 + part.signals})",
+            f"    load{i} = scratch({3 + len(part.places)})",
             f"    begin{i} = int(shared(table[{i}]))",
             f"    evaluate{i}(t, x, Constants{i}({given}), tail(table, begin{i}), load{i})",
             *(f"    b[{j}] += load{i}[{j}]" for j in range(3)),
-            *(f"    b[{behind + j}] = load{i}[{3 + j}]" for j in range(part.signals)),
+            *(
+                f"    b[{3 + place}] {'+=' if place in written else '='} load{i}[{3 + j}]"
+                for j, place in enumerate(part.places)
+            ),
         ]
-        behind += part.signals
+        written |= set(part.places)
     scope[TEXT] = "\n".join(lines)
     exec(compile(scope[TEXT], "sum of disturbances", "exec"), scope)  # noqa: S102
     return kernel(scope["evaluate"])  # type: ignore[no-any-return]

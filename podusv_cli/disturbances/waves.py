@@ -34,7 +34,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from typing import Any, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import model_validator
@@ -188,6 +188,7 @@ class Waves(Disturbance):
     the share of the waves that the hull reflects. Long waves, no resonance, no heave, roll, pitch.
     """
 
+    adds_up: ClassVar[bool] = True  # swell and a wind sea
     kind: Literal["waves"] = "waves"
     height: float = value(..., "m", "significant wave height Hs", ge=1e-6, le=1e3)
     period: float = value(..., "s", "period of the waves, see `period_is`", ge=1e-3, le=1e4)

@@ -166,7 +166,7 @@ class ClosedLoop:
         own = (partial(called, actuator), (*actuator.states, *actuator.signals_with))
         loop = (lambda: "the closed loop", LOOP)
         others = (
-            *((partial(called, part), part.signals) for part in self.disturbance.each()),
+            *((partial(called, part), signals) for part, signals in self.disturbance.told()),
             (partial(called, self.measurement), self.measurement.signals),
             (partial(called, self.estimator), self.estimated()),
         )

@@ -46,8 +46,11 @@ def _summands(scenario: Scenario) -> Conflicts:
     first: dict[Signal, str] = {}
     for key, part in parts.items():
         taken = [first.setdefault(signal, key) for signal in part.signals]
-        if taken and taken[0] != key:
-            text = f"logs {part.signals[0].name}, as {taken[0]} does; keep one of them"
+        if taken and taken[0] != key and not part.adds_up:
+            text = (
+                f"logs {part.signals[0].name}, as {taken[0]} does; keep one of them (waves may be "
+                "given several times)"
+            )
             yield key, text
 
 
