@@ -75,6 +75,14 @@ def test_a_search_opens_again_wherever_it_was_killed(tmp_path, monkeypatch):
         }  # fmt: skip
 
 
+def test_a_folder_without_its_scenario_says_how_to_go_on(tmp_path, monkeypatch):
+    monkeypatch.setattr(sampler, "version", lambda: "1")
+    opened(tmp_path / "out", planned(tmp_path))
+    (tmp_path / "out" / place.SCENARIO).unlink(missing_ok=True)
+    with pytest.raises(UsageError, match="podusv tune CONFIG --out"):
+        place.check(tmp_path / "out")
+
+
 def validation(folder, gain):
     """The store of the fresh draws for a gain that was found."""
     found = Trial(0, 0, {"gain": gain}, 4, FINISHED, (1.0,), (), (1.0,), 0.0)

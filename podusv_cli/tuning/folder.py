@@ -22,9 +22,14 @@ DIFFERENT = 4  # keys that a message names
 
 
 def check(folder: Path) -> None:
-    """Raise UsageError where this is no folder of a search."""
+    """Raise UsageError where this is no folder of a search, or one without its scenario."""
     if not (folder / TUNE).is_file():
         raise UsageError(f"{folder} is not the folder of a search: it has no {TUNE}")
+    if not (folder / SCENARIO).is_file():
+        raise UsageError(
+            f"{folder} was interrupted before it had its {SCENARIO}; give the scenario of the "
+            f"search: podusv tune CONFIG --out {folder}"
+        )
 
 
 def known(folder: Path, plan: TunePlan) -> dict[str, Any]:
