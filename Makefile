@@ -25,7 +25,7 @@ ABLATIONS := ablation ablation_figures ablation_standoff ablation_gains ablation
 TABLES := unknown:unknown_dynamics discrete:discrete_signals limits:period_limits learnt:learnt gains:fixed_gains
 SEAS := exact sensors sensors_alone current state_3 state_5 state_6 pods delay thruster_failure dead_zone
 STUDIES := hull_and_sea unknown_dynamics rivals sea_state_2 sea_state_4 sea_state_6
-SEARCHES := phases hull network sliding
+SEARCHES := phases hull sensors network sliding
 COMPARISONS := printed_compare figures_compare figures_compare_standoff corrected_compare
 
 .DEFAULT_GOAL := help
@@ -95,7 +95,7 @@ tune: $(VENV)/dev.done ## the committed searches for gains, about half an hour o
 	@for name in $(SEARCHES); do \
 	    $(BIN)/podusv tune configs/studies/tune_$$name.yaml --out results/.tuning/$$name && \
 	    mkdir -p results/tuning/$$name/figures && \
-	    (cd results/.tuning/$$name && cp laws.csv validation.csv gains.csv importance.csv ../../tuning/$$name && \
+	    (cd results/.tuning/$$name && cp laws.csv limits.csv validation.csv gains.csv importance.csv ../../tuning/$$name && \
 	        cp figures/validation.png ../../tuning/$$name/figures) || exit 1; \
 	done
 	@echo "what was found: results/tuning.md; every table and figure: results/.tuning/*/report.html"

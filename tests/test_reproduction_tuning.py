@@ -12,9 +12,10 @@ from podusv_cli.tuning.plan import TunePlan
 
 ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "results" / "tuning.md").read_text()
-CASES = ("hull", "network", "phases", "sliding")
+CASES = ("hull", "network", "phases", "sensors", "sliding")
+WHOLE = ("rank_before", "rank_after", "better_than_before", "better_than_after")
 RANGED = r"(\S+ \[\S+ \S+\])"
-ROW = rf"^\| (\w+) \| (\d+) \| (\d+) \| {RANGED} \| {RANGED} \| {RANGED} \|$"
+ROW = r"^\| (\w+) " + r"\| (\d+) " * 5 + rf"\| {RANGED} \| {RANGED} \| {RANGED} \|$"
 
 
 def table(case, name):
@@ -36,8 +37,9 @@ def told(row, name, digits):
 @pytest.mark.parametrize("case", CASES)
 def test_the_table_of_laws_is_that_of_the_search(case):
     rows = re.findall(ROW, section(case), re.MULTILINE)
+    gains = table(case, "gains").groupby("law").size()
     expected = [
-        (row["law"], str(row["rank_before"]), str(row["rank_after"]),
+        (row["law"], str(gains[row["law"]]), *(str(row[name]) for name in WHOLE),
          told(row, "objective_before", 0), told(row, "objective_after", 0), told(row, "ratio", 2))
         for row in table(case, "laws").sort_values("rank_after").to_dict("records")
     ]  # fmt: skip
@@ -64,3 +66,17 @@ def test_the_pairs_that_are_named_are_those_of_the_search(case):
     for a, b, before, after in found:
         assert told(pairs.loc["before", a, b], "ratio", 3) == before
         assert told(pairs.loc["after", a, b], "ratio", 3) == after
+
+
+def test_the_total_variations_behind_sensors_are_those_of_the_fresh_draws():
+    """Whoever chatters is told by it, and by nothing else on the page."""
+    limits = table("sensors", "limits").set_index(["law", "when", "inequality"]).value
+    found = re.findall(r"^\| (\w+) " + r"\| (\d+) " * 4 + r"\|$", section("sensors"), re.MULTILINE)
+    assert len(found) == len(table("sensors", "laws"))
+    for law, *numbers in found:
+        expected = [
+            f"{limits[law, when, text]:.0f}"
+            for text in ("quantile(tv_tau_u, 0.95) <= 2000", "quantile(tv_tau_r, 0.95) <= 620")
+            for when in ("before", "after")
+        ]
+        assert numbers == expected

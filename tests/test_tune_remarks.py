@@ -47,7 +47,7 @@ def test_a_search_with_fewer_than_ten_whole_trials_for_each_gain_is_told():
         plan=SimpleNamespace(gains={"pid": (1, 2, 3), "li": (1, 2)}),
     )  # fmt: skip
     (text,) = remarks._few(results)
-    assert text.startswith("pid: a search finished 20 trials for 3 gains")
+    assert ": pid 20 for 3 gains; give a larger tune.budget" in text
 
 
 def test_an_inequality_that_holds_in_training_only_is_told():

@@ -71,14 +71,17 @@ def _unsound(results: Results) -> Iterator[str]:
 
 
 def _few(results: Results) -> Iterator[str]:
+    told = []
     for law in results.winners:
         whole = min(sum(t.status == FINISHED for t in one) for one in results.trials[law])
         gains = len(results.plan.gains[law])
         if is_few(whole, gains):
-            yield (
-                f"{law}: a search finished {whole} trials for {gains} gains, which is few (fewer "
-                f"than {ENOUGH} each); give a larger tune.budget"
-            )
+            told.append(f"{law} {whole} for {gains} gains")
+    if told:
+        yield (
+            f"fewer than {ENOUGH} trials on all draws for each gain, so chance has a part in what "
+            f"was found: {', '.join(told)}; give a larger tune.budget"
+        )
 
 
 def _overfitted(results: Results) -> Iterator[str]:
