@@ -312,3 +312,18 @@ def test_a_quantity_of_one_of_several_disturbances():
     assert {one.disturbance[0] for one in each} == {scenario.disturbance[0]}
     with pytest.raises(ScenarioError, match=re.escape("disturbance[1].speed")):
         load_text(several + sweep % (-2, -1), "a.yaml", checks=[sweep_faults])
+    other = sweep.replace("disturbance[1]", "disturbance.1")
+    same = load_text(several + other % (0.1, 1), "a.yaml", checks=[sweep_faults]).scenario
+    assert same.sweep == scenario.sweep
+
+
+@pytest.mark.parametrize(
+    "key", ["disturbance[2].speed", "disturbance.2.speed", "disturbance.speed"]
+)
+def test_what_a_list_of_disturbances_does_not_have_is_told_with_what_it_has(key):
+    several = BASE.replace("{kind: harmonic}", "[{kind: step}, {kind: current, speed: 0.5}]")
+    text = f"{several}  vary: {{'{key}': {{uniform: [0, 1]}}}}\n"
+    with pytest.raises(ScenarioError) as error:
+        load_text(text, "a.yaml", checks=[sweep_faults])
+    says = "the list has 2 entries, disturbance[0] to disturbance[1] (step, current)"
+    assert says in str(error.value)

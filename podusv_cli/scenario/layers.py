@@ -10,7 +10,19 @@ from functools import partial, reduce
 from podusv_cli.scenario.phrases import found
 from podusv_cli.scenario.shipped import relative_to
 from podusv_cli.scenario.yaml_text import MAX_DEPTH, plain_node, read, read_text
-from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, merge, whole_names
+from podusv_cli.scenario.yaml_tree import (
+    NAMED_BY_KEYS,
+    Fault,
+    Mark,
+    Node,
+    Route,
+    bracketed,
+    dotted,
+    fitting,
+    merge,
+    steps_of,
+    whole_names,
+)
 
 FLOW = ("[", "{", "'", '"')  # what lists, mappings and text in quotes start with
 
@@ -29,7 +41,12 @@ def composed(
     # All overrides are one layer, so that their order matters only where they give the same key.
     nothing = Node({}, Mark(source))
     top = reduce(partial(merge, by_kind=False), settings, nothing)
-    return replace(reduce(merge, [*reversed(layers), top]), mark=Mark(source))
+    whole = reduce(partial(_over, faults=faults), [*reversed(layers), top])
+    return replace(whole, mark=Mark(source))
+
+
+def _over(base: Node, top: Node, faults: list[Fault]) -> Node:
+    return merge(base, fitting(base, top, faults))
 
 
 def _layers(text: str, source: str, faults: list[Fault], placed: bool) -> list[Node]:
@@ -82,7 +99,24 @@ def _mapping(text: str, source: str, faults: list[Fault], placed: bool = True) -
             Fault(node.mark, "", f"a scenario is a mapping of keys to values, found {what}")
         )
         return None
-    return node
+    return node and _named_alike(node, (), faults)
+
+
+def _named_alike(node: Node, at: Route, faults: list[Fault]) -> Node:
+    """The tree with entries that are named by keys in one form, `disturbance[2].seed`."""
+    inside = {(*at, key): entry for key, entry in node.mapping.items()}
+    for place, entry in inside.items():
+        if any(named[: len(place)] == place for named in NAMED_BY_KEYS):
+            node = node.with_entry(str(place[-1]), _named_alike(entry, place, faults))
+    if at not in NAMED_BY_KEYS or not node.mapping:
+        return node
+    alike: dict[str, Node] = {}
+    for key, entry in node.mapping.items():
+        if bracketed(key) in alike:
+            text = f"given twice, as {bracketed(key)} too"
+            faults.append(Fault(entry.key_mark or entry.mark, dotted((*at, key)), text))
+        alike[bracketed(key)] = entry
+    return replace(node, content=alike)
 
 
 def _read_base(
@@ -110,7 +144,7 @@ def _override_tree(override: str, faults: list[Fault]) -> Node:
     name, equals, text = override.partition("=")
     shown = override if override.isprintable() else ascii(override)
     mark = Mark(f"--set {shown}")
-    keys = list(whole_names(tuple(name.strip().split("."))))
+    keys = list(whole_names(steps_of(name.strip())))
     node: Node | None = None
     if not equals or not all(keys):
         faults.append(Fault(mark, "", "write it as --set section.key=value"))

@@ -27,6 +27,7 @@ from podusv_cli.scenario.yaml_tree import (
     Route,
     dotted,
     find,
+    fitting,
     merge,
     plain,
 )
@@ -54,8 +55,10 @@ class Loaded:
 
     def changed(self, top: Node, checks: Sequence[Check] = ()) -> Scenario:
         """The scenario of the same tree with another merged over it. Raises ScenarioError."""
-        root, known, source = merge(self.root, top), self.scenario.plugged, self.root.mark.source
-        return _checked(root, known, source, [], checks)[0]
+        faults: list[Fault] = []
+        root = merge(self.root, fitting(self.root, top, faults))
+        source = self.root.mark.source
+        return _checked(root, self.scenario.plugged, source, faults, checks)[0]
 
 
 def load(

@@ -88,8 +88,19 @@ def _unknown_key(root: Node, section: Key, complaint: Any) -> Iterator[Fault]:
     route = (*section.path, name)
     node = follow(root, route)[-1]
     hint = _elsewhere(section, name) or did_you_mean(name, section.keys)
-    text = f"unknown key{hint} (allowed: {', '.join(section.keys)})"
-    yield Fault(node.key_mark or node.mark, dotted(route), text)
+    several = _several(section, follow(root, section.path)[-1])
+    told = several or f"{hint} (allowed: {', '.join(section.keys)})"
+    yield Fault(node.key_mark or node.mark, dotted(route), f"unknown key{told}")
+
+
+def _several(section: Key, given: Node) -> str:
+    """`; for several write a list: ...`, where a section has kinds for keys and may be a list."""
+    whole = section.top.follow(section.path)[0] if section.path else section
+    kinds = [name for name in given.mapping if name in whole.kinds]
+    if not kinds or not whole.item(0):
+        return ""
+    written = ", ".join(f"{{kind: {kind}, ...}}" for kind in kinds)
+    return f"; for several kinds write a list: {whole.path[-1]}: [{written}]"
 
 
 def _elsewhere(section: Key, name: str) -> str:
@@ -124,7 +135,8 @@ def _no_kind(root: Node, section: Key, complaint: Any) -> Iterator[Fault]:
     if not _explained(root, route):
         node = follow(root, section.path)[-1]
         homes = filter(None, (_home(name, section.kinds) for name in node.mapping))
-        text = f"missing (allowed: {', '.join(section.kinds)}){next(homes, '')}"
+        several = _several(section, node)
+        text = f"missing (allowed: {', '.join(section.kinds)}){several or next(homes, '')}"
         yield Fault(node.mark, dotted(route), text)
 
 

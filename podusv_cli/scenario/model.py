@@ -97,7 +97,9 @@ class Scenario(Component):
         "laws to compare, by name; each starts from those keys of `controller` that it has too; "
         "`name: null` takes out an inherited one",
     )
-    claims: dict[str, Claim] = value({}, "", "what `podusv compare` is to judge, by name")
+    claims: dict[str, Claim] = value(
+        {}, "", "what `podusv compare` is to judge, by name; null: no inherited one"
+    )
     simulation: Simulation = value(Simulation(), "", "integration")
     control: Control = value(Control(), "", "sampling of the law")
     log: Log = value(Log(), "", "logging")

@@ -18,10 +18,11 @@ from podusv_cli.scenario.phrases import found, quoted, unknown
 from podusv_cli.scenario.sections import NAME, NAME_IN_WORDS
 from podusv_cli.scenario.shipped import PREFIX
 from podusv_cli.scenario.yaml_text import read
-from podusv_cli.scenario.yaml_tree import Fault, Node, Route, dotted, merge
+from podusv_cli.scenario.yaml_tree import Fault, Node, Route, dotted, fitting, merge
 from podusv_cli.vessels.vessel import COEFFICIENTS, VESSELS, Vessel
 
-# Sections whose entries have names of the user's; one that is null takes out an inherited one.
+# Sections whose entries have names of the user's. An entry that is null takes out an inherited one,
+# and a section that is null all of them.
 NAMED: tuple[Route, ...] = (
     ("controllers",), ("claims",), ("sweep", "vary"), ("sweep", "grid"), ("sweep", "claims"),
     ("tune", "space"),
@@ -134,13 +135,15 @@ def _of_kinds(root: Node, top: Key) -> list[tuple[str, Node, type[Component]]]:
 
 
 def _without_null(root: Node, section: Route = ()) -> Node:
-    """The tree without entries that are null in those sections whose entries have free names."""
+    """The tree without what is null: sections whose entries have free names, and their entries."""
     if section not in BESIDE_NAMED or not root.mapping:
         return root
     entries = {
         name: _without_null(entry, (*section, name))
         for name, entry in root.mapping.items()
-        if section not in NAMED or entry.content is not None or entry.faulty
+        if entry.content is not None
+        or entry.faulty
+        or (section not in NAMED and (*section, name) not in NAMED)
     }
     return replace(root, content=entries)
 
@@ -231,7 +234,7 @@ def _over_preset(
         return given
     if preset.content in names:
         base = preset_file(presets, str(preset.content), faults, plugins)
-        return merge(base, given) if base else given
+        return merge(base, fitting(base, given, faults, (key,))) if base else given
     if ABSENT in plugins:
         return given
     what = f"{presets.noun} {found(preset.content, preset.text)}"

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Any, Literal, Self
 
-from pydantic import model_validator
+from pydantic import field_validator, model_validator
 
 from podusv_cli.core.component import Component, value
 from podusv_cli.scenario.distributions import WAYS, Distribution
+from podusv_cli.scenario.yaml_tree import bracketed
 
 
 class Quantity(Distribution):
@@ -19,6 +20,11 @@ class Quantity(Distribution):
     times: Distribution | None = value(None, "", "a factor on the scenario's own value")
     plus: Distribution | None = value(None, "", "a summand to the scenario's own value")
     seed: bool = value(False, "", "true: a whole number from 0 to 2^53 - 1, as seed of something")
+
+    @field_validator("keys")
+    @classmethod
+    def _in_one_form(cls, keys: tuple[str, ...]) -> tuple[str, ...]:
+        return tuple(map(bracketed, keys))
 
     @property
     def given(self) -> list[str]:

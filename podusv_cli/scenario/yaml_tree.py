@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -89,6 +90,16 @@ def route(key: str) -> Route:
     return tuple(int(place) if place else name for place, name in steps)
 
 
+def steps_of(key: str) -> tuple[str, ...]:
+    """("disturbance", "2", "seed") for `disturbance[2].seed` and for `disturbance.2.seed`."""
+    return tuple(re.sub(r"\[(\d+)\]", r".\1", key).split("."))
+
+
+def bracketed(key: str) -> str:
+    """`disturbance[2].seed`, also for `disturbance.2.seed`."""
+    return re.sub(r"\.(\d+)(?=\.|\[|$)", r"[\1]", key)
+
+
 def whole_names(steps: Route) -> Route:
     """The steps of a key, of which `vessel.m` in `sweep.vary.vessel.m.times` is a single one."""
     above, rest = steps[:2], steps[2:]
@@ -97,7 +108,7 @@ def whole_names(steps: Route) -> Route:
     # `seed` may be the end of a name.
     ends = (i for i, step in enumerate(rest) if step in (QUANTITY | RANGE) - {"seed"})
     end = next(ends, len(rest))
-    return (*above, *filter(None, [dotted(rest[:end])]), *rest[end:])
+    return (*above, *filter(None, [bracketed(dotted(rest[:end]))]), *rest[end:])
 
 
 def printable(text: str) -> str:
@@ -164,13 +175,52 @@ def merge(base: Node, top: Node, *, by_kind: bool = True) -> Node:
     return replace(top, content=entries, faulty=top.faulty or base.faulty)
 
 
+def fitting(base: Node, top: Node, faults: list[Fault], at: Route = ()) -> Node:
+    """`top`, without what it has at places that lists of `base` do not have; these are faults.
+
+    A mapping with a kind replaces a list.
+    """
+    entries = _items(base.content)
+    if entries and top.mapping and "kind" not in top.mapping:
+        strange = [key for key in top.mapping if not _is_place(key, len(entries))]
+        named = any(entry.mapping for entry in entries)
+        wrong = [key for key in strange if named or key.lstrip("-").isdecimal()]
+        for key in wrong:
+            mark = top.mapping[key].key_mark or top.mapping[key].mark
+            kinds = [entry.get("kind") for entry in entries]
+            place = bracketed(dotted((*at, key)))
+            faults.append(Fault(mark, place, entries_of(bracketed(dotted(at)), kinds)))
+        if wrong:
+            return base
+    if not top.mapping or _another_kind(base, top):
+        return top
+    below = base.mapping or {str(i): entry for i, entry in enumerate(entries)}
+    both = {
+        key: fitting(below[key], entry, faults, (*at, key)) if key in below else entry
+        for key, entry in top.mapping.items()
+    }
+    return replace(top, content=both)
+
+
+def entries_of(key: str, kinds: Sequence[Any]) -> str:
+    """What a list has, by the kinds of its entries, which may be None."""
+    last = len(kinds) - 1
+    told = ", ".join(kind for kind in kinds if isinstance(kind, str))
+    to = f" to {key}[{last}]" if last else ""
+    kinds_told = f" ({told})" if told else ""
+    count = f"{len(kinds)} entries" if last else "1 entry"
+    return f"the list has {count}, {key}[0]{to}{kinds_told}; name one of these"
+
+
 def _names_places(base: Node, top: Node) -> bool:
     """Whether `top` is a mapping of places in the list `base`."""
     places = top.mapping
-    return bool(places) and all(
-        place.isdecimal() and len(place) <= LONGEST_PLACE and int(place) < len(_items(base.content))
-        for place in places
-    )
+    return bool(places) and all(_is_place(place, len(_items(base.content))) for place in places)
+
+
+def _is_place(key: str, count: int) -> bool:
+    """Whether a key is a place in a list of so many entries."""
+    return key.isdecimal() and len(key) <= LONGEST_PLACE and int(key) < count
 
 
 def _another_kind(base: Node, top: Node) -> bool:

@@ -17,7 +17,7 @@ from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import did_you_mean, found, unknown
 from podusv_cli.scenario.sections import CLAIM, CLAIM_IN_WORDS
 from podusv_cli.scenario.sweep import Quantity, Sweep
-from podusv_cli.scenario.yaml_tree import Route, dotted, route
+from podusv_cli.scenario.yaml_tree import Route, dotted, entries_of, route
 from podusv_cli.study.claims import parse
 from podusv_cli.study.draws import DrawError, content, described, drawn
 from podusv_cli.study.expressions import parse_success
@@ -75,7 +75,9 @@ def _key(key: str, quantity: Quantity, laws: Mapping[str, Scenario]) -> Iterator
         return
     lacking = [label for label, one in laws.items() if not _has(one, key)]
     if len(lacking) == len(laws):
-        yield f"unknown key {key!r}{did_you_mean(key, _numbers(laws))}"
+        near = did_you_mean(key, _numbers(laws))
+        beyond = next(filter(None, (_no_entry(one, steps) for one in laws.values())), "")
+        yield beyond or f"unknown key {key!r}{near}"
     elif lacking:
         having = ", ".join(label for label in laws if label not in lacking)
         who = f"{key} is no key of {', '.join(lacking)}"
@@ -91,6 +93,18 @@ def _has(scenario: Scenario, key: str) -> bool:
     except LookupError:
         return False
     return dotted(steps) == key and steps[0] in DRAWN
+
+
+def _no_entry(scenario: Scenario, steps: Route) -> str:
+    """What a list on the way has, where the step behind it is none of its places; else empty."""
+    for end in range(1, len(steps)):
+        if not _has(scenario, dotted(steps[:end])):
+            return ""
+        whole, step = content(scenario, steps[:end]), steps[end]
+        if isinstance(whole, tuple) and not (isinstance(step, int) and step < len(whole)):
+            kinds = [getattr(part, "kind", None) for part in whole]
+            return entries_of(dotted(steps[:end]), kinds)
+    return ""
 
 
 def _numbers(laws: Mapping[str, Scenario]) -> list[str]:
