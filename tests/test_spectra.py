@@ -55,6 +55,12 @@ def test_the_peak_of_jonswap_is_gamma_times_that_of_the_ittc_spectrum():
     assert low == pytest.approx(0.3125 * 4.0 / PEAK * math.exp(-1.25), rel=1e-12)
 
 
+def test_far_below_its_peak_a_spectrum_is_nothing_and_no_overflow():
+    with np.errstate(all="raise"):
+        found = spectra.jonswap(np.array([1e-200, 1.0, 1e5]), 1.0, 1e5, 3.3)
+    assert max(found[:2]) < 1e-90 < 1e-12 < found[2]
+
+
 def test_wind_spectra_by_hand():
     f = np.array([1.0 / 172.0])
     half = 2.0 ** (-5.0 / (3.0 * 0.468))  # where x = 1

@@ -22,6 +22,7 @@ from podusv_cli.core.random_words import uniforms
 GRAVITY = 9.81  # m/s2
 WATER = 1025.0  # kg/m3, sea water
 SMALLEST = -700.0  # below, e^x is nothing
+FAR = 1000.0  # times a rate is its peak, where there is nothing left of a spectrum
 SAMPLES = 16  # of a spectrum in every bin
 NORSOK_N = 0.468
 HARRIS_LENGTH = 1800.0  # m
@@ -52,7 +53,7 @@ def jonswap(rate: Vector, height: float, peak: float, gamma: float) -> Vector:
     (after DNV-RP-C205): alpha = (5/16) height^2 peak^4 / g^2, sigma 0.07 below and 0.09 above the
     peak, and the factor 1 - 0.287 ln gamma, which keeps the height.
     """
-    ratio = peak / rate
+    ratio = np.minimum(peak / rate, FAR)
     fourth = ratio * ratio * ratio * ratio
     smooth = 0.3125 * height * height * fourth / rate
     smooth = smooth * exponential(np.maximum(-1.25 * fourth, SMALLEST))
