@@ -11,7 +11,7 @@ def segment(t: float, count: int, times: Vector) -> int:
     low = 0
     high = count
     while high - low > 1:
-        middle = (low + high) // 2
+        middle = (low + high) >> 1  # a register of whole numbers is not divided
         if times[middle] <= t:
             low = middle
         else:
