@@ -1,4 +1,4 @@
-"""What results/sea.md tells of loads and wave motions, from the logs that `make sea` leaves."""
+"""The rms loads that results/sea.md tells, as a CSV table from the logs that `make sea` leaves."""
 
 from __future__ import annotations
 
@@ -12,20 +12,19 @@ from podusv_cli.interface import open_run
 SEA = Path(__file__).parent / "sea"
 RUNS = ("exact", "state_6", "current")
 LAW, SINCE = "velocity_vector", 100.0  # s; after the approach
-SIGNALS = ["b_u", "b_v", "b_r", "psi_w", "r_w"]  # the last two where there are waves
+LOADS = ["b_u", "b_v", "b_r"]
 
 
 def rms(name: str) -> pd.Series:
-    """Root mean squares of the loads on the hull, and of the waves that compass and gyro see."""
+    """Root mean squares of the loads on the hull in a run."""
     run = open_run(SEA / name / LAW)
     settled = run["time"] >= SINCE
-    logged = [name for name in SIGNALS if name in run.log]
-    return pd.Series({name: (run[name][settled] ** 2).mean() ** 0.5 for name in logged})
+    return pd.Series({load: (run[load][settled] ** 2).mean() ** 0.5 for load in LOADS})
 
 
 def main() -> None:
     """Print a line a run."""
-    table = pd.DataFrame({name: rms(name) for name in RUNS}).T[SIGNALS]
+    table = pd.DataFrame({name: rms(name) for name in RUNS}).T
     sys.stdout.write(table.to_csv(index_label="run", float_format="%.6g"))
 
 

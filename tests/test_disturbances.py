@@ -4,14 +4,19 @@ import math
 
 import numpy as np
 import pytest
-from conftest import example, kinds, load_at
+from conftest import NONLINEAR, example, kinds, load_at
 from pydantic import ValidationError
 from scenario_samples import SOUND, findings, write
 
+from podusv_cli.core.kernel import bundle
 from podusv_cli.disturbances.calm import Calm
+from podusv_cli.disturbances.current import Current
 from podusv_cli.disturbances.file import FromFile
 from podusv_cli.disturbances.harmonic import Harmonic, HarmonicDisturbance
 from podusv_cli.disturbances.step import Step
+from podusv_cli.disturbances.total import Total
+from podusv_cli.disturbances.waves import Waves
+from podusv_cli.disturbances.wind import Wind
 from podusv_cli.scenario.load import load
 
 # sin and cos are 0 or +-1 at these times, except where the numbers are written out.
@@ -105,6 +110,31 @@ def test_what_claims_to_depend_on_time_alone_does(kind):
     for t in random.uniform(0, 300, 20):
         loads = [load_at(sea, t, random.normal(0, 5, 6)) for _ in range(3)]
         np.testing.assert_array_equal(loads, [loads[0]] * 3)
+
+
+SLOW = (
+    Wind(speed=8.0, gusts="norsok"),
+    Waves(height=0.1, period=2.0, components=21),
+    Waves(height=0.1, period=2.0, components=21, spreading=2),
+)
+
+
+@pytest.mark.parametrize("sea", [*SLOW, Total(parts=(Current(), *SLOW))])
+def test_what_a_disturbance_leaves_out_changes_no_bit_of_its_load(sea):
+    """In a stage its signals, and at a time that it was asked for what depends on time alone."""
+    random, kernel = np.random.default_rng(2), sea.kernel_with(NONLINEAR)
+    k, table = bundle(sea.constants_with(NONLINEAR)), sea.table_for(NONLINEAR, 60.0)
+    for t in random.uniform(0.0, 60.0, 5):
+        once, x, y = np.zeros(3 + len(sea.signals)), *random.normal(0.0, 1.0, (2, 6))
+        kernel(t, y, k, table, once)
+        for before, again in ((np.full(len(once), np.nan), 0.0), (once, 1.0)):
+            whole, stage = before.copy(), before.copy()
+            kernel(t, x, k, table, whole, again, 0.0)
+            kernel(t, x, k, table, stage, again, 1.0)
+            fresh = np.full(len(once), np.nan)
+            kernel(t, x, k, table, fresh)
+            np.testing.assert_array_equal(whole, fresh)
+            np.testing.assert_array_equal(stage[:3], fresh[:3])
 
 
 def test_a_step_sets_in_at_its_time_and_grows_along_its_ramp():

@@ -32,6 +32,7 @@ from podusv_cli.core.recording import Recording
 from podusv_cli.core.steps import whole_steps
 from podusv_cli.disturbances.calm import Calm
 from podusv_cli.disturbances.harmonic import HarmonicDisturbance
+from podusv_cli.disturbances.total import Total
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.loop import STATE, ClosedLoop, Observer
 from podusv_cli.engine.simulate import simulate
@@ -91,6 +92,25 @@ def test_not_evaluating_a_load_twice_changes_no_bit(hold_every):
     loop = corrected(disturbance=HarmonicDisturbance())
     asked = run(replace(loop, disturbance=Asked()), 20.0, hold_every=hold_every)
     assert same(asked, run(loop, 20.0, hold_every=hold_every))
+
+
+def test_a_disturbance_is_told_what_it_may_leave_out():
+    """An evaluation that is one more at its time, and one whose signals nobody reads."""
+    told = []
+
+    class Telling(Calm):
+        of_time: ClassVar[bool] = False
+
+        @staticmethod
+        def evaluate(t, x, k, table, b, again=0.0, stage=0.0):
+            b[:3] = 0.0
+            told.append((t, again, stage))
+
+    whole = Total(parts=(Telling(), Calm()))
+    run(adrift(disturbance=whole), 1.0, 0.5, compiled=False)
+    a_step = [(0.25, 0.0, 1.0), (0.25, 1.0, 1.0), (0.5, 0.0, 1.0), (0.5, 1.0, 0.0)]
+    assert told[:5] == [(0.0, 0.0, 0.0), *a_step]
+    assert told[5:] == [(0.5 + t, again, stage) for t, again, stage in a_step]
 
 
 def test_time_is_a_whole_number_of_steps():

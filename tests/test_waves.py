@@ -8,10 +8,10 @@ from conftest import NONLINEAR, Constant, adrift, run
 from scenario_samples import SOUND, told
 
 from podusv_cli.core.kernel import bundle
-from podusv_cli.disturbances import waves
 from podusv_cli.disturbances.base import WAVE_MOTION
 from podusv_cli.disturbances.spectra import GRAVITY, WATER
 from podusv_cli.disturbances.total import Total
+from podusv_cli.disturbances.wave_kernels import short_crested
 from podusv_cli.disturbances.waves import Waves
 from podusv_cli.disturbances.wind import Wind
 
@@ -78,7 +78,7 @@ def test_the_kernels_add_up_what_the_docstring_says(spreading):
 
 def test_both_kernels_agree_on_waves_of_one_direction():
     sea = Waves(height=0.3, period=1.8, direction=0.8, components=10)
-    long, short = asked(sea), asked(sea, kernel=waves._short_crested)
+    long, short = asked(sea), asked(sea, kernel=short_crested)
     for t in (0.0, 17.3):
         x = (3.0, -4.0, 0.4, 0.5, 0.1, 0.2)
         np.testing.assert_allclose(long(t, x), short(t, x), rtol=1e-9, atol=1e-12)

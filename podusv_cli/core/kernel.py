@@ -11,7 +11,7 @@ from __future__ import annotations
 import builtins
 import dis
 from collections import namedtuple
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cache
 from types import FunctionType
 from typing import Any, TypeVar
@@ -48,6 +48,14 @@ def scratch(count: int) -> Vector:
 
 
 @kernel
+def widest() -> None:
+    """Have loops of the kernel that calls this use the widest vector registers there are.
+
+    The compiler prefers 256 bits, since short loops gain nothing by 512. It changes no result.
+    """
+
+
+@kernel
 def shared(number: float) -> float:
     """A number that is the same in all runs that march side by side."""
     return number
@@ -60,6 +68,12 @@ def filled(whole: int, count: int) -> int:
     All of them where a register holds several rounds; where it holds several runs, `count`.
     """
     return whole
+
+
+def accepted(function: Any, arguments: Sequence[str], optional: Collection[str]) -> list[str]:
+    """Which of these arguments a kernel is given: all, or all but the optional ones."""
+    needed = [name for name in arguments if name not in optional]
+    return needed if function.__code__.co_argcount == len(needed) else list(arguments)
 
 
 def with_globals(function: Any, name: str, **replaced: Any) -> Any:

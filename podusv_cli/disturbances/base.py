@@ -31,13 +31,20 @@ FLOW = (
 )  # fmt: skip
 
 
+# The arguments of a disturbance's kernel, and those which it may do without.
+ARGUMENTS = ("t", "x", "k", "table", "b", "again", "stage")
+OPTIONAL = ("again", "stage")
+
+
 class Disturbance(Component):
     """A load on the hull in the body frame.
 
     `evaluate(t, x, k, table, b)` is a kernel that writes (b_u [N], b_v [N], b_r [N m]) at time
     t [s] and state x = (x, y, psi, u, v, r) into `b`, and behind them one number for each of its
     `signals`. One that does not look at x says so with `of_time`, and is not asked twice for the
-    same t.
+    same t. One that takes much time may have two arguments more, numbers that are 0 or 1: where
+    `again` is 1, `b` still has what it wrote for this t and maybe another x; where `stage` is 1, a
+    step is under way, and its signals are not needed.
     """
 
     noun: ClassVar[str] = "disturbance"

@@ -15,7 +15,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from podusv_cli.core.elementary import cos_sin
-from podusv_cli.core.kernel import Vector
+from podusv_cli.core.kernel import LANES, Vector, kernel
 from podusv_cli.core.portable import exponential, logarithm
 from podusv_cli.core.random_words import uniforms
 
@@ -23,6 +23,9 @@ GRAVITY = 9.81  # m/s2
 WATER = 1025.0  # kg/m3, sea water
 SMALLEST = -700.0  # below, e^x is nothing
 FAR = 1000.0  # times a rate is its peak, where there is nothing left of a spectrum
+# Components in one round of a loop, two registers full: the compiler writes out a loop over one of
+# them number by number.
+GROUP = 2 * LANES
 SAMPLES = 16  # of a spectrum in every bin
 NORSOK_N = 0.468
 HARRIS_LENGTH = 1800.0  # m
@@ -129,6 +132,18 @@ def growing_edges(low: float, high: float, count: int) -> Vector:
     """Edges of `count` bins, each wider than the one before by the same factor."""
     ends = logarithm(np.array([low, high]))
     return exponential(np.linspace(ends[0], ends[1], count + 1))
+
+
+def whole_groups(count: int) -> int:
+    """`count` rounded up to whole groups of components."""
+    return -(-count // GROUP) * GROUP
+
+
+@kernel
+def cleared(count: int, sums: Vector) -> None:
+    """Set all partial sums to 0."""
+    for i in range(count):
+        sums[i] = 0.0
 
 
 def directions(spreading: int, count: int, seed: int, stream: str) -> Vector:

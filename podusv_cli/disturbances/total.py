@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence, Set
 from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from podusv_cli.core.kernel import Vector, constants_type, kernel, scratch, shared, tail
+from podusv_cli.core.kernel import (
+    Vector,
+    accepted,
+    constants_type,
+    kernel,
+    scratch,
+    shared,
+    tail,
+)
 from podusv_cli.core.plugins import TEXT
 from podusv_cli.core.signal import Signal
-from podusv_cli.disturbances.base import Disturbance
+from podusv_cli.disturbances.base import ARGUMENTS, OPTIONAL, Disturbance
 from podusv_cli.vessels.vessel import Vessel
 
 
@@ -119,22 +128,29 @@ def _sum(parts: Sequence[Part]) -> Callable[..., None]:
     Its source is written out, because compiled code cannot choose between functions.
     """
     scope: dict[str, Any] = {"scratch": scratch, "tail": tail, "shared": shared}
-    lines = ["def evaluate(t, x, k, table, b):", "    b[0] = b[1] = b[2] = 0.0"]
+    lines = ["def evaluate(t, x, k, table, b, again=0.0, stage=0.0):", "    u = v = r = 0.0"]
     written: set[int] = set()
+    count = Counter(place for part in parts for place in part.places)
     for i, part in enumerate(parts):
         scope |= {f"evaluate{i}": part.evaluate, f"Constants{i}": constants_type(part.constants)}
-        given = ", ".join(f"k.part{i}_{name}" for name in part.constants)
-        lines += [
-            f"    load{i} = scratch({3 + len(part.places)})",
-            f"    begin{i} = int(shared(table[{i}]))",
-            f"    evaluate{i}(t, x, Constants{i}({given}), tail(table, begin{i}), load{i})",
-            *(f"    b[{j}] += load{i}[{j}]" for j in range(3)),
-            *(
-                f"    b[{3 + place}] {'+=' if place in written else '='} load{i}[{3 + j}]"
-                for j, place in enumerate(part.places)
-            ),
-        ]
+        lines += _lines(i, part, written, alone=all(count[place] == 1 for place in part.places))
         written |= set(part.places)
-    scope[TEXT] = "\n".join(lines)
+    scope[TEXT] = "\n".join([*lines, "    b[0], b[1], b[2] = u, v, r"])
     exec(compile(scope[TEXT], "sum of disturbances", "exec"), scope)  # noqa: S102
     return kernel(scope["evaluate"])  # type: ignore[no-any-return]
+
+
+def _lines(i: int, part: Part, written: Set[int], alone: bool) -> Iterator[str]:
+    """What the kernel of the sum does for a part. One whose signals add up does not find them."""
+    given = ", ".join(f"k.part{i}_{name}" for name in part.constants)
+    own = {"k": f"Constants{i}({given})", "table": f"tail(table, begin{i})", "b": f"load{i}"}
+    own |= {} if alone else {"again": "0.0"}
+    passed = (own.get(a, a) for a in accepted(part.evaluate, ARGUMENTS, OPTIONAL))
+    yield f"    load{i} = scratch({3 + len(part.places)})"
+    yield f"    begin{i} = int(shared(table[{i}]))"
+    for j, place in enumerate(part.places):
+        yield f"    load{i}[{3 + j}] = {f'b[{3 + place}]' if alone else '0.0'}"
+    yield f"    evaluate{i}({', '.join(passed)})"
+    yield from (f"    {axis} += load{i}[{j}]" for j, axis in enumerate("uvr"))
+    for j, place in enumerate(part.places):
+        yield f"    b[{3 + place}] {'+=' if place in written else '='} load{i}[{3 + j}]"

@@ -40,145 +40,17 @@ import numpy as np
 from pydantic import model_validator
 
 from podusv_cli.core.component import value
-from podusv_cli.core.elementary import cos_sin, cos_sin_of_turns
-from podusv_cli.core.kernel import LANES, Vector, kernel, scratch, whole_lanes
+from podusv_cli.core.elementary import cos_sin
+from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.signal import Signal
 from podusv_cli.disturbances import spectra
 from podusv_cli.disturbances.base import WAVE_MOTION, Disturbance
+from podusv_cli.disturbances.wave_kernels import TURN, long_crested, short_crested
 from podusv_cli.vessels.vessel import Vessel
 
 STREAM = "waves"
 LEAST = 0.01  # of the spectrum's energy that the cut-offs must leave
 ELEVATION = Signal("zeta", "m", "elevation of the sea where the vessel is", r"\zeta")
-TURN = 2.0 * math.pi
-LONG_ROOM, SHORT_ROOM = 6 * LANES, 15 * LANES  # eight partial sums each of 6 and of 15 sums
-
-
-@kernel
-def _cleared(count: int, sums: Vector) -> None:
-    for i in range(count):
-        sums[i] = 0.0
-
-
-@kernel
-def _added(sums: Vector, which: int) -> float:
-    """One sum from its eight parts."""
-    at = which * LANES
-    low = (sums[at] + sums[at + 1]) + (sums[at + 2] + sums[at + 3])
-    high = (sums[at + 4] + sums[at + 5]) + (sums[at + 6] + sums[at + 7])
-    return float(low + high)
-
-
-@kernel
-def _square(sums: Vector, which: int) -> float:
-    """Squared magnitude of an envelope."""
-    c, s = _added(sums, which), _added(sums, which + 1)
-    return c * c + s * s
-
-
-@kernel
-def _hull_axes(north: float, east: float, x: Vector, b: Vector) -> None:
-    """b[6], b[7] = u_w, v_w of the rate (north, east) of the motion, with psi_w in b[5]."""
-    c, s = cos_sin(b[5])
-    c_psi, s_psi = cos_sin(x[2] + b[5])
-    b[6] = (c - 1.0) * x[3] + s * x[4] + c_psi * north + s_psi * east
-    b[7] = (c - 1.0) * x[4] - s * x[3] + c_psi * east - s_psi * north
-
-
-@kernel
-def _long_crested(t: float, x: Vector, k: Any, table: Vector, b: Vector) -> None:
-    """Drift load, first-order motion, elevation, of waves that all go in one direction."""
-    count = int(k.lanes)
-    c_psi, s_psi = cos_sin(x[2])
-    c_gamma = c_psi * k.c_beta + s_psi * k.s_beta
-    s_gamma = c_psi * k.s_beta - s_psi * k.c_beta
-    way = (k.c_beta * x[0] + k.s_beta * x[1]) / TURN
-    slow = k.long2 * c_gamma * c_gamma + k.wide2 * s_gamma * s_gamma
-    both, speed = c_gamma * s_gamma, (c_gamma * x[3] + s_gamma * x[4]) / TURN
-    turning = 4.0 * (k.long2 - k.wide2) * both * x[5] / TURN
-    sums = scratch(LONG_ROOM)
-    _cleared(LONG_ROOM, sums)
-    for block in range(count // LANES):
-        for j in range(LANES):
-            i = block * LANES + j
-            number, a = table[2 * count + i], table[3 * count + i]
-            c, s = cos_sin_of_turns(table[i] * t + table[count + i] - number * way)
-            square = number * number
-            part = 1.0 / (1.0 + slow * square)
-            c, s = a * c, a * s
-            c_felt, s_felt = c * part * part, s * part * part
-            met, fading = table[i] - number * speed, turning * square * part
-            sums[j] += c
-            sums[8 + j] += s
-            sums[16 + j] += s_felt
-            sums[24 + j] += c_felt * number
-            sums[32 + j] += c_felt * met - s_felt * fading
-            sums[40 + j] -= (s_felt * met + c_felt * fading) * number
-    envelope, moved = _square(sums, 0), k.motion * _added(sums, 2)
-    b[0] = k.drift_u * c_gamma * abs(c_gamma) * envelope
-    b[1] = k.drift_v * s_gamma * abs(s_gamma) * envelope
-    b[2] = k.drift_arm * b[1]
-    b[3], b[4] = moved * k.c_beta, moved * k.s_beta
-    b[5] = -k.motion * c_gamma * s_gamma * _added(sums, 3)
-    rate, turned = k.motion * TURN * _added(sums, 4), s_gamma * s_gamma - c_gamma * c_gamma
-    _hull_axes(rate * k.c_beta, rate * k.s_beta, x, b)
-    b[8] = -k.motion * (both * TURN * _added(sums, 5) + turned * x[5] * _added(sums, 3))
-    b[9] = _added(sums, 0)
-
-
-@kernel
-def _short_crested(t: float, x: Vector, k: Any, table: Vector, b: Vector) -> None:
-    """The same of waves with a direction each.
-
-    Waves from ahead and astern, from port and starboard have envelopes of their own.
-    """
-    count = int(k.lanes)
-    c_psi, s_psi = cos_sin(x[2])
-    north, east = x[0] / TURN, x[1] / TURN
-    turning = 4.0 * (k.long2 - k.wide2) * x[5]
-    sums = scratch(SHORT_ROOM)
-    _cleared(SHORT_ROOM, sums)
-    for block in range(count // LANES):
-        for j in range(LANES):
-            i = block * LANES + j
-            number, a = table[2 * count + i], table[3 * count + i]
-            c_beta, s_beta = table[4 * count + i], table[5 * count + i]
-            way = c_beta * north + s_beta * east
-            c, s = cos_sin_of_turns(table[i] * t + table[count + i] - number * way)
-            c_gamma, s_gamma = c_psi * c_beta + s_psi * s_beta, c_psi * s_beta - s_psi * c_beta
-            slow = k.long2 * c_gamma * c_gamma + k.wide2 * s_gamma * s_gamma
-            square, both = number * number, c_gamma * s_gamma
-            part = 1.0 / (1.0 + slow * square)
-            c, s, felt = a * c, a * s, part * part
-            met = TURN * table[i] - number * (c_gamma * x[3] + s_gamma * x[4])
-            fading = turning * both * square * part
-            rate, fall = (c * met - s * fading) * felt, (s * met + c * fading) * felt
-            turned = (s_gamma - c_gamma) * (s_gamma + c_gamma) * x[5] * c * felt
-            ahead, astern = max(c_gamma, 0.0), max(-c_gamma, 0.0)
-            right, left = max(s_gamma, 0.0), max(-s_gamma, 0.0)
-            sums[j] += c
-            sums[8 + j] += s * felt * c_beta
-            sums[16 + j] += s * felt * s_beta
-            sums[24 + j] += c * felt * number * c_gamma * s_gamma
-            sums[32 + j] += ahead * c
-            sums[40 + j] += ahead * s
-            sums[48 + j] += astern * c
-            sums[56 + j] += astern * s
-            sums[64 + j] += right * c
-            sums[72 + j] += right * s
-            sums[80 + j] += left * c
-            sums[88 + j] += left * s
-            sums[96 + j] += rate * c_beta
-            sums[104 + j] += rate * s_beta
-            sums[112 + j] += (turned - fall * both) * number
-    b[0] = k.drift_u * (_square(sums, 4) - _square(sums, 6))
-    b[1] = k.drift_v * (_square(sums, 8) - _square(sums, 10))
-    b[2] = k.drift_arm * b[1]
-    b[3], b[4] = k.motion * _added(sums, 1), k.motion * _added(sums, 2)
-    b[5] = -k.motion * _added(sums, 3)
-    _hull_axes(k.motion * _added(sums, 12), k.motion * _added(sums, 13), x, b)
-    b[8] = -k.motion * _added(sums, 14)
-    b[9] = _added(sums, 0)
 
 
 class Waves(Disturbance):
@@ -273,7 +145,7 @@ class Waves(Disturbance):
         away = spectra.directions(self.spreading, count, self.seed, STREAM)
         c, s = np.transpose([cos_sin(self._travel + angle) for angle in away.tolist()])
         number = drawn.rate * drawn.rate / spectra.GRAVITY
-        rows = np.zeros((6, whole_lanes(count)))
+        rows = np.zeros((6, spectra.whole_groups(count)))
         rows[:, :count] = drawn.rate / TURN, drawn.phase / TURN, number, drawn.amplitude, c, s
         return rows.ravel()
 
@@ -287,7 +159,7 @@ class Waves(Disturbance):
         pressure = 0.5 * spectra.WATER * spectra.GRAVITY
         c_beta, s_beta = cos_sin(self._travel)
         return {
-            "lanes": float(whole_lanes(self.components)), "motion": self.motion,
+            "lanes": float(spectra.whole_groups(self.components)), "motion": self.motion,
             "c_beta": float(c_beta), "s_beta": float(s_beta),
             "long2": vessel.length**2 / 48.0, "wide2": vessel.beam**2 / 48.0,
             "drift_u": pressure * self.reflection_u**2 * vessel.beam,
@@ -297,7 +169,7 @@ class Waves(Disturbance):
 
     def kernel_with(self, vessel: Vessel) -> Callable[..., None]:
         """One for waves in one direction, and a slower one for waves in many."""
-        return _short_crested if self.spreading else self.evaluate
+        return short_crested if self.spreading else self.evaluate
 
     def conflicts(self, vessel: Vessel, step: float) -> Iterator[tuple[str, str]]:
         """A cut-off that the step cannot resolve."""
@@ -312,6 +184,9 @@ class Waves(Disturbance):
 
     @staticmethod
     @kernel
-    def evaluate(t: float, x: Vector, k: Any, table: Vector, b: Vector) -> None:
+    def evaluate(
+        t: float, x: Vector, k: Any, table: Vector, b: Vector, again: float = 0.0,
+        stage: float = 0.0,
+    ) -> None:  # fmt: skip
         """Of long-crested waves; see `kernel_with`."""
-        _long_crested(t, x, k, table, b)
+        long_crested(t, x, k, table, b, again, stage)

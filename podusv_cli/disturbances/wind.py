@@ -11,17 +11,15 @@ from pydantic import model_validator
 
 from podusv_cli.core.component import value
 from podusv_cli.core.elementary import cos_sin, cos_sin_of_turns
-from podusv_cli.core.kernel import LANES, Vector, kernel, scratch
+from podusv_cli.core.kernel import Vector, kernel, scratch, widest
 from podusv_cli.core.kinematics import direction
 from podusv_cli.core.signal import Signal
 from podusv_cli.disturbances import spectra
 from podusv_cli.disturbances.base import Disturbance
+from podusv_cli.disturbances.spectra import GROUP, cleared
 from podusv_cli.vessels.vessel import Vessel
 
 STREAM = "wind"
-# Components are added up in two registers' width: the compiler writes out a loop over one of them
-# number by number.
-GROUP = 2 * LANES
 LEVER = 0.18  # of the yaw moment, by Blendermann
 SPEED = Signal("V_w", "m/s", "wind speed at the height where it acts, with gusts")
 FROM = Signal("beta_w", "rad", "direction that the wind comes from", r"\beta_w")
@@ -31,8 +29,8 @@ FROM = Signal("beta_w", "rad", "direction that the wind comes from", r"\beta_w")
 def _gust(t: float, count: int, table: Vector) -> float:
     """The sum of all components, by sixteen partial sums, in groups of four."""
     sums = scratch(GROUP)
-    for j in range(GROUP):
-        sums[j] = 0.0
+    widest()
+    cleared(GROUP, sums)
     for block in range(count // GROUP):
         for j in range(GROUP):
             i = block * GROUP + j
@@ -131,14 +129,10 @@ class Wind(Disturbance):
             return np.zeros(1)
         edges = spectra.growing_edges(self.lowest, self.highest, self.components)
         drawn = spectra.cosines(spectra.in_bins(self._density, edges), edges, self.seed, STREAM)
-        rows = np.zeros((3, self._lanes))
+        rows = np.zeros((3, spectra.whole_groups(self.components)))
         phase = drawn.phase / (2.0 * math.pi)
         rows[:, : self.components] = drawn.rate, phase, drawn.amplitude
         return rows.ravel()
-
-    @property
-    def _lanes(self) -> int:
-        return -(-self.components // GROUP) * GROUP
 
     def _density(self, frequency: Vector) -> Vector:
         if self.gusts == "norsok":
@@ -156,7 +150,7 @@ class Wind(Disturbance):
         return vessel.windage.constants() | {
             "length": vessel.length, "mean": self.mean, "density": self.density,
             "direction": self.direction, "c_from": float(c), "s_from": float(s),
-            "lanes": 0.0 if self.gusts == "none" else float(self._lanes),
+            "lanes": 0.0 if self.gusts == "none" else float(spectra.whole_groups(self.components)),
         }  # fmt: skip
 
     def conflicts(self, vessel: Vessel, step: float) -> Iterator[tuple[str, str]]:
@@ -173,10 +167,13 @@ class Wind(Disturbance):
 
     @staticmethod
     @kernel
-    def evaluate(t: float, x: Vector, k: Any, table: Vector, b: Vector) -> None:
-        """The load, the wind's speed and where it comes from."""
+    def evaluate(
+        t: float, x: Vector, k: Any, table: Vector, b: Vector, again: float = 0.0,
+        stage: float = 0.0,
+    ) -> None:  # fmt: skip
+        """The load, the wind's speed and where it comes from; the speed depends on t alone."""
         c_psi, s_psi = cos_sin(x[2])
-        speed = k.mean + _gust(t, int(k.lanes), table)
+        speed = b[3] if again > 0.0 else k.mean + _gust(t, int(k.lanes), table)
         ahead = c_psi * k.c_from + s_psi * k.s_from
         aside = c_psi * k.s_from - s_psi * k.c_from
         blendermann(x[3] + speed * ahead, x[4] + speed * aside, k, b)

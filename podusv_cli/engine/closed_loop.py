@@ -65,15 +65,29 @@ def drive(
 
 
 @kernel
-def rates(
-    t: float, s: Vector, ds: Vector,
-    path: Function, disturbance: Function, law: Function, actuator: Function, after: Function,
-    follow: Function, c: Wires, n: Plan, again: bool, loaded: bool,
-) -> None:  # fmt: skip
-    """Right-hand side of the closed loop at time t; leaves all signals in the row.
+def load(
+    t: float, s: Vector, disturbance: Function, c: Wires, n: Plan, again: bool, stage: bool
+) -> None:
+    """Put the disturbance at t and s into the row; in a stage within a step its load is enough.
 
     `again`: the evaluation before was at this very t, so what depends on time alone is in the row.
-    `loaded`: the disturbance at this t and s is in the row.
+    """
+    if not (again and n.load_of_time == 1):
+        disturbance(
+            t, s, c.disturbance, c.disturbance_table, tail(c.row, n.b),
+            1.0 if again else 0.0, 1.0 if stage else 0.0,
+        )  # fmt: skip
+
+
+@kernel
+def rates(
+    t: float, s: Vector, ds: Vector,
+    path: Function, law: Function, actuator: Function, after: Function, follow: Function,
+    c: Wires, n: Plan, again: bool,
+) -> None:  # fmt: skip
+    """Right-hand side of the closed loop at time t, whose load is in the row; fills the row.
+
+    `again` as in `load`.
     """
     row = c.row
     demand, tau, b = tail(row, n.demand), tail(row, n.tau), tail(row, n.b)
@@ -82,8 +96,6 @@ def rates(
     p, table, work = c.law, c.law_table, c.work
     if not again:
         path(t, c.path, c.path_table, row)
-    if not (loaded or (again and n.load_of_time == 1)):
-        disturbance(t, s, c.disturbance, c.disturbance_table, b)
     if n.hold_every > 0 and n.update_first > 0:
         for i in range(n.states - n.memory):
             memory_rate[i] = 0.0
@@ -128,11 +140,14 @@ def step(
     k2, k3, k4 = tail(k1, count), tail(k1, 2 * count), tail(k1, 3 * count)
     y = tail(k1, 4 * count)
     shifted(count, s, 0.5 * h, k1, y)
-    rates(t + 0.5 * h, y, k2, path, disturbance, law, actuator, after, follow, c, n, False, False)
+    load(t + 0.5 * h, y, disturbance, c, n, False, True)
+    rates(t + 0.5 * h, y, k2, path, law, actuator, after, follow, c, n, False)
     shifted(count, s, 0.5 * h, k2, y)
-    rates(t + 0.5 * h, y, k3, path, disturbance, law, actuator, after, follow, c, n, True, False)
+    load(t + 0.5 * h, y, disturbance, c, n, True, True)
+    rates(t + 0.5 * h, y, k3, path, law, actuator, after, follow, c, n, True)
     shifted(count, s, h, k3, y)
-    rates(t + h, y, k4, path, disturbance, law, actuator, after, follow, c, n, False, False)
+    load(t + h, y, disturbance, c, n, False, True)
+    rates(t + h, y, k4, path, law, actuator, after, follow, c, n, False)
     for i in range(count):
         s[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
 
@@ -170,14 +185,12 @@ def instant(
     again = k > first and t == (k - 1) * h + h  # where the last stage of the step before was
     if n.relayed > 0:
         begin_step(k, t, c.relay)
+    load(t, c.s, disturbance, c, n, again, False)
     if n.measured > 0:
-        perceive(k, t, disturbance, measurement, correct, c, n)
+        perceive(k, t, measurement, correct, c, n)
     if n.sample_every > 0 or n.hold_every > 0:
         sample_and_hold(k, t, h, path, law, sample, after, c, n)
-    loaded = n.measured > 0
-    rates(
-        t, c.s, c.stages, path, disturbance, law, actuator, after, follow, c, n, again, loaded
-    )  # fmt: skip
+    rates(t, c.s, c.stages, path, law, actuator, after, follow, c, n, again)
     measure(c.s, c.row)
     if not (finite(n.states, c.s) and finite(n.columns, c.row)):
         return False
@@ -265,9 +278,9 @@ def rates_along(
         there = tail(out, i * (n.states + n.columns))
         if n.relayed > 0:
             c.relay[BEGAN] = here[0]
+        load(here[0], tail(here, 1), disturbance, c, n, False, False)
         rates(
-            here[0], tail(here, 1), there, path, disturbance, law, actuator, after, follow, c, n,
-            False, False,
+            here[0], tail(here, 1), there, path, law, actuator, after, follow, c, n, False
         )  # fmt: skip
         measure(tail(here, 1), c.row)
         for j in range(n.columns):

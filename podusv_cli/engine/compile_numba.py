@@ -48,7 +48,21 @@ def scratch_of(number: Any) -> Any:
     return intrinsic(prefer_literal=True)(typed)
 
 
-PRIMITIVES = {kernel.tail: intrinsic(tail_of), kernel.scratch: scratch_of(types.float64)}
+@intrinsic
+def widest(typing: Any) -> Any:
+    """`kernel.widest`, for which llvmlite has no name."""
+
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        set.add(builder.function.attributes, '"prefer-vector-width"="512"')
+        return context.get_dummy_value()
+
+    return types.none(), code
+
+
+PRIMITIVES = {
+    kernel.tail: intrinsic(tail_of), kernel.scratch: scratch_of(types.float64),
+    kernel.widest: widest,
+}  # fmt: skip
 
 
 def object_code(function: Any, prototype: Any) -> Code:

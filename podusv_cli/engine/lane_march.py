@@ -9,7 +9,15 @@ from __future__ import annotations
 from typing import Any
 
 from podusv_cli.core.kernel import LANES, Vector, kernel, tail
-from podusv_cli.engine.closed_loop import finite, measure, named_plan, named_wires, rates, step
+from podusv_cli.engine.closed_loop import (
+    finite,
+    load,
+    measure,
+    named_plan,
+    named_wires,
+    rates,
+    step,
+)
 from podusv_cli.engine.layout import STOP, Function
 from podusv_cli.engine.relay import begin_step
 from podusv_cli.engine.sampled import perceive, sample_and_hold
@@ -93,14 +101,12 @@ def advance_lanes(
         again = k > first and t == (k - 1) * h + h  # see `closed_loop.instant`
         if n.relayed > 0:
             begin_step(k, t, c.relay)
+        load(t, c.s, disturbance, c, n, again, False)
         if n.measured > 0:
-            perceive(k, t, disturbance, measurement, correct, c, n)
+            perceive(k, t, measurement, correct, c, n)
         if n.sample_every > 0 or n.hold_every > 0:
             sample_and_hold(k, t, h, path, law, sample, after, c, n)
-        loaded = n.measured > 0
-        rates(
-            t, c.s, c.stages, path, disturbance, law, actuator, after, follow, c, n, again, loaded
-        )  # fmt: skip
+        rates(t, c.s, c.stages, path, law, actuator, after, follow, c, n, again)
         measure(c.s, c.row)
         lost = lanes_not(lanes_and(finite(n.states, c.s), finite(n.columns, c.row)))
         if lanes_any(lost) and end_lanes(k, lost, c, n, size, under_way, ends) == 0:

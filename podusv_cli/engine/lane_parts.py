@@ -14,7 +14,7 @@ from numba.extending import intrinsic
 from podusv_cli.core import elementary, kernel
 from podusv_cli.core.kernel import LANES
 from podusv_cli.engine import lane_march
-from podusv_cli.engine.compile_numba import scratch_of
+from podusv_cli.engine.compile_numba import scratch_of, widest
 from podusv_cli.engine.lane_masks import (
     joined,
     lanes_and,
@@ -174,7 +174,7 @@ def _extreme(sign: str) -> Any:
 # What stands for kernels that are no arithmetic.
 PRIMITIVES = {
     kernel.tail: lanes_tail, kernel.scratch: scratch_of(FLOAT), kernel.shared: lanes_first,
-    kernel.filled: _filled,
+    kernel.filled: _filled, kernel.widest: widest,
     elementary.bits: _bitwise(FLOAT, WHOLE), elementary.of_bits: _bitwise(WHOLE, FLOAT),
     lane_march.lanes_and: lanes_and, lane_march.lanes_not: lanes_not,
     lane_march.lanes_any: lanes_any, lane_march.lane_true: lane_true,

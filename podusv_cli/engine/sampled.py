@@ -75,16 +75,12 @@ def sample_and_hold(
 
 
 @kernel
-def perceive(
-    k: int, t: float, disturbance: Function, measurement: Function, correct: Function,
-    c: Wires, n: Plan,
-) -> None:  # fmt: skip
+def perceive(k: int, t: float, measurement: Function, correct: Function, c: Wires, n: Plan) -> None:
     """Measure at instant k, and take what is delivered into the estimate.
 
-    Leaves the disturbance at t in the row, and the measured values behind the other signals.
+    Leaves the measured values behind the other signals in the row, which has the disturbance.
     """
     b, sensed, measured = tail(c.row, n.b), c.sensed, tail(c.row, n.sensed)
-    disturbance(t, c.s, c.disturbance, c.disturbance_table, b)
     measurement(t, float(k), c.s, b, c.measurement, c.measurement_table, sensed)
     correct(t, sensed, tail(c.s, n.estimate), c.estimator, c.estimator_table)
     logged = 0

@@ -14,16 +14,18 @@ from typing import Any
 
 import numpy as np
 
-from podusv_cli.core.kernel import Vector, unpacker
+from podusv_cli.core.kernel import Vector, accepted, unpacker
+from podusv_cli.disturbances.base import OPTIONAL
 
 NUMBER, WHOLE = c_double, c_int64
-NUMBERS = ("t", "instant", "weight")
+NUMBERS = ("t", "instant", "weight", "again", "stage")
 VECTOR = POINTER(NUMBER)
 # The arguments of every part, in the order in which the loop takes the parts. The time t, an
-# instant's position and its weight in an integral [s] are numbers, all others vectors.
+# instant's position, its weight in an integral [s], and whether an evaluation is one more at its
+# instant or a stage within a step are numbers, all others vectors.
 SIGNATURES = {
     "path": "t p table target",
-    "disturbance": "t x p table b",
+    "disturbance": "t x p table b again stage",
     "law": "t x memory target p table tau rate signals work",
     "sample": "t x memory target p table",
     "actuator": "t x state demand p table tau rate signals",
@@ -51,10 +53,15 @@ EVALUATE_ALL = CFUNCTYPE(None, PROTOTYPES["law"], WHOLE, WHOLE, WHOLE, *[VECTOR]
 def bind(part: str, inner: Any, names: tuple[str, ...]) -> Any:
     """The door of a part to the kernel `inner`, whose constants have these names."""
     arguments = SIGNATURES[part].split()
-    passed = ", ".join("named(p)" if a == "p" else a for a in arguments)
+    passed = ", ".join("named(p)" if a == "p" else a for a in taken(part, inner))
     scope: dict[str, Any] = {"kernel": inner, "named": unpacker(names)}
     exec(f"def {part}_entry({', '.join(arguments)}):\n    kernel({passed})", scope)  # noqa: S102
     return scope[f"{part}_entry"]
+
+
+def taken(part: str, inner: Any) -> list[str]:
+    """Which arguments of a part its kernel takes."""
+    return accepted(inner, SIGNATURES[part].split(), OPTIONAL)
 
 
 def pointer(vector: Vector) -> Any:
