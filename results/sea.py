@@ -1,4 +1,4 @@
-"""The rms loads that results/sea.md tells, as a CSV table from the logs that `make sea` leaves."""
+"""What results/sea.md tells of loads and wave motions, from the logs that `make sea` leaves."""
 
 from __future__ import annotations
 
@@ -12,19 +12,20 @@ from podusv_cli.interface import open_run
 SEA = Path(__file__).parent / "sea"
 RUNS = ("exact", "state_6", "current")
 LAW, SINCE = "velocity_vector", 100.0  # s; after the approach
-LOADS = ["b_u", "b_v", "b_r"]
+SIGNALS = ["b_u", "b_v", "b_r", "psi_w", "r_w"]  # the last two where there are waves
 
 
 def rms(name: str) -> pd.Series:
-    """Root mean squares of the loads on the hull in a run."""
+    """Root mean squares of the loads on the hull, and of the waves that compass and gyro see."""
     run = open_run(SEA / name / LAW)
     settled = run["time"] >= SINCE
-    return pd.Series({load: (run[load][settled] ** 2).mean() ** 0.5 for load in LOADS})
+    logged = [name for name in SIGNALS if name in run.log]
+    return pd.Series({name: (run[name][settled] ** 2).mean() ** 0.5 for name in logged})
 
 
 def main() -> None:
     """Print a line a run."""
-    table = pd.DataFrame({name: rms(name) for name in RUNS}).T
+    table = pd.DataFrame({name: rms(name) for name in RUNS}).T[SIGNALS]
     sys.stdout.write(table.to_csv(index_label="run", float_format="%.6g"))
 
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from conftest import POD, VESSELS, Constant, adrift, run
+from conftest import NONLINEAR, POD, VESSELS, Constant, adrift, run
 from scipy.stats import norm
 
 from podusv_cli.actuators.pod import Pod, Pods
@@ -120,3 +120,21 @@ def test_halving_the_step_changes_the_integration_error_only():
         ends.append(np.array([one[name][-1] for name in ("x", "y", "psi")]))
     order = math.log2(np.abs(ends[0] - ends[1]).max() / np.abs(ends[1] - ends[2]).max())
     assert 3.5 < order < 5.0
+
+
+def test_the_acceleration_that_is_left_out_is_as_large_as_docs_sea_md_says():
+    """As its numbers are drawn and connected, over ten hours."""
+    given = {"speed": 0.06, "direction": 1.0, "speed_std": 0.02, "direction_std": 0.3}
+    wanders = Current(**given, time_constant=120.0)
+    speed, direction = wanders.table_for(NONLINEAR, 36_000.0)[1:].reshape(-1, 2).T
+    water = np.stack([speed * np.cos(direction), speed * np.sin(direction)])
+    rms = float(np.sqrt((np.diff(water) ** 2).sum(0).mean()))
+    assert rms == pytest.approx(3.5e-3, rel=0.03)
+    loads = NONLINEAR.m11 * rms / math.sqrt(2.0), NONLINEAR.m22 * rms / math.sqrt(2.0)
+    assert loads == pytest.approx((0.065, 0.085), rel=0.03)
+    for lag, told in ((4.0, 3.5e-3), (36.0, 9e-3)):
+        off, left = np.zeros(2), []
+        for change in np.diff(water).T:
+            off = math.exp(-1.0 / lag) * off + change * lag * -math.expm1(-1.0 / lag)
+            left.append(off)
+        assert np.std(left) == pytest.approx(told, rel=0.06)

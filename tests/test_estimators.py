@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import NONLINEAR, PAPER, Constant, corrected, example, run
+from conftest import NONLINEAR, PAPER, Constant, adrift, corrected, example, run
 from estimator_samples import ESTIMATED, Steady, Taken, delivered, errors, sailed
 
 from podusv_cli.actuators.saturated import Saturated
@@ -15,7 +15,7 @@ from podusv_cli.estimators.ekf import ExtendedKalmanFilter
 from podusv_cli.estimators.low_pass import LowPass
 from podusv_cli.estimators.none import NoEstimator
 from podusv_cli.estimators.passive_observer import PassiveObserver
-from podusv_cli.measurements.sensors import Sensors
+from podusv_cli.measurements.sensors import Sensor, Sensors
 from podusv_cli.scenario.explain import signals
 
 EVERY = list(kinds("podusv_cli.estimators", Estimator).values())
@@ -119,6 +119,19 @@ def test_a_measured_velocity_comes_first():
     seen[15] = 0.0  # not measured, and the pose does not move
     follow(0.0, seen, np.zeros(3), state, k, np.zeros(1), rate)
     assert rate[3] == 0.0
+
+
+@pytest.mark.parametrize("kind", MODELS)
+def test_an_estimate_is_late_by_the_delay_as_told(kind):
+    """At 0.5 m/s and 0.1 s 50 mm; the velocity is right."""
+    sensor, late = Sensor(period=0.1), Sensor(period=0.1, delay=0.1)
+    seen = Sensors(position=late, heading=sensor, velocity=None, yaw_rate=sensor)
+    start = (0.0, 0.0, 0.0, 0.5, 0.0, 0.0)
+    law = Constant(surge=1.405)
+    log = run(adrift(controller=law, measurement=seen, estimator=kind(), start=start), 40.0)
+    assert log["x"][-1] - log["x_est"][-1] == pytest.approx(0.1 * log["u"][-1], rel=0.01)
+    assert log["u"][-1] == pytest.approx(log["u_est"][-1], abs=1e-4)
+    assert 0.1 * log["u"][-1] == pytest.approx(0.05, abs=5e-4)
 
 
 def test_what_estimators_need_and_how_fast_they_are():

@@ -1,5 +1,6 @@
 """results/sea.md tells what the committed studies and comparisons found."""
 
+import math
 import re
 from pathlib import Path
 
@@ -54,15 +55,44 @@ def test_what_noise_costs_is_as_in_the_studies(law):
             STUDIES[state].loc[(period, law, metric)].q50
             for metric in ("saturated_fraction", "tv_tau_u")
         )
-        expected.append(f"{100 * share:.0f} %, {demand:.0f} N")
+        cell = f"{100 * share:.0f} %, {demand:.0f} N"
+        expected.append(cell if math.isfinite(demand) else "more than half failed")
     assert row(law, 1) == expected
 
 
-def test_a_law_told_of_the_loads_fails_more_often_with_more_positions():
-    for table in STUDIES.values():
-        failed = [table.loc[(p, "proposed_anti_windup", "iae")].failed for p in PERIODS]
-        assert failed == sorted(failed, reverse=True)
-        assert failed[0] > failed[-1]
+def failed(state, period, law):
+    """How many of 20 draws failed."""
+    return round(20 * STUDIES[state].loc[(period, law, "iae")].failed)
+
+
+def test_how_often_a_law_that_is_told_of_the_loads_fails():
+    assert {failed(n, p, "proposed_anti_windup") for n in STUDIES for p in PERIODS[:2]} == {20}
+    rare = [failed(n, "2.0", "proposed_anti_windup") for n in STUDIES]
+    assert "all draws at 10 and 2 Hz, and in {}, {} and {} of 20 at 0.5 Hz".format(*rare) in WORDS
+
+
+def largest(state, period, law, share="q50"):
+    return 1000 * STUDIES[state].loc[(period, law, "error_after_max")][share]
+
+
+def test_what_is_said_in_short_is_as_in_the_studies():
+    often = [(state, period) for state in STUDIES for period in PERIODS[:2]]
+    worst = max(largest(*at, law, "q95") for at in often for law in LAWS[1:4])
+    ours = max(largest(*at, LAWS[0], "q95") for at in often)
+    assert f"stay within {worst / 1000:.2f} m of the target" in WORDS
+    assert f"`velocity_vector` within {ours / 1000:.2f} m." in WORDS
+    lost = [failed(6, "2.0", law) for law in LAWS[1:4]]
+    assert f"in {min(lost)} to {max(lost)} of 20 draws" in WORDS
+    assert failed(6, "2.0", LAWS[0]) == 1
+
+
+def test_what_fewer_positions_cost_is_as_in_the_studies():
+    def cost(state, law):
+        return f"{largest(state, '2.0', law) - largest(state, '0.1', law):.0f}"
+
+    theirs, ours = ([cost(n, law) for n in STUDIES] for law in ("proposed", LAWS[0]))
+    assert "cost `proposed` {} and {} mm in states 2 and 4".format(*theirs) in WORDS
+    assert "`velocity_vector` {}, {} and {} mm in states 2, 4 and 6".format(*ours) in WORDS
 
 
 def single(name):
@@ -101,20 +131,26 @@ def test_what_actuators_cost_is_as_in_the_comparisons(law):
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_states_3_and_5_are_told_as_committed(law):
-    three, five = (1000 * number(f"state_{n}", law, "error_after_max") for n in (3, 5))
-    assert f"`{law}` {three:.0f} and {five:.0f}" in WORDS
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [(("state_3", "state_5"), "States 3 and 5"), (("rare", "rare_told"), "`rare_told.yaml`):")],
+)
+def test_pairs_of_single_runs_are_told_as_committed(names, said, law):
+    one, other = (1000 * number(name, law, "error_after_max") for name in names)
+    assert f"`{law}` {one:.0f} and {other:.0f}" in WORDS.partition(said)[2][:500]
 
 
 def test_the_loads_are_those_of_the_logs():
     loads = pd.read_csv(ROOT / "results/sea/loads.csv", index_col="run")
-    u, v, r = loads.T.values
+    u, v, r, psi, yaw_rate = loads.T.values
     for sentence, at in (
         ("Its rms loads after 100 s are {:.2f} N, {:.2f} N and {:.2f} N m in surge", 0),
         ("sea state 6 they are {:.2f} N, {:.2f} N and {:.2f} N m;", 1),
         ("the current alone makes {:.2f} N, {:.2f} N and {:.2f} N m of that", 2),
     ):
         assert sentence.format(u[at], v[at], r[at]) in WORDS
+    shaken = f"compass by {1000 * psi[1]:.0f} mrad and the gyro by {1000 * yaw_rate[1]:.0f} mrad/s"
+    assert shaken in WORDS
     assert list(loads.index) == ["exact", "state_6", "current"]
 
 
