@@ -62,7 +62,7 @@ def delayed_growth(loop: Loop, delay: float) -> float:
     """Largest real part [1/s] of the loop's roots where the law's output acts after a delay [s].
 
     e' = -d e + g . (e, m) a delay before. The roots are eigenvalues of the derivative along the
-    demand's way, collocated at Chebyshev's points (Breda, Maset, Vermiglio, SIAM J. Sci. Comput.
+    delayed demand, collocated at Chebyshev's points (Breda, Maset, Vermiglio, SIAM J. Sci. Comput.
     27, 2005).
     """
     n, now, late = len(loop.matrix), loop.matrix.copy(), np.zeros_like(loop.matrix)
