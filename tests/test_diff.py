@@ -194,6 +194,15 @@ def test_every_key_of_the_scenario_counts():
     }  # fmt: skip
 
 
+def test_lists_differ_entry_by_entry():
+    one = "disturbance:\n- {kind: wind, speed: 1.0}\n- {kind: waves, gamma: {a: [1, 2]}, seed: 1}\n"
+    other = one.replace("seed: 1", "seed: 2")
+    assert scenario_changes(one, other) == {"disturbance[1].seed": (1, 2)}
+    longer = other + "- {kind: step}\n"
+    assert scenario_changes(other, longer) == {"disturbance[2].kind": (None, "step")}
+    assert scenario_changes("a: [1, 2]\n", "a: [1, 3]\n") == {"a": ((1, 2), (1, 3))}
+
+
 def test_versions_count_and_moments_do_not():
     one = {"podusv": "1", "packages": {"numba": "1"}, "argv": ["a"], "started": "x", "git": None}
     other = {"podusv": "1", "packages": {"numba": "2"}, "argv": [], "started": "y", "git": {"c": 1}}

@@ -3,6 +3,7 @@
 import json
 import math
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from small_study import written
 
 from podusv_cli.core.errors import UsageError
 from podusv_cli.process.extras import Extras
+from podusv_cli.scenario.sweep import Quantity
 from podusv_cli.storage import manifest
 from podusv_cli.storage.run_folder import open_run
 from podusv_cli.study import keep
@@ -191,6 +193,14 @@ def test_values_to_choose_from_and_every_quantity_are_in_the_table(study):
     assert list(runs.drawn) == sorted(study.results.plan.sweep.vary)
     assert set(runs.drawn["start.y"].tolist()) <= {0.0, 2.5}
     assert set(judged(study.results.plan, runs).sensitivity.quantity) == set(runs.drawn)
+
+
+def test_seeds_have_no_sensitivity_because_their_numbers_have_no_order(study):
+    plan, runs = study.results.plan, study.results.runs
+    seeds = plan.sweep.vary | {"start.y": Quantity(seed=True)}
+    sweep = plan.sweep.model_copy(update={"vary": seeds})
+    seeded = replace(plan, scenario=plan.scenario.model_copy(update={"sweep": sweep}))
+    assert set(judged(seeded, runs).sensitivity.quantity) == set(runs.drawn) - {"start.y"}
 
 
 @pytest.mark.parametrize("command", ["plot", "compare", "rerun", "diff"])

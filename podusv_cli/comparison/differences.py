@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from podusv_cli.pages.page import flat, value_text
@@ -18,10 +19,11 @@ def differences(
     """Keys whose values differ, with the value of every run; None for a missing key.
 
     `scenarios` are resolved scenarios by label. Sections in `ignored` and keys with an ending in
-    `prose` are left out. The keys of one section are adjacent.
+    `prose` are left out. The keys of one section are adjacent. Lists of mappings are
+    compared entry by entry, `disturbance[2].seed`.
     """
     flattened = {
-        label: dict(flat({key: part for key, part in tree.items() if key not in ignored}))
+        label: dict(_each({key: part for key, part in tree.items() if key not in ignored}))
         for label, tree in scenarios.items()
     }
     keys = dict.fromkeys(key for values in flattened.values() for key in values)
@@ -43,8 +45,22 @@ def as_text(found: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, str]]
     }
 
 
+def _each(tree: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Keys and values of a scenario, with those of the entries of lists."""
+    for key, value in flat(tree):
+        if (
+            isinstance(value, (list, tuple))
+            and value
+            and all(isinstance(one, Mapping) for one in value)
+        ):
+            for place, entry in enumerate(value):
+                yield from ((f"{key}[{place}].{name}", inner) for name, inner in _each(entry))
+        else:
+            yield key, value
+
+
 def _section(key: str) -> str:
-    return key.partition(".")[0]
+    return re.split(r"[.[]", key, maxsplit=1)[0]
 
 
 def _follows_from_kind(

@@ -12,13 +12,8 @@ from podusv_cli.core.signal import STATE, Signal
 from podusv_cli.vessels.vessel import Vessel
 
 # Not `u_hat`: laws with an observer of their own log that.
-ESTIMATE = (
-    Signal("x_est", "m", "estimated position, north"),
-    Signal("y_est", "m", "estimated position, east"),
-    Signal("psi_est", "rad", "estimated heading, not wrapped", r"\psi_{est}"),
-    Signal("u_est", "m/s", "estimated surge velocity"),
-    Signal("v_est", "m/s", "estimated sway velocity"),
-    Signal("r_est", "rad/s", "estimated yaw rate"),
+ESTIMATE = tuple(
+    Signal(f"{q.name}_est", q.unit, f"estimated {q.meaning}", rf"{q.symbol}_{{est}}") for q in STATE
 )
 # What the nominal vessel does not explain, as two of the estimators know it.
 LOADS = (

@@ -18,7 +18,7 @@ from podusv_cli.core.steps import misfit
 from podusv_cli.measurements.base import FRESH, OWN, Measurement
 
 MEASURED = tuple(
-    Signal(f"{state.name}_m", state.unit, f"measured: {state.meaning}", rf"{state.symbol}_m")
+    Signal(f"{state.name}_m", state.unit, f"measured {state.meaning}", rf"{state.symbol}_m")
     for state in STATE
 )
 UNITS = "m, rad, m/s or rad/s"

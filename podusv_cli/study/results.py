@@ -114,9 +114,10 @@ def judged(plan: Plan, runs: Table) -> Results:
         claims.ParsedClaim(name, claim, claims.parse(claim.expect, plan.laws, known))
         for name, claim in sweep.claims.items()
     ]
+    numbers = {q: values for q, values in runs.drawn.items() if not sweep.vary[q].seed}
     tables = (
         summary.summary(runs, sweep.level, known), summary.pairs(runs, MARGIN, sweep.level, known),
-        summary.sensitivity(runs, runs.drawn, sweep.level, known),
+        summary.sensitivity(runs, numbers, sweep.level, known),
     )  # fmt: skip
     laws, pairs, sensitivity = (
         table if sweep.independent else summary.without_intervals(table) for table in tables
