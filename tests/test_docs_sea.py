@@ -22,7 +22,7 @@ def test_the_example_of_a_list_is_a_scenario_whose_loads_all_act():
     scenario = load_text(block, "a.yaml").scenario
     kinds = [part.kind for part in scenario.disturbance]
     assert kinds == ["harmonic", "current", "wind", "waves"]
-    again = load_text(block, "a.yaml", ["disturbance.3.seed=2"]).scenario.disturbance
+    again = load_text(block, "a.yaml", ["disturbance[3].seed=2"]).scenario.disturbance
     assert [part.seed for part in again[1:]] == [1, 1, 2]
 
 
