@@ -103,6 +103,22 @@ class Disturbance(Component):
         """
         return None
 
+    def sets_in(self) -> float:
+        """Before this time [s] it has no load."""
+        return 0.0
+
+    def jumps(self) -> float:
+        """The time [s] at which its load jumps, 0 where it does not within the run."""
+        return 0.0
+
+    def sea(self) -> tuple[float, float]:
+        """Significant height [m] and the peak's angular frequency [rad/s]; no height: no waves."""
+        return 0.0, 1.0
+
+    def has_gusts(self) -> bool:
+        """Whether it has gusts with a spectrum of the open sea."""
+        return False
+
     def alike_in_table(self) -> list[int]:
         """Places in the table that all runs side by side have to share; its kernel's `shared`."""
         return []

@@ -27,6 +27,14 @@ class Step(Disturbance):
         """The load afterwards."""
         return abs(self.b_u), abs(self.b_v), abs(self.b_r)
 
+    def sets_in(self) -> float:
+        """When the load sets in."""
+        return self.time
+
+    def jumps(self) -> float:
+        """The same without a ramp."""
+        return 0.0 if self.ramp else self.time
+
     @staticmethod
     @kernel
     def evaluate(t: float, x: Vector, k: Any, table: Vector, b: Vector) -> None:

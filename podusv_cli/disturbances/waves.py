@@ -123,6 +123,10 @@ class Waves(Disturbance):
         """The peak's angular frequency [rad/s]."""
         return 2.0 * math.pi / (self.period * spectra.peak_period(self._gamma, self.period_is))
 
+    def sea(self) -> tuple[float, float]:
+        """Height and peak."""
+        return self.height, self.peak
+
     @property
     def _gamma(self) -> float:
         return self.gamma if self.spectrum == "jonswap" else 1.0

@@ -123,6 +123,10 @@ class Wind(Disturbance):
         """Speed and direction."""
         return SPEED, FROM
 
+    def has_gusts(self) -> bool:
+        """Whether a spectrum is given."""
+        return self.gusts != "none"
+
     def table(self) -> Vector:
         """Rows of rates and phases in turns, and amplitudes; no rows without gusts."""
         if self.gusts == "none":

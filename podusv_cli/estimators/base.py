@@ -41,6 +41,10 @@ class Estimator(Component):
         """Every number of its state, in order; the estimate first."""
         return ESTIMATE
 
+    def assumed_noise(self) -> tuple[tuple[str, float], ...]:
+        """For each number of the state the key and value of the noise that is assumed, or ""."""
+        return (("", 0.0),) * len(ESTIMATE)
+
     @staticmethod
     def correct(t: float, seen: Vector, state: Vector, k: Any, table: Vector) -> None:
         """Take what was delivered at this instant into the state."""

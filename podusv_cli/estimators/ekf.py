@@ -126,6 +126,11 @@ class ExtendedKalmanFilter(Estimator):
         """The estimate, the load, the covariance."""
         return (*ESTIMATE, *LOADS, *[COVARIANCE] * (N * (N + 1) // 2))
 
+    def assumed_noise(self) -> tuple[tuple[str, float], ...]:
+        """The standard deviations that measurements are taken to have."""
+        names = ("sigma_p", "sigma_p", "sigma_psi", "sigma_u", "sigma_v", "sigma_r")
+        return tuple((name, getattr(self, name)) for name in names)
+
     def constants(self) -> dict[str, float]:
         """Without a load, one that is 0 and does not wander."""
         without = {} if self.bias else dict.fromkeys(("q_b", "q_b_psi"), 0.0)

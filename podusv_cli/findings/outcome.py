@@ -29,12 +29,27 @@ def saturated(scenario: Scenario, log: Recording) -> Sentences:
 
 
 def _windup(scenario: Scenario) -> str:
-    law = scenario.controller
+    law, switching = scenario.controller, _switching(scenario)
+    if switching:
+        return (
+            f"{' and '.join(switching)} can make the demand swing from limit to limit, which "
+            "anti-windup does not mend; compare a run without, or take smaller gains"
+        )
     if not law.slots():
         return "the law has no memory that could wind up"
     if law.wants_loads():
         return "the law is told the loads that act, so its memory does not wind up"
     return f"while limited, the law's adaptation and integrators wind up; {law.against_windup}"
+
+
+def _switching(scenario: Scenario) -> list[str]:
+    """What makes a demand swing that is not limited for long otherwise."""
+    delay, period = scenario.actuator.delay(), scenario.control.period
+    return [
+        *([f"a command delay of {delay:g} s"] if delay else []),
+        *([] if scenario.measurement.is_exact else ["sensors with noise and delay"]),
+        *([f"a control period of {period:g} s"] if period else []),
+    ]
 
 
 @after(

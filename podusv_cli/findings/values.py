@@ -37,11 +37,13 @@ def damping_sign(case: Case) -> Sentences:
 
 @before(
     "large-angle", about="start.psi", meaning="an angle is beyond a whole turn",
-    condition="an angle of start or path beyond 2 pi", remedy="give the angle in radians",
+    condition="an angle of start, path or disturbance beyond 2 pi",
+    remedy="give the angle in radians",
 )  # fmt: skip
 def large_angle(case: Case) -> Sentences:
-    """An angle of the start or of the path exceeds a whole turn."""
-    for section, part in (("start", case.scenario.start), ("path", case.scenario.path)):
+    """An angle of the start, the path or a disturbance exceeds a whole turn."""
+    parts = {"start": case.scenario.start, "path": case.scenario.path}
+    for section, part in {**parts, **case.scenario.disturbances()}.items():
         for name, field in type(part).model_fields.items():
             if unit_of(field) == "rad" and abs(getattr(part, name)) > TURN:
                 angle = getattr(part, name)

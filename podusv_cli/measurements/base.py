@@ -49,6 +49,10 @@ class Measurement(Component):
         """Times [from, to] [s] without samples, of each of x, y, psi, u, v, r."""
         return ((),) * len(STATE)
 
+    def noise_of_each(self) -> tuple[float, ...]:
+        """Standard deviation of the errors of each of x, y, psi, u, v, r."""
+        return (0.0,) * len(STATE)
+
     def constants_with(self, step: float, motion: int) -> dict[str, float]:
         """Its constants `k`, for a run with this step [s].
 

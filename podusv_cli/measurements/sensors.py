@@ -114,6 +114,12 @@ class Sensors(Measurement):
         sensors = self.instruments().values()
         return tuple(one.outages if one else () for one, count in sensors for _ in range(count))
 
+    def noise_of_each(self) -> tuple[float, ...]:
+        """White noise and bias of the sensors together."""
+        sensors = self.instruments().values()
+        each = [(math.hypot(one.noise, one.bias) if one else 0.0, n) for one, n in sensors]
+        return tuple(noise for noise, count in each for _ in range(count))
+
     @property
     def signals(self) -> tuple[Signal, ...]:
         """What is measured, as it was delivered last."""

@@ -1,0 +1,138 @@
+"""Findings about disturbances, sensors and the command path whose values can hardly be meant."""
+
+from __future__ import annotations
+
+import math
+
+from podusv_cli.core.finding import At, Sentences, before
+from podusv_cli.core.signal import STATE
+from podusv_cli.core.steps import misfit
+from podusv_cli.findings.finding import Case
+
+GRAVITY = 9.81
+BREAKS = 1.0 / 7.0  # height over length at which waves break
+MODEL = 2.0  # m; gusts were measured for what is larger
+FAR = 2.0  # factor between what an estimator assumes and what a sensor does
+
+
+@before(
+    "late-load", about="disturbance", meaning="a load sets in after the run",
+    condition="the time of a step is not before the end of the run",
+    remedy="take an earlier time, or simulate longer",
+)  # fmt: skip
+def late_load(case: Case) -> Sentences:
+    """The run ends before a load sets in."""
+    end = case.scenario.simulation.duration
+    for key, part in case.scenario.disturbances().items():
+        if part.sets_in() >= end:
+            yield At(
+                f"{key}.time",
+                f"the load of {part.sets_in():g} s never acts, since the run ends at {end:g} s; "
+                "take an earlier time, or simulate longer",
+            )
+
+
+@before(
+    "load-between-steps", about="disturbance", meaning="a load jumps between two steps",
+    condition="the time of a step without a ramp is no whole number of simulation.step",
+    remedy="take a whole number of steps, or a ramp",
+)  # fmt: skip
+def load_between_steps(case: Case) -> Sentences:
+    """RK4 is of first order in the step in which the load jumps."""
+    for key, part in case.scenario.disturbances().items():
+        told = misfit(part.jumps(), case.scenario.simulation.step) if part.jumps() > 0.0 else ""
+        if told:
+            yield At(f"{key}.time", f"{told}; the method is of first order at such a jump")
+
+
+@before(
+    "late-outage", about="measurement", meaning="an outage begins after the run",
+    condition="an outage does not begin before the end of the run",
+    remedy="let the outage begin earlier, or simulate longer",
+)  # fmt: skip
+def late_outage(case: Case) -> Sentences:
+    """The run ends before a sensor is lost."""
+    end, each = case.scenario.simulation.duration, case.scenario.measurement.outages_of_each()
+    for start in dict.fromkeys(start for spans in each for start, _ in spans if start >= end):
+        yield (
+            f"the outage from {start:g} s on never happens, since the run ends at {end:g} s; take "
+            "an earlier time, or simulate longer"
+        )
+
+
+@before(
+    "dead-zone", about="actuator.command", meaning="the dead zone swallows all that can be given",
+    condition="the dead zone is not smaller than the actuator's limit",
+    remedy="take a smaller dead zone",
+)  # fmt: skip
+def dead_zone(case: Case) -> Sentences:
+    """A demand within the actuator's limit gives nothing."""
+    actuator = case.scenario.actuator
+    if not actuator.command:
+        return
+    zones = {"dead_zone_u": "N", "dead_zone_r": "N m"}
+    for (name, unit), limit in zip(zones.items(), actuator.limits(), strict=True):
+        zone = getattr(actuator.command, name)
+        if zone >= limit:
+            yield At(
+                f"actuator.command.{name}",
+                f"{zone:g} {unit} is not below the {limit:g} {unit} that the actuator gives: "
+                "demands up to its limit give nothing; take a smaller dead zone",
+            )
+
+
+@before(
+    "estimator-noise", about="estimator",
+    meaning="the filter assumes another noise than sensors have",
+    condition=f"a sigma differs by more than a factor of {FAR:g} from its sensor's noise",
+    remedy="give the estimator the sensors' noise",
+)  # fmt: skip
+def estimator_noise(case: Case) -> Sentences:
+    """An estimator trusts a sensor too much or too little. Waves are noise to it, too."""
+    assumed = case.scenario.estimator.assumed_noise()
+    each = case.scenario.measurement.noise_of_each()
+    waves = any(part.sea()[0] for part in case.scenario.disturbances().values())
+    told = dict[str, str]()
+    for (key, sigma), noise, state in zip(assumed, each, STATE, strict=True):
+        far = sigma < noise / FAR or (sigma > FAR * noise and not waves)
+        if key and noise > 0.0 and far:
+            told[key] = (
+                f"{sigma:g} {state.unit}, while the sensor's noise is {noise:.3g} {state.unit}"
+            )
+    for key, text in told.items():
+        yield At(f"estimator.{key}", f"{text}; give the estimator the noise that the sensor has")
+
+
+@before(
+    "steep-waves", about="disturbance", meaning="waves steeper than waves can stand",
+    condition="Hs exceeds a seventh of the length of waves of the peak's period",
+    remedy="take lower or longer waves; at model scale, times go by the root of the scale",
+)  # fmt: skip
+def steep_waves(case: Case) -> Sentences:
+    """Waves break from a seventh of their length on: g T^2/(2 pi)/7 in deep water."""
+    for key, part in case.scenario.disturbances().items():
+        height, omega = part.sea()
+        length = 2.0 * math.pi * GRAVITY / omega**2
+        if height > BREAKS * length:
+            yield At(
+                f"{key}.height",
+                f"{height:g} m of waves that are {length:.3g} m long: they break above "
+                f"{BREAKS * length:.2g} m; take lower or longer waves",
+            )
+
+
+@before(
+    "model-gusts", about="disturbance", meaning="a gust spectrum of the open sea on a model",
+    condition=f"a gust spectrum, and a vessel shorter than {MODEL:g} m",
+    remedy="leave gusts out, or simulate at full scale",
+)  # fmt: skip
+def model_gusts(case: Case) -> Sentences:
+    """Gust spectra hold at full scale and do not scale with the vessel."""
+    length = case.scenario.vessel.length
+    for key, part in case.scenario.disturbances().items():
+        if part.has_gusts() and length < MODEL:
+            yield At(
+                f"{key}.gusts",
+                f"this spectrum was measured over the open sea and does not scale to a vessel of "
+                f"{length:g} m; leave gusts out, or simulate at full scale",
+            )
