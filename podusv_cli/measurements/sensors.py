@@ -167,19 +167,23 @@ class Sensors(Measurement):
     ) -> None:
         """Sample what is due, with its error; deliver what has waited long enough."""
         for i in range(6):
-            head, now = tail(table, HEAD * i), int(instant)
-            period, due = int(shared(head[PERIOD])), now - int(shared(head[DELAY]))
-            waiting, room = tail(seen, int(shared(head[WAITING]))), int(shared(head[ROOM]))
+            head = tail(table, HEAD * i)
+            period = shared(head[PERIOD])
             seen[FRESH + i] = 0.0
-            if period > 0 and now % period == 0:
-                moved = b[int(k.motion) + i] if k.motion > 0.0 else 0.0
-                sample = x[i] + moved + table[int(shared(head[ERRORS])) + now // period]
-                waiting[now // period % room] = rounded(sample, head[RESOLUTION])
-            if period > 0 and due >= 0 and due % period == 0:
-                sample = waiting[due // period % room]
-                if not math.isnan(sample):
-                    seen[i] = sample
-                    seen[FRESH + i] = 1.0
+            if period > 0.0:
+                # Periods since the start: quotients of whole numbers, which take less
+                # time than remainders.
+                sampled, delivered = instant / period, (instant - shared(head[DELAY])) / period
+                waiting, room = tail(seen, int(shared(head[WAITING]))), int(shared(head[ROOM]))
+                if sampled == int(sampled):
+                    moved = b[int(k.motion) + i] if k.motion > 0.0 else 0.0
+                    sample = x[i] + moved + table[int(shared(head[ERRORS])) + int(sampled)]
+                    waiting[int(sampled) % room] = rounded(sample, head[RESOLUTION])
+                if delivered >= 0.0 and delivered == int(delivered):
+                    sample = waiting[int(delivered) % room]
+                    if not math.isnan(sample):
+                        seen[i] = sample
+                        seen[FRESH + i] = 1.0
 
 
 @kernel
