@@ -63,6 +63,10 @@ GOALS = (
         "N runs at once beside N / cores single ones", 1.05,
         lambda found: float(found["batch"]["31000"]["cost"][1]),
     ),
+    Goal(
+        "a run in current, wind, 100 waves, with sensors, beside calm water", 2.5,
+        lambda found: float(found["seas"]["sea, sensors"][1]),
+    ),
     Goal("peak memory less the log, without figures", 150.0, _memory(RUN), "MB"),
     Goal("peak memory less the log, with figures", 150.0, _memory("podusv run"), "MB"),
     Goal("`podusv run` without figures", 0.7, _seconds(RUN), "s"),

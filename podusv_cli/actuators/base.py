@@ -35,6 +35,8 @@ class Actuator(Component):
     """
 
     noun: ClassVar[str] = "actuator"
+
+    feels_motion: ClassVar[bool] = True  # False: `drive` does not look at x, nor in a subclass
     command: Command | None = value(
         None, "", "how the law's demand reaches the actuator; at once and as it is by default"
     )

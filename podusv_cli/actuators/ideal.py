@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from podusv_cli.actuators.base import Actuator
 from podusv_cli.core.kernel import Vector, kernel
@@ -12,6 +12,7 @@ class Ideal(Actuator):
     """No limits, no lag, no sway force, as in the paper's simulations."""
 
     kind: Literal["ideal"] = "ideal"
+    feels_motion: ClassVar[bool] = False
 
     @staticmethod
     @kernel

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from podusv_cli.actuators.base import SATURATION, Actuator
 from podusv_cli.core.component import value
@@ -14,6 +14,7 @@ class Saturated(Actuator):
     """Surge force and yaw moment cut off at limits that are the same ahead and astern."""
 
     kind: Literal["saturated"] = "saturated"
+    feels_motion: ClassVar[bool] = False
     surge_limit: float = value(8.0, "N", "largest surge force, ahead and astern", gt=0)
     yaw_limit: float = value(2.5, "N m", "largest yaw moment, both ways", gt=0)
 

@@ -20,7 +20,7 @@ class Plan(NamedTuple):
     demand: int
     tau: int
     b: int
-    flow: int  # offset in the row of the current's speed and direction; 0: the water is at rest
+    flow: int  # offset in the row of the current's speed and direction; 0: no actuator needs it
     flags: int
     sensed: int
     columns: int  # length of the row

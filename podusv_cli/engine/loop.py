@@ -185,7 +185,8 @@ class ClosedLoop:
         return Plan(
             states=memory + sum(size for _, size in law.slots()),
             estimate=estimate if self.measured else 0, memory=memory,
-            signals=signals, demand=demand, tau=tau, b=b, flow=_flow(self.disturbance, b),
+            signals=signals, demand=demand, tau=tau, b=b,
+            flow=_flow(self.disturbance, b) if actuator.feels_motion else 0,
             flags=flags, sensed=sensed, columns=columns,
             steps=grid.steps, log_every=grid.log_every, hold_every=grid.hold_every,
             sample_every=_sample_steps(law.sample_period(), grid),
