@@ -24,6 +24,9 @@ def test_the_example_of_a_list_is_a_scenario_whose_loads_all_act():
     assert kinds == ["harmonic", "current", "wind", "waves"]
     again = load_text(block, "a.yaml", ["disturbance[3].seed=2"]).scenario.disturbance
     assert [part.seed for part in again[1:]] == [1, 1, 2]
+    (line,) = re.findall(r"`(disturbance\[3\].seed: .*?)` below `vary:`", SEA)
+    study = f"{block}sweep:\n  draws: 2\n  vary:\n    {line}\n"
+    assert load_text(study, "a.yaml").scenario.sweep.vary["disturbance[3].seed"].seed
 
 
 @pytest.mark.parametrize("state", range(2, 7))
