@@ -286,6 +286,36 @@ def test_a_mapping_of_kinds_is_told_to_be_a_list(kind):
     assert all(line.endswith(hint) for line in said)
 
 
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("measurement: {kind: sensors, gnss: {}}", "unknown key; did you mean 'position'?"),
+        ("measurement: {kind: sensors, compass: {}}", "unknown key; did you mean 'heading'?"),
+        (
+            "measurement: {kind: sensors, position: {rate: 5}}",
+            "unknown key; did you mean 'period'?",
+        ),
+        ("measurement: {kind: sensors, position: null}", "found null; it cannot be left out"),
+        (
+            "measurement: {kind: sensors, position: {noise: -1}}",
+            "must be a number not below 0 [m],",
+        ),
+        ("measurement: {kind: sensors, yaw_rate: {bias: -1}}", "not below 0 [rad/s],"),
+        ("actuator: {kind: saturated, delay: 1}", "unknown key; did you mean 'command.delay'?"),
+        ("actuator: {kind: saturated, failure: {time: 1, pod: 0}}", "pod belongs to kind pod"),
+    ],
+)
+def test_other_words_and_places_are_told_with_podusv_s_own(text, says):
+    (line,) = told(
+        SOUND.replace(
+            "actuator: {kind: ideal}\n", "" if "actuator" in text else "actuator: {kind: ideal}\n"
+        )
+        + text
+        + "\n"
+    )
+    assert says in line
+
+
 CLAIMED = "claims: {C1: {says: a, source: b, expect: pid.iae < 1}}\n"
 
 

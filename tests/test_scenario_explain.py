@@ -10,7 +10,9 @@ from known_signals import ABOUT
 from pydantic import Discriminator
 from pydantic.types import Strict
 
+from podusv_cli.comparison.settings import settings
 from podusv_cli.core.component import Component
+from podusv_cli.measurements.sensors import Sensor, Sensors
 from podusv_cli.scenario.explain import Row, UnknownKeyError, explain, kinds
 from podusv_cli.scenario.keys import BOUNDS, PATTERNS_IN_WORDS, limits, members, sections
 from podusv_cli.scenario.model import Scenario
@@ -213,3 +215,12 @@ def test_equation_numbers_are_said_to_be_the_papers(monkeypatch, capsys):
     note = "(n) is equation n of the paper"
     assert note in podusv("explain", "controller.k_ze").out
     assert note not in podusv("explain", "simulation.step").out
+
+
+def test_the_unit_of_a_sensor_s_errors_is_that_of_what_it_measures():
+    for sensor, unit in (("position", "m"), ("heading", "rad"), ("velocity", "m/s")):
+        (row,) = explain(f"measurement.{sensor}.noise")
+        assert row.unit == unit
+    told = {one.key: one.unit for one in settings(Sensors(position=Sensor(noise=0.5)))}
+    assert told["position.noise"] == "m"
+    assert told["yaw_rate.bias"] == "rad/s"

@@ -78,7 +78,10 @@ IN_VARY = [
     ("vessel.m: @{}", "must have one of uniform, normal, lognormal"),
     ("vessel.m: @{seed: true, angle: all}", "found angle and seed"),
     ("vessel.m: @3", "must be a mapping of keys: uniform, normal"),
-    ("vessel.m: @{seed: true}", "vessel.m is no seed, which is a whole number"),
+    (
+        "vessel.m: @{seed: true}",
+        "vessel.m cannot be drawn as a seed, since it is not a whole number",
+    ),
     ("a: @{keys: [vessel.m, start.x], angle: all}, start.x: {angle: all}", "drawn twice, by start"),
     ("a: @{keys: [start.x, start.x], angle: all}", "start.x is drawn twice"),
 ]
@@ -315,6 +318,15 @@ def test_a_quantity_of_one_of_several_disturbances():
     other = sweep.replace("disturbance[1]", "disturbance.1")
     same = load_text(several + other % (0.1, 1), "a.yaml", checks=[sweep_faults]).scenario
     assert same.sweep == scenario.sweep
+
+
+def test_a_seed_that_is_drawn_as_another_number_is_told_how_to_draw_it():
+    several = BASE.replace("{kind: harmonic}", "{kind: current, speed: 0.5}")
+    text = several + "  vary: {disturbance.seed: {uniform: [1, 10]}}\n"
+    with pytest.raises(ScenarioError) as error:
+        load_text(text, "a.yaml", checks=[sweep_faults])
+    says = "uniform draws others; write seed: true or integers: [low, high]"
+    assert f"disturbance.seed is a whole number, and {says}" in str(error.value)
 
 
 @pytest.mark.parametrize(

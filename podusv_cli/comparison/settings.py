@@ -76,18 +76,20 @@ def _preset(part: Component) -> Component | None:
     return type(part)(**{**plain(node), "preset": name}) if node else None
 
 
-def _settings(part: Component, base: Component | None, prefix: str = "") -> Iterator[Setting]:
+def _settings(
+    part: Component, base: Component | None, prefix: str = "", unit: str = ""
+) -> Iterator[Setting]:
     for name, field in type(part).model_fields.items():
         content = getattr(part, name)
         default = getattr(base, name) if base else field.get_default(call_default_factory=True)
         inner, others = _inside(content), _inside(default)
         for step, one in inner.items():
-            yield from _settings(one, others.get(step), f"{prefix}{name}.{step}")
+            yield from _settings(one, others.get(step), f"{prefix}{name}.{step}", unit_of(field))
         if not inner:
             meaning = summary(type(part)) if name == "kind" else field.description or ""
             other = content != default and f".{name}" not in PROSE
             yield Setting(
-                f"{prefix}{name}", value_text(content), unit_of(field),
+                f"{prefix}{name}", value_text(content), unit_of(field, unit),
                 value_text(None if field.is_required() and not base else default), meaning,
                 other or (name in WHICH and bool(content)),
             )  # fmt: skip

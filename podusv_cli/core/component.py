@@ -119,10 +119,17 @@ def value(default: Any, unit: str, meaning: str, **limits: Any) -> Any:
     return Field(default, description=meaning, json_schema_extra={"unit": unit}, **limits)
 
 
-def unit_of(field: FieldInfo) -> str:
-    """The unit that `value` attached to a field, "" where there is none."""
+OF_SECTION = "unit of the section"  # stands for the unit of the field that holds the component
+
+
+def unit_of(field: FieldInfo, of_section: str = OF_SECTION) -> str:
+    """The unit that `value` attached to a field, "" where there is none.
+
+    `of_section` is the unit of the field that holds the component.
+    """
     extra = field.json_schema_extra
-    return str(extra.get("unit", "")) if isinstance(extra, dict) else ""
+    own = str(extra.get("unit", "")) if isinstance(extra, dict) else ""
+    return of_section if own == OF_SECTION else own
 
 
 Positive = Annotated[float, Field(gt=0)]

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field
 
-from podusv_cli.core.component import Component, value
+from podusv_cli.core.component import OF_SECTION, Component, value
 from podusv_cli.core.elementary import ROUND
 from podusv_cli.core.kernel import Vector, kernel, shared, tail
 from podusv_cli.core.random_words import gauss_markov, normals, uniforms
@@ -21,7 +21,6 @@ MEASURED = tuple(
     Signal(f"{state.name}_m", state.unit, f"measured {state.meaning}", rf"{state.symbol}_m")
     for state in STATE
 )
-UNITS = "m, rad, m/s or rad/s"
 # What the table has of each quantity, before all samples' errors: period and delay in steps (a
 # period of 0: not measured), resolution, where its errors begin in the table; where samples wait in
 # `seen` for their delivery, and how many can.
@@ -37,12 +36,17 @@ class Sensor(Component):
 
     period: float = value(0.1, "s", "time between two samples, a whole number of steps", gt=0)
     delay: float = value(0.0, "s", "from a sample to its delivery, a whole number of steps", ge=0)
-    noise: float = value(0.0, UNITS, "standard deviation of white noise", ge=0)
+    noise: float = value(0.0, OF_SECTION, "standard deviation of white noise", ge=0)
     bias: float = value(
-        0.0, UNITS, "standard deviation of a bias that wanders (first-order Gauss-Markov)", ge=0
+        0.0,
+        OF_SECTION,
+        "standard deviation of a bias that wanders (first-order Gauss-Markov)",
+        ge=0,
     )
     bias_time: float = value(100.0, "s", "time constant of the bias", gt=0)
-    resolution: float = value(0.0, UNITS, "samples are rounded to multiples; 0: not rounded", ge=0)
+    resolution: float = value(
+        0.0, OF_SECTION, "samples are rounded to multiples; 0: not rounded", ge=0
+    )
     lost: float = value(0.0, "", "share of the samples that are lost, at random", ge=0, lt=1)
     outages: tuple[Span, ...] = value(
         (), "s", "times [from, to] whose samples are lost", strict=False

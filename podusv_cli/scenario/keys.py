@@ -55,6 +55,7 @@ class Key:
     kind: str = ""
     model: type[Component] = Scenario
     scenario: type[Scenario] = Scenario
+    unit_of_section: str = ""
 
     @property
     def top(self) -> Key:
@@ -74,7 +75,7 @@ class Key:
     @property
     def unit(self) -> str:
         """The unit of the value, "" where it has none."""
-        return unit_of(self.field) if self.field and not self.keys else ""
+        return unit_of(self.field, self.unit_of_section) if self.field and not self.keys else ""
 
     @property
     def range(self) -> str:
@@ -139,8 +140,9 @@ class Key:
         given = isinstance(self.default, model)
         default = getattr(self.default, name) if given else field.default
         path, route = (*self.path, name), (*self.route, name)
+        unit = unit_of(self.field) if self.field else ""
         return Key(
-            path, field.annotation, field, default, route, self.kind, model, self.scenario
+            path, field.annotation, field, default, route, self.kind, model, self.scenario, unit
         )  # fmt: skip
 
     def item(self, step: str | int) -> Key | None:

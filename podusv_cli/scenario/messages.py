@@ -106,7 +106,9 @@ def _several(section: Key, given: Node) -> str:
 def _elsewhere(section: Key, name: str) -> str:
     """`; K_Pu belongs to kind pid`, or at the top `; did you mean 'controller.K_Pu'?`."""
     if section.path:
-        return _home(name, section.top.follow(section.path)[0].kinds)
+        same = section.top.follow(section.path)
+        of_kinds = {key.kind: key for key in same} if len(same) > 1 else same[0].kinds
+        return _home(name, of_kinds) or _below(name, section)
     alike = (
         key.path
         for key in section.top.all()
@@ -114,6 +116,12 @@ def _elsewhere(section: Key, name: str) -> str:
     )
     places = dict.fromkeys(dotted(path) for path in alike if {NAME, NUMBER}.isdisjoint(path))
     return f"; did you mean {either([repr(p) for p in places][:MOST_PLACES])}?" if places else ""
+
+
+def _below(name: str, section: Key) -> str:
+    """`; did you mean 'command.delay'?`, where a section in this one has such a key."""
+    places = [f"{part}.{name}" for part, key in section.keys.items() if name in key.keys]
+    return f"; did you mean {either([repr(place) for place in places])}?" if places else ""
 
 
 def _home(name: str, kinds: dict[str, Key]) -> str:
@@ -169,6 +177,8 @@ def _hint(node: Node, key: Key) -> str:
     """How to write the value, if its text shows what was meant."""
     if isinstance(node.content, float) and node.content % 1 == 0 and int in key.types:
         return f"; write {int(node.content)}"
+    if node.content is None and key.section:
+        return "; it cannot be left out"
     if not isinstance(node.content, str):
         return hint(node.text, (bool,) if bool in key.types else ())
     if node.content and node.content in key.kinds:

@@ -38,11 +38,19 @@ def without_case(word: str) -> str:
     return word.casefold().replace("_", "")
 
 
+# Words that others use, and the keys that podusv has for them.
+SYNONYMS = {
+    "gnss": "position", "gps": "position", "compass": "heading", "gyro": "yaw_rate",
+    "speed_log": "velocity", "rate": "period", "frequency": "period",
+}  # fmt: skip
+
+
 def did_you_mean(word: str, known: Iterable[str]) -> str:
     """`; did you mean 'length'?`, or nothing where no known word is close."""
     words = list(known)
     alike = [other for other in words if without_case(other) == without_case(word)]
-    close = alike or get_close_matches(word, words, n=1)
+    meant = [other for other in words if other == SYNONYMS.get(word.casefold())]
+    close = alike or meant or get_close_matches(word, words, n=1)
     return f"; did you mean '{close[0]}'?" if close else ""
 
 

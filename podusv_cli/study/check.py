@@ -12,6 +12,7 @@ from podusv_cli.core.component import Component
 from podusv_cli.engine.loop import Observer, entries
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.scenario.expressions import ExpressionError
+from podusv_cli.scenario.keys import Key
 from podusv_cli.scenario.load import values
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import did_you_mean, found, unknown
@@ -28,6 +29,7 @@ DRAWN = (
     "controller",
 )  # fmt: skip
 TRIED = np.array([2.0**-30, 0.5, 1.0 - 2.0**-30])  # shares at which a distribution is tried
+REAL = ("uniform", "normal", "lognormal", "triangular", "angle")  # draw other than whole numbers
 MOST_TRIED = 50  # values of a choice
 Faults = Iterator[tuple[Route, str]]
 
@@ -125,7 +127,10 @@ def _type(key: str, quantity: Quantity, scenario: Scenario) -> Iterator[str]:
     if steps[-1] in ("kind", "preset"):
         yield f"a draw cannot change {key}; list its values under grid"
     elif quantity.seed and int not in described(scenario, steps).types:
-        yield f"{key} is no seed, which is a whole number"
+        yield f"{key} cannot be drawn as a seed, since it is not a whole number"
+    elif _is_whole(described(scenario, steps)) and (way := _real(quantity)):
+        seed = "seed: true or " if steps[-1] == "seed" else ""
+        yield f"{key} is a whole number, and {way} draws others; write {seed}integers: [low, high]"
     elif _is_number(own) or (own is None and not quantity.relative):
         return
     elif words and way != "choice":
@@ -133,6 +138,15 @@ def _type(key: str, quantity: Quantity, scenario: Scenario) -> Iterator[str]:
     elif not words:
         what = "a section" if isinstance(own, Component) else found(own, str(own or "null"))
         yield f"{key} is no number but {what}"
+
+
+def _is_whole(key: Key) -> bool:
+    return int in key.types and float not in key.types
+
+
+def _real(quantity: Quantity) -> str:
+    """The way to draw, where it draws other than whole numbers; else empty."""
+    return next((way for way in quantity.distribution.given if way in REAL), "")
 
 
 def _tried(name: str, quantity: Quantity, laws: Mapping[str, Scenario]) -> Iterator[str]:
