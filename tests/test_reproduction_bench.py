@@ -104,7 +104,7 @@ def test_the_table_of_tuned_gains_is_that_of_the_runs():
     np.testing.assert_allclose(TUNED.ratio, done / best, rtol=1e-5)
 
 
-@pytest.mark.parametrize(("law", "told"), [("proposed", 35), ("dsc", 41), ("li", 38)])
+@pytest.mark.parametrize(("law", "told"), [("proposed", 37), ("dsc", 40), ("li", 39)])
 def test_what_the_paper_s_laws_gain_is_what_the_page_says(law, told):
     place = ["task", "condition"]
     before, after = (
@@ -121,6 +121,7 @@ def test_behind_pods_and_at_rest_tuned_laws_fail_where_the_page_says():
     assert pods[["adrc_tuned", "dsc_tuned", "li_tuned", "adrc", "hand_position"]].tolist() == [
         8, 8, 8, 2, 7,
     ]  # fmt: skip
+    assert pods["proposed_tuned"] == len(lost[lost.law == "proposed_tuned"]) == 2
     assert not {"hand_position_tuned", "dsc", "li"} & set(pods.index)
     assert set(lost[lost.law == "proposed_crab_tuned"].task) == {"station"}
     assert len(lost[lost.law == "proposed_crab_tuned"]) == 7
