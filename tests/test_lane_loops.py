@@ -88,23 +88,31 @@ def places(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector
     )
 
 
-@pytest.mark.parametrize("watch", [loops, places])
-def test_loops_and_places_differ_from_lane_to_lane(watch: Any) -> None:
-    """As the kernel has it alone, number by number."""
+def check(watch: Any) -> None:
+    """Every lane has the numbers that it has alone, NaN and the signs of zeros included."""
     alone = compile.entry("observer", watch, ("nothing",))
     side_by_side = compile.lane_entry("observer", watch, ("nothing",), frozenset())
     draws, nothing = np.random.default_rng(8), np.zeros((1, LANES))
-    for _ in range(10):
+    for turn in range(10):
         s, seen = draws.normal(0.0, 1.5, (3, LANES)), draws.normal(0.0, 1.0, (9, LANES))
+        if turn == 9:
+            s[0, :4], s[1, 4:] = [math.nan, 0.0, -0.0, 1e300], [math.nan, -0.0, 0.0, 3.0]
         row = np.sort(draws.normal(0.5, 1.0, (SIZE, LANES)), axis=0)
         wanted = seen.copy()
         for lane in range(LANES):
             own = [np.ascontiguousarray(part[:, lane]) for part in (s, row, nothing, wanted)]
-            alone(0.0, 1.0, *map(pointer, own))
+            alone(2.0, 1.0, *map(pointer, own))
             wanted[:, lane] = own[-1]
         rooms = [aligned(part) for part in (s, row, nothing, seen)]
-        side_by_side(0.0, 1.0, *(room.ctypes.data_as(LANE_VECTOR) for room in rooms))
+        side_by_side(2.0, 1.0, *(room.ctypes.data_as(LANE_VECTOR) for room in rooms))
         np.testing.assert_array_equal(rooms[3], wanted.ravel())
+        np.testing.assert_array_equal(np.signbit(rooms[3]), np.signbit(wanted.ravel()))
+
+
+@pytest.mark.parametrize("watch", [loops, places])
+def test_loops_and_places_differ_from_lane_to_lane(watch: Any) -> None:
+    """As the kernel has it alone, number by number."""
+    check(watch)
 
 
 @kernel

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
-import linecache
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,7 +11,6 @@ from typing import Any
 import numpy as np
 import pytest
 from plugin_samples import LAW
-from plugin_samples import SCENARIO as SCENARIO_OF_LAW
 
 from podusv_cli.actuators.ideal import Ideal
 from podusv_cli.actuators.saturated import Saturated
@@ -24,7 +21,6 @@ from podusv_cli.engine import compile
 from podusv_cli.engine.batch import Batch, simulate_many
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.lane_doors import LANE_VECTOR
-from podusv_cli.engine.lane_source import OtherSource, source
 from podusv_cli.engine.lanes import why_alone
 from podusv_cli.engine.loop import ClosedLoop, Observer
 from podusv_cli.engine.march import Work
@@ -160,15 +156,6 @@ def test_what_cannot_march_side_by_side_marches_alone_and_says_why() -> None:
     same(simulate_many(loops, grid, observer=watching, side_by_side=True), alone)
 
 
-TEXT = """
-from podusv_cli.core.kernel import kernel
-
-@kernel
-def twice(x):
-    return x + x
-"""
-
-
 @kernel
 def signed(x: float, limit: float, out: Vector) -> float:
     """Branches, returns from within them and a loop that changes what they set."""
@@ -227,34 +214,6 @@ def aligned(content: Vector) -> Vector:
     room = room[-(room.ctypes.data // 8) % LANES :][: content.size]
     room[:] = content.ravel()
     return room
-
-
-def test_a_file_that_was_edited_is_not_rewritten(tmp_path: Path) -> None:
-    """Its kernel may be another one by now than the one that is loaded."""
-    path = tmp_path / "edited.py"
-    path.write_text(TEXT)
-    spec = importlib.util.spec_from_file_location("edited", path)
-    assert spec
-    assert spec.loader
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    assert source(module.twice).name == "twice"
-    path.write_text(TEXT.replace("x + x", "x - x"))
-    linecache.checkcache()
-    with pytest.raises(OtherSource, match=r"edited.py was edited since twice was loaded"):
-        source(module.twice)
-
-
-def test_a_plug_in_whose_file_is_gone_marches_side_by_side(tmp_path: Path) -> None:
-    """A study keeps the text of its plug-ins, so it needs none of their files."""
-    (tmp_path / "laws").mkdir()
-    law, config = tmp_path / "laws/my_law.py", tmp_path / "mine.yaml"
-    law.write_text(f"{LAW}# {tmp_path}\n")  # so that no other test has loaded it
-    config.write_text(SCENARIO_OF_LAW)
-    written = load(config).scenario.singles()["cross_track"]
-    law.unlink()
-    linecache.checkcache()
-    assert why_alone(written.closed_loop(), Observer()) == ""
 
 
 def test_the_law_that_podusv_new_writes_marches_side_by_side(podusv: Any) -> None:

@@ -6,13 +6,13 @@ from __future__ import annotations
 import ast
 import copy
 from collections.abc import Collection
-from functools import partial, reduce
+from functools import cache, partial, reduce
 from typing import Any
 
 import numpy as np
 
 from podusv_cli.core import kernel
-from podusv_cli.engine.lane_source import NotForLanes, has_source
+from podusv_cli.engine.lane_source import NotForLanes, has_source, source
 from podusv_cli.engine.lane_syntax import call, found, name_of, set_to
 
 EXTREMES = ("min", "max")
@@ -22,6 +22,29 @@ ON = "lanes_on"  # the lanes that a kernel is called in
 def takes_mask(called: Any, plain: Collection[Any]) -> bool:
     """Whether this is a kernel that takes the lanes in which it acts as its first argument."""
     return kernel.is_kernel(called) and called not in plain and has_source(called)
+
+
+def is_truth(node: ast.expr) -> bool:
+    """Whether an expression is true or false, and no number, as it is written."""
+    if isinstance(node, ast.BoolOp):
+        return all(map(is_truth, node.values))
+    if isinstance(node, ast.UnaryOp):
+        return isinstance(node.op, ast.Not)
+    written_out = isinstance(node, ast.Constant) and isinstance(node.value, bool)
+    return written_out or isinstance(node, ast.Compare)
+
+
+@cache
+def stores(called: Any) -> bool:
+    """Whether a kernel, or one that it calls, writes into a vector."""
+    if not (kernel.is_kernel(called) and has_source(called)):
+        return False
+    node, scope = source(called), called.__globals__
+    return any(
+        (isinstance(part, ast.Subscript) and isinstance(part.ctx, ast.Store))
+        or (isinstance(part, ast.Call) and stores(found(part.func, scope)))
+        for part in ast.walk(node)
+    )
 
 
 class Expressions:
@@ -81,22 +104,61 @@ class Expressions:
             return index.id not in self.known and isinstance(self.scope.get(index.id), int)
         return isinstance(index, ast.Constant)
 
+    def truth(self, node: ast.expr) -> ast.expr:
+        """An expression of which only the truth counts."""
+        return self.combined(node) if isinstance(node, ast.BoolOp) else self.expression(node)
+
     def of_BoolOp(self, node: ast.BoolOp) -> ast.expr:
+        if not all(map(is_truth, node.values)):
+            raise NotForLanes(f"line {node.lineno}: `and` and `or` of numbers as a value")
+        return self.combined(node)
+
+    def combined(self, node: ast.BoolOp) -> ast.expr:
+        """`and` or `or` of truths."""
         first_look_up = next((i for i, v in enumerate(node.values) if i and self.looks_up(v)), 0)
         if first_look_up:
             return self.expression(ast.copy_location(self.short(node, first_look_up), node))
         word = "lanes_and" if isinstance(node.op, ast.And) else "lanes_or"
-        first, *rest = map(self.expression, node.values)
+        first, *rest = map(self.truth, node.values)
         for other in rest:
             first = call(word, first, other)
         return first
 
     def looks_up(self, node: ast.expr) -> bool:
-        """Whether an expression reads a place that only the lanes that need it may know."""
-        return any(
+        """Whether an expression calls a kernel, or reads a place that not every lane may know."""
+        return self.calls_kernel(node) or any(
             isinstance(part, ast.Subscript) and not self.is_fixed(part.slice)
             for part in ast.walk(node)
         )
+
+    def called(self, node: ast.AST) -> Any:
+        """The global that is called, or None."""
+        if not isinstance(node, ast.Call):
+            return None
+        local = isinstance(node.func, ast.Name) and node.func.id in self.known
+        return None if local else found(node.func, self.scope)
+
+    def calls_kernel(self, node: ast.AST) -> bool:
+        """Whether an expression calls a kernel that acts in some of the lanes."""
+        return any(takes_mask(self.called(part), self.plain) for part in ast.walk(node))
+
+    def check_order(self, node: ast.expr) -> None:
+        """Refuse a choice beside a kernel that stores; the choice would be computed first.
+
+        The choice may be an argument of that kernel.
+        """
+        storing = [set(ast.walk(part)) for part in ast.walk(node) if stores(self.called(part))]
+        inner = [part for part in ast.walk(node) if part is not node and self.goes_first(part)]
+        if any(part not in within for part in inner for within in storing):
+            raise NotForLanes(
+                f"line {node.lineno}: a choice beside a kernel that stores; write two statements"
+            )
+
+    def goes_first(self, node: ast.AST) -> bool:
+        """Whether a part of an expression is computed before the statement."""
+        if isinstance(node, ast.IfExp):
+            return not (self.cheap(node.body) and self.cheap(node.orelse))
+        return isinstance(node, ast.BoolOp) and any(map(self.looks_up, node.values[1:]))
 
     def short(self, node: ast.BoolOp, count: int) -> ast.expr:
         """A choice that evaluates all but `count` values in the lanes that need them."""
@@ -115,10 +177,12 @@ class Expressions:
 
     def of_UnaryOp(self, node: ast.UnaryOp) -> ast.expr:
         if isinstance(node.op, ast.Not):
-            return call("lanes_not", self.expression(node.operand))
+            return call("lanes_not", self.truth(node.operand))
         return self.of_parts(node)
 
     def of_Compare(self, node: ast.Compare) -> ast.expr:
+        if len(node.ops) > 1 and any(map(self.looks_up, node.comparators)):
+            raise NotForLanes(f"line {node.lineno}: a chain of comparisons with calls or places")
         places = [node.left, *node.comparators]
         made: ast.expr | None = None
         for left, sign, right in zip(places, node.ops, places[1:], strict=False):
@@ -129,7 +193,8 @@ class Expressions:
 
     def of_IfExp(self, node: ast.IfExp) -> ast.expr:
         if self.cheap(node.body) and self.cheap(node.orelse):
-            return call("lanes_pick", *map(self.expression, (node.test, node.body, node.orelse)))
+            chosen = self.truth(node.test), *map(self.expression, (node.body, node.orelse))
+            return call("lanes_pick", *chosen)
         name = self.fresh("choice")
         body, orelse = (ast.copy_location(set_to(name, v), node) for v in (node.body, node.orelse))
         self.before += self.statement(ast.copy_location(ast.If(node.test, [body], [orelse]), node))
@@ -138,10 +203,11 @@ class Expressions:
     def of_Call(self, node: ast.Call) -> ast.expr:
         if node.keywords:
             raise NotForLanes(f"line {node.lineno}: arguments by name are not for lanes")
-        arguments = list(map(self.expression, node.args))
+        called = self.called(node)
         local = isinstance(node.func, ast.Name) and node.func.id in self.known
-        called = None if local else found(node.func, self.scope)
         name = node.func.id if isinstance(node.func, ast.Name) and not local else ""
+        write = self.truth if name == "bool" else self.expression
+        arguments = list(map(write, node.args))
         if name in EXTREMES:
             return reduce(partial(call, name), arguments)
         if name == "bool":

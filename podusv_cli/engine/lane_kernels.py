@@ -86,6 +86,9 @@ class _Rewriter(Loops):
         write = getattr(self, f"on_{type(node).__name__}", None)
         if write is None:
             raise NotForLanes(f"line {node.lineno}: {type(node).__name__} is not for lanes")
+        for name in ("value", "test", "iter"):
+            if part := getattr(node, name, None):
+                self.check_order(part)
         made = write(node)
         made, self.before = [*self.before, *made], outer
         for part in made:
@@ -119,7 +122,14 @@ class _Rewriter(Loops):
         self.known.add(name)
         return set_to(name, made)
 
+    def on_AnnAssign(self, node: ast.AnnAssign) -> list[ast.stmt]:
+        if node.value is None:
+            return []
+        return self.on_Assign(ast.Assign([node.target], node.value))
+
     def on_AugAssign(self, node: ast.AugAssign) -> list[ast.stmt]:
+        if self.calls_kernel(node.target):
+            raise NotForLanes(f"line {node.lineno}: a place that a kernel computes; name it first")
         old = copy.deepcopy(node.target)
         old.ctx = ast.Load()
         return self.on_Assign(ast.Assign([node.target], ast.BinOp(old, node.op, node.value)))
@@ -163,7 +173,7 @@ class _Rewriter(Loops):
 
     def on_If(self, node: ast.If) -> list[ast.stmt]:
         condition = self.fresh("condition")
-        made: list[ast.stmt] = [set_to(condition, self.expression(node.test))]
+        made: list[ast.stmt] = [set_to(condition, self.truth(node.test))]
         outer, self.apart = self.apart, True
         made += self.lanes(node.body, condition, "lanes_if")
         made += self.lanes(node.orelse, condition, "lanes_else")

@@ -32,7 +32,17 @@ def note_outer_reads(function: ast.FunctionDef) -> None:
     names = {n.id for n in ast.walk(function) if isinstance(n, ast.Name)}
     for loop in ast.walk(function):
         if isinstance(loop, LOOPS):
-            loop.outside = {n for n in names if reads(function, n) > reads(loop, n)}  # type: ignore[union-attr]
+            own = {n: reads(loop, n) - _of_counts(loop, n) for n in names}
+            loop.outside = {  # type: ignore[union-attr]
+                n for n in names if reads(function, n) - _of_counts(function, n) > max(own[n], 0)
+            }
+
+
+def _of_counts(node: ast.AST, name: str) -> int:
+    """How often a variable is read in loops of which it is the count."""
+    if isinstance(node, ast.For) and _sets(node.target, name):
+        return sum(reads(part, name) for part in node.body)
+    return sum(_of_counts(part, name) for part in ast.iter_child_nodes(node))
 
 
 def ends_apart(loop: ast.For | ast.While) -> bool:
@@ -133,8 +143,10 @@ class Loops(Expressions):
             raise NotForLanes(f"line {node.lineno}: a loop with else")
         over = self.expression(node.iter)
         counts = {n.id for n in ast.walk(node.target) if isinstance(n, ast.Name)}
-        if ends_apart(node) and counts & node.outside:  # type: ignore[attr-defined]
-            raise NotForLanes(f"line {node.lineno}: the count of a loop that ends early is used")
+        if (self.apart or ends_apart(node)) and counts & node.outside:  # type: ignore[attr-defined]
+            raise NotForLanes(
+                f"line {node.lineno}: the count of a loop that not every run has is used after it"
+            )
         self.known |= counts
         if not ends_apart(node):
             return [ast.For(node.target, over, self.rounds(node), [])]
@@ -148,7 +160,7 @@ class Loops(Expressions):
             raise NotForLanes(f"line {node.lineno}: a loop with else")
         start, going, outer = self.begun()
         kept, self.before = self.before, []
-        test = self.expression(node.test)
+        test = self.truth(node.test)
         first, self.before = self.before, kept
         inside = [*first, set_to(going, call("lanes_if", name_of(going), test)), self.left(going)]
         inside += self.rounds(node)

@@ -64,9 +64,21 @@ def copy_lane(lane: int, count: int, vector: Any, out: Vector) -> None:
 
 
 @kernel
+def follow_lane(lane: int, other: int, count: int, vector: Any) -> None:
+    """Give a lane the numbers of another one."""
+    numbers = lane_numbers(vector)
+    for i in range(count):
+        numbers[i * LANES + lane] = numbers[i * LANES + other]
+
+
+@kernel
 def end_lanes(k: int, lost: Any, c: Any, n: Any, size: int, under_way: Vector, ends: Vector) -> int:
-    """Keep state, row and observer's numbers of lanes that end here; how many lanes go on."""
-    living = 0
+    """Keep state, row and observer's numbers of lanes that end here; how many lanes go on.
+
+    A lane that has ended goes on with the state of one that has not, and without an effect on it: a
+    loop of a law need not end for numbers that are not finite.
+    """
+    living, last = 0, 0
     for lane in range(LANES):
         if under_way[REACHED + lane] < 0.0:
             if lane_true(lost, lane):
@@ -76,7 +88,11 @@ def end_lanes(k: int, lost: Any, c: Any, n: Any, size: int, under_way: Vector, e
                 copy_lane(lane, n.columns, c.row, tail(out, n.states))
                 copy_lane(lane, size, c.seen, tail(out, n.states + n.columns))
             else:
-                living += 1
+                living, last = living + 1, lane
+    for lane in range(LANES):
+        if living > 0 and lane_true(lost, lane):
+            follow_lane(lane, last, n.states, c.s)
+            follow_lane(lane, last, n.states, c.stages)
     return living
 
 

@@ -20,7 +20,9 @@ from podusv_cli.engine.lane_source import OtherSource, has_source
 from podusv_cli.engine.lane_types import FLOAT
 from podusv_cli.engine.object_cache import Code
 
-AS_WRITTEN = (lane_march.advance_lanes, lane_march.end_lanes, lane_march.copy_lane)
+AS_WRITTEN = (
+    lane_march.advance_lanes, lane_march.end_lanes, lane_march.copy_lane, lane_march.follow_lane,
+)  # fmt: skip
 PLAIN = {*PRIMITIVES, *AS_WRITTEN}
 
 

@@ -111,13 +111,7 @@ def _rounded(name: str) -> Any:
 @intrinsic
 def _float(typing: Any, number: Any) -> Any:
     kind = FLOAT if isinstance(number, LanesType) else types.float64
-    return kind(number), lambda c, b, s, args: _converted(c, b, number, args[0], kind)
-
-
-def _converted(context: Any, builder: Any, given: Any, value: Any, kind: Any) -> Any:
-    if given is WHOLE:
-        return builder.sitofp(value, IR[FLOAT])
-    return context.cast(builder, value, given, kind)
+    return kind(number), lambda c, b, s, args: c.cast(b, args[0], number, kind)
 
 
 @intrinsic(prefer_literal=True)

@@ -22,7 +22,7 @@ from numba.extending import intrinsic
 from podusv_cli.core.kernel import LANES
 from podusv_cli.engine.compile_numba import tail_of
 from podusv_cli.engine.lane_masks import all_lanes
-from podusv_cli.engine.lane_types import FLOAT, IR, WHOLE, LanesType
+from podusv_cli.engine.lane_types import BOOL, FLOAT, IR, WHOLE, LanesType
 
 VECTOR: Any = types.CPointer(FLOAT)
 
@@ -162,6 +162,8 @@ def lanes_whole(typing: Any, number: Any) -> Any:
     """`int(number)`."""
     if number is WHOLE:
         return WHOLE(number), lambda c, b, s, args: args[0]
+    if number is BOOL:
+        return WHOLE(number), lambda c, b, s, args: c.cast(b, args[0], BOOL, WHOLE)
     if isinstance(number, LanesType):
         return WHOLE(FLOAT), lambda c, b, s, args: b.fptosi(args[0], IR[WHOLE])
     return types.int64(number), lambda c, b, s, args: c.cast(b, args[0], number, types.int64)

@@ -33,9 +33,15 @@ def source(function: Any) -> ast.FunctionDef:
     nodes, codes = _functions(_text(function), code.co_filename)
     place = code.co_name, code.co_firstlineno
     found = codes.get(place)
-    if found is None or (found.co_code, found.co_names) != (code.co_code, code.co_names):
+    if found is None or _content(found) != _content(code):
         raise OtherSource(f"{code.co_filename} was edited since {code.co_name} was loaded")
     return nodes[place]
+
+
+def _content(code: CodeType) -> tuple[Any, ...]:
+    """All that makes one kernel another; constants as they are written, as 1 equals 1.0."""
+    numbers = [_content(c) if isinstance(c, CodeType) else repr(c) for c in code.co_consts]
+    return code.co_code, code.co_names, code.co_varnames, numbers
 
 
 def _text(function: Any) -> str:

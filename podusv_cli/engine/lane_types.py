@@ -15,6 +15,7 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.core.datamodel import models, register_default
+from numba.core.errors import TypingError
 from numba.core.imputils import lower_builtin, lower_cast
 from numba.core.typeconv import Conversion
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
@@ -80,11 +81,22 @@ def cast_to_lanes(context: Any, builder: Any, given: Any, wanted: Any, number: A
     if given == wanted:
         return number
     if isinstance(given, LanesType):
-        return builder.sitofp(number, IR[wanted])
+        return _converted(builder, number, given, wanted)
     scalar = context.cast(builder, number, given, wanted.scalar)
     if wanted is BOOL:
         scalar = builder.trunc(scalar, ir.IntType(1)) if scalar.type.width != 1 else scalar
     return splat(builder, scalar)
+
+
+def _converted(builder: Any, number: Any, given: Any, wanted: Any) -> Any:
+    """A truth is 0 or 1, as in Python."""
+    if given is BOOL and wanted is WHOLE:
+        return builder.zext(number, IR[WHOLE])
+    if given is BOOL and wanted is FLOAT:
+        return builder.uitofp(number, IR[FLOAT])
+    if given is WHOLE and wanted is FLOAT:
+        return builder.sitofp(number, IR[FLOAT])
+    raise TypingError(f"{given} cannot become {wanted}")
 
 
 def _has_lanes(args: Any) -> bool:

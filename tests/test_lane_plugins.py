@@ -1,0 +1,76 @@
+"""Laws from files side by side: files that change or are gone, and loops of laws."""
+
+from __future__ import annotations
+
+import importlib.util
+import linecache
+import threading
+from pathlib import Path
+
+import pytest
+from plugin_samples import LAW
+from plugin_samples import SCENARIO as SCENARIO_OF_LAW
+
+from podusv_cli.core.kernel import LANES
+from podusv_cli.engine.batch import simulate_many
+from podusv_cli.engine.grid import TimeGrid
+from podusv_cli.engine.lane_source import OtherSource, source
+from podusv_cli.engine.lanes import why_alone
+from podusv_cli.engine.loop import Observer
+from podusv_cli.engine.variants import variants
+from podusv_cli.scenario.load import load
+
+TEXT = """
+from podusv_cli.core.kernel import kernel
+
+@kernel
+def twice(x):
+    return 0.5 * x + x
+"""
+ENDLESS = """
+        rest = abs(x[3])
+        while rest > 1.0:
+            rest *= 0.5
+        tau[1] += rest
+"""
+
+
+@pytest.mark.parametrize(("old", "new"), [("x + x", "x - x"), ("0.5", "0.75"), ("0.5 *", "1 *")])
+def test_a_file_that_was_edited_is_not_rewritten(tmp_path: Path, old: str, new: str) -> None:
+    """Its kernel may be another one by now than the one that is loaded."""
+    path = tmp_path / "edited.py"
+    path.write_text(TEXT)
+    spec = importlib.util.spec_from_file_location("edited", path)
+    assert spec
+    assert spec.loader
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    assert source(module.twice).name == "twice"
+    path.write_text(TEXT.replace(old, new))
+    linecache.checkcache()
+    with pytest.raises(OtherSource, match=r"edited.py was edited since twice was loaded"):
+        source(module.twice)
+
+
+def test_a_plug_in_whose_file_is_gone_marches_side_by_side(tmp_path: Path) -> None:
+    """A study keeps the text of its plug-ins, so it needs none of their files."""
+    (tmp_path / "laws").mkdir()
+    law, config = tmp_path / "laws/my_law.py", tmp_path / "mine.yaml"
+    law.write_text(f"{LAW}# {tmp_path}\n")  # so that no other test has loaded it
+    config.write_text(SCENARIO_OF_LAW)
+    written = load(config).scenario.singles()["cross_track"]
+    law.unlink()
+    linecache.checkcache()
+    assert why_alone(written.closed_loop(), Observer()) == ""
+
+
+def test_a_run_that_has_diverged_holds_up_no_loop_of_the_others(tmp_path: Path) -> None:
+    """Its state is not finite any more, and a law's `while` need not end for that."""
+    (tmp_path / "laws").mkdir()
+    (tmp_path / "laws/my_law.py").write_text(f"{LAW}{ENDLESS}")
+    (tmp_path / "mine.yaml").write_text(SCENARIO_OF_LAW)
+    base = load(tmp_path / "mine.yaml").scenario.closed_loop()
+    speeds, before = [1e301, *[0.1] * (LANES - 1)], set(threading.enumerate())
+    done = simulate_many(variants(base, {"start.u": speeds}), TimeGrid(0.01, 20), side_by_side=True)
+    assert done.status.tolist() == ["diverged", *["finished"] * (LANES - 1)]
+    assert set(threading.enumerate()) <= before, "none is still in a loop"
