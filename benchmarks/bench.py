@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.alternatives import plain_engine, python_alternatives
-from benchmarks.batch import batch_costs
+from benchmarks.batch import batch_costs, hours_for_a_million, side_by_side_laws
 from benchmarks.c_program import build
 from benchmarks.commands import commands
 from benchmarks.engine import actuators, all_beside_c, growth, law_costs, log_megabytes, seas
@@ -38,7 +38,9 @@ PARTS: dict[str, Callable[[], Any]] = {
     "beside_c": beside_c,
     "growth": growth,
     "batch": batch_costs,
+    "side_by_side_laws": side_by_side_laws,
     "side_by_side": side_by_side_costs,
+    "million": hours_for_a_million,
     "log_megabytes": log_megabytes,
     "law": law_costs,
     "actuators": actuators,

@@ -30,7 +30,15 @@ column.
 """
 
 
-SIDE_BY_SIDE = """
+LAWS_SIDE_BY_SIDE = """\
+Processor time of a run that marches beside seven others, and of one of a batch that marches one by
+one, both with all metrics and all that Python does for a run.
+"""
+MILLION = """\
+Hours that a million runs of 31 000 steps with other starts take on all cores, from 512 runs side by
+side and 64 one by one; compiling is left out.
+"""
+SIDE_BY_SIDE = """\
 `benchmarks/side_by_side.c` marches eight runs of adaptive_neural with 27 nodes as structure of
 arrays, with -O3 and without -ffast-math, and integrates the distance only. All integrals agree to
 1e-9 relative. podusv is timed with all that Python does for a run, in processor time.
@@ -76,8 +84,13 @@ def markdown(results: Results) -> str:
         "## Many runs at once\n",
         BATCH,
         _batch(results["batch"]),
+        "## Runs side by side\n",
+        LAWS_SIDE_BY_SIDE,
+        _laws_side_by_side(results["side_by_side_laws"]),
         SIDE_BY_SIDE,
         _side_by_side(results["side_by_side"]),
+        MILLION,
+        _million(results["million"]),
         "## One evaluation of a law\n",
         _laws(results["law"]),
         "## One step behind each actuator\n",
@@ -130,13 +143,30 @@ def _batch(batch: Results) -> str:
             steps,
             f"{found['runs']} on {found['cores']}",
             *(spread(found["seconds"][name], 1e3) for name in ("alone", "batch")),
-            *(spread(found[name]) for name in ("cost", "processor cost", "side by side")),
+            *(spread(found[name]) for name in ("cost", "processor cost")),
         ]
         for steps, found in batch.items()
     )
     header = ["steps", "runs on cores", "ms a run alone", "ms a run in the batch"]
-    costs = ["cost", "cost in processor time", "processor time side by side"]
-    return table([*header, *costs], rows)
+    return table([*header, "cost", "cost in processor time"], rows)
+
+
+def _laws_side_by_side(laws: Results) -> str:
+    rows = (
+        [
+            *label.split("; "),
+            *(spread(found[name], 1e3) for name in ("side by side", "one by one")),
+            spread(found["ratio"]),
+        ]
+        for label, found in laws.items()
+    )
+    return table(["law, network", "steps", "ms side by side", "ms one by one", "ratio"], rows)
+
+
+def _million(laws: Results) -> str:
+    names = ("side by side", "one by one")
+    rows = ([law, *(spread(found[name]) for name in names)] for law, found in laws.items())
+    return table(["law, network", *(f"hours {name}" for name in names)], rows)
 
 
 def _side_by_side(found: Results) -> str:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.alternatives import python_alternatives
-from benchmarks.batch import batch_costs
+from benchmarks.batch import batch_costs, side_by_side_laws
 from benchmarks.c_program import TOLERANCE, agreement, build
 from benchmarks.cases import CASES, Case, rivals
 from benchmarks.engine import beside_c, growth
@@ -63,9 +63,16 @@ def test_the_cost_of_a_step_does_not_depend_on_how_many_there_are():
 def test_many_runs_cost_what_their_steps_cost():
     whole = batch_costs()["31000"]
     assert whole["processor cost"][1] <= 1.05
-    assert whole["side by side"][1] <= 0.35
     # Other programs take cores away; they do not give any.
     assert whole["cost"][0] <= 1.05
+
+
+def test_a_run_side_by_side_takes_less_than_a_third_of_the_usual_time():
+    found = side_by_side_laws(3)
+    whole = [law["ratio"][1] for label, law in found.items() if label.endswith("; 31000")]
+    usual, many_nodes = whole[:4], whole[4:]
+    assert max(usual) <= 0.33
+    assert max(many_nodes) <= 0.5
 
 
 def test_runs_side_by_side_beside_plain_c_that_marches_so():
