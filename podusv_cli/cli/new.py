@@ -15,7 +15,7 @@ def new(
         str,
         typer.Argument(
             metavar="WHAT",
-            help="law, path, disturbance, metric, figure or vessel.",
+            help="law, path, disturbance, measurement, estimator, metric, figure or vessel.",
             autocompletion=parts,
         ),
     ],

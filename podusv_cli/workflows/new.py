@@ -23,7 +23,7 @@ from podusv_cli.vessels.vessel import VESSELS
 TEMPLATES = "podusv_cli.workflows"
 FOLDER = "starting_files"
 TESTED = "python -m pytest test_$name.py"
-DEFAULTS = {"path": "line", "disturbance": "none", "law": "pid", "several": ""}
+DEFAULTS = {"path": "line", "disturbance": "none", "law": "pid", "more": ""}
 
 
 def _figures() -> Iterable[str]:
@@ -53,11 +53,19 @@ def _plugin(what: str, taken: Callable[[], Iterable[str]], command: str, **words
 PARTS = {
     "law": _plugin(
         "law", partial(kinds_of, Scenario, "controller"), "compare",
-        law="$name", several="controllers: {$name: {}, pid: {kind: pid}}",
+        law="$name", more="controllers: {$name: {}, pid: {kind: pid}}",
     ),
     "path": _plugin("path", partial(kinds_of, Scenario, "path"), "run", path="$name"),
     "disturbance": _plugin(
         "disturbance", partial(kinds_of, Scenario, "disturbance"), "run", disturbance="$name"
+    ),
+    "measurement": _plugin(
+        "measurement", partial(kinds_of, Scenario, "measurement"), "run",
+        more="measurement: {kind: $name}",
+    ),
+    "estimator": _plugin(
+        "estimator", partial(kinds_of, Scenario, "estimator"), "run",
+        more="measurement: {kind: sensors}\nestimator: {kind: $name}",
     ),
     "metric": _plugin("metric", lambda: METRICS, "run"),
     "figure": _plugin("figure", _figures, "compare"),
@@ -107,7 +115,7 @@ def _words(what: str, name: str) -> dict[str, str]:
     return DEFAULTS | own | {
         "name": name, "what": what, "file": f"{name}.py",
         "Class": "".join(word.capitalize() for word in name.split("_")),
-        "sentence": f"A {what} of our own.",
+        "sentence": f"{'An' if what[0] in 'aeiou' else 'A'} {what} of our own.",
     }  # fmt: skip
 
 
