@@ -22,7 +22,7 @@ from podusv_cli.engine.batch_threads import BatchRun, Common, Thread
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.lanes import FEWEST, Sorter
 from podusv_cli.engine.loop import STATE, ClosedLoop, Observer
-from podusv_cli.engine.march import Ending, Work
+from podusv_cli.engine.march import Ending, WaitingThread, Work
 from podusv_cli.engine.simulate import why
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.process.workers import available_workers
@@ -137,6 +137,7 @@ class _Runs:
         self._lanes = Sorter(observer, len(loops) * (grid.steps + 1), lanes)
         self._ready: list[Thread] = []
         self._busy: list[Thread] = []
+        self._maker = WaitingThread()
         self._over, self._settled = 0, False
 
     def march(self, workers: int) -> None:
@@ -154,6 +155,7 @@ class _Runs:
         except KeyboardInterrupt:
             pass
         finally:
+            self._maker.end()
             self._stop()
 
     def _begin(self, position: int) -> None:
@@ -222,7 +224,7 @@ class _Runs:
 
         work = Work(noted)  # a law's `start` may never return
         with interrupts_enabled():
-            work.finish()
+            work.finish(thread=self._maker)
         if found:
             return found[0]
         if isinstance(work.error, KeyboardInterrupt):
@@ -232,6 +234,8 @@ class _Runs:
         elif work.error:
             self._batch.refuse(position, "crashed", in_a_line(work.error))
         else:
+            self._maker.end()
+            self._maker = WaitingThread()
             self._batch.refuse(position, "hung", f"before the first instant: {work.fault()}")
         return None
 
