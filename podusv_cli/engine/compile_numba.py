@@ -95,7 +95,12 @@ def inlined(function: Any) -> Any:
 
 def _in_short(told: str) -> str:
     """What numba says of the innermost place, and where that is."""
-    words = told.split("\n\nFile")[0].split("\nThere are")[0].split("\nDuring")[0]
+    reason = re.search(r"raised a specific error:\n +TypingError: (.*)", told)
+    words = (
+        reason[1]
+        if reason
+        else told.split("\n\nFile")[0].split("\nThere are")[0].split("\nDuring")[0]
+    )
     kept = [line for line in words.splitlines() if not line.startswith("Failed in nopython mode")]
     place = re.search(r'^File "([^"]+)", line (\d+):\n(?:.*\n)*?(.*)\n +\^', told, re.MULTILINE)
     where = f" ({Path(place[1]).name}, line {place[2]}: {place[3].strip()})" if place else ""

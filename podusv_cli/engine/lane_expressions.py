@@ -16,6 +16,7 @@ from podusv_cli.engine.lane_source import NotForLanes, has_source, source
 from podusv_cli.engine.lane_syntax import call, found, name_of, set_to
 
 EXTREMES = ("min", "max")
+SIGNS = (ast.Lt, ast.LtE, ast.Gt, ast.GtE, ast.Eq, ast.NotEq)
 ON = "lanes_on"  # the lanes that a kernel is called in
 
 
@@ -32,6 +33,11 @@ def is_truth(node: ast.expr) -> bool:
         return isinstance(node.op, ast.Not)
     written_out = isinstance(node, ast.Constant) and isinstance(node.value, bool)
     return written_out or isinstance(node, ast.Compare)
+
+
+def is_written_out(node: ast.expr) -> bool:
+    """Whether an expression has no names, so that Python itself computes it."""
+    return not any(isinstance(part, ast.Name) for part in ast.walk(node))
 
 
 @cache
@@ -78,8 +84,11 @@ class Expressions:
 
     def expression(self, node: ast.expr) -> ast.expr:
         """What an expression becomes."""
-        write = getattr(self, f"of_{type(node).__name__}", self.of_parts)
-        return ast.copy_location(write(node), node)
+        write: Any = getattr(self, f"of_{type(node).__name__}", None)
+        if write is None:
+            raise NotForLanes(f"line {node.lineno}: {type(node).__name__} is not for lanes")
+        made: ast.expr = ast.copy_location(write(node), node)
+        return made
 
     def of_parts(self, node: ast.expr) -> ast.expr:
         """An expression whose parts become what they become."""
@@ -91,6 +100,8 @@ class Expressions:
                 new = [self.expression(p) if isinstance(p, ast.expr) else p for p in part]
                 setattr(made, name, new)
         return made
+
+    of_Attribute = of_Constant = of_Name = of_Tuple = of_parts
 
     def of_Subscript(self, node: ast.Subscript) -> ast.expr:
         if self.is_fixed(node.slice):
@@ -171,7 +182,7 @@ class Expressions:
         return ast.IfExp(first, ast.Constant(True), rest)
 
     def of_BinOp(self, node: ast.BinOp) -> ast.expr:
-        if isinstance(node.op, ast.Pow):
+        if isinstance(node.op, ast.Pow) and not is_written_out(node):
             return call("lanes_power", self.expression(node.left), self.expression(node.right))
         return self.of_parts(node)
 
@@ -181,6 +192,8 @@ class Expressions:
         return self.of_parts(node)
 
     def of_Compare(self, node: ast.Compare) -> ast.expr:
+        if not all(isinstance(sign, SIGNS) for sign in node.ops):
+            raise NotForLanes(f"line {node.lineno}: `is` and `in` are not for lanes; write ==")
         if len(node.ops) > 1 and any(map(self.looks_up, node.comparators)):
             raise NotForLanes(f"line {node.lineno}: a chain of comparisons with calls or places")
         places = [node.left, *node.comparators]
@@ -204,6 +217,11 @@ class Expressions:
         if node.keywords:
             raise NotForLanes(f"line {node.lineno}: arguments by name are not for lanes")
         called = self.called(node)
+        if called is kernel.shared and not self.scope["__name__"].startswith("podusv_cli."):
+            raise NotForLanes(
+                f"line {node.lineno}: shared is for podusv's own kernels, whose runs are sorted by "
+                "that number; write int(k.count) of a constant"
+            )
         local = isinstance(node.func, ast.Name) and node.func.id in self.known
         name = node.func.id if isinstance(node.func, ast.Name) and not local else ""
         write = self.truth if name == "bool" else self.expression

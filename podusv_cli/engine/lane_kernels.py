@@ -11,10 +11,10 @@ import copy
 from collections.abc import Collection
 from typing import Any
 
-from podusv_cli.engine.lane_expressions import ON, takes_mask
+from podusv_cli.engine.lane_expressions import ON, stores, takes_mask
 from podusv_cli.engine.lane_loops import Loops, Returns, note_outer_reads
 from podusv_cli.engine.lane_source import NotForLanes, source
-from podusv_cli.engine.lane_syntax import call, found, leaves, name_of, set_to, tailed
+from podusv_cli.engine.lane_syntax import call, found, leaves, name_of, reads, set_to, tailed
 
 RESULT = "lanes_result"
 RETURN = (ast.Return,)
@@ -26,7 +26,22 @@ def rewritten(function: Any, words: dict[str, Any], plain: Collection[Any]) -> A
     `words` are the functions that it is written in; kernels in `plain` know nothing of lanes.
     """
     node = copy.deepcopy(source(function))
+    _check_names(node, function.__globals__, words)
     return _made(function, _Rewriter(node, function.__globals__, plain).function(), words)
+
+
+def _check_names(node: ast.FunctionDef, scope: dict[str, Any], words: Collection[str]) -> None:
+    """Refuse arguments and names that the rewritten kernel would take for something else."""
+    given = node.args
+    if given.posonlyargs or given.kwonlyargs or given.vararg or given.kwarg:
+        raise NotForLanes(f"line {node.lineno}: {node.name} takes other than plain arguments")
+    for part in [part for part in ast.walk(node) if isinstance(part, ast.Name)]:
+        name = part.id
+        if name.startswith("lanes_") or (name in scope and name in {*words, "bool"}):
+            raise NotForLanes(
+                f"line {part.lineno}: {name} stands for something else in kernels side by side; "
+                "call it another name"
+            )
 
 
 def everywhere(function: Any, plain: Collection[Any]) -> Any:
@@ -132,9 +147,22 @@ class _Rewriter(Loops):
             raise NotForLanes(f"line {node.lineno}: a place that a kernel computes; name it first")
         old = copy.deepcopy(node.target)
         old.ctx = ast.Load()
-        return self.on_Assign(ast.Assign([node.target], ast.BinOp(old, node.op, node.value)))
+        return self.to(node.target, ast.BinOp(old, node.op, node.value))
+
+    def check_places(self, node: ast.Assign) -> None:
+        """Refuse places that would be computed before what Python computes first."""
+        parts = [part for target in node.targets for part in ast.walk(target)]
+        several = len(node.targets) > 1 or isinstance(node.targets[0], ast.Tuple)
+        stored = any(stores(self.called(part)) for part in ast.walk(node.value))
+        looked_up = sum(isinstance(part, ast.Subscript) for part in parts) > 1
+        if (stored and looked_up) or ((stored or several) and any(map(self.goes_first, parts))):
+            raise NotForLanes(
+                f"line {node.lineno}: a place that is computed beside a kernel that stores, or a "
+                "choice in one of several places; name the value, or the place, first"
+            )
 
     def on_Assign(self, node: ast.Assign) -> list[ast.stmt]:
+        self.check_places(node)
         if len(node.targets) == 1:
             return self.to(node.targets[0], node.value)
         name = self.fresh("value")
@@ -175,10 +203,21 @@ class _Rewriter(Loops):
         condition = self.fresh("condition")
         made: list[ast.stmt] = [set_to(condition, self.truth(node.test))]
         outer, self.apart = self.apart, True
+        both = [(self.fresh("before"), name) for name in self.of_both(node)]
+        made += [set_to(before, name_of(name)) for before, name in both]
         made += self.lanes(node.body, condition, "lanes_if")
+        for before, name in both:
+            made.append(ast.Expr(call("lanes_same", name_of(before), name_of(name))))
         made += self.lanes(node.orelse, condition, "lanes_else")
         self.apart = outer
         return made
+
+    def of_both(self, node: ast.If) -> list[str]:
+        """Variables that one branch sets and the other one reads."""
+        parts = [part for inner in node.body for part in ast.walk(inner)]
+        names = {p.id for p in parts if isinstance(p, ast.Name) and isinstance(p.ctx, ast.Store)}
+        read = {n for n in names & self.known if any(reads(other, n) for other in node.orelse)}
+        return sorted(read)
 
     def lanes(self, nodes: list[ast.stmt], condition: str, word: str) -> list[ast.stmt]:
         """Statements that run where any lane takes the branch."""

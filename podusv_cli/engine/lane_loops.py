@@ -61,7 +61,7 @@ def _use(node: ast.stmt, name: str) -> str:
     if isinstance(node, LOOPS):
         head = node.iter if isinstance(node, ast.For) else node.test
         use = READ if reads(head, name) else first_use(node.body, name)
-        return "" if use == SET and ends_apart(node) else use
+        return "" if use == SET else use  # it may have no round
     if reads(node, name) or (isinstance(node, ast.AugAssign) and _sets(node.target, name)):
         return READ
     targets = node.targets if isinstance(node, ast.Assign) else []
@@ -141,6 +141,9 @@ class Loops(Expressions):
     def on_For(self, node: ast.For) -> list[ast.stmt]:
         if node.orelse:
             raise NotForLanes(f"line {node.lineno}: a loop with else")
+        parts = node.target.elts if isinstance(node.target, ast.Tuple) else [node.target]
+        if not all(isinstance(part, ast.Name) for part in parts):
+            raise NotForLanes(f"line {node.lineno}: a loop whose count is no variable")
         over = self.expression(node.iter)
         counts = {n.id for n in ast.walk(node.target) if isinstance(n, ast.Name)}
         if (self.apart or ends_apart(node)) and counts & node.outside:  # type: ignore[attr-defined]
@@ -164,6 +167,8 @@ class Loops(Expressions):
         first, self.before = self.before, kept
         inside = [*first, set_to(going, call("lanes_if", name_of(going), test)), self.left(going)]
         inside += self.rounds(node)
+        if leaves(node.body, (ast.Break,)):  # which no test may come after
+            inside.append(self.left(going))
         self.mask, self.apart = outer
         return [start, ast.While(ast.Constant(True), inside, [])]
 
@@ -184,7 +189,7 @@ class Loops(Expressions):
         self.loops.append(loop)
         self.going.append(self.mask)
         loop.body = tailed(loop.body, OUT_OF_LOOP)
-        written = self.block(loop.body)
+        written = self.block(loop.body) or [ast.Pass()]
         self.loops.pop()
         self.going.pop()
         return written

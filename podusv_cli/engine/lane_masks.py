@@ -105,6 +105,17 @@ def lanes_assign(typing: Any, mask: Any, new: Any, old: Any) -> Any:
 
 
 @intrinsic
+def lanes_same(typing: Any, before: Any, now: Any) -> Any:
+    """Refuse a variable that is whole before a branch, and a float where the other one reads it."""
+    if lanes_of(before) is WHOLE and lanes_of(now) is FLOAT:
+        raise TypingError(
+            "a variable is a whole number where one branch reads it, and a float in the other "
+            "branch; write 1.0 for 1 before them"
+        )
+    return types.none(before, now), lambda c, b, sig, args: c.get_dummy_value()
+
+
+@intrinsic
 def lanes_pick(typing: Any, condition: Any, one: Any, other: Any) -> Any:
     """`one if condition else other`, both evaluated."""
     condition_type = types.unliteral(condition)

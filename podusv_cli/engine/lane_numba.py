@@ -58,7 +58,7 @@ def _for_lanes(function: Any) -> Any:
     elif has_source(function):
         made = rewritten(function, WORDS, PLAIN)
     outer = made.__globals__
-    named = {i.argval for i in dis.get_instructions(function) if i.opname == "LOAD_GLOBAL"}
+    named = {i.argval for i in dis.get_instructions(made) if i.opname == "LOAD_GLOBAL"}
     inner = {name: inlined(outer[name]) for name in named if kernel.is_kernel(outer.get(name))}
     return kernel.with_globals(made, function.__qualname__, **inner)
 

@@ -26,6 +26,7 @@ from podusv_cli.engine.lane_masks import (
     lanes_not,
     lanes_or,
     lanes_pick,
+    lanes_same,
     lanes_start,
     mask_of,
 )
@@ -125,7 +126,9 @@ def _power(typing: Any, number: Any, exponent: Any) -> Any:
             b, args[0], exponent.literal_value
         )
     if not {lanes_of(number), lanes_of(exponent)} == {FLOAT}:
-        raise TypingError(f"{number} ** {exponent}")
+        raise TypingError(
+            f"{number} ** {exponent}; write both as floats, or the exponent as a number"
+        )
 
     def code(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         both = [context.cast(builder, v, k, FLOAT) for v, k in zip(args, sig.args, strict=True)]
@@ -158,6 +161,8 @@ def _extreme(sign: str) -> Any:
             compare = (
                 builder.fcmp_ordered if isinstance(scalar, types.Float) else builder.icmp_signed
             )
+            if isinstance(scalar, types.Boolean):
+                compare = builder.icmp_unsigned
             return builder.select(compare(sign, second, first), second, first)
 
         return kind(one, other), code
@@ -178,6 +183,7 @@ WORDS: dict[str, Any] = {
     "lanes_lift": lanes_lift, "lanes_assign": lanes_assign, "lanes_pick": lanes_pick,
     "lanes_and": lanes_and, "lanes_or": lanes_or, "lanes_not": lanes_not, "lanes_if": lanes_if,
     "lanes_else": lanes_else, "lanes_any": lanes_any, "lanes_start": lanes_start,
+    "lanes_same": lanes_same,
     "lanes_load": lanes_load, "lanes_store": lanes_store, "int": lanes_whole,
     "lanes_ceil": _rounded("ceil"), "lanes_floor": _rounded("floor"),
     "lanes_power": _power, "min": _extreme("<"), "max": _extreme(">"), "float": _float,

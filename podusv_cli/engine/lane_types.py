@@ -99,6 +99,15 @@ def _converted(builder: Any, number: Any, given: Any, wanted: Any) -> Any:
     raise TypingError(f"{given} cannot become {wanted}")
 
 
+ONE: tuple[Any, ...] = (
+    math.sin, math.cos, math.tan, math.asin, math.acos, math.atan, math.exp, math.log,
+    math.sinh, math.cosh, math.tanh, math.log10, math.log1p, math.expm1, math.asinh, math.acosh,
+    math.atanh, math.erf, math.radians, math.degrees,
+)  # fmt: skip
+TWO: tuple[Any, ...] = (math.atan2, math.hypot, math.pow, math.copysign)
+OF_FLOATS = {operator.truediv, math.sqrt, math.fabs, *ONE, *TWO} - {math.pow}  # numba's pow differs
+
+
 def _has_lanes(args: Any) -> bool:
     return any(isinstance(a, LanesType) for a in args)
 
@@ -114,9 +123,8 @@ def _operation(function: Any, arity: int, result: Any = None) -> None:
             kinds = [lanes_of(a) for a in args]
             if kws or len(args) != arity or not _has_lanes(args) or None in kinds:
                 return None
-            kind = FLOAT if FLOAT in kinds or function is operator.truediv else WHOLE
-            if all(k is BOOL for k in kinds):
-                kind = BOOL
+            floats = FLOAT in kinds or function in OF_FLOATS
+            kind = FLOAT if floats else WHOLE  # truths are the numbers 0 and 1
             return signature(result or kind, *[kind] * arity)
 
 
@@ -202,12 +210,6 @@ def _library(function: Any, arity: int) -> None:
     _by_lane(function, arity)
 
 
-ONE: tuple[Any, ...] = (
-    math.sin, math.cos, math.tan, math.asin, math.acos, math.atan, math.exp, math.log,
-    math.sinh, math.cosh, math.tanh, math.log10, math.log1p, math.expm1, math.asinh, math.acosh,
-    math.atanh, math.erf, math.radians, math.degrees,
-)  # fmt: skip
-TWO: tuple[Any, ...] = (math.atan2, math.hypot, math.pow, math.copysign)
 LLVM: dict[Any, str] = {math.sqrt: "sqrt", math.fabs: "fabs", abs: "fabs"}
 for _function in ONE:
     _library(_function, 1)
@@ -216,6 +218,14 @@ for _function in TWO:
 for _function, _llvm in LLVM.items():
     _operation(_function, 1)
     _lower(_function, FLOAT, 1, lambda b, x, name=_llvm: intrinsic_call(b, name, x))
+_lower(
+    abs, WHOLE, 1,
+    lambda b, x: b.select(
+        b.icmp_signed("<", x, ir.Constant(x.type, [0] * LANES)),
+        b.sub(ir.Constant(x.type, [0] * LANES), x),
+        x,
+    ),
+)  # fmt: skip
 for _function in (operator.mod, operator.floordiv):
     _operation(_function, 2)
     _by_lane(_function, 2, FLOAT)
