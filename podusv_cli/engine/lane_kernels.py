@@ -78,7 +78,8 @@ class _Rewriter(Loops):
         Returns().function(node)
         ast.fix_missing_locations(node)
         note_outer_reads(node)
-        body = tailed(node.body[1:] if ast.get_docstring(node) is not None else node.body)
+        body = node.body[1:] if ast.get_docstring(node) is not None else node.body
+        body = tailed(body, RETURN, self.fresh("left"))
         several = leaves(body[:-1], RETURN) or not body or not isinstance(body[-1], RETURN)
         values = [n.value for b in body for n in ast.walk(b) if isinstance(n, ast.Return)]
         written = self.block(body) or [ast.Pass()]

@@ -188,7 +188,7 @@ class Loops(Expressions):
         """The statements of a loop."""
         self.loops.append(loop)
         self.going.append(self.mask)
-        loop.body = tailed(loop.body, OUT_OF_LOOP)
+        loop.body = tailed(loop.body, OUT_OF_LOOP, self.fresh("left"))
         written = self.block(loop.body) or [ast.Pass()]
         self.loops.pop()
         self.going.pop()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import copy
 from collections.abc import Mapping
 from typing import Any
 
@@ -50,22 +49,49 @@ def ends(nodes: list[ast.stmt], kinds: Kinds) -> bool:
     )
 
 
-def tailed(nodes: list[ast.stmt], kinds: Kinds = (ast.Return,)) -> list[ast.stmt]:
-    """The same statements with every `return`, or what else leaves, at the end of a branch."""
+def tailed(nodes: list[ast.stmt], kinds: Kinds, flag: str) -> list[ast.stmt]:
+    """The same statements with every `return`, or what else leaves, at the end of a branch.
+
+    What follows branches that both may go on runs where the variable `flag` says that none left.
+    """
+    made = _tailed(nodes, kinds, flag)
+    if any(reads(node, flag) for node in made):
+        made.insert(0, ast.copy_location(set_to(flag, ast.Constant(False)), made[0]))
+    return made
+
+
+def _tailed(nodes: list[ast.stmt], kinds: Kinds, flag: str) -> list[ast.stmt]:
     for i, node in enumerate(nodes):
         if isinstance(node, kinds):
             return nodes[: i + 1]
         if not _leaves(node, kinds):
             continue
         assert isinstance(node, ast.If)  # loops are not returned from any more, see `lane_loops`
-        rest = nodes[i + 1 :]
-        branches = [
-            tailed(b if ends(b, kinds) else [*b, *copy.deepcopy(rest)], kinds)
-            for b in (node.body, node.orelse)
-        ]
-        made = ast.copy_location(ast.If(node.test, *branches), node)
-        return [*nodes[:i], made]
+        branches, rest = [node.body, node.orelse], nodes[i + 1 :]
+        behind: list[ast.stmt] = []
+        going_on = [branch for branch in branches if not ends(branch, kinds)]
+        if len(going_on) == 2 and rest:
+            branches = [_noted(branch, kinds, flag) for branch in branches]
+            stayed = ast.UnaryOp(ast.Not(), name_of(flag))
+            behind = [ast.copy_location(ast.If(stayed, _tailed(rest, kinds, flag), []), rest[0])]
+        elif going_on:
+            branches = [[*b, *rest] if b is going_on[0] else b for b in branches]
+        inner = [_tailed(branch, kinds, flag) for branch in branches]
+        return [*nodes[:i], ast.copy_location(ast.If(node.test, *inner), node), *behind]
     return nodes
+
+
+def _noted(nodes: list[ast.stmt], kinds: Kinds, flag: str) -> list[ast.stmt]:
+    """The same statements, which set the flag before they leave."""
+    made: list[ast.stmt] = []
+    for node in nodes:
+        if isinstance(node, kinds):
+            made.append(ast.copy_location(set_to(flag, ast.Constant(True)), node))
+        if isinstance(node, ast.If):
+            inner = [_noted(branch, kinds, flag) for branch in (node.body, node.orelse)]
+            node = ast.copy_location(ast.If(node.test, *inner), node)
+        made.append(node)
+    return made
 
 
 def reads(node: ast.AST, name: str) -> int:
