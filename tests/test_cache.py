@@ -10,12 +10,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import Constant, adrift, run
+from conftest import Constant, adrift, example, kinds, run
 from numba import njit
 
 from podusv_cli.core.kernel import Vector, kernel, specialise
 from podusv_cli.core.kinematics import wrap
 from podusv_cli.engine import code_folder, compile, object_cache
+from podusv_cli.engine.loop import Observer, entries
 
 FORCE = 0.0
 
@@ -41,6 +42,20 @@ def test_kernels_of_the_same_name_are_not_taken_for_each_other():
     for force in (1.0, 7.0):
         out = run(adrift(controller=constant_law(force)), 0.05)
         np.testing.assert_array_equal(out["tau_u_cmd"], force)
+
+
+def test_what_does_nothing_has_the_same_code_for_every_law():
+    """Laws without samples, and that do not hear of limits, whose constants differ."""
+    laws = (example(kind) for kind in kinds("controllers").values())
+    parts = [list(entries(adrift(controller=law), Observer())) for law in laws]
+    for part in ("sample", "after_saturation"):
+        idle = {(k, names) for one in parts for p, k, names in one if p == part and is_idle(k)}
+        assert len(idle) == 1
+
+
+def is_idle(function: Any) -> bool:
+    """Whether a kernel is the loop's own, which stands where a law has none."""
+    return bool(function.__module__ == entries.__module__)
 
 
 def test_kernels_that_read_different_constants_are_not_taken_for_each_other():

@@ -217,15 +217,17 @@ def entries(
     """Name, kernel and constants' names of every part, in the order the loop takes them."""
     law, path, disturbance, actuator = loop.controller, loop.path, loop.disturbance, loop.actuator
     constants = tuple(recall(law.constants_with, loop.nominal))
-    sample = law.sample if law.sample_period() > 0 else _no_sample
-    after_saturation = law.after_saturation if law.wants_loads() else _ignore_loads
+    # What does nothing reads no constants: its machine code is the same for every law.
+    sample = (law.sample, constants) if law.sample_period() > 0 else (_no_sample, ())
+    told = law.wants_loads()
+    after_saturation = (law.after_saturation, constants) if told else (_ignore_loads, ())
     yield "path", path.evaluate, tuple(recall(path.constants))
     loads = tuple(recall(disturbance.constants_with, loop.vessel))
     yield "disturbance", disturbance.kernel_with(loop.vessel), loads
     yield "law", law.law, constants
-    yield "sample", sample, constants
+    yield "sample", *sample
     yield "actuator", actuator.drive_with(), tuple(recall(actuator.constants))
-    yield "after_saturation", after_saturation, constants
+    yield "after_saturation", *after_saturation
     yield from _seeing(loop, recall)
     yield "observer", observer.watch, tuple(observer.constants)
 
