@@ -9,6 +9,7 @@ from scenario_samples import SOUND, VESSEL_NAMES, findings, loaded, told, write
 
 from podusv_cli.actuators.pod import Pods
 from podusv_cli.core.errors import ScenarioError
+from podusv_cli.scenario import presets
 from podusv_cli.scenario.load import load, load_text, resolved_yaml
 from podusv_cli.scenario.named_files import MAX_POINTS
 from podusv_cli.scenario.presets import preset_file, preset_names
@@ -31,6 +32,13 @@ def test_a_preset_is_its_file(name):
     assert faults == []
     vessel = loaded(SOUND.replace("preset: paper", f"preset: {name}")).scenario.vessel
     assert vessel == Vessel(preset=name, **plain(node))
+
+
+def test_a_preset_is_parsed_once_however_many_scenarios_have_it(monkeypatch):
+    first, parsed = loaded(SOUND).scenario, []
+    monkeypatch.setattr(presets, "read", lambda text, source, *more, **how: parsed.append(source))
+    assert loaded(SOUND).scenario == first
+    assert not parsed
 
 
 def test_a_vessel_can_change_some_values_of_its_preset():

@@ -53,7 +53,19 @@ def preset_file(
 ) -> Node | None:
     """The values of a preset by its name, one of `preset_names`."""
     text = _preset_files(presets, plugins)[name].read_text("utf-8")
-    return read(text, f"{presets.file} {name}.yaml", faults, placed=False)
+    node, found = _tree(text, f"{presets.file} {name}.yaml")
+    faults += found
+    return node
+
+
+@cache
+def _tree(text: str, source: str) -> tuple[Node | None, tuple[Fault, ...]]:
+    """The tree of a preset's text, and what is wrong with it.
+
+    Every scenario has some presets, several times, so each is parsed once.
+    """
+    faults: list[Fault] = []
+    return read(text, source, faults, placed=False), tuple(faults)
 
 
 def preset_text(presets: Presets, name: str, key: str, plugins: Plugins = ()) -> str:
