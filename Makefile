@@ -6,7 +6,8 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt
 STEP := PODUSV=$(BIN)/podusv results/step.sh
 # A file to a core; what its tests share is made once.
-PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/pytest --numprocesses auto --dist loadfile
+# Tests start processes, which would each translate podusv's source anew without byte code on disk.
+PYTEST := OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(BIN)/pytest --numprocesses auto --dist loadfile
 OURS := podusv_cli tests benchmarks results examples docs
 # Every dependency of a run at its lower bound; what tests need beside them, as new as may be.
 OLDEST := .venv-oldest
