@@ -48,7 +48,9 @@ def study(tmp_path_factory):
     (folder / "faulty.yaml").write_text(text)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(march, "PATIENCE", 0.3)
-        request = sweep.Request(("sweep.draws=16",), folder / "study", workers=1, figures=False)
+        request = sweep.Request(
+            ("sweep.draws=7", "sweep.seed=14"), folder / "study", workers=1, figures=False
+        )
         return sweep.run(folder / "faulty.yaml", request, lambda tally: None)
 
 
