@@ -1,12 +1,10 @@
 """A study's folder: the same bytes however the runs were made, and nothing that is made is lost."""
 
 import errno
-import io
 import json
 import os
 import shutil
 
-import h5py
 import numpy as np
 import pytest
 from small_study import TEXT, made, small, written
@@ -15,13 +13,12 @@ from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.engine.simulate import simulate
 from podusv_cli.study import march as marching
 from podusv_cli.study import runs_file, runs_writer
-from podusv_cli.study import store as stores
 from podusv_cli.study import unit as units
 from podusv_cli.study.draws import drawn, draws
 from podusv_cli.study.plan import watching
 from podusv_cli.study.results import judged
-from podusv_cli.study.store import BLOCK, RUNS, UNITS, Store, encoded, read, undamaged
-from podusv_cli.study.unit import Unit, UnitResult
+from podusv_cli.study.store import RUNS, UNITS, Store
+from podusv_cli.study.unit import Unit
 from podusv_cli.workflows import studies, sweep
 
 
@@ -146,35 +143,6 @@ def test_a_unit_that_comes_while_the_table_is_written_is_kept(whole, tmp_path, m
     assert not list((store.folder / UNITS).iterdir())
 
 
-def test_a_whole_study_removes_only_units_that_it_read(tmp_path, monkeypatch):
-    store = made(tmp_path / "study", draws=8)
-    finishing(monkeypatch, lambda: (store.folder / UNITS / "late.h5").write_bytes(b"late"))
-    store.write_runs()
-    assert [path.name for path in (store.folder / UNITS).iterdir()] == ["late.h5"]
-
-
-def test_a_unit_that_cannot_be_read_is_an_error_and_not_missing(tmp_path, monkeypatch):
-    store = made(tmp_path / "study", part=(1, 5))
-    there = sorted((store.folder / UNITS).iterdir())
-
-    def fail(path):
-        raise OSError(errno.EIO, "Input/output error")
-
-    monkeypatch.setattr(stores.Path, "read_bytes", fail)
-    for act in (store.covered, store.write_runs, lambda: list(store.results())):
-        with pytest.raises(StorageError, match=r"cannot read .*units/.*: Input/output error"):
-            act()
-    assert sorted((store.folder / UNITS).iterdir()) == there
-
-
-def test_a_unit_that_is_gone_before_it_is_read_spoils_no_table(tmp_path, monkeypatch):
-    store = made(tmp_path / "study", part=(1, 5))
-    monkeypatch.setattr(stores, "read", lambda path, seal: None)
-    with pytest.raises(StorageError, match="another podusv removed or changed it meanwhile"):
-        store.write_runs()
-    assert not (store.folder / RUNS).exists()
-
-
 def replace_folder(store, folder):
     return Store(folder, store.plan)
 
@@ -222,41 +190,6 @@ def test_time_over_keeps_what_is_made(tmp_path, monkeypatch):
     assert not whole
     assert 0 < tally.made < tally.wanted
     assert sum(int(mask.sum()) for mask in store.covered().values()) == tally.made
-
-
-def test_a_unit_with_any_other_byte_is_damaged(tmp_path):
-    store = made(tmp_path / "study", part=(1, 5))
-    path = next((store.folder / UNITS).glob("pid-*"))
-    sound = path.read_bytes()
-    there = store.covered()["pid", 0].sum()
-    places = [*range(0, BLOCK, 7), *np.linspace(BLOCK, len(sound) - 1, 40).astype(int)]
-    spoilt = [sound[:at] + bytes([sound[at] ^ 1]) + sound[at + 1 :] for at in places]
-    for content in (b"", sound[:-9], sound[:300], sound + b"0", *spoilt):
-        path.write_bytes(content)
-        assert read(path, store.seal) is None
-        assert store.covered()["pid", 0].sum() == 0 < there
-    path.write_bytes(sound)
-    assert store.covered()["pid", 0].sum() == there
-
-
-def test_a_unit_is_counted_without_hdf5(tmp_path, monkeypatch):
-    store = made(tmp_path / "study", part=(1, 5))
-    opened = []
-    monkeypatch.setattr(h5py, "File", lambda *given, **options: opened.append(given))
-    assert sum(int(mask.sum()) for mask in store.covered().values()) == 16
-    assert all(given[0] == store.folder / RUNS for given in opened)
-
-
-@pytest.mark.parametrize("law", ["pid", "ä" * 400])
-def test_a_unit_of_any_name_is_read_as_it_was(law):
-    numbers = np.array([1.5, np.nan])
-    unit = Unit(law, 3, 70, 2)
-    result = UnitResult(unit, {"iae": numbers}, np.array([0, 1], np.uint8), numbers, ("", "ü"))
-    content = encoded(result, "seal")
-    assert undamaged(content, "seal") == unit
-    assert undamaged(content, "other") is None
-    with h5py.File(io.BytesIO(content), "r") as file:
-        assert file["table"].shape == (2, 2)
 
 
 def test_a_full_disk_while_the_table_is_filled_keeps_the_units(whole, tmp_path, monkeypatch):
