@@ -128,6 +128,7 @@ def _sum(parts: Sequence[Part]) -> Callable[..., None]:
     Its source is written out, because compiled code cannot choose between functions.
     """
     scope: dict[str, Any] = {"scratch": scratch, "tail": tail, "shared": shared}
+    scope["__name__"] = __name__  # podusv's own, which may use `shared`
     lines = ["def evaluate(t, x, k, table, b, again=0.0, stage=0.0):", "    u = v = r = 0.0"]
     written: set[int] = set()
     count = Counter(place for part in parts for place in part.places)

@@ -181,6 +181,10 @@ class Expressions:
             return ast.IfExp(first, rest, ast.Constant(False))
         return ast.IfExp(first, ast.Constant(True), rest)
 
+    def is_ours(self) -> bool:
+        """Whether the kernel is podusv's own."""
+        return str(self.scope.get("__name__")).startswith("podusv_cli.")
+
     def of_BinOp(self, node: ast.BinOp) -> ast.expr:
         if isinstance(node.op, ast.Pow) and not is_written_out(node):
             return call("lanes_power", self.expression(node.left), self.expression(node.right))
@@ -217,7 +221,7 @@ class Expressions:
         if node.keywords:
             raise NotForLanes(f"line {node.lineno}: arguments by name are not for lanes")
         called = self.called(node)
-        if called is kernel.shared and not self.scope["__name__"].startswith("podusv_cli."):
+        if called is kernel.shared and not self.is_ours():
             raise NotForLanes(
                 f"line {node.lineno}: shared is for podusv's own kernels, whose runs are sorted by "
                 "that number; write int(k.count) of a constant"
