@@ -84,9 +84,20 @@ PARTS = {f"paper/{name}.yaml" for name in ("base", "claims", "ablation_laws")}
 CONFIGS = ROOT / "configs"
 SHIPPED = {path.relative_to(CONFIGS).as_posix(): path for path in CONFIGS.rglob("*.yaml")}
 
+# Of these others are made, which have the same keys: by other numbers, or by `extends`.
+ALIKE = {
+    *(f"sea/state_{state}.yaml" for state in (2, 3, 5, 6)),
+    *(f"studies/{name}.yaml" for name in ("sea_state_2", "sea_state_6", "tune_phases", "tune_hull")),
+}  # fmt: skip
+
 
 @pytest.mark.parametrize(
-    "name", sorted(n for n in SHIPPED.keys() - PARTS if not n.startswith("bench/"))
+    "name",
+    [
+        pytest.param(name, marks=[pytest.mark.slow] * (name in ALIKE))
+        for name in sorted(SHIPPED.keys() - PARTS)
+        if not name.startswith("bench/")
+    ],
 )
 def test_every_run_of_a_shipped_scenario_reads_back(name):
     for scenario in load(SHIPPED[name]).scenario.singles().values():
