@@ -87,7 +87,8 @@ SHIPPED = {path.relative_to(CONFIGS).as_posix(): path for path in CONFIGS.rglob(
 # Of these others are made, which have the same keys: by other numbers, or by `extends`.
 ALIKE = {
     *(f"sea/state_{state}.yaml" for state in (2, 3, 5, 6)),
-    *(f"studies/{name}.yaml" for name in ("sea_state_2", "sea_state_6", "tune_phases", "tune_hull")),
+    *(f"studies/sea_state_{state}.yaml" for state in (2, 6)),
+    *(f"studies/tune_{name}.yaml" for name in ("phases", "hull")),
 }  # fmt: skip
 
 
