@@ -40,7 +40,7 @@ FORMS = {
     "({b} or {b})|not {c}|bool({f})|math.isnan({f})|math.isfinite({f})|truth({f}, {f})|"
     "({b} if {c} else {b})|({b}) == ({b})",
     "c": "{b}|{b}|({c} and {c})|({c} or {c})|not ({c})|{f}|{i}",
-    "q": "{w} % 4|{i} % 4|min(max({i}, 0), 4)|whole({f}, {i}) % 3", "p": "0|1|2|3|4|COUNT",
+    "q": "{w} % 4|({i}) % 4|min(max({i}, 0), 4)|whole({f}, {i}) % 3", "p": "0|1|2|3|4|COUNT",
     "w": "int(max(-9e9, min({f}, 9e9)))",
 }  # fmt: skip
 LEAVES = {

@@ -70,7 +70,10 @@ def test_a_run_that_has_diverged_holds_up_no_loop_of_the_others(tmp_path: Path) 
     (tmp_path / "laws/my_law.py").write_text(f"{LAW}{ENDLESS}")
     (tmp_path / "mine.yaml").write_text(SCENARIO_OF_LAW)
     base = load(tmp_path / "mine.yaml").scenario.closed_loop()
-    speeds, before = [1e301, *[0.1] * (LANES - 1)], set(threading.enumerate())
-    done = simulate_many(variants(base, {"start.u": speeds}), TimeGrid(0.01, 20), side_by_side=True)
+    speeds, grid = [1e301, *[0.1] * (LANES - 1)], TimeGrid(0.01, 20)
+    before = set(threading.enumerate())
+    done = simulate_many(variants(base, {"start.u": speeds}), grid, side_by_side=True)
     assert done.status.tolist() == ["diverged", *["finished"] * (LANES - 1)]
+    for thread in set(threading.enumerate()) - before:
+        thread.join(5.0)  # s; the batch's own thread ends by itself
     assert set(threading.enumerate()) <= before, "none is still in a loop"

@@ -35,6 +35,13 @@ def is_kernel(thing: object) -> bool:
     return getattr(thing, "__kernel__", False) is True
 
 
+def named_kernels(function: Any) -> dict[str, Any]:
+    """The kernels among the globals that a function names, by name."""
+    named = {i.argval for i in dis.get_instructions(function) if i.opname == "LOAD_GLOBAL"}
+    found = {name: function.__globals__.get(name) for name in named}
+    return {name: thing for name, thing in found.items() if is_kernel(thing)}
+
+
 @kernel
 def tail(vector: Vector, start: int) -> Vector:
     """The part of `vector` from index `start` on, sharing its memory."""

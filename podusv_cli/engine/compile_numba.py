@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import dis
 import linecache
 import re
 from functools import cache
@@ -70,14 +69,14 @@ def object_code(function: Any, prototype: Any) -> Code:
 
     Raises TypeError for a kernel that needs more than arithmetic and the mathematical library.
     """
-    return translated(function, _with_inlined, _signature(prototype))
+    return translated(function, _with_inlined, signature(prototype, from_ctypes))
 
 
-def translated(function: Any, prepare: Any, signature: Any) -> Code:
+def translated(function: Any, prepare: Any, typed: Any) -> Code:
     """Object code of what `prepare` makes of a kernel, with this signature of numba's types."""
     linecache.checkcache()  # numba shows lines from there; a file may have been edited meanwhile
     try:
-        compiled = cfunc(signature, **OPTIONS)(prepare(function))
+        compiled = cfunc(typed, **OPTIONS)(prepare(function))
     except NumbaError as error:
         raise TypeError(_in_short(str(error))) from error
     module = llvm.parse_assembly(compiled.inspect_llvm())
@@ -109,23 +108,20 @@ def _in_short(told: str) -> str:
 
 def _with_inlined(function: Any) -> Any:
     """A copy of the kernel whose globals have numba functions in place of other kernels."""
-    outer = function.__globals__
-    named = {i.argval for i in dis.get_instructions(function) if i.opname == "LOAD_GLOBAL"}
-    called = {name for name in named if kernel.is_kernel(outer.get(name))}
-    inner = {name: inlined(outer[name]) for name in called}
+    inner = {name: inlined(called) for name, called in kernel.named_kernels(function).items()}
     return kernel.with_globals(function, function.__qualname__, **inner)
 
 
-def _signature(prototype: Any) -> Any:
-    arguments = [_type(kind) for kind in prototype._argtypes_]
-    return _type(prototype._restype_)(*arguments)
+def signature(prototype: Any, type_of: Any) -> Any:
+    """A prototype in numba's types; `type_of` gives that of what is no function."""
 
+    def typed(kind: Any) -> Any:
+        if kind and issubclass(kind, ctypes._CFuncPtr):  # type: ignore[attr-defined]
+            # numba wants a function from a Python object to its address, but never calls it here.
+            return types.ExternalFunctionPointer(signature(kind, type_of), ctypes.addressof)
+        return type_of(kind)
 
-def _type(kind: Any) -> Any:
-    if kind and issubclass(kind, ctypes._CFuncPtr):  # type: ignore[attr-defined]
-        # numba wants a function from a Python object to its address, but never calls it here.
-        return types.ExternalFunctionPointer(_signature(kind), ctypes.addressof)
-    return from_ctypes(kind)  # type: ignore[no-untyped-call]
+    return typed(prototype._restype_)(*map(typed, prototype._argtypes_))
 
 
 def _check_calls(module: Any, name: str) -> None:

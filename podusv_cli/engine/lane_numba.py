@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import ctypes
-import dis
 from functools import cache
 from typing import Any
 
@@ -33,7 +32,8 @@ def object_code(function: Any, prototype: Any) -> Code:
     TypeError where that need not be so the next time.
     """
     try:
-        return compile_numba.translated(function, _for_lanes, _signature(prototype))
+        signature = compile_numba.signature(prototype, _type)
+        return compile_numba.translated(function, _for_lanes, signature)
     except (OtherSource, MemoryError, OSError) as error:
         raise TypeError(in_a_line(error)) from error
     except TypeError as error:  # says what and where
@@ -57,19 +57,11 @@ def _for_lanes(function: Any) -> Any:
         made = everywhere(function, PLAIN)
     elif has_source(function):
         made = rewritten(function, WORDS, PLAIN)
-    outer = made.__globals__
-    named = {i.argval for i in dis.get_instructions(made) if i.opname == "LOAD_GLOBAL"}
-    inner = {name: inlined(outer[name]) for name in named if kernel.is_kernel(outer.get(name))}
+    inner = {name: inlined(called) for name, called in kernel.named_kernels(made).items()}
     return kernel.with_globals(made, function.__qualname__, **inner)
 
 
-def _signature(prototype: Any) -> Any:
-    return _type(prototype._restype_)(*map(_type, prototype._argtypes_))
-
-
 def _type(kind: Any) -> Any:
-    if kind and issubclass(kind, ctypes._CFuncPtr):  # type: ignore[attr-defined]
-        return types.ExternalFunctionPointer(_signature(kind), ctypes.addressof)
     if kind and issubclass(kind, ctypes._Pointer):
         return types.CPointer(_type(kind._type_))
     return FLOAT if kind and issubclass(kind, ctypes.Array) else from_ctypes(kind)

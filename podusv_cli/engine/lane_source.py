@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import dis
 import linecache
 from collections.abc import Iterator
 from functools import cache
@@ -11,7 +10,7 @@ from types import CodeType
 from typing import Any
 
 from podusv_cli.core import plugins
-from podusv_cli.core.kernel import is_kernel
+from podusv_cli.core.kernel import named_kernels
 
 
 class NotForLanes(TypeError):
@@ -88,11 +87,5 @@ def _whole_numbers(function: Any, done: set[Any]) -> Iterator[str]:
             and isinstance(node.args[0], ast.Attribute)
         ):
             yield node.args[0].attr
-    for instruction in dis.get_instructions(function):
-        called = (
-            function.__globals__.get(instruction.argval)
-            if instruction.opname == "LOAD_GLOBAL"
-            else None
-        )
-        if is_kernel(called):
-            yield from _whole_numbers(called, done)
+    for called in named_kernels(function).values():
+        yield from _whole_numbers(called, done)
