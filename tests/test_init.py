@@ -93,9 +93,10 @@ def test_init_lists_every_scenario_that_is_meant_to_be_run(podusv):
     assert others - layers == {"paper/base", "paper/claims", "paper/ablation_laws", "theory/base"}
     assert list(points)[:4] == [*FIRST]
     assert list(points)[4:] == sorted(set(points) - set(FIRST))
-    begin, rest = " ".join(podusv("init").out.split()).split(FIRST[0], 1)
-    assert begin.startswith("the first 4 are meant to begin with")
-    assert FIRST[0] + rest == " ".join(
+    first, rest = podusv("init").out.split("\n", 1)
+    assert first.startswith("to begin with: paper/corrected (a run), own_vessel (a hull of your")
+    assert all(f" {name} (" in first for name in FIRST)
+    assert " ".join(rest.split()) == " ".join(
         [*(f"{name} {text}" for name, text in points.items()), "copy one to edit: podusv init NAME"]
     )
 

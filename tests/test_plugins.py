@@ -76,6 +76,14 @@ def test_workers_of_a_comparison_know_it(podusv):
     assert own["sha256"] == DIGEST
 
 
+def test_validate_says_ok_only_when_the_law_of_a_study_has_passed_too(podusv):
+    study = SCENARIO + "sweep: {draws: 2, vary: {start.x: {uniform: [-6, -5]}}}\n"
+    name = put(study, LAW.replace("        rate[0] = signals[0]\n", ""))
+    said = podusv("validate", name)
+    assert (said.code, said.out) == (2, "")
+    assert "it leaves the rate of drift unwritten" in one_line(said.err)
+
+
 def test_a_run_repeats_itself_without_the_original(podusv):
     podusv("run", put(), "--out", "r", *QUIET)
     shutil.move("r", "moved")

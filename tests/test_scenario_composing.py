@@ -6,7 +6,8 @@ import pytest
 from conftest import kinds
 from scenario_samples import SOUND, VESSEL_NAMES, findings, loaded, told, write
 
-from podusv_cli.scenario.load import load
+from podusv_cli.scenario.load import load, tree_yaml
+from podusv_cli.scenario.sweep import Keep
 
 *OTHERS, LAST = kinds("controllers")
 A_LAW = f"{', '.join(OTHERS)} or {LAST}"
@@ -259,6 +260,10 @@ def test_null_takes_out_all_inherited_entries():
     assert (scenario.claims, scenario.sweep.vary) == ({}, {})
     assert load("base.yaml", ["claims=null"]).scenario.claims == {}
     assert list(load("base.yaml").scenario.claims) == ["C1"]
+    kept = load("base.yaml", ["sweep.keep.failed=3", "sweep.keep.worst.iae=2"])
+    assert kept.scenario.sweep.keep.failed == 3
+    write("kept.yaml", tree_yaml(kept))
+    assert load("kept.yaml", ["sweep.keep=null"]).scenario.sweep.keep == Keep()
 
 
 def test_another_preset_of_pods_keeps_the_kind_and_nothing_else():

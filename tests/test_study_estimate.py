@@ -77,7 +77,21 @@ def test_a_pilot_takes_some_runs_of_every_law_as_its_pace(monkeypatch):
     assert pilot(small())["pid", 0] == pytest.approx(0.1)
     monkeypatch.setattr(estimating, "MOST_PLACES", 2)  # one cell of each law
     grid = pilot(small(grid="{disturbance.scale: [0.5, 1, 2]}"))
-    assert grid == dict.fromkeys([(law, i) for law in ("pid", "li") for i in range(3)], 0.1)
+    assert grid == dict.fromkeys(
+        [(law, i) for law in ("pid", "li") for i in range(3)], pytest.approx(0.1)
+    )
+
+
+def test_the_first_runs_of_a_process_which_load_machine_code_are_not_timed(monkeypatch):
+    spent = [0.0]
+
+    def slow_at_first(plan, unit, **options):
+        spent[0] += 0.05 * unit.count if spent[0] else 10.0
+        return make(plan, unit, **options)
+
+    monkeypatch.setattr(estimating, "make", slow_at_first)
+    monkeypatch.setattr(estimating.time, "process_time", lambda: spent[0])
+    assert pilot(small())["li", 0] == pytest.approx(0.05)
 
 
 def test_a_law_that_ends_its_process_is_named(monkeypatch):

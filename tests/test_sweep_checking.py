@@ -52,6 +52,10 @@ def vary(text: str) -> str:
 IN_VARY = [
     ("vessel.mm: @{angle: all}", "unknown key 'vessel.mm'; did you mean 'vessel.m'?"),
     ("vesel.m: @{angle: all}", "unknown key 'vesel.m'; did you mean 'vessel.m'?"),
+    (
+        "hull: @{times: {uniform: [1, 2]}}",
+        "'hull'; a quantity with a name of your own needs `keys`",
+    ),
     ("vessel: @{angle: all}", "vessel is no number but a section"),
     ("path.points: @{angle: all}", "unknown key 'path.points'"),
     ("vessel.source: @{choice: [me]}", "vessel.source is no number but \"The paper's"),

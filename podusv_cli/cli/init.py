@@ -33,7 +33,8 @@ def init(
     from podusv_cli.workflows import init as workflow  # heavy imports only when needed
 
     if name is None:
-        echo(f"the first {len(workflow.FIRST)} are meant to begin with: run, own hull, laws, study")
+        first = ", ".join(f"{point} ({shown})" for point, shown in workflow.FIRST.items())
+        echo(f"to begin with: {first}")
         for point, description in workflow.starting_points().items():
             echo_entry(point, description)
         echo("copy one to edit: podusv init NAME")

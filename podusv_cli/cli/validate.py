@@ -45,53 +45,39 @@ def validate(
     parse_claims(loaded)
     scenario = loaded.scenario
     laws, steps = ", ".join(scenario.labels()), scenario.time_grid().steps
+    # All is computed before the first line, since timing the runs of a study checks the laws.
+    study = _study(loaded, scenario.sweep) if scenario.sweep else []
+    findings = preflight(scenario)
     echo(f"{config}: ok ({scenario.name}, {laws}, {steps} steps)")
-    echo(f"a run takes {largest(scenario)}")
-    if scenario.sweep:
-        if scenario.tune:
-            echo("as a study, by podusv sweep:")
-        paces = _tell_study(loaded, scenario.sweep)
-        if scenario.tune:
-            echo("as a search, by podusv tune:")
-            _tell_tuning(scenario, paces)
-    for finding in preflight(scenario):
-        echo(str(finding))
+    echo(f"a run takes {largest(scenario)}", *study, *findings)
     if verbose:
         if scenario.sweep:
             _tell_marches(scenario)
         _explain(loaded)
 
 
-def _tell_study(loaded: Loaded, sweep: Sweep) -> dict[str, float]:
-    """How many runs the study has, and which of its draws the scenario cannot take.
-
-    Returns the seconds of a run of every law.
-    """
+def _study(loaded: Loaded, sweep: Sweep) -> list[str]:
+    """How many runs the study has, which draws the scenario cannot take, and what it all takes."""
     from podusv_cli.process.workers import available_workers
     from podusv_cli.study.estimate import estimate, pilot
     from podusv_cli.study.invalid import check_draws
     from podusv_cli.study.plan import plan
+    from podusv_cli.tuning.plan import TunePlan
 
     made = plan(loaded)
     draws, places = sweep.draws, [(law, cell.index) for law in made.laws for cell in made.cells]
-    echo(
+    counted = (
         f"runs of the study: {len(places) * draws:,} "
         f"(laws: {len(made.laws)}, cells: {len(made.cells)}, draws: {draws:,})"
     )
-    echo(check_draws(made).in_words())
-    paces = pilot(made)
-    need = estimate(made, paces, dict.fromkeys(places, draws), available_workers())
-    echo(*need.in_words())
-    return {law: seconds for (law, _), seconds in paces.items()}
-
-
-def _tell_tuning(scenario: Scenario, paces: dict[str, float]) -> None:
-    """Which gains are searched, and how many runs and how much time that takes."""
-    from podusv_cli.process.workers import available_workers
-    from podusv_cli.tuning.plan import TunePlan
-
-    for line in TunePlan(scenario).in_words(paces, available_workers()):
-        echo(line)
+    paces, cores = pilot(made), available_workers()
+    need = estimate(made, paces, dict.fromkeys(places, draws), cores)
+    lines = [counted, check_draws(made).in_words(), *need.in_words()]
+    if not loaded.scenario.tune:
+        return lines
+    seconds = {law: pace for (law, _), pace in paces.items()}
+    search = TunePlan(loaded.scenario).in_words(seconds, cores)
+    return ["as a study, by podusv sweep:", *lines, "as a search, by podusv tune:", *search]
 
 
 def _tell_marches(scenario: Scenario) -> None:

@@ -27,6 +27,7 @@ NAMED: tuple[Route, ...] = (
     ("controllers",), ("claims",), ("sweep", "vary"), ("sweep", "grid"), ("sweep", "claims"),
     ("tune", "space"),
 )  # fmt: skip
+EMPTIED: tuple[Route, ...] = (*NAMED, ("sweep", "keep"))  # null is a section with nothing in it
 BESIDE_NAMED = {named[:end] for named in NAMED for end in range(len(named) + 1)}
 
 
@@ -147,7 +148,7 @@ def _of_kinds(root: Node, top: Key) -> list[tuple[str, Node, type[Component]]]:
 
 
 def _without_null(root: Node, section: Route = ()) -> Node:
-    """The tree without what is null: sections whose entries have free names, and their entries."""
+    """The tree without what is null: sections that null empties, and entries with free names."""
     if section not in BESIDE_NAMED or not root.mapping:
         return root
     entries = {
@@ -155,7 +156,7 @@ def _without_null(root: Node, section: Route = ()) -> Node:
         for name, entry in root.mapping.items()
         if entry.content is not None
         or entry.faulty
-        or (section not in NAMED and (*section, name) not in NAMED)
+        or (section not in NAMED and (*section, name) not in EMPTIED)
     }
     return replace(root, content=entries)
 

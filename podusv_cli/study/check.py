@@ -31,6 +31,7 @@ DRAWN = (
 TRIED = np.array([2.0**-30, 0.5, 1.0 - 2.0**-30])  # shares at which a distribution is tried
 REAL = ("uniform", "normal", "lognormal", "triangular", "angle")  # draw other than whole numbers
 MOST_TRIED = 50  # values of a choice
+FREE_NAME = "; a quantity with a name of your own needs `keys`, as in keys: [vessel.m, vessel.I_z]"
 Faults = Iterator[tuple[Route, str]]
 
 
@@ -79,7 +80,8 @@ def _key(key: str, quantity: Quantity, laws: Mapping[str, Scenario]) -> Iterator
     if len(lacking) == len(laws):
         near = did_you_mean(key, _numbers(laws))
         beyond = next(filter(None, (_no_entry(one, steps) for one in laws.values())), "")
-        yield beyond or f"unknown key {key!r}{near}"
+        free = "" if quantity.keys or len(steps) > 1 else FREE_NAME
+        yield beyond or f"unknown key {key!r}{near or free}"
     elif lacking:
         having = ", ".join(label for label in laws if label not in lacking)
         who = f"{key} is no key of {', '.join(lacking)}"

@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 
+from podusv_cli.core.kernel import LANES
 from podusv_cli.core.quantities import bytes_in_words, time_in_words
 from podusv_cli.process.workers import run_all
 from podusv_cli.scenario.limits import estimate as size_of_run
@@ -96,9 +97,13 @@ def pilot(plan: Plan) -> dict[Place, float]:
 
 
 def _timed(plan: Plan, law: str, cell: int, progress: Callable[[float], None]) -> float:
-    """Processor time of a run [s]: of as many as take long enough to be measured."""
+    """Processor time of a run [s]: of as many as take long enough to be measured.
+
+    Runs of one step come first and are not timed, since a process loads machine code then.
+    """
     whole = plan.single(law, cell).time_grid()
     grid = replace(whole, steps=min(whole.steps, MOST_STEPS))
+    make(plan, Unit(law, cell, 0, min(LANES, plan.sweep.draws)), grid=replace(whole, steps=1))
     count, spent = 1, 0.0
     while True:
         began = time.process_time()

@@ -19,7 +19,11 @@ from podusv_cli.scenario.yaml_text import read
 from podusv_cli.storage import files
 
 SCHEMA = "podusv.schema.json"
-FIRST = ("paper/corrected", "own_vessel", "paper/corrected_compare", "studies/hull_and_sea")
+# What to begin with, and what each shows.
+FIRST = {
+    "paper/corrected": "a run", "own_vessel": "a hull of your own",
+    "paper/corrected_compare": "a comparison of laws", "studies/hull_and_sea": "a study",
+}  # fmt: skip
 EDITOR_LINE = re.compile(r"^# yaml-language-server: .*$", re.MULTILINE)
 
 
