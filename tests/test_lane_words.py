@@ -33,7 +33,7 @@ def truths(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector
     seen[1] = (s[0] > 0.0) + (s[1] > 0.0)
     if (s[0] > 0.0) == (s[2] > 0.0):
         seen[2] = 5.0
-    seen[3] = abs(int(s[0])) + math.sqrt(abs(int(s[1])))
+    seen[3] = +abs(int(s[0])) + math.sqrt(abs(int(s[1])))
 
 
 @kernel

@@ -179,6 +179,7 @@ _lower(operator.neg, FLOAT, 1, lambda b, x: b.fsub(ir.Constant(x.type, [-0.0] * 
 _lower(operator.neg, WHOLE, 1, lambda b, x: b.sub(ir.Constant(x.type, [0] * LANES), x))
 _operation(operator.pos, 1)
 _lower(operator.pos, FLOAT, 1, lambda b, x: x)
+_lower(operator.pos, WHOLE, 1, lambda b, x: x)
 
 
 def intrinsic_call(builder: Any, name: str, x: Any) -> Any:
