@@ -104,10 +104,17 @@ MISTAKES = {  # what is replaced in the page's law
         "tau[0] = k.K_u * missing + memory[0]",
         "tau[0] = np.dot(x, x)",
     ),
-    "`@kernel` is missing, or a slice, a list, `print` or `raise` is in the kernel": (
-        "    @kernel\n    def law",
-        "    def law",
+    "a slice, a list, `len`, `print` or `raise` is in the kernel": (
+        "tau[0] = k.K_u * missing + memory[0]",
+        "print(x[0]); tau[0] = 0.0",
     ),
+    "`@kernel` is missing": ("    @kernel\n    def law", "    def law"),
+    "a variable is read that a branch need not have set": (
+        "tau[0] = k.K_u * missing + memory[0]",
+        "if t < 9.0:\n            late = 1.0\n        tau[0] = late * missing",
+    ),
+    "an index counts from the end": ("tau[0] = k.K_u * missing", "tau[0] = x[-1]"),
+    "an argument is written that may only be read": ("tau[0] =", "tau[0] = x[3] ="),
     "an endless loop": ("rate[0] = k.K_i * missing", "while True:\n            pass"),
     "a `kind` that exists": ('"pursuit"', '"pid"'),
     "a signal named as one of the closed loop's": ('"heading_error", "rad"', '"psi", "rad"'),

@@ -17,12 +17,14 @@ from podusv_cli.core.component import called
 from podusv_cli.core.errors import LawError, in_a_line
 from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.core.signal import NAME, Signal
+from podusv_cli.engine.kernel_faults import check_kernel
 from podusv_cli.engine.loop import ClosedLoop
 from podusv_cli.engine.march import Work
 
 PROVENANCE = "provenance"  # is a group in every log
 UNWRITTEN = -1.234567890123e-290  # no law writes just this
 # What a law's arithmetic may raise: the run tells it, as divergence.
+FLOAT_AS_COUNT = "'float' object cannot be interpreted as an integer"
 OF_NUMBERS = (ArithmeticError, ValueError)
 
 
@@ -33,6 +35,7 @@ def check_law(loop: ClosedLoop) -> None:
     another size, an output left unwritten, an exception, and for a law that does not return. No
     number at all is left for the run to tell.
     """
+    check_kernel(loop.controller.law)
     with np.errstate(all="ignore"):
         _asked(loop, _check_declared, ())
         _asked(loop, _ask, OF_NUMBERS)
@@ -48,6 +51,8 @@ def _asked(
         raise work.error
     if work.result is None and not isinstance(work.error, left):
         fault = _constant(loop.controller, work.error) or work.fault()
+        if FLOAT_AS_COUNT in str(work.error):
+            fault += "; constants are floats: write int(k.count)"
         message = f"{called(loop.controller)}, evaluated once before the run: {fault}"
         raise LawError(message) from work.error
 
@@ -83,7 +88,13 @@ def evaluated(loop: ClosedLoop, before: float) -> tuple[Vector, Vector, Vector]:
     tau, rate, signals = (np.full(n, before) for n in (2, len(memory), len(law.signals)))
     if law.sample_period() > 0:
         law.sample(0.0, x, memory, target, k, table)
+    read = {"x": x, "memory": memory, "target": target, "table": table}
+    before_it = {name: vector.copy() for name, vector in read.items()}
     law.law(0.0, x, memory, target, k, table, tau, rate, signals, np.zeros(law.workspace()))
+    for name, vector in read.items():
+        same = (vector == before_it[name]) | (np.isnan(vector) & np.isnan(before_it[name]))
+        if len(changed := np.flatnonzero(~same)):
+            raise LawError(f"{called(law)}: it writes {name}[{changed[0]}], which it may only read")
     return tau, rate, signals
 
 

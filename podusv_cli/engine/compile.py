@@ -14,6 +14,7 @@ from typing import Any, cast
 
 from podusv_cli.core.errors import LawError
 from podusv_cli.engine import lane_doors, object_cache, signatures
+from podusv_cli.engine.kernel_faults import check_kernel, unsupported
 from podusv_cli.engine.lane_march import advance_lanes
 from podusv_cli.process.interrupts import interrupts_deferred
 
@@ -30,16 +31,18 @@ def entry(part: str, inner: Any, names: tuple[str, ...]) -> Any:
     """The compiled kernel `inner` of a component, callable by the loop as this part.
 
     `names` are those of the component's constants. Raises LawError for a kernel that cannot be
-    compiled.
+    compiled, or that would read what is not there.
     """
+    check_kernel(inner)
     label = f"{part}_entry_{inner.__module__}_{inner.__qualname__}"
     bound = signatures.bind(part, inner, names)
     try:
         return compiled(bound, signatures.PROTOTYPES[part], label)
     except TypeError as error:
         place = f"{Path(inner.__code__.co_filename).name}, line {inner.__code__.co_firstlineno}"
+        reason = unsupported(inner) or f"{error}; {RULES}"
         raise LawError(
-            f"kernel {inner.__qualname__} ({place}) cannot become machine code: {error}; {RULES}"
+            f"kernel {inner.__qualname__} ({place}) cannot become machine code: {reason}"
         ) from error
 
 
@@ -47,8 +50,9 @@ def entry(part: str, inner: Any, names: tuple[str, ...]) -> Any:
 def lane_entry(part: str, inner: Any, names: tuple[str, ...], alike: frozenset[str]) -> Any:
     """The same with a run in every lane; constants in `alike` are the same in all of them.
 
-    Raises TypeError for a kernel that cannot go another way in every lane.
+    Raises TypeError for a kernel that cannot go another way in every lane, LawError as `entry`.
     """
+    check_kernel(inner)
     return compiled(*_lane_door(part, inner, names, alike), LANES_BY)
 
 

@@ -1,0 +1,92 @@
+"""Kernels that would compute from what happens to be in memory are refused; sound ones are not."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import pkgutil
+from collections.abc import Iterator
+from types import FunctionType
+from typing import Any
+
+import pytest
+
+import podusv_cli
+from podusv_cli.core.kernel import is_kernel
+from podusv_cli.engine.kernel_faults import faults
+from podusv_cli.engine.lane_source import has_source, source
+
+SOUND = {
+    "set in both branches": "if x[0] > 0.0:\n q = 1.0\nelse:\n q = 2.0\ny = q",
+    "the other branch returns": "if x[0] > 0.0:\n return\nelse:\n q = 2.0\ny = q",
+    "set before": "q = 0.0\nif x[0] > 0.0:\n q = 1.0\ny = q",
+    "a loop with rounds": "for i in range(3):\n q = x[i]\ny = q + i",
+    "a loop that is left once it is set": "while True:\n q = x[0]\n if q > 1.0:\n  break\ny = q",
+    "set before each continue": "for i in range(2):\n q = x[i]\n if q > 0.0:\n  continue\ny = q",
+    "an assignment in a condition": "if (q := x[0]) > 0.0:\n y = q",
+    "an index from the front": "y = x[5 - 1]",
+    "the end of a tuple": "pair = (x[0], x[1])\ny = pair[-1]",
+}
+UNSET = {
+    "one branch": "if x[0] > 0.0:\n q = 1.0\ny = q",
+    "elif without else": "if x[0] > 0.0:\n q = 1.0\nelif x[1] > 0.0:\n q = 2.0\ny = q",
+    "a loop that need not run": "while x[0] > 9.0:\n q = x[0]\ny = q",
+    "a count that need not run": "n = int(x[0])\nfor i in range(n):\n q = x[i]\ny = q",
+    "a loop left before": "for i in range(3):\n if x[i] > 0.0:\n  break\n q = x[i]\ny = q",
+    "a round passed over": "for i in range(3):\n if x[i] > 0.0:\n  continue\n q = x[i]\ny = q",
+    "no rounds at all": "for i in range(0):\n q = 1.0\ny = q",
+    "added to": "if x[0] > 0.0:\n q = 1.0\nq += 1.0",
+    "read in its own loop": "for i in range(3):\n if x[i] > 0.0:\n  y = q\n q = x[i]",
+}
+
+
+def found(body: str) -> list[tuple[int, str]]:
+    lines = "".join(f"    {line}\n" for line in body.splitlines())
+    (node,) = ast.parse(f"def kernel(x):\n{lines}").body
+    assert isinstance(node, ast.FunctionDef)
+    return list(faults(node))
+
+
+@pytest.mark.parametrize("body", SOUND.values(), ids=list(SOUND))
+def test_a_sound_kernel_passes(body: str) -> None:
+    assert found(body) == []
+
+
+@pytest.mark.parametrize("body", UNSET.values(), ids=list(UNSET))
+def test_a_variable_that_may_be_unset_is_named_with_its_line(body: str) -> None:
+    (fault,) = found(body)
+    line = 2 + next(i for i, text in enumerate(body.splitlines()) if reads_q(text))
+    assert fault[0] == line
+    assert fault[1].startswith("q may have no value here")
+
+
+def reads_q(text: str) -> bool:
+    return text.strip() in ("y = q", "q += 1.0")
+
+
+def test_an_index_from_the_end_of_a_vector_is_named() -> None:
+    assert found("y = x[0]\ny = x[-1]") == [
+        (3, "x[-1] counts from the end, and a kernel does not know where a vector ends; count from "
+         "the front"),
+    ]  # fmt: skip
+
+
+def shipped() -> Iterator[Any]:
+    """Every kernel of podusv that is in a file."""
+    for part in pkgutil.walk_packages(podusv_cli.__path__, "podusv_cli."):
+        if not part.name.endswith("__main__"):
+            module = vars(importlib.import_module(part.name))
+            classes = [thing for thing in module.values() if isinstance(thing, type)]
+            inner = [getattr(f, "__func__", f) for one in classes for f in vars(one).values()]
+            for thing in (*module.values(), *inner):
+                if isinstance(thing, FunctionType) and is_kernel(thing) and has_source(thing):
+                    yield thing
+
+
+def test_no_kernel_of_podusv_has_such_a_fault() -> None:
+    """Kernels from outside are looked at before they are compiled; these here."""
+    kernels = set(shipped())
+    assert len(kernels) > 200
+    assert {
+        one.__qualname__: found for one in kernels if (found := list(faults(source(one))))
+    } == {}
