@@ -50,9 +50,8 @@ def entry(part: str, inner: Any, names: tuple[str, ...]) -> Any:
 def lane_entry(part: str, inner: Any, names: tuple[str, ...], alike: frozenset[str]) -> Any:
     """The same with a run in every lane; constants in `alike` are the same in all of them.
 
-    Raises TypeError for a kernel that cannot go another way in every lane, LawError as `entry`.
+    Raises TypeError for a kernel that cannot go another way in every lane.
     """
-    check_kernel(inner)
     return compiled(*_lane_door(part, inner, names, alike), LANES_BY)
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from podusv_cli.core.kernel import LANES, Vector
 from podusv_cli.engine import lane_doors, lane_source, signatures
 from podusv_cli.engine.grid import TimeGrid
+from podusv_cli.engine.kernel_faults import check_kernel
 from podusv_cli.engine.lane_march import REACHED
 from podusv_cli.engine.layout import Plan, Wires
 from podusv_cli.engine.loop import ClosedLoop, Observer, entries
@@ -60,12 +61,15 @@ def alike(loop: ClosedLoop, observer: Observer) -> dict[str, frozenset[str]]:
 def marcher(loop: ClosedLoop, observer: Observer) -> Callable[..., int]:
     """The compiled march of runs like this loop, side by side.
 
-    Raises TypeError where a part cannot go another way in every lane.
+    Raises TypeError where a part cannot go another way in every lane, LawError for a kernel that
+    would read what is not there.
     """
     from podusv_cli.engine import compile  # only what marches side by side needs it
 
-    shared = alike(loop, observer)
-    doors = [compile.lane_entry(*part, shared[part[0]]) for part in entries(loop, observer)]
+    shared, parts = alike(loop, observer), list(entries(loop, observer))
+    for _, inner, _ in parts:
+        check_kernel(inner)
+    doors = [compile.lane_entry(*part, shared[part[0]]) for part in parts]
     march = compile.lane_routine()
 
     def compiled_march(
