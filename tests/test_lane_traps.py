@@ -102,11 +102,11 @@ def left_over(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vec
 @pytest.mark.parametrize(
     ("watch", "says"),
     [
-        (value_of_or, "`and` and `or` of numbers as a value"),
-        (chain, "a chain of comparisons with calls or places"),
-        (order, "a choice beside a kernel that stores; write two statements"),
+        (value_of_or, "`and` or `or` of numbers as a value; write"),
+        (chain, "a chain of comparisons with a call or an index"),
+        (order, "a choice beside a kernel that writes into a vector; write two"),
         (place, "a place that a kernel computes; name it first"),
-        (left_over, "the count of a loop that not every run has is used after it"),
+        (left_over, "not every run has this loop, whose count is read after it"),
     ],
 )
 def test_it_is_refused_and_marches_alone(watch: Any, says: str) -> None:

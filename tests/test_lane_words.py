@@ -167,13 +167,13 @@ def first_run(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vec
     [
         (own_word, "max stands for something else in kernels side by side"),
         (own_lanes, "lanes_known stands for something else"),
-        (walrus, "NamedExpr is not for lanes"),
+        (walrus, r"y := s\[1\]\): runs side by side cannot do this"),
         (count_in_a_place, "a loop whose count is no variable"),
         (place_first, "a place that is computed beside a kernel that stores"),
         (other_kind, "a whole number where one branch reads it, and a float in the other"),
         (no_rounds, r"last is set in a branch within a loop.*before the loop"),
         (positions, "by_position takes other than plain arguments"),
-        (identity, "`is` and `in`"),
+        (identity, "`is` or `in`; write =="),
         (first_run, "shared is for podusv's own kernels"),
     ],
 )

@@ -150,7 +150,7 @@ def test_what_cannot_march_side_by_side_marches_alone_and_says_why() -> None:
     base, watching = loop("pid"), Observer(Mean.watch)
     why = why_alone(base, watching)
     assert "test_lanes.py" in why
-    assert "for runs to march side by side, a kernel loops over a count" in why
+    assert "the count of a `for` may not (write `while`)" in why
     loops, grid = scattered(base, 1), TimeGrid(0.01, 20)
     alone = simulate_many(loops, grid, observer=watching, side_by_side=False)
     same(simulate_many(loops, grid, observer=watching, side_by_side=True), alone)
@@ -240,7 +240,7 @@ def test_validate_says_which_runs_of_a_study_march_side_by_side(podusv: Any) -> 
     said = podusv("validate", "a.yaml", "-v").out
     assert "b: runs march side by side" in said
     assert "a: runs march one by one: No implementation" in said
-    assert "(my_law.py, line 44: for i in range(int(x[0] * x[0])):); for runs to" in said
+    assert "(my_law.py, line 44: for i in range(int(x[0] * x[0])):); lanes(" in said
 
 
 def test_a_law_with_a_while_marches_side_by_side(podusv: Any) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from podusv_cli.core import kernel
-from podusv_cli.engine.lane_source import NotForLanes, has_source, source
+from podusv_cli.engine.lane_source import has_source, refused, source
 from podusv_cli.engine.lane_syntax import call, found, name_of, set_to
 
 EXTREMES = ("min", "max")
@@ -86,7 +86,7 @@ class Expressions:
         """What an expression becomes."""
         write: Any = getattr(self, f"of_{type(node).__name__}", None)
         if write is None:
-            raise NotForLanes(f"line {node.lineno}: {type(node).__name__} is not for lanes")
+            raise refused(node, f"{ast.unparse(node)}: runs side by side cannot do this")
         made: ast.expr = ast.copy_location(write(node), node)
         return made
 
@@ -121,7 +121,7 @@ class Expressions:
 
     def of_BoolOp(self, node: ast.BoolOp) -> ast.expr:
         if not all(map(is_truth, node.values)):
-            raise NotForLanes(f"line {node.lineno}: `and` and `or` of numbers as a value")
+            raise refused(node, "`and` or `or` of numbers as a value; write a if a != 0.0 else b")
         return self.combined(node)
 
     def combined(self, node: ast.BoolOp) -> ast.expr:
@@ -161,8 +161,8 @@ class Expressions:
         storing = [set(ast.walk(part)) for part in ast.walk(node) if stores(self.called(part))]
         inner = [part for part in ast.walk(node) if part is not node and self.goes_first(part)]
         if any(part not in within for part in inner for within in storing):
-            raise NotForLanes(
-                f"line {node.lineno}: a choice beside a kernel that stores; write two statements"
+            raise refused(
+                node, "a choice beside a kernel that writes into a vector; write two statements"
             )
 
     def goes_first(self, node: ast.AST) -> bool:
@@ -197,9 +197,9 @@ class Expressions:
 
     def of_Compare(self, node: ast.Compare) -> ast.expr:
         if not all(isinstance(sign, SIGNS) for sign in node.ops):
-            raise NotForLanes(f"line {node.lineno}: `is` and `in` are not for lanes; write ==")
+            raise refused(node, "`is` or `in`; write ==")
         if len(node.ops) > 1 and any(map(self.looks_up, node.comparators)):
-            raise NotForLanes(f"line {node.lineno}: a chain of comparisons with calls or places")
+            raise refused(node, "a chain of comparisons with a call or an index; name it first")
         places = [node.left, *node.comparators]
         made: ast.expr | None = None
         for left, sign, right in zip(places, node.ops, places[1:], strict=False):
@@ -219,12 +219,13 @@ class Expressions:
 
     def of_Call(self, node: ast.Call) -> ast.expr:
         if node.keywords:
-            raise NotForLanes(f"line {node.lineno}: arguments by name are not for lanes")
+            raise refused(node, "arguments by name; give them by position")
         called = self.called(node)
         if called is kernel.shared and not self.is_ours():
-            raise NotForLanes(
-                f"line {node.lineno}: shared is for podusv's own kernels, whose runs are sorted by "
-                "that number; write int(k.count) of a constant"
+            raise refused(
+                node,
+                "shared is for podusv's own kernels, whose runs are sorted by "
+                "that number; write int(k.count) of a constant",
             )
         local = isinstance(node.func, ast.Name) and node.func.id in self.known
         name = node.func.id if isinstance(node.func, ast.Name) and not local else ""

@@ -9,11 +9,12 @@ from __future__ import annotations
 import ast
 import copy
 from collections.abc import Collection
+from pathlib import Path
 from typing import Any
 
 from podusv_cli.engine.lane_expressions import ON, stores, takes_mask
 from podusv_cli.engine.lane_loops import Loops, Returns, note_outer_reads
-from podusv_cli.engine.lane_source import NotForLanes, source
+from podusv_cli.engine.lane_source import NotForLanes, refused, source
 from podusv_cli.engine.lane_syntax import call, found, leaves, name_of, reads, set_to, tailed
 
 RESULT = "lanes_result"
@@ -24,23 +25,28 @@ def rewritten(function: Any, words: dict[str, Any], plain: Collection[Any]) -> A
     """The kernel with the lanes in which it acts as its first argument.
 
     `words` are the functions that it is written in; kernels in `plain` know nothing of lanes.
+    Raises NotForLanes with the kernel's file, line and what to write.
     """
     node = copy.deepcopy(source(function))
-    _check_names(node, function.__globals__, words)
-    return _made(function, _Rewriter(node, function.__globals__, plain).function(), words)
+    try:
+        _check_names(node, function.__globals__, words)
+        written = _Rewriter(node, function.__globals__, plain).function()
+    except NotForLanes as error:
+        raise NotForLanes(f"{Path(function.__code__.co_filename).name}, {error}") from error
+    return _made(function, written, words)
 
 
 def _check_names(node: ast.FunctionDef, scope: dict[str, Any], words: Collection[str]) -> None:
     """Refuse arguments and names that the rewritten kernel would take for something else."""
     given = node.args
     if given.posonlyargs or given.kwonlyargs or given.vararg or given.kwarg:
-        raise NotForLanes(f"line {node.lineno}: {node.name} takes other than plain arguments")
+        raise refused(node, f"{node.name} takes other than plain arguments; write def f(a, b)")
     for part in [part for part in ast.walk(node) if isinstance(part, ast.Name)]:
         name = part.id
         if name.startswith("lanes_") or (name in scope and name in {*words, "bool"}):
-            raise NotForLanes(
-                f"line {part.lineno}: {name} stands for something else in kernels side by side; "
-                "call it another name"
+            raise refused(
+                part,
+                f"{name} stands for something else in kernels side by side; call it another name",
             )
 
 
@@ -101,7 +107,9 @@ class _Rewriter(Loops):
         outer, self.before = self.before, []
         write = getattr(self, f"on_{type(node).__name__}", None)
         if write is None:
-            raise NotForLanes(f"line {node.lineno}: {type(node).__name__} is not for lanes")
+            raise refused(
+                node, f"{ast.unparse(node).splitlines()[0]}: runs side by side cannot do this"
+            )
         for name in ("value", "test", "iter"):
             if part := getattr(node, name, None):
                 self.check_order(part)
@@ -145,7 +153,7 @@ class _Rewriter(Loops):
 
     def on_AugAssign(self, node: ast.AugAssign) -> list[ast.stmt]:
         if self.calls_kernel(node.target):
-            raise NotForLanes(f"line {node.lineno}: a place that a kernel computes; name it first")
+            raise refused(node, "a place that a kernel computes; name it first")
         old = copy.deepcopy(node.target)
         old.ctx = ast.Load()
         return self.to(node.target, ast.BinOp(old, node.op, node.value))
@@ -157,9 +165,10 @@ class _Rewriter(Loops):
         stored = any(stores(self.called(part)) for part in ast.walk(node.value))
         looked_up = sum(isinstance(part, ast.Subscript) for part in parts) > 1
         if (stored and looked_up) or ((stored or several) and any(map(self.goes_first, parts))):
-            raise NotForLanes(
-                f"line {node.lineno}: a place that is computed beside a kernel that stores, or a "
-                "choice in one of several places; name the value, or the place, first"
+            raise refused(
+                node,
+                "a place that is computed beside a kernel that stores, or a "
+                "choice in one of several places; name the value, or the place, first",
             )
 
     def on_Assign(self, node: ast.Assign) -> list[ast.stmt]:
@@ -196,7 +205,10 @@ class _Rewriter(Loops):
         if isinstance(target, ast.Name):
             return [self.kept(target.id, value)]
         if not isinstance(target, ast.Subscript):
-            raise NotForLanes(f"line {target.lineno}: an assignment to {ast.unparse(target)}")
+            raise refused(
+                target,
+                f"{ast.unparse(target)} = ...; assign to a variable, or to a number of a vector",
+            )
         place = [self.expression(target.value), self.expression(target.slice)]
         return [ast.Expr(call("lanes_store", name_of(self.mask), *place, value))]
 

@@ -11,7 +11,7 @@ import ast
 from typing import Any
 
 from podusv_cli.engine.lane_expressions import Expressions
-from podusv_cli.engine.lane_source import NotForLanes
+from podusv_cli.engine.lane_source import refused
 from podusv_cli.engine.lane_syntax import (
     LOOPS,
     OUT_OF_LOOP,
@@ -133,22 +133,24 @@ class Loops(Expressions):
             use = first_use(loop.body, name)
             outlives = name in loop.outside and (use != SET or ends_apart(loop))  # type: ignore[union-attr]
             if use == READ or outlives:
-                raise NotForLanes(
-                    f"{name} is set in a branch within a loop, or in a loop that ends early; set "
-                    "it before the loop"
+                raise refused(
+                    loop,
+                    f"{name} is set in a branch within a loop, or in a loop "
+                    "that ends early; set it before the loop, too",
                 )
 
     def on_For(self, node: ast.For) -> list[ast.stmt]:
         if node.orelse:
-            raise NotForLanes(f"line {node.lineno}: a loop with else")
+            raise refused(node, "a loop with else; test a variable after the loop")
         parts = node.target.elts if isinstance(node.target, ast.Tuple) else [node.target]
         if not all(isinstance(part, ast.Name) for part in parts):
-            raise NotForLanes(f"line {node.lineno}: a loop whose count is no variable")
+            raise refused(node, "a loop whose count is no variable; name it")
         over = self.expression(node.iter)
         counts = {n.id for n in ast.walk(node.target) if isinstance(n, ast.Name)}
         if (self.apart or ends_apart(node)) and counts & node.outside:  # type: ignore[attr-defined]
-            raise NotForLanes(
-                f"line {node.lineno}: the count of a loop that not every run has is used after it"
+            raise refused(
+                node,
+                "not every run has this loop, whose count is read after it; keep it in a variable",
             )
         self.known |= counts
         if not ends_apart(node):
@@ -160,7 +162,7 @@ class Loops(Expressions):
 
     def on_While(self, node: ast.While) -> list[ast.stmt]:
         if node.orelse:
-            raise NotForLanes(f"line {node.lineno}: a loop with else")
+            raise refused(node, "a loop with else; test a variable after the loop")
         start, going, outer = self.begun()
         kept, self.before = self.before, []
         test = self.truth(node.test)

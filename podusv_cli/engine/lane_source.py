@@ -17,6 +17,11 @@ class NotForLanes(TypeError):
     """A kernel that cannot be rewritten for lanes."""
 
 
+def refused(node: Any, text: str) -> NotForLanes:
+    """The error for a statement or an expression that cannot be rewritten."""
+    return NotForLanes(f"line {node.lineno}: {text}")
+
+
 class OtherSource(TypeError):
     """A kernel whose file was edited since it was loaded."""
 

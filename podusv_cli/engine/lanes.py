@@ -27,11 +27,10 @@ from podusv_cli.measurements.base import KNOWN, OWN
 
 NUMBER = 8  # bytes
 FEWEST = 3  # runs; fewer take no longer alone
-RULES = (
-    "for runs to march side by side, a kernel loops over a count that is the same in all runs "
-    "(`while`, `break` and `return` may end a loop at another time in every run), sets before a "
-    "loop what a later round reads, and gives arguments by position; lanes(int64) is a whole "
-    "number that may be another one in every run"
+# What numba says of numbers that differ between runs, in the words of its types.
+TYPES = (
+    "lanes(...) are numbers that may differ between runs; the count of a `for` may not (write "
+    "`while`), and no text and no None may depend on them"
 )
 WORTH = 20_000_000  # instants of a batch, from which on compiling takes less than it gains
 MARCHING = -1.0  # stands for the instants that a lane has reached
@@ -228,5 +227,5 @@ def why_alone(loop: ClosedLoop, observer: Observer) -> str:
         places(loop, observer)
         marcher(loop, observer)
     except TypeError as error:
-        return f"{error}; {RULES}"
+        return f"{error}; {TYPES}" if "lanes(" in str(error) else str(error)
     return ""
