@@ -8,17 +8,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
+import numpy.typing as npt
 import pandas as pd
 
 from podusv_cli.core.component import Component
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.finding import Finding
-from podusv_cli.core.kernel import Vector
 from podusv_cli.engine import batch
 from podusv_cli.engine.check import check_law
-from podusv_cli.engine.variants import variants
 from podusv_cli.findings.finding import postflight, preflight
+from podusv_cli.interface.parameters import check_words, columns, scenarios
 from podusv_cli.interface.results import Comparison, Run
 from podusv_cli.interface.scenarios import Changes, Source, loaded
 from podusv_cli.process.extras import Extras
@@ -123,16 +122,24 @@ def compare(
 
 
 def simulate_many(
-    source: Source, parameters: Mapping[str, Sequence[float] | Vector], *, workers: int = 0
-) -> pd.DataFrame:
+    source: Source, parameters: Mapping[str, Sequence[Any] | npt.NDArray[Any]], *,
+    workers: int = 0, side_by_side: bool | None = None,
+) -> pd.DataFrame:  # fmt: skip
     """Simulate a scenario once for each entry of the parameters; a row a run.
 
-    `parameters` are dotted keys of numbers, each with one value a run; `vessel.m` changes the
-    vessel, not what the controller is told of it (`nominal.m`). The columns are the parameters,
+    `parameters` are dotted keys of numbers or words, each with one value a run; `vessel.m` changes
+    the vessel, not what the controller is told of it (`nominal.m`). The columns are the parameters,
     `status`, `cause` (why a run did not finish), and the metrics, NaN where a run ended
     before one is defined. A run that diverges, hangs or raises an exception costs no other.
-    `workers` runs are simulated at a time (0: one a core). No logs are kept. Raises ScenarioError,
-    and ValueError for unknown keys, unequal lengths and numbers out of range.
+    `workers` runs are simulated at a time (0: one a core). No logs are kept.
+
+    By default runs march eight side by side where the code for that is compiled already, or where
+    the batch has 20 million steps or more in all (`engine.lanes.WORTH`). `side_by_side=True`
+    compiles the code, which takes 10 to 20 s once and is kept on disk; `False` has runs march one
+    by one. No bit of the result depends on it.
+
+    Raises ScenarioError, LawError, and ValueError for unknown keys, unequal lengths, values out of
+    range and a negative number of workers.
 
     >>> import podusv_cli as podusv
     >>> scenario = podusv.load("podusv:own_vessel.yaml", {"simulation.duration": 30.0})
@@ -141,11 +148,16 @@ def simulate_many(
     0      50.0  finished
     1      60.0  finished
     """
-    scenario = _single(loaded(source))
-    loop, grid, watching = scenario.closed_loop(), scenario.time_grid(), scenario.observer()
+    scenario, given = _single(loaded(source)), columns(parameters)
+    if workers < 0:
+        raise ValueError(f"workers = {workers}: must be 0 (one a core) or more")
+    loop, watching = scenario.closed_loop(), scenario.observer()
+    loops = [one.closed_loop() for one in scenarios(scenario, given)]
     check_law(loop)
-    done = batch.simulate_many(variants(loop, parameters), grid, observer=watching, workers=workers)
-    given = {key: np.asarray(numbers, float) for key, numbers in parameters.items()}
+    check_words(scenario, loops, given)
+    done = batch.simulate_many(
+        loops, scenario.time_grid(), observer=watching, workers=workers, side_by_side=side_by_side
+    )
     ends = {"status": done.status, "cause": done.cause}
     return pd.DataFrame({**given, **ends, **watching.summaries(done.seen)})
 

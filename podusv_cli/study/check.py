@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from podusv_cli.core.component import Component
-from podusv_cli.engine.loop import Observer, entries
+from podusv_cli.engine.grid import TimeGrid
+from podusv_cli.engine.loop import ClosedLoop, Observer, entries
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.scenario.expressions import ExpressionError
 from podusv_cli.scenario.keys import Key
@@ -76,10 +77,10 @@ def _key(key: str, quantity: Quantity, laws: Mapping[str, Scenario]) -> Iterator
     if section not in DRAWN and section in Scenario.model_fields:
         yield f"{section} is the same for all runs of a cell; list values of {key} under grid"
         return
-    lacking = [label for label, one in laws.items() if not _has(one, key)]
+    lacking = [label for label, one in laws.items() if not has(one, key)]
     if len(lacking) == len(laws):
         near = did_you_mean(key, _numbers(laws))
-        beyond = next(filter(None, (_no_entry(one, steps) for one in laws.values())), "")
+        beyond = next(filter(None, (no_entry(one, steps) for one in laws.values())), "")
         free = "" if quantity.keys or len(steps) > 1 else FREE_NAME
         yield beyond or f"unknown key {key!r}{near or free}"
     elif lacking:
@@ -90,7 +91,8 @@ def _key(key: str, quantity: Quantity, laws: Mapping[str, Scenario]) -> Iterator
         yield from (t for one in laws.values() for t in _type(key, quantity, one))
 
 
-def _has(scenario: Scenario, key: str) -> bool:
+def has(scenario: Scenario, key: str) -> bool:
+    """Whether the scenario has this key, in a section that may differ between runs."""
     steps = route(key)
     try:
         content(scenario, steps)
@@ -99,10 +101,10 @@ def _has(scenario: Scenario, key: str) -> bool:
     return dotted(steps) == key and steps[0] in DRAWN
 
 
-def _no_entry(scenario: Scenario, steps: Route) -> str:
+def no_entry(scenario: Scenario, steps: Route) -> str:
     """What a list on the way has, where the step behind it is none of its places; else empty."""
     for end in range(1, len(steps)):
-        if not _has(scenario, dotted(steps[:end])):
+        if not has(scenario, dotted(steps[:end])):
             return ""
         whole, step = content(scenario, steps[:end]), steps[end]
         if isinstance(whole, tuple) and not (isinstance(step, int) and step < len(whole)):
@@ -130,7 +132,7 @@ def _type(key: str, quantity: Quantity, scenario: Scenario) -> Iterator[str]:
         yield f"a draw cannot change {key}; list its values under grid"
     elif quantity.seed and int not in described(scenario, steps).types:
         yield f"{key} cannot be drawn as a seed, since it is not a whole number"
-    elif _is_whole(described(scenario, steps)) and (way := _real(quantity)):
+    elif is_whole(described(scenario, steps)) and (way := _real(quantity)):
         seed = "seed: true or " if steps[-1] == "seed" else ""
         yield f"{key} is a whole number, and {way} draws others; write {seed}integers: [low, high]"
     elif _is_number(own) or (own is None and not quantity.relative):
@@ -142,7 +144,8 @@ def _type(key: str, quantity: Quantity, scenario: Scenario) -> Iterator[str]:
         yield f"{key} is no number but {what}"
 
 
-def _is_whole(key: Key) -> bool:
+def is_whole(key: Key) -> bool:
+    """Whether the value is a whole number, and no other."""
     return int in key.types and float not in key.types
 
 
@@ -181,14 +184,21 @@ def _refused(name: str, quantity: Quantity, scenario: Scenario, value: Any) -> s
 def _rebuilt(one: Scenario, other: Scenario) -> bool:
     """Whether two runs differ in more than numbers."""
     try:
-        return _structure(one) != _structure(other)
+        return structure(*_looped(one)) != structure(*_looped(other))
     except ValueError:  # no whole number of steps between samples
         return True
 
 
-def _structure(scenario: Scenario) -> tuple[Any, ...]:
-    loop = scenario.closed_loop()
-    return loop.layout(scenario.time_grid()), list(entries(loop, Observer()))
+def _looped(scenario: Scenario) -> tuple[ClosedLoop, TimeGrid]:
+    return scenario.closed_loop(), scenario.time_grid()
+
+
+def structure(loop: ClosedLoop, grid: TimeGrid) -> tuple[Any, ...]:
+    """What runs of one batch have to have in common: places in vectors, kernels, their constants.
+
+    Raises ValueError where there is no whole number of steps between samples.
+    """
+    return loop.layout(grid), list(entries(loop, Observer()))
 
 
 def _twice(sweep: Sweep) -> Faults:

@@ -24,6 +24,7 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.core.random_words import Words, in_unit_interval
 from podusv_cli.scenario.keys import Key, keys_of
 from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.phrases import hint
 from podusv_cli.scenario.sweep import Quantity, Sweep
 from podusv_cli.scenario.yaml_tree import Route, dotted, route
 
@@ -34,9 +35,9 @@ SWEEP = "sweep"  # the stream of a sweep's own draws
 
 
 class Number(NamedTuple):
-    """What a key becomes, and the quantity that says so."""
+    """What a key becomes, and what a message about it starts with: who says so, if anybody."""
 
-    quantity: str
+    source: str
     value: Any
 
     def __str__(self) -> str:
@@ -112,13 +113,20 @@ def drawn(scenario: Scenario, vary: Mapping[str, Quantity], draw: Draw) -> Scena
     `vessel.m` does not change `nominal`, which the law is told. Raises DrawError where a number is
     out of range.
     """
-    given: dict[str, dict[Route, Number]] = {}
+    new: dict[Route, Number] = {}
     for name, number in draw.items():
         for key in vary[name].targets(name):
-            section, *rest = _steps(key)
-            own = content(scenario, (section, *rest)) if vary[name].relative else None
-            new = Number(name, vary[name].value(own, number))
-            given.setdefault(str(section), {})[tuple(rest)] = new
+            steps = _steps(key)
+            own = content(scenario, steps) if vary[name].relative else None
+            new[steps] = Number(f"sweep.vary.{name}: ", vary[name].value(own, number))
+    return with_values(scenario, new)
+
+
+def with_values(scenario: Scenario, new: Mapping[Route, Number]) -> Scenario:
+    """The scenario with new values at these places. Raises DrawError for one out of range."""
+    given: dict[str, dict[Route, Number]] = {}
+    for (section, *rest), number in new.items():
+        given.setdefault(str(section), {})[tuple(rest)] = number
     return scenario.model_copy(
         update={section: _section(scenario, section, new) for section, new in given.items()}
     )
@@ -187,7 +195,7 @@ def _with(whole: Any, steps: Route, new: Any) -> Any:
 def _sentence(
     scenario: Scenario, at: Route, new: Mapping[Route, Number], error: ValidationError
 ) -> str:
-    """The first complaint, as a sentence with quantity, key, value and range."""
+    """The first complaint, as a sentence with source, key, value and range."""
     complaint = error.errors(include_url=False)[0]
     place = next((steps for steps in new if complaint["loc"][: len(steps)] == steps), None)
     if place is None:
@@ -195,5 +203,6 @@ def _sentence(
         numbers = ", ".join(f"{dotted((*at, *s))} = {x}" for s, x in new.items())
         return f"{dotted(at)}: {reason}, with {numbers}"
     key = described(scenario, (*at, *place))
-    found = f"sweep.vary.{new[place].quantity}: {dotted(key.path)} = {new[place]}"
-    return f"{found}; must be {key.wanted}"
+    number = new[place]
+    advice = hint(number.value, key.types) if isinstance(number.value, str) else ""
+    return f"{number.source}{dotted(key.path)} = {number}; must be {key.wanted}{advice}"

@@ -1,0 +1,107 @@
+"""The scenarios of many runs, from one value a run for each of some keys."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from podusv_cli.core.component import Component
+from podusv_cli.engine.check import check_law
+from podusv_cli.engine.loop import ClosedLoop
+from podusv_cli.scenario.load import values
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.phrases import as_yaml, unknown
+from podusv_cli.scenario.yaml_tree import Route, bracketed, route
+from podusv_cli.study.check import DRAWN, has, is_whole, no_entry, structure
+from podusv_cli.study.draws import DrawError, Number, content, described, with_values
+
+Columns = dict[str, list[Any]]  # by key, with one value a run
+
+
+def columns(parameters: Mapping[str, Any]) -> Columns:
+    """The values as Python's own. Raises ValueError where they are not one a run for every key."""
+    found = {key: _column(key, given) for key, given in parameters.items()}
+    lengths = {key: len(column) for key, column in found.items()}
+    if not found:
+        raise ValueError("no parameters: give a key and its values, as {'vessel.m': [20.0, 25.0]}")
+    if len(set(lengths.values())) > 1:
+        raise ValueError(f"all parameters need one value a run; their lengths are {lengths}")
+    return found
+
+
+def _column(key: str, given: Any) -> list[Any]:
+    array = np.asarray(given, object)
+    if array.ndim != 1:
+        what = f"an array of shape {array.shape}" if array.ndim else f"{given!r:.60}"
+        raise ValueError(f"{key}: must be a list or array with one value a run, found {what}")
+    return [one.item() if isinstance(one, np.generic) else one for one in array.tolist()]
+
+
+def scenarios(scenario: Scenario, given: Columns) -> list[Scenario]:
+    """The scenario of every run. Raises ValueError for unknown keys and values out of range."""
+    steps = {key: _steps(scenario, key) for key in given}
+    whole = {key for key, at in steps.items() if is_whole(described(scenario, at))}
+    made = []
+    for row, new in enumerate(zip(*given.values(), strict=True)):
+        numbers = {
+            steps[key]: Number("", int(one) if key in whole and _is_integer(one) else one)
+            for key, one in zip(given, new, strict=True)
+        }
+        try:
+            made.append(with_values(scenario, numbers))
+        except DrawError as error:
+            raise ValueError(f"row {row}: {error}") from error
+    return made
+
+
+def _steps(scenario: Scenario, name: str) -> Route:
+    """The steps of a key. Raises ValueError where runs of a batch cannot differ in it."""
+    key = bracketed(name)
+    steps = route(key)
+    section = str(steps[0]) if steps else ""
+    if section not in DRAWN and section in Scenario.model_fields:
+        raise ValueError(
+            f"{name}: {section} is the same in all runs of a batch (allowed: keys of "
+            f"{', '.join(DRAWN)}); to change it: podusv.load(source, {{{name!r}: ...}})"
+        )
+    if not steps or not has(scenario, key):
+        known = [one for one in values(scenario) if has(scenario, one)]
+        beyond = no_entry(scenario, steps)
+        raise ValueError(f"{name}: {beyond or unknown('key', key, known, 'podusv explain')}")
+    if isinstance(content(scenario, steps), Component):
+        raise ValueError(f"{name}: is a section; name one of the keys in it")
+    if steps[-1] in ("kind", "preset"):
+        raise ValueError(f"{name}: is the same in all runs of a batch; make a batch for each")
+    return steps
+
+
+def check_words(scenario: Scenario, loops: Sequence[ClosedLoop], given: Columns) -> None:
+    """Check the law with every combination of words that the runs have.
+
+    Raises LawError, and ValueError where words change how the loop is put together.
+    """
+    words = {key: column for key, column in given.items() if any(map(_is_word, column))}
+    rows = list(enumerate(zip(*words.values(), strict=True)))
+    first_rows = {combination: row for row, combination in reversed(rows)}
+    for own, row in first_rows.items():
+        check_law(loops[row])
+        alike = (structure(loops[at], scenario.time_grid()) for at in (row, 0))
+        if next(alike) != next(alike):
+            raise ValueError(
+                f"row {row}: {_told(words, own)} changes how the loop is put together, and row 0 "
+                f"has {_told(words, rows[0][1])}; make a batch for each"
+            )
+
+
+def _told(words: Columns, own: Iterable[Any]) -> str:
+    return ", ".join(f"{key} = {as_yaml(one)}" for key, one in zip(words, own, strict=True))
+
+
+def _is_word(one: Any) -> bool:
+    return isinstance(one, (str, bool))
+
+
+def _is_integer(one: Any) -> bool:
+    return isinstance(one, float) and one.is_integer()
