@@ -160,9 +160,11 @@ class Writer:
         return [*made, f"    {self.leave()[0] if word == 'return' else word}"]
 
     def guarded(self, depth: int) -> list[str]:
-        """A variable that is set in a branch, and read under the same condition."""
+        """A variable that is set anew in a branch, and read under the same condition."""
         flag, name = self.new("flag"), self.new("some")
-        first = self.lines(f"{flag} = {{b}}", f"if {flag}:", f"    {name} = {{f}}")
+        first = self.lines(
+            f"{flag} = {{b}}", f"{name} = {{f}}", f"if {flag}:", f"    {name} = {{f}}"
+        )
         place = self.one_of(["out[0]", "out[3]", *self.known["f"]])
         return [*first, *self.block(depth - 1, 1), f"if {flag}:", f"    {place} = {name}"]
 

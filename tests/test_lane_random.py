@@ -20,11 +20,11 @@ from podusv_cli.engine.signatures import pointer
 NAMES, ALIKE = ("gain", "mode"), frozenset({"mode"})
 WILD = (math.nan, math.inf, -math.inf, 0.0, -0.0, 1e300, -1e300, 1.0, 2.0, -1.0)
 REASONS = (  # why a kernel may be refused
-    "`and` and `or` of numbers as a value", "a place that a kernel computes",
-    "a chain of comparisons with calls or places", "a place that is computed beside a kernel",
-    "a choice beside a kernel that stores", "a choice between .+ and ",
+    "`and` or `or` of numbers as a value", "a place that a kernel computes",
+    "a chain of comparisons with a call or an index", "a place that is computed beside a kernel",
+    "a choice beside a kernel that writes", "a choice between .+ and ",
     "is set in a branch within a loop", r"\S+ \*\* \S+; write both as floats",
-    "the count of a loop that not every run has", "a whole number where one branch reads it",
+    "not every run has this loop", "a whole number where one branch reads it",
     r"Cannot unify \S+ and \S+ for",
 )  # fmt: skip
 
@@ -72,7 +72,9 @@ def outcome(seed: int) -> str:
 @pytest.mark.parametrize("count", [4, pytest.param(150, marks=pytest.mark.slow)])
 def test_random_kernels_have_the_bits_that_they_have_alone(count: int) -> None:
     """Most of them march side by side; the others are refused for a known reason."""
-    outcomes = {seed: outcome(seed) for seed in range(count)}
+    outcomes = {seed: outcome(seed) for seed in (*range(count), 47)}  # 47 is refused
     known = re.compile("|".join(["^equal$", "^no kernel$", *REASONS]))
     assert {seed: told for seed, told in outcomes.items() if not known.search(told)} == {}
-    assert list(outcomes.values()).count("equal") >= count // 3
+    ends = list(outcomes.values())
+    assert ends.count("equal") >= count // 3
+    assert ends.count("no kernel") <= count // 10

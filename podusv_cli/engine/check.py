@@ -17,14 +17,15 @@ from podusv_cli.core.component import called
 from podusv_cli.core.errors import LawError, in_a_line
 from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.core.signal import NAME, Signal
-from podusv_cli.engine.kernel_faults import check_kernel
+from podusv_cli.engine.kernel_faults import check_arguments, check_kernel
 from podusv_cli.engine.loop import ClosedLoop
 from podusv_cli.engine.march import Work
 
 PROVENANCE = "provenance"  # is a group in every log
 UNWRITTEN = -1.234567890123e-290  # no law writes just this
-# What a law's arithmetic may raise: the run tells it, as divergence.
 FLOAT_AS_COUNT = "'float' object cannot be interpreted as an integer"
+READ = (1, 2, 3, 5)  # x, memory, target and table among a law's arguments
+# What a law's arithmetic may raise: the run tells it, as divergence.
 OF_NUMBERS = (ArithmeticError, ValueError)
 
 
@@ -32,13 +33,16 @@ def check_law(loop: ClosedLoop) -> None:
     """Ask the loop's law at the start of a run, with vectors of the declared sizes.
 
     Raises LawError for signals that are undeclared or declared twice, a memory, table or outputs of
-    another size, an output left unwritten, an exception, and for a law that does not return. No
-    number at all is left for the run to tell.
+    another size, an output left unwritten, an argument written that is to be read, an exception,
+    for a law that does not return, and as `check_kernel`. No number at all is left for the run to
+    tell.
     """
-    check_kernel(loop.controller.law)
+    law = loop.controller.law
+    check_kernel(law)
     with np.errstate(all="ignore"):
         _asked(loop, _check_declared, ())
         _asked(loop, _ask, OF_NUMBERS)
+    check_arguments(law, READ)
 
 
 def _asked(

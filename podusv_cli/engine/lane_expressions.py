@@ -121,7 +121,7 @@ class Expressions:
 
     def of_BoolOp(self, node: ast.BoolOp) -> ast.expr:
         if not all(map(is_truth, node.values)):
-            raise refused(node, "`and` or `or` of numbers as a value; write a if a != 0.0 else b")
+            raise refused(node, "`and` or `or` of numbers as a value; write it with if and else")
         return self.combined(node)
 
     def combined(self, node: ast.BoolOp) -> ast.expr:

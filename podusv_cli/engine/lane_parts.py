@@ -126,9 +126,7 @@ def _power(typing: Any, number: Any, exponent: Any) -> Any:
             b, args[0], exponent.literal_value
         )
     if not {lanes_of(number), lanes_of(exponent)} == {FLOAT}:
-        raise TypingError(
-            f"{number} ** {exponent}; write both as floats, or the exponent as a number"
-        )
+        raise TypingError(f"{number} ** {exponent}; write both as floats, or the base as a float")
 
     def code(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         both = [context.cast(builder, v, k, FLOAT) for v, k in zip(args, sig.args, strict=True)]

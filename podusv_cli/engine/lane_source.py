@@ -23,7 +23,7 @@ def refused(node: Any, text: str) -> NotForLanes:
 
 
 class OtherSource(TypeError):
-    """A kernel whose file was edited since it was loaded."""
+    """A kernel that its file does not have: edited since it was loaded, or no `def`."""
 
 
 def has_source(function: Any) -> bool:
@@ -34,11 +34,16 @@ def has_source(function: Any) -> bool:
 def source(function: Any) -> ast.FunctionDef:
     """A kernel as it was written. Raises OtherSource where the file is another one by now."""
     code = function.__code__
-    nodes, codes = _functions(_text(function), code.co_filename)
+    try:
+        nodes, codes = _functions(_text(function), code.co_filename)
+    except SyntaxError as error:
+        raise OtherSource(f"{code.co_filename} is no Python any more") from error
     place = code.co_name, code.co_firstlineno
     found = codes.get(place)
     if found is None or _content(found) != _content(code):
         raise OtherSource(f"{code.co_filename} was edited since {code.co_name} was loaded")
+    if place not in nodes:
+        raise OtherSource(f"{code.co_filename}, line {place[1]}: a lambda; write it with def")
     return nodes[place]
 
 

@@ -150,10 +150,10 @@ class Work:
     def _run(self) -> None:
         # Looked up by the thread itself, since the system crashes if the thread has ended.
         look_up = getattr(time, "pthread_getcpuclockid", None)
-        if look_up:
-            self._clock = partial(time.clock_gettime, look_up(get_ident()))
-        else:
-            self._clock = time.process_time
+        read = time.clock_gettime if look_up else lambda _: time.process_time()
+        clock = look_up(get_ident()) if look_up else 0
+        began = read(clock)  # a waiting thread has worked before
+        self._clock = lambda: read(clock) - began
         try:
             self.result = self._function()
         except BaseException as error:  # a law may raise anything

@@ -220,7 +220,7 @@ COMPILED: dict[Callable[..., None], str] = {
     helped: "test_law_mistakes.py, line {2}: helper is no kernel; write @kernel above it",
     slicing: "test_law_mistakes.py, line {2}: a slice: take tail(vector, n), or a loop",
     numpy_inside: "test_law_mistakes.py, line {2}: np.dot: numpy works on arrays; take math",
-    allocating: "test_law_mistakes.py, line {2}: np.array: numpy works on arrays; take math",
+    allocating: "test_law_mistakes.py, line {2}: a list: take variables, or scratch(n)",
     raising: "test_law_mistakes.py, line {4}: raise: machine code knows no errors; write a number",
     text: "Cannot cast Literal[str](much) to float64",
 }
