@@ -6,6 +6,7 @@ import shutil
 import subprocess
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from threading import Barrier
 
 import pytest
@@ -25,7 +26,7 @@ from storage_samples import (
 )
 
 from podusv_cli.core.errors import StorageError
-from podusv_cli.storage import staging
+from podusv_cli.storage import manifest, staging
 from podusv_cli.storage.run_folder import RunWriter
 
 CALLS = ("mkdir", "write", "fsync", "replace", "rename")
@@ -106,6 +107,20 @@ def test_writers_that_finish_at_the_same_time(final, force, exchanging):
     assert not (force and exchanging) or len(winners) == 8
     others = {content(final.with_name(name))["log.h5"][0] for name in beside(final)}
     assert others == set(range(8)) - set(winners)
+
+
+def test_a_folder_that_is_renamed_while_it_is_looked_at_costs_no_result(final, monkeypatch):
+    def gone(folder: Path, found: manifest.Manifest) -> list[str]:
+        raise StorageError(f"cannot list {folder}: no such file or folder")
+
+    with RunWriter(final) as writer:
+        writer.finish("finished")
+    with RunWriter(final, force=True) as writer:
+        writer.add("log.h5", b"new")
+        monkeypatch.setattr(manifest, "foreign", gone)
+        with pytest.raises(StorageError, match=r"this result is in .*/run-2 instead"):
+            writer.finish("finished")
+    assert content(final.with_name("run-2")) == {"log.h5": b"new"}
 
 
 @pytest.mark.parametrize("deed", [fails(errno.ENOSPC), interrupts])

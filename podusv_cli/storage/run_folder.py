@@ -153,15 +153,19 @@ def _check_replaceable(final: Path, force: bool) -> None:
             return
         if final.is_symlink() or not final.is_dir():
             raise Taken(f"{final} exists and is not a folder")
-        if not any(final.iterdir()):
+        try:
+            if not any(final.iterdir()):
+                return
+        except FileNotFoundError:  # another writer has just renamed it
             return
     try:
         found = manifest.read(final)
-    except StorageError as error:
+        foreign = manifest.foreign(final, found)
+    except StorageError as error:  # or another writer has just renamed it
         raise Taken(f"{final} exists and is not a finished run folder") from error
     if not force:
         raise Taken(f"{final} exists already; --force replaces it")
-    shown = (name for name in manifest.foreign(final, found) if not Path(name).name.startswith("."))
+    shown = (name for name in foreign if not Path(name).name.startswith("."))
     if other := next(shown, ""):
         raise Taken(f"{final} holds {other}, which is not the run's; --force would remove it")
 
