@@ -24,7 +24,8 @@ from podusv_cli.scenario.explain import Row, explain, signals
 from podusv_cli.scenario.keys import SCENARIO, Key
 from podusv_cli.scenario.presets import preset_names, preset_text, with_presets
 
-SHOWN = "podusv:pod/kept.yaml"  # of its runs every figure has something to show
+# Of their runs every figure has something to show; the first that can draws it.
+SHOWN = ("podusv:pod/kept.yaml", "podusv:sea/sensors.yaml", "podusv:sea/state_4.yaml")
 SECONDS = 60.0
 DRAWN = "figures"  # the folder of their pictures
 
@@ -46,14 +47,18 @@ def _write(file: Path, content: bytes) -> None:
 
 
 def pictures() -> Iterable[tuple[str, bytes]]:
-    """Every figure of two laws behind pods, as PNG."""
-    scenario = podusv.load(SHOWN, {"simulation.duration": SECONDS})
-    runs = [
-        (name, podusv.simulate(one).recording, one)
-        for name, one in scenario.singles().items()
-        if name in ("proposed", "pid")
-    ]
-    return draw(dressed(runs), FIGURES, ["png"])
+    """Every figure, as PNG, of two laws behind pods, or in a sea."""
+    drawn: dict[str, bytes] = {}
+    for shown in SHOWN:
+        scenario = podusv.load(shown, {"simulation.duration": SECONDS})
+        runs = [
+            (name, podusv.simulate(one).recording, one)
+            for name, one in scenario.singles().items()
+            if name in ("proposed", "pid")
+        ]
+        left = [name for name in FIGURES if f"{name}.png" not in drawn]
+        drawn |= dict(draw(dressed(runs), left, ["png"]))
+    return drawn.items()
 
 
 KINDS = {
@@ -146,8 +151,8 @@ def figures_page() -> str:
     """Every figure with its picture."""
     parts = [
         "# All figures",
-        f"Drawn from the first {SECONDS:g} s of two laws of `{SHOWN}`. [Figures](../figures.md) "
-        "tells how to draw them.",
+        f"Drawn from the first {SECONDS:g} s of two laws of one of {', '.join(map(code, SHOWN))}. "
+        "[Figures](../figures.md) tells how to draw them.",
     ]
     for name, sheet in FIGURES.items():
         shown = ", ".join(map(code, sheet.signals))
