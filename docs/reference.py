@@ -24,7 +24,7 @@ from podusv_cli.scenario.explain import Row, explain, signals
 from podusv_cli.scenario.keys import SCENARIO, Key
 from podusv_cli.scenario.presets import preset_names, preset_text, with_presets
 
-# Of their runs every figure has something to show; the first that can draws it.
+# A figure is drawn from runs of the first of these scenarios that has its signals.
 SHOWN = ("podusv:pod/kept.yaml", "podusv:sea/sensors.yaml", "podusv:sea/state_4.yaml")
 SECONDS = 60.0
 DRAWN = "figures"  # the folder of their pictures

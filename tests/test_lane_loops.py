@@ -109,6 +109,12 @@ def check(watch: Any) -> None:
         np.testing.assert_array_equal(np.signbit(rooms[3]), np.signbit(wanted.ravel()))
 
 
+def refuses(watch: Any, says: str) -> None:
+    """A kernel is not compiled for runs side by side, for a reason with these words."""
+    with pytest.raises(TypeError, match=says):
+        compile.lane_entry("observer", watch, ("nothing",), frozenset())
+
+
 @pytest.mark.parametrize("watch", [loops, places])
 def test_loops_and_places_differ_from_lane_to_lane(watch: Any) -> None:
     """As the kernel has it alone, number by number."""
@@ -127,5 +133,4 @@ def carried(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vecto
 
 def test_a_variable_that_would_lose_its_number_is_refused() -> None:
     """It says what to write instead."""
-    with pytest.raises(TypeError, match=r"last is set in a branch within a loop.*before the loop"):
-        compile.lane_entry("observer", carried, ("nothing",), frozenset())
+    refuses(carried, r"last is set in a branch within a loop.*before the loop")

@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from test_lane_loops import check
+from test_lane_loops import check, refuses
 
 from podusv_cli.core.kernel import Vector, kernel
-from podusv_cli.engine import compile
 
 
 @kernel
@@ -111,5 +110,4 @@ def left_over(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vec
 )
 def test_it_is_refused_and_marches_alone(watch: Any, says: str) -> None:
     """With the line, and what it is."""
-    with pytest.raises(TypeError, match=says):
-        compile.lane_entry("observer", watch, ("nothing",), frozenset())
+    refuses(watch, says)

@@ -6,10 +6,9 @@ import math
 from typing import Any
 
 import pytest
-from test_lane_loops import check
+from test_lane_loops import check, refuses
 
 from podusv_cli.core.kernel import Vector, kernel, shared
-from podusv_cli.engine import compile
 
 
 @kernel
@@ -179,5 +178,4 @@ def first_run(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vec
 )
 def test_it_is_refused_and_marches_alone(watch: Any, says: str) -> None:
     """With the line, and what to write instead."""
-    with pytest.raises(TypeError, match=says):
-        compile.lane_entry("observer", watch, ("nothing",), frozenset())
+    refuses(watch, says)

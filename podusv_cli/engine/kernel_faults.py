@@ -118,18 +118,23 @@ def unsupported(function: Any) -> str:
     """What of a kernel, or of one that it calls, there is no machine code for; else empty."""
     if not is_kernel(function):
         return f"{getattr(function, '__name__', function)} is no kernel; write @kernel above it"
-    for one in _reached(function):
-        if node := _source(one):
-            if one in named_kernels(one).values():
-                return f"{one.__name__} calls itself; write a loop"
-            file, parts = Path(one.__code__.co_filename).name, [*_body(node)]
-            for look in (_without_code, _of_numpy):
-                for part in parts:
-                    if text := look(part, one.__globals__):
-                        return f"{file}, line {part.lineno}: {text}"  # type: ignore[attr-defined]
-            if line := _returns_at_times(node):
-                return f"{file}, line {line}: it returns a value here only; always return one"
-    return ""
+    return next(filter(None, map(_unsupported, _reached(function))), "")
+
+
+def _unsupported(function: Any) -> str:
+    """The same of one kernel alone, with file and line."""
+    if function in named_kernels(function).values():
+        return f"{function.__name__} calls itself; write a loop"
+    node = _source(function)
+    if not node:
+        return ""
+    looks = (_without_code, _of_numpy)
+    told = ((part, look(part, function.__globals__)) for look in looks for part in _body(node))
+    found = [(part.lineno, text) for part, text in told if text]  # type: ignore[attr-defined]
+    if line := _returns_at_times(node):
+        found.append((line, "it returns a value here only; always return one"))
+    file = Path(function.__code__.co_filename).name
+    return next((f"{file}, line {line}: {text}" for line, text in found), "")
 
 
 def _body(node: ast.FunctionDef) -> Iterator[ast.AST]:
