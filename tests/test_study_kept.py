@@ -12,7 +12,6 @@ from command_samples import commanded, one_line
 from small_study import written
 
 from podusv_cli.core.errors import UsageError
-from podusv_cli.process.extras import Extras
 from podusv_cli.scenario.sweep import Quantity
 from podusv_cli.storage import manifest
 from podusv_cli.storage.run_folder import open_run
@@ -83,15 +82,21 @@ def test_kept_runs_equal_the_table(study):
         assert kept.recording.status == "finished"
 
 
-def test_a_kept_log_that_differs_is_told(study, tmp_path, monkeypatch):
-    results = study.results
-    (one, other, *_) = keep.wanted(results)
-    shutil.copytree(study.folder / "logs" / other.name, tmp_path / "logs" / one.name)
-    monkeypatch.setattr(keep, "wanted", lambda results: [one])
-    extras = Extras()
-    (found,) = keep.found(tmp_path, results, extras)
-    assert "in the log and" in found.difference
-    assert one.name in str(extras.missing[0])
+def test_a_kept_log_that_differs_leaves_no_verdict(study, tmp_path, podusv):
+    (one, other, *_) = keep.wanted(study.results)
+    folder = tmp_path / "study"
+    shutil.copytree(study.folder, folder)
+    shutil.rmtree(folder / "logs" / one.name)
+    shutil.copytree(folder / "logs" / other.name, folder / "logs" / one.name)
+    before = json.loads((folder / "claims.json").read_text())
+    assert before["claims"]
+    code, out, err = podusv("sweep", "report", str(folder), "--no-figures")
+    assert code == 3
+    kept = len(keep.wanted(study.results))
+    assert f"1 of {kept} kept logs differ from it; in that of {one.name}, iae is" in out
+    assert one.name in err
+    assert json.loads((folder / "claims.json").read_text())["claims"] == []
+    assert "No claim is judged" in (folder / "report.html").read_text()
 
 
 def test_continuing_keeps_what_is_kept(study, tmp_path):

@@ -76,7 +76,7 @@ def run(
     """Simulate all draws of all laws, or those that are missing, and judge the study's claims.
 
     Run it again to continue after an interrupt, or with more draws. Exit code 3 when a run crashed,
-    hung or was invalid; runs that diverge are results.
+    hung or was invalid, and when a kept log differs from the table; runs that diverge are results.
     """
     from podusv_cli.workflows import sweep as workflow  # heavy imports only when needed
 
@@ -117,11 +117,14 @@ def part_of(text: str) -> tuple[int, int]:
 
 
 def _tell(done: Swept, *, as_json: bool, quiet: bool) -> None:
-    """Print a study, and on stderr what of it could not be made; exit with 3 for broken runs."""
+    """Print a study, and on stderr what of it could not be made.
+
+    Exits with 3 for broken runs, and for kept logs that differ from the table.
+    """
     echo_result(done, lambda: _report(done), as_json=as_json, quiet=quiet)
     for part in done.missing:
         echo(part.traced, err=True)
-    if done.results and done.results.broken:
+    if done.results and (done.results.broken or done.results.contradicted):
         raise typer.Exit(SOME_FAILED)
 
 
@@ -137,6 +140,8 @@ def _report(done: Swept) -> None:
     echo_table(*done.results.cells())
     for v in done.results.verdicts:
         echo_entry(v.name, v.claim.says, v.evidence(), facts=v.verdict)
+    if done.results.contradicted:
+        echo(done.results.contradicted)
     if done.results.broken:
         echo(f"{done.results.broken} runs crashed, hung or were invalid: see the report")
     echo(f"study: {done.folder}")

@@ -42,7 +42,8 @@ def alike(loop: ClosedLoop, observer: Observer) -> dict[str, frozenset[str]]:
     chosen = {
         "path": loop.path.choices(), "disturbance": loop.disturbance.choices(),
         "actuator": loop.actuator.choices(), "law": law.choices(), "sample": law.choices(),
-        "after_saturation": law.choices(), "observer": frozenset(names["observer"]),
+        "after_saturation": law.choices(),
+        "observer": frozenset(names["observer"]) - observer.differing,
         "measurement": loop.measurement.choices(), "correct": loop.estimator.choices(),
         "follow": loop.estimator.choices(),
     }  # fmt: skip
@@ -103,7 +104,15 @@ def places(loop: ClosedLoop, observer: Observer) -> list[tuple[int, list[int]]]:
     names["estimator"], shared["estimator"] = names["correct"], shared["correct"]
     found = {
         part: [i for i, n in enumerate(names[part]) if n in shared[part]]
-        for part in ("path", "disturbance", "law", "actuator", "measurement", "estimator")
+        for part in (
+            "path",
+            "disturbance",
+            "law",
+            "actuator",
+            "measurement",
+            "estimator",
+            "observer",
+        )
     }
     found |= {
         "disturbance_table": loop.disturbance.alike_in_table(),

@@ -76,11 +76,19 @@ AT_START = (0.0,)  # s
 
 @dataclass(frozen=True)
 class Observer:
-    """A kernel `watch(t, weight, s, row, k, seen)` that sees every instant, and its constants."""
+    """A kernel `watch(t, weight, s, row, k, seen)` that sees every instant of a run.
+
+    It gathers `size` numbers. Runs that march side by side have equal constants but for those named
+    in `differing`.
+    """
 
     watch: Callable[..., None] = _see_nothing
-    constants: dict[str, float] = field(default_factory=lambda: {"nothing": 0.0})
     size: int = 1
+    differing: frozenset[str] = frozenset()
+
+    def constants_for(self, loop: ClosedLoop) -> dict[str, float]:
+        """The kernel's constants in a run of this loop."""
+        return {"nothing": 0.0}
 
 
 @dataclass(frozen=True)
@@ -229,7 +237,7 @@ def entries(
     yield "actuator", actuator.drive_with(), tuple(recall(actuator.constants))
     yield "after_saturation", *after_saturation
     yield from _seeing(loop, recall)
-    yield "observer", observer.watch, tuple(observer.constants)
+    yield "observer", observer.watch, tuple(recall(observer.constants_for, loop))
 
 
 def _seeing(loop: ClosedLoop, recall: Recall) -> Iterator[tuple[str, Any, tuple[str, ...]]]:
@@ -270,7 +278,7 @@ def wire(
         estimator=numbers(estimator.constants_with, loop.nominal),
         estimator_table=recall(estimator.table),
         vessel=numbers(loop.vessel.constants),
-        observer=np.array(list(observer.constants.values()) or [0.0]),
+        observer=numbers(observer.constants_for, loop),
         s=np.concatenate([start, recall(actuator.rest), estimate, loop.first_memory(recall)]),
         row=np.zeros(plan.columns), stages=np.zeros(5 * plan.states),
         sensed=measurement.first(start, grid.step),

@@ -74,8 +74,10 @@ def _rms(position: int) -> Result:
     return lambda seen, step: math.sqrt(mean(seen, step))
 
 
-OF = Accumulator(watch, lambda layout: SIZE, _constants, INTEGRALS)
-OF_SETTLED = Accumulator(watch_settled, lambda layout: 2 * SETTLED, _constants, SETTLED)
+OF = Accumulator(watch, lambda layout: SIZE, _constants, INTEGRALS, ("standoff",))
+OF_SETTLED = Accumulator(
+    watch_settled, lambda layout: 2 * SETTLED, _constants, SETTLED, ("standoff",)
+)
 iae = Metric(
     "iae", "m s", "integral of z_e", OF, gathered(ABSOLUTE), 1, counts_standoff=True,
     symbol=r"\int z_e\,\mathrm{d}t",

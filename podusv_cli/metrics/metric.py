@@ -58,7 +58,9 @@ class Accumulator:
 
     The kernel `watch(t, weight, s, row, k, seen)` is called like an observer's, see
     `engine.simulate`. Its `seen` are `size` numbers, 0 at first; with size 0 it is left out. It
-    reads `constants` from `k`; a name used by several accumulators must have one value.
+    reads `constants` from `k`; a name used by several accumulators must have one value. Every run
+    of a batch has constants of its own, and the same size. Runs march side by side only with runs
+    of equal constants, but for those named in `differing`.
 
     The first `integrals` numbers are integrals over time, made with `add`; the very first is the
     time itself. They are trapezoidal sums over the steps: `weight` [s] is that of the instant.
@@ -68,6 +70,7 @@ class Accumulator:
     size: Callable[[Layout], int]
     constants: Callable[[Layout], dict[str, float]]
     integrals: int = 0
+    differing: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from functools import cache
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -64,13 +64,37 @@ def _watch(parts: Parts) -> Callable[..., None]:
     return specialise(chained, "metrics", COUNT=count, **kernels)  # type: ignore[no-any-return]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Metrics(Observer):
     """An observer for `engine.simulate` that gathers the numbers of all metrics."""
 
-    parts: Parts = ()
-    step: float = 0.0
-    known: Mapping[str, Metric] = field(default_factory=dict)
+    parts: Parts
+    step: float  # s
+    known: Mapping[str, Metric]
+    layout: Layout
+
+    def constants_for(self, loop: ClosedLoop) -> dict[str, float]:
+        """The constants of all accumulators in a run of this loop.
+
+        Raises LawError where one of them gathers another number of numbers than in the observer's
+        own loop, or has another value than another one for a constant of the same name.
+        """
+        layout, sizes = replace(self.layout, loop=loop), dict(self.parts)
+        constants: dict[str, float] = {}
+        for part, metric in self._accumulators.items():
+            size, own = _asked(part, metric, layout)
+            if size != sizes.get(part, 0):
+                what = f"gathers {size} numbers in this run and {sizes.get(part, 0)} in others"
+                raise LawError(f"metric {metric}: its accumulator {what} of the same batch")
+            for name, number in own.items():
+                if constants.setdefault(name, number) != number:
+                    what = f"has another constant {name!r} than another metric"
+                    raise LawError(f"metric {metric}: its accumulator {what}; give it another name")
+        return constants
+
+    @cached_property
+    def _accumulators(self) -> dict[Accumulator, str]:
+        return _accumulators(self.known)
 
     def summary(self, seen: Vector, failed: Failed | None = None) -> dict[str, float]:
         """Metrics by name; NaN where a run ended before one is defined.
@@ -111,22 +135,33 @@ def observer(
     loop: ClosedLoop, grid: TimeGrid, *, steady_fraction: float, settling_radius: float,
     known: Mapping[str, Metric] = METRICS,
 ) -> Metrics:  # fmt: skip
-    """The observer of those of the known metrics that this loop has."""
+    """The observer of those of the known metrics that this loop has.
+
+    It serves all loops of the same structure: each has constants of its own. Raises LawError for a
+    metric whose accumulator does not answer.
+    """
     layout = Layout(loop, loop.layout(grid), grid.last_part(steady_fraction), settling_radius)
-    accumulators = {m.accumulator: m.name for m in known.values() if m.accumulator}
-    parts: Parts = ()
-    constants: dict[str, float] = {}
-    for part, metric in accumulators.items():
-        try:
-            count = part.size(layout)
-            parts += ((part, count),) if count else ()
-            own = dict(part.constants(layout)) if count else {}
-        except Exception as error:  # a plug-in's function may raise anything
-            what = "its accumulator, asked for size and constants"
-            raise LawError(f"metric {metric}, {what}: {in_a_line(error)}") from error
-        for name, number in own.items():
-            if constants.setdefault(name, number) != number:
-                what = f"has another constant {name!r} than another metric"
-                raise LawError(f"metric {metric}: its accumulator {what}; give it another name")
-    size = sum(size for _, size in parts)
-    return Metrics(_watch(parts), constants, size, parts, grid.step, known)
+    sizes = {part: _asked(part, metric, layout)[0] for part, metric in _accumulators(known).items()}
+    parts = tuple((part, size) for part, size in sizes.items() if size)
+    differing = frozenset(name for part, _ in parts for name in part.differing)
+    found = Metrics(
+        _watch(parts), sum(size for _, size in parts), differing,
+        parts=parts, step=grid.step, known=known, layout=layout,
+    )  # fmt: skip
+    found.constants_for(loop)
+    return found
+
+
+def _accumulators(known: Mapping[str, Metric]) -> dict[Accumulator, str]:
+    """Every accumulator, with a metric that is computed from it."""
+    return {metric.accumulator: name for name, metric in known.items() if metric.accumulator}
+
+
+def _asked(part: Accumulator, metric: str, layout: Layout) -> tuple[int, dict[str, float]]:
+    """How many numbers an accumulator gathers in a loop, and its constants; none for 0 numbers."""
+    try:
+        size = part.size(layout)
+        return size, dict(part.constants(layout)) if size else {}
+    except Exception as error:  # a plug-in's function may raise anything
+        what = "its accumulator, asked for size and constants"
+        raise LawError(f"metric {metric}, {what}: {in_a_line(error)}") from error

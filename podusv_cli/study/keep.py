@@ -129,6 +129,18 @@ def difference(run: Run, one: Wanted, runs: Table) -> str:
     return ""
 
 
+def contradiction(kept: Sequence[Kept]) -> str:
+    """Why the table is in doubt: how many kept logs differ from it; "" where none does."""
+    differing = [one for one in kept if one.difference]
+    if not differing:
+        return ""
+    first = differing[0]
+    return (
+        f"no claim is judged, since the table of runs is in doubt: {len(differing)} of {len(kept)} "
+        f"kept logs differ from it; in that of {first.wanted.name}, {first.difference}"
+    )
+
+
 def tracks(kept: Sequence[Kept], extras: Extras) -> list[Track]:
     """The distance to the target in every kept log that has it."""
     made = [extras.made(f"the track of {one.wanted.name}", partial(_track, one)) for one in kept]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -30,6 +30,7 @@ class Results:
     sensitivity: pd.DataFrame
     parsed: Sequence[claims.ParsedClaim]
     verdicts: Sequence[verdict.StudyVerdict]
+    contradicted: str = ""  # why no claim is judged: a kept log has other numbers than the table
 
     @cached_property
     def known(self) -> dict[str, Metric]:
@@ -72,6 +73,10 @@ class Results:
         told = " ".join(claim.expect for claim in self.plan.sweep.claims.values())
         return [m for m in self.runs.metrics if m in ALWAYS or f".{m}" in told]
 
+    def without_verdicts(self, contradicted: str) -> Results:
+        """The tables alone, where the runs are not what their logs say."""
+        return replace(self, parsed=(), verdicts=(), contradicted=contradicted)
+
     def cells(self) -> tuple[list[str], list[list[str]]]:
         """Head and rows of the table of the answer: failures and medians of every law."""
         head = ["law", "cell", "failed", *(f"{name}, median" for name in self.shown)]
@@ -95,6 +100,7 @@ class Results:
         return {
             "preliminary": self.preliminary,
             "broken": self.broken,
+            "contradicted": self.contradicted,
             "summary": self.summary.to_dict("records"),
             "claims": [one.as_json() for one in self.verdicts],
         }

@@ -26,7 +26,7 @@ from podusv_cli.study.cluster import engine
 from podusv_cli.study.estimate import estimate, pilot
 from podusv_cli.study.invalid import check_draws
 from podusv_cli.study.joining import mixture
-from podusv_cli.study.keep import found
+from podusv_cli.study.keep import contradiction, found
 from podusv_cli.study.march import Engine, Gaps, Part, Tally, Tell, march
 from podusv_cli.study.plan import plan
 from podusv_cli.study.remote import Recipe
@@ -197,6 +197,9 @@ def answered(store: Store, request: Request) -> Swept:
         if results.plan.sweep.keep != Keep():
             request.say("making the logs that are kept")
         kept = make() if whole and not store.kernels else found(store.folder, results, extras)
+        if contradicted := contradiction(kept):
+            results = results.without_verdicts(contradicted)
+            outputs.write_tables(store.folder, results)
         request.say("drawing figures and writing the report")
         outputs.write_report(store.folder, results, kept, extras, figures=request.figures)
         if extras.interrupted:
