@@ -7,7 +7,12 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from podusv_cli.scenario.load import load
+from podusv_cli.study.draws import drawn, draws
+from podusv_cli.study.plan import plan
+
 RESULTS = Path(__file__).parents[1] / "results"
+STUDIES = RESULTS.parent / "configs" / "studies"
 PAGE = (RESULTS / "studies.md").read_text()
 LAWS = {"proposed": "proposed", "DSC": "dsc", "Li": "li", "PID": "pid"}
 ABLATED = LAWS | {"no adaptation": "no_adaptation"}
@@ -113,3 +118,16 @@ def test_the_told_mass_sets_peak_demand_and_settled_error():
     told = " ".join(TOLD.split())
     assert f"the peak demand ({by['peak_tau_u', 'nominal.m']:.2f})" in told
     assert f"about a millimetre ({by['e_steady', 'nominal.m']:.2f})" in told
+
+
+@pytest.mark.parametrize("config", sorted(STUDIES.glob("*.yaml")), ids=lambda path: path.stem)
+def test_no_published_study_draws_what_a_metric_is_measured_by(config):
+    """The standoff, and the execute and switch of trials: all runs of a law have the same."""
+    made = plan(load(config))
+    for law in made.laws:
+        single = made.single(law, 0)
+        watching = single.observer()
+        same = watching.constants_for(single.closed_loop())
+        for draw in draws(made.sweep, 0, 5):
+            loop = drawn(single, made.sweep.vary, draw).closed_loop()
+            assert watching.constants_for(loop) == same
