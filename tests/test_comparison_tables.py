@@ -31,6 +31,21 @@ def test_cells_have_number_mark_and_ratio():
     ]
 
 
+def test_a_run_that_does_not_end_at_its_target_is_never_the_best():
+    unsettled = [str(FRAME.columns[1])]
+    assert table.cells(FRAME, unsettled=unsettled)[0] == [
+        "iae",
+        "m s",
+        "4*",
+        "2 (0.5)",
+        "8 (2)",
+        "-",
+    ]
+    assert unsettled[0] not in table.leaders(FRAME, unsettled=unsettled)
+    assert "4*" in table.as_markdown(FRAME, {}, unsettled=unsettled)
+    assert r"\textbf{4}" in table.as_latex(FRAME, unsettled=unsettled)
+
+
 def test_numbers_that_read_the_same_are_marked_the_same():
     frame = table.table({"a": {"iae": 0.500653}, "b": {"iae": 0.500649}, "c": {"iae": 0.50066}})
     assert table.cells(frame) == [["iae", "m s", "0.50065*", "0.50065* (1)", "0.50066 (1)"]]
@@ -152,6 +167,14 @@ def test_an_entry_answers_for_its_run():
     assert len(entry.signal("y_e")) == len(entry.signal("W_norm_u")) == len(entry.signal("v")) == 0
     assert (entry.until, entry.ending) == (4.0, "")
     assert entry.check("finished") is True
+
+
+def test_an_entry_is_off_its_target_beyond_the_settling_radius_but_in_a_trial():
+    near, far = (Folder({"e_steady": error}) for error in (0.9, 1.1))
+    assert [Entry("a", run, scenario()).off_target for run in (near, far)] == [False, True]
+    assert not Entry("a", far, scenario("metrics.settling_radius=2")).off_target
+    assert not Entry("a", far, scenario("controller={kind: zigzag}")).off_target
+    assert not Entry("a", Folder({"e_steady": 1.1}, "diverged"), scenario()).off_target
 
 
 def test_an_entry_that_diverged_has_no_metrics_and_ends_early():

@@ -1,6 +1,7 @@
 """Warnings after a run, with times; underactuation."""
 
 import math
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -38,7 +39,7 @@ def test_findings_come_in_the_order_of_the_scenario_s_sections():
     ]
     assert sections == sorted(sections)
     assert {kind.when for kind in finding_kinds().values()} == {"before", "after"}
-    assert len(finding_kinds()) == 37
+    assert len(finding_kinds()) == 40
 
 
 def test_every_code_is_documented_with_its_meaning():
@@ -147,6 +148,45 @@ def test_a_vessel_that_ends_further_away_than_it_started_is_told_with_both_dista
     assert f"is {out['z_e'][late].mean():.3g} m away" in text
     assert told("moves-away") == []
     assert told("moves-away", "controller={kind: pid}", "start={x: 0.0, y: 0.0}") == []
+
+
+def test_a_vessel_that_stays_behind_is_told_with_its_error_beyond_the_standoff():
+    weak = "controller={kind: pid, K_Pu: 2.0, K_Iu: 0, K_Du: 0, standoff: 0.5}"
+    behind = (weak, "start={x: -10.0, y: 0.0}", "simulation.duration=100")
+    (text,) = told("never-settles", *behind)
+    out = log(*behind)
+    error = np.mean(out["z_e"][out["time"] >= 80.0]) - 0.5
+    assert f"is {error:.3g} m away from its standoff of 0.5 m" in text
+    assert told("moves-away", *behind) == []
+    assert told("never-settles", *behind, f"metrics.settling_radius={error + 0.01}") == []
+    assert told("never-settles", "controller.standoff=3.0", "simulation.duration=100") == []
+    assert told("never-settles", "controller={kind: turning_circle, execute: 1.0}") == []
+
+
+CALM = ("vessel={preset: cybership2}", "disturbance={kind: none}", "simulation.duration=120")
+
+
+def test_a_swing_that_goes_on_is_told_with_amplitude_and_period():
+    swinging = (*CALM, "controller={kind: velocity_vector}", "path={kind: line, speed: 0.5}")
+    (text,) = told("limit-cycle", *swinging)
+    out = log(*swinging)
+    y, time = (out[name][out["time"] >= 96.0] for name in ("y", "time"))
+    ups = time[1:][(y[:-1] < 0.0) & (y[1:] >= 0.0)]
+    amplitude, period = (float(part) for part in re.findall(r"of (\S+) (?:m|s) ", text))
+    assert amplitude == pytest.approx(np.ptp(y) / 2, rel=0.03)
+    assert period == pytest.approx(np.diff(ups).mean(), rel=0.02)
+
+
+def test_a_swing_that_dies_away_or_follows_a_load_is_not_told():
+    stable = (*CALM, "controller={kind: velocity_vector}", "path={kind: line, speed: 1.1}")
+    pushed = (
+        "controller={kind: pid}", "simulation.duration=120",
+        "disturbance={kind: harmonic, b_v: {sin: 2.0, sin_rate: 1.3, cos: 0.0}}",
+    )  # fmt: skip
+    assert told("limit-cycle", *stable) == []
+    out = log(*pushed)
+    assert np.ptp(out["y"][out["time"] >= 96.0]) > 0.05
+    assert told("limit-cycle", *pushed) == []
 
 
 def test_nothing_is_told_about_a_run_without_rows():

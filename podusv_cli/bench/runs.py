@@ -81,7 +81,7 @@ def _run(case: Case, law: str, scenario: Scenario) -> BenchRun:
     numbers = seeing.summary(recording.seen) if recording.seen is not None else {}
     track = np.stack([recording[name] for name in ("x", "y", "x_d", "y_d")], axis=1)
     settled = numbers.get("z_e_steady", math.nan)
-    if recording.status != "finished" or settled <= scenario.metrics.settling_radius:
+    if recording.status != "finished" or scenario.at_target(settled):
         return BenchRun(
             case.place, law, recording.status, _first(recording.message), numbers, track
         )

@@ -94,9 +94,8 @@ def _report(done: Compared, verbose: bool) -> None:
     from podusv_cli.comparison.table import NOTE, cells
 
     result = done.result
-    echo_table(
-        ["metric", "unit", *map(str, result.table.columns)], cells(result.table, result.metrics)
-    )
+    head = ["metric", "unit", *map(str, result.table.columns)]
+    echo_table(head, cells(result.table, result.metrics, result.unsettled))
     echo(NOTE)
     for v in result.verdicts:
         echo_entry(v.name, v.claim.says, v.evidence(), facts=v.answer)

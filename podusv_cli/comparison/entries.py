@@ -75,6 +75,12 @@ class Entry:
         """Every metric of the run by name, NaN where it is undefined."""
         return {name: self.metric(name) for name in dict.fromkeys([*self.run.metrics, *self.cost])}
 
+    @property
+    def off_target(self) -> bool:
+        """Whether the run finished, but not at its target; no table ranks it."""
+        finished = self.recording.status == "finished"
+        return finished and not self.scenario.at_target(self.metric("e_steady"))
+
     def signal(self, name: str) -> Vector:
         """A logged or derived signal; empty where the run has none of this name."""
         log, plugins = self.recording, self.scenario.plugged

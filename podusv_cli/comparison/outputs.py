@@ -50,6 +50,11 @@ class Result:
     metrics: Mapping[str, Metric] = field(default_factory=lambda: METRICS)  # that the table knows
     peaks: Mapping[str, float] = field(default_factory=dict)  # of signals, as claims name them
 
+    @property
+    def unsettled(self) -> list[str]:
+        """The runs that do not end at their target, which no table ranks."""
+        return [entry.label for entry in self.entries if entry.off_target]
+
 
 def write(writer: RunWriter, result: Result, extras: Extras) -> None:
     """Write table and verdicts in every form into the comparison's folder."""
@@ -69,9 +74,11 @@ def _forms(result: Result) -> dict[str, Callable[[], bytes]]:
     forms: dict[str, Callable[[], bytes]] = {
         TABLE: lambda: table.as_csv(lasting, result.metrics).encode(),
         "comparison.md": lambda: table.as_markdown(
-            lasting, result.endings, result.metrics
+            lasting, result.endings, result.metrics, result.unsettled
         ).encode(),
-        "comparison.tex": lambda: table.as_latex(lasting, result.metrics).encode(),
+        "comparison.tex": lambda: table.as_latex(
+            lasting, result.metrics, result.unsettled
+        ).encode(),
         TIMING: lambda: json_files.encode({**_claims(timed), "metrics": times}),
     }
     if result.verdicts:
@@ -142,5 +149,6 @@ def as_report(
         noticed=merged(result.warnings), table=result.table, verdicts=result.verdicts,
         theories={entry.label: entry.run.theory for entry in result.entries if entry.run.theory},
         figures=pictures, provenance=provenance, chase=moving, metrics=result.metrics,
+        unsettled=result.unsettled,
     )  # fmt: skip
     return report.page(story)

@@ -43,6 +43,7 @@ class Story:
     missing: Sequence[str] = ()  # what could not be made, and why
     chase: Mapping[str, Any] = field(default_factory=dict)  # see `chase.chase`
     metrics: Mapping[str, Metric] = field(default_factory=lambda: METRICS)  # of the table
+    unsettled: Sequence[str] = ()  # runs that do not end at their target
 
 
 def page(story: Story) -> str:
@@ -50,7 +51,7 @@ def page(story: Story) -> str:
     from markupsafe import Markup  # with jinja2
 
     figures = [*enumerate(story.figures, 1)]
-    best = leaders(story.table, story.metrics)
+    best = leaders(story.table, story.metrics, story.unsettled)
     return environment("podusv_cli.comparison").get_template("report.html.j2").render(
         title=story.title,
         story=story,
@@ -62,7 +63,7 @@ def page(story: Story) -> str:
         noticed=_by_code(story.noticed, story.scenario.plugged),
         metrics={str(name): story.metrics[str(name)] for name in story.table.index},
         single=len(story.table.columns) == 1,
-        cells=cells(story.table, story.metrics),
+        cells=cells(story.table, story.metrics, story.unsettled),
         stability=(stability.HEAD, [*stability.rows(story.theories)]),
         beside=figures[:BESIDE],
         figures=figures,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import pandas as pd
 
@@ -14,10 +14,11 @@ from podusv_cli.metrics.table import CLOCKED, METRICS
 
 METRIC = "metric"
 NOTE = (
-    "* smallest of its row, except for measured times and, where a law keeps a standoff, for "
-    "numbers that contain it; in brackets the ratio to the first run; - not defined, or the run "
-    "did not finish"
+    "* smallest of its row among the runs that end at their target, except for measured times and, "
+    "where a law keeps a standoff, for numbers that contain it; in brackets the ratio to the first "
+    "run; - not defined, or the run did not finish"
 )
+Names = Collection[str]
 
 
 def table(
@@ -54,13 +55,21 @@ def as_csv(frame: pd.DataFrame, known: Mapping[str, Metric] = METRICS) -> str:
     return full.to_csv(lineterminator="\n", header=[escaping.csv(str(c)) for c in full.columns])
 
 
-def cells(frame: pd.DataFrame, known: Mapping[str, Metric] = METRICS) -> list[list[str]]:
-    """Rows of text: metric, unit, then number and ratio to the first run; best marked with *."""
+def cells(
+    frame: pd.DataFrame, known: Mapping[str, Metric] = METRICS, unsettled: Names = ()
+) -> list[list[str]]:
+    """Rows of text: metric, unit, then number and ratio to the first run; best marked with *.
+
+    `unsettled` are the runs that do not end at their target; they are never the best.
+    """
     rows, unranked = [], _unranked(frame, known)
     for name, numbers in frame.iterrows():
-        best = math.nan if name in unranked else numbers.min()
+        best = math.nan if name in unranked else numbers.drop(list(unsettled)).min()
         first = numbers.iloc[0]
-        texts = [_cell(number, first, best, i) for i, number in enumerate(numbers)]
+        texts = [
+            _cell(number, first, math.nan if label in unsettled else best, i)
+            for i, (label, number) in enumerate(numbers.items())
+        ]
         rows.append([str(name), known[str(name)].unit, *texts])
     return rows
 
@@ -79,10 +88,16 @@ def _unranked(frame: pd.DataFrame, known: Mapping[str, Metric] = METRICS) -> lis
     ]
 
 
-def leaders(frame: pd.DataFrame, known: Mapping[str, Metric] = METRICS) -> dict[str, list[str]]:
-    """The metrics in which each run is best; equal numbers and measured times rank nobody."""
-    best: dict[str, list[str]] = {str(label): [] for label in frame.columns}
-    for name, numbers in frame.drop(index=_unranked(frame, known)).iterrows():
+def leaders(
+    frame: pd.DataFrame, known: Mapping[str, Metric] = METRICS, unsettled: Names = ()
+) -> dict[str, list[str]]:
+    """The metrics in which each run is best; equal numbers and measured times rank nobody.
+
+    Neither do `unsettled` runs, which do not end at their target.
+    """
+    ranked = frame.drop(index=_unranked(frame, known), columns=list(unsettled))
+    best: dict[str, list[str]] = {str(label): [] for label in ranked.columns}
+    for name, numbers in ranked.iterrows():
         shown = numbers.dropna().map(_shown)
         if shown.nunique() > 1:
             for label in shown.index[shown == _shown(numbers.min())]:
@@ -104,8 +119,9 @@ def _cell(number: float, first: float, best: float, position: int) -> str:
 
 
 def as_markdown(
-    frame: pd.DataFrame, endings: Mapping[str, str], known: Mapping[str, Metric] = METRICS
-) -> str:
+    frame: pd.DataFrame, endings: Mapping[str, str], known: Mapping[str, Metric] = METRICS,
+    unsettled: Names = (),
+) -> str:  # fmt: skip
     """The table in Markdown, followed by the reasons why runs did not finish."""
     last = {label: ending.strip().splitlines()[-1:] for label, ending in endings.items()}
     failures = [
@@ -114,7 +130,7 @@ def as_markdown(
         for line in lines
     ]
     head = ["metric", "unit", *(escaping.markdown_cell(str(label)) for label in frame.columns)]
-    lines = [head, ["---", "---", *["---:"] * len(frame.columns)], *cells(frame, known)]
+    lines = [head, ["---", "---", *["---:"] * len(frame.columns)], *cells(frame, known, unsettled)]
     return (
         "\n".join("| " + " | ".join(line) + " |" for line in lines)
         + f"\n\n{NOTE}\n"
@@ -122,11 +138,13 @@ def as_markdown(
     )
 
 
-def as_latex(frame: pd.DataFrame, known: Mapping[str, Metric] = METRICS) -> str:
+def as_latex(
+    frame: pd.DataFrame, known: Mapping[str, Metric] = METRICS, unsettled: Names = ()
+) -> str:
     """The table in LaTeX (booktabs): symbols where metrics have one, the best of a row in bold."""
     head = ["metric", "unit", *map(str, frame.columns)]
     body = [[escaping.latex(cell) for cell in head]]
-    for name, unit, *numbers in cells(frame, known):
+    for name, unit, *numbers in cells(frame, known, unsettled):
         symbol = known[name].symbol
         shown = f"${symbol}$" if symbol else escaping.latex(name)
         body.append([shown, quantities.raised(unit), *map(_marked, numbers)])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator
 
 from podusv_cli.core.component import unit_of
 from podusv_cli.core.finding import At, Sentences, before
@@ -10,6 +11,7 @@ from podusv_cli.findings.finding import Case
 from podusv_cli.vessels.vessel import Vessel
 
 DAMPING = ("X_uu", "X_uuu", "Y_vv", "N_rr")  # a positive linear one is refused by the model
+ADDED_MASS = {"X_udot": "m11", "Y_vdot": "m22", "N_rdot": "m33"}  # and the inertia it belongs to
 TURN = 2.0 * math.pi
 
 
@@ -20,19 +22,43 @@ TURN = 2.0 * math.pi
 )  # fmt: skip
 def damping_sign(case: Case) -> Sentences:
     """A nonlinear damping coefficient is positive, so it accelerates the motion."""
+    for where, _, _, number in _positive(case, DAMPING):
+        yield At(
+            where,
+            f"{number} accelerates the motion that it should damp; damping coefficients are "
+            f"negative: -{number.partition(' ')[0]}?",
+        )
+
+
+@before(
+    "added-mass-sign", about="vessel", meaning="added mass makes the hull lighter",
+    condition="X_udot, Y_vdot or N_rdot is positive",
+    remedy="make the coefficient negative; papers that print positive added masses add them",
+)  # fmt: skip
+def added_mass_sign(case: Case) -> Sentences:
+    """An added mass is positive, so it is taken from the inertia (M = M_RB - diag(X_udot, ...))."""
+    for where, vessel, name, number in _positive(case, ADDED_MASS):
+        inertia = ADDED_MASS[name]
+        unit = number.partition(" ")[2]
+        yield At(
+            where,
+            f"{number} makes the hull lighter than it is: {inertia} = "
+            f"{getattr(vessel, inertia):.4g} {unit}, as {inertia} is the rigid body's less {name}; "
+            f"added masses are negative numbers here: -{number.partition(' ')[0]}?",
+        )
+
+
+def _positive(case: Case, names: Iterable[str]) -> Iterator[tuple[str, Vessel, str, str]]:
+    """Key, vessel, name and value of each positive coefficient, once if both vessels have it."""
     vessels = {"vessel": case.scenario.vessel, "nominal": case.scenario.nominal}
     reported = set[tuple[str, float]]()
     for section, vessel in vessels.items():
-        for name in DAMPING:
+        for name in names:
             number = getattr(vessel, name)
             if number > 0.0 and (name, number) not in reported:
                 reported.add((name, number))
-                unit = unit_of(Vessel.model_fields[name])
-                yield At(
-                    f"{section}.{name}",
-                    f"{number:g} {unit} accelerates the motion that it should damp; damping "
-                    f"coefficients are negative: {-number:g}?",
-                )
+                text = f"{number:g} {unit_of(Vessel.model_fields[name])}"
+                yield f"{section}.{name}", vessel, name, text
 
 
 @before(

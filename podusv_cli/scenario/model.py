@@ -202,6 +202,13 @@ class Scenario(Component):
         """When the part of the run begins that counts as settled [s]."""
         return self.time_grid().last_part(self.metrics.steady_fraction)
 
+    def at_target(self, error: float) -> bool:
+        """Whether a run with this mean error over the steady window [m] ends at its target.
+
+        That is within `metrics.settling_radius`. A manoeuvring trial has no target to be at.
+        """
+        return bool(self.controller.trial()) or error <= self.metrics.settling_radius
+
     def conflicts(self) -> list[tuple[str, str]]:
         """Key and message for every pair of values that contradict each other."""
         return conflicts(self)
