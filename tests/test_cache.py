@@ -222,7 +222,7 @@ def test_a_full_disk_costs_time_only(cache, monkeypatch):
     def full(*paths: Any, **folders: Any) -> None:
         raise OSError("no space left on device")
 
-    assert code_folder.code_folder(object_cache.source_digest())
+    assert code_folder.code_folder(object_cache.translators())
     monkeypatch.setattr(os, "replace", full)
     assert compile.compiled(ready, ONE_TO_ONE)(2.5) == 2.5
     assert [path.name for path in cache.rglob("*.*")] == [code_folder.MARK]

@@ -1,15 +1,13 @@
 """The folder where compiled code is kept: one that nobody but its user can write to.
 
-Whoever can write a piece of compiled code has it run by the next command. So the folder and all
-folders above it have to be safe from other users.
+Whoever can write a piece of compiled code has it run by the next command. So others must not be
+able to write into the folder, nor into the one that it lies in.
 """
 
 from __future__ import annotations
 
-import grp
 import logging
 import os
-import pwd
 import re
 import shutil
 import stat
@@ -21,7 +19,9 @@ from pathlib import Path
 from podusv_cli.core.escaping import visible
 from podusv_cli.process.temporary_names import remove_abandoned_files, temporary_name
 
-KEPT = 8  # folders of this many other states of the source stay on disk
+KEPT = 2  # folders of this many other states of what translates kernels stay on disk
+PIECES = 4000  # of compiled code in a folder; of more the oldest are removed
+OTHERS = stat.S_IWGRP | stat.S_IWOTH
 DIGEST = re.compile(r"[0-9a-f]{16}")
 # By this name and first line other programs know a cache; the second line says that it is ours.
 MARK = "CACHEDIR.TAG"
@@ -90,38 +90,18 @@ def _made(root: Path, name: str) -> Path:
     if not _is_marked(folder):
         write(folder / MARK, MARKED)
     _forget_old(folder)
+    _forget_pieces(folder)
     remove_abandoned_files(folder)
     return folder
 
 
-def _check(root: Path) -> None:
-    """PermissionError where others can put something in place of this folder or of one above it.
-
-    The way there is looked at as it is written, and as it is with all links resolved.
-    """
-    real = Path(os.path.realpath(root))
-    for path in dict.fromkeys((root, *root.parents, real, *real.parents)):
-        with suppress(FileNotFoundError):
-            found = path.lstat()
-            owners = {os.getuid()} if path == real else {os.getuid(), 0}
-            _demand(path != real or stat.S_ISDIR(found.st_mode), f"{path} is not a folder")
-            _demand(found.st_uid in owners, f"another user owns {path}")
-            _demand(not _open_to_others(found), f"others can write to {path}")
-
-
-def _open_to_others(found: os.stat_result) -> bool:
-    if stat.S_ISLNK(found.st_mode) or found.st_mode & stat.S_ISVTX:  # as /tmp: names are safe there
-        return False
-    grouped = found.st_mode & stat.S_IWGRP and not _is_own_group(found.st_gid)
-    return bool(found.st_mode & stat.S_IWOTH or grouped)
-
-
-def _is_own_group(number: int) -> bool:
-    """Whether the group has the user's name and nobody else in it, as many systems make them."""
-    with suppress(KeyError):
-        group, user = grp.getgrgid(number), pwd.getpwuid(os.getuid()).pw_name
-        return group.gr_name == user and set(group.gr_mem) <= {user}
-    return False
+def _check(folder: Path) -> None:
+    """Raise PermissionError where somebody else owns this folder or can write into it."""
+    with suppress(FileNotFoundError):
+        found = folder.stat()
+        _demand(stat.S_ISDIR(found.st_mode), f"{folder} is not a folder")
+        _demand(found.st_uid == os.getuid(), f"another user owns {folder}")
+        _demand(not found.st_mode & OTHERS, f"others can write to {folder}: chmod go-w {folder}")
 
 
 def _is_marked(folder: Path) -> bool:
@@ -136,3 +116,11 @@ def _forget_old(current: Path) -> None:
     caches = [path for path in alike if path != current and _is_marked(path)]
     for old in sorted(caches, key=lambda path: -path.stat().st_mtime)[KEPT:]:
         shutil.rmtree(old, ignore_errors=True)
+
+
+def _forget_pieces(folder: Path) -> None:
+    """Remove the pieces that were made longest ago, of more than `PIECES`."""
+    pieces = list(folder.glob("*.code"))
+    if len(pieces) > PIECES:
+        for old in sorted(pieces, key=lambda path: -path.stat().st_mtime)[PIECES // 2 :]:
+            old.unlink(missing_ok=True)

@@ -3,15 +3,17 @@
 What is kept of a kernel is plain object code: it needs no Python and no numba, and loading it takes
 llvmlite alone. The name of a kept piece ends in a digest of all that goes into it: the byte code
 and constants of the kernel and of every kernel that it calls, the processor, the versions of what
-translates. The pieces lie in a folder named after a digest of the source files that can hold
-kernels. So kernels of one name, laws that live elsewhere, machines that share a home, and a process
-that imported the source before it was edited do not get into each other's way.
+translates. The pieces lie in a folder named after a digest of podusv's own files that translate. So
+kernels of one name, laws that live elsewhere, machines that share a home, and a process that
+imported the source before it was edited do not get into each other's way; and a comment, which
+changes no byte code, compiles nothing anew.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
+import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from functools import cache, singledispatch
@@ -25,9 +27,11 @@ import numpy as np
 
 from podusv_cli.engine import code_folder
 
-# What a source file that makes kernels has in it; what is edited elsewhere leaves machine code as
-# it is, but for constants, which the digest of a piece has in it.
-MARKS = (b"@kernel", b"specialise(", b"with_globals(")
+# The files of podusv that turn kernels into machine code, from the package's folder.
+TRANSLATORS = (
+    "core/kernel.py", "engine/compile*.py", "engine/lane*.py", "engine/object_cache.py",
+    "engine/signatures.py",
+)  # fmt: skip
 
 
 class Code(NamedTuple):
@@ -42,7 +46,7 @@ class Code(NamedTuple):
 
 def stored(prototype: Any, name: str, translate: Callable[[], Code]) -> Any:
     """The function of this name as ctypes calls it: found on disk, or translated and kept there."""
-    folder = code_folder.code_folder(source_digest())
+    folder = code_folder.code_folder(translators())
     path = folder / f"{name}.code" if folder else None
     code = _read(path) if path else None
     if code is None:
@@ -57,7 +61,7 @@ def stored(prototype: Any, name: str, translate: Callable[[], Code]) -> Any:
 
 def is_kept(name: str) -> bool:
     """Whether a piece of this name is on the disk."""
-    folder = code_folder.code_folder(source_digest())
+    folder = code_folder.code_folder(translators())
     return bool(folder and (folder / f"{name}.code").exists())
 
 
@@ -111,7 +115,7 @@ def fingerprint(function: Any) -> str:
 @cache
 def _circumstances() -> tuple[str, ...]:
     settings = sorted(f"{k}={v}" for k, v in os.environ.items() if k.startswith("NUMBA_"))
-    versions = [version(package) for package in ("numba", "llvmlite")]
+    versions = [sys.version, *(version(package) for package in ("numba", "llvmlite"))]
     cpu = [llvm.get_process_triple(), llvm.get_host_cpu_name()]
     return (*settings, *versions, *cpu, llvm.get_host_cpu_features().flatten())
 
@@ -190,12 +194,8 @@ def _(thing: Any, names: Iterable[str], told: dict[Any, int]) -> Iterator[str]:
 
 
 @cache
-def source_digest() -> str:
-    """Digest of every source file that can hold a kernel or turns kernels into machine code."""
-    digest = hashlib.sha256()
-    engine = Path(__file__).resolve().parent
-    for path in sorted(engine.parent.rglob("*.py")):
-        content, name = path.read_bytes(), path.relative_to(engine.parent).as_posix()
-        if path.parent == engine or any(mark in content for mark in MARKS):
-            digest.update(name.encode() + b"\0" + content + b"\0")
-    return digest.hexdigest()[:16]
+def translators() -> str:
+    """Digest of podusv's files that turn kernels into machine code."""
+    package = Path(__file__).resolve().parents[1]
+    files = sorted(path for pattern in TRANSLATORS for path in package.glob(pattern))
+    return _digest(b"\0".join(path.read_bytes() for path in files))

@@ -129,43 +129,26 @@ def test_a_folder_that_is_not_ones_own_is_not_used(folder, monkeypatch, caplog):
 
 @pytest.mark.parametrize("mode", [0o777, 0o707, 0o770])
 def test_a_folder_that_others_can_write_to_is_not_used(folder, mode, monkeypatch, caplog):
-    """Neither it nor one inside it, nor a link to it: they could rename what is in it."""
-    monkeypatch.setattr(code_folder, "_is_own_group", lambda group: False)
-    shared = folder / "shared"
-    (shared / "inside").mkdir(parents=True)
-    shared.chmod(mode)
-    (folder / "link").symlink_to(shared)
-    for place in (shared, shared / "inside", shared / "new" / "deep", folder / "link" / "new"):
-        assert refused(place, monkeypatch, caplog) == f"others can write to {shared}"
-
-
-def test_a_folder_in_one_like_tmp_or_of_ones_own_group_is_used(folder, monkeypatch, caplog):
-    (folder / "tmp").mkdir()
-    (folder / "tmp").chmod(0o1777)  # where nobody can rename what is another's
-    (folder / "grouped").mkdir()
-    (folder / "grouped").chmod(0o775)
-    monkeypatch.setattr(code_folder, "_is_own_group", lambda group: True)
-    for place in (folder / "tmp" / "mine", folder / "grouped" / "mine"):
-        FRESH.cache_clear()
-        monkeypatch.setenv("PODUSV_CACHE", str(place))
-        found = FRESH(NAME)
-        assert found == place / NAME
-        assert found.stat().st_mode & 0o777 == 0o700
-    assert not caplog.messages
-
-
-def test_a_folder_for_all_in_place_of_the_code_is_not_used_nor_a_link_to_one(
-    folder, monkeypatch, caplog
-):
-    cache = folder / "cache"
-    cache.mkdir()
-    for place in (folder / "open", cache / NAME):
+    """Neither the place nor the folder of the code in it, nor a link to such a one."""
+    (folder / "cache").mkdir()
+    for place in (folder / "shared", folder / "cache" / NAME):
         place.mkdir()
-        place.chmod(0o777)
-    assert refused(cache, monkeypatch, caplog) == f"others can write to {cache / NAME}"
-    (cache / NAME).rmdir()
-    (cache / NAME).symlink_to(folder / "open")
-    assert refused(cache, monkeypatch, caplog) == f"others can write to {folder / 'open'}"
+        place.chmod(mode)
+    (folder / "link").symlink_to(folder / "shared")
+    for place in (folder / "shared", folder / "link"):
+        remedy = f"others can write to {place}: chmod go-w {place}"
+        assert refused(place, monkeypatch, caplog) == remedy
+    said = refused(folder / "cache", monkeypatch, caplog)
+    assert said.startswith(f"others can write to {folder / 'cache' / NAME}")
+
+
+def test_a_folder_that_podusv_makes_is_for_nobody_else(folder, monkeypatch, caplog):
+    FRESH.cache_clear()
+    monkeypatch.setenv("PODUSV_CACHE", str(folder / "mine"))
+    assert FRESH(NAME) == folder / "mine" / NAME
+    for made in (folder / "mine", folder / "mine" / NAME):
+        assert made.stat().st_mode & 0o777 == 0o700
+    assert not caplog.messages
 
 
 # --- folders of former states of the source
@@ -216,6 +199,18 @@ def test_old_caches_are_forgotten(tmp_path, monkeypatch):
     assert code_kept(MANY - 1) == folder
     left = sorted(int(path.name, 16) for path in cache.iterdir())
     assert left == list(range(MANY))[-code_folder.KEPT - 1 :]
+
+
+def test_the_oldest_pieces_of_very_many_are_forgotten(tmp_path, monkeypatch):
+    monkeypatch.setattr(code_folder, "PIECES", 6)
+    monkeypatch.setenv("PODUSV_CACHE", str(tmp_path))
+    folder = code_kept(1)
+    for number in range(7):
+        (folder / f"piece_{number}.code").touch()
+        os.utime(folder / f"piece_{number}.code", (number, number))
+    code_kept(1)
+    left = sorted(path.stem for path in folder.glob("*.code"))
+    assert left == ["piece_4", "piece_5", "piece_6"]
 
 
 def test_a_folder_that_cannot_be_written_is_passed_over_and_that_is_told(
