@@ -122,6 +122,12 @@ def test_a_period_that_does_not_fit_is_one_sentence_with_its_key(key, content, s
     assert line.startswith(f"--set {key}={content}: {says}")
 
 
+def test_a_law_among_several_is_wrong_once():
+    several = "controllers:\n  zag: {kind: zigzag, check_every: 0.015}\n  pid: {kind: pid}"
+    (line,) = told(SOUND.replace("controller: {kind: pid}", several))
+    assert line.startswith("a.yaml:6:36: controllers.zag.check_every: 0.015 s is no whole")
+
+
 @pytest.mark.parametrize(
     ("sound", "wrong", "says"),
     [
