@@ -190,9 +190,10 @@ def test_sampled_control_is_the_law_at_samples_held_in_between():
     np.testing.assert_allclose(beta[1:], expected, rtol=1e-8)
 
 
-def test_a_difference_that_fits_no_step_is_refused():
-    loop = corrected(controller=AdaptiveNeural(rate="difference", difference_step=0.015))
-    with pytest.raises(ValueError, match=r"0\.015"):
+@pytest.mark.parametrize("period", [0.015, 1e-12])
+def test_a_difference_that_fits_no_step_is_refused(period):
+    loop = corrected(controller=AdaptiveNeural(rate="difference", difference_step=period))
+    with pytest.raises(ValueError, match=f"samples every {period:g} s, no whole number of steps"):
         simulate(loop, TimeGrid(0.01, 10), compiled=False)
 
 

@@ -187,9 +187,13 @@ def test_velocities_are_taken_in_where_they_are_measured():
     assert (np.diagonal(P)[3:6] < 0.5 * np.diagonal(wide)[3:6]).all()
 
 
-def test_a_value_corrects_as_the_formula_says_and_nothing_new_corrects_nothing():
+@pytest.mark.parametrize(
+    ("place", "innovation"), [*enumerate([5.0, 5.0, 5.0 - 2.0 * np.pi] + [5.0] * 3)]
+)
+def test_a_value_corrects_as_the_formula_says_and_nothing_new_corrects_nothing(place, innovation):
+    """A heading alone is corrected by the shorter way round."""
     ekf = ExtendedKalmanFilter()
-    seen, state, k = delivered(ekf, np.zeros(6), np.array([0.1, 0, 0, 0, 0, 0]))
+    seen, state, k = delivered(ekf, np.zeros(6), np.full(6, 5.0))
     before = np.random.default_rng(2).normal(size=(N, N))
     before = before @ before.T
     state[N:] = before[UPPER]
@@ -197,10 +201,14 @@ def test_a_value_corrects_as_the_formula_says_and_nothing_new_corrects_nothing()
     unchanged = state.copy()
     ekf.correct(0.0, seen, state, k, np.zeros(1))
     np.testing.assert_array_equal(state, unchanged)
-    seen[6] = 1.0
+    seen[6 + place] = 1.0
     ekf.correct(0.0, seen, state, k, np.zeros(1))
-    gain = before[:, 0] / (before[0, 0] + k.sigma_p**2)
-    np.testing.assert_allclose(state[:N], 0.1 * gain, rtol=1e-12)
-    joseph = np.eye(N) - np.outer(gain, np.eye(N)[0])
-    after = joseph @ before @ joseph.T + k.sigma_p**2 * np.outer(gain, gain)
+    sigma, row = (
+        [k.sigma_p, k.sigma_p, k.sigma_psi, k.sigma_u, k.sigma_v, k.sigma_r][place],
+        np.eye(N)[place],
+    )
+    gain = before[:, place] / (before[place, place] + sigma**2)
+    np.testing.assert_allclose(state[:N], innovation * gain, rtol=1e-12)
+    joseph = np.eye(N) - np.outer(gain, row)
+    after = joseph @ before @ joseph.T + sigma**2 * np.outer(gain, gain)
     np.testing.assert_allclose(square(state[N:]), after, rtol=1e-9, atol=1e-9)

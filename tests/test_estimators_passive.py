@@ -98,13 +98,15 @@ def test_at_speed_the_full_model_needs_faster_velocities_and_the_linear_one_does
 
 
 def test_the_linear_model_has_linear_damping_alone():
-    linear_only = PAPER.model_copy(update={"X_uu": -3.0, "Y_vv": -4.0, "N_rr": -5.0})
+    both = {"X_uu": -3.0, "Y_vv": -4.0, "N_rr": -5.0, "Y_r": 0.4, "N_v": -0.6}
+    linear_only = PAPER.model_copy(update=both)
     k = bundle(PassiveObserver(model="linear").constants_with(linear_only))
     state, rate = np.zeros(18), np.full(18, np.nan)
     state[3:6] = nu = 0.7, -0.2, 0.3
     observe(0.0, np.zeros(18), np.zeros(3), state, k, np.zeros(1), rate)
     inertia = [PAPER.m11, PAPER.m22, PAPER.m33]
-    expected = np.multiply([PAPER.X_u, PAPER.Y_v, PAPER.N_r], nu) / inertia
+    damping = [[PAPER.X_u, 0.0, 0.0], [0.0, PAPER.Y_v, 0.4], [0.0, -0.6, PAPER.N_r]]
+    expected = np.array(damping) @ nu / inertia
     np.testing.assert_allclose(rate[3:6], expected, rtol=1e-12)
 
 

@@ -45,6 +45,10 @@ def only_where_needed(
         seen[3] = 3.0
     seen[4] = noted(s[2], seen) if s[2] > 0.0 else 7.0
     seen[5] = noted(row[int(s[0] > 0.0)] if s[1] > 0.0 else 2.0, seen)
+    if s[0] > 0.0 and s[1] > 0.0 and row[int(s[2] > 0.0)] > 0.0 and s[2] < 1.0:
+        seen[6] = 6.0  # each of the four decides in some lanes
+    if s[0] > 0.5 or s[1] > 0.5 or row[int(s[2] > 0.0)] > 1.0 or s[2] < -1.0:
+        seen[7] = 5.0
 
 
 @kernel

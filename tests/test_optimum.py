@@ -13,13 +13,14 @@ import numpy as np
 import pytest
 from command_samples import BASE
 from conftest import VESSELS
+from scipy.integrate import quad
 
 from podusv_cli.controllers.pid import Pid
 from podusv_cli.core.component import Component
 from podusv_cli.core.errors import NotConvergedError, UsageError
 from podusv_cli.core.kernel import bundle, kernel, transplanted
 from podusv_cli.disturbances.base import Disturbance
-from podusv_cli.optimum import collocation
+from podusv_cli.optimum import collocation, feedback
 from podusv_cli.optimum.problem import Motion, problem
 from podusv_cli.process.interrupts import interrupts_caught
 from podusv_cli.scenario.load import load, load_text
@@ -78,6 +79,46 @@ def test_full_thrust_is_reversed_when_pontryagin_says_so():
     surge = motion.demands[:, 0]
     away = abs(motion.times - t_s) > 0.06  # the step in which it is reversed
     np.testing.assert_allclose(surge[away], np.where(motion.times < t_s, 8, -8)[away], atol=0.05)
+
+
+def test_the_gaps_and_the_cost_of_a_segment_are_of_the_fifth_order_along_a_known_motion():
+    """Surge u' = -d u + a t from u = 1: exponentials give u and x; the cost is of x^2."""
+    pytest.importorskip("casadi", reason=REASON)
+    chase = load_text(CHASE.replace("X_u: 0.0", "X_u: -20.0"), "a.yaml").scenario
+    m, a = chase.vessel.m11, 1.5
+    d = 20.0 / m
+
+    def known(t: float) -> np.ndarray:
+        fading, once = math.exp(-d * t), 1.0 + a / d**2
+        x = once * (1.0 - fading) / d + a * t**2 / (2.0 * d) - a * t / d**2
+        return np.array([x, 0, 0, once * fading + a * t / d - a / d**2, 0, 0, m * a * t, 0])
+
+    def off(h: float) -> np.ndarray:
+        """Gaps of x and u, and the error of the integral."""
+        segment, nothing = collocation._segment(problem(chase, "ise"), h), np.zeros(3)
+        still = [nothing] * 3 + [np.zeros(2)] * 3
+        gaps, cost, _ = segment(known(0.0), known(h), *still, 0.0)
+        return np.array(
+            [*np.array(gaps)[[0, 3], 0], float(cost) - quad(lambda t: known(t)[0] ** 2, 0, h)[0]]
+        )
+
+    np.testing.assert_allclose(off(0.2) / off(0.1), 2.0**5, rtol=0.1)
+
+
+def test_the_gains_are_those_of_the_linear_quadratic_regulator(monkeypatch):
+    """At rest without damping surge and yaw are z'' = a; x^2 + u^2 + a^2/w^4 has these gains."""
+    pytest.importorskip("casadi", reason=REASON)
+    monkeypatch.setattr(feedback, "BANDWIDTH", w := 1.5)
+    chase = load_text(CHASE.replace("X_u: 0.0", "X_u: 0.0, N_r: 0.0"), "a.yaml").scenario
+
+    def first(h: float) -> np.ndarray:
+        times = h * np.arange(round(8.0 / h) + 1)
+        still = Motion(times, np.zeros((len(times), 6)), np.zeros((len(times), 2)))
+        surge, yaw = feedback._gains(problem(chase, "iae"), still)[0]
+        return np.stack([surge[[0, 3]] / chase.vessel.m11, yaw[[2, 5]] / chase.vessel.m33])
+
+    found = 2.0 * first(0.005) - first(0.01)  # the trapezoidal rule's error is of the first order
+    np.testing.assert_allclose(found, [[w**2, math.sqrt(2.0 * w**2 + w**4)]] * 2, rtol=3e-4)
 
 
 def test_the_plant_on_symbols_is_the_plant():

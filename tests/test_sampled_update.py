@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from conftest import GENTLE, SMOOTH_START, corrected
 from scipy.integrate import solve_ivp
 
+from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.simulate import simulate
 from podusv_cli.findings.stability import loops, sampled_growth
 from podusv_cli.scenario.load import load_text
@@ -36,24 +38,35 @@ def test_the_demand_has_the_integral_up_to_its_own_sample():
             assert np.ptp(integral[10:20]) == 0.0
 
 
-@pytest.mark.parametrize("count", [3, 30])
-def test_the_predicted_growth_is_that_of_the_loop_integrated_by_hand(count):
+def test_the_memory_takes_a_sample_by_a_method_of_the_fourth_order():
+    """Over the period that ends, beta' = (A_u + |alpha|) (alpha - beta) with the sample's alpha."""
+    loop, period = corrected(controller=GENTLE, start=SMOOTH_START), 0.4
+
+    def off(count):
+        grid = TimeGrid(period / count, count, hold_every=count, update_first=True)
+        run = simulate(loop, grid)
+        alpha, beta = run["alpha_u"][-1], run["beta_u"]
+        fading = np.exp(-(GENTLE.A_u + abs(alpha)) * period)
+        return beta[-1] - (alpha + (beta[0] - alpha) * fading)
+
+    assert off(16) / off(32) == pytest.approx(2.0**4, rel=0.1)
+
+
+def test_the_predicted_growth_converges_to_that_of_the_loop_integrated_by_hand():
     scenario = load_text(TEXT % "before", "a.yaml").scenario
-    loop, h = loops(scenario, np.array([0.5, 0.0, 0.0]))[0], 0.01
+    loop, T = loops(scenario, np.array([0.5, 0.0, 0.0]))[0], 0.3
+
+    def moved(rates, start):
+        return solve_ivp(rates, (0.0, T), start, rtol=1e-12, atol=1e-14).y[:, -1]
 
     def period(e, m):
         """m' = F (e_held, m) first, then e' = -d e + g . (e_held, m)."""
-        taken = solve_ivp(
-            lambda t, y: loop.memory @ [e, *y], (0.0, count * h), m, rtol=1e-11, atol=1e-14
-        )
-        m = taken.y[:, -1]
+        m = moved(lambda t, y: loop.memory @ [e, *y], m)
         c = loop.feedback @ [e, *m]
-        moved = solve_ivp(
-            lambda t, y: -loop.damping * y + c, (0.0, count * h), [e], rtol=1e-11, atol=1e-14
-        )
-        return [*moved.y[:, -1], *m]
+        return [*moved(lambda t, y: -loop.damping * y + c, [e]), *m]
 
     size = len(loop.feedback)
     through = np.array([period(one[0], one[1:]) for one in np.eye(size)]).T
     growth = np.abs(np.linalg.eigvals(through)).max()
-    assert sampled_growth(loop, h, count, update_first=True) == pytest.approx(growth, rel=1e-4)
+    coarse, fine = (sampled_growth(loop, T / n, n, update_first=True) - growth for n in (16, 32))
+    assert coarse / fine == pytest.approx(2.0**4, rel=0.1)

@@ -98,6 +98,37 @@ def test_a_wrong_section_is_one_sentence_at_its_place(text, says):
 
 
 @pytest.mark.parametrize(
+    ("key", "content", "says"),
+    [
+        ("control.period", "0.015", "control.period: 0.015 s is no whole number of steps of 0.01"),
+        ("actuator.command.delay", "0.004", "actuator.command.delay: 0.004 s is no whole number"),
+        ("controller", "{kind: zigzag, check_every: 0.015}", "controller.check_every: 0.015 s is"),
+        (
+            "controller",
+            "{kind: adaptive_neural, rate: difference, difference_step: 0.04}",
+            "controller.difference_step: 0.04 s is no whole number of control periods of 0.03 s",
+        ),
+        (
+            "measurement",
+            "{kind: sensors, heading: {period: 0.015}}",
+            "measurement.heading.period: 0.015 s is no whole number of steps",
+        ),
+    ],
+)
+def test_a_period_that_does_not_fit_is_one_sentence_with_its_key(key, content, says):
+    (line,) = told(
+        SOUND + "control: {period: 0.03}\n" * ("control periods" in says), [f"{key}={content}"]
+    )
+    assert line.startswith(f"--set {key}={content}: {says}")
+
+
+def test_a_law_among_several_is_wrong_once():
+    several = "controllers:\n  zag: {kind: zigzag, check_every: 0.015}\n  pid: {kind: pid}"
+    (line,) = told(SOUND.replace("controller: {kind: pid}", several))
+    assert line.startswith("a.yaml:6:36: controllers.zag.check_every: 0.015 s is no whole")
+
+
+@pytest.mark.parametrize(
     ("sound", "wrong", "says"),
     [
         (

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from counting import counted
 from scenario_samples import loaded
+from scipy.stats import qmc
 
 from podusv_cli.core.random_words import in_unit_interval
 from podusv_cli.scenario.model import Scenario
@@ -104,13 +105,17 @@ def test_other_seeds_streams_and_names_give_other_draws() -> None:
     assert abs(np.corrcoef(uniforms(1, "a", 0, 5000), uniforms(1, "b", 0, 5000))[0, 1]) < 0.05
 
 
-def test_sobol_points_fill_the_square_evenly() -> None:
-    sweep = Sweep.model_validate(
-        {"design": "sobol", "vary": {n: {"uniform": (0.0, 1.0)} for n in ("x", "y")}}
-    )
-    found = table(sweep, 0, 1024)
-    counts, _, _ = np.histogram2d(found["x"], found["y"], bins=32, range=[[0, 1], [0, 1]])
-    assert (counts == 1).all()
+def test_sobol_points_are_scipy_s_with_the_digits_of_each_quantity_shifted() -> None:
+    """Which leaves them as evenly spread as they are."""
+    plain = (qmc.Sobol(2, scramble=False, bits=32).random(64) * 2.0**32).astype(np.uint64)
+    vary, shifts = {n: {"uniform": (0.0, 1.0)} for n in ("x", "y")}, set()
+    for seed, stream in ((1, "sweep"), (2, "sweep"), (1, "tune")):
+        sweep = Sweep.model_validate({"design": "sobol", "seed": seed, "vary": vary})
+        points = table(sweep, 0, 64, stream)
+        digits = np.column_stack([points["x"], points["y"]]) * 2.0**32
+        (both,) = np.unique(plain ^ digits.astype(np.uint64), axis=0).tolist()
+        shifts |= {0, *both}
+    assert len(shifts) == 7  # none is without, and no two are alike
 
 
 def test_a_draw_changes_what_it_names_and_nothing_else() -> None:

@@ -3,6 +3,7 @@
 import json
 import platform
 import shutil
+from dataclasses import replace
 from datetime import UTC, datetime
 
 import numpy as np
@@ -86,13 +87,15 @@ def test_other_numbers_are_refused_with_the_machines_and_nothing_is_written(shar
         merged([other, shards[1]], tmp_path / "the other way round")
 
 
-def test_another_status_or_cause_is_another_run(shards, tmp_path):
+@pytest.mark.parametrize(
+    ("name", "other"),
+    [("status", {"status": [3, *[0] * 4]}), ("cause", {"causes": ("x", *[""] * 4)})],
+)
+def test_another_status_or_cause_is_another_run(shards, tmp_path, name, other):
     shutil.copytree(shards[0], tmp_path / "other")
     store = Store(tmp_path / "other", small())
-    result = next(store.results())
-    result.status[0] = 3
-    store.write(result)
-    with pytest.raises(StorageError, match=r"\(status of draw 0\)"):
+    store.write(replace(next(store.results()), **other))
+    with pytest.raises(StorageError, match=rf"\({name} of draw 0\)"):
         merged([shards[0], store.folder], tmp_path / "all")
 
 

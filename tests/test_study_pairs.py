@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import math
+from itertools import permutations
 
 import numpy as np
 import pytest
@@ -38,6 +39,13 @@ def test_margins_are_those_of_the_claims_of_single_runs() -> None:
             assert st.at_most(a, b, 0.05) == SIGNS[ast.LtE](a, b, 0.05)
 
 
+def test_the_margin_is_of_the_larger_of_two_numbers_whatever_their_signs() -> None:
+    a = np.array([98.9, 99.0, -100.0, -100.0, -0.001, 0.0])
+    b = np.array([100.0, 100.0, -98.9, -99.0, 0.0, 0.001])
+    assert st.below(a, b, 0.01).tolist() == [True, False, True, False, True, True]
+    assert not st.below(b, a, 0.01).any()
+
+
 def test_ratios_of_failed_runs() -> None:
     a, b = np.array([3.0, inf, 1.0, inf, 0.0, nan]), np.array([2.0, 1.0, inf, inf, 0.0, 1.0])
     assert st.ratios(a, b)[:5].tolist() == [1.5, inf, 0.0, 1.0, 1.0]
@@ -61,8 +69,8 @@ def test_rank_correlation_of_known_rows() -> None:
 
 
 def test_unrelated_quantities_stay_within_what_chance_gives() -> None:
-    random = np.random.default_rng(8)
-    x, y = random.normal(size=(2, 500, 60))
-    y[y > 1.5] = inf
-    found = [abs(rank_correlation(*pair)) for pair in zip(x, y, strict=True)]
-    assert np.mean(np.array(found) <= st.by_chance(60, 0.95)) >= 0.93  # 500 studies: 0.95 - 2 sigma
+    x = np.arange(6.0)  # all its orders are equally likely
+    found = [rank_correlation(x, np.array(order)) for order in permutations(x)]
+    spread = math.sqrt(np.mean(np.square(found)))
+    assert st.by_chance(6, 0.95) == pytest.approx(1.959964 * spread, rel=1e-6)
+    assert [st.by_chance(n, 0.95) for n in (0, 1, 2)] == [1.0, 1.0, 1.0]

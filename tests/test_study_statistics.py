@@ -85,6 +85,9 @@ def test_known_ranks_of_a_median() -> None:
     # Conover, table of order statistics: of 20 values, the 6th and the 15th hold the median
     assert st.quantile(np.arange(1.0, 21.0), 0.5, 0.95) == (10.0, 6.0, 15.0)
     assert st.quantile(np.arange(1.0, 7.0), 0.5, 0.95)[1:] == (1.0, 6.0)
+    # of 100 values, the k-th is the k % quantile, although 0.07 * 100 is more than 7 in floats
+    ordered = np.arange(1.0, 101.0)
+    assert [st.quantile(ordered, k / 100, 0.95).estimate for k in range(1, 100)] == [*range(1, 100)]
 
 
 def test_too_few_draws_leave_a_side_open_instead_of_wrong() -> None:

@@ -4,6 +4,8 @@ import math
 
 import numpy as np
 import pandas as pd
+import pytest
+from scipy.stats import spearmanr
 from study_samples import Made, study
 
 from podusv_cli.study import statistics as st
@@ -88,6 +90,18 @@ def test_sensitivity_finds_the_quantity_that_matters_and_ranks_failures_worst():
     # the other way round if failures were left out or counted as small
     late = np.where(mass > 0.2, inf, 1.0 - mass)
     assert row(sensitivity(study(a=late), draws), quantity="vessel.m").correlation > 0.5
+
+
+def test_sensitivity_is_of_the_draws_in_which_the_number_is_known():
+    random = np.random.default_rng(2)
+    mass = random.random(40)
+    energy = np.where((mass < 0.4) | (random.random(40) < 0.2), nan, mass + random.random(40))
+    runs, known = Made({"a": {"iae": np.ones(40), "energy": energy}}), ~np.isnan(energy)
+    found = row(sensitivity(runs, {"vessel.m": mass}), metric="energy")
+    assert found.n == known.sum() < 40
+    expected = spearmanr(mass[known], energy[known]).statistic
+    assert found.correlation == pytest.approx(expected, rel=1e-12)
+    assert found.by_chance == pytest.approx(1.959964 / math.sqrt(known.sum() - 1), rel=1e-6)
 
 
 def test_measured_times_are_in_no_table():

@@ -9,14 +9,18 @@ import re
 import numpy as np
 import pandas as pd
 import pytest
-from tune_samples import searched, toy, tuned
+from tune_samples import planned, searched, toy, tuned
 
 from podusv_cli.scenario.load import load
+from podusv_cli.study.unit import UnitResult
 from podusv_cli.tuning import sampler, trials
 from podusv_cli.tuning.pictures import sketches
 from podusv_cli.tuning.remarks import remarks
-from podusv_cli.tuning.search import _far
+from podusv_cli.tuning.sampler import Sampler
+from podusv_cli.tuning.search import Search, _far
+from podusv_cli.tuning.space import Gain
 from podusv_cli.tuning.trials import CUT, FINISHED, PRUNED, Trial, best, front
+from podusv_cli.tuning.validation import chosen
 
 BUDGET = 100
 
@@ -232,6 +236,8 @@ def test_the_best_trial_holds_inequalities_first_and_is_finished():
     ]  # fmt: skip
     assert best(found).number == 3
     assert best(found[1:2]).number == 1, "where none holds them, the nearest"
+    winners = [made_up(7, 5.0), made_up(7, 0.5, excess=0.1), made_up(3, 4.0), made_up(2, 4.5)]
+    assert chosen(winners) == 2, "of the winners of all repeats, by their places"
 
 
 def test_of_a_front_the_middle_is_taken():
@@ -250,6 +256,35 @@ def test_a_trial_is_far_worse_only_by_all_objectives():
     assert _far((2.0,), (math.inf,))
     assert not _far((math.inf,), (math.inf,))
     assert not _far((2.0, 2.0), (9.0, 2.5))
+
+
+@pytest.mark.parametrize(("excess", "met"), [(0.0, 0), (0.1, 1)])
+def test_only_a_trial_that_holds_all_inequalities_prunes_others(optuna, tmp_path, excess, met):
+    """Where a far better one holds them, the next batch begins; else the trials go on to draw 1."""
+    search = Search(
+        planned(tmp_path, "tune.subject_to=[median(effort_u) >= 0]"), "toy", 0, tmp_path
+    )
+    search.trials = [made_up(0, 0.01, excess=excess)]
+    (tmp_path / trials.FOLDER).mkdir()
+    nothing = np.zeros(1)
+    following = [
+        search.done(place, UnitResult(unit, {"effort_u": np.ones(1)}, nothing, nothing, ("",)))
+        for place, _, unit in search.begin()
+    ]
+    assert {unit.first for _, _, unit in following[-1]} == {met}
+
+
+def test_trials_that_have_not_ended_keep_others_away(optuna):
+    """A batch is asked for at once: of two samplers with the same results and random numbers, one
+    has a trial under way."""
+
+    def asked(batches: tuple[int, ...]):
+        sampler = Sampler([Gain("gain", 1.0, 0.1, 10.0)], 1, [1])
+        tried = sampler.ask(0, 8)
+        sampler.tell([[(trial["gain"] - 3.0) ** 2] for trial in tried], [[]] * 8)
+        return [sampler.ask(batch, 1) for batch in batches][-1]
+
+    assert asked((1, 2)) != asked((2,))
 
 
 def test_trials_read_back_with_infinite_numbers(tmp_path):

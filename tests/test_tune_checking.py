@@ -9,6 +9,7 @@ import pytest
 from small_study import TEXT
 from tune_samples import faults, planned, toy
 
+from podusv_cli.core.component import Component, value
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.scenario.load import load_text, resolved_yaml
 from podusv_cli.scenario.tune import Range
@@ -17,6 +18,7 @@ from podusv_cli.study.draws import SWEEP, table, words
 from podusv_cli.tuning.check import tune_faults
 from podusv_cli.tuning.objective import Runs, evaluate, excess, parse_inequality, parse_objective
 from podusv_cli.tuning.plan import TRAIN, VALIDATE, TunePlan
+from podusv_cli.tuning.space import _around
 
 TUNED = TEXT + "tune: {budget: 200, train: 4, validate: 10, space: {around: 10.0}}\n"
 
@@ -78,12 +80,19 @@ def test_another_range_replaces_an_inherited_one():
     assert {*Range.model_fields} <= RANGE | DISTRIBUTIONS
 
 
+class Bounded(Component):
+    gain: float = value(1.0, "1", "with ends that a factor of 10 leaves", ge=0.5, le=4.0)
+
+
 def test_around_covers_every_gain_and_stays_in_its_range():
     found = {gain.key: gain for gain in plan().gains["pid"]}
     assert {"K_Pu", "K_Ir", "T_d", "k_ze", "standoff"} <= set(found)
     assert not {"difference_step", "hold_below", "kind", "reference"} & set(found)
     assert (found["K_Pu"].low, found["K_Pu"].high) == (110.0, 11000.0)
     assert all(gain.log and gain.low < gain.own < gain.high for gain in found.values())
+    field = Bounded.model_fields["gain"]
+    cut = [(gain.low, gain.high) for gain in (_around(f, "gain", 1.0, field) for f in (10.0, 1.5))]
+    assert cut == [(0.5, 4.0), (1.0 / 1.5, 1.5)]
 
 
 def test_a_key_may_be_kept_or_be_of_one_law():

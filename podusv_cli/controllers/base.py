@@ -62,6 +62,9 @@ class Controller(Component):
     # Fields that a search for gains leaves alone, although they are numbers above 0
     no_gains: ClassVar[tuple[str, ...]] = ()
 
+    # The field that `sample_period` is taken from, for messages; empty where there is none
+    period_key: ClassVar[str] = ""
+
     # What a finding advises where a saturated actuator winds the law's memory up
     against_windup: ClassVar[str] = "tell it the loads that act (wants_loads, after_saturation)"
 

@@ -148,7 +148,8 @@ class TrackingController(Controller):
     """Options of the errors and virtual controls, the same for every law that uses them."""
 
     against_windup: ClassVar[str] = "consider anti_windup: auxiliary"
-    no_gains: ClassVar[tuple[str, ...]] = ("difference_step",)  # a whole number of steps
+    period_key: ClassVar[str] = "difference_step"
+    no_gains: ClassVar[tuple[str, ...]] = (period_key,)  # a whole number of steps
 
     k_ze: float = value(0.1, "1/s", "gain of the distance in (21)", ge=0)
     k_psie: float = value(0.1, "1/s", "gain of the heading error in (30)", ge=0)

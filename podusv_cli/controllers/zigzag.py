@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from podusv_cli.controllers.base import Slots, Trial
 from podusv_cli.controllers.manoeuvre import Manoeuvre, steered
@@ -20,6 +20,7 @@ class Zigzag(Manoeuvre):
     """The angle/switch zig-zag, first to starboard (IMO MSC.137(76): 10/10 and 20/20 deg)."""
 
     kind: Literal["zigzag"] = "zigzag"
+    period_key: ClassVar[str] = "check_every"
     angle: float = value(
         math.radians(10.0), "rad", "angle of the thrust to either side", gt=0, le=0.5 * math.pi
     )

@@ -69,7 +69,7 @@ def _times(scenario: Scenario) -> Conflicts:
         "simulation.duration": scenario.simulation.duration,
         "control.period": scenario.control.period,
         "actuator.command.delay": scenario.actuator.delay(),
-        **{f"{key}.difference_step": law.sample_period() for key, law in scenario.laws().items()},
+        **_sampled(scenario),
     }
     if max(times.values()) / step > MOST_INSTANTS:
         key, time = max(times.items(), key=lambda item: item[1])
@@ -82,13 +82,20 @@ def _times(scenario: Scenario) -> Conflicts:
             yield key, told
 
 
+def _sampled(scenario: Scenario) -> dict[str, float]:
+    """Seconds between two samples of each law, by the key that gives them."""
+    return {
+        f"{key}.{law.period_key}".rstrip("."): law.sample_period()
+        for key, law in scenario.laws().items()
+    }
+
+
 def _samples(scenario: Scenario) -> Conflicts:
     period = scenario.control.period
-    for key, law in scenario.laws().items():
-        sample = law.sample_period()
+    for key, sample in _sampled(scenario).items():
         if period and sample and not whole_steps(sample, period):
             text = f"{sample:g} s is no whole number of control periods of {period:g} s"
-            yield f"{key}.difference_step", text + fitting(sample, period)
+            yield key, text + fitting(sample, period)
 
 
 def _seeing(scenario: Scenario) -> Conflicts:

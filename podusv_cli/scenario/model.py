@@ -221,8 +221,10 @@ class Scenario(Component):
         return {f"disturbance[{i}]": part for i, part in enumerate(sea)}
 
     def laws(self) -> dict[str, Controller]:
-        """`controller` and all `controllers`, by their keys."""
+        """All `controllers`, and `controller` where it is none of them, by their keys."""
         several = {f"controllers.{label}": law for label, law in self.controllers.items()}
+        if self.controller in several.values():
+            return several
         return {"controller": self.controller} | several
 
     def about(self) -> dict[str, Signal]:

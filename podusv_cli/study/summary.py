@@ -57,18 +57,20 @@ def sensitivity(
 ) -> pd.DataFrame:
     """Spearman's rank correlation of every metric with every drawn number, by law and cell.
 
-    `by_chance` is what unrelated quantities stay within. Words that are drawn have no ranks.
+    Of the `n` draws in which the metric is known. `by_chance` is what unrelated quantities stay
+    within. Words that are drawn have no ranks.
     """
     drawn = {name: np.asarray(values) for name, values in draws.items()}
     numbers = {name: values for name, values in drawn.items() if values.dtype.kind in "fiub"}
     rows = [
         {"law": law, "cell": runs.cells[cell], "quantity": quantity, "metric": name,
-         "n": len(values), "correlation": correlation,
-         "by_chance": statistics.by_chance(len(values), level)}
+         "n": known, "correlation": correlation,
+         "by_chance": statistics.by_chance(known, level)}
         for law in runs.laws for cell in range(len(runs.cells))
         for done in [runs.done(law)[cell]]
         for ranked in [{q: statistics.standard(values[done]) for q, values in numbers.items()}]
         for name, values in _columns(runs, law, cell, metrics)
+        for known in [int(np.sum(~np.isnan(values)))]
         for quantity, correlation in statistics.rank_correlations(ranked, values).items()
     ]  # fmt: skip
     return pd.DataFrame(rows)
