@@ -18,9 +18,8 @@ from podusv_cli import __version__
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.recording import Allocate, Recording, Status
-from podusv_cli.engine.check import check_law
-from podusv_cli.engine.simulate import marcher, simulate
-from podusv_cli.findings.finding import postflight
+from podusv_cli.engine.simulate import ready, simulate
+from podusv_cli.findings.finding import postflight, preflight
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.operations import operations
 from podusv_cli.process.extras import Extras, Missing
@@ -186,11 +185,25 @@ def unwritten(outcomes: Iterable[Outcome]) -> str:
 
 def warm_up(scenario: Scenario) -> None:
     """Have all code of this scenario's loop compiled and loaded. Raises LawError."""
-    loop, compiled = scenario.closed_loop(), scenario.simulation.compiled
-    check_law(loop)
-    marcher(loop, scenario.observer(), compiled)
+    loop, grid, compiled = (
+        scenario.closed_loop(),
+        scenario.time_grid(),
+        scenario.simulation.compiled,
+    )
+    ready(loop, grid, scenario.observer(), compiled)
     if scenario.log.monitor:
-        monitor.prepare(loop, scenario.time_grid(), compiled)
+        monitor.prepare(loop, grid, compiled)
+
+
+def examined(scenario: Scenario) -> list[Finding]:
+    """The findings about a scenario, after every check that its runs make before the first step.
+
+    All code of its laws is compiled and loaded then. Raises LawError.
+    """
+    check_figures(scenario)
+    for single in scenario.singles().values():
+        warm_up(single)
+    return preflight(scenario)
 
 
 def simulated(

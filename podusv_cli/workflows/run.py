@@ -8,13 +8,13 @@ from pathlib import Path
 
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.finding import Finding
-from podusv_cli.findings.finding import preflight, unknown_codes
+from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Loaded, load, resolved_yaml
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import unknown
 from podusv_cli.storage.run_folder import default_folder
-from podusv_cli.workflows.execute import Finished, Progress, Stopwatch, Task, check_figures, execute
+from podusv_cli.workflows.execute import Finished, Progress, Stopwatch, Task, examined, execute
 
 RESULTS = Path("results")
 # The figures that take longest first; `sea` and `estimates` for runs that have waves, wind, current
@@ -58,9 +58,8 @@ def run_loaded(
     with watch.part("load"):
         scenario = single(loaded, request.controller)
         target = request.out or default_folder(RESULTS, scenario.name, resolved_yaml(scenario))
-    with watch.part("preflight"):
-        check_figures(scenario)
-        noticed = preflight(scenario)
+    with watch.part("compile"):
+        noticed = examined(scenario)
     for finding in noticed:
         request.warn(finding)
     task = Task(
