@@ -28,7 +28,7 @@ from podusv_cli.process.workers import Outcome
 from podusv_cli.scenario.limits import HELD, estimate
 from podusv_cli.scenario.load import resolved_yaml
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.storage import files, provenance
+from podusv_cli.storage import csv_files, files, provenance
 from podusv_cli.storage import run_folder as folder
 from podusv_cli.theory import monitor
 from podusv_cli.theory.report import as_json as theory_report
@@ -285,8 +285,8 @@ def _write(
     told = [finding.as_json() for finding in warnings]
     writer.add_json("metrics.json", {**status, "metrics": metrics, "warnings": told})
     known = task.scenario.known_metrics()
-    rows = [f"{name},{metrics[name]!r},{m.unit}" for name, m in known.items() if name in metrics]
-    writer.add("metrics.csv", "\n".join(["metric,value,unit", *rows, ""]).encode())
+    rows = [(name, metrics[name], m.unit) for name, m in known.items() if name in metrics]
+    writer.add("metrics.csv", csv_files.lines([("metric", "value", "unit"), *rows]).encode())
 
 
 def _drawn(task: Task, recording: Recording, extras: Extras) -> dict[str, bytes]:

@@ -135,6 +135,7 @@ OTHERS = {
         2,
         "another constant",
     ),
+    "word": ("m = made('a b')", 2, "the name of a metric is at most 64 letters, digits and '_'"),
     "metric": ("m = made('iae')", 2, "my_law.py: podusv_cli.metrics.distance has the name 'iae'"),
     "figure": (
         "f = figure('pods', caption='', signals=('x',))(failing)",
