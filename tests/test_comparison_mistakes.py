@@ -17,6 +17,7 @@ from podusv_cli.scenario.expressions import ExpressionError
         ("a.ia < 3", "unknown signal or metric 'ia'; did you mean 'iae'?"),
         ("d.iae < 3", "unknown run 'd' (allowed: a, b, c, coarse, cut, even, lost, thin)"),
         ("maximum(a.z_e) < 3", "unknown function 'maximum'"),
+        ("median(a.iae / b.iae) < 1", "'median'; it belongs to sweep.claims (allowed here: abs"),
         ("max(a.iae) < 3", "a number where a signal is needed"),
         ("max(a.z_e, 5) < 3", "takes a signal, or a signal and two times"),
         ("max(a.z_e, 5, 2) < 3", "the first time must lie before the second"),

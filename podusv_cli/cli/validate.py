@@ -60,6 +60,7 @@ def validate(
 def _study(loaded: Loaded, sweep: Sweep) -> list[str]:
     """How many runs the study has, which draws the scenario cannot take, and what it all takes."""
     from podusv_cli.process.workers import available_workers
+    from podusv_cli.study.check import unjudged
     from podusv_cli.study.estimate import estimate, pilot
     from podusv_cli.study.invalid import check_draws
     from podusv_cli.study.plan import plan
@@ -73,7 +74,8 @@ def _study(loaded: Loaded, sweep: Sweep) -> list[str]:
     )
     paces, cores = pilot(made), available_workers()
     need = estimate(made, paces, dict.fromkeys(places, draws), cores)
-    lines = [counted, check_draws(made).in_words(), *need.in_words()]
+    remark = unjudged(loaded.scenario)
+    lines = [counted, check_draws(made).in_words(), *need.in_words(), *filter(None, [remark])]
     if not loaded.scenario.tune:
         return lines
     seconds = {law: pace for (law, _), pace in paces.items()}

@@ -17,6 +17,15 @@ LARGEST = 1e300  # of numbers written down
 DEEPEST = 60  # nested brackets, signs and operations
 
 
+# The functions of each language, by the section of a scenario that it is for.
+FUNCTIONS = {
+    "claims": (
+        "max", "min", "mean", "final", "variation", "integral", "rms_above", "abs", "hypot", "rate",
+    ),
+    "sweep.claims": ("share", "failures", "quantile", "median"),
+}  # fmt: skip
+
+
 class ExpressionError(ValueError):
     """An expression that has no meaning; the text says what to write instead."""
 
@@ -47,6 +56,11 @@ def known(name: str, names: Collection[str], what: str) -> str:
     """The name, if it is one of these. Raises ExpressionError with the nearest that is."""
     if name in names:
         return name
+    if homes := [home for home, functions in FUNCTIONS.items() if name in functions]:
+        allowed = ", ".join(sorted(names))
+        raise ExpressionError(
+            f"unknown {what} {name!r}; it belongs to {homes[0]} (allowed here: {allowed})"
+        )
     raise ExpressionError(unknown(f"{what} {name!r}", name, sorted(names), "podusv list"))
 
 

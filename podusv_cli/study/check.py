@@ -50,6 +50,16 @@ def sweep_faults(scenario: Scenario) -> list[tuple[Route, str]]:
     ]  # fmt: skip
 
 
+def unjudged(scenario: Scenario) -> str:
+    """A sentence about the claims that a study does not judge; empty where there are none."""
+    if not scenario.claims:
+        return ""
+    return (
+        f"claims ({', '.join(scenario.claims)}) are about single runs, which podusv compare "
+        "judges; a study judges sweep.claims"
+    )
+
+
 def singles(scenario: Scenario) -> dict[str, Scenario]:
     """The scenario of every law that takes part in the sweep."""
     wanted = scenario.sweep.laws if scenario.sweep else ()

@@ -10,6 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from podusv_cli.comparison.claims import parse_claims
 from podusv_cli.core.errors import UsageError
 from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.process.extras import Extras, Missing
@@ -116,6 +117,7 @@ def _loaded(config: Path, request: Request) -> tuple[Loaded, Path]:
             f"{config} has no key `tune`, which says how many runs a search has; see "
             "docs/tuning.md, or start from one: podusv init studies/tune_small"
         )
+    parse_claims(loaded)
     own = config if given else RESULTS / f"{loaded.scenario.name}-tune"
     return loaded, request.out or own
 
