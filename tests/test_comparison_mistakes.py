@@ -18,6 +18,7 @@ from podusv_cli.scenario.expressions import ExpressionError
         ("d.iae < 3", "unknown run 'd' (allowed: a, b, c, coarse, cut, even, lost, thin)"),
         ("maximum(a.z_e) < 3", "unknown function 'maximum'"),
         ("median(a.iae / b.iae) < 1", "'median'; it belongs to sweep.claims (allowed here: abs"),
+        ("a.iae / 0.0 < 3", "'a.iae / 0.0': divides by zero"),
         ("max(a.iae) < 3", "a number where a signal is needed"),
         ("max(a.z_e, 5) < 3", "takes a signal, or a signal and two times"),
         ("max(a.z_e, 5, 2) < 3", "the first time must lie before the second"),

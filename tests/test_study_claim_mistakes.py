@@ -16,6 +16,7 @@ MISTAKES = {
     "share(propsed.iae < pid.iae) >= 0.9": "unknown law 'propsed'; did you mean 'proposed'?",
     "median(pid.z_e_stedy) >= 0.9": "unknown metric 'z_e_stedy'; did you mean 'z_e_steady'?",
     "shares(proposed.iae < pid.iae) >= 0.9": "unknown statistic 'shares'; did you mean 'share'?",
+    "median(pid.iae / 0) < 3": "'pid.iae / 0': divides by zero",
     "mean(pid.z_e) < 3": "unknown statistic 'mean'; it belongs to claims (allowed here: failures",
     "max(abs(pid.tau_u)) == 300": "unknown statistic 'max'; it belongs to claims",
     "share(finish(pid)) >= 0.9": "unknown property 'finish'; did you mean 'finished'?",

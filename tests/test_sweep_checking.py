@@ -87,6 +87,7 @@ IN_VARY = [
     ),
     ("a: @{keys: [vessel.m, start.x], angle: all}, start.x: {angle: all}", "drawn twice, by start"),
     ("a: @{keys: [start.x, start.x], angle: all}", "start.x is drawn twice"),
+    ('a: @{keys: [""], angle: all}', "unknown key ''"),
     ("law: @{keys: [start.x], angle: all}", "law is another column of the table of runs"),
     ("success: @{keys: [start.x], angle: all}", "name the quantity success_drawn"),
     ("iae: @{keys: [start.x], angle: all}", "iae is another column of the table of runs"),

@@ -44,7 +44,20 @@ def syntax_tree(text: str, example: str) -> ast.expr:
         level = [child for node in level for child in ast.iter_child_nodes(node)]
     if level:
         raise ExpressionError(f"is nested more than {DEEPEST} deep")
+    for node in ast.walk(tree):
+        match node:
+            case ast.BinOp(op=ast.Div(), right=divisor) if _is_zero(divisor):
+                refuse(node, "divides by zero, which is no number; leave the division out")
     return tree
+
+
+def _is_zero(node: ast.expr) -> bool:
+    match node:
+        case ast.UnaryOp(operand=part):
+            return _is_zero(part)
+        case ast.Constant(value=int() | float() as number):
+            return number == 0
+    return False
 
 
 def refuse(node: ast.AST, why: str) -> NoReturn:

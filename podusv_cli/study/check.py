@@ -132,7 +132,7 @@ def has(scenario: Scenario, key: str) -> bool:
         content(scenario, steps)
     except LookupError:
         return False
-    return dotted(steps) == key and steps[0] in DRAWN
+    return bool(steps) and dotted(steps) == key and steps[0] in DRAWN
 
 
 def no_entry(scenario: Scenario, steps: Route) -> str:
