@@ -6,6 +6,7 @@ They are parsed by Python, and evaluated by whoever gives them a meaning; never 
 from __future__ import annotations
 
 import ast
+import re
 import warnings
 from collections.abc import Collection
 from typing import NoReturn
@@ -15,6 +16,8 @@ from podusv_cli.scenario.phrases import unknown
 LONGEST = 500  # characters of an expression
 LARGEST = 1e300  # of numbers written down
 DEEPEST = 60  # nested brackets, signs and operations
+# Numbers that Python reads and scenarios do not write.
+FOREIGN = re.compile(r"(?<![\w.])(?:0[xobXOB]\w+|[0-9.]*[0-9]_[0-9_.]*)")
 
 
 # The functions of each language, by the section of a scenario that it is for.
@@ -39,6 +42,8 @@ def syntax_tree(text: str, example: str) -> ast.expr:
             tree = ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         raise ExpressionError(f"cannot read {text!r}; example: {example}") from error
+    if foreign := FOREIGN.search(text):
+        raise ExpressionError(f"{foreign[0]!r} is no number; write it in decimal, without _")
     level: list[ast.AST] = [tree]
     for _ in range(DEEPEST):
         level = [child for node in level for child in ast.iter_child_nodes(node)]
