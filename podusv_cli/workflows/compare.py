@@ -149,7 +149,7 @@ def _keep_apart(items: Sequence[Path], target: Path) -> None:
 
 def _writer(target: Path, members: Sequence[Member], request: Request) -> RunWriter:
     sizes = [estimate(member.scenario) for member in members if member.run is None]
-    space = needed(sizes, request.jobs or available_workers())
+    space = needed(sizes, request.workers or available_workers())
     return RunWriter(target, force=request.force, named=request.out is not None, needed=space)
 
 
@@ -171,7 +171,7 @@ def make_runs(
         if progress:
             progress(wanted[position].label, fraction)
 
-    outcomes = run_all([partial(execute, task) for task in tasks], advance, request.jobs)
+    outcomes = run_all([partial(execute, task) for task in tasks], advance, request.workers)
     return {member.label: outcome for member, outcome in zip(wanted, outcomes, strict=True)}
 
 
@@ -241,7 +241,7 @@ def _add_figures(
 ) -> None:  # fmt: skip
     """Draw the figures, write those in the formats asked for, and the report, which has all."""
     draw = partial(outputs.drawn, result, extras, progress, request.names, request.formats)
-    figures = extras.attempt("figures", partial(draw, request.jobs)) or {}
+    figures = extras.attempt("figures", partial(draw, request.workers)) or {}
     for name, content in figures.items():
         if name.rpartition(".")[2] in request.formats:
             writer.add(f"figures/{name}", content)

@@ -36,7 +36,7 @@ class Request:
     plugins: Sequence[str] = ()  # files beside those that a scenario names
     names: Sequence[str] = ()  # of figures of a comparison; all that fit where empty
     formats: Sequence[str] = ("png",)  # of figures of a comparison
-    jobs: int = 0  # processes at a time; 0: one a core
+    workers: int = 0  # processes at a time; 0: one a core
     controller: str = ""  # which of `controllers` to run
 
 
