@@ -201,7 +201,8 @@ def _leaders(searches: Sequence[Search]) -> str:
         if search.trials:
             value = best(search.trials).values[0]
             found[search.law] = min(value, found.get(search.law, value))
-    return "best so far: " + ", ".join(f"{law} {value:.4g}" for law, value in found.items())
+    leaders = ", ".join(f"{law} {value:.4g}" for law, value in found.items())
+    return f"best so far: {leaders}" if found else "no gains are tried yet"
 
 
 def _written(results: Results, folder: Path, request: Request) -> Tuned:
