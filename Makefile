@@ -142,13 +142,15 @@ clean: ## remove the virtual environment and all caches
 $(BIN)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	    { echo "podusv needs Python 3.11 or newer; say which with: make PYTHON=python3.12 ..." >&2; exit 1; }
-	@echo "setting up $(VENV) (once)"
+	@echo "setting up $(VENV), once: two or three steps, about a minute in all"
 	@$(PYTHON) -m venv $(VENV)
 
 $(VENV)/run.done: $(BIN)/python pyproject.toml constraints.txt
+	@echo "  installing podusv and what it needs (numpy, numba, h5py, matplotlib, ...)"
 	@$(PIP) --editable .
 	@touch $@
 
 $(VENV)/dev.done: $(VENV)/run.done
+	@echo "  installing the development tools (ruff, mypy, pytest, ...)"
 	@$(PIP) --editable '.[dev]'
 	@touch $@

@@ -38,7 +38,7 @@ def test_only_what_is_asked_for_is_drawn_and_what_cannot_be_is_told(podusv, monk
     monkeypatch.setattr(execute, "_drawn", lambda *given: {})  # of each run
     config = write("two.yaml", FIGURED)
     asked = ("--figures", "--figure", "errors", "--figure", "pods", "--format", "pdf, png")
-    said = podusv(config, "--out", "x", "--jobs", "1", *asked)
+    said = podusv(config, "--out", "x", "--workers", "1", *asked)
     assert said.code == 0
     assert "figure pods could not be made: no run logged any of n, " in said.err
     assert "traceback" not in said.err

@@ -79,6 +79,7 @@ def test_commands_and_options_are_offered_and_nothing_heavy_is_imported(
         ("podusv explain near-t", {"near-target"}),
         ("podusv explain controller.pid.K_P", {"controller.pid.K_Pu", "controller.pid.K_Pr"}),
         ("podusv init pod/k", {"pod/kept"}),
+        ("podusv list me", {"measurements", "metrics"}),
         ("podusv sweep export x --format p", {"parquet"}),
         ("podusv sweep run a.yaml --set control.p", {"control.period="}),
     ],

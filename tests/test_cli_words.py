@@ -134,6 +134,31 @@ def test_every_name_that_is_listed_is_explained(podusv):
         assert re.search(rf"^(\w+\.)*{name}\b", said.out, re.MULTILINE), name
 
 
+@pytest.mark.parametrize(
+    ("part", "headings"),
+    [
+        ("vessel", ["vessel (preset, a vessel):"]),
+        ("vessels", ["vessel (preset, a vessel):"]),
+        ("laws", ["controller:"]),
+        ("controller", ["controller:"]),
+        ("actuators", ["actuator:", "actuator.pod (preset, a set of pods):"]),
+        ("metric", ["metrics:"]),
+        ("findings", ["findings (silence):"]),
+    ],
+)
+def test_a_part_of_the_list_stands_in_the_whole_list(podusv, part, headings):
+    said = podusv("list", part)
+    assert (said.code, re.findall(r"^\S.*", said.out, re.MULTILINE)) == (0, headings)
+    for section in re.split(r"^(?=\S)", said.out, flags=re.MULTILINE):
+        assert section in podusv("list").out
+
+
+def test_an_unknown_part_of_the_list_is_told_with_all_parts(podusv):
+    said = podusv("list", "vesels")
+    assert (said.code, said.out) == (2, "")
+    assert "unknown part 'vesels'; did you mean 'vessels'? (allowed: paths, " in said.err
+
+
 def test_a_preset_is_explained_with_its_source_and_what_it_holds_for(podusv):
     vessel, pods = podusv("explain", "otter").out.split("otter  ")[1:]
     assert vessel.startswith("vessel (vessel.preset)\n")

@@ -6,6 +6,7 @@ import pytest
 from comparison_samples import Folder, scenario
 from known_signals import ABOUT
 
+from podusv_cli.cli import progress
 from podusv_cli.cli.progress import progress_bars
 from podusv_cli.comparison import outputs
 from podusv_cli.comparison.entries import Entry
@@ -48,3 +49,24 @@ def test_drawing_is_progress_too():
 def test_there_is_no_bar_without_a_terminal():
     with progress_bars(wanted=True) as advance:
         assert advance is None
+
+
+def test_what_stays_is_printed_in_place_of_what_is_being_done(monkeypatch, capsys):
+    monkeypatch.setattr(progress, "supports_colours", lambda stream: True)
+    with progress.StudyLine(wanted=True) as line:
+        line.say("looking for gains")
+        line.note("64 runs; in results", "and no more")
+        line.say("drawing")
+        line.warn("other kernels")
+    erased = progress.ERASED.replace("\x1b[K", "")  # typer writes codes to terminals only
+    assert capsys.readouterr().err == (
+        f"{erased}looking for gains{erased}64 runs; in results\nand no more\n"
+        f"{erased}drawing{erased}warning: other kernels\n{erased}"
+    )
+
+
+def test_what_stays_is_printed_without_a_terminal_too(capsys):
+    with progress.StudyLine(wanted=False) as line:
+        line.say("looking for gains")
+        line.note("64 runs; in results")
+    assert capsys.readouterr().err == "64 runs; in results\n"

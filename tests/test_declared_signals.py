@@ -44,7 +44,9 @@ def test_a_signal_has_a_symbol_of_its_name_and_needs_a_name_that_a_claim_can_use
     assert [Signal(name, "m", "").symbol for name in ("e", "e_c", "e_ct", "e_c_t")] == [
         "e", "e_c", "e_{ct}", "e_{c,t}",
     ]  # fmt: skip
-    with pytest.raises(ValueError, match="letters, digits and '_', not 'e ct'"):
+    with pytest.raises(
+        ValueError, match="letters, digits and '_', starting with a letter, found 'e ct'"
+    ):
         Signal("e ct", "m", "")
 
 

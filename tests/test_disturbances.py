@@ -204,6 +204,13 @@ def test_a_record_is_read_from_a_file_beside_the_scenario(tmp_path, monkeypatch)
         ("0,1,1,0\n\n1,s3cret,2,0\n", "line 3, column 2 of the record is no number"),
         ("0,s3cret,5,0\n1,1,2,0\n", "line 1, column 2 of the record is no number"),
         ("O,0,5,0\n1,1,2,0\n2,1,2,0\n", "line 1, column 1 of the record is no number"),
+        ("0,1,1,0\n1,1_0,2,0\n", "line 2, column 2 of the record is no number"),
+        ("0,1,1,0\n1,0x10,2,0\n", "line 2, column 2 of the record is no number"),
+        ("0,1,1,0\n1,\uff11,2,0\n", "line 2, column 2 of the record is no number"),
+        ("0,1,1,0\n1,1 0,2,0\n", "line 2, column 2 of the record is no number"),
+        ("0,1,1,0\n1,Infinity,2,0\n", "line 2, column 2 of the record is not a finite number"),
+        ("0,1,1,0\n1,-nan,2,0\n", "line 2, column 2 of the record is not a finite number"),
+        ("0,1,1,0\n1,1e999,2,0\n", "line 2, column 2 of the record is not a finite number"),
         ("0,1,1,0\n1,1,,0\n", "line 2, column 3 of the record is no number"),
         ("0,1,1,0\n1,1,nan,0\n", "line 2, column 3 of the record is not a finite number"),
         ("0,1,1,0\n0,1,2,0\n", "line 2 of the record: its time is not after that of the line "

@@ -7,6 +7,8 @@ import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
+import numpy as np
+import pandas as pd
 import pytest
 from command_samples import BASE, Command, commanded, write
 from comparison_samples import FRAME, verdicts
@@ -17,7 +19,7 @@ from podusv_cli.cli import progress, terminal
 from podusv_cli.comparison import claims, report, table
 from podusv_cli.core import escaping
 from podusv_cli.pages.page import environment
-from podusv_cli.storage import json_files
+from podusv_cli.storage import csv_files, json_files
 
 TURNED, COLOUR = "\u202e", "\x1b[31m"  # letters from right to left from here on; red from here on
 EVIL = f"=cmd|'/C x'!A0{COLOUR}{TURNED}\x9b1m\n# <script>[a](b)`*_\u200b"
@@ -84,6 +86,18 @@ def test_json_says_the_same_without_the_letters():
     assert not nasty(text)
     assert "\u8239" in text
     assert json.loads(text) == content
+
+
+def test_no_heading_and_no_cell_of_a_csv_file_is_a_formula():
+    frame = pd.DataFrame({"=a": ["-b", "c,d"], EVIL: [1.5, np.inf], "e": [True, 2]})
+    rows = [
+        [escaping.csv("=a"), escaping.csv(EVIL), "e"],
+        ["'-b", "1.5", "True"],
+        ["c,d", "inf", "2"],
+    ]
+    assert list(csv.reader(io.StringIO(csv_files.text(frame)))) == rows
+    content = [list(frame.columns), *frame.to_numpy().tolist()]
+    assert list(csv.reader(io.StringIO(csv_files.lines(content)))) == rows
 
 
 def test_the_tables_of_a_comparison_hold_no_label_that_is_more_than_text():

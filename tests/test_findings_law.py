@@ -6,6 +6,7 @@ from findings_samples import BARE, codes, finding, late, log, scene, simulated
 
 from podusv_cli.controllers.velocity_loop import Loop
 from podusv_cli.engine.continuous import continuous
+from podusv_cli.findings.finding import preflight
 from podusv_cli.findings.stability import loops, rk4_growth, sampled_growth
 
 LONG = "simulation.duration=120"
@@ -28,6 +29,26 @@ def test_the_saddle_grows_at_the_rate_that_is_told():
     early = (out["time"] > 5) & (out["time"] < 20)
     rate = np.polyfit(out["time"][early], np.log(np.abs(out["z_e"][early] - 0.5)), 1)[0]
     assert 0.0 < rate < 0.071
+
+
+@pytest.mark.parametrize(
+    ("law", "gain", "key"),
+    [
+        ("pid", "K_Pu", "K_Du"),
+        ("pid", "K_Ir", "K_Dr"),
+        ("pid", "K_Dr", "K_Dr"),
+        ("adaptive_neural", "k_ue", "Gamma_u"),
+        ("velocity_vector", "k_p", "k_u"),
+        ("velocity_vector", "omega_r", "k_r"),
+        ("hand_position", "k_i", "k_v"),
+    ],
+)
+def test_the_gain_that_makes_a_loop_fast_is_named(law, gain, key):
+    """It is not the one that does it with usual gains."""
+    changed = (f"controller={{kind: {law}, {gain}: 1e9}}",)
+    (first, *_) = (f for f in preflight(scene(*changed)) if f.code.startswith("stiff-"))
+    assert first.text.endswith(f"or a smaller {gain}")
+    assert gain == key or not first.text.endswith(f" {key}")
 
 
 @pytest.mark.parametrize("fold", ["printed", "none"])

@@ -181,6 +181,18 @@ def test_points_without_a_way_are_refused(points):
         Waypoints(points=points)
 
 
+FAR = ((0.0, 0.0), (1e200, 1e200), (2e200, 0.0))
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"points": FAR}, {"speed": 1e300}, {"speed": 5e-324}, {"speed": 5e-324, "legs": "straight"}],
+)
+def test_a_course_beyond_all_numbers_is_refused(wrong):
+    with pytest.raises(ValueError, match="beyond all numbers"):
+        Waypoints(**{"points": POINTS} | wrong)
+
+
 def test_a_sine_stays_within_its_amplitude_and_returns_to_its_axis_every_half_wavelength():
     path = Sinusoid(x=2.0, y=1.0, course=0.7, speed=0.4, amplitude=2.5, wavelength=20.0)
     seen = path.targets(np.linspace(0.0, 100.0, 4001))[:, :2] - (2.0, 1.0)

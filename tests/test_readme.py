@@ -55,6 +55,15 @@ def pattern(shown: str) -> str:
     return " ?.* ?".join(gaps).replace(r"\ ", " ")
 
 
+def test_pages_that_are_followed_in_one_folder_write_into_folders_of_their_own() -> None:
+    named = [
+        {words[words.index("--out") + 1] for words, _, _ in dialogues(page) if "--out" in words}
+        for page in ("README.md", "docs/tutorial.md")
+    ]
+    assert all(named)
+    assert not set.intersection(*named)
+
+
 @pytest.fixture
 def podusv(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

@@ -16,6 +16,23 @@ TRUTH = "compiled: must be true or false, found"
 NETWORK = "    network:\n      "
 
 
+@pytest.mark.parametrize("kind", ["{a: 1}", "[b]", "[]", "{}", "3", "true"])
+@pytest.mark.parametrize(
+    "section", ["path", "disturbance", "actuator", "controller", "measurement", "estimator"]
+)
+def test_a_kind_that_is_no_word_is_unknown(section, kind):
+    lines = [line for line in SOUND.splitlines() if not line.startswith(section)]
+    (line,) = told("\n".join([*lines, f"{section}: {{kind: {kind}}}", ""]))
+    assert f"{section}.kind: " in line
+    assert "allowed: " in line
+
+
+@pytest.mark.parametrize("preset", ["{a: 1}", "[b]", "{}"])
+def test_a_preset_that_is_no_word_is_unknown(preset):
+    (line,) = told(SOUND.replace("preset: paper", f"preset: {preset}"))
+    assert "vessel.preset: " in line
+
+
 def test_a_sound_scenario_has_no_findings():
     assert told() == []
 

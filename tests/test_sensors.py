@@ -226,6 +226,8 @@ def test_times_that_do_not_fit_the_step_are_told():
     told = dict(odd.conflicts(H))
     assert set(told) == {"position.period", "heading.delay"}
     assert "try 0.01" in told["position.period"]
+    late = dict(Sensors(heading=Sensor(period=0.1, delay=2.0**31)).conflicts(H))
+    assert "at most 1,000,000 can wait" in late["heading.delay"]
     backwards = Sensors(heading=Sensor(outages=((3.0, 2.0),)))
     assert "found [3, 2]" in dict(backwards.conflicts(H))["heading.outages[0]"]
 

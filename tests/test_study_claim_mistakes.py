@@ -4,15 +4,21 @@ from __future__ import annotations
 
 import pytest
 
-from podusv_cli.scenario.expressions import ExpressionError
+from podusv_cli.comparison.curves import REDUCERS
+from podusv_cli.comparison.expressions import OPERATIONS
+from podusv_cli.scenario.expressions import FUNCTIONS, ExpressionError
 from podusv_cli.study.claims import parse
 from podusv_cli.study.expressions import parse_success
+from podusv_cli.study.samples import STATISTICS
 
 LAWS = ["proposed", "pid", "li"]
 MISTAKES = {
     "share(propsed.iae < pid.iae) >= 0.9": "unknown law 'propsed'; did you mean 'proposed'?",
     "median(pid.z_e_stedy) >= 0.9": "unknown metric 'z_e_stedy'; did you mean 'z_e_steady'?",
     "shares(proposed.iae < pid.iae) >= 0.9": "unknown statistic 'shares'; did you mean 'share'?",
+    "median(pid.iae / 0) < 3": "'pid.iae / 0': divides by zero",
+    "mean(pid.z_e) < 3": "unknown statistic 'mean'; it belongs to claims (allowed here: failures",
+    "max(abs(pid.tau_u)) == 300": "unknown statistic 'max'; it belongs to claims",
     "share(finish(pid)) >= 0.9": "unknown property 'finish'; did you mean 'finished'?",
     "failures(pdi) <= 0.1": "unknown law 'pdi'; did you mean 'pid'?",
     "failures(pid.iae) <= 0.1": "failures takes the name of one law",
@@ -41,6 +47,11 @@ MISTAKES = {
     "": "cannot read",
     "not " * 70 + "failures(pid) < 0.1": "nested more than",
 }
+
+
+def test_the_functions_of_both_languages_are_known_to_their_messages() -> None:
+    assert set(FUNCTIONS["claims"]) == {*REDUCERS, *OPERATIONS, "rate"}
+    assert set(FUNCTIONS["sweep.claims"]) == set(STATISTICS)
 
 
 @pytest.mark.parametrize("text", MISTAKES)

@@ -7,7 +7,7 @@ import h5py
 import pytest
 from small_study import TEXT, made, small, written
 
-from podusv_cli.core.errors import StorageError, UsageError
+from podusv_cli.core.errors import ScenarioError, StorageError, UsageError
 from podusv_cli.process.workers import Outcome
 from podusv_cli.study import plan as plans
 from podusv_cli.study import store as stores
@@ -34,6 +34,20 @@ def placed(store, draws=40):
 def updated(monkeypatch):
     """From here on, podusv has other kernels."""
     return lambda: monkeypatch.setattr(plans, "kernels", lambda scenario: "another digest")
+
+
+def test_claims_that_a_study_does_not_judge_are_named(tmp_path):
+    config, warnings = tmp_path / "small.yaml", []
+    request = sweep.Request(
+        ("sweep.draws=4",), tmp_path / "s", workers=1, figures=False, warn=warnings.append
+    )
+    text = TEXT + "claims: {M: {says: a, source: b, expect: %s}}\n"
+    config.write_text(text % "median(li.iae / pid.iae) < 1")
+    with pytest.raises(ScenarioError, match=r"'median'; it belongs to sweep\.claims"):
+        sweep.run(config, request, lambda tally: None)
+    config.write_text(text % "li.iae < pid.iae")
+    sweep.run(config, request, lambda tally: None)
+    assert "claims (M) are about single runs" in warnings[0]
 
 
 def test_runs_of_other_kernels_are_read_and_told(whole, tmp_path, updated, podusv):

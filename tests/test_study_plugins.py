@@ -9,6 +9,7 @@ from plugin_samples import LAW
 from small_study import TEXT
 from test_study_dask import DASK, PATIENCE, background, until
 
+from podusv_cli.core.errors import ScenarioError
 from podusv_cli.study import remote
 from podusv_cli.study.joining import digests
 from podusv_cli.study.remote import Recipe
@@ -52,6 +53,17 @@ def test_a_study_keeps_its_plugin(config, tmp_path, monkeypatch):
     assert alone.metrics["iae"] == table.metric("mine", "iae")[0, 3]
     merged = merge([study], tmp_path / "merged", sweep.Request(figures=False))
     assert (merged.folder / RUNS).read_bytes() == (study / RUNS).read_bytes()
+
+
+@pytest.mark.parametrize("name", ["law", "until", "sha256", "success"])
+def test_no_metric_has_the_name_of_another_column(config, name):
+    metric = (
+        f'\nfrom podusv_cli.metrics.metric import Metric\nOWN = Metric("{name}", "m", "of mine")\n'
+    )
+    law = config.parent / "laws/my_law.py"
+    law.write_text(LAW + metric)
+    with pytest.raises(ScenarioError, match=f"plugins: metric {name}: the table of runs has"):
+        swept(config, config.parent / "study")
 
 
 def test_a_worker_needs_no_file_of_a_plugin(config, tmp_path, monkeypatch):

@@ -87,6 +87,15 @@ IN_VARY = [
     ),
     ("a: @{keys: [vessel.m, start.x], angle: all}, start.x: {angle: all}", "drawn twice, by start"),
     ("a: @{keys: [start.x, start.x], angle: all}", "start.x is drawn twice"),
+    ('a: @{keys: [""], angle: all}', "unknown key ''"),
+    ("law: @{keys: [start.x], angle: all}", "law is another column of the table of runs"),
+    ("success: @{keys: [start.x], angle: all}", "name the quantity success_drawn"),
+    ("iae: @{keys: [start.x], angle: all}", "iae is another column of the table of runs"),
+    ('"": @{keys: [start.x], angle: all}', "the name of a quantity with `keys` is at most 64"),
+    (".: @{keys: [start.x], angle: all}", "the name of a quantity with `keys` is at most 64"),
+    ("/law: @{keys: [start.x], angle: all}", "the name of a quantity with `keys` is at most 64"),
+    ("x/y: @{keys: [start.x], angle: all}", "the name of a quantity with `keys` is at most 64"),
+    ("start.y: @{keys: [start.x], angle: all}", "the name of a quantity with `keys` is at most"),
 ]
 ELSEWHERE = [
     ("laws: [soft, @pidd]", "sweep.laws[1]: unknown law 'pidd'; did you mean 'pid'?"),

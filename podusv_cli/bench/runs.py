@@ -11,8 +11,7 @@ import numpy as np
 from podusv_cli.bench.cases import Case
 from podusv_cli.core.errors import PodusvError, in_a_line
 from podusv_cli.core.kernel import Vector
-from podusv_cli.engine.check import check_law
-from podusv_cli.engine.simulate import marcher, simulate
+from podusv_cli.engine.simulate import ready, simulate
 from podusv_cli.scenario.model import Scenario
 
 POINTS = 150  # of a track
@@ -48,9 +47,10 @@ class BenchRun:
 def warm_up(case: Case) -> None:
     """Check all laws of a case and compile what they need. Raises LawError."""
     for scenario in case.laws.values():
-        loop = scenario.closed_loop()
-        check_law(loop)
-        marcher(loop, scenario.observer(), scenario.simulation.compiled)
+        ready(
+            scenario.closed_loop(), scenario.time_grid(), scenario.observer(),
+            scenario.simulation.compiled,
+        )  # fmt: skip
 
 
 def play(case: Case) -> list[BenchRun]:

@@ -35,9 +35,7 @@ def bench(
     assign: options.Assignments = None,
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("results/bench"),
     force: options.Force = False,
-    workers: Annotated[
-        int, typer.Option(min=0, help="Processes at a time.", show_default="one a core")
-    ] = 0,
+    workers: options.Workers = 0,
     figures: options.Figures = True,
     optimum: Annotated[
         bool, typer.Option("--optimum", help="Find the optimum of each case; a minute or two each.")

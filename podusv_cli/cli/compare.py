@@ -45,9 +45,7 @@ def compare(
     form: Annotated[
         str, typer.Option("--format", help="Of figures: png, pdf, svg; several with commas.")
     ] = "png",
-    jobs: Annotated[
-        int, typer.Option(min=0, help="Processes at a time.", show_default="one a core")
-    ] = 0,
+    workers: options.Workers = 0,
     as_json: options.AsJson = False,
     allow_large: options.AllowLarge = False,
     quiet: options.Quiet = False,
@@ -66,7 +64,7 @@ def compare(
     warned = Warnings(quiet)
     request = Request(
         assign or (), out, force, figures, sys.argv, warned, allow_large, plugin or (),
-        figure or (), [name.strip() for name in form.split(",")], jobs,
+        figure or (), [name.strip() for name in form.split(",")], workers,
     )  # fmt: skip
     with progress_bars(wanted=not (quiet or as_json)) as progress:
         done = workflow.compare([Path(item) for item in items], request, progress)

@@ -65,6 +65,14 @@ def figures(context: typer.Context, incomplete: str) -> Offered:
     return _beginning(incomplete, {name: sheet.caption for name, sheet in known.items()})
 
 
+def listed(context: typer.Context, incomplete: str) -> Offered:
+    """Parts of `podusv list`."""
+    from podusv_cli.cli.list import parts
+
+    found = (word for part in parts(_plugins(context)) for word in part.words)
+    return _beginning(incomplete, dict.fromkeys(found, ""))
+
+
 def names(context: typer.Context, incomplete: str) -> Offered:
     """What `podusv explain` explains: keys, kinds, signals, presets, metrics, findings."""
     from podusv_cli.findings.finding import finding_kinds

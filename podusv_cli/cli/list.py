@@ -2,37 +2,100 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Annotated, NamedTuple
+
+import typer
+
+from podusv_cli.cli import completion
 from podusv_cli.cli.options import Plugins
 from podusv_cli.cli.terminal import echo, echo_entry
 
+if TYPE_CHECKING:
+    from podusv_cli.core.component import Presets
+    from podusv_cli.core.plugins import Plugins as Known
 
-def list(plugin: Plugins = None) -> None:
+Entries = Iterator[tuple[str, str, str]]  # name, what it is, facts
+
+
+class Part(NamedTuple):
+    """A part of the list; `words` are what it can be called on the command line."""
+
+    words: tuple[str, ...]
+    heading: str
+    entries: Entries
+
+
+def list(
+    part: Annotated[
+        str,
+        typer.Argument(
+            help="One part only: vessels, paths, laws, metrics, figures, findings, ...",
+            autocompletion=completion.listed,
+        ),
+    ] = "",
+    plugin: Plugins = None,
+) -> None:
     """List the kinds of components, the presets, the metrics, the figures and the findings.
 
     `podusv explain NAME` tells more about each.
     """
-    from podusv_cli.figures.drawing import figures_with
-    from podusv_cli.findings.finding import finding_kinds
-    from podusv_cli.metrics.table import metrics_with
-    from podusv_cli.scenario.explain import first_sentence, kinds
+    from podusv_cli.core.errors import UsageError
+    from podusv_cli.scenario.phrases import unknown
     from podusv_cli.scenario.plugins import on_hand
-    from podusv_cli.scenario.presets import preset_names, preset_text, with_presets
 
-    plugins = on_hand(plugin or ())
+    every = [*parts(on_hand(plugin or ()))]
+    chosen = [one for one in every if not part or {part, f"{part}s"} & {*one.words}]
+    if not chosen:
+        known = dict.fromkeys(word for one in every for word in one.words)
+        raise UsageError(unknown(f"part {part!r}", part, known))
+    for one in chosen:
+        echo(f"{one.heading}:")
+        for name, text, facts in one.entries:
+            echo_entry(f"  {name}", text, facts=facts)
+
+
+def parts(plugins: Known) -> Iterator[Part]:
+    """All parts, in the order of the list."""
+    from podusv_cli.scenario.explain import kinds
+    from podusv_cli.scenario.plugins import BASES
+    from podusv_cli.scenario.presets import with_presets
+
     for section, summaries in kinds(plugins).items():
-        echo(f"{section}:")
-        for kind, summary in summaries.items():
-            echo_entry(f"  {kind}", summary)
+        words = dict.fromkeys((f"{section}s", f"{BASES[section].noun}s"))
+        yield Part((*words,), section, ((kind, text, "") for kind, text in summaries.items()))
     for key, (_, presets) in with_presets().items():
-        echo(f"{key} (preset, a {presets.noun}):")
-        for name in preset_names(presets, plugins):
-            echo_entry(f"  {name}", first_sentence(preset_text(presets, name, "source", plugins)))
-    echo("metrics:")
+        words = dict.fromkeys((f"{key.partition('.')[0]}s", "presets"))
+        heading = f"{key} (preset, a {presets.noun})"
+        yield Part((*words,), heading, _presets(presets, plugins))
+    yield Part(("metrics",), "metrics", _metrics(plugins))
+    yield Part(("figures",), "figures", _figures(plugins))
+    yield Part(("findings",), "findings (silence)", _findings(plugins))
+
+
+def _presets(presets: Presets, plugins: Known) -> Entries:
+    from podusv_cli.scenario.explain import first_sentence
+    from podusv_cli.scenario.presets import preset_names, preset_text
+
+    for name in preset_names(presets, plugins):
+        yield name, first_sentence(preset_text(presets, name, "source", plugins)), ""
+
+
+def _metrics(plugins: Known) -> Entries:
+    from podusv_cli.metrics.table import metrics_with
+
     for name, metric in metrics_with(plugins).items():
-        echo_entry(f"  {name}", metric.meaning, facts=f"[{metric.unit}]")
-    echo("figures:")
-    for name, sheet in figures_with(plugins).items():
-        echo_entry(f"  {name}", sheet.caption)
-    echo("findings (silence):")
+        yield name, metric.meaning, f"[{metric.unit}]"
+
+
+def _figures(plugins: Known) -> Entries:
+    from podusv_cli.figures.drawing import figures_with  # matplotlib is slow to import
+
+    yield from ((name, sheet.caption, "") for name, sheet in figures_with(plugins).items())
+
+
+def _findings(plugins: Known) -> Entries:
+    from podusv_cli.findings.finding import finding_kinds
+
     for name, finding in finding_kinds(plugins).items():
-        echo_entry(f"  {name}", finding.meaning, facts=f"{finding.when} a run, {finding.about}")
+        yield name, finding.meaning, f"{finding.when} a run, {finding.about}"

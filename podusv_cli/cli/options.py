@@ -33,6 +33,9 @@ Out = Annotated[
 ]
 Force = Annotated[bool, typer.Option("--force", help="Replace finished results.")]
 Figures = Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the results.")]
+Workers = Annotated[
+    int, typer.Option(min=0, help="Processes at a time.", show_default="one a core")
+]
 Scheduler = Annotated[
     str, typer.Option(help="Dask scheduler whose workers compute, as tcp://host:8786.")
 ]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from podusv_cli.cli.terminal import columns, supports_colours
+from podusv_cli.cli.terminal import columns, echo, supports_colours
 from podusv_cli.core.escaping import visible
 from podusv_cli.core.quantities import time_in_words
 
@@ -90,6 +90,15 @@ class StudyLine:
             left = [f"{time_in_words(tally.left)} left"] if tally.made < tally.wanted else []
             self._show(f"{tally.made} of {tally.wanted} runs", *left, text)
 
+    def note(self, *lines: str) -> None:
+        """Print lines that stay, in place of what is being done now."""
+        self._erase()
+        echo(*lines, err=True)
+
+    def warn(self, text: str) -> None:
+        """Print a warning that stays."""
+        self.note(f"warning: {text}")
+
     def say(self, text: str) -> None:
         """Show what is being done now."""
         self._show(text)
@@ -110,6 +119,9 @@ class StudyLine:
 
     def __exit__(self, *error: object) -> None:
         """Erase the line."""
+        self._erase()
+
+    def _erase(self) -> None:
         if self._wanted and self._last:
             with suppress(OSError):
                 typer.echo(ERASED, nl=False, err=True)

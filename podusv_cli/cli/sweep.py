@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import shlex
 import sys
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -60,9 +59,7 @@ def run(
     until: Annotated[
         str, typer.Option(help="Time after which no more runs are begun, as 90s, 30min, 8h.")
     ] = "",
-    workers: Annotated[
-        int, typer.Option(min=0, help="Processes at a time.", show_default="one a core")
-    ] = 0,
+    workers: options.Workers = 0,
     shard: Annotated[
         str, typer.Option(help="A part of the study, as 3/20: for `podusv sweep merge`.")
     ] = "",
@@ -84,8 +81,8 @@ def run(
     with StudyLine(wanted=not (quiet or as_json)) as line:
         request = workflow.Request(
             changes, out, seconds(until), workers, part_of(shard), sys.argv, plugin or (), figures,
-            scheduler, allow_mixed, line.say, warn,
-            None if quiet or as_json else partial(echo, err=True),
+            scheduler, allow_mixed, line.say, line.warn,
+            None if quiet or as_json else line.note,
         )  # fmt: skip
         done = workflow.run(Path(config), request, line.tell)
     for refused in done.refused:
@@ -178,7 +175,7 @@ def report(
     from podusv_cli.workflows import sweep as workflow
 
     with StudyLine(wanted=not (quiet or as_json)) as line:
-        request = workflow.Request(argv=sys.argv, figures=figures, say=line.say, warn=warn)
+        request = workflow.Request(argv=sys.argv, figures=figures, say=line.say, warn=line.warn)
         done = workflow.report(study, request)
     _tell(done, as_json=as_json, quiet=quiet)
 
@@ -196,7 +193,7 @@ def merge(
     from podusv_cli.workflows.sweep import Request
 
     with StudyLine(wanted=not (quiet or as_json)) as line:
-        request = Request(argv=sys.argv, figures=figures, say=line.say, warn=warn)
+        request = Request(argv=sys.argv, figures=figures, say=line.say, warn=line.warn)
         done = joining.merge(studies, out, request)
     _tell(done, as_json=as_json, quiet=quiet)
 

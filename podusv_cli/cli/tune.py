@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -24,9 +23,7 @@ def tune(
         Path | None,
         typer.Option(help="Folder of the search.", show_default="results/<name>-tune"),
     ] = None,
-    workers: Annotated[
-        int, typer.Option(min=0, help="Processes at a time.", show_default="one a core")
-    ] = 0,
+    workers: options.Workers = 0,
     scheduler: options.Scheduler = "",
     allow_mixed: options.AllowMixed = False,
     figures: options.Figures = True,
@@ -45,7 +42,7 @@ def tune(
     with StudyLine(wanted=not (quiet or as_json)) as line:
         request = workflow.Request(
             assign or (), out, workers, sys.argv, plugin or (), figures, line.say, scheduler,
-            allow_mixed, (lambda text: None) if quiet or as_json else partial(echo, err=True),
+            allow_mixed, (lambda text: None) if quiet or as_json else line.note,
         )  # fmt: skip
         done = workflow.tune(Path(config), request, line.advance)
     for refused in done.refused:

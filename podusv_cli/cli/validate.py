@@ -29,16 +29,17 @@ def validate(
     allow_large: AllowLarge = False,
     plugin: Plugins = None,
 ) -> None:
-    """Check a scenario: keys and values first, then claims; if all are valid, print findings.
+    """Check a scenario as a run does before its first step; if all is valid, print findings.
 
     Exit code 0, with a line for each finding; or 2 with a line for each fault.
     """
     from podusv_cli.comparison.claims import parse_claims
-    from podusv_cli.findings.finding import preflight, unknown_codes
+    from podusv_cli.findings.finding import unknown_codes
     from podusv_cli.scenario.limits import largest, limits
     from podusv_cli.scenario.load import load
     from podusv_cli.study.check import sweep_faults
     from podusv_cli.tuning.check import tune_faults
+    from podusv_cli.workflows.execute import examined
 
     checks = (unknown_codes, limits(allow_large), sweep_faults, tune_faults)
     loaded = load(config, assign or (), checks, plugin or ())
@@ -47,7 +48,7 @@ def validate(
     laws, steps = ", ".join(scenario.labels()), scenario.time_grid().steps
     # All is computed before the first line, since timing the runs of a study checks the laws.
     study = _study(loaded, scenario.sweep) if scenario.sweep else []
-    findings = preflight(scenario)
+    findings = examined(scenario)
     echo(f"{config}: ok ({scenario.name}, {laws}, {steps} steps)")
     echo(f"a run takes {largest(scenario)}", *study, *findings)
     if verbose:
@@ -59,6 +60,7 @@ def validate(
 def _study(loaded: Loaded, sweep: Sweep) -> list[str]:
     """How many runs the study has, which draws the scenario cannot take, and what it all takes."""
     from podusv_cli.process.workers import available_workers
+    from podusv_cli.study.check import unjudged
     from podusv_cli.study.estimate import estimate, pilot
     from podusv_cli.study.invalid import check_draws
     from podusv_cli.study.plan import plan
@@ -72,7 +74,8 @@ def _study(loaded: Loaded, sweep: Sweep) -> list[str]:
     )
     paces, cores = pilot(made), available_workers()
     need = estimate(made, paces, dict.fromkeys(places, draws), cores)
-    lines = [counted, check_draws(made).in_words(), *need.in_words()]
+    remark = unjudged(loaded.scenario)
+    lines = [counted, check_draws(made).in_words(), *need.in_words(), *filter(None, [remark])]
     if not loaded.scenario.tune:
         return lines
     seconds = {law: pace for (law, _), pace in paces.items()}

@@ -100,11 +100,11 @@ def add_made(writer: RunWriter, extras: Extras, name: str, form: Callable[[], by
 
 def drawn(
     result: Result, extras: Extras, progress: Callable[[str, float], None] | None = None,
-    names: Sequence[str] = (), formats: Sequence[str] = ("png",), jobs: int = 0,
+    names: Sequence[str] = (), formats: Sequence[str] = ("png",), workers: int = 0,
 ) -> dict[str, bytes]:  # fmt: skip
     """The figures of all runs together by file name: as asked, and as SVG for the report.
 
-    Without `names` these are all that fit. `jobs` processes draw at a time (0: one a core). A
+    Without `names` these are all that fit. `workers` processes draw at a time (0: one a core). A
     figure that was asked for and that no run has signals for is missing among the `extras`.
     """
     # matplotlib is slow to import
@@ -121,7 +121,7 @@ def drawn(
             extras.missing.append(Missing(f"figure {name}", f"no run logged any of {wanted}"))
     names = tuple(dict.fromkeys(names)) or tuple(known)
     formats = tuple(dict.fromkeys((*formats, IN_REPORT)))
-    return draw_in_parallel(shown, names, formats, extras, progress=tell, workers=jobs)
+    return draw_in_parallel(shown, names, formats, extras, progress=tell, workers=workers)
 
 
 def as_report(

@@ -11,6 +11,7 @@ import pandas as pd
 from podusv_cli.core import escaping, quantities
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import CLOCKED, METRICS
+from podusv_cli.storage import csv_files
 
 METRIC = "metric"
 NOTE = (
@@ -51,8 +52,7 @@ def with_ratios(frame: pd.DataFrame, known: Mapping[str, Metric] = METRICS) -> p
 
 def as_csv(frame: pd.DataFrame, known: Mapping[str, Metric] = METRICS) -> str:
     """The table as CSV, in full precision, with ratios last."""
-    full = with_ratios(frame, known)
-    return full.to_csv(lineterminator="\n", header=[escaping.csv(str(c)) for c in full.columns])
+    return csv_files.text(with_ratios(frame, known).reset_index())
 
 
 def cells(

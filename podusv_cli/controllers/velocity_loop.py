@@ -48,7 +48,7 @@ class AdaptedBound:
 
 @dataclass(frozen=True)
 class Loop:
-    """A linearised velocity loop; `key` is the gain that makes it fast, and `cause` why it is.
+    """A linearised velocity loop; `key` is the gain that mostly makes it fast, and `cause` why.
 
     `name` is what messages call it, `bound` an adapted bound that acts on it.
     """
@@ -76,5 +76,7 @@ class Loop:
 
     @property
     def fastest(self) -> float:
-        """Largest eigenvalue's magnitude [1/s]."""
+        """Largest eigenvalue's magnitude [1/s]; infinite where a number is."""
+        if not np.isfinite(self.matrix).all():
+            return np.inf
         return float(np.abs(np.linalg.eigvals(self.matrix)).max())

@@ -13,6 +13,16 @@ from dataclasses import dataclass
 from podusv_cli.core.errors import LawError
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")  # usable as a variable in logs and claims
+NAME_IN_WORDS = "is at most 64 letters, digits and '_', starting with a letter"
+
+
+def check_words(kind: str, name: str, *texts: str) -> None:
+    """Raise ValueError where no log or table can hold the name, or a text beside it."""
+    if not NAME.fullmatch(name):
+        raise ValueError(f"the name of a {kind} {NAME_IN_WORDS}, found {name!r}")
+    for text in texts:
+        if not text.isprintable():
+            raise ValueError(f"{name}: {text!r} has a character that no log can hold")
 
 
 @dataclass(frozen=True)
@@ -34,11 +44,7 @@ class Signal:
 
     def __post_init__(self) -> None:
         """Check the name; make a symbol of it where none is given: `e_ct` becomes `e_{ct}`."""
-        if not NAME.fullmatch(self.name):
-            raise ValueError(f"a signal's name is letters, digits and '_', not {self.name!r}")
-        for text in (self.unit, self.meaning, self.symbol):
-            if not text.isprintable():
-                raise ValueError(f"{self.name}: {text!r} has a character that no log can hold")
+        check_words("signal", self.name, self.unit, self.meaning, self.symbol)
         head, *rest = self.name.split("_")
         below = ",".join(rest)
         written = f"{head}_{{{below}}}" if len(below) > 1 else self.name

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +11,9 @@ import numpy as np
 from podusv_cli.core.kernel import Vector
 
 LARGEST = 900_000  # characters: the resolved scenario, which has the rows, must be readable
+# A number as scenarios and files write it; Python takes 1_0 and digits of other scripts, too.
+NUMBER = re.compile(r"[-+]?(\.[0-9]+|(0|[1-9][0-9]*)(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
+NOT_FINITE = re.compile(r"[-+]?(nan|inf|infinity)", re.IGNORECASE)
 Layouts = Mapping[int, Sequence[str]]  # by count: the columns' names, as `b_u [N]`
 
 
@@ -61,10 +64,7 @@ def _cells(line: str) -> list[str]:
 
 def _is_number(cell: str) -> bool:
     """Whether a cell is a number, which may be infinite or undefined."""
-    with suppress(ValueError):
-        float(cell)
-        return True
-    return False
+    return bool(NUMBER.fullmatch(cell) or NOT_FINITE.fullmatch(cell))
 
 
 def _counted(lines: list[Line], noun: str, layouts: Layouts) -> None:
@@ -80,10 +80,9 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def _numbers(lines: list[Line], noun: str) -> Vector:
-    try:
-        rows = np.array([cells for _, cells in lines], dtype=float)
-    except ValueError:
-        raise ValueError(_wrong_cell(lines, noun)) from None
+    if wrong := _wrong_cell(lines, noun):
+        raise ValueError(wrong)
+    rows = np.array([cells for _, cells in lines], dtype=float)
     if not np.all(np.isfinite(rows)):
         row, column = np.argwhere(~np.isfinite(rows))[0].tolist()
         where = f"line {lines[row].number}, column {column + 1} of {noun}"
@@ -92,9 +91,12 @@ def _numbers(lines: list[Line], noun: str) -> Vector:
 
 
 def _wrong_cell(lines: list[Line], noun: str) -> str:
-    places = ((number, i, cell) for number, cells in lines for i, cell in enumerate(cells, 1))
-    number, column, _ = next(place for place in places if not _is_number(place[2]))
-    return f"line {number}, column {column} of {noun} is no number"
+    """Where a cell is no number; empty where all are."""
+    for number, cells in lines:
+        for column, cell in enumerate(cells, 1):
+            if not _is_number(cell):
+                return f"line {number}, column {column} of {noun} is no number"
+    return ""
 
 
 def _in_order(rows: Vector, order: list[int], header: Line, noun: str) -> Vector:

@@ -12,7 +12,6 @@ from numbers import Real
 
 import numpy as np
 
-from podusv_cli.controllers.base import Controller
 from podusv_cli.core.component import called
 from podusv_cli.core.errors import LawError, in_a_line
 from podusv_cli.core.kernel import Vector, bundle
@@ -20,6 +19,7 @@ from podusv_cli.core.signal import NAME, Signal
 from podusv_cli.engine.kernel_faults import check_arguments, check_kernel
 from podusv_cli.engine.loop import ClosedLoop
 from podusv_cli.engine.march import Work
+from podusv_cli.vessels.vessel import COEFFICIENTS
 
 PROVENANCE = "provenance"  # is a group in every log
 UNWRITTEN = -1.234567890123e-290  # no law writes just this
@@ -30,7 +30,7 @@ OF_NUMBERS = (ArithmeticError, ValueError)
 
 
 def check_law(loop: ClosedLoop) -> None:
-    """Ask the loop's law at the start of a run, with vectors of the declared sizes.
+    """Ask the loop's path and law at the start of a run, with vectors of the declared sizes.
 
     Raises LawError for signals that are undeclared or declared twice, a memory, table or outputs of
     another size, an output left unwritten, an argument written that is to be read, an exception,
@@ -39,37 +39,40 @@ def check_law(loop: ClosedLoop) -> None:
     """
     law = loop.controller.law
     check_kernel(law)
+    check_kernel(loop.path.evaluate)
     with np.errstate(all="ignore"):
-        _asked(loop, _check_declared, ())
-        _asked(loop, _ask, OF_NUMBERS)
+        asked(called(loop.path), loop.path.table)
+        asked(called(loop.path), loop.first_target, OF_NUMBERS)
+        asked(called(loop.controller), partial(_check_declared, loop))
+        asked(called(loop.controller), partial(_ask, loop), OF_NUMBERS)
     check_arguments(law, READ)
 
 
-def _asked(
-    loop: ClosedLoop, ask: Callable[[ClosedLoop], int], left: tuple[type[Exception], ...]
-) -> None:
+def asked(part: str, ask: Callable[[], object], left: tuple[type[Exception], ...] = ()) -> None:
     """Ask, and raise LawError for any exception but those that are `left` for the run to tell."""
-    work = Work(partial(ask, loop))
+    work = Work(lambda: int(ask() is None))
     work.finish()
     if isinstance(work.error, LawError):
         raise work.error
     if work.result is None and not isinstance(work.error, left):
-        fault = _constant(loop.controller, work.error) or work.fault()
+        fault = _constant(work.error) or work.fault()
         if FLOAT_AS_COUNT in str(work.error):
             fault += "; constants are floats: write int(k.count)"
-        message = f"{called(loop.controller)}, evaluated once before the run: {fault}"
+        message = f"{part}, evaluated once before the run: {fault}"
         raise LawError(message) from work.error
 
 
-def _constant(law: Controller, error: BaseException | None) -> str:
+def _constant(error: BaseException | None) -> str:
     """What is wrong where a kernel reads a constant that there is not; else empty."""
     if not (isinstance(error, AttributeError) and hasattr(error.obj, "_fields")):
         return ""
-    own = ", ".join(type(law).model_fields)
-    return f"{in_a_line(error)}; it has those of the nominal vessel, and {own}"
+    names = error.obj._fields
+    inherited = ["those of the nominal vessel"] if set(COEFFICIENTS) <= set(names) else []
+    known = ", ".join(name for name in names if name not in COEFFICIENTS)
+    return f"{in_a_line(error)}; it has {', and '.join([known, *inherited])}"
 
 
-def _check_declared(loop: ClosedLoop) -> int:
+def _check_declared(loop: ClosedLoop) -> None:
     law = loop.controller
     _check_signals(loop)
     memory, declared = loop.first_memory(), (sum(size for _, size in law.slots()),)
@@ -82,7 +85,6 @@ def _check_declared(loop: ClosedLoop) -> int:
     for name, number in law.constants_with(loop.nominal).items():
         if not (name.isidentifier() and isinstance(number, Real)):
             raise LawError(f"{called(law)}: its constant {name} = {number!r} is no named number")
-    return 0
 
 
 def evaluated(loop: ClosedLoop, before: float) -> tuple[Vector, Vector, Vector]:
@@ -102,7 +104,7 @@ def evaluated(loop: ClosedLoop, before: float) -> tuple[Vector, Vector, Vector]:
     return tau, rate, signals
 
 
-def _ask(loop: ClosedLoop) -> int:
+def _ask(loop: ClosedLoop) -> None:
     law, (tau, rate, signals) = loop.controller, evaluated(loop, UNWRITTEN)
     slots = [f"the rate of {part.name}" for part, size in law.slots() for _ in range(size)]
     names = ("tau_u_cmd", "tau_r_cmd", *(part.name for part in law.signals), *slots)
@@ -112,7 +114,6 @@ def _ask(loop: ClosedLoop) -> int:
     if law.wants_loads():
         k, memory = bundle(law.constants_with(loop.nominal)), loop.first_memory()
         law.after_saturation(0.0, memory, tau, np.zeros(3), k, law.table(), rate)
-    return 0
 
 
 def _check_signals(loop: ClosedLoop) -> None:

@@ -256,8 +256,18 @@ def wire(
     loop: ClosedLoop, plan: Plan, observer: Observer, grid: TimeGrid, rows: int = 1,
     allocate: Allocate = np.empty, recall: Recall = call,
 ) -> Wires:  # fmt: skip
-    """The loop's vectors, ready for the march to begin, with room for this many logged rows."""
+    """The loop's vectors, ready for the march to begin, with room for this many logged rows.
 
+    Numbers beyond all limits are for the run to tell.
+    """
+    with np.errstate(all="ignore"):
+        return _wired(loop, plan, observer, grid, rows, allocate, recall)
+
+
+def _wired(
+    loop: ClosedLoop, plan: Plan, observer: Observer, grid: TimeGrid, rows: int,
+    allocate: Allocate, recall: Recall,
+) -> Wires:  # fmt: skip
     def numbers(constants: Callable[..., dict[str, float]], *given: Any) -> Vector:
         return np.array(list(recall(constants, *given).values()) or [0.0])
 

@@ -11,6 +11,7 @@ import numpy as np
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Allocate, Recording, Status
 from podusv_cli.engine import closed_loop, signatures
+from podusv_cli.engine.check import asked, check_law
 from podusv_cli.engine.columns import by_name, names
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.layout import Plan, Wires
@@ -59,6 +60,17 @@ def simulate(
             progress and (lambda reached: progress(reached / last)),
         )  # fmt: skip
         return replace(_record(loop, grid, wires, plan, ending), about=about)
+
+
+def ready(loop: ClosedLoop, grid: TimeGrid, observer: Observer, compiled: bool) -> None:
+    """Make every check of a run before its first step, and have its march compiled and loaded.
+
+    Raises LawError.
+    """
+    check_law(loop)
+    loop.check_fit(grid.step)
+    asked("the closed loop", partial(wire, loop, loop.layout(grid), observer, grid))
+    marcher(loop, observer, compiled)
 
 
 def marcher(loop: ClosedLoop, observer: Observer, compiled: bool) -> Callable[..., int]:

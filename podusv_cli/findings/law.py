@@ -15,6 +15,7 @@ from podusv_cli.findings.stability import (
     bursts,
     delay_margin,
     delayed_growth,
+    fast_gain,
     loops,
     rk4_growth,
     sampled_growth,
@@ -40,7 +41,7 @@ def _too_fast(case: Case, cause: Cause) -> Sentences:
                 yield (
                     f"the {loop.axis} {loop.name} turns at {loop.fastest:.3g} 1/s, too fast for "
                     f"RK4 with {grid.step:g} s; take a step below {_largest_step(loop):.2g} s, "
-                    f"or a smaller {loop.key}"
+                    f"or a smaller {fast_gain(case.scenario, nu, loop)}"
                 )
 
 
@@ -59,12 +60,13 @@ def _sampled_too_fast(case: Case, cause: Cause) -> Sentences:
     grid, period = case.scenario.time_grid(), case.scenario.control.period
     if not grid.hold_every:
         return
-    for loop in loops(case.scenario, case.reference.working, cause):
+    nu = case.reference.working
+    for loop in loops(case.scenario, nu, cause):
         growth = sampled_growth(loop, grid.step, grid.hold_every, update_first=grid.update_first)
         if growth > UNSTABLE:
             yield (
                 f"the {loop.axis} {loop.name}, held for {period:g} s, grows {growth:.3g} times a "
-                f"period; take a shorter period, or a smaller {loop.key}"
+                f"period; take a shorter period, or a smaller {fast_gain(case.scenario, nu, loop)}"
             )
 
 
@@ -105,7 +107,8 @@ def delayed_loop(case: Case) -> Sentences:
                 reported.add(loop.axis)
                 yield (
                     f"the {loop.axis} {loop.name} grows with a delay of {delay:g} s; take a delay "
-                    f"below {delay_margin(loop, delay):.2g} s, or a smaller {loop.key}"
+                    f"below {delay_margin(loop, delay):.2g} s, or a smaller "
+                    f"{fast_gain(case.scenario, nu, loop)}"
                 )
 
 

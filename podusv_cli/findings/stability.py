@@ -124,6 +124,19 @@ def loops(scenario: Scenario, nu: Vector, cause: Cause | None = None) -> list[Lo
     return [loop for loop in found if cause in (None, loop.cause)]
 
 
+def fast_gain(scenario: Scenario, nu: Vector, loop: Loop) -> str:
+    """The law's gain whose halving slows a loop most; the loop's own key where several do."""
+    law, about = scenario.controller, axes(scenario, nu)
+
+    def slowed(key: str) -> float:
+        halved = law.model_copy(update={key: 0.5 * getattr(law, key)})
+        alike = (one for one in halved.velocity_loops(about, nu) if one.name == loop.name)
+        return min((one.fastest for one in alike if one.axis == loop.axis), default=np.inf)
+
+    gains = [key for key in type(law).model_fields if isinstance(getattr(law, key), float)]
+    return min(sorted(gains, key=lambda key: key != loop.key), key=slowed, default=loop.key)
+
+
 def bursts(loop: Loop, bound: AdaptedBound, error: float, step: float) -> bool:
     """Whether a velocity error grows under RK4 although the bound's adaptation should reduce it.
 

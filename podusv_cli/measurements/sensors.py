@@ -27,6 +27,7 @@ MEASURED = tuple(
 PERIOD, DELAY, RESOLUTION, ERRORS, WAITING, ROOM, HEAD = range(7)
 
 ROUNDED = 1e-9  # of a sample
+MOST_WAITING = 1_000_000  # samples that are under way at a time
 
 Span = Annotated[tuple[float, float], Field(strict=False)]
 
@@ -78,6 +79,9 @@ class Sensor(Component):
         for key, time in (("period", self.period), ("delay", self.delay)):
             if time and (told := misfit(time, step)):
                 yield key, told
+        if (waiting := self.delay / self.period) > MOST_WAITING:
+            text = f"{self.delay:g} s are {waiting:.3g} periods; at most {MOST_WAITING:,} can wait"
+            yield "delay", text
         for i, (start, end) in enumerate(self.outages):
             if not 0.0 <= start <= end:
                 text = f"must be [from, to] with 0 <= from <= to, found [{start:g}, {end:g}]"

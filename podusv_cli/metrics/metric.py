@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from podusv_cli.core.kernel import Vector, kernel
+from podusv_cli.core.signal import check_words
 from podusv_cli.engine.layout import Plan
 from podusv_cli.engine.loop import ClosedLoop
 
@@ -94,6 +95,10 @@ class Metric:
     happens: bool = False
     counts_standoff: bool = False
     symbol: str = ""
+
+    def __post_init__(self) -> None:
+        """Check the words. Raises ValueError."""
+        check_words("metric", self.name, self.unit, self.meaning, self.symbol)
 
 
 def gathered(position: int) -> Result:

@@ -49,11 +49,21 @@ class Waypoints(Path):
             raise ValueError(f"needs at least two points, has {len(self.points)}")
         with np.errstate(all="ignore"):
             knots = self._knots()
-        if not np.all(np.isfinite(knots)):
-            raise ValueError("the points are too far apart, or the speed is too small, for numbers")
-        if np.any(np.diff(knots) <= 0):
-            raise ValueError("two neighbouring points are the same")
+            if np.any(np.diff(knots) <= 0):
+                raise ValueError("two neighbouring points are the same")
+            if not (np.all(np.isfinite(knots)) and self._has_numbers()):
+                raise ValueError(
+                    "the times or the course are beyond all numbers; points are too far apart or "
+                    "too near, or the speed is too small or too large"
+                )
         return self
+
+    def _has_numbers(self) -> bool:
+        """Whether the spline's coefficients are finite."""
+        try:
+            return bool(np.all(np.isfinite(self.table())))
+        except ValueError:  # scipy refuses what overflows on the way
+            return False
 
     def waypoints(self) -> tuple[Point, ...]:
         """The points as they are given."""

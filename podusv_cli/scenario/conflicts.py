@@ -21,10 +21,12 @@ MOST_INSTANTS = 2**53  # that are distinct numbers
 
 def conflicts(scenario: Scenario) -> list[tuple[str, str]]:
     """Key and message for every pair of values that contradict each other."""
-    return [*_defaults(scenario), *_unanswered(scenario), *_summands(scenario)] or [
+    parts = [*_defaults(scenario), *_unanswered(scenario), *_summands(scenario)]
+    values = parts or [
         *_times(scenario), *_samples(scenario), *_names(scenario), *scenario.metrics.conflicts(),
-        *_signals(scenario), *_seeing(scenario),
+        *_seeing(scenario),
     ]  # fmt: skip
+    return values or list(_signals(scenario))
 
 
 def _defaults(scenario: Scenario) -> Conflicts:

@@ -6,6 +6,7 @@ They are parsed by Python, and evaluated by whoever gives them a meaning; never 
 from __future__ import annotations
 
 import ast
+import re
 import warnings
 from collections.abc import Collection
 from typing import NoReturn
@@ -15,6 +16,17 @@ from podusv_cli.scenario.phrases import unknown
 LONGEST = 500  # characters of an expression
 LARGEST = 1e300  # of numbers written down
 DEEPEST = 60  # nested brackets, signs and operations
+# Numbers that Python reads and scenarios do not write.
+FOREIGN = re.compile(r"(?<![\w.])(?:0[xobXOB]\w+|[0-9.]*[0-9]_[0-9_.]*)")
+
+
+# The functions of each language, by the section of a scenario that it is for.
+FUNCTIONS = {
+    "claims": (
+        "max", "min", "mean", "final", "variation", "integral", "rms_above", "abs", "hypot", "rate",
+    ),
+    "sweep.claims": ("share", "failures", "quantile", "median"),
+}  # fmt: skip
 
 
 class ExpressionError(ValueError):
@@ -30,12 +42,27 @@ def syntax_tree(text: str, example: str) -> ast.expr:
             tree = ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         raise ExpressionError(f"cannot read {text!r}; example: {example}") from error
+    if foreign := FOREIGN.search(text):
+        raise ExpressionError(f"{foreign[0]!r} is no number; write it in decimal, without _")
     level: list[ast.AST] = [tree]
     for _ in range(DEEPEST):
         level = [child for node in level for child in ast.iter_child_nodes(node)]
     if level:
         raise ExpressionError(f"is nested more than {DEEPEST} deep")
+    for node in ast.walk(tree):
+        match node:
+            case ast.BinOp(op=ast.Div(), right=divisor) if _is_zero(divisor):
+                refuse(node, "divides by zero, which is no number; leave the division out")
     return tree
+
+
+def _is_zero(node: ast.expr) -> bool:
+    match node:
+        case ast.UnaryOp(operand=part):
+            return _is_zero(part)
+        case ast.Constant(value=int() | float() as number):
+            return number == 0
+    return False
 
 
 def refuse(node: ast.AST, why: str) -> NoReturn:
@@ -47,6 +74,11 @@ def known(name: str, names: Collection[str], what: str) -> str:
     """The name, if it is one of these. Raises ExpressionError with the nearest that is."""
     if name in names:
         return name
+    if homes := [home for home, functions in FUNCTIONS.items() if name in functions]:
+        allowed = ", ".join(sorted(names))
+        raise ExpressionError(
+            f"unknown {what} {name!r}; it belongs to {homes[0]} (allowed here: {allowed})"
+        )
     raise ExpressionError(unknown(f"{what} {name!r}", name, sorted(names), "podusv list"))
 
 

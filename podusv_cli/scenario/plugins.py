@@ -114,10 +114,10 @@ def _required(plugin: Plugin, mark: Mark, given: Node | None = None) -> Node:
 def _used(root: Node) -> Iterator[Plugin]:
     """The installed packages that have a component or a vessel which the scenario names."""
     vessels = {
-        root.mapping[key].get("preset") for key in ("vessel", "nominal") if key in root.mapping
+        root.mapping[key].word("preset") for key in ("vessel", "nominal") if key in root.mapping
     }
-    vessels -= {None, *preset_names(VESSELS)}
-    named = [(section, node.get("kind")) for section, node in _components(root)]
+    vessels -= {"", *preset_names(VESSELS)}
+    named = [(section, node.word("kind")) for section, node in _components(root)]
     foreign = [
         (section, kind) for section, kind in named if kind not in kinds_of(Scenario, section)
     ]
@@ -186,7 +186,7 @@ def recorded(files: Sequence[str], root: Node, faults: list[Fault]) -> tuple[Nod
     used, their components, too. All other components are kept as plain values.
     """
     own = root.mapping.get(KEY)
-    used = {entry.get("sha256") for entry in own.mapping.values()} if own else set()
+    used = {entry.word("sha256") for entry in own.mapping.values()} if own else set()
     here = from_files(files, faults)
     known = tuple(p if p.sha256 in used else p.without_components() for p in here)
     absent = (ABSENT, *_stand_ins(root, scenario_class(known))) if used else ()
@@ -196,8 +196,8 @@ def recorded(files: Sequence[str], root: Node, faults: list[Fault]) -> tuple[Nod
 def _stand_ins(root: Node, known: type[Scenario]) -> Plugins:
     unknown: dict[tuple[str, str], frozenset[str]] = {}
     for section, node in _components(root):
-        kind = node.get("kind")
-        if isinstance(kind, str) and kind not in kinds_of(known, section):
+        kind = node.word("kind")
+        if kind and kind not in kinds_of(known, section):
             names = unknown.get((section, kind), frozenset()) | node.mapping.keys() - {"kind"}
             unknown[section, kind] = names
     return tuple(_stand_in(*key, names) for key, names in unknown.items())

@@ -117,8 +117,8 @@ def with_contents(root: Node, top: Key, faults: list[Fault]) -> Node:
         return root
     laws = dict(several.mapping)
     for label, own in laws.items():
-        kind = own.get("kind") or (default.get("kind") if default else None)
-        law = top.keys["controller"].kinds.get(str(kind))
+        kind = own.word("kind") or (default.word("kind") if default else "")
+        law = top.keys["controller"].kinds.get(kind)
         if law and own.mapping:
             laws[label] = with_files(own, f"controllers.{label}", law.model, faults)
     return root.with_entry("controllers", replace(several, content=laws))
@@ -134,7 +134,7 @@ def _lists(root: Node, top: Key) -> Iterator[tuple[str, tuple[Node, ...], Key]]:
 
 def _listed(part: Node, name: str, item: Key, faults: list[Fault]) -> Node:
     """One section of a list with what its files hold."""
-    known = item.kinds.get(str(part.get("kind"))) if part.mapping else None
+    known = item.kinds.get(part.word("kind")) if part.mapping else None
     return with_files(part, name, known.model, faults) if known else part
 
 
@@ -143,7 +143,7 @@ def _of_kinds(root: Node, top: Key) -> list[tuple[str, Node, type[Component]]]:
     given = (
         (name, root.mapping[name], key) for name, key in top.keys.items() if name in root.mapping
     )
-    found = ((name, node, key.kinds.get(str(node.get("kind")))) for name, node, key in given)
+    found = ((name, node, key.kinds.get(node.word("kind"))) for name, node, key in given)
     return [(name, node, key.model) for name, node, key in found if key and node.mapping]
 
 
@@ -223,7 +223,7 @@ def _with_source(vessel: Node, plugins: Plugins) -> Node:
 
     A source that is not the preset's own is left as it is.
     """
-    name, source = vessel.get("preset"), vessel.mapping.get("source")
+    name, source = vessel.word("preset"), vessel.mapping.get("source")
     known = name in preset_names(VESSELS, plugins)
     base = preset_file(VESSELS, name, [], plugins) if known else None
     stem = str(base.get("source")).removesuffix(".") if base else ""
@@ -278,7 +278,7 @@ def stands_in(root: Node) -> bool:
 
 
 def _over_base(base: Node, own: Node, top: Key) -> Node:
-    law = top.keys["controller"].kinds.get(str(own.get("kind") or base.get("kind")))
+    law = top.keys["controller"].kinds.get(own.word("kind") or base.word("kind"))
     if not law or not isinstance(own.content, dict):
         return own
     shared = {key: part for key, part in base.mapping.items() if key in law.keys}

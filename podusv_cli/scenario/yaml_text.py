@@ -18,6 +18,7 @@ from typing import Any
 
 import yaml
 
+from podusv_cli.core.timed_rows import NUMBER
 from podusv_cli.scenario.phrases import found, quoted
 from podusv_cli.scenario.shipped import file_of
 from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, Route, dotted
@@ -36,7 +37,6 @@ WORDS = {
     for word in spellings
 }
 INTEGER = re.compile(r"[-+]?(0|[1-9][0-9]{0,299})")
-NUMBER = re.compile(r"[-+]?(\.[0-9]+|(0|[1-9][0-9]*)(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 NOT_FINITE = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
 
 # Parts of PyYAML's messages, and the messages for users.

@@ -73,6 +73,11 @@ class Node:
         entry = self.mapping.get(key)
         return entry.content if entry else None
 
+    def word(self, key: str) -> str:
+        """The text of an entry; empty where there is none, and where it is no text."""
+        content = self.get(key)
+        return content if isinstance(content, str) else ""
+
     def with_entry(self, key: str, entry: Node) -> Node:
         """This mapping with an entry added or replaced."""
         return replace(self, content={**self.mapping, key: entry})
@@ -187,7 +192,7 @@ def fitting(base: Node, top: Node, faults: list[Fault], at: Route = ()) -> Node:
         wrong = [key for key in strange if named or key.lstrip("-").isdecimal()]
         for key in wrong:
             mark = top.mapping[key].key_mark or top.mapping[key].mark
-            kinds = [entry.get("kind") for entry in entries]
+            kinds = [entry.word("kind") for entry in entries]
             place = bracketed(dotted((*at, key)))
             faults.append(Fault(mark, place, entries_of(bracketed(dotted(at)), kinds)))
         if wrong:

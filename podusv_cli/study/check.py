@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
 from podusv_cli.core.component import Component
+from podusv_cli.core.signal import NAME, NAME_IN_WORDS
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.loop import ClosedLoop, Observer, entries
 from podusv_cli.metrics.metric import Metric
@@ -23,6 +24,7 @@ from podusv_cli.scenario.yaml_tree import Route, dotted, entries_of, route
 from podusv_cli.study.claims import parse
 from podusv_cli.study.draws import DrawError, content, described, drawn
 from podusv_cli.study.expressions import parse_success
+from podusv_cli.study.runs import AXES, ENDING, OWN
 
 # The sections that may differ between the runs of a cell.
 DRAWN = (
@@ -43,9 +45,19 @@ def sweep_faults(scenario: Scenario) -> list[tuple[Route, str]]:
         return []
     laws = list(_laws(scenario, sweep))
     return laws or [
-        *_vary(singles(scenario), sweep), *_twice(sweep), *_keep(scenario, sweep),
-        *_claims(scenario, sweep),
+        *_metric_names(scenario), *_vary(singles(scenario), sweep), *_twice(sweep),
+        *_keep(scenario, sweep), *_claims(scenario, sweep),
     ]  # fmt: skip
+
+
+def unjudged(scenario: Scenario) -> str:
+    """A sentence about the claims that a study does not judge; empty where there are none."""
+    if not scenario.claims:
+        return ""
+    return (
+        f"claims ({', '.join(scenario.claims)}) are about single runs, which podusv compare "
+        "judges; a study judges sweep.claims"
+    )
 
 
 def singles(scenario: Scenario) -> dict[str, Scenario]:
@@ -63,11 +75,33 @@ def _laws(scenario: Scenario, sweep: Sweep) -> Faults:
             yield ("sweep", "laws", place), f"{label} is named twice"
 
 
+def _metric_names(scenario: Scenario) -> Faults:
+    """Metrics of plug-ins that have the name of something else in the table of runs."""
+    for name in scenario.known_metrics():
+        if name in {*OWN, *ENDING}:
+            yield ("plugins",), f"metric {name}: the table of runs has another column of this name"
+
+
 def _vary(laws: Mapping[str, Scenario], sweep: Sweep) -> Faults:
+    taken = {*AXES, *ENDING, *(name for one in laws.values() for name in _metrics(one))}
     for name, quantity in sweep.vary.items():
+        if wrong := _wrong_name(name, quantity, taken):
+            yield ("sweep", "vary", name), wrong
+            continue
         texts = [text for key in quantity.targets(name) for text in _key(key, quantity, laws)]
         texts = texts or list(_tried(name, quantity, laws))
         yield from ((("sweep", "vary", name), text) for text in dict.fromkeys(texts))
+
+
+def _wrong_name(name: str, quantity: Quantity, taken: Collection[str]) -> str:
+    """Why a quantity cannot be a column of the table of runs under this name; else empty."""
+    if name in quantity.targets(name):
+        return ""
+    if not NAME.fullmatch(name):
+        return f"the name of a quantity with `keys` {NAME_IN_WORDS}, as in hull_mass"
+    if name in taken:
+        return f"{name} is another column of the table of runs; name the quantity {name}_drawn"
+    return ""
 
 
 def _key(key: str, quantity: Quantity, laws: Mapping[str, Scenario]) -> Iterator[str]:
@@ -98,7 +132,7 @@ def has(scenario: Scenario, key: str) -> bool:
         content(scenario, steps)
     except LookupError:
         return False
-    return dotted(steps) == key and steps[0] in DRAWN
+    return bool(steps) and dotted(steps) == key and steps[0] in DRAWN
 
 
 def no_entry(scenario: Scenario, steps: Route) -> str:

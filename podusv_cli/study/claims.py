@@ -207,8 +207,6 @@ def _compared(node: ast.Compare) -> Iterator[Link]:
     """Every statistic of a comparison, on the left of a sign and a number."""
     sides = [node.left, *node.comparators]
     for left, sign, right in zip(sides, node.ops, sides[1:], strict=False):
-        if type(sign) not in SIGNS:
-            refuse(node, "compare with <, <=, >, >=")
         calls = [side for side in (left, right) if not _is_number(side)]
         if len(calls) != 1:
             refuse(
@@ -218,6 +216,8 @@ def _compared(node: ast.Compare) -> Iterator[Link]:
             )
         first = calls[0] is left
         call, bound = _statistic(calls[0]), number(right if first else left)
+        if type(sign) not in SIGNS:
+            refuse(node, "compare with <, <=, >, >=")
         _checked(call, bound)
         toward = sign if first else MIRRORED[type(sign)]()
         yield Link(ast.unparse(call), call, toward, bound)

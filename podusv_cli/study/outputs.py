@@ -11,12 +11,13 @@ import pandas as pd
 from podusv_cli.core.errors import UsageError
 from podusv_cli.pages.page import Picture
 from podusv_cli.process.extras import Extras
-from podusv_cli.storage import files
+from podusv_cli.storage import csv_files, files
 from podusv_cli.storage.json_files import encode
 from podusv_cli.storage.run_folder import MISSING
 from podusv_cli.study import pictures, report, summary, verdict
 from podusv_cli.study.keep import Kept, tracks
 from podusv_cli.study.results import Results
+from podusv_cli.study.runs import AXES, ENDING
 from podusv_cli.study.runs_file import Table
 from podusv_cli.study.sittings import timing
 from podusv_cli.study.unit import STATUSES
@@ -87,7 +88,7 @@ def export(runs: Table, path: Path) -> None:
                 "Parquet needs pyarrow: pip install pyarrow; or export --format csv"
             ) from error
     else:
-        content = whole.to_csv(index=False, lineterminator="\n").encode()
+        content = csv_files.text(whole).encode()
     files.write_bytes(path, content)
 
 
@@ -96,7 +97,6 @@ def _frame(runs: Table, law: str, cell: int) -> pd.DataFrame:
     drawn = {name: values[done] for name, values in runs.drawn.items()}
     words = np.array(STATUSES)[runs.status(law)[cell][done]]
     numbers = {name: runs.metric(law, name)[cell][done] for name in runs.metrics}
-    return pd.DataFrame(
-        {"law": law, "cell": runs.cells[cell], "draw": np.flatnonzero(done), **drawn,
-         "status": words, "success": runs.success(law)[cell][done], **numbers}
-    )  # fmt: skip
+    place = zip(AXES, (law, runs.cells[cell], np.flatnonzero(done)), strict=True)
+    ending = zip(ENDING, (words, runs.success(law)[cell][done]), strict=True)
+    return pd.DataFrame({**dict(place), **drawn, **dict(ending), **numbers})

@@ -12,6 +12,13 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.metrics.metric import Metric
 
 Mask = NDArray[Any]  # of booleans
+# Columns of the table of all runs, ahead of the drawn quantities and behind them.
+AXES, ENDING = ("law", "cell", "draw"), ("status", "success")
+FAILED = ("failed_run", "failed_cause")  # in runs.h5, which runs have a cause, and the causes
+SEAL = "sha256"  # of `status`, `until` and the metrics, in the order of the file
+SEAL_OF_THE_REST = "sha256_rest"  # of axes, causes and drawn quantities; the first tables have none
+DRAWN = "drawn"  # the group of drawn quantities
+OWN = (*AXES, *FAILED, "status", "until", DRAWN, SEAL, SEAL_OF_THE_REST)  # are no metrics
 
 
 class Runs(Protocol):

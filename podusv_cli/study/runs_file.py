@@ -17,15 +17,10 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.study.expressions import FINISHED, parse_success, succeeded
-from podusv_cli.study.runs import Mask
+from podusv_cli.study.runs import AXES, DRAWN, FAILED, OWN, SEAL, SEAL_OF_THE_REST, Mask
 from podusv_cli.study.unit import BROKEN, MISSING, STATUSES, Codes, Unit, UnitResult
 
-AXES = ("law", "cell", "draw")
-FAILED = ("failed_run", "failed_cause")  # which runs have a cause, and the causes
-SEAL = "sha256"  # of `status`, `until` and the metrics, in the order of the file
-SEAL_OF_THE_REST = "sha256_rest"  # of axes, causes and drawn quantities; the first tables have none
 Known = Mapping[str, Metric]
-DRAWN = "drawn"  # the group of drawn quantities
 ROWS = 4096  # runs read or written at a time
 
 
@@ -84,8 +79,7 @@ class Table:
     @cached_property
     def metrics(self) -> tuple[str, ...]:
         """The names of the metrics."""
-        own = {*AXES, *FAILED, "status", "until", DRAWN, SEAL, SEAL_OF_THE_REST}
-        return tuple(name for name in self._file if name not in own)
+        return tuple(name for name in self._file if name not in OWN)
 
     def metric(self, law: str, name: str) -> Vector:
         """A metric of every run of a law, shape (cell, draw); NaN where it has none."""

@@ -16,14 +16,8 @@ from podusv_cli.metrics.metric import Metric
 from podusv_cli.process.temporary_names import temporary_name
 from podusv_cli.storage.files import new_file, storage_errors
 from podusv_cli.storage.log import FILE, UNDATED, LogLayout, describe, write_at
-from podusv_cli.study.runs_file import (
-    DRAWN,
-    ROWS,
-    SEAL,
-    SEAL_OF_THE_REST,
-    digest,
-    digest_of_the_rest,
-)
+from podusv_cli.study.runs import DRAWN, SEAL, SEAL_OF_THE_REST
+from podusv_cli.study.runs_file import ROWS, digest, digest_of_the_rest
 from podusv_cli.study.unit import MISSING, STATUSES, UnitResult
 
 BLOCK = 2**20  # bytes written and read at a time

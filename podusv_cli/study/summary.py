@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from podusv_cli.core import escaping
 from podusv_cli.core.kernel import Vector
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import CLOCKED, METRICS
+from podusv_cli.storage import csv_files
 from podusv_cli.study import statistics
 from podusv_cli.study.runs import Mask, Runs, worst
 
@@ -83,9 +83,8 @@ def without_intervals(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def as_csv(frame: pd.DataFrame) -> str:
-    """A table as CSV with six significant digits; an infinite number is `inf`, an unknown empty."""
-    text = frame.map(lambda cell: escaping.csv(cell) if isinstance(cell, str) else cell)
-    return text.to_csv(index=False, float_format="%.6g", lineterminator="\n")
+    """A table as CSV with six significant digits."""
+    return csv_files.text(frame, "%.6g")
 
 
 def _names(runs: Runs, metrics: Known) -> list[str]:

@@ -11,10 +11,9 @@ import numpy.typing as npt
 from podusv_cli.core.kernel import Vector
 from podusv_cli.engine import lanes
 from podusv_cli.engine.batch import Lazily, simulate_many
-from podusv_cli.engine.check import check_law
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.loop import ClosedLoop
-from podusv_cli.engine.simulate import marcher
+from podusv_cli.engine.simulate import ready
 from podusv_cli.study.draws import drawn, draws
 from podusv_cli.study.plan import Plan, watching
 
@@ -70,8 +69,7 @@ def prepare(plan: Plan, law: str, cell: int, runs: int = 0) -> None:
     """
     scenario = plan.single(law, cell)
     loop, seeing = scenario.closed_loop(), watching(scenario)
-    check_law(loop)
-    marcher(loop, seeing, compiled=True)
+    ready(loop, scenario.time_grid(), seeing, compiled=True)
     runs = runs or plan.sweep.draws * len(plan.cells)
     lanes.prepare(loop, seeing, runs * scenario.time_grid().steps)
 

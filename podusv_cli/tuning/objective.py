@@ -100,9 +100,17 @@ def named(tree: ast.expr, metrics: Mapping[str, Metric]) -> list[str]:
 
 
 def _names(tree: ast.expr, metrics: Mapping[str, Metric]) -> list[str]:
-    """What an expression is about, found by evaluating it on a single made-up run."""
-    walk = OfRuns(metrics, runs=Runs({name: np.ones(1) for name in metrics}, np.zeros(1, bool)))
-    _evaluated(tree, walk, math.inf)
+    """What an expression is about, as its evaluation on a single made-up run shows.
+
+    Raises ExpressionError.
+    """
+    sizes = np.sqrt(np.arange(2.0, 2.0 + len(metrics)))  # no quotient or sum of them is whole
+    made_up = {name: np.array([size]) for name, size in zip(metrics, sizes, strict=True)}
+    walk = OfRuns(metrics, runs=Runs(made_up, np.zeros(1, bool)))
+    with np.errstate(all="ignore"):
+        found = _evaluated(tree, walk, math.inf)
+    if not math.isfinite(found) and FAILURES not in walk.names:  # here, no run failed
+        refuse(tree, f"is no finite number, whatever the runs are; example: {EXAMPLE}")
     return walk.names
 
 

@@ -20,7 +20,7 @@ from podusv_cli.pages.page import Picture
 from podusv_cli.process.extras import Extras, Missing
 from podusv_cli.process.interrupts import interrupts_deferred
 from podusv_cli.process.workers import Outcome, Report, run_all
-from podusv_cli.storage import provenance
+from podusv_cli.storage import csv_files, provenance
 from podusv_cli.storage.run_folder import RunWriter
 
 Progress = Callable[[str, float], None]
@@ -183,4 +183,4 @@ def _write(
 
 
 def _csv(rows: pd.DataFrame) -> bytes:
-    return rows.to_csv(index=False, lineterminator="\n", float_format=DIGITS).encode()
+    return csv_files.text(rows, DIGITS).encode()

@@ -23,13 +23,13 @@ from podusv_cli.findings.finding import merged
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.table import CLOCKED
 from podusv_cli.process.extras import Extras, Missing
-from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
+from podusv_cli.process.interrupts import interrupts_deferred
 from podusv_cli.process.workers import Outcome, available_workers, run_all
 from podusv_cli.scenario.limits import estimate, needed
 from podusv_cli.scenario.load import resolved_yaml
 from podusv_cli.storage import provenance
 from podusv_cli.storage.run_folder import RunWriter, default_folder, open_run
-from podusv_cli.workflows.execute import Task, execute, unwritten, warm_up
+from podusv_cli.workflows.execute import Task, execute, unwritten
 from podusv_cli.workflows.gather import Gathered, gather
 from podusv_cli.workflows.members import Member
 from podusv_cli.workflows.run import RESULTS, Request
@@ -149,7 +149,7 @@ def _keep_apart(items: Sequence[Path], target: Path) -> None:
 
 def _writer(target: Path, members: Sequence[Member], request: Request) -> RunWriter:
     sizes = [estimate(member.scenario) for member in members if member.run is None]
-    space = needed(sizes, request.jobs or available_workers())
+    space = needed(sizes, request.workers or available_workers())
     return RunWriter(target, force=request.force, named=request.out is not None, needed=space)
 
 
@@ -158,9 +158,6 @@ def make_runs(
 ) -> dict[str, Outcome]:
     """Execute the members that have no run yet, in parallel, each into a folder in `folder`."""
     wanted = [member for member in members if member.run is None]
-    with interrupts_enabled():
-        for member in wanted:
-            warm_up(member.scenario)
     tasks = [
         Task(
             member.scenario, member.text, folder / member.label,
@@ -174,7 +171,7 @@ def make_runs(
         if progress:
             progress(wanted[position].label, fraction)
 
-    outcomes = run_all([partial(execute, task) for task in tasks], advance, request.jobs)
+    outcomes = run_all([partial(execute, task) for task in tasks], advance, request.workers)
     return {member.label: outcome for member, outcome in zip(wanted, outcomes, strict=True)}
 
 
@@ -244,7 +241,7 @@ def _add_figures(
 ) -> None:  # fmt: skip
     """Draw the figures, write those in the formats asked for, and the report, which has all."""
     draw = partial(outputs.drawn, result, extras, progress, request.names, request.formats)
-    figures = extras.attempt("figures", partial(draw, request.jobs)) or {}
+    figures = extras.attempt("figures", partial(draw, request.workers)) or {}
     for name, content in figures.items():
         if name.rpartition(".")[2] in request.formats:
             writer.add(f"figures/{name}", content)

@@ -18,9 +18,8 @@ from podusv_cli import __version__
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.recording import Allocate, Recording, Status
-from podusv_cli.engine.check import check_law
-from podusv_cli.engine.simulate import marcher, simulate
-from podusv_cli.findings.finding import postflight
+from podusv_cli.engine.simulate import ready, simulate
+from podusv_cli.findings.finding import postflight, preflight
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.operations import operations
 from podusv_cli.process.extras import Extras, Missing
@@ -29,7 +28,7 @@ from podusv_cli.process.workers import Outcome
 from podusv_cli.scenario.limits import HELD, estimate
 from podusv_cli.scenario.load import resolved_yaml
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.storage import files, provenance
+from podusv_cli.storage import csv_files, files, provenance
 from podusv_cli.storage import run_folder as folder
 from podusv_cli.theory import monitor
 from podusv_cli.theory.report import as_json as theory_report
@@ -186,11 +185,25 @@ def unwritten(outcomes: Iterable[Outcome]) -> str:
 
 def warm_up(scenario: Scenario) -> None:
     """Have all code of this scenario's loop compiled and loaded. Raises LawError."""
-    loop, compiled = scenario.closed_loop(), scenario.simulation.compiled
-    check_law(loop)
-    marcher(loop, scenario.observer(), compiled)
+    loop, grid, compiled = (
+        scenario.closed_loop(),
+        scenario.time_grid(),
+        scenario.simulation.compiled,
+    )
+    ready(loop, grid, scenario.observer(), compiled)
     if scenario.log.monitor:
-        monitor.prepare(loop, scenario.time_grid(), compiled)
+        monitor.prepare(loop, grid, compiled)
+
+
+def examined(scenario: Scenario) -> list[Finding]:
+    """The findings about a scenario, after every check that its runs make before the first step.
+
+    All code of its laws is compiled and loaded then. Raises LawError.
+    """
+    check_figures(scenario)
+    for single in scenario.singles().values():
+        warm_up(single)
+    return preflight(scenario)
 
 
 def simulated(
@@ -272,8 +285,8 @@ def _write(
     told = [finding.as_json() for finding in warnings]
     writer.add_json("metrics.json", {**status, "metrics": metrics, "warnings": told})
     known = task.scenario.known_metrics()
-    rows = [f"{name},{metrics[name]!r},{m.unit}" for name, m in known.items() if name in metrics]
-    writer.add("metrics.csv", "\n".join(["metric,value,unit", *rows, ""]).encode())
+    rows = [(name, metrics[name], m.unit) for name, m in known.items() if name in metrics]
+    writer.add("metrics.csv", csv_files.lines([("metric", "value", "unit"), *rows]).encode())
 
 
 def _drawn(task: Task, recording: Recording, extras: Extras) -> dict[str, bytes]:

@@ -9,10 +9,10 @@ from pathlib import Path
 
 from podusv_cli.comparison.claims import ParsedClaim, parse_claims
 from podusv_cli.core.errors import UsageError
-from podusv_cli.findings.finding import preflight, unknown_codes
+from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Loaded, load
-from podusv_cli.workflows.execute import check_figures
+from podusv_cli.workflows.execute import examined
 from podusv_cli.workflows.members import Member, comparable, distinct, numbered
 from podusv_cli.workflows.run import Request
 
@@ -72,10 +72,9 @@ def from_folder(path: Path, files: Sequence[str] = ()) -> Item:
 def from_scenario(loaded: Loaded, *, alone: bool) -> Item:
     """The runs of a scenario, and its claims; `alone` says that nothing else is compared."""
     scenario, singles = loaded.scenario, loaded.scenario.singles()
-    check_figures(scenario)
     labels = list(singles) if alone or scenario.controllers else [scenario.name]
     members = [
-        Member(label, single, loaded.text, noticed=preflight(single))
+        Member(label, single, loaded.text, noticed=examined(single))
         for label, single in zip(labels, singles.values(), strict=True)
     ]
     return Item(scenario.name, members, list(singles), parse_claims(loaded))

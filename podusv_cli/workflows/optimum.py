@@ -13,9 +13,8 @@ from podusv_cli.controllers.schedule import Schedule
 from podusv_cli.controllers.velocity_vector import VelocityVector
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.recording import Recording
-from podusv_cli.engine.check import check_law
-from podusv_cli.engine.loop import ClosedLoop
-from podusv_cli.engine.simulate import simulate
+from podusv_cli.engine.loop import ClosedLoop, Observer
+from podusv_cli.engine.simulate import ready, simulate
 from podusv_cli.findings.finding import preflight, unknown_codes
 from podusv_cli.optimum import collocation
 from podusv_cli.optimum.collocation import Stage
@@ -117,8 +116,9 @@ def _guesses(scenario: Scenario, wanted: Problem) -> dict[str, Motion]:
 
 
 def _run(scenario: Scenario, loop: ClosedLoop) -> Recording:
-    check_law(loop)
-    log = simulate(loop, scenario.time_grid(), compiled=scenario.simulation.compiled)
+    grid, compiled = scenario.time_grid(), scenario.simulation.compiled
+    ready(loop, grid, Observer(), compiled)
+    log = simulate(loop, grid, compiled=compiled)
     if log.status == "interrupted":
         raise KeyboardInterrupt
     return log

@@ -8,13 +8,13 @@ from pathlib import Path
 
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.finding import Finding
-from podusv_cli.findings.finding import preflight, unknown_codes
+from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Loaded, load, resolved_yaml
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import unknown
 from podusv_cli.storage.run_folder import default_folder
-from podusv_cli.workflows.execute import Finished, Progress, Stopwatch, Task, check_figures, execute
+from podusv_cli.workflows.execute import Finished, Progress, Stopwatch, Task, examined, execute
 
 RESULTS = Path("results")
 # The figures that take longest first; `sea` and `estimates` for runs that have waves, wind, current
@@ -36,7 +36,7 @@ class Request:
     plugins: Sequence[str] = ()  # files beside those that a scenario names
     names: Sequence[str] = ()  # of figures of a comparison; all that fit where empty
     formats: Sequence[str] = ("png",)  # of figures of a comparison
-    jobs: int = 0  # processes at a time; 0: one a core
+    workers: int = 0  # processes at a time; 0: one a core
     controller: str = ""  # which of `controllers` to run
 
 
@@ -58,9 +58,8 @@ def run_loaded(
     with watch.part("load"):
         scenario = single(loaded, request.controller)
         target = request.out or default_folder(RESULTS, scenario.name, resolved_yaml(scenario))
-    with watch.part("preflight"):
-        check_figures(scenario)
-        noticed = preflight(scenario)
+    with watch.part("compile"):
+        noticed = examined(scenario)
     for finding in noticed:
         request.warn(finding)
     task = Task(

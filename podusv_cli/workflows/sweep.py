@@ -12,6 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from podusv_cli.comparison.claims import parse_claims
 from podusv_cli.core.errors import UsageError
 from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.process.extras import Extras, Missing
@@ -21,7 +22,7 @@ from podusv_cli.scenario.load import Loaded, load, tree_yaml
 from podusv_cli.scenario.sweep import Keep
 from podusv_cli.storage import manifest
 from podusv_cli.study import outputs
-from podusv_cli.study.check import sweep_faults
+from podusv_cli.study.check import sweep_faults, unjudged
 from podusv_cli.study.cluster import engine
 from podusv_cli.study.estimate import estimate, pilot
 from podusv_cli.study.invalid import check_draws
@@ -178,6 +179,9 @@ def _loaded(config: Path, request: Request) -> Loaded:
             f"{config} has no key `sweep`, which says what is to be drawn; see docs/studies.md, or "
             "start from one: podusv init studies/hull_and_sea"
         )
+    parse_claims(loaded)
+    if remark := unjudged(loaded.scenario):
+        request.warn(remark)
     return loaded
 
 

@@ -10,6 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from podusv_cli.comparison.claims import parse_claims
 from podusv_cli.core.errors import UsageError
 from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.process.extras import Extras, Missing
@@ -116,6 +117,7 @@ def _loaded(config: Path, request: Request) -> tuple[Loaded, Path]:
             f"{config} has no key `tune`, which says how many runs a search has; see "
             "docs/tuning.md, or start from one: podusv init studies/tune_small"
         )
+    parse_claims(loaded)
     own = config if given else RESULTS / f"{loaded.scenario.name}-tune"
     return loaded, request.out or own
 
@@ -199,7 +201,8 @@ def _leaders(searches: Sequence[Search]) -> str:
         if search.trials:
             value = best(search.trials).values[0]
             found[search.law] = min(value, found.get(search.law, value))
-    return "best so far: " + ", ".join(f"{law} {value:.4g}" for law, value in found.items())
+    leaders = ", ".join(f"{law} {value:.4g}" for law, value in found.items())
+    return f"best so far: {leaders}" if found else "no gains are tried yet"
 
 
 def _written(results: Results, folder: Path, request: Request) -> Tuned:

@@ -7,7 +7,6 @@ from contextlib import suppress
 from pathlib import Path
 
 from podusv_cli.core.errors import StorageError, UsageError
-from podusv_cli.engine.check import check_law
 from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import load
@@ -35,8 +34,6 @@ def verify(
     if out:
         files.check_places([out])
         _spare(out, force)
-    for single in scenario.singles().values():
-        check_law(single.closed_loop())
     return verification.verify(scenario, tolerance, progress)
 
 

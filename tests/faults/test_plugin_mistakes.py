@@ -8,7 +8,7 @@ from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import pytest
-from plugin_samples import LAW, put
+from plugin_samples import LAW, SCENARIO, put
 
 import podusv_cli as podusv_python
 from podusv_cli.core import plugins
@@ -22,8 +22,7 @@ MISTAKES = {
     "no constant": (
         "return PUSH * k.gain",
         "return PUSH * k.gian",
-        "no attribute 'gian' (my_law.py, line 22); it has those of the nominal vessel, and kind, "
-        "gain",
+        "no attribute 'gian' (my_law.py, line 22); it has gain, and those of the nominal vessel",
     ),
     "no rate": ("        rate[0] = signals[0]\n", "", "it leaves the rate of drift unwritten"),
     "wrong shape": ("np.zeros(1)", "np.zeros(2)", "a memory of shape (2,), its slots are (1,)"),
@@ -35,18 +34,66 @@ MISTAKES = {
 }
 
 
+COMMANDS = [("validate",), *((name, "--out", "r", "--no-figures") for name in ("run", "compare"))]
+
+
 @pytest.mark.parametrize("name", MISTAKES)
 def test_it_is_refused_before_the_run(podusv, name):
     right, wrong, words = MISTAKES[name]
     assert right in LAW
-    for command in ("run", "compare"):
-        said = podusv(command, put(law=LAW.replace(right, wrong)), "--out", "r", "--no-figures")
+    for command, *options in COMMANDS:
+        said = podusv(command, put(law=LAW.replace(right, wrong)), *options)
         told = " ".join(said.err.split())
         assert said.code == 2, said.err
         assert words in told
         assert "my_law.py, line " in told
         assert "bug" not in told
         assert not Path("r").exists()
+
+
+PATH = """
+from podusv_cli.paths.base import Path
+
+
+class Still(Path):
+    kind: Literal["still"] = "still"
+    radius: float = value(1.0, "m", "of nothing", gt=0)
+
+    def table(self):
+        return np.array([1.0])
+
+    @staticmethod
+    @kernel
+    def evaluate(t, k, table, target):
+        for i in range(6):
+            target[i] = k.radius
+"""
+PATH_MISTAKES = {
+    "constant": (
+        "= k.radius",
+        "= k.radios",
+        "'radios' (my_law.py, line 59); it has radius",
+    ),
+    "numpy": ("= k.radius", "= np.linalg.norm(3.0)", "cannot become machine code"),
+    "table": (
+        "np.array([1.0])",
+        "np.array(1 / 0)",
+        "division by zero (my_law.py, line 53)",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", PATH_MISTAKES)
+def test_a_mistake_in_a_path_is_not_blamed_on_the_law(podusv, name):
+    right, wrong, words = PATH_MISTAKES[name]
+    scenario = SCENARIO.replace("kind: line", "kind: still")
+    for command, *options in COMMANDS:
+        said = podusv(command, put(scenario, LAW + PATH.replace(right, wrong)), *options)
+        told = " ".join(said.err.split())
+        assert said.code == 2, said.err
+        assert words in told
+        assert "law cross_track" not in told
+        assert "bug" not in told
 
 
 MORE = """
@@ -88,6 +135,7 @@ OTHERS = {
         2,
         "another constant",
     ),
+    "word": ("m = made('a b')", 2, "the name of a metric is at most 64 letters, digits and '_'"),
     "metric": ("m = made('iae')", 2, "my_law.py: podusv_cli.metrics.distance has the name 'iae'"),
     "figure": (
         "f = figure('pods', caption='', signals=('x',))(failing)",
@@ -117,6 +165,7 @@ def test_mistakes_in_metrics_figures_and_findings_cost_no_run(podusv, name):
     assert words in " ".join(said.err.split())
     assert "bug" not in said.err
     assert Path("r/log.h5").exists() == (code == 0)
+    assert podusv("validate", "a.yaml").code == code
     if code == 0:
         assert '"iae"' in Path("r/metrics.json").read_text()
 
