@@ -17,7 +17,6 @@ import hashlib
 import io
 import json
 import os
-import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
@@ -30,9 +29,11 @@ import h5py
 import numpy as np
 
 from podusv_cli.core.errors import StorageError, UsageError
+from podusv_cli.metrics.table import metrics_with
+from podusv_cli.scenario.plugins import again
 from podusv_cli.storage import files, json_files
 from podusv_cli.storage.run_folder import STUDY
-from podusv_cli.study import runs_file, runs_writer
+from podusv_cli.study import record, runs_file, runs_writer
 from podusv_cli.study.draws import table
 from podusv_cli.study.plan import Plan, digest, disagreements
 from podusv_cli.study.runs import Mask
@@ -67,21 +68,22 @@ class Store:
             f"{', '.join(laws)}); they are shown as they are, and no runs or logs are added"
         )
 
-    def open(self, started: str, scenario: str = "") -> None:
+    def open(self, started: str, texts: Mapping[str, str] = MappingProxyType({})) -> None:
         """Make the folder, or check that it holds this very study, and note what is asked for.
 
-        `scenario` is the text of the scenario's file, where one is to be written. Raises UsageError
-        where it holds another study, naming what is different, and StorageError.
+        `texts` has the scenario and its plug-ins by the names of their files, where they are to be
+        written. Raises UsageError where it holds another study, naming what is different, and
+        StorageError.
         """
         history: list[Any] = []
         known = (self.folder / STUDY).exists()
         if known:
-            told = json_files.read(self.folder / STUDY)
-            self._agree(self.folder, told.get("identity", {}))
-            history = list(told.get("history", []))
-            if self.plan.sweep.draws < told["draws"]:
+            there = record.read(self.folder)
+            self._agree(self.folder, there.identity)
+            history = [asked.model_dump() for asked in there.history]
+            if self.plan.sweep.draws < there.draws:
                 raise UsageError(
-                    f"{self.folder} has {told['draws']} draws; ask for as many or more, or name "
+                    f"{self.folder} has {there.draws} draws; ask for as many or more, or name "
                     "another folder with --out"
                 )
         elif not files.is_empty(self.folder):
@@ -90,24 +92,32 @@ class Store:
         content = {
             "format": FORMAT, "name": self.plan.scenario.name, "draws": self.plan.sweep.draws,
             "laws": self.plan.laws, "cells": [cell.label for cell in self.plan.cells],
-            "identity": self._identity(), "history": [*history, asked],
+            "identity": self._identity(), "history": [*history, asked], **self._metrics(),
         }  # fmt: skip
         # With more draws in study.json than in the scenario, the study could not be continued. And
         # without study.json, a folder that is not empty is no study.
-        if known and scenario:
-            self._write_scenario(scenario)
+        if known:
+            self._write_scenario(texts)
         files.make_folder(self.folder)
         files.write_bytes(self.folder / STUDY, json_files.encode(content))
         files.make_folder(self.folder / UNITS)
-        if scenario and not known:
-            self._write_scenario(scenario)
+        if not known:
+            self._write_scenario(texts)
 
-    def _write_scenario(self, text: str) -> None:
+    def _write_scenario(self, texts: Mapping[str, str]) -> None:
         """Write the scenario, which refers to nothing outside the folder, and its plug-ins."""
-        contents = {SCENARIO: text, **self.plan.scenario.plugin_files()}
-        for name, content in contents.items():
+        for name, content in texts.items():
             files.make_folder((self.folder / name).parent)
             files.write_bytes(self.folder / name, content.encode())
+
+    def _metrics(self) -> dict[str, Any]:
+        """What a reader without the study's plug-ins has to know of its metrics."""
+        scenario = self.plan.scenario
+        if not scenario.plugins:
+            return {}
+        own = metrics_with((), scenario.metrics.named())
+        known = {name: scenario.known_metrics()[name] for name in self.plan.metrics}
+        return {"metrics": list(known), "metrics_of_plugins": record.of_plugins(known, own)}
 
     def agree(self, other: Store) -> None:
         """Raise UsageError where another folder holds another study, naming what is different."""
@@ -187,7 +197,7 @@ class Store:
         except StorageError as error:
             raise StorageError(
                 f"{error}; restore the file, or move it away and simulate its runs again with: "
-                f"podusv sweep run {shlex.quote(str(self.folder))}"
+                f"{again('sweep run', self.folder)}"
             ) from error
         return found
 
