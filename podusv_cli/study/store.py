@@ -31,7 +31,7 @@ import numpy as np
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.metrics.table import metrics_with
 from podusv_cli.scenario.plugins import again
-from podusv_cli.storage import files, json_files
+from podusv_cli.storage import files, hdf5, json_files
 from podusv_cli.storage.run_folder import STUDY
 from podusv_cli.study import record, runs_file, runs_writer
 from podusv_cli.study.draws import table
@@ -283,12 +283,16 @@ def undamaged(content: bytes, seal: str) -> Unit | None:
 
 
 def read(path: Path, seal: str) -> UnitResult | None:
-    """A unit with its runs; None for a file that is damaged or of another identity."""
+    """A unit with its runs; None for a file that is damaged or of another identity.
+
+    Raises StorageError for one that is sealed like a unit and is none.
+    """
     content = _content(path)
     unit = undamaged(content, seal)
     if unit is None:
         return None
-    with h5py.File(io.BytesIO(content), "r") as file:
+    with hdf5.readable(path, "runs"), h5py.File(io.BytesIO(content), "r") as file:
+        hdf5.check(file)
         table, names = file["table"][()], file["table"].attrs["metrics"].split()
         causes = tuple(text.decode() for text in file["cause"][()])
         metrics = dict(zip(names, table[:-1], strict=True))
@@ -296,9 +300,12 @@ def read(path: Path, seal: str) -> UnitResult | None:
 
 
 def _content(path: Path) -> bytes:
-    """A file's bytes; none where another podusv removed it meanwhile. Raises StorageError."""
+    """A file's bytes; none where another podusv removed it meanwhile, or where it is no file.
+
+    Raises StorageError.
+    """
     with files.storage_errors(f"cannot read {path}"), suppress(FileNotFoundError):
-        return path.read_bytes()
+        return path.read_bytes() if path.is_file() else b""
     return b""
 
 
