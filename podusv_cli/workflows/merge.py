@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
 from podusv_cli.core.errors import UsageError
 from podusv_cli.storage import files
+from podusv_cli.storage.writer import TABLES, sole_writer
 from podusv_cli.study import record
 from podusv_cli.study.joining import join, missing, mixture
 from podusv_cli.study.march import Tally
@@ -35,8 +36,18 @@ def merge(studies: Sequence[Path], out: Path, request: Request) -> Swept:
         request.warn(store.remark)
     plugins = record.plugin_files(most.folder, store.plan.scenario)
     texts = {SCENARIO: files.read_text(most.folder / SCENARIO), **plugins}
+    with sole_writer(out), sole_writer(out, TABLES):
+        return _joined(store, others, texts, started, request)
+
+
+def _joined(
+    store: Store, others: Sequence[Store], texts: Mapping[str, str], started: datetime,
+    request: Request,
+) -> Swept:  # fmt: skip
+    """Write the runs of the others into a study, and judge it where it is whole."""
+    out, plugged = store.folder, store.plan.scenario.plugged
     store.open(started.isoformat(timespec="seconds"), texts)
-    sitting = Sitting(out, request.argv, started, store.plan.scenario.plugged, studies)
+    sitting = Sitting(out, request.argv, started, plugged, [other.folder for other in others])
     join(store, others)
     sitting.end(0)
     if mixed := mixture(out):

@@ -20,10 +20,11 @@ from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Loaded, Plugged, load, tree_yaml
 from podusv_cli.scenario.sweep import Keep
 from podusv_cli.storage import manifest
+from podusv_cli.storage.writer import PATIENCE, TABLES, sole_writer
 from podusv_cli.study import outputs
 from podusv_cli.study.check import sweep_faults
 from podusv_cli.study.cluster import engine
-from podusv_cli.study.estimate import estimate, pilot
+from podusv_cli.study.estimate import check_fits, estimate, pilot
 from podusv_cli.study.invalid import check_draws
 from podusv_cli.study.joining import mixture
 from podusv_cli.study.keep import found, unmade
@@ -92,7 +93,15 @@ def run(config: Path, request: Request, tell: Tell) -> Swept:
     kept.
     """
     started = datetime.now(UTC)
-    store = _opened(config, request, started)
+    store, texts = _planned(config, request)
+    check_fits(store.plan, store.folder, request.shard[1])
+    with sole_writer(store.folder):
+        store.open(started.isoformat(timespec="seconds"), texts)
+        return _run(store, request, started, tell)
+
+
+def _run(store: Store, request: Request, started: datetime, tell: Tell) -> Swept:
+    """Simulate what is missing of a study whose folder is open, and judge it if it is whole."""
     with _engine(store, request) as found:
         tally, whole = _marched(store, request, started, found, tell)
     refused = tuple(found.told().get("refused", {}).values())
@@ -102,8 +111,9 @@ def run(config: Path, request: Request, tell: Tell) -> Swept:
             return Swept(store.folder, tally, part_is_whole=True, refused=refused)
     if not whole:
         return Swept(store.folder, tally, refused=refused)
-    store.write_runs()
-    return replace(answered(store, request), refused=refused)
+    with sole_writer(store.folder, TABLES, PATIENCE):
+        store.write_runs()
+        return replace(answered(store, request), refused=refused)
 
 
 def _marched(
@@ -157,8 +167,8 @@ def _is_whole(store: Store) -> bool:
     return tally.made == tally.wanted
 
 
-def _opened(config: Path, request: Request, started: datetime) -> Store:
-    """The store of a new study, or of one that is to be continued."""
+def _planned(config: Path, request: Request) -> tuple[Store, dict[str, str]]:
+    """The store of a new study, or of one that is to be continued; its scenario and plug-ins."""
     given = config.is_dir()
     if given:
         check_study(config)
@@ -167,10 +177,8 @@ def _opened(config: Path, request: Request, started: datetime) -> Store:
     plugged = partial(plugins.loaded, trusted=request.trust or not given)
     loaded = _loaded(config / SCENARIO if given else config, request, plugged)
     folder = request.out or (config if given else RESULTS / f"{loaded.scenario.name}-sweep")
-    store = Store(folder, plan(loaded))
     texts = {SCENARIO: tree_yaml(loaded), **loaded.scenario.plugin_files()}
-    store.open(started.isoformat(timespec="seconds"), texts)
-    return store
+    return Store(folder, plan(loaded)), texts
 
 
 def _loaded(config: Path, request: Request, plugged: Plugged) -> Loaded:
@@ -222,12 +230,13 @@ def report(study: Path, request: Request) -> Swept:
     """Judge a study anew, of the runs that are there. Raises UsageError where there are none."""
     started, store = datetime.now(UTC), stored(study, request.warn, trusted=request.trust)
     if not Tally.of(store.covered()).made:
-        raise UsageError(f"{study} has no runs yet: podusv sweep run {study}")
-    Sitting(study, request.argv, started, store.plan.scenario.plugged).end(0)
-    store.write_runs()
-    if not store.runs().common.any():
-        raise UsageError(
-            f"no draw in {study} has runs of all laws yet, so they cannot be compared; continue: "
-            f"podusv sweep run {study}"
-        )
-    return answered(store, request)
+        raise UsageError(f"{study} has no runs yet: {plugins.again('sweep run', study)}")
+    with sole_writer(study, TABLES):
+        Sitting(study, request.argv, started, store.plan.scenario.plugged).end(0)
+        store.write_runs()
+        if not store.runs().common.any():
+            raise UsageError(
+                f"no draw in {study} has runs of all laws yet, so they cannot be compared; "
+                f"continue: {plugins.again('sweep run', study)}"
+            )
+        return answered(store, request)

@@ -18,6 +18,7 @@ from podusv_cli.scenario import plugins
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Loaded, load
 from podusv_cli.storage import files, manifest
+from podusv_cli.storage.writer import sole_writer
 from podusv_cli.study.check import sweep_faults
 from podusv_cli.study.cluster import engine
 from podusv_cli.study.march import Engine, Tally
@@ -91,9 +92,17 @@ def tune(config: Path, request: Request, tell: Tell) -> Tuned:
     started = datetime.now(UTC)
     optuna()
     loaded, folder = _loaded(config, request)
+    with sole_writer(folder):
+        return _tuned(loaded, folder, request, started, tell)
+
+
+def _tuned(
+    loaded: Loaded, folder: Path, request: Request, started: datetime, tell: Tell
+) -> Tuned:  # fmt: skip
+    """Search what is not there yet in a folder that no other process writes into."""
     plan = TunePlan(loaded.scenario)
     told = place.known(folder, plan)
-    plan = replace(plan, idle=told["idle"] if told else _idle(plan, request))
+    plan = replace(plan, idle=told.idle if told else _idle(plan, request))
     stamp = started.isoformat(timespec="seconds")
     place.write(folder, plan, told, stamp, place.scenario_texts(loaded))
     request.begin(f"{plan.size}; in {folder}")
