@@ -137,9 +137,8 @@ def load_resolved(
     """The scenario of a finished run, which refers to no file but its plug-ins.
 
     Unless `plugged` loads these, components that are in no installed package are kept as plain
-    values. Raises
-    StorageError where it does or is no YAML mapping at all, ScenarioError where it is one that this
-    podusv does not know.
+    values. Raises StorageError where it refers to another one or is no YAML mapping at all,
+    ScenarioError where it is one that this podusv does not know.
     """
     faults: list[Fault] = []
     root = read(text, source, faults, most=MOST_RESOLVED)

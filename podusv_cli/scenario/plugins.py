@@ -84,9 +84,7 @@ def _listed(own: Node) -> list[tuple[Node, Node]]:
     return [(node, Node({}, node.mark)) for node in several]
 
 
-def loaded(
-    root: Node, faults: list[Fault], *, trusted: bool = True
-) -> tuple[Node, Plugins]:  # fmt: skip
+def loaded(root: Node, faults: list[Fault], *, trusted: bool = True) -> tuple[Node, Plugins]:
     """The tree with plug-ins as they stand in resolved.yaml, and the plug-ins.
 
     There a file is named as in the run's folder, with its digest, and an installed package stands
