@@ -59,7 +59,7 @@ def test_the_example_runs_and_repeats_itself(podusv):
     assert log["unsolved"][-1] == 0.0
     assert abs(log["tau_r_cmd"]).max() <= 2.5
     assert log["tau_u_cmd"] == pytest.approx(8.0, rel=1e-3)  # the target is far away
-    assert podusv("rerun", "one").code == 0
+    assert podusv("rerun", "one", "--trust").code == 0
 
 
 def test_as_machine_code_it_is_refused_in_a_sentence(podusv):

@@ -88,7 +88,7 @@ def test_a_run_repeats_itself_without_the_original(podusv):
     podusv("run", put(), "--out", "r", *QUIET)
     shutil.move("r", "moved")
     shutil.rmtree("laws")
-    assert "identical" in podusv("rerun", "moved").out
+    assert "identical" in podusv("rerun", "moved", "--trust").out
     assert podusv("run", "moved/resolved.yaml", "--out", "again", *QUIET).code == 0
     assert Path("again/log.h5").read_bytes() == Path("moved/log.h5").read_bytes()
     assert podusv("diff", "moved", "again").code == 0
@@ -115,7 +115,7 @@ def test_a_finished_run_is_looked_at_without_reading_its_file(podusv):
     assert json.loads(said.out)["comparison"]["law_ns"]["soft"] is None
     assert "0.25" in Path("d/report.html").read_text()
     assert not Path("touched").exists()
-    assert podusv("rerun", "c/soft").code == 2
+    assert podusv("rerun", "c/soft", "--trust").code == 2
 
 
 def test_an_edit_is_noticed_by_the_code_cache_and_in_the_name(podusv):

@@ -2,6 +2,7 @@
 
 import os
 import signal
+from types import SimpleNamespace
 
 import pytest
 from small_study import small, written
@@ -115,3 +116,19 @@ def test_both_commands_tell_it(podusv, tmp_path):
     assert run.err.startswith("80 runs: about ")
     quiet = podusv("sweep", "run", config, "--out", tmp_path / "b", "--no-figures", "--quiet")
     assert quiet.err == ""
+
+
+def test_a_study_that_cannot_fit_is_refused_before_the_first_run(tmp_path, podusv, monkeypatch):
+    config = written(tmp_path / "small.yaml")
+    out = tmp_path / "results/study"
+    said = podusv("sweep", "run", config, "--out", out, "--draws", "1000000000")
+    assert said.code == 5
+    assert "2,000,000,000 runs (sweep.draws: 1,000,000,000) were asked for" in said.err
+    assert not out.exists()
+    free = SimpleNamespace(free=1e15)
+    monkeypatch.setattr("podusv_cli.storage.run_folder.shutil.disk_usage", lambda path: free)
+    monkeypatch.setattr("podusv_cli.study.estimate.os.sysconf", lambda name: 100_000)
+    said = podusv("sweep", "run", config, "--out", out, "--draws", "1000000000")
+    assert said.code == 5
+    assert "its tables take 64 GB of memory or more, and this machine has 10 GB" in said.err
+    assert not out.exists()

@@ -18,7 +18,8 @@ from podusv_cli.workflows import sweep
 def partial_study(folder, **ranges):
     """A study of 40 draws, of which each law has only some."""
     config = written(folder / "small.yaml")
-    store = sweep._opened(config, sweep.Request(out=folder / "study"), sweep.datetime.now())
+    store, texts = sweep._planned(config, sweep.Request(out=folder / "study"))
+    store.open("now", texts)
     for law, pieces in ranges.items():
         for first, count in pieces:
             store.write(make(store.plan, Unit(law, 0, first, count)))

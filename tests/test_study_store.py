@@ -98,7 +98,7 @@ def test_a_damaged_table_is_refused_and_never_overwritten(whole, tmp_path):
         lambda: studies.status(folder),
         lambda: studies.export(folder, "csv", None),
     ):
-        with pytest.raises(StorageError, match=r"runs.h5: damaged .*; restore the file, or move"):
+        with pytest.raises(StorageError, match=r"runs.h5: damaged, .*; restore the file, or move"):
             command()
     assert (folder / RUNS).read_bytes() == before
     (folder / RUNS).unlink()

@@ -36,14 +36,6 @@ def test_a_unit_that_cannot_be_read_is_an_error_and_not_missing(tmp_path, monkey
     assert sorted((store.folder / UNITS).iterdir()) == there
 
 
-def test_a_unit_that_is_gone_before_it_is_read_spoils_no_table(tmp_path, monkeypatch):
-    store = made(tmp_path / "study", part=(1, 5))
-    monkeypatch.setattr(stores, "read", lambda path, seal: None)
-    with pytest.raises(StorageError, match="another podusv removed or changed it meanwhile"):
-        store.write_runs()
-    assert not (store.folder / RUNS).exists()
-
-
 def test_a_unit_with_any_other_byte_is_damaged(tmp_path):
     store = made(tmp_path / "study", part=(1, 5))
     path = next((store.folder / UNITS).glob("pid-*"))

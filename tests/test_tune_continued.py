@@ -142,7 +142,7 @@ def test_a_search_in_parts_equals_one_in_one_go(whole, tmp_path):
     with pytest.raises(KeyboardInterrupt):
         tuned(tmp_path / "part", ONCE, tell=fresh)
     part = workflow.tune(
-        tmp_path / "part" / "out", workflow.Request(figures=False), lambda *_: None
+        tmp_path / "part" / "out", workflow.Request(figures=False, trust=True), lambda *_: None
     )
     assert contents(part.folder) == contents(whole.folder)
 

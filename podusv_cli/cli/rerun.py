@@ -11,7 +11,7 @@ import typer
 
 from podusv_cli.cli.diff import DIFFERENT, changes_in_words, deviation_in_words, log_in_words
 from podusv_cli.cli.exit_codes import INTERRUPTED
-from podusv_cli.cli.options import AllowLarge, AsJson, Force
+from podusv_cli.cli.options import AllowLarge, AsJson, Force, Trust
 from podusv_cli.cli.terminal import echo, echo_entry, echo_json
 
 if TYPE_CHECKING:
@@ -27,6 +27,7 @@ def rerun(
     ] = None,
     force: Force = False,
     allow_large: AllowLarge = False,
+    trust: Trust = False,
     as_json: AsJson = False,
 ) -> None:
     """Repeat a finished run from its folder and tell whether the log is the same.
@@ -38,7 +39,9 @@ def rerun(
     from podusv_cli.workflows import rerun as repeating  # heavy imports only when they are needed
     from podusv_cli.workflows.run import Request
 
-    request = Request(out=out, force=force, figures=False, argv=sys.argv, allow_large=allow_large)
+    request = Request(
+        out=out, force=force, figures=False, argv=sys.argv, allow_large=allow_large, trust=trust
+    )
     with progress_bars(wanted=not as_json) as progress:
         done = repeating.rerun(Path(run), request, progress)
     if as_json:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shlex
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -65,6 +64,7 @@ def run(
     ] = "",
     scheduler: options.Scheduler = "",
     allow_mixed: options.AllowMixed = False,
+    trust: options.Trust = False,
     figures: options.Figures = True,
     as_json: options.AsJson = False,
     quiet: options.Quiet = False,
@@ -81,7 +81,7 @@ def run(
     with StudyLine(wanted=not (quiet or as_json)) as line:
         request = workflow.Request(
             changes, out, seconds(until), workers, part_of(shard), sys.argv, plugin or (), figures,
-            scheduler, allow_mixed, line.say, line.warn,
+            scheduler, allow_mixed, trust, line.say, line.warn,
             None if quiet or as_json else line.note,
         )  # fmt: skip
         done = workflow.run(Path(config), request, line.tell)
@@ -150,7 +150,9 @@ def _next(done: Swept) -> str:
     """What to do with an unfinished study."""
     if done.part_is_whole:
         return "this shard is done: join all of them with podusv sweep merge"
-    return f"continue with: podusv sweep run {shlex.quote(str(done.folder))}"
+    from podusv_cli.scenario.plugins import again
+
+    return f"continue with: {again('sweep run', done.folder)}"
 
 
 @command
@@ -168,14 +170,16 @@ def status(study: Study, as_json: options.AsJson = False) -> None:
 
 @command
 def report(
-    study: Study, figures: options.Figures = True, as_json: options.AsJson = False,
-    quiet: options.Quiet = False,
+    study: Study, figures: options.Figures = True, trust: options.Trust = False,
+    as_json: options.AsJson = False, quiet: options.Quiet = False,
 ) -> None:  # fmt: skip
     """Make the tables, verdicts and figures of a study anew, of what is there."""
     from podusv_cli.workflows import sweep as workflow
 
     with StudyLine(wanted=not (quiet or as_json)) as line:
-        request = workflow.Request(argv=sys.argv, figures=figures, say=line.say, warn=line.warn)
+        request = workflow.Request(
+            argv=sys.argv, figures=figures, trust=trust, say=line.say, warn=line.warn
+        )
         done = workflow.report(study, request)
     _tell(done, as_json=as_json, quiet=quiet)
 
@@ -185,6 +189,7 @@ def merge(
     studies: Annotated[list[Path], typer.Argument(metavar="STUDY...", help="Folders of shards.")],
     out: Annotated[Path, typer.Option(help="Folder of the whole study.")],
     figures: options.Figures = True,
+    trust: options.Trust = False,
     as_json: options.AsJson = False,
     quiet: options.Quiet = False,
 ) -> None:
@@ -193,7 +198,7 @@ def merge(
     from podusv_cli.workflows.sweep import Request
 
     with StudyLine(wanted=not (quiet or as_json)) as line:
-        request = Request(argv=sys.argv, figures=figures, say=line.say, warn=line.warn)
+        request = Request(argv=sys.argv, figures=figures, trust=trust, say=line.say, warn=line.warn)
         done = joining.merge(studies, out, request)
     _tell(done, as_json=as_json, quiet=quiet)
 
@@ -208,11 +213,12 @@ def draw(
         Path | None,
         typer.Option(help="The file to write.", show_default="<name>-<law>-<draw>.yaml"),
     ] = None,
+    trust: options.Trust = False,
 ) -> None:
     """Write one run of a study as a scenario of its own, for `podusv run` and `compare`."""
     from podusv_cli.workflows import studies
 
-    path = studies.draw(study, law, number, cell, out)
+    path = studies.draw(study, law, number, cell, out, trusted=trust)
     echo_path(path)
     echo(f"run it: podusv run {path}", err=True)
 

@@ -26,6 +26,7 @@ def tune(
     workers: options.Workers = 0,
     scheduler: options.Scheduler = "",
     allow_mixed: options.AllowMixed = False,
+    trust: options.Trust = False,
     figures: options.Figures = True,
     as_json: options.AsJson = False,
     quiet: options.Quiet = False,
@@ -42,7 +43,7 @@ def tune(
     with StudyLine(wanted=not (quiet or as_json)) as line:
         request = workflow.Request(
             assign or (), out, workers, sys.argv, plugin or (), figures, line.say, scheduler,
-            allow_mixed, (lambda text: None) if quiet or as_json else line.note,
+            allow_mixed, trust, (lambda text: None) if quiet or as_json else line.note,
         )  # fmt: skip
         done = workflow.tune(Path(config), request, line.advance)
     for refused in done.refused:

@@ -43,11 +43,6 @@ class Total(Disturbance):
         return all(part.of_time for part in self.parts)
 
     @property
-    def is_recorded(self) -> bool:  # type: ignore[override]
-        """Whether one of them is only values of a finished run."""
-        return any(part.is_recorded for part in self.parts)
-
-    @property
     def signals(self) -> tuple[Signal, ...]:
         """Those of all parts, in their order; once where several parts add up to one."""
         return tuple(signal for _, signals in self.told() for signal in signals)

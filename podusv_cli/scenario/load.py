@@ -39,6 +39,11 @@ STUDIES = ("sweep", "tune")  # sections that only studies have
 HEADING = "# A complete scenario, every value written out; it runs again to the same log.\n"
 
 
+# From a tree to the tree with its plug-ins in order, and these; see `plugins.loaded`.
+Plugged = Callable[[Node, list[Fault]], tuple[Node, Plugins]]
+LOOKED_AT: Plugged = partial(plugins.recorded, ())
+
+
 @dataclass(frozen=True)
 class Loaded:
     """A scenario and the origins of its values.
@@ -63,24 +68,25 @@ class Loaded:
 
 def load(
     path: str | os.PathLike[str], overrides: Sequence[str] = (), checks: Sequence[Check] = (),
-    files: Sequence[str] = (),
+    files: Sequence[str] = (), plugged: Plugged = plugins.loaded,
 ) -> Loaded:  # fmt: skip
     """The scenario of a file, with overrides such as `vessel.m=24`.
 
-    `checks` are made after the scenario's own; `files` are plug-ins beside the scenario's. Raises
-    ScenarioError with all faults, also if the file cannot be read.
+    `checks` are made after the scenario's own; `files` are plug-ins beside the scenario's, and
+    `plugged` takes in all of them. Raises ScenarioError with all faults, also if the file cannot be
+    read.
     """
     faults: list[Fault] = []
     source = os.fspath(path)
     text = read_text(source, Mark(source), "", faults)
     if text is None:
         raise ScenarioError(_ordered(faults, source))
-    return load_text(text, source, overrides, checks, files)
+    return load_text(text, source, overrides, checks, files, plugged)
 
 
 def load_text(
     text: str, source: str, overrides: Sequence[str] = (), checks: Sequence[Check] = (),
-    files: Sequence[str | Plugin] = (), *, placed: bool = True,
+    files: Sequence[str | Plugin] = (), plugged: Plugged = plugins.loaded, *, placed: bool = True,
 ) -> Loaded:  # fmt: skip
     """The scenario of a text; `source` names it in messages and is where its file names start.
 
@@ -92,15 +98,14 @@ def load_text(
     if root is None:
         raise ScenarioError(_ordered(faults, source))
     root = plugins.with_given(root, files)
-    root, known = _plugged(plugins.loaded, root, source, faults)
+    root, known = _plugged(plugged, root, source, faults)
     scenario, origins = _checked(root, known, source, faults, checks)
     return Loaded(scenario, origins, text, root)
 
 
 def _plugged(
-    plugged: Callable[[Node, list[Fault]], tuple[Node, Plugins]], root: Node, source: str,
-    faults: list[Fault],
-) -> tuple[Node, Plugins]:  # fmt: skip
+    plugged: Plugged, root: Node, source: str, faults: list[Fault]
+) -> tuple[Node, Plugins]:
     """The tree with its plug-ins. Without one of them, nothing else can be said of the tree."""
     before = len(faults)
     root, known = plugged(root, faults)
@@ -127,15 +132,13 @@ def _checked(
 
 
 def load_resolved(
-    text: str, source: str, checks: Sequence[Check] = (), *, to_run: bool = False,
-    files: Sequence[str] = (),
-) -> Scenario:  # fmt: skip
+    text: str, source: str, checks: Sequence[Check] = (), plugged: Plugged = LOOKED_AT
+) -> Scenario:
     """The scenario of a finished run, which refers to no file but its plug-ins.
 
-    With `to_run` these are loaded. Else no file but `files` is, and components that are in none of
-    these and in no installed package are kept as plain values. Raises
-    StorageError where it does or is no YAML mapping at all, ScenarioError where it is one that this
-    podusv does not know.
+    Unless `plugged` loads these, components that are in no installed package are kept as plain
+    values. Raises StorageError where it refers to another one or is no YAML mapping at all,
+    ScenarioError where it is one that this podusv does not know.
     """
     faults: list[Fault] = []
     root = read(text, source, faults, most=MOST_RESOLVED)
@@ -150,7 +153,6 @@ def load_resolved(
         (first, *_) = _ordered(faults, source)
         raise StorageError(f"{first} (damaged: not as podusv wrote it)")
     root = replace(root, mark=Mark(source))
-    plugged = plugins.loaded if to_run else partial(plugins.recorded, files)
     root, known = _plugged(plugged, root, source, faults)
     return _checked(root, known, source, faults, checks)[0]
 

@@ -66,6 +66,7 @@ Summands = Annotated[
     Annotated[Part, Tag("one")] | Annotated[tuple[Part, ...], Field(strict=False), Tag("several")],
     Discriminator(lambda given: "several" if isinstance(given, (list, tuple)) else "one"),
 ]
+PARTS = ("path", "disturbance", "actuator", "measurement", "estimator", "controller")
 DISTURBANCE = "what the sea does; those of a list add up"
 
 
@@ -156,14 +157,14 @@ class Scenario(Component):
             name: texts[one.sha256] for name, one in self.plugins.items() if name.endswith(".py")
         }
 
-    def can_run(self) -> bool:
-        """Whether none of its parts is only values of a finished run."""
-        loop = self.closed_loop()
-        parts = (
-            loop.path, loop.disturbance, loop.actuator, loop.measurement, loop.estimator,
-            loop.controller,
-        )  # fmt: skip
-        return not any(part.is_recorded for part in parts)
+    @property
+    def recorded(self) -> tuple[str, ...]:
+        """The sections that are only values of a finished run."""
+        parts = {name: getattr(self, name) for name in PARTS}
+        several = {
+            name: part if isinstance(part, tuple) else (part,) for name, part in parts.items()
+        }
+        return tuple(n for n, each in several.items() if any(one.is_recorded for one in each))
 
     def closed_loop(self) -> ClosedLoop:
         """The closed loop of vessel, path, disturbance, actuator, measurement and law."""

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import cache
+from pathlib import Path as File
 from typing import Any, Literal
 
 from pydantic import create_model
@@ -17,6 +19,8 @@ from podusv_cli.core.plugins import ABSENT, Plugin, Plugins, digest, from_file, 
 from podusv_cli.disturbances.base import Disturbance
 from podusv_cli.estimators.base import Estimator
 from podusv_cli.measurements.base import Measurement
+from podusv_cli.metrics.metric import Metric
+from podusv_cli.metrics.table import metrics_with
 from podusv_cli.paths.base import Path
 from podusv_cli.scenario.keys import keys_of
 from podusv_cli.scenario.model import Scenario, scenario_class
@@ -29,6 +33,7 @@ from podusv_cli.vessels.vessel import VESSELS
 
 KEY = "plugins"
 FOLDER = "plugins"  # of a run, where its plug-in files are
+Parts = Sequence[tuple[str, str, frozenset[str]]]  # section, kind and fields of components
 BASES: dict[str, type[Component]] = {
     "path": Path, "disturbance": Disturbance, "actuator": Actuator, "measurement": Measurement,
     "estimator": Estimator, "controller": Controller,
@@ -79,18 +84,19 @@ def _listed(own: Node) -> list[tuple[Node, Node]]:
     return [(node, Node({}, node.mark)) for node in several]
 
 
-def loaded(root: Node, faults: list[Fault]) -> tuple[Node, Plugins]:
+def loaded(root: Node, faults: list[Fault], *, trusted: bool = True) -> tuple[Node, Plugins]:
     """The tree with plug-ins as they stand in resolved.yaml, and the plug-ins.
 
     There a file is named as in the run's folder, with its digest, and an installed package stands
     where the scenario uses a component of it. Where a plug-in cannot be loaded, or its components
-    are none, there is a fault.
+    are none, there is a fault; so there is for every file that the tree names where it is not
+    `trusted`, as loading a file executes it.
     """
     own = root.mapping.get(KEY) or Node({}, root.mark)
     entries: dict[str, Node] = {}
     known: dict[str, Plugin] = {}
     for name, wanted in [] if own.faulty else _listed(own):
-        if plugin := _plugin(name, wanted, faults):
+        if plugin := _plugin(name, wanted, faults, trusted):
             place = next(n for n in _names(plugin) if known.setdefault(n, plugin) == plugin)
             entries[place] = _required(plugin, name.mark, wanted)
     plugins = tuple(dict.fromkeys((*known.values(), *installed())))
@@ -135,7 +141,7 @@ def _names(plugin: Plugin) -> tuple[str, ...]:
     return f"{FOLDER}/{plugin.name}", f"{FOLDER}/{plugin.sha256[:8]}_{plugin.name}"
 
 
-def _plugin(name: Node, wanted: Node, faults: list[Fault]) -> Plugin | None:
+def _plugin(name: Node, wanted: Node, faults: list[Fault], trusted: bool) -> Plugin | None:
     """The plug-in that the scenario names, or None with a fault."""
     if isinstance(name.content, Plugin):
         return name.content
@@ -144,7 +150,13 @@ def _plugin(name: Node, wanted: Node, faults: list[Fault]) -> Plugin | None:
         text = f"must be a list of files like my_law.py and installed packages, found {what}"
         faults.append(Fault(name.mark, KEY, text))
         return None
-    plugin = _file(name, faults) if name.content.endswith(".py") else _package(name, faults)
+    is_file = name.content.endswith(".py")
+    if is_file and name.mark.line and not trusted:
+        path = relative_to(name.mark.source, name.content)
+        text = f"this would execute the plug-in file {path}; read it, then allow it with --trust"
+        faults.append(Fault(name.mark, KEY, text))
+        return None
+    plugin = _file(name, faults) if is_file else _package(name, faults)
     return plugin if plugin and _is_wanted(plugin, wanted, faults) else None
 
 
@@ -178,28 +190,46 @@ def _is_wanted(plugin: Plugin, wanted: Node, faults: list[Fault]) -> bool:
     return False
 
 
-def recorded(files: Sequence[str], root: Node, faults: list[Fault]) -> tuple[Node, Plugins]:
-    """The tree of a finished run, and what stands in for its plug-ins.
+def recorded(
+    files: Sequence[str], root: Node, faults: list[Fault], *, parts: Parts = (),
+    metrics: Sequence[Metric] = (),
+) -> tuple[Node, Plugins]:  # fmt: skip
+    """The tree of a finished run or study, and what stands in for its plug-ins.
 
-    The files in its folder are not read, so that looking at a run runs nobody's code. Those that
+    The files in its folder are not read, so that looking at it runs nobody's code. Those that
     the user names (`files`) and installed packages are, and where they are the very ones that were
-    used, their components, too. All other components are kept as plain values.
+    used, their components, too. All other components are kept as plain values. `parts` and
+    `metrics` are components that the tree's own need not have, and metrics, of a study's runs.
     """
     own = root.mapping.get(KEY)
     used = {entry.word("sha256") for entry in own.mapping.values()} if own else set()
     here = from_files(files, faults)
     known = tuple(p if p.sha256 in used else p.without_components() for p in here)
-    absent = (ABSENT, *_stand_ins(root, scenario_class(known))) if used else ()
-    return root, (*known, *absent)
+    if not used:
+        return root, known
+    unknown = tuple(("metrics", one) for one in metrics if one.name not in metrics_with(known))
+    told = Plugin("metrics of the study", digest(repr(metrics)), offers=unknown)
+    return root, (*known, ABSENT, told, *_stand_ins(root, parts, scenario_class(known)))
 
 
-def _stand_ins(root: Node, known: type[Scenario]) -> Plugins:
+def again(command: str, folder: File) -> str:
+    """The command line that goes on with a folder, which may have plug-in files of its own."""
+    trust = " --trust" if (folder / FOLDER).is_dir() else ""
+    return f"podusv {command} {shlex.quote(str(folder))}{trust}"
+
+
+def are_absent(known: Plugins) -> bool:
+    """Whether values stand for a plug-in that is not loaded."""
+    return ABSENT in known
+
+
+def _stand_ins(root: Node, parts: Parts, known: type[Scenario]) -> Plugins:
     unknown: dict[tuple[str, str], frozenset[str]] = {}
-    for section, node in _components(root):
-        kind = node.word("kind")
+    own = ((section, node.word("kind"), node.mapping) for section, node in _components(root))
+    for section, kind, names in (*own, *parts):
         if kind and kind not in kinds_of(known, section):
-            names = unknown.get((section, kind), frozenset()) | node.mapping.keys() - {"kind"}
-            unknown[section, kind] = names
+            fields = {name for name in names if name.isidentifier() and name[0] != "_"}
+            unknown[section, kind] = unknown.get((section, kind), frozenset()) | fields - {"kind"}
     return tuple(_stand_in(*key, names) for key, names in unknown.items())
 
 

@@ -24,6 +24,7 @@ from podusv_cli.process.temporary_names import remove_abandoned_files, temporary
 
 LARGEST_TEXT = 16 * 2**20  # bytes
 LARGEST_FILE = 4 * 2**30  # bytes
+LOCKS = (".podusv-runs.lock", ".podusv-tables.lock")  # in a folder while it is written
 ELSEWHERE = "; read it with h5py or xarray, or log less often (log.every)"
 _CREATE = os.O_CREAT | os.O_EXCL | os.O_CLOEXEC | os.O_WRONLY
 CAUSES = {
@@ -141,13 +142,13 @@ def disk_array(folder: Path, size: int) -> Vector:
 
 
 def is_empty(folder: Path) -> bool:
-    """Whether a folder is missing or holds nothing but what killed processes left unfinished.
+    """Whether a folder is missing or holds nothing but a lock and what killed processes left.
 
-    Their files are removed. Raises StorageError.
+    Their unfinished files are removed. Raises StorageError.
     """
     remove_abandoned_files(folder)
     with storage_errors(f"cannot read {folder}"):
-        return not folder.exists() or not any(folder.iterdir())
+        return not folder.exists() or {path.name for path in folder.iterdir()} <= {*LOCKS}
 
 
 def make_folder(path: Path) -> None:

@@ -8,9 +8,10 @@ from collections import Counter
 from collections.abc import Mapping
 from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
+from pydantic import BaseModel, ValidationError
 
 from podusv_cli.core import escaping
 from podusv_cli.core.errors import StorageError
@@ -18,6 +19,7 @@ from podusv_cli.storage.files import read_text
 
 DEEPEST = 32  # levels
 LONGEST = 300  # digits of an integer that is a finite float
+Model = TypeVar("Model", bound=BaseModel)
 
 
 def encode(content: Mapping[str, Any]) -> bytes:
@@ -55,6 +57,18 @@ def read(path: Path) -> dict[str, Any]:
     if not isinstance(content, dict):
         raise StorageError(f"cannot read {path}: no JSON object")
     return content
+
+
+def read_as(path: Path, model: type[Model]) -> Model:
+    """Read a JSON object of known keys; raises StorageError for a wrong one, with its place."""
+    try:
+        return model.model_validate(read(path))
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_input=False)[0]
+        place = ".".join(map(str, first["loc"]))
+        raise StorageError(
+            f"cannot read {path}: damaged, not as podusv wrote it ({place}: {first['msg']})"
+        ) from error
 
 
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -24,6 +24,7 @@ from podusv_cli.core.errors import StorageError
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording, Status
 from podusv_cli.core.signal import NAME, Signal
+from podusv_cli.storage import hdf5
 from podusv_cli.storage.files import ELSEWHERE, LARGEST_FILE, LARGEST_TEXT, file_size, opened
 from podusv_cli.storage.log import PROVENANCE, RESOLVED
 from podusv_cli.storage.manifest import other_format
@@ -42,8 +43,6 @@ OLD_AXES = {
     ),
 }  # fmt: skip
 OLD_WRAPPED = ("psi_d", "psi_e", "psi_d_held")
-# What h5py raises on damaged files; ValueError includes text that is not UTF-8.
-_DAMAGE = (OSError, RuntimeError, ValueError, KeyError, TypeError, MemoryError, OverflowError)
 
 
 class _Member(NamedTuple):
@@ -85,7 +84,7 @@ def read_log(path: Path, largest: float = LARGEST_CONTENT) -> Recording:
 def resolved_yaml(path: Path) -> str:
     """The complete scenario of a log file. Raises StorageError."""
     with _opened(path) as (file, _):
-        _check_hard_link(file.id, PROVENANCE)
+        hdf5.check_link(file.id, PROVENANCE)
         group = h5py.h5g.open(file.id, PROVENANCE.encode())
         return _text(_dataset(group, RESOLVED)).decode()
 
@@ -99,13 +98,9 @@ def _opened(
         if file_size(raw) > largest:
             found = f"{file_size(raw)} bytes, at most {largest} allowed"
             raise StorageError(f"cannot read {path}: {found}{ELSEWHERE}")
-        try:
-            with h5py.File(raw) as file:
-                _check_format(file)
-                yield file, raw
-        except _DAMAGE as error:
-            reason = " ".join(str(error).split()) or type(error).__name__
-            raise StorageError(f"{path}: damaged, or not a log of podusv: {reason}") from error
+        with hdf5.readable(path, "a log"), h5py.File(raw) as file:
+            _check_format(file)
+            yield file, raw
 
 
 def _check_format(file: h5py.File) -> None:
@@ -155,20 +150,10 @@ def _text(holder: h5py.h5a.AttrID | h5py.h5d.DatasetID) -> bytes:
     return content.tobytes().rstrip(b"\0")
 
 
-def _check_hard_link(group: h5py.h5g.GroupID, name: str) -> None:
-    if group.links.get_info(name.encode()).type != h5py.h5l.TYPE_HARD:
-        raise ValueError(f"{name} is a link to elsewhere")
-
-
 def _dataset(group: h5py.h5g.GroupID, name: str) -> h5py.h5d.DatasetID:
     """A dataset with all its data in this file and only the expected filters."""
-    _check_hard_link(group, name)
-    dataset = h5py.h5d.open(group, name.encode())
-    # Checked before anything else: the mere shape of a virtual dataset can open other files.
-    made = dataset.get_create_plist()
-    if made.get_layout() == h5py.h5d.VIRTUAL or made.get_external_count():
-        raise ValueError(f"{name} keeps its data in another file")
-    filters = _filters(made)
+    dataset = hdf5.dataset(group, name)
+    filters = _filters(dataset.get_create_plist())
     if not set(filters) <= _FILTERS or len(set(filters)) < len(filters):
         raise ValueError(f"{name} is packed in an unknown way")
     if dataset.shape is None:

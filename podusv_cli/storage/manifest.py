@@ -12,7 +12,7 @@ from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.core.recording import Status
 from podusv_cli.storage import files as atomic
 from podusv_cli.storage import json_files
-from podusv_cli.storage.files import ELSEWHERE, LARGEST_FILE, fingerprint
+from podusv_cli.storage.files import ELSEWHERE, LARGEST_FILE, LOCKS, fingerprint
 
 NAME = "manifest.json"
 FORMAT = 2  # of run folder and log, as written; all formats from 1 on are read
@@ -112,7 +112,7 @@ def _names(folder: Path, above: str = "") -> Iterator[str]:
         for entry in entries:
             if entry.is_dir(follow_symlinks=False):
                 yield from _names(Path(entry.path), f"{above}{entry.name}/")
-            else:
+            elif entry.name not in LOCKS:
                 yield f"{above}{entry.name}"
 
 

@@ -39,7 +39,7 @@ def collect(
             "processor": processor(),
             "libc": " ".join(platform.libc_ver()).strip() or None,
         },
-        "plugins": [plugin.as_json() for plugin in plugins],
+        "plugins": [plugin.as_json() for plugin in plugins if plugin.version or plugin.path],
         "git": source_tree(Path(podusv_cli.__file__).parent),
         "argv": list(argv),
         **times(started, finished),

@@ -71,7 +71,7 @@ class RunWriter:
         _check_replaceable(final, force)
         self._staging = Staging(final)
         try:
-            _check_free_space(final, needed)
+            check_free_space(final, needed, "log less often (log.every), or elsewhere (--out)")
         except StorageError:
             self._staging.discard()
             raise
@@ -170,14 +170,14 @@ def _check_replaceable(final: Path, force: bool) -> None:
         raise Taken(f"{final} holds {other}, which is not the run's; --force would remove it")
 
 
-def _check_free_space(final: Path, needed: float) -> None:
+def check_free_space(final: Path, needed: float, remedy: str) -> None:
     """StorageError if fewer than `needed` bytes are free on the disk of `final`."""
     with files.storage_errors(f"cannot make {final}"):
-        free = shutil.disk_usage(final.parent).free
+        free = shutil.disk_usage(next(path for path in final.parents if path.exists())).free
     if needed > free:
         raise StorageError(
             f"cannot make {final}: it takes {bytes_in_words(needed)} of disk or more, and "
-            f"{bytes_in_words(free)} are free; log less often (log.every), or elsewhere (--out)"
+            f"{bytes_in_words(free)} are free; {remedy}"
         )
 
 

@@ -18,6 +18,7 @@ from podusv_cli.scenario.keys import Key
 from podusv_cli.scenario.load import values
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import did_you_mean, found, unknown
+from podusv_cli.scenario.plugins import are_absent
 from podusv_cli.scenario.sections import CLAIM, CLAIM_IN_WORDS
 from podusv_cli.scenario.sweep import Quantity, Sweep
 from podusv_cli.scenario.yaml_tree import Route, dotted, entries_of, route
@@ -44,9 +45,11 @@ def sweep_faults(scenario: Scenario) -> list[tuple[Route, str]]:
     if sweep is None:
         return []
     laws = list(_laws(scenario, sweep))
+    # Without its plug-ins, nothing can be drawn; study.json says of what draws the runs are.
+    draws = () if are_absent(scenario.plugged) else _vary(singles(scenario), sweep)
     return laws or [
-        *_metric_names(scenario), *_vary(singles(scenario), sweep), *_twice(sweep),
-        *_keep(scenario, sweep), *_claims(scenario, sweep),
+        *_metric_names(scenario), *draws, *_twice(sweep), *_keep(scenario, sweep),
+        *_claims(scenario, sweep),
     ]  # fmt: skip
 
 

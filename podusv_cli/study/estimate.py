@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import math
+import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 
+from podusv_cli.core.errors import StorageError
 from podusv_cli.core.kernel import LANES
 from podusv_cli.core.quantities import bytes_in_words, time_in_words
 from podusv_cli.process.workers import run_all
 from podusv_cli.scenario.limits import estimate as size_of_run
+from podusv_cli.storage.run_folder import check_free_space
 from podusv_cli.study import runs_writer
 from podusv_cli.study.plan import Plan
 from podusv_cli.study.unit import Unit, make, prepare
@@ -24,6 +29,7 @@ MOST_STEPS = 100_000  # of a run of a pilot
 MOST_PLACES = 40  # laws and cells of which runs are timed
 # Rough costs (s of processor time, bytes), which matter in small studies only.
 REPORT, FIGURES, LOG, LOG_FIGURES = 4.0, 5.0, 0.5, 3.5
+HELD_BYTES = 32  # of a run in memory while tables are made: four numbers
 REPORT_BYTES, FIGURES_BYTES, LOG_BYTES, LOG_FIGURES_BYTES = 3.5e5, 1.2e6, 2e4, 3.5e5
 
 
@@ -137,6 +143,24 @@ def estimate(
         kept=(logs[0], logs[1]), others=(others[0], others[1]),
         untimed=tuple(sorted({law for law, cell in missing if (law, cell) not in paces})),
     )  # fmt: skip
+
+
+def check_fits(plan: Plan, folder: Path, parts: int = 1) -> None:
+    """Raise StorageError where the runs of one of so many parts surely do not fit.
+
+    They need their table on the disk, and a few numbers a run in memory.
+    """
+    shape = (len(plan.laws), len(plan.cells), plan.sweep.draws)
+    runs, told = math.prod(shape), f"{math.prod(shape):,} runs (sweep.draws: {shape[2]:,})"
+    fewer = f"{told} were asked for; ask for fewer draws, or elsewhere (--out)"
+    table = runs_writer.bytes_of(shape, len(plan.metrics), len(plan.sweep.vary))
+    check_free_space(folder, table / parts, fewer)
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    if (held := HELD_BYTES * runs) > memory:
+        raise StorageError(
+            f"cannot make {folder}: its tables take {bytes_in_words(held)} of memory or more, and "
+            f"this machine has {bytes_in_words(memory)}; {told} were asked for; ask for fewer draws"
+        )
 
 
 def _kept(plan: Plan) -> dict[str, tuple[int, int]]:

@@ -77,6 +77,11 @@ def wanted(results: Results) -> list[Wanted]:
     return list(found.values())
 
 
+def unmade(folder: Path, results: Results) -> list[Wanted]:
+    """The runs that are to be kept and are not there yet."""
+    return [one for one in wanted(results) if not (folder / LOGS / one.name).exists()]
+
+
 def _failed(runs: Table, law: str, count: int) -> Iterator[Wanted]:
     for draw, cell in np.argwhere(runs.failed(law).T)[:count].tolist():
         yield Wanted(law, cell, draw, "failed")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -19,10 +19,12 @@ from podusv_cli.engine.object_cache import ingredients
 from podusv_cli.metrics.table import Metrics
 from podusv_cli.scenario.load import Loaded, values
 from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.plugins import are_absent
 from podusv_cli.scenario.sweep import Keep, Sweep
 from podusv_cli.study.cells import Cell, cells
 from podusv_cli.study.check import sweep_faults
 from podusv_cli.study.draws import SWEEP
+from podusv_cli.study.record import Record
 
 # Sections of a scenario that change no number of a study.
 COSMETIC = ("name", "description", "log", "silence", "claims", "controllers", "sweep", "tune")
@@ -48,6 +50,12 @@ class Plan:
     scenario: Scenario
     cells: tuple[Cell, ...]
     variant: Variant | None = None  # which one of the study it is, if any
+    record: Record | None = None  # stands for plug-ins that are not loaded
+
+    @property
+    def can_run(self) -> bool:
+        """Whether its runs can be simulated; not where its plug-ins are not loaded."""
+        return not are_absent(self.scenario.plugged)
 
     @property
     def sweep(self) -> Sweep:
@@ -69,6 +77,8 @@ class Plan:
     @cached_property
     def metrics(self) -> tuple[str, ...]:
         """The names of the metrics that a law of the study has during a run, in their order."""
+        if self.record:
+            return tuple(self.record.metrics)
         loops = [watching(self.single(law, cell.index)) for law in self.laws for cell in self.cells]
         found = {name for one in loops for name in one.summary(np.full(one.size, np.nan))}
         return tuple(name for name in self.scenario.known_metrics() if name in found)
@@ -80,6 +90,11 @@ class Plan:
     @cached_property
     def identity(self) -> dict[str, Any]:
         """All that the numbers depend on, by dotted keys; two studies that agree can be joined."""
+        return self.record.identity if self.record else self.stated
+
+    @cached_property
+    def stated(self) -> dict[str, Any]:
+        """The identity as the scenario has it; without what only plug-ins that are absent know."""
         sweep = self.sweep
         told: dict[str, Any] = {"sweep.seed": sweep.seed, "sweep.design": sweep.design}
         if self.stream != SWEEP:
@@ -91,10 +106,11 @@ class Plan:
                 single = self.single(law, cell.index)
                 kept = {
                     key: value for key, value in values(single).items()
-                    if key.partition(".")[0] not in COSMETIC
+                    if key.partition(".")[0] not in (*COSMETIC, *single.recorded)
                 }  # fmt: skip
                 told |= {f"{law}[{cell.index}].{key}": value for key, value in kept.items()}
-                told[f"{law}[{cell.index}]{KERNELS}"] = kernels(single)
+                if self.can_run:
+                    told[f"{law}[{cell.index}]{KERNELS}"] = kernels(single)
         return told
 
     def varied(self, variant: Variant) -> Plan:
@@ -147,9 +163,11 @@ def differing(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[str]:
     return [key for key in dict.fromkeys([*one, *other]) if one.get(key) != other.get(key)]
 
 
-def disagreements(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[str]:
-    """Each key that two identities have different values for, with both values."""
+def disagreements(
+    one: Mapping[str, Any], other: Mapping[str, Any], keys: Sequence[str] | None = None
+) -> list[str]:
+    """Each of these keys, or of those that two identities differ in, with both values."""
     return [
         f"{key}: {one.get(key, 'not there')}, not {other.get(key, 'not there')}"
-        for key in differing(one, other)
+        for key in (differing(one, other) if keys is None else keys)
     ]

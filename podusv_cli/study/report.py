@@ -10,7 +10,6 @@ import numpy as np
 
 from podusv_cli.pages.page import Picture, environment, flat, value_text
 from podusv_cli.process.extras import Missing
-from podusv_cli.scenario.load import values
 from podusv_cli.scenario.phrases import as_yaml
 from podusv_cli.scenario.sweep import Sweep
 from podusv_cli.study.bars import bars
@@ -164,12 +163,12 @@ def _numbers(results: Results) -> list[list[str]]:
 
 def _varied(sweep: Sweep, results: Results) -> list[tuple[str, str, str]]:
     """Every drawn quantity: its keys, how it is drawn, and the scenario's own values."""
-    own = values(results.plan.single(results.runs.laws[0], 0))
+    own, run = results.plan.identity, f"{results.runs.laws[0]}[0]"
     return [
         (
             ", ".join(quantity.targets(name)),
             in_words(quantity),
-            ", ".join(value_text(own.get(key)) for key in quantity.targets(name)),
+            ", ".join(value_text(own.get(f"{run}.{key}")) for key in quantity.targets(name)),
         )
         for name, quantity in sweep.vary.items()
     ]

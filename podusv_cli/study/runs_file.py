@@ -16,6 +16,7 @@ from podusv_cli.core.errors import StorageError
 from podusv_cli.core.kernel import Vector
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import METRICS
+from podusv_cli.storage import files, hdf5
 from podusv_cli.study.expressions import FINISHED, parse_success, succeeded
 from podusv_cli.study.runs import AXES, DRAWN, FAILED, OWN, SEAL, SEAL_OF_THE_REST, Mask
 from podusv_cli.study.unit import BROKEN, MISSING, STATUSES, Codes, Unit, UnitResult
@@ -54,25 +55,24 @@ class Table:
         """`success` is the expression for a run's. Raises StorageError for a damaged file."""
         self.path, self._known, self._successes = path, known, dict[str, Mask]()
         self._success = parse_success(success, known)
-        try:
+        with files.opened(path):  # refuses what is no regular file
+            pass
+        with hdf5.readable(path, "runs"):
             self._file = h5py.File(path, "r")
+            hdf5.check(self._file)
             self.identity = self._file.attrs["identity"].decode()
             self.laws = tuple(word.decode() for word in self._file["law"][()])
             self.cells = tuple(word.decode() for word in self._file["cell"][()])
             self.wanted = len(self._file["draw"])
-        except (OSError, KeyError, ValueError, RuntimeError, AttributeError) as error:
-            raise StorageError(f"cannot read {path}: damaged ({error})") from error
 
     def check(self) -> None:
         """Raises StorageError where a number or a word is not as it was written."""
-        try:
+        with hdf5.readable(self.path, "runs"):
             arrays = (self._file[name] for name in ("status", "until", *self.metrics))
             found = {SEAL: digest(law for array in arrays for law in array)}
             if SEAL_OF_THE_REST in self._file:
                 found[SEAL_OF_THE_REST] = digest_of_the_rest(self._file)
             same = all(bytes(self._file[name][()]) == own.encode() for name, own in found.items())
-        except (OSError, KeyError, ValueError, RuntimeError) as error:
-            raise StorageError(f"cannot read {self.path}: damaged ({error})") from error
         if not same:
             raise StorageError(f"cannot read {self.path}: its numbers were altered")
 

@@ -7,7 +7,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, NonNegativeInt, PositiveInt
 
 from podusv_cli.core.plugins import Plugin
 from podusv_cli.storage import files, json_files, manifest, provenance
@@ -15,10 +17,47 @@ from podusv_cli.storage import files, json_files, manifest, provenance
 NAME = "provenance.json"
 
 
+class _Platform(BaseModel):
+    model_config = ConfigDict(strict=True)
+    processor: str
+    libc: str | None
+
+
+class _Packages(BaseModel):
+    model_config = ConfigDict(strict=True)
+    numpy: str | None
+    numba: str | None
+
+
+class _Noted(BaseModel):
+    """What is read of a sitting; there may be more."""
+
+    model_config = ConfigDict(strict=True)
+    started: str
+    finished: str | None
+    duration_s: float | None
+    runs: NonNegativeInt
+    podusv: str
+    python: str
+    platform: _Platform
+    packages: _Packages
+    timed_runs: dict[str, PositiveInt] = {}
+    processor_s: dict[str, float] = {}
+
+
+def _noted(sitting: dict[str, Any]) -> dict[str, Any]:
+    _Noted.model_validate(sitting)
+    return sitting
+
+
+class _Provenance(BaseModel):
+    sittings: list[Annotated[dict[str, Any], AfterValidator(_noted)]]
+
+
 def sittings(folder: Path) -> list[dict[str, Any]]:
     """The sittings of a study so far, the oldest first. Raises StorageError."""
     path = folder / NAME
-    return list(json_files.read(path).get("sittings", [])) if path.exists() else []
+    return json_files.read_as(path, _Provenance).sittings if path.exists() else []
 
 
 def timing(folder: Path) -> dict[str, Any]:

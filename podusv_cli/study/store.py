@@ -17,7 +17,6 @@ import hashlib
 import io
 import json
 import os
-import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
@@ -30,9 +29,11 @@ import h5py
 import numpy as np
 
 from podusv_cli.core.errors import StorageError, UsageError
-from podusv_cli.storage import files, json_files
+from podusv_cli.metrics.table import metrics_with
+from podusv_cli.scenario.plugins import again
+from podusv_cli.storage import files, hdf5, json_files
 from podusv_cli.storage.run_folder import STUDY
-from podusv_cli.study import runs_file, runs_writer
+from podusv_cli.study import record, runs_file, runs_writer
 from podusv_cli.study.draws import table
 from podusv_cli.study.plan import Plan, digest, disagreements
 from podusv_cli.study.runs import Mask
@@ -67,21 +68,22 @@ class Store:
             f"{', '.join(laws)}); they are shown as they are, and no runs or logs are added"
         )
 
-    def open(self, started: str, scenario: str = "") -> None:
+    def open(self, started: str, texts: Mapping[str, str] = MappingProxyType({})) -> None:
         """Make the folder, or check that it holds this very study, and note what is asked for.
 
-        `scenario` is the text of the scenario's file, where one is to be written. Raises UsageError
-        where it holds another study, naming what is different, and StorageError.
+        `texts` has the scenario and its plug-ins by the names of their files, where they are to be
+        written. Raises UsageError where it holds another study, naming what is different, and
+        StorageError.
         """
         history: list[Any] = []
         known = (self.folder / STUDY).exists()
         if known:
-            told = json_files.read(self.folder / STUDY)
-            self._agree(self.folder, told.get("identity", {}))
-            history = list(told.get("history", []))
-            if self.plan.sweep.draws < told["draws"]:
+            there = record.read(self.folder)
+            self._agree(self.folder, there.identity)
+            history = [asked.model_dump() for asked in there.history]
+            if self.plan.sweep.draws < there.draws:
                 raise UsageError(
-                    f"{self.folder} has {told['draws']} draws; ask for as many or more, or name "
+                    f"{self.folder} has {there.draws} draws; ask for as many or more, or name "
                     "another folder with --out"
                 )
         elif not files.is_empty(self.folder):
@@ -90,24 +92,32 @@ class Store:
         content = {
             "format": FORMAT, "name": self.plan.scenario.name, "draws": self.plan.sweep.draws,
             "laws": self.plan.laws, "cells": [cell.label for cell in self.plan.cells],
-            "identity": self._identity(), "history": [*history, asked],
+            "identity": self._identity(), "history": [*history, asked], **self._metrics(),
         }  # fmt: skip
         # With more draws in study.json than in the scenario, the study could not be continued. And
         # without study.json, a folder that is not empty is no study.
-        if known and scenario:
-            self._write_scenario(scenario)
+        if known:
+            self._write_scenario(texts)
         files.make_folder(self.folder)
         files.write_bytes(self.folder / STUDY, json_files.encode(content))
         files.make_folder(self.folder / UNITS)
-        if scenario and not known:
-            self._write_scenario(scenario)
+        if not known:
+            self._write_scenario(texts)
 
-    def _write_scenario(self, text: str) -> None:
+    def _write_scenario(self, texts: Mapping[str, str]) -> None:
         """Write the scenario, which refers to nothing outside the folder, and its plug-ins."""
-        contents = {SCENARIO: text, **self.plan.scenario.plugin_files()}
-        for name, content in contents.items():
+        for name, content in texts.items():
             files.make_folder((self.folder / name).parent)
             files.write_bytes(self.folder / name, content.encode())
+
+    def _metrics(self) -> dict[str, Any]:
+        """What a reader without the study's plug-ins has to know of its metrics."""
+        scenario = self.plan.scenario
+        if not scenario.plugins:
+            return {}
+        own = metrics_with((), scenario.metrics.named())
+        known = {name: scenario.known_metrics()[name] for name in self.plan.metrics}
+        return {"metrics": list(known), "metrics_of_plugins": record.of_plugins(known, own)}
 
     def agree(self, other: Store) -> None:
         """Raise UsageError where another folder holds another study, naming what is different."""
@@ -143,8 +153,8 @@ class Store:
     def write_runs(self) -> None:
         """Put every run into runs.h5, and remove its units once no run is missing.
 
-        Another podusv may make units meanwhile, so only those that were read are removed. Raises
-        StorageError, also where one of them is gone before it was read.
+        A driver may make more units meanwhile, so the same ones are read each time. Raises
+        StorageError.
         """
         paths = [path for path in self._units() if undamaged(_content(path), self.seal)]
         self._write_table(lambda: self._these(paths))
@@ -157,14 +167,7 @@ class Store:
         """What runs.h5 has already, and these units."""
         for earlier in self._earlier():
             yield from earlier.results()
-        for path in paths:
-            result = read(path, self.seal)
-            if result is None:
-                raise StorageError(
-                    f"cannot read {path}: another podusv removed or changed it meanwhile; run the "
-                    "command again"
-                )
-            yield result
+        yield from filter(None, (read(path, self.seal) for path in paths))
 
     def _write_table(self, results: Callable[[], Iterator[UnitResult]]) -> None:
         plan, known = self.plan, self.plan.scenario.known_metrics()
@@ -187,7 +190,7 @@ class Store:
         except StorageError as error:
             raise StorageError(
                 f"{error}; restore the file, or move it away and simulate its runs again with: "
-                f"podusv sweep run {shlex.quote(str(self.folder))}"
+                f"{again('sweep run', self.folder)}"
             ) from error
         return found
 
@@ -273,12 +276,16 @@ def undamaged(content: bytes, seal: str) -> Unit | None:
 
 
 def read(path: Path, seal: str) -> UnitResult | None:
-    """A unit with its runs; None for a file that is damaged or of another identity."""
+    """A unit with its runs; None for a file that is damaged or of another identity.
+
+    Raises StorageError for one that is sealed like a unit and is none.
+    """
     content = _content(path)
     unit = undamaged(content, seal)
     if unit is None:
         return None
-    with h5py.File(io.BytesIO(content), "r") as file:
+    with hdf5.readable(path, "runs"), h5py.File(io.BytesIO(content), "r") as file:
+        hdf5.check(file)
         table, names = file["table"][()], file["table"].attrs["metrics"].split()
         causes = tuple(text.decode() for text in file["cause"][()])
         metrics = dict(zip(names, table[:-1], strict=True))
@@ -286,9 +293,12 @@ def read(path: Path, seal: str) -> UnitResult | None:
 
 
 def _content(path: Path) -> bytes:
-    """A file's bytes; none where another podusv removed it meanwhile. Raises StorageError."""
+    """A file's bytes; none where another podusv removed it meanwhile, or where it is no file.
+
+    Raises StorageError.
+    """
     with files.storage_errors(f"cannot read {path}"), suppress(FileNotFoundError):
-        return path.read_bytes()
+        return path.read_bytes() if path.is_file() else b""
     return b""
 
 

@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from pydantic import BaseModel, ConfigDict, Field, PositiveInt
+
 from podusv_cli.core.errors import UsageError
 from podusv_cli.scenario.load import Loaded, tree_yaml, yaml_text
 from podusv_cli.scenario.sections import LONGEST_NAME
@@ -32,29 +34,52 @@ def check(folder: Path) -> None:
         )
 
 
-def known(folder: Path, plan: TunePlan) -> dict[str, Any]:
-    """What tune.json says of this very search; nothing where the folder is missing or empty.
+class Asked(BaseModel):
+    """What one `podusv tune` asked for."""
+
+    model_config = ConfigDict(strict=True, frozen=True)
+    budget: PositiveInt
+    repeats: PositiveInt
+    validate_: PositiveInt = Field(alias="validate")
+    started: str
+
+
+class Record(BaseModel):
+    """What is read of tune.json; there is more."""
+
+    model_config = ConfigDict(strict=True, frozen=True)
+    identity: dict[str, Any]
+    idle: dict[str, list[str]]
+    history: list[Asked]
+
+
+def known(folder: Path, plan: TunePlan) -> Record | None:
+    """What tune.json says of this very search; None where the folder is missing or empty.
 
     Raises UsageError where the folder holds something else, naming what is different.
     """
     if not (folder / TUNE).exists():
         if not files.is_empty(folder):
             raise UsageError(f"{folder} is no search and not empty; name another with --out")
-        return {}
-    told = json_files.read(folder / TUNE)
-    _agree(folder, told.get("identity", {}), _identity(plan))
-    _as_much(folder, told["history"], plan.tune)
+        return None
+    told = json_files.read_as(folder / TUNE, Record)
+    _agree(folder, told.identity, _identity(plan))
+    _as_much(folder, _asked(told), plan.tune)
     return told
 
 
+def _asked(told: Record | None) -> list[dict[str, Any]]:
+    return [one.model_dump(by_alias=True) for one in told.history] if told else []
+
+
 def write(
-    folder: Path, plan: TunePlan, told: Mapping[str, Any], started: str, texts: Mapping[str, str]
+    folder: Path, plan: TunePlan, told: Record | None, started: str, texts: Mapping[str, str]
 ) -> None:
     """Note what is asked for, after what is `known` of the search.
 
     `texts` has the scenario and its plug-ins by the names of their files. Raises StorageError.
     """
-    content = json_files.encode(_content(plan, told.get("history", []), started))
+    content = json_files.encode(_content(plan, _asked(told), started))
     # With a larger budget in tune.json than in the scenario, the search could not be continued. And
     # without tune.json, a folder that is not empty is no search.
     if told:

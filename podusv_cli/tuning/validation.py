@@ -6,11 +6,11 @@ import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from podusv_cli.core.kernel import Vector
 from podusv_cli.storage import files, json_files
 from podusv_cli.storage.run_folder import STUDY
+from podusv_cli.study import record
 from podusv_cli.study.march import Engine, Tally, march
 from podusv_cli.study.plan import Plan, disagreements
 from podusv_cli.study.runs import Mask
@@ -74,9 +74,9 @@ def _clear(folder: Path, plan: Plan) -> None:
     """
     if not (folder / STUDY).exists():
         return
-    told: dict[str, Any] = json_files.read(folder / STUDY)
-    same = not disagreements(told.get("identity", {}), json_files.plain(plan.identity))
-    if same and told.get("draws", 0) <= plan.sweep.draws:
+    told = record.read(folder)
+    same = not disagreements(told.identity, json_files.plain(plan.identity))
+    if same and told.draws <= plan.sweep.draws:
         return
     with files.storage_errors(f"cannot remove old runs in {folder}"):
         if (folder / UNITS).exists():

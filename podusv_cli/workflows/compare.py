@@ -227,7 +227,7 @@ def _with_costs(entries: Sequence[Entry], extras: Extras) -> list[Entry]:
     timed = [
         e for e in entries
         if e.scenario.simulation.compiled and len(e.recording["time"])
-        and e.scenario.can_run()
+        and not e.scenario.recorded
     ]  # fmt: skip
     loops = [(entry.scenario.closed_loop(), entry.recording) for entry in timed]
     costs = extras.attempt("the laws' times", lambda: law_costs(loops)) or [UNMEASURED] * len(timed)

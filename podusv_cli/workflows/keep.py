@@ -15,7 +15,7 @@ from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sections import LONGEST_NAME
 from podusv_cli.storage.run_folder import LOGS
 from podusv_cli.study.draws import drawn, draws
-from podusv_cli.study.keep import Kept, Wanted, found, wanted
+from podusv_cli.study.keep import Kept, Wanted, found, unmade
 from podusv_cli.study.plan import Plan
 from podusv_cli.study.results import Results
 from podusv_cli.workflows.execute import Task, execute, warm_up
@@ -47,7 +47,7 @@ def keep(
     A run that fails is missing among the `extras`. Raises StorageError only for what is not about
     one run.
     """
-    missing = [one for one in wanted(results) if not (folder / LOGS / one.name).exists()]
+    missing = unmade(folder, results)
     tasks = [_task(folder, results.plan, one, argv, figures=figures) for one in missing]
     with interrupts_enabled():
         for law, cell in dict.fromkeys((one.law, one.cell) for one in missing):

@@ -7,6 +7,7 @@ import math
 import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -16,9 +17,10 @@ from podusv_cli.comparison.outputs import RESERVED, TABLE
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.recording import Recording
-from podusv_cli.scenario.load import load_resolved
+from podusv_cli.scenario.load import LOOKED_AT, Plugged, load_resolved
 from podusv_cli.scenario.messages import Check
 from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.plugins import recorded
 from podusv_cli.storage import manifest
 from podusv_cli.storage.files import read_text
 from podusv_cli.storage.run_folder import LOG, LOGS, STUDY, THEORY, Run, open_run
@@ -53,11 +55,11 @@ class Member:
 
 
 def from_folder(
-    path: Path, checks: Sequence[Check] = (), *, to_run: bool = False, files: Sequence[str] = ()
+    path: Path, checks: Sequence[Check] = (), plugged: Plugged = LOOKED_AT
 ) -> list[Member]:
     """The finished runs of a folder: one run, or all those of a comparison.
 
-    `checks` as `load`, `to_run` and `files` as `load_resolved` has them. Raises UsageError for a
+    `checks` and `plugged` as `load_resolved` has them. Raises UsageError for a
     folder without finished runs, StorageError for a damaged one.
     """
     if (path / STUDY).is_file():
@@ -65,7 +67,7 @@ def from_folder(
     inner = _listed(path) if os.path.lexists(path / manifest.NAME) else _unlisted(path)
     if not inner:
         manifest.demand(path)
-    return [_from_run(child, checks, to_run, files) for child in (inner or [path])]
+    return [_from_run(child, checks, plugged) for child in (inner or [path])]
 
 
 def _about_study(path: Path) -> str:
@@ -100,11 +102,11 @@ def _first_row(path: Path) -> list[str]:
         raise StorageError(f"cannot read {path}: no CSV ({error})") from error
 
 
-def _from_run(path: Path, checks: Sequence[Check], to_run: bool, files: Sequence[str]) -> Member:
+def _from_run(path: Path, checks: Sequence[Check], plugged: Plugged) -> Member:
     """A finished run whose log and theory.json were checked. StorageError, ScenarioError."""
     run = open_run(path)
     source = str(path / "resolved.yaml")
-    scenario = load_resolved(run.resolved_yaml, source, checks, to_run=to_run, files=files)
+    scenario = load_resolved(run.resolved_yaml, source, checks, plugged)
     if wrong := _fault(run.recording):
         raise StorageError(f"{path / LOG}: damaged, or not a log of a run: {wrong}")
     stability.check(run.theory, run.folder / THEORY)
@@ -125,7 +127,7 @@ def _fault(log: Recording) -> str:
 
 def comparable(path: Path, files: Sequence[str] = ()) -> list[Member]:
     """As `from_folder`; also checks that the logs hold the memory with which laws are timed."""
-    members = from_folder(path, files=files)
+    members = from_folder(path, plugged=partial(recorded, files))
     for member in members:
         if member.run:
             _check_memory(member.run, member.scenario)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
 from podusv_cli.core.errors import UsageError
+from podusv_cli.storage import files
+from podusv_cli.storage.writer import TABLES, sole_writer
+from podusv_cli.study import record
 from podusv_cli.study.joining import join, missing, mixture
 from podusv_cli.study.march import Tally
 from podusv_cli.study.sittings import Sitting
@@ -23,16 +26,28 @@ def merge(studies: Sequence[Path], out: Path, request: Request) -> Swept:
     """
     if inside := [study for study in studies if study.resolve() == out.resolve()]:
         raise UsageError(f"--out {out} is one of the studies, {inside[0]}; name another folder")
-    started, others = datetime.now(UTC), [stored(study) for study in studies]
+    started = datetime.now(UTC)
+    others = [stored(study, trusted=request.trust) for study in studies]
     most = max(others, key=lambda other: other.plan.sweep.draws)
     store = Store(out, most.plan, most.kernels)
     for other in others:
         store.agree(other)
     if store.remark:
         request.warn(store.remark)
-    text = (most.folder / SCENARIO).read_text(encoding="utf-8")
-    store.open(started.isoformat(timespec="seconds"), text)
-    sitting = Sitting(out, request.argv, started, store.plan.scenario.plugged, studies)
+    plugins = record.plugin_files(most.folder, store.plan.scenario)
+    texts = {SCENARIO: files.read_text(most.folder / SCENARIO), **plugins}
+    with sole_writer(out), sole_writer(out, TABLES):
+        return _joined(store, others, texts, started, request)
+
+
+def _joined(
+    store: Store, others: Sequence[Store], texts: Mapping[str, str], started: datetime,
+    request: Request,
+) -> Swept:  # fmt: skip
+    """Write the runs of the others into a study, and judge it where it is whole."""
+    out, plugged = store.folder, store.plan.scenario.plugged
+    store.open(started.isoformat(timespec="seconds"), texts)
+    sitting = Sitting(out, request.argv, started, plugged, [other.folder for other in others])
     join(store, others)
     sitting.end(0)
     if mixed := mixture(out):

@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from podusv_cli.figures.drawing import check_names, draw_in_parallel, dressed, f
 from podusv_cli.figures.sheet import Sheet
 from podusv_cli.figures.style import Shown
 from podusv_cli.process.extras import Extras, Missing
+from podusv_cli.scenario.plugins import recorded
 from podusv_cli.storage import files, manifest
 from podusv_cli.workflows.members import Member, from_folder
 from podusv_cli.workflows.run import Request
@@ -45,8 +47,8 @@ def plot(
     Raises UsageError for an unknown figure or format, for a figure that the runs lack the signals
     of, and for a file that belongs to a finished folder; StorageError.
     """
-    out, plugins = request.out or Path(), request.plugins
-    members = _labelled(member for path in runs for member in from_folder(path, files=plugins))
+    out, plugged = request.out or Path(), partial(recorded, request.plugins)
+    members = _labelled(one for path in runs for one in from_folder(path, plugged=plugged))
     known = figures_of(member.scenario for member in members)
     check_names(request.names, request.formats, known)
     shown = dressed([(m.label, m.run.recording, m.scenario) for m in members if m.run])

@@ -17,6 +17,7 @@ from podusv_cli.core.recording import Status
 from podusv_cli.process.extras import Missing
 from podusv_cli.process.workers import INTERRUPTED, available_workers
 from podusv_cli.scenario.limits import estimate, limits, needed
+from podusv_cli.scenario.plugins import loaded
 from podusv_cli.storage import manifest, provenance, run_folder
 from podusv_cli.storage.run_folder import Run
 from podusv_cli.storage.staging import Staging, remove_abandoned
@@ -93,7 +94,8 @@ def rerun(path: Path, request: Request, progress: Progress | None = None) -> Rep
     this podusv does not know a key any more or the run is too large, and StorageError.
     """
     manifest.demand(path)
-    members = from_folder(path, (limits(request.allow_large, read_back=True),), to_run=True)
+    plugged = partial(loaded, trusted=request.trust)
+    members = from_folder(path, (limits(request.allow_large, read_back=True),), plugged)
     for run in _runs(members):
         if run.status == "interrupted":
             raise UsageError(f"{run.folder} was interrupted; there is no whole run to repeat")

@@ -5,17 +5,19 @@ from __future__ import annotations
 import os
 import shlex
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.escaping import visible
+from podusv_cli.scenario import plugins
 from podusv_cli.scenario.load import load, resolved_yaml
 from podusv_cli.scenario.phrases import unknown
 from podusv_cli.storage import files, json_files
 from podusv_cli.storage.run_folder import STUDY
-from podusv_cli.study import outputs
+from podusv_cli.study import outputs, record
 from podusv_cli.study.plan import KERNELS, differing, disagreements, plan
 from podusv_cli.study.store import RUNS, SCENARIO, Store, few
 from podusv_cli.workflows.keep import alone, seen_from
@@ -56,21 +58,32 @@ def check_study(folder: Path) -> None:
         raise UsageError(f"{folder} is not the folder of a study: it has no {STUDY}")
 
 
-def stored(study: Path, warn: Warn = silent) -> Store:
+def stored(
+    study: Path, warn: Warn = silent, *, trusted: bool = False, to_run: bool = False
+) -> Store:
     """The store of a study's folder, for reading.
 
-    Runs of other kernels than those of this podusv are no fault; `warn` is told of them. Raises
-    UsageError where the folder is no study, and where its scenario is not the one of its runs.
+    Its plug-in files are executed only where they are `trusted`; values of study.json stand for
+    them, unless they are needed `to_run` a draw. Runs of other kernels than those of this podusv
+    are no fault; `warn` is told of them. Raises UsageError where the folder is no study, and where
+    its scenario is not the one of its runs; ScenarioError where its plug-ins are needed and not
+    trusted.
     """
     check_study(study)
-    made = plan(load(study / SCENARIO))
-    told, ours = json_files.read(study / STUDY).get("identity", {}), json_files.plain(made.identity)
-    keys = differing(told, ours)
+    there = record.read(study)
+    looked_at = partial(plugins.recorded, (), parts=there.parts(), metrics=there.foreign())
+    needed = partial(plugins.loaded, trusted=trusted)
+    made = plan(load(study / SCENARIO, plugged=needed if trusted or to_run else looked_at))
+    told, ours = there.identity, json_files.plain(made.stated)
+    keys = [key for key in differing(told, ours) if key in ours or made.can_run]
     if any(key not in told or not key.endswith(KERNELS) for key in keys):
         raise UsageError(
             f"{study / SCENARIO} is not the scenario of the runs in {STUDY}: "
-            f"{few(disagreements(ours, told))}; restore the file, or use the podusv that made them"
+            f"{few(disagreements(ours, told, keys))}; restore the file, or use the podusv that "
+            "made them"
         )
+    if not made.can_run:
+        made = replace(made, record=there)
     store = Store(study, made, {key: told[key] for key in keys})
     if store.remark:
         warn(store.remark)
@@ -87,9 +100,14 @@ def status(study: Path, warn: Warn = silent) -> Made:
     return Made(store.plan.sweep.draws, rows)
 
 
-def draw(study: Path, law: str, number: int, cell: int, out: Path | None) -> Path:
-    """Write the scenario of one run of a study. Raises UsageError, StorageError."""
-    made = stored(study).plan
+def draw(
+    study: Path, law: str, number: int, cell: int, out: Path | None, *, trusted: bool = False
+) -> Path:
+    """Write the scenario of one run of a study, whose plug-ins are executed if they are `trusted`.
+
+    Raises UsageError, ScenarioError where they are not, StorageError.
+    """
+    made = stored(study, trusted=trusted, to_run=True).plan
     if law not in made.laws:
         raise UsageError(unknown(f"law {law!r}", law, made.laws))
     if cell >= len(made.cells):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import shlex
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
@@ -17,17 +16,19 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.process.extras import Extras, Missing
 from podusv_cli.process.interrupts import interrupts_deferred
+from podusv_cli.scenario import plugins
 from podusv_cli.scenario.limits import limits
-from podusv_cli.scenario.load import Loaded, load, tree_yaml
+from podusv_cli.scenario.load import Loaded, Plugged, load, tree_yaml
 from podusv_cli.scenario.sweep import Keep
 from podusv_cli.storage import manifest
+from podusv_cli.storage.writer import PATIENCE, TABLES, sole_writer
 from podusv_cli.study import outputs
 from podusv_cli.study.check import sweep_faults, unjudged
 from podusv_cli.study.cluster import engine
-from podusv_cli.study.estimate import estimate, pilot
+from podusv_cli.study.estimate import check_fits, estimate, pilot
 from podusv_cli.study.invalid import check_draws
 from podusv_cli.study.joining import mixture
-from podusv_cli.study.keep import contradiction, found
+from podusv_cli.study.keep import contradiction, found, unmade
 from podusv_cli.study.march import Engine, Gaps, Part, Tally, Tell, march
 from podusv_cli.study.plan import plan
 from podusv_cli.study.remote import Recipe
@@ -55,6 +56,7 @@ class Request:
     figures: bool = True
     scheduler: str = ""  # of a Dask cluster, as tcp://host:port
     mixed: bool = False  # whether its workers may compute other bits than this machine
+    trust: bool = False  # whether plug-in files of a study's folder may be executed
     say: Callable[[str], None] = lambda text: None  # what is done after the last run
     warn: Warn = silent  # is told what is odd, and no error
     begin: Callable[..., None] | None = None  # is told what the missing runs need
@@ -92,7 +94,15 @@ def run(config: Path, request: Request, tell: Tell) -> Swept:
     kept.
     """
     started = datetime.now(UTC)
-    store = _opened(config, request, started)
+    store, texts = _planned(config, request)
+    check_fits(store.plan, store.folder, request.shard[1])
+    with sole_writer(store.folder):
+        store.open(started.isoformat(timespec="seconds"), texts)
+        return _run(store, request, started, tell)
+
+
+def _run(store: Store, request: Request, started: datetime, tell: Tell) -> Swept:
+    """Simulate what is missing of a study whose folder is open, and judge it if it is whole."""
     with _engine(store, request) as found:
         tally, whole = _marched(store, request, started, found, tell)
     refused = tuple(found.told().get("refused", {}).values())
@@ -102,8 +112,9 @@ def run(config: Path, request: Request, tell: Tell) -> Swept:
             return Swept(store.folder, tally, part_is_whole=True, refused=refused)
     if not whole:
         return Swept(store.folder, tally, refused=refused)
-    store.write_runs()
-    return replace(answered(store, request), refused=refused)
+    with sole_writer(store.folder, TABLES, PATIENCE):
+        store.write_runs()
+        return replace(answered(store, request), refused=refused)
 
 
 def _marched(
@@ -124,7 +135,7 @@ def _marched(
             begin=partial(_announce, store, request, engine.workers),
         )  # fmt: skip
     except KeyboardInterrupt as stop:
-        again = f"podusv sweep run {shlex.quote(str(store.folder))}"
+        again = plugins.again("sweep run", store.folder)
         made = f"the {seen.made} runs that are made" if seen.made else "all runs that were made"
         raise KeyboardInterrupt(f"interrupted; {made} are kept, continue with: {again}") from stop
     finally:
@@ -157,23 +168,23 @@ def _is_whole(store: Store) -> bool:
     return tally.made == tally.wanted
 
 
-def _opened(config: Path, request: Request, started: datetime) -> Store:
-    """The store of a new study, or of one that is to be continued."""
+def _planned(config: Path, request: Request) -> tuple[Store, dict[str, str]]:
+    """The store of a new study, or of one that is to be continued; its scenario and plug-ins."""
     given = config.is_dir()
     if given:
         check_study(config)
     if request.out and request.out.exists() and not request.out.is_dir():
         raise UsageError(f"--out {request.out} is a file; name a folder")
-    loaded = _loaded(config / SCENARIO if given else config, request)
+    plugged = partial(plugins.loaded, trusted=request.trust or not given)
+    loaded = _loaded(config / SCENARIO if given else config, request, plugged)
     folder = request.out or (config if given else RESULTS / f"{loaded.scenario.name}-sweep")
-    store = Store(folder, plan(loaded))
-    store.open(started.isoformat(timespec="seconds"), tree_yaml(loaded))
-    return store
+    texts = {SCENARIO: tree_yaml(loaded), **loaded.scenario.plugin_files()}
+    return Store(folder, plan(loaded)), texts
 
 
-def _loaded(config: Path, request: Request) -> Loaded:
+def _loaded(config: Path, request: Request, plugged: Plugged) -> Loaded:
     checks = (unknown_codes, limits(allow_large=True), sweep_faults)
-    loaded = load(config, request.overrides, checks, request.plugins)
+    loaded = load(config, request.overrides, checks, request.plugins, plugged)
     if loaded.scenario.sweep is None:
         raise UsageError(
             f"{config} has no key `sweep`, which says what is to be drawn; see docs/studies.md, or "
@@ -200,7 +211,13 @@ def answered(store: Store, request: Request) -> Swept:
         )  # fmt: skip
         if results.plan.sweep.keep != Keep():
             request.say("making the logs that are kept")
-        kept = make() if whole and not store.kernels else found(store.folder, results, extras)
+        if whole and not store.plan.can_run and unmade(store.folder, results):
+            request.warn(
+                f"no logs of kept runs are made, as this would execute the plug-in files in "
+                f"{store.folder}; read them, then allow it with --trust"
+            )
+        adds = whole and store.plan.can_run and not store.kernels
+        kept = make() if adds else found(store.folder, results, extras)
         if contradicted := contradiction(kept):
             results = results.without_verdicts(contradicted)
             outputs.write_tables(store.folder, results)
@@ -209,7 +226,7 @@ def answered(store: Store, request: Request) -> Swept:
         if extras.interrupted:
             raise KeyboardInterrupt(
                 "interrupted; runs, tables and verdicts are whole, the rest is made by: "
-                f"podusv sweep report {shlex.quote(str(store.folder))}"
+                f"{plugins.again('sweep report', store.folder)}"
             )
         manifest.write(store.folder, "finished" if whole else "interrupted")
         tally = Tally(results.wanted, results.made)
@@ -218,14 +235,15 @@ def answered(store: Store, request: Request) -> Swept:
 
 def report(study: Path, request: Request) -> Swept:
     """Judge a study anew, of the runs that are there. Raises UsageError where there are none."""
-    started, store = datetime.now(UTC), stored(study, request.warn)
+    started, store = datetime.now(UTC), stored(study, request.warn, trusted=request.trust)
     if not Tally.of(store.covered()).made:
-        raise UsageError(f"{study} has no runs yet: podusv sweep run {study}")
-    Sitting(study, request.argv, started, store.plan.scenario.plugged).end(0)
-    store.write_runs()
-    if not store.runs().common.any():
-        raise UsageError(
-            f"no draw in {study} has runs of all laws yet, so they cannot be compared; continue: "
-            f"podusv sweep run {study}"
-        )
-    return answered(store, request)
+        raise UsageError(f"{study} has no runs yet: {plugins.again('sweep run', study)}")
+    with sole_writer(study, TABLES):
+        Sitting(study, request.argv, started, store.plan.scenario.plugged).end(0)
+        store.write_runs()
+        if not store.runs().common.any():
+            raise UsageError(
+                f"no draw in {study} has runs of all laws yet, so they cannot be compared; "
+                f"continue: {plugins.again('sweep run', study)}"
+            )
+        return answered(store, request)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +15,11 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.process.extras import Extras, Missing
 from podusv_cli.process.interrupts import interrupts_deferred
+from podusv_cli.scenario import plugins
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Loaded, load
 from podusv_cli.storage import files, manifest
+from podusv_cli.storage.writer import sole_writer
 from podusv_cli.study.check import sweep_faults
 from podusv_cli.study.cluster import engine
 from podusv_cli.study.march import Engine, Tally
@@ -56,6 +58,7 @@ class Request:
     say: Callable[[str], None] = lambda text: None
     scheduler: str = ""  # of a Dask cluster, as tcp://host:port
     mixed: bool = False  # whether its workers may compute other bits than this machine
+    trust: bool = False  # whether plug-in files of a search's folder may be executed
     begin: Callable[[str], None] = lambda text: None  # is told what the search is to simulate
 
 
@@ -90,9 +93,17 @@ def tune(config: Path, request: Request, tell: Tell) -> Tuned:
     started = datetime.now(UTC)
     optuna()
     loaded, folder = _loaded(config, request)
+    with sole_writer(folder):
+        return _tuned(loaded, folder, request, started, tell)
+
+
+def _tuned(
+    loaded: Loaded, folder: Path, request: Request, started: datetime, tell: Tell
+) -> Tuned:  # fmt: skip
+    """Search what is not there yet in a folder that no other process writes into."""
     plan = TunePlan(loaded.scenario)
     told = place.known(folder, plan)
-    plan = replace(plan, idle=told["idle"] if told else _idle(plan, request))
+    plan = replace(plan, idle=told.idle if told else _idle(plan, request))
     stamp = started.isoformat(timespec="seconds")
     place.write(folder, plan, told, stamp, place.scenario_texts(loaded))
     request.begin(f"{plan.size}; in {folder}")
@@ -111,7 +122,8 @@ def _loaded(config: Path, request: Request) -> tuple[Loaded, Path]:
         raise UsageError(f"--out {request.out} is a file; name a folder")
     checks = (unknown_codes, limits(allow_large=True), sweep_faults, tune_faults)
     source = config / place.SCENARIO if given else config
-    loaded = load(source, request.overrides, checks, request.plugins)
+    plugged = partial(plugins.loaded, trusted=request.trust or not given)
+    loaded = load(source, request.overrides, checks, request.plugins, plugged)
     if loaded.scenario.tune is None:
         raise UsageError(
             f"{config} has no key `tune`, which says how many runs a search has; see "
@@ -147,7 +159,7 @@ def _simulated(
         stamp = started.isoformat(timespec="seconds")
         runs = validate(plan, winners, folder, stamp, engine, validated)
     except KeyboardInterrupt as stop:
-        again = f"podusv tune {shlex.quote(str(folder))}"
+        again = plugins.again("tune", folder)
         raise KeyboardInterrupt(
             f"interrupted; all batches that were finished are kept, continue with: {again}"
         ) from stop
@@ -216,7 +228,7 @@ def _written(results: Results, folder: Path, request: Request) -> Tuned:
         if extras.interrupted:
             raise KeyboardInterrupt(
                 "interrupted; gains and tables are whole, the rest is made by: "
-                f"podusv tune {shlex.quote(str(folder))}"
+                f"{plugins.again('tune', folder)}"
             )
         manifest.write(folder, "finished")
         return Tuned(folder, results, tuple(extras.missing))
