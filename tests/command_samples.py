@@ -26,7 +26,7 @@ actuator: {kind: saturated}
 start: {x: -5.0, y: -2.0, u: 0.3}
 simulation: {duration: 1.0}
 controller: {kind: pid, K_Pu: 100.0}
-silence: [saturated] # the gains are large on purpose
+silence: [saturated, never-settles] # the gains are large on purpose, and runs are short
 """
 TWO = BASE + "controllers: {stiff: {K_Pu: 200.0}, soft: {K_Pu: 5.0}}\n"
 LONG = BASE.replace("duration: 1.0", "duration: 1e5, step: 1e-3") + "log: {every: 1000}\n"

@@ -51,7 +51,7 @@ def _integrate(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Ve
     seen[2] += 1.0
 
 
-WATCH = Observer(_integrate, {"nothing": 0.0}, 3)
+WATCH = Observer(_integrate, 3)
 
 
 def test_the_same_loop_gives_the_same_bits_whatever_the_blocks():

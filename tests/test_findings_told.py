@@ -13,7 +13,12 @@ from podusv_cli.findings.finding import merged
 from podusv_cli.scenario.load import load
 
 SHORT = ("--set", "simulation.duration=1", "--set", "actuator={kind: ideal}", "--no-figures")
-SWAYING = ("--set", "vessel.preset=paper", "--set", "silence=[path-bend, bound-growing]")
+SWAYING = (
+    "--set",
+    "vessel.preset=paper",
+    "--set",
+    "silence=[path-bend, bound-growing, never-settles]",
+)
 
 
 def scenario_file(name: str) -> str:
@@ -39,7 +44,7 @@ def test_what_is_silenced_is_not_shown(podusv):
         "--set",
         "vessel.preset=paper",
         "--set",
-        "silence=[sway-drift, sway-unstable, bound-growing]",
+        "silence=[sway-drift, sway-unstable, bound-growing, never-settles]",
     )
     assert podusv("run", scenario_file("corrected.yaml"), *bad, *SHORT, "--out", "o").err == ""
     said = podusv("validate", scenario_file("corrected.yaml"), *bad)

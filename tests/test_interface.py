@@ -32,7 +32,7 @@ SHORT: dict[str, Any] = {
     "start": {"x": -5.0, "y": -2.0, "u": 0.3},
     "simulation": {"duration": 1.0},
     "controller": {"kind": "pid", "K_Pu": 100.0},
-    "silence": ["saturated"],
+    "silence": ["saturated", "never-settles"],
 }
 TWO = {**SHORT, "controllers": {"stiff": {"K_Pu": 200.0}, "soft": {"K_Pu": 5.0}}}
 CLAIM = {"says": "s", "source": "p", "expect": "stiff.iae > 0"}

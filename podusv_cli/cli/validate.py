@@ -39,7 +39,7 @@ def validate(
     from podusv_cli.scenario.load import load
     from podusv_cli.study.check import sweep_faults
     from podusv_cli.tuning.check import tune_faults
-    from podusv_cli.workflows.execute import examined
+    from podusv_cli.workflows.execute import examined, warm_up
 
     checks = (unknown_codes, limits(allow_large), sweep_faults, tune_faults)
     loaded = load(config, assign or (), checks, plugin or ())
@@ -49,6 +49,8 @@ def validate(
     # All is computed before the first line, since timing the runs of a study checks the laws.
     study = _study(loaded, scenario.sweep) if scenario.sweep else []
     findings = examined(scenario)
+    for single in scenario.singles().values():
+        warm_up(single)
     echo(f"{config}: ok ({scenario.name}, {laws}, {steps} steps)")
     echo(f"a run takes {largest(scenario)}", *study, *findings)
     if verbose:

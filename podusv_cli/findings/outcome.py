@@ -14,6 +14,7 @@ VISIBLE = 0.01  # hull lengths; a smaller swing is no finding
 PERIODS = 3  # fewer of them in the steady window do not show that a swing goes on
 PURE = 0.5  # share of a swing's variance at one frequency
 DECAY = 0.95  # of the amplitude from one half of the window to the other; less is dying away
+NEARING = 0.98  # of the error from one half of the window to the other; more is no approach
 FORCED = 0.1  # share of a load's variance at that frequency, which then drives the swing
 
 
@@ -82,7 +83,7 @@ def moves_away(scenario: Scenario, log: Recording) -> Sentences:
 @after(
     "never-settles", about="controller", meaning="the vessel is not at its target at the end",
     condition="the mean of |z_e - standoff| over the steady window exceeds metrics.settling_radius",
-    remedy="take larger gains, add integral action, simulate longer, or raise the settling radius",
+    remedy="simulate longer where it still comes nearer; else larger gains or integral action",
 )  # fmt: skip
 def never_settles(scenario: Scenario, log: Recording) -> Sentences:
     """The run ends without having come to its target; `moves-away` says so of a worse one."""
@@ -91,13 +92,16 @@ def never_settles(scenario: Scenario, log: Recording) -> Sentences:
         return
     approach, radius = scenario.controller.approach(), scenario.metrics.settling_radius
     standoff = approach.standoff if approach else 0.0
-    error = float(np.abs(log["z_e"][late] - standoff).mean())
+    errors = np.abs(log["z_e"][late] - standoff)
+    error, half = float(errors.mean()), len(errors) // 2
     if not scenario.at_target(error):
         place = f"its standoff of {standoff:g} m" if standoff else "its target"
+        nearing = half and errors[half:].mean() < NEARING * errors[:half].mean()
+        remedy = "simulate longer" if nearing else "take larger gains, or add integral action"
         yield (
             f"the vessel is {error:.3g} m away from {place} over the steady window, more than the "
-            f"settling radius of {radius:g} m, so no table ranks the run; take larger gains, add "
-            "integral action, simulate longer, or raise metrics.settling_radius"
+            f"settling radius of {radius:g} m, and {'still comes' if nearing else 'does not come'} "
+            f"nearer in it, so no table ranks the run; {remedy}, or raise metrics.settling_radius"
         )
 
 

@@ -51,19 +51,18 @@ class Waypoints(Path):
             knots = self._knots()
             if np.any(np.diff(knots) <= 0):
                 raise ValueError("two neighbouring points are the same")
-            if not (np.all(np.isfinite(knots)) and self._has_numbers()):
+            if not self._has_numbers(knots):
                 raise ValueError(
                     "the times or the course are beyond all numbers; points are too far apart or "
                     "too near, or the speed is too small or too large"
                 )
         return self
 
-    def _has_numbers(self) -> bool:
-        """Whether the spline's coefficients are finite."""
-        try:
-            return bool(np.all(np.isfinite(self.table())))
-        except ValueError:  # scipy refuses what overflows on the way
-            return False
+    def _has_numbers(self, knots: Vector) -> bool:
+        """Whether a bound of all numbers on the way to the spline's coefficients is finite."""
+        steps, size = np.diff(knots), np.abs(self._course()).max()
+        scales = np.maximum(steps, 1.0).max() ** 2 / np.minimum(steps, 1.0).min() ** 3
+        return bool(np.isfinite(1e3 * (size + 1.0) * scales))
 
     def waypoints(self) -> tuple[Point, ...]:
         """The points as they are given."""

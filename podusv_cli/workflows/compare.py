@@ -23,13 +23,13 @@ from podusv_cli.findings.finding import merged
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.table import CLOCKED
 from podusv_cli.process.extras import Extras, Missing
-from podusv_cli.process.interrupts import interrupts_deferred
+from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.process.workers import Outcome, available_workers, run_all
 from podusv_cli.scenario.limits import estimate, needed
 from podusv_cli.scenario.load import resolved_yaml
 from podusv_cli.storage import provenance
 from podusv_cli.storage.run_folder import RunWriter, default_folder, open_run
-from podusv_cli.workflows.execute import Task, execute, unwritten
+from podusv_cli.workflows.execute import Task, execute, unwritten, warm_up
 from podusv_cli.workflows.gather import Gathered, gather
 from podusv_cli.workflows.members import Member
 from podusv_cli.workflows.run import RESULTS, Request
@@ -158,6 +158,9 @@ def make_runs(
 ) -> dict[str, Outcome]:
     """Execute the members that have no run yet, in parallel, each into a folder in `folder`."""
     wanted = [member for member in members if member.run is None]
+    with interrupts_enabled():
+        for member in wanted:
+            warm_up(member.scenario)
     tasks = [
         Task(
             member.scenario, member.text, folder / member.label,

@@ -18,6 +18,7 @@ from podusv_cli import __version__
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.recording import Allocate, Recording, Status
+from podusv_cli.engine.check import check_law
 from podusv_cli.engine.simulate import ready, simulate
 from podusv_cli.findings.finding import postflight, preflight
 from podusv_cli.metrics.cost import law_costs
@@ -184,25 +185,25 @@ def unwritten(outcomes: Iterable[Outcome]) -> str:
 
 
 def warm_up(scenario: Scenario) -> None:
-    """Have all code of this scenario's loop compiled and loaded. Raises LawError."""
-    loop, grid, compiled = (
-        scenario.closed_loop(),
-        scenario.time_grid(),
-        scenario.simulation.compiled,
-    )
+    """Make every check of a run before its first step, and have all its code compiled and loaded.
+
+    Raises LawError.
+    """
+    loop, grid = scenario.closed_loop(), scenario.time_grid()
+    compiled = scenario.simulation.compiled
     ready(loop, grid, scenario.observer(), compiled)
     if scenario.log.monitor:
         monitor.prepare(loop, grid, compiled)
 
 
 def examined(scenario: Scenario) -> list[Finding]:
-    """The findings about a scenario, after every check that its runs make before the first step.
+    """The findings about a scenario whose figures, laws and paths were asked before.
 
-    All code of its laws is compiled and loaded then. Raises LawError.
+    Raises LawError.
     """
     check_figures(scenario)
     for single in scenario.singles().values():
-        warm_up(single)
+        check_law(single.closed_loop())
     return preflight(scenario)
 
 

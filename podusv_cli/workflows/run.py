@@ -59,7 +59,7 @@ def run_loaded(
     with watch.part("load"):
         scenario = single(loaded, request.controller)
         target = request.out or default_folder(RESULTS, scenario.name, resolved_yaml(scenario))
-    with watch.part("compile"):
+    with watch.part("preflight"):
         noticed = examined(scenario)
     for finding in noticed:
         request.warn(finding)

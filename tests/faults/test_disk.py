@@ -92,7 +92,7 @@ def fill(free: int) -> None:
 
 @needs_mount
 def test_a_full_disk_for_compiled_code_costs_time_and_nothing_else(tmp_path, monkeypatch):
-    monkeypatch.setenv("PODUSV_CACHE", str(tmp_path))
+    monkeypatch.setenv("PODUSV_CACHE", str(tmp_path / "cache"))
     law = Code("law", b"\x90" * 100_000)
 
     def on_a_small_disk() -> tuple[set[str], bool]:
