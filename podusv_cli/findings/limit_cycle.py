@@ -68,9 +68,8 @@ def _forced(scenario: Scenario, log: Recording, rows: Mask, near: slice) -> bool
     for inertia, axis in axes:
         motion += inertia * mean_square(np.gradient(log[axis][rows], time))
         load += mean_square(log[f"b_{axis}"][rows]) / inertia
-    velocities = [np.gradient(log[name][rows], time) for name in ("x_d", "y_d")]
-    turns = _turned(*(np.gradient(v, time) for v in velocities), _course(log, rows))
-    load += hull.m11 * sum(map(mean_square, turns))
+    x, y = (np.gradient(np.gradient(log[name][rows], time), time) for name in ("x_d", "y_d"))
+    load += hull.m11 * sum(map(mean_square, _turned(x, y, _course(log, rows))))
     return load > FORCED**2 * motion
 
 

@@ -58,7 +58,7 @@ def _switching(scenario: Scenario) -> list[str]:
 @after(
     "moves-away", about="controller", meaning="the vessel ends further away than it started",
     condition="the mean distance over the steady window exceeds that at the start by a hull length",
-    remedy="check signs and units of the law and of the nominal vessel",
+    remedy="check signs and units of the law and of the nominal vessel, or take larger gains",
 )  # fmt: skip
 def moves_away(scenario: Scenario, log: Recording) -> Sentences:
     """The law does not track: the distance to the target has grown over the run."""
@@ -70,7 +70,8 @@ def moves_away(scenario: Scenario, log: Recording) -> Sentences:
         yield (
             f"the vessel starts {start:.3g} m from the target and is {end:.3g} m away from it at "
             f"the end (mean over the steady window): {scenario.controller.label} does not track; "
-            "check signs and units of the law and of what it is told about the vessel"
+            "check signs and units of the law and of what it is told about the vessel, or take "
+            "larger gains"
         )
 
 
@@ -95,7 +96,7 @@ def never_settles(scenario: Scenario, log: Recording) -> Sentences:
         yield (
             f"the vessel is {error:.3g} m away from {place} over the steady window, more than the "
             f"settling radius of {radius:g} m, and {'still comes' if nearing else 'does not come'} "
-            f"nearer in it, so no table ranks the run; {remedy}, or raise metrics.settling_radius"
+            f"nearer in it, so no table ranks the run; {remedy}"
         )
 
 
