@@ -179,7 +179,7 @@ def _hint(node: Node, key: Key) -> str:
         return f"; write {int(node.content)}"
     if node.content is None and key.section:
         return "; it cannot be left out"
-    if isinstance(node.content, (int, float)) and limits(key.field).get("le") == 0:
+    if type(node.content) in (int, float) and limits(key.field).get("le") == 0:
         return f"; it is negative here, as it is published with the force: {-node.content:g}?"
     if not isinstance(node.content, str):
         return hint(node.text, (bool,) if bool in key.types else ())
