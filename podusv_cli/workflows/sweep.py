@@ -112,7 +112,7 @@ def _run(store: Store, request: Request, started: datetime, tell: Tell) -> Swept
             return Swept(store.folder, tally, part_is_whole=True, refused=refused)
     if not whole:
         return Swept(store.folder, tally, refused=refused)
-    with sole_writer(store.folder, TABLES, PATIENCE):
+    with sole_writer(store.folder, TABLES, PATIENCE, request.warn):
         store.write_runs()
         return replace(answered(store, request), refused=refused)
 
@@ -235,10 +235,12 @@ def answered(store: Store, request: Request) -> Swept:
 
 def report(study: Path, request: Request) -> Swept:
     """Judge a study anew, of the runs that are there. Raises UsageError where there are none."""
-    started, store = datetime.now(UTC), stored(study, request.warn, trusted=request.trust)
-    if not Tally.of(store.covered()).made:
-        raise UsageError(f"{study} has no runs yet: {plugins.again('sweep run', study)}")
-    with sole_writer(study, TABLES):
+    started = datetime.now(UTC)
+    check_study(study)
+    with sole_writer(study, TABLES):  # as draws and runs may be added until it is locked
+        store = stored(study, request.warn, trusted=request.trust)
+        if not Tally.of(store.covered()).made:
+            raise UsageError(f"{study} has no runs yet: {plugins.again('sweep run', study)}")
         Sitting(study, request.argv, started, store.plan.scenario.plugged).end(0)
         store.write_runs()
         if not store.runs().common.any():
