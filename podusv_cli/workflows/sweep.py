@@ -19,6 +19,7 @@ from podusv_cli.process.interrupts import interrupts_deferred
 from podusv_cli.scenario import plugins
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Loaded, Plugged, load, tree_yaml
+from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sweep import Keep
 from podusv_cli.storage import manifest
 from podusv_cli.storage.writer import PATIENCE, TABLES, sole_writer
@@ -177,9 +178,14 @@ def _planned(config: Path, request: Request) -> tuple[Store, dict[str, str]]:
         raise UsageError(f"--out {request.out} is a file; name a folder")
     plugged = partial(plugins.loaded, trusted=request.trust or not given)
     loaded = _loaded(config / SCENARIO if given else config, request, plugged)
-    folder = request.out or (config if given else RESULTS / f"{loaded.scenario.name}-sweep")
+    folder = request.out or (config if given else default_folder(loaded.scenario))
     texts = {SCENARIO: tree_yaml(loaded), **loaded.scenario.plugin_files()}
     return Store(folder, plan(loaded)), texts
+
+
+def default_folder(scenario: Scenario) -> Path:
+    """Where the study of a scenario goes that is given no place."""
+    return RESULTS / f"{scenario.name}-sweep"
 
 
 def _loaded(config: Path, request: Request, plugged: Plugged) -> Loaded:
