@@ -94,8 +94,12 @@ def test_a_kept_log_that_differs_leaves_no_verdict(study, tmp_path, podusv):
     assert code == 3
     kept = len(keep.wanted(study.results))
     assert f"1 of {kept} kept logs differ from it; in that of {one.name}, iae is" in out
-    assert one.name in err
-    assert json.loads((folder / "claims.json").read_text())["claims"] == []
+    assert f"logs/{one.name} differs from runs.h5: iae is" in err
+    assert "could not be made" not in err + (folder / "missing.json").read_text()
+    claims = json.loads((folder / "claims.json").read_text())
+    assert claims["claims"] == []
+    assert claims["contradicted"] in out
+    assert (folder / "claims.md").read_text().startswith("No claim is judged, since the table")
     assert "No claim is judged" in (folder / "report.html").read_text()
 
 

@@ -4,6 +4,7 @@ import errno
 import json
 import os
 import shutil
+from datetime import UTC, datetime
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from podusv_cli.study import unit as units
 from podusv_cli.study.draws import drawn, draws
 from podusv_cli.study.plan import watching
 from podusv_cli.study.results import judged
+from podusv_cli.study.sittings import Sitting, sittings
 from podusv_cli.study.store import RUNS, UNITS, Store
 from podusv_cli.study.unit import Unit
 from podusv_cli.workflows import studies, sweep
@@ -227,6 +229,23 @@ def test_times_of_all_sittings_are_added_up(tmp_path):
         assert found["runs"] == 24
         assert found["ms_a_run"] == pytest.approx(1e3 * found["processor_s"] / 24)
         assert found["processor_s"] > 0.0
+
+
+def test_a_sitting_keeps_those_that_others_noted_meanwhile(tmp_path):
+    now = datetime.now(UTC)
+    driver = Sitting(tmp_path, ["run"], now, ())
+    for _ in range(3):
+        Sitting(tmp_path, ["report"], now, ()).end(0)
+    driver.end(7)
+    assert [one["runs"] for one in sittings(tmp_path)] == [7, 0, 0, 0]
+
+
+def test_draws_beyond_those_asked_for_are_refused(whole, tmp_path):
+    shutil.copytree(whole.folder, tmp_path / "study")
+    fewer = Store(tmp_path / "study", small(draws=8))
+    with pytest.raises(StorageError, match="there are runs of 40 draws"):
+        fewer.write_runs()
+    assert (fewer.folder / RUNS).read_bytes() == (whole.folder / RUNS).read_bytes()
 
 
 def test_success_is_evaluated_once_for_each_law(whole, monkeypatch):

@@ -1,17 +1,22 @@
 """One process writes a study or a search; another one is refused and damages nothing."""
 
+import errno
+import fcntl
 import os
 import shutil
 import signal
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 from command_samples import under_way, wait_for
 from small_study import TEXT, made, written
 
+from podusv_cli.core.errors import StorageError
 from podusv_cli.storage import writer
 from podusv_cli.storage.writer import TABLES, sole_writer
 from podusv_cli.study.store import SCENARIO
+from podusv_cli.workflows import sweep
 
 
 @pytest.fixture(scope="module")
@@ -69,8 +74,42 @@ def test_a_driver_waits_for_the_tables(study, podusv, monkeypatch):
     with sole_writer(study, TABLES):
         said = podusv("sweep", "run", study, "--draws", "6", "--no-figures")
         assert said.code == 5
+        assert said.err.count(f"process ({os.getpid()} on ") == 2  # while it waits, and at the end
+        assert "waiting 0.1 s at most" in said.err
         assert "6" in podusv("sweep", "status", study).out
     assert podusv("sweep", "run", study, "--draws", "6", "--no-figures").code == 0
+
+
+def test_a_report_is_of_the_draws_that_are_there_when_it_has_the_lock(study, monkeypatch):
+    @contextmanager
+    def late(*given):
+        made(study, draws=8)  # by another process, after the command began
+        (study / SCENARIO).write_text(TEXT.replace("draws: 40", "draws: 8"))
+        with sole_writer(*given):
+            yield
+
+    monkeypatch.setattr(sweep, "sole_writer", late)
+    done = sweep.report(study, sweep.Request(figures=False))
+    assert (done.tally.made, done.tally.wanted) == (16, 16)
+
+
+@pytest.mark.parametrize("number", [errno.ENOSYS, errno.ENOLCK])
+def test_a_disk_without_locks_is_refused(study, monkeypatch, number):
+    def flock(*given):
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(fcntl, "flock", flock)
+    said = f"{study}: its file system has no locks"
+    with pytest.raises(StorageError, match=said), sole_writer(study):
+        pass
+
+
+@pytest.mark.parametrize("words", [("run", "."), ("run", "{config}", "--out", ".")])
+def test_the_folder_may_be_the_current_one(study, tmp_path, podusv, monkeypatch, words):
+    monkeypatch.chdir(study)
+    config = written(tmp_path / "small.yaml", ("draws: 40", "draws: 4"))
+    said = podusv("sweep", *(word.format(config=config) for word in words), "--no-figures")
+    assert said.code == 0, said.err
 
 
 @pytest.mark.slow

@@ -159,6 +159,8 @@ RUNS = Runs(
         ("-2 * median(iae)", -2.0),
         ("12 / median(iae)", 12.0),
         ("12 / -median(iae)", -6.0),
+        ("median(iae) / (quantile(iae, 0.75) - quantile(iae, 0.25))", 2.0),
+        ("1 / (quantile(tv_tau_u, 0.75) - quantile(tv_tau_u, 0.74))", -0.25),
     ],
 )
 def test_a_failed_run_is_the_worst_of_every_statistic(text, number):

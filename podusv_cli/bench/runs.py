@@ -11,7 +11,7 @@ import numpy as np
 from podusv_cli.bench.cases import Case
 from podusv_cli.core.errors import PodusvError, in_a_line
 from podusv_cli.core.kernel import Vector
-from podusv_cli.engine.simulate import ready, simulate
+from podusv_cli.engine.simulate import simulate
 from podusv_cli.scenario.model import Scenario
 
 POINTS = 150  # of a track
@@ -42,15 +42,6 @@ class BenchRun:
     def good(self) -> bool:
         """Whether the vessel is at its target at the end."""
         return self.status == "finished"
-
-
-def warm_up(case: Case) -> None:
-    """Check all laws of a case and compile what they need. Raises LawError."""
-    for scenario in case.laws.values():
-        ready(
-            scenario.closed_loop(), scenario.time_grid(), scenario.observer(),
-            scenario.simulation.compiled,
-        )  # fmt: skip
 
 
 def play(case: Case) -> list[BenchRun]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
@@ -12,10 +12,9 @@ from podusv_cli.cli.options import Plugins
 from podusv_cli.cli.terminal import echo, echo_entry
 
 if TYPE_CHECKING:
-    from podusv_cli.core.component import Presets
     from podusv_cli.core.plugins import Plugins as Known
 
-Entries = Iterator[tuple[str, str, str]]  # name, what it is, facts
+Entries = Iterable[tuple[str, str, str]]  # name, what it is, facts
 
 
 class Part(NamedTuple):
@@ -57,35 +56,25 @@ def list(
 
 def parts(plugins: Known) -> Iterator[Part]:
     """All parts, in the order of the list."""
-    from podusv_cli.scenario.explain import kinds
+    from podusv_cli.metrics.table import metrics_with
+    from podusv_cli.scenario.explain import first_sentence, kinds
     from podusv_cli.scenario.plugins import BASES
-    from podusv_cli.scenario.presets import with_presets
+    from podusv_cli.scenario.presets import preset_names, preset_text, with_presets
 
     for section, summaries in kinds(plugins).items():
-        words = dict.fromkeys((f"{section}s", f"{BASES[section].noun}s"))
-        yield Part((*words,), section, ((kind, text, "") for kind, text in summaries.items()))
+        words = (f"{section}s", f"{BASES[section].noun}s")
+        yield Part(words, section, ((kind, text, "") for kind, text in summaries.items()))
     for key, (_, presets) in with_presets().items():
-        words = dict.fromkeys((f"{key.partition('.')[0]}s", "presets"))
-        heading = f"{key} (preset, a {presets.noun})"
-        yield Part((*words,), heading, _presets(presets, plugins))
-    yield Part(("metrics",), "metrics", _metrics(plugins))
+        texts = [
+            (name, first_sentence(preset_text(presets, name, "source", plugins)), "")
+            for name in preset_names(presets, plugins)
+        ]
+        words = (f"{key.partition('.')[0]}s", "presets")
+        yield Part(words, f"{key} (preset, a {presets.noun})", texts)
+    metrics = ((name, m.meaning, f"[{m.unit}]") for name, m in metrics_with(plugins).items())
+    yield Part(("metrics",), "metrics", metrics)
     yield Part(("figures",), "figures", _figures(plugins))
     yield Part(("findings",), "findings (silence)", _findings(plugins))
-
-
-def _presets(presets: Presets, plugins: Known) -> Entries:
-    from podusv_cli.scenario.explain import first_sentence
-    from podusv_cli.scenario.presets import preset_names, preset_text
-
-    for name in preset_names(presets, plugins):
-        yield name, first_sentence(preset_text(presets, name, "source", plugins)), ""
-
-
-def _metrics(plugins: Known) -> Entries:
-    from podusv_cli.metrics.table import metrics_with
-
-    for name, metric in metrics_with(plugins).items():
-        yield name, metric.meaning, f"[{metric.unit}]"
 
 
 def _figures(plugins: Known) -> Entries:
@@ -95,7 +84,7 @@ def _figures(plugins: Known) -> Entries:
 
 
 def _findings(plugins: Known) -> Entries:
-    from podusv_cli.findings.finding import finding_kinds
+    from podusv_cli.findings.finding import finding_kinds  # imports half of podusv
 
     for name, finding in finding_kinds(plugins).items():
         yield name, finding.meaning, f"{finding.when} a run, {finding.about}"

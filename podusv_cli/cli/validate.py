@@ -31,7 +31,8 @@ def validate(
 ) -> None:
     """Check a scenario as a run does before its first step; if all is valid, print findings.
 
-    Exit code 0, with a line for each finding; or 2 with a line for each fault.
+    Exit code 0, with a line for each finding; 2 with a line for each fault; or 5 for a study that
+    fits neither on the disk nor into memory.
     """
     from podusv_cli.comparison.claims import parse_claims
     from podusv_cli.findings.finding import unknown_codes
@@ -63,12 +64,14 @@ def _study(loaded: Loaded, sweep: Sweep) -> list[str]:
     """How many runs the study has, which draws the scenario cannot take, and what it all takes."""
     from podusv_cli.process.workers import available_workers
     from podusv_cli.study.check import unjudged
-    from podusv_cli.study.estimate import estimate, pilot
+    from podusv_cli.study.estimate import check_fits, estimate, pilot
     from podusv_cli.study.invalid import check_draws
     from podusv_cli.study.plan import plan
     from podusv_cli.tuning.plan import TunePlan
+    from podusv_cli.workflows.sweep import default_folder
 
     made = plan(loaded)
+    check_fits(made, default_folder(loaded.scenario))
     draws, places = sweep.draws, [(law, cell.index) for law in made.laws for cell in made.cells]
     counted = (
         f"runs of the study: {len(places) * draws:,} "

@@ -252,6 +252,7 @@ def _seeing(loop: ClosedLoop, recall: Recall) -> Iterator[tuple[str, Any, tuple[
     yield "follow", follow, constants
 
 
+@np.errstate(all="ignore")
 def wire(
     loop: ClosedLoop, plan: Plan, observer: Observer, grid: TimeGrid, rows: int = 1,
     allocate: Allocate = np.empty, recall: Recall = call,
@@ -260,14 +261,7 @@ def wire(
 
     Numbers beyond all limits are for the run to tell.
     """
-    with np.errstate(all="ignore"):
-        return _wired(loop, plan, observer, grid, rows, allocate, recall)
 
-
-def _wired(
-    loop: ClosedLoop, plan: Plan, observer: Observer, grid: TimeGrid, rows: int,
-    allocate: Allocate, recall: Recall,
-) -> Wires:  # fmt: skip
     def numbers(constants: Callable[..., dict[str, float]], *given: Any) -> Vector:
         return np.array(list(recall(constants, *given).values()) or [0.0])
 

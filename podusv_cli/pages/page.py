@@ -51,7 +51,7 @@ def environment(package: str) -> Environment:
         loader=loader, autoescape=True, finalize=_shown, undefined=StrictUndefined,
         trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
-    made.filters |= {"sentence": _sentence, "raised": _raised}
+    made.filters |= {"sentence": sentence, "raised": _raised}
     return made
 
 
@@ -60,7 +60,7 @@ def _shown(value: Any) -> Any:
     return value if hasattr(value, "__html__") else lines(value)
 
 
-def _sentence(text: str) -> str:
+def sentence(text: str) -> str:
     """The text with a capital and a full stop; a symbol at the start stays as it is."""
     first = text.partition(" ")[0].rstrip(",;:")
     start = text[:1].upper() if first.isalpha() and first.islower() else text[:1]

@@ -15,15 +15,16 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True)
 class Missing:
-    """A part of a result that could not be made: why, in a line, and the traceback."""
+    """A part of a result that could not be made or has another problem: why, and the traceback."""
 
     what: str
     why: str
     trace: str = ""
+    problem: str = "could not be made"
 
     def __str__(self) -> str:
         """The sentence for the user."""
-        return f"{self.what} could not be made: {self.why}"
+        return f"{self.what} {self.problem}: {self.why}"
 
     @property
     def traced(self) -> str:

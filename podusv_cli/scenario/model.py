@@ -194,6 +194,15 @@ class Scenario(Component):
             settling_radius=self.metrics.settling_radius,
         )  # fmt: skip
 
+    def ready(self) -> None:
+        """Make every check of a run before its first step, and have its march compiled and loaded.
+
+        Raises LawError.
+        """
+        from podusv_cli.engine.simulate import ready  # who reads scenarios simulates nothing
+
+        ready(self.closed_loop(), self.time_grid(), self.observer(), self.simulation.compiled)
+
     def known_metrics(self) -> dict[str, Metric]:
         """All metrics by name, with those of plug-ins, and of windows and radii named here."""
         known = metrics_with(self.plugged, self.metrics.named())

@@ -24,7 +24,8 @@ from podusv_cli.process.temporary_names import remove_abandoned_files, temporary
 
 LARGEST_TEXT = 16 * 2**20  # bytes
 LARGEST_FILE = 4 * 2**30  # bytes
-LOCKS = (".podusv-runs.lock", ".podusv-tables.lock")  # in a folder while it is written
+# In a folder while it is written.
+LOCKS = (".podusv-runs.lock", ".podusv-tables.lock", ".podusv-provenance.lock")
 ELSEWHERE = "; read it with h5py or xarray, or log less often (log.every)"
 _CREATE = os.O_CREAT | os.O_EXCL | os.O_CLOEXEC | os.O_WRONLY
 CAUSES = {
@@ -149,6 +150,23 @@ def is_empty(folder: Path) -> bool:
     remove_abandoned_files(folder)
     with storage_errors(f"cannot read {folder}"):
         return not folder.exists() or {path.name for path in folder.iterdir()} <= {*LOCKS}
+
+
+def names_inside(folder: Path, above: str = "") -> Iterator[str]:
+    """All but folders and locks in a folder and in those in it: names as `logs/pid-0-0/log.h5`.
+
+    Links are not followed. What another process removes meanwhile is left out. Raises StorageError.
+    """
+    with (
+        storage_errors(f"cannot list {folder}"),
+        suppress(FileNotFoundError),
+        os.scandir(folder) as entries,
+    ):
+        for entry in entries:
+            if entry.is_dir(follow_symlinks=False):
+                yield from names_inside(Path(entry.path), f"{above}{entry.name}/")
+            elif entry.name not in LOCKS:
+                yield f"{above}{entry.name}"
 
 
 def make_folder(path: Path) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -12,7 +11,7 @@ from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.core.recording import Status
 from podusv_cli.storage import files as atomic
 from podusv_cli.storage import json_files
-from podusv_cli.storage.files import ELSEWHERE, LARGEST_FILE, LOCKS, fingerprint
+from podusv_cli.storage.files import ELSEWHERE, LARGEST_FILE, fingerprint
 
 NAME = "manifest.json"
 FORMAT = 2  # of run folder and log, as written; all formats from 1 on are read
@@ -39,7 +38,7 @@ class Manifest(BaseModel):
 
 def write(folder: Path, status: Status) -> Manifest:
     """Write the manifest of `folder`. Raises StorageError, also for links and devices in it."""
-    names = sorted(name for name in _names(folder) if name != NAME)
+    names = sorted(name for name in atomic.names_inside(folder) if name != NAME)
     manifest = Manifest(
         podusv_format=FORMAT, status=status, files={name: _entry(folder / name) for name in names}
     )
@@ -99,21 +98,12 @@ def check(folder: Path) -> Manifest:
 
 def foreign(folder: Path, manifest: Manifest) -> list[str]:
     """Files in `folder` that the manifest does not list, sorted."""
-    return sorted(set(_names(folder)) - set(manifest.files) - {NAME})
+    return sorted(set(atomic.names_inside(folder)) - set(manifest.files) - {NAME})
 
 
 def _entry(path: Path) -> FileEntry:
     digest, size = fingerprint(path)
     return FileEntry(sha256=digest, bytes=size)
-
-
-def _names(folder: Path, above: str = "") -> Iterator[str]:
-    with atomic.storage_errors(f"cannot list {folder}"), os.scandir(folder) as entries:
-        for entry in entries:
-            if entry.is_dir(follow_symlinks=False):
-                yield from _names(Path(entry.path), f"{above}{entry.name}/")
-            elif entry.name not in LOCKS:
-                yield f"{above}{entry.name}"
 
 
 def place(folder: Path, name: str) -> Path:

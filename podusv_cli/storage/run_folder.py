@@ -173,7 +173,9 @@ def _check_replaceable(final: Path, force: bool) -> None:
 def check_free_space(final: Path, needed: float, remedy: str) -> None:
     """StorageError if fewer than `needed` bytes are free on the disk of `final`."""
     with files.storage_errors(f"cannot make {final}"):
-        free = shutil.disk_usage(next(path for path in final.parents if path.exists())).free
+        place = final.absolute()  # as "." has no parents
+        there = next(path for path in (place, *place.parents) if path.exists())
+        free = shutil.disk_usage(there).free
     if needed > free:
         raise StorageError(
             f"cannot make {final}: it takes {bytes_in_words(needed)} of disk or more, and "

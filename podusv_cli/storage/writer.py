@@ -2,43 +2,44 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import platform
 import stat
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from podusv_cli.core.errors import StorageError
 from podusv_cli.process.interrupts import interrupts_enabled
-from podusv_cli.storage.files import LOCKS, make_folder, storage_errors
+from podusv_cli.storage.files import LOCKS, make_folder, names_inside, storage_errors
 
-RUNS, TABLES = LOCKS  # what a writer makes; tables are also made while runs still come
+if TYPE_CHECKING:
+    from filelock import BaseFileLock
+
+# What a writer makes; tables are also made while runs still come, and both note their sittings.
+RUNS, TABLES, PROVENANCE = LOCKS
 PATIENCE = 600.0  # s that a driver waits for another process to finish the tables
+WITHOUT_LOCKS = (errno.ENOSYS, errno.ENOLCK, errno.ENOTSUP)  # what such a file system answers
 
 
 @contextmanager
-def sole_writer(folder: Path, what: str = RUNS, patience: float = 0.0) -> Iterator[None]:
+def sole_writer(
+    folder: Path, what: str = RUNS, patience: float = 0.0,
+    warn: Callable[[str], None] = lambda text: None,
+) -> Iterator[None]:  # fmt: skip
     """Make the folder, and keep other processes from writing into it during the block.
 
-    The lock is one of the operating system, which ends with its process. Raises StorageError where
-    another process has it after `patience` [s], and for a link, pipe or device in the folder.
+    The lock is one of the operating system, which ends with its process. `warn` is told where
+    another process has it, for whose end this waits `patience` [s]. Raises StorageError where it
+    has it still, for a file system without locks, and for a link, pipe or device in the folder.
     """
-    from filelock import FileLock, Timeout  # 30 ms, for commands that write a study
-
     make_folder(folder)
     _check_plain(folder)
     path = folder / what
-    with storage_errors(f"cannot lock {folder}"):
-        try:
-            with interrupts_enabled():
-                lock = FileLock(path)
-                lock.acquire(timeout=patience)
-        except Timeout as error:
-            raise StorageError(
-                f"{folder}: another podusv process{_holder(path)} writes there; wait until it has "
-                "ended, end it, or name another folder with --out"
-            ) from error
+    with storage_errors(f"cannot lock {folder}"), interrupts_enabled():
+        lock = _locked(path, patience, warn)
     try:
         with suppress(OSError):  # a full disk, where only the message lacks these words
             path.write_text(f"{os.getpid()} {platform.node()}")
@@ -46,6 +47,31 @@ def sole_writer(folder: Path, what: str = RUNS, patience: float = 0.0) -> Iterat
     finally:
         path.unlink(missing_ok=True)  # while it is locked; who waits for it looks for a new one
         lock.release()
+
+
+def _locked(path: Path, patience: float, warn: Callable[[str], None]) -> BaseFileLock:
+    from filelock import FileLock, Timeout  # 30 ms, for commands that write a study
+
+    lock = FileLock(path, fallback_to_soft=False)  # a soft one outlives a process that is killed
+    try:
+        with suppress(Timeout):
+            lock.acquire(timeout=0.0)
+            return lock
+        other = f"{path.parent}: another podusv process{_holder(path)} writes there"
+        if patience:
+            warn(f"{other}; waiting {patience:g} s at most for its end")
+        try:
+            lock.acquire(timeout=patience)
+        except Timeout as error:
+            raise StorageError(f"{other}; wait until it has ended, or end it") from error
+    except OSError as error:
+        if error.errno not in WITHOUT_LOCKS:
+            raise
+        raise StorageError(
+            f"cannot lock {path.parent}: its file system has no locks, without which two processes "
+            "may write there at once; use a folder on a local disk"
+        ) from error
+    return lock
 
 
 def _holder(path: Path) -> str:
@@ -58,14 +84,12 @@ def _holder(path: Path) -> str:
 
 def _check_plain(folder: Path) -> None:
     """Raise StorageError for anything in the folder but files and folders."""
-    with storage_errors(f"cannot read {folder}"):
-        for place, folders, files in os.walk(folder):
-            for path in (Path(place, name) for name in (*folders, *files)):
-                with suppress(FileNotFoundError):  # another process has removed it
-                    mode = path.lstat().st_mode
-                    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
-                        what = "a symbolic link" if stat.S_ISLNK(mode) else "no file"
-                        raise StorageError(
-                            f"cannot write {folder}: {path} is {what}; podusv writes nothing out "
-                            "of the folder, so remove it"
-                        )
+    for path in map(folder.joinpath, names_inside(folder)):
+        with storage_errors(f"cannot read {path}"), suppress(FileNotFoundError):
+            mode = path.lstat().st_mode
+            if not stat.S_ISREG(mode):
+                what = "a symbolic link" if stat.S_ISLNK(mode) else "no file"
+                raise StorageError(
+                    f"cannot write {folder}: {path} is {what}; podusv writes nothing out "
+                    "of the folder, so remove it"
+                )

@@ -107,10 +107,10 @@ def _named(runs: Table, law: str, draws: Iterable[int]) -> Iterator[Wanted]:
 def found(folder: Path, results: Results, extras: Extras) -> list[Kept]:
     """The kept runs, compared with the table; one that is not there or differs is missing."""
     kept = [_opened(folder / LOGS / one.name, one, results, extras) for one in wanted(results)]
-    for one in kept:
-        if one.difference:
-            what = f"a log of {one.wanted.name} with the numbers of runs.h5"
-            extras.missing.append(Missing(what, one.difference))
+    extras.missing += [
+        Missing(f"{LOGS}/{one.wanted.name}", one.difference, problem="differs from runs.h5")
+        for one in kept if one.difference
+    ]  # fmt: skip
     return kept
 
 
@@ -120,7 +120,9 @@ def _opened(path: Path, one: Wanted, results: Results, extras: Extras) -> Kept:
     try:
         run = open_run(path)
     except StorageError as error:
-        extras.missing.append(Missing(f"{LOGS}/{one.name}", str(error)))
+        extras.missing.append(
+            Missing(f"{LOGS}/{one.name}", str(error), problem="could not be read")
+        )
         return Kept(one, None)
     return Kept(one, run, difference(run, one, results.runs))
 

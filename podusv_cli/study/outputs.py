@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 
 from podusv_cli.core.errors import UsageError
-from podusv_cli.pages.page import Picture
+from podusv_cli.core.escaping import markdown
+from podusv_cli.pages.page import Picture, sentence
 from podusv_cli.process.extras import Extras
 from podusv_cli.storage import csv_files, files
 from podusv_cli.storage.json_files import encode
@@ -28,12 +29,16 @@ FIGURES, REPORT = "figures", "report.html"
 def write_tables(folder: Path, results: Results) -> None:
     """Write tables and verdicts into the study's folder. Raises StorageError."""
     told = {"format": 1, "claims": [one.as_json() for one in results.verdicts]}
+    judged = verdict.as_markdown(results.verdicts)
+    if results.contradicted:
+        told["contradicted"] = results.contradicted
+        judged = f"{markdown(sentence(results.contradicted))}\n"
     contents = {
         "summary.csv": summary.as_csv(results.summary).encode(),
         "pairs.csv": summary.as_csv(results.pairs).encode(),
         "sensitivity.csv": summary.as_csv(results.sensitivity).encode(),
         "claims.json": encode(told),
-        "claims.md": verdict.as_markdown(results.verdicts).encode(),
+        "claims.md": judged.encode(),
         "timing.json": encode(timing(folder)),
     }
     files.write_all({folder / name: content for name, content in contents.items()})

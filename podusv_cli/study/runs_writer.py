@@ -12,6 +12,7 @@ from typing import Any
 import h5py
 import numpy as np
 
+from podusv_cli.core.errors import StorageError
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.process.temporary_names import temporary_name
 from podusv_cli.storage.files import new_file, storage_errors
@@ -175,6 +176,11 @@ def _fill(part: Path, header: Header, places: dict[str, Room], results: Iterable
             _blank(out, room, MISSING if name == "status" else np.nan)
         for result in results:
             unit = result.unit
+            if unit.draws.stop > header.wanted:
+                raise StorageError(
+                    f"cannot write runs.h5 of {header.wanted} draws: there are runs of "
+                    f"{unit.draws.stop} draws, which another process has added; run it again"
+                )
             at = (header.laws.index(unit.law), unit.cell, unit.first)
             arrays = {**result.metrics, "status": result.status, "until": result.until}
             for name, numbers in arrays.items():

@@ -13,6 +13,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, NonNegativeInt, Posi
 
 from podusv_cli.core.plugins import Plugin
 from podusv_cli.storage import files, json_files, manifest, provenance
+from podusv_cli.storage.writer import PATIENCE, PROVENANCE, sole_writer
 
 NAME = "provenance.json"
 
@@ -76,7 +77,10 @@ def timing(folder: Path) -> dict[str, Any]:
 
 
 class Sitting:
-    """One sitting, noted when it begins and again when its runs are over."""
+    """One sitting, noted when it begins and again when its runs are over.
+
+    A report may note its own sitting while runs still come.
+    """
 
     def __init__(
         self, folder: Path, argv: Sequence[str], started: datetime, plugins: Iterable[Plugin],
@@ -88,21 +92,25 @@ class Sitting:
         Raises StorageError.
         """
         self._folder, self._started = folder, started
-        self._earlier = sittings(folder)
-        for other in others:
-            self._earlier += [one for one in sittings(other) if one not in self._earlier]
         begun = provenance.collect(argv, started, started, plugins)
         self._origin = begun | {"finished": None, "duration_s": None, "runs": 0}
         with files.storage_errors(f"cannot remove {folder / manifest.NAME}"):
             (folder / manifest.NAME).unlink(missing_ok=True)
-        self._write()
+        with sole_writer(folder, PROVENANCE, PATIENCE):
+            earlier = sittings(folder)
+            for other in others:
+                earlier += [one for one in sittings(other) if one not in earlier]
+            self._place = len(earlier)
+            self._write(earlier)
 
     def end(self, runs: int, told: Mapping[str, Any] = MappingProxyType({})) -> None:
         """Note how many runs it made, and what else is told of it. Raises StorageError."""
         times = provenance.times(self._started, datetime.now(UTC))
         self._origin |= {**times, "runs": runs, **told}
-        self._write()
+        with sole_writer(self._folder, PROVENANCE, PATIENCE):
+            self._write(sittings(self._folder))
 
-    def _write(self) -> None:
-        content = {"format": 1, "sittings": [*self._earlier, self._origin]}
+    def _write(self, noted: list[dict[str, Any]]) -> None:
+        noted[self._place : self._place + 1] = [self._origin]
+        content = {"format": 1, "sittings": noted}
         files.write_bytes(self._folder / NAME, json_files.encode(content))

@@ -28,6 +28,7 @@ from podusv_cli.study.samples import number
 EXAMPLE, INEQUALITY = "median(iae)", "failures <= 0.05"
 FAILURES, MEDIAN, QUANTILE = "failures", "median", "quantile"
 STATISTICS = (MEDIAN, QUANTILE)
+INVENTED = 1000  # runs on which an expression is tried
 UPWARD = (ast.Gt, ast.GtE)
 SCALING = (ast.Mult, ast.Div)  # a negative part turns round what the other means
 FALLING = (ast.Sub, ast.Div)  # the more of the second part, the less of the whole
@@ -100,13 +101,14 @@ def named(tree: ast.expr, metrics: Mapping[str, Metric]) -> list[str]:
 
 
 def _names(tree: ast.expr, metrics: Mapping[str, Metric]) -> list[str]:
-    """What an expression is about, as its evaluation on a single made-up run shows.
+    """What an expression is about, as its evaluation on invented runs shows.
 
-    Raises ExpressionError.
+    These are many and all differ, so that a spread of theirs is not zero. Raises ExpressionError.
     """
-    sizes = np.sqrt(np.arange(2.0, 2.0 + len(metrics)))  # no quotient or sum of them is whole
-    made_up = {name: np.array([size]) for name, size in zip(metrics, sizes, strict=True)}
-    walk = OfRuns(metrics, runs=Runs(made_up, np.zeros(1, bool)))
+    numbers = np.random.default_rng(0).uniform(1.0, 2.0, (len(metrics), INVENTED))
+    walk = OfRuns(
+        metrics, runs=Runs(dict(zip(metrics, numbers, strict=True)), np.zeros(INVENTED, bool))
+    )
     with np.errstate(all="ignore"):
         found = _evaluated(tree, walk, math.inf)
     if not math.isfinite(found) and FAILURES not in walk.names:  # here, no run failed

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from podusv_cli.engine.simulate import ready
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.verification.dop853 import Dop853Result, integrate, why_skipped
 from podusv_cli.verification.ranking import Ranking, ranking
@@ -109,7 +108,7 @@ def verify(
     """Verify every run of a scenario: its one law, or all of `controllers`. Raises LawError."""
     singles = scenario.singles()
     for one in singles.values():
-        ready(one.closed_loop(), one.time_grid(), one.observer(), one.simulation.compiled)
+        one.ready()
     runs = {
         label: check(one, progress and partial(progress, label)) for label, one in singles.items()
     }

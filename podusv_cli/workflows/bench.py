@@ -14,7 +14,7 @@ import pandas as pd
 from podusv_cli.bench import optima, page, standing
 from podusv_cli.bench.cases import Case, Wanted, cases
 from podusv_cli.bench.optima import Least
-from podusv_cli.bench.runs import BenchRun, crashed, play, warm_up
+from podusv_cli.bench.runs import BenchRun, crashed, play
 from podusv_cli.optimum.collocation import casadi
 from podusv_cli.pages.page import Picture
 from podusv_cli.process.extras import Extras, Missing
@@ -78,8 +78,8 @@ def bench(wanted: Wanted, request: Request, progress: Progress | None = None) ->
         casadi()
     started, every, extras = datetime.now(UTC), list(cases(wanted)), Extras()
     with RunWriter(request.out, force=request.force) as writer:
-        for case in every:
-            warm_up(case)
+        for scenario in (scenario for case in every for scenario in case.laws.values()):
+            scenario.ready()
         runs = list(_simulated(every, request, progress))
         made = standing.table(runs)
         found = list(_solved(every, runs, request, progress, extras)) if request.optimum else []

@@ -19,7 +19,7 @@ from podusv_cli.core.errors import StorageError
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.recording import Allocate, Recording, Status
 from podusv_cli.engine.check import check_law
-from podusv_cli.engine.simulate import ready, simulate
+from podusv_cli.engine.simulate import simulate
 from podusv_cli.findings.finding import postflight, preflight
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.operations import operations
@@ -189,11 +189,10 @@ def warm_up(scenario: Scenario) -> None:
 
     Raises LawError.
     """
-    loop, grid = scenario.closed_loop(), scenario.time_grid()
-    compiled = scenario.simulation.compiled
-    ready(loop, grid, scenario.observer(), compiled)
+    scenario.ready()
     if scenario.log.monitor:
-        monitor.prepare(loop, grid, compiled)
+        loop, grid = scenario.closed_loop(), scenario.time_grid()
+        monitor.prepare(loop, grid, scenario.simulation.compiled)
 
 
 def examined(scenario: Scenario) -> list[Finding]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +13,7 @@ from podusv_cli.controllers.schedule import Schedule
 from podusv_cli.controllers.velocity_vector import VelocityVector
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.recording import Recording
-from podusv_cli.engine.loop import ClosedLoop, Observer
-from podusv_cli.engine.simulate import ready, simulate
+from podusv_cli.engine.simulate import simulate
 from podusv_cli.findings.finding import preflight, unknown_codes
 from podusv_cli.optimum import collocation
 from podusv_cli.optimum.collocation import Stage
@@ -83,7 +82,7 @@ def optimum(
     target = request.out or free_folder(RESULTS / scenario.name / "optimum")
     with RunWriter(target, force=request.force, needed=estimate(scenario).needed):
         pass  # a place that cannot be written to is told before anything is computed
-    guesses = _guesses(scenario, wanted)
+    guesses = _guesses(scenario)
     stages, motion = collocation.searched(wanted, guesses, step, progress)
     repeated = _repeating(scenario, wanted, motion)
     task = Task(
@@ -94,17 +93,15 @@ def optimum(
     return Optimum(minimised, stages, done, _departures(done.folder, motion))
 
 
-def _guesses(scenario: Scenario, wanted: Problem) -> dict[str, Motion]:
+def _guesses(scenario: Scenario) -> dict[str, Motion]:
     """Runs of the scenario's laws, and of velocity_vector, from which the search may begin.
 
     A law that diverges is left out. Raises LawError, and UsageError where all diverge.
     """
-    laws = {label: one.controller for label, one in scenario.singles().items()}
-    if not any(law.label == BESIDE.label for law in laws.values()):
-        laws[BESIDE.label] = BESIDE
-    runs = {
-        label: _run(scenario, replace(wanted.loop, controller=law)) for label, law in laws.items()
-    }
+    singles = scenario.singles()
+    if not any(one.controller.label == BESIDE.label for one in singles.values()):
+        singles[BESIDE.label] = scenario.alone().model_copy(update={"controller": BESIDE})
+    runs = {label: _run(one) for label, one in singles.items()}
     ended = {label: run for label, run in runs.items() if run.status == "finished"}
     if not ended:
         label, run = next(iter(runs.items()))
@@ -115,10 +112,12 @@ def _guesses(scenario: Scenario, wanted: Problem) -> dict[str, Motion]:
     return {label: Motion.of(run) for label, run in ended.items()}
 
 
-def _run(scenario: Scenario, loop: ClosedLoop) -> Recording:
-    grid, compiled = scenario.time_grid(), scenario.simulation.compiled
-    ready(loop, grid, Observer(), compiled)
-    log = simulate(loop, grid, compiled=compiled)
+def _run(scenario: Scenario) -> Recording:
+    scenario.ready()
+    log = simulate(
+        scenario.closed_loop(), scenario.time_grid(), observer=scenario.observer(),
+        compiled=scenario.simulation.compiled,
+    )  # fmt: skip
     if log.status == "interrupted":
         raise KeyboardInterrupt
     return log

@@ -19,6 +19,7 @@ from podusv_cli.process.interrupts import interrupts_deferred
 from podusv_cli.scenario import plugins
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Loaded, Plugged, load, tree_yaml
+from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sweep import Keep
 from podusv_cli.storage import manifest
 from podusv_cli.storage.writer import PATIENCE, TABLES, sole_writer
@@ -112,7 +113,7 @@ def _run(store: Store, request: Request, started: datetime, tell: Tell) -> Swept
             return Swept(store.folder, tally, part_is_whole=True, refused=refused)
     if not whole:
         return Swept(store.folder, tally, refused=refused)
-    with sole_writer(store.folder, TABLES, PATIENCE):
+    with sole_writer(store.folder, TABLES, PATIENCE, request.warn):
         store.write_runs()
         return replace(answered(store, request), refused=refused)
 
@@ -177,9 +178,14 @@ def _planned(config: Path, request: Request) -> tuple[Store, dict[str, str]]:
         raise UsageError(f"--out {request.out} is a file; name a folder")
     plugged = partial(plugins.loaded, trusted=request.trust or not given)
     loaded = _loaded(config / SCENARIO if given else config, request, plugged)
-    folder = request.out or (config if given else RESULTS / f"{loaded.scenario.name}-sweep")
+    folder = request.out or (config if given else default_folder(loaded.scenario))
     texts = {SCENARIO: tree_yaml(loaded), **loaded.scenario.plugin_files()}
     return Store(folder, plan(loaded)), texts
+
+
+def default_folder(scenario: Scenario) -> Path:
+    """Where the study of a scenario goes that is given no place."""
+    return RESULTS / f"{scenario.name}-sweep"
 
 
 def _loaded(config: Path, request: Request, plugged: Plugged) -> Loaded:
@@ -235,10 +241,12 @@ def answered(store: Store, request: Request) -> Swept:
 
 def report(study: Path, request: Request) -> Swept:
     """Judge a study anew, of the runs that are there. Raises UsageError where there are none."""
-    started, store = datetime.now(UTC), stored(study, request.warn, trusted=request.trust)
-    if not Tally.of(store.covered()).made:
-        raise UsageError(f"{study} has no runs yet: {plugins.again('sweep run', study)}")
-    with sole_writer(study, TABLES):
+    started = datetime.now(UTC)
+    check_study(study)
+    with sole_writer(study, TABLES):  # as draws and runs may be added until it is locked
+        store = stored(study, request.warn, trusted=request.trust)
+        if not Tally.of(store.covered()).made:
+            raise UsageError(f"{study} has no runs yet: {plugins.again('sweep run', study)}")
         Sitting(study, request.argv, started, store.plan.scenario.plugged).end(0)
         store.write_runs()
         if not store.runs().common.any():
