@@ -19,7 +19,6 @@ from podusv_cli.engine.object_cache import ingredients
 from podusv_cli.metrics.table import Metrics
 from podusv_cli.scenario.load import Loaded, values
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.plugins import are_absent
 from podusv_cli.scenario.sweep import Keep, Sweep
 from podusv_cli.study.cells import Cell, cells
 from podusv_cli.study.check import sweep_faults
@@ -51,11 +50,6 @@ class Plan:
     cells: tuple[Cell, ...]
     variant: Variant | None = None  # which one of the study it is, if any
     record: Record | None = None  # stands for plug-ins that are not loaded
-
-    @property
-    def can_run(self) -> bool:
-        """Whether its runs can be simulated; not where its plug-ins are not loaded."""
-        return not are_absent(self.scenario.plugged)
 
     @property
     def sweep(self) -> Sweep:
@@ -109,7 +103,7 @@ class Plan:
                     if key.partition(".")[0] not in (*COSMETIC, *single.recorded)
                 }  # fmt: skip
                 told |= {f"{law}[{cell.index}].{key}": value for key, value in kept.items()}
-                if self.can_run:
+                if not self.record:
                     told[f"{law}[{cell.index}]{KERNELS}"] = kernels(single)
         return told
 

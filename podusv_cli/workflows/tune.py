@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,7 @@ from podusv_cli.process.extras import Extras, Missing
 from podusv_cli.process.interrupts import interrupts_deferred
 from podusv_cli.scenario import plugins
 from podusv_cli.scenario.limits import limits
-from podusv_cli.scenario.load import Loaded, load
+from podusv_cli.scenario.load import Loaded
 from podusv_cli.storage import files, manifest
 from podusv_cli.storage.writer import sole_writer
 from podusv_cli.study.check import sweep_faults
@@ -41,6 +40,7 @@ from podusv_cli.tuning.space import with_gains
 from podusv_cli.tuning.trials import best
 from podusv_cli.tuning.validation import validate
 from podusv_cli.workflows.run import RESULTS
+from podusv_cli.workflows.studies import scenario_of
 
 Tell = Callable[[Tally, str], None]
 
@@ -121,9 +121,7 @@ def _loaded(config: Path, request: Request) -> tuple[Loaded, Path]:
     if request.out and request.out.exists() and not request.out.is_dir():
         raise UsageError(f"--out {request.out} is a file; name a folder")
     checks = (unknown_codes, limits(allow_large=True), sweep_faults, tune_faults)
-    source = config / place.SCENARIO if given else config
-    plugged = partial(plugins.loaded, trusted=request.trust or not given)
-    loaded = load(source, request.overrides, checks, request.plugins, plugged)
+    loaded = scenario_of(config, request.overrides, checks, request.plugins, trusted=request.trust)
     if loaded.scenario.tune is None:
         raise UsageError(
             f"{config} has no key `tune`, which says how many runs a search has; see "
