@@ -115,6 +115,28 @@ def test_logs_are_made_where_the_plug_ins_are_trusted(study, podusv):
     assert len(list((study / "logs").iterdir())) == 3 * 2
 
 
+ODD = {
+    "name": {"metrics_of_plugins": {"<script>": {}}},
+    "unit": {"metrics_of_plugins": {"largest_east": {"unit": "\n"}}},
+    "unknown": {"metrics": ["iae", "largest_west"]},
+    "twice": {"metrics": ["iae", "iae"]},
+}
+
+
+@pytest.mark.parametrize("change", ODD.values(), ids=ODD)
+def test_odd_words_in_the_record_are_refused_in_a_sentence(study, podusv, change):
+    record = json.loads((study / "study.json").read_text())
+    plain = record["metrics_of_plugins"]["largest_east"]
+    metrics = {name: plain | new for name, new in change.get("metrics_of_plugins", {}).items()}
+    record |= change | ({"metrics_of_plugins": metrics} if metrics else {})
+    (study / "study.json").write_text(json.dumps(record))
+    before = (study / "runs.h5").read_bytes()
+    said = podusv("sweep", "report", study, "--no-figures")
+    assert said.code == 5
+    assert f"{study / 'study.json'}: damaged" in said.err
+    assert (study / "runs.h5").read_bytes() == before
+
+
 @pytest.fixture
 def installed_lab(tmp_path, monkeypatch):
     """`examples/my_lab` as an installed package, in this process and its children."""

@@ -71,11 +71,12 @@ class Plan:
     @cached_property
     def metrics(self) -> tuple[str, ...]:
         """The names of the metrics that a law of the study has during a run, in their order."""
-        if self.record:
-            return tuple(self.record.metrics)
+        names = set(self.record.metrics) if self.record else self._measured()
+        return tuple(name for name in self.scenario.known_metrics() if name in names)
+
+    def _measured(self) -> set[str]:
         loops = [watching(self.single(law, cell.index)) for law in self.laws for cell in self.cells]
-        found = {name for one in loops for name in one.summary(np.full(one.size, np.nan))}
-        return tuple(name for name in self.scenario.known_metrics() if name in found)
+        return {name for one in loops for name in one.summary(np.full(one.size, np.nan))}
 
     def single(self, law: str, cell: int) -> Scenario:
         """The scenario of one law in one cell."""

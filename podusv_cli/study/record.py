@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
-from pydantic import BaseModel, ConfigDict, PositiveInt
+from pydantic import BaseModel, ConfigDict, PositiveInt, model_validator
 
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.plugins import digest
@@ -41,16 +41,19 @@ class MetricOfPlugin(BaseModel):
 
 
 class Record(BaseModel):
-    """The content of study.json; only a study with plug-ins has its metrics there."""
+    """What is read of study.json; only a study with plug-ins has its metrics there."""
 
     model_config = ConfigDict(strict=True, frozen=True)
     draws: PositiveInt
-    laws: list[str]
-    cells: list[str]
     identity: dict[str, Any]
     history: list[Asked]
     metrics: list[str] = []
     metrics_of_plugins: dict[str, MetricOfPlugin] = {}
+
+    @model_validator(mode="after")
+    def _can_be_told(self) -> Self:
+        self.foreign()  # ValueError for a name or unit that no metric has
+        return self
 
     def parts(self) -> Parts:
         """Section, kind and field names of every component that the runs had."""

@@ -21,6 +21,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -164,10 +165,15 @@ class Store:
                     path.unlink(missing_ok=True)
 
     def _these(self, paths: Sequence[Path]) -> Iterator[UnitResult]:
-        """What runs.h5 has already, and these units."""
-        for earlier in self._earlier():
-            yield from earlier.results()
-        yield from filter(None, (read(path, self.seal) for path in paths))
+        """What runs.h5 has already, and these units. Raises StorageError for other metrics."""
+        there = (result for earlier in self._earlier() for result in earlier.results())
+        for result in chain(there, filter(None, (read(path, self.seal) for path in paths))):
+            if set(result.metrics) != set(self.plan.metrics):
+                raise StorageError(
+                    f"cannot read {self.folder / STUDY}: damaged, it has other metrics than the "
+                    "runs; restore the file"
+                )
+            yield result
 
     def _write_table(self, results: Callable[[], Iterator[UnitResult]]) -> None:
         plan, known = self.plan, self.plan.scenario.known_metrics()
