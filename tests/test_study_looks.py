@@ -4,6 +4,7 @@ import csv
 import json
 import shutil
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -140,6 +141,8 @@ def test_odd_words_in_the_record_are_refused_in_a_sentence(study, podusv, change
 @pytest.fixture
 def installed_lab(tmp_path, monkeypatch):
     """`examples/my_lab` as an installed package, in this process and its children."""
+    with suppress(ImportError):
+        import importlib_metadata  # noqa: F401, PLC0415  as Dask does; it replaces Python's own
     monkeypatch.syspath_prepend(str(install(tmp_path / "site")))
     installed.cache_clear()
     yield

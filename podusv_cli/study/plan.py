@@ -27,6 +27,7 @@ from podusv_cli.study.record import Record
 
 # Sections of a scenario that change no number of a study.
 COSMETIC = ("name", "description", "log", "silence", "claims", "controllers", "sweep", "tune")
+MOST_NAMED = 4  # keys that a message about another study names
 KERNELS = " kernels"  # ends the key of the digest of a law's compiled source
 
 
@@ -160,9 +161,11 @@ def differing(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[str]:
 
 def disagreements(
     one: Mapping[str, Any], other: Mapping[str, Any], keys: Sequence[str] | None = None
-) -> list[str]:
-    """Each of these keys, or of those that two identities differ in, with both values."""
-    return [
+) -> str:
+    """The first of these keys, or of those that two identities differ in, with both values."""
+    keys = differing(one, other) if keys is None else keys
+    texts = [
         f"{key}: {one.get(key, 'not there')}, not {other.get(key, 'not there')}"
-        for key in (differing(one, other) if keys is None else keys)
+        for key in keys[:MOST_NAMED]
     ]
+    return "; ".join(texts) + (" and more" if len(keys) > MOST_NAMED else "")

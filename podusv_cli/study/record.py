@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, PositiveInt, model_validator
+from pydantic import BaseModel, ConfigDict, PositiveInt, field_validator
 
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.plugins import digest
@@ -50,10 +50,11 @@ class Record(BaseModel):
     metrics: list[str] = []
     metrics_of_plugins: dict[str, MetricOfPlugin] = {}
 
-    @model_validator(mode="after")
-    def _can_be_told(self) -> Self:
-        self.foreign()  # ValueError for a name or unit that no metric has
-        return self
+    @field_validator("metrics_of_plugins")
+    @classmethod
+    def _possible(cls, given: dict[str, MetricOfPlugin]) -> dict[str, MetricOfPlugin]:
+        _metrics(given)  # ValueError for a name or unit that no metric has
+        return given
 
     def parts(self) -> Parts:
         """Section, kind and field names of every component that the runs had."""
@@ -61,10 +62,13 @@ class Record(BaseModel):
 
     def foreign(self) -> tuple[Metric, ...]:
         """The metrics of plug-ins, as values that can be told and not gathered."""
-        return tuple(
-            Metric(name=name, accumulator=GATHERED, **one.model_dump())
-            for name, one in self.metrics_of_plugins.items()
-        )
+        return _metrics(self.metrics_of_plugins)
+
+
+def _metrics(given: Mapping[str, MetricOfPlugin]) -> tuple[Metric, ...]:
+    return tuple(
+        Metric(name, accumulator=GATHERED, **one.model_dump()) for name, one in given.items()
+    )
 
 
 def read(folder: Path) -> Record:

@@ -98,18 +98,12 @@ class Store:
         # With more draws in study.json than in the scenario, the study could not be continued. And
         # without study.json, a folder that is not empty is no study.
         if known:
-            self._write_scenario(texts)
+            files.write_texts(self.folder, texts)
         files.make_folder(self.folder)
         files.write_bytes(self.folder / STUDY, json_files.encode(content))
         files.make_folder(self.folder / UNITS)
         if not known:
-            self._write_scenario(texts)
-
-    def _write_scenario(self, texts: Mapping[str, str]) -> None:
-        """Write the scenario, which refers to nothing outside the folder, and its plug-ins."""
-        for name, content in texts.items():
-            files.make_folder((self.folder / name).parent)
-            files.write_bytes(self.folder / name, content.encode())
+            files.write_texts(self.folder, texts)
 
     def _metrics(self) -> dict[str, Any]:
         """What a reader without the study's plug-ins has to know of its metrics."""
@@ -129,7 +123,7 @@ class Store:
         remedy: str = "name another folder with --out",
     ) -> None:  # fmt: skip
         if found := disagreements(identity, self._identity()):
-            raise UsageError(f"{folder} holds another study: {few(found)}; {remedy}")
+            raise UsageError(f"{folder} holds another study: {found}; {remedy}")
 
     def _identity(self) -> dict[str, Any]:
         """The identity as JSON gives it back."""
@@ -231,11 +225,6 @@ class _Again:
         return self.make()
 
 
-def few(texts: Sequence[str]) -> str:
-    """The first of several texts."""
-    return "; ".join(texts[:4]) + (" and more" if len(texts) > 4 else "")
-
-
 def _place(unit: Unit, plan: Plan) -> tuple[str, int, int, int]:
     return unit.law, unit.cell, unit.first, unit.count
 
@@ -290,8 +279,7 @@ def read(path: Path, seal: str) -> UnitResult | None:
     unit = undamaged(content, seal)
     if unit is None:
         return None
-    with hdf5.readable(path, "runs"), h5py.File(io.BytesIO(content), "r") as file:
-        hdf5.check(file)
+    with hdf5.opened(path, "runs", content) as file:
         table, names = file["table"][()], file["table"].attrs["metrics"].split()
         causes = tuple(text.decode() for text in file["cause"][()])
         metrics = dict(zip(names, table[:-1], strict=True))

@@ -14,14 +14,22 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.core.escaping import visible
 from podusv_cli.core.plugins import ABSENT
 from podusv_cli.scenario import plugins
-from podusv_cli.scenario.load import LOOKED_AT, Loaded, Plugged, load, load_stored, resolved_yaml
+from podusv_cli.scenario.load import (
+    LOOKED_AT,
+    Loaded,
+    Plugged,
+    load,
+    load_stored,
+    resolved_yaml,
+    tree_yaml,
+)
 from podusv_cli.scenario.messages import Check
 from podusv_cli.scenario.phrases import unknown
 from podusv_cli.storage import files, json_files
 from podusv_cli.storage.run_folder import STUDY
 from podusv_cli.study import outputs, record
 from podusv_cli.study.plan import KERNELS, differing, disagreements, plan
-from podusv_cli.study.store import RUNS, SCENARIO, Store, few
+from podusv_cli.study.store import RUNS, SCENARIO, Store
 from podusv_cli.workflows.keep import alone, seen_from
 
 FORMATS = ("csv", "parquet")
@@ -74,6 +82,11 @@ def scenario_of(
     return _kept(config, overrides, checks, added, partial(plugins.loaded, trusted=trusted))
 
 
+def scenario_texts(loaded: Loaded) -> dict[str, str]:
+    """The scenario and its plug-ins, by the names of their files in the folder."""
+    return {SCENARIO: tree_yaml(loaded), **loaded.scenario.plugin_files()}
+
+
 def _kept(
     folder: Path, overrides: Sequence[str] = (), checks: Sequence[Check] = (),
     added: Sequence[str] = (), plugged: Plugged = LOOKED_AT,
@@ -106,7 +119,7 @@ def stored(
     if any(key not in told or not key.endswith(KERNELS) for key in keys):
         raise UsageError(
             f"{study / SCENARIO} is not the scenario of the runs in {STUDY}: "
-            f"{few(disagreements(ours, told, keys))}; restore the file, or use the podusv that "
+            f"{disagreements(ours, told, keys)}; restore the file, or use the podusv that "
             "made them"
         )
     store = Store(study, made, {key: told[key] for key in keys})

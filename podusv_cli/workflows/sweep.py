@@ -18,7 +18,7 @@ from podusv_cli.process.extras import Extras, Missing
 from podusv_cli.process.interrupts import interrupts_deferred
 from podusv_cli.scenario import plugins
 from podusv_cli.scenario.limits import limits
-from podusv_cli.scenario.load import Loaded, tree_yaml
+from podusv_cli.scenario.load import Loaded
 from podusv_cli.scenario.sweep import Keep
 from podusv_cli.storage import manifest
 from podusv_cli.storage.writer import PATIENCE, TABLES, sole_writer
@@ -37,7 +37,14 @@ from podusv_cli.study.sittings import Sitting
 from podusv_cli.study.store import SCENARIO, Store
 from podusv_cli.workflows.keep import keep
 from podusv_cli.workflows.run import RESULTS
-from podusv_cli.workflows.studies import Warn, check_study, scenario_of, silent, stored
+from podusv_cli.workflows.studies import (
+    Warn,
+    check_study,
+    scenario_of,
+    scenario_texts,
+    silent,
+    stored,
+)
 
 WHOLE: Part = (1, 1)  # the only shard
 
@@ -177,8 +184,7 @@ def _planned(config: Path, request: Request) -> tuple[Store, dict[str, str]]:
         raise UsageError(f"--out {request.out} is a file; name a folder")
     loaded = _loaded(config, request)
     folder = request.out or (config if given else RESULTS / f"{loaded.scenario.name}-sweep")
-    texts = {SCENARIO: tree_yaml(loaded), **loaded.scenario.plugin_files()}
-    return Store(folder, plan(loaded)), texts
+    return Store(folder, plan(loaded)), scenario_texts(loaded)
 
 
 def _loaded(config: Path, request: Request) -> Loaded:

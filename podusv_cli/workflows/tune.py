@@ -25,6 +25,7 @@ from podusv_cli.study.march import Engine, Tally
 from podusv_cli.study.plan import digest
 from podusv_cli.study.remote import Recipe
 from podusv_cli.study.sittings import Sitting
+from podusv_cli.study.store import SCENARIO
 from podusv_cli.study.unit import prepare
 from podusv_cli.tuning import folder as place
 from podusv_cli.tuning import outputs
@@ -40,7 +41,7 @@ from podusv_cli.tuning.space import with_gains
 from podusv_cli.tuning.trials import best
 from podusv_cli.tuning.validation import validate
 from podusv_cli.workflows.run import RESULTS
-from podusv_cli.workflows.studies import scenario_of
+from podusv_cli.workflows.studies import scenario_of, scenario_texts
 
 Tell = Callable[[Tally, str], None]
 
@@ -105,7 +106,7 @@ def _tuned(
     told = place.known(folder, plan)
     plan = replace(plan, idle=told.idle if told else _idle(plan, request))
     stamp = started.isoformat(timespec="seconds")
-    place.write(folder, plan, told, stamp, place.scenario_texts(loaded))
+    place.write(folder, plan, told, stamp, scenario_texts(loaded))
     request.begin(f"{plan.size}; in {folder}")
     with _engine(plan, folder, request) as found:
         results = _simulated(plan, folder, request, started, found, tell)
@@ -188,7 +189,7 @@ def _idle(plan: TunePlan, request: Request) -> dict[str, tuple[str, ...]]:
 
 def _engine(plan: TunePlan, folder: Path, request: Request) -> AbstractContextManager[Engine]:
     """Where trials and fresh draws are simulated."""
-    text = (folder / place.SCENARIO).read_text(encoding="utf-8")
+    text = (folder / SCENARIO).read_text(encoding="utf-8")
     recipe = Recipe(text, tuple(plan.scenario.plugin_files().items()))
     seal = digest(plan.base.identity)
     return engine(request.scheduler, request.workers, recipe, seal, mixed=request.mixed)
