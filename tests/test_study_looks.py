@@ -142,7 +142,7 @@ def test_odd_words_in_the_record_are_refused_in_a_sentence(study, podusv, change
 def installed_lab(tmp_path, monkeypatch):
     """`examples/my_lab` as an installed package, in this process and its children."""
     with suppress(ImportError):
-        import importlib_metadata  # noqa: F401, PLC0415  as Dask does; it replaces Python's own
+        import importlib_metadata  # noqa: F401  as Dask does; it replaces Python's own
     monkeypatch.syspath_prepend(str(install(tmp_path / "site")))
     installed.cache_clear()
     yield
