@@ -20,6 +20,7 @@ from podusv_cli.scenario.expressions import ExpressionError
         ("median(a.iae / b.iae) < 1", "'median'; it belongs to sweep.claims (allowed here: abs"),
         ("a.iae / 0.0 < 3", "'a.iae / 0.0': divides by zero"),
         ("a.iae < 1_0", "'1_0' is no number; write it in decimal"),
+        ("a.iae < 1e1_0", "'1e1_0' is no number; write it in decimal"),
         ("a.iae < 0x10", "'0x10' is no number"),
         ("a.iae < 1j", "not a plain number"),
         ("max(a.iae) < 3", "a number where a signal is needed"),

@@ -11,7 +11,7 @@ from old_results import draw_quickly
 from storage_samples import files
 from test_reproduction import untimed
 
-from podusv_cli.scenario.load import load, load_resolved, resolved_yaml
+from podusv_cli.scenario.load import load, load_stored, resolved_yaml
 from podusv_cli.scenario.presets import preset_names, with_presets
 from podusv_cli.workflows import compare, execute
 
@@ -102,4 +102,4 @@ ALIKE = {
 )
 def test_every_run_of_a_shipped_scenario_reads_back(name):
     for scenario in load(SHIPPED[name]).scenario.singles().values():
-        assert load_resolved(resolved_yaml(scenario), "resolved.yaml") == scenario
+        assert load_stored(resolved_yaml(scenario), "resolved.yaml").scenario == scenario

@@ -11,7 +11,7 @@ from scenario_samples import SOUND, loaded
 
 from podusv_cli.core.component import Component
 from podusv_cli.scenario.keys import limits, members, sections
-from podusv_cli.scenario.load import HEADING, load_resolved, load_text, resolved_yaml, values
+from podusv_cli.scenario.load import HEADING, load_stored, load_text, resolved_yaml, values
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sections import LABEL
 from podusv_cli.scenario.sweep import Sweep
@@ -136,7 +136,7 @@ def possible(data: dict[str, Any]) -> Scenario:
 @given(SCENARIOS)
 def test_a_resolved_scenario_reads_back_to_the_same_bits(data):
     scenario = possible(data)
-    again = load_resolved(resolved_yaml(scenario), "resolved.yaml")
+    again = load_stored(resolved_yaml(scenario), "resolved.yaml").scenario
     assert again == scenario
     assert repr(again) == repr(scenario), "-0.0 equals 0.0, but is not the same number"
 
@@ -150,7 +150,7 @@ def test_a_sea_seen_through_sensors_reads_back_to_the_same_bits():
     )
     text += "estimator: {kind: ekf}\n"
     scenario = load_text(text, "a.yaml").scenario
-    again = load_resolved(resolved_yaml(scenario), "resolved.yaml")
+    again = load_stored(resolved_yaml(scenario), "resolved.yaml").scenario
     assert again == scenario
     assert repr(again) == repr(scenario)
 

@@ -4,7 +4,7 @@ import pytest
 from scenario_samples import SOUND, write
 
 from podusv_cli.scenario import limits
-from podusv_cli.scenario.load import load, load_resolved, resolved_yaml
+from podusv_cli.scenario.load import load, load_stored, resolved_yaml
 from podusv_cli.scenario.yaml_text import MAX_NODES
 from podusv_cli.storage import json_files, manifest
 
@@ -24,7 +24,7 @@ def of_two_files(tmp_path, monkeypatch):
 @pytest.mark.slow
 def test_a_scenario_of_several_long_files_is_read_back(of_two_files):
     text = resolved_yaml(of_two_files)
-    assert load_resolved(text, "resolved.yaml") == of_two_files
+    assert load_stored(text, "resolved.yaml").scenario == of_two_files
 
 
 @pytest.mark.slow

@@ -12,8 +12,8 @@ STUDY, PROVENANCE = "study.json", "provenance.json"
 REMOVED = object()
 VALUES = [None, [], {}, "x", -1, 1.5, 10**290, True, [1], {"a": [1]}]
 DAMAGES = [
-    *((STUDY, (key,), value) for key in ("identity", "history", "laws") for value in VALUES[3:8]),
-    *((STUDY, (key,), REMOVED) for key in ("draws", "identity", "history", "laws", "cells")),
+    *((STUDY, (key,), value) for key in ("identity", "history") for value in VALUES[3:8]),
+    *((STUDY, (key,), REMOVED) for key in ("draws", "identity", "history")),
     *((STUDY, ("draws",), value) for value in VALUES[:6]),
     *((STUDY, ("history", 0), value) for value in VALUES),
     *((STUDY, ("history", 0, "draws"), value) for value in (None, "x", 0, [])),

@@ -1,11 +1,14 @@
-"""A table of a study shows what is stored in its own file, and nothing of another file."""
+"""A folder of podusv shows what is stored in its own files, and nothing of another file."""
 
+import json
 import os
 import shutil
 
 import h5py
 import numpy as np
 import pytest
+from rerun_samples import copied
+from rerun_samples import made as made_run
 from small_study import TEXT, made, small
 
 from podusv_cli.core.errors import StorageError
@@ -92,3 +95,76 @@ def test_a_pipe_in_place_of_a_file_does_not_hang(study, podusv, name, code):
     said = podusv("sweep", "status", study)
     assert said.code == code
     assert ("not a regular file" in said.err) == (code == 5)
+
+
+ROWS = "t,b_u,b_v,b_r\n0,7654.5,0,0\n1,0,0,0\n"
+WAYS = {
+    "extends": ("name:", "extends: {}/a.yaml\nname:"),
+    "file": ("{kind: harmonic}", "{{kind: file, file: {}/a.csv}}"),
+    "list": ("{kind: harmonic}", "[{{kind: none}}, {{kind: file, file: {}/a.csv}}]"),
+    "link": None,
+}
+COMMANDS = {
+    "status": ("sweep", "status"),
+    "report": ("sweep", "report", "--no-figures"),
+    "draw": ("sweep", "draw", "--law", "pid", "--draw", "1"),
+    "run": ("sweep", "run", "--no-figures"),
+    "tune": ("tune",),
+}
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_stored_study_names_no_other_file(study, secret, podusv, command, way):
+    if command == "tune":
+        pytest.importorskip("optuna")
+        (study / "tune.json").write_text(json.dumps({}))
+    (secret / "a.csv").write_text(ROWS)
+    (secret / "a.yaml").write_text("s3cret: 7654.5\ndescription: s3cret\n")
+    path = study / SCENARIO
+    if WAYS[way]:
+        old, new = WAYS[way]
+        path.write_text(path.read_text().replace(old, new.format(secret)))
+    else:
+        path.replace(secret / "whole.yaml")
+        path.symlink_to(secret / "whole.yaml")
+    words = COMMANDS[command]
+    before = sorted(study.iterdir())
+    said = podusv(*words[:2], study, *words[2:]) if words[0] == "sweep" else podusv("tune", study)
+    assert said.code == 5
+    assert "refers to another file" in said.err or "a symbolic link" in said.err
+    assert "s3cret" not in said.err
+    assert "7654.5" not in said.err
+    assert sorted(study.iterdir()) == before
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    return made_run(tmp_path_factory.mktemp("run") / "first")
+
+
+FILES = {
+    "disturbance": b"disturbance: {kind: file, file: %s/a.csv}",
+    "list": b"disturbance: [{kind: none}, {kind: file, file: %s/a.csv}]",
+}
+
+
+@pytest.mark.parametrize("command", ["plot", "compare", "diff", "rerun"])
+@pytest.mark.parametrize("text", FILES.values(), ids=FILES)
+def test_a_finished_run_names_no_other_file(finished, secret, podusv, command, text):
+    (secret / "a.csv").write_text(ROWS)
+    given = text.replace(b"%s", str(secret).encode())
+
+    def change(content):
+        old = b"disturbance:\n  kind: none"
+        assert old in content
+        return content.replace(old, given)
+
+    run = copied(finished, secret / "run", resolved_yaml=change)
+    if command == "diff":
+        said = podusv("diff", run, finished)
+    else:
+        said = podusv(command, run, finished) if command == "compare" else podusv(command, run)
+    assert said.code == 5
+    assert "file: refers to another file" in said.err
+    assert "7654.5" not in said.out + said.err

@@ -4,14 +4,16 @@ import csv
 import json
 import shutil
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from installed_sample import LAB, install
 from plugin_samples import LAW
 from small_study import TEXT
 from test_plugins_everywhere import MORE
 
-from podusv_cli.core.plugins import MODULES
+from podusv_cli.core.plugins import MODULES, installed
 from podusv_cli.workflows import sweep
 
 MARK = Path("imported")
@@ -112,6 +114,55 @@ def test_logs_are_made_where_the_plug_ins_are_trusted(study, podusv):
     assert not (study / "logs").exists()
     assert podusv("sweep", "report", study, "--no-figures", "--trust").code == 0
     assert len(list((study / "logs").iterdir())) == 3 * 2
+
+
+ODD = {
+    "name": {"metrics_of_plugins": {"<script>": {}}},
+    "unit": {"metrics_of_plugins": {"largest_east": {"unit": "\n"}}},
+    "unknown": {"metrics": ["iae", "largest_west"]},
+    "twice": {"metrics": ["iae", "iae"]},
+}
+
+
+@pytest.mark.parametrize("change", ODD.values(), ids=ODD)
+def test_odd_words_in_the_record_are_refused_in_a_sentence(study, podusv, change):
+    record = json.loads((study / "study.json").read_text())
+    plain = record["metrics_of_plugins"]["largest_east"]
+    metrics = {name: plain | new for name, new in change.get("metrics_of_plugins", {}).items()}
+    record |= change | ({"metrics_of_plugins": metrics} if metrics else {})
+    (study / "study.json").write_text(json.dumps(record))
+    before = (study / "runs.h5").read_bytes()
+    said = podusv("sweep", "report", study, "--no-figures")
+    assert said.code == 5
+    assert f"{study / 'study.json'}: damaged" in said.err
+    assert (study / "runs.h5").read_bytes() == before
+
+
+@pytest.fixture
+def installed_lab(tmp_path, monkeypatch):
+    """`examples/my_lab` as an installed package, in this process and its children."""
+    with suppress(ImportError):
+        import importlib_metadata  # noqa: F401  as Dask does; it replaces Python's own
+    monkeypatch.syspath_prepend(str(install(tmp_path / "site")))
+    installed.cache_clear()
+    yield
+    installed.cache_clear()
+    for name in [name for name in sys.modules if name.partition(".")[0] == "my_lab"]:
+        del sys.modules[name]
+
+
+@pytest.mark.usefixtures("installed_lab")
+def test_a_study_of_an_installed_package_asks_for_no_trust(tmp_path, podusv):
+    text = (LAB / "scenario.yaml").read_text().replace("duration: 20.0", "duration: 0.5")
+    sweep = "sweep: {draws: 2, vary: {start.psi: {angle: all}}, keep: {draws: [0]}}\n"
+    (tmp_path / "lab.yaml").write_text(text.partition("claims:")[0] + sweep)
+    study = tmp_path / "study"
+    made = podusv("sweep", "run", "lab.yaml", "--out", study, "--workers", "1", "--no-figures")
+    assert made.code == 0, made.err
+    shutil.rmtree(study / "logs")
+    said = podusv("sweep", "report", study, "--no-figures")
+    assert (said.code, "trust" in said.err) == (0, False)
+    assert len(list((study / "logs").iterdir())) == 3
 
 
 CHANGES = [("seed: 7", "seed: 8"), ("[0.7, 1.3]", "[0.7, 1.4]"), ("duration: 1.0", "duration: 2.0")]

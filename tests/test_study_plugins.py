@@ -9,7 +9,7 @@ from plugin_samples import LAW
 from small_study import TEXT
 from test_study_dask import DASK, PATIENCE, background, until
 
-from podusv_cli.core.errors import ScenarioError
+from podusv_cli.core.errors import LawError, ScenarioError
 from podusv_cli.study import remote
 from podusv_cli.study.joining import digests
 from podusv_cli.study.remote import Recipe
@@ -53,6 +53,16 @@ def test_a_study_keeps_its_plugin(config, tmp_path, monkeypatch):
     assert alone.metrics["iae"] == table.metric("mine", "iae")[0, 3]
     merged = merge([study], tmp_path / "merged", sweep.Request(figures=False))
     assert (merged.folder / RUNS).read_bytes() == (study / RUNS).read_bytes()
+
+
+def test_a_mistake_in_a_law_leaves_no_folder_that_the_mended_law_does_not_fit(config, tmp_path):
+    law = config.parent / "laws/my_law.py"
+    law.write_text(LAW.replace("k.", "k.no_such_", 1))
+    with pytest.raises(LawError, match="no_such_"):
+        swept(config, tmp_path / "study")
+    assert not (tmp_path / "study").exists()
+    law.write_text(LAW)
+    assert swept(config, tmp_path / "study", overrides=["sweep.draws=2"]).results.made == 6
 
 
 @pytest.mark.parametrize("name", ["law", "until", "sha256", "success"])

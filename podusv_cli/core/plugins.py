@@ -157,8 +157,8 @@ def installed() -> Plugins:
     """
     found: dict[str, Plugin] = {}
     for package in distributions():
-        points = tuple(
-            (point.group.removeprefix("podusv."), point)
+        points = tuple(  # with the backport of importlib.metadata, which Dask imports, of its class
+            (point.group.removeprefix("podusv."), EntryPoint(point.name, point.value, point.group))
             for point in package.entry_points
             if point.group in GROUPS
         )

@@ -17,7 +17,7 @@ LONGEST = 500  # characters of an expression
 LARGEST = 1e300  # of numbers written down
 DEEPEST = 60  # nested brackets, signs and operations
 # Numbers that Python reads and scenarios do not write.
-FOREIGN = re.compile(r"(?<![\w.])(?:0[xobXOB]\w+|[0-9.]*[0-9]_[0-9_.]*)")
+FOREIGN = re.compile(r"(?<![\w.])(?:0[xobXOB]\w+|[0-9.]*[0-9](?:\.?[eE][+-]?[0-9]+)?_[0-9_.]*)")
 
 
 # The functions of each language, by the section of a scenario that it is for.

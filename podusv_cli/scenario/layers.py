@@ -7,9 +7,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial, reduce
 
+from podusv_cli.scenario.named_files import ELSEWHERE
 from podusv_cli.scenario.phrases import found
 from podusv_cli.scenario.shipped import relative_to
-from podusv_cli.scenario.yaml_text import MAX_DEPTH, plain_node, read, read_text
+from podusv_cli.scenario.yaml_text import MAX_DEPTH, MAX_NODES, plain_node, read, read_text
 from podusv_cli.scenario.yaml_tree import (
     NAMED_BY_KEYS,
     Fault,
@@ -35,14 +36,28 @@ def composed(
     None if the text cannot be parsed. File names in `extends` are relative to `source`.
     """
     layers = _layers(text, source, faults, placed)
-    settings = [_override_tree(override, faults) for override in overrides]
+    top = _settings(source, overrides, faults)
     if not layers:
         return None
-    # All overrides are one layer, so that their order matters only where they give the same key.
-    nothing = Node({}, Mark(source))
-    top = reduce(partial(merge, by_kind=False), settings, nothing)
     whole = reduce(partial(_over, faults=faults), [*reversed(layers), top])
     return replace(whole, mark=Mark(source))
+
+
+def alone(
+    text: str, source: str, overrides: Sequence[str], faults: list[Fault], most: int
+) -> Node | None:
+    """As `composed` for a text of at most `most` values that extends no file."""
+    node = _mapping(text, source, faults, most=most)
+    if node and (above := node.mapping.get("extends")):
+        faults.append(Fault(above.mark, "extends", ELSEWHERE))
+    top = _settings(source, overrides, faults)
+    return node and replace(_over(node, top, faults), mark=Mark(source))
+
+
+def _settings(source: str, overrides: Sequence[str], faults: list[Fault]) -> Node:
+    """All overrides as one layer, so that their order matters only where they give one key."""
+    trees = [_override_tree(override, faults) for override in overrides]
+    return reduce(partial(merge, by_kind=False), trees, Node({}, Mark(source)))
 
 
 def _over(base: Node, top: Node, faults: list[Fault]) -> Node:
@@ -90,8 +105,10 @@ def extended_files(node: Node) -> tuple[Node, ...]:
     return above.content if isinstance(above.content, tuple) else (above,)
 
 
-def _mapping(text: str, source: str, faults: list[Fault], placed: bool = True) -> Node | None:
-    node = read(text, source, faults, placed=placed)
+def _mapping(
+    text: str, source: str, faults: list[Fault], placed: bool = True, most: int = MAX_NODES
+) -> Node | None:  # fmt: skip
+    node = read(text, source, faults, placed=placed, most=most)
     if node and not isinstance(node.content, dict):
         # The text is not shown: the file may be one that the user may not read.
         what = "text" if isinstance(node.content, str) else found(node.content, node.text)

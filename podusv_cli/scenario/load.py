@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -14,12 +14,12 @@ from podusv_cli.core.errors import ScenarioError, StorageError
 from podusv_cli.core.plugins import Plugin, Plugins
 from podusv_cli.scenario import plugins
 from podusv_cli.scenario.keys import keys_of
-from podusv_cli.scenario.layers import composed
+from podusv_cli.scenario.layers import alone, composed
 from podusv_cli.scenario.messages import Check, check
 from podusv_cli.scenario.model import Scenario, scenario_class
-from podusv_cli.scenario.phrases import found
+from podusv_cli.scenario.named_files import without_files
 from podusv_cli.scenario.presets import complete, stands_in, with_contents
-from podusv_cli.scenario.yaml_text import MAX_NODES, read, read_text, resolve
+from podusv_cli.scenario.yaml_text import MAX_NODES, read_text, resolve
 from podusv_cli.scenario.yaml_tree import (
     Fault,
     Mark,
@@ -32,7 +32,6 @@ from podusv_cli.scenario.yaml_tree import (
     plain,
 )
 
-REFERENCES: tuple[Route, ...] = (("extends",), ("path", "file"))  # to other files
 # Values; several times those of one file, since a scenario may extend files with long lists.
 MOST_RESOLVED = 3 * MAX_NODES
 STUDIES = ("sweep", "tune")  # sections that only studies have
@@ -97,10 +96,37 @@ def load_text(
     root = composed(text, source, overrides, faults, placed=placed)
     if root is None:
         raise ScenarioError(_ordered(faults, source))
-    root = plugins.with_given(root, files)
-    root, known = _plugged(plugged, root, source, faults)
+    root, known = _plugged(plugged, plugins.with_given(root, files), source, faults)
     scenario, origins = _checked(root, known, source, faults, checks)
     return Loaded(scenario, origins, text, root)
+
+
+def load_stored(
+    text: str, source: str, overrides: Sequence[str] = (), checks: Sequence[Check] = (),
+    files: Sequence[str | Plugin] = (), plugged: Plugged = LOOKED_AT,
+) -> Loaded:  # fmt: skip
+    """The scenario in the folder of a run, study or search: it refers to no file but its plug-ins.
+
+    Unless `plugged` loads these, components that are in no installed package are kept as plain
+    values. Raises StorageError where the text names another file, which is not read, or is no YAML
+    mapping at all; ScenarioError where it is one that this podusv does not know.
+    """
+    faults: list[Fault] = []
+    root = alone(text, source, overrides, faults, MOST_RESOLVED)
+    _undamaged(faults, source)
+    if root is None or faults:
+        raise ScenarioError(_ordered(faults, source))
+    root, known = _plugged(plugged, plugins.with_given(root, files), source, faults)
+    with_contents(root, keys_of(scenario_class(known)), faults, without_files)
+    _undamaged(faults, source)
+    scenario, origins = _checked(root, known, source, faults, checks)
+    return Loaded(scenario, origins, text, root)
+
+
+def _undamaged(faults: list[Fault], source: str) -> None:
+    """Raise StorageError with the first fault in the file called `source`."""
+    for fault in _ordered([one for one in faults if one.mark.source == source], source)[:1]:
+        raise StorageError(f"{fault} (damaged: not as podusv wrote it)")
 
 
 def _plugged(
@@ -129,32 +155,6 @@ def _checked(
         first = next(iter(scenario.controllers.values()))
         scenario = scenario.model_copy(update={"controller": first})
     return scenario, origins
-
-
-def load_resolved(
-    text: str, source: str, checks: Sequence[Check] = (), plugged: Plugged = LOOKED_AT
-) -> Scenario:
-    """The scenario of a finished run, which refers to no file but its plug-ins.
-
-    Unless `plugged` loads these, components that are in no installed package are kept as plain
-    values. Raises StorageError where it refers to another one or is no YAML mapping at all,
-    ScenarioError where it is one that this podusv does not know.
-    """
-    faults: list[Fault] = []
-    root = read(text, source, faults, most=MOST_RESOLVED)
-    faults += [
-        Fault(node.mark, dotted(route), "refers to another file, which no finished run does")
-        for route in REFERENCES
-        if root and (node := find(root, route)) and node.content is not None
-    ]
-    if root and not isinstance(root.content, dict):
-        faults.append(Fault(root.mark, "", f"is {found(root.content, root.text)}, no scenario"))
-    if faults or not root:
-        (first, *_) = _ordered(faults, source)
-        raise StorageError(f"{first} (damaged: not as podusv wrote it)")
-    root = replace(root, mark=Mark(source))
-    root, known = _plugged(plugged, root, source, faults)
-    return _checked(root, known, source, faults, checks)[0]
 
 
 def _ordered(faults: list[Fault], first: str) -> list[Fault]:

@@ -16,6 +16,8 @@ MAX_POINTS = MAX_NODES // 4  # a point is three values, and the resolved scenari
 MOST_FAULTS = 10  # in one file of points
 COLUMNS = ("x [m]", "y [m]")
 
+ELSEWHERE = "refers to another file, which nothing in a folder of podusv does"
+
 Form = Callable[[str, str, list[Fault]], Node]  # of a file's text and name
 
 
@@ -26,6 +28,17 @@ def with_files(given: Node, section: str, model: type[Component], faults: list[F
         forms[key] = taker, partial(_whole, f"{section}.{key}")
     for key, (taker, form) in forms.items():
         given = _read_in(given, section, key, taker, form, faults)
+    return given
+
+
+def without_files(
+    given: Node, section: str, model: type[Component], faults: list[Fault]
+) -> Node:  # fmt: skip
+    """The section as it is; a fault for every file that it names itself, not with `--set`."""
+    for key in (*model.rows_of, *model.texts_of):
+        file = given.mapping.get(key)
+        if file and file.mark.line and file.content is not None:
+            faults.append(Fault(file.mark, f"{section}.{key}", ELSEWHERE))
     return given
 
 

@@ -198,14 +198,15 @@ def recorded(
 
     The files in its folder are not read, so that looking at it runs nobody's code. Those that
     the user names (`files`) and installed packages are, and where they are the very ones that were
-    used, their components, too. All other components are kept as plain values. `parts` and
-    `metrics` are components that the tree's own need not have, and metrics, of a study's runs.
+    used, their components, too. Where one is not at hand, ABSENT is among the plug-ins, and all
+    other components are kept as plain values. `parts` and `metrics` are components that the tree's
+    own need not have, and metrics, of a study's runs.
     """
     own = root.mapping.get(KEY)
     used = {entry.word("sha256") for entry in own.mapping.values()} if own else set()
     here = from_files(files, faults)
     known = tuple(p if p.sha256 in used else p.without_components() for p in here)
-    if not used:
+    if not used - {plugin.sha256 for plugin in here}:
         return root, known
     unknown = tuple(("metrics", one) for one in metrics if one.name not in metrics_with(known))
     told = Plugin("metrics of the study", digest(repr(metrics)), offers=unknown)
@@ -216,11 +217,6 @@ def again(command: str, folder: File) -> str:
     """The command line that goes on with a folder, which may have plug-in files of its own."""
     trust = " --trust" if (folder / FOLDER).is_dir() else ""
     return f"podusv {command} {shlex.quote(str(folder))}{trust}"
-
-
-def are_absent(known: Plugins) -> bool:
-    """Whether values stand for a plug-in that is not loaded."""
-    return ABSENT in known
 
 
 def _stand_ins(root: Node, parts: Parts, known: type[Scenario]) -> Plugins:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cache
 from importlib.resources import files
@@ -29,6 +29,7 @@ NAMED: tuple[Route, ...] = (
 )  # fmt: skip
 EMPTIED: tuple[Route, ...] = (*NAMED, ("sweep", "keep"))  # null is a section with nothing in it
 BESIDE_NAMED = {named[:end] for named in NAMED for end in range(len(named) + 1)}
+Fill = Callable[[Node, str, type[Component], list[Fault]], Node]  # a section with its files
 
 
 @cache
@@ -105,12 +106,16 @@ def _sections(root: Node, top: Key, faults: list[Fault]) -> Node:
     return with_contents(root, top, faults)
 
 
-def with_contents(root: Node, top: Key, faults: list[Fault]) -> Node:
-    """The tree with what files hold in place of the files' names."""
+def with_contents(root: Node, top: Key, faults: list[Fault], fill: Fill = with_files) -> Node:
+    """The tree with what files hold in place of the files' names, or as `fill` has it."""
     for name, given, model in _of_kinds(root, top):
-        root = root.with_entry(name, with_files(given, name, model, faults))
+        root = root.with_entry(name, fill(given, name, model, faults))
     for name, parts, item in _lists(root, top):
-        parts = tuple(_listed(part, f"{name}[{i}]", item, faults) for i, part in enumerate(parts))
+        kinds = [item.kinds.get(part.word("kind")) if part.mapping else None for part in parts]
+        parts = tuple(
+            fill(part, f"{name}[{i}]", kind.model, faults) if kind else part
+            for i, (part, kind) in enumerate(zip(parts, kinds, strict=True))
+        )
         root = root.with_entry(name, replace(root.mapping[name], content=parts))
     several, default = root.mapping.get("controllers"), root.mapping.get("controller")
     if not several or not several.mapping:
@@ -120,7 +125,7 @@ def with_contents(root: Node, top: Key, faults: list[Fault]) -> Node:
         kind = own.word("kind") or (default.word("kind") if default else "")
         law = top.keys["controller"].kinds.get(kind)
         if law and own.mapping:
-            laws[label] = with_files(own, f"controllers.{label}", law.model, faults)
+            laws[label] = fill(own, f"controllers.{label}", law.model, faults)
     return root.with_entry("controllers", replace(several, content=laws))
 
 
@@ -130,12 +135,6 @@ def _lists(root: Node, top: Key) -> Iterator[tuple[str, tuple[Node, ...], Key]]:
         given, item = root.mapping.get(name), key.item(0)
         if given and isinstance(given.content, tuple) and item and item.kinds:
             yield name, given.content, item
-
-
-def _listed(part: Node, name: str, item: Key, faults: list[Fault]) -> Node:
-    """One section of a list with what its files hold."""
-    known = item.kinds.get(part.word("kind")) if part.mapping else None
-    return with_files(part, name, known.model, faults) if known else part
 
 
 def _of_kinds(root: Node, top: Key) -> list[tuple[str, Node, type[Component]]]:

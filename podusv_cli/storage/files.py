@@ -87,6 +87,13 @@ def write_all(contents: Mapping[Path, bytes]) -> None:
         sync_folder(folder)
 
 
+def write_texts(folder: Path, texts: Mapping[str, str]) -> None:
+    """As `write_all` for texts by their names in the folder, whose folders are made."""
+    for name in texts:
+        make_folder((folder / name).parent)
+    write_all({folder / name: text.encode() for name, text in texts.items()})
+
+
 def check_places(paths: Iterable[Path]) -> None:
     """Raise StorageError if these files cannot be written; nothing is left behind.
 

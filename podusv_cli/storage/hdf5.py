@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
 import h5py
 
 from podusv_cli.core.errors import StorageError
+from podusv_cli.storage import files
 
 # What h5py raises on damaged files; ValueError includes text that is not UTF-8.
 DAMAGE = (
@@ -25,6 +27,28 @@ def readable(path: Path, kind: str) -> Iterator[None]:
     except DAMAGE as error:
         reason = " ".join(str(error).split()) or type(error).__name__
         raise StorageError(f"{path}: damaged, or not {kind} of podusv: {reason}") from error
+
+
+@contextmanager
+def opened(path: Path, kind: str, content: bytes | None = None) -> Iterator[h5py.File]:
+    """A regular file with all of its data in itself, or its `content`, which is read already.
+
+    Whatever h5py raises in the block is a StorageError that calls the file no `kind`.
+    """
+    source = _descriptor(path) if content is None else nullcontext(io.BytesIO(content))
+    with source as name, readable(path, kind), h5py.File(name, "r") as file:
+        check(file)
+        yield file
+
+
+@contextmanager
+def _descriptor(path: Path) -> Iterator[str]:
+    """A name of the open file: under its own name there may be another one by now.
+
+    HDF5 reads it by itself, as it may close it when Python has ended and cannot be called.
+    """
+    with files.opened(path) as raw:
+        yield f"/dev/fd/{raw.fileno()}"
 
 
 def check_link(group: h5py.h5g.GroupID, name: str) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from podusv_cli.core.component import Component
+from podusv_cli.core.plugins import ABSENT
 from podusv_cli.core.signal import NAME, NAME_IN_WORDS
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.loop import ClosedLoop, Observer, entries
@@ -18,7 +19,6 @@ from podusv_cli.scenario.keys import Key
 from podusv_cli.scenario.load import values
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import did_you_mean, found, unknown
-from podusv_cli.scenario.plugins import are_absent
 from podusv_cli.scenario.sections import CLAIM, CLAIM_IN_WORDS
 from podusv_cli.scenario.sweep import Quantity, Sweep
 from podusv_cli.scenario.yaml_tree import Route, dotted, entries_of, route
@@ -46,7 +46,7 @@ def sweep_faults(scenario: Scenario) -> list[tuple[Route, str]]:
         return []
     laws = list(_laws(scenario, sweep))
     # Without its plug-ins, nothing can be drawn; study.json says of what draws the runs are.
-    draws = () if are_absent(scenario.plugged) else _vary(singles(scenario), sweep)
+    draws = () if ABSENT in scenario.plugged else _vary(singles(scenario), sweep)
     return laws or [
         *_metric_names(scenario), *draws, *_twice(sweep), *_keep(scenario, sweep),
         *_claims(scenario, sweep),

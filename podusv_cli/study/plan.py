@@ -19,7 +19,6 @@ from podusv_cli.engine.object_cache import ingredients
 from podusv_cli.metrics.table import Metrics
 from podusv_cli.scenario.load import Loaded, values
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.plugins import are_absent
 from podusv_cli.scenario.sweep import Keep, Sweep
 from podusv_cli.study.cells import Cell, cells
 from podusv_cli.study.check import sweep_faults
@@ -28,6 +27,7 @@ from podusv_cli.study.record import Record
 
 # Sections of a scenario that change no number of a study.
 COSMETIC = ("name", "description", "log", "silence", "claims", "controllers", "sweep", "tune")
+MOST_NAMED = 4  # keys that a message about another study names
 KERNELS = " kernels"  # ends the key of the digest of a law's compiled source
 
 
@@ -53,11 +53,6 @@ class Plan:
     record: Record | None = None  # stands for plug-ins that are not loaded
 
     @property
-    def can_run(self) -> bool:
-        """Whether its runs can be simulated; not where its plug-ins are not loaded."""
-        return not are_absent(self.scenario.plugged)
-
-    @property
     def sweep(self) -> Sweep:
         """The study's settings. Raises UsageError where the scenario has none."""
         if self.scenario.sweep is None:
@@ -77,11 +72,12 @@ class Plan:
     @cached_property
     def metrics(self) -> tuple[str, ...]:
         """The names of the metrics that a law of the study has during a run, in their order."""
-        if self.record:
-            return tuple(self.record.metrics)
+        names = set(self.record.metrics) if self.record else self._measured()
+        return tuple(name for name in self.scenario.known_metrics() if name in names)
+
+    def _measured(self) -> set[str]:
         loops = [watching(self.single(law, cell.index)) for law in self.laws for cell in self.cells]
-        found = {name for one in loops for name in one.summary(np.full(one.size, np.nan))}
-        return tuple(name for name in self.scenario.known_metrics() if name in found)
+        return {name for one in loops for name in one.summary(np.full(one.size, np.nan))}
 
     def single(self, law: str, cell: int) -> Scenario:
         """The scenario of one law in one cell."""
@@ -109,7 +105,7 @@ class Plan:
                     if key.partition(".")[0] not in (*COSMETIC, *single.recorded)
                 }  # fmt: skip
                 told |= {f"{law}[{cell.index}].{key}": value for key, value in kept.items()}
-                if self.can_run:
+                if not self.record:
                     told[f"{law}[{cell.index}]{KERNELS}"] = kernels(single)
         return told
 
@@ -165,9 +161,11 @@ def differing(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[str]:
 
 def disagreements(
     one: Mapping[str, Any], other: Mapping[str, Any], keys: Sequence[str] | None = None
-) -> list[str]:
-    """Each of these keys, or of those that two identities differ in, with both values."""
-    return [
+) -> str:
+    """The first of these keys, or of those that two identities differ in, with both values."""
+    keys = differing(one, other) if keys is None else keys
+    texts = [
         f"{key}: {one.get(key, 'not there')}, not {other.get(key, 'not there')}"
-        for key in (differing(one, other) if keys is None else keys)
+        for key in keys[:MOST_NAMED]
     ]
+    return "; ".join(texts) + (" and more" if len(keys) > MOST_NAMED else "")

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, PositiveInt
+from pydantic import BaseModel, ConfigDict, PositiveInt, field_validator
 
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.plugins import digest
@@ -41,16 +41,20 @@ class MetricOfPlugin(BaseModel):
 
 
 class Record(BaseModel):
-    """The content of study.json; only a study with plug-ins has its metrics there."""
+    """What is read of study.json; only a study with plug-ins has its metrics there."""
 
     model_config = ConfigDict(strict=True, frozen=True)
     draws: PositiveInt
-    laws: list[str]
-    cells: list[str]
     identity: dict[str, Any]
     history: list[Asked]
     metrics: list[str] = []
     metrics_of_plugins: dict[str, MetricOfPlugin] = {}
+
+    @field_validator("metrics_of_plugins")
+    @classmethod
+    def _possible(cls, given: dict[str, MetricOfPlugin]) -> dict[str, MetricOfPlugin]:
+        _metrics(given)  # ValueError for a name or unit that no metric has
+        return given
 
     def parts(self) -> Parts:
         """Section, kind and field names of every component that the runs had."""
@@ -58,10 +62,13 @@ class Record(BaseModel):
 
     def foreign(self) -> tuple[Metric, ...]:
         """The metrics of plug-ins, as values that can be told and not gathered."""
-        return tuple(
-            Metric(name=name, accumulator=GATHERED, **one.model_dump())
-            for name, one in self.metrics_of_plugins.items()
-        )
+        return _metrics(self.metrics_of_plugins)
+
+
+def _metrics(given: Mapping[str, MetricOfPlugin]) -> tuple[Metric, ...]:
+    return tuple(
+        Metric(name, accumulator=GATHERED, **one.model_dump()) for name, one in given.items()
+    )
 
 
 def read(folder: Path) -> Record:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import hashlib
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import ExitStack
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from podusv_cli.core.errors import StorageError
 from podusv_cli.core.kernel import Vector
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import METRICS
-from podusv_cli.storage import files, hdf5
+from podusv_cli.storage import hdf5
 from podusv_cli.study.expressions import FINISHED, parse_success, succeeded
 from podusv_cli.study.runs import AXES, DRAWN, FAILED, OWN, SEAL, SEAL_OF_THE_REST, Mask
 from podusv_cli.study.unit import BROKEN, MISSING, STATUSES, Codes, Unit, UnitResult
@@ -55,11 +56,9 @@ class Table:
         """`success` is the expression for a run's. Raises StorageError for a damaged file."""
         self.path, self._known, self._successes = path, known, dict[str, Mask]()
         self._success = parse_success(success, known)
-        with files.opened(path):  # refuses what is no regular file
-            pass
+        self._open = ExitStack()
+        self._file = self._open.enter_context(hdf5.opened(path, "runs"))
         with hdf5.readable(path, "runs"):
-            self._file = h5py.File(path, "r")
-            hdf5.check(self._file)
             self.identity = self._file.attrs["identity"].decode()
             self.laws = tuple(word.decode() for word in self._file["law"][()])
             self.cells = tuple(word.decode() for word in self._file["cell"][()])

@@ -9,25 +9,21 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, NonNegativeInt, PositiveInt
+from pydantic import (
+    AfterValidator,
+    AliasPath,
+    BaseModel,
+    ConfigDict,
+    Field,
+    NonNegativeInt,
+    PositiveInt,
+)
 
 from podusv_cli.core.plugins import Plugin
 from podusv_cli.storage import files, json_files, manifest, provenance
 from podusv_cli.storage.writer import PATIENCE, PROVENANCE, sole_writer
 
 NAME = "provenance.json"
-
-
-class _Platform(BaseModel):
-    model_config = ConfigDict(strict=True)
-    processor: str
-    libc: str | None
-
-
-class _Packages(BaseModel):
-    model_config = ConfigDict(strict=True)
-    numpy: str | None
-    numba: str | None
 
 
 class _Noted(BaseModel):
@@ -40,8 +36,10 @@ class _Noted(BaseModel):
     runs: NonNegativeInt
     podusv: str
     python: str
-    platform: _Platform
-    packages: _Packages
+    processor: str = Field(validation_alias=AliasPath("platform", "processor"))
+    libc: str | None = Field(validation_alias=AliasPath("platform", "libc"))
+    numpy: str | None = Field(validation_alias=AliasPath("packages", "numpy"))
+    numba: str | None = Field(validation_alias=AliasPath("packages", "numba"))
     timed_runs: dict[str, PositiveInt] = {}
     processor_s: dict[str, float] = {}
 

@@ -21,6 +21,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -97,18 +98,12 @@ class Store:
         # With more draws in study.json than in the scenario, the study could not be continued. And
         # without study.json, a folder that is not empty is no study.
         if known:
-            self._write_scenario(texts)
+            files.write_texts(self.folder, texts)
         files.make_folder(self.folder)
         files.write_bytes(self.folder / STUDY, json_files.encode(content))
         files.make_folder(self.folder / UNITS)
         if not known:
-            self._write_scenario(texts)
-
-    def _write_scenario(self, texts: Mapping[str, str]) -> None:
-        """Write the scenario, which refers to nothing outside the folder, and its plug-ins."""
-        for name, content in texts.items():
-            files.make_folder((self.folder / name).parent)
-            files.write_bytes(self.folder / name, content.encode())
+            files.write_texts(self.folder, texts)
 
     def _metrics(self) -> dict[str, Any]:
         """What a reader without the study's plug-ins has to know of its metrics."""
@@ -128,7 +123,7 @@ class Store:
         remedy: str = "name another folder with --out",
     ) -> None:  # fmt: skip
         if found := disagreements(identity, self._identity()):
-            raise UsageError(f"{folder} holds another study: {few(found)}; {remedy}")
+            raise UsageError(f"{folder} holds another study: {found}; {remedy}")
 
     def _identity(self) -> dict[str, Any]:
         """The identity as JSON gives it back."""
@@ -164,10 +159,15 @@ class Store:
                     path.unlink(missing_ok=True)
 
     def _these(self, paths: Sequence[Path]) -> Iterator[UnitResult]:
-        """What runs.h5 has already, and these units."""
-        for earlier in self._earlier():
-            yield from earlier.results()
-        yield from filter(None, (read(path, self.seal) for path in paths))
+        """What runs.h5 has already, and these units. Raises StorageError for other metrics."""
+        there = (result for earlier in self._earlier() for result in earlier.results())
+        for result in chain(there, filter(None, (read(path, self.seal) for path in paths))):
+            if set(result.metrics) != set(self.plan.metrics):
+                raise StorageError(
+                    f"cannot read {self.folder / STUDY}: damaged, it has other metrics than the "
+                    "runs; restore the file"
+                )
+            yield result
 
     def _write_table(self, results: Callable[[], Iterator[UnitResult]]) -> None:
         plan, known = self.plan, self.plan.scenario.known_metrics()
@@ -225,11 +225,6 @@ class _Again:
         return self.make()
 
 
-def few(texts: Sequence[str]) -> str:
-    """The first of several texts."""
-    return "; ".join(texts[:4]) + (" and more" if len(texts) > 4 else "")
-
-
 def _place(unit: Unit, plan: Plan) -> tuple[str, int, int, int]:
     return unit.law, unit.cell, unit.first, unit.count
 
@@ -284,8 +279,7 @@ def read(path: Path, seal: str) -> UnitResult | None:
     unit = undamaged(content, seal)
     if unit is None:
         return None
-    with hdf5.readable(path, "runs"), h5py.File(io.BytesIO(content), "r") as file:
-        hdf5.check(file)
+    with hdf5.opened(path, "runs", content) as file:
         table, names = file["table"][()], file["table"].attrs["metrics"].split()
         causes = tuple(text.decode() for text in file["cause"][()])
         metrics = dict(zip(names, table[:-1], strict=True))

@@ -9,18 +9,18 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, Field, PositiveInt
 
 from podusv_cli.core.errors import UsageError
-from podusv_cli.scenario.load import Loaded, tree_yaml, yaml_text
+from podusv_cli.scenario.load import yaml_text
 from podusv_cli.scenario.sections import LONGEST_NAME
 from podusv_cli.scenario.tune import Tune
 from podusv_cli.storage import files, json_files
 from podusv_cli.study.plan import disagreements
+from podusv_cli.study.store import SCENARIO
 from podusv_cli.tuning import sampler, trials
 from podusv_cli.tuning.plan import TunePlan
 from podusv_cli.tuning.results import Results
 
-TUNE, SCENARIO, TUNED = "tune.json", "scenario.yaml", "tuned.yaml"
+TUNE, TUNED = "tune.json", "tuned.yaml"
 FORMAT = 2
-DIFFERENT = 4  # keys that a message names
 
 
 def check(folder: Path) -> None:
@@ -63,7 +63,10 @@ def known(folder: Path, plan: TunePlan) -> Record | None:
             raise UsageError(f"{folder} is no search and not empty; name another with --out")
         return None
     told = json_files.read_as(folder / TUNE, Record)
-    _agree(folder, told.identity, _identity(plan))
+    if different := disagreements(told.identity, _identity(plan)):
+        raise UsageError(
+            f"{folder} holds another search: {different}; name another folder with --out"
+        )
     _as_much(folder, _asked(told), plan.tune)
     return told
 
@@ -83,12 +86,12 @@ def write(
     # With a larger budget in tune.json than in the scenario, the search could not be continued. And
     # without tune.json, a folder that is not empty is no search.
     if told:
-        _write_scenario(folder, texts)
+        files.write_texts(folder, texts)
     files.make_folder(folder)
     files.write_bytes(folder / TUNE, content)
     files.make_folder(folder / trials.FOLDER)
     if not told:
-        _write_scenario(folder, texts)
+        files.write_texts(folder, texts)
 
 
 def _identity(plan: TunePlan) -> dict[str, Any]:
@@ -110,16 +113,6 @@ def _content(plan: TunePlan, history: Sequence[Any], started: str) -> dict[str, 
     }  # fmt: skip
 
 
-def _agree(folder: Path, there: dict[str, Any], wanted: dict[str, Any]) -> None:
-    differing = disagreements(there, wanted)
-    if differing:
-        more = " and more" if len(differing) > DIFFERENT else ""
-        raise UsageError(
-            f"{folder} holds another search: {'; '.join(differing[:DIFFERENT])}{more}; name "
-            "another folder with --out"
-        )
-
-
 def _as_much(folder: Path, history: Sequence[Mapping[str, Any]], tune: Tune) -> None:
     """Raise UsageError where runs that are there would be thrown away."""
     for key, unit in (("budget", "runs"), ("repeats", "searches"), ("validate", "fresh draws")):
@@ -129,17 +122,6 @@ def _as_much(folder: Path, history: Sequence[Mapping[str, Any]], tune: Tune) -> 
                 f"{folder} has {key}: {there} ({unit}); ask for as many or more, or name another "
                 "folder with --out"
             )
-
-
-def scenario_texts(loaded: Loaded) -> dict[str, str]:
-    """The scenario and its plug-ins, by the names of their files in the folder."""
-    return {SCENARIO: tree_yaml(loaded), **loaded.scenario.plugin_files()}
-
-
-def _write_scenario(folder: Path, texts: Mapping[str, str]) -> None:
-    for name in texts:
-        files.make_folder((folder / name).parent)
-    files.write_all({folder / name: text.encode() for name, text in texts.items()})
 
 
 def tuned_yaml(results: Results) -> bytes:

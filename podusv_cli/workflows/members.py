@@ -17,7 +17,7 @@ from podusv_cli.comparison.outputs import RESERVED, TABLE
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.recording import Recording
-from podusv_cli.scenario.load import LOOKED_AT, Plugged, load_resolved
+from podusv_cli.scenario.load import LOOKED_AT, Plugged, load_stored
 from podusv_cli.scenario.messages import Check
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.plugins import recorded
@@ -59,7 +59,7 @@ def from_folder(
 ) -> list[Member]:
     """The finished runs of a folder: one run, or all those of a comparison.
 
-    `checks` and `plugged` as `load_resolved` has them. Raises UsageError for a
+    `checks` and `plugged` as `load_stored` has them. Raises UsageError for a
     folder without finished runs, StorageError for a damaged one.
     """
     if (path / STUDY).is_file():
@@ -106,11 +106,11 @@ def _from_run(path: Path, checks: Sequence[Check], plugged: Plugged) -> Member:
     """A finished run whose log and theory.json were checked. StorageError, ScenarioError."""
     run = open_run(path)
     source = str(path / "resolved.yaml")
-    scenario = load_resolved(run.resolved_yaml, source, checks, plugged)
+    given = load_stored(run.resolved_yaml, source, checks=checks, plugged=plugged)
     if wrong := _fault(run.recording):
         raise StorageError(f"{path / LOG}: damaged, or not a log of a run: {wrong}")
     stability.check(run.theory, run.folder / THEORY)
-    return Member(path.name, scenario, run=run)
+    return Member(path.name, given.scenario, run=run)
 
 
 def _fault(log: Recording) -> str:

@@ -12,14 +12,24 @@ from typing import Any
 
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.escaping import visible
+from podusv_cli.core.plugins import ABSENT
 from podusv_cli.scenario import plugins
-from podusv_cli.scenario.load import load, resolved_yaml
+from podusv_cli.scenario.load import (
+    LOOKED_AT,
+    Loaded,
+    Plugged,
+    load,
+    load_stored,
+    resolved_yaml,
+    tree_yaml,
+)
+from podusv_cli.scenario.messages import Check
 from podusv_cli.scenario.phrases import unknown
 from podusv_cli.storage import files, json_files
 from podusv_cli.storage.run_folder import STUDY
 from podusv_cli.study import outputs, record
 from podusv_cli.study.plan import KERNELS, differing, disagreements, plan
-from podusv_cli.study.store import RUNS, SCENARIO, Store, few
+from podusv_cli.study.store import RUNS, SCENARIO, Store
 from podusv_cli.workflows.keep import alone, seen_from
 
 FORMATS = ("csv", "parquet")
@@ -58,6 +68,34 @@ def check_study(folder: Path) -> None:
         raise UsageError(f"{folder} is not the folder of a study: it has no {STUDY}")
 
 
+def scenario_of(
+    config: Path, overrides: Sequence[str], checks: Sequence[Check], added: Sequence[str], *,
+    trusted: bool,
+) -> Loaded:  # fmt: skip
+    """The scenario of a file, or of the folder of a study or search, to be simulated.
+
+    Plug-in files of a folder are executed only where they are `trusted`; `added` are others. Raises
+    ScenarioError, and StorageError for a damaged folder.
+    """
+    if not config.is_dir():
+        return load(config, overrides, checks, added)
+    return _kept(config, overrides, checks, added, partial(plugins.loaded, trusted=trusted))
+
+
+def scenario_texts(loaded: Loaded) -> dict[str, str]:
+    """The scenario and its plug-ins, by the names of their files in the folder."""
+    return {SCENARIO: tree_yaml(loaded), **loaded.scenario.plugin_files()}
+
+
+def _kept(
+    folder: Path, overrides: Sequence[str] = (), checks: Sequence[Check] = (),
+    added: Sequence[str] = (), plugged: Plugged = LOOKED_AT,
+) -> Loaded:  # fmt: skip
+    """The scenario that a folder keeps; no link to another file, either."""
+    path = folder / SCENARIO
+    return load_stored(files.read_text(path), str(path), overrides, checks, added, plugged)
+
+
 def stored(
     study: Path, warn: Warn = silent, *, trusted: bool = False, to_run: bool = False
 ) -> Store:
@@ -66,24 +104,24 @@ def stored(
     Its plug-in files are executed only where they are `trusted`; values of study.json stand for
     them, unless they are needed `to_run` a draw. Runs of other kernels than those of this podusv
     are no fault; `warn` is told of them. Raises UsageError where the folder is no study, and where
-    its scenario is not the one of its runs; ScenarioError where its plug-ins are needed and not
-    trusted.
+    its scenario is not the one of its runs; StorageError where that is damaged or names another
+    file; ScenarioError where its plug-ins are needed and not trusted.
     """
     check_study(study)
     there = record.read(study)
     looked_at = partial(plugins.recorded, (), parts=there.parts(), metrics=there.foreign())
     needed = partial(plugins.loaded, trusted=trusted)
-    made = plan(load(study / SCENARIO, plugged=needed if trusted or to_run else looked_at))
+    made = plan(_kept(study, plugged=needed if trusted or to_run else looked_at))
+    if ABSENT in made.scenario.plugged:
+        made = replace(made, record=there)
     told, ours = there.identity, json_files.plain(made.stated)
-    keys = [key for key in differing(told, ours) if key in ours or made.can_run]
+    keys = [key for key in differing(told, ours) if key in ours or not made.record]
     if any(key not in told or not key.endswith(KERNELS) for key in keys):
         raise UsageError(
             f"{study / SCENARIO} is not the scenario of the runs in {STUDY}: "
-            f"{few(disagreements(ours, told, keys))}; restore the file, or use the podusv that "
+            f"{disagreements(ours, told, keys)}; restore the file, or use the podusv that "
             "made them"
         )
-    if not made.can_run:
-        made = replace(made, record=there)
     store = Store(study, made, {key: told[key] for key in keys})
     if store.remark:
         warn(store.remark)

@@ -18,7 +18,7 @@ from podusv_cli.process.extras import Extras, Missing
 from podusv_cli.process.interrupts import interrupts_deferred
 from podusv_cli.scenario import plugins
 from podusv_cli.scenario.limits import limits
-from podusv_cli.scenario.load import Loaded, Plugged, load, tree_yaml
+from podusv_cli.scenario.load import Loaded
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sweep import Keep
 from podusv_cli.storage import manifest
@@ -38,7 +38,14 @@ from podusv_cli.study.sittings import Sitting
 from podusv_cli.study.store import SCENARIO, Store
 from podusv_cli.workflows.keep import keep
 from podusv_cli.workflows.run import RESULTS
-from podusv_cli.workflows.studies import Warn, check_study, silent, stored
+from podusv_cli.workflows.studies import (
+    Warn,
+    check_study,
+    scenario_of,
+    scenario_texts,
+    silent,
+    stored,
+)
 
 WHOLE: Part = (1, 1)  # the only shard
 
@@ -97,6 +104,8 @@ def run(config: Path, request: Request, tell: Tell) -> Swept:
     started = datetime.now(UTC)
     store, texts = _planned(config, request)
     check_fits(store.plan, store.folder, request.shard[1])
+    for law in store.plan.laws:  # before there is a folder that a mended law would not fit
+        store.plan.single(law, 0).ready()
     with sole_writer(store.folder):
         store.open(started.isoformat(timespec="seconds"), texts)
         return _run(store, request, started, tell)
@@ -176,11 +185,9 @@ def _planned(config: Path, request: Request) -> tuple[Store, dict[str, str]]:
         check_study(config)
     if request.out and request.out.exists() and not request.out.is_dir():
         raise UsageError(f"--out {request.out} is a file; name a folder")
-    plugged = partial(plugins.loaded, trusted=request.trust or not given)
-    loaded = _loaded(config / SCENARIO if given else config, request, plugged)
+    loaded = _loaded(config, request)
     folder = request.out or (config if given else default_folder(loaded.scenario))
-    texts = {SCENARIO: tree_yaml(loaded), **loaded.scenario.plugin_files()}
-    return Store(folder, plan(loaded)), texts
+    return Store(folder, plan(loaded)), scenario_texts(loaded)
 
 
 def default_folder(scenario: Scenario) -> Path:
@@ -188,9 +195,9 @@ def default_folder(scenario: Scenario) -> Path:
     return RESULTS / f"{scenario.name}-sweep"
 
 
-def _loaded(config: Path, request: Request, plugged: Plugged) -> Loaded:
+def _loaded(config: Path, request: Request) -> Loaded:
     checks = (unknown_codes, limits(allow_large=True), sweep_faults)
-    loaded = load(config, request.overrides, checks, request.plugins, plugged)
+    loaded = scenario_of(config, request.overrides, checks, request.plugins, trusted=request.trust)
     if loaded.scenario.sweep is None:
         raise UsageError(
             f"{config} has no key `sweep`, which says what is to be drawn; see docs/studies.md, or "
@@ -217,12 +224,12 @@ def answered(store: Store, request: Request) -> Swept:
         )  # fmt: skip
         if results.plan.sweep.keep != Keep():
             request.say("making the logs that are kept")
-        if whole and not store.plan.can_run and unmade(store.folder, results):
+        if whole and store.plan.record and unmade(store.folder, results):
             request.warn(
                 f"no logs of kept runs are made, as this would execute the plug-in files in "
                 f"{store.folder}; read them, then allow it with --trust"
             )
-        adds = whole and store.plan.can_run and not store.kernels
+        adds = whole and not store.plan.record and not store.kernels
         kept = make() if adds else found(store.folder, results, extras)
         if contradicted := contradiction(kept):
             results = results.without_verdicts(contradicted)

@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,7 @@ from podusv_cli.process.extras import Extras, Missing
 from podusv_cli.process.interrupts import interrupts_deferred
 from podusv_cli.scenario import plugins
 from podusv_cli.scenario.limits import limits
-from podusv_cli.scenario.load import Loaded, load
+from podusv_cli.scenario.load import Loaded
 from podusv_cli.storage import files, manifest
 from podusv_cli.storage.writer import sole_writer
 from podusv_cli.study.check import sweep_faults
@@ -26,6 +25,7 @@ from podusv_cli.study.march import Engine, Tally
 from podusv_cli.study.plan import digest
 from podusv_cli.study.remote import Recipe
 from podusv_cli.study.sittings import Sitting
+from podusv_cli.study.store import SCENARIO
 from podusv_cli.study.unit import prepare
 from podusv_cli.tuning import folder as place
 from podusv_cli.tuning import outputs
@@ -41,6 +41,7 @@ from podusv_cli.tuning.space import with_gains
 from podusv_cli.tuning.trials import best
 from podusv_cli.tuning.validation import validate
 from podusv_cli.workflows.run import RESULTS
+from podusv_cli.workflows.studies import scenario_of, scenario_texts
 
 Tell = Callable[[Tally, str], None]
 
@@ -105,7 +106,7 @@ def _tuned(
     told = place.known(folder, plan)
     plan = replace(plan, idle=told.idle if told else _idle(plan, request))
     stamp = started.isoformat(timespec="seconds")
-    place.write(folder, plan, told, stamp, place.scenario_texts(loaded))
+    place.write(folder, plan, told, stamp, scenario_texts(loaded))
     request.begin(f"{plan.size}; in {folder}")
     with _engine(plan, folder, request) as found:
         results = _simulated(plan, folder, request, started, found, tell)
@@ -121,9 +122,7 @@ def _loaded(config: Path, request: Request) -> tuple[Loaded, Path]:
     if request.out and request.out.exists() and not request.out.is_dir():
         raise UsageError(f"--out {request.out} is a file; name a folder")
     checks = (unknown_codes, limits(allow_large=True), sweep_faults, tune_faults)
-    source = config / place.SCENARIO if given else config
-    plugged = partial(plugins.loaded, trusted=request.trust or not given)
-    loaded = load(source, request.overrides, checks, request.plugins, plugged)
+    loaded = scenario_of(config, request.overrides, checks, request.plugins, trusted=request.trust)
     if loaded.scenario.tune is None:
         raise UsageError(
             f"{config} has no key `tune`, which says how many runs a search has; see "
@@ -190,7 +189,7 @@ def _idle(plan: TunePlan, request: Request) -> dict[str, tuple[str, ...]]:
 
 def _engine(plan: TunePlan, folder: Path, request: Request) -> AbstractContextManager[Engine]:
     """Where trials and fresh draws are simulated."""
-    text = (folder / place.SCENARIO).read_text(encoding="utf-8")
+    text = (folder / SCENARIO).read_text(encoding="utf-8")
     recipe = Recipe(text, tuple(plan.scenario.plugin_files().items()))
     seal = digest(plan.base.identity)
     return engine(request.scheduler, request.workers, recipe, seal, mixed=request.mixed)
