@@ -137,7 +137,7 @@ contracts: $(VENV)/dev.done
 	@$(BIN)/lint-imports
 
 clean: ## remove the virtual environment and all caches
-	rm -rf $(VENV) build dist site docs/reference *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) build dist site docs/reference docs/schema.json *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 
 $(BIN)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
@@ -148,6 +148,7 @@ $(BIN)/python:
 $(VENV)/run.done: $(BIN)/python pyproject.toml constraints.txt
 	@echo "  installing podusv and what it needs (numpy, numba, h5py, matplotlib, ...)"
 	@$(PIP) --editable .
+	@$(BIN)/podusv schema > docs/schema.json # for editors, which complete keys in configs/
 	@touch $@
 
 $(VENV)/dev.done: $(VENV)/run.done
