@@ -14,6 +14,7 @@ from findings_samples import CONFIGS, log, scene
 from podusv_cli.controllers.base import Controller
 from podusv_cli.core.recording import Recording
 from podusv_cli.findings.finding import finding_kinds, postflight, preflight
+from podusv_cli.findings.limit_cycle import limit_cycle
 from podusv_cli.findings.outcome import saturated
 from podusv_cli.findings.proof import argument, input_rank
 from podusv_cli.scenario.load import load
@@ -157,6 +158,9 @@ def test_a_vessel_that_stays_behind_is_told_with_its_error_beyond_the_standoff()
     out = log(*behind)
     error = np.mean(out["z_e"][out["time"] >= 80.0]) - 0.5
     assert f"is {error:.3g} m away from its standoff of 0.5 m" in text
+    assert "does not come nearer in it" in text
+    early = (weak.replace("2.0", "20.0"), "start={x: -30.0, y: 0.0}", "simulation.duration=20")
+    assert "still comes nearer in it" in told("never-settles", *early)[0]
     assert told("moves-away", *behind) == []
     assert told("never-settles", *behind, f"metrics.settling_radius={error + 0.01}") == []
     assert told("never-settles", "controller.standoff=3.0", "simulation.duration=100") == []
@@ -177,16 +181,70 @@ def test_a_swing_that_goes_on_is_told_with_amplitude_and_period():
     assert period == pytest.approx(np.diff(ups).mean(), rel=0.02)
 
 
-def test_a_swing_that_dies_away_or_follows_a_load_is_not_told():
+STILL = scene(
+    *CALM[:2], "path={kind: line, speed: 0.5}", "controller={kind: velocity_vector}"
+).alone()
+LONG, SWAY = STILL.vessel.length, STILL.vessel.m22
+
+
+def swinging(periods=4.0, size=0.02, decay=1.0, noise=0.0, load=0.0, turn=0.0):
+    """Whether a run is told to swing: across a line, in hull lengths, over the steady window.
+
+    `decay` is the amplitude at the end over that in the middle of the window, `load` the sway force
+    over m22 times the acceleration, `turn` the acceleration of the target over that of the swing.
+    """
+    t = np.arange(0.0, 20.001, 0.01)
+    rate = 2.0 * np.pi * periods / 4.0
+    swing = LONG * size * np.sin(rate * t) * decay ** ((t - 18.0) / 2.0)
+    pushed = turn * LONG * size * np.sin(rate * t)
+    random = np.random.default_rng(1).normal(0.0, noise * LONG * size, len(t))
+    zero = np.zeros_like(t)
+    signals = {
+        "time": t, "x": 0.5 * t, "x_d": 0.5 * t, "y": swing + pushed + random, "y_d": pushed,
+        "u": zero, "v": np.gradient(swing, t), "r": zero, "b_u": zero, "b_r": zero,
+        "b_v": load * SWAY * rate * rate * swing,
+    }  # fmt: skip
+    scenario = STILL.model_copy(
+        update={"simulation": STILL.simulation.model_copy(update={"duration": 20.0})}
+    )
+    return bool(list(limit_cycle.search(scenario, Recording("finished", "a law", signals))))
+
+
+@pytest.mark.parametrize(
+    ("told", "untold"),
+    [
+        ({"size": 0.011}, {"size": 0.009}),
+        ({"periods": 3.0}, {"periods": 2.0}),
+        ({"decay": 0.97}, {"decay": 0.9}),
+        ({"decay": 1.5}, {"decay": 0.5}),
+        ({"noise": 0.2}, {"noise": 1.5}),
+        ({"load": 0.05}, {"load": 0.2}),
+        ({"turn": 0.05}, {"turn": 0.2}),
+    ],
+)
+def test_a_swing_is_told_where_it_is_visible_pure_and_goes_on_by_itself(told, untold):
+    assert swinging(**told)
+    assert not swinging(**untold)
+
+
+@pytest.mark.parametrize(
+    "kind", ["{kind: current, speed: 0.05}", "{kind: waves, height: 0.01, period: 1.5}"]
+)
+def test_a_cycle_in_a_sea_is_told_as_in_calm_water(kind):
+    cycling = ("controller={kind: velocity_vector}", "path={kind: line, speed: 0.5}")
+    assert told("limit-cycle", CALM[0], CALM[2], f"disturbance={kind}", *cycling)
+
+
+def test_a_stable_law_a_push_and_a_winding_path_are_no_cycle():
     stable = (*CALM, "controller={kind: velocity_vector}", "path={kind: line, speed: 1.1}")
+    winding = (*CALM[1:], "controller={kind: velocity_vector}", "path={kind: sinusoid}")
     pushed = (
         "controller={kind: pid}", "simulation.duration=120",
         "disturbance={kind: harmonic, b_v: {sin: 2.0, sin_rate: 1.3, cos: 0.0}}",
     )  # fmt: skip
-    assert told("limit-cycle", *stable) == []
     out = log(*pushed)
     assert np.ptp(out["y"][out["time"] >= 96.0]) > 0.05
-    assert told("limit-cycle", *pushed) == []
+    assert [told("limit-cycle", *run) for run in (stable, winding, pushed)] == [[], [], []]
 
 
 def test_nothing_is_told_about_a_run_without_rows():

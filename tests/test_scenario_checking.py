@@ -151,7 +151,8 @@ def test_a_law_among_several_is_wrong_once():
         (
             "{preset: paper}",
             "{preset: paper, X_u: 0.5}",
-            "1:30: vessel.X_u: must be a number not above 0 [kg/s], found 0.5",
+            "1:30: vessel.X_u: must be a number not above 0 [kg/s], found 0.5; it is "
+            "negative here, as it is published with the force: -0.5?",
         ),
         (
             "{preset: paper}",
@@ -168,8 +169,9 @@ def test_a_law_among_several_is_wrong_once():
         (
             "{preset: paper}",
             "{m: 3}",
-            "1:9: vessel.preset: missing (allowed: " + VESSEL_NAMES + "); a vessel without one "
-            "needs length, beam, I_z",
+            "1:9: vessel: missing: length, beam, I_z; or take them from a preset (allowed: "
+            + VESSEL_NAMES
+            + ")",
         ),
         (
             "{preset: paper}",
@@ -278,8 +280,9 @@ def test_a_key_of_a_kind_is_told_without_the_kind(text, says):
 
 def test_what_is_missing_is_told_at_the_file():
     assert told("description: nothing else\n") == [
-        "a.yaml: vessel.preset: missing (allowed: " + VESSEL_NAMES + "); a vessel without one "
-        "needs length, beam, m, I_z",
+        "a.yaml: vessel: missing: length, beam, m, I_z; or take them from a preset (allowed: "
+        + VESSEL_NAMES
+        + ")",
         f"a.yaml: path: missing; must be a mapping of keys with kind {A_PATH}",
         f"a.yaml: disturbance: missing; must be a mapping of keys with kind {A_SEA} or a list of "
         "these",

@@ -104,7 +104,8 @@ def test_a_source_tells_what_the_scenario_changed_and_is_the_same_when_loaded_ag
 
 def test_a_wrong_nominal_value_is_told_at_its_place():
     assert told(SOUND + "nominal: {X_u: 1, preset: x}\n") == [
-        "a.yaml:6:16: nominal.X_u: must be a number not above 0 [kg/s], found 1",
+        "a.yaml:6:16: nominal.X_u: must be a number not above 0 [kg/s], found 1; it is "
+        "negative here, as it is published with the force: -1?",
         "a.yaml:6:27: nominal.preset: unknown vessel 'x' (allowed: " + VESSEL_NAMES + ")",
     ]
 

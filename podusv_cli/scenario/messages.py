@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from podusv_cli.scenario.keys import NAME, NUMBER, Key, either
+from podusv_cli.scenario.keys import NAME, NUMBER, Key, either, limits
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import did_you_mean, found, hint, unknown, without_case
 from podusv_cli.scenario.presets import stands_in
@@ -179,6 +179,8 @@ def _hint(node: Node, key: Key) -> str:
         return f"; write {int(node.content)}"
     if node.content is None and key.section:
         return "; it cannot be left out"
+    if type(node.content) in (int, float) and limits(key.field).get("le") == 0:
+        return f"; it is negative here, as it is published with the force: {-node.content:g}?"
     if not isinstance(node.content, str):
         return hint(node.text, (bool,) if bool in key.types else ())
     if node.content and node.content in key.kinds:

@@ -213,8 +213,8 @@ def _without_preset(given: Node, key: str, plugins: Plugins, faults: list[Fault]
     if not lacking or given.faulty:
         return given
     known = ", ".join(preset_names(VESSELS, plugins))
-    text = f"missing (allowed: {known}); a vessel without one needs "
-    faults.append(Fault(given.mark, f"{key}.preset", text + ", ".join(lacking)))
+    text = f"missing: {', '.join(lacking)}; or take them from a preset (allowed: {known})"
+    faults.append(Fault(given.mark, key, text))
     return replace(given, faulty=True)
 
 

@@ -157,7 +157,10 @@ class StudyVerdict:
         if any(part.unknown for part in self.parts):
             return "missing numbers leave the answer open"
         if self.more is None:
-            return "an estimate lies on its bound, where no number of draws would decide"
+            return (
+                "the shares found are just those asked for, so it cannot be said how many draws "
+                "would decide"
+            )
         return (
             f"about {max(self.more, self.draws + 1)} draws would decide, if shares stay as they are"
         )

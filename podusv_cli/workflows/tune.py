@@ -214,7 +214,7 @@ def _leaders(searches: Sequence[Search]) -> str:
             value = best(search.trials).values[0]
             found[search.law] = min(value, found.get(search.law, value))
     leaders = ", ".join(f"{law} {value:.4g}" for law, value in found.items())
-    return f"best so far: {leaders}" if found else "no gains are tried yet"
+    return f"best on the training draws: {leaders}" if found else "no gains are tried yet"
 
 
 def _written(results: Results, folder: Path, request: Request) -> Tuned:
