@@ -102,5 +102,6 @@ def never_settles(scenario: Scenario, log: Recording) -> Sentences:
 
 def _arrives(errors: Vector, fraction: float, radius: float) -> bool:
     """Whether errors that fall as in this fraction of a run reach the radius in as long a run."""
-    earlier, later = (part.mean() for part in np.array_split(errors, 2))
-    return bool((earlier - later) / (0.5 * fraction) > later - radius)
+    half = -(-len(errors) // 2)
+    earlier, later = float(errors[:half].mean()), float(errors[-half:].mean())
+    return (earlier - later) / (0.5 * fraction) > later - radius
