@@ -4,11 +4,11 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt
-STEP := PODUSV=$(BIN)/podusv results/step.sh
+STEP := PODUSV=$(BIN)/podusv examples/reproduce/step.sh
 # A file to a core; what its tests share is made once.
 # Tests start processes, which would each translate podusv's source anew without byte code on disk.
 PYTEST := OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(BIN)/pytest --numprocesses auto --dist loadfile
-OURS := podusv_cli tests benchmarks results examples docs
+OURS := podusv_cli tests benchmarks examples docs
 # Every dependency of a run at its lower bound; what tests need beside them, as new as may be.
 OLDEST := .venv-oldest
 LOWEST := sed -n '/^dependencies = \[/,/^\]/s/^ *"\(.*\)>=\(.*\)",/\1==\2/p' pyproject.toml
@@ -36,15 +36,15 @@ help: ## what can be made
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
 
 # Exit code 4: diverged, as it must. Exit code 3: some of the runs diverged; in figures_compare they must.
-reproduce: $(VENV)/run.done ## the paper, claim by claim, into results/paper/
+reproduce: $(VENV)/run.done ## the paper, claim by claim, into results/.runs/paper/
 	@echo "$(words printed_from_zero $(COMPARISONS)) steps, two to eight minutes on two cores:"
 	@rm -f results/paper.log
 	@$(STEP) run paper printed_from_zero 4
 	@for name in $(COMPARISONS); do \
 	    $(STEP) compare paper $$name $$(case $$name in figures_compare) echo 3;; *) echo 0;; esac) || exit 1; \
 	done
-	@$(BIN)/python results/verdicts.py
-	@echo "what was found: results/README.md; every table, claim and figure: results/paper/*/report.html"
+	@$(BIN)/python examples/reproduce/verdicts.py
+	@echo "what was found: results/README.md; every table, claim and figure: results/.runs/paper/*/report.html"
 
 # In F and S the law without its network diverges, as it must: exit code 3.
 claim: $(VENV)/run.done ## the paper's central claim: parts off, wrong vessels, sampling
@@ -55,23 +55,23 @@ claim: $(VENV)/run.done ## the paper's central claim: parts off, wrong vessels, 
 	done
 	@for table in $(TABLES); do \
 	    echo "  $${table#*:}" && \
-	    $(BIN)/python results/claim.py $${table%:*} > results/.table && \
+	    $(BIN)/python examples/reproduce/claim.py $${table%:*} > results/.table && \
 	    mv results/.table results/paper/$${table#*:}.csv || exit 1; \
 	done
 	@echo "what was found: results/claim.md"
 
-pod: $(VENV)/run.done ## the laws behind a pod, into results/pod/
+pod: $(VENV)/run.done ## the laws behind a pod, into results/.runs/pod/
 	@echo "$(words $(PODS)) steps:"
 	@rm -f results/pod.log
 	@for name in $(PODS); do $(STEP) compare pod $$name 0 || exit 1; done
-	@echo "what was found: results/pod.md; every table and figure: results/pod/*/report.html"
+	@echo "what was found: results/pod.md; every table and figure: results/.runs/pod/*/report.html"
 
-sea: $(VENV)/run.done ## single runs in a sea and through sensors, into results/sea/
+sea: $(VENV)/run.done ## single runs in a sea and through sensors, into results/.runs/sea/
 	@echo "$(words $(SEAS)) steps, about five minutes on two cores:"
 	@rm -f results/sea.log
 	@for name in $(SEAS); do $(STEP) compare sea $$name 0 || exit 1; done
-	@$(BIN)/python results/sea.py > results/.table && mv results/.table results/sea/loads.csv
-	@echo "what was found: results/sea.md; every table and figure: results/sea/*/report.html"
+	@$(BIN)/python examples/reproduce/sea.py > results/.table && mv results/.table results/sea/loads.csv
+	@echo "what was found: results/sea.md; every table and figure: results/.runs/sea/*/report.html"
 
 bench-laws: $(VENV)/run.done ## all laws over standard tasks, into results/bench/
 	@$(BIN)/podusv bench --force --out results/.bench && mkdir -p results/bench && \
@@ -87,7 +87,7 @@ sweep: $(VENV)/run.done ## the committed studies at full size, about half an hou
 	@for name in $(STUDIES); do \
 	    $(BIN)/podusv sweep run configs/studies/$$name.yaml --out results/.studies/$$name && \
 	    mkdir -p results/studies/$$name/figures && \
-	    (cd results/.studies/$$name && cp summary.csv pairs.csv sensitivity.csv claims.md claims.json ../../studies/$$name && \
+	    (cd results/.studies/$$name && cp summary.csv pairs.csv sensitivity.csv claims.json ../../studies/$$name && \
 	        cp figures/*-iae.png ../../studies/$$name/figures) || exit 1; \
 	done
 	@echo "what was found: results/studies.md; every table and figure: results/.studies/*/report.html"
@@ -137,7 +137,7 @@ contracts: $(VENV)/dev.done
 	@$(BIN)/lint-imports
 
 clean: ## remove the virtual environment and all caches
-	rm -rf $(VENV) build dist site docs/reference *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) build dist site docs/reference docs/schema.json *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 
 $(BIN)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
@@ -148,6 +148,7 @@ $(BIN)/python:
 $(VENV)/run.done: $(BIN)/python pyproject.toml constraints.txt
 	@echo "  installing podusv and what it needs (numpy, numba, h5py, matplotlib, ...)"
 	@$(PIP) --editable .
+	@$(BIN)/podusv schema > docs/schema.json # for editors, which complete keys in configs/
 	@touch $@
 
 $(VENV)/dev.done: $(VENV)/run.done

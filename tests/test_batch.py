@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 import threading
-import time
 import weakref
 from _ctypes import FUNCFLAG_PYTHONAPI
 from dataclasses import replace
@@ -23,7 +22,7 @@ from podusv_cli.controllers.pid import Pid
 from podusv_cli.core.component import value
 from podusv_cli.core.errors import LawError
 from podusv_cli.core.kernel import Vector, kernel
-from podusv_cli.engine import march, signatures
+from podusv_cli.engine import signatures
 from podusv_cli.engine.batch import Batch, Lazily, simulate_many
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.loop import STATE, ClosedLoop
@@ -268,22 +267,3 @@ def test_a_kernel_that_cannot_be_compiled_is_raised() -> None:
 
     with pytest.raises(LawError):
         simulate_many([adrift(controller=Broken())] * 3, GRID)
-
-
-def spin() -> int:
-    """Compute for longer than a glance at it."""
-    end = time.process_time() + 0.12
-    while time.process_time() < end:
-        pass
-    return 1
-
-
-def test_a_thread_that_has_worked_for_long_does_not_hang(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What it computed before counts for none of its pieces of work."""
-    monkeypatch.setattr(march, "PATIENCE", 0.3)
-    thread = march.WaitingThread()
-    pieces = [march.Work(spin) for _ in range(8)]
-    for piece in pieces:
-        piece.finish(thread=thread)
-    thread.end()
-    assert [piece.result for piece in pieces] == [1] * 8

@@ -15,20 +15,18 @@ claims:
   near: {says: Soft tracks worse., source: nobody, expect: soft.iae > stiff.iae}
   cheap: {says: Soft is cheap., source: nobody, expect: soft.law_ns < 1e9}
 """
+FIGURES = ("trajectory", "errors", "controls")
 # In place of podusv: writes what a comparison leaves, talks much, and ends as the name says.
 STUB = """#!/bin/sh
 echo "walls of 2.118e+93" >&2
 test "$1 $5" = "compare --force" || exit 9
-mkdir -p "$4" && echo new > "$4/comparison.md" && echo {} > "$4/manifest.json"
+mkdir -p "$4" && echo new > "$4/comparison.csv" && echo {} > "$4/manifest.json"
 case $2 in *figures*) exit 3;; esac
 exit 0
 """
 
 
-def kept(path: str) -> bool:
-    """Whether git would keep a file of that path in this checkout."""
-    told = subprocess.run(["git", "check-ignore", "--quiet", "--no-index", path], cwd=ROOT)
-    return told.returncode == 1
+KEPT = ("comparison.csv", "claims.json", *(f"figures/{n}.png" for n in FIGURES))
 
 
 def test_what_is_committed_of_a_comparison_comes_out_the_same_every_time(
@@ -40,15 +38,15 @@ def test_what_is_committed_of_a_comparison_comes_out_the_same_every_time(
     draw_quickly(monkeypatch)
     for folder in ("first", "second"):
         assert podusv("compare", "two.yaml", "--out", folder).code == 0
-    names = [str(p.relative_to("first")) for p in Path("first").rglob("*") if p.is_file()]
-    moved = {n for n in names if Path("first", n).read_bytes() != Path("second", n).read_bytes()}
-    assert {"timing.json", "manifest.json"} <= moved
-    for place in ("results/paper/x_compare", "results/paper/ablation_x", "results/pod/x"):
-        committed = {name for name in names if kept(f"{place}/{name}")}
-        assert {"comparison.csv", "comparison.md", "comparison.tex"} <= committed
-        assert not committed & moved
-    assert {n for n in names if kept(f"results/sea/x/{n}")} == {"comparison.csv", "claims.json"}
-    assert not {"comparison.csv", "claims.json"} & moved
+    for name in KEPT:
+        assert Path("first", name).read_bytes() == Path("second", name).read_bytes()
+
+
+def test_of_a_comparison_only_what_cannot_be_derived_is_committed():
+    listed = ["git", "ls-files", "results/paper", "results/pod", "results/sea"]
+    told = subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    names = {Path(path).name for path in told.splitlines() if path.count("/") > 2}
+    assert names <= set(map(os.path.basename, KEPT))
 
 
 def test_git_tracks_nothing_that_it_would_not_keep():
@@ -61,8 +59,8 @@ def test_git_tracks_nothing_that_it_would_not_keep():
 def checkout(tmp_path):
     """A checkout with a committed result and a stub of podusv."""
     (tmp_path / "results/paper/one").mkdir(parents=True)
-    (tmp_path / "results/paper/one/comparison.md").write_text("old\n")
-    shutil.copy(ROOT / "results/step.sh", tmp_path / "results/step.sh")
+    (tmp_path / "results/paper/one/comparison.csv").write_text("old\n")
+    shutil.copy(ROOT / "examples/reproduce/step.sh", tmp_path / "step.sh")
     (tmp_path / "podusv").write_text(STUB)
     (tmp_path / "podusv").chmod(0o755)
     return tmp_path
@@ -70,7 +68,7 @@ def checkout(tmp_path):
 
 def step(checkout: Path, name: str, code: int) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        ["results/step.sh", "compare", "paper", name, str(code)], cwd=checkout, text=True,
+        ["./step.sh", "compare", "paper", name, str(code)], cwd=checkout, text=True,
         capture_output=True, env={**os.environ, "PODUSV": "./podusv"},
     )  # fmt: skip
 
@@ -89,14 +87,13 @@ def test_a_step_that_ends_otherwise_stops_and_shows_why(checkout):
     assert done.returncode == 1
     assert "exit code 3 in place of 0" in done.stdout
     assert "2.118e+93" in done.stdout
-    assert (checkout / "results/paper/one/comparison.md").read_text() == "old\n"
+    assert (checkout / "results/paper/one/comparison.csv").read_text() == "old\n"
 
 
-def test_a_step_replaces_committed_files_and_leaves_others(checkout):
-    own = checkout / "results/paper/one/mine.txt"
-    own.write_text("mine\n")
-    for _ in range(2):  # over committed files alone, then over a whole result
+def test_a_step_replaces_committed_files_and_adds_none(checkout):
+    place = checkout / "results/paper/one"
+    (place / "mine.txt").write_text("mine\n")
+    for _ in range(2):
         assert step(checkout, "one", 0).returncode == 0
-        assert (checkout / "results/paper/one/comparison.md").read_text() == "new\n"
-        assert own.read_text() == "mine\n"
-    assert not list((checkout / "results/.new").rglob("*.md"))
+        found = {path.name: path.read_text() for path in place.iterdir()}
+        assert found == {"comparison.csv": "new\n", "mine.txt": "mine\n"}

@@ -22,8 +22,8 @@ LAWS = (
 
 
 def module() -> object:
-    """results/claim.py, which is a script."""
-    spec = importlib.util.spec_from_file_location("claim", ROOT / "results/claim.py")
+    """examples/reproduce/claim.py, which is a script."""
+    spec = importlib.util.spec_from_file_location("claim", ROOT / "examples/reproduce/claim.py")
     assert spec
     assert spec.loader
     found = importlib.util.module_from_spec(spec)

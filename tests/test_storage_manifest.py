@@ -123,7 +123,7 @@ ENTRY = {"sha256": "0" * 64, "bytes": 1}
 BROKEN = {
     "other format": (
         lambda it: it.update(podusv_format=3),
-        "format 3; this podusv reads formats 1 to 2",
+        "format 3; this podusv reads format 2",
     ),
     "no format": (lambda it: it.pop("podusv_format"), "format None; this podusv reads"),
     "no status": (lambda it: it.pop("status"), "status: Field required"),

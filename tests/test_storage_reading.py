@@ -108,100 +108,29 @@ def only_time(count: int) -> Callable[[h5py.File], None]:
     return change
 
 
-def compact(file: h5py.File) -> None:
-    made = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
-    made.set_layout(h5py.h5d.COMPACT)
-    space = h5py.h5s.create_simple((50,))
-    new = h5py.h5d.create(file.id, b"y_compact", h5py.h5t.IEEE_F64LE, space, made)
-    h5py.Dataset(new).attrs.create("units", np.bytes_("m"))
-    for key in ("long_name", "symbol"):
-        h5py.Dataset(new).attrs.create(key, np.bytes_("y"))
-
-
-def bomb(file: h5py.File) -> None:
-    """A chunk that is larger than the numbers in it."""
-    remake(file, "x", shape=(50,), dtype="<f8", chunks=(50,), **PACKED)
-    file["x"].id.write_direct_chunk((0,), bytes(100_000))
-
-
-def many(file: h5py.File) -> None:
-    for number in range(1000):
-        file[f"x{number}"] = file["x"]
-
-
-def about(name: str, content: object) -> Callable[[h5py.File], None]:
-    return lambda file: file["x"].attrs.create(name, content)
-
-
-def no_nodes(file: h5py.File) -> None:
-    for name, shape in (("W_hat_u", (50, 0)), ("rbf_center", (0, 3))):
-        remake(file, name, shape=shape, dtype="<f8")
-
-
 FIFTY = np.zeros(50)
-HOSTILE = {
+WRONG = {
     "soft link": (linked("x", h5py.SoftLink("/z_e")), "link to elsewhere"),
     "soft link to nothing": (linked("x", h5py.SoftLink("/nowhere")), "link to elsewhere"),
-    "object": (replaced("x", shape=(50,), dtype=h5py.string_dtype()), "no 64-bit numbers"),
-    "reference": (replaced("x", shape=(50,), dtype=h5py.ref_dtype), "no 64-bit numbers"),
-    "ragged": (replaced("x", shape=(50,), dtype=h5py.vlen_dtype(float)), "no 64-bit numbers"),
-    "compound": (replaced("x", shape=(50,), dtype=[("a", "<f8")]), "no 64-bit numbers"),
-    "single precision": (replaced("x", shape=(50,), dtype="<f4"), "no 64-bit numbers"),
-    "big endian": (replaced("x", shape=(50,), dtype=">f8"), "no 64-bit numbers"),
-    "no shape": (replaced("x", data=h5py.Empty("<f8")), "x is empty"),
-    "matrix": (replaced("x", shape=(50, 2), dtype="<f8"), "2 dimensions"),
     "too short": (replaced("x", data=FIFTY[1:], **PACKED), "49 values along time"),
     "other nodes": (replaced("rbf_width", data=FIFTY[:4], **PACKED), "4 values along input"),
-    "not in the file": (replaced("x", shape=(50,), dtype="<f8"), "x has no numbers in this file"),
-    "compact": (compact, "y_compact has no numbers in this file"),
-    "bomb": (bomb, "packed in an unknown way"),
-    "unknown filter": (replaced("x", data=FIFTY, compression="lzf"), "packed in an unknown way"),
-    "nothing stored": (replaced("x", shape=(50,), dtype="<f8", **PACKED), "chunk is missing"),
-    "giant": (replaced("x", shape=(2**40,), dtype="<f8", chunks=(4096,)), "along time"),
     "giant in all": (only_time(2**40), "claims 8796093022208 bytes.*; read it with h5py or xarray"),
-    "large without data": (only_time(2**28), "chunk is missing"),
-    "unbounded chunk": (
-        replaced("x", data=FIFTY, chunks=(2**20,), maxshape=(None,), **PACKED), "unknown way",
-    ),
-    "group": (lambda file: (file.pop("x"), file.create_group("x")), "damaged"),
-    "named type": (linked("x", np.dtype("<f8")), "damaged"),
-    "no time": (lambda file: file.pop("time"), "no time"),
-    "unknown signal": (lambda file: file.create_dataset("tau_w", data=FIFTY), "'tau_w' does not"),
-    "unknown bytes": (lambda file: file.create_dataset(b"\xff\xfe", data=FIFTY), "no name of a"),
-    "no identifier": (lambda file: file.create_dataset("tau w", data=FIFTY), "'tau w' is no name"),
-    "long name": (lambda file: file.create_dataset("a" * 65, data=FIFTY), "a' is no name of a"),
-    "many": (many, "it has 1010 members, more than 1000"),
-    "other format": (described("podusv_format", np.int32(3)), "format 3; this .* formats 1 to 2"),
-    "format 0": (described("podusv_format", np.int32(0)), "format 0; this .* formats 1 to 2"),
-    "endless axes": (about("axes", "time"), "no single string of fixed length"),
-    "other axes": (about("axes", np.bytes_("node")), "8 values along node instead of 50"),
-    "long symbol": (about("symbol", np.bytes_("\x1b[2J")), "symbol holds characters that are no"),
-    "format in words": (described("podusv_format", "1"), "podusv_format is no number"),
-    "formats": (described("podusv_format", [1, 1], "<i4"), "podusv_format is no number"),
+    "no time": (lambda file: file.pop("time"), "damaged"),
+    "unknown signal": (lambda file: file.create_dataset("tau_w", data=FIFTY), "damaged"),
+    "later format": (described("podusv_format", np.int32(3)), "format 3; this .* reads format 2$"),
     "no format": (lambda file: file.attrs.pop("podusv_format"), "damaged"),
     "no status": (lambda file: file.attrs.pop("status"), "damaged"),
     "unknown status": (described("status", np.bytes_("asleep")), "unknown status 'asleep'"),
-    "endless status": (described("status", "finished"), "no single string of fixed length"),
-    "statuses": (described("status", [b"finished"], "S8"), "no single string of fixed length"),
-    "empty status": (described("status", h5py.Empty("S8")), "no single string|unknown status"),
-    "no nodes": (no_nodes, "W_hat_u has no values along node"),
-    "escape": (described("controller", np.bytes_(b"pid\x1b[2J")), "characters that are no text"),
     "no text": (described("controller", np.bytes_(b"\xff")), "utf-8"),
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("case", HOSTILE)
+@pytest.mark.parametrize("case", WRONG)
 def test_a_log_that_is_not_as_podusv_writes_it_is_refused(path, case):
-    change, words = HOSTILE[case]
+    change, words = WRONG[case]
     with pytest.raises(StorageError, match=words) as caught:
         read(path, rewritten(change))
     assert "\n" not in str(caught.value)
-
-
-def test_a_log_behind_something_else_is_refused(path):
-    # HDF5 would find it there, and count all places in the file from there.
-    with pytest.raises(StorageError, match="no HDF5 file of the kind that podusv writes"):
-        read(path, bytes(512) + log())
 
 
 @pytest.fixture
@@ -230,8 +159,6 @@ def test_data_in_other_files_are_refused(path, secret):
         (linked("provenance", h5py.SoftLink("/")), "link to elsewhere"),
         (linked("provenance/resolved_yaml", h5py.SoftLink("/x")), "link to elsewhere"),
         (replaced("provenance", data=1.0), "damaged"),
-        (replaced("provenance/resolved_yaml", data="a: 1\n"), "no single string"),
-        (replaced("provenance/resolved_yaml", data=np.zeros((), "S20000000")), "20000000 bytes"),
         (lambda file: file.pop("provenance"), "damaged"),
     ],
 )

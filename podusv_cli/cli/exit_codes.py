@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import os
-import resource
 import sys
 import traceback
 from collections.abc import Callable
@@ -35,8 +34,6 @@ MEANINGS = {
     141: "the reader of a pipe closed it",
     143: "terminated",
 }
-# A run has up to 18 files open at once, a comparison two more for each worker.
-LEAST_OPEN_FILES, OPEN_FILES = 64, 1024
 PLEASE_REPORT = "This is a bug in podusv. Please report it with the lines above."
 
 
@@ -57,7 +54,6 @@ def with_exit_codes(command: Callable[Given, None]) -> Callable[Given, None]:
 
 def _exit_code(command: Callable[[], None], interrupts: Interrupts) -> int:
     try:
-        _raise_limit_of_open_files()
         command()
     except (typer.Abort, typer.BadParameter):
         raise
@@ -70,22 +66,6 @@ def _exit_code(command: Callable[[], None], interrupts: Interrupts) -> int:
             return INTERRUPTED
         return report_error(error)
     return 0
-
-
-def _raise_limit_of_open_files() -> None:
-    """Raise the limit of open files to what commands need; StorageError if that is not allowed.
-
-    A run that reached the limit at its end would lack figures or its log.
-    """
-    allowed, most = resource.getrlimit(resource.RLIMIT_NOFILE)
-    if allowed != resource.RLIM_INFINITY and allowed < OPEN_FILES:
-        if most != resource.RLIM_INFINITY and most < LEAST_OPEN_FILES:
-            raise StorageError(
-                f"at most {most} files may be open at once, podusv needs {LEAST_OPEN_FILES}; "
-                f"allow more with `ulimit -n {OPEN_FILES}`"
-            )
-        wanted = OPEN_FILES if most == resource.RLIM_INFINITY else min(most, OPEN_FILES)
-        resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, most))
 
 
 def report_error(error: BaseException) -> int:

@@ -22,7 +22,7 @@ from podusv_cli.engine.batch_threads import BatchRun, Common, Thread
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.lanes import FEWEST, Sorter
 from podusv_cli.engine.loop import STATE, ClosedLoop, Observer
-from podusv_cli.engine.march import Ending, WaitingThread, Work
+from podusv_cli.engine.march import Ending
 from podusv_cli.engine.simulate import why
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.process.workers import available_workers
@@ -137,7 +137,6 @@ class _Runs:
         self._lanes = Sorter(observer, len(loops) * (grid.steps + 1), lanes)
         self._ready: list[Thread] = []
         self._busy: list[Thread] = []
-        self._maker = WaitingThread()
         self._over, self._settled = 0, False
 
     def march(self, workers: int) -> None:
@@ -155,7 +154,6 @@ class _Runs:
         except KeyboardInterrupt:
             pass
         finally:
-            self._maker.end()
             self._stop()
 
     def _begin(self, position: int) -> None:
@@ -215,28 +213,16 @@ class _Runs:
         return loop
 
     def _contained(self, position: int, make: Callable[[], T]) -> T | None:
-        """What is made for a run; an exception, or no end at all, is that run's and no other's."""
-        found: list[T] = []
-
-        def noted() -> int:
-            found.append(make())
-            return len(found)
-
-        work = Work(noted)  # a law's `start` may never return
-        with interrupts_enabled():
-            work.finish(thread=self._maker)
-        if found:
-            return found[0]
-        if isinstance(work.error, KeyboardInterrupt):
-            raise work.error
-        if isinstance(work.error, InvalidLoop):
-            self._batch.refuse(position, "invalid", str(work.error))
-        elif work.error:
-            self._batch.refuse(position, "crashed", in_a_line(work.error))
-        else:
-            self._maker.end()
-            self._maker = WaitingThread()
-            self._batch.refuse(position, "hung", f"before the first instant: {work.fault()}")
+        """What is made for a run; an exception is that run's and no other's."""
+        try:
+            with interrupts_enabled():
+                return make()
+        except KeyboardInterrupt:
+            raise
+        except InvalidLoop as error:
+            self._batch.refuse(position, "invalid", str(error))
+        except BaseException as error:  # a law may raise anything
+            self._batch.refuse(position, "crashed", in_a_line(error))
         return None
 
     def _wait(self) -> None:

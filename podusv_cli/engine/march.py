@@ -39,27 +39,6 @@ class Ending(NamedTuple):
     cause: str = ""
 
 
-class WaitingThread:
-    """A thread for one short piece of work after another; to start one for each takes longer."""
-
-    def __init__(self) -> None:
-        """It waits for work."""
-        self._line: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
-        Thread(target=self._serve, daemon=True).start()
-
-    def begin(self, work: Callable[[], None]) -> None:
-        """Have it do this next."""
-        self._line.put(work)
-
-    def end(self) -> None:
-        """Have it end when its work is done."""
-        self._line.put(None)
-
-    def _serve(self) -> None:
-        while work := self._line.get():
-            work()
-
-
 class Work:
     """A function that runs in a thread of its own; `result` or `error` is set when it is over.
 
@@ -78,16 +57,10 @@ class Work:
         self._clock: Callable[[], float] = lambda: 0.0  # the thread's processor time
         self._last_change = (-1.0, 0.0)  # the instant under way, and the time when it was new
 
-    def start(self, thread: WaitingThread | None = None) -> None:
-        """Start a thread, or give the function to one that waits.
-
-        It ignores the floating-point errors that this thread ignores.
-        """
-        self.started, run = True, partial(copy_context().run, self._run)
-        if thread:
-            thread.begin(run)
-        else:
-            Thread(target=run, daemon=True).start()
+    def start(self) -> None:
+        """Start a thread, which ignores the floating-point errors that this one ignores."""
+        self.started = True
+        Thread(target=copy_context().run, args=(self._run,), daemon=True).start()
 
     def wait(self, seconds: float = GLANCE) -> None:
         """Wait until the bell rings, but not longer than this."""
@@ -103,11 +76,9 @@ class Work:
             self._last_change = (instant, used)
         return not self.over and used - self._last_change[1] > PATIENCE
 
-    def finish(
-        self, progress: Callable[[int], None] | None = None, thread: WaitingThread | None = None
-    ) -> None:
+    def finish(self, progress: Callable[[int], None] | None = None) -> None:
         """Start, and wait until it is over or hangs."""
-        self.start(thread)
+        self.start()
         while not (self.over or self.hangs()):
             self.wait()
             if progress:
@@ -150,10 +121,9 @@ class Work:
     def _run(self) -> None:
         # Looked up by the thread itself, since the system crashes if the thread has ended.
         look_up = getattr(time, "pthread_getcpuclockid", None)
-        read = time.clock_gettime if look_up else lambda _: time.process_time()
-        clock = look_up(get_ident()) if look_up else 0
-        began = read(clock)  # a waiting thread has worked before
-        self._clock = lambda: read(clock) - began
+        self._clock = (
+            partial(time.clock_gettime, look_up(get_ident())) if look_up else time.process_time
+        )
         try:
             self.result = self._function()
         except BaseException as error:  # a law may raise anything

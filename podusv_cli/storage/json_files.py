@@ -6,7 +6,6 @@ import json
 import math
 from collections import Counter
 from collections.abc import Mapping
-from itertools import chain
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -17,7 +16,6 @@ from podusv_cli.core import escaping
 from podusv_cli.core.errors import StorageError
 from podusv_cli.storage.files import read_text
 
-DEEPEST = 32  # levels
 LONGEST = 300  # digits of an integer that is a finite float
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -50,7 +48,6 @@ def read(path: Path) -> dict[str, Any]:
             read_text(path), object_pairs_hook=_object,
             parse_float=_finite, parse_int=_whole, parse_constant=_finite,
         )  # fmt: skip
-        _check_depth(content)
     except (ValueError, RecursionError) as error:
         reason = " ".join(str(error).split())
         raise StorageError(f"cannot read {path}: not valid JSON ({reason})") from error
@@ -91,13 +88,3 @@ def _finite(digits: str) -> float:
 def _whole(digits: str) -> int:
     # Whatever reads the number may want it as a float.
     return int(digits) if len(digits) < LONGEST else int(_finite(digits))
-
-
-def _check_depth(content: Any) -> None:
-    level = [content]
-    for _ in range(DEEPEST):
-        lists = (thing for thing in level if isinstance(thing, list))
-        mappings = (thing.values() for thing in level if isinstance(thing, dict))
-        level = [*chain.from_iterable(chain(lists, mappings))]
-    if level:
-        raise ValueError(f"nested deeper than {DEEPEST} levels")

@@ -192,8 +192,7 @@ def _dataset(file: h5py.File, name: str, array: Vector, compress: bool) -> h5py.
 
 def _description(signal: Signal) -> dict[str, str]:
     facts = {"units": signal.unit, "long_name": signal.meaning, "symbol": signal.symbol}
-    # The same as the dimension scales. Those refer to other objects, and no reader should follow
-    # references in a file that it does not trust.
+    # The same as the dimension scales, for readers that do not follow references.
     facts["axes"] = " ".join(signal.dimensions)
     return facts | ({"wrapped": "modulo 2 pi"} if signal.wrapped else {})
 

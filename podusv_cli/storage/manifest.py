@@ -14,7 +14,7 @@ from podusv_cli.storage import json_files
 from podusv_cli.storage.files import ELSEWHERE, LARGEST_FILE, fingerprint
 
 NAME = "manifest.json"
-FORMAT = 2  # of run folder and log, as written; all formats from 1 on are read
+FORMAT = 2  # of run folder and log
 
 
 class FileEntry(BaseModel):
@@ -72,9 +72,9 @@ def read(folder: Path) -> Manifest:
 
 def other_format(found: object) -> str:
     """Why this podusv cannot read a format; empty if it can."""
-    if type(found) is int and 1 <= found <= FORMAT:
+    if found == FORMAT:
         return ""
-    return f"written in format {found!r}; this podusv reads formats 1 to {FORMAT}"
+    return f"written in format {found!r}; this podusv reads format {FORMAT}"
 
 
 def check(folder: Path) -> Manifest:

@@ -5,10 +5,8 @@ import json
 import os
 import random
 import socket
-import zlib
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
@@ -78,8 +76,7 @@ TEXTS = {
     "list": "[]", "number": "1", "word": '"a"', "null": "null", "true": "true",
     "no JSON": "{whole}", "open": "{{whole}", "twice": "{{whole}}{}", "no text": "{\udcff}",
     "mark": "\ufeff{{whole}}", "zero": "{{whole}, \0}", "comma": "{{whole},}",
-    "deep": "[" * 100_000, "nested": '{{whole}, "a": ' + "[" * 900 + "]" * 900 + "}",
-    "mappings": '{{whole}, "a": ' + '{"a": ' * 900 + "1" + "}" * 901,
+    "deep": "[" * 100_000,
     "nan": '{{whole}, "a": NaN}', "infinity": '{{whole}, "a": -Infinity}',
     "large": '{{whole}, "a": 1e999}', "digits": '{{whole}, "a": ' + "9" * 4000 + "}",
     "more digits": '{{whole}, "a": ' + "9" * 1_000_000 + "}",
@@ -132,29 +129,6 @@ def hdf5(folder: Path, argument: str) -> None:
     (folder / LOG).write_bytes(content.getvalue())
 
 
-def _replaced(name: str, **how: Any) -> Callable[[h5py.File, Path], object]:
-    def change(file: h5py.File, pipe: Path) -> None:
-        del file[name]
-        file.create_dataset(name, **how)
-
-    return change
-
-
-PACKED = {"compression": "gzip", "shuffle": True, "fletcher32": True}
-
-
-def _bomb(size: int) -> Callable[[h5py.File, Path], object]:
-    """`u` in a single chunk that unpacks to `size` bytes whatever its shape says."""
-
-    def change(file: h5py.File, pipe: Path) -> None:
-        shape = (len(file["u"]),)
-        del file["u"]
-        dataset = file.create_dataset("u", shape, dtype="<f8", chunks=shape, compression="gzip")
-        dataset.id.write_direct_chunk((0,), zlib.compress(bytes(size), 1))
-
-    return change
-
-
 def _linked(name: str, link: Callable[[Path], object]) -> Callable[[h5py.File, Path], object]:
     def change(file: h5py.File, pipe: Path) -> None:
         if name in file:
@@ -170,69 +144,10 @@ def _external(file: h5py.File, pipe: Path) -> None:
     file.create_dataset("u", shape, dtype="<f8", external=[(str(pipe), 0, 8 * shape[0])])
 
 
-def _attributes(count: int) -> Callable[[h5py.File, Path], object]:
-    def change(file: h5py.File, pipe: Path) -> None:
-        room, kind = h5py.h5s.create(h5py.h5s.SCALAR), h5py.h5t.STD_I8LE
-        for i in range(count):
-            h5py.h5a.create(file["u"].id, b"a%d" % i, kind, room)
-
-    return change
-
-
-def _nested(depth: int) -> Callable[[h5py.File, Path], object]:
-    def change(file: h5py.File, pipe: Path) -> None:
-        group = file["provenance"].id
-        for _ in range(depth):
-            group = h5py.h5g.create(group, b"a")
-
-    return change
-
-
-def _members(count: int) -> Callable[[h5py.File, Path], object]:
-    def change(file: h5py.File, pipe: Path) -> None:
-        for i in range(count):
-            h5py.h5o.link(file["x"].id, file.id, f"x{i}".encode())
-
-    return change
-
-
-def _again(*names: str) -> Callable[[h5py.File, Path], object]:
-    """The group of these names is its own child, and the root's."""
-
-    def change(file: h5py.File, pipe: Path) -> None:
-        for name in names:
-            if name in file:
-                del file[name]
-            file[name] = file["/"]
-
-    return change
-
-
-def _giant(file: h5py.File, pipe: Path) -> None:
-    """Every signal a petabyte long, without a chunk of it."""
-    for name, dataset in list(file.items()):
-        if isinstance(dataset, h5py.Dataset) and len(dataset.shape) == 1 and dataset.shape[0] == 11:
-            del file[name]
-            file.create_dataset(name, (2**47,), dtype="<f8", chunks=(2**17,), **PACKED)
-
-
 HDF5: dict[str, Callable[[h5py.File, Path], object]] = {
-    "bomb": _bomb(2**29), "no_numbers": _replaced("u", shape=(11,), dtype="<f8"),
-    "giant": _giant,
-    "wide_chunk": _replaced("u", shape=(11,), dtype="<f8", chunks=(2**28,), maxshape=(None,)),
-    "nested_ragged": _replaced("u", shape=(11,), dtype=h5py.vlen_dtype(np.dtype("V16"))),
     "external": _external,
     "external_link": _linked("u", lambda pipe: h5py.ExternalLink(str(pipe), "/u")),
     "external_provenance": _linked("provenance", lambda pipe: h5py.ExternalLink(str(pipe), "/")),
-    "attributes": _attributes(2000),
-    "many_attributes": _attributes(1_000_000),
-    "nested": _nested(1000),
-    "deeply_nested": _nested(50_000),
-    "members": _members(2000),
-    "many_members": _members(400_000),
-    "root_in_itself": _again("u"),
-    "root_in_provenance": _again("provenance"),
-    "cycle_aside": _again("provenance/again"),
 }  # fmt: skip
 
 
@@ -247,15 +162,8 @@ def _table(path: Path) -> None:
         file["data/values"] = np.zeros((100, 100))
 
 
-def _late(path: Path) -> None:
-    """A log of no program: HDF5 behind a block of the user's."""
-    with h5py.File(path, "w", userblock_size=512) as file:
-        file.attrs.create("podusv_format", np.int32(1))
-
-
 FOREIGN: dict[str, Callable[[Path], object]] = {
     "table": _table,
-    "late": _late,
     "signature": lambda path: path.write_bytes(b"\x89HDF\r\n\x1a\n"),
     "signature_and_noise": lambda path: path.write_bytes(
         b"\x89HDF\r\n\x1a\n" + random.Random(2).randbytes(5000)

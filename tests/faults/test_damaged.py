@@ -30,9 +30,7 @@ JSON = ("metrics.json", "provenance.json", "theory.json")
 UNREAD = ("scenario.yaml", "metrics.csv")
 READ = ("log.h5", "resolved.yaml", *JSON)
 FEW = ("log.h5", "resolved.yaml", "theory.json", "metrics.csv")  # one of each sort
-FULL = ("many_attributes", "deeply_nested", "many_members")  # take minutes to make
 LENGTHY = ("comments", "lines", "many", "wide", "keys")  # take seconds to read
-HARMLESS = ("attributes", "many_attributes", "nested", "deeply_nested", "cycle_aside")  # unread
 
 
 def unless_lengthy(ways: Iterable[str]) -> list[Any]:
@@ -186,13 +184,7 @@ def test_a_scenario_that_podusv_does_not_write(opened, which):
 
 
 @pytest.mark.parametrize(
-    "way",
-    [
-        *(f"hdf5 {which}" for which in HDF5 if count(which not in FULL, True)),
-        *(f"foreign {which}" for which in FOREIGN),
-    ],
+    "way", [*(f"hdf5 {which}" for which in HDF5), *(f"foreign {which}" for which in FOREIGN)]
 )
 def test_a_log_of_another_program(opened, way):
-    harmless = way.removeprefix("hdf5 ") in HARMLESS
-    found = opened(f"!{way}", patience=600)  # for making it
-    check(way, found, "same" if harmless else "refused")
+    check(way, opened(f"!{way}"), "refused")

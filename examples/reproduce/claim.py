@@ -1,6 +1,6 @@
 """Tables behind results/claim.md: a law that is told a wrong vessel, sampled control, and f_hat.
 
-    python results/claim.py unknown | discrete | limits | learnt | gains
+    python examples/reproduce/claim.py unknown | discrete | limits | learnt | gains
 
 Each prints a CSV table. The scenarios are those of configs/paper; every number comes from a run.
 """
@@ -28,7 +28,7 @@ from podusv_cli.theory.ideal_weights import unloaded_accelerations
 from podusv_cli.workflows.execute import Stopwatch, simulated
 
 Case, Value = TypeVar("Case"), TypeVar("Value")
-PAPER = Path(__file__).parents[1] / "configs/paper"
+PAPER = Path(__file__).parents[2] / "configs/paper"
 READINGS = {
     "F": "figures_compare.yaml",
     "S": "figures_compare_standoff.yaml",

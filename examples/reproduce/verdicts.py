@@ -6,7 +6,7 @@ import json
 import sys
 from pathlib import Path
 
-PAPER = Path(__file__).parent / "paper"
+PAPER = Path(__file__).parents[2] / "results/.runs/paper"
 READINGS = {
     "P": "printed_compare",
     "F": "figures_compare",

@@ -1,15 +1,14 @@
 #!/usr/bin/env bash
 # One step of `make reproduce`, `make pod` and `make sea`: runs a scenario and prints a line with the time it took.
 #
-#   results/step.sh run|compare FOLDER NAME CODE
+#   examples/reproduce/step.sh run|compare FOLDER NAME CODE
 #
 # for configs/FOLDER/NAME.yaml, which has to end with that exit code. What podusv says is kept in
-# results/FOLDER.log. The result goes to results/FOLDER/NAME; where only the committed files are there, it is
-# made beside them and laid over them when it is whole.
+# results/FOLDER.log, the result in results/.runs/FOLDER/NAME. Of it, the files that results/FOLDER/NAME has are
+# replaced there.
 set -uo pipefail
 verb=$1 folder=$2 name=$3 wanted=$4
-place=results/$folder/$name made=results/$folder/$name log=results/$folder.log
-test -e "$place/manifest.json" || made=results/.new/$folder/$name
+kept=results/$folder/$name made=results/.runs/$folder/$name log=results/$folder.log
 
 printf '  %-26s' "$name"
 SECONDS=0
@@ -21,8 +20,10 @@ if test "$code" -ne "$wanted"; then
     tail -n 5 "$log"
     exit 1
 fi
-if test "$made" != "$place"; then
-    mkdir -p "$place" && cp -R "$made/." "$place/" && rm -rf "$made" || exit 1
+if test -d "$kept"; then
+    (cd "$kept" && find . -type f) | while read -r file; do
+        test ! -e "$made/$file" || cp "$made/$file" "$kept/$file" || exit 1
+    done || exit 1
 fi
 case $code in
     0) how="done" ;;
