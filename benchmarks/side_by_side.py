@@ -15,9 +15,9 @@ import numpy as np
 from benchmarks.c_program import TOLERANCE, compiler
 from benchmarks.cases import Case, grid, metrics_observer
 from benchmarks.timing import in_turns, quartiles, ratio, timed
+from benchmarks.variants import variants
 from podusv_cli.core.kernel import LANES, Vector
 from podusv_cli.engine.batch import simulate_many
-from podusv_cli.engine.variants import variants
 
 SOURCE = Path(__file__).with_name("side_by_side.c")
 # Neither flag allows the compiler to change a result.

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from conftest import Constant, adrift, corrected
 
+from benchmarks.variants import variants
 from podusv_cli.actuators.saturated import Saturated
 from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
 from podusv_cli.controllers.dsc import DynamicSurface
@@ -27,7 +28,6 @@ from podusv_cli.engine.batch import Batch, Lazily, simulate_many
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.loop import STATE, ClosedLoop
 from podusv_cli.engine.simulate import simulate
-from podusv_cli.engine.variants import variants
 from podusv_cli.metrics.table import observer
 from podusv_cli.paths.waypoints import Waypoints
 

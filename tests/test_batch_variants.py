@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 from conftest import NONLINEAR, corrected
 
+from benchmarks.variants import variants
 from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
 from podusv_cli.controllers.network import Network
-from podusv_cli.engine.variants import variants
 
 ROOT = Path(__file__).resolve().parent.parent
 

@@ -11,6 +11,7 @@ import pytest
 from conftest import REQUIRED
 from test_lanes import COUNT, ROOT, both, loop, same, scattered
 
+from benchmarks.variants import variants
 from podusv_cli.actuators.base import Actuator
 from podusv_cli.controllers.base import Controller
 from podusv_cli.core.component import Component
@@ -19,7 +20,6 @@ from podusv_cli.disturbances.base import Disturbance
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.lanes import why_alone
 from podusv_cli.engine.loop import ClosedLoop, Observer
-from podusv_cli.engine.variants import variants
 from podusv_cli.paths.base import Path
 from podusv_cli.scenario.load import load
 

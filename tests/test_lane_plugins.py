@@ -13,13 +13,13 @@ from plugin_samples import LAW
 from plugin_samples import SCENARIO as SCENARIO_OF_LAW
 from test_lanes import same
 
+from benchmarks.variants import variants
 from podusv_cli.core.kernel import LANES
 from podusv_cli.engine.batch import simulate_many
 from podusv_cli.engine.grid import TimeGrid
 from podusv_cli.engine.lane_source import OtherSource, source
 from podusv_cli.engine.lanes import why_alone
 from podusv_cli.engine.loop import Observer
-from podusv_cli.engine.variants import variants
 from podusv_cli.scenario.load import load
 
 TEXT = """

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from plugin_samples import LAW
 
+from benchmarks.variants import variants
 from podusv_cli.actuators.ideal import Ideal
 from podusv_cli.actuators.saturated import Saturated
 from podusv_cli.controllers.base import Controller
@@ -24,7 +25,6 @@ from podusv_cli.engine.lane_doors import LANE_VECTOR
 from podusv_cli.engine.lanes import why_alone
 from podusv_cli.engine.loop import ClosedLoop, Observer
 from podusv_cli.engine.march import Work
-from podusv_cli.engine.variants import variants
 from podusv_cli.metrics.table import observer
 from podusv_cli.scenario.load import load
 
