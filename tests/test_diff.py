@@ -62,6 +62,7 @@ def test_wrapped_angles_are_the_shorter_way_round_apart(name):
 
 def test_zeros_of_either_sign_are_no_distance_apart_but_differ():
     assert deviation(0.0, -0.0).ulps == 0
+    assert deviation_in_words(deviation(0.0, -0.0)).endswith("(the sign of zero)")
     assert differing(np.array([0.0]), np.array([-0.0]))[0]
 
 
