@@ -208,6 +208,8 @@ def test_versions_count_and_moments_do_not():
     one = {"podusv": "1", "packages": {"numba": "1"}, "argv": ["a"], "started": "x", "git": None}
     other = {"podusv": "1", "packages": {"numba": "2"}, "argv": [], "started": "y", "git": {"c": 1}}
     assert version_changes(one, other) == {"packages.numba": ("1", "2")}
+    deep = [{"a": {"b": {"c": number}}} for number in (1, 2)]
+    assert version_changes(*deep) == {"a.b.c": (1, 2)}
 
 
 def test_a_log_without_a_readable_scenario_is_damaged():
