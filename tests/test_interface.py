@@ -238,7 +238,7 @@ def test_scenarios_runs_and_folders_are_compared(kept):
     assert done.folder.parent == Path("results/run-soft")
     again = podusv.compare([str(kept.folder), done.folder / "soft"], figures=False)
     assert again.table.loc["iae"].tolist() == done.table.loc["iae"].tolist()
-    with pytest.raises(UsageError, match="start.x: only finished runs are given"):
+    with pytest.raises(UsageError, match=r"start\.x: only finished runs are given"):
         podusv.compare(kept, {"start.x": 1.0})
 
 
