@@ -90,6 +90,7 @@ def test_a_run_that_ended_early_has_not_settled():
 def test_half_the_failures_make_an_infinite_median():
     assert middle([1.0, math.inf]) == math.inf
     assert middle([1.0, 2.0, math.inf]) == 2.0
+    assert middle([1.0, 2.0]) == 1.5
 
 
 def test_a_profile_ends_at_the_share_of_cases_that_the_law_does():

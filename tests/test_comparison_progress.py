@@ -27,6 +27,7 @@ def test_costs_are_median_and_quartiles(monkeypatch):
 def test_names_are_told_apart():
     assert members.numbered(["a", "a", "a_2", "b", "a"]) == ["a", "a_2", "a_2_2", "b", "a_3"]
     assert members.numbered(["figures", "unit"], outputs.RESERVED) == ["figures_2", "unit_2"]
+    assert members.numbered(["pid", "Pid"]) == ["pid", "Pid_2"]
 
 
 @pytest.mark.slow

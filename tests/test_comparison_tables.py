@@ -56,6 +56,11 @@ def test_a_measured_time_is_never_marked_as_the_best():
     assert table.cells(frame) == [["law_ns", "ns", "90", "80 (0.889)"]]
 
 
+def test_where_a_law_keeps_a_standoff_to_be_nearer_is_not_better():
+    frame = table.table({"a": {"iae": 9.0, "iae_e": 5.0}, "b": {"iae": 8.0, "iae_e": 6.0}})
+    assert table.leaders(frame) == {"a": ["iae_e"], "b": []}
+
+
 def test_csv_has_units_first_and_ratios_last():
     full = table.with_ratios(FRAME)
     assert list(full) == ["unit", "a", "b", "c", "lost", "b/a", "c/a", "lost/a"]

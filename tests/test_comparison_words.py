@@ -75,6 +75,11 @@ def verdict(text: str, tolerance: float = 0.05):
         ("rate", "max(rate(a.x_d)) == min(rate(a.x_d))", "final(a.x_d) == final(a.z_e)"),
         ("integral", "integral(a.z_e) == a.iae", "integral(b.z_e) == a.iae"),
         ("variation", "variation(a.z_e) == 10", "variation(b.z_e) == 10"),
+        (
+            "fast",
+            "rms_above(a.z_e, 2) < rms_above(a.z_e, 0.1)",
+            "rms_above(a.z_e, 0.1) < rms_above(a.z_e, 2)",
+        ),
         ("plane", "max(hypot(a.z_e, a.x_d)) == 10", "max(hypot(a.z_e, a.x_d)) == 11"),
         ("check", "finished(a)", "finished(lost)"),
         ("denial", "not finished(lost)", "not finished(a)"),

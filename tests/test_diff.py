@@ -62,6 +62,7 @@ def test_wrapped_angles_are_the_shorter_way_round_apart(name):
 
 def test_zeros_of_either_sign_are_no_distance_apart_but_differ():
     assert deviation(0.0, -0.0).ulps == 0
+    assert deviation_in_words(deviation(0.0, -0.0)).endswith("(the sign of zero)")
     assert differing(np.array([0.0]), np.array([-0.0]))[0]
 
 
@@ -207,6 +208,8 @@ def test_versions_count_and_moments_do_not():
     one = {"podusv": "1", "packages": {"numba": "1"}, "argv": ["a"], "started": "x", "git": None}
     other = {"podusv": "1", "packages": {"numba": "2"}, "argv": [], "started": "y", "git": {"c": 1}}
     assert version_changes(one, other) == {"packages.numba": ("1", "2")}
+    deep = [{"a": {"b": {"c": number}}} for number in (1, 2)]
+    assert version_changes(*deep) == {"a.b.c": (1, 2)}
 
 
 def test_a_log_without_a_readable_scenario_is_damaged():

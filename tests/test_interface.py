@@ -187,6 +187,7 @@ def test_a_run_that_diverges_is_a_run_and_its_warnings_are_there():
     assert run.metrics["iae"] == pytest.approx(kept, rel=1e-12)
     assert any("warning[" in line for line in run.warnings)
     assert "diverged at t = 0.08 s" in run._repr_html_()
+    assert "&lt;podusv run" in run._repr_html_()
 
 
 def test_without_xarray_a_sentence_says_what_to_do(kept, monkeypatch):
@@ -237,6 +238,8 @@ def test_scenarios_runs_and_folders_are_compared(kept):
     assert done.folder.parent == Path("results/run-soft")
     again = podusv.compare([str(kept.folder), done.folder / "soft"], figures=False)
     assert again.table.loc["iae"].tolist() == done.table.loc["iae"].tolist()
+    with pytest.raises(UsageError, match=r"start\.x: only finished runs are given"):
+        podusv.compare(kept, {"start.x": 1.0})
 
 
 def test_many_runs_are_the_rows_of_a_table():
@@ -255,6 +258,7 @@ def test_verify_is_a_table_of_numbers():
     assert list(found) == ["value", "order", "relative_error", "converged"]
     assert found.loc[("pid", "iae"), "value"] == podusv.simulate(SHORT).metrics["iae"]
     assert not found["converged"].all()
+    assert found["converged"].equals(found["relative_error"] <= 1e-9)
 
 
 def test_the_example_in_the_documentation_runs(capsys):

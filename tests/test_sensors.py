@@ -122,6 +122,7 @@ def test_errors_do_not_depend_on_the_other_sensors_or_on_the_length_of_the_run()
     heading = [_errors(each.table_for(H, 100), 2, 51) for each in (one, other)]
     np.testing.assert_array_equal(*heading)
     assert heading[0].std() > 0.05
+    assert not np.allclose(_errors(other.table_for(H, 100), 0, 51), 10.0 * heading[1])
     assert len(found) == 101
 
 

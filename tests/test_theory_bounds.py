@@ -114,6 +114,7 @@ def test_without_leakage_there_is_no_bound(name):
 def test_before_a_run_only_lambda_and_the_conditions_are_known():
     before = bound(None)
     assert all(condition.holds for condition in before.conditions)
+    assert bound(None, gamma_u=3.0, sigma_bu=0.5).corrected.candidates["b_u"] == 0.75
     assert before.corrected.lambda_ > bound().corrected.lambda_
     assert math.isnan(before.corrected.value)
 
