@@ -223,6 +223,8 @@ def test_the_tolerance_of_an_order_is_of_the_larger_number():
 def test_an_integral_knows_its_time():
     assert verdict("integral(coarse.tau_u) == 20", tolerance=1e-9)[0] is True
     assert verdict("mean(coarse.tau_u, 4, 8) == 2", tolerance=1e-9)[0] is True
+    # Trapezoids over 0, 1, 4 at 0, 2, 4 s.
+    assert verdict("mean(coarse.x_d * coarse.x_d, 0, 4) == 1.5", tolerance=1e-9)[0] is True
 
 
 def test_names_of_a_scenario_stand_for_other_runs():
