@@ -5,7 +5,7 @@ from pathlib import Path
 from podusv_cli.scenario.load import load_text
 from podusv_cli.study.march import Processes, march
 from podusv_cli.study.plan import plan
-from podusv_cli.study.store import Store
+from podusv_cli.study.store import SCENARIO, Store
 
 TEXT = """
 name: small
@@ -43,6 +43,13 @@ def made(folder: Path, workers=1, part=(1, 1), **changes):
     if whole and part == (1, 1):
         store.write_runs()
     return store
+
+
+def folder_with_scenario(folder: Path) -> Path:
+    """The folder of a whole study of four draws, with its scenario."""
+    study = made(folder, draws=4).folder
+    (study / SCENARIO).write_text(TEXT.replace("draws: 40", "draws: 4"))
+    return study
 
 
 def written(path: Path, *changes):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from rerun_samples import copied
 from rerun_samples import made as made_run
-from small_study import TEXT, made, small
+from small_study import folder_with_scenario, small
 
 from podusv_cli.core.errors import StorageError
 from podusv_cli.study.store import RUNS, SCENARIO, UNITS, encoded, read
@@ -21,9 +21,7 @@ KEY = "drawn/vessel.m"
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    folder = made(tmp_path_factory.mktemp("study") / "whole", draws=4).folder
-    (folder / SCENARIO).write_text(TEXT.replace("draws: 40", "draws: 4"))
-    return folder
+    return folder_with_scenario(tmp_path_factory.mktemp("study") / "whole")
 
 
 @pytest.fixture

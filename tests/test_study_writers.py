@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from command_samples import under_way, wait_for
-from small_study import TEXT, made, written
+from small_study import TEXT, folder_with_scenario, made, written
 
 from podusv_cli.core.errors import StorageError
 from podusv_cli.storage import writer
@@ -21,9 +21,7 @@ from podusv_cli.workflows import sweep
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    folder = made(tmp_path_factory.mktemp("study") / "whole", draws=4).folder
-    (folder / SCENARIO).write_text(TEXT.replace("draws: 40", "draws: 4"))
-    return folder
+    return folder_with_scenario(tmp_path_factory.mktemp("study") / "whole")
 
 
 @pytest.fixture

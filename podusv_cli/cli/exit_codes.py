@@ -25,8 +25,8 @@ MEANINGS = {
     0: "done",
     1: "a bug in podusv",
     2: "wrong usage or scenario",
-    3: "some of several runs failed (`compare`) or figures (`plot`), a number is not converged "
-    "(`verify`, `optimum`), or runs differ (`rerun`, `diff`)",
+    3: "some of several runs failed (`compare`, `sweep`) or figures (`plot`), a number is not "
+    "converged (`verify`, `optimum`), or runs differ (`rerun`, `diff`, kept logs of `sweep`)",
     4: "the simulation diverged; what was computed is kept",
     5: "input or output failed",
     129: "the terminal was closed",

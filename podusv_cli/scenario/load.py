@@ -126,7 +126,7 @@ def load_stored(
 def _undamaged(faults: list[Fault], source: str) -> None:
     """Raise StorageError with the first fault in the file called `source`."""
     for fault in _ordered([one for one in faults if one.mark.source == source], source)[:1]:
-        raise StorageError(f"{fault} (damaged: not as podusv wrote it)")
+        raise StorageError(f"{fault} (the file is damaged, or podusv did not write it)")
 
 
 def _plugged(

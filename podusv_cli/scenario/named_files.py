@@ -16,7 +16,7 @@ MAX_POINTS = MAX_NODES // 4  # a point is three values, and the resolved scenari
 MOST_FAULTS = 10  # in one file of points
 COLUMNS = ("x [m]", "y [m]")
 
-ELSEWHERE = "refers to another file, which nothing in a folder of podusv does"
+ELSEWHERE = "refers to another file; the scenario that podusv keeps in a folder never does"
 
 Form = Callable[[str, str, list[Fault]], Node]  # of a file's text and name
 

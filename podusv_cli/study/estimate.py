@@ -152,7 +152,9 @@ def check_fits(plan: Plan, folder: Path, parts: int = 1) -> None:
     """
     shape = (len(plan.laws), len(plan.cells), plan.sweep.draws)
     runs, told = math.prod(shape), f"{math.prod(shape):,} runs (sweep.draws: {shape[2]:,})"
-    fewer = f"{told} were asked for; ask for fewer draws, or elsewhere (--out)"
+    fewer = (
+        f"{told} were asked for; ask for fewer draws, or name a folder on a larger disk with --out"
+    )
     table = runs_writer.bytes_of(shape, len(plan.metrics), len(plan.sweep.vary))
     check_free_space(folder, table / parts, fewer)
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
