@@ -26,7 +26,7 @@ from storage_samples import (
 )
 
 from podusv_cli.core.errors import StorageError
-from podusv_cli.storage import manifest
+from podusv_cli.storage import manifest, staging
 from podusv_cli.storage.run_folder import RunWriter
 
 CALLS = ("mkdir", "write", "fsync", "replace", "rename")
@@ -75,8 +75,16 @@ def test_a_lesser_one_takes_no_place(final):
     assert content(final.with_name("run-2")) == {"log.h5": b"half"}
 
 
+@pytest.fixture(params=[True, False], ids=["exchanging", "plain"])
+def exchanging(request, monkeypatch):
+    """Whether the file system lets two names trade places."""
+    if not request.param:
+        monkeypatch.setattr(staging, "exchange", lambda one, other: fails(errno.EINVAL)())
+    return bool(request.param)
+
+
 @pytest.mark.parametrize("force", [False, True])
-def test_writers_that_finish_at_the_same_time(final, force):
+def test_writers_that_finish_at_the_same_time(final, force, exchanging):
     writers = [RunWriter(final, force=force) for _ in range(8)]
     for number, writer in enumerate(writers):
         writer.add("log.h5", bytes([number]) * 1000)
@@ -96,6 +104,7 @@ def test_writers_that_finish_at_the_same_time(final, force):
     found = content(final)["log.h5"]
     assert found in [bytes([number]) * 1000 for number in winners]
     assert force or len(winners) == 1
+    assert not (force and exchanging) or len(winners) == 8
     others = {content(final.with_name(name))["log.h5"][0] for name in beside(final)}
     assert others == set(range(8)) - set(winners)
 
@@ -116,7 +125,7 @@ def test_a_folder_that_is_renamed_while_it_is_looked_at_costs_no_result(final, m
 
 @pytest.mark.parametrize("deed", [fails(errno.ENOSPC), interrupts])
 @pytest.mark.parametrize("before", [None, OLD])
-def test_a_failure_at_any_step_leaves_the_old_run_or_the_new_one(final, before, deed):
+def test_a_failure_at_any_step_leaves_the_old_run_or_the_new_one(final, before, deed, exchanging):
     def attempt(saboteur: Saboteur) -> None:
         shutil.rmtree(final, ignore_errors=True)
         if before:
@@ -151,8 +160,11 @@ def in_a_child(work: Callable[[], object]) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("lost", [False, pytest.param(True, marks=pytest.mark.slow)])
-def test_killed_at_any_step_the_old_run_or_the_new_one_comes_back(final, lost):
-    """`lost`: somebody deletes the folder before the next run clears up; no half of one appears."""
+def test_killed_at_any_step_the_old_run_or_the_new_one_comes_back(final, lost, exchanging):
+    """`lost`: somebody deletes the folder before the next run clears up; no half of one appears.
+
+    It need not even come back where names can trade places: it was there all the time.
+    """
     other = final.with_name("other")
 
     def attempt(saboteur: Saboteur) -> None:
@@ -172,13 +184,14 @@ def test_killed_at_any_step_the_old_run_or_the_new_one_comes_back(final, lost):
 
     seen = []
     for _ in until_nothing_breaks(attempt, kills):
+        assert not exchanging or content(final) in (OLD, NEW)
         if lost:
             shutil.rmtree(final, ignore_errors=True)
         write(other, NEW, force=True)  # the next run to the same place clears up
         assert beside(final) == {"other"}
         seen.append(content(final) if final.exists() else None)
     assert len(seen) > 30
-    assert OLD in seen
+    assert (OLD in seen) != (lost and exchanging)
     assert seen[-1] == (None if lost else NEW)
     assert all(found in ((None, OLD) if lost else (OLD, NEW)) for found in seen)
 

@@ -1,11 +1,12 @@
 """Atomic folders: filled under a hidden name beside their final place, then renamed.
 
-The hidden folder `<box>/new` is filled. To replace an older folder, that is first renamed to
-`<box>/old`; who finds it there after a kill puts it back.
+The hidden folder `<box>/new` is filled. To replace an older folder the two are exchanged by one
+system call; where the file system has none, the older one is first renamed to `<box>/old`.
 """
 
 from __future__ import annotations
 
+import ctypes
 import errno
 import os
 import shutil
@@ -17,6 +18,8 @@ from podusv_cli.process.temporary_names import abandoned, temporary_name
 from podusv_cli.storage import files
 
 _TAKEN = (errno.ENOTEMPTY, errno.EEXIST, errno.ENOTDIR)
+# Nothing to exchange with, or no exchange on this system or file system.
+_NO_EXCHANGE = (errno.ENOENT, errno.ENOSYS, errno.EINVAL, errno.ENOTSUP)
 
 
 class Taken(StorageError):
@@ -74,9 +77,30 @@ class Staging:
             raise Taken(text) from error
 
     def _replace(self) -> None:
-        with suppress(FileNotFoundError):
-            os.rename(self.final, _old(self._box))
-        self._rename()
+        if not self._exchanged():
+            with suppress(FileNotFoundError):
+                os.rename(self.final, _old(self._box))
+            self._rename()
+
+    def _exchanged(self) -> bool:
+        try:
+            exchange(self.folder, self.final)
+        except OSError as error:
+            if error.errno not in _NO_EXCHANGE:
+                raise
+            return False
+        return True
+
+
+def exchange(one: Path, other: Path) -> None:
+    """Exchange two paths by one system call. OSError, with ENOSYS where there is no such call."""
+    rename = getattr(ctypes.CDLL(None, use_errno=True), "renameat2", None)
+    if rename is None:
+        raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
+    here, swapping = -100, 2  # AT_FDCWD, RENAME_EXCHANGE
+    if rename(here, os.fsencode(one), here, os.fsencode(other), swapping) != 0:
+        number = ctypes.get_errno()
+        raise OSError(number, os.strerror(number))
 
 
 def remove_abandoned(parent: Path) -> None:
