@@ -1,6 +1,7 @@
 """Pods as mechanics: thrust and its inverse, lags and rates, equilibria, symmetry, bad input."""
 
 import math
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -48,8 +49,11 @@ def loads(actuator: Pods, state: Vector, x: Vector, demand: tuple[float, float] 
     return tau, rate, dict(zip((s.name for s in actuator.signals), signals, strict=True))
 
 
+NORMAL = partial(st.floats, allow_subnormal=False)  # 1e-323 N is beyond a root's arithmetic
+
+
 @given(
-    T=st.floats(-8, 8), u=st.floats(-1, 1), v=st.floats(-1, 1), T_nV=st.floats(0, 0.5),
+    T=NORMAL(-8, 8), u=st.floats(-1, 1), v=st.floats(-1, 1), T_nV=NORMAL(0, 0.5),
     form=st.sampled_from(["physical", "printed"]),
 )  # fmt: skip
 def test_the_inverse_gives_the_thrust_back(T, u, v, T_nV, form):
