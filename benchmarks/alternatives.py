@@ -12,9 +12,9 @@ from benchmarks.cases import LAWS, Case, grid
 from benchmarks.plain import Loop, rk4
 from benchmarks.timing import in_turns, quartiles, timed
 from podusv_cli.core.kernel import Vector
-from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.loop import STATE
-from podusv_cli.engine.simulate import simulate
+from podusv_cli.engine.loop.closed_loop import STATE
+from podusv_cli.engine.running.simulate import simulate
+from podusv_cli.engine.step.grid import TimeGrid
 
 SPAN = 5.0  # s
 CASE = Case("adaptive_neural", "27 grid")

@@ -11,10 +11,10 @@ import numpy as np
 from benchmarks.cases import LAWS, Case, grid, metrics_observer
 from benchmarks.timing import in_turns, quartiles, ratio, timed
 from benchmarks.variants import variants
-from podusv_cli.engine.batch import simulate_many
-from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.loop import ClosedLoop, Observer
-from podusv_cli.engine.simulate import simulate
+from podusv_cli.engine.loop.closed_loop import ClosedLoop, Observer
+from podusv_cli.engine.running.batch import simulate_many
+from podusv_cli.engine.running.simulate import simulate
+from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.process.workers import available_workers
 
 CASE = Case("adaptive_neural", "27 grid")

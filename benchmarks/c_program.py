@@ -13,8 +13,8 @@ import numpy as np
 
 from benchmarks.cases import NETWORKS, Case, grid, metrics_observer
 from podusv_cli.core.kernel import Vector
-from podusv_cli.engine.loop import STATE
-from podusv_cli.engine.simulate import simulate
+from podusv_cli.engine.loop.closed_loop import STATE
+from podusv_cli.engine.running.simulate import simulate
 
 SOURCE = Path(__file__).with_name("closed_loop.c")
 FLAGS = {"O3": ("-O3", "-march=native"), "Ofast": ("-Ofast", "-march=native")}

@@ -7,11 +7,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from podusv_cli.controllers.base import Controller
-from podusv_cli.controllers.network import Network
+from podusv_cli.components.controllers.base import Controller
+from podusv_cli.components.controllers.network import Network
 from podusv_cli.core.registry import kinds
-from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.loop import ClosedLoop
+from podusv_cli.engine.loop.closed_loop import ClosedLoop
+from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.metrics.table import Metrics, observer
 from podusv_cli.scenario.load import load
 from podusv_cli.scenario.model import Scenario
@@ -53,7 +53,7 @@ class Case:
 
     def controller(self) -> Controller:
         """The law with those of the scenario's values that it shares."""
-        kind = kinds("podusv_cli.controllers", Controller)[self.law]
+        kind = kinds("podusv_cli.components.controllers", Controller)[self.law]
         given = _scenario().controller.model_dump(exclude={"kind"})
         fields: dict[str, Any] = {name: given[name] for name in kind.model_fields.keys() & given}
         if self.network:

@@ -12,12 +12,12 @@ from typing import Any
 from benchmarks.c_program import agreement, timer
 from benchmarks.cases import CASES, ROOT, SCENARIO, Case, grid, metrics_observer, rivals
 from benchmarks.timing import Timer, in_turns, quartiles, ratio, timed
-from podusv_cli.controllers.base import Controller
-from podusv_cli.controllers.network import Network
-from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.loop import ClosedLoop
-from podusv_cli.engine.replay import replayer
-from podusv_cli.engine.simulate import simulate
+from podusv_cli.components.controllers.base import Controller
+from podusv_cli.components.controllers.network import Network
+from podusv_cli.engine.loop.closed_loop import ClosedLoop
+from podusv_cli.engine.running.replay import replayer
+from podusv_cli.engine.running.simulate import simulate
+from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.scenario.limits import estimate
 from podusv_cli.scenario.load import load
 from podusv_cli.scenario.model import Scenario

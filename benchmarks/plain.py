@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
-from podusv_cli.engine.loop import ClosedLoop
+from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
+from podusv_cli.engine.loop.closed_loop import ClosedLoop
 
 Array = npt.NDArray[np.float64]
 

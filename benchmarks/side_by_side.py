@@ -17,7 +17,7 @@ from benchmarks.cases import Case, grid, metrics_observer
 from benchmarks.timing import in_turns, quartiles, ratio, timed
 from benchmarks.variants import variants
 from podusv_cli.core.kernel import LANES, Vector
-from podusv_cli.engine.batch import simulate_many
+from podusv_cli.engine.running.batch import simulate_many
 
 SOURCE = Path(__file__).with_name("side_by_side.c")
 # Neither flag allows the compiler to change a result.

@@ -8,7 +8,7 @@ from typing import Any
 
 from podusv_cli.core.component import Component
 from podusv_cli.core.kernel import Vector
-from podusv_cli.engine.loop import STATE, ClosedLoop
+from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop
 
 
 def variants(

@@ -19,34 +19,34 @@ from typing import Any
 
 import numpy as np
 
-from podusv_cli.actuators.base import Actuator
-from podusv_cli.actuators.ideal import Ideal
-from podusv_cli.controllers.base import Controller
-from podusv_cli.controllers.pid import Pid
+from podusv_cli.components.actuators.base import Actuator
+from podusv_cli.components.actuators.ideal import Ideal
+from podusv_cli.components.controllers.base import Controller
+from podusv_cli.components.controllers.pid import Pid
+from podusv_cli.components.disturbances.base import Disturbance
+from podusv_cli.components.disturbances.calm import Calm
+from podusv_cli.components.estimators.base import Estimator
+from podusv_cli.components.measurements.base import Measurement
+from podusv_cli.components.measurements.exact import Exact
+from podusv_cli.components.measurements.sensors import Sensors
+from podusv_cli.components.paths.base import TARGET
+from podusv_cli.components.paths.base import Path as AnyPath
+from podusv_cli.components.paths.line import Line
 from podusv_cli.core import plugins, registry
 from podusv_cli.core.component import Component
 from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.core.plugins import Plugin
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import Signal
-from podusv_cli.disturbances.base import Disturbance
-from podusv_cli.disturbances.calm import Calm
-from podusv_cli.engine.check import check_law
-from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.loop import ClosedLoop
-from podusv_cli.engine.simulate import simulate
-from podusv_cli.estimators.base import Estimator
+from podusv_cli.engine.loop.closed_loop import ClosedLoop
+from podusv_cli.engine.running.check import check_law
+from podusv_cli.engine.running.simulate import simulate
+from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.figures.drawing import dressed
 from podusv_cli.figures.sheet import Sheet
 from podusv_cli.figures.style import house_style, image
-from podusv_cli.measurements.base import Measurement
-from podusv_cli.measurements.exact import Exact
-from podusv_cli.measurements.sensors import Sensors
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import metrics_with, observer
-from podusv_cli.paths.base import TARGET
-from podusv_cli.paths.base import Path as AnyPath
-from podusv_cli.paths.line import Line
 from podusv_cli.scenario.load import load_text
 from podusv_cli.testing_seeing import ESTIMATOR_CHECKS, MEASUREMENT_CHECKS, usual_vessel
 from podusv_cli.theory import derived
@@ -100,7 +100,7 @@ def _members(own: Plugin, room: str, kind: type[Any]) -> list[Any]:
 def components(own: Plugin, fields: Mapping[str, Mapping[str, Any]]) -> Iterator[Component]:
     """Every component of a plug-in file, with its defaults."""
     for room, (_, base) in ROOMS.items():
-        package = f"podusv_cli.{room}"
+        package = f"podusv_cli.components.{room}"
         known = registry.kinds(package, base)
         for kind, made in registry.kinds(package, base, (own,)).items():
             if kind not in known:

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from podusv_cli.components.estimators.base import Estimator
+from podusv_cli.components.measurements.base import FRESH, KNOWN, OWN, VALUE, Measurement
+from podusv_cli.components.vessels.vessel import VESSELS, Vessel
 from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.core.signal import STATE
-from podusv_cli.estimators.base import Estimator
-from podusv_cli.measurements.base import FRESH, KNOWN, OWN, VALUE, Measurement
 from podusv_cli.scenario.presets import preset_file
 from podusv_cli.scenario.yaml_tree import plain
-from podusv_cli.vessels.vessel import VESSELS, Vessel
 
 SIX = len(STATE)
 BEYOND = -1.234567890123e-290  # behind every vector; nobody writes just this

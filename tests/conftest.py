@@ -16,27 +16,27 @@ from hypothesis import settings
 from old_results import among_old_results
 
 import podusv_cli
-from podusv_cli.actuators.base import Actuator
-from podusv_cli.actuators.ideal import Ideal
-from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
-from podusv_cli.controllers.base import Controller, Slots
+from podusv_cli.components.actuators.base import Actuator
+from podusv_cli.components.actuators.ideal import Ideal
+from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
+from podusv_cli.components.controllers.base import Controller, Slots
+from podusv_cli.components.disturbances.base import Disturbance
+from podusv_cli.components.disturbances.calm import Calm
+from podusv_cli.components.disturbances.harmonic import HarmonicDisturbance
+from podusv_cli.components.estimators.base import Estimator
+from podusv_cli.components.measurements.base import Measurement
+from podusv_cli.components.paths.base import TARGET, Path
+from podusv_cli.components.paths.line import Line
+from podusv_cli.components.paths.line_circle import LineCircle
+from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core import registry
 from podusv_cli.core.component import Component, value
 from podusv_cli.core.kernel import Vector, bundle, kernel
 from podusv_cli.core.recording import Recording
-from podusv_cli.disturbances.base import Disturbance
-from podusv_cli.disturbances.calm import Calm
-from podusv_cli.disturbances.harmonic import HarmonicDisturbance
-from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.loop import STATE, ClosedLoop
-from podusv_cli.engine.simulate import simulate
-from podusv_cli.estimators.base import Estimator
-from podusv_cli.measurements.base import Measurement
-from podusv_cli.paths.base import TARGET, Path
-from podusv_cli.paths.line import Line
-from podusv_cli.paths.line_circle import LineCircle
+from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop
+from podusv_cli.engine.running.simulate import simulate
+from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.process.interrupts import SIGNALS
-from podusv_cli.vessels.vessel import Vessel
 
 PACKAGE = File(podusv_cli.__file__).parent
 ROOMS: dict[str, Any] = {
@@ -75,16 +75,20 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def vessel(name: str) -> Vessel:
     """The vessel of that parameter file."""
-    return Vessel(preset=name, **yaml.safe_load((PACKAGE / f"vessels/{name}.yaml").read_text()))
+    return Vessel(
+        preset=name, **yaml.safe_load((PACKAGE / f"components/vessels/{name}.yaml").read_text())
+    )
 
 
-VESSELS = {path.stem: vessel(path.stem) for path in sorted((PACKAGE / "vessels").glob("*.yaml"))}
+VESSELS = {
+    path.stem: vessel(path.stem) for path in sorted((PACKAGE / "components/vessels").glob("*.yaml"))
+}
 PAPER, NONLINEAR = VESSELS["paper"], VESSELS["paper_nonlinear"]
 
 
 def kinds(room: str) -> dict[str, type[Component]]:
     """Everything registered in a room, by kind."""
-    return registry.kinds(f"podusv_cli.{room}", ROOMS[room])
+    return registry.kinds(f"podusv_cli.components.{room}", ROOMS[room])
 
 
 def example(kind: type[Component], **fields: Any) -> Any:

@@ -5,15 +5,15 @@ from typing import Any, Literal
 import numpy as np
 from conftest import NONLINEAR, Constant, adrift, run
 
+from podusv_cli.components.disturbances.base import Disturbance
+from podusv_cli.components.disturbances.calm import Calm
+from podusv_cli.components.estimators.base import ESTIMATE, Estimator
+from podusv_cli.components.measurements.base import FRESH, Measurement
 from podusv_cli.core.component import value
 from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import Vector, bundle, kernel
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import Signal
-from podusv_cli.disturbances.base import Disturbance
-from podusv_cli.disturbances.calm import Calm
-from podusv_cli.estimators.base import ESTIMATE, Estimator
-from podusv_cli.measurements.base import FRESH, Measurement
 
 STATE = ("x", "y", "psi", "u", "v", "r")
 MEASURED = tuple(Signal(f"{name}_m", "", "measured") for name in STATE)

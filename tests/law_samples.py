@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from conftest import NONLINEAR, corrected, run
 
-from podusv_cli.actuators.saturated import Saturated
+from podusv_cli.components.actuators.saturated import Saturated
+from podusv_cli.components.disturbances.harmonic import Harmonic, HarmonicDisturbance
 from podusv_cli.core.recording import Recording
-from podusv_cli.disturbances.harmonic import Harmonic, HarmonicDisturbance
 
 MEAN = Harmonic(mean=0.5)
 STEADY = HarmonicDisturbance(b_u=MEAN, b_v=MEAN, b_r=MEAN)

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from podusv_cli.scenario.load import load, tree_yaml
-from podusv_cli.study.plan import plan
-from podusv_cli.study.store import Store
-from podusv_cli.study.unit import Unit, UnitResult
+from podusv_cli.studies.study.plan import plan
+from podusv_cli.studies.study.store import Store
+from podusv_cli.studies.study.unit import Unit, UnitResult
 from podusv_cli.workflows import studies, sweep
 
 CONFIG = Path(__file__).parents[1] / "configs/studies/hull_and_sea.yaml"

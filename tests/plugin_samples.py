@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from podusv_cli.controllers.base import Controller
+from podusv_cli.components.controllers.base import Controller
 from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.signal import Signal

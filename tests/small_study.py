@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from podusv_cli.scenario.load import load_text
-from podusv_cli.study.march import Processes, march
-from podusv_cli.study.plan import plan
-from podusv_cli.study.store import SCENARIO, Store
+from podusv_cli.studies.study.dispatch import Processes, march
+from podusv_cli.studies.study.plan import plan
+from podusv_cli.studies.study.store import SCENARIO, Store
 
 TEXT = """
 name: small

@@ -5,10 +5,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from podusv_cli.process.workers import Outcome
-from podusv_cli.study import remote
-from podusv_cli.study.plan import digest
-from podusv_cli.study.remote import Reply
-from podusv_cli.study.unit import Unit, UnitResult
+from podusv_cli.studies.study import remote
+from podusv_cli.studies.study.plan import digest
+from podusv_cli.studies.study.remote import Reply
+from podusv_cli.studies.study.unit import Unit, UnitResult
 
 REPORT = {
     "podusv": "1.0", "numpy": "2.0", "the kernels of pid": "abc", "the study": "def",

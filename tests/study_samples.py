@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from podusv_cli.scenario.sections import Claim
-from podusv_cli.study.claims import ParsedClaim, judge, parse
-from podusv_cli.study.verdict import StudyVerdict
+from podusv_cli.studies.study.claims import ParsedClaim, judge, parse
+from podusv_cli.studies.study.verdict import StudyVerdict
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,9 @@ from conftest import Constant, adrift, example, kinds, run
 from hypothesis import given
 from hypothesis import strategies as st
 
-from podusv_cli.actuators.base import Actuator
-from podusv_cli.actuators.ideal import Ideal
-from podusv_cli.actuators.saturated import Saturated
+from podusv_cli.components.actuators.base import Actuator
+from podusv_cli.components.actuators.ideal import Ideal
+from podusv_cli.components.actuators.saturated import Saturated
 from podusv_cli.core.kernel import Vector, bundle, kernel
 
 every_kind = pytest.mark.parametrize("kind", kinds("actuators").values(), ids=kinds("actuators"))

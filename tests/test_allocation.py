@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import lsq_linear, minimize
 
-from podusv_cli.actuators.allocation import EFFORT, PREFERENCE, allocate
-from podusv_cli.actuators.allocation_single import one_pod
-from podusv_cli.actuators.pod import Pod, Pods
+from podusv_cli.components.actuators.allocation import EFFORT, PREFERENCE, allocate
+from podusv_cli.components.actuators.allocation_single import one_pod
+from podusv_cli.components.actuators.pod import Pod, Pods
 from podusv_cli.core.kernel import Vector, bundle
 
 LIMIT = math.radians(35.0)

@@ -15,21 +15,21 @@ import pytest
 from conftest import Constant, adrift, corrected
 
 from benchmarks.variants import variants
-from podusv_cli.actuators.saturated import Saturated
-from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
-from podusv_cli.controllers.dsc import DynamicSurface
-from podusv_cli.controllers.network import Network
-from podusv_cli.controllers.pid import Pid
+from podusv_cli.components.actuators.saturated import Saturated
+from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
+from podusv_cli.components.controllers.dsc import DynamicSurface
+from podusv_cli.components.controllers.network import Network
+from podusv_cli.components.controllers.pid import Pid
+from podusv_cli.components.paths.waypoints import Waypoints
 from podusv_cli.core.component import value
 from podusv_cli.core.errors import LawError
 from podusv_cli.core.kernel import Vector, kernel
-from podusv_cli.engine import signatures
-from podusv_cli.engine.batch import Batch, Lazily, simulate_many
-from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.loop import STATE, ClosedLoop
-from podusv_cli.engine.simulate import simulate
+from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop
+from podusv_cli.engine.machine import signatures
+from podusv_cli.engine.running.batch import Batch, Lazily, simulate_many
+from podusv_cli.engine.running.simulate import simulate
+from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.metrics.table import observer
-from podusv_cli.paths.waypoints import Waypoints
 
 GRID = TimeGrid(0.01, 2000)
 SETTINGS = {"steady_fraction": 0.5, "settling_radius": 12.0}

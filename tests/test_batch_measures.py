@@ -11,16 +11,16 @@ from scenario_samples import loaded
 import podusv_cli as podusv
 from podusv_cli.core.errors import LawError
 from podusv_cli.core.kernel import Vector, kernel
-from podusv_cli.engine.batch import simulate_many
-from podusv_cli.engine.loop import ClosedLoop
-from podusv_cli.engine.simulate import simulate
+from podusv_cli.engine.loop.closed_loop import ClosedLoop
+from podusv_cli.engine.running.batch import simulate_many
+from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.metrics.metric import Accumulator, Metric, gathered
 from podusv_cli.metrics.table import METRICS, observer
 from podusv_cli.scenario.load import values
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.yaml_tree import route
-from podusv_cli.study.check import has, structure
-from podusv_cli.study.draws import DrawError, Number, with_values
+from podusv_cli.studies.study.check import has, structure
+from podusv_cli.studies.study.draws import DrawError, Number, with_values
 
 SECTIONS = {"paths": "path", "disturbances": "disturbance", "actuators": "actuator"}
 SECTIONS |= {room: room.removesuffix("s") for room in ("measurements", "estimators", "controllers")}

@@ -10,8 +10,8 @@ import pytest
 from conftest import NONLINEAR, corrected
 
 from benchmarks.variants import variants
-from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
-from podusv_cli.controllers.network import Network
+from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
+from podusv_cli.components.controllers.network import Network
 
 ROOT = Path(__file__).resolve().parent.parent
 

@@ -10,13 +10,13 @@ import pandas as pd
 import pytest
 from plugin_samples import LAW
 
-from podusv_cli.bench.cases import AXES, Case, Wanted, cases, shipped_bench
-from podusv_cli.bench.optima import Least, wanted
-from podusv_cli.bench.page import as_markdown, page
-from podusv_cli.bench.runs import FAILED, BenchRun, play
-from podusv_cli.bench.standing import leaderboard, middle, profile, table, with_optima
 from podusv_cli.core.errors import ScenarioError, UsageError
 from podusv_cli.scenario.load import load_text
+from podusv_cli.studies.bench.cases import AXES, Case, Wanted, cases, shipped_bench
+from podusv_cli.studies.bench.optima import Least, wanted
+from podusv_cli.studies.bench.page import as_markdown, page
+from podusv_cli.studies.bench.runs import FAILED, BenchRun, play
+from podusv_cli.studies.bench.standing import leaderboard, middle, profile, table, with_optima
 
 LAYERS = {
     "laws.yaml": "vessel: {preset: paper_nonlinear}\n"

@@ -11,7 +11,7 @@ from benchmarks.c_program import TOLERANCE, agreement, build
 from benchmarks.cases import CASES, Case, rivals
 from benchmarks.engine import beside_c, growth
 from benchmarks.side_by_side import side_by_side_costs
-from podusv_cli.controllers.base import Controller
+from podusv_cli.components.controllers.base import Controller
 from podusv_cli.core.registry import kinds
 
 pytestmark = pytest.mark.benchmark
@@ -90,6 +90,6 @@ def test_python_alternatives_are_slower_at_the_same_accuracy():
 
 def test_every_law_with_a_feedback_is_timed():
     """A schedule and the manoeuvres of trials need no more than a few operations."""
-    known = kinds("podusv_cli.controllers", Controller)
+    known = kinds("podusv_cli.components.controllers", Controller)
     untimed = {"schedule", "turning_circle", "zigzag"}
     assert {loop.controller.kind for loop in rivals().values()} == set(known) - untimed

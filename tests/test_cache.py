@@ -15,8 +15,8 @@ from numba import njit
 
 from podusv_cli.core.kernel import Vector, kernel, specialise
 from podusv_cli.core.kinematics import wrap
-from podusv_cli.engine import code_folder, compile, object_cache
-from podusv_cli.engine.loop import Observer, entries
+from podusv_cli.engine.loop.closed_loop import Observer, entries
+from podusv_cli.engine.machine import code_folder, compile, object_cache
 
 FORCE = 0.0
 

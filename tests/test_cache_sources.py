@@ -12,20 +12,20 @@ from typing import Any
 import pytest
 from conftest import PACKAGE
 
-from podusv_cli.engine import object_cache
+from podusv_cli.engine.machine import object_cache
 
 SCRIPT = """
 import json, sys
 from pathlib import Path
 import numpy as np
-from podusv_cli.actuators.ideal import Ideal
-from podusv_cli.controllers.pid import Pid
-from podusv_cli.disturbances.calm import Calm
-from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.loop import ClosedLoop
-from podusv_cli.engine.simulate import simulate
-from podusv_cli.paths.line import Line
-from podusv_cli.vessels.vessel import Vessel
+from podusv_cli.components.actuators.ideal import Ideal
+from podusv_cli.components.controllers.pid import Pid
+from podusv_cli.components.disturbances.calm import Calm
+from podusv_cli.engine.step.grid import TimeGrid
+from podusv_cli.engine.loop.closed_loop import ClosedLoop
+from podusv_cli.engine.running.simulate import simulate
+from podusv_cli.components.paths.line import Line
+from podusv_cli.components.vessels.vessel import Vessel
 
 hull = Vessel(preset="box", length=1.0, beam=0.5, m=20.0, I_z=2.0, X_u=-1.0, Y_v=-2.0, N_r=-1.0)
 start = (-4.0, -3.0, 0.2, 0.1, 0.0, 0.0)

@@ -8,12 +8,12 @@ import pytest
 from conftest import GENTLE, PAPER, SMOOTH_START, corrected, example, kinds, last_state, run
 from scipy.integrate import solve_ivp
 
-from podusv_cli.actuators.saturated import Saturated
+from podusv_cli.components.actuators.saturated import Saturated
+from podusv_cli.components.disturbances.harmonic import Harmonic, HarmonicDisturbance
+from podusv_cli.components.paths.circle import Circle
+from podusv_cli.components.paths.line import Line
 from podusv_cli.core.kernel import Vector
-from podusv_cli.disturbances.harmonic import Harmonic, HarmonicDisturbance
-from podusv_cli.engine.loop import STATE, ClosedLoop
-from podusv_cli.paths.circle import Circle
-from podusv_cli.paths.line import Line
+from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop
 
 # A trial takes samples, so it is no differential equation; a schedule does not look at the target.
 CONTINUOUS = {n: k for n, k in kinds("controllers").items() if not example(k).sample_period()}

@@ -13,13 +13,13 @@ from conftest import (
     run,
 )
 
-from podusv_cli.actuators.base import Actuator
-from podusv_cli.actuators.command import Command
-from podusv_cli.actuators.pod import Pods
-from podusv_cli.controllers.pid import Pid
+from podusv_cli.components.actuators.base import Actuator
+from podusv_cli.components.actuators.command import Command
+from podusv_cli.components.actuators.pod import Pods
+from podusv_cli.components.controllers.pid import Pid
+from podusv_cli.components.paths.line import Line
 from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, bundle, is_kernel, kernel
-from podusv_cli.paths.line import Line
 
 every_kind = pytest.mark.parametrize("kind", kinds("actuators").values(), ids=kinds("actuators"))
 PATH = Command(delay=0.2, dead_zone_u=0.3, dead_zone_r=0.05, resolution_u=0.1, resolution_r=0.02)

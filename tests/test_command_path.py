@@ -20,17 +20,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import lambertw
 
-from podusv_cli.actuators.command import Command, Failure
-from podusv_cli.actuators.ideal import Ideal
-from podusv_cli.actuators.pod import Pods
-from podusv_cli.controllers.pid import Pid
-from podusv_cli.controllers.velocity_vector import VelocityVector
+from podusv_cli.components.actuators.command import Command, Failure
+from podusv_cli.components.actuators.ideal import Ideal
+from podusv_cli.components.actuators.pod import Pods
+from podusv_cli.components.controllers.pid import Pid
+from podusv_cli.components.controllers.velocity_vector import VelocityVector
+from podusv_cli.components.paths.line import Line
 from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, bundle, kernel
-from podusv_cli.engine.continuous import continuous
-from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.loop import ClosedLoop
-from podusv_cli.paths.line import Line
+from podusv_cli.engine.loop.closed_loop import ClosedLoop
+from podusv_cli.engine.running.continuous import continuous
+from podusv_cli.engine.step.grid import TimeGrid
 
 START = (0.0, 0.0, 0.0, 0.4, 0.0, 0.0)
 K = 60.0  # kg/s, of `Brake`

@@ -6,9 +6,9 @@ from conftest import PACKAGE
 from findings_samples import codes, finding, late, log, scene
 from scipy.special import lambertw
 
-from podusv_cli.controllers.velocity_loop import Loop
+from podusv_cli.components.controllers.velocity_loop import Loop
 from podusv_cli.core.errors import PodusvError
-from podusv_cli.engine.simulate import simulate
+from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.findings.stability import delay_margin, delayed_growth
 from podusv_cli.optimum.problem import problem
 from podusv_cli.scenario.load import load

@@ -4,6 +4,7 @@ import inspect
 import math
 from collections import Counter
 from collections.abc import Callable, Iterator
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -11,16 +12,16 @@ import pytest
 from conftest import NONLINEAR, PACKAGE, ROOMS, VESSELS, corrected, example, kinds, situations
 from pydantic import BaseModel, ValidationError
 
-from podusv_cli.controllers.base import Controller
-from podusv_cli.controllers.manoeuvre import Manoeuvre
-from podusv_cli.controllers.schedule import Schedule
+from podusv_cli.components.controllers.base import Controller
+from podusv_cli.components.controllers.manoeuvre import Manoeuvre
+from podusv_cli.components.controllers.schedule import Schedule
+from podusv_cli.components.measurements.exact import Exact
+from podusv_cli.components.paths.base import TARGET
+from podusv_cli.components.vessels.vessel import COEFFICIENTS, Vessel
 from podusv_cli.core import registry
 from podusv_cli.core.kernel import Vector, bundle, is_kernel
-from podusv_cli.engine.columns import names
-from podusv_cli.measurements.exact import Exact
-from podusv_cli.paths.base import TARGET
+from podusv_cli.engine.loop.columns import names
 from podusv_cli.scenario.explain import signals
-from podusv_cli.vessels.vessel import COEFFICIENTS, Vessel
 
 EVERY = [(room, name, kind) for room in ROOMS for name, kind in kinds(room).items()]
 every_kind = pytest.mark.parametrize(
@@ -163,14 +164,14 @@ def test_kinds_and_class_names_are_unique():
     classes = [
         thing
         for room, base in ROOMS.items()
-        for path in (PACKAGE / room).glob("*.py")
-        for thing in vars(__import__(f"podusv_cli.{room}.{path.stem}", fromlist=["_"])).values()
+        for path in (PACKAGE / "components" / room).glob("*.py")
+        for thing in vars(import_module(f"podusv_cli.components.{room}.{path.stem}")).values()
         if isinstance(thing, type) and issubclass(thing, base) and "kind" in thing.model_fields
-        and thing.__module__ == f"podusv_cli.{room}.{path.stem}"
+        and thing.__module__ == f"podusv_cli.components.{room}.{path.stem}"
     ]  # fmt: skip
     assert len(classes) == len(EVERY)
     for room in ROOMS:
-        mine = [c for c in classes if c.__module__.startswith(f"podusv_cli.{room}.")]
+        mine = [c for c in classes if c.__module__.startswith(f"podusv_cli.components.{room}.")]
         kinds_here = Counter(c.model_fields["kind"].default for c in mine)
         assert kinds_here == Counter(kinds(room).keys())
     assert set(Counter(c.__name__ for c in classes).values()) == {1}
@@ -220,7 +221,7 @@ def test_every_vessel_has_the_same_constants_in_the_same_order():
 
 def test_the_registry_is_sorted_and_leaves_out_what_has_no_kind():
     for room, base in ROOMS.items():
-        found = registry.kinds(f"podusv_cli.{room}", base)
+        found = registry.kinds(f"podusv_cli.components.{room}", base)
         assert list(found) == sorted(found)
         assert base not in found.values()
         assert all(kind.model_fields["kind"].default == name for name, kind in found.items())

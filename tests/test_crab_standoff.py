@@ -9,16 +9,16 @@ from conftest import NONLINEAR, ask, corrected, run, situations
 from law_samples import STEADY, WRONG, rms, task
 from pydantic import ValidationError
 
-from podusv_cli.actuators.saturated import Saturated
-from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
-from podusv_cli.controllers.backstepping import Backstepping
-from podusv_cli.controllers.crab import SWAY, observe_sway, on_path, take_aim
-from podusv_cli.controllers.dsc import DynamicSurface
-from podusv_cli.controllers.pid import Pid
+from podusv_cli.components.actuators.saturated import Saturated
+from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
+from podusv_cli.components.controllers.backstepping import Backstepping
+from podusv_cli.components.controllers.crab import SWAY, observe_sway, on_path, take_aim
+from podusv_cli.components.controllers.dsc import DynamicSurface
+from podusv_cli.components.controllers.pid import Pid
+from podusv_cli.components.paths.circle import Circle
+from podusv_cli.components.paths.line import Line
+from podusv_cli.components.vessels.plant import plant, sway_force
 from podusv_cli.core.kernel import bundle
-from podusv_cli.paths.circle import Circle
-from podusv_cli.paths.line import Line
-from podusv_cli.vessels.plant import plant, sway_force
 
 KINDS = (AdaptiveNeural, DynamicSurface, Backstepping, Pid)
 

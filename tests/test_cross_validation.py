@@ -19,13 +19,13 @@ import numpy as np
 import pytest
 from conftest import Constant, adrift, run
 
+from podusv_cli.components.disturbances import spectra
+from podusv_cli.components.disturbances.current import Current
+from podusv_cli.components.disturbances.wind import blendermann
+from podusv_cli.components.vessels.plant import plant
+from podusv_cli.components.vessels.vessel import Vessel
+from podusv_cli.components.vessels.windage import Windage
 from podusv_cli.core.kernel import bundle
-from podusv_cli.disturbances import spectra
-from podusv_cli.disturbances.current import Current
-from podusv_cli.disturbances.wind import blendermann
-from podusv_cli.vessels.plant import plant
-from podusv_cli.vessels.vessel import Vessel
-from podusv_cli.vessels.windage import Windage
 
 PI = math.pi
 

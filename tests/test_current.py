@@ -7,11 +7,11 @@ import pytest
 from conftest import NONLINEAR, POD, VESSELS, Constant, adrift, run
 from scipy.stats import norm
 
-from podusv_cli.actuators.pod import Pod, Pods
+from podusv_cli.components.actuators.pod import Pod, Pods
+from podusv_cli.components.disturbances.current import Current
+from podusv_cli.components.disturbances.total import Total
+from podusv_cli.components.disturbances.waves import Waves
 from podusv_cli.core.random_words import gauss_markov
-from podusv_cli.disturbances.current import Current
-from podusv_cli.disturbances.total import Total
-from podusv_cli.disturbances.waves import Waves
 
 SPEED, DIRECTION = 0.3, 0.8
 WATER = SPEED * np.array([math.cos(DIRECTION), math.sin(DIRECTION)])

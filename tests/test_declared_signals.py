@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from conftest import Constant, corrected, run
 
-from podusv_cli.controllers.base import Slots
-from podusv_cli.controllers.pid import Pid
+from podusv_cli.components.controllers.base import Slots
+from podusv_cli.components.controllers.pid import Pid
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.signal import Signal
-from podusv_cli.engine.check import check_law
+from podusv_cli.engine.running.check import check_law
 
 E_CT = Signal("e_ct", "m", "cross-track error")
 MODES = Signal("modes", "m", "amplitudes of the modes", axes=("mode",))

@@ -10,10 +10,10 @@ import sympy as sp
 from conftest import NONLINEAR, PAPER, Situation, situations
 from mpmath import mp
 
-from podusv_cli.controllers.backstepping import Backstepping, alpha_r_rate, alpha_u_rate
-from podusv_cli.controllers.tracking import track
+from podusv_cli.components.controllers.backstepping import Backstepping, alpha_r_rate, alpha_u_rate
+from podusv_cli.components.controllers.tracking import track
+from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.kernel import Vector, bundle
-from podusv_cli.vessels.vessel import Vessel
 
 GAINS = {"k_ze": 0.3, "k_psie": 0.7, "standoff": 0.5}
 STATE = sp.symbols("x y psi u v r x_d y_d x_d_dot y_d_dot x_d_ddot y_d_ddot")

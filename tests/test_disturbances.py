@@ -8,15 +8,15 @@ from conftest import NONLINEAR, example, kinds, load_at
 from pydantic import ValidationError
 from scenario_samples import SOUND, findings, write
 
+from podusv_cli.components.disturbances.calm import Calm
+from podusv_cli.components.disturbances.current import Current
+from podusv_cli.components.disturbances.file import FromFile
+from podusv_cli.components.disturbances.harmonic import Harmonic, HarmonicDisturbance
+from podusv_cli.components.disturbances.step import Step
+from podusv_cli.components.disturbances.total import Total
+from podusv_cli.components.disturbances.waves import Waves
+from podusv_cli.components.disturbances.wind import Wind
 from podusv_cli.core.kernel import bundle
-from podusv_cli.disturbances.calm import Calm
-from podusv_cli.disturbances.current import Current
-from podusv_cli.disturbances.file import FromFile
-from podusv_cli.disturbances.harmonic import Harmonic, HarmonicDisturbance
-from podusv_cli.disturbances.step import Step
-from podusv_cli.disturbances.total import Total
-from podusv_cli.disturbances.waves import Waves
-from podusv_cli.disturbances.wind import Wind
 from podusv_cli.scenario.load import load
 
 # sin and cos are 0 or +-1 at these times, except where the numbers are written out.

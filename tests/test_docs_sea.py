@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from podusv_cli.measurements.sensors import Sensors
+from podusv_cli.components.measurements.sensors import Sensors
 from podusv_cli.scenario.load import load_text
 
 ROOT = Path(__file__).parents[1]

@@ -10,11 +10,11 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from numba import njit
 
+from podusv_cli.components.disturbances.harmonic import Harmonic, HarmonicDisturbance
 from podusv_cli.core.elementary import arctangent, cos_sin, cos_sin_of_turns, exponential
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.kinematics import direction
-from podusv_cli.disturbances.harmonic import Harmonic, HarmonicDisturbance
-from podusv_cli.engine import compile_numba
+from podusv_cli.engine.machine import compile_numba
 
 EPSILON = np.finfo(float).eps
 

@@ -23,19 +23,19 @@ from conftest import (
 from hypothesis import given
 from hypothesis import strategies as st
 
-from podusv_cli.actuators.saturated import Saturated
-from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
-from podusv_cli.controllers.backstepping import Backstepping
-from podusv_cli.controllers.pid import Pid
+from podusv_cli.components.actuators.saturated import Saturated
+from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
+from podusv_cli.components.controllers.backstepping import Backstepping
+from podusv_cli.components.controllers.pid import Pid
+from podusv_cli.components.disturbances.calm import Calm
+from podusv_cli.components.disturbances.harmonic import HarmonicDisturbance
+from podusv_cli.components.disturbances.total import Total
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.steps import whole_steps
-from podusv_cli.disturbances.calm import Calm
-from podusv_cli.disturbances.harmonic import HarmonicDisturbance
-from podusv_cli.disturbances.total import Total
-from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.loop import STATE, ClosedLoop, Observer
-from podusv_cli.engine.simulate import simulate
+from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop, Observer
+from podusv_cli.engine.running.simulate import simulate
+from podusv_cli.engine.step.grid import TimeGrid
 
 
 def same(one: Recording, other: Recording) -> bool:

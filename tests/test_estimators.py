@@ -5,20 +5,20 @@ import pytest
 from conftest import NONLINEAR, PAPER, Constant, adrift, corrected, example, run
 from estimator_samples import ESTIMATED, Steady, Taken, delivered, errors, sailed
 
-from podusv_cli.actuators.saturated import Saturated
-from podusv_cli.controllers.base import Controller
-from podusv_cli.controllers.velocity_vector import VelocityVector
+from podusv_cli.components.actuators.saturated import Saturated
+from podusv_cli.components.controllers.base import Controller
+from podusv_cli.components.controllers.velocity_vector import VelocityVector
+from podusv_cli.components.estimators.base import Estimator
+from podusv_cli.components.estimators.ekf import ExtendedKalmanFilter
+from podusv_cli.components.estimators.low_pass import LowPass
+from podusv_cli.components.estimators.none import NoEstimator
+from podusv_cli.components.estimators.passive_observer import PassiveObserver
+from podusv_cli.components.measurements.sensors import Sensor, Sensors
 from podusv_cli.core.kernel import is_kernel
 from podusv_cli.core.registry import kinds
-from podusv_cli.estimators.base import Estimator
-from podusv_cli.estimators.ekf import ExtendedKalmanFilter
-from podusv_cli.estimators.low_pass import LowPass
-from podusv_cli.estimators.none import NoEstimator
-from podusv_cli.estimators.passive_observer import PassiveObserver
-from podusv_cli.measurements.sensors import Sensor, Sensors
 from podusv_cli.scenario.explain import signals
 
-EVERY = list(kinds("podusv_cli.estimators", Estimator).values())
+EVERY = list(kinds("podusv_cli.components.estimators", Estimator).values())
 MODELS = [PassiveObserver, ExtendedKalmanFilter]  # those that know the vessel
 NOISY = Taken(every=10, sigma_p=0.02, sigma_psi=0.005, sigma_nu=0.02, velocities=True)
 
@@ -38,7 +38,7 @@ def test_its_first_states_are_the_estimate_and_it_starts_with_the_truth(kind):
 
 @pytest.mark.parametrize("kind", EVERY)
 def test_no_law_logs_a_name_that_an_estimator_logs(kind):
-    for law in kinds("podusv_cli.controllers", Controller).values():
+    for law in kinds("podusv_cli.components.controllers", Controller).values():
         loop = corrected(controller=example(law), measurement=Taken(), estimator=kind())
         assert {part.name for part in kind().states} <= set(loop.about())
 

@@ -8,11 +8,11 @@ from conftest import NONLINEAR, VESSELS, Constant
 from estimator_samples import Steady, Taken, delivered, errors, sailed
 from scipy.linalg import expm, solve_discrete_are, solve_discrete_lyapunov
 
+from podusv_cli.components.estimators.ekf import ExtendedKalmanFilter, N
+from podusv_cli.components.estimators.slopes import slopes
+from podusv_cli.components.vessels.plant import plant
 from podusv_cli.core.kernel import Vector, bundle
-from podusv_cli.engine import compile, signatures
-from podusv_cli.estimators.ekf import ExtendedKalmanFilter, N
-from podusv_cli.estimators.slopes import slopes
-from podusv_cli.vessels.plant import plant
+from podusv_cli.engine.machine import compile, signatures
 
 UPPER = np.triu_indices(N)
 AFLOAT = {"controller": Constant(), "start": (0.0,) * 6}

@@ -8,9 +8,9 @@ from conftest import PAPER, VESSELS, Constant
 from estimator_samples import Steady, Taken, errors, sailed
 from pydantic import ValidationError
 
+from podusv_cli.components.estimators.passive_observer import LOAD, SEEN, SWING, PassiveObserver
+from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.kernel import Vector, bundle, kernel
-from podusv_cli.estimators.passive_observer import LOAD, SEEN, SWING, PassiveObserver
-from podusv_cli.vessels.vessel import Vessel
 
 observe = PassiveObserver.follow
 AFLOAT = {"controller": Constant(), "start": (0.0,) * 6}  # at rest, and left alone

@@ -5,8 +5,8 @@ import pytest
 from drawn_samples import drawn, line, no_figures_but, panels, recording, scenario, shown
 from scenario_samples import SOUND
 
+from podusv_cli.components.measurements.sensors import Sensor, Sensors
 from podusv_cli.figures.drawing import FIGURES
-from podusv_cli.measurements.sensors import Sensor, Sensors
 from podusv_cli.workflows import run
 
 SEA = {

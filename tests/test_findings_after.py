@@ -11,7 +11,7 @@ import pytest
 from conftest import PACKAGE, VESSELS, example, kinds
 from findings_samples import CONFIGS, log, scene
 
-from podusv_cli.controllers.base import Controller
+from podusv_cli.components.controllers.base import Controller
 from podusv_cli.core.recording import Recording
 from podusv_cli.findings.finding import finding_kinds, postflight, preflight
 from podusv_cli.findings.limit_cycle import limit_cycle

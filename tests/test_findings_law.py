@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from findings_samples import BARE, codes, finding, late, log, scene, simulated
 
-from podusv_cli.controllers.velocity_loop import Loop
-from podusv_cli.engine.continuous import continuous
+from podusv_cli.components.controllers.velocity_loop import Loop
+from podusv_cli.engine.running.continuous import continuous
 from podusv_cli.findings.finding import preflight
 from podusv_cli.findings.stability import loops, rk4_growth, sampled_growth
 

@@ -7,11 +7,11 @@ import pytest
 from conftest import VESSELS
 from findings_samples import codes, finding, late, log, scene
 
+from podusv_cli.components.vessels.plant import plant
 from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.findings.finding import Case
 from podusv_cli.findings.reference import drift, reference
 from podusv_cli.findings.task import sliding_distance
-from podusv_cli.vessels.plant import plant
 
 LONG = "simulation.duration=300"
 SWITCH = 15.0

@@ -9,18 +9,18 @@ import sympy as sp
 from conftest import NONLINEAR, ask, corrected, run, situations
 from law_samples import STEADY, WRONG, rms, task
 
-from podusv_cli.actuators.saturated import Saturated
-from podusv_cli.controllers.adrc import Adrc
-from podusv_cli.controllers.hand_point import hand_errors
-from podusv_cli.controllers.hand_position import HandPosition
-from podusv_cli.controllers.velocity_loop import Axis
+from podusv_cli.components.actuators.saturated import Saturated
+from podusv_cli.components.controllers.adrc import Adrc
+from podusv_cli.components.controllers.hand_point import hand_errors
+from podusv_cli.components.controllers.hand_position import HandPosition
+from podusv_cli.components.controllers.velocity_loop import Axis
+from podusv_cli.components.disturbances.calm import Calm
+from podusv_cli.components.paths.circle import Circle
+from podusv_cli.components.paths.line import Line
+from podusv_cli.components.vessels.plant import plant
 from podusv_cli.core.kernel import Vector, bundle
-from podusv_cli.disturbances.calm import Calm
-from podusv_cli.engine.loop import ClosedLoop
-from podusv_cli.paths.circle import Circle
-from podusv_cli.paths.line import Line
+from podusv_cli.engine.loop.closed_loop import ClosedLoop
 from podusv_cli.scenario.load import load
-from podusv_cli.vessels.plant import plant
 
 ROOT = Path(__file__).resolve().parent.parent
 

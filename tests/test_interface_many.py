@@ -9,7 +9,7 @@ import pytest
 from test_interface import SHORT
 
 import podusv_cli as podusv
-from podusv_cli.engine import batch
+from podusv_cli.engine.running import batch
 
 REFUSED: list[tuple[Any, str]] = [
     ({"vessel.m": [20.0, -3.0]}, "row 1: vessel.m = -3; must be a number above 0 [kg]"),

@@ -15,8 +15,13 @@ import pytest
 import podusv_cli
 from podusv_cli.core.errors import LawError
 from podusv_cli.core.kernel import is_kernel, kernel
-from podusv_cli.engine.kernel_faults import check_arguments, check_kernel, faults, unsupported
-from podusv_cli.engine.lane_source import has_source, source
+from podusv_cli.engine.machine.kernel_faults import (
+    check_arguments,
+    check_kernel,
+    faults,
+    unsupported,
+)
+from podusv_cli.engine.machine.lane_source import has_source, source
 
 SOUND = {
     "set in both branches": "if x[0] > 0.0:\n q = 1.0\nelse:\n q = 2.0\ny = q",

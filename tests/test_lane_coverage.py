@@ -12,19 +12,19 @@ from conftest import REQUIRED
 from test_lanes import COUNT, ROOT, both, loop, same, scattered
 
 from benchmarks.variants import variants
-from podusv_cli.actuators.base import Actuator
-from podusv_cli.controllers.base import Controller
+from podusv_cli.components.actuators.base import Actuator
+from podusv_cli.components.controllers.base import Controller
+from podusv_cli.components.disturbances.base import Disturbance
+from podusv_cli.components.paths.base import Path
 from podusv_cli.core.component import Component
 from podusv_cli.core.registry import kinds
-from podusv_cli.disturbances.base import Disturbance
-from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.lanes import why_alone
-from podusv_cli.engine.loop import ClosedLoop, Observer
-from podusv_cli.paths.base import Path
+from podusv_cli.engine.loop.closed_loop import ClosedLoop, Observer
+from podusv_cli.engine.running.lanes import why_alone
+from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.scenario.load import load
 
 GRID = TimeGrid(0.01, 200)
-LAWS = kinds("podusv_cli.controllers", Controller)
+LAWS = kinds("podusv_cli.components.controllers", Controller)
 TESTED = ("adaptive_neural", "pid", "dsc", "backstepping")  # by `test_lanes`, with its actuators
 QUICK = ("zigzag", "schedule")  # samples, and a table; the compiler takes seconds for others
 SCENARIOS = ("sea/delay", "sea/dead_zone", "sea/sensors", "sea/state_4", "sea/pods",
@@ -66,14 +66,17 @@ def test_every_path_disturbance_and_actuator_can_march_side_by_side(part: str) -
     rooms: dict[str, type[Component]] = {
         "path": Path, "disturbance": Disturbance, "actuator": Actuator,
     }  # fmt: skip
-    for name, kind in kinds(f"podusv_cli.{part}s", rooms[part]).items():
+    for name, kind in kinds(f"podusv_cli.components.{part}s", rooms[part]).items():
         one = replace(base, **{part: made(kind)})
         assert (name, why_alone(one, Observer())) == (name, "")
 
 
 def test_numbers_of_paths_and_currents_differ_from_run_to_run() -> None:
     """So do the pieces of a spline, and of a record, in which the runs are."""
-    path, sea = kinds("podusv_cli.paths", Path), kinds("podusv_cli.disturbances", Disturbance)
+    path, sea = (
+        kinds("podusv_cli.components.paths", Path),
+        kinds("podusv_cli.components.disturbances", Disturbance),
+    )
     drifting = sea["current"](speed=0.1, speed_std=0.05, interval=0.1)  # type: ignore[call-arg]
     base = replace(loop("pid"), path=made(path["waypoints"]), disturbance=drifting)
     speeds = np.linspace(0.5, 60.0, COUNT)

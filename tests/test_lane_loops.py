@@ -11,9 +11,9 @@ from test_lanes import aligned
 
 from podusv_cli.core.interpolation import segment
 from podusv_cli.core.kernel import LANES, Vector, kernel, tail
-from podusv_cli.engine import compile
-from podusv_cli.engine.lane_doors import LANE_VECTOR
-from podusv_cli.engine.signatures import pointer
+from podusv_cli.engine.machine import compile
+from podusv_cli.engine.machine.lane_doors import LANE_VECTOR
+from podusv_cli.engine.machine.signatures import pointer
 
 SIZE = 6  # numbers of a table that increases
 

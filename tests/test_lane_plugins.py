@@ -15,11 +15,11 @@ from test_lanes import same
 
 from benchmarks.variants import variants
 from podusv_cli.core.kernel import LANES
-from podusv_cli.engine.batch import simulate_many
-from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.lane_source import OtherSource, source
-from podusv_cli.engine.lanes import why_alone
-from podusv_cli.engine.loop import Observer
+from podusv_cli.engine.loop.closed_loop import Observer
+from podusv_cli.engine.machine.lane_source import OtherSource, source
+from podusv_cli.engine.running.batch import simulate_many
+from podusv_cli.engine.running.lanes import why_alone
+from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.scenario.load import load
 
 TEXT = """

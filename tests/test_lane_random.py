@@ -13,9 +13,9 @@ from test_lanes import aligned, bits
 
 from podusv_cli.core.errors import LawError
 from podusv_cli.core.kernel import LANES, Vector
-from podusv_cli.engine import compile
-from podusv_cli.engine.lane_doors import LANE_VECTOR
-from podusv_cli.engine.signatures import pointer
+from podusv_cli.engine.machine import compile
+from podusv_cli.engine.machine.lane_doors import LANE_VECTOR
+from podusv_cli.engine.machine.signatures import pointer
 
 NAMES, ALIKE = ("gain", "mode"), frozenset({"mode"})
 WILD = (math.nan, math.inf, -math.inf, 0.0, -0.0, 1e300, -1e300, 1.0, 2.0, -1.0)

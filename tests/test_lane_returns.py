@@ -9,7 +9,7 @@ import pytest
 from test_lane_loops import SIZE, check
 
 from podusv_cli.core.kernel import Vector, kernel
-from podusv_cli.engine.lane_syntax import OUT_OF_LOOP, Kinds, tailed
+from podusv_cli.engine.machine.lane_syntax import OUT_OF_LOOP, Kinds, tailed
 
 
 @kernel

@@ -13,18 +13,18 @@ import pytest
 from plugin_samples import LAW
 
 from benchmarks.variants import variants
-from podusv_cli.actuators.ideal import Ideal
-from podusv_cli.actuators.saturated import Saturated
-from podusv_cli.controllers.base import Controller
+from podusv_cli.components.actuators.ideal import Ideal
+from podusv_cli.components.actuators.saturated import Saturated
+from podusv_cli.components.controllers.base import Controller
 from podusv_cli.core.kernel import LANES, Vector, kernel
 from podusv_cli.core.registry import kinds
-from podusv_cli.engine import compile
-from podusv_cli.engine.batch import Batch, simulate_many
-from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.lane_doors import LANE_VECTOR
-from podusv_cli.engine.lanes import why_alone
-from podusv_cli.engine.loop import ClosedLoop, Observer
-from podusv_cli.engine.march import Work
+from podusv_cli.engine.loop.closed_loop import ClosedLoop, Observer
+from podusv_cli.engine.machine import compile
+from podusv_cli.engine.machine.lane_doors import LANE_VECTOR
+from podusv_cli.engine.running.batch import Batch, simulate_many
+from podusv_cli.engine.running.lanes import why_alone
+from podusv_cli.engine.running.watch import Work
+from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.metrics.table import observer
 from podusv_cli.scenario.load import load
 
@@ -50,7 +50,7 @@ sweep: {draws: 4, vary: {vessel.m: {uniform: [50.0, 60.0]}}}
 
 def loop(law: str) -> ClosedLoop:
     """The task of the paper with a law."""
-    kind = kinds("podusv_cli.controllers", Controller)[law]
+    kind = kinds("podusv_cli.components.controllers", Controller)[law]
     return replace(SCENARIO.closed_loop(), controller=kind())
 
 
@@ -108,7 +108,7 @@ def test_runs_side_by_side_have_the_bits_that_they_have_alone(
 @pytest.mark.slow  # the compiler takes half a minute
 def test_options_of_a_law_and_of_its_sampling_march_side_by_side() -> None:
     """Held directions, samples, the observer of the sway load, anti-windup, a held demand."""
-    law = kinds("podusv_cli.controllers", Controller)["dsc"]
+    law = kinds("podusv_cli.components.controllers", Controller)["dsc"]
     controller = law.model_validate(
         {
             "rate": "difference",

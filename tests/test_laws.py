@@ -9,13 +9,13 @@ from conftest import NONLINEAR, PAPER, Answer, Situation, ask, corrected, run, s
 from hypothesis import given
 from hypothesis import strategies as st
 
-from podusv_cli.controllers.adaptive_neural import AdaptiveNeural, shunting_rate
-from podusv_cli.controllers.backstepping import Backstepping, alpha_r_rate, alpha_u_rate
-from podusv_cli.controllers.dsc import DynamicSurface
-from podusv_cli.controllers.network import activation
-from podusv_cli.controllers.pid import Pid
-from podusv_cli.controllers.polar_backstepping import PolarBackstepping
-from podusv_cli.controllers.tracking import Tracking, track
+from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural, shunting_rate
+from podusv_cli.components.controllers.backstepping import Backstepping, alpha_r_rate, alpha_u_rate
+from podusv_cli.components.controllers.dsc import DynamicSurface
+from podusv_cli.components.controllers.network import activation
+from podusv_cli.components.controllers.pid import Pid
+from podusv_cli.components.controllers.polar_backstepping import PolarBackstepping
+from podusv_cli.components.controllers.tracking import Tracking, track
 from podusv_cli.core.kernel import Vector, bundle
 
 POLAR = (AdaptiveNeural, DynamicSurface, Backstepping)

@@ -8,16 +8,16 @@ import sympy as sp
 from conftest import NONLINEAR, ask, corrected, run, situations
 from law_samples import STEADY, WRONG, rms, task
 
-from podusv_cli.actuators.saturated import Saturated
-from podusv_cli.controllers.alos import CRAB, Alos, learning
-from podusv_cli.controllers.guidance import course_frame, line_of_sight, wanted_speed
-from podusv_cli.controllers.los_pid import LosPid
-from podusv_cli.controllers.velocity_loop import Axis
+from podusv_cli.components.actuators.saturated import Saturated
+from podusv_cli.components.controllers.alos import CRAB, Alos, learning
+from podusv_cli.components.controllers.guidance import course_frame, line_of_sight, wanted_speed
+from podusv_cli.components.controllers.los_pid import LosPid
+from podusv_cli.components.controllers.velocity_loop import Axis
+from podusv_cli.components.paths.circle import Circle
+from podusv_cli.components.paths.line import Line
 from podusv_cli.core.kernel import bundle
 from podusv_cli.core.kinematics import wrap
 from podusv_cli.core.recording import Recording
-from podusv_cli.paths.circle import Circle
-from podusv_cli.paths.line import Line
 
 LEARNING = [Alos(), Alos(learns="integral")]
 LAWS = [LosPid(), *LEARNING]

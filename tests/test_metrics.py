@@ -7,26 +7,26 @@ import numpy as np
 import pytest
 from conftest import NONLINEAR, POD, Constant, corrected, example, target_at
 
-from podusv_cli.actuators.pod import Pod, Pods
-from podusv_cli.actuators.saturated import Saturated
-from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
-from podusv_cli.controllers.backstepping import Backstepping
-from podusv_cli.controllers.pid import Pid
-from podusv_cli.controllers.turning_circle import TurningCircle
-from podusv_cli.controllers.zigzag import Zigzag
+from podusv_cli.components.actuators.pod import Pod, Pods
+from podusv_cli.components.actuators.saturated import Saturated
+from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
+from podusv_cli.components.controllers.backstepping import Backstepping
+from podusv_cli.components.controllers.pid import Pid
+from podusv_cli.components.controllers.turning_circle import TurningCircle
+from podusv_cli.components.controllers.zigzag import Zigzag
+from podusv_cli.components.estimators.none import NoEstimator
+from podusv_cli.components.measurements.sensors import Sensors
+from podusv_cli.components.paths.line_circle import LineCircle
 from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, kernel
-from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.simulate import simulate
-from podusv_cli.estimators.none import NoEstimator
-from podusv_cli.measurements.sensors import Sensors
+from podusv_cli.engine.running.simulate import simulate
+from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.metrics import distance
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.metric import close_integrals
 from podusv_cli.metrics.operations import operations
 from podusv_cli.metrics.table import METRICS, observer
 from podusv_cli.metrics.windows import NAMED
-from podusv_cli.paths.line_circle import LineCircle
 
 
 def gathered(

@@ -7,15 +7,15 @@ import pytest
 from command_samples import TWO, write
 from conftest import corrected
 
-from podusv_cli.actuators.saturated import Saturated
 from podusv_cli.comparison.claims import parse_claims
+from podusv_cli.components.actuators.saturated import Saturated
 from podusv_cli.core.errors import ScenarioError
-from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.simulate import simulate
+from podusv_cli.engine.running.simulate import simulate
+from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.metrics.table import METRICS, metrics_with, observer
 from podusv_cli.metrics.windows import NAMED, called
 from podusv_cli.scenario.load import load_text
-from podusv_cli.study.expressions import parse_success
+from podusv_cli.studies.study.expressions import parse_success
 
 WINDOWS = (("bend", (12.0, 31.0)), ("start", (0.0, 5.0)), ("rest", (35.004, 40.0)))
 RADII = (("far", 9.0), ("near", 0.01))

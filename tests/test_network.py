@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
-from podusv_cli.controllers.network import Network, activate, activation, adapt, weigh
+from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
+from podusv_cli.components.controllers.network import Network, activate, activation, adapt, weigh
 from podusv_cli.core.kernel import Vector, bundle
 
 LISTED = ((0.0, 0.0, 0.0), (1.0, -0.5, 0.2), (2.0, 0.5, -0.7), (-1.0, 0.1, 0.9))

@@ -10,9 +10,9 @@ import pytest
 from command_samples import ROOT
 from conftest import NONLINEAR
 
+from podusv_cli.components.paths.circle import Circle
+from podusv_cli.components.paths.line import Line
 from podusv_cli.core.kernel import bundle
-from podusv_cli.paths.circle import Circle
-from podusv_cli.paths.line import Line
 from podusv_cli.storage.run_folder import open_run
 
 EXAMPLE = ROOT / "examples/nmpc"

@@ -7,14 +7,14 @@ import pytest
 import sympy as sp
 from conftest import NONLINEAR, ask, corrected, run, situations
 
-from podusv_cli.actuators.saturated import Saturated
-from podusv_cli.controllers.observer import OBSERVED, ObservingController
-from podusv_cli.controllers.velocity_loop import Axis
-from podusv_cli.controllers.velocity_vector import VelocityVector
+from podusv_cli.components.actuators.saturated import Saturated
+from podusv_cli.components.controllers.observer import OBSERVED, ObservingController
+from podusv_cli.components.controllers.velocity_loop import Axis
+from podusv_cli.components.controllers.velocity_vector import VelocityVector
+from podusv_cli.components.disturbances.harmonic import Harmonic, HarmonicDisturbance
+from podusv_cli.components.vessels.plant import plant
 from podusv_cli.core.kernel import bundle
 from podusv_cli.core.registry import kinds
-from podusv_cli.disturbances.harmonic import Harmonic, HarmonicDisturbance
-from podusv_cli.vessels.plant import plant
 
 MEANS = (0.4, -0.3, 0.2)
 STEADY = HarmonicDisturbance(
@@ -25,7 +25,7 @@ SPEED = {
     "VelocityVector": 0.4,
     "Adrc": 0.0,
 }  # of the target, for loops
-OBSERVING = list(kinds("podusv_cli.controllers", ObservingController).values())
+OBSERVING = list(kinds("podusv_cli.components.controllers", ObservingController).values())
 
 
 @pytest.mark.parametrize("kind", OBSERVING)

@@ -18,15 +18,12 @@ from conftest import PACKAGE
 HEAD = """
 from typing import Any, ClassVar, Literal
 import numpy as np
-from podusv_cli.core.component import value
-from podusv_cli.core.kernel import Vector, kernel
-from podusv_cli.core.signal import Signal
+from podusv_cli.plugin import Signal, Vector, kernel, value
 """
 FILES = {
     # It has neither psi_e nor z_e, a memory with an axis of its own, and tells of a fast loop.
-    "controllers/cross_track.py": """
-from podusv_cli.controllers.base import Controller
-from podusv_cli.controllers.velocity_loop import Loop
+    "components/controllers/cross_track.py": """
+from podusv_cli.plugin import Controller, Loop
 
 E_CT = Signal("e_ct", "m", "cross-track error")
 MODES = Signal("modes", "m", "amplitudes of the modes", axes=("mode",))
@@ -60,8 +57,8 @@ class CrossTrack(Controller):
         for i in range(3):
             rate[i] = signals[0]
 """,
-    "paths/still.py": """
-from podusv_cli.paths.base import Path
+    "components/paths/still.py": """
+from podusv_cli.plugin import Path
 
 
 class Still(Path):
@@ -77,8 +74,8 @@ class Still(Path):
             target[i] = 0.0
         target[0] = k.north
 """,
-    "disturbances/steady.py": """
-from podusv_cli.disturbances.base import Disturbance
+    "components/disturbances/steady.py": """
+from podusv_cli.plugin import Disturbance
 
 
 class Steady(Disturbance):
@@ -92,8 +89,8 @@ class Steady(Disturbance):
     def evaluate(t, x, k, table, b):
         b[0], b[1], b[2] = k.push, 0.0, 0.0
 """,
-    "actuators/lagging.py": """
-from podusv_cli.actuators.base import Actuator
+    "components/actuators/lagging.py": """
+from podusv_cli.plugin import Actuator
 
 BEHIND = Signal("behind", "N", "what the force lags behind the demand")
 FORCE = Signal("force", "N", "surge force of the lagging actuator")
@@ -115,7 +112,7 @@ class Lagging(Actuator):
         rate[0] = signals[0] / k.lag
 """,
     "metrics/reach.py": """
-from podusv_cli.metrics.metric import Accumulator, Metric, gathered
+from podusv_cli.plugin import Accumulator, Metric, gathered
 
 
 @kernel
@@ -129,13 +126,12 @@ reach = Metric("reach", "m", "largest distance east", OF, gathered(0))
 twice = Metric("twice", "s", "twice the run", OF, gathered(1))
 """,
     "figures/cross.py": """
-from podusv_cli.figures.panels import signals_over_time
-from podusv_cli.figures.sheet import figure
+from podusv_cli.plugin import figure, signals_over_time
 
 cross = figure("cross", caption="cross-track error", signals=("e_ct",))(signals_over_time("e_ct"))
 """,
     "findings/lazy.py": """
-from podusv_cli.core.finding import after, before
+from podusv_cli.plugin import after, before
 
 
 @before("lazy-law", about="controller", meaning="the gain is small")
@@ -177,8 +173,10 @@ def place(tmp_path_factory):
     for name, text in FILES.items():
         assert not (copy / name).exists()
         (copy / name).write_text(HEAD + text)
-    barge = yaml.safe_load((copy / "vessels/paper_nonlinear.yaml").read_text()) | {"m": 40.0}
-    (copy / "vessels/barge.yaml").write_text(yaml.safe_dump(barge))
+    barge = yaml.safe_load((copy / "components/vessels/paper_nonlinear.yaml").read_text()) | {
+        "m": 40.0
+    }
+    (copy / "components/vessels/barge.yaml").write_text(yaml.safe_dump(barge))
     (folder / "a.yaml").write_text(SCENARIO)
     return folder
 

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from podusv_cli.core.kernel import kernel, scratch
-from podusv_cli.engine.simulate import simulate
+from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.metrics.operations import Tally, operations
 from podusv_cli.scenario.load import load
 

@@ -15,17 +15,17 @@ from command_samples import BASE
 from conftest import VESSELS
 from scipy.integrate import quad
 
-from podusv_cli.controllers.pid import Pid
+from podusv_cli.components.controllers.pid import Pid
+from podusv_cli.components.disturbances.base import Disturbance
+from podusv_cli.components.vessels.plant import plant
 from podusv_cli.core.component import Component
 from podusv_cli.core.errors import NotConvergedError, UsageError
 from podusv_cli.core.kernel import bundle, kernel, transplanted
-from podusv_cli.disturbances.base import Disturbance
 from podusv_cli.optimum import collocation, feedback
 from podusv_cli.optimum.problem import Motion, problem
 from podusv_cli.process.interrupts import interrupts_caught
 from podusv_cli.scenario.load import load, load_text
 from podusv_cli.storage.run_folder import open_run
-from podusv_cli.vessels.plant import plant
 from podusv_cli.workflows import optimum
 
 REASON = "CasADi is not installed: podusv[optimum]"

@@ -11,13 +11,13 @@ from conftest import example, kinds, target_at
 from pydantic import ValidationError
 from scipy.interpolate import CubicSpline
 
-from podusv_cli.paths.base import Path
-from podusv_cli.paths.circle import Circle
-from podusv_cli.paths.figure_eight import FigureEight
-from podusv_cli.paths.line import Line
-from podusv_cli.paths.line_circle import LineCircle
-from podusv_cli.paths.sinusoid import Sinusoid
-from podusv_cli.paths.waypoints import Waypoints
+from podusv_cli.components.paths.base import Path
+from podusv_cli.components.paths.circle import Circle
+from podusv_cli.components.paths.figure_eight import FigureEight
+from podusv_cli.components.paths.line import Line
+from podusv_cli.components.paths.line_circle import LineCircle
+from podusv_cli.components.paths.sinusoid import Sinusoid
+from podusv_cli.components.paths.waypoints import Waypoints
 
 POINTS = ((0.0, 0.0), (5.0, 1.0), (8.0, 6.0), (8.0, 12.0), (3.0, 15.0))
 ORDERS = ("position", "velocity", "acceleration")

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 from scipy.optimize import root
 
+from podusv_cli.components.disturbances.harmonic import Harmonic, HarmonicDisturbance
+from podusv_cli.components.vessels.plant import plant
+from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.kernel import bundle
 from podusv_cli.core.kinematics import earth_velocity, wrap
-from podusv_cli.disturbances.harmonic import Harmonic, HarmonicDisturbance
-from podusv_cli.vessels.plant import plant
-from podusv_cli.vessels.vessel import Vessel
 
 speed = st.floats(-3, 3)
 velocities = st.tuples(speed, speed, speed).map(np.array)

@@ -151,15 +151,16 @@ def test_scenarios_of_one_process_know_only_their_own_files(tmp_path, monkeypatc
     assert scenario_class(()) is Scenario
 
 
+PID = "podusv_cli.components.controllers.pid"
 FAULTY = {
     "def (": "a.yaml:2:11: plugins: laws/my_law.py cannot be imported: SyntaxError: invalid "
     "syntax (my_law.py, line 1)",
     "import no_such_module": "laws/my_law.py cannot be imported: ModuleNotFoundError: No module "
     "named 'no_such_module' (my_law.py, line 1)",
-    "from podusv_cli.controllers.pid import Pid\nclass Mine(Pid):\n    gain = 1.0\n": "gain = 1.0",
+    f"from {PID} import Pid\nclass Mine(Pid):\n    gain = 1.0\n": "gain = 1.0",
     "raise SystemExit(0)": "laws/my_law.py cannot be imported: SystemExit: 0 (my_law.py, line 1)",
-    "from podusv_cli.controllers.pid import Pid\n\n\nclass Mine(Pid): pass\n": "a.yaml:2:10: "
-    "plugins: my_law.py, line 4, class Mine: its kind pid is that of podusv_cli.controllers.pid, "
+    f"from {PID} import Pid\n\n\nclass Mine(Pid): pass\n": "a.yaml:2:10: "
+    f"plugins: my_law.py, line 4, class Mine: its kind pid is that of {PID}, "
     "too; take another name",
     LAW.replace('Literal["cross_track"]', "str"): "class CrossTrack: its kind is no fixed word; "
     'write kind: Literal["mine"] = "mine"',

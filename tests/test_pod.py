@@ -14,14 +14,14 @@ from pydantic import ValidationError
 from test_closed_loop import order
 from test_metrics import gathered
 
-from podusv_cli.actuators import allocation_qp
-from podusv_cli.actuators.allocation import allocate
-from podusv_cli.actuators.pod import Pod, Pods
-from podusv_cli.actuators.propeller import speed_for, speed_gain, thrust
-from podusv_cli.controllers.pid import Pid
+from podusv_cli.components.actuators import allocation_qp
+from podusv_cli.components.actuators.allocation import allocate
+from podusv_cli.components.actuators.pod import Pod, Pods
+from podusv_cli.components.actuators.propeller import speed_for, speed_gain, thrust
+from podusv_cli.components.controllers.pid import Pid
+from podusv_cli.components.paths.line import Line
 from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.figures.drawing import FIGURES
-from podusv_cli.paths.line import Line
 
 DRAG = 0.72 * 0.5 + 1.32742 * 0.25 + 5.86643 * 0.125  # the paper's vessel at 0.5 m/s [N]
 

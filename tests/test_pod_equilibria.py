@@ -10,11 +10,11 @@ from conftest import Constant, adrift, corrected, run, vessel
 from scipy.optimize import fsolve
 from test_pod import pods
 
-from podusv_cli.actuators.pod import Pods
-from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
+from podusv_cli.components.actuators.pod import Pods
+from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
+from podusv_cli.components.disturbances.harmonic import Harmonic, HarmonicDisturbance
+from podusv_cli.components.paths.line import Line
 from podusv_cli.core.recording import Recording
-from podusv_cli.disturbances.harmonic import Harmonic, HarmonicDisturbance
-from podusv_cli.paths.line import Line
 
 X_P, U = -0.499, 0.5
 RESULTS = " ".join((Path(__file__).parent.parent / "results/pod.md").read_text().split())

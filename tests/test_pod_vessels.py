@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from podusv_cli.actuators.pod import Pods
-from podusv_cli.engine.simulate import simulate
+from podusv_cli.components.actuators.pod import Pods
+from podusv_cli.components.vessels.vessel import VESSELS
+from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.findings.finding import preflight
 from podusv_cli.scenario.load import load
 from podusv_cli.scenario.presets import preset_names, preset_text
-from podusv_cli.vessels.vessel import VESSELS
 
 PODS = Pods.presets
 CONFIGS = Path(__file__).parent.parent / "configs/pod/vessels"

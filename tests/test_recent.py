@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from podusv_cli.engine.recent import Recent
-from podusv_cli.paths.line import Line
-from podusv_cli.paths.sinusoid import Sinusoid
+from podusv_cli.components.paths.line import Line
+from podusv_cli.components.paths.sinusoid import Sinusoid
+from podusv_cli.engine.loop.recent import Recent
 
 
 def test_the_very_same_object_is_not_asked_again() -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from podusv_cli.comparison.claims import judge, parse_claims
 from podusv_cli.comparison.entries import Entry
-from podusv_cli.engine.simulate import simulate
+from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.metrics.operations import operations
 from podusv_cli.metrics.table import observer
 from podusv_cli.scenario.load import load

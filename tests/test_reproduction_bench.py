@@ -6,10 +6,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from podusv_cli.bench.cases import AXES, shipped_bench
-from podusv_cli.bench.page import as_markdown
-from podusv_cli.bench.standing import middle
 from podusv_cli.scenario.load import load_text
+from podusv_cli.studies.bench.cases import AXES, shipped_bench
+from podusv_cli.studies.bench.page import as_markdown
+from podusv_cli.studies.bench.standing import middle
 
 RESULTS = Path(__file__).parents[1] / "results"
 PAGE = (RESULTS / "bench.md").read_text()

@@ -8,8 +8,8 @@ import pandas as pd
 import pytest
 
 from podusv_cli.scenario.load import load
-from podusv_cli.study.draws import drawn, draws
-from podusv_cli.study.plan import plan
+from podusv_cli.studies.study.draws import drawn, draws
+from podusv_cli.studies.study.plan import plan
 
 RESULTS = Path(__file__).parents[1] / "results"
 STUDIES = RESULTS.parent / "configs" / "studies"

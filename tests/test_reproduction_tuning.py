@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 
 from podusv_cli.scenario.load import load
-from podusv_cli.tuning.check import tune_faults
-from podusv_cli.tuning.plan import TunePlan
+from podusv_cli.studies.tuning.check import tune_faults
+from podusv_cli.studies.tuning.plan import TunePlan
 
 ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "results" / "tuning.md").read_text()

@@ -5,8 +5,8 @@ import pytest
 from conftest import GENTLE, SMOOTH_START, corrected
 from scipy.integrate import solve_ivp
 
-from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.simulate import simulate
+from podusv_cli.engine.running.simulate import simulate
+from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.findings.stability import loops, sampled_growth
 from podusv_cli.scenario.load import load_text
 

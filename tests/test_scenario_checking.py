@@ -4,8 +4,8 @@ import pytest
 from conftest import kinds
 from scenario_samples import SOUND, VESSEL_NAMES, told
 
+from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.vessels.vessel import Vessel
 
 KEYS = ", ".join(Scenario.model_fields)
 VESSEL_KEYS = ", ".join(Vessel.model_fields)

@@ -11,8 +11,8 @@ from pydantic import Discriminator
 from pydantic.types import Strict
 
 from podusv_cli.comparison.settings import settings
+from podusv_cli.components.measurements.sensors import Sensor, Sensors
 from podusv_cli.core.component import Component
-from podusv_cli.measurements.sensors import Sensor, Sensors
 from podusv_cli.scenario.explain import Row, UnknownKeyError, explain, kinds
 from podusv_cli.scenario.keys import BOUNDS, PATTERNS_IN_WORDS, limits, members, sections
 from podusv_cli.scenario.model import Scenario

@@ -5,7 +5,7 @@ from conftest import kinds
 from counting import counted
 from scenario_samples import SOUND, loaded, told
 
-from podusv_cli.controllers.pid import Pid
+from podusv_cli.components.controllers.pid import Pid
 from podusv_cli.core.errors import ScenarioError
 from podusv_cli.scenario.load import load_text, values
 from podusv_cli.scenario.model import Scenario

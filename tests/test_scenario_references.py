@@ -7,14 +7,14 @@ from pathlib import Path
 import pytest
 from scenario_samples import SOUND, VESSEL_NAMES, findings, loaded, told, write
 
-from podusv_cli.actuators.pod import Pods
+from podusv_cli.components.actuators.pod import Pods
+from podusv_cli.components.vessels.vessel import VESSELS, Vessel
 from podusv_cli.core.errors import ScenarioError
 from podusv_cli.scenario import presets
 from podusv_cli.scenario.load import load, load_text, resolved_yaml
 from podusv_cli.scenario.named_files import MAX_POINTS
 from podusv_cli.scenario.presets import preset_file, preset_names
 from podusv_cli.scenario.yaml_tree import plain
-from podusv_cli.vessels.vessel import VESSELS, Vessel
 
 
 @pytest.fixture(autouse=True)

@@ -5,13 +5,13 @@ from typing import Any
 
 import pytest
 
+from podusv_cli.components.vessels.vessel import VESSELS as SHIPPED
 from podusv_cli.findings.finding import finding_kinds
 from podusv_cli.scenario.keys import NAME, NUMBER, SCENARIO, sections
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.presets import preset_names
 from podusv_cli.scenario.schema import json_schema
 from podusv_cli.scenario.yaml_tree import dotted
-from podusv_cli.vessels.vessel import VESSELS as SHIPPED
 
 SCHEMA = json_schema(tuple(finding_kinds()))
 KEYS = [key for key in SCENARIO.all() if not key.is_kind]

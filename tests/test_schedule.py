@@ -9,8 +9,8 @@ from conftest import NONLINEAR, corrected, run
 from pydantic import ValidationError
 from scenario_samples import SOUND, findings
 
-from podusv_cli.controllers.pid import Pid
-from podusv_cli.controllers.schedule import Schedule
+from podusv_cli.components.controllers.pid import Pid
+from podusv_cli.components.controllers.schedule import Schedule
 from podusv_cli.core.kernel import bundle
 from podusv_cli.core.timed_rows import LARGEST
 from podusv_cli.pages.page import value_text

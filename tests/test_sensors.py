@@ -7,20 +7,20 @@ import numpy as np
 import pytest
 from conftest import NONLINEAR, Constant, adrift, corrected, run
 
-from podusv_cli.controllers.velocity_vector import VelocityVector
+from podusv_cli.components.controllers.velocity_vector import VelocityVector
+from podusv_cli.components.disturbances.current import Current
+from podusv_cli.components.disturbances.harmonic import HarmonicDisturbance
+from podusv_cli.components.disturbances.step import Step
+from podusv_cli.components.disturbances.total import Total
+from podusv_cli.components.disturbances.waves import Waves
+from podusv_cli.components.estimators.ekf import ExtendedKalmanFilter
+from podusv_cli.components.estimators.none import NoEstimator
+from podusv_cli.components.measurements.base import FRESH, KNOWN, VALUE
+from podusv_cli.components.measurements.sensors import ERRORS, HEAD, Sensor, Sensors, rounded
 from podusv_cli.core.errors import LawError
 from podusv_cli.core.signal import STATE
-from podusv_cli.disturbances.current import Current
-from podusv_cli.disturbances.harmonic import HarmonicDisturbance
-from podusv_cli.disturbances.step import Step
-from podusv_cli.disturbances.total import Total
-from podusv_cli.disturbances.waves import Waves
-from podusv_cli.engine.batch import simulate_many
-from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.estimators.ekf import ExtendedKalmanFilter
-from podusv_cli.estimators.none import NoEstimator
-from podusv_cli.measurements.base import FRESH, KNOWN, VALUE
-from podusv_cli.measurements.sensors import ERRORS, HEAD, Sensor, Sensors, rounded
+from podusv_cli.engine.running.batch import simulate_many
+from podusv_cli.engine.step.grid import TimeGrid
 
 H = 0.01
 PERFECT = Sensor(period=H)

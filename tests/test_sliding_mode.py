@@ -9,15 +9,15 @@ import sympy as sp
 from conftest import NONLINEAR, ask, corrected, run, situations
 from law_samples import STEADY, WRONG, rms, task
 
-from podusv_cli.actuators.saturated import Saturated
-from podusv_cli.controllers.hand_point import hand_errors
-from podusv_cli.controllers.sliding_mode import SlidingMode, reach, twist
-from podusv_cli.controllers.velocity_loop import Axis
+from podusv_cli.components.actuators.saturated import Saturated
+from podusv_cli.components.controllers.hand_point import hand_errors
+from podusv_cli.components.controllers.sliding_mode import SlidingMode, reach, twist
+from podusv_cli.components.controllers.velocity_loop import Axis
+from podusv_cli.components.disturbances.calm import Calm
+from podusv_cli.components.paths.circle import Circle
+from podusv_cli.components.paths.line import Line
+from podusv_cli.components.vessels.plant import plant
 from podusv_cli.core.kernel import bundle
-from podusv_cli.disturbances.calm import Calm
-from podusv_cli.paths.circle import Circle
-from podusv_cli.paths.line import Line
-from podusv_cli.vessels.plant import plant
 
 LAYER, TWIST = SlidingMode(), SlidingMode(reaching="super_twisting")
 LAWS = pytest.mark.parametrize("law", [LAYER, TWIST], ids=["layer", "twist"])

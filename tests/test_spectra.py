@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from podusv_cli.disturbances import spectra
+from podusv_cli.components.disturbances import spectra
 
 PEAK = 1.3
 FINE = np.geomspace(0.2, 60.0, 20_001) * PEAK

@@ -10,13 +10,13 @@ from small_study import small
 from stub_cluster import REPORT, StubClient
 
 from podusv_cli.core.errors import StorageError, UsageError
-from podusv_cli.study import cluster as clusters
-from podusv_cli.study import march as marching
-from podusv_cli.study.cluster import Cluster
-from podusv_cli.study.march import march
-from podusv_cli.study.remote import BITS, Recipe, Terms
-from podusv_cli.study.store import Store
-from podusv_cli.study.unit import STATUSES
+from podusv_cli.studies.study import cluster as clusters
+from podusv_cli.studies.study import dispatch as marching
+from podusv_cli.studies.study.cluster import Cluster
+from podusv_cli.studies.study.dispatch import march
+from podusv_cli.studies.study.remote import BITS, Recipe, Terms
+from podusv_cli.studies.study.store import Store
+from podusv_cli.studies.study.unit import STATUSES
 
 OTHER_BITS = REPORT | {f"{BITS}pid": "124"}
 OTHER_NUMPY = REPORT | {"numpy": "1.9"}

@@ -12,10 +12,10 @@ import pytest
 from small_study import TEXT, made, small
 
 from podusv_cli.core.errors import StorageError
-from podusv_cli.study.cluster import connected
-from podusv_cli.study.march import march
-from podusv_cli.study.remote import Recipe
-from podusv_cli.study.store import RUNS, Store
+from podusv_cli.studies.study.cluster import connected
+from podusv_cli.studies.study.dispatch import march
+from podusv_cli.studies.study.remote import Recipe
+from podusv_cli.studies.study.store import RUNS, Store
 
 PATIENCE = 60.0  # s
 # So long that an interrupt comes before the end.
@@ -110,7 +110,7 @@ def until(happened):
 
 
 def test_no_scheduler_is_a_sentence(distributed, monkeypatch):
-    monkeypatch.setattr("podusv_cli.study.cluster.PATIENCE", 0.3)
+    monkeypatch.setattr("podusv_cli.studies.study.cluster.PATIENCE", 0.3)
     with (
         pytest.raises(StorageError, match=r"--scheduler tcp://127.0.0.1:9: no scheduler answers"),
         connected("tcp://127.0.0.1:9", Recipe(TEXT), "", mixed=False),

@@ -16,7 +16,7 @@ from scipy.stats import qmc
 from podusv_cli.core.random_words import in_unit_interval
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sweep import Quantity, Sweep
-from podusv_cli.study.draws import DrawError, drawn, draws, seeds, table, uniforms, words
+from podusv_cli.studies.study.draws import DrawError, drawn, draws, seeds, table, uniforms, words
 
 VARY = """
 sweep:

@@ -12,8 +12,8 @@ from rerun_samples import made as made_run
 from small_study import folder_with_scenario, small
 
 from podusv_cli.core.errors import StorageError
-from podusv_cli.study.store import RUNS, SCENARIO, UNITS, encoded, read
-from podusv_cli.study.unit import Unit, make
+from podusv_cli.studies.study.store import RUNS, SCENARIO, UNITS, encoded, read
+from podusv_cli.studies.study.unit import Unit, make
 
 SECRET = 0.123456789
 KEY = "drawn/vessel.m"

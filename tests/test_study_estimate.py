@@ -8,10 +8,10 @@ import pytest
 from small_study import small, written
 from stub_cluster import invented
 
-from podusv_cli.study import estimate as estimating
-from podusv_cli.study.estimate import estimate, pilot
-from podusv_cli.study.store import RUNS, Store
-from podusv_cli.study.unit import Unit, make
+from podusv_cli.studies.study import estimate as estimating
+from podusv_cli.studies.study.estimate import estimate, pilot
+from podusv_cli.studies.study.store import RUNS, Store
+from podusv_cli.studies.study.unit import Unit, make
 from podusv_cli.workflows import sweep
 
 PACES = {("pid", 0): 0.25, ("li", 0): 0.5}  # s a run
@@ -130,7 +130,7 @@ def test_a_study_that_cannot_fit_is_refused_before_the_first_run(tmp_path, podus
     assert valid.err == said.err.replace(str(out), "results/small-sweep")
     free = SimpleNamespace(free=1e15)
     monkeypatch.setattr("podusv_cli.storage.run_folder.shutil.disk_usage", lambda path: free)
-    monkeypatch.setattr("podusv_cli.study.estimate.os.sysconf", lambda name: 100_000)
+    monkeypatch.setattr("podusv_cli.studies.study.estimate.os.sysconf", lambda name: 100_000)
     said = podusv("sweep", "run", config, "--out", out, "--draws", draws)
     assert said.code == 5
     assert "its tables take 64 GB of memory or more, and this machine has 10 GB" in said.err

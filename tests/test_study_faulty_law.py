@@ -6,9 +6,9 @@ from html_tree import tree
 from plugin_samples import LAW
 from small_study import TEXT
 
-from podusv_cli.engine import march
-from podusv_cli.study.sittings import sittings
-from podusv_cli.study.unit import STATUSES
+from podusv_cli.engine.running import watch as march
+from podusv_cli.studies.study.sittings import sittings
+from podusv_cli.studies.study.unit import STATUSES
 from podusv_cli.workflows import sweep
 
 START = """\

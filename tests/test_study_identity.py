@@ -9,11 +9,11 @@ from small_study import TEXT, made, small, written
 
 from podusv_cli.core.errors import ScenarioError, StorageError, UsageError
 from podusv_cli.process.workers import Outcome
-from podusv_cli.study import plan as plans
-from podusv_cli.study import store as stores
-from podusv_cli.study.march import ENDED, Driver
-from podusv_cli.study.store import RUNS, Store
-from podusv_cli.study.unit import Unit, crashed
+from podusv_cli.studies.study import plan as plans
+from podusv_cli.studies.study import store as stores
+from podusv_cli.studies.study.dispatch import ENDED, Driver
+from podusv_cli.studies.study.store import RUNS, Store
+from podusv_cli.studies.study.unit import Unit, crashed
 from podusv_cli.workflows import studies, sweep
 from podusv_cli.workflows.merge import merge
 

@@ -12,9 +12,9 @@ from small_study import TEXT, made, small
 
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.storage import provenance
-from podusv_cli.study import store as stores
-from podusv_cli.study.joining import _machine, join, missing
-from podusv_cli.study.store import RUNS, Store
+from podusv_cli.studies.study import store as stores
+from podusv_cli.studies.study.joining import _machine, join, missing
+from podusv_cli.studies.study.store import RUNS, Store
 from podusv_cli.workflows import sweep as workflow
 from podusv_cli.workflows.merge import merge
 

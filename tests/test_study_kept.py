@@ -15,8 +15,8 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.scenario.sweep import Quantity
 from podusv_cli.storage import manifest
 from podusv_cli.storage.run_folder import open_run
-from podusv_cli.study import keep
-from podusv_cli.study.results import judged
+from podusv_cli.studies.study import keep
+from podusv_cli.studies.study.results import judged
 from podusv_cli.workflows import run as running
 from podusv_cli.workflows import studies, sweep
 from podusv_cli.workflows.merge import merge

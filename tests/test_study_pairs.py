@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from podusv_cli.comparison.tolerance import SIGNS
-from podusv_cli.study import statistics as st
+from podusv_cli.studies.study import statistics as st
 
 inf, nan = math.inf, math.nan
 

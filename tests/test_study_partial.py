@@ -9,9 +9,9 @@ import pytest
 from small_study import TEXT, small, written
 
 from podusv_cli.core.errors import ScenarioError, UsageError
-from podusv_cli.study.march import Driver
-from podusv_cli.study.store import Store
-from podusv_cli.study.unit import Unit, make
+from podusv_cli.studies.study.dispatch import Driver
+from podusv_cli.studies.study.store import Store
+from podusv_cli.studies.study.unit import Unit, make
 from podusv_cli.workflows import sweep
 
 

@@ -10,11 +10,11 @@ from small_study import TEXT
 from test_study_dask import DASK, PATIENCE, background, until
 
 from podusv_cli.core.errors import LawError, ScenarioError
-from podusv_cli.study import remote
-from podusv_cli.study.joining import digests
-from podusv_cli.study.remote import Recipe
-from podusv_cli.study.store import RUNS
-from podusv_cli.study.unit import Unit, make
+from podusv_cli.studies.study import remote
+from podusv_cli.studies.study.joining import digests
+from podusv_cli.studies.study.remote import Recipe
+from podusv_cli.studies.study.store import RUNS
+from podusv_cli.studies.study.unit import Unit, make
 from podusv_cli.workflows import run as running
 from podusv_cli.workflows import studies, sweep
 from podusv_cli.workflows.merge import merge

@@ -16,7 +16,7 @@ from test_report_chase import BROWSER, QUIET, WIDTHS, needs_browser
 
 from podusv_cli.process.extras import Extras
 from podusv_cli.storage import files
-from podusv_cli.study import bars, figures, outputs, pictures, report
+from podusv_cli.studies.study import bars, figures, outputs, pictures, report
 from podusv_cli.workflows import sweep
 
 SUCCESS = "  success: finished and iae <= 0.215\n  claims:\n"

@@ -11,16 +11,16 @@ import pytest
 from small_study import TEXT, made, small, written
 
 from podusv_cli.core.errors import StorageError, UsageError
-from podusv_cli.engine.simulate import simulate
-from podusv_cli.study import march as marching
-from podusv_cli.study import runs_file, runs_writer
-from podusv_cli.study import unit as units
-from podusv_cli.study.draws import drawn, draws
-from podusv_cli.study.plan import watching
-from podusv_cli.study.results import judged
-from podusv_cli.study.sittings import Sitting, sittings
-from podusv_cli.study.store import RUNS, UNITS, Store
-from podusv_cli.study.unit import Unit
+from podusv_cli.engine.running.simulate import simulate
+from podusv_cli.studies.study import dispatch as marching
+from podusv_cli.studies.study import runs_file, runs_writer
+from podusv_cli.studies.study import unit as units
+from podusv_cli.studies.study.draws import drawn, draws
+from podusv_cli.studies.study.plan import watching
+from podusv_cli.studies.study.results import judged
+from podusv_cli.studies.study.sittings import Sitting, sittings
+from podusv_cli.studies.study.store import RUNS, UNITS, Store
+from podusv_cli.studies.study.unit import Unit
 from podusv_cli.workflows import studies, sweep
 
 

@@ -8,8 +8,8 @@ import pytest
 from scipy.stats import spearmanr
 from study_samples import Made, study
 
-from podusv_cli.study import statistics as st
-from podusv_cli.study.summary import as_csv, pairs, sensitivity, summary
+from podusv_cli.studies.study import statistics as st
+from podusv_cli.studies.study.summary import as_csv, pairs, sensitivity, summary
 
 inf, nan = math.inf, math.nan
 

@@ -10,9 +10,9 @@ from small_study import made
 from test_study_store import finishing
 
 from podusv_cli.core.errors import StorageError
-from podusv_cli.study import store as stores
-from podusv_cli.study.store import BLOCK, RUNS, UNITS, encoded, read, undamaged
-from podusv_cli.study.unit import Unit, UnitResult
+from podusv_cli.studies.study import store as stores
+from podusv_cli.studies.study.store import BLOCK, RUNS, UNITS, encoded, read, undamaged
+from podusv_cli.studies.study.unit import Unit, UnitResult
 
 
 def test_a_whole_study_removes_only_units_that_it_read(tmp_path, monkeypatch):

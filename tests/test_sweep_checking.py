@@ -14,10 +14,10 @@ from podusv_cli.scenario.explain import explain
 from podusv_cli.scenario.load import Loaded, load_text, resolved_yaml
 from podusv_cli.scenario.sweep import Quantity
 from podusv_cli.scenario.yaml_tree import DISTRIBUTIONS, QUANTITY
-from podusv_cli.study.cells import MOST, cells
-from podusv_cli.study.check import singles, sweep_faults
-from podusv_cli.study.draws import DrawError, drawn, draws
-from podusv_cli.study.invalid import _has_ranges_only, invalid_draws
+from podusv_cli.studies.study.cells import MOST, cells
+from podusv_cli.studies.study.check import singles, sweep_faults
+from podusv_cli.studies.study.draws import DrawError, drawn, draws
+from podusv_cli.studies.study.invalid import _has_ranges_only, invalid_draws
 
 ROOT = Path(__file__).parents[1]
 BASE = """\

@@ -13,12 +13,12 @@ import pytest
 import sympy as sp
 from conftest import PAPER, Situation, ask, situations
 
-from podusv_cli.controllers.adaptive_neural import AdaptiveNeural, shunting_rate
-from podusv_cli.controllers.network import activation
-from podusv_cli.controllers.polar_backstepping import B_HAT_R, B_HAT_U, WEIGHTS, lemma
-from podusv_cli.controllers.tracking import track
+from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural, shunting_rate
+from podusv_cli.components.controllers.network import activation
+from podusv_cli.components.controllers.polar_backstepping import B_HAT_R, B_HAT_U, WEIGHTS, lemma
+from podusv_cli.components.controllers.tracking import track
+from podusv_cli.components.vessels.plant import plant
 from podusv_cli.core.kernel import Vector, bundle, kernel
-from podusv_cli.vessels.plant import plant
 
 # Errors, estimates' errors, and what is unknown.
 z_e, psi_e, u_e, r_e, y_u, y_r = sp.symbols("z_e psi_e u_e r_e y_u y_r", real=True)

@@ -7,10 +7,10 @@ import pytest
 from conftest import kinds
 
 from podusv_cli import testing_seeing
+from podusv_cli.components.estimators.low_pass import LowPass
+from podusv_cli.components.measurements.base import FRESH, OWN, Measurement
+from podusv_cli.components.measurements.sensors import MEASURED
 from podusv_cli.core.kernel import Vector, kernel
-from podusv_cli.estimators.low_pass import LowPass
-from podusv_cli.measurements.base import FRESH, OWN, Measurement
-from podusv_cli.measurements.sensors import MEASURED
 from podusv_cli.testing import checks, keeps_its_declaration
 
 SOUND = [

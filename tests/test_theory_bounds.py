@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from conftest import NONLINEAR, PAPER
 
-from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
-from podusv_cli.controllers.backstepping import Backstepping
-from podusv_cli.controllers.dsc import DynamicSurface
-from podusv_cli.controllers.polar_backstepping import PolarBackstepping
+from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
+from podusv_cli.components.controllers.backstepping import Backstepping
+from podusv_cli.components.controllers.dsc import DynamicSurface
+from podusv_cli.components.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.theory.bounds import Observed, Pair, UltimateBound, sway_bound, ultimate_bound
 
 SEEN = Observed(

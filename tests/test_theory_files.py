@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 
-from podusv_cli.controllers.network import Network
+from podusv_cli.components.controllers.network import Network
 from podusv_cli.core.recording import Recording
 from podusv_cli.figures.drawing import FIGURES, dressed
 from podusv_cli.figures.stability import FAR, POINTS

@@ -18,28 +18,28 @@ from conftest import (
     target_at,
 )
 
-from podusv_cli.actuators.pod import Pod, Pods
-from podusv_cli.actuators.saturated import Saturated
-from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
-from podusv_cli.controllers.backstepping import Backstepping
-from podusv_cli.controllers.dsc import DynamicSurface
-from podusv_cli.controllers.network import activation
-from podusv_cli.controllers.polar_backstepping import PolarBackstepping
+from podusv_cli.components.actuators.pod import Pod, Pods
+from podusv_cli.components.actuators.saturated import Saturated
+from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
+from podusv_cli.components.controllers.backstepping import Backstepping
+from podusv_cli.components.controllers.dsc import DynamicSurface
+from podusv_cli.components.controllers.network import activation
+from podusv_cli.components.controllers.polar_backstepping import PolarBackstepping
+from podusv_cli.components.disturbances.harmonic import HarmonicDisturbance
+from podusv_cli.components.paths.circle import Circle
+from podusv_cli.components.paths.line import Line
+from podusv_cli.components.vessels.plant import plant
 from podusv_cli.core.kernel import Vector, bundle, kernel
 from podusv_cli.core.recording import Recording
-from podusv_cli.disturbances.harmonic import HarmonicDisturbance
-from podusv_cli.engine.columns import by_name, names
-from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.layout import Plan
-from podusv_cli.engine.loop import STATE, ClosedLoop
-from podusv_cli.engine.replay import rates_replay
-from podusv_cli.paths.circle import Circle
-from podusv_cli.paths.line import Line
+from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop
+from podusv_cli.engine.loop.columns import by_name, names
+from podusv_cli.engine.running.replay import rates_replay
+from podusv_cli.engine.step.grid import TimeGrid
+from podusv_cli.engine.step.layout import Plan
 from podusv_cli.theory.ideal_weights import unloaded_accelerations
 from podusv_cli.theory.lyapunov import TERMS
 from podusv_cli.theory.monitor import Monitored, monitored
 from podusv_cli.theory.rates import error_rates
-from podusv_cli.vessels.plant import plant
 
 GAINS: dict[str, Any] = {"Gamma_u": 1.0, "Gamma_r": 1.0, "gamma_u": 10.0, "gamma_r": 10.0}
 LAWS: list[PolarBackstepping] = [GENTLE, DynamicSurface(**GAINS), Backstepping(**GAINS)]

@@ -5,13 +5,13 @@ import pytest
 from conftest import NONLINEAR, adrift, corrected, load_at, run
 from scenario_samples import SOUND, told
 
+from podusv_cli.components.disturbances.current import Current
+from podusv_cli.components.disturbances.harmonic import Harmonic, HarmonicDisturbance
+from podusv_cli.components.disturbances.total import Total
+from podusv_cli.components.disturbances.waves import Waves
+from podusv_cli.components.measurements.sensors import Sensor, Sensors
 from podusv_cli.core.errors import LawError
 from podusv_cli.core.kernel import bundle
-from podusv_cli.disturbances.current import Current
-from podusv_cli.disturbances.harmonic import Harmonic, HarmonicDisturbance
-from podusv_cli.disturbances.total import Total
-from podusv_cli.disturbances.waves import Waves
-from podusv_cli.measurements.sensors import Sensor, Sensors
 
 SEA = HarmonicDisturbance()
 MORE = HarmonicDisturbance(b_u=Harmonic(mean=3.0), scale=0.5)

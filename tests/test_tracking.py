@@ -9,11 +9,11 @@ from conftest import NONLINEAR, Situation, corrected, last_state, run, situation
 from hypothesis import given
 from hypothesis import strategies as st
 
-from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
-from podusv_cli.controllers.tracking import PSI_D_HELD, PSI_D_RATE_HELD, Tracking, track
+from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
+from podusv_cli.components.controllers.tracking import PSI_D_HELD, PSI_D_RATE_HELD, Tracking, track
+from podusv_cli.components.paths.line import Line
 from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.core.kinematics import direction
-from podusv_cli.paths.line import Line
 
 DIFFERENCE = {"rate": "difference", "difference_step": 0.01}
 

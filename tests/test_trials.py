@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from podusv_cli.components.vessels.plant import plant
 from podusv_cli.core.kernel import bundle
 from podusv_cli.process.extras import Extras
 from podusv_cli.scenario.load import load_text
 from podusv_cli.scenario.shipped import file_of
-from podusv_cli.vessels.plant import plant
 from podusv_cli.workflows.execute import Stopwatch, simulated, summary
 
 LEVER, EXECUTE = 0.499, 20.0

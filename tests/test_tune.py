@@ -12,15 +12,15 @@ import pytest
 from tune_samples import planned, searched, toy, tuned
 
 from podusv_cli.scenario.load import load
-from podusv_cli.study.unit import UnitResult
-from podusv_cli.tuning import sampler, trials
-from podusv_cli.tuning.pictures import sketches
-from podusv_cli.tuning.remarks import remarks
-from podusv_cli.tuning.sampler import Sampler
-from podusv_cli.tuning.search import Search, _far
-from podusv_cli.tuning.space import Gain
-from podusv_cli.tuning.trials import CUT, FINISHED, PRUNED, Trial, best, front
-from podusv_cli.tuning.validation import chosen
+from podusv_cli.studies.study.unit import UnitResult
+from podusv_cli.studies.tuning import sampler, trials
+from podusv_cli.studies.tuning.pictures import sketches
+from podusv_cli.studies.tuning.remarks import remarks
+from podusv_cli.studies.tuning.sampler import Sampler
+from podusv_cli.studies.tuning.search import Search, _far
+from podusv_cli.studies.tuning.space import Gain
+from podusv_cli.studies.tuning.trials import CUT, FINISHED, PRUNED, Trial, best, front
+from podusv_cli.studies.tuning.validation import chosen
 
 BUDGET = 100
 
@@ -91,8 +91,8 @@ def test_the_found_scenario_extends_the_searched_one(done):
 def test_numbers_of_the_report_come_from_draws_that_no_search_has_seen(done):
     drawn = done.results.runs.drawn["start.psi"]
     plan = done.results.plan
-    from podusv_cli.study.draws import SWEEP, table
-    from podusv_cli.tuning.plan import TRAIN
+    from podusv_cli.studies.study.draws import SWEEP, table
+    from podusv_cli.studies.tuning.plan import TRAIN
 
     others = [table(plan.scenario.sweep, 0, 500, s)["start.psi"] for s in (SWEEP, TRAIN)]
     assert len(drawn) == plan.tune.validate
@@ -101,8 +101,8 @@ def test_numbers_of_the_report_come_from_draws_that_no_search_has_seen(done):
 
 def test_the_found_gains_give_the_numbers_of_the_validation(done):
     """One run of the validation again, by hand."""
-    from podusv_cli.study.unit import Unit, make
-    from podusv_cli.tuning.plan import VALIDATE
+    from podusv_cli.studies.study.unit import Unit, make
+    from podusv_cli.studies.tuning.plan import VALIDATE
 
     scenario = load(done.folder / "tuned.yaml").scenario
     gains = {key: getattr(scenario.controllers["toy"], key) for key in ("gain", "other")}
@@ -169,7 +169,7 @@ def test_two_objectives_give_a_front(optuna, tmp_path):
 
 @pytest.mark.slow
 def test_gains_that_the_law_refuses_fail_and_cost_no_simulation(optuna, tmp_path, monkeypatch):
-    from podusv_cli.tuning import search as module
+    from podusv_cli.studies.tuning import search as module
 
     real = module.with_gains
     monkeypatch.setattr(

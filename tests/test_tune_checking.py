@@ -14,11 +14,17 @@ from podusv_cli.metrics.table import METRICS
 from podusv_cli.scenario.load import load_text, resolved_yaml
 from podusv_cli.scenario.tune import Range
 from podusv_cli.scenario.yaml_tree import DISTRIBUTIONS, RANGE
-from podusv_cli.study.draws import SWEEP, table, words
-from podusv_cli.tuning.check import tune_faults
-from podusv_cli.tuning.objective import Runs, evaluate, excess, parse_inequality, parse_objective
-from podusv_cli.tuning.plan import TRAIN, VALIDATE, TunePlan
-from podusv_cli.tuning.space import _around
+from podusv_cli.studies.study.draws import SWEEP, table, words
+from podusv_cli.studies.tuning.check import tune_faults
+from podusv_cli.studies.tuning.objective import (
+    Runs,
+    evaluate,
+    excess,
+    parse_inequality,
+    parse_objective,
+)
+from podusv_cli.studies.tuning.plan import TRAIN, VALIDATE, TunePlan
+from podusv_cli.studies.tuning.space import _around
 
 TUNED = TEXT + "tune: {budget: 200, train: 4, validate: 10, space: {around: 10.0}}\n"
 

@@ -9,12 +9,12 @@ import pytest
 from tune_samples import contents, planned, searched, tuned
 
 from podusv_cli.core.errors import StorageError, UsageError
-from podusv_cli.study.store import RUNS, UNITS, Store
-from podusv_cli.tuning import folder as place
-from podusv_cli.tuning import sampler, trials
-from podusv_cli.tuning.plan import VALIDATE
-from podusv_cli.tuning.trials import FINISHED, Trial
-from podusv_cli.tuning.validation import FOLDER, _clear, contestants
+from podusv_cli.studies.study.store import RUNS, UNITS, Store
+from podusv_cli.studies.tuning import folder as place
+from podusv_cli.studies.tuning import sampler, trials
+from podusv_cli.studies.tuning.plan import VALIDATE
+from podusv_cli.studies.tuning.trials import FINISHED, Trial
+from podusv_cli.studies.tuning.validation import FOLDER, _clear, contestants
 from podusv_cli.workflows import tune as workflow
 
 MOST = 40  # calls after which a process is killed at the latest

@@ -10,10 +10,10 @@ from tune_samples import planned
 
 from podusv_cli.core.errors import PodusvError
 from podusv_cli.scenario.load import load_text
-from podusv_cli.tuning import idle as module
-from podusv_cli.tuning.check import tune_faults
-from podusv_cli.tuning.idle import find_idle
-from podusv_cli.tuning.plan import TunePlan
+from podusv_cli.studies.tuning import idle as module
+from podusv_cli.studies.tuning.check import tune_faults
+from podusv_cli.studies.tuning.idle import find_idle
+from podusv_cli.studies.tuning.plan import TunePlan
 
 TUNED = TEXT + "tune: {budget: 200, train: 4, validate: 10, space: {around: 10.0}}\n"
 

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import pandas as pd
 import pytest
 
-from podusv_cli.tuning import remarks
-from podusv_cli.tuning.trials import CUT, FINISHED
+from podusv_cli.studies.tuning import remarks
+from podusv_cli.studies.tuning.trials import CUT, FINISHED
 
 
 def pairs(ratio, low, high):

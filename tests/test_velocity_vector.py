@@ -14,18 +14,18 @@ from hypothesis import strategies as st
 from law_samples import STEADY, WRONG, rms, task
 from test_pod import pods
 
-from podusv_cli.actuators.saturated import Saturated
-from podusv_cli.controllers.velocity_vector import VelocityVector, guidance
+from podusv_cli.components.actuators.saturated import Saturated
+from podusv_cli.components.controllers.velocity_vector import VelocityVector, guidance
+from podusv_cli.components.disturbances.calm import Calm
+from podusv_cli.components.paths.circle import Circle
+from podusv_cli.components.paths.line import Line
+from podusv_cli.components.paths.line_circle import LineCircle
+from podusv_cli.components.vessels.plant import sway_force
 from podusv_cli.core.kernel import bundle
 from podusv_cli.core.kinematics import wrap
 from podusv_cli.core.recording import Recording
-from podusv_cli.disturbances.calm import Calm
 from podusv_cli.findings.finding import preflight
-from podusv_cli.paths.circle import Circle
-from podusv_cli.paths.line import Line
-from podusv_cli.paths.line_circle import LineCircle
 from podusv_cli.scenario.load import load, load_text
-from podusv_cli.vessels.plant import sway_force
 
 LAW = VelocityVector()
 ROOT = Path(__file__).resolve().parent.parent

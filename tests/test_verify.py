@@ -8,8 +8,8 @@ from conftest import corrected, run
 from findings_samples import CONFIGS, scene
 
 from podusv_cli.cli.verify import _in_order
-from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
-from podusv_cli.engine.continuous import continuous
+from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
+from podusv_cli.engine.running.continuous import continuous
 from podusv_cli.scenario.load import load
 from podusv_cli.verification.dop853 import integrate, why_skipped
 from podusv_cli.verification.ranking import ranking

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from podusv_cli.actuators.pod import Pods
+from podusv_cli.components.actuators.pod import Pods
+from podusv_cli.components.vessels.plant import yaw_moment
 from podusv_cli.core.kernel import bundle
 from podusv_cli.scenario.load import load
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.vessels.plant import yaw_moment
 
 CONFIGS = Path(__file__).parent.parent / "configs/pod/vessels"
 GRAVITY, WATER = 9.81, 1025.0

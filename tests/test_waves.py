@@ -7,13 +7,13 @@ import pytest
 from conftest import NONLINEAR, Constant, adrift, run
 from scenario_samples import SOUND, told
 
+from podusv_cli.components.disturbances.base import WAVE_MOTION
+from podusv_cli.components.disturbances.spectra import GRAVITY, WATER
+from podusv_cli.components.disturbances.total import Total
+from podusv_cli.components.disturbances.wave_kernels import short_crested
+from podusv_cli.components.disturbances.waves import Waves
+from podusv_cli.components.disturbances.wind import Wind
 from podusv_cli.core.kernel import bundle
-from podusv_cli.disturbances.base import WAVE_MOTION
-from podusv_cli.disturbances.spectra import GRAVITY, WATER
-from podusv_cli.disturbances.total import Total
-from podusv_cli.disturbances.wave_kernels import short_crested
-from podusv_cli.disturbances.waves import Waves
-from podusv_cli.disturbances.wind import Wind
 
 SHORT = NONLINEAR.model_copy(update={"length": 1e-3, "beam": 1e-3})
 MOTION = tuple(signal.name for signal in WAVE_MOTION)

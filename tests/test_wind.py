@@ -8,9 +8,9 @@ from conftest import NONLINEAR, VESSELS, load_at
 from scenario_samples import SOUND, told
 from scipy.integrate import quad
 
+from podusv_cli.components.disturbances.wind import Wind, blendermann
+from podusv_cli.components.vessels.windage import Windage
 from podusv_cli.core.kernel import bundle
-from podusv_cli.disturbances.wind import Wind, blendermann
-from podusv_cli.vessels.windage import Windage
 
 AIR = 1.225
 HULL = Windage(

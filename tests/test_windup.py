@@ -8,10 +8,10 @@ from conftest import NONLINEAR, PRINTED_START, corrected, kinds, run, situations
 from pydantic import ValidationError
 from test_pod import TWIN, pods
 
-from podusv_cli.actuators.saturated import Saturated
-from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
-from podusv_cli.controllers.backstepping import Backstepping
-from podusv_cli.controllers.pid import Pid
+from podusv_cli.components.actuators.saturated import Saturated
+from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
+from podusv_cli.components.controllers.backstepping import Backstepping
+from podusv_cli.components.controllers.pid import Pid
 from podusv_cli.core.kernel import bundle, is_kernel
 from podusv_cli.core.recording import Recording
 

@@ -3,13 +3,13 @@
 from pathlib import Path
 
 from podusv_cli.scenario.load import load, load_text
-from podusv_cli.study.march import Processes
-from podusv_cli.study.unit import prepare
-from podusv_cli.tuning import trials
-from podusv_cli.tuning.check import tune_faults
-from podusv_cli.tuning.march import march
-from podusv_cli.tuning.plan import TunePlan
-from podusv_cli.tuning.search import Search
+from podusv_cli.studies.study.dispatch import Processes
+from podusv_cli.studies.study.unit import prepare
+from podusv_cli.studies.tuning import trials
+from podusv_cli.studies.tuning.check import tune_faults
+from podusv_cli.studies.tuning.dispatch import march
+from podusv_cli.studies.tuning.plan import TunePlan
+from podusv_cli.studies.tuning.search import Search
 from podusv_cli.workflows import tune as workflow
 
 # They have times, and the report the last sitting.
@@ -23,7 +23,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from podusv_cli.controllers.base import Controller
+from podusv_cli.components.controllers.base import Controller
 from podusv_cli.core.component import value
 from podusv_cli.core.kernel import kernel
 from podusv_cli.core.signal import Signal

@@ -14,14 +14,14 @@ from typing import Any, Literal
 import casadi as ca
 import numpy as np
 
-from podusv_cli.controllers.base import Slots
-from podusv_cli.controllers.observer import B_U, OBSERVED, ObservingController, observe
-from podusv_cli.controllers.velocity_loop import Axis, Loop
+from podusv_cli.components.controllers.base import Slots
+from podusv_cli.components.controllers.observer import B_U, OBSERVED, ObservingController, observe
+from podusv_cli.components.controllers.velocity_loop import Axis, Loop
+from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, kernel, tail
 from podusv_cli.core.signal import Signal
 from podusv_cli.optimum.collocation import dynamics
-from podusv_cli.vessels.vessel import Vessel
 
 PLAN = Signal(
     "plan", "N", "planned demands: surge [N] and yaw [N m] of each step", axes=("planned",)

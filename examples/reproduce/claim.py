@@ -19,7 +19,7 @@ import pandas as pd
 
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
-from podusv_cli.engine.replay import rates_replay
+from podusv_cli.engine.running.replay import rates_replay
 from podusv_cli.findings.stability import loops, sampled_growth
 from podusv_cli.process.workers import run_all
 from podusv_cli.scenario.load import load

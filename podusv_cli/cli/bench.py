@@ -48,8 +48,11 @@ def bench(
     A law of your own takes part by --laws FILE, a scenario with `controllers` (and `plugins`).
     Exit code 3 where a law crashed; laws that diverge or miss their target are results.
     """
-    from podusv_cli.bench.cases import Wanted, shipped_bench  # heavy imports only when needed
     from podusv_cli.cli.progress import progress_bars
+    from podusv_cli.studies.bench.cases import (  # heavy imports only when needed
+        Wanted,
+        shipped_bench,
+    )
     from podusv_cli.workflows import bench as workflow
 
     chosen = {"tasks": task or (), "vessels": vessel or (), "conditions": condition or ()}
@@ -64,7 +67,7 @@ def bench(
 
 
 def _report(done: Benched) -> None:
-    from podusv_cli.bench.page import headings, told
+    from podusv_cli.studies.bench.page import headings, told
 
     board = done.board
     echo_table(headings(board), [[str(law), *told(row)] for law, row in board.iterrows()])

@@ -12,14 +12,7 @@ import typer
 from podusv_cli.cli import completion, options
 from podusv_cli.cli.exit_codes import with_exit_codes
 from podusv_cli.cli.progress import StudyLine
-from podusv_cli.cli.terminal import (
-    echo,
-    echo_entry,
-    echo_json,
-    echo_path,
-    echo_result,
-    echo_table,
-)
+from podusv_cli.cli.terminal import echo, echo_entry, echo_json, echo_path, echo_result, echo_table
 from podusv_cli.core.errors import UsageError
 
 if TYPE_CHECKING:

@@ -54,8 +54,8 @@ def tune(
 
 
 def _report(done: Tuned) -> None:
-    from podusv_cli.tuning.remarks import remarks
-    from podusv_cli.tuning.report import intervals, percent, ratio, spread
+    from podusv_cli.studies.tuning.remarks import remarks
+    from podusv_cli.studies.tuning.report import intervals, percent, ratio, spread
 
     results = done.results
     rows = [

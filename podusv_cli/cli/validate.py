@@ -38,8 +38,8 @@ def validate(
     from podusv_cli.findings.finding import unknown_codes
     from podusv_cli.scenario.limits import largest, limits
     from podusv_cli.scenario.load import load
-    from podusv_cli.study.check import sweep_faults
-    from podusv_cli.tuning.check import tune_faults
+    from podusv_cli.studies.study.check import sweep_faults
+    from podusv_cli.studies.tuning.check import tune_faults
     from podusv_cli.workflows.execute import examined, warm_up
 
     checks = (unknown_codes, limits(allow_large), sweep_faults, tune_faults)
@@ -63,11 +63,11 @@ def validate(
 def _study(loaded: Loaded, sweep: Sweep) -> list[str]:
     """How many runs the study has, which draws the scenario cannot take, and what it all takes."""
     from podusv_cli.process.workers import available_workers
-    from podusv_cli.study.check import unjudged
-    from podusv_cli.study.estimate import check_fits, estimate, pilot
-    from podusv_cli.study.invalid import check_draws
-    from podusv_cli.study.plan import plan
-    from podusv_cli.tuning.plan import TunePlan
+    from podusv_cli.studies.study.check import unjudged
+    from podusv_cli.studies.study.estimate import check_fits, estimate, pilot
+    from podusv_cli.studies.study.invalid import check_draws
+    from podusv_cli.studies.study.plan import plan
+    from podusv_cli.studies.tuning.plan import TunePlan
     from podusv_cli.workflows.sweep import default_folder
 
     made = plan(loaded)
@@ -90,8 +90,8 @@ def _study(loaded: Loaded, sweep: Sweep) -> list[str]:
 
 def _tell_marches(scenario: Scenario) -> None:
     """Which laws' runs march side by side, and why the others do not."""
-    from podusv_cli.engine.lanes import why_alone
-    from podusv_cli.study.plan import watching
+    from podusv_cli.engine.running.lanes import why_alone
+    from podusv_cli.studies.study.plan import watching
 
     for law, single in scenario.singles().items():
         why = why_alone(single.closed_loop(), watching(single))

@@ -58,7 +58,7 @@ def _kind(component: type[Component]) -> str:
 
 
 def _place(component: type[Component]) -> str:
-    """Where a class is: `podusv_cli.controllers.pid.Pid`, or `my_law.py, line 12, class Mine`."""
+    """Where a class is: its module and name, or `my_law.py, line 12, class Mine`."""
     module = component.__module__
     if not module.startswith(f"{MODULES}."):
         return f"{module}.{component.__name__}"

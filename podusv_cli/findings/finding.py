@@ -14,15 +14,14 @@ from podusv_cli.core.finding import Finding, FindingKind
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.core.recording import Recording
-from podusv_cli.engine.check import evaluated
+from podusv_cli.engine.running.check import evaluated
 from podusv_cli.findings.reference import Reference, reference
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import unknown
 
 # A kind of finding may be in the file of the component that it is about.
-PACKAGES = (
-    "findings", "paths", "disturbances", "actuators", "measurements", "estimators", "controllers"
-)  # fmt: skip
+PARTS = ("paths", "disturbances", "actuators", "measurements", "estimators", "controllers")
+PACKAGES = ("findings", *(f"components.{part}" for part in PARTS))
 
 
 @cache

@@ -7,8 +7,8 @@ from functools import partial
 
 import numpy as np
 
-from podusv_cli.actuators.base import SATURATION
-from podusv_cli.controllers.velocity_loop import Cause, Loop
+from podusv_cli.components.actuators.base import SATURATION
+from podusv_cli.components.controllers.velocity_loop import Cause, Loop
 from podusv_cli.core.finding import FindingKind, Sentences, before
 from podusv_cli.findings.finding import Case
 from podusv_cli.findings.stability import (

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from podusv_cli.actuators.base import Actuator
-from podusv_cli.controllers.polar_backstepping import PolarBackstepping
+from podusv_cli.components.actuators.base import Actuator
+from podusv_cli.components.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.theory.bounds import Condition, ultimate_bound
 

@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
+from podusv_cli.components.vessels.plant import surge_force, sway_force, yaw_moment
 from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.vessels.plant import surge_force, sway_force, yaw_moment
 
 SAMPLES = 60
 FASTEST = 100.0  # m/s; larger sway is not searched for

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from podusv_cli.controllers.velocity_loop import AdaptedBound, Axis, Cause, Loop
+from podusv_cli.components.controllers.velocity_loop import AdaptedBound, Axis, Cause, Loop
+from podusv_cli.components.vessels.plant import surge_force, yaw_moment
 from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.vessels.plant import surge_force, yaw_moment
 
 NODES = 20  # of the demand on its way to the actuator
 BURST_STEPS = 20  # steps within which the error of a start that is too stiff grows

@@ -7,12 +7,12 @@ from functools import partial
 
 import numpy as np
 
-from podusv_cli.controllers.base import Approach
+from podusv_cli.components.controllers.base import Approach
+from podusv_cli.components.vessels.plant import sway_force
 from podusv_cli.core.finding import FindingKind, Sentences, before
 from podusv_cli.core.kernel import bundle
 from podusv_cli.findings.finding import Case
 from podusv_cli.findings.reference import FASTEST, drift, median
-from podusv_cli.vessels.plant import sway_force
 
 RUNAWAY = 1.0  # in target speeds; with faster sway a hull may circle the target
 BESIDE = 1e-9  # s; distance from a break at which the target is evaluated on either side

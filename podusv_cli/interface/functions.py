@@ -14,8 +14,8 @@ import pandas as pd
 from podusv_cli.core.component import Component
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.finding import Finding
-from podusv_cli.engine import batch
-from podusv_cli.engine.check import check_law
+from podusv_cli.engine.running import batch
+from podusv_cli.engine.running.check import check_law
 from podusv_cli.findings.finding import postflight, preflight
 from podusv_cli.interface.parameters import check_words, columns, scenarios
 from podusv_cli.interface.results import Comparison, Run

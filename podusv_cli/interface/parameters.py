@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 
 from podusv_cli.core.component import Component
-from podusv_cli.engine.check import check_law
-from podusv_cli.engine.loop import ClosedLoop
+from podusv_cli.engine.loop.closed_loop import ClosedLoop
+from podusv_cli.engine.running.check import check_law
 from podusv_cli.scenario.load import values
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import as_yaml, unknown
 from podusv_cli.scenario.yaml_tree import Route, bracketed, route
-from podusv_cli.study.check import DRAWN, has, is_whole, no_entry, structure
-from podusv_cli.study.draws import DrawError, Number, content, described, with_values
+from podusv_cli.studies.study.check import DRAWN, has, is_whole, no_entry, structure
+from podusv_cli.studies.study.draws import DrawError, Number, content, described, with_values
 
 Columns = dict[str, list[Any]]  # by key, with one value a run
 

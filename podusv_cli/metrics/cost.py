@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from podusv_cli.core.recording import Recording
-from podusv_cli.engine.loop import ClosedLoop
-from podusv_cli.engine.replay import replayer
+from podusv_cli.engine.loop.closed_loop import ClosedLoop
+from podusv_cli.engine.running.replay import replayer
 from podusv_cli.metrics.metric import Metric
 
 REPLAYS = 25

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from podusv_cli.core.kernel import Vector, kernel
-from podusv_cli.engine.layout import DISTANCE
+from podusv_cli.engine.step.layout import DISTANCE
 from podusv_cli.metrics.metric import Accumulator, Layout, Metric, Result, add, gathered, ratio
 from podusv_cli.metrics.windows import settled_from
 

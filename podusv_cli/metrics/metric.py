@@ -10,8 +10,8 @@ import numpy as np
 
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.signal import check_words
-from podusv_cli.engine.layout import Plan
-from podusv_cli.engine.loop import ClosedLoop
+from podusv_cli.engine.loop.closed_loop import ClosedLoop
+from podusv_cli.engine.step.layout import Plan
 
 
 @dataclass(frozen=True)

@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from podusv_cli.components.paths.base import TARGET
 from podusv_cli.core.elementary import arctangent
 from podusv_cli.core.kernel import bundle, scratch, transplanted
 from podusv_cli.core.recording import Recording
-from podusv_cli.engine.loop import STATE, ClosedLoop
-from podusv_cli.engine.replay import logged_rows
+from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop
+from podusv_cli.engine.running.replay import logged_rows
 from podusv_cli.metrics.metric import Metric
-from podusv_cli.paths.base import TARGET
 
 # where the target, the vessel's state and the law's memory begin in a logged row
 ENDS = (1, 1 + len(TARGET), 1 + len(TARGET) + len(STATE))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from podusv_cli.actuators.propeller import DELTA, LIMITED
+from podusv_cli.components.actuators.propeller import DELTA, LIMITED
 from podusv_cli.core.kernel import Vector, kernel, tail
 from podusv_cli.metrics.metric import Accumulator, Layout, Metric, add, gathered, ratio
 

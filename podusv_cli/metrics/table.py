@@ -13,8 +13,8 @@ from podusv_cli.core import registry
 from podusv_cli.core.errors import LawError, in_a_line
 from podusv_cli.core.kernel import Vector, kernel, specialise, tail
 from podusv_cli.core.plugins import Plugins
-from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.loop import ClosedLoop, Observer
+from podusv_cli.engine.loop.closed_loop import ClosedLoop, Observer
+from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.metrics.metric import Accumulator, Layout, Metric, close_integrals
 from podusv_cli.metrics.windows import NONE, Radii, Windows, named
 

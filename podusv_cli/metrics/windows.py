@@ -10,7 +10,7 @@ from functools import cache
 from typing import Any
 
 from podusv_cli.core.kernel import Vector, kernel, specialise
-from podusv_cli.engine.layout import DISTANCE
+from podusv_cli.engine.step.layout import DISTANCE
 from podusv_cli.metrics.metric import Accumulator, Metric, Result
 
 NAMED = "NAME"  # stands for a scenario's word in the name of a metric

@@ -17,12 +17,12 @@ from typing import Any
 
 import numpy as np
 
+from podusv_cli.components.vessels.plant import plant
 from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.errors import NotConvergedError, UsageError
 from podusv_cli.core.kernel import Vector, bundle, transplanted
 from podusv_cli.optimum.problem import Motion, Problem
 from podusv_cli.process.interrupts import interrupts_caught, interrupts_deferred
-from podusv_cli.vessels.plant import plant
 
 TOLERANCE = 1e-8  # of IPOPT
 MOST_ITERATIONS = 1000

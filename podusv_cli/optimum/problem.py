@@ -11,7 +11,7 @@ import numpy as np
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.core.recording import Recording
-from podusv_cli.engine.loop import STATE, ClosedLoop
+from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop
 from podusv_cli.scenario.model import Scenario
 
 Minimised = Literal["iae", "ise"]

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import islice
 
+from podusv_cli.components.paths.base import TARGET
 from podusv_cli.core.quantities import bytes_in_words, time_in_words
-from podusv_cli.engine.columns import names
-from podusv_cli.paths.base import TARGET
+from podusv_cli.engine.loop.columns import names
 from podusv_cli.scenario.conflicts import Conflicts
 from podusv_cli.scenario.messages import Check
 from podusv_cli.scenario.model import Scenario

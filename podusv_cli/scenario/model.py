@@ -9,25 +9,26 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, SupportsIndex, TypeV
 
 from pydantic import Discriminator, Field, Tag, create_model
 
-from podusv_cli.actuators.base import Actuator
-from podusv_cli.controllers.base import Controller
+from podusv_cli.components.actuators.base import Actuator
+from podusv_cli.components.controllers.base import Controller
+from podusv_cli.components.disturbances.base import Disturbance
+from podusv_cli.components.disturbances.total import Total
+from podusv_cli.components.estimators.base import Estimator
+from podusv_cli.components.estimators.none import NoEstimator
+from podusv_cli.components.measurements.base import Measurement
+from podusv_cli.components.measurements.exact import Exact
+from podusv_cli.components.paths.base import Path
+from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import Component, value
 from podusv_cli.core.plugins import Plugins, from_file, installed
 from podusv_cli.core.registry import any_of
 from podusv_cli.core.signal import Signal
 from podusv_cli.core.steps import whole_steps
-from podusv_cli.disturbances.base import Disturbance
-from podusv_cli.disturbances.total import Total
-from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.loop import ClosedLoop
-from podusv_cli.estimators.base import Estimator
-from podusv_cli.estimators.none import NoEstimator
-from podusv_cli.measurements.base import Measurement
-from podusv_cli.measurements.exact import Exact
+from podusv_cli.engine.loop.closed_loop import ClosedLoop
+from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import Metrics, metrics_with, observer
 from podusv_cli.metrics.windows import NAMED
-from podusv_cli.paths.base import Path
 from podusv_cli.scenario.conflicts import conflicts
 from podusv_cli.scenario.sections import (
     NAME,
@@ -42,7 +43,6 @@ from podusv_cli.scenario.sections import (
 from podusv_cli.scenario.sweep import Sweep
 from podusv_cli.scenario.tune import Tune
 from podusv_cli.theory import monitor
-from podusv_cli.vessels.vessel import Vessel
 
 if TYPE_CHECKING:
     AnyActuator = Actuator
@@ -52,12 +52,12 @@ if TYPE_CHECKING:
     AnyMeasurement = Measurement
     AnyPath = Path
 else:
-    AnyActuator = any_of("podusv_cli.actuators", Actuator)
-    AnyController = any_of("podusv_cli.controllers", Controller)
-    AnyDisturbance = any_of("podusv_cli.disturbances", Disturbance)
-    AnyEstimator = any_of("podusv_cli.estimators", Estimator)
-    AnyMeasurement = any_of("podusv_cli.measurements", Measurement)
-    AnyPath = any_of("podusv_cli.paths", Path)
+    AnyActuator = any_of("podusv_cli.components.actuators", Actuator)
+    AnyController = any_of("podusv_cli.components.controllers", Controller)
+    AnyDisturbance = any_of("podusv_cli.components.disturbances", Disturbance)
+    AnyEstimator = any_of("podusv_cli.components.estimators", Estimator)
+    AnyMeasurement = any_of("podusv_cli.components.measurements", Measurement)
+    AnyPath = any_of("podusv_cli.components.paths", Path)
 
 
 Part = TypeVar("Part")
@@ -199,7 +199,9 @@ class Scenario(Component):
 
         Raises LawError.
         """
-        from podusv_cli.engine.simulate import ready  # who reads scenarios simulates nothing
+        from podusv_cli.engine.running.simulate import (
+            ready,  # who reads scenarios simulates nothing
+        )
 
         ready(self.closed_loop(), self.time_grid(), self.observer(), self.simulation.compiled)
 
@@ -259,14 +261,14 @@ def scenario_class(plugins: Plugins) -> type[Scenario]:
 
 @cache
 def _class(plugins: Plugins, _places: tuple[str, ...]) -> type[Scenario]:
-    law: Any = any_of("podusv_cli.controllers", Controller, plugins)
-    sea: Any = any_of("podusv_cli.disturbances", Disturbance, plugins)
+    law: Any = any_of("podusv_cli.components.controllers", Controller, plugins)
+    sea: Any = any_of("podusv_cli.components.disturbances", Disturbance, plugins)
     annotations: dict[str, Any] = {
-        "path": any_of("podusv_cli.paths", Path, plugins),
+        "path": any_of("podusv_cli.components.paths", Path, plugins),
         "disturbance": Summands[sea],  # type: ignore[misc]
-        "measurement": any_of("podusv_cli.measurements", Measurement, plugins),
-        "estimator": any_of("podusv_cli.estimators", Estimator, plugins),
-        "actuator": any_of("podusv_cli.actuators", Actuator, plugins),
+        "measurement": any_of("podusv_cli.components.measurements", Measurement, plugins),
+        "estimator": any_of("podusv_cli.components.estimators", Estimator, plugins),
+        "actuator": any_of("podusv_cli.components.actuators", Actuator, plugins),
         "controller": law,
         "controllers": GenericAlias(dict, (str, law)),
     }

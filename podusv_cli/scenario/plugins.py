@@ -11,17 +11,18 @@ from typing import Any, Literal
 
 from pydantic import create_model
 
-from podusv_cli.actuators.base import Actuator
-from podusv_cli.controllers.base import Controller
+from podusv_cli.components.actuators.base import Actuator
+from podusv_cli.components.controllers.base import Controller
+from podusv_cli.components.disturbances.base import Disturbance
+from podusv_cli.components.estimators.base import Estimator
+from podusv_cli.components.measurements.base import Measurement
+from podusv_cli.components.paths.base import Path
+from podusv_cli.components.vessels.vessel import VESSELS
 from podusv_cli.core.component import Component, Recorded, value
 from podusv_cli.core.errors import LawError, ScenarioError
 from podusv_cli.core.plugins import ABSENT, Plugin, Plugins, digest, from_file, installed
-from podusv_cli.disturbances.base import Disturbance
-from podusv_cli.estimators.base import Estimator
-from podusv_cli.measurements.base import Measurement
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import metrics_with
-from podusv_cli.paths.base import Path
 from podusv_cli.scenario.keys import keys_of
 from podusv_cli.scenario.model import Scenario, scenario_class
 from podusv_cli.scenario.phrases import did_you_mean, found, quoted
@@ -29,7 +30,6 @@ from podusv_cli.scenario.presets import preset_names
 from podusv_cli.scenario.shipped import relative_to
 from podusv_cli.scenario.yaml_text import read_text
 from podusv_cli.scenario.yaml_tree import Fault, Mark, Node
-from podusv_cli.vessels.vessel import VESSELS
 
 KEY = "plugins"
 FOLDER = "plugins"  # of a run, where its plug-in files are

@@ -10,6 +10,7 @@ from importlib.resources import files
 from importlib.resources.abc import Traversable
 from pathlib import Path
 
+from podusv_cli.components.vessels.vessel import COEFFICIENTS, VESSELS, Vessel
 from podusv_cli.core.component import Component, Presets
 from podusv_cli.core.plugins import ABSENT, Plugins
 from podusv_cli.scenario.keys import SCENARIO, Key
@@ -19,7 +20,6 @@ from podusv_cli.scenario.sections import NAME, NAME_IN_WORDS
 from podusv_cli.scenario.shipped import PREFIX
 from podusv_cli.scenario.yaml_text import read
 from podusv_cli.scenario.yaml_tree import Fault, Node, Route, dotted, fitting, merge
-from podusv_cli.vessels.vessel import COEFFICIENTS, VESSELS, Vessel
 
 # Sections whose entries have names of the user's. An entry that is null takes out an inherited one,
 # and a section that is null all of them.

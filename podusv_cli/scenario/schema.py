@@ -6,13 +6,13 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import Component
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.scenario.explain import EXTENDS
 from podusv_cli.scenario.keys import Key, keys_of
 from podusv_cli.scenario.model import scenario_class
 from podusv_cli.scenario.presets import preset_names, with_presets
-from podusv_cli.vessels.vessel import Vessel
 
 TITLE = "podusv scenario"
 DIALECT = "http://json-schema.org/draft-07/schema#"

@@ -12,11 +12,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from podusv_cli.controllers.polar_backstepping import PolarBackstepping
+from podusv_cli.components.controllers.polar_backstepping import PolarBackstepping
+from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
-from podusv_cli.engine.replay import Replayed
-from podusv_cli.vessels.vessel import Vessel
+from podusv_cli.engine.running.replay import Replayed
 
 TRIES = 400  # values of lambda that are tried for the lowest bound
 

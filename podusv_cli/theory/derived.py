@@ -17,7 +17,7 @@ def derived_with(plugins: Plugins) -> dict[str, Derived]:
     """All derived signals by name, with those of these plug-ins."""
     return {
         name: derived
-        for package in ("podusv_cli.controllers", "podusv_cli.theory")
+        for package in ("podusv_cli.components.controllers", "podusv_cli.theory")
         for name, derived in registry.named(package, Derived, plugins).items()
     }
 

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from podusv_cli.controllers.network import Network
-from podusv_cli.controllers.polar_backstepping import PolarBackstepping
+from podusv_cli.components.controllers.network import Network
+from podusv_cli.components.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
-from podusv_cli.engine.loop import ClosedLoop
-from podusv_cli.engine.replay import Replayed
+from podusv_cli.engine.loop.closed_loop import ClosedLoop
+from podusv_cli.engine.running.replay import Replayed
 
 MOST_ROWS = 2000  # of a run that the fit uses, evenly spread
 MOST_NUMBERS = 2_000_000  # rows times nodes of the fit

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from podusv_cli.controllers.polar_backstepping import PolarBackstepping
+from podusv_cli.components.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import Signal
-from podusv_cli.engine.loop import ClosedLoop
-from podusv_cli.engine.replay import Replayed
+from podusv_cli.engine.loop.closed_loop import ClosedLoop
+from podusv_cli.engine.running.replay import Replayed
 from podusv_cli.theory.bounds import Pair
 from podusv_cli.theory.ideal_weights import IdealWeights
 from podusv_cli.theory.rates import Errors

@@ -7,15 +7,15 @@ from functools import partial
 
 import numpy as np
 
-from podusv_cli.controllers.network import ACTIVATION, NODE_DISTANCE, W_NORM_R, W_NORM_U
-from podusv_cli.controllers.polar_backstepping import Y_R, Y_U, PolarBackstepping
+from podusv_cli.components.controllers.network import ACTIVATION, NODE_DISTANCE, W_NORM_R, W_NORM_U
+from podusv_cli.components.controllers.polar_backstepping import Y_R, Y_U, PolarBackstepping
 from podusv_cli.core.derived import Derived
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Allocate, Recording, blocks, largest
 from podusv_cli.core.signal import Signal, by_name
-from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.loop import ClosedLoop
-from podusv_cli.engine.replay import Replayed, rates_replay
+from podusv_cli.engine.loop.closed_loop import ClosedLoop
+from podusv_cli.engine.running.replay import Replayed, rates_replay
+from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.theory import bounds, ideal_weights
 from podusv_cli.theory.lyapunov import TERMS, V_DOT, V, lyapunov, norms, remainders
 from podusv_cli.theory.rates import error_rates

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from podusv_cli.controllers.polar_backstepping import PolarBackstepping
+from podusv_cli.components.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
-from podusv_cli.engine.replay import Replayed
+from podusv_cli.engine.running.replay import Replayed
 
 
 @dataclass(frozen=True)

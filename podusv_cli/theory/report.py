@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from podusv_cli.core.recording import largest
-from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.loop import ClosedLoop
+from podusv_cli.engine.loop.closed_loop import ClosedLoop
+from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.theory.bounds import Bound, Condition
 from podusv_cli.theory.monitor import Monitored, Window
 

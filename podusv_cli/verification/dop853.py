@@ -13,9 +13,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from podusv_cli.components.paths.base import TARGET
 from podusv_cli.core.kernel import Vector, bundle
-from podusv_cli.engine.continuous import Slope, continuous
-from podusv_cli.paths.base import TARGET
+from podusv_cli.engine.running.continuous import Slope, continuous
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.verification.step_halving import Level, Progress
 

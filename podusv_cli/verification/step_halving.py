@@ -9,8 +9,8 @@ import numpy as np
 
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Status
-from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.simulate import simulate
+from podusv_cli.engine.running.simulate import simulate
+from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.scenario.model import Scenario
 
 Progress = Callable[[float], None]

@@ -11,10 +11,6 @@ from typing import Any
 
 import pandas as pd
 
-from podusv_cli.bench import optima, page, standing
-from podusv_cli.bench.cases import Case, Wanted, cases
-from podusv_cli.bench.optima import Least
-from podusv_cli.bench.runs import BenchRun, crashed, play
 from podusv_cli.optimum.collocation import casadi
 from podusv_cli.pages.page import Picture
 from podusv_cli.process.extras import Extras, Missing
@@ -22,6 +18,10 @@ from podusv_cli.process.interrupts import interrupts_deferred
 from podusv_cli.process.workers import Outcome, Report, run_all
 from podusv_cli.storage import csv_files, provenance
 from podusv_cli.storage.run_folder import RunWriter
+from podusv_cli.studies.bench import optima, page, standing
+from podusv_cli.studies.bench.cases import Case, Wanted, cases
+from podusv_cli.studies.bench.optima import Least
+from podusv_cli.studies.bench.runs import BenchRun, crashed, play
 
 Progress = Callable[[str, float], None]
 RUNS, BOARD, REPORT, ORIGIN = "runs.csv", "leaderboard.md", "report.html", "provenance.json"
@@ -153,8 +153,8 @@ def _play(case: Case, tell: Callable[[float], None]) -> list[BenchRun]:
 
 
 def _drawn(runs: Sequence[BenchRun], made: pd.DataFrame) -> list[Picture]:
-    from podusv_cli.bench.figures import profiles, tracks  # matplotlib is slow to import
     from podusv_cli.figures.style import house_style, image
+    from podusv_cli.studies.bench.figures import profiles, tracks  # matplotlib is slow to import
 
     laws = list(standing.leaderboard(made).index)
     with house_style():

@@ -125,10 +125,10 @@ def _check_figures(request: Request, members: Sequence[Member]) -> None:
     if request.names and not request.figures:
         raise UsageError(f"--figure {request.names[0]} and --no-figures contradict each other")
     if request.names or set(request.formats) != {"png"}:
-        from podusv_cli.figures.drawing import (
+        from podusv_cli.figures.drawing import (  # matplotlib is slow to import
             check_names,
             figures_of,
-        )  # matplotlib is slow to import
+        )
 
         sheets = figures_of(member.scenario for member in members)
         check_names(request.names, request.formats, sheets)

@@ -18,8 +18,8 @@ from podusv_cli import __version__
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.recording import Allocate, Recording, Status
-from podusv_cli.engine.check import check_law
-from podusv_cli.engine.simulate import simulate
+from podusv_cli.engine.running.check import check_law
+from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.findings.finding import postflight, preflight
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.operations import operations

@@ -9,11 +9,11 @@ from pathlib import Path
 from podusv_cli.core.errors import UsageError
 from podusv_cli.storage import files
 from podusv_cli.storage.writer import TABLES, sole_writer
-from podusv_cli.study import record
-from podusv_cli.study.joining import join, missing, mixture
-from podusv_cli.study.march import Tally
-from podusv_cli.study.sittings import Sitting
-from podusv_cli.study.store import SCENARIO, Store
+from podusv_cli.studies.study import record
+from podusv_cli.studies.study.dispatch import Tally
+from podusv_cli.studies.study.joining import join, missing, mixture
+from podusv_cli.studies.study.sittings import Sitting
+from podusv_cli.studies.study.store import SCENARIO, Store
 from podusv_cli.workflows.studies import stored
 from podusv_cli.workflows.sweep import Request, Swept, answered
 

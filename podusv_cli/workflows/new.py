@@ -11,6 +11,7 @@ from importlib.resources import files
 from pathlib import Path
 from string import Template
 
+from podusv_cli.components.vessels.vessel import VESSELS
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.scenario.model import Scenario
@@ -18,7 +19,6 @@ from podusv_cli.scenario.phrases import unknown
 from podusv_cli.scenario.plugins import kinds_of
 from podusv_cli.scenario.presets import preset_names
 from podusv_cli.storage import files as storage
-from podusv_cli.vessels.vessel import VESSELS
 
 TEMPLATES = "podusv_cli.workflows"
 FOLDER = "starting_files"

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from podusv_cli.controllers.schedule import Schedule
-from podusv_cli.controllers.velocity_vector import VelocityVector
+from podusv_cli.components.controllers.schedule import Schedule
+from podusv_cli.components.controllers.velocity_vector import VelocityVector
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.recording import Recording
-from podusv_cli.engine.simulate import simulate
+from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.findings.finding import preflight, unknown_codes
 from podusv_cli.optimum import collocation
 from podusv_cli.optimum.collocation import Stage

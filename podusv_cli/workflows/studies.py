@@ -27,9 +27,9 @@ from podusv_cli.scenario.messages import Check
 from podusv_cli.scenario.phrases import unknown
 from podusv_cli.storage import files, json_files
 from podusv_cli.storage.run_folder import STUDY
-from podusv_cli.study import outputs, record
-from podusv_cli.study.plan import KERNELS, differing, disagreements, plan
-from podusv_cli.study.store import RUNS, SCENARIO, Store
+from podusv_cli.studies.study import outputs, record
+from podusv_cli.studies.study.plan import KERNELS, differing, disagreements, plan
+from podusv_cli.studies.study.store import RUNS, SCENARIO, Store
 from podusv_cli.workflows.keep import alone, seen_from
 
 FORMATS = ("csv", "parquet")

@@ -23,19 +23,19 @@ from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sweep import Keep
 from podusv_cli.storage import manifest
 from podusv_cli.storage.writer import PATIENCE, TABLES, sole_writer
-from podusv_cli.study import outputs
-from podusv_cli.study.check import sweep_faults, unjudged
-from podusv_cli.study.cluster import engine
-from podusv_cli.study.estimate import check_fits, estimate, pilot
-from podusv_cli.study.invalid import check_draws
-from podusv_cli.study.joining import mixture
-from podusv_cli.study.keep import contradiction, found, unmade
-from podusv_cli.study.march import Engine, Gaps, Part, Tally, Tell, march
-from podusv_cli.study.plan import plan
-from podusv_cli.study.remote import Recipe
-from podusv_cli.study.results import Results, judged
-from podusv_cli.study.sittings import Sitting
-from podusv_cli.study.store import SCENARIO, Store
+from podusv_cli.studies.study import outputs
+from podusv_cli.studies.study.check import sweep_faults, unjudged
+from podusv_cli.studies.study.cluster import engine
+from podusv_cli.studies.study.dispatch import Engine, Gaps, Part, Tally, Tell, march
+from podusv_cli.studies.study.estimate import check_fits, estimate, pilot
+from podusv_cli.studies.study.invalid import check_draws
+from podusv_cli.studies.study.joining import mixture
+from podusv_cli.studies.study.keep import contradiction, found, unmade
+from podusv_cli.studies.study.plan import plan
+from podusv_cli.studies.study.remote import Recipe
+from podusv_cli.studies.study.results import Results, judged
+from podusv_cli.studies.study.sittings import Sitting
+from podusv_cli.studies.study.store import SCENARIO, Store
 from podusv_cli.workflows.keep import keep
 from podusv_cli.workflows.run import RESULTS
 from podusv_cli.workflows.studies import (

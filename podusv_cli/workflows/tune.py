@@ -19,27 +19,27 @@ from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Loaded
 from podusv_cli.storage import files, manifest
 from podusv_cli.storage.writer import sole_writer
-from podusv_cli.study.check import sweep_faults
-from podusv_cli.study.cluster import engine
-from podusv_cli.study.march import Engine, Tally
-from podusv_cli.study.plan import digest
-from podusv_cli.study.remote import Recipe
-from podusv_cli.study.sittings import Sitting
-from podusv_cli.study.store import SCENARIO
-from podusv_cli.study.unit import prepare
-from podusv_cli.tuning import folder as place
-from podusv_cli.tuning import outputs
-from podusv_cli.tuning.check import tune_faults
-from podusv_cli.tuning.idle import find_idle
-from podusv_cli.tuning.march import march
-from podusv_cli.tuning.plan import TRAIN, TunePlan
-from podusv_cli.tuning.remarks import remarks
-from podusv_cli.tuning.results import Results
-from podusv_cli.tuning.sampler import optuna
-from podusv_cli.tuning.search import Search
-from podusv_cli.tuning.space import with_gains
-from podusv_cli.tuning.trials import best
-from podusv_cli.tuning.validation import validate
+from podusv_cli.studies.study.check import sweep_faults
+from podusv_cli.studies.study.cluster import engine
+from podusv_cli.studies.study.dispatch import Engine, Tally
+from podusv_cli.studies.study.plan import digest
+from podusv_cli.studies.study.remote import Recipe
+from podusv_cli.studies.study.sittings import Sitting
+from podusv_cli.studies.study.store import SCENARIO
+from podusv_cli.studies.study.unit import prepare
+from podusv_cli.studies.tuning import folder as place
+from podusv_cli.studies.tuning import outputs
+from podusv_cli.studies.tuning.check import tune_faults
+from podusv_cli.studies.tuning.dispatch import march
+from podusv_cli.studies.tuning.idle import find_idle
+from podusv_cli.studies.tuning.plan import TRAIN, TunePlan
+from podusv_cli.studies.tuning.remarks import remarks
+from podusv_cli.studies.tuning.results import Results
+from podusv_cli.studies.tuning.sampler import optuna
+from podusv_cli.studies.tuning.search import Search
+from podusv_cli.studies.tuning.space import with_gains
+from podusv_cli.studies.tuning.trials import best
+from podusv_cli.studies.tuning.validation import validate
 from podusv_cli.workflows.run import RESULTS
 from podusv_cli.workflows.studies import scenario_of, scenario_texts
 

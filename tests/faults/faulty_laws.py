@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from podusv_cli.controllers.pid import Pid
+from podusv_cli.components.controllers.pid import Pid
 from podusv_cli.core.kernel import Vector, kernel
 
 BEGIN, END = 0.4999, 0.5001

@@ -19,16 +19,16 @@ import pytest
 from conftest import ROOMS, corrected, example, kinds
 from scenario_samples import SOUND
 
-from podusv_cli.actuators.saturated import Saturated
 from podusv_cli.comparison.log_difference import compare
 from podusv_cli.comparison.run_difference import CLOCKED
-from podusv_cli.controllers.adaptive_neural import AdaptiveNeural
-from podusv_cli.controllers.backstepping import Backstepping
-from podusv_cli.engine.grid import TimeGrid
-from podusv_cli.engine.loop import ClosedLoop
-from podusv_cli.engine.simulate import simulate
+from podusv_cli.components.actuators.saturated import Saturated
+from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
+from podusv_cli.components.controllers.backstepping import Backstepping
+from podusv_cli.components.paths.line_circle import LineCircle
+from podusv_cli.engine.loop.closed_loop import ClosedLoop
+from podusv_cli.engine.running.simulate import simulate
+from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.metrics.table import observer
-from podusv_cli.paths.line_circle import LineCircle
 from podusv_cli.process.workers import run_all
 from podusv_cli.scenario.load import load, load_text
 from podusv_cli.storage.files import fingerprint

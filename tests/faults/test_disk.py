@@ -23,8 +23,8 @@ from old_results import (
 )
 from storage_samples import deadline, files
 
-from podusv_cli.engine import code_folder, object_cache
-from podusv_cli.engine.object_cache import Code
+from podusv_cli.engine.machine import code_folder, object_cache
+from podusv_cli.engine.machine.object_cache import Code
 from podusv_cli.storage import manifest
 
 FULL = Path("/dev/full")

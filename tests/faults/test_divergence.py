@@ -11,14 +11,14 @@ import pytest
 from command_samples import BASE, commanded, write
 from conftest import Constant, adrift, corrected, run
 
-from podusv_cli.controllers.base import Slots
-from podusv_cli.controllers.pid import Pid
+from podusv_cli.components.controllers.base import Slots
+from podusv_cli.components.controllers.pid import Pid
 from podusv_cli.core.errors import LawError
 from podusv_cli.core.signal import Signal
-from podusv_cli.engine import march
-from podusv_cli.engine.batch import simulate_many
-from podusv_cli.engine.check import check_law
-from podusv_cli.engine.grid import TimeGrid
+from podusv_cli.engine.running import watch as march
+from podusv_cli.engine.running.batch import simulate_many
+from podusv_cli.engine.running.check import check_law
+from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.storage import manifest
 from podusv_cli.storage.run_folder import open_run
 

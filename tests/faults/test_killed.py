@@ -23,7 +23,7 @@ from old_results import (
 )
 from storage_samples import Saboteur, files, until_nothing_breaks
 
-from podusv_cli.engine import code_folder, object_cache
+from podusv_cli.engine.machine import code_folder, object_cache
 from podusv_cli.process.temporary_names import temporary_name
 
 CALLS = ("mkdir", "open", "write", "fsync", "replace", "rename", "unlink", "rmdir")

@@ -11,16 +11,16 @@ import pytest
 from command_samples import BASE, write
 from conftest import Constant, adrift
 
-from podusv_cli.controllers.base import Controller
-from podusv_cli.controllers.pid import Pid
+from podusv_cli.components.controllers.base import Controller
+from podusv_cli.components.controllers.pid import Pid
+from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.errors import LawError
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.registry import kinds
 from podusv_cli.core.signal import Signal
-from podusv_cli.engine.check import check_law
-from podusv_cli.engine.loop import ClosedLoop, Observer
-from podusv_cli.engine.simulate import marcher
-from podusv_cli.vessels.vessel import Vessel
+from podusv_cli.engine.loop.closed_loop import ClosedLoop, Observer
+from podusv_cli.engine.running.check import check_law
+from podusv_cli.engine.running.simulate import marcher
 
 
 def logged(name: str, *axes: str, fixed: bool = False) -> Signal:
@@ -252,16 +252,16 @@ def test_a_command_refuses_it_in_a_line(podusv, monkeypatch):
         assert not Path("x").exists()
 
 
+PID = "podusv_cli.components.controllers.pid"
 IMPORTED = {
     "def (": "own_laws.mine cannot be imported: SyntaxError: invalid syntax (mine.py, line 1)",
     "import nothing_of_this_name": "own_laws.mine cannot be imported: ModuleNotFoundError: No "
     "module named 'nothing_of_this_name' (mine.py, line 1)",
-    "from podusv_cli.controllers.pid import Pid\nclass Mine(Pid):\n    kind: str = 'mine'": (
+    f"from {PID} import Pid\nclass Mine(Pid):\n    kind: str = 'mine'": (
         "own_laws.mine.Mine: its kind is no fixed word; write kind: Literal[\"mine\"] = \"mine\""
     ),
-    "from podusv_cli.controllers.pid import Pid\nclass Mine(Pid): pass": (
-        "own_laws.mine.Mine: its kind pid is that of podusv_cli.controllers.pid, too; take "
-        "another name"
+    f"from {PID} import Pid\nclass Mine(Pid): pass": (
+        f"own_laws.mine.Mine: its kind pid is that of {PID}, too; take another name"
     ),
 }  # fmt: skip
 

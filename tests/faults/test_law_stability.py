@@ -8,14 +8,14 @@ from conftest import NONLINEAR, VESSELS, ask, corrected, run
 from counts import count
 from law_samples import STEADY
 
-from podusv_cli.actuators.saturated import Saturated
-from podusv_cli.controllers.adrc import Adrc
-from podusv_cli.controllers.velocity_vector import VelocityVector
+from podusv_cli.components.actuators.saturated import Saturated
+from podusv_cli.components.controllers.adrc import Adrc
+from podusv_cli.components.controllers.velocity_vector import VelocityVector
+from podusv_cli.components.paths.circle import Circle
+from podusv_cli.components.paths.line import Line
+from podusv_cli.components.vessels.plant import plant, surge_force, sway_force, yaw_moment
+from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.kernel import Vector, bundle
-from podusv_cli.paths.circle import Circle
-from podusv_cli.paths.line import Line
-from podusv_cli.vessels.plant import plant, surge_force, sway_force, yaw_moment
-from podusv_cli.vessels.vessel import Vessel
 
 SPEED, LOAD = 0.5, np.array([0.5, 0.5, 0.5])  # m/s; N and N m
 CAREFUL = VelocityVector(omega_v=0.2)

@@ -11,13 +11,13 @@ from counts import count
 
 from podusv_cli.comparison.claims import parse_claims
 from podusv_cli.core.errors import PodusvError
-from podusv_cli.engine.simulate import ready
+from podusv_cli.engine.running.simulate import ready
 from podusv_cli.findings.finding import preflight, unknown_codes
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import load_text
-from podusv_cli.study.check import sweep_faults
-from podusv_cli.study.plan import plan
-from podusv_cli.tuning.check import tune_faults
+from podusv_cli.studies.study.check import sweep_faults
+from podusv_cli.studies.study.plan import plan
+from podusv_cli.studies.tuning.check import tune_faults
 
 SEED = 20261123
 TEXT = """

@@ -52,7 +52,7 @@ def test_it_is_refused_before_the_run(podusv, name):
 
 
 PATH = """
-from podusv_cli.paths.base import Path
+from podusv_cli.components.paths.base import Path
 
 
 class Still(Path):

@@ -16,7 +16,7 @@ from storage_samples import Saboteur, fails
 
 from podusv_cli.core.errors import StorageError
 from podusv_cli.storage import files
-from podusv_cli.study.store import RUNS, Store
+from podusv_cli.studies.study.store import RUNS, Store
 from podusv_cli.workflows import sweep
 
 KILLS, WRITES = count(2, 200), count(4, 60)

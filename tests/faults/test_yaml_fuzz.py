@@ -19,9 +19,9 @@ import podusv_cli
 from podusv_cli.comparison.claims import parse_claims
 from podusv_cli.core.errors import ScenarioError
 from podusv_cli.scenario.load import load
-from podusv_cli.study.cells import cells
-from podusv_cli.study.check import singles, sweep_faults
-from podusv_cli.study.invalid import invalid_draws
+from podusv_cli.studies.study.cells import cells
+from podusv_cli.studies.study.check import singles, sweep_faults
+from podusv_cli.studies.study.invalid import invalid_draws
 
 CONFIGS = Path(podusv_cli.__file__).parents[1] / "configs"
 MEBIBYTE = 1024 if sys.platform == "linux" else 1024**2  # in units of ru_maxrss

@@ -1,7 +1,6 @@
 """A figure of the line-of-sight law's errors."""
 
-from podusv_cli.figures.panels import signals_over_time
-from podusv_cli.figures.sheet import figure
+from podusv_cli.plugin import figure, signals_over_time
 
 track_error = figure(
     "track_error", caption="Cross-track error and course of the line-of-sight law", signals=("e_y",)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from podusv_cli.core.kernel import Vector, kernel
-from podusv_cli.metrics.metric import Accumulator, Metric, gathered
+from podusv_cli.plugin import Accumulator, Metric, Vector, gathered, kernel
 
 
 @kernel

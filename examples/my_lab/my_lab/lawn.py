@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, Literal
 
-from podusv_cli.core.component import value
-from podusv_cli.core.kernel import Vector, kernel
-from podusv_cli.paths.base import Path
+from podusv_cli.plugin import Path, Vector, kernel, value
 
 
 class Lawn(Path):

@@ -7,11 +7,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from podusv_cli.controllers.base import Controller, Slots
-from podusv_cli.core.component import value
-from podusv_cli.core.kernel import Vector, kernel
-from podusv_cli.core.signal import Signal
-from podusv_cli.vessels.vessel import Vessel
+from podusv_cli.plugin import Controller, Signal, Slots, Vector, Vessel, kernel, value
 
 E_Y = Signal("e_y", "m", "cross-track error: how far right of the path the vessel is")
 CHI_D = Signal("chi_d", "rad", "course that the line of sight asks for")

@@ -1,0 +1,149 @@
+"""What every actuator offers."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar
+
+import numpy as np
+
+from podusv_cli.components.actuators.command import (
+    GIVEN,
+    Command,
+    Drive,
+    Failure,
+    commanded,
+    failing,
+)
+from podusv_cli.core.component import Component, value
+from podusv_cli.core.kernel import Vector, bundle, kernel
+from podusv_cli.core.signal import Signal
+
+SMALL = 1e-3  # of a demand or a state, for finite differences
+ROUNDS = 20  # of Newton's method
+SATURATION = Signal("saturated", "1", "1 while the actuator limits what the law asked for", "sat")
+
+
+class Actuator(Component):
+    """What turns a demand (tau_u, tau_r) into loads on the hull.
+
+    `drive(t, x, state, demand, k, table, tau, rate, signals)` is a kernel: from the vessel's state
+    x, whose u and v are relative to the water, the actuator's own `state` and the `demand` (tau_u
+    [N], tau_r [N m]) it writes the loads (tau_u, tau_v, tau_r) into `tau`, the rate of its state
+    into `rate`, and one number for each of its `signals`. Limits act here, inside the right-hand
+    side.
+
+    `states` and `signals` declare every number; the numbers of one vector have the same signal,
+    which has an axis.
+
+    Every actuator has a `command` path and a `failure`, none by default. They lie around `drive`:
+    `drive_with` and `signals_with` are with them, all other methods are about the healthy actuator
+    alone.
+    """
+
+    noun: ClassVar[str] = "actuator"
+
+    feels_motion: ClassVar[bool] = True  # False: `drive` does not look at x, nor in a subclass
+    command: Command | None = value(
+        None, "", "how the law's demand reaches the actuator; at once and as it is by default"
+    )
+    failure: Failure | None = value(None, "", "loss of effectiveness at a time")
+
+    @property
+    def states(self) -> tuple[Signal, ...]:
+        """The actuator's own states."""
+        return ()
+
+    @property
+    def signals(self) -> tuple[Signal, ...]:
+        """What `drive` writes into `signals`."""
+        return ()
+
+    @staticmethod
+    def drive(
+        t: float, x: Vector, state: Vector, demand: Vector, k: Any, table: Vector,
+        tau: Vector, rate: Vector, signals: Vector,
+    ) -> None:  # fmt: skip
+        """Write loads, rates and signals; every actuator has its own."""
+        raise NotImplementedError
+
+    @staticmethod
+    @kernel
+    def lose(state: Vector, k: Any, table: Vector, tau: Vector, signals: Vector) -> None:
+        """Leave a part of the loads and signals that `drive` wrote, once the actuator has failed.
+
+        By default `k.failure_effectiveness` times the loads.
+        """
+        for i in range(3):
+            tau[i] *= k.failure_effectiveness
+
+    def drive_with(self) -> Drive:
+        """`drive` with command path and failure; `drive` itself where it has neither.
+
+        Its `demand` has a third number, when the present step began [s].
+        """
+        drive: Drive = self.drive
+        if self.failure:
+            drive = failing(drive, self.lose)
+        return commanded(drive) if self.command else drive
+
+    @property
+    def signals_with(self) -> tuple[Signal, ...]:
+        """What `drive_with` writes into `signals`."""
+        return (*GIVEN, *self.signals) if self.command else self.signals
+
+    @property
+    def is_relayed(self) -> bool:
+        """Whether it has a command path or a failure."""
+        return bool(self.command or self.failure)
+
+    def delay(self) -> float:
+        """How long the law's demand takes to the actuator [s]."""
+        return self.command.delay if self.command else 0.0
+
+    def rest(self) -> Vector:
+        """The state at the start of a run."""
+        return np.zeros(len(self.states))
+
+    def limits(self) -> tuple[float, float]:
+        """Largest surge force [N] and yaw moment [N m], both ways; infinite where not constant."""
+        return math.inf, math.inf
+
+    def shortest_lag(self) -> float:
+        """The smallest time constant of its states [s]; infinite without states."""
+        return math.inf
+
+    def settled(self, x: Vector, demand: Vector) -> Vector:
+        """Loads (tau_u, tau_v, tau_r) once the actuator has followed a constant demand.
+
+        `x` is the vessel's state, which is held; `demand` is (tau_u [N], tau_r [N m]). By Newton's
+        method from rest, for the state that does not change any more.
+        """
+        state = self.rest()
+        for _ in range(ROUNDS):
+            tau, rate = self._driven(x, state, demand)
+            if np.allclose(rate, 0.0):
+                break
+            shifts = SMALL * np.eye(len(state))
+            slopes = [(self._driven(x, state + d, demand)[1] - rate) / SMALL for d in shifts]
+            state = state - np.linalg.lstsq(np.array(slopes).T, rate, rcond=None)[0]
+        return tau
+
+    def _driven(self, x: Vector, state: Vector, demand: Vector) -> tuple[Vector, Vector]:
+        """Loads and rate of the state."""
+        tau, rate, signals = np.zeros(3), np.zeros(len(state)), np.zeros(len(self.signals))
+        k, table = bundle(self.constants()), self.table()
+        self.drive(0.0, x, state, demand, k, table, tau, rate, signals)
+        return tau, rate
+
+    def input_matrix(self) -> Vector:
+        """How loads (tau_u, tau_v, tau_r) follow small demands at rest, shape (3, 2).
+
+        By central differences, of what has settled. A rank below 3 is what the paper's section 2
+        calls underactuated.
+        """
+        columns = [
+            (self.settled(np.zeros(6), demand) - self.settled(np.zeros(6), -demand)) / (2.0 * SMALL)
+            for demand in SMALL * np.eye(2)
+        ]
+        return np.array(columns).T

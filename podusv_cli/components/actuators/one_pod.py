@@ -1,0 +1,49 @@
+"""One pod of a set: its numbers, and its failure."""
+
+from __future__ import annotations
+
+import math
+
+from podusv_cli.components.actuators.command import Failure
+from podusv_cli.core.component import Component, value
+
+
+class Pod(Component):
+    """One propeller and the pod that turns it.
+
+    `n` counts turns a second, or parts of full speed where the actuator's `counts` says so; units
+    with s for it then go without.
+    """
+
+    x: float = value(..., "m", "position ahead of the body origin; negative at the stern")
+    y: float = value(0.0, "m", "position to starboard of the body origin")
+    T_nn: float = value(..., "N s2", "thrust over |n|n ahead, at rest", gt=0)
+    T_nn_astern: float = value(..., "N s2", "thrust over |n|n astern, at rest", gt=0)
+    T_nV: float = value(0.0, "N s2/m", "change of thrust over |n| times speed", ge=0)
+    n_max: float = value(..., "1/s", "largest propeller speed ahead", gt=0)
+    n_max_astern: float = value(..., "1/s", "largest propeller speed astern", ge=0)
+    n_rate: float = value(..., "1/s2", "fastest change of the propeller's speed", gt=0)
+    n_lag: float = value(..., "s", "time constant of the propeller's speed", gt=0)
+    angle_limit: float = value(
+        math.radians(35.0), "rad", "largest angle, both ways; 0 for a fixed propeller",
+        ge=0, le=0.5 * math.pi,
+    )  # fmt: skip
+    angle_rate: float = value(..., "rad/s", "fastest change of the angle", gt=0)
+    angle_lag: float = value(..., "s", "time constant of the angle", gt=0)
+    power_nnn: float | None = value(
+        None, "W s3", "power over |n|^3; without it neither power nor energy is logged", ge=0
+    )
+
+    def numbers(self) -> list[float]:
+        """The pod's row in the actuator's table, see `propeller`."""
+        return [
+            self.x, self.y, self.T_nn, self.T_nn_astern, self.T_nV, self.n_max, self.n_max_astern,
+            self.angle_limit, self.n_rate, self.angle_rate, self.n_lag, self.angle_lag,
+            self.power_nnn or 0.0,
+        ]  # fmt: skip
+
+
+class PodFailure(Failure):
+    """A pod's loss of thrust at a time."""
+
+    pod: int = value(..., "", "the pod that fails, from 0", ge=0)

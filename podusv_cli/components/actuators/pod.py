@@ -1,0 +1,278 @@
+"""Pods: propellers that turn with their axis, from a demand to propeller speeds and angles."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Literal, Self
+
+import numpy as np
+from pydantic import model_validator
+
+from podusv_cli.components.actuators.allocation import allocate, speeds
+from podusv_cli.components.actuators.allocation_qp import MOST_PODS
+from podusv_cli.components.actuators.allocation_single import within
+from podusv_cli.components.actuators.base import SATURATION, Actuator
+from podusv_cli.components.actuators.one_pod import Pod, PodFailure
+from podusv_cli.components.actuators.propeller import (
+    ANGLE,
+    DELTA,
+    DELTA_CMD,
+    DELTA_LAG,
+    DELTA_RATE,
+    LIMITED,
+    N_AHEAD,
+    N_ASTERN,
+    N_LAG,
+    N_RATE,
+    POWER,
+    POWER_TAKEN,
+    SPEEDS,
+    THRUST,
+    WIDTH,
+    X,
+    Y,
+    speed_gain,
+    thrust,
+)
+from podusv_cli.core.component import Presets, value
+from podusv_cli.core.kernel import Vector, bundle, kernel, scratch, tail
+from podusv_cli.core.signal import Signal
+
+SATURATED, SPEED_LIMITED, ANGLE_LIMITED, RATE_LIMITED, FLAGS = range(5)
+NEARLY = 1.0 - 1e-9
+ROUNDS = 20  # until speeds and angles agree
+STRONGEST = 1e15  # N, N m; beside it a demand of 1 is lost in rounding
+SMALL = 1e-3  # of what the pods can do, for finite differences
+
+
+@kernel
+def act(state: Vector, gains: Vector, k: Any, table: Vector, tau: Vector, thrusts: Vector) -> None:
+    """Loads (9) of all pods as they stand, and the thrust of each."""
+    count = int(k.count)
+    tau[0] = tau[1] = tau[2] = 0.0
+    for i in range(count):
+        pod, delta = tail(table, i * WIDTH), state[count + i]
+        T = thrust(state[i], gains[i], pod, k)
+        along, across = T * math.cos(delta), T * math.sin(delta)
+        thrusts[i] = T
+        tau[0] += along
+        tau[1] += 0.0 if k.neglect_sway_force > 0.0 else across
+        tau[2] += pod[X] * across - pod[Y] * along
+
+
+@kernel
+def follow(state: Vector, command: Vector, k: Any, table: Vector, rate: Vector) -> bool:
+    """Rates of speeds and angles: first-order lags within limits; whether any is at its limit."""
+    count, limited = int(k.count), False
+    for i in range(count):
+        pod = tail(table, i * WIDTH)
+        wanted = (command[i] - state[i]) / pod[N_LAG]
+        rate[i] = within(wanted, -pod[N_RATE], pod[N_RATE])
+        turn = (command[count + i] - state[count + i]) / pod[DELTA_LAG]
+        rate[count + i] = within(turn, -pod[DELTA_RATE], pod[DELTA_RATE])
+        if rate[i] != wanted or rate[count + i] != turn:
+            limited = True
+    return limited
+
+
+@kernel
+def at_limits(command: Vector, k: Any, table: Vector, flags: Vector) -> None:
+    """Whether any speed, any angle is commanded to its limit."""
+    count = int(k.count)
+    flags[SPEED_LIMITED] = flags[ANGLE_LIMITED] = 0.0
+    for i in range(count):
+        pod, n, delta = tail(table, i * WIDTH), command[i], abs(command[count + i])
+        if n >= pod[N_AHEAD] * NEARLY or n <= -pod[N_ASTERN] * NEARLY:
+            flags[SPEED_LIMITED] = 1.0
+        if pod[ANGLE] > 0.0 and delta >= pod[ANGLE] * NEARLY:
+            flags[ANGLE_LIMITED] = 1.0
+
+
+class Pods(Actuator):
+    """Pods that turn surge force and yaw moment into propeller speeds and propulsion angles.
+
+    Raises a validation error where the pods cannot make a yaw moment and a surge force.
+    """
+
+    kind: Literal["pod"] = "pod"
+    presets = Presets("podusv_cli.components.actuators", "set of pods", "pod file")
+    preset: str = value("", "", "name of the file that brings the pods along; none where empty")
+    source: str = value("", "", "where the pods' numbers come from")
+    validity: str = value("", "", "what they hold for")
+    counts: Literal["turns", "parts"] = value(
+        "turns", "", "what n counts: turns a second, logged as n, or parts of full speed, "
+        "logged as n_part; units of the pods' numbers with s for n then go without",
+    )  # fmt: skip
+    failure: PodFailure | None = value(None, "", "a pod's loss of thrust at a time")
+    pods: tuple[Pod, ...] = value(..., "", "every pod; in place of the preset's", strict=False)
+    priority: Literal["yaw", "surge"] = value(
+        "yaw", "", "what is met first when surge force and yaw moment cannot both be had"
+    )
+    thrust_form: Literal["physical", "printed"] = value(
+        "physical", "", "T_nV takes thrust away with the advance speed, or adds as printed in (8)"
+    )
+    neglect_sway_force: bool = value(False, "", "leave out the sway force, the paper's Y_p = 0")
+    sway_weight: float = value(
+        0.0, "", "several pods: what sway force counts in the squares beside 1 for surge", ge=0
+    )
+    horizon: float = value(
+        0.0, "s", "0: angles and speeds anywhere within their limits are asked for; else those "
+        "that their rates allow within this time", ge=0,
+    )  # fmt: skip
+
+    @model_validator(mode="after")
+    def _steerable(self) -> Self:
+        if not 1 <= len(self.pods) <= MOST_PODS:
+            raise ValueError(f"has {len(self.pods)} pods; 1 to {MOST_PODS} are possible")
+        if not any((pod.angle_limit > 0 and pod.x != 0) or pod.y != 0 for pod in self.pods):
+            raise ValueError(
+                "has no authority over yaw: a pod that turns needs a lever arm x other than 0, "
+                "one that does not (angle_limit 0) a lever arm y"
+            )
+        if len(self.pods) == 1 and not (self.pods[0].angle_limit > 0 and self.pods[0].x != 0):
+            raise ValueError(
+                "has one pod, which cannot make surge force and yaw moment apart from each other; "
+                "it needs a lever arm x and an angle_limit, both other than 0"
+            )
+        fixed = [pod for pod in self.pods if pod.angle_limit == 0]
+        if len(fixed) == len(self.pods) and len({pod.y for pod in fixed}) == 1:
+            raise ValueError(
+                "has only fixed propellers side by side at the same y, which cannot make surge "
+                "force and yaw moment apart from each other; place them at different y"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _there(self) -> Self:
+        if self.failure and self.failure.pod >= len(self.pods):
+            raise ValueError(
+                f"has no pod {self.failure.pod} that could fail: its {len(self.pods)} are counted "
+                f"from 0, so that failure.pod is at most {len(self.pods) - 1}"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _computable(self) -> Self:
+        most = [
+            max(
+                pod.T_nn * pod.n_max * pod.n_max,
+                pod.T_nn_astern * pod.n_max_astern * pod.n_max_astern,
+            )
+            for pod in self.pods
+        ]
+        arms = [math.sqrt(pod.x * pod.x + pod.y * pod.y) for pod in self.pods]
+        force, moment = sum(most), sum(T * arm for T, arm in zip(most, arms, strict=True))
+        if not max(force, moment) <= STRONGEST:
+            raise ValueError(
+                f"has a full thrust of {force:g} N and a yaw moment of {moment:g} N m, of which no "
+                f"more than {STRONGEST:g} can be computed with; take smaller T_nn, T_nn_astern, "
+                "n_max, n_max_astern, x or y"
+            )
+        return self
+
+    @property
+    def states(self) -> tuple[Signal, ...]:
+        """Speed and angle of every pod."""
+        count = len(self.pods)
+        return (SPEEDS[self.counts][0],) * count + (DELTA,) * count
+
+    @property
+    def signals(self) -> tuple[Signal, ...]:
+        """Commands, thrust and, where every pod's is known, power; flags of what is at a limit."""
+        known = all(pod.power_nnn is not None for pod in self.pods)
+        vectors = (SPEEDS[self.counts][1], DELTA_CMD, THRUST, *((POWER_TAKEN,) if known else ()))
+        return (SATURATION, *LIMITED, *(signal for signal in vectors for _ in self.pods))
+
+    def constants(self) -> dict[str, float]:
+        """The options, and how many pods there are."""
+        known = all(pod.power_nnn is not None for pod in self.pods)
+        return super().constants() | {
+            "count": float(len(self.pods)),
+            "power_known": float(known),
+            "closed_form": float(len(self.pods) == 1 and self.pods[0].y == 0.0),
+        }
+
+    def table(self) -> Vector:
+        """The pods' numbers, row after row."""
+        return np.array([number for pod in self.pods for number in pod.numbers()])
+
+    def shortest_lag(self) -> float:
+        """Of speeds and angles."""
+        return min(min(pod.n_lag, pod.angle_lag) for pod in self.pods)
+
+    def settled(self, x: Vector, demand: Vector) -> Vector:
+        """Loads where the pods' state is what is commanded; the advance speed hangs on the angle.
+
+        A horizon only takes longer to get there, so it is left out.
+        """
+        k, table, count = (
+            bundle(self.constants() | {"horizon": 0.0}),
+            self.table(),
+            len(self.states),
+        )
+        tau, rate, state = np.zeros(3), np.zeros(count), self.rest()
+        signals = np.zeros(len(self.signals))
+        for _ in range(ROUNDS):
+            self.drive(0.0, x, state, demand, k, table, tau, rate, signals)
+            command = signals[FLAGS : FLAGS + count]
+            if np.allclose(state, command, rtol=1e-9, atol=0.0):
+                break
+            state = command.copy()
+        return tau
+
+    def input_matrix(self) -> Vector:
+        """As for every actuator, but for loads that have settled, about a third of full thrust.
+
+        At rest with no demand an angle has no effect yet, and loads follow the demand with a lag.
+        """
+        force = sum(pod.T_nn * pod.n_max * pod.n_max for pod in self.pods) / 3.0
+        at, still, small = np.array([force, 0.0]), np.zeros(6), SMALL * force
+        columns = [
+            (self.settled(still, at + change) - self.settled(still, at - change)) / (2.0 * small)
+            for change in small * np.eye(2)
+        ]
+        return np.array(columns).T
+
+    @staticmethod
+    @kernel
+    def lose(state: Vector, k: Any, table: Vector, tau: Vector, signals: Vector) -> None:
+        """Take the lost part of the pod's thrust off the loads; allocation and power are as before.
+
+        The pod's angle is as before, too.
+        """
+        count, i = int(k.count), int(k.failure_pod)
+        thrusts, pod = tail(signals, FLAGS + 2 * count), tail(table, i * WIDTH)
+        lost = (1.0 - k.failure_effectiveness) * thrusts[i]
+        along, across = lost * math.cos(state[count + i]), lost * math.sin(state[count + i])
+        thrusts[i] -= lost
+        tau[0] -= along
+        tau[1] -= 0.0 if k.neglect_sway_force > 0.0 else across
+        tau[2] -= pod[X] * across - pod[Y] * along
+
+    @staticmethod
+    @kernel
+    def drive(
+        t: float, x: Vector, state: Vector, demand: Vector, k: Any, table: Vector,
+        tau: Vector, rate: Vector, signals: Vector,
+    ) -> None:  # fmt: skip
+        """Loads from the pods' states; rates towards what the demand asks for."""
+        count = int(k.count)
+        command, thrusts = tail(signals, FLAGS), tail(signals, FLAGS + 2 * count)
+        gains, T = scratch(MOST_PODS), scratch(MOST_PODS)
+        for i in range(count):
+            gains[i] = speed_gain(x, tail(table, i * WIDTH), state[count + i], k)
+        act(state, gains, k, table, tau, thrusts)
+        met = allocate(state, demand, gains, k, table, T, tail(command, count))
+        speeds(count, T, gains, k, table, command)
+        # What is no number must not get lost between limits.
+        lost = 0.0 * (demand[0] + demand[1])
+        for i in range(2 * count):
+            command[i] += lost
+        signals[SATURATED] = 0.0 if met else 1.0
+        signals[RATE_LIMITED] = 1.0 if follow(state, command, k, table, rate) else 0.0
+        at_limits(command, k, table, signals)
+        if k.power_known > 0.0:
+            power = tail(thrusts, count)
+            for i in range(count):
+                n = abs(state[i])
+                power[i] = table[i * WIDTH + POWER] * n * n * n

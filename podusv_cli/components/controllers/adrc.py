@@ -1,0 +1,58 @@
+"""Active disturbance rejection: exact linearisation about a hand point with observed loads.
+
+The motion of the hand point is linearised with the nominal vessel, and what that vessel does not
+explain is rejected with the extended state observer. Source: J. Han, "From PID to active
+disturbance rejection control", IEEE Trans. Industrial Electronics 56 (2009), 900-906; the hand
+point as in `hand_position`.
+
+Proved: with known loads, off the limits and behind a pure moment, the hand point comes to its
+target. Not proved: the heading with `reference: origin`, any limit, and pods, where an offset
+stays. Anti-windup: the observer is told the loads that act. docs/laws.md has the derivation.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+
+from podusv_cli.components.controllers.base import Slots, each
+from podusv_cli.components.controllers.hand_point import PSI_F, HandController, hand_errors, push
+from podusv_cli.components.controllers.observer import B_R, B_U, B_V, ObservingController, observe
+from podusv_cli.components.vessels.vessel import Vessel
+from podusv_cli.core.kernel import Vector, kernel
+
+LAGGED = 6  # position in the memory, behind the observer
+
+
+class Adrc(HandController, ObservingController):
+    """Moves the hand point as a mass that can be pushed anywhere; an observer finds the loads."""
+
+    kind: Literal["adrc"] = "adrc"
+
+    def slots(self) -> Slots:
+        """The observer and the lagged heading."""
+        return super().slots() + each((PSI_F,))
+
+    def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
+        """Velocities and heading as they are, and no load."""
+        return np.append(super().start(x, target, nominal), x[2])
+
+    def gains(self) -> tuple[tuple[str, float, float], ...]:
+        """Of a hull at rest."""
+        surge, yaw = self.rate_gains()
+        return ("k_v", surge, self.omega_u), ("k_v", yaw, self.omega_r)
+
+    @staticmethod
+    @kernel
+    def law(
+        t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
+        tau: Vector, rate: Vector, signals: Vector, work: Vector,
+    ) -> None:  # fmt: skip
+        """A + k_v s along and across the bow, less the observed loads."""
+        h = hand_errors(x, memory[LAGGED], target, k)
+        along, across = h.A_a + k.k_v * h.s_a, h.A_b + k.k_v * h.s_b
+        push(x, along, across, memory[B_U], memory[B_V], memory[B_R], k, tau)
+        observe(x, memory, tau, k, rate)
+        rate[LAGGED] = h.psi_f_rate
+        signals[0], signals[1], signals[2] = h.s_a, h.s_b, h.distance

@@ -1,0 +1,113 @@
+"""Line of sight that learns the crab angle, so that it stays on the path in a cross load.
+
+Source of `adaptive`, ALOS: T. I. Fossen, "An adaptive line-of-sight (ALOS) guidance law for path
+following of aircraft and marine craft", IEEE Trans. Control Systems Technology 31 (2023),
+2887-2894. Of `integral`, ILOS: E. Borhaug, A. Pavlov and K. Y. Pettersen, "Integral LOS control for
+path following of underactuated marine surface vessels in the presence of constant ocean currents",
+IEEE CDC (2008), 4984-4991. The speed that follows the target, and the autopilot with observed
+loads, are podusv's.
+
+Proved, for a heading that is exact and a constant crab angle: the cross-track error tends to 0. Not
+proved: the autopilot together with the guidance, and any limit. Anti-windup: the observer is told
+the loads that act; what is learnt grows slowly far from the line. docs/laws.md has the equations.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from podusv_cli.components.controllers.base import Slots, each
+from podusv_cli.components.controllers.guidance import (
+    STEERED,
+    LineOfSight,
+    course_frame,
+    line_of_sight,
+    wanted_speed,
+)
+from podusv_cli.components.controllers.observer import B_R, B_U, ObservingController, observe
+from podusv_cli.components.vessels.plant import surge_force, yaw_moment
+from podusv_cli.components.vessels.vessel import Vessel
+from podusv_cli.core.component import value
+from podusv_cli.core.kernel import Vector, kernel
+from podusv_cli.core.kinematics import wrap
+from podusv_cli.core.signal import Signal
+
+CRAB, OFFSET = 6, 7  # positions in the memory
+LEARNT = (
+    Signal("crab", "rad", "learnt crab angle", r"\hat\beta"),
+    Signal("offset", "m", "what the integral adds to the cross-track error", r"\sigma y_i"),
+)
+INTEGRAL = 1.0
+
+
+@kernel
+def learning(across: float, crab: float, offset: float, k: Any) -> tuple[float, float]:
+    """Rates of crab angle and offset; one is always 0. The angle stays within +-crab_m."""
+    shifted = across + offset
+    squared = k.lookahead * k.lookahead + shifted * shifted
+    if k.learns == INTEGRAL:
+        return 0.0, k.sigma * k.lookahead * across / squared
+    rate = k.gamma * k.lookahead * k.lookahead * across / squared
+    stuck = abs(crab) >= k.crab_m and rate * crab > 0.0
+    return (0.0 if stuck else rate), 0.0
+
+
+class Alos(LineOfSight, ObservingController):
+    """Line of sight less a learnt crab angle, at a speed that follows the target."""
+
+    kind: Literal["alos"] = "alos"
+    signals: ClassVar[tuple[Signal, ...]] = STEERED
+    lookahead: float = value(0.7, "m", "distance ahead on the path that the bow aims at", gt=0)
+    U: float = value(1.1, "m/s", "largest wanted surge velocity", gt=0)
+    learns: Literal["adaptive", "integral"] = value(
+        "adaptive", "", "how the crab angle is found: adapted as an angle (ALOS, Fossen 2023), or "
+        "by an integral of the cross-track error (ILOS, Borhaug et al. 2008)",
+    )  # fmt: skip
+    gamma: float = value(0.2, "rad/(m s)", "gain of the adapted angle", ge=0)
+    crab_m: float = value(0.5, "rad", "largest adapted angle", gt=0)
+    sigma: float = value(0.1, "m/s", "gain of the integral", ge=0)
+    k_u: float = value(1.0, "1/s", "gain of the surge velocity", gt=0)
+    k_psi: float = value(1.2, "1/s", "gain of the heading", gt=0)
+    k_r: float = value(1.3, "1/s", "gain of the yaw rate", gt=0)
+
+    N_m: float = value(2.5, "N m", "moment beyond which surge yields to yaw", gt=0)
+
+    def slots(self) -> Slots:
+        """The observer, then crab angle and offset."""
+        return (*super().slots(), *each(LEARNT))
+
+    def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
+        """Nothing is learnt yet."""
+        return np.concatenate([super().start(x, target, nominal), np.zeros(2)])
+
+    def gains(self) -> tuple[tuple[str, float, float], ...]:
+        """The yaw rate's gain with that of the heading."""
+        return ("k_u", self.k_u, self.omega_u), ("k_r", self.k_r + self.k_psi, self.omega_r)
+
+    @staticmethod
+    @kernel
+    def law(
+        t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
+        tau: Vector, rate: Vector, signals: Vector, work: Vector,
+    ) -> None:  # fmt: skip
+        """Heading to the line of sight less the crab angle; speed along the course."""
+        at = course_frame(x, target, k)
+        u, v, r = x[3], x[4], x[5]
+        crab, offset = memory[CRAB], memory[OFFSET]
+        crab_rate, offset_rate = learning(at.across, crab, offset, k)
+        sight, sight_rate = line_of_sight(at, offset, offset_rate, k)
+        psi_r = wrap(at.course - crab + sight)
+        psi_e = wrap(psi_r - x[2])
+        turn = at.turn - crab_rate + sight_rate
+        r_d = turn + k.k_psi * psi_e
+        yaw = k.k_psi * (turn - r) + k.k_r * (r_d - r)
+        tau[1] = k.m33 * yaw - yaw_moment(u, v, r, k) - memory[B_R]
+
+        u_d = wanted_speed(x, at, k) * max(math.cos(psi_e), 0.0) * k.N_m / max(abs(tau[1]), k.N_m)
+        tau[0] = k.m11 * k.k_u * (u_d - u) - surge_force(u, v, r, k) - memory[B_U]
+        signals[0], signals[1], signals[2], signals[3] = at.along, at.across, psi_r, u_d
+        observe(x, memory, tau, k, rate)
+        rate[CRAB], rate[OFFSET] = crab_rate, offset_rate

@@ -1,0 +1,149 @@
+"""What every control law offers."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, NamedTuple
+
+from podusv_cli.components.controllers.velocity_loop import Axis, Loop
+from podusv_cli.components.vessels.vessel import Vessel
+from podusv_cli.core.component import Component
+from podusv_cli.core.kernel import Vector
+from podusv_cli.core.signal import Signal
+
+Slots = tuple[tuple[Signal, int], ...]
+
+
+def each(signals: tuple[Signal, ...], count: int = 1) -> Slots:
+    """A part of the memory of `count` numbers for each of these signals."""
+    return tuple((signal, count) for signal in signals)
+
+
+class Approach(NamedTuple):
+    """The surge velocity that a law wants grows by `gain` [1/s] with the distance beyond this."""
+
+    gain: float
+    standoff: float  # m
+
+
+class Trial(NamedTuple):
+    """A manoeuvring trial: when it begins [s], and the change of heading that reverses it [rad].
+
+    `switch` is 0 where nothing is reversed.
+    """
+
+    execute: float
+    switch: float = 0.0
+
+
+class Controller(Component):
+    """A law from (state, target) to a demand (tau_u [N], tau_r [N m]).
+
+    `law(t, x, memory, target, k, table, tau, rate, signals, work)` is a kernel. It reads the time
+    t [s], the state x = (x, y, psi, u, v, r), its own `memory`, the `target` (see
+    `paths.base.TARGET`) and its constants `k`, which hold its fields and the *nominal* vessel's
+    coefficients. It writes the demand into `tau`, the rate of its memory into `rate`, and one
+    number for each of its `signals`; `work` is scratch of `workspace()` numbers.
+
+    `sample(t, x, memory, target, k, table)` is a kernel that may change `memory`; it is called at
+    every multiple of `sample_period()`, before anything else sees that instant.
+
+    `after_saturation(t, memory, demand, tau, k, table, rate)` is a kernel that may change the
+    `rate` that `law` wrote, once the actuator has made loads `tau` of the `demand`; it is called
+    where `wants_loads()`.
+
+    A law declares what it logs: `signals`, the parts of its memory in `slots()`, and
+    `fixed_signals()`. `explain` finds a signal that is in `signals` or a constant of the module.
+    """
+
+    noun: ClassVar[str] = "law"
+
+    signals: ClassVar[tuple[Signal, ...]] = ()
+
+    # Fields that a search for gains leaves alone, although they are numbers above 0
+    no_gains: ClassVar[tuple[str, ...]] = ()
+
+    # The field that `sample_period` is taken from, for messages; empty where there is none
+    period_key: ClassVar[str] = ""
+
+    # What a finding advises where a saturated actuator winds the law's memory up
+    against_windup: ClassVar[str] = "tell it the loads that act (wants_loads, after_saturation)"
+
+    @property
+    def label(self) -> str:
+        """The law's kind."""
+        return str(type(self).model_fields["kind"].default)
+
+    @staticmethod
+    def law(
+        t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
+        tau: Vector, rate: Vector, signals: Vector, work: Vector,
+    ) -> None:  # fmt: skip
+        """Write demand, rates and signals; every law has its own."""
+        raise NotImplementedError
+
+    @staticmethod
+    def sample(t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector) -> None:
+        """Change the memory at a sampling instant."""
+        raise NotImplementedError
+
+    @staticmethod
+    def after_saturation(
+        t: float, memory: Vector, demand: Vector, tau: Vector, k: Any, table: Vector, rate: Vector
+    ) -> None:
+        """Change the memory's rate in the light of the loads (tau_u, tau_v, tau_r) that act."""
+        raise NotImplementedError
+
+    def wants_loads(self) -> bool:
+        """Whether the law has to know the loads that act."""
+        return False
+
+    def sample_period(self) -> float:
+        """Seconds between two calls of `sample`; 0 where the law needs none."""
+        return 0.0
+
+    def slots(self) -> Slots:
+        """Signal and length of every part of the memory, in order."""
+        return ()
+
+    def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
+        """Its fast loops, linearised about the velocity nu = (u, v, r); `axes` are surge and yaw.
+
+        From them findings tell whether the step or the sampling period is too long.
+        """
+        return []
+
+    def approach(self) -> Approach | None:
+        """How a law that points at the target drives towards it; None for any other law."""
+        return None
+
+    def optimum_of(self) -> str:
+        """The metric that its motion minimises among all motions of the task; empty for laws."""
+        return ""
+
+    def trial(self) -> Trial | None:
+        """The manoeuvring trial that this is, for the metrics of trials; None for a law."""
+        return None
+
+    def lyapunov(self) -> Any:
+        """The law itself where (46) is its Lyapunov function, see `theory.monitor`; else None."""
+        return None
+
+    def workspace(self) -> int:
+        """How many numbers of scratch the law needs."""
+        return 1
+
+    def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
+        """The memory at t = 0 for the state x and the target there."""
+        raise NotImplementedError
+
+    def fixed_signals(self) -> dict[Signal, Vector]:
+        """Arrays worth logging that do not change during a run."""
+        return {}
+
+    def declared(self) -> tuple[Signal, ...]:
+        """Everything that the law adds to a log."""
+        return (*self.signals, *(signal for signal, _ in self.slots()), *self.fixed_signals())
+
+    def constants_with(self, nominal: Vessel) -> dict[str, float]:
+        """The law's constants together with those of the vessel it is told about."""
+        return nominal.constants() | self.constants()

@@ -1,0 +1,192 @@
+"""What can go wrong with the adaptive laws, and with all that steer by distance and direction.
+
+The printed sign, and a network that lies elsewhere; then folding and singularities.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+from typing import Any
+
+import numpy as np
+
+from podusv_cli.components.controllers.network import NODE_DISTANCE, nearest, node_distance
+from podusv_cli.components.controllers.polar_backstepping import PolarBackstepping
+from podusv_cli.components.controllers.tracking import TrackingController
+from podusv_cli.core.finding import Sentences, after, before, rows_where, times_of
+from podusv_cli.core.recording import Recording
+
+KICK = 1.0  # rad/s; beyond what a hull turns at
+NEAR = 0.05  # hull lengths
+CROSSWISE = 0.05  # |cos psi_e|; the virtual surge velocity is magnified twentyfold
+FAR = 2.0  # widths; a node further away answers with less than exp(-2)
+LAST = 0.1  # of the run, over which a bound is watched
+GROWN = 0.01  # by which it may grow there
+
+
+@before(
+    "coupling-saddle", about="controller.coupling", meaning="the printed sign makes a saddle",
+    condition="k_ze k_ue < 1 or k_psie k_re < 1 with the printed sign",
+    remedy="take coupling: corrected, or larger gains", law=PolarBackstepping,
+)  # fmt: skip
+def coupling_saddle(case: Any) -> Sentences:
+    """With the printed sign, z_e' = -k_ze z_e - u_e and m11 u_e' = -k_ue u_e - z_e; yaw alike.
+
+    The determinant (k_ze k_ue - 1)/m11 is negative where k_ze k_ue < 1: a saddle.
+    """
+    law, vessel = case.scenario.controller, case.scenario.vessel
+    pairs = (
+        ("k_ze", "k_ue", law.k_ze, law.k_ue, vessel.m11),
+        ("k_psie", "k_re", law.k_psie, law.k_re, vessel.m33),
+    )
+    for outer, inner, k, k_e, inertia in pairs:
+        if law.coupling == "printed" and k * k_e < 1.0:
+            matrix = np.array([[-k, -1.0], [-1.0 / inertia, -k_e / inertia]])
+            growth = float(np.linalg.eigvals(matrix).real.max())
+            yield (
+                f"the printed sign with {outer} {inner} = {k * k_e:.2g} < 1 makes a saddle that "
+                f"grows at {growth:.2g} 1/s unless the network's adaptation hides it; take "
+                "coupling: corrected, or larger gains"
+            )
+
+
+@before(
+    "network-range", about="controller.network", meaning="no node near the speeds needed",
+    condition=f"a steady (u, v, r) along the path is more than {FAR:g} widths from every node",
+    remedy="move low and high, or widen spread", law=PolarBackstepping,
+)  # fmt: skip
+def network_range(case: Any) -> Sentences:
+    """No node of the network within two widths of the velocities that keep up with the target."""
+    nu = case.reference.nu[np.isfinite(case.reference.nu).all(axis=1)]
+    if not len(nu):
+        return
+    network = case.scenario.controller.network
+    distance = nearest(nu, network.center_array(), network.width_array())
+    worst = int(distance.argmax())
+    if distance[worst] > FAR:
+        u, v, r = nu[worst]
+        yield (
+            f"keeping up means u = {u:.2g} m/s, v = {v:.2g} m/s, r = {r:.2g} rad/s, and the "
+            f"nearest node is {distance[worst]:.2g} widths away: the network is blind there; "
+            "move low and high, or widen spread"
+        )
+
+
+@after(
+    "off-network", about="controller.network", meaning="no node within two widths",
+    condition=f"no node within {FAR:g} widths of (u, v, r)",
+    remedy="move low and high, or widen spread", law=PolarBackstepping,
+)  # fmt: skip
+def off_network(scenario: Any, log: Recording) -> Sentences:
+    """No node of the network within two widths of (u, v, r)."""
+    name = NODE_DISTANCE.name
+    distance = operator.itemgetter(name) if name in log else node_distance.compute
+    off = rows_where(log, lambda part: distance(part) > FAR)
+    if off.any():
+        yield (
+            f"no node within {FAR:g} widths of (u, v, r) {times_of(log, off)}; the network is "
+            "blind there"
+        )
+
+
+@after(
+    "bound-growing", about="controller", meaning="an estimated bound still grew at the end",
+    condition=f"growth above {GROWN:.0%} over the last {LAST:.0%} of the run, to a new maximum",
+    remedy="simulate longer, or take more leakage", law=PolarBackstepping,
+)  # fmt: skip
+def bound_growing(scenario: Any, log: Recording) -> Sentences:
+    """An estimated bound still grows at the end."""
+    time = log["time"]
+    if log.status != "finished" or len(time) < 2:
+        return
+    since = time[-1] - LAST * (time[-1] - time[0])
+    for name in ("b_hat_u", "b_hat_r"):
+        bound = log[name]
+        before_then = bound[: np.searchsorted(time, since, side="right")].max()
+        if bound[-1] > (1.0 + GROWN) * before_then and bound[-1] == bound.max():
+            yield (
+                f"{name} still grows at the end: {bound[-1]:.3g} against at most "
+                f"{before_then:.3g} until {since:.6g} s; the run is not settled, "
+                "or the leakage is too small"
+            )
+
+
+@before(
+    "start-astern", about="start", meaning="the start lies outside the folding range",
+    condition="the target is more than a right angle off the bow, and fold is not joint",
+    remedy="turn start.psi, or take fold: joint", law=TrackingController,
+)  # fmt: skip
+def start_astern(case: Any) -> Sentences:
+    """The target lies abaft the beam at t = 0 and the law does not fold line of sight and error."""
+    law, start = case.scenario.controller, case.scenario.start
+    if law.fold == "joint":
+        return
+    psi_e = math.remainder(case.first_signals.get("psi_d", math.nan) - start.psi, 2.0 * math.pi)
+    if abs(psi_e) >= 0.5 * math.pi:
+        yield (
+            f"the target lies {math.degrees(psi_e):.0f} degrees off the bow at the start, beyond "
+            f"the right angle within which fold: {law.fold} steers towards it; turn start.psi, or "
+            "take fold: joint"
+        )
+
+
+@before(
+    "start-kick", about="controller.first_difference", meaning="the first difference is a kick",
+    condition=f"|psi_d(0)|/difference_step above {KICK:g} rad/s",
+    remedy="take first_difference: from_start", law=TrackingController,
+)  # fmt: skip
+def start_kick(case: Any) -> Sentences:
+    """Remark 5's difference, started from psi_d = 0, is a kick of psi_d(0)/Delta t for a sample."""
+    law = case.scenario.controller
+    if law.rate != "difference" or law.first_difference != "from_zero":
+        return
+    psi_d = case.first_signals.get("psi_d", math.nan)
+    kick = math.remainder(psi_d, 2.0 * math.pi) / law.difference_step
+    if abs(kick) > KICK:
+        yield (
+            f"the first difference of psi_d starts from zero and turns the virtual yaw rate by "
+            f"{kick:.3g} rad/s for {law.difference_step:g} s; take first_difference: from_start"
+        )
+
+
+@after(
+    "near-target", about="controller.standoff", meaning="z_e came close to its singularity",
+    condition=f"z_e below {NEAR:g} hull lengths, and hold_below is smaller than that",
+    remedy="take a standoff, or hold_below", law=TrackingController,
+)  # fmt: skip
+def near_target(scenario: Any, log: Recording) -> Sentences:
+    """z_e comes near 0, where psi_d is not defined and w = psi_d' grows as 1/z_e.
+
+    With standoff_reference: crab z_e is meant to vanish: the law points at a point beyond it.
+    """
+    law, near = scenario.controller, NEAR * scenario.vessel.length
+    if law.standoff_reference == "crab":
+        return
+    close = rows_where(log, lambda part: part["z_e"] < near)
+    if close.any() and law.hold_below < near:
+        at = int(log["z_e"].argmin())
+        kept = f"the standoff of {law.standoff:g} m did not keep it away; take hold_below"
+        remedy = kept if law.standoff else "take a standoff, or hold_below"
+        yield (
+            f"z_e falls below {near:.2g} m {times_of(log, close)}, to {log['z_e'][at]:.2g} m at "
+            f"{log['time'][at]:.6g} s; the direction of the target is singular at 0, so "
+            f"numbers from there on depend on the step; {remedy}"
+        )
+
+
+@after(
+    "crosswise", about="controller", meaning="cos psi_e came close to zero",
+    condition=f"|cos psi_e| below {CROSSWISE:g}",
+    remedy="start with a heading nearer to the line of sight", law=TrackingController,
+)  # fmt: skip
+def crosswise(scenario: Any, log: Recording) -> Sentences:
+    """cos psi_e comes near 0, by which (21) divides."""
+    if "psi_e" not in log:
+        return
+    across = rows_where(log, lambda part: np.abs(np.cos(part["psi_e"])) < CROSSWISE)
+    if across.any():
+        yield (
+            f"|cos psi_e| falls below {CROSSWISE:g} {times_of(log, across)}; the virtual surge "
+            "velocity (21) divides by it"
+        )

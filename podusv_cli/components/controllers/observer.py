@@ -1,0 +1,107 @@
+"""Extended state observer of the velocities: the load that the nominal vessel does not explain.
+
+For each axis, with inertia m, nominal Coriolis and damping force f and the load tau that acts,
+
+    nu_hat' = (tau + f + b_hat)/m + 2 omega (nu - nu_hat),   b_hat' = m omega^2 (nu - nu_hat).
+
+Both poles are at -omega. Source: J. Han, "From PID to active disturbance rejection control", IEEE
+Trans. Industrial Electronics 56 (2009), 900-906; linear, and tuned by omega alone, after Z. Gao,
+"Scaling and bandwidth-parameterization based controller tuning", American Control Conference
+(2003), 4989-4996.
+
+The observer is the only integrator of a law that uses it. It is told the loads that act, so it
+does not wind up while the actuator limits the demand.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from podusv_cli.components.controllers.base import Controller, Slots, each
+from podusv_cli.components.controllers.velocity_loop import Axis, Loop
+from podusv_cli.components.vessels.plant import surge_force, sway_force, yaw_moment
+from podusv_cli.components.vessels.vessel import Vessel
+from podusv_cli.core.component import value
+from podusv_cli.core.kernel import Vector, kernel
+from podusv_cli.core.signal import Signal
+
+U_HAT, V_HAT, R_HAT, B_U, B_V, B_R = range(6)  # positions in the memory
+OBSERVED = (
+    Signal("u_hat", "m/s", "surge velocity, observed", r"\hat u"),
+    Signal("v_hat", "m/s", "sway velocity, observed", r"\hat v"),
+    Signal("r_hat", "rad/s", "yaw rate, observed", r"\hat r"),
+    Signal("b_obs_u", "N", "surge load that the nominal vessel does not explain", r"\hat b_u"),
+    Signal("b_obs_v", "N", "sway load that the nominal vessel does not explain", r"\hat b_v"),
+    Signal("b_obs_r", "N m", "yaw load that the nominal vessel does not explain", r"\hat b_r"),
+)
+
+
+@kernel
+def observe(x: Vector, memory: Vector, tau: Vector, k: Any, rate: Vector) -> None:
+    """Rates of the observer as if the demand `tau` acted; `after_saturation` adds what differs."""
+    u, v, r = x[3], x[4], x[5]
+    e_u, e_v, e_r = u - memory[U_HAT], v - memory[V_HAT], r - memory[R_HAT]
+    surge = tau[0] + surge_force(u, v, r, k) + memory[B_U]
+    sway = sway_force(u, v, r, k) + memory[B_V]
+    yaw = tau[1] + yaw_moment(u, v, r, k) + memory[B_R]
+    rate[U_HAT] = surge / k.m11 + 2.0 * k.omega_u * e_u
+    rate[V_HAT] = sway / k.m22 + 2.0 * k.omega_v * e_v
+    rate[R_HAT] = yaw / k.m33 + 2.0 * k.omega_r * e_r
+    rate[B_U] = k.m11 * k.omega_u * k.omega_u * e_u
+    rate[B_V] = k.m22 * k.omega_v * k.omega_v * e_v
+    rate[B_R] = k.m33 * k.omega_r * k.omega_r * e_r
+
+
+class ObservingController(Controller):
+    """A law whose memory is the observer."""
+
+    omega_u: float = value(2.5, "rad/s", "bandwidth of the observer in surge", gt=0)
+    omega_v: float = value(2.0, "rad/s", "bandwidth of the observer in sway", gt=0)
+    omega_r: float = value(1.2, "rad/s", "bandwidth of the observer in yaw", gt=0)
+
+    def slots(self) -> Slots:
+        """Velocities and loads."""
+        return each(OBSERVED)
+
+    def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
+        """The velocities as they are, and no load."""
+        return np.array([x[3], x[4], x[5], 0.0, 0.0, 0.0])
+
+    def wants_loads(self) -> bool:
+        """Always: the observer has to know the loads that act."""
+        return True
+
+    @staticmethod
+    @kernel
+    def after_saturation(
+        t: float, memory: Vector, demand: Vector, tau: Vector, k: Any, table: Vector, rate: Vector
+    ) -> None:
+        """Put the loads that act in place of the demand."""
+        rate[U_HAT] += (tau[0] - demand[0]) / k.m11
+        rate[V_HAT] += tau[1] / k.m22
+        rate[R_HAT] += (tau[2] - demand[1]) / k.m33
+
+    def gains(self) -> tuple[tuple[str, float, float], ...]:
+        """Key, gain [1/s] and observer bandwidth of the surge and of the yaw loop."""
+        raise NotImplementedError
+
+    def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
+        """Error e = nu and memory (e_hat, b_hat/m): tau = -m_told (k e + b_hat/m_told - d e).
+
+        The nominal damping that the law cancels is taken to be the true one.
+        """
+        return [_loop(axis, *gain) for axis, gain in zip(axes, self.gains(), strict=True)]
+
+
+def _loop(axis: Axis, key: str, gain: float, omega: float) -> Loop:
+    """nu' = -d nu + g.(nu, nu_hat, b), with b the observed load per told inertia."""
+    ratio, d = axis.told / axis.inertia, axis.damping
+    return Loop(
+        axis.name, key, d, np.array([d - ratio * gain, 0.0, -ratio]),
+        np.array([
+            [2.0 * omega - gain, -2.0 * omega, 0.0],
+            [omega * omega, -omega * omega, 0.0],
+        ]),
+    )  # fmt: skip

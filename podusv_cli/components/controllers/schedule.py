@@ -1,0 +1,126 @@
+"""A demand that is given over time, and a feedback that holds the vessel to the motion it makes."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Any, ClassVar, Literal, Self
+
+import numpy as np
+from pydantic import field_validator, model_validator
+
+from podusv_cli.components.controllers.base import Controller
+from podusv_cli.components.vessels.vessel import Vessel
+from podusv_cli.core.component import value
+from podusv_cli.core.interpolation import cubic, linear, segment
+from podusv_cli.core.kernel import Vector, kernel, tail
+from podusv_cli.core.kinematics import wrap
+from podusv_cli.core.signal import Signal
+from podusv_cli.core.timed_rows import timed_rows
+
+TIMED, STATES = 3, 6  # numbers of a row: time and demand; then the state, then the gains
+WITH_MOTION = TIMED + STATES + 2 * STATES
+DEMAND = ("t [s]", "tau_u [N]", "tau_r [N m]")
+MOTION = ("x [m]", "y [m]", "psi [rad]", "u [m/s]", "v [m/s]", "r [rad/s]")
+LAYOUTS = {TIMED: DEMAND, WITH_MOTION: (*DEMAND, *MOTION, "then the gains of tau_u and tau_r")}
+HOLD = 1.0  # the place of "hold" among the choices of `between`, as kernels know it
+# Where a row of the table has these, behind the demand: state and its rate, gains (surge, yaw).
+STATE, GAINS = 2, 2 + 2 * STATES
+FEEDBACK_U = Signal("feedback_u", "N", "surge force that departures from the scheduled motion add")
+FEEDBACK_R = Signal("feedback_r", "N m", "yaw moment that departures from the motion add")
+
+
+@lru_cache(maxsize=4)  # one schedule is read a dozen times in a run
+def _rows(text: str) -> Vector:
+    """The numbers in lines with commas, the heading continuous. Raises ValueError."""
+    rows = timed_rows(text, "the schedule", LAYOUTS)
+    if rows.shape[1] == WITH_MOTION:
+        rows[:, TIMED + 2] = np.unwrap(rows[:, TIMED + 2])
+    rows.flags.writeable = False
+    return rows
+
+
+class Schedule(Controller):
+    """tau(t) = tau_s(t) + K(t) (x_s(t) - x), of which the rows give tau_s, x_s and K.
+
+    Rows of three numbers (t, tau_u, tau_r) have no x_s: then there is no feedback. A hull that does
+    not keep its course by itself needs feedback to repeat a motion: every rounding error grows.
+    Demand and gains are straight lines between rows, x_s a cubic. Before the first and after the
+    last row the nearest row holds.
+    """
+
+    kind: Literal["schedule"] = "schedule"
+    texts_of: ClassVar[dict[str, str]] = {"file": "rows"}
+    signals: ClassVar[tuple[Signal, ...]] = (FEEDBACK_U, FEEDBACK_R)
+    file: str | None = value(None, "", "CSV file beside the scenario; its text is read into `rows`")
+    rows: str = value(
+        "", "", "lines of t [s], tau_u [N], tau_r [N m]; or of these, the state x, y, psi, u, v, r "
+        "and the gains from its errors, six of tau_u and six of tau_r",
+    )  # fmt: skip
+    between: Literal["linear", "hold"] = value(
+        "linear", "", "demand between rows: a straight line, or the last row's"
+    )
+    minimises: Literal["nothing", "iae", "ise"] = value(
+        "nothing", "", "the metric of which the motion is an optimum, where it is one"
+    )
+
+    @field_validator("rows")
+    @classmethod
+    def _readable(cls, rows: str) -> str:
+        _rows(rows)
+        return rows
+
+    @model_validator(mode="after")
+    def _given(self) -> Self:
+        if not self.rows:
+            raise ValueError("file is missing; name a CSV file with columns t, tau_u, tau_r")
+        return self
+
+    def optimum_of(self) -> str:
+        """What `minimises` says."""
+        return "" if self.minimises == "nothing" else self.minimises
+
+    def constants(self) -> dict[str, float]:
+        """The fields' choices, how many rows there are, and how many numbers in each of them."""
+        rows, columns = _rows(self.rows).shape
+        width = GAINS + 2 * STATES if columns == WITH_MOTION else 2
+        return super().constants() | {"rows_count": float(rows), "row_width": float(width)}
+
+    def table(self) -> Vector:
+        """The times, then the rows: demand; of those with a motion also state, rate, gains."""
+        times, demand, motion = np.split(_rows(self.rows), [1, TIMED], axis=1)
+        if not motion.size:
+            return np.concatenate([times.ravel(), demand.ravel()])
+        state, gains = np.split(motion, [STATES], axis=1)
+        rates = np.gradient(state, times.ravel(), axis=0)
+        return np.concatenate([times.ravel(), np.hstack([demand, state, rates, gains]).ravel()])
+
+    def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
+        """No memory."""
+        return np.zeros(0)
+
+    @staticmethod
+    @kernel
+    def law(
+        t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
+        tau: Vector, rate: Vector, signals: Vector, work: Vector,
+    ) -> None:  # fmt: skip
+        """The demand at t, and what the state's errors add."""
+        count, width = int(k.rows_count), int(k.row_width)
+        i = min(segment(t, count, table), count - 2)
+        length = table[i + 1] - table[i]
+        s = min(max((t - table[i]) / length, 0.0), 1.0)
+        a, b = tail(table, count + width * i), tail(table, count + width * (i + 1))
+        held = math.floor(s) if k.between == HOLD else s
+        tau[0], tau[1] = linear(held, a[0], b[0]), linear(held, a[1], b[1])
+        signals[0] = signals[1] = 0.0
+        if width > GAINS:
+            for j in range(STATES):
+                before, after = tail(a, STATE + j), tail(b, STATE + j)
+                there = cubic(s, length, before[0], after[0], before[STATES], after[STATES])
+                error = wrap(there - x[j]) if j == 2 else there - x[j]
+                g = GAINS + j
+                signals[0] += linear(s, a[g], b[g]) * error
+                signals[1] += linear(s, a[g + STATES], b[g + STATES]) * error
+        tau[0] += signals[0]
+        tau[1] += signals[1]

@@ -1,0 +1,76 @@
+"""A recorded load."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any, ClassVar, Literal, Self
+
+import numpy as np
+from pydantic import field_validator, model_validator
+
+from podusv_cli.components.disturbances.base import Disturbance
+from podusv_cli.core.component import value
+from podusv_cli.core.interpolation import linear, segment
+from podusv_cli.core.kernel import Vector, kernel, tail
+from podusv_cli.core.timed_rows import timed_rows
+
+LAYOUTS = {4: ("t [s]", "b_u [N]", "b_v [N]", "b_r [N m]")}
+
+
+@lru_cache(maxsize=4)  # one record is read a dozen times in a run
+def _rows(text: str) -> Vector:
+    """Raises ValueError."""
+    rows = timed_rows(text, "the record", LAYOUTS)
+    rows.flags.writeable = False
+    return rows
+
+
+class FromFile(Disturbance):
+    """A recorded load, in straight lines between its rows.
+
+    Before the first and after the last row the nearest row holds, as with the law `schedule`: a
+    record that is to end in calm water ends with a row of zeros.
+    """
+
+    of_time: ClassVar[bool] = True
+    kind: Literal["file"] = "file"
+    texts_of: ClassVar[dict[str, str]] = {"file": "rows"}
+    file: str | None = value(None, "", "CSV file beside the scenario; its text is read into `rows`")
+    rows: str = value("", "", "lines of t [s], b_u [N], b_v [N], b_r [N m], times increasing")
+
+    @field_validator("rows")
+    @classmethod
+    def _readable(cls, rows: str) -> str:
+        _rows(rows)
+        return rows
+
+    @model_validator(mode="after")
+    def _given(self) -> Self:
+        if not self.rows:
+            raise ValueError("file is missing; name a CSV file with columns t, b_u, b_v, b_r")
+        return self
+
+    def constants(self) -> dict[str, float]:
+        """How many rows there are."""
+        return {"count": float(len(_rows(self.rows)))}
+
+    def table(self) -> Vector:
+        """The times, then the loads row by row."""
+        rows = _rows(self.rows)
+        return np.concatenate([rows[:, 0], rows[:, 1:].ravel()])
+
+    def bounds(self) -> tuple[float, float, float]:
+        """The largest recorded magnitudes."""
+        u, v, r = np.abs(_rows(self.rows)[:, 1:]).max(axis=0).tolist()
+        return u, v, r
+
+    @staticmethod
+    @kernel
+    def evaluate(t: float, x: Vector, k: Any, table: Vector, b: Vector) -> None:
+        """The load between the two rows around t."""
+        count = int(k.count)
+        i = min(segment(t, count, table), count - 2)
+        s = min(max((t - table[i]) / (table[i + 1] - table[i]), 0.0), 1.0)
+        before, after = tail(table, count + 3 * i), tail(table, count + 3 * (i + 1))
+        for j in range(3):
+            b[j] = linear(s, before[j], after[j])

@@ -1,0 +1,104 @@
+"""The paper's disturbance (52): a mean, a sine and a cosine on every axis."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar, Literal, NamedTuple
+
+import numpy as np
+
+from podusv_cli.components.disturbances.base import Disturbance
+from podusv_cli.core.component import Component, value
+from podusv_cli.core.elementary import cos_sin
+from podusv_cli.core.kernel import LANES, Vector, filled, kernel, scratch, whole_lanes
+
+WAVES = 6  # a sine and a cosine on every axis
+
+
+class Wave(NamedTuple):
+    """cos cos(rate t) + sin sin(rate t)."""
+
+    rate: float
+    cos: float
+    sin: float
+
+
+class Harmonic(Component):
+    """mean + sin sin(sin_rate t + sin_phase) + cos cos(cos_rate t + cos_phase) on one axis.
+
+    In N, in yaw N m.
+    """
+
+    mean: float = value(0.0, "N or N m", "constant part")
+    sin: float = value(0.0, "N or N m", "amplitude of the sine")
+    sin_rate: float = value(0.2, "rad/s", "angular frequency of the sine", ge=0)
+    sin_phase: float = value(0.0, "rad", "angle of the sine at t = 0", ge=-1e6, le=1e6)
+    cos: float = value(0.0, "N or N m", "amplitude of the cosine")
+    cos_rate: float = value(0.2, "rad/s", "angular frequency of the cosine", ge=0)
+    cos_phase: float = value(0.0, "rad", "angle of the cosine at t = 0", ge=-1e6, le=1e6)
+
+    def waves(self) -> tuple[Wave, ...]:
+        """The sine and the cosine, each as a cosine and a sine without phase."""
+        c, s = cos_sin(self.sin_phase)
+        sine = Wave(self.sin_rate, float(self.sin * s), float(self.sin * c))
+        c, s = cos_sin(self.cos_phase)
+        return sine, Wave(self.cos_rate, float(self.cos * c), float(-self.cos * s))
+
+    def bound(self) -> float:
+        """What its magnitude never exceeds.
+
+        A wave of rate 0 is constant, and waves of one rate are one wave. Of two rates it is the sum
+        of the amplitudes, which the load reaches only where the rates have no common period.
+        """
+        sine, cosine = waves = self.waves()
+        if sine.rate == cosine.rate:
+            waves = (Wave(sine.rate, sine.cos + cosine.cos, sine.sin + cosine.sin),)
+        mean = self.mean + sum(wave.cos for wave in waves if wave.rate == 0.0)
+        moving = (math.hypot(wave.sin, wave.cos) for wave in waves if wave.rate > 0.0)
+        return sum(moving, abs(mean))
+
+
+class HarmonicDisturbance(Disturbance):
+    """Loads of (52); the defaults are its numbers."""
+
+    of_time: ClassVar[bool] = True
+    kind: Literal["harmonic"] = "harmonic"
+    scale: float = value(1.0, "", "factor on all three axes", ge=0)
+    b_u: Harmonic = value(
+        Harmonic(mean=0.5, sin=0.1, sin_rate=0.2, cos=0.3, cos_rate=0.5), "N", "surge force"
+    )
+    b_v: Harmonic = value(
+        Harmonic(mean=0.5, sin=0.2, sin_rate=0.2, cos=0.1, cos_rate=0.4), "N", "sway force"
+    )
+    b_r: Harmonic = value(
+        Harmonic(mean=0.5, sin=0.1, sin_rate=0.1, cos=0.1, cos_rate=0.2), "N m", "yaw moment"
+    )
+
+    def constants(self) -> dict[str, float]:
+        """The fields' numbers, and the length of the table's rows."""
+        return super().constants() | {"waves": float(whole_lanes(WAVES))}
+
+    def table(self) -> Vector:
+        """Rates of the waves, their cosines, their sines: three rows, the sines of (52) first."""
+        axes = (self.b_u.waves(), self.b_v.waves(), self.b_r.waves())
+        waves = [sine for sine, _ in axes] + [cosine for _, cosine in axes]
+        rows = np.zeros((3, whole_lanes(WAVES)))
+        rows[:, :WAVES] = np.transpose(waves) + 0.0  # no -0.0
+        return rows.ravel()
+
+    def bounds(self) -> tuple[float, float, float]:
+        """The bound of every axis, scaled."""
+        u, v, r = (self.scale * axis.bound() for axis in (self.b_u, self.b_v, self.b_r))
+        return u, v, r
+
+    @staticmethod
+    @kernel
+    def evaluate(t: float, x: Vector, k: Any, table: Vector, b: Vector) -> None:
+        """Equation (52), scaled."""
+        waves, count = scratch(LANES), int(k.waves)
+        for i in range(filled(count, WAVES)):
+            cosine, sine = cos_sin(table[i] * t)
+            waves[i] = table[count + i] * cosine + table[2 * count + i] * sine
+        b[0] = k.scale * (k.b_u_mean + waves[0] + waves[3])
+        b[1] = k.scale * (k.b_v_mean + waves[1] + waves[4])
+        b[2] = k.scale * (k.b_r_mean + waves[2] + waves[5])

@@ -1,0 +1,215 @@
+"""The sums over the components of `waves`, whose docstring has the equations."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from podusv_cli.components.disturbances.spectra import GROUP, cleared
+from podusv_cli.core.elementary import cos_sin, cos_sin_of_turns
+from podusv_cli.core.kernel import LANES, Vector, kernel, scratch, widest
+
+TURN = 2.0 * math.pi
+# Room for partial sums: of an envelope, of it and the motion, of four envelopes, of these as well.
+PAIR, LONG_ROOM, FACES, SHORT_ROOM = 2 * LANES, 6 * LANES, 8 * LANES, 15 * LANES
+
+
+@kernel
+def _added(sums: Vector, which: int) -> float:
+    """One sum from its eight parts."""
+    at = which * LANES
+    low = (sums[at] + sums[at + 1]) + (sums[at + 2] + sums[at + 3])
+    high = (sums[at + 4] + sums[at + 5]) + (sums[at + 6] + sums[at + 7])
+    return float(low + high)
+
+
+@kernel
+def _square(sums: Vector, which: int) -> float:
+    """Squared magnitude of an envelope."""
+    c, s = _added(sums, which), _added(sums, which + 1)
+    return c * c + s * s
+
+
+@kernel
+def _hull_axes(north: float, east: float, x: Vector, b: Vector) -> None:
+    """b[6], b[7] = u_w, v_w of the rate (north, east) of the motion, with psi_w in b[5]."""
+    c, s = cos_sin(b[5])
+    c_psi, s_psi = cos_sin(x[2] + b[5])
+    b[6] = (c - 1.0) * x[3] + s * x[4] + c_psi * north + s_psi * east
+    b[7] = (c - 1.0) * x[4] - s * x[3] + c_psi * east - s_psi * north
+
+
+@kernel
+def _wave(t: float, way: float, i: int, count: int, table: Vector) -> tuple[float, float]:
+    """Cosine and sine of a component's phase, times its amplitude; `way` is in turns."""
+    number, a = table[2 * count + i], table[3 * count + i]
+    c, s = cos_sin_of_turns(table[i] * t + table[count + i] - number * way)
+    return a * c, a * s
+
+
+@kernel
+def long_crested(
+    t: float, x: Vector, k: Any, table: Vector, b: Vector, again: float = 0.0, stage: float = 0.0
+) -> None:
+    """Drift load of waves that all go in one direction; but in a stage, motion and elevation."""
+    c_psi, s_psi = cos_sin(x[2])
+    c_gamma = c_psi * k.c_beta + s_psi * k.s_beta
+    s_gamma = c_psi * k.s_beta - s_psi * k.c_beta
+    way = (k.c_beta * x[0] + k.s_beta * x[1]) / TURN
+    if stage > 0.0:
+        envelope = _long_envelope(t, way, k, table)
+    else:
+        envelope = _long_motion(t, x, way, c_gamma, s_gamma, k, table, b)
+    b[0] = k.drift_u * c_gamma * abs(c_gamma) * envelope
+    b[1] = k.drift_v * s_gamma * abs(s_gamma) * envelope
+    b[2] = k.drift_arm * b[1]
+
+
+@kernel
+def _long_envelope(t: float, way: float, k: Any, table: Vector) -> float:
+    """Its squared magnitude. Sums lie in the kernel of their loop, or it gets no vector code."""
+    count, sums = int(k.lanes), scratch(PAIR)
+    widest()
+    cleared(PAIR, sums)
+    for block in range(count // GROUP):
+        for j in range(LANES):
+            for half in range(2):
+                c, s = _wave(t, way, block * GROUP + half * LANES + j, count, table)
+                sums[j] += c
+                sums[LANES + j] += s
+    return _square(sums, 0)
+
+
+@kernel
+def _long_motion(
+    t: float, x: Vector, way: float, c_gamma: float, s_gamma: float, k: Any, table: Vector,
+    b: Vector,
+) -> float:  # fmt: skip
+    """Put first-order motion, its velocity and the elevation into b; as `_long_envelope`."""
+    count, sums = int(k.lanes), scratch(LONG_ROOM)
+    slow = k.long2 * c_gamma * c_gamma + k.wide2 * s_gamma * s_gamma
+    both, speed = c_gamma * s_gamma, (c_gamma * x[3] + s_gamma * x[4]) / TURN
+    turning = 4.0 * (k.long2 - k.wide2) * both * x[5] / TURN
+    widest()
+    cleared(LONG_ROOM, sums)
+    for block in range(count // GROUP):
+        for j in range(LANES):
+            for half in range(2):
+                i = block * GROUP + half * LANES + j
+                c, s = _wave(t, way, i, count, table)
+                number = table[2 * count + i]
+                square = number * number
+                part = 1.0 / (1.0 + slow * square)
+                c_felt, s_felt = c * part * part, s * part * part
+                met, fading = table[i] - number * speed, turning * square * part
+                sums[j] += c
+                sums[LANES + j] += s
+                sums[2 * LANES + j] += s_felt
+                sums[3 * LANES + j] += c_felt * number
+                sums[4 * LANES + j] += c_felt * met - s_felt * fading
+                sums[5 * LANES + j] -= (s_felt * met + c_felt * fading) * number
+    moved, rate = k.motion * _added(sums, 2), k.motion * TURN * _added(sums, 4)
+    b[3], b[4] = moved * k.c_beta, moved * k.s_beta
+    b[5] = -k.motion * c_gamma * s_gamma * _added(sums, 3)
+    turned = s_gamma * s_gamma - c_gamma * c_gamma
+    _hull_axes(rate * k.c_beta, rate * k.s_beta, x, b)
+    b[8] = -k.motion * (both * TURN * _added(sums, 5) + turned * x[5] * _added(sums, 3))
+    b[9] = _added(sums, 0)
+    return _square(sums, 0)
+
+
+@kernel
+def short_crested(
+    t: float, x: Vector, k: Any, table: Vector, b: Vector, again: float = 0.0, stage: float = 0.0
+) -> None:
+    """The same of waves with a direction each.
+
+    Waves from ahead and astern, from port and starboard have envelopes of their own.
+    """
+    c_psi, s_psi = cos_sin(x[2])
+    if stage > 0.0:
+        _short_envelopes(t, x, c_psi, s_psi, k, table, b)
+    else:
+        _short_motion(t, x, c_psi, s_psi, k, table, b)
+
+
+@kernel
+def _facing(j: int, c: float, s: float, c_gamma: float, s_gamma: float, sums: Vector) -> None:
+    """Add to the envelopes of waves from ahead, from astern, from port and from starboard."""
+    ahead, astern = max(c_gamma, 0.0), max(-c_gamma, 0.0)
+    right, left = max(s_gamma, 0.0), max(-s_gamma, 0.0)
+    sums[j] += ahead * c
+    sums[LANES + j] += ahead * s
+    sums[2 * LANES + j] += astern * c
+    sums[3 * LANES + j] += astern * s
+    sums[4 * LANES + j] += right * c
+    sums[5 * LANES + j] += right * s
+    sums[6 * LANES + j] += left * c
+    sums[7 * LANES + j] += left * s
+
+
+@kernel
+def _drift(sums: Vector, k: Any, b: Vector) -> None:
+    b[0] = k.drift_u * (_square(sums, 0) - _square(sums, 2))
+    b[1] = k.drift_v * (_square(sums, 4) - _square(sums, 6))
+    b[2] = k.drift_arm * b[1]
+
+
+@kernel
+def _short_envelopes(
+    t: float, x: Vector, c_psi: float, s_psi: float, k: Any, table: Vector, b: Vector
+) -> None:
+    """The drift load alone."""
+    count, sums, north, east = int(k.lanes), scratch(FACES), x[0] / TURN, x[1] / TURN
+    widest()
+    cleared(FACES, sums)
+    for block in range(count // GROUP):
+        for j in range(LANES):
+            for half in range(2):
+                i = block * GROUP + half * LANES + j
+                c_beta, s_beta = table[4 * count + i], table[5 * count + i]
+                c, s = _wave(t, c_beta * north + s_beta * east, i, count, table)
+                c_gamma, s_gamma = c_psi * c_beta + s_psi * s_beta, c_psi * s_beta - s_psi * c_beta
+                _facing(j, c, s, c_gamma, s_gamma, sums)
+    _drift(sums, k, b)
+
+
+@kernel
+def _short_motion(
+    t: float, x: Vector, c_psi: float, s_psi: float, k: Any, table: Vector, b: Vector
+) -> None:
+    """The drift load, first-order motion, its velocity and the elevation."""
+    count, sums, north, east = int(k.lanes), scratch(SHORT_ROOM), x[0] / TURN, x[1] / TURN
+    turning = 4.0 * (k.long2 - k.wide2) * x[5]
+    widest()
+    cleared(SHORT_ROOM, sums)
+    for block in range(count // GROUP):
+        for j in range(LANES):
+            for half in range(2):
+                i = block * GROUP + half * LANES + j
+                number = table[2 * count + i]
+                c_beta, s_beta = table[4 * count + i], table[5 * count + i]
+                c, s = _wave(t, c_beta * north + s_beta * east, i, count, table)
+                c_gamma, s_gamma = c_psi * c_beta + s_psi * s_beta, c_psi * s_beta - s_psi * c_beta
+                _facing(j, c, s, c_gamma, s_gamma, sums)
+                slow = k.long2 * c_gamma * c_gamma + k.wide2 * s_gamma * s_gamma
+                square, both = number * number, c_gamma * s_gamma
+                part = 1.0 / (1.0 + slow * square)
+                felt = part * part
+                met = TURN * table[i] - number * (c_gamma * x[3] + s_gamma * x[4])
+                fading = turning * both * square * part
+                rate, fall = (c * met - s * fading) * felt, (s * met + c * fading) * felt
+                turned = (s_gamma - c_gamma) * (s_gamma + c_gamma) * x[5] * c * felt
+                sums[8 * LANES + j] += c
+                sums[9 * LANES + j] += s * felt * c_beta
+                sums[10 * LANES + j] += s * felt * s_beta
+                sums[11 * LANES + j] += c * felt * number * c_gamma * s_gamma
+                sums[12 * LANES + j] += rate * c_beta
+                sums[13 * LANES + j] += rate * s_beta
+                sums[14 * LANES + j] += (turned - fall * both) * number
+    _drift(sums, k, b)
+    b[3], b[4] = k.motion * _added(sums, 9), k.motion * _added(sums, 10)
+    b[5] = -k.motion * _added(sums, 11)
+    _hull_axes(k.motion * _added(sums, 12), k.motion * _added(sums, 13), x, b)
+    b[8] = -k.motion * _added(sums, 14)
+    b[9] = _added(sums, 8)

@@ -1,0 +1,196 @@
+"""Waves: the motion that sensors see, and the load by which they drive the vessel off.
+
+On the phase omega t - k (x cos beta + y sin beta) + eps of every component the vessel's own
+position acts, with k = omega^2/g of deep water: so a vessel under way meets the waves at their
+encounter frequency.
+
+First-order motion. At the surface, water moves on circles of the wave's amplitude a: by
+a sin(phase) in the direction beta in which the wave travels. A hull much shorter than the wave
+goes with it. A longer one feels the mean over its length L and beam B, and turns with the slope
+of its sway along the hull, -a k cos(gamma) sin(gamma) cos(phase), gamma = beta - psi. With
+stations that count as a bell of the same second moment as a box, L^2/12, mean and slope both
+get the factor e^-q, q = k^2 (L^2 cos^2 gamma + B^2 sin^2 gamma)/24. The factor here is
+(1 + q/2)^-2, the same for long waves and quicker; in head sea with waves as long as the hull it
+is 0.30, the mean over a box 0, over a parabolic waterline 0.30. This is motion in long waves:
+no resonance, no heave, roll or pitch, no first-order load. The motion is added to what sensors
+see, and the vessel's state goes on without it.
+
+Its velocity. Sensors of velocity see the rate of what sensors of position see, in the axes of the
+hull that yaws with the waves: R(psi + psi_w)^T (R(psi) (u, v) + (x_w, y_w)') and r + psi_w'. What
+this adds to (u, v, r) is (u_w, v_w, r_w). The rates are those of the sums, component by component:
+a phase runs with omega_e = omega - k (u cos gamma + v sin gamma), and gamma with -r, by which the
+factor changes as (1 + q/2)^-2 (-q'/(1 + q/2)), q' = k^2 (L^2 - B^2) r cos gamma sin gamma/12.
+
+Second-order drift. Radiation stress rho g a^2/4 presses with incoming and reflected waves (a
+and R a) from one side, with what passes from the other; as no energy is lost, the difference is
+rho g (R a)^2/2 a metre (Maruo 1960). A hull is taken as a box: ends of width B against waves
+from ahead or astern, sides of length L against the rest, so that X = c_u cos(gamma)
+|cos(gamma)| a^2 with c_u = rho g R_u^2 B/2, and Y likewise with L. Newman's approximation of
+the products of two waves makes the load c |sum of a |cos(gamma)| e^(i phase)|^2, which changes
+slowly. R does not depend on the frequency here; a real hull reflects hardly any long waves.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from typing import Any, ClassVar, Literal, Self
+
+import numpy as np
+from pydantic import model_validator
+
+from podusv_cli.components.disturbances import spectra
+from podusv_cli.components.disturbances.base import WAVE_MOTION, Disturbance
+from podusv_cli.components.disturbances.wave_kernels import TURN, long_crested, short_crested
+from podusv_cli.components.vessels.vessel import Vessel
+from podusv_cli.core.component import value
+from podusv_cli.core.elementary import cos_sin
+from podusv_cli.core.kernel import Vector, kernel
+from podusv_cli.core.signal import Signal
+
+STREAM = "waves"
+LEAST = 0.01  # of the spectrum's energy that the cut-offs must leave
+ELEVATION = Signal("zeta", "m", "elevation of the sea where the vessel is", r"\zeta")
+
+
+class Waves(Disturbance):
+    """Irregular waves as a sum of cosines: motion for the sensors, and slow drift as a load.
+
+    Motion is that of the water, filtered over the hull; drift has one coefficient per axis, from
+    the share of the waves that the hull reflects. Long waves, no resonance, no heave, roll, pitch.
+    """
+
+    adds_up: ClassVar[bool] = True  # swell and a wind sea
+    kind: Literal["waves"] = "waves"
+    height: float = value(..., "m", "significant wave height Hs", ge=1e-6, le=1e3)
+    period: float = value(..., "s", "period of the waves, see `period_is`", ge=1e-3, le=1e4)
+    period_is: spectra.Period = value(
+        "peak", "", "which period: of the spectrum's peak, mean (T1), or zero-crossing (Tz)"
+    )
+    direction: float = value(
+        0.0, "rad", "where the waves come from: 0 north, pi/2 east", ge=-1e6, le=1e6
+    )
+    spectrum: Literal["jonswap", "ittc"] = value(
+        "jonswap", "", "JONSWAP, or the ITTC's modified Pierson-Moskowitz spectrum"
+    )
+    gamma: float = value(3.3, "", "peakedness of the JONSWAP spectrum", ge=1, le=7)
+    spreading: int = value(
+        0, "", "n of the directions' density cos^2n; 0: all waves in one direction", ge=0, le=50
+    )
+    components: int = value(100, "", "how many cosines", ge=1, le=10_000)
+    lowest: float = value(
+        0.5, "", "least frequency of a component, in terms of the peak's", gt=0, le=1e3
+    )
+    highest: float = value(
+        4.0, "", "largest frequency of a component, in terms of the peak's", gt=0, le=1e3
+    )
+    motion: float = value(1.0, "", "factor on first-order motion; 0: none", ge=0)
+    reflection_u: float = value(
+        0.3, "", "share of a wave's amplitude that bow and stern reflect; podusv's choice", ge=0,
+        le=1,
+    )  # fmt: skip
+    reflection_v: float = value(
+        0.3, "", "share of a wave's amplitude that the sides reflect; podusv's choice", ge=0, le=1
+    )
+    drift_arm: float = value(0.0, "m", "where the drift force in sway acts, ahead of the origin")
+    seed: int = value(
+        1, "", "of rates, phases and directions", ge=0, lt=2**63
+    )  # fmt: skip
+
+    @model_validator(mode="after")
+    def _has_waves(self) -> Self:
+        if self.lowest >= self.highest:
+            raise ValueError(
+                f"lowest {self.lowest:g} must be below highest {self.highest:g}, both in terms of "
+                "the peak's frequency"
+            )
+        kept = math.fsum(self._variance()) / (self.height / 4.0) ** 2
+        if not kept >= LEAST:
+            raise ValueError(
+                f"between lowest {self.lowest:g} and highest {self.highest:g} the spectrum has "
+                f"{100 * kept:.1f} % of its energy, and must have {100 * LEAST:g} % or more; 0.5 "
+                "and 4 keep nearly all"
+            )
+        return self
+
+    @property
+    def signals(self) -> tuple[Signal, ...]:
+        """First-order motion, its velocity, and the elevation."""
+        return (*WAVE_MOTION, ELEVATION)
+
+    @property
+    def peak(self) -> float:
+        """The peak's angular frequency [rad/s]."""
+        return 2.0 * math.pi / (self.period * spectra.peak_period(self._gamma, self.period_is))
+
+    def sea(self) -> tuple[float, float]:
+        """Height and peak."""
+        return self.height, self.peak
+
+    @property
+    def _gamma(self) -> float:
+        return self.gamma if self.spectrum == "jonswap" else 1.0
+
+    def _edges(self) -> Vector:
+        return spectra.even_edges(
+            self.lowest * self.peak, self.highest * self.peak, self.components
+        )
+
+    def _variance(self) -> Vector:
+        def density(rate: Vector) -> Vector:
+            return spectra.jonswap(rate, self.height, self.peak, self._gamma)
+
+        return spectra.in_bins(density, self._edges())
+
+    def table(self) -> Vector:
+        """Rows of rates and phases in turns, wave numbers, amplitudes, directions of travel."""
+        count = self.components
+        drawn = spectra.cosines(self._variance(), self._edges(), self.seed, STREAM)
+        away = spectra.directions(self.spreading, count, self.seed, STREAM)
+        c, s = np.transpose([cos_sin(self._travel + angle) for angle in away.tolist()])
+        number = drawn.rate * drawn.rate / spectra.GRAVITY
+        rows = np.zeros((6, spectra.whole_groups(count)))
+        rows[:, :count] = drawn.rate / TURN, drawn.phase / TURN, number, drawn.amplitude, c, s
+        return rows.ravel()
+
+    @property
+    def _travel(self) -> float:
+        """Where the waves go."""
+        return self.direction + math.pi
+
+    def constants_with(self, vessel: Vessel) -> dict[str, float]:
+        """What the kernel needs: sizes, direction, the hull's lengths, drift coefficients."""
+        pressure = 0.5 * spectra.WATER * spectra.GRAVITY
+        c_beta, s_beta = cos_sin(self._travel)
+        return {
+            "lanes": float(spectra.whole_groups(self.components)), "motion": self.motion,
+            "c_beta": float(c_beta), "s_beta": float(s_beta),
+            "long2": vessel.length**2 / 48.0, "wide2": vessel.beam**2 / 48.0,
+            "drift_u": pressure * self.reflection_u**2 * vessel.beam,
+            "drift_v": pressure * self.reflection_v**2 * vessel.length,
+            "drift_arm": self.drift_arm,
+        }  # fmt: skip
+
+    def kernel_with(self, vessel: Vessel) -> Callable[..., None]:
+        """One for waves in one direction, and a slower one for waves in many."""
+        return short_crested if self.spreading else self.evaluate
+
+    def conflicts(self, vessel: Vessel, step: float) -> Iterator[tuple[str, str]]:
+        """A cut-off that the step cannot resolve."""
+        most = math.pi / step
+        if self.highest * self.peak > most:
+            yield (
+                "highest",
+                f"waves up to {self.highest * self.peak:.4g} rad/s ({self.highest:g} times the "
+                f"peak's {self.peak:.4g}) are too fast for steps of {step:g} s, which resolve "
+                f"{most:.4g} rad/s at most; give a smaller `highest` or `simulation.step`",
+            )
+
+    @staticmethod
+    @kernel
+    def evaluate(
+        t: float, x: Vector, k: Any, table: Vector, b: Vector, again: float = 0.0,
+        stage: float = 0.0,
+    ) -> None:  # fmt: skip
+        """Of long-crested waves; see `kernel_with`."""
+        long_crested(t, x, k, table, b, again, stage)

@@ -1,0 +1,190 @@
+"""Wind: its mean, gusts, and the load by Blendermann's formulas."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any, Literal, Self
+
+import numpy as np
+from pydantic import model_validator
+
+from podusv_cli.components.disturbances import spectra
+from podusv_cli.components.disturbances.base import Disturbance
+from podusv_cli.components.disturbances.spectra import GROUP, cleared
+from podusv_cli.components.vessels.vessel import Vessel
+from podusv_cli.core.component import value
+from podusv_cli.core.elementary import cos_sin, cos_sin_of_turns
+from podusv_cli.core.kernel import Vector, kernel, scratch, widest
+from podusv_cli.core.kinematics import direction
+from podusv_cli.core.signal import Signal
+
+STREAM = "wind"
+LEVER = 0.18  # of the yaw moment, by Blendermann
+SPEED = Signal("V_w", "m/s", "wind speed at the height where it acts, with gusts")
+FROM = Signal("beta_w", "rad", "direction that the wind comes from", r"\beta_w")
+
+
+@kernel
+def _gust(t: float, count: int, table: Vector) -> float:
+    """The sum of all components, by sixteen partial sums, in groups of four."""
+    sums = scratch(GROUP)
+    widest()
+    cleared(GROUP, sums)
+    for block in range(count // GROUP):
+        for j in range(GROUP):
+            i = block * GROUP + j
+            c, _ = cos_sin_of_turns(table[i] * t + table[count + i])
+            sums[j] += table[2 * count + i] * c
+    total = 0.0
+    for j in range(0, GROUP, 4):
+        total += (sums[j] + sums[j + 1]) + (sums[j + 2] + sums[j + 3])
+    return total
+
+
+@kernel
+def blendermann(u_r: float, v_r: float, k: Any, b: Vector) -> None:
+    """Load of the wind on a hull that moves by (u_r, v_r) through the air.
+
+    X = q C_X A_F, Y = q C_Y A_L, N = q C_N A_L L with q = rho V_r^2/2 and gamma = -atan2(v_r, u_r),
+    0 in wind from ahead: C_X = -CD_l cos(gamma)/D, C_Y = CD_t sin(gamma)/D, C_N = (s_L/L -
+    0.18 (|gamma| - pi/2)) C_Y, D = 1 - delta/2 (1 - (CD_l A_F/A_L)/CD_t) sin^2(2 gamma). Seen in
+    cybergalactic/MSS, blendermann94.m, which has gamma in place of |gamma|: right for wind from one
+    side only, as the formula was published; a hull with two equal sides needs |gamma|.
+    """
+    square = u_r * u_r + v_r * v_r
+    b[0] = b[1] = b[2] = 0.0
+    if square > 0.0:
+        speed = math.sqrt(square)
+        c, s = u_r / speed, -v_r / speed
+        drag = k.CD_l_bow if c >= 0.0 else k.CD_l_stern
+        double = 2.0 * s * c
+        share = 1.0 - drag * k.A_F / (k.A_L * k.CD_t)
+        pressure = 0.5 * k.density * square / (1.0 - 0.5 * k.delta * share * double * double)
+        b[0] = -pressure * drag * c * k.A_F
+        b[1] = pressure * k.CD_t * s * k.A_L
+        angle = abs(direction(u_r, v_r))
+        b[2] = (k.s_L - LEVER * (angle - 0.5 * math.pi) * k.length) * b[1]
+
+
+class Wind(Disturbance):
+    """Wind from one direction, with gusts: a load on what the vessel has above the water.
+
+    The mean at `at` follows the logarithmic profile U = U10 (1 + 2.5 sqrt(drag) ln(at/10)). Gusts
+    are a sum of cosines with the spectrum chosen, the same all over the vessel and along the mean
+    wind only. The load is the steady one of the relative wind at every instant.
+    """
+
+    kind: Literal["wind"] = "wind"
+    speed: float = value(..., "m/s", "mean speed 10 m above the sea", gt=0)
+    direction: float = value(
+        0.0, "rad", "where the wind comes from: 0 north, pi/2 east", ge=-1e6, le=1e6
+    )
+    at: float = value(
+        10.0, "m", "height at which the wind is taken that acts on the vessel", gt=0, le=1e3
+    )
+    drag: float = value(
+        0.0026, "", "drag coefficient of the sea's surface, of the profile and the Harris spectrum",
+        gt=0, le=0.1,
+    )  # fmt: skip
+    gusts: Literal["none", "norsok", "harris"] = value(
+        "none", "", "spectrum of the gusts: none, NORSOK (Froya), or Harris"
+    )
+    components: int = value(50, "", "how many cosines make the gusts", ge=1, le=10_000)
+    lowest: float = value(
+        1.0 / 600.0, "Hz", "least frequency of a gust; slower changes belong to the mean", gt=0
+    )
+    highest: float = value(0.5, "Hz", "largest frequency of a gust", gt=0)
+    density: float = value(1.225, "kg/m3", "density of the air", gt=0)
+    seed: int = value(1, "", "of rates and phases of the gusts", ge=0, lt=2**63)
+
+    @model_validator(mode="after")
+    def _blows(self) -> Self:
+        if self.lowest >= self.highest:
+            raise ValueError(
+                f"lowest {self.lowest:g} Hz must be below highest {self.highest:g} Hz; 0.0017 and "
+                "0.5 are usual"
+            )
+        if self.mean <= 0.0:
+            calm = 10.0 * math.exp(-0.4 / math.sqrt(self.drag))
+            raise ValueError(
+                f"at {self.at:g} m the profile has no wind left, which ends {calm:.3g} m above the "
+                "sea; give a larger `at`"
+            )
+        return self
+
+    @property
+    def mean(self) -> float:
+        """The mean speed at the height where it acts [m/s]."""
+        return self.speed * (1.0 + 2.5 * math.sqrt(self.drag) * math.log(self.at / 10.0))
+
+    @property
+    def signals(self) -> tuple[Signal, ...]:
+        """Speed and direction."""
+        return SPEED, FROM
+
+    def has_gusts(self) -> bool:
+        """Whether a spectrum is given."""
+        return self.gusts != "none"
+
+    def table(self) -> Vector:
+        """Rows of rates and phases in turns, and amplitudes; no rows without gusts."""
+        if self.gusts == "none":
+            return np.zeros(1)
+        edges = spectra.growing_edges(self.lowest, self.highest, self.components)
+        drawn = spectra.cosines(spectra.in_bins(self._density, edges), edges, self.seed, STREAM)
+        rows = np.zeros((3, spectra.whole_groups(self.components)))
+        phase = drawn.phase / (2.0 * math.pi)
+        rows[:, : self.components] = drawn.rate, phase, drawn.amplitude
+        return rows.ravel()
+
+    def _density(self, frequency: Vector) -> Vector:
+        if self.gusts == "norsok":
+            return spectra.norsok(frequency, self.speed, self.at)
+        return spectra.harris(frequency, self.speed, self.drag)
+
+    def constants_with(self, vessel: Vessel) -> dict[str, float]:
+        """What the kernel needs: mean wind, number of components, windage.
+
+        Raises ValueError for a vessel without windage.
+        """
+        if vessel.windage is None:
+            raise ValueError(NO_WINDAGE)
+        c, s = cos_sin(self.direction)
+        return vessel.windage.constants() | {
+            "length": vessel.length, "mean": self.mean, "density": self.density,
+            "direction": self.direction, "c_from": float(c), "s_from": float(s),
+            "lanes": 0.0 if self.gusts == "none" else float(spectra.whole_groups(self.components)),
+        }  # fmt: skip
+
+    def conflicts(self, vessel: Vessel, step: float) -> Iterator[tuple[str, str]]:
+        """A vessel without windage, or gusts that the step cannot resolve."""
+        if vessel.windage is None:
+            yield "kind", NO_WINDAGE
+        if self.gusts != "none" and self.highest > 0.5 / step:
+            yield (
+                "highest",
+                f"gusts up to {self.highest:g} Hz are too fast for steps of {step:g} s, which "
+                f"resolve {0.5 / step:.4g} Hz at most; give a smaller `highest` or "
+                "`simulation.step`",
+            )
+
+    @staticmethod
+    @kernel
+    def evaluate(
+        t: float, x: Vector, k: Any, table: Vector, b: Vector, again: float = 0.0,
+        stage: float = 0.0,
+    ) -> None:  # fmt: skip
+        """The load, the wind's speed and where it comes from; the speed depends on t alone."""
+        c_psi, s_psi = cos_sin(x[2])
+        speed = b[3] if again > 0.0 else k.mean + _gust(t, int(k.lanes), table)
+        ahead = c_psi * k.c_from + s_psi * k.s_from
+        aside = c_psi * k.s_from - s_psi * k.c_from
+        blendermann(x[3] + speed * ahead, x[4] + speed * aside, k, b)
+        b[3], b[4] = speed, k.direction
+
+
+NO_WINDAGE = (
+    "the vessel has no windage, so no wind can act on it; give vessel.windage its areas A_F and "
+    "A_L [m2], or take a preset that has them"
+)

@@ -1,0 +1,83 @@
+"""What every estimator offers."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import numpy as np
+
+from podusv_cli.components.vessels.vessel import Vessel
+from podusv_cli.core.component import Component
+from podusv_cli.core.kernel import Vector
+from podusv_cli.core.signal import STATE, Signal
+
+# Not `u_hat`: laws with an observer of their own log that.
+ESTIMATE = tuple(
+    Signal(f"{q.name}_est", q.unit, f"estimated {q.meaning}", rf"{q.symbol}_{{est}}") for q in STATE
+)
+# What the nominal vessel does not explain, as two of the estimators know it.
+LOADS = (
+    Signal("b_est_x", "N", "estimated load, north", r"b_{est,x}"),
+    Signal("b_est_y", "N", "estimated load, east", r"b_{est,y}"),
+    Signal("b_est_psi", "N m", "estimated load, about the vertical", r"b_{est,\psi}"),
+)
+POSE_ALONE = (True, True, True, False, False, False)  # x, y, psi have to be measured
+
+
+class Estimator(Component):
+    """From measurements to the state that the law works with.
+
+    Its own state is part of the closed loop's, and its first six numbers are the estimate. Two
+    kernels move it. `correct(t, seen, state, k, table)` is called at every instant, after the
+    measurement: it may change the state where something was delivered. `follow(t, seen, tau,
+    state, k, table, rate)` writes the state's rate, between the instants too; `tau` are the loads
+    (surge, sway, yaw) that the actuator produces. `seen` is laid out as in `measurements.base`.
+    """
+
+    noun: ClassVar[str] = "estimator"
+
+    @property
+    def states(self) -> tuple[Signal, ...]:
+        """Every number of its state, in order; the estimate first."""
+        return ESTIMATE
+
+    def assumed_noise(self) -> tuple[tuple[str, float], ...]:
+        """For each number of the state the key and value of the noise that is assumed, or ""."""
+        return (("", 0.0),) * len(ESTIMATE)
+
+    @staticmethod
+    def correct(t: float, seen: Vector, state: Vector, k: Any, table: Vector) -> None:
+        """Take what was delivered at this instant into the state."""
+        raise NotImplementedError
+
+    @staticmethod
+    def follow(
+        t: float, seen: Vector, tau: Vector, state: Vector, k: Any, table: Vector, rate: Vector
+    ) -> None:
+        """Write the rate of the state."""
+        raise NotImplementedError
+
+    def needs(self) -> tuple[bool, ...]:
+        """Which of x, y, psi, u, v, r have to be measured."""
+        return (True,) * len(ESTIMATE)
+
+    def lacking(self, measured: tuple[bool, ...]) -> str:
+        """What it needs and is not measured, in a sentence; else empty."""
+        pairs = zip(STATE, self.needs(), measured, strict=True)
+        missing = [state.name for state, needed, known in pairs if needed and not known]
+        if not missing:
+            return ""
+        text = f"needs {', '.join(missing)} measured; give a sensor, or an estimator that can"
+        return f"{text} do without"
+
+    def constants_with(self, nominal: Vessel) -> dict[str, float]:
+        """Its constants `k`, with those of the vessel that the law is told about."""
+        return nominal.constants() | self.constants()
+
+    def start(self, x: Vector, nominal: Vessel) -> Vector:
+        """Its state at t = 0, where the vessel's state is x: the truth, and zeros behind it."""
+        return np.concatenate([x, np.zeros(len(self.states) - len(ESTIMATE))])
+
+    def shortest_lag(self) -> float:
+        """The smallest time constant of its continuous part [s]; infinite without one."""
+        return float("inf")

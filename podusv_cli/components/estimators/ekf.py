@@ -1,0 +1,176 @@
+"""Extended Kalman filter: continuous between deliveries, discrete at them.
+
+The state is (x, y, psi, u, v, r) and a load (north, east, about the vertical) that wanders as a
+Wiener process. Between deliveries
+
+    eta' = R(psi) nu,   M nu' = f(nu) + tau + R(psi)^T b,   b' = 0,   P' = F P + P F^T + Q
+
+with the nominal vessel's Coriolis and damping force f and the derivative F of the right-hand sides
+at the estimate. Q is diagonal: q_u^2 and so on for accelerations that the model does not explain,
+q_b^2 for the load. Where something is delivered, one value after the other is taken in, so no
+matrix has to be inverted: for value z of state i with standard deviation sigma
+
+    s = P_ii + sigma^2,   x += P_:i (z - x_i)/s,   P -= P_:i P_i:/s
+
+and for the heading z - x_i is brought into (-pi, pi]. Source: A. Gelb (ed.), "Applied Optimal
+Estimation", MIT Press 1974, table 6.1-1, for the filter; sequential scalar updates are exact since
+the measurements' errors are independent. P is a part of the loop's state and integrated with it, as
+its upper triangle by rows.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+
+from podusv_cli.components.estimators.base import ESTIMATE, LOADS, POSE_ALONE, Estimator
+from podusv_cli.components.estimators.slopes import slopes
+from podusv_cli.components.measurements.base import FRESH, VALUE
+from podusv_cli.components.vessels.plant import plant
+from podusv_cli.components.vessels.vessel import Vessel
+from podusv_cli.core.component import value
+from podusv_cli.core.elementary import cos_sin
+from podusv_cli.core.kernel import Vector, kernel, scratch, tail
+from podusv_cli.core.kinematics import wrap
+from podusv_cli.core.signal import Signal
+
+N = 9  # numbers that are estimated: pose, velocities, loads
+MOVING = 6  # of them, those that something known makes change
+COVARIANCE = Signal(
+    "P_est", "", "covariance of the estimate's errors and the loads', upper triangle by rows; each "
+    "entry in the product of two units", "P", ("entry",),
+)  # fmt: skip
+
+
+@kernel
+def unpacked(packed: Vector, full: Vector) -> None:
+    """A symmetric matrix from its upper triangle."""
+    at = 0
+    for i in range(N):
+        for j in range(i, N):
+            full[N * i + j] = packed[at]
+            full[N * j + i] = packed[at]
+            at += 1
+
+
+@kernel
+def spread(f: Vector, packed: Vector, q: Vector, rate: Vector) -> None:
+    """P' = F P + P F^T + Q; F has entries in rows 0 to 5 and columns 2 to 8 alone."""
+    full, moved = scratch(81), scratch(81)
+    unpacked(packed, full)
+    for i in range(MOVING):
+        for j in range(N):
+            total = 0.0
+            for c in range(2, N):
+                total += f[N * i + c] * full[N * c + j]
+            moved[N * i + j] = total
+    for i in range(N * MOVING, N * N):
+        moved[i] = 0.0
+    at = 0
+    for i in range(N):
+        for j in range(i, N):
+            rate[at] = moved[N * i + j] + moved[N * j + i]
+            at += 1
+        rate[at - N + i] += q[i]
+
+
+@kernel
+def take_in(i: int, innovation: float, sigma: float, state: Vector) -> None:
+    """Correct estimate and covariance by one measured value."""
+    full = scratch(81)
+    packed = tail(state, N)
+    unpacked(packed, full)
+    gain = 1.0 / (full[N * i + i] + sigma * sigma)
+    for j in range(N):
+        state[j] += full[N * j + i] * gain * innovation
+    at = 0
+    for j in range(N):
+        for c in range(j, N):
+            packed[at] -= full[N * j + i] * gain * full[N * i + c]
+            at += 1
+
+
+@kernel
+def wanderings(k: Any, q: Vector) -> None:
+    """The diagonal of Q."""
+    q[0] = q[1] = q[2] = 0.0
+    q[3], q[4], q[5] = k.q_u * k.q_u, k.q_v * k.q_v, k.q_r * k.q_r
+    q[6] = q[7] = k.q_b * k.q_b
+    q[8] = k.q_b_psi * k.q_b_psi
+
+
+class ExtendedKalmanFilter(Estimator):
+    """The estimate with the least mean square error, as far as the model is right.
+
+    The standard deviations are by default those of the measurement `sensors`.
+    """
+
+    kind: Literal["ekf"] = "ekf"
+    bias: bool = value(True, "", "whether it estimates a load, too")
+    q_u: float = value(0.02, "m/s2/sqrt(Hz)", "unexplained surge acceleration", ge=0)
+    q_v: float = value(0.02, "m/s2/sqrt(Hz)", "unexplained sway acceleration", ge=0)
+    q_r: float = value(0.02, "rad/s2/sqrt(Hz)", "unexplained yaw acceleration", ge=0)
+    q_b: float = value(0.1, "N/sqrt(s)", "how fast the load's force wanders", ge=0)
+    q_b_psi: float = value(0.05, "N m/sqrt(s)", "how fast the load's moment wanders", ge=0)
+    sigma_b: float = value(1.0, "N", "standard deviation of the force at the start", ge=0)
+    sigma_b_psi: float = value(0.5, "N m", "standard deviation of the moment at the start", ge=0)
+    sigma_p: float = value(0.02, "m", "standard deviation of a measured position, each axis", gt=0)
+    sigma_psi: float = value(0.005, "rad", "standard deviation of a measured heading", gt=0)
+    sigma_u: float = value(0.02, "m/s", "standard deviation of a measured surge velocity", gt=0)
+    sigma_v: float = value(0.02, "m/s", "standard deviation of a measured sway velocity", gt=0)
+    sigma_r: float = value(0.002, "rad/s", "standard deviation of a measured yaw rate", gt=0)
+
+    @property
+    def states(self) -> tuple[Signal, ...]:
+        """The estimate, the load, the covariance."""
+        return (*ESTIMATE, *LOADS, *[COVARIANCE] * (N * (N + 1) // 2))
+
+    def assumed_noise(self) -> tuple[tuple[str, float], ...]:
+        """The standard deviations that measurements are taken to have."""
+        names = ("sigma_p", "sigma_p", "sigma_psi", "sigma_u", "sigma_v", "sigma_r")
+        return tuple((name, getattr(self, name)) for name in names)
+
+    def constants(self) -> dict[str, float]:
+        """Without a load, one that is 0 and does not wander."""
+        without = {} if self.bias else dict.fromkeys(("q_b", "q_b_psi"), 0.0)
+        return super().constants() | without
+
+    @staticmethod
+    @kernel
+    def correct(t: float, seen: Vector, state: Vector, k: Any, table: Vector) -> None:
+        """Take in what was delivered, one value after the other."""
+        sigma = scratch(6)
+        sigma[0], sigma[1], sigma[2] = k.sigma_p, k.sigma_p, k.sigma_psi
+        sigma[3], sigma[4], sigma[5] = k.sigma_u, k.sigma_v, k.sigma_r
+        for i in range(MOVING):
+            if seen[FRESH + i] != 0.0:
+                innovation = seen[VALUE + i] - state[i]
+                take_in(i, wrap(innovation) if i == 2 else innovation, sigma[i], state)
+
+    @staticmethod
+    @kernel
+    def follow(
+        t: float, seen: Vector, tau: Vector, state: Vector, k: Any, table: Vector, rate: Vector
+    ) -> None:
+        """The nominal vessel, and how far the estimate may be off it."""
+        cosine, sine = cos_sin(state[2])
+        b, f, q = scratch(3), scratch(54), scratch(9)
+        b[0] = cosine * state[6] + sine * state[7]
+        b[1] = cosine * state[7] - sine * state[6]
+        b[2] = state[8]
+        plant(state, tau, b, k, rate)
+        rate[6] = rate[7] = rate[8] = 0.0
+        slopes(state, b, cosine, sine, k, f)
+        wanderings(k, q)
+        spread(f, tail(state, N), q, tail(rate, N))
+
+    def start(self, x: Vector, nominal: Vessel) -> Vector:
+        """The truth; of the load nothing is known but how large it may be."""
+        force, moment = (self.sigma_b, self.sigma_b_psi) if self.bias else (0.0, 0.0)
+        unsure = np.diag(np.square([0.0] * MOVING + [force, force, moment]))
+        return np.concatenate([x, np.zeros(3), unsure[np.triu_indices(N)]])
+
+    def needs(self) -> tuple[bool, ...]:
+        """The pose; velocities are taken in where they are measured."""
+        return POSE_ALONE

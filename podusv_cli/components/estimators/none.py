@@ -1,0 +1,32 @@
+"""Measurements as they are."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from podusv_cli.components.estimators.base import Estimator
+from podusv_cli.components.measurements.base import FRESH
+from podusv_cli.core.kernel import Vector, kernel
+
+
+class NoEstimator(Estimator):
+    """The law works with each value as it was delivered last."""
+
+    kind: Literal["none"] = "none"
+
+    @staticmethod
+    @kernel
+    def correct(t: float, seen: Vector, state: Vector, k: Any, table: Vector) -> None:
+        """Take over what is new."""
+        for i in range(6):
+            if seen[FRESH + i] != 0.0:
+                state[i] = seen[i]
+
+    @staticmethod
+    @kernel
+    def follow(
+        t: float, seen: Vector, tau: Vector, state: Vector, k: Any, table: Vector, rate: Vector
+    ) -> None:
+        """Nothing moves between two deliveries."""
+        for i in range(6):
+            rate[i] = 0.0

@@ -1,0 +1,143 @@
+"""A path through given points, smooth or with corners."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar, Literal, Self
+
+import numpy as np
+from pydantic import model_validator
+
+from podusv_cli.components.paths.base import Break, Path, Point
+from podusv_cli.core.component import value
+from podusv_cli.core.interpolation import segment
+from podusv_cli.core.kernel import Vector, kernel
+
+ALIGNED = 1e-9  # of the speed; a smaller change of velocity is rounding
+LOOP = 2.0  # the place of "loop" among the choices of `after`, as kernels know it
+
+
+class Waypoints(Path):
+    """A natural cubic spline through the points, in the time that chords at `speed` would take.
+
+    Position, velocity and acceleration are continuous, so the speed varies a little in bends. With
+    `legs: straight` the target goes along the chords at `speed`, and its velocity jumps at corners.
+    After the last point the target goes straight on with the speed it has there, or stops, or goes
+    back to the first point and round again.
+    """
+
+    kind: Literal["waypoints"] = "waypoints"
+    rows_of: ClassVar[dict[str, str]] = {"file": "points"}
+    file: str | None = value(
+        None, "", "CSV file with one `x,y` [m] a line, beside the scenario; read into `points`"
+    )
+    points: tuple[Point, ...] = value(
+        (), "m", "list of [x, y], at least two, neighbours apart", strict=False
+    )
+    speed: float = value(0.5, "m/s", "speed along the chords between the points", gt=0)
+    legs: Literal["spline", "straight"] = value(
+        "spline", "", "between the points: a smooth spline, or straight lines with corners"
+    )
+    after: Literal["continue", "stop", "loop"] = value(
+        "continue", "", "after the last point: straight on, a stop, or from there to the first "
+        "point and round again",
+    )  # fmt: skip
+
+    @model_validator(mode="after")
+    def _travelled(self) -> Self:
+        if len(self.points) < 2:
+            raise ValueError(f"needs at least two points, has {len(self.points)}")
+        with np.errstate(all="ignore"):
+            knots = self._knots()
+            if np.any(np.diff(knots) <= 0):
+                raise ValueError("two neighbouring points are the same")
+            if not self._has_numbers(knots):
+                raise ValueError(
+                    "the times or the course are beyond all numbers; points are too far apart or "
+                    "too near, or the speed is too small or too large"
+                )
+        return self
+
+    def _has_numbers(self, knots: Vector) -> bool:
+        """Whether a bound of all numbers on the way to the spline's coefficients is finite."""
+        steps, size = np.diff(knots), np.abs(self._course()).max()
+        scales = np.maximum(steps, 1.0).max() ** 2 / np.minimum(steps, 1.0).min() ** 3
+        return bool(np.isfinite(1e3 * (size + 1.0) * scales))
+
+    def waypoints(self) -> tuple[Point, ...]:
+        """The points as they are given."""
+        return self.points
+
+    def runs_on_from(self) -> float:
+        """When the target passes the last point, if it goes straight on."""
+        return float(self._knots()[-1]) if self.after == "continue" else math.inf
+
+    def breaks(self) -> tuple[Break, ...]:
+        """The corners, and the stop at the last point; of a loop those of the first round."""
+        corners = self._corners() if self.legs == "straight" else ()
+        stop = (float(self._knots()[-1]),) if self.after == "stop" else ()
+        return tuple(Break(time, "velocity") for time in (*corners, *stop))
+
+    def _corners(self) -> tuple[float, ...]:
+        """When the target passes from a leg to one of another direction [s]."""
+        legs, knots = np.diff(self._course(), axis=0), self._knots()
+        velocities = legs / np.diff(knots)[:, None]
+        if self.after == "loop":  # the last leg is followed by the first
+            velocities = np.vstack([velocities, velocities[:1]])
+        turns = np.abs(np.diff(velocities, axis=0)).max(axis=1) > ALIGNED * self.speed
+        return tuple(knots[1:][: len(turns)][turns].tolist())
+
+    def _course(self) -> Vector:
+        """The points that the spline goes through; a loop ends where it begins."""
+        closing = (
+            self.points[:1] if self.after == "loop" and self.points[0] != self.points[-1] else ()
+        )
+        return np.asarray((*self.points, *closing), float)
+
+    def _knots(self) -> Vector:
+        """Time [s] at which the target passes each point."""
+        chords = np.hypot(*np.diff(self._course(), axis=0).T)
+        return np.concatenate([[0.0], np.cumsum(chords)]) / self.speed
+
+    def constants(self) -> dict[str, float]:
+        """The speed, what comes after, the number of points, and the time that they take."""
+        knots = self._knots()
+        return super().constants() | {"count": float(len(knots)), "period": float(knots[-1])}
+
+    def table(self) -> Vector:
+        """The knots, then eight coefficients a knot: cubic in x and in y, highest power first."""
+        knots, cubic = self._knots(), self._cubic()
+        end = cubic(knots[-1])
+        velocity = np.zeros(2) if self.after == "stop" else cubic(knots[-1], 1)
+        last = np.concatenate([[0, 0], velocity, end])
+        rows = np.vstack(
+            [cubic.c.transpose(1, 2, 0).reshape(-1, 8), last[[0, 1, 2, 4, 0, 1, 3, 5]]]
+        )
+        return np.concatenate([knots, rows.ravel()])
+
+    def _cubic(self) -> Any:
+        """Piecewise cubic polynomials of the time through the points."""
+        from scipy.interpolate import CubicSpline, PPoly
+
+        knots, course = self._knots(), self._course()
+        if self.legs == "straight":
+            slopes = np.diff(course, axis=0) / np.diff(knots)[:, None]
+            nothing = np.zeros_like(slopes)
+            return PPoly(np.stack([nothing, nothing, slopes, course[:-1]]), knots)
+        ends = "periodic" if self.after == "loop" else "natural"
+        return CubicSpline(knots, course, bc_type=ends)
+
+    @staticmethod
+    @kernel
+    def evaluate(t: float, k: Any, table: Vector, target: Vector) -> None:
+        """The spline and its derivatives, by Horner's rule."""
+        count = int(k.count)
+        if k.after == LOOP:
+            t -= k.period * math.floor(t / k.period)
+        i = segment(t, count, table)
+        s = t - table[i]
+        for axis in range(2):
+            c = count + 8 * i + 4 * axis
+            target[axis] = ((table[c] * s + table[c + 1]) * s + table[c + 2]) * s + table[c + 3]
+            target[2 + axis] = (3.0 * table[c] * s + 2.0 * table[c + 1]) * s + table[c + 2]
+            target[4 + axis] = 6.0 * table[c] * s + 2.0 * table[c + 1]

@@ -1,0 +1,1 @@
+"""A kernel in, a C function out: signatures, compilers, and compiled code on disk."""

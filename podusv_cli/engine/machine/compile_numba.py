@@ -1,0 +1,136 @@
+"""Object code of kernels by numba. `object_cache` keeps it on the disk for later processes."""
+
+from __future__ import annotations
+
+import ctypes
+import linecache
+import re
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import llvmlite.binding as llvm
+from numba import cfunc, njit, types
+from numba.core import cgutils
+from numba.core.errors import NumbaError
+from numba.core.typing.ctypes_utils import from_ctypes
+from numba.extending import intrinsic
+
+from podusv_cli.core import kernel
+from podusv_cli.engine.machine.object_cache import Code, target
+
+# Kernels are inlined: to pass a law's constants to another function takes as long as the law.
+OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": False, "forceinline": True}
+INNER = OPTIONS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # called by kernels only
+
+
+# An intrinsic gives numba the signature of a primitive of `core.kernel`, and its LLVM code.
+def tail_of(typing: Any, vector: Any, start: Any) -> Any:
+    """`kernel.tail`."""
+
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.gep(arguments[0], [arguments[1]])
+
+    return vector(vector, types.int64), code
+
+
+def scratch_of(number: Any) -> Any:
+    """`kernel.scratch` with room for numbers of this type."""
+
+    def typed(typing: Any, count: Any) -> Any:
+        def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            kind, size = context.get_value_type(number), count.literal_value
+            return cgutils.alloca_once(builder, kind, size)  # type: ignore[no-untyped-call]
+
+        return types.CPointer(number)(count), code  # type: ignore[no-untyped-call]
+
+    return intrinsic(prefer_literal=True)(typed)
+
+
+@intrinsic
+def widest(typing: Any) -> Any:
+    """`kernel.widest`, for which llvmlite has no name."""
+
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        set.add(builder.function.attributes, '"prefer-vector-width"="512"')
+        return context.get_dummy_value()
+
+    return types.none(), code
+
+
+PRIMITIVES = {
+    kernel.tail: intrinsic(tail_of), kernel.scratch: scratch_of(types.float64),
+    kernel.widest: widest,
+}  # fmt: skip
+
+
+def object_code(function: Any, prototype: Any) -> Code:
+    """Object code of a kernel and all kernels it calls, as a C function with this prototype.
+
+    Raises TypeError for a kernel that needs more than arithmetic and the mathematical library.
+    """
+    return translated(function, _with_inlined, signature(prototype, from_ctypes))
+
+
+def translated(function: Any, prepare: Any, typed: Any) -> Code:
+    """Object code of what `prepare` makes of a kernel, with this signature of numba's types."""
+    linecache.checkcache()  # numba shows lines from there; a file may have been edited meanwhile
+    try:
+        compiled = cfunc(typed, **OPTIONS)(prepare(function))
+    except NumbaError as error:
+        raise TypeError(_in_short(str(error))) from error
+    module = llvm.parse_assembly(compiled.inspect_llvm())
+    _check_calls(module, function.__qualname__)
+    return Code(compiled.native_name, target().emit_object(module))
+
+
+@cache
+def inlined(function: Any) -> Any:
+    """The kernel and all kernels it calls, as a numba function to be compiled into its caller."""
+    if function in PRIMITIVES:
+        return PRIMITIVES[function]
+    return njit(**INNER)(_with_inlined(function))
+
+
+def _in_short(told: str) -> str:
+    """What numba says of the innermost place, and where that is."""
+    reason = re.search(r"raised a specific error:\n +TypingError: (.*)", told)
+    words = (
+        reason[1]
+        if reason
+        else told.split("\n\nFile")[0].split("\nThere are")[0].split("\nDuring")[0]
+    )
+    kept = [line for line in words.splitlines() if not line.startswith("Failed in nopython mode")]
+    place = re.search(r'^File "([^"]+)", line (\d+):\n(?:.*\n)*?(.*)\n +\^', told, re.MULTILINE)
+    where = f" ({Path(place[1]).name}, line {place[2]}: {place[3].strip()})" if place else ""
+    return f"{' '.join(' '.join(kept).split())}{where}"
+
+
+def _with_inlined(function: Any) -> Any:
+    """A copy of the kernel whose globals have numba functions in place of other kernels."""
+    inner = {name: inlined(called) for name, called in kernel.named_kernels(function).items()}
+    return kernel.with_globals(function, function.__qualname__, **inner)
+
+
+def signature(prototype: Any, type_of: Any) -> Any:
+    """A prototype in numba's types; `type_of` gives that of what is no function."""
+
+    def typed(kind: Any) -> Any:
+        if kind and issubclass(kind, ctypes._CFuncPtr):  # type: ignore[attr-defined]
+            # numba wants a function from a Python object to its address, but never calls it here.
+            return types.ExternalFunctionPointer(signature(kind, type_of), ctypes.addressof)
+        return type_of(kind)
+
+    return typed(prototype._restype_)(*map(typed, prototype._argtypes_))
+
+
+def _check_calls(module: Any, name: str) -> None:
+    """Refuse code that calls an unknown function: loading it would end the process silently."""
+    process = ctypes.CDLL(None)
+    declared = [f.name for f in module.functions if f.is_declaration]
+    for wanted in declared:
+        if not wanted.startswith("llvm.") and not hasattr(process, wanted):
+            raise TypeError(
+                f"{name} needs {wanted}, which is no function of the mathematical library: it "
+                "allocates, prints or raises"
+            )

@@ -1,0 +1,198 @@
+"""Machine code on disk: found again by any later process, and never older than its source.
+
+What is kept of a kernel is plain object code: it needs no Python and no numba, and loading it takes
+llvmlite alone. The name of a kept piece ends in a digest of all that goes into it: the byte code
+and constants of the kernel and of every kernel that it calls, the processor, the versions of what
+translates. The pieces lie in a folder named after a digest of podusv's own files that translate. So
+kernels of one name, laws that live elsewhere, machines that share a home, and a process that
+imported the source before it was edited do not get into each other's way; and a comment, which
+changes no byte code, compiles nothing anew.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
+from functools import cache, singledispatch
+from importlib.metadata import version
+from pathlib import Path
+from types import CodeType, FunctionType, ModuleType
+from typing import Any, NamedTuple
+
+import llvmlite.binding as llvm
+import numpy as np
+
+from podusv_cli.engine.machine import code_folder
+
+# The files of podusv that turn kernels into machine code, from the package's folder.
+TRANSLATORS = ("core/kernel.py", "engine/machine/*.py")
+
+
+class Code(NamedTuple):
+    """Object code, and the name in it of the function to call.
+
+    Without a name it is the reason why there is no object code, so that it is not tried again.
+    """
+
+    symbol: str
+    content: bytes
+
+
+def stored(prototype: Any, name: str, translate: Callable[[], Code]) -> Any:
+    """The function of this name as ctypes calls it: found on disk, or translated and kept there."""
+    folder = code_folder.code_folder(translators())
+    path = folder / f"{name}.code" if folder else None
+    code = _read(path) if path else None
+    if code is None:
+        code = translate()
+        if path:
+            with suppress(OSError):  # a full disk costs the next process its time, no more
+                _write(path, code)
+    if not code.symbol:
+        raise TypeError(code.content.decode())
+    return _loaded(prototype, code)
+
+
+def is_kept(name: str) -> bool:
+    """Whether a piece of this name is on the disk."""
+    folder = code_folder.code_folder(translators())
+    return bool(folder and (folder / f"{name}.code").exists())
+
+
+def target() -> Any:
+    """This machine, as LLVM takes it."""
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    cpu, features = llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
+    return llvm.Target.from_default_triple().create_target_machine(
+        cpu=cpu, features=features, opt=3, reloc="pic", codemodel="jitdefault", jit=True
+    )
+
+
+def _loaded(prototype: Any, code: Code) -> Any:
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), target())
+    engine.add_object_file(llvm.ObjectFileRef.from_data(code.content))
+    engine.finalize_object()
+    function = prototype(engine.get_function_address(code.symbol))
+    function.engine = engine  # whose memory the code lies in
+    return function
+
+
+def _read(path: Path) -> Code | None:
+    with suppress(OSError):
+        digest, _, rest = path.read_bytes().partition(b"\n")
+        if _seal(path, rest) == digest:
+            symbol, _, content = rest.partition(b"\n")
+            return Code(symbol.decode(), content)
+    return None
+
+
+def _write(path: Path, code: Code) -> None:
+    rest = code.symbol.encode() + b"\n" + code.content
+    code_folder.write(path, _seal(path, rest) + b"\n" + rest)
+
+
+def _seal(path: Path, rest: bytes) -> bytes:
+    """Digest of a piece and of its name: whole, but under another's name, it is damaged."""
+    return _digest(path.name.encode() + b"\0" + rest).encode()
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()[:16]
+
+
+def fingerprint(function: Any) -> str:
+    """A short digest of what the machine code of a kernel depends on."""
+    return _digest("\n".join([*ingredients(function, {}), *_circumstances()]).encode())
+
+
+@cache
+def _circumstances() -> tuple[str, ...]:
+    settings = sorted(f"{k}={v}" for k, v in os.environ.items() if k.startswith("NUMBA_"))
+    versions = [sys.version, *(version(package) for package in ("numba", "llvmlite"))]
+    cpu = [llvm.get_process_triple(), llvm.get_host_cpu_name()]
+    return (*settings, *versions, *cpu, llvm.get_host_cpu_features().flatten())
+
+
+def ingredients(function: Any, told: dict[Any, int]) -> Iterator[str]:
+    """Everything that the machine code of a kernel depends on, the kernels it calls included.
+
+    `told` counts the functions and attributes of modules that have been told already.
+    """
+    told[function] = len(told)
+    names: dict[str, None] = {}
+    for code in _codes(function.__code__):
+        yield code.co_code.hex()
+        yield repr([c for c in code.co_consts if not isinstance(c, CodeType)])
+        yield repr((code.co_names, code.co_varnames))
+        names |= dict.fromkeys(code.co_names)
+    # Names of attributes are among these names, too. That one of them may add to the digest what
+    # the kernel does not use does no harm.
+    for name in names:
+        yield from _described(function.__globals__.get(name), names, told)
+
+
+def _codes(code: CodeType) -> Iterator[CodeType]:
+    """The code of a function and of the functions inside it."""
+    yield code
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _codes(constant)
+
+
+@singledispatch
+def _described(thing: Any, names: Iterable[str], told: dict[Any, int]) -> Iterator[str]:
+    """What stands behind a name of a function that uses these names.
+
+    A class or a function of a library is told by what it is called. What has no name is told by its
+    address at worst, and then compiled by each process anew.
+    """
+    called = getattr(thing, "__qualname__", getattr(thing, "__name__", ""))
+    members = getattr(thing, "__members__", ())  # of an enumeration
+    fields = getattr(thing, "_fields", ())  # of a named tuple
+    yield repr((getattr(thing, "__module__", ""), called or thing, fields, members))
+    if source := getattr(thing, "py_func", None):  # of what numba's own decorators made
+        yield from _described(source, names, told)
+
+
+@_described.register
+def _(thing: FunctionType, names: Iterable[str], told: dict[Any, int]) -> Iterator[str]:
+    if thing in told:
+        yield str(told[thing])
+    else:
+        yield from ingredients(thing, told)
+
+
+@_described.register
+def _(thing: ModuleType, names: Iterable[str], told: dict[Any, int]) -> Iterator[str]:
+    """A module, by what it has of these names: `settings.GAIN`."""
+    yield thing.__name__
+    for name in names:
+        if (thing, name) not in told and hasattr(thing, name):
+            told[thing, name] = len(told)
+            yield name
+            yield from _described(getattr(thing, name), names, told)
+
+
+@_described.register
+def _(thing: tuple, names: Iterable[str], told: dict[Any, int]) -> Iterator[str]:  # type: ignore[type-arg]
+    yield repr((type(thing).__qualname__, getattr(thing, "_fields", ()), len(thing)))
+    for item in thing:
+        yield from _described(item, names, told)
+
+
+@_described.register(np.ndarray)
+@_described.register(np.generic)
+def _(thing: Any, names: Iterable[str], told: dict[Any, int]) -> Iterator[str]:
+    yield f"{thing.dtype}{thing.shape}{thing.tobytes().hex()}"
+
+
+@cache
+def translators() -> str:
+    """Digest of podusv's files that turn kernels into machine code."""
+    package = Path(__file__).resolve().parents[1]
+    files = sorted(path for pattern in TRANSLATORS for path in package.glob(pattern))
+    return _digest(b"\0".join(path.read_bytes() for path in files))

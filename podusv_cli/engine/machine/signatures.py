@@ -1,0 +1,81 @@
+"""The few signatures that the loop calls through.
+
+A component's kernel takes its constants as a named tuple `k`; the loop hands over a bare vector
+`p`. `bind` makes the door between the two.
+
+As machine code all of them follow C's calling convention, whose types are given here by ctypes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from ctypes import CFUNCTYPE, POINTER, c_double, c_int64
+from typing import Any
+
+import numpy as np
+
+from podusv_cli.components.disturbances.base import OPTIONAL
+from podusv_cli.core.kernel import Vector, accepted, unpacker
+
+NUMBER, WHOLE = c_double, c_int64
+NUMBERS = ("t", "instant", "weight", "again", "stage")
+VECTOR = POINTER(NUMBER)
+# The arguments of every part, in the order in which the loop takes the parts. The time t, an
+# instant's position, its weight in an integral [s], and whether an evaluation is one more at its
+# instant or a stage within a step are numbers, all others vectors.
+SIGNATURES = {
+    "path": "t p table target",
+    "disturbance": "t x p table b again stage",
+    "law": "t x memory target p table tau rate signals work",
+    "sample": "t x memory target p table",
+    "actuator": "t x state demand p table tau rate signals",
+    "after_saturation": "t memory demand tau p table rate",
+    "measurement": "t instant x b p table seen",
+    "correct": "t seen state p table",
+    "follow": "t seen tau state p table rate",
+    "observer": "t weight s row p seen",
+}
+PROTOTYPES: dict[str, Any] = {
+    part: CFUNCTYPE(None, *(NUMBER if a in NUMBERS else VECTOR for a in arguments.split()))
+    for part, arguments in SIGNATURES.items()
+}
+RIGHT_HAND_SIDE = ("path", "disturbance", "law", "actuator", "after_saturation", "follow")
+ADVANCE = CFUNCTYPE(
+    WHOLE, *PROTOTYPES.values(), WHOLE, WHOLE, NUMBER, POINTER(VECTOR), POINTER(WHOLE)
+)
+RATES_ALONG = CFUNCTYPE(
+    None, *(PROTOTYPES[part] for part in RIGHT_HAND_SIDE),
+    WHOLE, VECTOR, VECTOR, POINTER(VECTOR), POINTER(WHOLE),
+)  # fmt: skip
+EVALUATE_ALL = CFUNCTYPE(None, PROTOTYPES["law"], WHOLE, WHOLE, WHOLE, *[VECTOR] * 5)
+
+
+def bind(part: str, inner: Any, names: tuple[str, ...]) -> Any:
+    """The door of a part to the kernel `inner`, whose constants have these names."""
+    arguments = SIGNATURES[part].split()
+    passed = ", ".join("named(p)" if a == "p" else a for a in taken(part, inner))
+    scope: dict[str, Any] = {"kernel": inner, "named": unpacker(names)}
+    exec(f"def {part}_entry({', '.join(arguments)}):\n    kernel({passed})", scope)  # noqa: S102
+    return scope[f"{part}_entry"]
+
+
+def taken(part: str, inner: Any) -> list[str]:
+    """Which arguments of a part its kernel takes."""
+    return accepted(inner, SIGNATURES[part].split(), OPTIONAL)
+
+
+def pointer(vector: Vector) -> Any:
+    """Where the numbers of a vector begin. TypeError unless they are float64, one by the other."""
+    if vector.dtype != np.float64 or not vector.flags.c_contiguous:
+        raise TypeError(f"machine code takes contiguous float64, not {vector.dtype}")
+    return vector.ctypes.data_as(VECTOR)
+
+
+def pointers(vectors: Sequence[Vector]) -> Any:
+    """Where each of these vectors begins; they have to outlive its use."""
+    return (VECTOR * len(vectors))(*map(pointer, vectors))
+
+
+def whole_numbers(numbers: Sequence[int]) -> Any:
+    """These numbers, one by the other."""
+    return (WHOLE * len(numbers))(*numbers)

@@ -1,0 +1,269 @@
+"""Many runs at once: side by side where that is possible, as many at a time as there are cores.
+
+The compiled march releases the interpreter's lock, so threads are enough. A thread marches over
+several runs side by side (`lanes`), or over one with the compiled code of `simulate`. No log is
+kept; a run's observer gathers what is wanted of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Protocol, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from podusv_cli.core.errors import PodusvError, in_a_line
+from podusv_cli.core.escaping import visible
+from podusv_cli.core.kernel import Vector
+from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop, Observer
+from podusv_cli.engine.running.batch_threads import BatchRun, Common, Thread
+from podusv_cli.engine.running.lanes import FEWEST, Sorter
+from podusv_cli.engine.running.simulate import why
+from podusv_cli.engine.running.watch import Ending
+from podusv_cli.engine.step.grid import TimeGrid
+from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
+from podusv_cli.process.workers import available_workers
+
+T = TypeVar("T")
+
+
+class Loops(Protocol):
+    """Closed loops by position; a run's loop is asked for once, when the run is to begin."""
+
+    def __len__(self) -> int:
+        """The number of runs."""
+
+    def __getitem__(self, position: int, /) -> ClosedLoop:
+        """The loop of a run. ValueError and PodusvError say that there cannot be such a loop."""
+
+
+@dataclass(frozen=True)
+class Lazily:
+    """Loops that `make` makes one by one, so that they need not exist all at once."""
+
+    count: int
+    make: Callable[[int], ClosedLoop]
+
+    def __len__(self) -> int:
+        """The number of runs."""
+        return self.count
+
+    def __getitem__(self, position: int, /) -> ClosedLoop:
+        """Make the loop of a run."""
+        return self.make(position)
+
+
+@dataclass(frozen=True)
+class Batch:
+    """How N runs ended and what was gathered in them, one entry or row a run.
+
+    `status` is one of these words; `cause` is a sentence for the middle four, else empty.
+
+    finished      it reached the last instant
+    diverged      a number is not finite
+    hung          a step took more than `march.PATIENCE` of processor time
+    crashed       the law, or another part, raised an exception
+    invalid       its loop cannot be made, or has another structure than the others
+    interrupted   an interrupt stopped it, or kept it from beginning
+
+    A run that did not begin has 0 instants reached and NaN in its rows.
+    """
+
+    status: npt.NDArray[np.str_]  # (N,)
+    cause: npt.NDArray[np.object_]  # (N,), str
+    reached: npt.NDArray[np.int64]  # (N,), good instants; steps + 1 for a finished run
+    state: Vector  # (N, 6), the vessel's state where the march ended
+    seen: Vector  # (N, observer.size)
+
+    def note(self, run: BatchRun, ending: Ending, grid: TimeGrid) -> None:
+        """Enter how a run ended."""
+        i, wires = run.position, run.wires
+        self.reached[i], self.status[i] = ending.reached, ending.status
+        self.state[i], self.seen[i] = wires.s[: len(STATE)], wires.seen
+        if ending.status not in ("finished", "interrupted"):
+            self.cause[i] = why(ending, run.loop, grid, wires)
+
+    def refuse(self, position: int, status: str, cause: str) -> None:
+        """Enter that a run cannot begin."""
+        self.status[position], self.cause[position] = status, visible(" ".join(cause.split()))
+
+
+def simulate_many(
+    loops: Loops,
+    grid: TimeGrid,
+    *,
+    observer: Observer | None = None,
+    workers: int = 0,
+    progress: Callable[[float], None] | None = None,
+    like: ClosedLoop | None = None,
+    side_by_side: bool | None = None,
+) -> Batch:
+    """Integrate loops of one structure over the grid, `workers` at a time (0: one a core).
+
+    The structure (kinds, sizes of memory, sampling) is that of `like`, by default that of the first
+    loop that can be made. Every run gives the bits that `simulate` gives, whatever the number of
+    workers and however the others end; `Batch` says how a run may end. `progress` is called with
+    the fraction of runs done. KeyboardInterrupt stops all runs at once and keeps what is done.
+    `side_by_side` says whether runs may share a march; by default they do where the code for it is
+    compiled already or the batch is worth it. It changes no bit. Raises LawError where a kernel
+    cannot be compiled.
+    """
+    observer = observer or Observer()
+    grid = replace(grid, log_every=grid.steps + 1)  # one row, for the first instant
+    batch = _blank(len(loops), observer)
+    with interrupts_deferred():
+        runs = _Runs(loops, grid, batch, observer, like, progress, side_by_side)
+        runs.march(workers or available_workers())
+    return batch
+
+
+class InvalidLoop(Exception):
+    """There cannot be such a loop, or it has another structure than the batch."""
+
+
+class _Runs:
+    """The runs of a batch while they are made."""
+
+    def __init__(
+        self, loops: Loops, grid: TimeGrid, batch: Batch, observer: Observer,
+        like: ClosedLoop | None, progress: Callable[[float], None] | None, lanes: bool | None,
+    ) -> None:  # fmt: skip
+        self._loops, self._grid, self._batch, self._observer = loops, grid, batch, observer
+        self._common = Common(like, grid, observer) if like else None
+        self._progress = progress or (lambda fraction: None)
+        self._lanes = Sorter(observer, len(loops) * (grid.steps + 1), lanes)
+        self._ready: list[Thread] = []
+        self._busy: list[Thread] = []
+        self._over, self._settled = 0, False
+
+    def march(self, workers: int) -> None:
+        """March over all runs; an interrupt or an error stops those that are under way."""
+        try:
+            for position in range(len(self._loops)):
+                self._begin(position)
+                self._start(workers, self._wait)
+            for runs in self._lanes.rest():
+                self._together(runs)
+            while self._ready or self._busy:
+                self._start(workers, self._wait)
+                if self._busy:
+                    self._wait()
+        except KeyboardInterrupt:
+            pass
+        finally:
+            self._stop()
+
+    def _begin(self, position: int) -> None:
+        """Make a run, and have it march alone, or wait for others to march beside it."""
+        run = self._made(position)
+        if run:
+            self._together(self._lanes.sorted(run.wires, run))
+        else:
+            self._count()
+
+    def _together(self, runs: list[BatchRun]) -> None:
+        """Have runs march side by side, or one by one where that takes no longer."""
+        assert self._common is not None
+        if len(runs) >= FEWEST and self._lanes.advance:
+            self._ready.append(self._common.together(runs, self._lanes.advance))
+        else:
+            self._ready += map(self._common.alone, runs)
+
+    def _start(self, workers: int, wait: Callable[[], None]) -> None:
+        """Start all threads that are ready, and wait while there are enough."""
+        while self._ready:
+            thread = self._ready.pop(0)
+            thread.work.start()
+            self._busy.append(thread)
+            while len(self._busy) >= workers:
+                wait()
+
+    def _made(self, position: int) -> BatchRun | None:
+        """The run, or None and an entry of why there is none."""
+        if self._settled:
+            return self._contained(position, partial(self._run, position))
+        loop = self._contained(position, partial(self._checked, position))
+        if loop is None:
+            return None
+        self._settle(loop)
+        return self._contained(position, partial(self._run, position, loop))
+
+    def _settle(self, loop: ClosedLoop) -> None:
+        """Have the march compiled, by the first loop."""
+        common = self._common = self._common or Common(loop, self._grid, self._observer)
+        self._lanes.choose(loop)
+        if not self._lanes.advance:
+            common.advance  # noqa: B018  a kernel that cannot be compiled ends the batch
+        self._settled = True
+
+    def _run(self, position: int, loop: ClosedLoop | None = None) -> BatchRun:
+        assert self._common is not None
+        return self._common.run(position, loop or self._checked(position))
+
+    def _checked(self, position: int) -> ClosedLoop:
+        """The loop of a run."""
+        try:
+            loop = self._loops[position]
+            (self._common or Common(loop, self._grid, self._observer)).check(loop)
+        except (PodusvError, ValueError) as error:
+            raise InvalidLoop(str(error)) from error
+        return loop
+
+    def _contained(self, position: int, make: Callable[[], T]) -> T | None:
+        """What is made for a run; an exception is that run's and no other's."""
+        try:
+            with interrupts_enabled():
+                return make()
+        except KeyboardInterrupt:
+            raise
+        except InvalidLoop as error:
+            self._batch.refuse(position, "invalid", str(error))
+        except BaseException as error:  # a law may raise anything
+            self._batch.refuse(position, "crashed", in_a_line(error))
+        return None
+
+    def _wait(self) -> None:
+        """Wait a moment for a thread to end, and enter the runs of those that have, or hang."""
+        with interrupts_enabled():
+            self._busy[0].work.wait()  # any of them rings the bell
+        for thread in [thread for thread in self._busy if thread.work.over or thread.work.hangs()]:
+            self._busy.remove(thread)
+            self._enter(thread)
+
+    def _enter(self, thread: Thread) -> None:
+        """Enter how the runs of a thread ended; which of several hangs, shows each alone."""
+        if thread.work.result is None and len(thread.runs) > 1:
+            thread.work.stop()
+            assert self._common is not None
+            again = [self._common.run(run.position, run.loop) for run in thread.runs]
+            self._ready += map(self._common.alone, again)
+            return
+        for run, ending in zip(thread.runs, thread.endings(False), strict=True):
+            self._batch.note(run, ending, self._grid)
+        for _ in thread.runs:
+            self._count()
+
+    def _count(self) -> None:
+        self._over += 1
+        self._progress(self._over / len(self._loops))
+
+    def _stop(self) -> None:
+        stopped = [thread for thread in self._busy if not thread.work.over]
+        for thread in stopped:
+            thread.work.stop()
+        for thread in self._busy:
+            if thread in stopped:
+                thread.work.stopped()
+            for run, ending in zip(thread.runs, thread.endings(thread in stopped), strict=True):
+                self._batch.note(run, ending, self._grid)
+
+
+def _blank(count: int, observer: Observer) -> Batch:
+    return Batch(
+        status=np.full(count, "interrupted"), cause=np.full(count, "", object),
+        reached=np.zeros(count, np.int64), state=np.full((count, len(STATE)), np.nan),
+        seen=np.full((count, observer.size), np.nan),
+    )  # fmt: skip

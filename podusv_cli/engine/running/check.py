@@ -1,0 +1,161 @@
+"""Is a law what it says it is? Asked once, in plain Python, before it becomes machine code.
+
+There its vectors are bare pointers, and what it writes past their ends is somebody else's number.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+from functools import partial
+from numbers import Real
+
+import numpy as np
+
+from podusv_cli.components.vessels.vessel import COEFFICIENTS
+from podusv_cli.core.component import called
+from podusv_cli.core.errors import LawError, in_a_line
+from podusv_cli.core.kernel import Vector, bundle
+from podusv_cli.core.signal import NAME, Signal
+from podusv_cli.engine.loop.closed_loop import ClosedLoop
+from podusv_cli.engine.machine.kernel_faults import check_arguments, check_kernel
+from podusv_cli.engine.running.watch import Work
+
+PROVENANCE = "provenance"  # is a group in every log
+UNWRITTEN = -1.234567890123e-290  # no law writes just this
+FLOAT_AS_COUNT = "'float' object cannot be interpreted as an integer"
+READ = (1, 2, 3, 5)  # x, memory, target and table among a law's arguments
+# What a law's arithmetic may raise: the run tells it, as divergence.
+OF_NUMBERS = (ArithmeticError, ValueError)
+
+
+def check_law(loop: ClosedLoop) -> None:
+    """Ask the loop's path and law at the start of a run, with vectors of the declared sizes.
+
+    Raises LawError for signals that are undeclared or declared twice, a memory, table or outputs of
+    another size, an output left unwritten, an argument written that is to be read, an exception,
+    for a law that does not return, and as `check_kernel`. No number at all is left for the run to
+    tell.
+    """
+    law = loop.controller.law
+    check_kernel(law)
+    check_kernel(loop.path.evaluate)
+    with np.errstate(all="ignore"):
+        asked(called(loop.path), loop.path.table)
+        asked(called(loop.path), loop.first_target, OF_NUMBERS)
+        asked(called(loop.controller), partial(_check_declared, loop))
+        asked(called(loop.controller), partial(_ask, loop), OF_NUMBERS)
+    check_arguments(law, READ)
+
+
+def asked(part: str, ask: Callable[[], object], left: tuple[type[Exception], ...] = ()) -> None:
+    """Ask, and raise LawError for any exception but those that are `left` for the run to tell."""
+    work = Work(lambda: int(ask() is None))
+    work.finish()
+    if isinstance(work.error, LawError):
+        raise work.error
+    if work.result is None and not isinstance(work.error, left):
+        fault = _constant(work.error) or work.fault()
+        if FLOAT_AS_COUNT in str(work.error):
+            fault += "; constants are floats: write int(k.count)"
+        message = f"{part}, evaluated once before the run: {fault}"
+        raise LawError(message) from work.error
+
+
+def _constant(error: BaseException | None) -> str:
+    """What is wrong where a kernel reads a constant that there is not; else empty."""
+    if not (isinstance(error, AttributeError) and hasattr(error.obj, "_fields")):
+        return ""
+    names = error.obj._fields
+    inherited = ["those of the nominal vessel"] if set(COEFFICIENTS) <= set(names) else []
+    known = ", ".join(name for name in names if name not in COEFFICIENTS)
+    return f"{in_a_line(error)}; it has {', and '.join([known, *inherited])}"
+
+
+def _check_declared(loop: ClosedLoop) -> None:
+    law = loop.controller
+    _check_signals(loop)
+    memory, declared = loop.first_memory(), (sum(size for _, size in law.slots()),)
+    if np.shape(memory) != declared:
+        shapes = f"it starts with a memory of shape {np.shape(memory)}, its slots are {declared}"
+        raise LawError(f"{called(law)}: {shapes}")
+    table = law.table()
+    if not (isinstance(table, np.ndarray) and table.dtype == np.float64 and table.ndim == 1):
+        raise LawError(f"{called(law)}: its table is no vector of float64; write np.array([1.0])")
+    for name, number in law.constants_with(loop.nominal).items():
+        if not (name.isidentifier() and isinstance(number, Real)):
+            raise LawError(f"{called(law)}: its constant {name} = {number!r} is no named number")
+
+
+def evaluated(loop: ClosedLoop, before: float) -> tuple[Vector, Vector, Vector]:
+    """Demand, rates and signals that the law writes at the start of a run, over `before`."""
+    law, memory, target = loop.controller, loop.first_memory(), loop.first_target()
+    x, k, table = np.array(loop.start), bundle(law.constants_with(loop.nominal)), law.table()
+    tau, rate, signals = (np.full(n, before) for n in (2, len(memory), len(law.signals)))
+    if law.sample_period() > 0:
+        law.sample(0.0, x, memory, target, k, table)
+    read = {"x": x, "memory": memory, "target": target, "table": table}
+    before_it = {name: vector.copy() for name, vector in read.items()}
+    law.law(0.0, x, memory, target, k, table, tau, rate, signals, np.zeros(law.workspace()))
+    for name, vector in read.items():
+        same = (vector == before_it[name]) | (np.isnan(vector) & np.isnan(before_it[name]))
+        if len(changed := np.flatnonzero(~same)):
+            raise LawError(f"{called(law)}: it writes {name}[{changed[0]}], which it may only read")
+    return tau, rate, signals
+
+
+def _ask(loop: ClosedLoop) -> None:
+    law, (tau, rate, signals) = loop.controller, evaluated(loop, UNWRITTEN)
+    slots = [f"the rate of {part.name}" for part, size in law.slots() for _ in range(size)]
+    names = ("tau_u_cmd", "tau_r_cmd", *(part.name for part in law.signals), *slots)
+    outputs = zip(names, (*tau, *signals, *rate), strict=True)
+    if left := next((name for name, number in outputs if number == UNWRITTEN), ""):
+        raise LawError(f"{called(law)}: it leaves {left} unwritten")
+    if law.wants_loads():
+        k, memory = bundle(law.constants_with(loop.nominal)), loop.first_memory()
+        law.after_saturation(0.0, memory, tau, np.zeros(3), k, law.table(), rate)
+
+
+def _check_signals(loop: ClosedLoop) -> None:
+    """LawError for what the log could not take, or would mix up."""
+    law = loop.controller
+    if isinstance(law.signals, str):
+        raise LawError(f"{called(law)}: its signals are no tuple; write (Signal(...),)")
+    loop.about()
+    try:
+        _check_axes(loop)
+    except LawError as error:
+        raise LawError(f"{called(law)}: {error}") from error
+
+
+def _check_axes(loop: ClosedLoop) -> None:
+    """Every logged array has as many values along each of its axes as all others have."""
+    lengths: dict[str, tuple[int, str]] = {}
+    names = {*loop.about(), PROVENANCE}
+    for part, shape in _shapes(loop):
+        if part.fixed and not part.axes:
+            raise LawError(f"signal {part.name}: it is fixed and has no axis; name one")
+        taken = [axis for axis in part.axes if axis in names or not NAME.fullmatch(axis)]
+        if taken or part.name == PROVENANCE or 0 in shape:
+            what = f"its axis {taken[0]!r}" if taken else f"its name or its shape {shape}"
+            raise LawError(f"signal {part.name}: {what} cannot stand in a log; choose another")
+        if len(shape) != len(part.axes):
+            raise LawError(
+                f"signal {part.name}: its values have the shape {shape} at an instant and its axes "
+                f"are {part.axes}; name one axis for each dimension"
+            )
+        for axis, size in zip(part.axes, shape, strict=True):
+            known, other = lengths.setdefault(axis, (size, part.name))
+            if known != size:
+                raise LawError(
+                    f"signal {part.name}: it has {size} values along {axis!r}, and {other} has "
+                    f"{known}; name their axes differently"
+                )
+
+
+def _shapes(loop: ClosedLoop) -> Iterator[tuple[Signal, tuple[int, ...]]]:
+    """The signals that may be vectors, each with its shape at an instant."""
+    law, actuator = loop.controller, loop.actuator
+    for part, count in (*law.slots(), *Counter((*actuator.states, *actuator.signals_with)).items()):
+        yield part, (count,) if part.axes or count > 1 else ()
+    yield from ((part, array.shape) for part, array in law.fixed_signals().items())

@@ -1,0 +1,43 @@
+"""The closed loop as s' = f(t, s), for integrators other than the engine's own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from podusv_cli.core.kernel import Vector
+from podusv_cli.engine.loop.closed_loop import ClosedLoop, Observer, wire
+from podusv_cli.engine.running.simulate import marcher
+from podusv_cli.engine.step.grid import TimeGrid
+
+Slope = Callable[[float, Vector], Vector]
+
+
+def continuous(loop: ClosedLoop, duration: float, *, compiled: bool = True) -> tuple[Slope, Vector]:
+    """f(t, s) for t up to `duration` [s], and s(0).
+
+    s is the vessel's state, the actuator's, the law's memory. f raises ArithmeticError where a
+    number is not finite. Raises ValueError for a law that takes samples, for measurements and for
+    a delay, which are no ordinary differential equations.
+    """
+    if loop.measured:
+        raise ValueError("a law that works with measurements has no continuous right-hand side")
+    if loop.controller.sample_period() > 0:
+        raise ValueError("a law that takes samples has no continuous right-hand side")
+    if loop.actuator.delay() > 0:
+        raise ValueError("an actuator with a delay has no continuous right-hand side")
+    grid = TimeGrid(1.0, 1, log_every=2)
+    plan = loop.layout(grid)
+    wires = wire(loop, plan, Observer(), TimeGrid(duration, 1))
+    march = marcher(loop, Observer(), compiled)
+
+    def slope(t: float, s: Vector) -> Vector:
+        # The march over instant 1 of a grid with step t and no step after it: rates, no more.
+        wires.s[:] = s
+        with np.errstate(all="ignore"):
+            if march(1, 2, t, wires, plan) != 2:
+                raise ArithmeticError(f"not finite at t = {t:.6g} s")
+        return wires.stages[: plan.states].copy()
+
+    return slope, wires.s.copy()

@@ -1,0 +1,240 @@
+"""Runs side by side: the vectors of several runs as one, a run in every lane.
+
+What compiled code for lanes takes and gives, without numba. A number of a vector is `LANES` numbers
+in memory, one of every run, so that a register holds them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from podusv_cli.components.measurements.base import KNOWN, OWN
+from podusv_cli.core.kernel import LANES, Vector
+from podusv_cli.engine.loop.closed_loop import ClosedLoop, Observer, entries
+from podusv_cli.engine.machine import lane_doors, lane_source, signatures
+from podusv_cli.engine.machine.kernel_faults import check_kernel
+from podusv_cli.engine.running.watch import Ending
+from podusv_cli.engine.step.grid import TimeGrid
+from podusv_cli.engine.step.lane_march import REACHED
+from podusv_cli.engine.step.layout import Plan, Wires
+from podusv_cli.engine.step.relay import COUNT
+
+NUMBER = 8  # bytes
+FEWEST = 3  # runs; fewer take no longer alone
+# What numba says of numbers that differ between runs, in the words of its types.
+TYPES = (
+    "lanes(...) are numbers that may differ between runs; the count of a `for` may not (write "
+    "`while`), and no text and no None may depend on them"
+)
+WORTH = 20_000_000  # instants of a batch, from which on compiling takes less than it gains
+MARCHING = -1.0  # stands for the instants that a lane has reached
+
+
+def alike(loop: ClosedLoop, observer: Observer) -> dict[str, frozenset[str]]:
+    """By part the constants that all lanes have to share: choices, sizes and positions."""
+    law, names = loop.controller, {part: names for part, _, names in entries(loop, observer)}
+    chosen = {
+        "path": loop.path.choices(), "disturbance": loop.disturbance.choices(),
+        "actuator": loop.actuator.choices(), "law": law.choices(), "sample": law.choices(),
+        "after_saturation": law.choices(),
+        "observer": frozenset(names["observer"]) - observer.differing,
+        "measurement": loop.measurement.choices(), "correct": loop.estimator.choices(),
+        "follow": loop.estimator.choices(),
+    }  # fmt: skip
+    whole = {part: lane_source.whole_numbers(inner) for part, inner, _ in entries(loop, observer)}
+    whole["disturbance"] = frozenset(
+        loop.disturbance.constant_of(i, name)
+        for i, part in enumerate(loop.disturbance.each())
+        for name in lane_source.whole_numbers(part.kernel_with(loop.vessel))
+    )
+    for one in (("law", "sample", "after_saturation"), ("correct", "follow")):  # of one component
+        whole |= dict.fromkeys(one, frozenset().union(*(whole[part] for part in one)))
+    return {part: (chosen[part] | whole[part]) & set(names[part]) for part in names}
+
+
+def marcher(loop: ClosedLoop, observer: Observer) -> Callable[..., int]:
+    """The compiled march of runs like this loop, side by side.
+
+    Raises TypeError where a part cannot go another way in every lane, LawError for a kernel that
+    would read what is not there.
+    """
+    from podusv_cli.engine.machine import compile  # only what marches side by side needs it
+
+    shared, parts = alike(loop, observer), list(entries(loop, observer))
+    for _, inner, _ in parts:
+        check_kernel(inner)
+    doors = [compile.lane_entry(*part, shared[part[0]]) for part in parts]
+    march = compile.lane_routine()
+
+    def compiled_march(
+        last: int, h: float, vectors: list[Vector], plan: Plan, under_way: Vector, ends: Vector
+    ) -> int:
+        pointers = (lane_doors.LANE_VECTOR * len(vectors))(
+            *(vector.ctypes.data_as(lane_doors.LANE_VECTOR) for vector in vectors)
+        )
+        return int(
+            march(
+                *doors, 0, last, h, pointers, signatures.whole_numbers(plan),
+                len(vectors[Wires._fields.index("seen")]) // LANES,
+                signatures.pointer(under_way), signatures.pointer(ends),
+            )
+        )  # fmt: skip
+
+    return compiled_march
+
+
+def is_compiled(loop: ClosedLoop, observer: Observer) -> bool:
+    """Whether the march of runs like this loop is on the disk, or in memory."""
+    from podusv_cli.engine.machine import compile
+
+    shared = alike(loop, observer)
+    return compile.has_lanes([(*part, shared[part[0]]) for part in entries(loop, observer)])
+
+
+def places(loop: ClosedLoop, observer: Observer) -> list[tuple[int, list[int]]]:
+    """Where the numbers that are alike lie: positions of vectors in `Wires`, and in these."""
+    shared = alike(loop, observer)
+    names = {part: names for part, _, names in entries(loop, observer)}
+    names["estimator"], shared["estimator"] = names["correct"], shared["correct"]
+    found = {
+        part: [i for i, n in enumerate(names[part]) if n in shared[part]]
+        for part in (
+            "path",
+            "disturbance",
+            "law",
+            "actuator",
+            "measurement",
+            "estimator",
+            "observer",
+        )
+    }
+    found |= {
+        "disturbance_table": loop.disturbance.alike_in_table(),
+        "measurement_table": loop.measurement.alike_in_table(),
+        "sensed": list(range(KNOWN, OWN)) if loop.measured else [],
+        "relay": [COUNT],
+    }
+    return [(Wires._fields.index(vector), inside) for vector, inside in found.items()]
+
+
+def _room(count: int) -> Vector:
+    """Zeros that begin at a whole register."""
+    room = np.zeros(count + LANES)
+    return room[-(room.ctypes.data // NUMBER) % LANES :][:count]
+
+
+def _side_by_side(vectors: Sequence[Vector]) -> Vector:
+    """One vector of several, a lane each; the lanes that are left repeat the first."""
+    room = _room(LANES * max(map(len, vectors)))
+    for lane in range(LANES):
+        vector = vectors[lane if lane < len(vectors) else 0]
+        room[lane::LANES][: len(vector)] = vector
+    return room
+
+
+@dataclass(frozen=True, eq=False)
+class Lanes:
+    """Runs that march side by side. `runs` are their own vectors, which get the result."""
+
+    runs: Sequence[Wires]
+    vectors: list[Vector]
+    plan: Plan
+    under_way: Vector
+    ends: Vector
+
+    @classmethod
+    def of(cls, runs: Sequence[Wires], plan: Plan) -> Lanes:
+        """Side by side, ready for the march."""
+        size = plan.states + plan.columns + len(runs[0].seen)
+        under_way = np.zeros(REACHED + LANES)
+        under_way[REACHED : REACHED + len(runs)] = MARCHING
+        vectors = [_side_by_side(several) for several in zip(*runs, strict=True)]
+        return cls(runs, vectors, plan, under_way, np.zeros(LANES * size))
+
+    def march(self, advance: Callable[..., int], grid: TimeGrid) -> Callable[[], int]:
+        """A function that marches over the grid."""
+        last = grid.steps + 1
+        return partial(advance, last, grid.step, self.vectors, self.plan, self.under_way, self.ends)
+
+    def endings(self, reached: int, last: int) -> list[Ending]:
+        """How each run ended, where the march stopped at `reached`; its vectors are filled in."""
+        return [self._ending(lane, reached, last) for lane in range(len(self.runs))]
+
+    def _ending(self, lane: int, reached: int, last: int) -> Ending:
+        wires, ended = self.runs[lane], self.under_way[REACHED + lane]
+        vectors = Wires(*self.vectors)
+        kept = [vector[lane::LANES] for vector in (vectors.s, vectors.row, vectors.seen)]
+        if ended != MARCHING:
+            kept = np.split(
+                self.ends.reshape(LANES, -1)[lane], np.cumsum([len(part) for part in kept])[:-1]
+            )
+        wires.s[:], wires.row[:], wires.seen[:] = (
+            part[: len(own)]
+            for part, own in zip(kept, (wires.s, wires.row, wires.seen), strict=True)
+        )
+        if ended != MARCHING:
+            return Ending(int(ended), "diverged")
+        return Ending(reached, "finished" if reached == last else "interrupted")
+
+
+class Sorter:
+    """Sorts the runs of a batch by what they have to have in common to march side by side."""
+
+    def __init__(self, observer: Observer, instants: int, wanted: bool | None) -> None:
+        """`instants` are those of all runs; `wanted` says whether to march side by side at all."""
+        self.advance: Callable[..., int] | None = None
+        self._observer, self._instants, self._wanted = observer, instants, wanted
+        self._places: list[tuple[int, list[int]]] = []
+        self._waiting: dict[tuple[float, ...], list[Any]] = {}
+        self._chosen = False
+
+    def choose(self, loop: ClosedLoop) -> None:
+        """Decide, by the first loop, whether runs march side by side."""
+        if not self._chosen:
+            self._chosen = True
+            with suppress(TypeError):  # `why_alone` tells why
+                if self._wanted or (self._wanted is None and self._is_worth(loop)):
+                    self._places = places(loop, self._observer)
+                    self.advance = marcher(loop, self._observer)
+
+    def _is_worth(self, loop: ClosedLoop) -> bool:
+        return self._instants >= WORTH or is_compiled(loop, self._observer)
+
+    def sorted(self, wires: Wires, run: Any) -> list[Any]:
+        """The runs to start now that this one is ready."""
+        if not self.advance:
+            return [run]
+        kind = tuple(float(wires[at][i]) for at, inside in self._places for i in inside)
+        waiting = self._waiting.setdefault(kind, [])
+        waiting.append(run)
+        if len(waiting) < LANES:
+            return []
+        ready = waiting.copy()
+        waiting.clear()
+        return ready
+
+    def rest(self) -> list[list[Any]]:
+        """The runs that still wait for others."""
+        return [runs for runs in self._waiting.values() if runs]
+
+
+def prepare(loop: ClosedLoop, observer: Observer, instants: int) -> None:
+    """Compile the march of runs like this loop, if so many instants in all are worth it."""
+    if instants >= WORTH:
+        why_alone(loop, observer)
+
+
+def why_alone(loop: ClosedLoop, observer: Observer) -> str:
+    """Why runs like this loop cannot march side by side; empty where they can."""
+    try:
+        places(loop, observer)
+        marcher(loop, observer)
+    except TypeError as error:
+        return f"{error}; {TYPES}" if "lanes(" in str(error) else str(error)
+    return ""

@@ -1,0 +1,115 @@
+"""Logged states gone through again: the rates there, and what one evaluation of a law costs."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from podusv_cli.core.kernel import Vector
+from podusv_cli.core.recording import Recording
+from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop, Observer, entries, wire
+from podusv_cli.engine.loop.columns import by_name, names
+from podusv_cli.engine.machine import signatures
+from podusv_cli.engine.step import rk4 as closed_loop
+from podusv_cli.engine.step.grid import TimeGrid
+from podusv_cli.engine.step.layout import Plan, Wires
+from podusv_cli.engine.step.relay import COUNT
+
+
+def logged_rows(loop: ClosedLoop, recording: Recording, most: int) -> Vector:
+    """At most so many rows of a log, evenly spread: time, target, vessel's state, law's memory."""
+    times = recording["time"]
+    chosen = np.linspace(0, len(times) - 1, min(most, len(times))).astype(int)
+    names = [*STATE, *(part.name for part, _ in loop.controller.slots())]
+    logged = np.column_stack([recording[name][chosen] for name in names])
+    return np.column_stack([times[chosen], loop.path.targets(times[chosen].tolist()), logged])
+
+
+def replayer(
+    loop: ClosedLoop, recording: Recording, *, most: int = 250, evaluations: int = 4000
+) -> Callable[[], float]:
+    """A function that times one evaluation of the law [ns], as the mean of one replay.
+
+    A replay goes over at most `most` logged rows until it has `evaluations`, in machine code.
+    """
+    from podusv_cli.engine.machine import compile  # a loop in plain Python needs no compiler
+
+    rows = logged_rows(loop, recording, most)
+    count, width = rows.shape
+    rounds = -(-evaluations // count)
+    room = max(width, len(loop.controller.signals)) * 2 + loop.controller.workspace()
+    constants = loop.controller.constants_with(loop.nominal)
+    p = np.array(list(constants.values()))
+    buffers = (rows.ravel(), p, loop.controller.table(), np.zeros(2), np.zeros(room))
+    vectors = [signatures.pointer(buffer) for buffer in buffers]
+    replay: Callable[..., None] = compile.routine(closed_loop.evaluate_all, signatures.EVALUATE_ALL)
+    law = compile.entry("law", loop.controller.law, tuple(constants))
+
+    def timed() -> float:
+        began = time.thread_time_ns()  # of the processor: what else it does is not the law's
+        replay(law, rounds, count, width, *vectors)
+        return float((time.thread_time_ns() - began) / (rounds * count))
+
+    return timed
+
+
+@dataclass(frozen=True)
+class Replayed:
+    """The right-hand side at logged states: rates by the state's names, and all signals.
+
+    `signals` holds the target's velocity and acceleration as well, and those of the law at the
+    logged state, even where control is sampled.
+    """
+
+    rates: dict[str, Vector]
+    signals: dict[str, Vector]
+
+
+def rates_replay(
+    loop: ClosedLoop, grid: TimeGrid, *, compiled: bool = True
+) -> Callable[[Recording], Replayed]:
+    """A function that gives the loop's right-hand side at every row of a recording of it.
+
+    Control is taken as continuous, also where the run's was sampled, and as without delay. The
+    rates of an estimator are left out: they depend on measurements, which the loop's
+    state does not hold.
+    """
+    plan = loop.layout(grid)._replace(hold_every=0, measured=0)
+    labels, split, about = names(loop), 1 + plan.states, loop.about()
+    state = list(dict.fromkeys(labels[:split]))
+    wires = wire(loop, plan, Observer(), grid)
+    wires.relay[COUNT] = 0.0
+    run = _rates_runner(loop, compiled)
+
+    def replayed(recording: Recording) -> Replayed:
+        logged = np.column_stack([recording[name] for name in state])
+        out = np.zeros((len(logged), plan.states + plan.columns))
+        run(len(logged), logged.ravel(), out.reshape(-1), wires, plan)
+        return Replayed(
+            by_name(labels[1:split], out[:, : plan.states], about),
+            by_name(labels[split:], out[:, plan.states :], about),
+        )
+
+    return replayed
+
+
+def _rates_runner(loop: ClosedLoop, compiled: bool) -> Callable[..., None]:
+    """`closed_loop.rates_along` of this loop less its functions."""
+    parts = list(entries(loop, Observer()))
+    chosen = [part for part in parts if part[0] in signatures.RIGHT_HAND_SIDE]
+    if not compiled:
+        doors = [signatures.bind(*part) for part in chosen]
+        return lambda *rest: closed_loop.rates_along(*doors, *rest)
+    from podusv_cli.engine.machine import compile  # a loop in plain Python needs no compiler
+
+    doors = [compile.entry(*part) for part in chosen]
+    run = compile.routine(closed_loop.rates_along, signatures.RATES_ALONG)
+
+    def compiled_run(count: int, logged: Vector, out: Vector, wires: Wires, plan: Plan) -> None:
+        vectors, sizes = signatures.pointers(wires), signatures.whole_numbers(plan)
+        run(*doors, count, signatures.pointer(logged), signatures.pointer(out), vectors, sizes)
+
+    return compiled_run

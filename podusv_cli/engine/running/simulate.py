@@ -1,0 +1,126 @@
+"""From components to a recording: march over the grid, name the columns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from podusv_cli.components.paths.base import TARGET
+from podusv_cli.core.kernel import Vector
+from podusv_cli.core.recording import Allocate, Recording, Status
+from podusv_cli.engine.loop.closed_loop import DEMAND, STATE, ClosedLoop, Observer, entries, wire
+from podusv_cli.engine.loop.columns import by_name, names
+from podusv_cli.engine.machine import signatures
+from podusv_cli.engine.running.check import asked, check_law
+from podusv_cli.engine.running.watch import Ending, Word, march
+from podusv_cli.engine.step import rk4 as closed_loop
+from podusv_cli.engine.step.grid import TimeGrid
+from podusv_cli.engine.step.layout import Plan, Wires
+from podusv_cli.process.interrupts import interrupts_deferred
+
+# What a log says of a run, by how its march ended.
+RECORDED: dict[Word, Status] = {
+    "finished": "finished", "interrupted": "interrupted",
+    "diverged": "diverged", "crashed": "diverged", "hung": "diverged",
+}  # fmt: skip
+
+
+def simulate(
+    loop: ClosedLoop,
+    grid: TimeGrid,
+    *,
+    observer: Observer | None = None,
+    compiled: bool = True,
+    progress: Callable[[float], None] | None = None,
+    allocate: Allocate = np.empty,
+) -> Recording:
+    """Integrate the closed loop over the grid.
+
+    `progress` is called with the fraction done, about 20 times a second. An interrupt ends the
+    march and keeps what was logged. `compiled=False` runs the same kernels as plain Python.
+    `allocate` gives the room for the logged rows; the recording's signals are views of it.
+    """
+    observer, about = observer or Observer(), loop.about()
+    loop.check_fit(grid.step)
+    plan = loop.layout(grid)
+    wires, last = wire(loop, plan, observer, grid, grid.rows, allocate), plan.steps + 1
+    advance = partial(marcher(loop, observer, compiled), 0, last, grid.step, wires, plan)
+    with np.errstate(all="ignore"), interrupts_deferred():
+        ending = march(
+            advance, last, wires.under_way,
+            progress and (lambda reached: progress(reached / last)),
+        )  # fmt: skip
+        return replace(_record(loop, grid, wires, plan, ending), about=about)
+
+
+def ready(loop: ClosedLoop, grid: TimeGrid, observer: Observer, compiled: bool) -> None:
+    """Make every check of a run before its first step, and have its march compiled and loaded.
+
+    Raises LawError.
+    """
+    check_law(loop)
+    loop.check_fit(grid.step)
+    asked("the closed loop", partial(wire, loop, loop.layout(grid), observer, grid))
+    marcher(loop, observer, compiled)
+
+
+def marcher(loop: ClosedLoop, observer: Observer, compiled: bool) -> Callable[..., int]:
+    """The march of this loop, `closed_loop.advance` less its functions, compiled if need be."""
+    if not compiled:
+        doors = [signatures.bind(*part) for part in entries(loop, observer)]
+        return lambda *rest: closed_loop.advance_plainly(*doors, *rest)
+    from podusv_cli.engine.machine import compile  # a loop in plain Python needs no compiler
+
+    doors = [compile.entry(*part) for part in entries(loop, observer)]
+    march = compile.routine(closed_loop.advance, signatures.ADVANCE)
+
+    def compiled_march(first: int, last: int, h: float, wires: Wires, plan: Plan) -> int:
+        vectors, sizes = signatures.pointers(wires), signatures.whole_numbers(plan)
+        return int(march(*doors, first, last, h, vectors, sizes))
+
+    return compiled_march
+
+
+def _logged(loop: ClosedLoop, table: Vector) -> dict[str, Vector]:
+    """The signals of a recording in a table of logged rows."""
+    named = by_name(names(loop), table, loop.about())
+    return {name: column for name, column in named.items() if name not in TARGET[2:]}
+
+
+def _record(
+    loop: ClosedLoop, grid: TimeGrid, wires: Wires, plan: Plan, ending: Ending
+) -> Recording:
+    rows = -(-ending.reached // plan.log_every)
+    signals = _logged(loop, wires.log.reshape(-1, plan.width)[:rows])
+    status, message = RECORDED[ending.status], ""
+    if status == "interrupted":
+        message = f"interrupted after t = {max(ending.reached - 1, 0) * grid.step:.6g} s"
+    if status == "diverged":
+        message = f"diverged {why(ending, loop, grid, wires)}; {_last_words(signals)}"
+    fixed = {part.name: array for part, array in loop.controller.fixed_signals().items()}
+    return Recording(status, loop.controller.label, signals, fixed, wires.seen.copy(), message)
+
+
+def why(ending: Ending, loop: ClosedLoop, grid: TimeGrid, wires: Wires) -> str:
+    """When and why a march that nobody interrupted did not reach its last instant."""
+    at = ending.reached * grid.step
+    return f"at t = {at:.6g} s: {ending.cause or _culprit(wires, names(loop), at)}"
+
+
+def _culprit(wires: Wires, labels: list[str], at: float) -> str:
+    now = np.concatenate([[at], wires.s, wires.row])
+    named = zip(labels, now, strict=True)
+    bad = next((name for name, x in named if not abs(x) <= closed_loop.LARGEST), "?")
+    return f"{bad} is not finite"
+
+
+def _last_words(signals: Mapping[str, Vector]) -> str:
+    last = ", ".join(
+        f"{name} {signals[name][-1]:.4g}"
+        for name in ("time", *STATE, *DEMAND)
+        if len(signals[name])
+    )
+    return f"last logged values: {last or 'none'}"

@@ -1,0 +1,149 @@
+"""The march in a thread of its own, watched by the thread that started it.
+
+Compiled code sees no signal, and a law may never return. The watching thread reports progress, sets
+the march's stop flag on an interrupt, and abandons a march that hangs.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from contextvars import copy_context
+from functools import partial
+from queue import Empty, SimpleQueue
+from threading import Thread, get_ident
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from podusv_cli.core.errors import in_a_line
+from podusv_cli.core.kernel import Vector
+from podusv_cli.engine.step.layout import STOP
+from podusv_cli.process.interrupts import interrupts_enabled
+
+Bell = SimpleQueue[None]
+GLANCE = 0.05  # s between two looks at a march
+PATIENCE = 10.0  # s of processor time that a step may take
+LAST_CHANCE = 1.0  # s for a march to end after its stop flag is set
+
+
+Word = Literal["finished", "diverged", "crashed", "hung", "interrupted"]
+
+
+class Ending(NamedTuple):
+    """How many instants are good, how the march ended, and the error that ended it, if any."""
+
+    reached: int
+    status: Word
+    cause: str = ""
+
+
+class Work:
+    """A function that runs in a thread of its own; `result` or `error` is set when it is over.
+
+    `under_way` is the vector of that name in `Wires`. The thread rings `bell` when it ends.
+    """
+
+    def __init__(
+        self, function: Callable[[], int], under_way: Vector | None = None, bell: Bell | None = None
+    ) -> None:
+        """Nothing runs before `start`."""
+        self.started = self.over = False
+        self.result: int | None = None
+        self.error: BaseException | None = None
+        self._function, self._bell = function, bell or SimpleQueue()
+        self._under_way = np.zeros(1 + STOP) if under_way is None else under_way
+        self._clock: Callable[[], float] = lambda: 0.0  # the thread's processor time
+        self._last_change = (-1.0, 0.0)  # the instant under way, and the time when it was new
+
+    def start(self) -> None:
+        """Start a thread, which ignores the floating-point errors that this one ignores."""
+        self.started = True
+        Thread(target=copy_context().run, args=(self._run,), daemon=True).start()
+
+    def wait(self, seconds: float = GLANCE) -> None:
+        """Wait until the bell rings, but not longer than this."""
+        with suppress(Empty):
+            self._bell.get(timeout=seconds)
+
+    def hangs(self) -> bool:
+        """Whether it has computed for `PATIENCE` at one instant. To be called again and again."""
+        instant, used = float(self._under_way[0]), 0.0
+        with suppress(OSError):  # the thread has ended
+            used = self._clock()
+        if instant != self._last_change[0]:
+            self._last_change = (instant, used)
+        return not self.over and used - self._last_change[1] > PATIENCE
+
+    def finish(self, progress: Callable[[int], None] | None = None) -> None:
+        """Start, and wait until it is over or hangs."""
+        self.start()
+        while not (self.over or self.hangs()):
+            self.wait()
+            if progress:
+                progress(self.reached)
+
+    def stop(self) -> None:
+        """Tell the march to stop at the next instant."""
+        self._under_way[STOP] = 1.0
+
+    def stopped(self) -> int:
+        """Stop the march, wait a moment until it has, and count the good instants."""
+        self.stop()
+        end = time.monotonic() + LAST_CHANCE
+        while self.started and not self.over and time.monotonic() < end:
+            self.wait()
+        return self.reached
+
+    @property
+    def reached(self) -> int:
+        """The number of good instants: all before the one that is under way."""
+        return int(self._under_way[0]) if self.result is None else self.result
+
+    def ending(self, last: int) -> Ending:
+        """How a march up to this instant ended; one that hangs is abandoned."""
+        if self.result is None:
+            self.stop()  # should the law return one day
+            return Ending(self.reached, "crashed" if self.error else "hung", self.fault())
+        return Ending(self.result, "finished" if self.result == last else "diverged")
+
+    def interrupted(self, last: int) -> Ending:
+        """How a march ended that an interrupt is to stop: by itself where it is over already."""
+        return self.ending(last) if self.over else Ending(self.stopped(), "interrupted")
+
+    def fault(self) -> str:
+        """What is wrong with a function that has no result."""
+        if not self.error:
+            return f"it is not over after {PATIENCE:g} s of computing"
+        return in_a_line(self.error)
+
+    def _run(self) -> None:
+        # Looked up by the thread itself, since the system crashes if the thread has ended.
+        look_up = getattr(time, "pthread_getcpuclockid", None)
+        self._clock = (
+            partial(time.clock_gettime, look_up(get_ident())) if look_up else time.process_time
+        )
+        try:
+            self.result = self._function()
+        except BaseException as error:  # a law may raise anything
+            self.error = error
+        self.over = True
+        self._bell.put(None)
+
+
+def march(
+    advance: Callable[[], int], last: int, under_way: Vector,
+    progress: Callable[[int], None] | None = None,
+) -> Ending:  # fmt: skip
+    """March up to the instant `last`, excluded. To be called while interrupts are held."""
+    work = Work(advance, under_way)
+    try:
+        with interrupts_enabled():
+            work.finish(progress)
+        return work.ending(last)
+    except KeyboardInterrupt:
+        return work.interrupted(last)
+    except BaseException:  # of `progress`; nobody will use what the march goes on to compute
+        work.stop()
+        raise

@@ -1,0 +1,126 @@
+"""The march of several runs side by side, a run in every lane.
+
+These kernels are for lanes only, so their branches stay as they are written. Their words stand for
+those of `lane_parts`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from podusv_cli.core.kernel import LANES, Vector, kernel, tail
+from podusv_cli.engine.step.layout import STOP, Function
+from podusv_cli.engine.step.relay import begin_step
+from podusv_cli.engine.step.rk4 import finite, load, measure, named_plan, named_wires, rates, step
+from podusv_cli.engine.step.sampled import perceive, sample_and_hold
+
+REACHED = STOP + 1  # in `under_way`: how many instants each lane reached, below 0 while it marches
+
+
+@kernel
+def lanes_and(one: Any, other: Any) -> Any:
+    """Where both masks are true."""
+    raise NotImplementedError
+
+
+@kernel
+def lanes_not(mask: Any) -> Any:
+    """Where a mask is not true."""
+    raise NotImplementedError
+
+
+@kernel
+def lanes_any(mask: Any) -> bool:
+    """Whether a mask is true in any lane."""
+    raise NotImplementedError
+
+
+@kernel
+def lane_true(mask: Any, lane: int) -> bool:
+    """Whether a mask is true in this lane."""
+    raise NotImplementedError
+
+
+@kernel
+def lane_numbers(vector: Vector) -> Vector:
+    """A vector's numbers one by one: the first number of every lane, then the second, ..."""
+    raise NotImplementedError
+
+
+@kernel
+def copy_lane(lane: int, count: int, vector: Any, out: Vector) -> None:
+    """The numbers of one lane."""
+    numbers = lane_numbers(vector)
+    for i in range(count):
+        out[i] = numbers[i * LANES + lane]
+
+
+@kernel
+def follow_lane(lane: int, other: int, count: int, vector: Any) -> None:
+    """Give a lane the numbers of another one."""
+    numbers = lane_numbers(vector)
+    for i in range(count):
+        numbers[i * LANES + lane] = numbers[i * LANES + other]
+
+
+@kernel
+def end_lanes(k: int, lost: Any, c: Any, n: Any, size: int, under_way: Vector, ends: Vector) -> int:
+    """Keep state, row and observer's numbers of lanes that end here; how many lanes go on.
+
+    A lane that has ended goes on with the state of one that has not, and without an effect on it: a
+    loop of a law need not end for numbers that are not finite.
+    """
+    living, last = 0, 0
+    for lane in range(LANES):
+        if under_way[REACHED + lane] < 0.0:
+            if lane_true(lost, lane):
+                under_way[REACHED + lane] = k
+                out = tail(ends, lane * (n.states + n.columns + size))
+                copy_lane(lane, n.states, c.s, out)
+                copy_lane(lane, n.columns, c.row, tail(out, n.states))
+                copy_lane(lane, size, c.seen, tail(out, n.states + n.columns))
+            else:
+                living, last = living + 1, lane
+    for lane in range(LANES):
+        if living > 0 and lane_true(lost, lane):
+            follow_lane(lane, last, n.states, c.s)
+            follow_lane(lane, last, n.states, c.stages)
+    return living
+
+
+@kernel
+def advance_lanes(
+    path: Function, disturbance: Function, law: Function, sample: Function, actuator: Function,
+    after: Function, measurement: Function, correct: Function, follow: Function, observe: Function,
+    first: int, last: int, h: float, wires: Any, plan: Any, size: int, under_way: Vector,
+    ends: Vector,
+) -> int:  # fmt: skip
+    """`closed_loop.advance` for all lanes, without a log.
+
+    A lane whose numbers are not finite goes on without an effect on the others. Returns the first
+    instant that was not begun, or at which no lane was left, or `last`.
+    """
+    c, n = named_wires(wires), named_plan(plan)
+    for k in range(first, last):
+        if under_way[STOP] != 0.0:
+            return k
+        under_way[0] = k
+        t = k * h
+        again = k > first and t == (k - 1) * h + h  # see `closed_loop.instant`
+        if n.relayed > 0:
+            begin_step(k, t, c.relay)
+        load(t, c.s, disturbance, c, n, again, False)
+        if n.measured > 0:
+            perceive(k, t, measurement, correct, c, n)
+        if n.sample_every > 0 or n.hold_every > 0:
+            sample_and_hold(k, t, h, path, law, sample, after, c, n)
+        rates(t, c.s, c.stages, path, law, actuator, after, follow, c, n, again)
+        measure(c.s, c.row)
+        lost = lanes_not(lanes_and(finite(n.states, c.s), finite(n.columns, c.row)))
+        if lanes_any(lost) and end_lanes(k, lost, c, n, size, under_way, ends) == 0:
+            return k
+        weight = 0.5 * h if k == 0 or k == n.steps else h
+        observe(t, weight, c.s, c.row, c.observer, c.seen)
+        if k < n.steps:
+            step(t, h, path, disturbance, law, actuator, after, follow, c, n)
+    return last

@@ -1,0 +1,58 @@
+"""The way of the law's demand to an actuator that has a command path, or that fails.
+
+A delay of m steps gives a stage of the RK4 step the demand that the law formed at the same stage m
+steps before. That is RK4 for the delay differential equation as one large ordinary one (the method
+of steps; Bellen and Zennaro, Numerical Methods for Delay Differential Equations, 2003): fourth
+order without any interpolation, and exact for a demand that is held.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from podusv_cli.core.kernel import Vector, kernel, shared, tail
+from podusv_cli.core.steps import whole_steps
+from podusv_cli.engine.step.grid import TimeGrid
+
+STAGES = 4  # of a step of RK4
+# In the vector `relay`: the place of the next demand, how many are under way, what the actuator is
+# given (tau_u [N], tau_r [N m], when the step began [s]), then the demands under way.
+NEXT, COUNT, GIVEN, BEGAN, DEMANDS = 0, 1, 2, 4, 5
+
+
+def relay(delay: float, grid: TimeGrid) -> Vector:
+    """The vector at the start of a run: zero demands are under way.
+
+    Raises ValueError for a delay [s] that is no whole number of steps.
+    """
+    steps = whole_steps(delay, grid.step)
+    if steps is None or (delay > 0 and steps == 0):
+        raise ValueError(
+            f"the actuator's command is delayed by {delay:g} s, no whole number of steps of "
+            f"{grid.step:g} s"
+        )
+    count = STAGES * min(steps, grid.steps + 1)  # of a later command nothing is seen
+    numbers = np.zeros(DEMANDS + 2 * count)
+    numbers[COUNT] = count
+    return numbers
+
+
+@kernel
+def begin_step(k: int, t: float, relay: Vector) -> None:
+    """Note that step k begins at time t."""
+    relay[BEGAN] = t
+    count = shared(relay[COUNT])
+    if count > 0.0:
+        relay[NEXT] = STAGES * k % int(count)
+
+
+@kernel
+def pass_on(demand: Vector, relay: Vector) -> None:
+    """Take this stage's demand, and give the actuator that of the same stage a delay before."""
+    relay[GIVEN], relay[GIVEN + 1] = demand[0], demand[1]
+    if shared(relay[COUNT]) > 0.0:
+        at = int(shared(relay[NEXT]))
+        place = tail(relay, DEMANDS + 2 * at)
+        relay[GIVEN], relay[GIVEN + 1] = place[0], place[1]
+        place[0], place[1] = demand[0], demand[1]
+        relay[NEXT] = at + 1

@@ -1,0 +1,287 @@
+"""The closed loop as kernels: right-hand side, RK4 step, and the march along the time grid.
+
+State s: the vessel's (x, y, psi, u, v, r), the actuator's states, the estimator's, the law's
+memory.
+Row: target, distance to it, law's signals, demand, tau, b and the disturbance's signals,
+actuator's signals, measured values; offsets are in `Plan`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from podusv_cli.components.vessels.plant import plant
+from podusv_cli.components.vessels.vessel import COEFFICIENTS
+from podusv_cli.core.elementary import cos_sin
+from podusv_cli.core.kernel import Vector, kernel, scratch, shared, tail, unpacker
+from podusv_cli.engine.step.layout import (
+    DISTANCE,
+    HELD_DEMAND,
+    HELD_SIGNALS,
+    HELD_TARGET,
+    HELD_X,
+    STOP,
+    Function,
+    Plan,
+    Wires,
+    shifted,
+)
+from podusv_cli.engine.step.relay import BEGAN, GIVEN, begin_step, pass_on
+from podusv_cli.engine.step.sampled import perceive, sample_and_hold
+
+LARGEST = 1e300
+
+
+# Vector to named coefficients of the vessel; the plant is the one part that never varies.
+coefficients = unpacker(COEFFICIENTS)
+# Machine code gets both as bare numbers, one by the other.
+named_wires, named_plan = unpacker(Wires._fields), unpacker(Plan._fields)
+
+
+@kernel
+def through_water(s: Vector, flow: Vector, x: Vector) -> None:
+    """x = the vessel's state with (u, v) relative to water that flows at (V_c, beta_c)."""
+    cosine, sine = cos_sin(flow[1] - s[2])
+    for i in range(6):
+        x[i] = s[i]
+    x[3] -= flow[0] * cosine
+    x[4] -= flow[0] * sine
+
+
+@kernel
+def drive(
+    t: float, s: Vector, ds: Vector, demand: Vector, actuator: Function, c: Wires, n: Plan
+) -> None:
+    """The actuator's loads, rates and signals, from the vessel's motion through the water."""
+    row, x = c.row, s
+    if n.flow > 0:
+        x = scratch(6)
+        through_water(s, tail(row, n.flow), x)
+    actuator(
+        t, x, tail(s, 6), demand, c.actuator, c.actuator_table,
+        tail(row, n.tau), tail(ds, 6), tail(row, n.flags),
+    )  # fmt: skip
+
+
+@kernel
+def load(
+    t: float, s: Vector, disturbance: Function, c: Wires, n: Plan, again: bool, stage: bool
+) -> None:
+    """Put the disturbance at t and s into the row; in a stage within a step its load is enough.
+
+    `again`: the evaluation before was at this very t, so what depends on time alone is in the row.
+    """
+    if not (again and n.load_of_time == 1):
+        disturbance(
+            t, s, c.disturbance, c.disturbance_table, tail(c.row, n.b),
+            1.0 if again else 0.0, 1.0 if stage else 0.0,
+        )  # fmt: skip
+
+
+@kernel
+def rates(
+    t: float, s: Vector, ds: Vector,
+    path: Function, law: Function, actuator: Function, after: Function, follow: Function,
+    c: Wires, n: Plan, again: bool,
+) -> None:  # fmt: skip
+    """Right-hand side of the closed loop at time t, whose load is in the row; fills the row.
+
+    `again` as in `load`.
+    """
+    row = c.row
+    demand, tau, b = tail(row, n.demand), tail(row, n.tau), tail(row, n.b)
+    memory, memory_rate = tail(s, n.memory), tail(ds, n.memory)
+    given = tail(s, n.estimate)  # the state that the law is given
+    p, table, work = c.law, c.law_table, c.work
+    if not again:
+        path(t, c.path, c.path_table, row)
+    if n.hold_every > 0 and n.update_first > 0:
+        for i in range(n.states - n.memory):
+            memory_rate[i] = 0.0
+    elif n.hold_every > 0:
+        held = c.held
+        law(
+            shared(held[0]), tail(held, HELD_X), memory, tail(held, HELD_TARGET), p, table,
+            tail(held, HELD_DEMAND), memory_rate, tail(held, HELD_SIGNALS), work,
+        )  # fmt: skip
+    else:
+        law(t, given, memory, row, p, table, demand, memory_rate, tail(row, n.signals), work)
+    wanted = demand
+    if n.relayed > 0:
+        pass_on(demand, c.relay)
+        wanted = tail(c.relay, GIVEN)
+    drive(t, s, ds, wanted, actuator, c, n)
+    if n.wants_loads > 0 and not (n.hold_every > 0 and n.update_first > 0):
+        after(t, memory, demand, tau, p, table, memory_rate)
+    if n.measured > 0:
+        follow(
+            t, c.sensed, tau, given, c.estimator, c.estimator_table, tail(ds, n.estimate)
+        )  # fmt: skip
+    plant(s, tau, b, coefficients(c.vessel), ds)
+
+
+@kernel
+def measure(s: Vector, row: Vector) -> None:
+    """The distance to the target (18)."""
+    x_e, y_e = row[0] - s[0], row[1] - s[1]
+    row[DISTANCE] = math.sqrt(x_e * x_e + y_e * y_e)
+
+
+@kernel
+def step(
+    t: float, h: float,
+    path: Function, disturbance: Function, law: Function, actuator: Function, after: Function,
+    follow: Function, c: Wires, n: Plan,
+) -> None:  # fmt: skip
+    """Classical RK4 from t to t + h; the first stage has been evaluated already."""
+    s, count = c.s, n.states
+    k1 = c.stages
+    k2, k3, k4 = tail(k1, count), tail(k1, 2 * count), tail(k1, 3 * count)
+    y = tail(k1, 4 * count)
+    shifted(count, s, 0.5 * h, k1, y)
+    load(t + 0.5 * h, y, disturbance, c, n, False, True)
+    rates(t + 0.5 * h, y, k2, path, law, actuator, after, follow, c, n, False)
+    shifted(count, s, 0.5 * h, k2, y)
+    load(t + 0.5 * h, y, disturbance, c, n, True, True)
+    rates(t + 0.5 * h, y, k3, path, law, actuator, after, follow, c, n, True)
+    shifted(count, s, h, k3, y)
+    load(t + h, y, disturbance, c, n, False, True)
+    rates(t + h, y, k4, path, law, actuator, after, follow, c, n, False)
+    for i in range(count):
+        s[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
+
+
+@kernel
+def finite(count: int, vector: Vector) -> bool:
+    """Whether all entries are numbers that can still be worked with."""
+    bad = 0
+    for i in range(count):
+        bad += 0 if abs(vector[i]) <= LARGEST else 1
+    return bad == 0
+
+
+@kernel
+def write_row(k: int, t: float, c: Wires, n: Plan) -> None:
+    """Log t, s and the row."""
+    s, row = c.s, c.row
+    out = tail(c.log, k // n.log_every * (1 + n.states + n.columns))
+    out[0] = t
+    for i in range(n.states):
+        out[1 + i] = s[i]
+    for i in range(n.columns):
+        out[1 + n.states + i] = row[i]
+
+
+@kernel
+def instant(
+    k: int, first: int, h: float, path: Function, disturbance: Function, law: Function,
+    sample: Function, actuator: Function, after: Function, measurement: Function,
+    correct: Function, follow: Function, observe: Function, c: Wires, n: Plan,
+) -> bool:  # fmt: skip
+    """Measure, sample, evaluate, observe and log instant k; whether all its numbers are finite."""
+    t = k * h
+    c.under_way[0] = k
+    again = k > first and t == (k - 1) * h + h  # where the last stage of the step before was
+    if n.relayed > 0:
+        begin_step(k, t, c.relay)
+    load(t, c.s, disturbance, c, n, again, False)
+    if n.measured > 0:
+        perceive(k, t, measurement, correct, c, n)
+    if n.sample_every > 0 or n.hold_every > 0:
+        sample_and_hold(k, t, h, path, law, sample, after, c, n)
+    rates(t, c.s, c.stages, path, law, actuator, after, follow, c, n, again)
+    measure(c.s, c.row)
+    if not (finite(n.states, c.s) and finite(n.columns, c.row)):
+        return False
+    weight = 0.5 * h if k == 0 or k == n.steps else h
+    observe(t, weight, c.s, c.row, c.observer, c.seen)
+    if k % n.log_every == 0:
+        write_row(k, t, c, n)
+    return True
+
+
+@kernel
+def advance(
+    path: Function, disturbance: Function, law: Function, sample: Function, actuator: Function,
+    after: Function, measurement: Function, correct: Function, follow: Function, observe: Function,
+    first: int, last: int, h: float, wires: Any, plan: Any,
+) -> int:  # fmt: skip
+    """March over the instants first .. last - 1.
+
+    Returns the first instant that is not finite, or that was not begun, or `last`.
+    """
+    c, n = named_wires(wires), named_plan(plan)
+    for k in range(first, last):
+        if c.under_way[STOP] != 0.0:
+            return k
+        if not instant(
+            k, first, h, path, disturbance, law, sample, actuator, after, measurement, correct,
+            follow, observe, c, n,
+        ):  # fmt: skip
+            return k
+        if k < n.steps:
+            step(k * h, h, path, disturbance, law, actuator, after, follow, c, n)
+    return last
+
+
+def advance_plainly(
+    path: Function, disturbance: Function, law: Function, sample: Function, actuator: Function,
+    after: Function, measurement: Function, correct: Function, follow: Function, observe: Function,
+    first: int, last: int, h: float, c: Wires, n: Plan,
+) -> int:  # fmt: skip
+    """`advance` as plain Python, whose `math` raises where machine code gives no number."""
+    for k in range(first, last):
+        try:
+            if c.under_way[STOP] != 0.0 or not instant(
+                k, first, h, path, disturbance, law, sample, actuator, after, measurement, correct,
+                follow, observe, c, n,
+            ):  # fmt: skip
+                return k
+        except (ArithmeticError, ValueError):
+            return k
+        try:
+            if k < n.steps:
+                step(k * h, h, path, disturbance, law, actuator, after, follow, c, n)
+        except (ArithmeticError, ValueError):
+            c.s[:] = math.nan
+    return last
+
+
+@kernel
+def evaluate_all(
+    law: Function, rounds: int, count: int, width: int,
+    rows: Vector, p: Vector, table: Vector, tau: Vector, out: Vector,
+) -> None:  # fmt: skip
+    """Call the law `rounds` times on each of `count` rows of (t, target, x, memory).
+
+    `out` takes rate, signals and scratch, each up to `width` numbers.
+    """
+    for _ in range(rounds):
+        for i in range(count):
+            row = tail(rows, i * width)
+            law(
+                row[0], tail(row, 7), tail(row, 13), tail(row, 1), p, table,
+                tau, out, tail(out, width), tail(out, 2 * width),
+            )  # fmt: skip
+
+
+@kernel
+def rates_along(
+    path: Function, disturbance: Function, law: Function, actuator: Function, after: Function,
+    follow: Function, count: int, logged: Vector, out: Vector, wires: Any, plan: Any,
+) -> None:  # fmt: skip
+    """For each of `count` logged rows of t, s: the rates of s, then the row, into `out`."""
+    c, n = named_wires(wires), named_plan(plan)
+    for i in range(count):
+        here = tail(logged, i * (1 + n.states))
+        there = tail(out, i * (n.states + n.columns))
+        if n.relayed > 0:
+            c.relay[BEGAN] = here[0]
+        load(here[0], tail(here, 1), disturbance, c, n, False, False)
+        rates(
+            here[0], tail(here, 1), there, path, law, actuator, after, follow, c, n, False
+        )  # fmt: skip
+        measure(tail(here, 1), c.row)
+        for j in range(n.columns):
+            there[n.states + j] = c.row[j]

@@ -1,0 +1,90 @@
+"""What happens at instants only: measurements, and the samples of sampled control."""
+
+from __future__ import annotations
+
+from podusv_cli.components.measurements.base import KNOWN
+from podusv_cli.core.kernel import Vector, kernel, shared, tail
+from podusv_cli.engine.step.layout import (
+    HELD_DEMAND,
+    HELD_SIGNALS,
+    HELD_TARGET,
+    HELD_X,
+    Function,
+    Plan,
+    Wires,
+    shifted,
+)
+
+
+@kernel
+def held_rates(
+    t: float, memory: Vector, rate: Vector, law: Function, after: Function, c: Wires, n: Plan
+) -> None:
+    """Rates of the law's memory with the sample at t held, and the loads of the period before."""
+    row, held = c.row, c.held
+    law(
+        t, tail(c.s, n.estimate), memory, row, c.law, c.law_table, tail(held, HELD_DEMAND), rate,
+        tail(held, HELD_SIGNALS), c.work,
+    )  # fmt: skip
+    if n.wants_loads > 0:
+        after(t, memory, tail(row, n.demand), tail(row, n.tau), c.law, c.law_table, rate)
+
+
+@kernel
+def update(t: float, h: float, law: Function, after: Function, c: Wires, n: Plan) -> None:
+    """Take the sample at t into the law's memory: RK4 over the period that ends, sample held."""
+    count, memory = n.states - n.memory, tail(c.s, n.memory)
+    k1 = tail(c.stages, n.memory)
+    k2, k3, k4 = tail(k1, n.states), tail(k1, 2 * n.states), tail(k1, 3 * n.states)
+    y = tail(k1, 4 * n.states)
+    for _ in range(n.hold_every):
+        held_rates(t, memory, k1, law, after, c, n)
+        shifted(count, memory, 0.5 * h, k1, y)
+        held_rates(t, y, k2, law, after, c, n)
+        shifted(count, memory, 0.5 * h, k2, y)
+        held_rates(t, y, k3, law, after, c, n)
+        shifted(count, memory, h, k3, y)
+        held_rates(t, y, k4, law, after, c, n)
+        for i in range(count):
+            memory[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
+
+
+@kernel
+def sample_and_hold(
+    k: int, t: float, h: float, path: Function, law: Function, sample: Function, after: Function,
+    c: Wires, n: Plan,
+) -> None:  # fmt: skip
+    """What happens at instants only: the law's own samples, and the hold of sampled control."""
+    given, row, held = tail(c.s, n.estimate), c.row, c.held
+    memory = tail(c.s, n.memory)
+    p, table = c.law, c.law_table
+    path(t, c.path, c.path_table, row)
+    if n.sample_every > 0 and k % n.sample_every == 0:
+        sample(t, given, memory, row, p, table)
+    if n.hold_every > 0 and k % n.hold_every == 0:
+        if n.update_first > 0 and k > 0:
+            update(t, h, law, after, c, n)
+        held[0] = t
+        for i in range(6):
+            held[HELD_X + i] = given[i]
+            held[HELD_TARGET + i] = row[i]
+        law(
+            t, given, memory, row, p, table, tail(row, n.demand), tail(c.stages, n.memory),
+            tail(row, n.signals), c.work,
+        )  # fmt: skip
+
+
+@kernel
+def perceive(k: int, t: float, measurement: Function, correct: Function, c: Wires, n: Plan) -> None:
+    """Measure at instant k, and take what is delivered into the estimate.
+
+    Leaves the measured values behind the other signals in the row, which has the disturbance.
+    """
+    b, sensed, measured = tail(c.row, n.b), c.sensed, tail(c.row, n.sensed)
+    measurement(t, float(k), c.s, b, c.measurement, c.measurement_table, sensed)
+    correct(t, sensed, tail(c.s, n.estimate), c.estimator, c.estimator_table)
+    logged = 0
+    for i in range(6):
+        if shared(sensed[KNOWN + i]) != 0.0:
+            measured[logged] = sensed[i]
+            logged += 1

@@ -1,0 +1,1 @@
+"""Experiments of many runs: studies over draws, searches for gains, and the bench of laws."""

@@ -1,0 +1,95 @@
+"""Figures of a bench. Import this module where a figure is drawn: matplotlib is slow to import."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from podusv_cli.core import escaping
+from podusv_cli.core.kernel import Vector
+from podusv_cli.figures.style import legend, look, new_figure
+from podusv_cli.studies.bench.runs import BenchRun
+from podusv_cli.studies.bench.standing import leaderboard, profile
+
+WORST = 4.0  # times the best law's IAE; the end of the profile's axis
+SMALL = 0.62  # inches, the side of a small multiple
+MARGIN = 0.15  # of a path's extent, around a small multiple
+LOST = "#D55E00"
+SMALL_TEXT: dict[str, Any] = {"fontsize": 5.5}
+NAMES = 0.75  # inches at the left, for the tasks
+DPI = 150.0  # as in a page of 1300 points
+TITLES = 0.28  # inches at the top, for the laws
+LONGEST = 12  # letters of a law's name in one line
+APART = {"bottom": 0.01, "right": 0.995, "wspace": 0.06, "hspace": 0.06}
+
+
+def profiles(made: pd.DataFrame, columns: int = 2) -> Figure:
+    """The share of cases that each law does within so many times the best law's IAE."""
+    figure = new_figure(columns, 3.2)
+    axes, ratios = figure.add_subplot(), np.geomspace(1.0, WORST, 300)
+    for place, law in enumerate(leaderboard(made).index):
+        color, linestyle, _ = look(place)
+        share = 100.0 * profile(made, law, ratios)
+        axes.plot(
+            ratios, share, color=color, linestyle=linestyle, label=escaping.figure(law), zorder=3
+        )
+    axes.set_xscale("log")
+    axes.set(
+        xlim=(1.0, WORST), ylim=(0.0, 101.0), ylabel="cases [%]",
+        xlabel="IAE over that of the best law of the case, at most",
+    )  # fmt: skip
+    axes.set_xticks([1, 1.2, 1.5, 2, 3, 4], ["1", "1.2", "1.5", "2", "3", "4"])
+    axes.minorticks_off()
+    legend(figure, columns)
+    return figure
+
+
+def tracks(runs: Sequence[BenchRun], laws: Sequence[str]) -> Figure:
+    """Small multiples of one vessel: a row a task, a column a law, all conditions together."""
+    tasks = list(dict.fromkeys(run.task for run in runs))
+    width, height = SMALL * len(laws) + NAMES, SMALL * len(tasks) + TITLES
+    figure = Figure(figsize=(width, height), dpi=DPI)
+    figure.set_layout_engine("none")
+    places = {"left": NAMES / width, "top": 1.0 - TITLES / height, **APART}
+    every = figure.subplots(len(tasks), len(laws), squeeze=False, gridspec_kw=places)
+    for task, row in zip(tasks, every, strict=True):
+        for law, axes in zip(laws, row, strict=True):
+            _small(axes, [run for run in runs if (run.task, run.law) == (task, law)])
+        row[0].set_ylabel(escaping.figure(task), **SMALL_TEXT, rotation=0, ha="right", va="center")
+    for law, axes in zip(laws, every[0], strict=True):
+        axes.set_title(_folded(law), **SMALL_TEXT, pad=2.0)
+    return figure
+
+
+def _folded(law: str) -> str:
+    """A law's name as text of a figure; a long one in two lines."""
+    first, _, rest = law.partition("_")
+    if not rest or len(law) <= LONGEST:
+        return escaping.figure(law)
+    return f"{escaping.figure(first)}_\n{escaping.figure(rest)}"
+
+
+def _small(axes: Axes, runs: Sequence[BenchRun]) -> None:
+    axes.set(xticks=[], yticks=[], aspect="equal")
+    for spine in axes.spines.values():
+        spine.set_linewidth(0.3)
+    for run in sorted(runs, key=lambda run: not run.good):
+        axes.plot(*run.track.T[1::-1], color=look(0)[0] if run.good else LOST, linewidth=0.5)
+    longest = max((run.track for run in runs), key=len)
+    if len(longest):
+        _frame(axes, longest)
+
+
+def _frame(axes: Axes, track: Vector) -> None:
+    """The path, and limits around it and the start; where a lost vessel goes is left out."""
+    x, y, x_d, y_d = track.T
+    axes.plot(y_d, x_d, color="#BBBBBB", linewidth=1.6, zorder=1)
+    ends = [np.append(x_d, x[:1]), np.append(y_d, y[:1])]
+    half = (0.5 + MARGIN) * max(float(np.ptp(end)) for end in ends)
+    north, east = (0.5 * (float(end.min()) + float(end.max())) for end in ends)
+    axes.set(xlim=(east - half, east + half), ylim=(north - half, north + half))

@@ -1,0 +1,108 @@
+"""The optimum of every case: the least IAE of all motions, with everything known beforehand.
+
+Cases that differ only in what laws are told, or how often they are asked, have the same one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import pandas as pd
+
+from podusv_cli.core.errors import NotConvergedError, UsageError
+from podusv_cli.engine.running.simulate import simulate
+from podusv_cli.optimum import collocation
+from podusv_cli.optimum.collocation import Stage
+from podusv_cli.optimum.problem import Motion, Problem, problem
+from podusv_cli.studies.bench.cases import Case
+from podusv_cli.studies.bench.runs import BenchRun
+
+STEPS = (0.4, 0.2)  # s, of the finest of three grids; the next where IPOPT finds nothing
+BEGINNINGS = 2  # how many laws the search begins from: the best of the case
+TASK = {"vessel", "start", "path", "disturbance", "actuator", "simulation"}
+
+Place = tuple[str, str, str]
+
+
+@dataclass(frozen=True)
+class Least:
+    """An optimum: the cases that it is of, IAE [m s], and by how much the finest grid lowered it.
+
+    `start` is the law from whose run the search came to it.
+    """
+
+    places: Sequence[Place]
+    iae: float
+    step: float
+    lowered: float
+    start: str
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """Cases with one optimum, and the laws whose runs the search begins from."""
+
+    cases: Sequence[Case]
+    laws: Sequence[str]
+
+
+def wanted(every: Iterable[Case], runs: Sequence[BenchRun]) -> tuple[list[Wanted], list[str]]:
+    """What is to be solved, and a sentence for each actuator or load that cannot be."""
+    tasks: dict[str, list[Case]] = {}
+    refused: dict[str, None] = {}
+    for case in every:
+        first = next(iter(case.laws.values()))
+        try:
+            problem(first, "iae")
+        except UsageError as error:
+            refused[str(error).partition(": ")[2]] = None
+            continue
+        tasks.setdefault(first.model_dump_json(include=TASK), []).append(case)
+    return [Wanted(cases, _best(cases, runs)) for cases in tasks.values()], list(refused)
+
+
+def _best(cases: Sequence[Case], runs: Sequence[BenchRun]) -> list[str]:
+    """Laws that reached the target in the first of the cases, by IAE."""
+    done = [run for run in runs if run.place == cases[0].place and run.good]
+    return [run.law for run in sorted(done, key=lambda run: run.metrics["iae"])[:BEGINNINGS]]
+
+
+def least(of: Wanted, tell: Callable[[float], None]) -> Least:
+    """The optimum of these cases. Raises NotConvergedError, UsageError without any beginning."""
+    case = of.cases[0]
+    places = [case.place for case in of.cases]
+    if not of.laws:
+        raise UsageError(f"{', '.join(case.place)}: no law reached its target to begin from")
+    scenarios = {law: case.laws[law] for law in of.laws}
+    guesses = {
+        law: Motion.of(simulate(one.closed_loop(), one.time_grid()))
+        for law, one in scenarios.items()
+    }
+    stages = _searched(problem(scenarios[of.laws[0]], "iae"), guesses, tell)
+    before, last = next(reversed(list(pairwise(stages))))
+    lowered = before.integral - last.integral
+    return Least(places, last.integral, last.step, float(np.nan_to_num(lowered)), last.start)
+
+
+def _searched(
+    asked: Problem, guesses: Mapping[str, Motion], tell: Callable[[float], None]
+) -> list[Stage]:
+    """Optima on ever finer grids. Raises NotConvergedError."""
+    *first, last = STEPS
+    for step in first:
+        with suppress(NotConvergedError):
+            return collocation.searched(asked, guesses, step, lambda _, part: tell(part))[0]
+    return collocation.searched(asked, guesses, last, lambda _, part: tell(part))[0]
+
+
+def table(found: Iterable[Least]) -> pd.DataFrame:
+    """A row for each case that has an optimum."""
+    rows = [
+        (*place, one.iae, one.step, one.lowered, one.start) for one in found for place in one.places
+    ]
+    names = ("vessel", "task", "condition", "optimum", "step", "lowered", "start")
+    return pd.DataFrame(rows, columns=pd.Index(names))

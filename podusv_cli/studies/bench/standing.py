@@ -1,0 +1,86 @@
+"""Who did how well: ratios to the best law of each case, ranks, failures, and the leaderboard."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+import pandas as pd
+
+from podusv_cli.core.kernel import Vector
+from podusv_cli.studies.bench.optima import Least
+from podusv_cli.studies.bench.runs import BenchRun
+
+PLACE = ["vessel", "task", "condition"]
+COLUMNS = ("iae", "z_e_steady", "settling_time", "peak_tau_u", "peak_tau_r", "tv_tau_u", "tv_tau_r")
+CLOSE = 1.1  # times the best law's IAE counts as close
+
+
+def table(runs: Iterable[BenchRun]) -> pd.DataFrame:
+    """A row for each law in each case, with `ratio` (inf where it failed) and `rank`.
+
+    `ratio` is its IAE over the least of the laws that are at their target. Ranks count from 1; laws
+    that failed share the mean of the last ranks.
+    """
+    rows = [
+        {**dict(zip(PLACE, run.place, strict=True)), "law": run.law, "status": run.status,
+         "cause": run.cause, **{name: run.metrics.get(name, np.nan) for name in COLUMNS}}
+        for run in runs
+    ]  # fmt: skip
+    made = pd.DataFrame(rows)
+    counted = made.iae.where(made.status == "finished", np.inf)
+    cases = counted.groupby([made[name] for name in PLACE], sort=False)
+    best = cases.transform("min")
+    made["ratio"] = np.where(np.isfinite(counted), counted / best, np.inf)
+    made["rank"] = cases.rank(method="average")
+    return made
+
+
+def with_optima(made: pd.DataFrame, optima: Sequence[Least]) -> pd.DataFrame:
+    """The table with `optimum` [m s], NaN where there is none, and `of_optimum`, IAE over it.
+
+    `of_optimum` is inf for a failed run.
+    """
+    iae = {place: found.iae for found in optima for place in found.places}
+    least = [iae.get(place, np.nan) for place in made[PLACE].itertuples(index=False, name=None)]
+    counted = made.iae.where(made.status == "finished", np.inf)
+    return made.assign(optimum=least, of_optimum=counted / least)
+
+
+def leaderboard(made: pd.DataFrame) -> pd.DataFrame:
+    """A row for each law, the best first: by mean rank over all cases.
+
+    `close` is the share of cases in which the law's IAE is within 10 % of the best. `median_ratio`
+    and `settled`, the distance over the steady window [m], are medians, with a run that failed or
+    ended early as inf; so is `of_optimum`, if the table has it, over cases with an optimum.
+    """
+    laws = made.groupby("law", sort=False)
+    board = pd.DataFrame(
+        {
+            "cases": laws.size(),
+            "failed": laws.status.agg(lambda status: int((status != "finished").sum())),
+            "mean_rank": laws["rank"].mean(),
+            "median_ratio": laws.ratio.agg(middle),
+            "close": laws.ratio.agg(lambda ratio: float((ratio <= CLOSE).mean())),
+            "settled": laws.z_e_steady.agg(lambda z_e: middle(z_e.fillna(np.inf))),
+        }
+    )
+    if "of_optimum" in made:
+        board["of_optimum"] = laws.of_optimum.agg(lambda ratio: middle(ratio.dropna()))
+    return board.sort_values("mean_rank", kind="stable")
+
+
+def middle(numbers: Iterable[float]) -> float:
+    """The median, where inf counts as the largest number."""
+    ordered = np.sort(np.fromiter(numbers, float))
+    half = len(ordered) // 2
+    return float(ordered[half] if len(ordered) % 2 else ordered[half - 1 : half + 1].mean())
+
+
+def profile(made: pd.DataFrame, law: str, ratios: Vector) -> Vector:
+    """Share of all cases in which the law's IAE is at most so many times the best one.
+
+    The performance profile of Dolan and More (2002); what it lacks to 1 at the right are failures.
+    """
+    own = np.sort(made.ratio[made.law == law].to_numpy())
+    return np.searchsorted(own, ratios, side="right") / len(own)

@@ -1,0 +1,84 @@
+"""Intervals of a claim's statistics as bars and in words, beside the bound of the claim."""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from podusv_cli.studies.study.claims import Link, ParsedClaim
+from podusv_cli.studies.study.samples import FAILURES, SHARE
+from podusv_cli.studies.study.verdict import Part, StudyVerdict
+
+SIGNS: dict[type[ast.cmpop], str] = {
+    ast.Lt: "below", ast.LtE: "at most", ast.Gt: "above", ast.GtE: "at least",
+}  # fmt: skip
+UPWARD = (ast.Gt, ast.GtE)
+MARGIN = 0.12  # of an axis beyond what is on it
+
+
+class Bar(NamedTuple):
+    """A bar; places in percent of its width, `None` for an estimate beyond the axis.
+
+    `asked` is the stretch where the comparison holds. An open end runs to the edge.
+    """
+
+    words: str
+    low: float
+    high: float
+    estimate: float | None
+    bound: float
+    asked: tuple[float, float]
+    ends: tuple[str, str]
+
+
+def bars(claim: ParsedClaim, verdict: StudyVerdict) -> Iterator[Bar]:
+    """A bar for each comparison of a claim in each cell."""
+    for links in claim.parsed.links.values():
+        for link in links:
+            for part in verdict.parts:
+                if part.statistic == link.text and part.n:
+                    yield _bar(link, part)
+
+
+def _bar(link: Link, part: Part) -> Bar:
+    shares = isinstance(link.call.func, ast.Name) and link.call.func.id in (SHARE, FAILURES)
+    first, last = _axis(link, part, shares=shares)
+
+    def place(number: float) -> float:
+        return round(100.0 * (min(max(number, first), last) - first) / (last - first), 2)
+
+    bound = place(link.bound)
+    asked = (bound, 100.0) if isinstance(link.sign, UPWARD) else (0.0, bound)
+    estimate = place(part.estimate) if math.isfinite(part.estimate) else None
+    ends = (_number(first, shares=shares), _number(last, shares=shares))
+    words = _words(link, part, shares=shares)
+    return Bar(words, place(part.low), place(part.high), estimate, bound, asked, ends)
+
+
+def _axis(link: Link, part: Part, *, shares: bool) -> tuple[float, float]:
+    """The ends of an axis that has bound and interval on it."""
+    told = [n for n in (part.low, part.high, part.estimate, link.bound) if math.isfinite(n)]
+    low, high = min(told), max(told)
+    room = MARGIN * (high - low) or 0.1 * abs(high) or 1.0
+    low, high = low - room, high + room
+    return (max(low, 0.0), min(high, 1.0)) if shares else (low, high)
+
+
+def _words(link: Link, part: Part, *, shares: bool) -> str:
+    estimate, low, high, bound = (
+        _number(number, shares=shares)
+        for number in (part.estimate, part.low, part.high, link.bound)
+    )
+    at = f" at {part.cell}" if part.cell else ""
+    asked = f"compared with: {SIGNS[type(link.sign)]} {bound}"
+    return f"{link.text}{at}: {estimate}, between {low} and {high}; {asked}"
+
+
+def _number(number: float, *, shares: bool) -> str:
+    if math.isnan(number):
+        return "unknown"
+    if math.isinf(number):
+        return "a failure" if number > 0 else "no limit"
+    return f"{100 * number:.3g} %" if shares else f"{number:.4g}"

@@ -1,0 +1,294 @@
+"""What is wrong with a scenario's key `sweep`, found before anything is drawn or simulated."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from podusv_cli.core.component import Component
+from podusv_cli.core.plugins import ABSENT
+from podusv_cli.core.signal import NAME, NAME_IN_WORDS
+from podusv_cli.engine.loop.closed_loop import ClosedLoop, Observer, entries
+from podusv_cli.engine.step.grid import TimeGrid
+from podusv_cli.metrics.metric import Metric
+from podusv_cli.scenario.expressions import ExpressionError
+from podusv_cli.scenario.keys import Key
+from podusv_cli.scenario.load import values
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.phrases import did_you_mean, found, unknown
+from podusv_cli.scenario.sections import CLAIM, CLAIM_IN_WORDS
+from podusv_cli.scenario.sweep import Quantity, Sweep
+from podusv_cli.scenario.yaml_tree import Route, dotted, entries_of, route
+from podusv_cli.studies.study.claims import parse
+from podusv_cli.studies.study.draws import DrawError, content, described, drawn
+from podusv_cli.studies.study.expressions import parse_success
+from podusv_cli.studies.study.runs import AXES, ENDING, OWN
+
+# The sections that may differ between the runs of a cell.
+DRAWN = (
+    "vessel", "nominal", "start", "path", "disturbance", "actuator", "measurement", "estimator",
+    "controller",
+)  # fmt: skip
+TRIED = np.array([2.0**-30, 0.5, 1.0 - 2.0**-30])  # shares at which a distribution is tried
+REAL = ("uniform", "normal", "lognormal", "triangular", "angle")  # draw other than whole numbers
+MOST_TRIED = 50  # values of a choice
+FREE_NAME = "; a quantity with a name of your own needs `keys`, as in keys: [vessel.m, vessel.I_z]"
+Faults = Iterator[tuple[Route, str]]
+
+
+def sweep_faults(scenario: Scenario) -> list[tuple[Route, str]]:
+    """Steps of the key and message for everything that is wrong; nothing without a sweep."""
+    sweep = scenario.sweep
+    if sweep is None:
+        return []
+    laws = list(_laws(scenario, sweep))
+    # Without its plug-ins, nothing can be drawn; study.json says of what draws the runs are.
+    draws = () if ABSENT in scenario.plugged else _vary(singles(scenario), sweep)
+    return laws or [
+        *_metric_names(scenario), *draws, *_twice(sweep), *_keep(scenario, sweep),
+        *_claims(scenario, sweep),
+    ]  # fmt: skip
+
+
+def unjudged(scenario: Scenario) -> str:
+    """A sentence about the claims that a study does not judge; empty where there are none."""
+    if not scenario.claims:
+        return ""
+    return (
+        f"claims ({', '.join(scenario.claims)}) are about single runs, which podusv compare "
+        "judges; a study judges sweep.claims"
+    )
+
+
+def singles(scenario: Scenario) -> dict[str, Scenario]:
+    """The scenario of every law that takes part in the sweep."""
+    wanted = scenario.sweep.laws if scenario.sweep else ()
+    return {n: one for n, one in scenario.singles().items() if n in (wanted or scenario.labels())}
+
+
+def _laws(scenario: Scenario, sweep: Sweep) -> Faults:
+    labels = scenario.labels()
+    for place, label in enumerate(sweep.laws):
+        if label not in labels:
+            yield ("sweep", "laws", place), unknown(f"law {label!r}", label, labels)
+        if label in sweep.laws[:place]:
+            yield ("sweep", "laws", place), f"{label} is named twice"
+
+
+def _metric_names(scenario: Scenario) -> Faults:
+    """Metrics of plug-ins that have the name of something else in the table of runs."""
+    for name in scenario.known_metrics():
+        if name in {*OWN, *ENDING}:
+            yield ("plugins",), f"metric {name}: the table of runs has another column of this name"
+
+
+def _vary(laws: Mapping[str, Scenario], sweep: Sweep) -> Faults:
+    taken = {*AXES, *ENDING, *(name for one in laws.values() for name in _metrics(one))}
+    for name, quantity in sweep.vary.items():
+        if wrong := _wrong_name(name, quantity, taken):
+            yield ("sweep", "vary", name), wrong
+            continue
+        texts = [text for key in quantity.targets(name) for text in _key(key, quantity, laws)]
+        texts = texts or list(_tried(name, quantity, laws))
+        yield from ((("sweep", "vary", name), text) for text in dict.fromkeys(texts))
+
+
+def _wrong_name(name: str, quantity: Quantity, taken: Collection[str]) -> str:
+    """Why a quantity cannot be a column of the table of runs under this name; else empty."""
+    if name in quantity.targets(name):
+        return ""
+    if not NAME.fullmatch(name):
+        return f"the name of a quantity with `keys` {NAME_IN_WORDS}, as in hull_mass"
+    if name in taken:
+        return f"{name} is another column of the table of runs; name the quantity {name}_drawn"
+    return ""
+
+
+def _key(key: str, quantity: Quantity, laws: Mapping[str, Scenario]) -> Iterator[str]:
+    """What is wrong with a key that a quantity changes; `laws` are the scenarios by law."""
+    steps = route(key)
+    section = str(steps[0]) if steps else ""
+    if section not in DRAWN and section in Scenario.model_fields:
+        yield f"{section} is the same for all runs of a cell; list values of {key} under grid"
+        return
+    lacking = [label for label, one in laws.items() if not has(one, key)]
+    if len(lacking) == len(laws):
+        near = did_you_mean(key, _numbers(laws))
+        beyond = next(filter(None, (no_entry(one, steps) for one in laws.values())), "")
+        free = "" if quantity.keys or len(steps) > 1 else FREE_NAME
+        yield beyond or f"unknown key {key!r}{near or free}"
+    elif lacking:
+        having = ", ".join(label for label in laws if label not in lacking)
+        who = f"{key} is no key of {', '.join(lacking)}"
+        yield f"{who}; name the laws that have it, {having}, in sweep.laws"
+    else:
+        yield from (t for one in laws.values() for t in _type(key, quantity, one))
+
+
+def has(scenario: Scenario, key: str) -> bool:
+    """Whether the scenario has this key, in a section that may differ between runs."""
+    steps = route(key)
+    try:
+        content(scenario, steps)
+    except LookupError:
+        return False
+    return bool(steps) and dotted(steps) == key and steps[0] in DRAWN
+
+
+def no_entry(scenario: Scenario, steps: Route) -> str:
+    """What a list on the way has, where the step behind it is none of its places; else empty."""
+    for end in range(1, len(steps)):
+        if not has(scenario, dotted(steps[:end])):
+            return ""
+        whole, step = content(scenario, steps[:end]), steps[end]
+        if isinstance(whole, tuple) and not (isinstance(step, int) and step < len(whole)):
+            kinds = [getattr(part, "kind", None) for part in whole]
+            return entries_of(dotted(steps[:end]), kinds)
+    return ""
+
+
+def _numbers(laws: Mapping[str, Scenario]) -> list[str]:
+    """All keys of numbers that a draw can change, but for those in lists."""
+    found = [item for one in laws.values() for item in values(one).items()]
+    return [key for key, own in found if route(key)[0] in DRAWN and _is_number(own)]
+
+
+def _is_number(own: Any) -> bool:
+    return isinstance(own, (int, float)) and not isinstance(own, bool)
+
+
+def _type(key: str, quantity: Quantity, scenario: Scenario) -> Iterator[str]:
+    """What is wrong with the kind of value that the key has."""
+    steps = route(key)
+    own, way = content(scenario, steps), quantity.given[0]
+    words = described(scenario, steps).choices or (isinstance(own, bool) and ("true", "false"))
+    if steps[-1] in ("kind", "preset"):
+        yield f"a draw cannot change {key}; list its values under grid"
+    elif quantity.seed and int not in described(scenario, steps).types:
+        yield f"{key} cannot be drawn as a seed, since it is not a whole number"
+    elif is_whole(described(scenario, steps)) and (way := _real(quantity)):
+        seed = "seed: true or " if steps[-1] == "seed" else ""
+        yield f"{key} is a whole number, and {way} draws others; write {seed}integers: [low, high]"
+    elif _is_number(own) or (own is None and not quantity.relative):
+        return
+    elif words and way != "choice":
+        yield f"{way} needs a number, and {key} is one of {', '.join(words)}; use choice"
+    elif not words:
+        what = "a section" if isinstance(own, Component) else found(own, str(own or "null"))
+        yield f"{key} is no number but {what}"
+
+
+def is_whole(key: Key) -> bool:
+    """Whether the value is a whole number, and no other."""
+    return int in key.types and float not in key.types
+
+
+def _real(quantity: Quantity) -> str:
+    """The way to draw, where it draws other than whole numbers; else empty."""
+    return next((way for way in quantity.distribution.given if way in REAL), "")
+
+
+def _tried(name: str, quantity: Quantity, laws: Mapping[str, Scenario]) -> Iterator[str]:
+    """What is wrong with some of the values that a quantity has: all, where there are few."""
+    discrete = quantity.distribution.choice or ()
+    drawn_values = [
+        *discrete[:MOST_TRIED],
+        *([] if discrete or quantity.seed else quantity.distribution.at(TRIED).tolist()),
+        *([1] if quantity.seed else []),
+    ]
+    for one in laws.values():
+        told = [_refused(name, quantity, one, value) for value in drawn_values]
+        if all(told) or (discrete and any(told)):
+            yield next(filter(None, told)).removeprefix(f"sweep.vary.{name}: ")
+        yield from (
+            "changes how the loop is put together or sampled; list its values under grid"
+            for value, refused in zip(drawn_values, told, strict=True)
+            if not refused and _rebuilt(one, drawn(one, {name: quantity}, {name: value}))
+        )
+
+
+def _refused(name: str, quantity: Quantity, scenario: Scenario, value: Any) -> str:
+    try:
+        drawn(scenario, {name: quantity}, {name: value})
+    except DrawError as error:
+        return str(error)
+    return ""
+
+
+def _rebuilt(one: Scenario, other: Scenario) -> bool:
+    """Whether two runs differ in more than numbers."""
+    try:
+        return structure(*_looped(one)) != structure(*_looped(other))
+    except ValueError:  # no whole number of steps between samples
+        return True
+
+
+def _looped(scenario: Scenario) -> tuple[ClosedLoop, TimeGrid]:
+    return scenario.closed_loop(), scenario.time_grid()
+
+
+def structure(loop: ClosedLoop, grid: TimeGrid) -> tuple[Any, ...]:
+    """What runs of one batch have to have in common: places in vectors, kernels, their constants.
+
+    Raises ValueError where there is no whole number of steps between samples.
+    """
+    return loop.layout(grid), list(entries(loop, Observer()))
+
+
+def _twice(sweep: Sweep) -> Faults:
+    keys = [(name, key) for name, q in sweep.vary.items() for key in q.targets(name)]
+    counts = Counter(key for _, key in keys)
+    for name, key in keys:
+        others = [other for other, same in keys if same == key and other != name]
+        if counts[key] > 1:
+            yield ("sweep", "vary", name), f"{key} is drawn twice{_by(others)}"
+        if key in sweep.grid:
+            yield ("sweep", "vary", name), f"{key} is under grid, too; leave one of them out"
+
+
+def _by(others: list[str]) -> str:
+    return f", by {' and '.join(others)} too" if others else ""
+
+
+def _metrics(scenario: Scenario) -> dict[str, Metric]:
+    """The metrics that are gathered during a run."""
+    return {n: m for n, m in scenario.known_metrics().items() if m.accumulator}
+
+
+def _keep(scenario: Scenario, sweep: Sweep) -> Faults:
+    metrics = _metrics(scenario)
+    for name in sweep.keep.worst:
+        if name not in metrics:
+            yield (
+                ("sweep", "keep", "worst", name),
+                unknown(f"metric {name!r}", name, metrics, "podusv list"),
+            )
+    for place, draw in enumerate(sweep.keep.draws):
+        if not 0 <= draw < sweep.draws:
+            text = f"there is no draw {draw}; they are 0 to {sweep.draws - 1}"
+            yield ("sweep", "keep", "draws", place), text
+
+
+def _claims(scenario: Scenario, sweep: Sweep) -> Faults:
+    if sweep.claims and not sweep.independent:
+        remedy = f"`claims: {{{next(iter(sweep.claims))}: null}}`"
+        yield (
+            ("sweep", "design"),
+            "Sobol' points are not independent, so the intervals that judge claims do not hold for "
+            f"them; write design: random, or take out each claim, as in {remedy}",
+        )
+    metrics, laws = _metrics(scenario), tuple(singles(scenario))
+    try:
+        parse_success(sweep.success, metrics)
+    except ExpressionError as error:
+        yield ("sweep", "success"), str(error)
+    for name, claim in sweep.claims.items():
+        if not CLAIM.fullmatch(name):
+            yield ("sweep", "claims", name), CLAIM_IN_WORDS
+        try:
+            parse(claim.expect, laws, metrics)
+        except ExpressionError as error:
+            yield ("sweep", "claims", name, "expect"), str(error)

@@ -1,0 +1,249 @@
+"""Claims about a study: parsed once, checked and evaluated by one walk, judged by intervals.
+
+    share(proposed.iae < pid.iae) >= 0.95
+    failures(proposed) <= 0.01 and not failures(pid) <= 0.01
+    quantile(proposed.z_e_steady, 0.99) <= 0.6
+    median(proposed.iae / li.iae) <= 1.0
+
+docs/study_claims.md describes the language.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from podusv_cli.core.kernel import Vector
+from podusv_cli.metrics.metric import Metric
+from podusv_cli.metrics.table import METRICS
+from podusv_cli.scenario.expressions import all_hold, function, known, refuse, syntax_tree
+from podusv_cli.studies.study.expressions import SIGNS, OverLaws
+from podusv_cli.studies.study.runs import Mask, Runs
+from podusv_cli.studies.study.samples import FAILURES, SHARE, STATISTICS, Sample, number
+from podusv_cli.studies.study.statistics import holm
+from podusv_cli.studies.study.verdict import Part, Stated, StudyVerdict
+
+EXAMPLE = "share(a.iae < b.iae) >= 0.95"
+# of a number on the left of a comparison
+MIRRORED: dict[type[ast.cmpop], type[ast.cmpop]] = {
+    ast.Lt: ast.Gt, ast.LtE: ast.GtE, ast.Gt: ast.Lt, ast.GtE: ast.LtE,
+}  # fmt: skip
+Samples = list[Sample]  # of a statistic, one for each cell
+
+
+class Link(NamedTuple):
+    """A statistic, by its text, compared with a number."""
+
+    text: str
+    call: ast.Call
+    sign: ast.cmpop
+    bound: float
+
+
+@dataclass(frozen=True)
+class Parsed:
+    """The syntax tree of a claim, its comparisons of statistics, and the laws that it is about."""
+
+    tree: ast.expr
+    links: Mapping[ast.Compare, Sequence[Link]]
+    laws: tuple[str, ...] = ()
+
+    @cached_property
+    def statistics(self) -> int:
+        """How many different statistics the claim has."""
+        return len({link.text for links in self.links.values() for link in links})
+
+
+@dataclass(frozen=True)
+class ParsedClaim:
+    """A claim of a study with its name."""
+
+    name: str
+    claim: Stated
+    parsed: Parsed
+
+
+@dataclass(frozen=True)
+class _Example:
+    """A study with a single draw in which every law has every metric; to check a claim."""
+
+    laws: Sequence[str]
+    metrics: Sequence[str]
+    cells = ("",)
+    wanted = 1
+
+    def metric(self, law: str, name: str) -> Vector:
+        return np.ones((1, 1))
+
+    def done(self, law: str) -> Mask:
+        return np.ones((1, 1), bool)
+
+    finished = success = done
+
+    def broken(self, law: str) -> Mask:
+        return np.zeros((1, 1), bool)
+
+
+def parse(text: str, laws: Sequence[str], metrics: Mapping[str, Metric] = METRICS) -> Parsed:
+    """A claim about these laws. Raises ExpressionError."""
+    tree = syntax_tree(text, EXAMPLE)
+    links = {node: list(_compared(node)) for node in _comparisons(tree)}
+    tried = _Evaluation(_Example(laws, list(metrics)), Parsed(tree, links), metrics)
+    tried.answer(level=0.5)
+    return replace(tried.parsed, laws=tuple(dict.fromkeys(tried.laws)))
+
+
+def judge(
+    claims: Sequence[ParsedClaim], runs: Runs, level: float,
+    metrics: Mapping[str, Metric] = METRICS,
+) -> list[StudyVerdict]:  # fmt: skip
+    """A verdict on every claim; the probability that any is wrong is at most 1 - level."""
+    tried = [_Evaluation(runs, c.parsed, metrics, c.claim.tolerance) for c in claims]
+    levels = holm(lambda i, at: tried[i].answer(at) is not None, len(tried), level)
+    return [_verdict(*each) for each in zip(claims, tried, levels, strict=True)]
+
+
+@dataclass
+class _Evaluation:
+    """The evaluation of one claim; statistics are computed once, by their text.
+
+    `whole` is False to leave out all draws in which a run crashed, hung or was invalid.
+    """
+
+    runs: Runs
+    parsed: Parsed
+    metrics: Mapping[str, Metric]
+    tolerance: float = 0.0
+    whole: bool = True
+    samples: dict[str, Samples] = field(default_factory=dict)
+    laws: list[str] = field(default_factory=list)
+
+    def answer(self, level: float) -> bool | None:
+        """Whether the claim holds in all cells, or in none; None where that cannot be told."""
+        answers = set(self.answers(level))
+        return answers.pop() if len(answers) == 1 else None
+
+    def answers(self, level: float) -> list[bool | None]:
+        """Whether the claim holds in each cell."""
+        return [self.holds(self.parsed.tree, cell, level) for cell in range(len(self.runs.cells))]
+
+    def inside(self, level: float) -> float:
+        """The level of each interval: several statistics of a claim share what it leaves."""
+        return 1.0 - (1.0 - level) / self.parsed.statistics
+
+    def holds(self, node: ast.expr, cell: int, level: float) -> bool | None:
+        """Whether a condition holds in a cell, which `_comparisons` found to be one."""
+        match node:
+            case ast.Compare():
+                return all_hold([self._held(each, cell, level) for each in self.parsed.links[node]])
+            case ast.UnaryOp(op=ast.Not(), operand=part):
+                answer = self.holds(part, cell, level)
+                return None if answer is None else not answer
+            case ast.BoolOp(values=parts):
+                return all_hold([self.holds(part, cell, level) for part in parts])
+        raise AssertionError(f"{ast.unparse(node)!r} was not refused")
+
+    def _held(self, link: Link, cell: int, level: float) -> bool | None:
+        if link.text not in self.samples:
+            self.samples[link.text] = self._sampled(link.call)
+        sample = self.samples[link.text][cell]
+        return sample.holds(link.sign, link.bound, self.tolerance, self.inside(level))
+
+    def _sampled(self, call: ast.Call) -> Samples:
+        """The statistic's samples, from the draws that all of its laws have been through."""
+        walk = OverLaws(self.metrics, self.tolerance, runs=self.runs)
+        sample = STATISTICS[function(call)](call, walk)
+        if not walk.names:
+            refuse(call, "names no law; write law.metric, as in a.iae")
+        self.laws += walk.names
+        used = np.logical_and.reduce([self._used(law) for law in set(walk.names)])
+        return [sample(label, i, used[i]) for i, label in enumerate(self.runs.cells)]
+
+    def _used(self, law: str) -> Mask:
+        done = self.runs.done(law)
+        return done if self.whole else done & ~self.runs.broken(law)
+
+    def needed(self, level: float) -> list[int | None]:
+        """For every comparison that is not decided in a cell, the draws that would decide it."""
+        inside = self.inside(level)
+        return [
+            sample.needed(link.sign, link.bound, self.tolerance, inside)
+            for links in self.parsed.links.values()
+            for link in links
+            for sample in self.samples[link.text]
+            if sample.holds(link.sign, link.bound, self.tolerance, inside) is None
+        ]
+
+
+def _comparisons(node: ast.expr) -> Iterator[ast.Compare]:
+    """Every comparison of a statistic with a number in a claim. Raises ExpressionError."""
+    match node:
+        case ast.Compare():
+            yield node
+        case ast.UnaryOp(op=ast.Not(), operand=part):
+            yield from _comparisons(part)
+        case ast.BoolOp(op=ast.And(), values=parts):
+            for part in parts:
+                yield from _comparisons(part)
+        case ast.BoolOp():
+            refuse(node, "join conditions with `and` only")
+        case _:
+            names = ", ".join(STATISTICS)
+            refuse(node, f"not a condition; compare one of {names} with a number")
+
+
+def _compared(node: ast.Compare) -> Iterator[Link]:
+    """Every statistic of a comparison, on the left of a sign and a number."""
+    sides = [node.left, *node.comparators]
+    for left, sign, right in zip(sides, node.ops, sides[1:], strict=False):
+        calls = [side for side in (left, right) if not _is_number(side)]
+        if len(calls) != 1:
+            refuse(
+                node,
+                "compare a statistic with a number; for two laws, write share(a.iae < b.iae) or "
+                "median(a.iae / b.iae) on the left",
+            )
+        first = calls[0] is left
+        call, bound = _statistic(calls[0]), number(right if first else left)
+        if type(sign) not in SIGNS:
+            refuse(node, "compare with <, <=, >, >=")
+        _checked(call, bound)
+        toward = sign if first else MIRRORED[type(sign)]()
+        yield Link(ast.unparse(call), call, toward, bound)
+
+
+def _is_number(node: ast.expr) -> bool:
+    return not any(isinstance(part, (ast.Name, ast.Attribute)) for part in ast.walk(node))
+
+
+def _statistic(node: ast.expr) -> ast.Call:
+    if not isinstance(node, ast.Call):
+        refuse(node, f"no statistic of all draws; write one of {', '.join(STATISTICS)}")
+    known(function(node), STATISTICS, "statistic")
+    return node
+
+
+def _checked(call: ast.Call, bound: float) -> None:
+    """Refuse a bound that no share can have, or that only a percentage could."""
+    if function(call) in (SHARE, FAILURES) and not 0.0 <= bound <= 1.0:
+        refuse(call, f"is a share between 0 and 1, and cannot be compared with {bound:g}")
+
+
+def _verdict(parsed: ParsedClaim, tried: _Evaluation, level: float) -> StudyVerdict:
+    runs, laws, answer = tried.runs, parsed.parsed.laws, tried.answer(level)
+    broken = sum(int(np.sum(runs.broken(law) & runs.done(law))) for law in laws)
+    others = replace(tried, whole=False, samples={}, laws=[]) if broken else tried
+    return StudyVerdict(
+        name=parsed.name, claim=parsed.claim, answer=answer, level=level, wanted=runs.wanted,
+        parts=[
+            Part.of(text, sample, tried.inside(level))
+            for text, samples in tried.samples.items() for sample in samples
+        ],
+        by_cell=dict(zip(runs.cells, tried.answers(level), strict=True)),
+        needed=tried.needed(level), broken=broken, without_broken=others.answer(level),
+    )  # fmt: skip

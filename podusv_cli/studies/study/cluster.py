@@ -1,0 +1,272 @@
+"""Units made by the workers of a Dask cluster; only this process writes.
+
+A worker reports what it computes with before the march, and again before each of its units, because
+workers may join and restart. It gets no units where that is not what this process computes with.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Iterable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import astuple, dataclass, replace
+from queue import Empty, SimpleQueue
+from typing import Any
+
+from podusv_cli.core.errors import StorageError, UsageError
+from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
+from podusv_cli.process.workers import Outcome
+from podusv_cli.studies.study import remote
+from podusv_cli.studies.study.dispatch import Done, Engine, Processes, Units
+from podusv_cli.studies.study.plan import Variant
+from podusv_cli.studies.study.remote import Recipe, Reply, Terms
+from podusv_cli.studies.study.unit import Unit
+
+WINDOW = 2  # units under way for each thread of a worker, so that none waits for this process
+LOOK = 2.0  # s, after which it is looked again which workers there are
+PATIENCE = 30.0  # s for the connection
+REPORTING = 300.0  # s for the reports; a worker that is later is checked before its first unit
+KILLED = "KilledWorker"  # Dask's exception for a task whose worker died, time after time
+
+
+@dataclass(frozen=True)
+class Task:
+    """A unit of a study or of a variant of it, and the terms of its making.
+
+    `allowed` are the workers that may make it (None: all); `alone` that nothing else is under way.
+    """
+
+    number: int
+    variant: Variant | None
+    unit: Unit
+    allowed: frozenset[str] | None = None
+    alone: bool = False
+
+
+def engine(
+    scheduler: str, workers: int, recipe: Recipe, identity: str, *, mixed: bool
+) -> AbstractContextManager[Engine]:
+    """Where units are made: processes of this machine, or the workers of a scheduler, if any."""
+    if not scheduler:
+        return nullcontext(Processes(workers))
+    return connected(scheduler, recipe, identity, mixed=mixed)
+
+
+@contextmanager
+def connected(address: str, recipe: Recipe, identity: str, *, mixed: bool) -> Iterator[Cluster]:
+    """The cluster of a scheduler, its workers checked; `identity` is the digest of the study's.
+
+    Raises UsageError without Dask and for a worker that does not fit, StorageError without a
+    scheduler.
+    """
+    with _client(address) as client:
+        ours = remote.report(recipe.text, recipe.plugins) | {"the study": identity}
+        cluster = Cluster(client, recipe, Terms(ours, mixed))
+        cluster.check()
+        yield cluster
+
+
+def _client(address: str) -> Any:
+    try:
+        from distributed import Client
+    except ImportError:
+        raise UsageError("--scheduler needs Dask: pip install 'podusv[cluster]'") from None
+    try:
+        return Client(address, timeout=PATIENCE, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise StorageError(
+            f"--scheduler {address}: no scheduler answers ({' '.join(str(error).split())}); "
+            "start one with `dask scheduler`, and give the address that it prints"
+        ) from error
+
+
+class Cluster:
+    """Makes units on the workers of a cluster; an engine of `march`."""
+
+    def __init__(self, client: Any, recipe: Recipe, terms: Terms) -> None:
+        """Take a client of Dask, the study, and what every worker has to report."""
+        self._client, self._recipe, self._terms = client, recipe, terms
+        self._threads, self._looked = dict[str, int](), -LOOK
+        self._running, self._finished = dict[Any, Task](), SimpleQueue[Any]()
+        self._again, self._suspects = deque[Task](), deque[Task]()
+        self._guilty, self._refused = list[Task](), dict[str, str]()
+        self._machines, self._made = dict[str, str](), dict[str, list[Task]]()
+
+    def check(self) -> None:
+        """Raise UsageError where a worker computes with something else, or where there is none."""
+        self._look()
+        if not self._threads:
+            raise UsageError(
+                "the scheduler has no workers yet; start one with `dask worker ADDRESS "
+                "--nthreads 1`, and run it again"
+            )
+        text, plugins = self._recipe.text, self._recipe.plugins
+        reports = {
+            worker: self._client.submit(remote.report, text, plugins, workers=[worker], pure=False)
+            for worker in sorted(self._threads)
+        }
+        end = time.monotonic() + REPORTING
+        for worker, future in reports.items():
+            self._check(worker, future, max(0.1, end - time.monotonic()))
+
+    def _check(self, worker: str, future: Any, patience: float) -> None:
+        try:
+            told = future.result(timeout=patience)
+        except TimeoutError:  # it is slow, or gone
+            return
+        except Exception as error:  # podusv or Dask may be another one there, or miss
+            raise UsageError(f"worker {worker} cannot load the study: {_words(error)}") from error
+        finally:
+            future.release()
+        if differing := self._terms.differing(told):
+            raise UsageError(f"worker {worker} computes with something else: {differing}")
+
+    def __call__(self, units: Units, done: Done) -> bool:
+        """As `march.Engine` says. Raises StorageError where the scheduler is lost."""
+        with interrupts_deferred():
+            try:
+                while self._fill(units):
+                    with interrupts_enabled():
+                        future, reply = self._wait()
+                    if reply:
+                        self._receive(self._running.pop(future), reply, done)
+            except KeyboardInterrupt:
+                return False
+            finally:
+                self._client.cancel(list(self._running))
+                self._running.clear()
+        return True
+
+    def _fill(self, units: Units) -> bool:
+        """Hand out units while workers have room; whether any is under way or waits."""
+        self._look()
+        allowed = frozenset(self._threads) - frozenset(self._refused) if self._refused else None
+        while allowed != frozenset() and self._has_room() and (task := self._next(units)):
+            self._submit(replace(task, allowed=allowed))
+        return bool(self._running or self._again or self._suspects)
+
+    def _has_room(self) -> bool:
+        alone = any(task.alone for task in self._running.values())
+        return not alone and len(self._running) < max(1, WINDOW * sum(self._threads.values()))
+
+    def _next(self, units: Units) -> Task | None:
+        if self._again:
+            return self._again.popleft()
+        if not self._suspects:
+            taken = next(units, None)
+            if not taken:
+                return None
+            number, plan, unit = taken
+            task = Task(number, plan.variant, unit)
+            if not self._is_guilty(task):
+                return task
+            self._suspects.append(replace(task, alone=True))
+        # A unit whose worker died may only have been beside the one that killed it.
+        return None if self._running else self._suspects.popleft()
+
+    def _is_guilty(self, task: Task) -> bool:
+        """Whether it is part of a unit that killed its worker when nothing else was under way."""
+        unit, at = task.unit, (task.variant, task.unit.law, task.unit.cell)
+        return any(
+            at == (found.variant, found.unit.law, found.unit.cell)
+            and unit.first in found.unit.draws
+            for found in self._guilty
+        )
+
+    def _submit(self, task: Task) -> None:
+        future = self._client.submit(
+            remote.made, self._recipe.text, self._recipe.plugins, astuple(task.unit),
+            self._terms.expected, astuple(task.variant) if task.variant else None,
+            mixed=self._terms.mixed, pure=False,
+            workers=sorted(task.allowed) if task.allowed else None,
+        )  # fmt: skip
+        self._running[future] = task
+        future.add_done_callback(self._finished.put)
+
+    def _wait(self) -> tuple[Any, Reply | None]:
+        """The next future that is done, and its reply; none when it is time to look for workers."""
+        try:
+            future = self._finished.get(timeout=LOOK)
+        except Empty:
+            return None, None
+        return future, self._reply(future) if future in self._running else None
+
+    def _reply(self, future: Any) -> Reply:
+        if future.status == "error":
+            error = future.exception()
+            killed = type(error).__name__ == KILLED
+            words = "the worker that made it ended, every time" if killed else _words(error)
+            return Reply("", "", {}, Outcome(failure=words, killed=killed))
+        try:
+            reply: Reply = future.result()
+        except Exception as error:
+            raise StorageError(
+                f"the connection to the scheduler was lost ({_words(error)}); all finished units "
+                "are kept: run it again to continue"
+            ) from error
+        future.release()
+        return reply
+
+    def _receive(self, task: Task, reply: Reply, done: Done) -> None:
+        if reply.outcome is None:
+            self._refused[reply.worker] = (
+                f"worker {reply.worker} got no units, because it computes with something else: "
+                f"{self._terms.differing(reply.report)}"
+            )
+            self._again.append(task)
+        elif reply.outcome.killed and not task.alone:
+            self._suspects.append(replace(task, alone=True))
+        else:
+            if reply.worker:
+                self._machines[reply.worker] = reply.machine
+                self._made.setdefault(reply.worker, []).append(task)
+            else:
+                self._guilty.append(task)
+            done(task.number, reply.outcome)
+
+    def _look(self) -> None:
+        """Note which workers there are; take back units that none of them may make."""
+        if time.monotonic() - self._looked < LOOK:
+            return
+        self._looked = time.monotonic()
+        workers = self._client.scheduler_info(n_workers=-1)["workers"]
+        self._threads = {name: told["nthreads"] for name, told in workers.items()}
+        for future, task in list(self._running.items()):
+            if task.allowed is not None and task.allowed.isdisjoint(self._threads):
+                self._again.append(self._running.pop(future))
+                self._client.cancel([future])
+
+    @property
+    def workers(self) -> int:
+        """The threads of all workers that there are now."""
+        return max(1, sum(self._threads.values()))
+
+    def told(self) -> dict[str, Any]:
+        """Which worker made how many runs, of the study which ones, and who was refused."""
+        workers = [
+            {
+                "worker": worker, "machine": self._machines[worker],
+                "runs": sum(task.unit.count for task in tasks),
+                "units": list(_joined(task.unit for task in tasks if task.variant is None)),
+            }
+            for worker, tasks in self._made.items()
+        ]  # fmt: skip
+        return {"workers": workers, "refused": self._refused}
+
+
+def _joined(units: Iterable[Unit]) -> Iterator[str]:
+    """Units in words, those that follow each other as one: `pid[0] draws 0 to 63`."""
+    found: list[Unit] = []
+    for unit in sorted(units):
+        last = found[-1] if found else None
+        if last and (last.law, last.cell, last.draws.stop) == (unit.law, unit.cell, unit.first):
+            found[-1] = replace(last, count=last.count + unit.count)
+        else:
+            found.append(unit)
+    for unit in found:
+        yield f"{unit.law}[{unit.cell}] draws {unit.first} to {unit.draws[-1]}"
+
+
+def _words(error: BaseException) -> str:
+    return f"{type(error).__name__}: {' '.join(str(error).split())}"

@@ -1,0 +1,227 @@
+"""Simulating all units of a plan that are not there yet, in processes of one machine or of many."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from itertools import count
+from typing import Any, Protocol, Self
+
+import numpy as np
+
+from podusv_cli.core.errors import PodusvError
+from podusv_cli.process.workers import Job, Outcome, available_workers, run_each
+from podusv_cli.studies.study.plan import Plan
+from podusv_cli.studies.study.runs import Mask
+from podusv_cli.studies.study.runs_file import stretches
+from podusv_cli.studies.study.store import Store
+from podusv_cli.studies.study.unit import STATUSES, Unit, UnitResult, crashed, make, prepare
+
+FIRST = 8  # draws of a unit before it is known how long a run takes
+AIM = 4.0  # s of computing that a unit is to take
+MOST = 4096  # draws of a unit
+# Causes are part of runs.h5, which has the same bytes whichever engine made it.
+ENDED = "it ended its process, each time that it was made; provenance.json tells how"
+
+
+Part = tuple[int, int]  # a shard: its number from 1, and how many there are
+
+
+@dataclass
+class Tally:
+    """How far a study is, for its progress."""
+
+    wanted: int
+    made: int = 0
+    failed: int = 0
+    began: float = field(default_factory=time.monotonic)
+    before: int = 0  # runs that were there already
+    computed: dict[str, float] = field(default_factory=dict)  # processor time by law [s]
+    ran: dict[str, int] = field(default_factory=dict)  # runs by law of which this is the time
+    ended: dict[str, str] = field(default_factory=dict)  # runs that ended their process, and how
+
+    @classmethod
+    def of(cls, there: Mapping[tuple[str, int], Mask]) -> Self:
+        """That of a study in which these runs are there."""
+        made = sum(int(mask.sum()) for mask in there.values())
+        return cls(sum(map(len, there.values())), made, before=made)
+
+    def note(self, unit: Unit, seconds: float) -> None:
+        """Enter the processor time of a unit."""
+        self.computed[unit.law] = self.computed.get(unit.law, 0.0) + seconds
+        self.ran[unit.law] = self.ran.get(unit.law, 0) + unit.count
+
+    @property
+    def rate(self) -> float:
+        """Runs a second, of those made now."""
+        return (self.made - self.before) / max(time.monotonic() - self.began, 1e-9)
+
+    @property
+    def left(self) -> float:
+        """Seconds that are left at this rate."""
+        return (self.wanted - self.made) / self.rate if self.rate else math.inf
+
+
+Tell = Callable[[Tally], None]
+Gaps = dict[tuple[str, int], int]  # how many runs, by law and cell
+# Numbered, with the study that each is of; after the last, there may be more.
+Units = Iterator[tuple[int, Plan, Unit]]
+Done = Callable[[int, Outcome], None]
+
+
+class Engine(Protocol):
+    """Where units are made."""
+
+    def __call__(self, units: Units, done: Done) -> bool:
+        """Take units as workers become free, and tell the outcome of each by its number.
+
+        `done` may add units to those that are still to be taken. The result of an outcome is that
+        of `timed`. False after an interrupt; units under way have no outcome then.
+        """
+
+    @property
+    def workers(self) -> int:
+        """How many units are made at a time."""
+
+    def told(self) -> dict[str, Any]:
+        """What a study's provenance has to say about the workers."""
+
+
+@dataclass(frozen=True)
+class Processes:
+    """Units are made in processes of this machine."""
+
+    count: int = 0  # one a core
+
+    def __call__(self, units: Units, done: Done) -> bool:
+        """As Engine says."""
+        # `map` asks again after the last unit, as units may be halved; a generator would not.
+        return run_each(map(self._job, units), done, workers=self.workers)
+
+    @property
+    def workers(self) -> int:
+        """As asked for, or one a core."""
+        return self.count or available_workers()
+
+    def _job(self, numbered: tuple[int, Plan, Unit]) -> tuple[int, Job]:
+        number, plan, unit = numbered
+        return number, partial(timed, plan, unit)
+
+    def told(self) -> dict[str, Any]:
+        """Nothing: the workers are those of the machine."""
+        return {}
+
+
+class Driver:
+    """Hands out units, keeps what comes back, and finds the run that ends its process."""
+
+    def __init__(self, store: Store, tell: Tell, until: float, part: Part) -> None:
+        """Units of this part are handed out until the monotonic time `until` [s]."""
+        self.store, self.plan, self._tell, self._until = store, store.plan, tell, until
+        there, inside = store.covered(), np.zeros(self.plan.sweep.draws, bool)
+        inside[shard(len(inside), *part)] = True
+        self._gaps = {key: stretches(inside & np.logical_not(mask)) for key, mask in there.items()}
+        self.tally = Tally.of({key: mask[inside] for key, mask in there.items()})
+        self._units, self._numbers = dict[int, Unit](), count()
+        self._halves: deque[Unit] = deque()
+        self._seconds = 0.0  # of computing a run, so far the longest average of a unit
+        self.failure: Outcome | None = None
+
+    def __iter__(self) -> Units:
+        """The units; more may come while some are under way."""
+        return self
+
+    def __next__(self) -> tuple[int, Plan, Unit]:
+        """The next unit, with its number."""
+        unit = self._next()
+        if unit is None:
+            raise StopIteration
+        number = next(self._numbers)
+        self._units[number] = unit
+        return number, self.plan, unit
+
+    def missing(self) -> Gaps:
+        """How many runs of each law and cell are missing, without those of which none is."""
+        return {key: sum(map(len, ranges)) for key, ranges in self._gaps.items() if ranges}
+
+    def _next(self) -> Unit | None:
+        if self._halves:
+            return self._halves.popleft()
+        if self.failure or time.monotonic() > self._until:
+            return None
+        left = {key: ranges for key, ranges in self._gaps.items() if ranges}
+        if not left:
+            return None
+        # All laws advance together, so that an unfinished study compares them on the same draws.
+        law, cell = min(left, key=lambda key: left[key][0].start)
+        ranges = self._gaps[law, cell]
+        first, stop = ranges[0].start, min(ranges[0].stop, ranges[0].start + self._size())
+        ranges[0] = range(stop, ranges[0].stop)
+        if not ranges[0]:
+            ranges.pop(0)
+        return Unit(law, cell, first, stop - first)
+
+    def _size(self) -> int:
+        return min(MOST, max(FIRST, round(AIM / self._seconds))) if self._seconds else FIRST
+
+    def done(self, number: int, outcome: Outcome) -> None:
+        """Keep the result of a unit; halve one that ended its process."""
+        unit = self._units.pop(number)
+        if outcome.result:
+            result, seconds = outcome.result
+            self._seconds = max(self._seconds, seconds / unit.count)
+            self.tally.note(unit, seconds)
+            self._keep(result)
+        elif outcome.killed and unit.count > 1:
+            self._halves.extend(unit.halves())
+        elif outcome.killed:
+            self.tally.ended[f"{unit.law}[{unit.cell}] draw {unit.first}"] = outcome.failure
+            self._keep(crashed(unit, self.plan.metrics, ENDED))
+        elif not outcome.interrupted:
+            self.failure = outcome
+
+    def _keep(self, result: UnitResult) -> None:
+        self.store.write(result)
+        self.tally.made += result.unit.count
+        self.tally.failed += int(np.count_nonzero(result.status != STATUSES.index("finished")))
+        self._tell(self.tally)
+
+
+def timed(plan: Plan, unit: Unit, progress: Callable[[float], None]) -> tuple[UnitResult, float]:
+    """A unit, and the processor time that it took [s]."""
+    began = time.process_time()
+    result = make(plan, unit)
+    return result, time.process_time() - began
+
+
+def shard(draws: int, number: int, count: int) -> slice:
+    """The draws of a shard."""
+    return slice((number - 1) * draws // count, number * draws // count)
+
+
+def march(
+    store: Store, tell: Tell, engine: Engine, *, seconds: float = math.inf, part: Part = (1, 1),
+    begin: Callable[[Gaps], None] = lambda missing: None,
+) -> tuple[Tally, bool]:  # fmt: skip
+    """Simulate what is missing, for so many seconds at most; how far it is, and if it is whole.
+
+    `begin` is told what is missing before the first run.
+
+    Every unit is on the disk before the next is handed out. Raises PodusvError where a unit cannot
+    be made at all or not be written, KeyboardInterrupt after an interrupt; what is made is kept.
+    """
+    driver = Driver(store, tell, time.monotonic() + seconds, part)
+    missing = driver.missing()
+    for law, cell in missing:
+        prepare(store.plan, law, cell)  # before the fork, so that no process compiles it again
+    begin(missing)
+    finished = engine(driver, driver.done)
+    if driver.failure:
+        raise PodusvError(driver.failure.failure)
+    if not finished:
+        raise KeyboardInterrupt
+    return driver.tally, driver.tally.made == driver.tally.wanted

@@ -1,0 +1,205 @@
+"""What expressions say about each run: values and conditions, computed for all runs at once.
+
+    proposed.iae < 0.9 * pid.iae and finished(pid)     about the runs of several laws in a draw
+    finished and z_e_steady <= 1.5                     about one run: when it is a success
+
+A condition holds, does not hold, or is unknown where a number is. docs/study_claims.md describes
+the language.
+"""
+
+from __future__ import annotations
+
+import ast
+import operator
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from podusv_cli.core.kernel import Vector
+from podusv_cli.metrics.metric import Metric
+from podusv_cli.metrics.table import METRICS
+from podusv_cli.scenario.expressions import function, known, literal, refuse, syntax_tree
+from podusv_cli.studies.study.runs import Mask, Runs, worst
+from podusv_cli.studies.study.statistics import at_most, below
+
+# A failed run's metric in arithmetic: larger than any number of a run, and the same for all, so
+# that both failing gives a ratio of 1 and a difference of 0. What exceeds REAL is infinite.
+FAILED, REAL = 1e100, 1e90
+FINISHED, SUCCESS = "finished", "success"
+
+
+class Condition(NamedTuple):
+    """Where a condition holds, and where it does not; unknown elsewhere."""
+
+    yes: Any
+    no: Any
+
+
+@dataclass
+class Walk(ABC):
+    """One walk over an expression about runs; `tolerance` is the margin of its comparisons."""
+
+    metrics: Mapping[str, Metric] = field(default_factory=lambda: METRICS)
+    tolerance: float = 0.0
+    both_failed: list[Any] = field(default_factory=list)  # where both sides of a comparison are inf
+    close: list[Any] = field(default_factory=list)  # where they differ by the margin or less
+
+    @abstractmethod
+    def metric(self, node: ast.expr) -> Vector:
+        """A metric of every run. Raises ExpressionError where the node is none."""
+
+    @abstractmethod
+    def property(self, node: ast.expr) -> Mask:
+        """A property of every run. Raises ExpressionError where the node is none."""
+
+    def condition(self, node: ast.expr) -> Condition:
+        """Where a condition holds. Raises ExpressionError."""
+        match node:
+            case ast.Compare():
+                return self._comparison(node)
+            case ast.UnaryOp(op=ast.Not(), operand=part):
+                return Condition(*reversed(self.condition(part)))
+            case ast.BoolOp(op=ast.And(), values=parts):
+                return _all([self.condition(part) for part in parts])
+            case ast.BoolOp():
+                refuse(node, "join conditions with `and` only")
+        held = self.property(node)
+        return Condition(held, ~held)
+
+    def _comparison(self, node: ast.Compare) -> Condition:
+        if any(type(sign) not in SIGNS for sign in node.ops):
+            refuse(node, "compare with <, <=, >, >=")
+        sides = pairwise(self.number(side) for side in (node.left, *node.comparators))
+        return _all([self._link(sign, a, b) for sign, (a, b) in zip(node.ops, sides, strict=True)])
+
+    def _link(self, sign: ast.cmpop, a: Any, b: Any) -> Condition:
+        if np.ndim(a) and np.ndim(b):
+            failed = np.isposinf(a) & np.isposinf(b)
+            self.both_failed.append(failed)
+            wins = below(a, b, self.tolerance) | below(b, a, self.tolerance)
+            self.close.append(~wins & ~failed & ~np.isnan(a) & ~np.isnan(b))
+        holds, unknown = SIGNS[type(sign)](a, b, self.tolerance), np.isnan(a) | np.isnan(b)
+        return Condition(holds & ~unknown, ~holds & ~unknown)
+
+    def number(self, node: ast.expr) -> Any:
+        """One number for every run; +inf where a failed run makes it larger than any."""
+        values = np.asarray(self._value(node))
+        return np.where(np.abs(values) > REAL, np.copysign(np.inf, values), values)
+
+    def _value(self, node: ast.expr) -> Any:
+        match node:
+            case ast.Constant():
+                return np.float64(literal(node))
+            case ast.UnaryOp(op=ast.USub(), operand=part):
+                return -self._value(part)
+            case ast.BinOp(left=left, right=right, op=sign) if type(sign) in ARITHMETIC:
+                with np.errstate(all="ignore"):
+                    return ARITHMETIC[type(sign)](self._value(left), self._value(right))
+            case ast.BinOp():
+                refuse(node, "calculate with + - * / only")
+        return self.metric(node)
+
+    def countable(self, name: str, values: Vector, failed: Mask) -> Vector:
+        """A metric with FAILED in place of infinity."""
+        numbers = worst(self.metrics[name], values, failed)
+        return np.where(np.isposinf(numbers), FAILED, numbers)
+
+
+@dataclass
+class OverLaws(Walk):
+    """Expressions about the runs of all laws in a draw: `law.metric`, `finished(law)`."""
+
+    runs: Runs = field(kw_only=True)
+    names: list[str] = field(default_factory=list)  # of the laws that were met in the expression
+
+    def metric(self, node: ast.expr) -> Vector:
+        """`law.metric`."""
+        match node:
+            case ast.Attribute(value=ast.Name(id=label), attr=name):
+                law, name = self.law(label), known(name, self.metrics, "metric")
+                return self.countable(name, self.runs.metric(law, name), ~self.runs.success(law))
+            case ast.Call():
+                refuse(node, "no function of numbers here; write law.metric, as in a.iae < b.iae")
+        refuse(node, "no meaning here; write law.metric, as in a.iae")
+
+    def property(self, node: ast.expr) -> Mask:
+        """`finished(law)` or `success(law)`."""
+        properties: dict[str, Callable[[str], Mask]] = {
+            FINISHED: self.runs.finished,
+            SUCCESS: self.runs.success,
+        }
+        if not isinstance(node, ast.Call):
+            refuse(node, "not a condition; compare numbers, or write finished(law) or success(law)")
+        return properties[known(function(node), properties, "property")](self.only(node))
+
+    def only(self, node: ast.Call) -> str:
+        """The law that is the only argument of a function. Raises ExpressionError."""
+        if len(node.args) != 1 or not isinstance(node.args[0], ast.Name):
+            refuse(node, f"{function(node)} takes the name of one law")
+        return self.law(node.args[0].id)
+
+    def law(self, label: str) -> str:
+        """The law, noted. Raises ExpressionError with the nearest name where there is none."""
+        self.names.append(known(label, self.runs.laws, "law"))
+        return label
+
+
+@dataclass
+class OfOneRun(Walk):
+    """Expressions about a single run: `finished`, and metrics by their names alone."""
+
+    values: Mapping[str, Vector] = field(kw_only=True)
+    ended: Mask = field(kw_only=True)
+
+    def metric(self, node: ast.expr) -> Vector:
+        """A metric's name."""
+        if not isinstance(node, ast.Name):
+            refuse(node, "write metrics by their names alone, as in finished and z_e_steady <= 1.5")
+        name = known(node.id, self.metrics, "metric")
+        values = self.values.get(name, np.full(np.shape(self.ended), np.nan))
+        return np.where(self.ended, self.countable(name, values, ~self.ended), np.nan)
+
+    def property(self, node: ast.expr) -> Mask:
+        """`finished`."""
+        if not isinstance(node, ast.Name):
+            refuse(node, "not a condition; compare metrics with numbers, or write finished alone")
+        known(node.id, (FINISHED,), "property")
+        return self.ended
+
+
+def parse_success(text: str, metrics: Mapping[str, Metric] = METRICS) -> ast.expr:
+    """The syntax tree of a condition for success. Raises ExpressionError."""
+    tree = syntax_tree(text, "finished and z_e_steady <= 1.5")
+    succeeded(tree, {}, np.ones(1, bool), metrics)
+    return tree
+
+
+def succeeded(
+    tree: ast.expr, values: Mapping[str, Vector], finished: Mask,
+    metrics: Mapping[str, Metric] = METRICS,
+) -> Mask:  # fmt: skip
+    """Which runs of a law are a success; one is not where the condition is unknown."""
+    held = OfOneRun(metrics, values=values, ended=finished).condition(tree).yes
+    return np.broadcast_to(held, np.shape(finished))
+
+
+def _all(conditions: Collection[Condition]) -> Condition:
+    """All of them: not where one is not, unknown where one is unknown, else yes."""
+    every = list(conditions)
+    yes = np.logical_and.reduce([part.yes for part in every])
+    return Condition(yes, np.logical_or.reduce([part.no for part in every]))
+
+
+SIGNS: dict[type[ast.cmpop], Callable[[Any, Any, float], Any]] = {
+    ast.Lt: below,
+    ast.LtE: at_most,
+    ast.Gt: lambda a, b, margin: below(b, a, margin),
+    ast.GtE: lambda a, b, margin: at_most(-a, -b, margin),
+}
+ARITHMETIC: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: np.divide,
+}  # fmt: skip

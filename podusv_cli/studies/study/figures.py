@@ -1,0 +1,265 @@
+"""Figures of a study, as functions of plain arrays and tables; axes by quantiles, not by tails.
+
+Import this module where a figure is drawn, because matplotlib is slow to import. Draw and save
+inside `figures.style.house_style()`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from podusv_cli.core import escaping
+from podusv_cli.core.kernel import Vector
+from podusv_cli.figures.style import TARGET_LOOK, legend, look, new_figure
+from podusv_cli.studies.study import statistics
+
+POINTS = 400  # of a curve
+TAIL = 0.005  # of the values beyond either end of an axis
+WIDE = 20.0  # a range this many times its lower end gets a logarithmic axis
+ROW, FRAME = 0.17, 0.75  # inches: a row of a chart, and what is around the rows
+LEAST_DISTANCE = 1e-3  # m, on a logarithmic axis
+MOST_BARS = 10  # quantities in a chart of correlations
+RATIOS = (1.01, 1.02, 1.05, 1.1, 1.2, 1.5, 2.0, 3.0, 5.0, 10.0, 30.0, 100.0, 1e3, 1e4, 1e6)
+BAND: dict[str, Any] = {"alpha": 0.18, "linewidth": 0.0}
+CENTRED: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 6.0}
+UNKNOWN = "#BBBBBB"
+
+
+def distributions(
+    values: Mapping[str, Vector], label: str, level: float, columns: int = 1
+) -> Figure:
+    """The empirical distribution of a metric for every law; failures (+inf) are missing mass."""
+    figure = new_figure(columns, 2.6)
+    axes = figure.add_subplot()
+    ends = _span(axes, values)
+    for place, (law, numbers) in enumerate(values.items()):
+        x = _steps(numbers, ends)
+        _share_curve(axes, place, _told(law, numbers), x, _at_most(numbers, x), len(numbers), level)
+    axes.set_ylim(0.0, 100.0)
+    axes.set(xlabel=label, ylabel="draws with at most this value [%]")
+    legend(figure, columns)
+    return figure
+
+
+def failure_rates(
+    values: Mapping[str, Vector], label: str, threshold: float, level: float, columns: int = 1
+) -> Figure:
+    """The share of draws that fail, were the metric's threshold another one; failures are +inf."""
+    figure = new_figure(columns, 2.6)
+    axes = figure.add_subplot()
+    ends = _span(axes, values, threshold)
+    for place, (law, numbers) in enumerate(values.items()):
+        x, n = _steps(numbers, ends), len(numbers)
+        _share_curve(axes, place, _told(law, numbers), x, n - _at_most(numbers, x), n, level)
+    axes.axvline(threshold, **TARGET_LOOK)
+    axes.set_yscale("log")
+    axes.set_ylim(50.0 / max(map(len, values.values())), 110.0)
+    axes.set(xlabel=f"threshold of {label}", ylabel="failed draws [%]")
+    axes.yaxis.set_major_formatter("{x:g}")
+    legend(figure, columns)
+    return figure
+
+
+def ratios(pairs: pd.DataFrame, columns: int = 1) -> Figure:
+    """The median paired ratio a / b with its interval, and how often each law wins.
+
+    `pairs` are rows of `summary.pairs`, all of one metric.
+    """
+    figure = new_figure(columns, FRAME + 2.0 * ROW * len(pairs))
+    axes = figure.add_subplot()
+    rows = range(len(pairs))
+    ends = _ratio_axis(axes, pairs)
+    for row, (_, pair) in zip(rows, pairs.iterrows(), strict=True):
+        low, high = np.clip([pair.ratio_low, pair.ratio_high], *ends)
+        axes.plot([low, high], [row, row], color=look(0)[0], linewidth=1.6, solid_capstyle="butt")
+        if ends[0] <= pair.ratio <= ends[1]:
+            axes.plot(pair.ratio, row, color=look(0)[0], marker="o", markersize=3.6)
+        for end in {low: pair.ratio_low, high: pair.ratio_high}.items():
+            if end[0] != end[1]:  # beyond the axis
+                mark = "<" if end[0] == ends[0] else ">"
+                axes.plot(end[0], row, color=look(0)[0], marker=mark, markersize=4, clip_on=False)
+    axes.axvline(1.0, **TARGET_LOOK)
+    axes.set_yticks(rows, [_pair(pair) for _, pair in pairs.iterrows()])
+    axes.set_ylim(len(pairs) - 0.4, -0.6)
+    axes.set_xlabel("median of the paired ratio a / b")
+    return figure
+
+
+def heatmaps(
+    panels: Mapping[str, Vector], label: str, x: tuple[str, Sequence[str]],
+    y: tuple[str, Sequence[str]], columns: int = 2,
+) -> Figure:  # fmt: skip
+    """A number of every cell for each law: columns are the values of x, rows those of y.
+
+    `x` and `y` are grid keys with their values; NaN is a cell without one, inf a failure.
+    """
+    height = FRAME + 2.0 * ROW * len(y[1])
+    figure = new_figure(columns, height)
+    every = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
+    finite = np.concatenate([panel[np.isfinite(panel)] for panel in panels.values()])
+    low, high = (finite.min(), finite.max()) if len(finite) else (0.0, 1.0)
+    for axes, (law, panel) in zip(every, panels.items(), strict=True):
+        shown = np.ma.masked_invalid(panel)
+        image = axes.pcolormesh(shown, vmin=low, vmax=high, cmap="cividis", edgecolors="white")
+        _write(axes, panel, low, high)
+        axes.set_title(escaping.figure(law))
+        axes.set_facecolor(UNKNOWN)
+        axes.grid(visible=False)
+        axes.tick_params(axis="y", length=0)
+        axes.set_xticks(np.arange(len(x[1])) + 0.5, [escaping.figure(v) for v in x[1]])
+        axes.set_xlabel(escaping.figure(x[0]))
+    every[0].set_yticks(np.arange(len(y[1])) + 0.5, [escaping.figure(v) for v in y[1]])
+    every[0].set_ylabel(escaping.figure(y[0]))
+    figure.colorbar(image, ax=list(every), label=label, fraction=0.05)
+    return figure
+
+
+def correlations(sensitivity: pd.DataFrame, columns: int = 1) -> Figure:
+    """Rank correlations of a metric with the drawn quantities that matter most to any law.
+
+    `sensitivity` are rows of `summary.sensitivity`, all of one metric and cell.
+    """
+    table = sensitivity.pivot(index="quantity", columns="law", values="correlation")
+    table = table[list(dict.fromkeys(sensitivity.law))]
+    order = table.abs().max(axis=1).sort_values(ascending=False).index[:MOST_BARS]
+    table, count = table.loc[order], len(table.columns)
+    figure = new_figure(columns, FRAME + (0.55 + 0.45 * count) * ROW * len(table))
+    axes = figure.add_subplot()
+    chance = float(sensitivity.by_chance.max())
+    for place, law in enumerate(table.columns):
+        at = np.arange(len(table)) + (place - (count - 1) / 2) * 0.8 / count
+        axes.barh(at, table[law], 0.7 / count, color=look(place)[0], label=escaping.figure(law))
+    if np.isfinite(chance):
+        look_of_chance: dict[str, Any] = {"color": "#E4E4E4", "linewidth": 0.0, "zorder": 0.0}
+        axes.axvspan(-chance, chance, label="by chance", **look_of_chance)
+    axes.axvline(0.0, **TARGET_LOOK)
+    axes.set_yticks(range(len(table)), [escaping.figure(name) for name in table.index])
+    axes.set_ylim(len(table) - 0.4, -0.6)
+    axes.set(xlim=(-1.0, 1.0), xlabel="rank correlation [1]")
+    axes.grid(visible=False, axis="y")
+    legend(figure, columns)
+    return figure
+
+
+def funnel(curves: Mapping[str, Sequence[tuple[Vector, Vector]]], columns: int = 2) -> Figure:
+    """The distance to the target over time of every run, in the colour of its law."""
+    figure = new_figure(columns, 2.6)
+    axes = figure.add_subplot()
+    for place, (law, runs) in enumerate(curves.items()):
+        color, linestyle, _ = look(place)
+        for number, (time, distance) in enumerate(runs):
+            label = escaping.figure(law) if not number else "_"
+            shown = np.maximum(distance, LEAST_DISTANCE)
+            axes.plot(time, shown, color=color, linestyle=linestyle, linewidth=0.8, label=label)
+    axes.set_yscale("log")
+    low, high = _span_of([distance for runs in curves.values() for _, distance in runs])
+    axes.set_ylim(low, high)
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.set(xlabel="$t$ [s]", ylabel="$z_e$ [m]")
+    axes.margins(x=0.0)
+    legend(figure, columns)
+    return figure
+
+
+def _span_of(distances: Sequence[Vector]) -> tuple[float, float]:
+    """Ends of a logarithmic axis of distances: what most runs have, a run that is lost aside."""
+    peaks = np.array([float(np.max(distance)) for distance in distances])
+    lows = [float(np.min(distance)) for distance in distances]
+    usual = peaks[peaks <= WIDE * float(np.median(peaks))]
+    return max(min(lows), LEAST_DISTANCE) / 1.5, float(usual.max()) * 1.5
+
+
+def _steps(values: Vector, ends: tuple[float, float]) -> Vector:
+    """Points at which a distribution is drawn: its values, thinned, between the axis's ends."""
+    low, high = ends
+    inside = np.sort(values[(values > low) & (values < high)])
+    chosen = np.linspace(0, len(inside) - 1, min(POINTS, len(inside))).astype(int)
+    return np.concatenate([[low], inside[chosen], [high]])
+
+
+def _at_most(values: Vector, x: Vector) -> NDArray[np.int_]:
+    """How many of the values do not exceed each x."""
+    return np.searchsorted(np.sort(values), x, side="right")
+
+
+def _share_curve(
+    axes: Axes, place: int, label: str, x: Vector, counts: NDArray[np.int_], n: int, level: float,
+) -> None:  # fmt: skip
+    """A share of draws [%] over x as steps, within its intervals."""
+    color, linestyle, _ = look(place)
+    percent = [100.0 * np.asarray(part) for part in statistics.share(counts, n, level)]
+    axes.plot(x, percent[0], color=color, linestyle=linestyle, label=label, drawstyle="steps-post")
+    axes.fill_between(x, percent[1], percent[2], color=color, step="post", **BAND)
+
+
+def _told(law: str, values: Vector) -> str:
+    """The law as a legend tells it: how many of its runs failed, or have no number."""
+    failed, unknown = int(np.isposinf(values).sum()), int(np.isnan(values).sum())
+    counts = [f"{failed} of {len(values)} failed"] if failed else []
+    counts += [f"{unknown} unknown"] if unknown else []
+    return escaping.figure(law) + (f" ({', '.join(counts)})" if counts else "")
+
+
+def _span(axes: Axes, values: Mapping[str, Vector], *shown: float) -> tuple[float, float]:
+    """The horizontal axis: what all laws have but for their tails, logarithmic where it is wide.
+
+    Returns its ends.
+    """
+    finite = [numbers[np.isfinite(numbers)] for numbers in values.values()]
+    found = [
+        *shown,
+        *(end for numbers in finite if len(numbers) for end in _without_tails(numbers)),
+    ]
+    low, high = min(found, default=0.0), max(found, default=1.0)
+    if 0.0 < low * WIDE < high:
+        axes.set_xscale("log")
+        axes.xaxis.set_major_formatter("{x:g}")
+        low, high = low / 1.05, high * 1.05
+    else:
+        margin = 0.03 * (high - low) or 0.1 * abs(high) or 1.0
+        low, high = low - margin, high + margin
+    axes.set_xlim(low, high)
+    return low, high
+
+
+def _without_tails(numbers: Vector) -> list[float]:
+    ends = [TAIL, 1.0 - TAIL]
+    return np.quantile(numbers, ends, method="inverted_cdf").tolist() if len(numbers) else []
+
+
+def _ratio_axis(axes: Axes, pairs: pd.DataFrame) -> tuple[float, float]:
+    """A logarithmic axis that is as long on both sides of 1; its ends."""
+    found = pairs[["ratio_low", "ratio", "ratio_high"]].to_numpy(float).ravel()
+    usable = np.abs(np.log(found[np.isfinite(found) & (found > 0.0)]))
+    reach = float(np.exp(1.15 * max(usable.max(initial=0.0), 0.02)))
+    axes.set_xscale("log")
+    axes.set_xlim(1.0 / reach, reach)
+    ticks = [1.0]
+    for tick in RATIOS:  # outwards from 1, where there is room
+        if tick < reach and tick / max(ticks) > reach**0.25:
+            ticks += [tick, 1.0 / tick]
+    axes.set_xticks(ticks, [f"{tick:.3g}" for tick in ticks])
+    axes.set_xticks([], minor=True)
+    return 1.0 / reach, reach
+
+
+def _pair(pair: pd.Series) -> str:
+    """A row's label: the laws, the cell, and in what share of draws either wins."""
+    names = f"{pair.a} / {pair.b}" + (f", {pair.cell}" if pair.cell else "")
+    wins = f"wins {100 * pair.a_wins:.3g} % / {100 * pair.b_wins:.3g} %"
+    return f"{escaping.figure(names)}\n{wins}"
+
+
+def _write(axes: Axes, panel: Vector, low: float, high: float) -> None:
+    """Every number into its cell, in a colour that can be read there."""
+    for (row, column), number in np.ndenumerate(panel):
+        dark = np.isfinite(number) and number < (low + high) / 2.0
+        text = "-" if np.isnan(number) else f"{number:.3g}"
+        axes.text(column + 0.5, row + 0.5, text, color="white" if dark else "black", **CENTRED)

@@ -1,0 +1,158 @@
+"""Joining folders of one study: are runs that two of them have the same, and what is missing."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from podusv_cli.core.errors import StorageError
+from podusv_cli.studies.study.runs import Mask
+from podusv_cli.studies.study.runs_file import stretches
+from podusv_cli.studies.study.sittings import NAME, sittings
+from podusv_cli.studies.study.store import Store
+from podusv_cli.studies.study.unit import UnitResult
+
+SIZE = 8  # bytes of a run's digest
+NOWHERE = -1  # the folder of a run that none has yet
+Place = tuple[str, int]  # a law, and the number of a cell
+
+
+def join(into: Store, others: Sequence[Store]) -> None:
+    """Write the runs of other folders of a study into one, after all of them are compared.
+
+    Raises StorageError where two have the same run with other numbers; nothing is written then.
+    """
+    seen = Comparison(into)
+    for other in (into, *others):
+        seen.add(other)
+    for other in others:
+        for result in other.results():
+            into.write(result)
+
+
+class Comparison:
+    """A digest of every run that was seen, and in which folder: 12 bytes a run."""
+
+    def __init__(self, first: Store) -> None:
+        """Nothing is seen yet of the study that this store belongs to."""
+        draws, places = first.plan.sweep.draws, first.covered()
+        self._digests = {place: np.zeros(draws, np.uint64) for place in places}
+        self._origins = {place: np.full(draws, NOWHERE, np.int32) for place in places}
+        self._stores: list[Store] = []
+
+    def add(self, store: Store) -> None:
+        """See all runs of a folder. Raises StorageError where one was seen with other numbers."""
+        self._stores.append(store)
+        for new in store.results():
+            place, rows = (new.unit.law, new.unit.cell), slice(new.unit.first, new.unit.draws.stop)
+            known, origins = self._digests[place][rows], self._origins[place][rows]
+            found = digests(new)
+            other = (origins != NOWHERE) & (known != found)
+            if other.any():
+                self._refuse(new, other, self._stores[origins[np.argmax(other)]])
+            known[:], origins[:] = found, len(self._stores) - 1
+
+    def _refuse(self, new: UnitResult, other: Mask, earlier: Store) -> None:
+        unit, folder = new.unit, self._stores[-1].folder
+        first = unit.first + int(np.argmax(other))
+        names = ", ".join(_differing(new, earlier, first))
+        cell = self._stores[-1].plan.cells[unit.cell].label
+        raise StorageError(
+            f"{folder}: {_ranges(other, unit.first)} of {unit.law}{f' at {cell}' if cell else ''} "
+            f"with other numbers than in {earlier.folder} ({names} of draw {first}); {folder} was "
+            f"made on {machines(folder)}, {earlier.folder} on {machines(earlier.folder)}; leave "
+            "one of the two out, or make its runs again on the other's kind of machine"
+        )
+
+
+def digests(result: UnitResult) -> Any:
+    """A digest of each run of a unit; NaN is one number, whatever its bits."""
+    columns = [*(result.metrics[name] for name in sorted(result.metrics)), result.until]
+    table = np.column_stack([*columns, result.status])
+    table[np.isnan(table)] = np.nan
+    found = (
+        hashlib.blake2b(row.tobytes() + cause.encode(), digest_size=SIZE).digest()
+        for row, cause in zip(table, result.causes, strict=True)
+    )
+    return np.frombuffer(b"".join(found), np.uint64)
+
+
+def _differing(new: UnitResult, earlier: Store, draw: int) -> Iterator[str]:
+    """The names of what is different of one run."""
+    old = next(
+        result for result in earlier.results()
+        if (result.unit.law, result.unit.cell) == (new.unit.law, new.unit.cell)
+        and draw in result.unit.draws
+    )  # fmt: skip
+    one, two = _run(old, draw), _run(new, draw)
+    for name, value in one.items():
+        if not np.array_equal(value, two[name], equal_nan=name != "cause"):
+            yield name
+
+
+def _run(result: UnitResult, draw: int) -> dict[str, Any]:
+    row = draw - result.unit.first
+    arrays: dict[str, Any] = {**result.metrics, "status": result.status, "until": result.until}
+    return {name: array[row] for name, array in arrays.items()} | {"cause": result.causes[row]}
+
+
+def mixture(folder: Path) -> str:
+    """A warning where the runs of a folder were made on different machines or versions, else ""."""
+    found = _machines(folder)
+    return (
+        f"the runs in {folder} are made on different machines or versions: {' and '.join(found)}; "
+        "their numbers may differ in the last bits"
+        if len(found) > 1
+        else ""
+    )
+
+
+def _machines(folder: Path) -> list[str]:
+    # A sitting that was killed has no end, and does not know how many runs it made.
+    made = (one for one in sittings(folder) if one["runs"] or one["finished"] is None)
+    return list(dict.fromkeys(map(_machine, made)))
+
+
+def machines(folder: Path) -> str:
+    """On what the runs of a folder were made: processor, C library and versions."""
+    found = _machines(folder)
+    return " and ".join(found) or f"a machine that its {NAME} does not tell"
+
+
+def _machine(sitting: Mapping[str, Any]) -> str:
+    platform, packages = sitting["platform"], sitting["packages"]
+    return (
+        f"{platform['processor']} ({platform['libc']}, podusv {sitting['podusv']}, "
+        f"Python {sitting['python']}, numpy {packages['numpy']}, numba {packages['numba']})"
+    )
+
+
+def missing(store: Store) -> list[str]:
+    """Which draws are not there, a sentence for all laws and cells that lack the same ones."""
+    lacking: dict[str, list[str]] = {}
+    covered = store.covered()
+    for (law, cell), there in covered.items():
+        if not there.all():
+            label = store.plan.cells[cell].label
+            told = lacking.setdefault(_ranges(np.logical_not(there)), [])
+            told.append(f"{law}{f' at {label}' if label else ''}")
+    every = len(covered)
+    return [
+        f"missing: {ranges} of {'every law and cell' if len(of) == every else _few(of)}"
+        for ranges, of in lacking.items()
+    ]
+
+
+def _few(words: Sequence[str]) -> str:
+    return ", ".join(words[:4]) + (f" and {len(words) - 4} more" if len(words) > 4 else "")
+
+
+def _ranges(mask: Mask, first: int = 0) -> str:
+    """`draw 9`, or `draws 3, 8 to 12`, where a mask is true."""
+    found = [range(r.start + first, r.stop + first) for r in stretches(mask)]
+    words = [f"{r.start} to {r[-1]}" if len(r) > 1 else str(r.start) for r in found]
+    return f"draw{'s' if np.sum(mask) > 1 else ''} {_few(words)}"

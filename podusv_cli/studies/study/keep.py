@@ -1,0 +1,162 @@
+"""Runs of a study of which a full run folder is kept: which they are, and whether they are equal.
+
+A kept run is made again from its draw, alone, and so has the numbers of runs.h5 to the last bit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from podusv_cli.core.errors import StorageError
+from podusv_cli.core.kernel import Vector
+from podusv_cli.process.extras import Extras, Missing
+from podusv_cli.storage.run_folder import LOGS, Run, open_run
+from podusv_cli.studies.study.results import Results
+from podusv_cli.studies.study.runs_file import Table
+
+POINTS = 2000  # of a kept run's curve in a figure
+
+
+class Wanted(NamedTuple):
+    """A run that is to be kept, and why."""
+
+    law: str
+    cell: int
+    draw: int
+    why: str
+
+    @property
+    def name(self) -> str:
+        """Of its folder, and of its scenario's file."""
+        return f"{self.law}-{self.cell}-{self.draw}"
+
+
+@dataclass(frozen=True)
+class Kept:
+    """A run that is wanted, its folder where it could be made, and how it differs from the table.
+
+    `difference` is "" where all metrics are equal to the last bit.
+    """
+
+    wanted: Wanted
+    run: Run | None
+    difference: str = ""
+
+
+@dataclass(frozen=True)
+class Track:
+    """The distance to the target over time of a kept run."""
+
+    law: str
+    time: Vector
+    distance: Vector
+
+
+def wanted(results: Results) -> list[Wanted]:
+    """The runs that `sweep.keep` asks for, each once, by law.
+
+    Failed runs are the first that diverged or were no success; a run that crashed, hung or was
+    invalid has no log. The worst have the largest value of a metric among those that succeeded.
+    """
+    keep = results.plan.sweep.keep
+    found: dict[tuple[str, int, int], Wanted] = {}
+    for law in results.runs.laws:
+        for one in (
+            *_failed(results.runs, law, keep.failed),
+            *(w for name, count in keep.worst.items() for w in _worst(results, law, name, count)),
+            *_named(results.runs, law, keep.draws),
+        ):
+            found.setdefault(one[:3], one)
+    return list(found.values())
+
+
+def unmade(folder: Path, results: Results) -> list[Wanted]:
+    """The runs that are to be kept and are not there yet."""
+    return [one for one in wanted(results) if not (folder / LOGS / one.name).exists()]
+
+
+def _failed(runs: Table, law: str, count: int) -> Iterator[Wanted]:
+    for draw, cell in np.argwhere(runs.failed(law).T)[:count].tolist():
+        yield Wanted(law, cell, draw, "failed")
+
+
+def _worst(results: Results, law: str, name: str, count: int) -> Iterator[Wanted]:
+    runs = results.runs
+    values = np.where(runs.success(law), runs.metric(law, name), np.nan)
+    order = np.argsort(-values, axis=None, kind="stable")[: min(count, np.isfinite(values).sum())]
+    for rank, place in enumerate(order.tolist(), 1):
+        cell, draw = divmod(place, runs.wanted)
+        yield Wanted(law, cell, draw, f"{name}: number {rank} of the largest")
+
+
+def _named(runs: Table, law: str, draws: Iterable[int]) -> Iterator[Wanted]:
+    done = runs.done(law)
+    for draw in draws:
+        for cell in range(len(runs.cells)):
+            if draw < runs.wanted and done[cell, draw]:
+                yield Wanted(law, cell, draw, "named in sweep.keep.draws")
+
+
+def found(folder: Path, results: Results, extras: Extras) -> list[Kept]:
+    """The kept runs, compared with the table; one that is not there or differs is missing."""
+    kept = [_opened(folder / LOGS / one.name, one, results, extras) for one in wanted(results)]
+    extras.missing += [
+        Missing(f"{LOGS}/{one.wanted.name}", one.difference, problem="differs from runs.h5")
+        for one in kept if one.difference
+    ]  # fmt: skip
+    return kept
+
+
+def _opened(path: Path, one: Wanted, results: Results, extras: Extras) -> Kept:
+    if not path.exists():
+        return Kept(one, None)
+    try:
+        run = open_run(path)
+    except StorageError as error:
+        extras.missing.append(
+            Missing(f"{LOGS}/{one.name}", str(error), problem="could not be read")
+        )
+        return Kept(one, None)
+    return Kept(one, run, difference(run, one, results.runs))
+
+
+def difference(run: Run, one: Wanted, runs: Table) -> str:
+    """The first metric in which a run differs from the table, with both values; "" if none does."""
+    for name in runs.metrics:
+        ours, theirs = run.metrics.get(name), float(runs.metric(one.law, name)[one.cell, one.draw])
+        if ours != (theirs if math.isfinite(theirs) else None):
+            return f"{name} is {ours!r} in the log and {theirs!r} in the table"
+    return ""
+
+
+def contradiction(kept: Sequence[Kept]) -> str:
+    """Why the table is in doubt: how many kept logs differ from it; "" where none does."""
+    differing = [one for one in kept if one.difference]
+    if not differing:
+        return ""
+    first = differing[0]
+    return (
+        f"no claim is judged, since the table of runs is in doubt: {len(differing)} of {len(kept)} "
+        f"kept logs differ from it; in that of {first.wanted.name}, {first.difference}"
+    )
+
+
+def tracks(kept: Sequence[Kept], extras: Extras) -> list[Track]:
+    """The distance to the target in every kept log that has it."""
+    made = [extras.made(f"the track of {one.wanted.name}", partial(_track, one)) for one in kept]
+    return [track for track in made if track]
+
+
+def _track(one: Kept) -> Track | None:
+    if one.run is None or "z_e" not in one.run.recording:
+        return None
+    log = one.run.recording
+    rows = np.unique(np.linspace(0, len(log["time"]) - 1, POINTS).astype(int))
+    return Track(one.wanted.law, log["time"][rows], log["z_e"][rows])

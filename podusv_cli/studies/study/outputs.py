@@ -1,0 +1,107 @@
+"""The files of a study: tables, verdicts, figures, the report, and exports of all runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from podusv_cli.core.errors import UsageError
+from podusv_cli.core.escaping import markdown
+from podusv_cli.pages.page import Picture, sentence
+from podusv_cli.process.extras import Extras
+from podusv_cli.storage import csv_files, files
+from podusv_cli.storage.json_files import encode
+from podusv_cli.storage.run_folder import MISSING
+from podusv_cli.studies.study import pictures, report, summary, verdict
+from podusv_cli.studies.study.keep import Kept, tracks
+from podusv_cli.studies.study.results import Results
+from podusv_cli.studies.study.runs import AXES, ENDING
+from podusv_cli.studies.study.runs_file import Table
+from podusv_cli.studies.study.sittings import timing
+from podusv_cli.studies.study.unit import STATUSES
+
+FIGURES, REPORT = "figures", "report.html"
+
+
+def write_tables(folder: Path, results: Results) -> None:
+    """Write tables and verdicts into the study's folder. Raises StorageError."""
+    told = {"format": 1, "claims": [one.as_json() for one in results.verdicts]}
+    judged = verdict.as_markdown(results.verdicts)
+    if results.contradicted:
+        told["contradicted"] = results.contradicted
+        judged = f"{markdown(sentence(results.contradicted))}\n"
+    contents = {
+        "summary.csv": summary.as_csv(results.summary).encode(),
+        "pairs.csv": summary.as_csv(results.pairs).encode(),
+        "sensitivity.csv": summary.as_csv(results.sensitivity).encode(),
+        "claims.json": encode(told),
+        "claims.md": judged.encode(),
+        "timing.json": encode(timing(folder)),
+    }
+    files.write_all({folder / name: content for name, content in contents.items()})
+
+
+def write_report(
+    folder: Path, results: Results, kept: Sequence[Kept], extras: Extras, *, figures: bool
+) -> None:
+    """Draw the figures and write the report. Raises StorageError.
+
+    What fails is noted in the `extras`. Files of an earlier report that are not made again are
+    removed: they would tell of other runs.
+    """
+    drawn, shown = dict[str, bytes](), list[Picture]()
+    if figures:
+        drawn, shown = pictures.drawn(results, tracks(kept, extras), extras)
+    page = extras.made(REPORT, lambda: report.page(folder, results, kept, shown, extras.missing))
+    publish(folder, drawn, page, extras)
+
+
+def publish(folder: Path, drawn: dict[str, bytes], page: str | None, extras: Extras) -> None:
+    """Write figures, the report and what is missing, in place of earlier ones."""
+    _replace(folder / FIGURES, drawn)
+    _replace(folder, {REPORT: (page or "").encode()} if page else {}, (REPORT,))
+    missing = {MISSING: encode(extras.as_json())} if extras.missing else {}
+    _replace(folder, missing, (MISSING,))
+
+
+def _replace(folder: Path, contents: dict[str, bytes], only: Sequence[str] = ()) -> None:
+    """Write files into a folder; remove others of these names, or all PNG files there."""
+    if contents:
+        files.make_folder(folder)
+        files.write_all({folder / name: content for name, content in contents.items()})
+    old = [folder / name for name in only] if only else sorted(folder.glob("*.png"))
+    with files.storage_errors(f"cannot remove old files in {folder}"):
+        for path in old:
+            if path.name not in contents:
+                path.unlink(missing_ok=True)
+
+
+def export(runs: Table, path: Path) -> None:
+    """Write all runs as one table, a row a run: CSV, or Parquet where the name ends so."""
+    frames = [
+        _frame(runs, law, cell) for law in runs.laws for cell in range(len(runs.cells))
+    ]  # fmt: skip
+    whole = pd.concat(frames, ignore_index=True)
+    if path.suffix == ".parquet":
+        try:
+            content = whole.to_parquet(index=False)
+        except ImportError as error:
+            raise UsageError(
+                "Parquet needs pyarrow: pip install pyarrow; or export --format csv"
+            ) from error
+    else:
+        content = csv_files.text(whole).encode()
+    files.write_bytes(path, content)
+
+
+def _frame(runs: Table, law: str, cell: int) -> pd.DataFrame:
+    done = runs.tried(law)[cell]
+    drawn = {name: values[done] for name, values in runs.drawn.items()}
+    words = np.array(STATUSES)[runs.status(law)[cell][done]]
+    numbers = {name: runs.metric(law, name)[cell][done] for name in runs.metrics}
+    place = zip(AXES, (law, runs.cells[cell], np.flatnonzero(done)), strict=True)
+    ending = zip(ENDING, (words, runs.success(law)[cell][done]), strict=True)
+    return pd.DataFrame({**dict(place), **drawn, **dict(ending), **numbers})

@@ -1,0 +1,171 @@
+"""What a study is to simulate: laws, cells, draws, and the identity of the result."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from podusv_cli.components.controllers.base import Controller
+from podusv_cli.core.errors import UsageError
+from podusv_cli.engine.loop.closed_loop import entries
+from podusv_cli.engine.machine.object_cache import ingredients
+from podusv_cli.engine.step import rk4 as closed_loop
+from podusv_cli.metrics.table import Metrics
+from podusv_cli.scenario.load import Loaded, values
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.sweep import Keep, Sweep
+from podusv_cli.studies.study.cells import Cell, cells
+from podusv_cli.studies.study.check import sweep_faults
+from podusv_cli.studies.study.draws import SWEEP
+from podusv_cli.studies.study.record import Record
+
+# Sections of a scenario that change no number of a study.
+COSMETIC = ("name", "description", "log", "silence", "claims", "controllers", "sweep", "tune")
+MOST_NAMED = 4  # keys that a message about another study names
+KERNELS = " kernels"  # ends the key of the digest of a law's compiled source
+
+
+@dataclass(frozen=True)
+class Variant:
+    """Laws of a study with other numbers, on draws of another stream; text and numbers alone.
+
+    `laws` holds for each its name, the name of the study's law, and its numbers that are others.
+    """
+
+    stream: str
+    draws: int
+    laws: tuple[tuple[str, str, tuple[tuple[str, Any], ...]], ...]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A scenario with its key `sweep`, in cells."""
+
+    scenario: Scenario
+    cells: tuple[Cell, ...]
+    variant: Variant | None = None  # which one of the study it is, if any
+    record: Record | None = None  # stands for plug-ins that are not loaded
+
+    @property
+    def sweep(self) -> Sweep:
+        """The study's settings. Raises UsageError where the scenario has none."""
+        if self.scenario.sweep is None:
+            raise UsageError(f"{self.scenario.name} has no key `sweep`; see docs/studies.md")
+        return self.scenario.sweep
+
+    @property
+    def stream(self) -> str:
+        """The stream of its draws."""
+        return self.variant.stream if self.variant else SWEEP
+
+    @property
+    def laws(self) -> tuple[str, ...]:
+        """The names of the laws that meet the draws."""
+        return tuple(self.sweep.laws) or self.scenario.labels()
+
+    @cached_property
+    def metrics(self) -> tuple[str, ...]:
+        """The names of the metrics that a law of the study has during a run, in their order."""
+        names = set(self.record.metrics) if self.record else self._measured()
+        return tuple(name for name in self.scenario.known_metrics() if name in names)
+
+    def _measured(self) -> set[str]:
+        loops = [watching(self.single(law, cell.index)) for law in self.laws for cell in self.cells]
+        return {name for one in loops for name in one.summary(np.full(one.size, np.nan))}
+
+    def single(self, law: str, cell: int) -> Scenario:
+        """The scenario of one law in one cell."""
+        return self.cells[cell].scenario.singles()[law]
+
+    @cached_property
+    def identity(self) -> dict[str, Any]:
+        """All that the numbers depend on, by dotted keys; two studies that agree can be joined."""
+        return self.record.identity if self.record else self.stated
+
+    @cached_property
+    def stated(self) -> dict[str, Any]:
+        """The identity as the scenario has it; without what only plug-ins that are absent know."""
+        sweep = self.sweep
+        told: dict[str, Any] = {"sweep.seed": sweep.seed, "sweep.design": sweep.design}
+        if self.stream != SWEEP:
+            told["stream"] = self.stream
+        for name, quantity in sweep.vary.items():
+            told[f"sweep.vary.{name}"] = quantity.model_dump(exclude_defaults=True)
+        for cell in self.cells:
+            for law in self.laws:
+                single = self.single(law, cell.index)
+                kept = {
+                    key: value for key, value in values(single).items()
+                    if key.partition(".")[0] not in (*COSMETIC, *single.recorded)
+                }  # fmt: skip
+                told |= {f"{law}[{cell.index}].{key}": value for key, value in kept.items()}
+                if not self.record:
+                    told[f"{law}[{cell.index}]{KERNELS}"] = kernels(single)
+        return told
+
+    def varied(self, variant: Variant) -> Plan:
+        """The variant of this study, which has no grid. Raises ValidationError."""
+        own = self.scenario.singles()
+        laws = {name: changed(own[law].controller, dict(new)) for name, law, new in variant.laws}
+        plain = {"laws": (), "draws": variant.draws, "claims": {}, "keep": Keep()}
+        scenario = self.scenario.model_copy(
+            update={
+                "controllers": laws, "controller": next(iter(laws.values())), "claims": {},
+                "tune": None, "sweep": self.sweep.model_copy(update=plain),
+            }
+        )  # fmt: skip
+        return Plan(scenario, (Cell(0, (), scenario),), variant)
+
+
+def changed(law: Controller, new: Mapping[str, Any]) -> Controller:
+    """The law with other numbers. Raises ValidationError where it refuses them."""
+    return type(law).model_validate(law.model_dump() | dict(new))
+
+
+def plan(loaded: Loaded) -> Plan:
+    """The plan of a scenario with a key `sweep`. Raises ScenarioError with all that is wrong."""
+    return Plan(loaded.scenario, cells(loaded, sweep_faults))
+
+
+def kernels(scenario: Scenario) -> str:
+    """A digest of the source of all kernels of a law's loop, the same on every processor."""
+    parts = [kernel for _, kernel, _ in entries(scenario.closed_loop(), watching(scenario))]
+    found = hashlib.sha256()
+    for kernel in (closed_loop.advance, *parts):
+        for text in ingredients(kernel, {}):
+            found.update(text.encode() + b"\0")
+    return found.hexdigest()[:16]
+
+
+def watching(scenario: Scenario) -> Metrics:
+    """The observer of a law's metrics."""
+    return scenario.observer()
+
+
+def digest(identity: Mapping[str, Any]) -> str:
+    """A short digest of an identity."""
+    text = json.dumps(identity, sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def differing(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[str]:
+    """The keys that two identities have different values for."""
+    return [key for key in dict.fromkeys([*one, *other]) if one.get(key) != other.get(key)]
+
+
+def disagreements(
+    one: Mapping[str, Any], other: Mapping[str, Any], keys: Sequence[str] | None = None
+) -> str:
+    """The first of these keys, or of those that two identities differ in, with both values."""
+    keys = differing(one, other) if keys is None else keys
+    texts = [
+        f"{key}: {one.get(key, 'not there')}, not {other.get(key, 'not there')}"
+        for key in keys[:MOST_NAMED]
+    ]
+    return "; ".join(texts) + (" and more" if len(keys) > MOST_NAMED else "")

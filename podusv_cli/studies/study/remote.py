@@ -1,0 +1,139 @@
+"""What a worker of a cluster does: it reports what it computes with, then makes units.
+
+Everything that is sent to a worker is text and numbers. The worker makes the plan of a study once.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from importlib.metadata import version
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import podusv_cli
+from podusv_cli.process.interrupts import Interrupts
+from podusv_cli.process.workers import Outcome, outcome_of
+from podusv_cli.scenario.load import load_text
+from podusv_cli.storage.provenance import processor
+from podusv_cli.studies.study.dispatch import timed
+from podusv_cli.studies.study.joining import digests
+from podusv_cli.studies.study.plan import Plan, Variant, digest, plan
+from podusv_cli.studies.study.unit import Unit, make
+
+PLANS = 2  # plans that a worker keeps
+CANARY = 2  # draws of each law, of which every worker has to compute the same bits
+PACKAGES = ("numpy", "numba", "llvmlite")
+BITS = "the bits of "  # and a law
+Report = dict[str, str]
+Plugins = tuple[tuple[str, str], ...]  # name and text of each file
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """A study as text, and its plug-in files by name."""
+
+    text: str
+    plugins: Plugins = ()
+
+
+@lru_cache(PLANS)
+def _placed(recipe: Recipe) -> tuple[Plan, TemporaryDirectory[str]]:
+    """The plan, and the folder that its plug-ins were read from; gone when it is forgotten."""
+    folder = TemporaryDirectory(prefix="podusv-")
+    for name, text in recipe.plugins:
+        place = Path(folder.name, name)
+        place.parent.mkdir(exist_ok=True)
+        place.write_text(text, encoding="utf-8")
+    return plan(load_text(recipe.text, str(Path(folder.name, "scenario.yaml")))), folder
+
+
+def _plan(recipe: Recipe) -> Plan:
+    return _placed(recipe)[0]
+
+
+@lru_cache(PLANS)
+def _variant(recipe: Recipe, told: tuple[Any, ...]) -> Plan:
+    return _plan(recipe).varied(Variant(*told))
+
+
+@lru_cache(PLANS)
+def _report(recipe: Recipe) -> Report:
+    made = _plan(recipe)
+    told = {"podusv": podusv_cli.__version__, "Python": platform.python_version()}
+    told |= {name: version(name) for name in PACKAGES}
+    for law in made.laws:
+        sources = [made.identity[f"{law}[{cell.index}] kernels"] for cell in made.cells]
+        told[f"the kernels of {law}"] = digest(dict.fromkeys(sources))
+    told["the study"] = digest(made.identity)
+    for law in made.laws:
+        canary = digests(make(made, Unit(law, 0, 0, min(CANARY, made.sweep.draws))))
+        told[f"{BITS}{law}"] = hashlib.sha256(canary.tobytes()).hexdigest()[:16]
+    return told
+
+
+def report(text: str, plugins: Plugins) -> Report:
+    """Versions, digests of all kernels and of the study, and digests of the bits of some runs."""
+    return dict(_report(Recipe(text, plugins)))
+
+
+@dataclass(frozen=True)
+class Terms:
+    """The report that workers have to give; with `mixed` the bits of runs may be others."""
+
+    report: Mapping[str, str]
+    mixed: bool = False
+
+    @property
+    def expected(self) -> str:
+        """A digest of what has to be the same."""
+        return digest(firm(self.report, mixed=self.mixed))
+
+    def differing(self, told: Mapping[str, str]) -> str:
+        """What is different in a worker's report, and a remedy; "" where nothing is."""
+        found = [
+            f"{name} is {told.get(name, 'not there')}, not {word}"
+            for name, word in firm(self.report, mixed=self.mixed).items()
+            if told.get(name) != word
+        ]
+        bits = all(line.startswith(BITS) for line in found)
+        remedy = "allow it with --allow-mixed" if bits else "install there what is installed here"
+        return f"{'; '.join(found)}; {remedy}, or leave the worker out" if found else ""
+
+
+def firm(told: Mapping[str, str], *, mixed: bool) -> Report:
+    """The part of a report that has to be the same on all workers."""
+    return {name: word for name, word in told.items() if not (mixed and name.startswith(BITS))}
+
+
+@dataclass(frozen=True)
+class Reply:
+    """What a worker sends back: who it is, its report, and the outcome of a unit.
+
+    There is no outcome where the report is not the expected one.
+    """
+
+    worker: str
+    machine: str
+    report: Report
+    outcome: Outcome | None
+
+
+def made(
+    text: str, plugins: Plugins, unit: tuple[str, int, int, int], expected: str,
+    variant: tuple[Any, ...] | None = None, *, mixed: bool,
+) -> Reply:  # fmt: skip
+    """Make a unit (law, cell, first draw, number of draws) of a study or a variant, on a worker."""
+    from distributed import get_worker
+
+    told, outcome, recipe = report(text, plugins), None, Recipe(text, plugins)
+    if digest(firm(told, mixed=mixed)) == expected:
+        plan = _variant(recipe, variant) if variant else _plan(recipe)
+        job = partial(timed, plan, Unit(*unit))
+        outcome = outcome_of(job, lambda fraction: None, Interrupts())
+    machine = f"{processor()} ({' '.join(platform.libc_ver())})"
+    return Reply(get_worker().address, machine, told, outcome)

@@ -1,0 +1,185 @@
+"""The HTML report of a study: one file that needs nothing else, the answer first."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from podusv_cli.pages.page import Picture, environment, flat, value_text
+from podusv_cli.process.extras import Missing
+from podusv_cli.scenario.phrases import as_yaml
+from podusv_cli.scenario.sweep import Sweep
+from podusv_cli.studies.study.bars import bars
+from podusv_cli.studies.study.keep import Kept
+from podusv_cli.studies.study.results import Results, digits
+from podusv_cli.studies.study.runs import Mask
+from podusv_cli.studies.study.sittings import sittings
+from podusv_cli.studies.study.unit import STATUSES
+from podusv_cli.studies.study.verdict import ANSWERS, StudyVerdict
+from podusv_cli.studies.study.words import in_words
+
+FIRST = 20  # rows of a table of runs
+SITTING = ("started", "duration_s", "runs", "podusv", "python", "platform.processor", "argv")
+
+
+class Row(NamedTuple):
+    """A run of a table: how it ended, when and why."""
+
+    law: str
+    cell: int
+    label: str
+    draw: int
+    status: str
+    until: str
+    cause: str
+
+
+class Rows(NamedTuple):
+    """The first runs of a kind, and how many there are."""
+
+    first: Sequence[Row]
+    total: int
+
+
+def page(
+    folder: Path, results: Results, kept: Sequence[Kept], figures: Sequence[Picture],
+    missing: Sequence[Missing],
+) -> str:  # fmt: skip
+    """The whole report."""
+    plan, beside = results.plan, _beside(figures)
+    ordered = [*beside, *(picture for picture in figures if picture not in beside)]
+    numbered = [*enumerate(ordered, 1)]
+    return environment("podusv_cli.studies.study").get_template("study.html.j2").render(
+        title=f"{plan.scenario.name}: a study",
+        folder=folder,
+        results=results,
+        scenario=plan.scenario,
+        sweep=plan.sweep,
+        several=len(results.runs.cells) > 1,
+        answers=_answers(results.verdicts),
+        claims=[(v, [*bars(p, v)]) for p, v in zip(results.parsed, results.verdicts, strict=True)],
+        laws=list(_laws(results)),
+        broken=runs_that(results, results.runs.broken),
+        failed=runs_that(results, results.runs.failed),
+        pairs=_pairs(results),
+        numbers=_numbers(results),
+        metrics={name: results.known[name] for name in results.shown},
+        varied=_varied(plan.sweep, results),
+        grid=[(key, ", ".join(map(as_yaml, given))) for key, given in plan.sweep.grid.items()],
+        kept=kept,
+        beside=numbered[: len(beside)],
+        figures=numbered,
+        missing=[str(one) for one in missing],
+        sittings=_sittings(folder),
+        latest=[(key, value_text(value)) for key, value in flat((sittings(folder) or [{}])[-1])],
+        first=FIRST,
+    )  # fmt: skip
+
+
+def _answers(verdicts: Sequence[StudyVerdict]) -> dict[str, list[tuple[int, StudyVerdict]]]:
+    """The verdicts with their numbers by answer."""
+    numbered = [*enumerate(verdicts, 1)]
+    return {
+        answer: [(i, verdict) for i, verdict in numbered if verdict.verdict == answer]
+        for answer in ANSWERS.values()
+    }
+
+
+def _laws(results: Results) -> Iterator[tuple[str, str, str, str, list[str]]]:
+    """For every law and cell: how many runs failed, the share's interval, and medians."""
+    for at, rows in results.summary.groupby(["law", "cell"], sort=False):
+        law, cell = map(str, at)
+        one, medians = rows.iloc[0], rows.set_index("metric").q50
+        failed = f"{round(one.failed * one.n)} of {one.n}"
+        share = _interval(100 * one.failed_low, 100 * one.failed_high, "{:.3g}".format, " %")
+        yield (
+            law,
+            cell,
+            failed,
+            share,
+            [digits(medians.get(name, np.nan)) for name in results.shown],
+        )
+
+
+def runs_that(results: Results, are: Any) -> Rows:
+    """The runs of which this is true, by draw; `are` gives a mask (cell, draw) of a law."""
+    runs = results.runs
+    masks: dict[str, Mask] = {law: are(law) & runs.done(law) for law in runs.laws}
+    places = sorted(
+        (draw, cell, law)
+        for law, mask in masks.items()
+        for draw, cell in np.argwhere(mask.T)[:FIRST].tolist()
+    )
+    rows = [_row(results, law, cell, draw) for draw, cell, law in places[:FIRST]]
+    return Rows(rows, sum(int(mask.sum()) for mask in masks.values()))
+
+
+def _row(results: Results, law: str, cell: int, draw: int) -> Row:
+    runs = results.runs
+    until = float(runs.until(law)[cell, draw])
+    status = STATUSES[int(runs.status(law)[cell, draw])]
+    cause = runs.causes.get((runs.laws.index(law), cell, draw), "") or _short_of(
+        results, law, cell, draw
+    )
+    told = "-" if np.isnan(until) else f"{until:.4g} s"
+    return Row(law, cell, runs.cells[cell], draw, status, told, cause)
+
+
+def _short_of(results: Results, law: str, cell: int, draw: int) -> str:
+    """Why a run that finished is no success: the metrics that decide."""
+    told = [
+        f"{name} = {results.runs.metric(law, name)[cell, draw]:.5g}" for name in results.runs.asked
+    ]
+    return ", ".join(told)
+
+
+def _pairs(results: Results) -> list[Any]:
+    """The rows of the shown metrics, in their order."""
+    rows: list[Any] = results.pairs.to_dict("records")
+    for row in rows:
+        row["interval"] = _interval(row["ratio_low"], row["ratio_high"], "{:.4g}".format)
+    return [row for name in results.shown for row in rows if row["metric"] == name]
+
+
+def _interval(low: float, high: float, words: Callable[[float], str], unit: str = "") -> str:
+    """Both ends, or `-` where there is no interval."""
+    return f"{words(low)} to {words(high)}{unit}" if low == low else "-"
+
+
+def _numbers(results: Results) -> list[list[str]]:
+    """Quantiles of the shown metrics, the median with its interval."""
+    rows: list[Any] = results.summary.to_dict("records")
+    return [
+        [one["law"], one["cell"], one["metric"], one["unit"],
+         *(digits(one[q]) for q in ("q05", "q25", "q50")),
+         _interval(one["q50_low"], one["q50_high"], digits),
+         *(digits(one[q]) for q in ("q75", "q95"))]
+        for one in rows if one["metric"] in results.shown
+    ]  # fmt: skip
+
+
+def _varied(sweep: Sweep, results: Results) -> list[tuple[str, str, str]]:
+    """Every drawn quantity: its keys, how it is drawn, and the scenario's own values."""
+    own, run = results.plan.identity, f"{results.runs.laws[0]}[0]"
+    return [
+        (
+            ", ".join(quantity.targets(name)),
+            in_words(quantity),
+            ", ".join(value_text(own.get(f"{run}.{key}")) for key in quantity.targets(name)),
+        )
+        for name, quantity in sweep.vary.items()
+    ]
+
+
+def _beside(figures: Sequence[Picture]) -> list[Picture]:
+    """The first distribution and the first ratios."""
+    first = {picture.name.partition("-")[0]: picture for picture in reversed(figures)}
+    return [first[kind] for kind in ("distribution", "ratios") if kind in first]
+
+
+def _sittings(folder: Path) -> list[list[str]]:
+    told = [dict(flat(one)) for one in sittings(folder)]
+    return [[value_text(one.get(key)) for key in SITTING] for one in told]

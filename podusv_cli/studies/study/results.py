@@ -1,0 +1,132 @@
+"""What a study says: the tables and verdicts of its runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from podusv_cli.metrics.metric import Metric
+from podusv_cli.studies.study import claims, summary, verdict
+from podusv_cli.studies.study.plan import Plan
+from podusv_cli.studies.study.runs_file import Table
+
+ALWAYS = ("iae", "z_e_steady")  # metrics that the answer has beside those of claims
+MARGIN = 0.01  # relative, of pairs
+
+
+@dataclass(frozen=True)
+class Results:
+    """The tables and verdicts of a study's runs, as far as these are made."""
+
+    plan: Plan
+    runs: Table
+    summary: pd.DataFrame
+    pairs: pd.DataFrame
+    sensitivity: pd.DataFrame
+    parsed: Sequence[claims.ParsedClaim]
+    verdicts: Sequence[verdict.StudyVerdict]
+    contradicted: str = ""  # why no claim is judged: a kept log has other numbers than the table
+
+    @cached_property
+    def known(self) -> dict[str, Metric]:
+        """All metrics, with those of plug-ins."""
+        return self.plan.scenario.known_metrics()
+
+    @cached_property
+    def broken(self) -> int:
+        """How many runs crashed, hung or were invalid."""
+        return sum(int(np.sum(self.runs.broken(law))) for law in self.runs.laws)
+
+    @cached_property
+    def made(self) -> int:
+        """How many runs there are."""
+        return sum(int(np.sum(self.runs.tried(law))) for law in self.runs.laws)
+
+    @property
+    def preliminary(self) -> str:
+        """How many draws the answer is about, in words; "" where none is missing."""
+        if self.made == self.wanted:
+            return ""
+        draws, laws = int(np.sum(self.runs.common, axis=1).min()), len(self.runs.laws)
+        cells = " of each cell" if len(self.runs.cells) > 1 else ""
+        of = f"that all {laws} laws have" if laws > 1 else "that are made"
+        return f"preliminary: {draws:,} of {self.runs.wanted:,} draws{cells} {of}"
+
+    @property
+    def wanted(self) -> int:
+        """How many runs were asked for."""
+        return len(self.runs.laws) * len(self.runs.cells) * self.runs.wanted
+
+    @property
+    def level(self) -> float:
+        """The confidence of all intervals; NaN where the draws allow none."""
+        return self.plan.sweep.level if self.plan.sweep.independent else np.nan
+
+    @property
+    def shown(self) -> list[str]:
+        """The metrics that the answer is about: those of the claims, and the most common."""
+        told = " ".join(claim.expect for claim in self.plan.sweep.claims.values())
+        return [m for m in self.runs.metrics if m in ALWAYS or f".{m}" in told]
+
+    def without_verdicts(self, contradicted: str) -> Results:
+        """The tables alone, where the runs are not what their logs say."""
+        return replace(self, parsed=(), verdicts=(), contradicted=contradicted)
+
+    def cells(self) -> tuple[list[str], list[list[str]]]:
+        """Head and rows of the table of the answer: failures and medians of every law."""
+        head = ["law", "cell", "failed", *(f"{name}, median" for name in self.shown)]
+        rows = []
+        for law in self.runs.laws:
+            for cell in self.runs.cells:
+                mine = self.summary[(self.summary.law == law) & (self.summary.cell == cell)]
+                rows.append([law, cell or "-", *self._row(mine.set_index("metric"))])
+        return head, rows
+
+    def _row(self, mine: pd.DataFrame) -> list[str]:
+        if not len(mine):  # no run yet
+            return ["-"] * (1 + len(self.shown))
+        first = mine.iloc[0]
+        share, low, high = (100.0 * first[name] for name in ("failed", "failed_low", "failed_high"))
+        failed = f"{share:.3g} %" + (f" [{low:.3g}, {high:.3g}]" if low == low else "")
+        return [failed, *(digits(mine.q50.get(name, np.nan)) for name in self.shown)]
+
+    def as_json(self) -> dict[str, Any]:
+        """What `--json` prints."""
+        return {
+            "preliminary": self.preliminary,
+            "broken": self.broken,
+            "contradicted": self.contradicted,
+            "summary": self.summary.to_dict("records"),
+            "claims": [one.as_json() for one in self.verdicts],
+        }
+
+
+def digits(number: float) -> str:
+    """A metric over all draws; infinite is a failed run, not a number is none."""
+    if np.isnan(number):
+        return "-"
+    return "failed" if np.isinf(number) else f"{number:.5g}"
+
+
+def judged(plan: Plan, runs: Table) -> Results:
+    """All tables and verdicts of a study's runs."""
+    sweep, known = plan.sweep, plan.scenario.known_metrics()
+    parsed = [
+        claims.ParsedClaim(name, claim, claims.parse(claim.expect, plan.laws, known))
+        for name, claim in sweep.claims.items()
+    ]
+    numbers = {q: values for q, values in runs.drawn.items() if not sweep.vary[q].seed}
+    tables = (
+        summary.summary(runs, sweep.level, known), summary.pairs(runs, MARGIN, sweep.level, known),
+        summary.sensitivity(runs, numbers, sweep.level, known),
+    )  # fmt: skip
+    laws, pairs, sensitivity = (
+        table if sweep.independent else summary.without_intervals(table) for table in tables
+    )
+    verdicts = claims.judge(parsed, runs, sweep.level, known)
+    return Results(plan, runs, laws, pairs, sensitivity, parsed, verdicts)

@@ -1,0 +1,179 @@
+"""runs.h5: every run of a study in one table; `runs_writer` writes it."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import ExitStack
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from podusv_cli.core.errors import StorageError
+from podusv_cli.core.kernel import Vector
+from podusv_cli.metrics.metric import Metric
+from podusv_cli.metrics.table import METRICS
+from podusv_cli.storage import hdf5
+from podusv_cli.studies.study.expressions import FINISHED, parse_success, succeeded
+from podusv_cli.studies.study.runs import AXES, DRAWN, FAILED, OWN, SEAL, SEAL_OF_THE_REST, Mask
+from podusv_cli.studies.study.unit import BROKEN, MISSING, STATUSES, Codes, Unit, UnitResult
+
+Known = Mapping[str, Metric]
+ROWS = 4096  # runs read or written at a time
+
+
+def digest(pieces: Iterable[Any]) -> str:
+    """A digest of the bytes of arrays, given piece by piece."""
+    found = hashlib.sha256()
+    for piece in pieces:
+        found.update(piece)
+    return found.hexdigest()
+
+
+def digest_of_the_rest(file: h5py.File) -> str:
+    """A digest of all that SEAL does not cover: names, types and content."""
+    names = [*AXES, *FAILED]
+    if DRAWN in file:
+        file[DRAWN].visititems(
+            lambda name, thing: (
+                names.append(f"{DRAWN}/{name}") if isinstance(thing, h5py.Dataset) else None
+            )
+        )
+    arrays = ((name, file[name][()]) for name in names)
+    return digest(
+        piece for name, a in arrays for piece in (f"{name} {a.dtype.str}\n".encode(), a.tobytes())
+    )
+
+
+class Table:
+    """runs.h5, open for reading: the `Runs` of a study; arrays are read when they are asked for."""
+
+    def __init__(self, path: Path, success: str = FINISHED, known: Known = METRICS) -> None:
+        """`success` is the expression for a run's. Raises StorageError for a damaged file."""
+        self.path, self._known, self._successes = path, known, dict[str, Mask]()
+        self._success = parse_success(success, known)
+        self._open = ExitStack()
+        self._file = self._open.enter_context(hdf5.opened(path, "runs"))
+        with hdf5.readable(path, "runs"):
+            self.identity = self._file.attrs["identity"].decode()
+            self.laws = tuple(word.decode() for word in self._file["law"][()])
+            self.cells = tuple(word.decode() for word in self._file["cell"][()])
+            self.wanted = len(self._file["draw"])
+
+    def check(self) -> None:
+        """Raises StorageError where a number or a word is not as it was written."""
+        with hdf5.readable(self.path, "runs"):
+            arrays = (self._file[name] for name in ("status", "until", *self.metrics))
+            found = {SEAL: digest(law for array in arrays for law in array)}
+            if SEAL_OF_THE_REST in self._file:
+                found[SEAL_OF_THE_REST] = digest_of_the_rest(self._file)
+            same = all(bytes(self._file[name][()]) == own.encode() for name, own in found.items())
+        if not same:
+            raise StorageError(f"cannot read {self.path}: its numbers were altered")
+
+    @cached_property
+    def metrics(self) -> tuple[str, ...]:
+        """The names of the metrics."""
+        return tuple(name for name in self._file if name not in OWN)
+
+    def metric(self, law: str, name: str) -> Vector:
+        """A metric of every run of a law, shape (cell, draw); NaN where it has none."""
+        if name not in self.metrics:
+            return np.full((len(self.cells), self.wanted), np.nan)
+        return np.asarray(self._file[name][self.laws.index(law)])
+
+    def status(self, law: str) -> Codes:
+        """How every run of a law ended, positions in STATUSES."""
+        return np.asarray(self._file["status"][self.laws.index(law)])
+
+    def until(self, law: str) -> Vector:
+        """The time that every run of a law reached [s]."""
+        return np.asarray(self._file["until"][self.laws.index(law)])
+
+    def tried(self, law: str) -> Mask:
+        """Whether a run was tried."""
+        return np.not_equal(self.status(law), MISSING)
+
+    @cached_property
+    def common(self) -> Mask:
+        """The draws (cell, draw) that all laws were tried on."""
+        return np.asarray(np.logical_and.reduce([self.tried(law) for law in self.laws]))
+
+    def done(self, law: str) -> Mask:
+        """The same for every law, so that an unfinished study compares them on the same draws."""
+        return self.common
+
+    def finished(self, law: str) -> Mask:
+        """Whether a run reached its end."""
+        return np.equal(self.status(law), STATUSES.index("finished"))
+
+    def broken(self, law: str) -> Mask:
+        """Whether a run crashed, hung or was invalid."""
+        return np.isin(self.status(law), [STATUSES.index(word) for word in BROKEN])
+
+    def success(self, law: str) -> Mask:
+        """Whether a run was a success. Kept, as all tables and claims ask again and again."""
+        if law not in self._successes:
+            read = {name: self.metric(law, name) for name in self.asked}
+            found = succeeded(self._success, read, self.finished(law), self._known)
+            self._successes[law] = np.ascontiguousarray(found)
+        return self._successes[law]
+
+    def failed(self, law: str) -> Mask:
+        """Whether a run has a result and is no success."""
+        return self.done(law) & ~self.success(law) & ~self.broken(law)
+
+    @cached_property
+    def asked(self) -> list[str]:
+        """The metrics that success depends on."""
+        used = {part.id for part in ast.walk(self._success) if isinstance(part, ast.Name)}
+        return [name for name in self._known if name in used]
+
+    @property
+    def drawn(self) -> dict[str, Any]:
+        """The drawn quantities, one entry a draw."""
+        found: dict[str, Any] = {}
+
+        def note(name: str, thing: Any) -> None:  # returns None, so that all are visited
+            if isinstance(thing, h5py.Dataset):
+                content = thing[()]
+                found[name] = np.char.decode(content) if content.dtype.kind == "S" else content
+
+        if DRAWN in self._file:
+            self._file[DRAWN].visititems(note)
+        return found
+
+    @cached_property
+    def causes(self) -> dict[tuple[int, int, int], str]:
+        """Why runs did not finish, by law, cell and draw."""
+        runs = map(tuple, self._file["failed_run"][()].tolist())
+        return dict(zip(runs, (c.decode() for c in self._file["failed_cause"][()]), strict=False))
+
+    def results(self) -> Iterator[UnitResult]:
+        """The runs that are made, as units."""
+        for position, law in enumerate(self.laws):
+            status = self.status(law)
+            for cell in range(len(self.cells)):
+                for rows in stretches(status[cell] != MISSING):
+                    for first in range(rows.start, rows.stop, ROWS):
+                        part = range(first, min(first + ROWS, rows.stop))
+                        yield self._unit(position, law, cell, part, status[cell])
+
+    def _unit(self, place: int, law: str, cell: int, rows: range, status: Codes) -> UnitResult:
+        part = slice(rows.start, rows.stop)
+        return UnitResult(
+            Unit(law, cell, rows.start, len(rows)),
+            {name: self._file[name][place, cell, part] for name in self.metrics},
+            status[part], self._file["until"][place, cell, part],
+            tuple(self.causes.get((place, cell, draw), "") for draw in rows),
+        )  # fmt: skip
+
+
+def stretches(there: Any) -> list[range]:
+    """The ranges of positions where a mask is true."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(int)))
+    return [range(first, stop) for first, stop in edges.reshape(-1, 2).tolist()]

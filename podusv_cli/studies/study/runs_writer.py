@@ -1,0 +1,206 @@
+"""Writing runs.h5 piece by piece, so that a million runs take no memory."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from podusv_cli.core.errors import StorageError
+from podusv_cli.metrics.metric import Metric
+from podusv_cli.process.temporary_names import temporary_name
+from podusv_cli.storage.files import new_file, storage_errors
+from podusv_cli.storage.log import FILE, UNDATED, LogLayout, describe, write_at
+from podusv_cli.studies.study.runs import DRAWN, SEAL, SEAL_OF_THE_REST
+from podusv_cli.studies.study.runs_file import ROWS, digest, digest_of_the_rest
+from podusv_cli.studies.study.unit import MISSING, STATUSES, UnitResult
+
+BLOCK = 2**20  # bytes written and read at a time
+NUMBERS = "iuf"  # numpy's kinds of numbers
+HEAD = 1200  # bytes of what the file says of an array, roughly
+
+
+@dataclass(frozen=True)
+class Header:
+    """What the table is about: labels of the axes, the identity, what was drawn, and metrics."""
+
+    title: str
+    identity: str
+    laws: Sequence[str]
+    cells: Sequence[str]
+    wanted: int  # draws of each cell
+    draws: Callable[[int, int], Mapping[str, Any]]  # first, count -> every drawn quantity
+    metrics: Mapping[str, Metric]
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Of every array of runs."""
+        return len(self.laws), len(self.cells), self.wanted
+
+
+def write(path: Path, header: Header, results: Sequence[UnitResult] | Any) -> None:
+    """Write the table, in place of an older one. `results` can be gone through more than once.
+
+    Raises StorageError; the older table is then still there.
+    """
+    part = path.with_name(temporary_name())
+    try:
+        causes = {
+            (header.laws.index(r.unit.law), r.unit.cell, r.unit.first + i): cause
+            for r in results for i, cause in enumerate(r.causes) if cause
+        }  # fmt: skip
+        places = _lay_out(part, header, dict(sorted(causes.items())))
+        with storage_errors(f"cannot write {path}"):
+            _fill(part, header, places, results)
+            os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+@dataclass(frozen=True)
+class Room:
+    """Where an array is in the file, and its type and shape."""
+
+    offset: int
+    kind: np.dtype[Any]
+    shape: tuple[int, ...]
+
+    @property
+    def end(self) -> int:
+        """The byte after its last."""
+        return self.offset + self.kind.itemsize * math.prod(self.shape)
+
+    def place(self, *index: int) -> int:
+        """The offset of an entry."""
+        flat = np.ravel_multi_index(index, self.shape)
+        return self.offset + self.kind.itemsize * int(flat)
+
+    def content(self, numbers: Any) -> bytes:
+        """Numbers as they are in the file."""
+        return np.asarray(numbers, self.kind).tobytes()
+
+
+def _lay_out(
+    part: Path, header: Header, causes: Mapping[tuple[int, int, int], str]
+) -> dict[str, Room]:
+    """Make the file with everything but long arrays; the places of these."""
+    layout, places = LogLayout(), dict[str, Room]()
+    with h5py.File(layout, "w", **FILE, **UNDATED) as file:
+        facts = {"title": header.title, "identity": header.identity, "status": " ".join(STATUSES)}
+        describe(file, facts)
+        scales = [_labels(file, "law", header.laws), _labels(file, "cell", header.cells)]
+        scales.append(_labels(file, "draw", np.arange(header.shape[2], dtype=np.int32)))
+        for name, first in header.draws(0, 1).items():
+            if first.dtype.kind in NUMBERS:
+                path = f"{DRAWN}/{name}"
+                places[path] = _room(file, path, first.dtype, (header.wanted,), ())
+            else:
+                words = header.draws(0, header.wanted)[name]
+                file.create_dataset(f"{DRAWN}/{name}", data=_column(words))
+        file.create_dataset("failed_run", data=np.array(list(causes), np.int64).reshape(-1, 3))
+        file.create_dataset("failed_cause", data=_labelled(list(causes.values()) or [""]))
+        kinds: dict[str, Any] = {"status": np.uint8, "until": np.float64}
+        kinds |= dict.fromkeys(header.metrics, np.float64)
+        for name, kind in kinds.items():
+            places[name] = _room(file, name, kind, header.shape, scales)
+        for name, metric in header.metrics.items():
+            describe(file[name], {"units": metric.unit, "long_name": metric.meaning})
+        for seal in (SEAL, SEAL_OF_THE_REST):
+            places[seal] = _room(file, seal, np.uint8, (64,), ())
+    with new_file(part, layout.size) as out:
+        layout.write_to(out)
+        out.truncate(max(layout.size, *(room.end for room in places.values())))
+    return places
+
+
+def bytes_of(shape: tuple[int, int, int], metrics: int, drawn: int) -> int:
+    """Roughly the size of a table of so many laws, cells and draws."""
+    of_a_run = 8 * (metrics + 1) + 1  # with `until` and `status`
+    return int(np.prod(shape)) * of_a_run + shape[2] * (4 + 8 * drawn) + HEAD * (metrics + 2)
+
+
+def _room(
+    file: h5py.File, name: str, kind: Any, shape: tuple[int, ...], scales: Sequence[h5py.Dataset]
+) -> Room:
+    """An array whose numbers podusv writes."""
+    made = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    made.set_obj_track_times(False)
+    made.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+    made.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
+    inside = h5py.h5p.create(h5py.h5p.LINK_CREATE)
+    inside.set_create_intermediate_group(True)
+    space, little = h5py.h5s.create_simple(shape), np.dtype(kind).newbyteorder("<")
+    made = h5py.h5d.create(file.id, name.encode(), h5py.h5t.py_create(little), space, made, inside)
+    dataset = h5py.Dataset(made)
+    for position, scale in enumerate(scales):
+        dataset.dims[position].attach_scale(scale)
+    return Room(made.get_offset(), little, shape)
+
+
+def _labels(file: h5py.File, axis: str, labels: Any) -> h5py.Dataset:
+    content = _labelled(labels) if isinstance(labels[0], str) else labels
+    scale = file.create_dataset(axis, data=content)
+    scale.make_scale(axis)
+    return scale
+
+
+def _labelled(words: Sequence[str]) -> Any:
+    return np.array([str(word).encode() for word in words])
+
+
+def _column(drawn: Any) -> Any:
+    """A drawn quantity as HDF5 takes it: numbers, or words where any of the values is one."""
+    values = np.array(drawn.tolist()) if drawn.dtype.kind == "O" else drawn
+    return _labelled(values.tolist()) if values.dtype.kind == "U" else values
+
+
+def _fill(part: Path, header: Header, places: dict[str, Room], results: Iterable[Any]) -> None:
+    """Write the long arrays, piece by piece. (An array in memory that is the file would take as
+    much memory, and a full disk would end the process.)
+    """
+    seal, rest = places.pop(SEAL), places.pop(SEAL_OF_THE_REST)
+    drawn = {name: places.pop(name) for name in list(places) if name.startswith(f"{DRAWN}/")}
+    with part.open("r+b", buffering=0) as out:
+        for first in range(0, header.wanted if drawn else 0, ROWS):
+            columns = header.draws(first, min(ROWS, header.wanted - first))
+            for name, room in drawn.items():
+                numbers = columns[name.removeprefix(f"{DRAWN}/")]
+                write_at(out, room.place(first), room.content(numbers))
+        for name, room in places.items():
+            _blank(out, room, MISSING if name == "status" else np.nan)
+        for result in results:
+            unit = result.unit
+            if unit.draws.stop > header.wanted:
+                raise StorageError(
+                    f"cannot write runs.h5 of {header.wanted} draws: there are runs of "
+                    f"{unit.draws.stop} draws, which another process has added; run it again"
+                )
+            at = (header.laws.index(unit.law), unit.cell, unit.first)
+            arrays = {**result.metrics, "status": result.status, "until": result.until}
+            for name, numbers in arrays.items():
+                write_at(out, places[name].place(*at), places[name].content(numbers))
+        found = digest(piece for room in places.values() for piece in _pieces(out, room))
+        write_at(out, seal.offset, found.encode())
+        with h5py.File(part, "r") as file:
+            found = digest_of_the_rest(file)
+        write_at(out, rest.offset, found.encode())
+        os.fsync(out.fileno())
+
+
+def _blank(out: Any, room: Room, content: float) -> None:
+    for start in range(room.offset, room.end, BLOCK):
+        count = (min(BLOCK, room.end - start)) // room.kind.itemsize
+        write_at(out, start, room.content(np.full(count, content)))
+
+
+def _pieces(out: Any, room: Room) -> Iterator[bytes]:
+    """The bytes of an array in the file, piece by piece."""
+    for start in range(room.offset, room.end, BLOCK):
+        out.seek(start)
+        yield out.read(min(BLOCK, room.end - start))

@@ -1,0 +1,166 @@
+"""The statistics of claims, and what each is computed from in one cell: counts or values."""
+
+from __future__ import annotations
+
+import ast
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from podusv_cli.core.kernel import Vector
+from podusv_cli.scenario.expressions import function, literal, refuse
+from podusv_cli.studies.study import statistics
+from podusv_cli.studies.study.expressions import SIGNS, OverLaws
+from podusv_cli.studies.study.runs import Mask
+from podusv_cli.studies.study.statistics import Interval
+
+
+@dataclass(frozen=True)
+class Sample(ABC):
+    """The draws of one cell: how many, and in how many of them a number is unknown.
+
+    In a share's comparisons of two laws, `both_failed` and `close` count the draws in which both
+    failed, and those in which they differ by no more than the margin.
+    """
+
+    cell: str
+    n: int
+    unknown: int
+    both_failed: int = field(default=0, kw_only=True)
+    close: int = field(default=0, kw_only=True)
+
+    @abstractmethod
+    def interval(self, level: float) -> Interval:
+        """The statistic with its interval."""
+
+    @abstractmethod
+    def holds(self, sign: ast.cmpop, bound: float, margin: float, level: float) -> bool | None:
+        """Whether the comparison holds all over the interval, or nowhere in it; else None."""
+
+    @abstractmethod
+    def needed(self, sign: ast.cmpop, bound: float, margin: float, level: float) -> int | None:
+        """Draws that would decide a comparison if they continue like these; None: none would."""
+
+    def _holds(self, sign: ast.cmpop, bound: float, margin: float, level: float) -> bool | None:
+        found = self.interval(level)
+        ends = [bool(SIGNS[type(sign)](end, bound, margin)) for end in (found.low, found.high)]
+        return ends[0] if self.n and ends[0] == ends[1] else None
+
+
+@dataclass(frozen=True)
+class Share(Sample):
+    """A share of draws: those in which something held. The margin is inside what held."""
+
+    yes: int
+
+    def interval(self, level: float) -> Interval:
+        """Clopper and Pearson's."""
+        if not self.n:
+            return Interval(math.nan, 0.0, 1.0)
+        return statistics.share(self.yes, self.n, level, self.unknown)
+
+    def holds(self, sign: ast.cmpop, bound: float, margin: float, level: float) -> bool | None:
+        """The bound of a share has no margin."""
+        return self._holds(sign, bound, 0.0, level)
+
+    def needed(self, sign: ast.cmpop, bound: float, margin: float, level: float) -> int | None:
+        """As if the share stayed as it is."""
+        return statistics.needed(self.yes / self.n, bound, level) if self.n else None
+
+
+@dataclass(frozen=True)
+class Quantile(Sample):
+    """A quantile of one value for each draw."""
+
+    values: Vector
+    q: float
+
+    def interval(self, level: float) -> Interval:
+        """Between two of the values."""
+        if not self.n:
+            return Interval(math.nan, -math.inf, math.inf)
+        return statistics.quantile(self.values, self.q, level)
+
+    def holds(self, sign: ast.cmpop, bound: float, margin: float, level: float) -> bool | None:
+        """The bound has the margin."""
+        return self._holds(sign, bound, margin, level)
+
+    def needed(self, sign: ast.cmpop, bound: float, margin: float, level: float) -> int | None:
+        """As if the share of values beyond the bound stayed as it is, which decides just so."""
+        if not self.n:
+            return None
+        held = float(np.mean(SIGNS[type(sign)](self.values, bound, margin)))
+        upper = isinstance(sign, (ast.Lt, ast.LtE))
+        return statistics.needed(held, self.q if upper else 1.0 - self.q, level)
+
+
+def number(node: ast.expr) -> float:
+    """A number as written, with its sign. Raises ExpressionError."""
+    match node:
+        case ast.UnaryOp(op=ast.USub(), operand=part):
+            return -literal(part)
+    return literal(node)
+
+
+# Statistics: from the call and a walk over runs to the sample of a cell, among its used draws.
+Sampler = Callable[[str, int, Mask], Sample]
+
+
+def _share(call: ast.Call, walk: OverLaws) -> Sampler:
+    held = walk.condition(_arguments(call, 1, "one condition, as in share(a.iae < b.iae)")[0])
+
+    def sample(label: str, cell: int, used: Mask) -> Share:
+        def count(where: Mask) -> int:
+            return int(np.sum(where[cell] & used))
+
+        unknown = count(~held.yes & ~held.no)
+        failed, close = (sum(map(count, masks)) for masks in (walk.both_failed, walk.close))
+        n, yes = int(used.sum()), count(held.yes)
+        return Share(label, n, unknown, yes, both_failed=failed, close=close)
+
+    return sample
+
+
+def _failures(call: ast.Call, walk: OverLaws) -> Sampler:
+    failed = ~walk.runs.success(walk.only(call))
+    return lambda label, cell, used: Share(
+        label, int(used.sum()), 0, int(np.sum(failed[cell] & used))
+    )
+
+
+def _quantile(call: ast.Call, walk: OverLaws) -> Sampler:
+    node, share = _arguments(call, 2, "a number of each draw and a share: quantile(a.iae, 0.95)")
+    q = number(share)
+    if not 0.0 < q < 1.0:
+        refuse(call, "the share must lie between 0 and 1, as in quantile(a.iae, 0.95)")
+    return _at_share(node, q, walk)
+
+
+def _median(call: ast.Call, walk: OverLaws) -> Sampler:
+    node = _arguments(call, 1, "one number of each draw, as in median(a.iae / b.iae)")[0]
+    return _at_share(node, statistics.MEDIAN, walk)
+
+
+def _at_share(node: ast.expr, q: float, walk: OverLaws) -> Sampler:
+    values = walk.number(node)
+
+    def sample(label: str, cell: int, used: Mask) -> Quantile:
+        chosen = values[cell][used]
+        return Quantile(label, len(chosen), int(np.isnan(chosen).sum()), chosen, q)
+
+    return sample
+
+
+def _arguments(call: ast.Call, count: int, wanted: str) -> list[ast.expr]:
+    if len(call.args) != count:
+        refuse(call, f"{function(call)} takes {wanted}")
+    return call.args
+
+
+SHARE, FAILURES = "share", "failures"
+STATISTICS: dict[str, Callable[[ast.Call, OverLaws], Sampler]] = {
+    SHARE: _share, FAILURES: _failures, "quantile": _quantile, "median": _median,
+}  # fmt: skip

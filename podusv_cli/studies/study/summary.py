@@ -1,0 +1,145 @@
+"""Tables of a study: each law, each pair of laws, and what each metric depends on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from podusv_cli.core.kernel import Vector
+from podusv_cli.metrics.metric import Metric
+from podusv_cli.metrics.table import CLOCKED, METRICS
+from podusv_cli.storage import csv_files
+from podusv_cli.studies.study import statistics
+from podusv_cli.studies.study.runs import Mask, Runs, worst
+
+LEVEL = 0.95
+MARGIN = 0.01  # relative; of pairs
+QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+Known = Mapping[str, Metric]
+
+
+def summary(runs: Runs, level: float = LEVEL, metrics: Known = METRICS) -> pd.DataFrame:
+    """For every law, cell and metric: failures and quantiles over all draws, with intervals."""
+    rows = [
+        {**_failures(runs, law, cell, level), "metric": name, "unit": metrics[name].unit,
+         **_quantiles(values, level)}
+        for law in runs.laws for cell in range(len(runs.cells))
+        for name, values in _columns(runs, law, cell, metrics)
+    ]  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def pairs(
+    runs: Runs, margin: float = MARGIN, level: float = LEVEL, metrics: Known = METRICS
+) -> pd.DataFrame:
+    """For every metric, cell and two laws a and b: who wins how often, and the median of a / b.
+
+    Of the draws that both laws met. A win is a smaller metric by more than the margin.
+    """
+    rows = [
+        {"metric": name, "cell": runs.cells[cell], "a": a, "b": b, "margin": margin,
+         **_pair(of_a[used], of_b[used], margin, level)}
+        for name in _names(runs, metrics) for cell in range(len(runs.cells))
+        for a, b in combinations(runs.laws, 2)
+        for of_a, of_b in [(values_of(runs, law, cell, metrics[name]) for law in (a, b))]
+        for used in [runs.done(a)[cell] & runs.done(b)[cell]]
+        if all(has(runs, law, cell, metrics[name]) for law in (a, b))
+    ]  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def sensitivity(
+    runs: Runs, draws: Mapping[str, Any], level: float = LEVEL, metrics: Known = METRICS
+) -> pd.DataFrame:
+    """Spearman's rank correlation of every metric with every drawn number, by law and cell.
+
+    Of the `n` draws in which the metric is known. `by_chance` is what unrelated quantities stay
+    within. Words that are drawn have no ranks.
+    """
+    drawn = {name: np.asarray(values) for name, values in draws.items()}
+    numbers = {name: values for name, values in drawn.items() if values.dtype.kind in "fiub"}
+    rows = [
+        {"law": law, "cell": runs.cells[cell], "quantity": quantity, "metric": name,
+         "n": known, "correlation": correlation,
+         "by_chance": statistics.by_chance(known, level)}
+        for law in runs.laws for cell in range(len(runs.cells))
+        for done in [runs.done(law)[cell]]
+        for ranked in [{q: statistics.standard(values[done]) for q, values in numbers.items()}]
+        for name, values in _columns(runs, law, cell, metrics)
+        for known in [int(np.sum(~np.isnan(values)))]
+        for quantity, correlation in statistics.rank_correlations(ranked, values).items()
+    ]  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def without_intervals(frame: pd.DataFrame) -> pd.DataFrame:
+    """The table with nothing in all columns that need independent draws."""
+    ends = [c for c in frame.columns if c.endswith(("_low", "_high")) or c == "by_chance"]
+    return frame.assign(**dict.fromkeys(ends, np.nan))
+
+
+def as_csv(frame: pd.DataFrame) -> str:
+    """A table as CSV with six significant digits."""
+    return csv_files.text(frame, "%.6g")
+
+
+def _names(runs: Runs, metrics: Known) -> list[str]:
+    """The metrics of these runs in the order of tables, without measured times."""
+    return [name for name in metrics if name in runs.metrics and name not in CLOCKED]
+
+
+def values_of(runs: Runs, law: str, cell: int, about: Metric) -> Vector:
+    """A metric of every draw of a cell; +inf for a run that failed."""
+    return worst(about, runs.metric(law, about.name)[cell], ~runs.success(law)[cell])
+
+
+def has(runs: Runs, law: str, cell: int, about: Metric) -> bool:
+    """Whether the law has the metric: a run that succeeded has it, or there is no such run."""
+    succeeded = runs.done(law)[cell] & runs.success(law)[cell]
+    values = values_of(runs, law, cell, about)[succeeded]
+    return bool(runs.done(law)[cell].any() and (not len(values) or not np.isnan(values).all()))
+
+
+def _columns(
+    runs: Runs, law: str, cell: int, metrics: Known
+) -> Iterator[tuple[str, Vector]]:  # fmt: skip
+    """Every metric that the law has, over the draws of a cell that it met."""
+    for name in _names(runs, metrics):
+        if has(runs, law, cell, metrics[name]):
+            yield name, values_of(runs, law, cell, metrics[name])[runs.done(law)[cell]]
+
+
+def _failures(runs: Runs, law: str, cell: int, level: float) -> dict[str, Any]:
+    done: Mask = runs.done(law)[cell]
+    failed, n = int(np.sum(done & ~runs.success(law)[cell])), int(np.sum(done))
+    return {
+        "law": law, "cell": runs.cells[cell], "n": n,
+        "broken": int(np.sum(done & runs.broken(law)[cell])),
+        **_named("failed", statistics.share(failed, n, level)),
+    }  # fmt: skip
+
+
+def _quantiles(values: Vector, level: float) -> dict[str, Any]:
+    found: dict[str, Any] = {"unknown": int(np.isnan(values).sum())}
+    intervals = statistics.quantiles(values, QUANTILES, level)
+    for q, interval in zip(QUANTILES, intervals, strict=True):
+        found |= _named(f"q{round(100 * q):02d}", interval)
+    return found
+
+
+def _pair(a: Vector, b: Vector, margin: float, level: float) -> dict[str, Any]:
+    found = statistics.pairs(a, b, margin)
+    ratio = statistics.quantile(statistics.ratios(a, b), statistics.MEDIAN, level)
+    return {
+        "n": found.n, "ties": found.ties, "both_failed": found.both_failed,
+        "unknown": found.unknown, **_named("a_wins", found.win_rate(level)),
+        **_named("b_wins", found.loss_rate(level)), **_named("ratio", ratio),
+    }  # fmt: skip
+
+
+def _named(name: str, found: statistics.Interval) -> dict[str, Any]:
+    return {name: found.estimate, f"{name}_low": found.low, f"{name}_high": found.high}

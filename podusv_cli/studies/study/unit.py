@@ -1,0 +1,115 @@
+"""A unit of a study: a range of draws of one law in one cell, simulated as one batch."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from podusv_cli.core.kernel import Vector
+from podusv_cli.engine.loop.closed_loop import ClosedLoop
+from podusv_cli.engine.running import lanes
+from podusv_cli.engine.running.batch import Lazily, simulate_many
+from podusv_cli.engine.running.simulate import ready
+from podusv_cli.engine.step.grid import TimeGrid
+from podusv_cli.studies.study.draws import drawn, draws
+from podusv_cli.studies.study.plan import Plan, watching
+
+# How a run can end. The position is the code in files; "missing" is a run that is not made yet.
+STATUSES = ("finished", "diverged", "hung", "crashed", "invalid", "missing")
+BROKEN = ("hung", "crashed", "invalid")  # no results of the law
+MISSING = STATUSES.index("missing")
+Codes = npt.NDArray[np.uint8]
+
+
+@dataclass(frozen=True, order=True)
+class Unit:
+    """Draws `first` to `first + count - 1` of a law in a cell."""
+
+    law: str
+    cell: int
+    first: int
+    count: int
+
+    @property
+    def draws(self) -> range:
+        """The numbers of the draws."""
+        return range(self.first, self.first + self.count)
+
+    def halves(self) -> tuple[Unit, Unit]:
+        """The unit as two, to find a run that crashes."""
+        half = self.count // 2
+        return (
+            Unit(self.law, self.cell, self.first, half),
+            Unit(self.law, self.cell, self.first + half, self.count - half),
+        )
+
+
+@dataclass(frozen=True)
+class UnitResult:
+    """What came of a unit; one number a draw.
+
+    `metrics` by name, NaN where a run ended before one is defined. `status` holds positions in
+    STATUSES, `until` the time that a run reached [s], `causes` why it did not finish, else "".
+    """
+
+    unit: Unit
+    metrics: Mapping[str, Vector]
+    status: Codes
+    until: Vector
+    causes: tuple[str, ...]
+
+
+def prepare(plan: Plan, law: str, cell: int, runs: int = 0) -> None:
+    """Check a law, and have its march compiled and loaded. Raises LawError.
+
+    `runs` is how many runs of it there will be, by default those of the plan.
+    """
+    scenario = plan.single(law, cell)
+    loop, seeing = scenario.closed_loop(), watching(scenario)
+    ready(loop, scenario.time_grid(), seeing, compiled=True)
+    runs = runs or plan.sweep.draws * len(plan.cells)
+    lanes.prepare(loop, seeing, runs * scenario.time_grid().steps)
+
+
+def make(
+    plan: Plan, unit: Unit, progress: Callable[[float], None] | None = None,
+    grid: TimeGrid | None = None,
+) -> UnitResult:  # fmt: skip
+    """Simulate a unit, run after run, over the scenario's instants or those of another grid.
+
+    Raises KeyboardInterrupt, and then nothing is kept.
+    """
+    scenario = plan.single(unit.law, unit.cell)
+    grid, seeing = grid or scenario.time_grid(), watching(scenario)
+    numbers, vary = list(draws(plan.sweep, unit.first, unit.count, plan.stream)), plan.sweep.vary
+
+    def loop(position: int) -> ClosedLoop:
+        return drawn(scenario, vary, numbers[position]).closed_loop()
+
+    done = simulate_many(
+        Lazily(unit.count, loop),
+        grid,
+        observer=seeing,
+        workers=1,
+        progress=progress,
+        like=scenario.closed_loop(),
+    )
+    if "interrupted" in done.status:
+        raise KeyboardInterrupt
+    return UnitResult(
+        unit, seeing.summaries(done.seen),
+        np.array([STATUSES.index(word) for word in done.status], np.uint8),
+        np.maximum(done.reached - 1, 0) * grid.step, tuple(map(str, done.cause)),
+    )  # fmt: skip
+
+
+def crashed(unit: Unit, names: tuple[str, ...], cause: str) -> UnitResult:
+    """The result of a unit of one run that ends its process."""
+    nothing = np.full(unit.count, np.nan)
+    return UnitResult(
+        unit, dict.fromkeys(names, nothing),
+        np.full(unit.count, STATUSES.index("crashed"), np.uint8), nothing, (cause,) * unit.count,
+    )  # fmt: skip

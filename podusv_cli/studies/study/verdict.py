@@ -1,0 +1,201 @@
+"""Verdicts on claims about a study: the evidence in words, as plain data and as a table."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal, Protocol, Self
+
+from podusv_cli.core.escaping import markdown, markdown_cell, markdown_code
+from podusv_cli.studies.study.samples import Sample
+
+Answer = Literal["reproduced", "not reproduced", "cannot tell"]
+ANSWERS: dict[bool | None, Answer] = {
+    True: "reproduced",
+    False: "not reproduced",
+    None: "cannot tell",
+}
+
+
+class Stated(Protocol):
+    """A claim as it is written in a scenario."""
+
+    @property
+    def says(self) -> str:
+        """The claim in a sentence."""
+
+    @property
+    def source(self) -> str:
+        """Where it was published."""
+
+    @property
+    def expect(self) -> str:
+        """The claim as an expression."""
+
+    @property
+    def tolerance(self) -> float:
+        """The margin of its comparisons."""
+
+    @property
+    def remark(self) -> str:
+        """Choices made where the source is silent."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """A statistic of a claim in one cell, with its interval at this level.
+
+    `unknown` draws lack a number. `both_failed` and `close` are draws without a winner.
+    """
+
+    statistic: str
+    cell: str
+    n: int
+    estimate: float
+    low: float
+    high: float
+    level: float
+    unknown: int
+    both_failed: int
+    close: int
+
+    @classmethod
+    def of(cls, statistic: str, sample: Sample, level: float) -> Self:
+        """The part that a sample gives."""
+        estimate, low, high = map(float, sample.interval(level))
+        return cls(
+            statistic, sample.cell, sample.n, estimate, low, high, level,
+            sample.unknown, sample.both_failed, sample.close,
+        )  # fmt: skip
+
+    def in_words(self) -> str:
+        """Such as `failures(pid) = 0.01 [0.002, 0.03] in 400 draws`."""
+        at = f" at {self.cell}" if self.cell else ""
+        counts = [f"{self.n} draws" if self.n else "no draw"]
+        counts += [f"both failed in {self.both_failed}"] if self.both_failed else []
+        counts += [f"{self.close} within the margin"] if self.close else []
+        counts += [f"a number is missing in {self.unknown}"] if self.unknown else []
+        interval = f"{self.estimate:.4g} [{self.low:.4g}, {self.high:.4g}]"
+        return f"{self.statistic}{at} = {interval} ({', '.join(counts)})"
+
+    def as_json(self) -> dict[str, object]:
+        """Plain data; what is infinite or undefined is None."""
+        return {k: _plain(v) for k, v in vars(self).items() if v != "" or k != "cell"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class StudyVerdict:
+    """The verdict on a claim about a study; `level` is that of the claim after Holm's correction.
+
+    `needed` are the draws of a cell that would decide what is open, None where no number would.
+    `broken` runs crashed, hung or were invalid; `without_broken` is the answer without their draws.
+    """
+
+    name: str
+    claim: Stated
+    answer: bool | None
+    level: float
+    wanted: int
+    parts: Sequence[Part]
+    by_cell: dict[str, bool | None]
+    needed: Sequence[int | None]
+    broken: int
+    without_broken: bool | None
+
+    @property
+    def verdict(self) -> Answer:
+        """The answer in words."""
+        return ANSWERS[self.answer]
+
+    @property
+    def draws(self) -> int:
+        """Draws of the cell that has the fewest."""
+        return min((part.n for part in self.parts), default=0)
+
+    @property
+    def preliminary(self) -> bool:
+        """Whether a cell has fewer draws than were asked for."""
+        return self.draws < self.wanted
+
+    @property
+    def more(self) -> int | None:
+        """Draws of a cell that would decide the claim; None where that is not known."""
+        counts = [count for count in self.needed if count is not None]
+        return max(counts) if counts and len(counts) == len(self.needed) else None
+
+    def evidence(self) -> str:
+        """The numbers and the reasons, in one line."""
+        return "; ".join([*(part.in_words() for part in self.parts), *self.reasons()])
+
+    def reasons(self) -> Iterator[str]:
+        """What a reader has to know beside the numbers."""
+        yield f"intervals at {100 * self._inside:.4g} %"
+        if self.preliminary:
+            yield f"preliminary: {self.draws} of {self.wanted} draws"
+        if self.answer is None:
+            yield self._doubt()
+        if self.broken:
+            yield f"{self.broken} runs crashed, hung or were invalid, and count as failed"
+        if self.without_broken != self.answer:
+            other = ANSWERS[self.without_broken]
+            yield f"these runs decide the verdict: without their draws it would be `{other}`"
+
+    @property
+    def _inside(self) -> float:
+        return self.parts[0].level if self.parts else self.level
+
+    def _doubt(self) -> str:
+        """Why the answer is "cannot tell", and what would change that."""
+        if not self.draws:
+            return "no draw has runs of all laws in the claim"
+        if None not in self.by_cell.values():
+            cells = (f"{ANSWERS[answer]} at {cell}" for cell, answer in self.by_cell.items())
+            return f"the cells disagree: {', '.join(cells)}"
+        if any(part.unknown == part.n for part in self.parts):
+            return "no run has a number that the claim is about"
+        if any(part.unknown for part in self.parts):
+            return "missing numbers leave the answer open"
+        if self.more is None:
+            return (
+                "the shares found are just those asked for, so it cannot be said how many draws "
+                "would decide"
+            )
+        return (
+            f"about {max(self.more, self.draws + 1)} draws would decide, if shares stay as they are"
+        )
+
+    def as_json(self) -> dict[str, object]:
+        """The verdict as plain data."""
+        claim = self.claim
+        return {
+            "claim": self.name, "says": claim.says, "source": claim.source,
+            "expect": claim.expect, "tolerance": claim.tolerance, "remark": claim.remark,
+            "verdict": self.verdict, "preliminary": self.preliminary, "draws": self.draws,
+            "wanted": self.wanted, "level": self.level,
+            "statistics": [part.as_json() for part in self.parts],
+            "needed": self.more if self.answer is None else None,
+            "broken": self.broken, "without_broken": ANSWERS[self.without_broken],
+            "reasons": list(self.reasons()),
+        }  # fmt: skip
+
+
+def _plain(value: object) -> object:
+    return value if not isinstance(value, float) or math.isfinite(value) else None
+
+
+def as_markdown(verdicts: Sequence[StudyVerdict]) -> str:
+    """The verdicts as a table, followed by remarks."""
+    rows = [
+        f"| {markdown_cell(v.name)} | "
+        f"{markdown_cell(v.claim.says)} ({markdown_cell(v.claim.source)}) | "
+        f"**{v.verdict}**{', preliminary' if v.preliminary else ''} | "
+        f"{markdown_code(v.claim.expect)}, tolerance {v.claim.tolerance:g} | "
+        f"{markdown_cell(v.evidence())} |"
+        for v in verdicts
+    ]
+    remarks = [
+        f"- {markdown(v.name)}: {markdown(v.claim.remark)}" for v in verdicts if v.claim.remark
+    ]
+    head = ["| | claim | verdict | put as | numbers |", "|---|---|---|---|---|"]
+    return "\n".join([*head, *rows, *(["", *remarks] if remarks else []), ""])

@@ -1,0 +1,69 @@
+"""What is wrong with a scenario's key `tune`, found before anything is simulated."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from podusv_cli.scenario.expressions import ExpressionError
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.tune import Tune
+from podusv_cli.scenario.yaml_tree import Route
+from podusv_cli.studies.study.check import singles
+from podusv_cli.studies.tuning.objective import parse_inequality, parse_objective
+from podusv_cli.studies.tuning.space import space_faults
+
+Faults = Iterator[tuple[Route, str]]
+
+
+def tune_faults(scenario: Scenario) -> list[tuple[Route, str]]:
+    """Steps of the key and message for everything that is wrong; nothing without `tune`."""
+    tune = scenario.tune
+    if tune is None:
+        return []
+    return [
+        *_study(scenario),
+        *_budget(tune),
+        *_expressions(scenario, tune),
+        *_space(scenario, tune),
+    ]
+
+
+def _study(scenario: Scenario) -> Faults:
+    if scenario.sweep is None:
+        yield ("tune",), "needs the key sweep: its `vary` says what is drawn; see docs/tuning.md"
+    elif scenario.sweep.grid:
+        told = "needs a study without a grid: put what laws have to cope with under sweep.vary"
+        yield ("tune",), f"{told}, and write `grid: {{{next(iter(scenario.sweep.grid))}: null}}`"
+    elif not scenario.sweep.independent:
+        told = f"{scenario.sweep.design} points have no intervals, which a comparison needs"
+        yield ("sweep", "design"), f"{told}; write design: random"
+
+
+def _budget(tune: Tune) -> Faults:
+    least = tune.batch * tune.train
+    if tune.budget < least:
+        yield (
+            ("tune", "budget"),
+            f"{tune.budget} runs are less than one batch of {tune.batch} gains with {tune.train} "
+            f"draws each; give {least} or more, or fewer draws (train)",
+        )
+
+
+def _expressions(scenario: Scenario, tune: Tune) -> Faults:
+    metrics = {n: m for n, m in scenario.known_metrics().items() if m.accumulator}
+    one = isinstance(tune.objective, str)
+    for place, text in enumerate(tune.objectives):
+        try:
+            parse_objective(text, metrics)
+        except ExpressionError as error:
+            yield ("tune", "objective", *(() if one else (place,))), str(error)
+    for place, text in enumerate(tune.subject_to):
+        try:
+            parse_inequality(text, metrics)
+        except ExpressionError as error:
+            yield ("tune", "subject_to", place), str(error)
+
+
+def _space(scenario: Scenario, tune: Tune) -> Faults:
+    for name, text in space_faults(singles(scenario), tune):
+        yield ("tune", "space", name), text

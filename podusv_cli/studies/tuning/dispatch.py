@@ -1,0 +1,83 @@
+"""Simulating what all searches ask for, in processes of this machine or by workers of a cluster.
+
+Searches do not depend on each other, so units of all of them are made side by side.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Sequence
+
+from podusv_cli.core.errors import PodusvError
+from podusv_cli.process.workers import Outcome
+from podusv_cli.studies.study import plan as study
+from podusv_cli.studies.study.dispatch import Engine, Tally
+from podusv_cli.studies.study.unit import Unit, UnitResult, crashed
+from podusv_cli.studies.tuning.search import Search
+
+Tell = Callable[[Tally, Sequence[Search]], None]
+Asked = tuple[int, study.Plan, Unit]  # a trial's place in its batch, and what to simulate
+
+
+class Driver:
+    """Hands out the units of all searches, and gives each what comes back."""
+
+    def __init__(self, searches: Sequence[Search], tell: Tell) -> None:
+        """Every search is asked for its first units."""
+        self._searches, self._tell = searches, tell
+        self._waiting = deque[tuple[Search, Asked]]()
+        self._busy: dict[int, tuple[Search, Asked]] = {}
+        self._number = 0
+        self.failure = ""
+        for search in searches:
+            self._add(search, search.begin())
+        budget = sum(search.plan.tune.budget for search in searches)
+        spent = sum(search.spent for search in searches)
+        self.tally = Tally(budget, spent, before=spent)
+
+    def __iter__(self) -> Driver:
+        """The units; more may come while some are under way."""
+        return self
+
+    def __next__(self) -> tuple[int, study.Plan, Unit]:
+        """The next unit, with its number and its study."""
+        if self.failure or not self._waiting:
+            raise StopIteration
+        search, asked = self._waiting.popleft()
+        self._number += 1
+        self._busy[self._number] = search, asked
+        return self._number, asked[1], asked[2]
+
+    def done(self, number: int, outcome: Outcome) -> None:
+        """Give a search the result of a unit; runs of a process that ended are crashed."""
+        search, (place, plan, unit) = self._busy.pop(number)
+        if outcome.result:
+            self._take(search, place, outcome.result[0])
+        elif outcome.killed:
+            self._take(search, place, crashed(unit, plan.metrics, outcome.failure))
+        elif not outcome.interrupted:
+            self.failure = outcome.failure
+
+    def _take(self, search: Search, place: int, result: UnitResult) -> None:
+        self._add(search, search.done(place, result))
+        self.tally.made += result.unit.count
+        self.tally.failed += sum(map(bool, result.causes))
+        self._tell(self.tally, self._searches)
+
+    def _add(self, search: Search, units: Sequence[Asked]) -> None:
+        self._waiting.extend((search, asked) for asked in units)
+
+
+def march(searches: Sequence[Search], engine: Engine, tell: Tell) -> Tally:
+    """Bring all searches to the end of their budget.
+
+    Every batch is on the disk before the next of its search is asked for. Raises PodusvError where
+    a unit cannot be made at all, KeyboardInterrupt after an interrupt; finished batches are kept.
+    """
+    driver = Driver(searches, tell)
+    finished = engine(driver, driver.done)
+    if driver.failure:
+        raise PodusvError(driver.failure)
+    if not finished:
+        raise KeyboardInterrupt
+    return driver.tally

@@ -1,0 +1,151 @@
+"""The folder of a search: what it is, and the scenario with the gains that were found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field, PositiveInt
+
+from podusv_cli.core.errors import UsageError
+from podusv_cli.scenario.load import yaml_text
+from podusv_cli.scenario.sections import LONGEST_NAME
+from podusv_cli.scenario.tune import Tune
+from podusv_cli.storage import files, json_files
+from podusv_cli.studies.study.plan import disagreements
+from podusv_cli.studies.study.store import SCENARIO
+from podusv_cli.studies.tuning import sampler, trials
+from podusv_cli.studies.tuning.plan import TunePlan
+from podusv_cli.studies.tuning.results import Results
+
+TUNE, TUNED = "tune.json", "tuned.yaml"
+FORMAT = 2
+
+
+def check(folder: Path) -> None:
+    """Raise UsageError where this is no folder of a search, or one without its scenario."""
+    if not (folder / TUNE).is_file():
+        raise UsageError(f"{folder} is not the folder of a search: it has no {TUNE}")
+    if not (folder / SCENARIO).is_file():
+        raise UsageError(
+            f"{folder} was interrupted before it had its {SCENARIO}; give the scenario of the "
+            f"search: podusv tune CONFIG --out {folder}"
+        )
+
+
+class Asked(BaseModel):
+    """What one `podusv tune` asked for."""
+
+    model_config = ConfigDict(strict=True, frozen=True)
+    budget: PositiveInt
+    repeats: PositiveInt
+    validate_: PositiveInt = Field(alias="validate")
+    started: str
+
+
+class Record(BaseModel):
+    """What is read of tune.json; there is more."""
+
+    model_config = ConfigDict(strict=True, frozen=True)
+    identity: dict[str, Any]
+    idle: dict[str, list[str]]
+    history: list[Asked]
+
+
+def known(folder: Path, plan: TunePlan) -> Record | None:
+    """What tune.json says of this very search; None where the folder is missing or empty.
+
+    Raises UsageError where the folder holds something else, naming what is different.
+    """
+    if not (folder / TUNE).exists():
+        if not files.is_empty(folder):
+            raise UsageError(f"{folder} is no search and not empty; name another with --out")
+        return None
+    told = json_files.read_as(folder / TUNE, Record)
+    if different := disagreements(told.identity, _identity(plan)):
+        raise UsageError(
+            f"{folder} holds another search: {different}; name another folder with --out"
+        )
+    _as_much(folder, _asked(told), plan.tune)
+    return told
+
+
+def _asked(told: Record | None) -> list[dict[str, Any]]:
+    return [one.model_dump(by_alias=True) for one in told.history] if told else []
+
+
+def write(
+    folder: Path, plan: TunePlan, told: Record | None, started: str, texts: Mapping[str, str]
+) -> None:
+    """Note what is asked for, after what is `known` of the search.
+
+    `texts` has the scenario and its plug-ins by the names of their files. Raises StorageError.
+    """
+    content = json_files.encode(_content(plan, _asked(told), started))
+    # With a larger budget in tune.json than in the scenario, the search could not be continued. And
+    # without tune.json, a folder that is not empty is no search.
+    if told:
+        files.write_texts(folder, texts)
+    files.make_folder(folder)
+    files.write_bytes(folder / TUNE, content)
+    files.make_folder(folder / trials.FOLDER)
+    if not told:
+        files.write_texts(folder, texts)
+
+
+def _identity(plan: TunePlan) -> dict[str, Any]:
+    told = {"format of tune.json": FORMAT, "optuna": sampler.version(), **plan.identity}
+    return json_files.plain(told)
+
+
+def _content(plan: TunePlan, history: Sequence[Any], started: str) -> dict[str, Any]:
+    tune = plan.tune
+    asked = {
+        "budget": tune.budget, "repeats": tune.repeats, "validate": tune.validate,
+        "started": started,
+    }  # fmt: skip
+    return {
+        "format": FORMAT, "name": plan.scenario.name, "laws": list(plan.laws),
+        "gains": {law: [gain.key for gain in found] for law, found in plan.gains.items()},
+        "idle": {law: list(keys) for law, keys in plan.idle.items()},
+        "identity": _identity(plan), "history": [*history, asked],
+    }  # fmt: skip
+
+
+def _as_much(folder: Path, history: Sequence[Mapping[str, Any]], tune: Tune) -> None:
+    """Raise UsageError where runs that are there would be thrown away."""
+    for key, unit in (("budget", "runs"), ("repeats", "searches"), ("validate", "fresh draws")):
+        there = max((one[key] for one in history), default=0)
+        if getattr(tune, key) < there:
+            raise UsageError(
+                f"{folder} has {key}: {there} ({unit}); ask for as many or more, or name another "
+                "folder with --out"
+            )
+
+
+def tuned_yaml(results: Results) -> bytes:
+    """The scenario with the gains that were found, for `compare` and `sweep`."""
+    plan, scenario = results.plan, results.plan.scenario
+    several = bool(scenario.controllers)
+    laws = {
+        law: ({} if several else {"kind": own.label})
+        | (dict(results.winner(law).gains) if law in results.winners else {})
+        for law, own in plan.laws.items()
+    }
+    end = "-tuned"
+    told = {
+        "extends": SCENARIO,
+        "name": f"{scenario.name[: LONGEST_NAME - len(end)]}{end}",
+        "description": _told(results),
+        "controllers": {law: content for law, content in laws.items() if content},
+        "tune": None,
+    }
+    return f"# The gains that podusv tune found.\n{yaml_text(told)}".encode()
+
+
+def _told(results: Results) -> str:
+    tune = results.plan.tune
+    searches: Sequence[str] = [f"{tune.budget} runs", f"{tune.train} draws"]
+    what = " and ".join(tune.objectives)
+    return f"Gains that podusv tune found for least {what} ({', '.join(searches)})."

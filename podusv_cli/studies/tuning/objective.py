@@ -1,0 +1,196 @@
+"""Objectives and inequalities of a search: statistics of a law's runs over all draws.
+
+median(iae) + 0.1 * quantile(tv_tau_u, 0.95)      what is to be small
+failures <= 0.05                                  what has to hold
+
+A failed run counts as the worst, and so does a number that nobody knows: as infinite where more is
+worse, and as minus infinite where less is.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, NoReturn
+
+import numpy as np
+
+from podusv_cli.core.kernel import Vector
+from podusv_cli.metrics.metric import Metric
+from podusv_cli.scenario.expressions import function, known, literal, refuse, syntax_tree
+from podusv_cli.studies.study import statistics
+from podusv_cli.studies.study.expressions import ARITHMETIC, SIGNS, Walk
+from podusv_cli.studies.study.runs import Mask
+from podusv_cli.studies.study.samples import number
+
+EXAMPLE, INEQUALITY = "median(iae)", "failures <= 0.05"
+FAILURES, MEDIAN, QUANTILE = "failures", "median", "quantile"
+STATISTICS = (MEDIAN, QUANTILE)
+INVENTED = 1000  # runs on which an expression is tried
+UPWARD = (ast.Gt, ast.GtE)
+SCALING = (ast.Mult, ast.Div)  # a negative part turns round what the other means
+FALLING = (ast.Sub, ast.Div)  # the more of the second part, the less of the whole
+
+
+class Runs(NamedTuple):
+    """The runs of one law with the same gains: metrics by name, and which runs failed."""
+
+    metrics: Mapping[str, Vector]
+    failed: Mask
+
+
+class Inequality(NamedTuple):
+    """A statistic that has to stay on one side of a number."""
+
+    text: str
+    tree: ast.expr
+    upward: bool
+    bound: float
+
+
+@dataclass
+class OfRuns(Walk):
+    """A number of each run, from metrics by their names alone; failed runs are the worst."""
+
+    runs: Runs = field(kw_only=True)
+    names: list[str] = field(default_factory=list)  # of the metrics that were met
+
+    def metric(self, node: ast.expr) -> Vector:
+        """A metric's name."""
+        if not isinstance(node, ast.Name):
+            refuse(node, "write metrics by their names alone, as in median(iae)")
+        name = known(node.id, self.metrics, "metric")
+        self.names.append(name)
+        values = self.runs.metrics.get(name, np.full(self.runs.failed.shape, np.nan))
+        return self.countable(name, values, self.runs.failed)
+
+    def property(self, node: ast.expr) -> Mask:
+        """There are none."""
+        refuse(node, "no condition here; write a number, as in median(iae)")
+
+
+def parse_objective(text: str, metrics: Mapping[str, Metric]) -> ast.expr:
+    """The tree of an objective. Raises ExpressionError."""
+    tree = syntax_tree(text, EXAMPLE)
+    if not _names(tree, metrics):
+        refuse(tree, f"is a number, whatever the gains are; example: {EXAMPLE}")
+    return tree
+
+
+def parse_inequality(text: str, metrics: Mapping[str, Metric]) -> Inequality:
+    """A statistic compared with a number. Raises ExpressionError."""
+    tree = syntax_tree(text, INEQUALITY)
+    match tree:
+        case ast.Compare(left=left, ops=[sign], comparators=[right]) if type(sign) in SIGNS:
+            bound = number(right)
+            if not _names(left, metrics):
+                refuse(left, f"is no statistic of the draws; example: {INEQUALITY}")
+            return Inequality(text, left, isinstance(sign, UPWARD), bound)
+    _no_inequality(tree)
+
+
+def _no_inequality(tree: ast.expr) -> NoReturn:
+    refuse(tree, f"compare one statistic with one number by <, <=, > or >=, as in {INEQUALITY}")
+
+
+def named(tree: ast.expr, metrics: Mapping[str, Metric]) -> list[str]:
+    """The metrics that an expression is about, each once."""
+    return [name for name in dict.fromkeys(_names(tree, metrics)) if name != FAILURES]
+
+
+def _names(tree: ast.expr, metrics: Mapping[str, Metric]) -> list[str]:
+    """What an expression is about, as its evaluation on invented runs shows.
+
+    These are many and all differ, so that a spread of theirs is not zero. Raises ExpressionError.
+    """
+    numbers = np.random.default_rng(0).uniform(1.0, 2.0, (len(metrics), INVENTED))
+    walk = OfRuns(
+        metrics, runs=Runs(dict(zip(metrics, numbers, strict=True)), np.zeros(INVENTED, bool))
+    )
+    with np.errstate(all="ignore"):
+        found = _evaluated(tree, walk, math.inf)
+    if not math.isfinite(found) and FAILURES not in walk.names:  # here, no run failed
+        refuse(tree, f"is no finite number, whatever the runs are; example: {EXAMPLE}")
+    return walk.names
+
+
+def evaluate(
+    tree: ast.expr, runs: Runs, metrics: Mapping[str, Metric], worst: float = math.inf
+) -> float:
+    """The number of an objective; infinite where it is the worst or not known.
+
+    `worst` is minus infinity where less is worse.
+    """
+    with np.errstate(all="ignore"):
+        found = float(_evaluated(tree, OfRuns(metrics, runs=runs), worst))
+    return found if math.isfinite(found) else math.inf
+
+
+def excess(one: Inequality, runs: Runs, metrics: Mapping[str, Metric]) -> float:
+    """By how much an inequality does not hold, relative to its bound; 0 or less where it holds."""
+    found = evaluate(one.tree, runs, metrics, -math.inf if one.upward else math.inf)
+    over = one.bound - found if one.upward and math.isfinite(found) else found - one.bound
+    return over / (abs(one.bound) or 1.0)
+
+
+def _evaluated(node: ast.expr, walk: OfRuns, worst: float) -> Any:
+    match node:
+        case ast.Constant():
+            return np.float64(literal(node))
+        case ast.UnaryOp(op=ast.USub(), operand=part):
+            return -_evaluated(part, walk, -worst)
+        case ast.BinOp(left=left, right=right, op=sign) if type(sign) in ARITHMETIC:
+            first = -worst if isinstance(sign, SCALING) and _is_negative(right) else worst
+            second = -worst if isinstance(sign, SCALING) and _is_negative(left) else worst
+            second = -second if isinstance(sign, FALLING) else second
+            parts = _evaluated(left, walk, first), _evaluated(right, walk, second)
+            return ARITHMETIC[type(sign)](*parts)
+        case ast.BinOp():
+            refuse(node, "calculate with + - * / only")
+        case ast.Name(id=name) if name == FAILURES:
+            walk.names.append(FAILURES)
+            return np.float64(np.mean(walk.runs.failed))
+        case ast.Call():
+            return _quantile(node, walk, worst)
+    refuse(node, f"no statistic of all draws; write median(...), quantile(..., 0.95) or {FAILURES}")
+
+
+def _is_negative(node: ast.expr) -> bool:
+    """Whether a factor has a minus; statistics count as positive."""
+    return isinstance(node, ast.UnaryOp)
+
+
+def _quantile(call: ast.Call, walk: OfRuns, worst: float) -> Any:
+    share = share_of(call)
+    return statistics.quantile(numbers_of(call, walk, worst), share, 0.5).estimate
+
+
+def numbers_of(call: ast.Call, walk: OfRuns, worst: float = math.inf) -> Vector:
+    """What a statistic is of: a number of each run, the worst where it failed or is not known."""
+    values = np.broadcast_to(walk.number(call.args[0]), walk.runs.failed.shape)
+    return np.where(walk.runs.failed | np.isnan(values), worst, values)
+
+
+def share_of(call: ast.Call) -> float:
+    """Which quantile a statistic is, from 0 to 1. Raises ExpressionError."""
+    return _shares[known(function(call), STATISTICS, "statistic")](call)
+
+
+def _half(call: ast.Call) -> float:
+    if len(call.args) != 1:
+        refuse(call, "median takes one number of each run, as in median(iae)")
+    return statistics.MEDIAN
+
+
+def _share(call: ast.Call) -> float:
+    if len(call.args) != 2:
+        refuse(call, "quantile takes a number of each run and a share: quantile(iae, 0.95)")
+    share = number(call.args[1])
+    if not 0.0 < share < 1.0:
+        refuse(call, "the share must lie between 0 and 1, as in quantile(iae, 0.95)")
+    return share
+
+
+_shares: dict[str, Callable[[ast.Call], float]] = {MEDIAN: _half, QUANTILE: _share}

@@ -1,0 +1,31 @@
+"""The files of a search: tables, figures and the report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from podusv_cli.process.extras import Extras
+from podusv_cli.storage import files
+from podusv_cli.studies.study.outputs import publish
+from podusv_cli.studies.study.summary import as_csv
+from podusv_cli.studies.tuning.results import Results
+
+TABLES = ("laws", "limits", "validation", "gains", "importance", "history")
+
+
+def write_tables(folder: Path, results: Results) -> None:
+    """Write all tables. Raises StorageError."""
+    tables = {
+        "laws": results.laws, "limits": results.limits, "validation": results.pairs,
+        "gains": results.gains, "importance": results.importance, "history": results.history,
+    }  # fmt: skip
+    files.write_all({folder / f"{name}.csv": as_csv(t).encode() for name, t in tables.items()})
+
+
+def write_report(folder: Path, results: Results, extras: Extras, *, figures: bool) -> None:
+    """Draw the figures and write the report; what fails is noted. Raises StorageError."""
+    from podusv_cli.studies.tuning import pictures, report
+
+    drawn, shown = pictures.drawn(results, extras) if figures else ({}, [])
+    page = extras.made("report.html", lambda: report.page(folder, results, shown, extras.missing))
+    publish(folder, drawn, page, extras)

@@ -1,0 +1,157 @@
+"""What a search is to simulate: laws with their gains, draws of three streams, and its identity."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+from podusv_cli.components.controllers.base import Controller
+from podusv_cli.core.errors import UsageError
+from podusv_cli.core.quantities import time_in_words
+from podusv_cli.metrics.metric import Metric
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.tune import Tune
+from podusv_cli.studies.study import plan as study
+from podusv_cli.studies.study.cells import Cell
+from podusv_cli.studies.study.check import singles
+from podusv_cli.studies.study.expressions import parse_success, succeeded
+from podusv_cli.studies.study.unit import STATUSES, UnitResult
+from podusv_cli.studies.tuning.objective import Inequality, Runs, parse_inequality, parse_objective
+from podusv_cli.studies.tuning.space import Gain, gains
+
+TRAIN, VALIDATE = "tune", "tune validation"  # streams of draws, beside a sweep's own
+# Settings that change no trial: more of them continues a search.
+OPEN = ("budget", "validate", "repeats")
+# Rough costs [s]: of a trial for Optuna, processes and files; of what comes before and after.
+TRIAL, AROUND = 0.1, 10.0
+ENOUGH = 10  # whole trials for each gain; with fewer, repeats end in different places
+Named = tuple[str, Mapping[str, Any]]  # a law of the scenario, and its numbers that are others
+
+
+def is_few(trials: int, gains: int) -> bool:
+    """Whether so many trials on all draws are few for so many gains."""
+    return trials < ENOUGH * gains
+
+
+@dataclass(frozen=True)
+class TunePlan:
+    """A scenario with the keys `sweep` and `tune`."""
+
+    scenario: Scenario
+    idle: Mapping[str, Sequence[str]] = field(default_factory=dict)  # change no run, by law
+
+    @property
+    def tune(self) -> Tune:
+        """The settings of the search. Raises UsageError where the scenario has none."""
+        if self.scenario.tune is None:
+            raise UsageError(f"{self.scenario.name} has no key `tune`; see docs/tuning.md")
+        return self.scenario.tune
+
+    @cached_property
+    def laws(self) -> dict[str, Controller]:
+        """The laws that take part, by name."""
+        return {label: one.controller for label, one in singles(self.scenario).items()}
+
+    @cached_property
+    def gains(self) -> dict[str, tuple[Gain, ...]]:
+        """The gains of every law; none for a law that is kept as it is."""
+        return {
+            label: tuple(
+                gain for gain in gains(one.controller, label, one, self.tune)
+                if gain.key not in self.idle.get(label, ())
+            )
+            for label, one in singles(self.scenario).items()
+        }  # fmt: skip
+
+    @cached_property
+    def metrics(self) -> dict[str, Metric]:
+        """All metrics by name."""
+        return self.scenario.known_metrics()
+
+    @cached_property
+    def objectives(self) -> list[Any]:
+        """The trees of the objectives."""
+        return [parse_objective(text, self.metrics) for text in self.tune.objectives]
+
+    @cached_property
+    def inequalities(self) -> list[Inequality]:
+        """What has to hold."""
+        return [parse_inequality(text, self.metrics) for text in self.tune.subject_to]
+
+    @cached_property
+    def _success(self) -> Any:
+        assert self.scenario.sweep
+        return parse_success(self.scenario.sweep.success, self.metrics)
+
+    def runs_wanted(self) -> dict[str, tuple[int, int]]:
+        """For every law, the runs of the search and those on the draws for validation."""
+        tune = self.tune
+        return {
+            law: (tune.repeats * tune.budget, (1 + tune.repeats) * tune.validate)
+            if found else (0, tune.validate)
+            for law, found in self.gains.items()
+        }  # fmt: skip
+
+    def in_words(self, paces: Mapping[str, float], workers: int) -> Iterator[str]:
+        """The gains of every law, and what the search takes at these seconds a run."""
+        for law, found in self.gains.items():
+            if found:
+                names = ", ".join(gain.key for gain in found)
+                yield f"gains of {law} ({len(found)}): {names}{self._few(len(found))}"
+            else:
+                yield f"{law} has no gains and is kept as it is"
+        yield "gains that change no run are left out when the search begins"
+        wanted, tune = self.runs_wanted(), self.tune
+        time = sum(sum(counts) * paces.get(law, 0.0) for law, counts in wanted.items())
+        time += TRIAL * sum(search for search, _ in wanted.values()) / tune.train
+        cores = f"{workers} core{'s' if workers > 1 else ''}"
+        yield f"{self.size}; about {time_in_words(time / workers + AROUND)} on {cores}"
+
+    def _few(self, gains: int) -> str:
+        """What to say of a budget that is small for so many gains."""
+        whole = self.tune.budget // self.tune.train
+        few = is_few(whole, gains)
+        return f"; a budget of {whole} trials on all draws is few for them" if few else ""
+
+    @property
+    def size(self) -> str:
+        """How many runs there are, in words."""
+        search, other = (sum(n) for n in zip(*self.runs_wanted().values(), strict=True))
+        tune = self.tune
+        return (
+            f"runs of the search: {search:,} (budget {tune.budget:,} for each law, repeats: "
+            f"{tune.repeats}); on draws for validation: {other:,}"
+        )
+
+    @cached_property
+    def base(self) -> study.Plan:
+        """The scenario's own study, which all others are variants of."""
+        return study.Plan(self.scenario, (Cell(0, (), self.scenario),))
+
+    def variant(self, laws: Mapping[str, Named], stream: str, draws: int) -> study.Plan:
+        """The study of laws by their new names, on draws of a stream."""
+        told = tuple((name, law, tuple(new.items())) for name, (law, new) in laws.items())
+        return self.base.varied(study.Variant(stream, draws, told))
+
+    def runs(self, results: list[UnitResult]) -> Runs:
+        """The runs of some units, in their order; failed is what the study calls no success."""
+        import numpy as np
+
+        names = dict.fromkeys(name for one in results for name in one.metrics)
+        blank = {id(one): np.full(one.unit.count, np.nan) for one in results}
+        metrics = {
+            name: np.concatenate([one.metrics.get(name, blank[id(one)]) for one in results])
+            for name in names
+        }
+        ended = np.concatenate([one.status == STATUSES.index("finished") for one in results])
+        return Runs(metrics, ~succeeded(self._success, metrics, ended, self.metrics))
+
+    @cached_property
+    def identity(self) -> dict[str, Any]:
+        """All that the trials depend on, by dotted keys."""
+        whole = self.variant({law: (law, {}) for law in self.laws}, TRAIN, self.tune.train)
+        told = {f"tune.{k}": v for k, v in self.tune.model_dump(exclude=set(OPEN)).items()}
+        assert self.scenario.sweep
+        return {**told, "sweep.success": self.scenario.sweep.success, **whole.identity}

@@ -1,0 +1,113 @@
+"""What is worth a sentence about a finished search."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from podusv_cli.studies.tuning.plan import ENOUGH, is_few
+from podusv_cli.studies.tuning.results import MARGIN, Results
+from podusv_cli.studies.tuning.trials import FINISHED
+
+
+def remarks(results: Results) -> list[str]:
+    """The answer first, then what it hangs on, and what a user may want to change."""
+    return [
+        *_answer(results), *_kept(results), *_idle(results), *_unsound(results), *_few(results),
+        *_overfitted(results), *_beyond(results), *_bounds(results),
+    ]  # fmt: skip
+
+
+def _answer(results: Results) -> Iterator[str]:
+    """The two best laws, by their objective and in the same draw, which may disagree."""
+    ordered = results.laws.sort_values("objective_after").law.tolist()
+    if len(ordered) < 2:
+        return
+    best, second = ordered[:2]
+    metric, pairs = results.shown[0], results.pairs
+    rows: Any = pairs[(pairs["when"] == "after") & (pairs.metric == metric)].to_dict("records")
+    for row in rows:
+        if {row["a"], row["b"]} == {best, second}:
+            yield (
+                f"{best} has the least {results.plan.tune.objectives[0]} after the search; in the "
+                f"same draw, the median ratio of {metric} of {row['a']} and {row['b']} is "
+                f"{row['ratio']:.3f} [{row['ratio_low']:.3f}, {row['ratio_high']:.3f}]: "
+                f"{_verdict(row)}"
+            )
+
+
+def _verdict(row: dict[str, Any]) -> str:
+    if row["ratio_high"] < 1.0:
+        return f"{row['a']} is better in the typical draw"
+    if row["ratio_low"] > 1.0:
+        return f"{row['b']} is better in the typical draw"
+    return "neither is better in the typical draw"
+
+
+def _kept(results: Results) -> Iterator[str]:
+    for law in results.plan.laws:
+        if law not in results.winners:
+            yield f"{law} has no gains, kept as it is"
+
+
+def _idle(results: Results) -> Iterator[str]:
+    for law, keys in results.plan.idle.items():
+        if keys:
+            yield f"{law}: not searched, as no run depends on it: {', '.join(keys)}"
+
+
+def _unsound(results: Results) -> Iterator[str]:
+    for law in results.winners:
+        trial = results.winner(law)
+        broken = [
+            one.text for one, over in zip(results.plan.inequalities, trial.excesses, strict=True)
+            if over > 0.0
+        ]  # fmt: skip
+        if broken:
+            yield f"{law}: no trial held {' and '.join(broken)} on the training draws"
+        elif not math.isfinite(trial.values[0]):
+            yield f"{law}: every trial failed on most draws; its gains mean nothing"
+
+
+def _few(results: Results) -> Iterator[str]:
+    told = []
+    for law in results.winners:
+        whole = min(sum(t.status == FINISHED for t in one) for one in results.trials[law])
+        gains = len(results.plan.gains[law])
+        if is_few(whole, gains):
+            told.append(f"{law} {whole} for {gains} gains")
+    if told:
+        yield (
+            f"fewer than {ENOUGH} trials on all draws for each gain, so chance has a part in what "
+            f"was found: {', '.join(told)}; give a larger tune.budget"
+        )
+
+
+def _overfitted(results: Results) -> Iterator[str]:
+    for law in results.winners:
+        taken, *others = results.spread(law)
+        if others and taken > (1.0 + MARGIN) * min(others):
+            yield (
+                f"{law}: the repeat that is best on the training draws has {taken:.4g} on the "
+                f"fresh ones, another {min(others):.4g}; more draws for training (tune.train) may "
+                "help"
+            )
+
+
+def _beyond(results: Results) -> Iterator[str]:
+    """Inequalities that gains hold on the training draws, and not on the fresh ones."""
+    table = results.limits
+    after: Any = table[table["when"] == "after"].to_dict("records")
+    for row in after:
+        if row["held_in_training"] and not row["holds"]:
+            yield (
+                f"{row['law']}: {row['inequality']} held on the training draws; on the fresh ones "
+                f"it is {row['value']:.4g}"
+            )
+
+
+def _bounds(results: Results) -> Iterator[str]:
+    for row in results.gains[results.gains["at"] != ""].to_dict("records"):
+        end = row["low"] if row["at"] == "lower" else row["high"]
+        yield f"{row['law']}: {row['gain']} is at the {row['at']} end of its range, {end:.4g}"

@@ -1,0 +1,135 @@
+"""The HTML report of a search: one file that needs nothing else, the answer first."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from podusv_cli.pages.page import Picture, environment, flat, value_text
+from podusv_cli.process.extras import Missing
+from podusv_cli.studies.study.results import digits
+from podusv_cli.studies.study.sittings import sittings
+from podusv_cli.studies.study.words import in_words
+from podusv_cli.studies.tuning.remarks import remarks
+from podusv_cli.studies.tuning.results import OBJECTIVES, Results
+from podusv_cli.studies.tuning.space import units_of
+
+FEW = 15  # pairs that are shown at once
+
+
+def page(
+    folder: Path, results: Results, figures: Sequence[Picture], missing: Sequence[Missing]
+) -> str:
+    """The whole report."""
+    plan = results.plan
+    assert plan.scenario.sweep
+    numbered = [*enumerate(figures, 1)]
+    return environment("podusv_cli.studies.tuning").get_template("tune.html.j2").render(
+        title=f"{plan.scenario.name}: gains",
+        folder=folder,
+        scenario=plan.scenario,
+        sweep=plan.scenario.sweep,
+        tune=plan.tune,
+        objectives=" and ".join(plan.tune.objectives),
+        laws=list(_laws(results)),
+        remarks=remarks(results),
+        pairs=list(_pairs(results)),
+        few=FEW,
+        metric=results.shown[0] if results.shown else "",
+        gains=list(_gains(results)),
+        varied=[
+            (", ".join(quantity.targets(name)), in_words(quantity))
+            for name, quantity in plan.scenario.sweep.vary.items()
+        ],
+        beside=numbered[:1],
+        figures=numbered,
+        metrics=plan.metrics,
+        missing=[str(one) for one in missing],
+        latest=[(key, value_text(value)) for key, value in flat((sittings(folder) or [{}])[-1])],
+    )  # fmt: skip
+
+
+def _laws(results: Results) -> Iterator[dict[str, Any]]:
+    """The rows of the answer, the best law after the search first."""
+    ordered: Any = results.laws.sort_values(["rank_after", "rank_before"]).to_dict("records")
+    for row in ordered:
+        yield row | {
+            "before": intervals(row, "before"), "after": intervals(row, "after"),
+            "failed": f"{percent(row, 'failed_before')}, then {percent(row, 'failed_after')}",
+            "change": ratio(row) if row["runs"] else "-",
+            "spread": spread(row),
+        }  # fmt: skip
+
+
+def intervals(row: Any, when: str) -> str:
+    """Every objective with its interval."""
+    names = [f"{name}_{when}" for name in OBJECTIVES]
+    return " and ".join(_interval(row, name) for name in names if name in row)
+
+
+def _interval(row: Any, name: str) -> str:
+    """A number with its interval, where it has one."""
+    estimate, low, high = (row[f"{name}{end}"] for end in ("", "_low", "_high"))
+    if math.isnan(low):
+        return digits(estimate)
+    return f"{digits(estimate)} [{digits(low)}, {digits(high)}]"
+
+
+def percent(row: Any, name: str) -> str:
+    """A share."""
+    return f"{100.0 * row[name]:.3g} %"
+
+
+def ratio(row: Any) -> str:
+    """A median ratio with its interval."""
+    return f"{row['ratio']:.3f} [{row['ratio_low']:.3f}, {row['ratio_high']:.3f}]"
+
+
+def spread(row: Any) -> str:
+    """The least and the largest objective of the repeats' winners."""
+    low, high = row["repeats_low"], row["repeats_high"]
+    return "-" if math.isnan(low) or low == high else f"{digits(low)} to {digits(high)}"
+
+
+def _pairs(results: Results) -> Iterator[dict[str, Any]]:
+    """Every pair of laws with its numbers before and after."""
+    table = results.pairs
+    table = table[table.metric.isin(results.shown[:1])]
+    by = {when: rows.to_dict("records") for when, rows in table.groupby("when")}
+    for before, after in zip(by.get("before", ()), by.get("after", ()), strict=True):
+        yield {
+            "a": before["a"], "b": before["b"], "before": ratio(before), "after": ratio(after),
+            "wins": [f"{100 * one['a_wins']:.3g} %" for one in (before, after)],
+            "losses": [f"{100 * one['b_wins']:.3g} %" for one in (before, after)],
+            "turned": _turned(before, after),
+        }  # fmt: skip
+
+
+def _turned(before: Any, after: Any) -> str:
+    """Whether the search turned the order of two laws, beyond doubt."""
+    if before["ratio_low"] > 1.0 > after["ratio_high"]:
+        return f"{before['a']} overtakes"
+    if before["ratio_high"] < 1.0 < after["ratio_low"]:
+        return f"{before['b']} overtakes"
+    return ""
+
+
+def _gains(results: Results) -> Iterator[dict[str, Any]]:
+    units = {law: units_of(own) for law, own in results.plan.laws.items()}
+    share = results.importance.set_index(["law", "gain"]) if len(results.importance) else None
+    rows: Any = results.gains.to_dict("records")
+    for row in rows:
+        at = (row["law"], row["gain"])
+        told = "-"
+        if share is not None and at in share.index:
+            one = share.loc[at]
+            told = f"{100 * one.importance:.0f} % [{100 * one.low:.0f}, {100 * one.high:.0f}]"
+        numbers = {name: value_text(row[name]) for name in ("before", "after")}
+        numbers |= {name: _end(row[name]) for name in ("low", "high")}
+        yield row | numbers | {"unit": units[row["law"]][row["gain"]], "share": told}
+
+
+def _end(number: float) -> str:
+    return "-" if math.isnan(number) else f"{number:.4g}"

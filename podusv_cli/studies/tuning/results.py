@@ -1,0 +1,260 @@
+"""What a search found, as tables: gains, laws before and after, pairs of laws, every trial."""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from podusv_cli.studies.study import statistics, summary
+from podusv_cli.studies.study.runs_file import Table
+from podusv_cli.studies.study.statistics import Interval
+from podusv_cli.studies.tuning.objective import (
+    Inequality,
+    OfRuns,
+    Runs,
+    evaluate,
+    excess,
+    named,
+    numbers_of,
+    share_of,
+)
+from podusv_cli.studies.tuning.plan import TunePlan
+from podusv_cli.studies.tuning.sampler import importances
+from podusv_cli.studies.tuning.space import Gain
+from podusv_cli.studies.tuning.trials import FINISHED, Trial
+from podusv_cli.studies.tuning.validation import View, chosen, repeated, tuned
+
+ALWAYS = ("iae", "z_e_steady")  # metrics that the tables have beside those of the objective
+OBJECTIVES = ("objective", "second_objective")  # columns
+MARGIN = 0.01  # relative, of pairs
+PARTS = 8  # of the trials; importances are computed without each, to see how sure they are
+FEWEST = 24  # trials that importances are computed from
+
+
+@dataclass(frozen=True)
+class Results:
+    """A finished search: its trials by law, a list for each repeat, and the runs on fresh draws."""
+
+    plan: TunePlan
+    trials: Mapping[str, Sequence[Sequence[Trial]]]
+    winners: Mapping[str, Sequence[Trial]]
+    runs: Table
+
+    @property
+    def level(self) -> float:
+        """Confidence of all intervals."""
+        assert self.plan.scenario.sweep
+        return self.plan.scenario.sweep.level
+
+    @property
+    def spent(self) -> dict[str, int]:
+        """The simulated runs of the search by law."""
+        return {
+            law: sum(trial.runs for repeat in repeats for trial in repeat)
+            for law, repeats in self.trials.items()
+        }
+
+    @cached_property
+    def shown(self) -> list[str]:
+        """The metrics of the tables."""
+        trees = [*self.plan.objectives, *(one.tree for one in self.plan.inequalities)]
+        told = [name for tree in trees for name in named(tree, self.plan.metrics)]
+        return [n for n in dict.fromkeys([*told, *ALWAYS]) if n in self.runs.metrics]
+
+    def after(self, law: str) -> str:
+        """The name of a law after the search, its own where it is kept as it is."""
+        return tuned(law) if law in self.winners else law
+
+    def winner(self, law: str) -> Trial:
+        """The trial whose gains are taken."""
+        return self.winners[law][chosen(self.winners[law])]
+
+    def met(self, name: str) -> Runs:
+        """The fresh runs of a law by the name of the table."""
+        metrics = {n: self.runs.metric(name, n)[0] for n in self.runs.metrics}
+        return Runs(metrics, ~self.runs.success(name)[0])
+
+    @cached_property
+    def laws(self) -> pd.DataFrame:
+        """Every law: failures and objective before and after on the fresh draws, and its ranks."""
+        table = pd.DataFrame([self._law(law) for law in self.plan.laws])
+        for when in ("before", "after"):
+            ranks = table[f"objective_{when}"].replace(np.inf, 1e300).rank(method="min")
+            table[f"rank_{when}"] = ranks.astype(int)
+            table[f"better_than_{when}"] = [self._better_than(law, when) for law in table.law]
+        return table
+
+    def _better_than(self, law: str, when: str) -> int:
+        """How many laws this one is better than in the typical draw, the whole interval of it."""
+        found = self.pairs
+        if not len(found):
+            return 0
+        found = found[(found["when"] == when) & (found.metric == self.shown[0])]
+        ahead = (found.a == law) & (found.ratio_high < 1.0)
+        return int((ahead | (found.b == law) & (found.ratio_low > 1.0)).sum())
+
+    def _law(self, law: str) -> dict[str, Any]:
+        told: dict[str, Any] = {"law": law, "runs": self.spent.get(law, 0)}
+        for when, name in (("before", law), ("after", self.after(law))):
+            runs = self.met(name)
+            failed = statistics.share(int(runs.failed.sum()), len(runs.failed), self.level)
+            told |= _interval(f"failed_{when}", failed)
+            for i, tree in enumerate(self.plan.objectives):
+                told |= _interval(f"{OBJECTIVES[i]}_{when}", self.objective(runs, tree))
+        found = self.pairs
+        own = found[(found["when"] == "tuning") & (found.a == tuned(law))]
+        own = own[own.metric == self.shown[0]]
+        for end in ("ratio", "ratio_low", "ratio_high"):
+            told[end] = float(own[end].iloc[0]) if len(own) else 1.0
+        spread = [v for v in self.spread(law) if math.isfinite(v)]
+        told["repeats_low"], told["repeats_high"] = (
+            (min(spread), max(spread)) if spread else (math.nan, math.nan)
+        )
+        return told
+
+    def objective(self, runs: Runs, tree: ast.expr) -> Interval:
+        """An objective, with an interval where it is one quantile of one number."""
+        found = evaluate(tree, runs, self.plan.metrics)
+        if not isinstance(tree, ast.Call):
+            return Interval(found, math.nan, math.nan)
+        values = numbers_of(tree, OfRuns(self.plan.metrics, runs=runs))
+        ends = statistics.quantile(values, share_of(tree), self.level)
+        return Interval(found, ends.low, ends.high)
+
+    @cached_property
+    def limits(self) -> pd.DataFrame:
+        """Every inequality on the fresh draws, before and after, for every law."""
+        return pd.DataFrame(
+            [
+                {"law": law, "when": when, "inequality": one.text, **self._limit(one, name),
+                 "held_in_training": law in self.winners and self.winner(law).excesses[i] <= 0.0}
+                for law in self.plan.laws
+                for when, name in (("before", law), ("after", self.after(law)))
+                for i, one in enumerate(self.plan.inequalities)
+            ],
+            columns=["law", "when", "inequality", "value", "value_low", "value_high", "holds",
+                     "held_in_training"],
+        )  # fmt: skip
+
+    def _limit(self, one: Inequality, name: str) -> dict[str, Any]:
+        runs = self.met(name)
+        holds = excess(one, runs, self.plan.metrics) <= 0.0
+        return {**_interval("value", self.objective(runs, one.tree)), "holds": holds}
+
+    def spread(self, law: str) -> list[float]:
+        """The objective on the fresh draws of every repeat's winner."""
+        names = set(self.runs.laws)
+        own = [repeated(law, repeat) for repeat in range(len(self.winners.get(law, ())))]
+        found = [tuned(law), *own] if law in self.winners else []
+        return [
+            evaluate(self.plan.objectives[0], self.met(name), self.plan.metrics)
+            for name in found if name in names
+        ]  # fmt: skip
+
+    @cached_property
+    def pairs(self) -> pd.DataFrame:
+        """Two laws in the same fresh draws: all before, all after, and each after and before."""
+        laws, known = list(self.plan.laws), self.plan.metrics
+        views = [
+            ("before", View(self.runs, {law: law for law in laws}, self.shown)),
+            ("after", View(self.runs, {law: self.after(law) for law in laws}, self.shown)),
+            *(
+                ("tuning", View(self.runs, {tuned(law): tuned(law), law: law}, self.shown))
+                for law in self.winners
+            ),
+        ]
+        tables = [
+            summary.pairs(view, MARGIN, self.level, known).assign(when=when) for when, view in views
+        ]
+        return pd.concat([one for one in tables if len(one)] or tables, ignore_index=True)
+
+    @cached_property
+    def gains(self) -> pd.DataFrame:
+        """Every gain: its range, the scenario's value, the found one, and those of all repeats."""
+        return pd.DataFrame(
+            [
+                {
+                    "law": law, "gain": gain.key, **_ends(gain),
+                    "before": gain.own, "after": self.winner(law).gains[gain.key],
+                    "at": gain.bound(self.winner(law).gains[gain.key]),
+                    "repeats": " ".join(str(t.gains[gain.key]) for t in self.winners[law]),
+                }
+                for law in self.winners for gain in self.plan.gains[law]
+            ],
+            columns=["law", "gain", "low", "high", "before", "after", "at", "repeats"],
+        )  # fmt: skip
+
+    @cached_property
+    def history(self) -> pd.DataFrame:
+        """Every trial in its order, with the best so far."""
+        return pd.DataFrame(
+            [row for law, all_ in self.trials.items() for repeat, found in enumerate(all_, 1)
+             for row in _history(law, repeat, found)]
+        )  # fmt: skip
+
+    @cached_property
+    def importance(self) -> pd.DataFrame:
+        """How much each gain matters, with the least and the most of repeats and of parts."""
+        rows = [
+            {"law": law, "gain": gain.key, **_range([one.get(gain.key, 0.0) for one in found])}
+            for law in self.trials for found in [list(self._importances(law))] if found
+            for gain in self.plan.gains[law]
+        ]  # fmt: skip
+        return pd.DataFrame(rows, columns=["law", "gain", "importance", "low", "high"])
+
+    def _importances(self, law: str) -> Iterator[dict[str, float]]:
+        """Of each repeat's trials without one part of them after the other."""
+        for trials in self.trials[law]:
+            for part in range(PARTS):
+                kept = [one for place, one in enumerate(trials) if place % PARTS != part]
+                if len(kept) >= FEWEST * (PARTS - 1) / PARTS:
+                    found = importances(
+                        self.plan.gains[law], [t.gains for t in kept], [t.values[0] for t in kept]
+                    )
+                    if found:
+                        yield found
+
+    def label(self, place: int) -> str:
+        """An objective with its unit, where it is a statistic of one metric."""
+        text, tree = self.plan.tune.objectives[place], self.plan.objectives[place]
+        match tree:
+            case ast.Call(args=[ast.Name(id=name), *_]) if unit := self.plan.metrics[name].unit:
+                return f"{text} [{unit}]"
+        return text
+
+
+def _ends(gain: Gain) -> dict[str, float]:
+    """The ends of a range; words have none."""
+    low, high = (math.nan, math.nan) if gain.words else (gain.low, gain.high)
+    return {"low": low, "high": high}
+
+
+def _interval(name: str, found: Interval) -> dict[str, Any]:
+    return {name: found.estimate, f"{name}_low": found.low, f"{name}_high": found.high}
+
+
+def _range(values: Sequence[float]) -> dict[str, float]:
+    return {"importance": float(np.mean(values)), "low": min(values), "high": max(values)}
+
+
+def _history(law: str, repeat: int, trials: Sequence[Trial]) -> Iterator[dict[str, Any]]:
+    spent, leader = 0, (math.inf, math.inf)
+    for trial in trials:
+        spent += trial.runs
+        if trial.status == FINISHED:
+            leader = min(leader, (trial.excess, trial.values[0]))
+        others = dict(zip(OBJECTIVES[1:], trial.values[1:], strict=False))
+        yield {
+            "law": law, "repeat": repeat, "trial": trial.number, "batch": trial.batch,
+            "status": trial.status, "runs": trial.runs, "spent": spent,
+            "objective": trial.values[0], **others, "failures": trial.failures,
+            "excess": trial.excess, "best": leader[1],
+            "gains": " ".join(f"{key}={number}" for key, number in trial.gains.items()),
+        }  # fmt: skip

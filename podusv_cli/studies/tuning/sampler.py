@@ -1,0 +1,136 @@
+"""Which gains to try next: Optuna, asked in batches; nothing else of podusv imports it.
+
+A search in one go, in parts or with other workers asks for the same gains, because the sampler is
+made anew for every batch, with a seed from the batch's number.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from importlib import import_module
+from typing import Any
+
+from podusv_cli.core.errors import UsageError
+from podusv_cli.studies.tuning.space import Gain
+
+STARTUP = 8  # trials before TPE takes over from random numbers: the first batch
+POPULATION = 24  # of NSGA-II
+WORST = 1e30  # what a sampler is told in place of infinity
+Values = Sequence[float]
+
+
+def optuna() -> Any:
+    """The module. Raises UsageError where it is not installed."""
+    try:
+        found = import_module("optuna")
+    except ImportError as error:
+        raise UsageError("podusv tune needs Optuna: pip install 'podusv[tune]'") from error
+    found.logging.set_verbosity(found.logging.ERROR)
+    return found
+
+
+class Sampler:
+    """The trials of one search as Optuna sees them, in memory."""
+
+    def __init__(self, gains: Sequence[Gain], objectives: int, seed: Sequence[Any]) -> None:
+        """`seed` is what the random numbers depend on, beside the number of a batch."""
+        self._optuna, self._gains, self._seed = optuna(), gains, seed
+        self._several = objectives > 1
+        self._study = self._optuna.create_study(directions=["minimize"] * objectives)
+        self._asked: list[Any] = []
+        own = {gain.key: self._first(gain) for gain in gains}
+        self._study.enqueue_trial({k: v for k, v in own.items() if v is not None})
+
+    def ask(self, batch: int, count: int) -> list[dict[str, Any]]:
+        """The gains of a batch's trials; the first of all are the scenario's."""
+        with _quiet():
+            self._study.sampler = self._made(batch)
+            self._asked = [self._study.ask() for _ in range(count)]
+            asked = [self._suggested(trial) for trial in self._asked]
+        if batch == 0:  # the scenario's own may have more digits, or lie outside of the ranges
+            asked[0] = {gain.key: gain.own for gain in self._gains}
+        return asked
+
+    def tell(self, values: Sequence[Values], excesses: Sequence[Values]) -> None:
+        """The objectives of the trials asked last, and by how much inequalities do not hold."""
+        with _quiet():
+            for trial, numbers, over in zip(self._asked, values, excesses, strict=True):
+                for place, number in enumerate(over):
+                    trial.set_constraint(str(place), _finite(number))
+                self._study.tell(trial, [_finite(number) for number in numbers])
+
+    def _made(self, batch: int) -> Any:
+        text = json.dumps([*self._seed, batch])
+        seed = int.from_bytes(hashlib.sha256(text.encode()).digest()[:4], "little")
+        samplers = self._optuna.samplers
+        if self._several:
+            return samplers.NSGAIISampler(population_size=POPULATION, seed=seed)
+        return samplers.TPESampler(
+            n_startup_trials=STARTUP, multivariate=True, constant_liar=True, seed=seed
+        )
+
+    def _suggested(self, trial: Any) -> dict[str, Any]:
+        return {gain.key: self._one(trial, gain) for gain in self._gains}
+
+    def _one(self, trial: Any, gain: Gain) -> Any:
+        if gain.words:
+            return trial.suggest_categorical(gain.key, list(gain.words))
+        if gain.whole:
+            return trial.suggest_int(gain.key, gain.low, gain.high)
+        return gain.value(trial.suggest_float(gain.key, gain.low, gain.high, log=gain.log))
+
+    def _first(self, gain: Gain) -> Any:
+        """The scenario's value as the first trial; outside of its range, the nearest end."""
+        if gain.words:
+            return gain.own if gain.in_range(gain.own) else None
+        return min(max(gain.own, gain.low), gain.high)
+
+
+def importances(
+    gains: Sequence[Gain], tried: Sequence[Mapping[str, Any]], values: Values
+) -> dict[str, float]:
+    """How much of an objective's variation over good trials each gain explains, adding up to 1.
+
+    PED-ANOVA (Watanabe et al., IJCAI 2023), of the best tenth of the trials within all.
+    """
+    found = optuna()
+    kinds = found.distributions
+    space = {
+        gain.key: kinds.CategoricalDistribution(list(gain.words)) if gain.words
+        else kinds.IntDistribution(int(gain.low), int(gain.high)) if gain.whole
+        else kinds.FloatDistribution(gain.low, gain.high, log=gain.log)
+        for gain in gains
+    }  # fmt: skip
+    with _quiet():
+        study = found.create_study()
+        for trial, number in zip(tried, values, strict=True):
+            params = {gain.key: trial[gain.key] for gain in gains if gain.in_range(trial[gain.key])}
+            if len(params) == len(space) and math.isfinite(number):
+                study.add_trial(
+                    found.trial.create_trial(params=params, distributions=space, value=number)
+                )
+        if len({trial.value for trial in study.trials}) < 2:
+            return {}
+        evaluator = found.importance.PedAnovaImportanceEvaluator()
+        return dict(found.importance.get_param_importances(study, evaluator=evaluator))
+
+
+def version() -> str:
+    """Optuna's version, on which the trials depend."""
+    return str(optuna().__version__)
+
+
+def _finite(number: float) -> float:
+    return min(max(number, -WORST), WORST)
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Without Optuna's warnings about options that are experimental."""
+    with warnings.catch_warnings(action="ignore"):
+        yield

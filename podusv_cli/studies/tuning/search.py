@@ -1,0 +1,208 @@
+"""The search for the gains of one law: batch by batch, each in two steps of simulation.
+
+All trials of a batch meet the first draws; those that are clearly worse than the best of earlier
+batches are pruned, the others meet the rest. What is simulated is decided by trials of earlier
+batches alone, so it does not depend on the order in which runs end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from podusv_cli.core.errors import StorageError
+from podusv_cli.studies.study import plan as study
+from podusv_cli.studies.study.unit import STATUSES, Unit, UnitResult
+from podusv_cli.studies.tuning import trials
+from podusv_cli.studies.tuning.objective import Runs, evaluate, excess
+from podusv_cli.studies.tuning.plan import TRAIN, TunePlan
+from podusv_cli.studies.tuning.sampler import Sampler
+from podusv_cli.studies.tuning.space import with_gains
+from podusv_cli.studies.tuning.trials import CUT, FINISHED, PRUNED, Trial
+
+FIRST = 4  # a trial is judged after one in so many draws
+WORSE = 1.5  # times the best: a trial that is worse by more is pruned
+
+
+@dataclass
+class Attempt:
+    """A trial under way: its gains, how many draws it may meet, and what it has met so far.
+
+    `plan` is None where the law refuses the gains.
+    """
+
+    gains: dict[str, object]
+    draws: int
+    plan: study.Plan | None
+    results: list[UnitResult]
+
+    @property
+    def met(self) -> int:
+        """How many draws it has met."""
+        return sum(one.unit.count for one in self.results)
+
+
+class Search:
+    """The search for the gains of a law with one of the tuner's seeds."""
+
+    def __init__(self, plan: TunePlan, law: str, repeat: int, folder: Path) -> None:
+        """Nothing is asked yet. `folder` holds the trials of an earlier sitting, if any."""
+        self.plan, self.law, self.repeat, self._folder = plan, law, repeat, folder
+        assert plan.scenario.sweep
+        seed = [plan.scenario.sweep.seed, repeat, law]
+        self._sampler = Sampler(plan.gains[law], len(plan.objectives), seed)
+        self.trials: list[Trial] = []
+        self._kept = trials.read(folder, self.name)
+        self._batch = 0
+        self._attempts: list[Attempt] = []
+        self._waiting = 0
+
+    @property
+    def name(self) -> str:
+        """The name of its file."""
+        return f"{self.law}-{self.repeat}"
+
+    @property
+    def spent(self) -> int:
+        """How many runs its trials took."""
+        return sum(trial.runs for trial in self.trials)
+
+    @property
+    def first(self) -> int:
+        """After how many draws a trial is judged."""
+        return max(1, self.plan.tune.train // FIRST)
+
+    def begin(self) -> list[tuple[int, study.Plan, Unit]]:
+        """The first units of the next batch that has to be simulated; none when the budget is used.
+
+        Batches that an earlier sitting has finished are told to the sampler.
+        """
+        while (left := self.plan.tune.budget - self.spent) > 0:
+            self._ask(left)
+            kept = self._known()
+            if kept is not None:
+                self._told(kept)
+            elif units := self._first_units():
+                return units
+        return []
+
+    def _first_units(self) -> list[tuple[int, study.Plan, Unit]]:
+        """The first units of a batch; none where the law refuses all gains, and the batch ends."""
+        draws = self._attempts[0].draws
+        found = self._units(min(self.first, draws)) or self._units(draws)
+        if not found:
+            self._end()
+        return found
+
+    def _ask(self, left: int) -> None:
+        """As many trials as the budget has whole ones for; the last one is cut to what is left."""
+        tune = self.plan.tune
+        count, draws = min(tune.batch, left // tune.train), tune.train
+        if not count:
+            count, draws = 1, left
+        self._attempts = [
+            self._attempt(gains, draws) for gains in self._sampler.ask(self._batch, count)
+        ]
+
+    def _attempt(self, gains: dict[str, object], draws: int) -> Attempt:
+        taken = with_gains(self.plan.laws[self.law], gains)
+        made = self.plan.variant({self.law: (self.law, gains)}, TRAIN, draws) if taken else None
+        return Attempt(gains, draws, made, [])
+
+    def _known(self) -> list[Trial] | None:
+        """The trials of this batch in the file; none for a batch that a smaller budget cut.
+
+        Raises StorageError where the file has other gains than those asked for.
+        """
+        kept = [trial for trial in self._kept if trial.batch == self._batch]
+        whole = [one.draws == self.plan.tune.train for one in self._attempts]
+        if [trial.status != CUT for trial in kept] != whole:
+            return None
+        if [dict(trial.gains) for trial in kept] != [one.gains for one in self._attempts]:
+            raise StorageError(
+                f"{self._folder / trials.FOLDER}: batch {self._batch} of {self.name} has other "
+                "gains than this machine asks for; continue the search on the machine that it "
+                "began on, or name another folder with --out"
+            )
+        return kept
+
+    def _units(self, until: int) -> list[tuple[int, study.Plan, Unit]]:
+        """The units that take every attempt to so many draws; those refused fail at once."""
+        found = []
+        for place, one in enumerate(self._attempts):
+            unit = Unit(self.law, 0, one.met, until - one.met)
+            if not unit.count or self._is_over(one):
+                continue
+            if one.plan:
+                found.append((place, one.plan, unit))
+            else:
+                one.results.append(self._refused(unit))
+        self._waiting = len(found)
+        return found
+
+    def _refused(self, unit: Unit) -> UnitResult:
+        nothing = np.full(unit.count, np.nan)
+        status = np.full(unit.count, STATUSES.index("invalid"), np.uint8)
+        return UnitResult(unit, {}, status, nothing, ("the law refuses these gains",) * unit.count)
+
+    def done(self, place: int, result: UnitResult) -> list[tuple[int, study.Plan, Unit]]:
+        """Take in a unit; the units that follow once all of its step are there."""
+        self._attempts[place].results.append(result)
+        self._waiting -= 1
+        return [] if self._waiting else self._next()
+
+    def _next(self) -> list[tuple[int, study.Plan, Unit]]:
+        more = self._units(self._attempts[0].draws)
+        if more:
+            return more
+        self._end()
+        return self.begin()
+
+    def _end(self) -> None:
+        """Keep the trials of a batch."""
+        self._told(list(self._made()))
+        trials.write(self._folder, self.name, self.trials)
+
+    def _is_over(self, one: Attempt) -> bool:
+        """Whether a trial is pruned: a sound one of earlier batches is far better by all."""
+        if not self.trials or one.met < self.first:
+            return False
+        values = self._values(self._first(one))
+        sound = [t for t in self.trials if t.status == FINISHED and t.excess == 0.0]
+        return any(_far(trial.first, values) for trial in sound)
+
+    def _made(self) -> Iterator[Trial]:
+        tune = self.plan.tune
+        for place, one in enumerate(self._attempts):
+            runs, met = self._runs(one), one.met
+            status = FINISHED if met == tune.train else CUT if one.draws < tune.train else PRUNED
+            yield Trial(
+                len(self.trials) + place, self._batch, one.gains, met, status, self._values(runs),
+                tuple(excess(text, runs, self.plan.metrics) for text in self.plan.inequalities),
+                self._values(self._first(one)), float(np.mean(runs.failed)),
+            )  # fmt: skip
+
+    def _told(self, made: Sequence[Trial]) -> None:
+        self._sampler.tell([t.values for t in made], [t.excesses for t in made])
+        self.trials += made
+        self._batch += 1
+
+    def _runs(self, one: Attempt) -> Runs:
+        return self.plan.runs(one.results)
+
+    def _first(self, one: Attempt) -> Runs:
+        """The runs of the first draws."""
+        metrics, failed = self._runs(one)
+        return Runs({n: v[: self.first] for n, v in metrics.items()}, failed[: self.first])
+
+    def _values(self, runs: Runs) -> tuple[float, ...]:
+        return tuple(evaluate(tree, runs, self.plan.metrics) for tree in self.plan.objectives)
+
+
+def _far(best: Sequence[float], values: Sequence[float]) -> bool:
+    """Whether every value is worse than the best by more than half of it."""
+    pairs = zip(best, values, strict=True)
+    return all(value > good + (WORSE - 1.0) * abs(good) for good, value in pairs)

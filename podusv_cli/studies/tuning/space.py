@@ -1,0 +1,203 @@
+"""What a search may change: the gains of each law, with their ranges."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import ValidationError
+
+from podusv_cli.components.controllers.base import Controller
+from podusv_cli.core.component import unit_of
+from podusv_cli.engine.loop.closed_loop import Observer, entries
+from podusv_cli.scenario.keys import limits
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.phrases import did_you_mean
+from podusv_cli.scenario.tune import AROUND, Range, Tune
+from podusv_cli.studies.study.plan import changed
+
+DIGITS = 4  # of a gain that is tried, so that a scenario shows all of them
+BOUNDARY = 0.02  # of a range: a gain that is nearer to an end is at its bound
+TRIED = 1.01  # a factor, to see whether a number is one that a search may change
+
+
+@dataclass(frozen=True)
+class Gain:
+    """A gain of a law: its key, the scenario's value, and what it may be.
+
+    `words` has the values of a choice; else it lies in [low, high].
+    """
+
+    key: str
+    own: Any
+    low: float = 0.0
+    high: float = 0.0
+    log: bool = False
+    whole: bool = False
+    words: tuple[Any, ...] = ()
+
+    def value(self, number: float) -> Any:
+        """A number of the sampler as the law gets it: in few digits, inside the range."""
+        if self.whole:
+            return int(number)
+        return min(max(float(f"{number:.{DIGITS}g}"), self.low), self.high)
+
+    def in_range(self, number: Any) -> bool:
+        """Whether the search could come to this value."""
+        return number in self.words if self.words else self.low <= number <= self.high
+
+    def bound(self, number: Any) -> str:
+        """The end of the range that a value is at, in words; "" where it is at none.
+
+        The scenario's own value may lie outside.
+        """
+        if self.words or not self.low <= number <= self.high or self.high == self.low:
+            return ""
+        place = self.place(number)
+        near = {"lower": place, "upper": 1.0 - place}
+        return next((end for end, away in near.items() if away < BOUNDARY), "")
+
+    @property
+    def ends(self) -> tuple[Any, ...]:
+        """The ends of its range, or all words."""
+        return self.words or (self.value(self.low), self.value(self.high))
+
+    def place(self, number: float) -> float:
+        """Where a number is between the ends, from 0 to 1, on the scale of the search."""
+        if self.log:
+            return math.log(number / self.low) / math.log(self.high / self.low)
+        return (number - self.low) / (self.high - self.low)
+
+    def at(self, place: float) -> Any:
+        """What is at a place between the ends, the reverse of `place`; or one of the words."""
+        if self.words:
+            return self.words[int(place * len(self.words))]
+        if self.log:
+            return self.value(self.low * (self.high / self.low) ** place)
+        return self.value(self.low + place * (self.high - self.low))
+
+
+def gains(law: Controller, label: str, scenario: Scenario, tune: Tune) -> tuple[Gain, ...]:
+    """The gains of a law that a search changes, in the order of its fields.
+
+    `scenario` is that of this law alone.
+    """
+    found = []
+    for key, content in _numbers(law):
+        wanted = tune.space.get(f"{label}.{key}", tune.space.get(key))
+        if wanted is None and _is_gain(law, key, scenario):
+            wanted = tune.space.get(AROUND)
+        if wanted is not None:
+            found += _of(wanted, key, content, type(law).model_fields[key])
+    return tuple(found)
+
+
+def units_of(law: Controller) -> dict[str, str]:
+    """The unit of each number of a law."""
+    return {key: unit_of(field) for key, field in type(law).model_fields.items()}
+
+
+def keys(law: Controller) -> list[str]:
+    """All keys of a law that `space` may name."""
+    return [key for key, _ in _numbers(law)]
+
+
+def _numbers(law: Controller) -> Iterator[tuple[str, Any]]:
+    for key in type(law).model_fields:
+        content = getattr(law, key)
+        if key != "kind" and isinstance(content, (bool, int, float, str)):
+            yield key, content
+
+
+def _is_gain(law: Controller, key: str, scenario: Scenario) -> bool:
+    """Whether a number is a gain: positive, and of a run's numbers, not of its structure."""
+    own = getattr(law, key)
+    if not isinstance(own, float) or own <= 0.0 or key in law.no_gains:
+        return False
+    changed = with_gains(law, {key: own * TRIED}) or with_gains(law, {key: own / TRIED})
+    if changed is None:
+        return False
+    try:
+        return _structure(scenario, changed) == _structure(scenario, law)
+    except ValueError:  # no whole number of steps between samples
+        return False
+
+
+def _structure(scenario: Scenario, law: Controller) -> tuple[Any, ...]:
+    loop = scenario.model_copy(update={"controller": law}).closed_loop()
+    return loop.layout(scenario.time_grid()), list(entries(loop, Observer()))
+
+
+def with_gains(law: Controller, new: Mapping[str, Any]) -> Controller | None:
+    """The law with other gains; None where it refuses them."""
+    try:
+        return changed(law, new)
+    except ValidationError:
+        return None
+
+
+def _of(wanted: float | Range, key: str, own: Any, field: Any) -> list[Gain]:
+    if isinstance(wanted, float):
+        return [_around(wanted, key, own, field)]
+    (way,) = wanted.given
+    return WAYS[way](getattr(wanted, way), key, own, field)
+
+
+def _around(factor: float, key: str, own: Any, field: Any) -> Gain:
+    """A factor to either side, cut where the field's range ends."""
+    low, high = float(own) / factor, float(own) * factor
+    ends = limits(field)
+    low = max(low, ends.get("ge", low), ends.get("gt", low))
+    high = min(high, ends.get("le", high), ends.get("lt", high))
+    return Gain(key, own, low, high, log=True)
+
+
+WAYS: dict[str, Callable[[Any, str, Any, Any], list[Gain]]] = {
+    "keep": lambda yes, key, own, field: [],
+    "around": lambda factor, key, own, field: [_around(factor, key, own, field)],
+    "log": lambda ends, key, own, field: [Gain(key, own, ends[0], ends[1], log=True)],
+    "uniform": lambda ends, key, own, field: [Gain(key, own, ends[0], ends[1])],
+    "integers": lambda ends, key, own, field: [Gain(key, own, ends[0], ends[1], whole=True)],
+    "choice": lambda words, key, own, field: [Gain(key, own, words=tuple(words))],
+}
+
+
+def space_faults(laws: Mapping[str, Scenario], tune: Tune) -> Iterator[tuple[str, str]]:
+    """Name and message of each entry of `space` that no law has, or cannot take."""
+    for name, content in tune.space.items():
+        label, dot, key = name.rpartition(".")
+        if name == AROUND or not isinstance(content, Range):
+            continue
+        named = {label: laws[label]} if dot and label in laws else {} if dot else dict(laws)
+        having = {n: one.controller for n, one in named.items() if key in keys(one.controller)}
+        if not having:
+            yield (
+                name,
+                f"unknown gain{did_you_mean(name, _known(laws))}; write a key of a law, or law.key",
+            )
+        yield from (
+            (name, text) for n, law in having.items() for text in _refused(n, law, key, content)
+        )
+
+
+def _known(laws: Mapping[str, Scenario]) -> list[str]:
+    own = [key for one in laws.values() for key in keys(one.controller)]
+    return [
+        *dict.fromkeys(own),
+        *(f"{n}.{key}" for n, one in laws.items() for key in keys(one.controller)),
+    ]
+
+
+def _refused(label: str, law: Controller, key: str, content: Range) -> Iterator[str]:
+    """What is wrong with a range for one law: the ends that its field does not take."""
+    own = getattr(law, key)
+    if content.keep:
+        return
+    if content.around and (not isinstance(own, float) or own <= 0.0):
+        yield f"{key} of {label} is {own!r}; a factor needs a number above 0, so write log: ..."
+        return
+    for end in content.choice or content.log or content.uniform or content.integers or ():
+        if with_gains(law, {key: end}) is None:
+            yield f"{label} does not take {key} = {end!r}; see podusv explain controller.{key}"

@@ -1,0 +1,129 @@
+"""Found gains on fresh draws: the scenario's and the found ones of every law meet the same."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from podusv_cli.core.kernel import Vector
+from podusv_cli.storage import files, json_files
+from podusv_cli.storage.run_folder import STUDY
+from podusv_cli.studies.study import record
+from podusv_cli.studies.study.dispatch import Engine, Tally, march
+from podusv_cli.studies.study.plan import Plan, disagreements
+from podusv_cli.studies.study.runs import Mask
+from podusv_cli.studies.study.runs_file import Table
+from podusv_cli.studies.study.store import RUNS, UNITS, Store
+from podusv_cli.studies.tuning.plan import VALIDATE, Named, TunePlan
+from podusv_cli.studies.tuning.trials import Trial, best
+
+FOLDER = "validation"
+Winners = Mapping[str, Sequence[Trial]]  # by law, one for each repeat
+
+
+def tuned(law: str) -> str:
+    """The name of a law with the gains that were found; no law's own name has a space."""
+    return f"{law} tuned"
+
+
+def repeated(law: str, repeat: int) -> str:
+    """The name of a law with the gains that a repeat found."""
+    return f"{law} repeat {repeat + 1}"
+
+
+def chosen(winners: Sequence[Trial]) -> int:
+    """Which repeat found the gains that are taken: the best on the draws for training."""
+    return best([replace(trial, number=place) for place, trial in enumerate(winners)]).number
+
+
+def contestants(plan: TunePlan, winners: Winners) -> dict[str, Named]:
+    """All laws that meet the fresh draws, by name: before, after, and those of other repeats."""
+    found: dict[str, Named] = {}
+    for law in plan.laws:
+        found[law] = law, {}
+        if law in winners:
+            first = chosen(winners[law])
+            for repeat, trial in enumerate(winners[law]):
+                found[tuned(law) if repeat == first else repeated(law, repeat)] = law, trial.gains
+    return found
+
+
+def validate(
+    plan: TunePlan, winners: Winners, folder: Path, started: str, engine: Engine,
+    tell: Callable[[Tally], None],
+) -> Table:  # fmt: skip
+    """Simulate what is missing of the validation; its runs.
+
+    Raises PodusvError, StorageError and KeyboardInterrupt; finished units are kept.
+    """
+    made = plan.variant(contestants(plan, winners), VALIDATE, plan.tune.validate)
+    store = Store(folder / FOLDER, made)
+    _clear(store.folder, made)
+    store.open(started)
+    march(store, tell, engine)
+    store.write_runs()
+    return store.runs()
+
+
+def _clear(folder: Path, plan: Plan) -> None:
+    """Remove the runs of other gains, which an earlier sitting with a smaller budget found.
+
+    study.json goes last, because a folder without it that is not empty is no study.
+    """
+    if not (folder / STUDY).exists():
+        return
+    told = record.read(folder)
+    same = not disagreements(told.identity, json_files.plain(plan.identity))
+    if same and told.draws <= plan.sweep.draws:
+        return
+    with files.storage_errors(f"cannot remove old runs in {folder}"):
+        if (folder / UNITS).exists():
+            shutil.rmtree(folder / UNITS)
+        for path in (folder / RUNS, folder / STUDY):
+            path.unlink(missing_ok=True)
+
+
+@dataclass(frozen=True)
+class View:
+    """Some laws of a table under other names, and some of its metrics: the `Runs` of a study."""
+
+    table: Table
+    names: Mapping[str, str]  # the table's, by name here
+    metrics: Sequence[str]
+
+    @property
+    def laws(self) -> Sequence[str]:
+        """Names of the laws."""
+        return list(self.names)
+
+    @property
+    def cells(self) -> Sequence[str]:
+        """The only cell."""
+        return self.table.cells
+
+    @property
+    def wanted(self) -> int:
+        """Draws that were asked for."""
+        return self.table.wanted
+
+    def metric(self, law: str, name: str) -> Vector:
+        """A metric of every run."""
+        return self.table.metric(self.names[law], name)
+
+    def done(self, law: str) -> Mask:
+        """Whether a run was tried."""
+        return self.table.done(self.names[law])
+
+    def finished(self, law: str) -> Mask:
+        """Whether a run reached its end."""
+        return self.table.finished(self.names[law])
+
+    def success(self, law: str) -> Mask:
+        """Whether a run was a success."""
+        return self.table.success(self.names[law])
+
+    def broken(self, law: str) -> Mask:
+        """Whether a run crashed, hung or was invalid."""
+        return self.table.broken(self.names[law])
