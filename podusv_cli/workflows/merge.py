@@ -14,8 +14,9 @@ from podusv_cli.studies.study.dispatch import Tally
 from podusv_cli.studies.study.joining import join, missing, mixture
 from podusv_cli.studies.study.sittings import Sitting
 from podusv_cli.studies.study.store import SCENARIO, Store
+from podusv_cli.workflows.many_runs import Request
 from podusv_cli.workflows.studies import stored
-from podusv_cli.workflows.sweep import Request, Swept, answered
+from podusv_cli.workflows.sweep import Swept, answered
 
 
 def merge(studies: Sequence[Path], out: Path, request: Request) -> Swept:
