@@ -97,7 +97,7 @@ def test_runs_that_all_diverge_are_still_reported(config, tmp_path):
     request = run.Request(("start.u=1e300",), tmp_path / "x")
     done = compare.compare([config], request)
     assert all(ending.startswith("diverged at t = 0 s") for ending in done.result.endings.values())
-    assert {verdict.answer for verdict in done.result.verdicts} == {"cannot tell"}
+    assert {verdict.verdict for verdict in done.result.verdicts} == {"cannot tell"}
     assert (done.folder / "report.html").is_file()
 
 

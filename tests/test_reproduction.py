@@ -97,7 +97,7 @@ def signs(letter, sets, laws=("proposed", "li", "pid")):
         if parsed.name != "C14"
         and not any(f"{law}." in parsed.claim.expect for law in ("li", "pid") if law not in laws)
     ]
-    return {v.name: SIGNS[v.answer] for v in judge(told, entries)}
+    return {v.name: SIGNS[v.verdict] for v in judge(told, entries)}
 
 
 def sensitivity():

@@ -35,11 +35,10 @@ class Bar(NamedTuple):
 
 def bars(claim: ParsedClaim, verdict: StudyVerdict) -> Iterator[Bar]:
     """A bar for each comparison of a claim in each cell."""
-    for links in claim.parsed.links.values():
-        for link in links:
-            for part in verdict.parts:
-                if part.statistic == link.text and part.n:
-                    yield _bar(link, part)
+    for link in claim.parsed.links:
+        for part in verdict.parts:
+            if part.statistic == link.text and part.n:
+                yield _bar(link, part)
 
 
 def _bar(link: Link, part: Part) -> Bar:

@@ -10,12 +10,13 @@ import pandas as pd
 
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.escaping import markdown
+from podusv_cli.expressions.verdict import as_markdown
 from podusv_cli.pages.page import Picture, sentence
 from podusv_cli.process.extras import Extras
 from podusv_cli.storage import csv_files, files
 from podusv_cli.storage.json_files import encode
 from podusv_cli.storage.run_folder import MISSING
-from podusv_cli.studies.study import pictures, report, summary, verdict
+from podusv_cli.studies.study import pictures, report, summary
 from podusv_cli.studies.study.keep import Kept, tracks
 from podusv_cli.studies.study.results import Results
 from podusv_cli.studies.study.runs import AXES, ENDING
@@ -29,7 +30,7 @@ FIGURES, REPORT = "figures", "report.html"
 def write_tables(folder: Path, results: Results) -> None:
     """Write tables and verdicts into the study's folder. Raises StorageError."""
     told = {"format": 1, "claims": [one.as_json() for one in results.verdicts]}
-    judged = verdict.as_markdown(results.verdicts)
+    judged = as_markdown(results.verdicts)
     if results.contradicted:
         told["contradicted"] = results.contradicted
         judged = f"{markdown(sentence(results.contradicted))}\n"

@@ -7,13 +7,15 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
 from podusv_cli.core.kernel import Vector
-from podusv_cli.scenario.expressions import function, literal, refuse
+from podusv_cli.expressions.margins import SIGNS
+from podusv_cli.expressions.reading import function, number, refuse
 from podusv_cli.studies.study import statistics
-from podusv_cli.studies.study.expressions import SIGNS, OverLaws
+from podusv_cli.studies.study.expressions import OverLaws
 from podusv_cli.studies.study.runs import Mask
 from podusv_cli.studies.study.statistics import Interval
 
@@ -97,14 +99,7 @@ class Quantile(Sample):
         return statistics.needed(held, self.q if upper else 1.0 - self.q, level)
 
 
-def number(node: ast.expr) -> float:
-    """A number as written, with its sign. Raises ExpressionError."""
-    match node:
-        case ast.UnaryOp(op=ast.USub(), operand=part):
-            return -literal(part)
-    return literal(node)
-
-
+SHARE, FAILURES, QUANTILE, MEDIAN = "share", "failures", "quantile", "median"
 # Statistics: from the call and a walk over runs to the sample of a cell, among its used draws.
 Sampler = Callable[[str, int, Mask], Sample]
 
@@ -132,20 +127,34 @@ def _failures(call: ast.Call, walk: OverLaws) -> Sampler:
 
 
 def _quantile(call: ast.Call, walk: OverLaws) -> Sampler:
-    node, share = _arguments(call, 2, "a number of each draw and a share: quantile(a.iae, 0.95)")
-    q = number(share)
-    if not 0.0 < q < 1.0:
-        refuse(call, "the share must lie between 0 and 1, as in quantile(a.iae, 0.95)")
-    return _at_share(node, q, walk)
+    return _at_share(*part_of(call, DRAWS), walk)
 
 
-def _median(call: ast.Call, walk: OverLaws) -> Sampler:
-    node = _arguments(call, 1, "one number of each draw, as in median(a.iae / b.iae)")[0]
-    return _at_share(node, statistics.MEDIAN, walk)
+class Wording(NamedTuple):
+    """What messages call a run, a number and a ratio of numbers."""
+
+    each: str
+    number: str
+    ratio: str
+
+
+DRAWS = Wording("draw", "a.iae", "a.iae / b.iae")
+
+
+def part_of(call: ast.Call, wording: Wording) -> tuple[ast.expr, float]:
+    """What a median or quantile is of, and its share from 0 to 1. Raises ExpressionError."""
+    if function(call) == MEDIAN:
+        wanted = f"one number of each {wording.each}, as in median({wording.ratio})"
+        return _arguments(call, 1, wanted)[0], statistics.MEDIAN
+    example = f"quantile({wording.number}, 0.95)"
+    node, share = _arguments(call, 2, f"a number of each {wording.each} and a share: {example}")
+    if not 0.0 < number(share) < 1.0:
+        refuse(call, f"the share must lie between 0 and 1, as in {example}")
+    return node, number(share)
 
 
 def _at_share(node: ast.expr, q: float, walk: OverLaws) -> Sampler:
-    values = walk.number(node)
+    values = walk.side(node)
 
     def sample(label: str, cell: int, used: Mask) -> Quantile:
         chosen = values[cell][used]
@@ -160,7 +169,6 @@ def _arguments(call: ast.Call, count: int, wanted: str) -> list[ast.expr]:
     return call.args
 
 
-SHARE, FAILURES = "share", "failures"
 STATISTICS: dict[str, Callable[[ast.Call, OverLaws], Sampler]] = {
-    SHARE: _share, FAILURES: _failures, "quantile": _quantile, "median": _median,
+    SHARE: _share, FAILURES: _failures, QUANTILE: _quantile, MEDIAN: _quantile,
 }  # fmt: skip

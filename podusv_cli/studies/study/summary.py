@@ -119,7 +119,7 @@ def _failures(runs: Runs, law: str, cell: int, level: float) -> dict[str, Any]:
     return {
         "law": law, "cell": runs.cells[cell], "n": n,
         "broken": int(np.sum(done & runs.broken(law)[cell])),
-        **_named("failed", statistics.share(failed, n, level)),
+        **statistics.share(failed, n, level).columns("failed"),
     }  # fmt: skip
 
 
@@ -127,7 +127,7 @@ def _quantiles(values: Vector, level: float) -> dict[str, Any]:
     found: dict[str, Any] = {"unknown": int(np.isnan(values).sum())}
     intervals = statistics.quantiles(values, QUANTILES, level)
     for q, interval in zip(QUANTILES, intervals, strict=True):
-        found |= _named(f"q{round(100 * q):02d}", interval)
+        found |= interval.columns(f"q{round(100 * q):02d}")
     return found
 
 
@@ -136,10 +136,6 @@ def _pair(a: Vector, b: Vector, margin: float, level: float) -> dict[str, Any]:
     ratio = statistics.quantile(statistics.ratios(a, b), statistics.MEDIAN, level)
     return {
         "n": found.n, "ties": found.ties, "both_failed": found.both_failed,
-        "unknown": found.unknown, **_named("a_wins", found.win_rate(level)),
-        **_named("b_wins", found.loss_rate(level)), **_named("ratio", ratio),
+        "unknown": found.unknown, **found.win_rate(level).columns("a_wins"),
+        **found.loss_rate(level).columns("b_wins"), **ratio.columns("ratio"),
     }  # fmt: skip
-
-
-def _named(name: str, found: statistics.Interval) -> dict[str, Any]:
-    return {name: found.estimate, f"{name}_low": found.low, f"{name}_high": found.high}

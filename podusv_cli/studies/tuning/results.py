@@ -17,7 +17,7 @@ from podusv_cli.studies.study.runs_file import Table
 from podusv_cli.studies.study.statistics import Interval
 from podusv_cli.studies.tuning.objective import (
     Inequality,
-    OfRuns,
+    OfGains,
     Runs,
     evaluate,
     excess,
@@ -105,9 +105,9 @@ class Results:
         for when, name in (("before", law), ("after", self.after(law))):
             runs = self.met(name)
             failed = statistics.share(int(runs.failed.sum()), len(runs.failed), self.level)
-            told |= _interval(f"failed_{when}", failed)
+            told |= failed.columns(f"failed_{when}")
             for i, tree in enumerate(self.plan.objectives):
-                told |= _interval(f"{OBJECTIVES[i]}_{when}", self.objective(runs, tree))
+                told |= self.objective(runs, tree).columns(f"{OBJECTIVES[i]}_{when}")
         found = self.pairs
         own = found[(found["when"] == "tuning") & (found.a == tuned(law))]
         own = own[own.metric == self.shown[0]]
@@ -124,7 +124,7 @@ class Results:
         found = evaluate(tree, runs, self.plan.metrics)
         if not isinstance(tree, ast.Call):
             return Interval(found, math.nan, math.nan)
-        values = numbers_of(tree, OfRuns(self.plan.metrics, runs=runs))
+        values = numbers_of(tree, OfGains(self.plan.metrics, runs=runs))
         ends = statistics.quantile(values, share_of(tree), self.level)
         return Interval(found, ends.low, ends.high)
 
@@ -146,7 +146,7 @@ class Results:
     def _limit(self, one: Inequality, name: str) -> dict[str, Any]:
         runs = self.met(name)
         holds = excess(one, runs, self.plan.metrics) <= 0.0
-        return {**_interval("value", self.objective(runs, one.tree)), "holds": holds}
+        return {**self.objective(runs, one.tree).columns("value"), "holds": holds}
 
     def spread(self, law: str) -> list[float]:
         """The objective on the fresh draws of every repeat's winner."""
@@ -234,10 +234,6 @@ def _ends(gain: Gain) -> dict[str, float]:
     """The ends of a range; words have none."""
     low, high = (math.nan, math.nan) if gain.words else (gain.low, gain.high)
     return {"low": low, "high": high}
-
-
-def _interval(name: str, found: Interval) -> dict[str, Any]:
-    return {name: found.estimate, f"{name}_low": found.low, f"{name}_high": found.high}
 
 
 def _range(values: Sequence[float]) -> dict[str, float]:
