@@ -13,7 +13,7 @@ from small_study import TEXT, made, small
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.storage import provenance
 from podusv_cli.studies.study import store as stores
-from podusv_cli.studies.study.joining import _machine, join, missing
+from podusv_cli.studies.study.joining import _machine, gaps, join
 from podusv_cli.studies.study.store import RUNS, SCENARIO, Store
 from podusv_cli.workflows import sweep as workflow
 from podusv_cli.workflows.merge import merge
@@ -106,7 +106,7 @@ def test_a_missing_shard_is_told(shards, tmp_path):
     assert done.missing_runs == ("missing: draws 5 to 9, 30 to 34 of every law and cell",)
     store = Store(tmp_path / "most", small())
     next(store.folder.glob("units/li-*")).unlink()
-    assert [line.split(" of ")[1] for line in missing(store)] == ["pid", "li"]
+    assert [line.split(" of ")[1] for line in gaps(store)] == ["pid", "li"]
 
 
 def test_what_cannot_be_the_outcome_is_refused(shards, tmp_path):

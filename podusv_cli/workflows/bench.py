@@ -19,7 +19,7 @@ from podusv_cli.process.workers import Outcome, Report, run_all
 from podusv_cli.storage import csv_files, provenance
 from podusv_cli.storage.run_folder import RunWriter
 from podusv_cli.studies.bench import optima, page, standing
-from podusv_cli.studies.bench.cases import Case, Wanted, cases
+from podusv_cli.studies.bench.cases import Case, Selection, cases
 from podusv_cli.studies.bench.optima import Least
 from podusv_cli.studies.bench.runs import BenchRun, crashed, play
 
@@ -68,7 +68,7 @@ class Benched:
         }  # fmt: skip
 
 
-def bench(wanted: Wanted, request: Request, progress: Progress | None = None) -> Benched:
+def bench(wanted: Selection, request: Request, progress: Progress | None = None) -> Benched:
     """Simulate every law in every case and write the leaderboard.
 
     Raises UsageError (without CasADi, too, if optima are wanted), ScenarioError, LawError before

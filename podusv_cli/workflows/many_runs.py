@@ -21,11 +21,11 @@ from podusv_cli.scenario.messages import Check
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage import files, manifest
 from podusv_cli.studies.study.cluster import engine
-from podusv_cli.studies.study.dispatch import Engine, Part
-from podusv_cli.studies.study.remote import Recipe
+from podusv_cli.studies.study.dispatch import Engine, Shard
+from podusv_cli.studies.study.remote import StudyText
 from podusv_cli.studies.study.store import SCENARIO
 
-WHOLE: Part = (1, 1)  # the only shard
+WHOLE: Shard = (1, 1)  # the only shard
 Tell = Callable[..., None]
 
 
@@ -47,7 +47,7 @@ class Request:
     mixed: bool = False  # whether its workers may compute other bits than this machine
     trust: bool = False  # whether plug-in files of the folder may be executed
     seconds: float = math.inf  # of computing, after which no unit of a study is begun
-    shard: Part = WHOLE
+    shard: Shard = WHOLE
     say: Tell = silent  # what is done beside the runs
     warn: Tell = silent  # is told what is odd, and no error
     begin: Tell | None = None  # is told what the missing runs need
@@ -92,7 +92,7 @@ def engine_for(
     request: Request, folder: Path, scenario: Scenario, seal: str
 ) -> AbstractContextManager[Engine]:
     """Where the units of a folder are made, whose study has this seal."""
-    recipe = Recipe(files.read_text(folder / SCENARIO), tuple(scenario.plugin_files().items()))
+    recipe = StudyText(files.read_text(folder / SCENARIO), tuple(scenario.plugin_files().items()))
     return engine(request.scheduler, request.workers, recipe, seal, mixed=request.mixed)
 
 

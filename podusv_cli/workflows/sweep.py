@@ -25,7 +25,7 @@ from podusv_cli.studies.study.joining import mixture
 from podusv_cli.studies.study.keep import contradiction, found, unmade
 from podusv_cli.studies.study.plan import plan
 from podusv_cli.studies.study.results import Results, judged
-from podusv_cli.studies.study.sittings import Sitting
+from podusv_cli.studies.study.sessions import Session
 from podusv_cli.studies.study.store import Store
 from podusv_cli.workflows.keep import keep
 from podusv_cli.workflows.many_runs import (
@@ -106,8 +106,8 @@ def _run(store: Store, request: Request, started: datetime, tell: Tell) -> Swept
 def _marched(
     store: Store, request: Request, started: datetime, engine: Engine, tell: Tell
 ) -> tuple[Tally, bool]:
-    """Simulate what is missing, and note the sitting; how far it is, and if it is whole."""
-    sitting = Sitting(store.folder, request.argv, started, store.plan.scenario.plugged)
+    """Simulate what is missing, and note the session; how far it is, and if it is whole."""
+    session = Session(store.folder, request.argv, started, store.plan.scenario.plugged)
     seen = Tally(0)
 
     def told(tally: Tally) -> None:
@@ -125,7 +125,7 @@ def _marched(
         raise interrupted(made, "sweep run", store.folder) from stop
     finally:
         timed = {"processor_s": seen.computed, "timed_runs": seen.ran}
-        sitting.end(seen.made - seen.before, {**timed, "ended": seen.ended, **engine.told()})
+        session.end(seen.made - seen.before, {**timed, "ended": seen.ended, **engine.told()})
 
 
 def _announce(store: Store, request: Request, workers: int, missing: Gaps) -> None:
@@ -203,7 +203,7 @@ def report(study: Path, request: Request) -> Swept:
         store = stored(study, request.warn, trusted=request.trust)
         if not Tally.of(store.covered()).made:
             raise UsageError(f"{study} has no runs yet: {plugins.again('sweep run', study)}")
-        Sitting(study, request.argv, started, store.plan.scenario.plugged).end(0)
+        Session(study, request.argv, started, store.plan.scenario.plugged).end(0)
         store.write_runs()
         if not store.runs().common.any():
             raise UsageError(

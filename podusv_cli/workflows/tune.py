@@ -16,7 +16,7 @@ from podusv_cli.storage.writer import sole_writer
 from podusv_cli.studies.study.check import sweep_faults
 from podusv_cli.studies.study.dispatch import Engine, Tally
 from podusv_cli.studies.study.plan import digest
-from podusv_cli.studies.study.sittings import Sitting
+from podusv_cli.studies.study.sessions import Session
 from podusv_cli.studies.study.unit import prepare
 from podusv_cli.studies.tuning import folder as place
 from podusv_cli.studies.tuning import outputs
@@ -112,8 +112,8 @@ def _loaded(config: Path, request: Request) -> tuple[Loaded, Path]:
 def _simulated(
     plan: TunePlan, folder: Path, request: Request, started: datetime, engine: Engine, tell: Tell
 ) -> Results:
-    """Search and validate what is not there yet, and note the sitting."""
-    sitting = Sitting(folder, request.argv, started, plan.scenario.plugged)
+    """Search and validate what is not there yet, and note the session."""
+    session = Session(folder, request.argv, started, plan.scenario.plugged)
     made = {"search": 0, "validation": 0}
 
     def searched(tally: Tally, searches: Sequence[Search]) -> None:
@@ -138,7 +138,7 @@ def _simulated(
     except KeyboardInterrupt as stop:
         raise interrupted("all batches that were finished", "tune", folder) from stop
     finally:
-        sitting.end(sum(made.values()), engine.told())
+        session.end(sum(made.values()), engine.told())
 
 
 def _prepare(plan: TunePlan) -> None:

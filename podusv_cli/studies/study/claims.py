@@ -26,10 +26,10 @@ from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.scenario.sweep import StudyClaim
 from podusv_cli.studies.study.expressions import OverLaws
-from podusv_cli.studies.study.runs import Mask, Runs
+from podusv_cli.studies.study.runs import Mask, StudyRuns
 from podusv_cli.studies.study.samples import FAILURES, SHARE, STATISTICS, Sample
 from podusv_cli.studies.study.statistics import holm
-from podusv_cli.studies.study.verdict import Part, StudyVerdict
+from podusv_cli.studies.study.verdict import Statistic, StudyVerdict
 
 EXAMPLE = "share(a.iae < b.iae) >= 0.95"
 # of a number on the left of a comparison
@@ -101,7 +101,7 @@ def parse(text: str, laws: Sequence[str], metrics: Mapping[str, Metric] = METRIC
 
 
 def judge(
-    claims: Sequence[ParsedClaim], runs: Runs, level: float,
+    claims: Sequence[ParsedClaim], runs: StudyRuns, level: float,
     metrics: Mapping[str, Metric] = METRICS,
 ) -> list[StudyVerdict]:  # fmt: skip
     """A verdict on every claim; the probability that any is wrong is at most 1 - level."""
@@ -118,7 +118,7 @@ class _Evaluation(Logic):
     False to leave out all draws in which a run crashed, hung or was invalid.
     """
 
-    runs: Runs
+    runs: StudyRuns
     parsed: Parsed
     metrics: Mapping[str, Metric]
     tolerance: float = 0.0
@@ -234,7 +234,7 @@ def _verdict(parsed: ParsedClaim, tried: _Evaluation) -> StudyVerdict:
         name=parsed.name, claim=parsed.claim, answer=tried.answer, level=tried.level,
         wanted=runs.wanted,
         parts=[
-            Part.of(text, sample, tried.inside)
+            Statistic.of(text, sample, tried.inside)
             for text, samples in tried.samples.items() for sample in samples
         ],
         by_cell=dict(zip(runs.cells, answers, strict=True)), needed=tried.needed(),

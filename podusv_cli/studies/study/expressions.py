@@ -22,7 +22,7 @@ from podusv_cli.expressions.reading import function, known, refuse, syntax_tree
 from podusv_cli.expressions.walk import Condition, Walk
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import METRICS
-from podusv_cli.studies.study.runs import Mask, Runs, worst
+from podusv_cli.studies.study.runs import Mask, StudyRuns, worst
 
 # A failed run's metric in arithmetic: larger than any number of a run, and the same for all, so
 # that both failing gives a ratio of 1 and a difference of 0. What exceeds REAL is infinite.
@@ -66,7 +66,7 @@ class OfRuns(Walk):
 class OverLaws(OfRuns):
     """Expressions about the runs of all laws in a draw: `law.metric`, `finished(law)`."""
 
-    runs: Runs = field(kw_only=True)
+    runs: StudyRuns = field(kw_only=True)
     names: list[str] = field(default_factory=list)  # of the laws that were met in the expression
 
     def quantity(self, node: ast.expr) -> Vector:

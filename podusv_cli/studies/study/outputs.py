@@ -21,7 +21,7 @@ from podusv_cli.studies.study.keep import Kept, tracks
 from podusv_cli.studies.study.results import Results
 from podusv_cli.studies.study.runs import AXES, ENDING
 from podusv_cli.studies.study.runs_file import Table
-from podusv_cli.studies.study.sittings import timing
+from podusv_cli.studies.study.sessions import timing
 from podusv_cli.studies.study.unit import STATUSES
 
 FIGURES, REPORT = "figures", "report.html"

@@ -17,13 +17,13 @@ from podusv_cli.studies.study.bars import bars
 from podusv_cli.studies.study.keep import Kept
 from podusv_cli.studies.study.results import Results
 from podusv_cli.studies.study.runs import Mask
-from podusv_cli.studies.study.sittings import sittings
+from podusv_cli.studies.study.sessions import sessions
 from podusv_cli.studies.study.statistics import Interval, digits
 from podusv_cli.studies.study.unit import STATUSES
 from podusv_cli.studies.study.words import in_words
 
 FIRST = 20  # rows of a table of runs
-SITTING = ("started", "duration_s", "runs", "podusv", "python", "platform.processor", "argv")
+SESSION = ("started", "duration_s", "runs", "podusv", "python", "platform.processor", "argv")
 
 
 class Row(NamedTuple):
@@ -74,8 +74,8 @@ def page(
         beside=numbered[: len(beside)],
         figures=numbered,
         missing=[str(one) for one in missing],
-        sittings=_sittings(folder),
-        latest=[(key, value_text(value)) for key, value in flat((sittings(folder) or [{}])[-1])],
+        sittings=_sessions(folder),
+        latest=[(key, value_text(value)) for key, value in flat((sessions(folder) or [{}])[-1])],
         first=FIRST,
     )  # fmt: skip
 
@@ -162,6 +162,6 @@ def _beside(figures: Sequence[Picture]) -> list[Picture]:
     return [first[kind] for kind in ("distribution", "ratios") if kind in first]
 
 
-def _sittings(folder: Path) -> list[list[str]]:
-    told = [dict(flat(one)) for one in sittings(folder)]
-    return [[value_text(one.get(key)) for key in SITTING] for one in told]
+def _sessions(folder: Path) -> list[list[str]]:
+    told = [dict(flat(one)) for one in sessions(folder)]
+    return [[value_text(one.get(key)) for key in SESSION] for one in told]

@@ -19,7 +19,7 @@ from podusv_cli.storage.files import new_file, storage_errors
 from podusv_cli.storage.log import FILE, UNDATED, LogLayout, describe, write_at
 from podusv_cli.studies.study.runs import DRAWN, SEAL, SEAL_OF_THE_REST
 from podusv_cli.studies.study.runs_file import ROWS, digest, digest_of_the_rest
-from podusv_cli.studies.study.unit import MISSING, STATUSES, UnitResult
+from podusv_cli.studies.study.unit import NOT_MADE, STATUSES, UnitResult
 
 BLOCK = 2**20  # bytes written and read at a time
 NUMBERS = "iuf"  # numpy's kinds of numbers
@@ -173,7 +173,7 @@ def _fill(part: Path, header: Header, places: dict[str, Room], results: Iterable
                 numbers = columns[name.removeprefix(f"{DRAWN}/")]
                 write_at(out, room.place(first), room.content(numbers))
         for name, room in places.items():
-            _blank(out, room, MISSING if name == "status" else np.nan)
+            _blank(out, room, NOT_MADE if name == "status" else np.nan)
         for result in results:
             unit = result.unit
             if unit.draws.stop > header.wanted:

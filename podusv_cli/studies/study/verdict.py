@@ -13,7 +13,7 @@ from podusv_cli.studies.study.statistics import Interval
 
 
 @dataclass(frozen=True)
-class Part:
+class Statistic:
     """A statistic of a claim in one cell, with its interval at this level.
 
     `unknown` draws lack a number. `both_failed` and `close` are draws without a winner.
@@ -64,7 +64,7 @@ class StudyVerdict(Verdict):
 
     level: float
     wanted: int
-    parts: Sequence[Part]
+    parts: Sequence[Statistic]
     by_cell: dict[str, bool | None]
     needed: Sequence[int | None]
     broken: int

@@ -36,7 +36,7 @@ SCALING = (ast.Mult, ast.Div)  # a negative part turns round what the other mean
 FALLING = (ast.Sub, ast.Div)  # the more of the second part, the less of the whole
 
 
-class Runs(NamedTuple):
+class Outcomes(NamedTuple):
     """The runs of one law with the same gains: metrics by name, and which runs failed."""
 
     metrics: Mapping[str, Vector]
@@ -56,7 +56,7 @@ class Inequality(NamedTuple):
 class OfGains(OfRuns):
     """A number of each run, from metrics by their names alone; failed runs are the worst."""
 
-    runs: Runs = field(kw_only=True)
+    runs: Outcomes = field(kw_only=True)
     names: list[str] = field(default_factory=list)  # of the metrics that were met
 
     def quantity(self, node: ast.expr) -> Vector:
@@ -109,7 +109,7 @@ def _names(tree: ast.expr, metrics: Mapping[str, Metric]) -> list[str]:
     """
     numbers = np.random.default_rng(0).uniform(1.0, 2.0, (len(metrics), INVENTED))
     walk = OfGains(
-        metrics, runs=Runs(dict(zip(metrics, numbers, strict=True)), np.zeros(INVENTED, bool))
+        metrics, runs=Outcomes(dict(zip(metrics, numbers, strict=True)), np.zeros(INVENTED, bool))
     )
     with np.errstate(all="ignore"):
         found = _evaluated(tree, walk, math.inf)
@@ -119,7 +119,7 @@ def _names(tree: ast.expr, metrics: Mapping[str, Metric]) -> list[str]:
 
 
 def evaluate(
-    tree: ast.expr, runs: Runs, metrics: Mapping[str, Metric], worst: float = math.inf
+    tree: ast.expr, runs: Outcomes, metrics: Mapping[str, Metric], worst: float = math.inf
 ) -> float:
     """The number of an objective; infinite where it is the worst or not known.
 
@@ -130,7 +130,7 @@ def evaluate(
     return found if math.isfinite(found) else math.inf
 
 
-def excess(one: Inequality, runs: Runs, metrics: Mapping[str, Metric]) -> float:
+def excess(one: Inequality, runs: Outcomes, metrics: Mapping[str, Metric]) -> float:
     """By how much an inequality does not hold, relative to its bound; 0 or less where it holds."""
     found = evaluate(one.tree, runs, metrics, -math.inf if one.upward else math.inf)
     over = one.bound - found if one.upward and math.isfinite(found) else found - one.bound

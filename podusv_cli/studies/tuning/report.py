@@ -9,7 +9,7 @@ from typing import Any
 
 from podusv_cli.pages.page import Picture, environment, flat, value_text
 from podusv_cli.process.extras import Missing
-from podusv_cli.studies.study.sittings import sittings
+from podusv_cli.studies.study.sessions import sessions
 from podusv_cli.studies.study.statistics import Interval, digits
 from podusv_cli.studies.study.words import in_words
 from podusv_cli.studies.tuning.remarks import remarks
@@ -47,7 +47,7 @@ def page(
         figures=numbered,
         metrics=plan.metrics,
         missing=[str(one) for one in missing],
-        latest=[(key, value_text(value)) for key, value in flat((sittings(folder) or [{}])[-1])],
+        latest=[(key, value_text(value)) for key, value in flat((sessions(folder) or [{}])[-1])],
     )  # fmt: skip
 
 

@@ -18,7 +18,7 @@ from podusv_cli.studies.study.statistics import Interval
 from podusv_cli.studies.tuning.objective import (
     Inequality,
     OfGains,
-    Runs,
+    Outcomes,
     evaluate,
     excess,
     named,
@@ -76,10 +76,10 @@ class Results:
         """The trial whose gains are taken."""
         return self.winners[law][chosen(self.winners[law])]
 
-    def met(self, name: str) -> Runs:
+    def met(self, name: str) -> Outcomes:
         """The fresh runs of a law by the name of the table."""
         metrics = {n: self.runs.metric(name, n)[0] for n in self.runs.metrics}
-        return Runs(metrics, ~self.runs.success(name)[0])
+        return Outcomes(metrics, ~self.runs.success(name)[0])
 
     @cached_property
     def laws(self) -> pd.DataFrame:
@@ -119,7 +119,7 @@ class Results:
         )
         return told
 
-    def objective(self, runs: Runs, tree: ast.expr) -> Interval:
+    def objective(self, runs: Outcomes, tree: ast.expr) -> Interval:
         """An objective, with an interval where it is one quantile of one number."""
         found = evaluate(tree, runs, self.plan.metrics)
         if not isinstance(tree, ast.Call):

@@ -68,7 +68,7 @@ def validate(
 
 
 def _clear(folder: Path, plan: Plan) -> None:
-    """Remove the runs of other gains, which an earlier sitting with a smaller budget found.
+    """Remove the runs of other gains, which an earlier session with a smaller budget found.
 
     study.json goes last, because a folder without it that is not empty is no study.
     """
