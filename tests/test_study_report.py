@@ -126,7 +126,7 @@ def test_no_figures_are_drawn_where_none_are_wanted(drawn, tmp_path):
 
 
 def test_a_study_with_a_grid_has_figures_of_cells_and_of_the_grid(whole):
-    names = [one.name for one in figures.sketches(whole.results, [])]
+    names = [one.name for one in figures.sketches(whole.results, {})]
     assert {"distribution-iae-cell0", "failures-iae-cell3", "grid-failed", "grid-iae"} <= {*names}
     assert len({*names}) == len(names)
 

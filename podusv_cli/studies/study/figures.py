@@ -43,7 +43,7 @@ CENTRED: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 6.0}
 UNKNOWN = "#BBBBBB"
 
 
-def sketches(results: Results, tracks: Sequence[Track]) -> Iterator[Sketch]:
+def sketches(results: Results, tracks: Mapping[str, Sequence[Track]]) -> Iterator[Sketch]:
     """The figures that the study has numbers for."""
     cells = range(min(len(results.runs.cells), MOST_CELLS))
     for name in results.shown:
@@ -198,16 +198,13 @@ def _correlations(results: Results, name: str, cell: int) -> Iterator[Sketch]:
         )
 
 
-def _funnel(tracks: Sequence[Track]) -> Iterator[Sketch]:
-    if tracks:
-        curves: dict[str, list[tuple[Vector, Vector]]] = {}
-        for track in tracks:
-            curves.setdefault(track.law, []).append((track.time, track.distance))
+def _funnel(tracks: Mapping[str, Sequence[Track]]) -> Iterator[Sketch]:
+    if count := sum(map(len, tracks.values())):
         yield Sketch(
             "funnel",
-            f"distance to the target over time in the {len(tracks)} runs whose logs are kept: a "
+            f"distance to the target over time in the {count} runs whose logs are kept: a "
             "choice of failed, worst and named runs, not of typical ones",
-            partial(funnel, curves),
+            partial(funnel, tracks),
         )
 
 
@@ -325,7 +322,7 @@ def correlations(sensitivity: pd.DataFrame) -> Figure:
     return figure
 
 
-def funnel(curves: Mapping[str, Sequence[tuple[Vector, Vector]]]) -> Figure:
+def funnel(curves: Mapping[str, Sequence[Track]]) -> Figure:
     """The distance to the target over time of every run, in the colour of its law."""
     figure = new_figure(COLUMNS, 2.6)
     axes = figure.add_subplot()

@@ -22,6 +22,7 @@ from podusv_cli.studies.study.results import Results
 from podusv_cli.studies.study.runs_file import Table
 
 POINTS = 2000  # of a kept run's curve in a figure
+Track = tuple[Vector, Vector]  # time [s] and distance to the target [m]
 
 
 class KeptRun(NamedTuple):
@@ -48,15 +49,6 @@ class Kept:
     wanted: KeptRun
     run: Run | None
     difference: str = ""
-
-
-@dataclass(frozen=True)
-class Track:
-    """The distance to the target over time of a kept run."""
-
-    law: str
-    time: Vector
-    distance: Vector
 
 
 def wanted(results: Results) -> list[KeptRun]:
@@ -148,10 +140,14 @@ def contradiction(kept: Sequence[Kept]) -> str:
     )
 
 
-def tracks(kept: Sequence[Kept], extras: Extras) -> list[Track]:
-    """The distance to the target in every kept log that has it."""
-    made = [extras.made(f"the track of {one.wanted.name}", partial(_track, one)) for one in kept]
-    return [track for track in made if track]
+def tracks(kept: Sequence[Kept], extras: Extras) -> dict[str, list[Track]]:
+    """The distance to the target over time in every kept log that has it, by law."""
+    found: dict[str, list[Track]] = {}
+    for one in kept:
+        track = extras.made(f"the track of {one.wanted.name}", partial(_track, one))
+        if track:
+            found.setdefault(one.wanted.law, []).append(track)
+    return found
 
 
 def _track(one: Kept) -> Track | None:
@@ -159,4 +155,4 @@ def _track(one: Kept) -> Track | None:
         return None
     log = one.run.recording
     rows = np.unique(np.linspace(0, len(log["time"]) - 1, POINTS).astype(int))
-    return Track(one.wanted.law, log["time"][rows], log["z_e"][rows])
+    return log["time"][rows], log["z_e"][rows]

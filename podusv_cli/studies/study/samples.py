@@ -7,7 +7,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -33,21 +33,19 @@ class Sample(ABC):
     unknown: int
     both_failed: int = field(default=0, kw_only=True)
     close: int = field(default=0, kw_only=True)
+    has_margin: ClassVar[bool]  # of the bound that the statistic is compared with
 
     @abstractmethod
     def interval(self, level: float) -> Interval:
         """The statistic with its interval."""
 
     @abstractmethod
-    def holds(self, sign: ast.cmpop, bound: float, margin: float, level: float) -> bool | None:
-        """Whether the comparison holds all over the interval, or nowhere in it; else None."""
-
-    @abstractmethod
     def needed(self, sign: ast.cmpop, bound: float, margin: float, level: float) -> int | None:
         """Draws that would decide a comparison if they continue like these; None: none would."""
 
-    def _holds(self, sign: ast.cmpop, bound: float, margin: float, level: float) -> bool | None:
-        found = self.interval(level)
+    def holds(self, sign: ast.cmpop, bound: float, margin: float, level: float) -> bool | None:
+        """Whether the comparison holds all over the interval, or nowhere in it; else None."""
+        found, margin = self.interval(level), margin if self.has_margin else 0.0
         ends = [bool(SIGNS[type(sign)](end, bound, margin)) for end in (found.low, found.high)]
         return ends[0] if self.n and ends[0] == ends[1] else None
 
@@ -57,16 +55,13 @@ class Share(Sample):
     """A share of draws: those in which something held. The margin is inside what held."""
 
     yes: int
+    has_margin = False
 
     def interval(self, level: float) -> Interval:
         """Clopper and Pearson's."""
         if not self.n:
             return Interval(math.nan, 0.0, 1.0)
         return statistics.share(self.yes, self.n, level, self.unknown)
-
-    def holds(self, sign: ast.cmpop, bound: float, margin: float, level: float) -> bool | None:
-        """The bound of a share has no margin."""
-        return self._holds(sign, bound, 0.0, level)
 
     def needed(self, sign: ast.cmpop, bound: float, margin: float, level: float) -> int | None:
         """As if the share stayed as it is."""
@@ -79,16 +74,13 @@ class Quantile(Sample):
 
     values: Vector
     q: float
+    has_margin = True
 
     def interval(self, level: float) -> Interval:
         """Between two of the values."""
         if not self.n:
             return Interval(math.nan, -math.inf, math.inf)
         return statistics.quantile(self.values, self.q, level)
-
-    def holds(self, sign: ast.cmpop, bound: float, margin: float, level: float) -> bool | None:
-        """The bound has the margin."""
-        return self._holds(sign, bound, margin, level)
 
     def needed(self, sign: ast.cmpop, bound: float, margin: float, level: float) -> int | None:
         """As if the share of values beyond the bound stayed as it is, which decides just so."""

@@ -34,20 +34,23 @@ def summary(runs: StudyRuns, level: float = LEVEL, metrics: Known = METRICS) -> 
 
 
 def pairs(
-    runs: StudyRuns, margin: float = MARGIN, level: float = LEVEL, metrics: Known = METRICS
-) -> pd.DataFrame:
+    runs: StudyRuns, margin: float = MARGIN, level: float = LEVEL, metrics: Known = METRICS,
+    names: Mapping[str, str] | None = None,
+) -> pd.DataFrame:  # fmt: skip
     """For every metric, cell and two laws a and b: who wins how often, and the median of a / b.
 
-    Of the draws that both laws met. A win is a smaller metric by more than the margin.
+    Of the draws that both laws met. A win is a smaller metric by more than the margin. `names` are
+    those of the runs' laws that are compared, by their names in the table; by default all.
     """
+    laws = names or {law: law for law in runs.laws}
     rows = [
         {"metric": name, "cell": runs.cells[cell], "a": a, "b": b, "margin": margin,
          **_pair(of_a[used], of_b[used], margin, level)}
         for name in _names(runs, metrics) for cell in range(len(runs.cells))
-        for a, b in combinations(runs.laws, 2)
-        for of_a, of_b in [(values_of(runs, law, cell, metrics[name]) for law in (a, b))]
-        for used in [runs.done(a)[cell] & runs.done(b)[cell]]
-        if all(has(runs, law, cell, metrics[name]) for law in (a, b))
+        for (a, one), (b, other) in combinations(laws.items(), 2)
+        for of_a, of_b in [(values_of(runs, law, cell, metrics[name]) for law in (one, other))]
+        for used in [runs.done(one)[cell] & runs.done(other)[cell]]
+        if all(has(runs, law, cell, metrics[name]) for law in (one, other))
     ]  # fmt: skip
     return pd.DataFrame(rows)
 

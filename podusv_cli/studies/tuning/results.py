@@ -29,7 +29,7 @@ from podusv_cli.studies.tuning.plan import TunePlan
 from podusv_cli.studies.tuning.sampler import importances
 from podusv_cli.studies.tuning.space import Gain
 from podusv_cli.studies.tuning.trials import FINISHED, Trial
-from podusv_cli.studies.tuning.validation import View, chosen, repeated, tuned
+from podusv_cli.studies.tuning.validation import chosen, repeated, tuned
 
 ALWAYS = ("iae", "z_e_steady")  # metrics that the tables have beside those of the objective
 OBJECTIVES = ("objective", "second_objective")  # columns
@@ -161,17 +161,15 @@ class Results:
     @cached_property
     def pairs(self) -> pd.DataFrame:
         """Two laws in the same fresh draws: all before, all after, and each after and before."""
-        laws, known = list(self.plan.laws), self.plan.metrics
-        views = [
-            ("before", View(self.runs, {law: law for law in laws}, self.shown)),
-            ("after", View(self.runs, {law: self.after(law) for law in laws}, self.shown)),
-            *(
-                ("tuning", View(self.runs, {tuned(law): tuned(law), law: law}, self.shown))
-                for law in self.winners
-            ),
+        known = {name: about for name, about in self.plan.metrics.items() if name in self.shown}
+        compared = [
+            ("before", {law: law for law in self.plan.laws}),
+            ("after", {law: self.after(law) for law in self.plan.laws}),
+            *(("tuning", {tuned(law): tuned(law), law: law}) for law in self.winners),
         ]
         tables = [
-            summary.pairs(view, MARGIN, self.level, known).assign(when=when) for when, view in views
+            summary.pairs(self.runs, MARGIN, self.level, known, names).assign(when=when)
+            for when, names in compared
         ]
         return pd.concat([one for one in tables if len(one)] or tables, ignore_index=True)
 
