@@ -68,7 +68,7 @@ def test_dask_as_a_user_starts_it_and_an_interrupt(distributed, tmp_path):
         with distributed.Client(address, set_as_default=False) as client:
             client.wait_for_workers(2, timeout=PATIENCE)
         with sweep(tmp_path, address) as first:
-            until(lambda: any((tmp_path / "study/units").glob("*.h5")))
+            until(lambda: any((tmp_path / "study/units").glob("*.unit")))
             first.send_signal(signal.SIGINT)
             assert first.wait(PATIENCE) == 130
         assert not (tmp_path / "study" / RUNS).exists()

@@ -9,11 +9,9 @@ import numpy as np
 import pytest
 from rerun_samples import copied
 from rerun_samples import made as made_run
-from small_study import folder_with_scenario, small
+from small_study import folder_with_scenario
 
-from podusv_cli.core.errors import StorageError
-from podusv_cli.studies.study.store import RUNS, SCENARIO, UNITS, encoded, read
-from podusv_cli.studies.study.unit import Unit, make
+from podusv_cli.studies.study.store import RUNS, SCENARIO, UNITS
 
 SECRET = 0.123456789
 KEY = "drawn/vessel.m"
@@ -67,26 +65,7 @@ def test_data_in_another_file_are_refused(study, secret, podusv, put):
     assert not (study / "runs.csv").exists()
 
 
-def test_data_of_a_unit_in_another_file_are_refused(study, secret, tmp_path, monkeypatch):
-    unit = make(small(draws=4), Unit("pid", 0, 0, 4))
-    real = h5py.Group.create_dataset
-
-    def elsewhere(group, name, **given):
-        if name != "table":
-            return real(group, name, **given)
-        shape = given["data"].shape
-        outside = [(str(secret / "secret"), 0, h5py.h5f.UNLIMITED)]
-        return real(group, name, shape, "<f8", external=outside)
-
-    monkeypatch.setattr(h5py.Group, "create_dataset", elsewhere)
-    path = study / UNITS / "pid-0-0-4.h5"
-    path.write_bytes(encoded(unit, "seal"))
-    monkeypatch.undo()
-    with pytest.raises(StorageError, match="table keeps its data in another file"):
-        read(path, "seal")
-
-
-@pytest.mark.parametrize(("name", "code"), [(RUNS, 5), (f"{UNITS}/pid-0-0-4.h5", 0)])
+@pytest.mark.parametrize(("name", "code"), [(RUNS, 5), (f"{UNITS}/pid-0-0-4.unit", 0)])
 def test_a_pipe_in_place_of_a_file_does_not_hang(study, podusv, name, code):
     (study / name).unlink(missing_ok=True)
     os.mkfifo(study / name)

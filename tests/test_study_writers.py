@@ -116,7 +116,7 @@ def test_a_killed_driver_leaves_no_lock(tmp_path, podusv, monkeypatch):
     config = written(tmp_path / "small.yaml", ("duration: 1.0", "duration: 400.0"))
     words = ("sweep", "run", str(config), "--out", "study", "--no-figures", "--workers", "2")
     with under_way(*words) as driver:
-        wait_for("study/units/*.h5")
+        wait_for("study/units/*.unit")
         said = podusv(*words)
         assert said.code == 5
         assert f"({driver.pid} on " in said.err

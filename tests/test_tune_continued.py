@@ -94,7 +94,7 @@ def validation(folder, gain):
 def test_runs_of_other_gains_are_replaced_wherever_that_was_killed(tmp_path):
     earlier, later = validation(tmp_path, 2.0), validation(tmp_path, 3.0)
     earlier.open("now")
-    for name in (RUNS, f"{UNITS}/toy-0-0-8.h5"):
+    for name in (RUNS, f"{UNITS}/toy-0-0-8.unit"):
         (earlier.folder / name).write_bytes(b"of other gains")
 
     def begin():

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from pathlib import Path
 
 import h5py
@@ -30,13 +29,12 @@ def readable(path: Path, kind: str) -> Iterator[None]:
 
 
 @contextmanager
-def opened(path: Path, kind: str, content: bytes | None = None) -> Iterator[h5py.File]:
-    """A regular file with all of its data in itself, or its `content`, which is read already.
+def opened(path: Path, kind: str) -> Iterator[h5py.File]:
+    """A regular file with all of its data in itself.
 
     Whatever h5py raises in the block is a StorageError that calls the file no `kind`.
     """
-    source = _descriptor(path) if content is None else nullcontext(io.BytesIO(content))
-    with source as name, readable(path, kind), h5py.File(name, "r") as file:
+    with _descriptor(path) as name, readable(path, kind), h5py.File(name, "r") as file:
         check(file)
         yield file
 

@@ -1,37 +1,36 @@
 """The folder of a study: units as they come, then runs.h5 with every run in one table.
 
     study.json     what the study is (identity), how many draws were asked for, and when
-    units/*.h5     a file a unit, each written whole; gone once they are in runs.h5
+    units/*.unit   a file a unit, each written whole; gone once they are in runs.h5
     runs.h5        every run, dimensions (law, cell, draw)
 
-runs.h5 holds one dataset a metric, `status` (a code, see its attribute), `until` [s] and causes; a
-unit has metrics and `until` as rows of `table`, whose attribute names them. Before that, in the
-user block that HDF5 leaves alone, are its facts in one line of JSON, with a digest of all bytes: so
-a unit is counted without HDF5, which takes ten times longer. A unit that is damaged or belongs to
-another identity is not read and not counted; such a runs.h5 is an error, as it may be all there is.
+runs.h5 holds one dataset a metric, `status` (a code, see its attribute), `until` [s] and causes. A
+unit is one line of JSON (law, cell, draws, names of metrics, causes, a digest of all bytes) before
+its numbers: the metrics and `until`, 64 bits each, then a byte of status for each draw. A unit that
+is damaged or belongs to another identity is not read and not counted; such a runs.h5 is an error,
+as it may be all there is.
 """
 
 from __future__ import annotations
 
 import hashlib
-import io
 import json
+import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict
+from dataclasses import astuple
 from itertools import chain
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-import h5py
 import numpy as np
 
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.metrics.table import metrics_with
 from podusv_cli.scenario.plugins import again
-from podusv_cli.storage import files, hdf5, json_files
+from podusv_cli.storage import files, json_files
 from podusv_cli.storage.run_folder import STUDY
 from podusv_cli.studies.study import record, runs_file, runs_writer
 from podusv_cli.studies.study.plan import Plan, digest, disagreements
@@ -42,7 +41,6 @@ UNITS, RUNS = "units", "runs.h5"
 SCENARIO = "scenario.yaml"  # whole: it refers to no other file but plug-ins beside it
 FORMAT = 1
 SEAL = "sha256"
-BLOCK = 512  # bytes of the smallest user block of HDF5
 
 
 class Store:
@@ -130,7 +128,7 @@ class Store:
     def write(self, result: UnitResult) -> None:
         """Keep the result of a unit. Raises StorageError."""
         unit = result.unit
-        name = f"{unit.law}-{unit.cell}-{unit.first}-{unit.count}.h5"
+        name = f"{unit.law}-{unit.cell}-{unit.first}-{unit.count}.unit"
         files.write_bytes(self.folder / UNITS / name, encoded(result, self.seal))
 
     def results(self) -> Iterator[UnitResult]:
@@ -142,7 +140,7 @@ class Store:
                 yield result
 
     def _units(self) -> list[Path]:
-        return sorted((self.folder / UNITS).glob("*.h5"))
+        return sorted((self.folder / UNITS).glob("*.unit"))
 
     def write_runs(self) -> None:
         """Put every run into runs.h5, and remove its units once no run is missing.
@@ -150,7 +148,7 @@ class Store:
         A driver may make more units meanwhile, so the same ones are read each time. Raises
         StorageError.
         """
-        paths = [path for path in self._units() if undamaged(_content(path), self.seal)]
+        paths = [path for path in self._units() if read(path, self.seal)]
         runs_writer.write(self.folder / RUNS, self.plan, self.seal, lambda: self._these(paths))
         if all(self.runs().tried(law).all() for law in self.plan.laws):
             with files.storage_errors(f"cannot remove the files in {self.folder / UNITS}"):
@@ -200,78 +198,52 @@ class Store:
             for (law, cell), mask in there.items():
                 mask[: earlier.wanted] = earlier.tried(law)[cell]
         for path in self._units():
-            if unit := undamaged(_content(path), self.seal):
+            if result := read(path, self.seal):
+                unit = result.unit
                 there[unit.law, unit.cell][unit.first : unit.draws.stop] = True
         return there
 
 
 def encoded(result: UnitResult, seal: str) -> bytes:
-    """A unit as the content of a file. One array is read several times faster than one a metric."""
-    unit, buffer = result.unit, io.BytesIO()
-    facts = {"identity": seal, **asdict(unit)}
-    # The digest is as long whatever it is of, and a user block has 512 bytes, or 1024, 2048, ...
-    block = BLOCK
-    while block <= len(_head(facts, b"")):
-        block *= 2
-    with h5py.File(buffer, "w", libver=("v108", "v108"), userblock_size=block) as file:
-        table = np.stack([*result.metrics.values(), result.until])
-        arrays = {"table": table, "status": result.status, "cause": _texts(result.causes)}
-        for name, array in arrays.items():
-            file.create_dataset(name, data=array, track_times=False)
-        file["table"].attrs["metrics"] = " ".join(result.metrics)
-    content = buffer.getvalue()[block:]
-    return _head(facts, content).ljust(block, b"\0") + content
+    """A unit as the content of a file."""
+    facts = {
+        "identity": seal, "unit": astuple(result.unit), "metrics": [*result.metrics],
+        "causes": result.causes,
+    }  # fmt: skip
+    table = np.array([*result.metrics.values(), result.until], "<f8")
+    numbers = table.tobytes() + np.array(result.status, np.uint8).tobytes()
+    return _head(facts, numbers) + numbers
 
 
-def _head(facts: Mapping[str, Any], content: bytes) -> bytes:
-    """The line before a unit's content: what it is, and a digest of this and of the content."""
-    found = hashlib.sha256(json.dumps(facts).encode() + content).hexdigest()
+def _head(facts: Mapping[str, Any], numbers: bytes) -> bytes:
+    """The line before a unit's numbers: what it is, and a digest of this and of the numbers."""
+    found = hashlib.sha256(json.dumps(facts).encode() + numbers).hexdigest()
     return json.dumps({**facts, SEAL: found}).encode() + b"\n"
 
 
-def undamaged(content: bytes, seal: str) -> Unit | None:
-    """Which unit a file has; None for one that is damaged or of another identity."""
-    head = content[: content.find(b"\n") + 1]
-    block = BLOCK
-    while block <= len(head):
-        block *= 2
+def decoded(content: bytes, seal: str) -> UnitResult | None:
+    """The unit of a file; None where it is damaged or of another identity."""
+    end = content.find(b"\n") + 1
     try:
-        facts = json.loads(head)
+        facts = json.loads(content[:end])
         del facts[SEAL]
-        whole = content[:block].rstrip(b"\0") == head == _head(facts, content[block:])
-        if not whole or facts.pop("identity") != seal:
+        if content[:end] != _head(facts, content[end:]) or facts["identity"] != seal:
             return None
-        return Unit(**facts)
+        names, unit = facts["metrics"], Unit(*facts["unit"])
+        shape = len(names) + 1, unit.count
+        table = np.frombuffer(content, "<f8", math.prod(shape), end).reshape(shape)
+        status = np.frombuffer(content, np.uint8, unit.count, end + table.nbytes)
+        metrics = dict(zip(names, table[:-1], strict=True))
+        return UnitResult(unit, metrics, status, table[-1], tuple(facts["causes"]))
     except (ValueError, KeyError, TypeError):
         return None
 
 
 def read(path: Path, seal: str) -> UnitResult | None:
-    """A unit with its runs; None for a file that is damaged or of another identity.
+    """The unit in a file; None where it is damaged, no file, or of another identity.
 
-    Raises StorageError for one that is sealed like a unit and is none.
-    """
-    content = _content(path)
-    unit = undamaged(content, seal)
-    if unit is None:
-        return None
-    with hdf5.opened(path, "runs", content) as file:
-        table, names = file["table"][()], file["table"].attrs["metrics"].split()
-        causes = tuple(text.decode() for text in file["cause"][()])
-        metrics = dict(zip(names, table[:-1], strict=True))
-        return UnitResult(unit, metrics, file["status"][()], table[-1], causes)
-
-
-def _content(path: Path) -> bytes:
-    """A file's bytes; none where another podusv removed it meanwhile, or where it is no file.
-
-    Raises StorageError.
+    None, too, where another podusv removed it meanwhile. Raises StorageError.
     """
     with files.storage_errors(f"cannot read {path}"), suppress(FileNotFoundError):
-        return path.read_bytes() if path.is_file() else b""
-    return b""
-
-
-def _texts(texts: Sequence[str]) -> Any:
-    content = [text.encode() for text in texts]
-    return np.array(content, dtype=f"S{max(1, *map(len, content))}")
+        return decoded(path.read_bytes(), seal) if path.is_file() else None
+    return None
