@@ -13,7 +13,7 @@ import ast
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -90,10 +90,6 @@ def parse_inequality(text: str, metrics: Mapping[str, Metric]) -> Inequality:
             if not _names(left, metrics):
                 refuse(left, f"is no statistic of the draws; example: {INEQUALITY}")
             return Inequality(text, left, isinstance(sign, UPWARD), bound)
-    _no_inequality(tree)
-
-
-def _no_inequality(tree: ast.expr) -> NoReturn:
     refuse(tree, f"compare one statistic with one number by <, <=, > or >=, as in {INEQUALITY}")
 
 
