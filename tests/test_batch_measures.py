@@ -85,8 +85,12 @@ def test_every_key_that_can_be_drawn_gives_the_metrics_of_the_run_alone(
         for key, old in values(base).items()
         if has(base, key) and isinstance(old, int | float) and not isinstance(old, bool)
     }
-    runs = {key: one for key, old in numbers.items() if (one := changed(base, key, old))}
-    assert len(runs) > len(numbers) / 2
+    first = kind is PARTS[0][-1]  # all keys with this part; of those that others share, a few
+    shared = [key for key in numbers if not key.startswith(section)]
+    left_out = {key for place, key in enumerate(shared) if (place + len(kind.__name__)) % 5}
+    tried = numbers if first else {k: old for k, old in numbers.items() if k not in left_out}
+    runs = {key: one for key, old in tried.items() if (one := changed(base, key, old))}
+    assert len(runs) > len(tried) / 2
     table = {
         key: [values(runs[row])[key] if row == key else numbers[key] for row in runs]
         for key in runs

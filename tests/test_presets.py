@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from podusv_cli.scenario.load import load, load_text
 from podusv_cli.storage.run_folder import open_run
 from podusv_cli.workflows import run as running
 
@@ -88,19 +87,6 @@ def test_the_table_of_metrics_has_every_digit(runs, name):
     lines = (runs[name].folder / "metrics.csv").read_text().splitlines()
     told = {metric: float(number) for metric, number, _ in (line.split(",") for line in lines[1:])}
     assert told == pytest.approx(runs[name].metrics, rel=0, abs=0, nan_ok=True)
-
-
-@pytest.mark.parametrize("path", sorted(CONFIGS.rglob("*.yaml")), ids=lambda path: path.stem)
-def test_every_config_says_what_it_is_for_and_is_sound(path):
-    first, second, *_ = path.read_text().splitlines()
-    assert first.startswith("# ")
-    prefix = "# yaml-language-server: $schema="
-    assert second.startswith(prefix)
-    assert (path.parent / second.removeprefix(prefix)).resolve().name == "schema.json"
-    if "not meant to be run" not in first:
-        scenario = load(path).scenario
-        assert scenario.description
-        assert load_text(path.read_text(), str(path)).scenario == scenario
 
 
 def test_a_vessel_of_ones_own_settles_where_its_thrust_is_its_drag(tmp_path):

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Sequence
+from itertools import cycle, islice, product
 from typing import Any, TypeVar
 
 import pytest
@@ -12,6 +13,13 @@ T = TypeVar("T")
 def count(few: T, full: T) -> T:
     """`full` where the environment variable PODUSV_FAULTS is `full`, else `few`."""
     return full if os.environ.get("PODUSV_FAULTS") == "full" else few
+
+
+def each_with_some(things: Sequence[Any], others: Sequence[Any]) -> list[tuple[Any, Any]]:
+    """Every pair with PODUSV_FAULTS=full; else each thing and each other at least once."""
+    pairs = max(len(things), len(others))
+    some = list(islice(zip(cycle(things), cycle(others), strict=False), pairs))
+    return count(some, list(product(things, others)))
 
 
 def few(commands: Sequence[tuple[str, tuple[str, ...]]]) -> list[Any]:
