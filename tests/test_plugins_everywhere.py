@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from command_samples import Command
 from plugin_samples import LAW, SCENARIO, put
-from test_cli_completion import offered_for
+from test_cli_words import offered_for
 
 import podusv_cli as podusv_python
 from podusv_cli.core.plugins import from_file
