@@ -68,11 +68,6 @@ def test_every_fault_is_a_line_on_stderr(podusv):
     )
 
 
-def test_a_missing_file_is_a_line_on_stderr(podusv):
-    said = podusv("validate", "nope.yaml")
-    assert said == (2, "", "nope.yaml: cannot be read: no such file or directory\n")
-
-
 def test_the_laws_to_compare_are_named_and_claims_are_checked(podusv):
     several = SOUND + "controllers: {slow: {k_ze: 0.01}, fast: {k_ze: 1}}\nclaims:\n"
     write("b.yaml", several + "  C1: {says: s, source: p, expect: slow.iae > fast.iae}\n")

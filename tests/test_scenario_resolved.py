@@ -143,20 +143,6 @@ def test_a_resolved_scenario_reads_back_to_the_same_bits(data):
     assert repr(again) == repr(scenario), "-0.0 equals 0.0, but is not the same number"
 
 
-def test_a_sea_seen_through_sensors_reads_back_to_the_same_bits():
-    sea = "[{kind: step}, {kind: current, speed: 0.1}, {kind: waves, height: 0.1, period: 2.0}]"
-    text = SOUND.replace("disturbance: {kind: none}", f"disturbance: {sea}")
-    assert text != SOUND
-    text += (
-        "measurement: {kind: sensors, velocity: null, heading: {outages: [[1, 2]], delay: 0.1}}\n"
-    )
-    text += "estimator: {kind: ekf}\n"
-    scenario = load_text(text, "a.yaml").scenario
-    again = load_stored(resolved_yaml(scenario), "resolved.yaml").scenario
-    assert again == scenario
-    assert repr(again) == repr(scenario)
-
-
 def test_every_value_is_written_out_and_none_is_a_default_any_more():
     first = loaded(SOUND)
     again = load_text(resolved_yaml(first.scenario), "resolved.yaml")

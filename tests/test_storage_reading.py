@@ -57,12 +57,6 @@ def test_what_was_written_is_read(path, recorded):
     assert log_reader.resolved_yaml(path) == YAML
 
 
-@pytest.mark.parametrize("text", ["", "a: 1\n", "# Schräglage ψ\n" * 20_000])
-def test_the_scenario_comes_back_whatever_its_length(path, text):
-    path.write_bytes(log(resolved_yaml=text))
-    assert log_reader.resolved_yaml(path) == text
-
-
 PACKED = {"compression": "gzip", "shuffle": True, "fletcher32": True}
 
 
@@ -117,15 +111,11 @@ def only_time(count: int) -> Callable[[h5py.File], None]:
 FIFTY = np.zeros(50)
 WRONG = {
     "soft link": (linked("x", h5py.SoftLink("/z_e")), "link to elsewhere"),
-    "soft link to nothing": (linked("x", h5py.SoftLink("/nowhere")), "link to elsewhere"),
     "too short": (replaced("x", data=FIFTY[1:], **PACKED), "49 values along time"),
     "other nodes": (replaced("rbf_width", data=FIFTY[:4], **PACKED), "4 values along input"),
     "giant in all": (only_time(2**40), "claims 8796093022208 bytes.*; read it with h5py or xarray"),
-    "no time": (lambda file: file.pop("time"), "damaged"),
     "unknown signal": (lambda file: file.create_dataset("tau_w", data=FIFTY), "damaged"),
     "later format": (described("podusv_format", np.int32(3)), "format 3; this .* reads format 2$"),
-    "no format": (lambda file: file.attrs.pop("podusv_format"), "damaged"),
-    "no status": (lambda file: file.attrs.pop("status"), "damaged"),
     "unknown status": (described("status", np.bytes_("asleep")), "unknown status 'asleep'"),
     "no text": (described("controller", np.bytes_(b"\xff")), "utf-8"),
 }  # fmt: skip
@@ -163,8 +153,6 @@ def test_data_in_other_files_are_refused(path, secret):
     ("change", "words"),
     [
         (linked("provenance", h5py.SoftLink("/")), "link to elsewhere"),
-        (linked("provenance/resolved_yaml", h5py.SoftLink("/x")), "link to elsewhere"),
-        (replaced("provenance", data=1.0), "damaged"),
         (lambda file: file.pop("provenance"), "damaged"),
     ],
 )

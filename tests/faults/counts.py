@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Sequence
-from itertools import cycle, islice, product
+from itertools import cycle, product
 from typing import Any, TypeVar
 
 import pytest
@@ -15,11 +15,13 @@ def count(few: T, full: T) -> T:
     return full if os.environ.get("PODUSV_FAULTS") == "full" else few
 
 
-def each_with_some(things: Sequence[Any], others: Sequence[Any]) -> list[tuple[Any, Any]]:
-    """Every pair with PODUSV_FAULTS=full; else each thing and each other at least once."""
-    pairs = max(len(things), len(others))
-    some = list(islice(zip(cycle(things), cycle(others), strict=False), pairs))
-    return count(some, list(product(things, others)))
+def each_with_some(commands: Sequence[tuple[str, ...]], others: Sequence[Any]) -> list[Any]:
+    """Each command with one of the other things in turn; with all, where all samples are taken."""
+    pairs = count(zip(commands, cycle(others), strict=False), product(commands, others))
+    return [
+        pytest.param(words, other, id=f"{' '.join(words)}-{other.__name__}")
+        for words, other in pairs
+    ]
 
 
 def few(commands: Sequence[tuple[str, tuple[str, ...]]]) -> list[Any]:

@@ -85,15 +85,13 @@ def refused(podusv: Command, words: tuple[str, ...], before: Callable[[], None])
     return one_line(said.err)
 
 
-@pytest.mark.parametrize(("words", "make"), each_with_some([*INSIDE, *ITSELF], ODD), ids=str)
+@pytest.mark.parametrize(("words", "make"), each_with_some([*INSIDE, *ITSELF], ODD))
 def test_something_that_is_no_folder(podusv, words, make):
     make(Path("place"))
     assert "place" in refused(podusv, words, lambda: None)
 
 
-@pytest.mark.parametrize(
-    ("words", "make"), each_with_some([RUN, COMPARE, ("plot", "x")], ODD), ids=str
-)
+@pytest.mark.parametrize(("words", "make"), each_with_some([RUN, COMPARE, ("plot", "x")], ODD))
 def test_something_that_is_no_folder_where_results_go_by_default(podusv, words, make):
     place = Path("figures" if words[0] == "plot" else "results")
     for path in place.glob("*"):
@@ -104,7 +102,7 @@ def test_something_that_is_no_folder_where_results_go_by_default(podusv, words, 
     assert place.name in refused(podusv, words, lambda: None)
 
 
-@pytest.mark.parametrize(("words", "make"), each_with_some(INSIDE, FORBIDDEN), ids=str)
+@pytest.mark.parametrize(("words", "make"), each_with_some(INSIDE, FORBIDDEN))
 def test_somewhere_where_one_may_not(podusv, words, make):
     make(Path("place"))
     line = refused(podusv, words, give_up_rights)

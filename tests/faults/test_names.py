@@ -88,13 +88,6 @@ def test_a_link_in_place_of_the_folder_is_left_alone(podusv, target, force):
     assert [path.name for path in Path("elsewhere").iterdir()] == ["kept"]
 
 
-def test_a_folder_reached_by_a_link_is_a_folder(podusv):
-    Path("real").mkdir()
-    Path("link").symlink_to("real")
-    said = podusv("run", write("a.yaml", BASE), "--out", "link/x", "--no-figures", "-q")
-    assert (said.code, manifest.check(Path("real/x")).status) == (0, "finished")
-
-
 def test_out_may_begin_with_a_dash_and_hold_any_letters(podusv):
     config = write("a.yaml", BASE)
     for out in ("-x", "\u0130 \u202e\U0001f6a2", "e\u0301", "a'b\"c", "new\nline"):

@@ -6,7 +6,6 @@ What does not stop sleeps or computes for many minutes: it would be waited for i
 import os
 import pty
 import signal
-import subprocess
 import sys
 import threading
 import time
@@ -351,19 +350,3 @@ def test_run_and_rerun_tell_an_interruption_in_the_same_words(podusv, monkeypatc
     assert (run.code, rerun.code) == (130, 130)
     assert run.err.startswith("short.yaml: interrupted after t = ")
     assert rerun.err == run.err.replace("short.yaml", "x")
-
-
-@pytest.mark.slow  # runs pytest
-def test_these_tests_end_where_signals_are_ignored():
-    """As in `nohup make test &`."""
-
-    def deaf() -> None:
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            signal.signal(number, signal.SIG_IGN)
-
-    words = ["-q", "-p", "no:cacheprovider", "-n", "0", "-k", "is_kept", str(Path(__file__))]
-    done = subprocess.run(
-        [sys.executable, "-m", "pytest", *words], cwd=ROOT, preexec_fn=deaf, timeout=120,
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stdout
