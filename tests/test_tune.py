@@ -22,7 +22,7 @@ from podusv_cli.studies.tuning.space import Gain
 from podusv_cli.studies.tuning.trials import CUT, FINISHED, PRUNED, Trial, best, front
 from podusv_cli.studies.tuning.validation import chosen
 
-BUDGET = 100
+BUDGET = 64
 
 
 @pytest.fixture
