@@ -14,6 +14,7 @@ from podusv_cli.components.estimators.low_pass import LowPass
 from podusv_cli.components.estimators.none import NoEstimator
 from podusv_cli.components.estimators.passive_observer import PassiveObserver
 from podusv_cli.components.measurements.sensors import Sensor, Sensors
+from podusv_cli.core.kernel import call
 from podusv_cli.core.registry import kinds
 from podusv_cli.scenario.explain import signals
 
@@ -84,11 +85,11 @@ def test_the_low_pass_lets_as_much_noise_through_as_theory_says():
 
 def test_a_measured_velocity_comes_first():
     seen, state, k = delivered(LowPass(), np.zeros(6), np.array([0, 0, 0, 0.7, 0.0, 0.0]))
-    rate, follow = np.full(6, np.nan), LowPass.follow
-    follow(0.0, seen, np.zeros(3), state, k, np.zeros(1), rate)
+    rate = np.full(6, np.nan)
+    call(LowPass.follow, seen=seen, state=state, k=k, rate=rate)
     np.testing.assert_allclose(rate[3], 0.7 / LowPass().T_nu)
     seen[15] = 0.0  # not measured, and the pose does not move
-    follow(0.0, seen, np.zeros(3), state, k, np.zeros(1), rate)
+    call(LowPass.follow, seen=seen, state=state, k=k, rate=rate)
     assert rate[3] == 0.0
 
 

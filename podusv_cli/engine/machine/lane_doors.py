@@ -6,9 +6,9 @@ from collections.abc import Set
 from ctypes import CFUNCTYPE, POINTER
 from typing import Any
 
-from podusv_cli.core.kernel import LANES, constants_type, kernel, shared
+from podusv_cli.core.kernel import LANES, constants_type, kernel, shared, taken
 from podusv_cli.engine.machine.lane_source import has_source
-from podusv_cli.engine.machine.signatures import NUMBER, NUMBERS, SIGNATURES, VECTOR, WHOLE, taken
+from podusv_cli.engine.machine.signatures import NUMBER, NUMBERS, SIGNATURES, VECTOR, WHOLE
 
 LANE_VECTOR = POINTER(NUMBER * LANES)
 PROTOTYPES: dict[str, Any] = {
@@ -29,7 +29,7 @@ def bind(part: str, inner: Any, names: tuple[str, ...], alike: Set[str]) -> Any:
     )
     inside: dict[str, Any] = {"Constants": constants_type(names), "shared": shared}
     exec(f"def named(p):\n    return Constants({fields})", inside)  # noqa: S102
-    passed = ["named(p)" if a == "p" else a for a in taken(part, inner)]
+    passed = ["named(k)" if a == "k" else a for a in taken(inner, arguments)]
     passed = ["None", *passed] if has_source(inner) else passed  # its mask: all lanes
     scope: dict[str, Any] = {"kernel": inner, "named": kernel(inside["named"])}
     exec(f"def {part}_entry({', '.join(arguments)}):\n    kernel({', '.join(passed)})", scope)  # noqa: S102
