@@ -16,11 +16,7 @@ from podusv_cli.core import plugins
 # What is written in place of what, and what is said.
 MISTAKES = {
     "two kinds": ('["cross_track"] =', '["other"] =', "its kind is no fixed word; write kind: "),
-    "other arguments": (
-        "law(t, x, ",
-        "law(t, y, ",
-        "'y' is none of its arguments (allowed: t, x, memory, ",
-    ),
+    "other arguments": ("law(t, x, ", "law(t, y, ", "'y' is none of its arguments (allowed: "),
     "no constant": (
         "return PUSH * k.gain",
         "return PUSH * k.gian",
