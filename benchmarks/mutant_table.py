@@ -163,7 +163,7 @@ TABLE: dict[str, list[Row]] = {
      "test_an_actuator_too_weak_is_told_and_falls_behind"),
     ("at.what == what and at.time < case.scenario.simulation.duration", "at.what == what",
      "test_what_comes_after_the_run_is_not_told"),
-    ("LONG = 0.02 ", "LONG = 0.2 ", "test_every_code_is_documented_with_its_meaning"),
+    ("LONG = 0.02 ", "LONG = 0.2 ", "test_every_finding_is_documented_as_its_declaration_says"),
 ],
 "figures": [
     ("low + int(np.argmin(y[low:high])), low + int(np.argmax(y[low:high]))",

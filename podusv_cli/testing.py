@@ -118,7 +118,7 @@ def keeps_its_declaration(component: Component) -> None:
 
 
 def is_finite(component: Component) -> None:
-    """At random states every output is written, and is a finite number."""
+    """At random states every output is written and finite, and nothing that is only to be read."""
     for seed in range(STATES):
         for out in evaluated(component, seed):
             assert np.isfinite(out).all(), f"at random state {seed} it writes {out}"
@@ -238,10 +238,18 @@ def evaluated(component: Component, seed: int) -> list[Vector]:
     bearing, distance = random.uniform(-np.pi, np.pi), random.uniform(1.0, 20.0)
     place = x[:2] + distance * np.array([np.cos(bearing), np.sin(bearing)])
     target = np.concatenate([place, random.uniform(-1.0, 1.0, 4) * [0.7, 0.7, 0.1, 0.1]])
+    x, target = _to_read(x), _to_read(target)
     for base, ask in CALLS:
         if isinstance(component, base):
             return ask(component, t, x, target, random)
     raise TypeError(f"{component_kind(component)} is no part of a closed loop")
+
+
+def _to_read(given: Vector) -> Vector:
+    """The same numbers; ValueError where a kernel writes one of them."""
+    given = given.copy()
+    given.flags.writeable = False
+    return given
 
 
 def _law(law: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vector]:
@@ -252,8 +260,8 @@ def _law(law: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vec
         call(law.sample, t=t, x=x, memory=memory, target=target, k=k, table=law.table())
     tau, rate, signals = outputs
     call(
-        law.law, t=t, x=x, memory=memory, target=target, k=k, table=law.table(), tau=tau, rate=rate,
-        signals=signals, work=np.full(law.workspace(), np.nan),
+        law.law, t=t, x=x, memory=_to_read(memory), target=target, k=k, table=law.table(), tau=tau,
+        rate=rate, signals=signals, work=np.full(law.workspace(), np.nan),
     )  # fmt: skip
     return outputs
 
@@ -274,7 +282,7 @@ def _sea(sea: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vec
 
 
 def _actuator(actuator: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vector]:
-    state, demand = actuator.rest(), random.normal(0.0, 5.0, 2)
+    state, demand = _to_read(actuator.rest()), _to_read(random.normal(0.0, 5.0, 2))
     outputs = [np.full(size, np.nan) for size in (3, len(state), len(actuator.signals))]
     k = bundle(actuator.constants())
     tau, rate, signals = outputs

@@ -49,10 +49,7 @@ class Folder:
 
 
 def verdicts():
-    runs = {
-        "a": Entry("a", Folder({"iae": 3.0}), scenario()),
-        "lost": Absent(scenario(), "killed"),
-    }
+    runs = {"a": Entry("a", Folder({"iae": 3.0}), scenario()), "lost": Absent(scenario(), "killed")}
     texts = {
         "C1": "x.iae == 3", "C2": "x.iae > 4", "C3": "lost.iae < x.iae", "C4": "1 / 3 < 0 * x.iae",
     }  # fmt: skip

@@ -5,13 +5,7 @@ from typing import Any, Literal
 
 import numpy as np
 import pytest
-from conftest import (
-    SMOOTH_START,
-    corrected,
-    example,
-    kinds,
-    run,
-)
+from conftest import SMOOTH_START, corrected, example, kinds, run
 
 from podusv_cli.components.actuators.base import Actuator
 from podusv_cli.components.actuators.command import Command

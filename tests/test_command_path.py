@@ -6,16 +6,7 @@ from typing import Any, Literal
 
 import numpy as np
 import pytest
-from conftest import (
-    PAPER,
-    POD,
-    SMOOTH_START,
-    Constant,
-    adrift,
-    corrected,
-    last_state,
-    run,
-)
+from conftest import PAPER, POD, SMOOTH_START, Constant, adrift, corrected, last_state, run
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import lambertw

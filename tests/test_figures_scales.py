@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn_samples import changed, drawn, line, no_figures_but, panels, recording, scenario, shown
+from drawn_samples import changed, drawn, line, panels, recording, scenario, shown
+from old_results import draw_quickly
 from scenario_samples import SOUND
 
 from podusv_cli.components.measurements.sensors import Sensor, Sensors
@@ -272,12 +273,12 @@ def test_outages_are_shaded_for_the_quantities_of_the_sensor():
 
 
 @pytest.mark.parametrize("measurement", ["exact", "sensors"])
-def test_a_run_draws_estimates_by_default_if_it_has_any(tmp_path, measurement):
+def test_a_run_draws_estimates_by_default_if_it_has_any(tmp_path, measurement, monkeypatch):
+    draw_quickly(monkeypatch)
     config = tmp_path / "a.yaml"
     brief = "simulation: {step: 0.01, duration: 0.1, compiled: false}\n"
     config.write_text(f"{SOUND}{brief}measurement: {{kind: {measurement}}}\n")
-    with no_figures_but("estimates", "sea", "errors", "trajectory", "controls"):
-        done = run.run(config, run.Request((), tmp_path / "run"))
+    done = run.run(config, run.Request((), tmp_path / "run"))
     found = {path.stem for path in (done.folder / "figures").iterdir()}
     assert ("estimates" in found) == (measurement == "sensors")
     assert "sea" not in found

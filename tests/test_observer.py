@@ -20,11 +20,7 @@ MEANS = (0.4, -0.3, 0.2)
 STEADY = HarmonicDisturbance(
     b_u=Harmonic(mean=MEANS[0]), b_v=Harmonic(mean=MEANS[1]), b_r=Harmonic(mean=MEANS[2])
 )
-SPEED = {
-    "Alos": 0.4,
-    "VelocityVector": 0.4,
-    "Adrc": 0.0,
-}  # of the target, for loops
+SPEED = {"Alos": 0.4, "VelocityVector": 0.4, "Adrc": 0.0}  # of the target, for loops
 OBSERVING = list(kinds("podusv_cli.components.controllers", ObservingController).values())
 
 

@@ -52,6 +52,8 @@ def jumps(path: Path, until: float) -> Iterator[tuple[float, str]]:
                 middle = 0.5 * (low + high)
                 a, b, c = (target_at(path, t)[axes] for t in (low, middle, high))
                 low, high = (low, middle) if abs(b - a).sum() > abs(c - b).sum() else (middle, high)
+                if abs(b - a).max() + abs(c - b).max() < 1e-6:  # too little for a jump
+                    break
             if abs(target_at(path, high) - target_at(path, low))[axes].max() > 1e-6:
                 yield 0.5 * (low + high), order
                 break

@@ -201,11 +201,7 @@ def test_what_plugins_may_name(podusv, text):
 
 
 def test_a_file_may_stand_alone_or_twice(podusv):
-    for entry in (
-        "laws/my_law.py",
-        "[laws/my_law.py, ./laws/my_law.py]",
-        "{laws/my_law.py: {}}",
-    ):
+    for entry in ("laws/my_law.py", "[laws/my_law.py, ./laws/my_law.py]", "{laws/my_law.py: {}}"):
         said = podusv("validate", put(SCENARIO.replace("[laws/my_law.py]", entry)))
         assert said.code == 0, said.err
 

@@ -37,10 +37,7 @@ def test_a_preset_that_is_no_word_is_unknown(preset):
     ("text", "says"),
     [
         ("step: 017", f"8: {NUMBER} '017'; numbers have no leading zeros"),
-        (
-            "step: 1:30",
-            f"8: {NUMBER} '1:30'; write the number out, colons are not read as minutes",
-        ),
+        ("step: 1:30", f"8: {NUMBER} '1:30'; write the number out, colons are not read as minutes"),
         ("step: '0.5'", f"8: {NUMBER} '0.5'; leave out the quotes"),
         ("step: 0,5", f"8: {NUMBER} '0,5'; write a decimal point"),
         ("step: 0.5 s", f"8: {NUMBER} '0.5 s'; convert it to that unit and leave the unit out"),
@@ -94,10 +91,7 @@ def test_a_wrong_value_is_one_sentence_at_its_place(text, says):
             "simulaton: 1",
             f"1: simulaton: unknown key; did you mean 'simulation'? (allowed: {KEYS})",
         ),
-        (
-            "K_Pu: 60",
-            f"1: K_Pu: unknown key; did you mean 'controller.K_Pu'? (allowed: {KEYS})",
-        ),
+        ("K_Pu: 60", f"1: K_Pu: unknown key; did you mean 'controller.K_Pu'? (allowed: {KEYS})"),
         ("x: 1", f"1: x: unknown key; did you mean 'start.x' or 'path.x'? (allowed: {KEYS})"),
         ('"a\\nb": 1', rf"1: a\nb: unknown key (allowed: {KEYS})"),
         (

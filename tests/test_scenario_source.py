@@ -75,10 +75,7 @@ def test_every_key_and_value_knows_its_line_and_column():
         ("a: 1\n---\nb: 2\n", "a.yaml:2:1: a second document starts here; write one a file"),
         ("", "a.yaml: is empty"),
         ("# nothing\n", "a.yaml: is empty"),
-        (
-            "\ufeffa: 1\n",
-            "a.yaml:1:1: starts with a byte order mark; save as UTF-8 without BOM",
-        ),
+        ("\ufeffa: 1\n", "a.yaml:1:1: starts with a byte order mark; save as UTF-8 without BOM"),
         ("a: 1\nb: \x07\n", "a.yaml:2:4: character U+0007 cannot stand in YAML"),
         ('a: "\\0"\n', "a.yaml:1:4: a: character U+0000 cannot stand in text"),
         ('a: "\\ud800"\n', "a.yaml:1:4: a: character U+D800 cannot stand in text"),

@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
+from old_results import draw_quickly
 from storage_samples import (
     NEW,
     OLD,
@@ -79,6 +80,7 @@ def test_everything_in_it_lasts_before_it_has_its_name(final, monkeypatch):
 def test_every_file_of_a_run_is_synced_before_the_run_has_its_name(podusv, monkeypatch):
     """The log, too, which is written in another way than the other files."""
     steps = durable_steps(monkeypatch)
+    draw_quickly(monkeypatch)
     assert podusv("run", "a.yaml", "--out", "x", "-q").code == 0
     named = [Path(path).name if step == "name" else "" for step, path in steps].index("x")
     synced = {Path(path).name for step, path in steps[:named] if step == "sync"}

@@ -130,10 +130,7 @@ def test_a_folder_reached_through_a_link_is_itself(folder):
 
 ENTRY = {"sha256": "0" * 64, "bytes": 1}
 BROKEN = {
-    "other format": (
-        lambda it: it.update(podusv_format=3),
-        "format 3; this podusv reads format 2",
-    ),
+    "other format": (lambda it: it.update(podusv_format=3), "format 3; this podusv reads format 2"),
     "no status": (lambda it: it.pop("status"), "status: Field required"),
     "list of files": (lambda it: it.update(files=["log.h5"]), "files"),
     "unknown key": (lambda it: it.update(author="me"), "author"),

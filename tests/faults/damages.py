@@ -105,7 +105,7 @@ def yaml(folder: Path, argument: str) -> None:
 
 YAML = {
     "empty": "", "open": "{a: [", "no_text": "a: \udcff", "deep": "a: " + "[" * 100_000,
-    "many": "a: [" + "1, " * 300_000 + "]", "aliases": "a: &a [1]\nb: [*a, *a]\n{whole}",
+    "aliases": "a: &a [1]\nb: [*a, *a]\n{whole}",
     "extends": "extends: {pipe}\n{whole}", "file": "path: {kind: waypoints, file: {pipe}}\n",
     "escaped": '"\\e[2J": 1\n{whole}', "tag": "a: !!python/object/apply:os.abort []\n{whole}",
 }  # fmt: skip

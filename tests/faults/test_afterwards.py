@@ -56,8 +56,10 @@ def missing(folder: str) -> list[dict[str, str]]:
     return found["missing"]  # type: ignore[no-any-return]
 
 
-@pytest.mark.parametrize(("options", "code"), [((), 0), (DIVERGING, 4)], ids=["done", "diverged"])
-@pytest.mark.parametrize("what", AFTER_A_RUN)
+@pytest.mark.parametrize(
+    ("what", "options", "code"),
+    [*((what, (), 0) for what in AFTER_A_RUN), ("the metrics", DIVERGING, 4)],
+)
 def test_the_log_is_kept_and_what_is_missing_is_told(podusv, monkeypatch, what, options, code):
     with monkeypatch.context() as patch:
         patch.setattr(*AFTER_A_RUN[what], broken)

@@ -13,14 +13,7 @@ import pytest
 from children import in_a_child, needs_mount, small_disk
 from command_samples import BASE, ROOT, Said, one_line, write
 from counts import count, few
-from old_results import (
-    COMMANDS,
-    SUCCESS,
-    assert_nothing_lost,
-    assert_whole,
-    bring_back,
-    left_over,
-)
+from old_results import COMMANDS, SUCCESS, assert_nothing_lost, assert_whole, bring_back, left_over
 from storage_samples import deadline, files
 
 from podusv_cli.storage import manifest

@@ -18,14 +18,7 @@ import pytest
 from children import Died, begun, in_a_child
 from command_samples import Said
 from counts import count, few
-from old_results import (
-    COMMANDS,
-    SUCCESS,
-    assert_nothing_lost,
-    assert_whole,
-    bring_back,
-    left_over,
-)
+from old_results import COMMANDS, SUCCESS, assert_nothing_lost, assert_whole, bring_back, left_over
 from storage_samples import Saboteur, fails, files, until_nothing_breaks
 
 from podusv_cli.engine.machine import code_folder, object_cache

@@ -65,17 +65,9 @@ class Still(Path):
             target[i] = k.radius
 """
 PATH_MISTAKES = {
-    "constant": (
-        "= k.radius",
-        "= k.radios",
-        "'radios' (my_law.py, line 59); it has radius",
-    ),
+    "constant": ("= k.radius", "= k.radios", "'radios' (my_law.py, line 59); it has radius"),
     "numpy": ("= k.radius", "= np.linalg.norm(3.0)", "cannot become machine code"),
-    "table": (
-        "np.array([1.0])",
-        "np.array(1 / 0)",
-        "division by zero (my_law.py, line 53)",
-    ),
+    "table": ("np.array([1.0])", "np.array(1 / 0)", "division by zero (my_law.py, line 53)"),
 }
 
 
@@ -114,40 +106,16 @@ def failing(*seen):
 """
 # What else a plug-in has, the exit code, and what is said.
 OTHERS = {
-    "result": (
-        "m = made(result=lambda seen, step: 1 / 0)",
-        0,
-        "own could not be made: Zero",
-    ),
+    "result": ("m = made(result=lambda seen, step: 1 / 0)", 0, "own could not be made: Zero"),
     "text": ("m = made(result=lambda seen, step: 'a')", 0, "metric own could not be made: ValueE"),
-    "size": (
-        "m = made(size=lambda layout: layout.no)",
-        2,
-        "metric own, its accumulator",
-    ),
+    "size": ("m = made(size=lambda layout: layout.no)", 2, "metric own, its accumulator"),
     "constants": ("m = made(constants=lambda layout: 5)", 2, "metric own, its accumulator, asked"),
-    "constant": (
-        "m = made(constants=lambda layout: {'standoff': 7.0})",
-        2,
-        "another constant",
-    ),
+    "constant": ("m = made(constants=lambda layout: {'standoff': 7.0})", 2, "another constant"),
     "word": ("m = made('a b')", 2, "the name of a metric is at most 64 letters, digits and '_'"),
     "metric": ("m = made('iae')", 2, "my_law.py: podusv_cli.metrics.distance has the name 'iae'"),
-    "figure": (
-        "f = figure('pods', caption='', signals=('x',))(failing)",
-        2,
-        "has the name 'pods'",
-    ),
-    "before": (
-        "f = before('a', about='path', meaning='m')(failing)",
-        0,
-        "not be looked for: Z",
-    ),
-    "after": (
-        "f = after('a', about='path', meaning='m')(failing)",
-        0,
-        "not be looked for: Z",
-    ),
+    "figure": ("f = figure('pods', caption='', signals=('x',))(failing)", 2, "has the name 'pods'"),
+    "before": ("f = before('a', about='path', meaning='m')(failing)", 0, "not be looked for: Z"),
+    "after": ("f = after('a', about='path', meaning='m')(failing)", 0, "not be looked for: Z"),
     "about": ("f = after('a', about='pth', meaning='m')(failing)", 2, "did you mean 'path'"),
 }
 
