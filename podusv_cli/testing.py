@@ -34,7 +34,7 @@ from podusv_cli.components.paths.base import Path as AnyPath
 from podusv_cli.components.paths.line import Line
 from podusv_cli.core import plugins, registry
 from podusv_cli.core.component import Component
-from podusv_cli.core.kernel import Vector, bundle
+from podusv_cli.core.kernel import Vector, bundle, call
 from podusv_cli.core.plugins import Plugin
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import Signal
@@ -238,9 +238,9 @@ def evaluated(component: Component, seed: int) -> list[Vector]:
     bearing, distance = random.uniform(-np.pi, np.pi), random.uniform(1.0, 20.0)
     place = x[:2] + distance * np.array([np.cos(bearing), np.sin(bearing)])
     target = np.concatenate([place, random.uniform(-1.0, 1.0, 4) * [0.7, 0.7, 0.1, 0.1]])
-    for base, call in CALLS:
+    for base, ask in CALLS:
         if isinstance(component, base):
-            return call(component, t, x, target, random)
+            return ask(component, t, x, target, random)
     raise TypeError(f"{component_kind(component)} is no part of a closed loop")
 
 
@@ -249,20 +249,27 @@ def _law(law: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vec
     memory = memory + random.normal(0.0, 0.1, len(memory))
     outputs = [np.full(size, np.nan) for size in (2, len(memory), len(law.signals))]
     if law.sample_period() > 0:
-        law.sample(t, x, memory, target, k, law.table())
-    law.law(t, x, memory, target, k, law.table(), *outputs, np.full(law.workspace(), np.nan))
+        call(law.sample, t=t, x=x, memory=memory, target=target, k=k, table=law.table())
+    tau, rate, signals = outputs
+    call(
+        law.law, t=t, x=x, memory=memory, target=target, k=k, table=law.table(), tau=tau, rate=rate,
+        signals=signals, work=np.full(law.workspace(), np.nan),
+    )  # fmt: skip
     return outputs
 
 
 def _path(path: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vector]:
     out = np.full(len(TARGET), np.nan)
-    path.evaluate(t, bundle(path.constants()), path.table(), out)
+    call(path.evaluate, t=t, k=bundle(path.constants()), table=path.table(), target=out)
     return [out]
 
 
 def _sea(sea: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vector]:
     out, hull = np.full(3 + len(sea.signals), np.nan), usual_vessel()
-    sea.evaluate(t, x, bundle(sea.constants_with(hull)), sea.table_for(hull, t), out)
+    call(
+        sea.evaluate, t=t, x=x, k=bundle(sea.constants_with(hull)), table=sea.table_for(hull, t),
+        b=out, again=0.0, stage=0.0,
+    )  # fmt: skip
     return [out]
 
 
@@ -270,14 +277,27 @@ def _actuator(actuator: Any, t: float, x: Vector, target: Vector, random: Any) -
     state, demand = actuator.rest(), random.normal(0.0, 5.0, 2)
     outputs = [np.full(size, np.nan) for size in (3, len(state), len(actuator.signals))]
     k = bundle(actuator.constants())
-    actuator.drive(t, x, state, demand, k, actuator.table(), *outputs)
+    tau, rate, signals = outputs
+    call(
+        actuator.drive, t=t, x=x, state=state, demand=demand, k=k, table=actuator.table(), tau=tau,
+        rate=rate, signals=signals,
+    )  # fmt: skip
     return outputs
 
 
 def _measurement(sensors: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vector]:
     seen = sensors.first(x, STEP)
     k, table = bundle(sensors.constants_with(STEP, 0)), sensors.table_for(STEP, STEPS)
-    sensors.sense(t, float(random.integers(STEPS)), x, np.zeros(3), k, table, seen)
+    call(
+        sensors.sense,
+        t=t,
+        instant=float(random.integers(STEPS)),
+        x=x,
+        b=np.zeros(3),
+        k=k,
+        table=table,
+        seen=seen,
+    )
     return [seen]
 
 
@@ -285,8 +305,8 @@ def _estimator(estimator: Any, t: float, x: Vector, target: Vector, random: Any)
     state, k = estimator.start(x, usual_vessel()), bundle(estimator.constants_with(usual_vessel()))
     seen = np.concatenate([x + random.normal(0.0, 0.1, 6), np.ones(12)])
     tau, rate, table = random.normal(0.0, 5.0, 3), np.full(len(state), np.nan), estimator.table()
-    estimator.correct(t, seen, state, k, table)
-    estimator.follow(t, seen, tau, state, k, table, rate)
+    call(estimator.correct, t=t, seen=seen, state=state, k=k, table=table)
+    call(estimator.follow, t=t, seen=seen, tau=tau, state=state, k=k, table=table, rate=rate)
     return [state, rate]
 
 

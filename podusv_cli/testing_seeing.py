@@ -12,7 +12,7 @@ import numpy as np
 from podusv_cli.components.estimators.base import Estimator
 from podusv_cli.components.measurements.base import FRESH, KNOWN, OWN, VALUE, Measurement
 from podusv_cli.components.vessels.vessel import VESSELS, Vessel
-from podusv_cli.core.kernel import Vector, bundle
+from podusv_cli.core.kernel import Vector, bundle, call
 from podusv_cli.core.signal import STATE
 from podusv_cli.scenario.presets import preset_file
 from podusv_cli.scenario.yaml_tree import plain
@@ -56,7 +56,16 @@ def watched(sensors: Measurement, steps: int = STEPS, table_of: int = STEPS) -> 
     rows = []
     for instant in range(steps):
         x = pose_at(instant * STEP)
-        sensors.sense(instant * STEP, float(instant), x, given, k, table, seen)
+        call(
+            sensors.sense,
+            t=instant * STEP,
+            instant=float(instant),
+            x=x,
+            b=given,
+            k=k,
+            table=table,
+            seen=seen,
+        )
         assert kept(seen), f"at instant {instant} it writes behind `seen`"
         assert (x == pose_at(instant * STEP)).all(), "it changes the true state"
         assert not given.any(), "it changes the disturbance"
@@ -112,9 +121,18 @@ class Asked:
     def step(self, t: float, seen: Vector, tau: Vector) -> Vector:
         """Correct, follow, and go on by a step by Euler's method; the new estimate."""
         given = seen.copy(), tau.copy()
-        self.estimator.correct(t, seen, self.state, self.k, self.table)
+        call(self.estimator.correct, t=t, seen=seen, state=self.state, k=self.k, table=self.table)
         corrected = self.state.copy()
-        self.estimator.follow(t, seen, tau, self.state, self.k, self.table, self.rate)
+        call(
+            self.estimator.follow,
+            t=t,
+            seen=seen,
+            tau=tau,
+            state=self.state,
+            k=self.k,
+            table=self.table,
+            rate=self.rate,
+        )
         for one, before, what in zip((seen, tau), given, ("seen", "tau"), strict=True):
             np.testing.assert_array_equal(one, before, f"it changes {what}")
         np.testing.assert_array_equal(self.state, corrected, "`follow` changes the state")
@@ -145,7 +163,7 @@ def waits_for_a_delivery(estimator: Estimator) -> None:
     """`correct` leaves the state where nothing was delivered."""
     asked, seen = Asked(estimator, pose_at(0.0)), delivery(pose_at(9.0), ALL, 0.0)
     before = asked.state.copy()
-    estimator.correct(1.0, seen, asked.state, asked.k, asked.table)
+    call(estimator.correct, t=1.0, seen=seen, state=asked.state, k=asked.k, table=asked.table)
     np.testing.assert_array_equal(asked.state, before, "nothing was delivered")
 
 

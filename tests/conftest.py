@@ -31,7 +31,7 @@ from podusv_cli.components.paths.line_circle import LineCircle
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core import registry
 from podusv_cli.core.component import Component, value
-from podusv_cli.core.kernel import Vector, bundle, kernel
+from podusv_cli.core.kernel import Vector, bundle, call, kernel
 from podusv_cli.core.recording import Recording
 from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop
 from podusv_cli.engine.running.simulate import simulate
@@ -99,7 +99,8 @@ def example(kind: type[Component], **fields: Any) -> Any:
 def target_at(path: Path, t: float) -> Vector:
     """Position, velocity and acceleration of the target at time t [s]."""
     target = np.full(len(TARGET), np.nan)
-    path.evaluate(t, *_numbers(path), target)
+    k, table = _numbers(path)
+    call(path.evaluate, t=t, k=k, table=table, target=target)
     return target
 
 
@@ -113,7 +114,8 @@ def load_at(disturbance: Disturbance, t: float, x: Vector | None = None) -> Vect
     b = np.full(3 + len(disturbance.signals), np.nan)
     state = np.zeros(6) if x is None else x
     k, table = disturbance.constants_with(NONLINEAR), disturbance.table_for(NONLINEAR, 400.0)
-    disturbance.kernel_with(NONLINEAR)(t, state, bundle(k), table, b)
+    evaluate = disturbance.kernel_with(NONLINEAR)
+    call(evaluate, t=t, x=state, k=bundle(k), table=table, b=b, again=0.0, stage=0.0)
     return b[:3]
 
 
@@ -130,7 +132,19 @@ def ask(law: Controller, x: Vector, memory: Vector, target: Vector, nominal: Ves
     tau, rate = np.full(2, np.nan), np.full(len(memory), np.nan)
     signals, work = np.full(len(law.signals), np.nan), np.full(law.workspace(), np.nan)
     k = bundle(law.constants_with(nominal))
-    law.law(1.0, x, memory, target, k, law.table(), tau, rate, signals, work)
+    call(
+        law.law,
+        t=1.0,
+        x=x,
+        memory=memory,
+        target=target,
+        k=k,
+        table=law.table(),
+        tau=tau,
+        rate=rate,
+        signals=signals,
+        work=work,
+    )
     return Answer(tau, rate, dict(zip((s.name for s in law.signals), signals, strict=True)))
 
 

@@ -20,9 +20,9 @@ from podusv_cli.core.kernel import kernel, tail
 GAIN, COUNT, PAIR = 1.5, 3, (0.25, -2.0)
 """
 KERNELS = {  # their arguments and what they return; one may call those before it
-    "whole": ("x, n", "{i}"), "truth": ("x, y", "{b}"), "one": ("x, y, out", "{f}"),
-    "two": ("x, n, out", "({f}, {i})"), "effect": ("x, out", ""),
-    "watch": ("t, weight, s, row, k, out", ""),
+    "whole": ("x, n", "{i}"), "truth": ("x, y", "{b}"), "one": ("x, y, seen", "{f}"),
+    "two": ("x, n, seen", "({f}, {i})"), "effect": ("x, seen", ""),
+    "watch": ("t, weight, s, row, k, seen", ""),
 }  # fmt: skip
 # What may be written for a float f, a whole number i, a truth b, a condition c, a place q, a place
 # that is written out p, and a float as a whole number w. "{f}" stands for a float, and so on.
@@ -31,11 +31,11 @@ FORMS = {
     "{f} ** 0.5|{f} ** {f}|{i} / {i}|{f} * {i}|{i} - {f}|abs({f})|float({i})|min({f}, {f})|"
     "max({f}, {f}, {i})|math.sin({f})|math.exp({f})|math.sqrt({f})|math.pow({f}, {f})|"
     "math.atan2({f}, {i})|math.tanh({f})|np.floor({f})|math.fabs({f})|({f} if {c} else {f})|"
-    "({f} if {c} else {i})|2.0 * ({b})|max({b}, {b})|out[{p}]|out[{q}]|tail(out, {q})[{q}]|"
-    "one({f}, {f}, out)|one({f}, {f}, tail(out, {q}))|two({f}, {i}, out)[0]",
+    "({f} if {c} else {i})|2.0 * ({b})|max({b}, {b})|seen[{p}]|seen[{q}]|tail(seen, {q})[{q}]|"
+    "one({f}, {f}, seen)|one({f}, {f}, tail(seen, {q}))|two({f}, {i}, seen)[0]",
     "i": "{i} + {i}|{i} - {i}|{i} * {i}|{i} // {i}|{i} % {i}|-{i}|{w}|min({i}, {i})|max({i}, {i})|"
     "math.floor(min(max({f}, -9.0), 9.0))|({i} if {c} else {i})|int({b})|{i} + ({b})|abs({i})|"
-    "whole({f}, {i})|two({f}, {i}, out)[1]",
+    "whole({f}, {i})|two({f}, {i}, seen)[1]",
     "b": "{f} < {f}|{f} >= {f}|{f} == {f}|{i} != {i}|{i} <= {f}|{f} < {f} <= {f}|({b} and {b})|"
     "({b} or {b})|not {c}|bool({f})|math.isnan({f})|math.isfinite({f})|truth({f}, {f})|"
     "({b} if {c} else {b})|({b}) == ({b})",
@@ -44,7 +44,8 @@ FORMS = {
     "w": "int(max(-9e9, min({f}, 9e9)))",
 }  # fmt: skip
 LEAVES = {
-    "f": "0.0|-0.0|0.3|-2.5|1e300|GAIN|PAIR[1]|1|out[0]|out[1]|out[3]", "i": "0|2|-3|COUNT|{w}|{w}",
+    "f": "0.0|-0.0|0.3|-2.5|1e300|GAIN|PAIR[1]|1|seen[0]|seen[1]|seen[3]",
+    "i": "0|2|-3|COUNT|{w}|{w}",
     "b": "{f} < {f}|{f} >= {f}|{f} == {f}|True", "c": "{f} < {f}|{f} > 0.0",
     "q": "0|1|2|COUNT|{w} % 4", "p": FORMS["p"], "w": FORMS["w"],
 }  # fmt: skip
@@ -64,7 +65,7 @@ class Writer:
         self.known = {"f": [n for n in given if n in "xyt"], "i": [n for n in given if n == "n"]}
         self.known["b"] = []
         later = list(KERNELS)[list(KERNELS).index(name) :]
-        self.lacks = [f"{other}(" for other in later] + ["out"] * ("out" not in given)
+        self.lacks = [f"{other}(" for other in later] + ["seen"] * ("seen" not in given)
         self.count, self.loops = 0, 0
         self.counts: list[str] = []  # of loops, which have to end
 
@@ -72,7 +73,7 @@ class Writer:
         """All of it."""
         body = self.block(2, self.draw.randint(1, 4))
         if self.name == "watch":
-            body += self.lines("out[5] = {f}", "out[6] = {i}")
+            body += self.lines("seen[5] = {f}", "seen[6] = {i}")
         head = ["@kernel", f"def {self.name}({self.arguments}):"]
         return "\n".join([*head, *(f"    {line}" for line in [*body, *self.leave()])]) + "\n"
 
@@ -126,23 +127,25 @@ class Writer:
         return [f"{self.set(kind)} = {value}"]
 
     def store(self, depth: int) -> list[str]:
-        places = ["out[{p}]", "out[{q}]", "tail(out, {q})[{q}]", *self.known["f"]]
+        places = ["seen[{p}]", "seen[{q}]", "tail(seen, {q})[{q}]", *self.known["f"]]
         return self.lines(f"{self.one_of(places)} = {self.draw.choice(['{f}', '{i}', '{b}'])}")
 
     def augment(self, depth: int) -> list[str]:
-        place = self.one_of(["out[{p}]", "out[{q}]", *self.known["f"]])
+        place = self.one_of(["seen[{p}]", "seen[{q}]", *self.known["f"]])
         return self.lines(f"{place} {self.draw.choice(['+=', '-=', '*=', '/='])} {{f}}")
 
     def several(self, depth: int) -> list[str]:
         """Two variables at once, or a variable and a place."""
         if self.draw.random() < 0.5:
-            value = self.filled(self.one_of(["{f}, {i}", "two({f}, {i}, out)"]), 1)
+            value = self.filled(self.one_of(["{f}, {i}", "two({f}, {i}, seen)"]), 1)
             return [f"{self.set('f')}, {self.set('i')} = {value}"]
-        value, place = self.lines("{f}", self.one_of(["out[1]", "out[{q}]", *self.known["f"]]))
+        value, place = self.lines("{f}", self.one_of(["seen[1]", "seen[{q}]", *self.known["f"]]))
         return [f"{self.set('f')} = {place} = {value}"]
 
     def call(self, depth: int) -> list[str]:
-        return self.lines(self.one_of(["effect({f}, out)", "effect({f}, tail(out, {q}))", "pass"]))
+        return self.lines(
+            self.one_of(["effect({f}, seen)", "effect({f}, tail(seen, {q}))", "pass"])
+        )
 
     def leave(self) -> list[str]:
         return self.lines(f"return {self.result}".rstrip())
@@ -165,7 +168,7 @@ class Writer:
         first = self.lines(
             f"{flag} = {{b}}", f"{name} = {{f}}", f"if {flag}:", f"    {name} = {{f}}"
         )
-        place = self.one_of(["out[0]", "out[3]", *self.known["f"]])
+        place = self.one_of(["seen[0]", "seen[3]", *self.known["f"]])
         return [*first, *self.block(depth - 1, 1), f"if {flag}:", f"    {place} = {name}"]
 
     def loop(self, depth: int) -> list[str]:

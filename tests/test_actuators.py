@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from podusv_cli.components.actuators.base import Actuator
 from podusv_cli.components.actuators.ideal import Ideal
 from podusv_cli.components.actuators.saturated import Saturated
-from podusv_cli.core.kernel import Vector, bundle, kernel
+from podusv_cli.core.kernel import Vector, bundle, call, kernel
 
 every_kind = pytest.mark.parametrize("kind", kinds("actuators").values(), ids=kinds("actuators"))
 
@@ -23,7 +23,18 @@ def drive(actuator: Actuator, surge: float, yaw: float) -> tuple[Vector, Vector,
     state, rate = actuator.rest(), np.full(len(actuator.states), np.nan)
     x, k = np.array([0, 0, 0, 0.5, 0, 0]), bundle(actuator.constants())
     demand = np.array([surge, yaw])
-    actuator.drive(1.0, x, state, demand, k, actuator.table(), tau, rate, signals)
+    call(
+        actuator.drive,
+        t=1.0,
+        x=x,
+        state=state,
+        demand=demand,
+        k=k,
+        table=actuator.table(),
+        tau=tau,
+        rate=rate,
+        signals=signals,
+    )
     return tau, signals, rate
 
 

@@ -19,7 +19,7 @@ from podusv_cli.components.measurements.exact import Exact
 from podusv_cli.components.paths.base import TARGET
 from podusv_cli.components.vessels.vessel import COEFFICIENTS, Vessel
 from podusv_cli.core import registry
-from podusv_cli.core.kernel import Vector, bundle, is_kernel
+from podusv_cli.core.kernel import Vector, bundle, call, is_kernel
 from podusv_cli.engine.loop.columns import names
 from podusv_cli.scenario.explain import signals
 
@@ -57,36 +57,41 @@ class Call:
         at = next(situations(law, 1, seed))
         self.t = float(random.uniform(0, 300))
         self.reads, sizes = self._shape(room, component, at, random)
-        self.writes = [np.full(size, np.nan) for size in sizes]
+        self.writes = {name: np.full(size, np.nan) for name, size in sizes.items()}
         self.kernel: Callable[..., None] = getattr(component, KERNELS[room])
 
     def _shape(
         self, room: str, component: Any, at: Any, random: Any
-    ) -> tuple[list[Any], list[int]]:
+    ) -> tuple[dict[str, Any], dict[str, int]]:
         if room == "disturbances":
             k, table = component.constants_with(NONLINEAR), component.table_for(NONLINEAR, 300.0)
-            return [at.x, bundle(k), table], [3 + len(component.signals)]
+            reads = {"x": at.x, "k": bundle(k), "table": table, "again": 0.0, "stage": 0.0}
+            return reads, {"b": 3 + len(component.signals)}
         if room == "estimators":
             k, state = bundle(component.constants_with(NONLINEAR)), component.start(at.x, NONLINEAR)
             seen = np.concatenate([at.x + random.normal(0, 0.1, 6), np.ones(12)])
-            return [seen, random.normal(0, 5, 3), state, k, component.table()], [len(state)]
+            tau, table = random.normal(0, 5, 3), component.table()
+            reads = {"seen": seen, "tau": tau, "state": state, "k": k, "table": table}
+            return reads, {"rate": len(state)}
         k, table = bundle(component.constants()), component.table()
         if room == "paths":
-            return [k, table], [6]
+            return {"k": k, "table": table}, {"target": 6}
         if room == "actuators":
             count = len(component.states)
             state = component.rest() + random.normal(0, 0.1, count)
-            reads = [at.x, state, random.normal(0, 5, 2), k, table]
-            return reads, [3, count, len(component.signals)]
+            demand = random.normal(0, 5, 2)
+            reads = {"x": at.x, "state": state, "demand": demand, "k": k, "table": table}
+            return reads, {"tau": 3, "rate": count, "signals": len(component.signals)}
         k = bundle(component.constants_with(NONLINEAR))
-        reads = [at.x, at.memory, at.target, k, table]
-        return reads, [2, len(at.memory), len(component.signals), component.workspace()]
+        reads = {"x": at.x, "memory": at.memory, "target": at.target, "k": k, "table": table}
+        sizes = {"tau": 2, "rate": len(at.memory), "signals": len(component.signals)}
+        return reads, sizes | {"work": component.workspace()}
 
     def __call__(self) -> list[Vector]:
         """Fresh outputs, without the scratch."""
-        written = [w.copy() for w in self.writes]
-        self.kernel(self.t, *self.reads, *written)
-        return written[:3]
+        written = {name: vector.copy() for name, vector in self.writes.items()}
+        call(self.kernel, t=self.t, **self.reads, **written)
+        return [vector for name, vector in written.items() if name != "work"]
 
 
 # What a measurement writes is its memory too; tests/test_testing_seeing.py asks it.
@@ -96,11 +101,11 @@ WRITING = [(room, kind) for room, _, kind in EVERY if room != "measurements"]
 @pytest.mark.parametrize(("room", "kind"), WRITING)
 def test_every_output_is_written_and_nothing_is_remembered_or_changed(room, kind):
     asked = [Call(room, example(kind), seed) for seed in range(50)]
-    before = [[np.array(argument) for argument in call.reads] for call in asked]
-    first = [call() for call in asked]
+    before = [[np.array(argument) for argument in one.reads.values()] for one in asked]
+    first = [one() for one in asked]
     assert all(np.isfinite(out).all() for written in first for out in written)
-    again = [call() for call in reversed(asked)][::-1]
-    after = [[np.array(argument) for argument in call.reads] for call in asked]
+    again = [one() for one in reversed(asked)][::-1]
+    after = [[np.array(argument) for argument in one.reads.values()] for one in asked]
     for one, other in zip(first + before, again + after, strict=True):
         for a, b in zip(one, other, strict=True):
             np.testing.assert_array_equal(a, b)

@@ -25,7 +25,7 @@ from podusv_cli.components.disturbances.wind import blendermann
 from podusv_cli.components.vessels.plant import plant
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.components.vessels.windage import Windage
-from podusv_cli.core.kernel import bundle
+from podusv_cli.core.kernel import bundle, call
 
 PI = math.pi
 
@@ -89,7 +89,14 @@ ACCELERATIONS = [
 def accelerations(vessel, sea, motion, tau):
     u, v, r, psi = motion
     x, load, rate = np.array([0.0, 0.0, psi, u, v, r]), np.zeros(5), np.zeros(6)
-    sea.evaluate(0.0, x, bundle(sea.constants_with(vessel)), sea.table_for(vessel, 1.0), load)
+    call(
+        sea.evaluate,
+        t=0.0,
+        x=x,
+        k=bundle(sea.constants_with(vessel)),
+        table=sea.table_for(vessel, 1.0),
+        b=load,
+    )
     plant(x, np.array([tau[0], 0.0, tau[1]]), load, bundle(vessel.constants()), rate)
     return rate[3:]
 

@@ -8,6 +8,7 @@ from conftest import NONLINEAR, example, kinds, load_at
 from pydantic import ValidationError
 from scenario_samples import SOUND, findings, write
 
+from podusv_cli.components.disturbances.base import ARGUMENTS
 from podusv_cli.components.disturbances.calm import Calm
 from podusv_cli.components.disturbances.current import Current
 from podusv_cli.components.disturbances.file import FromFile
@@ -16,7 +17,7 @@ from podusv_cli.components.disturbances.step import Step
 from podusv_cli.components.disturbances.total import Total
 from podusv_cli.components.disturbances.waves import Waves
 from podusv_cli.components.disturbances.wind import Wind
-from podusv_cli.core.kernel import bundle
+from podusv_cli.core.kernel import bundle, taking
 from podusv_cli.scenario.load import load
 
 # sin and cos are 0 or +-1 at these times, except where the numbers are written out.
@@ -122,17 +123,18 @@ SLOW = (
 @pytest.mark.parametrize("sea", [*SLOW, Total(parts=(Current(), *SLOW))])
 def test_what_a_disturbance_leaves_out_changes_no_bit_of_its_load(sea):
     """In a stage its signals, and at a time that it was asked for what depends on time alone."""
-    random, kernel = np.random.default_rng(2), sea.kernel_with(NONLINEAR)
+    random = np.random.default_rng(2)
+    kernel = taking(sea.kernel_with(NONLINEAR), ARGUMENTS)
     k, table = bundle(sea.constants_with(NONLINEAR)), sea.table_for(NONLINEAR, 60.0)
     for t in random.uniform(0.0, 60.0, 5):
         once, x, y = np.zeros(3 + len(sea.signals)), *random.normal(0.0, 1.0, (2, 6))
-        kernel(t, y, k, table, once)
+        kernel(t, y, k, table, once, 0.0, 0.0)
         for before, again in ((np.full(len(once), np.nan), 0.0), (once, 1.0)):
             whole, stage = before.copy(), before.copy()
             kernel(t, x, k, table, whole, again, 0.0)
             kernel(t, x, k, table, stage, again, 1.0)
             fresh = np.full(len(once), np.nan)
-            kernel(t, x, k, table, fresh)
+            kernel(t, x, k, table, fresh, 0.0, 0.0)
             np.testing.assert_array_equal(whole, fresh)
             np.testing.assert_array_equal(stage[:3], fresh[:3])
 

@@ -14,7 +14,7 @@ from podusv_cli.components.estimators.low_pass import LowPass
 from podusv_cli.components.estimators.none import NoEstimator
 from podusv_cli.components.estimators.passive_observer import PassiveObserver
 from podusv_cli.components.measurements.sensors import Sensor, Sensors
-from podusv_cli.core.kernel import is_kernel
+from podusv_cli.core.kernel import call, is_kernel
 from podusv_cli.core.registry import kinds
 from podusv_cli.scenario.explain import signals
 
@@ -49,10 +49,19 @@ def test_it_writes_every_rate_and_changes_nothing_that_it_reads(kind):
     seen, state, k = delivered(estimator, random.normal(size=6), random.normal(size=6))
     tau, rate = random.normal(size=3), np.full(len(state), np.nan)
     read = [part.copy() for part in (seen, tau, state)]
-    estimator.follow(0.0, seen, tau, state, k, estimator.table(), rate)
+    call(
+        estimator.follow,
+        t=0.0,
+        seen=seen,
+        tau=tau,
+        state=state,
+        k=k,
+        table=estimator.table(),
+        rate=rate,
+    )
     assert np.isfinite(rate).all()
     assert all(map(np.array_equal, read, (seen, tau, state)))
-    estimator.correct(0.0, seen, state, k, estimator.table())
+    call(estimator.correct, t=0.0, seen=seen, state=state, k=k, table=estimator.table())
     np.testing.assert_array_equal(seen, read[0])
     assert is_kernel(kind.follow)
     assert is_kernel(kind.correct)
@@ -113,11 +122,11 @@ def test_the_low_pass_lets_as_much_noise_through_as_theory_says():
 
 def test_a_measured_velocity_comes_first():
     seen, state, k = delivered(LowPass(), np.zeros(6), np.array([0, 0, 0, 0.7, 0.0, 0.0]))
-    rate, follow = np.full(6, np.nan), LowPass.follow
-    follow(0.0, seen, np.zeros(3), state, k, np.zeros(1), rate)
+    rate = np.full(6, np.nan)
+    call(LowPass.follow, seen=seen, state=state, k=k, rate=rate)
     np.testing.assert_allclose(rate[3], 0.7 / LowPass().T_nu)
     seen[15] = 0.0  # not measured, and the pose does not move
-    follow(0.0, seen, np.zeros(3), state, k, np.zeros(1), rate)
+    call(LowPass.follow, seen=seen, state=state, k=k, rate=rate)
     assert rate[3] == 0.0
 
 

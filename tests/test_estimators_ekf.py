@@ -11,7 +11,7 @@ from scipy.linalg import expm, solve_discrete_are, solve_discrete_lyapunov
 from podusv_cli.components.estimators.ekf import ExtendedKalmanFilter, N
 from podusv_cli.components.estimators.slopes import slopes
 from podusv_cli.components.vessels.plant import plant
-from podusv_cli.core.kernel import Vector, bundle
+from podusv_cli.core.kernel import Vector, bundle, call
 from podusv_cli.engine.machine import compile, signatures
 
 UPPER = np.triu_indices(N)
@@ -199,10 +199,10 @@ def test_a_value_corrects_as_the_formula_says_and_nothing_new_corrects_nothing(p
     state[N:] = before[UPPER]
     seen[6:12] = 0.0
     unchanged = state.copy()
-    ekf.correct(0.0, seen, state, k, np.zeros(1))
+    call(ekf.correct, t=0.0, seen=seen, state=state, k=k, table=np.zeros(1))
     np.testing.assert_array_equal(state, unchanged)
     seen[6 + place] = 1.0
-    ekf.correct(0.0, seen, state, k, np.zeros(1))
+    call(ekf.correct, t=0.0, seen=seen, state=state, k=k, table=np.zeros(1))
     sigma, row = (
         [k.sigma_p, k.sigma_p, k.sigma_psi, k.sigma_u, k.sigma_v, k.sigma_r][place],
         np.eye(N)[place],

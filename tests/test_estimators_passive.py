@@ -10,9 +10,10 @@ from pydantic import ValidationError
 
 from podusv_cli.components.estimators.passive_observer import LOAD, SEEN, SWING, PassiveObserver
 from podusv_cli.components.vessels.vessel import Vessel
-from podusv_cli.core.kernel import Vector, bundle, kernel
+from podusv_cli.core.kernel import Vector, bundle, kernel, taking
 
-observe = PassiveObserver.follow
+FOLLOW = ("t", "seen", "tau", "state", "k", "table", "rate")
+observe = taking(PassiveObserver.follow, FOLLOW)
 AFLOAT = {"controller": Constant(), "start": (0.0,) * 6}  # at rest, and left alone
 
 

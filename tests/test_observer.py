@@ -13,7 +13,7 @@ from podusv_cli.components.controllers.velocity_loop import Axis
 from podusv_cli.components.controllers.velocity_vector import VelocityVector
 from podusv_cli.components.disturbances.harmonic import Harmonic, HarmonicDisturbance
 from podusv_cli.components.vessels.plant import plant
-from podusv_cli.core.kernel import bundle
+from podusv_cli.core.kernel import bundle, call
 from podusv_cli.core.registry import kinds
 
 MEANS = (0.4, -0.3, 0.2)
@@ -65,7 +65,16 @@ def test_its_rates_are_those_of_the_vessel_and_a_double_pole(kind):
     for at in situations(law, 50):
         found = ask(law, *at, NONLINEAR)
         tau = np.array([found.tau[0], 0.7, 0.5 * found.tau[1]])  # what an actuator made of it
-        law.after_saturation(1.0, at.memory, found.tau, tau, k, law.table(), found.rate)
+        call(
+            law.after_saturation,
+            t=1.0,
+            memory=at.memory,
+            demand=found.tau,
+            tau=tau,
+            k=k,
+            table=law.table(),
+            rate=found.rate,
+        )
         plant(at.x, tau, at.memory[3:6], bundle(NONLINEAR.constants()), rate)
         error = at.x[3:] - at.memory[:3]
         np.testing.assert_allclose(found.rate[:3], rate[3:] + 2 * omega * error, rtol=1e-11)

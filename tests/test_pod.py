@@ -20,7 +20,7 @@ from podusv_cli.components.actuators.pod import Pod, Pods
 from podusv_cli.components.actuators.propeller import speed_for, speed_gain, thrust
 from podusv_cli.components.controllers.pid import Pid
 from podusv_cli.components.paths.line import Line
-from podusv_cli.core.kernel import Vector, bundle
+from podusv_cli.core.kernel import Vector, bundle, call
 from podusv_cli.figures.drawing import FIGURES
 
 DRAG = 0.72 * 0.5 + 1.32742 * 0.25 + 5.86643 * 0.125  # the paper's vessel at 0.5 m/s [N]
@@ -44,7 +44,18 @@ def loads(actuator: Pods, state: Vector, x: Vector, demand: tuple[float, float] 
     tau, rate = np.full(3, np.nan), np.full(len(state), np.nan)
     signals = np.full(len(actuator.signals), np.nan)
     k, table = bundle(actuator.constants()), actuator.table()
-    actuator.drive(0.0, x, state, np.array(demand, float), k, table, tau, rate, signals)
+    call(
+        actuator.drive,
+        t=0.0,
+        x=x,
+        state=state,
+        demand=np.array(demand, float),
+        k=k,
+        table=table,
+        tau=tau,
+        rate=rate,
+        signals=signals,
+    )
     assert np.isfinite(np.concatenate([tau, rate, signals])).all()
     return tau, rate, dict(zip((s.name for s in actuator.signals), signals, strict=True))
 

@@ -11,7 +11,7 @@ from scenario_samples import SOUND, findings
 
 from podusv_cli.components.controllers.pid import Pid
 from podusv_cli.components.controllers.schedule import Schedule
-from podusv_cli.core.kernel import bundle
+from podusv_cli.core.kernel import bundle, call
 from podusv_cli.core.timed_rows import LARGEST
 from podusv_cli.pages.page import value_text
 from podusv_cli.scenario.load import load, resolved_yaml
@@ -32,7 +32,19 @@ def demand(law, t, x=(0.0,) * 6):
     tau, signals = np.full(2, np.nan), np.full(2, np.nan)
     k = bundle(law.constants_with(NONLINEAR))
     none = np.zeros(0)
-    law.law(t, np.array(x), none, np.zeros(6), k, law.table(), tau, none, signals, np.zeros(1))
+    call(
+        law.law,
+        t=t,
+        x=np.array(x),
+        memory=none,
+        target=np.zeros(6),
+        k=k,
+        table=law.table(),
+        tau=tau,
+        rate=none,
+        signals=signals,
+        work=np.zeros(1),
+    )
     return [*tau, *signals]
 
 

@@ -17,7 +17,7 @@ from podusv_cli.components.disturbances.calm import Calm
 from podusv_cli.components.paths.circle import Circle
 from podusv_cli.components.paths.line import Line
 from podusv_cli.components.vessels.plant import plant
-from podusv_cli.core.kernel import bundle
+from podusv_cli.core.kernel import bundle, call
 
 LAYER, TWIST = SlidingMode(), SlidingMode(reaching="super_twisting")
 LAWS = pytest.mark.parametrize("law", [LAYER, TWIST], ids=["layer", "twist"])
@@ -112,10 +112,28 @@ def test_a_load_is_not_learnt_with_the_first_order_and_not_while_the_actuator_fa
     for x, memory, target in situations(TWIST, 20):
         found, k = ask(TWIST, x, memory, target, NONLINEAR), constants(TWIST)
         full, tau = found.rate.copy(), np.array([found.tau[0], 0.0, found.tau[1]])
-        TWIST.after_saturation(0.0, memory, found.tau, tau, k, TWIST.table(), found.rate)
+        call(
+            TWIST.after_saturation,
+            t=0.0,
+            memory=memory,
+            demand=found.tau,
+            tau=tau,
+            k=k,
+            table=TWIST.table(),
+            rate=found.rate,
+        )
         np.testing.assert_array_equal(found.rate, full)
         short = tau - [TWIST.eta * NONLINEAR.m11, 0.0, 3 * TWIST.eta * NONLINEAR.m33 / TWIST.hand]
-        TWIST.after_saturation(0.0, memory, found.tau, short, k, TWIST.table(), found.rate)
+        call(
+            TWIST.after_saturation,
+            t=0.0,
+            memory=memory,
+            demand=found.tau,
+            tau=short,
+            k=k,
+            table=TWIST.table(),
+            rate=found.rate,
+        )
         np.testing.assert_allclose(found.rate, full * [1 / 2, 1 / 10, 1.0], rtol=1e-12)
 
 

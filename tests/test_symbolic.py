@@ -115,9 +115,13 @@ def flipped(law: AdaptiveNeural, sign: str) -> AdaptiveNeural:
     """The law with one sign planted wrong: its kernel sees the constant negated or turned."""
 
     @kernel
-    def wrong(t: float, x: Vector, memory: Vector, target: Vector, k: Any, *rest: Any) -> None:
+    def wrong(
+        x: Vector, memory: Vector, target: Vector, k: Any, table: Vector, tau: Vector,
+        rate: Vector, signals: Vector, work: Vector,
+    ) -> None:  # fmt: skip
         turned = 1.0 - k.coupling if sign == "coupling" else -getattr(k, sign)
-        AdaptiveNeural.law(t, x, memory, target, k._replace(**{sign: turned}), *rest)
+        k = k._replace(**{sign: turned})
+        AdaptiveNeural.law(x, memory, target, k, table, tau, rate, signals, work)
 
     class Wrong(AdaptiveNeural):
         """A law with a fault."""

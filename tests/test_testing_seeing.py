@@ -10,7 +10,7 @@ from podusv_cli import testing_seeing
 from podusv_cli.components.estimators.low_pass import LowPass
 from podusv_cli.components.measurements.base import FRESH, OWN, Measurement
 from podusv_cli.components.measurements.sensors import MEASURED
-from podusv_cli.core.kernel import Vector, kernel
+from podusv_cli.core.kernel import Vector, call, kernel
 from podusv_cli.testing import checks, keeps_its_declaration
 
 SOUND = [
@@ -149,28 +149,28 @@ def deaf(t, seen, tau, state, k, table, rate):
 
 
 def unwrapped(t, seen, tau, state, k, table, rate):
-    LowPass.follow(t, seen, tau, state, k, table, rate)
+    call(LowPass.follow, t=t, seen=seen, tau=tau, state=state, k=k, table=table, rate=rate)
     rate[2] = (seen[2] - state[2]) / k.T_psi
     rate[5] = (10.0 * rate[2] - state[5]) / k.T_nu
 
 
 def forgets_a_rate(t, seen, tau, state, k, table, rate):
-    LowPass.follow(t, seen, tau, state, k, table, rate)
+    call(LowPass.follow, t=t, seen=seen, tau=tau, state=state, k=k, table=table, rate=rate)
     rate[5] = np.nan
 
 
 def writes_on(t, seen, tau, state, k, table, rate):
-    LowPass.follow(t, seen, tau, state, k, table, rate)
+    call(LowPass.follow, t=t, seen=seen, tau=tau, state=state, k=k, table=table, rate=rate)
     rate[6] = 0.0
 
 
 def moves_the_state(t, seen, tau, state, k, table, rate):
-    LowPass.follow(t, seen, tau, state, k, table, rate)
+    call(LowPass.follow, t=t, seen=seen, tau=tau, state=state, k=k, table=table, rate=rate)
     state[0] += 1.0
 
 
 def drifts(t, seen, tau, state, k, table, rate):
-    LowPass.follow(t, seen, tau, state, k, table, rate)
+    call(LowPass.follow, t=t, seen=seen, tau=tau, state=state, k=k, table=table, rate=rate)
     rate[5] += 5.0
 
 
@@ -198,7 +198,7 @@ class Unwrapped(LowPass):
     @staticmethod
     def follow(t, seen, tau, state, k, table, rate):
         """Go straight for the number of the heading, slowly."""
-        LowPass.follow(t, seen, tau, state, k, table, rate)
+        call(LowPass.follow, t=t, seen=seen, tau=tau, state=state, k=k, table=table, rate=rate)
         rate[2] = (seen[2] - state[2]) / 20.0
 
     def start(self, x, nominal):

@@ -194,9 +194,13 @@ FAULTS = ["coupling", "k_ue", "k_re", "Gamma_u", "Gamma_r", "gamma_u", "gamma_r"
 @pytest.mark.parametrize("sign", FAULTS)
 def test_a_wrong_sign_planted_in_the_law_is_caught(sign):
     @kernel
-    def wrong(t: float, x: Vector, memory: Vector, target: Vector, k: Any, *rest: Any) -> None:
+    def wrong(
+        x: Vector, memory: Vector, target: Vector, k: Any, table: Vector, tau: Vector,
+        rate: Vector, signals: Vector, work: Vector,
+    ) -> None:  # fmt: skip
         turned = 1.0 - k.coupling if sign == "coupling" else -getattr(k, sign)
-        AdaptiveNeural.law(t, x, memory, target, k._replace(**{sign: turned}), *rest)
+        k = k._replace(**{sign: turned})
+        AdaptiveNeural.law(x, memory, target, k, table, tau, rate, signals, work)
 
     class Wrong(AdaptiveNeural):
         """The law with one wrong sign that no field tells of."""

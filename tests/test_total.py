@@ -11,7 +11,7 @@ from podusv_cli.components.disturbances.total import Total
 from podusv_cli.components.disturbances.waves import Waves
 from podusv_cli.components.measurements.sensors import Sensor, Sensors
 from podusv_cli.core.errors import LawError
-from podusv_cli.core.kernel import bundle
+from podusv_cli.core.kernel import bundle, call
 
 SEA = HarmonicDisturbance()
 MORE = HarmonicDisturbance(b_u=Harmonic(mean=3.0), scale=0.5)
@@ -71,7 +71,8 @@ def all_of(part, t):
     """Load and signals by name."""
     b = np.full(3 + len(part.signals), np.nan)
     k, table = bundle(part.constants_with(NONLINEAR)), part.table_for(NONLINEAR, 400.0)
-    part.kernel_with(NONLINEAR)(t, STATE, k, table, b)
+    evaluate = part.kernel_with(NONLINEAR)
+    call(evaluate, t=t, x=STATE, k=k, table=table, b=b, again=0.0, stage=0.0)
     names = ("b_u", "b_v", "b_r", *(signal.name for signal in part.signals))
     return dict(zip(names, b.tolist(), strict=True))
 

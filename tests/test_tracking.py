@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
 from podusv_cli.components.controllers.tracking import PSI_D_HELD, PSI_D_RATE_HELD, Tracking, track
 from podusv_cli.components.paths.line import Line
-from podusv_cli.core.kernel import Vector, bundle
+from podusv_cli.core.kernel import Vector, bundle, call
 from podusv_cli.core.kinematics import direction
 
 DIFFERENCE = {"rate": "difference", "difference_step": 0.01}
@@ -169,7 +169,15 @@ def sampled(law: AdaptiveNeural, before: float, direction: float, t: float = 1.0
     memory = np.zeros(60)
     memory[PSI_D_HELD] = before
     target = np.array([7 * math.cos(direction), 7 * math.sin(direction), 0, 0, 0, 0])
-    law.sample(t, np.zeros(6), memory, target, bundle(law.constants_with(NONLINEAR)), law.table())
+    call(
+        law.sample,
+        t=t,
+        x=np.zeros(6),
+        memory=memory,
+        target=target,
+        k=bundle(law.constants_with(NONLINEAR)),
+        table=law.table(),
+    )
     assert memory[PSI_D_HELD] == pytest.approx(direction)
     return float(memory[PSI_D_RATE_HELD])
 

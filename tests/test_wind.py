@@ -10,7 +10,7 @@ from scipy.integrate import quad
 
 from podusv_cli.components.disturbances.wind import Wind, blendermann
 from podusv_cli.components.vessels.windage import Windage
-from podusv_cli.core.kernel import bundle
+from podusv_cli.core.kernel import bundle, call
 
 AIR = 1.225
 HULL = Windage(
@@ -68,7 +68,7 @@ def test_no_wind_no_load_and_twice_the_wind_four_times_the_load():
 def blown(sea, x, t=0.0, vessel=BLOWN):
     b = np.full(5, np.nan)
     k, table = bundle(sea.constants_with(vessel)), sea.table_for(vessel, 300.0)
-    sea.evaluate(t, np.array(x), k, table, b)
+    call(sea.evaluate, t=t, x=np.array(x), k=k, table=table, b=b, again=0.0, stage=0.0)
     return b
 
 

@@ -12,7 +12,7 @@ from podusv_cli.components.actuators.saturated import Saturated
 from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
 from podusv_cli.components.controllers.backstepping import Backstepping
 from podusv_cli.components.controllers.pid import Pid
-from podusv_cli.core.kernel import bundle, is_kernel
+from podusv_cli.core.kernel import bundle, call, is_kernel
 from podusv_cli.core.recording import Recording
 
 CHOOSING = {
@@ -101,7 +101,19 @@ def test_compensated_errors_obey_the_equations_without_limits():
         ):
             tau, signals, work = np.zeros(2), np.zeros(len(one.signals)), np.zeros(one.workspace())
             rate = np.zeros(len(at.memory))
-            one.law(0.0, x, at.memory, at.target, numbers, one.table(), tau, rate, signals, work)
+            call(
+                one.law,
+                t=0.0,
+                x=x,
+                memory=at.memory,
+                target=at.target,
+                k=numbers,
+                table=one.table(),
+                tau=tau,
+                rate=rate,
+                signals=signals,
+                work=work,
+            )
             rates.append((rate[2], signals[4], at.memory[2]))
         (told, u_e, b_hat), _ = rates
         u_c = u_e - xi[0]

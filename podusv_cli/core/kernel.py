@@ -13,11 +13,15 @@ import dis
 from collections import namedtuple
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cache
+from pathlib import Path
 from types import FunctionType
 from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
+
+from podusv_cli.core.errors import LawError
+from podusv_cli.core.plugins import TEXT
 
 Vector = npt.NDArray[np.float64]
 LANES = 8  # numbers in the widest vector register; loops over whole registers are fastest
@@ -106,10 +110,38 @@ def filled(whole: int, count: int) -> int:
     return whole
 
 
-def accepted(function: Any, arguments: Sequence[str], optional: Collection[str]) -> list[str]:
-    """Which of these arguments a kernel is given: all, or all but the optional ones."""
-    needed = [name for name in arguments if name not in optional]
-    return needed if function.__code__.co_argcount == len(needed) else list(arguments)
+def taken(function: Any, offered: Collection[str]) -> tuple[str, ...]:
+    """The arguments that a kernel takes, in its own order; it names those that it needs.
+
+    Raises LawError for one that is not among those offered.
+    """
+    code = function.__code__
+    names: tuple[str, ...] = code.co_varnames[: code.co_argcount]
+    for name in names:
+        if name not in offered:
+            place = f"{Path(code.co_filename).name}, line {code.co_firstlineno}"
+            what = f"{name!r} is none of its arguments (allowed: {', '.join(offered)})"
+            raise LawError(f"kernel {function.__qualname__} ({place}): {what}")
+    return names
+
+
+def call(function: Any, **offered: Any) -> Any:
+    """What a kernel gives for those of these arguments that it takes; raises as `taken`."""
+    return function(*(offered[name] for name in taken(function, offered)))
+
+
+def absent() -> None:
+    """Stands for a kernel that a component of its own has to write."""
+    raise NotImplementedError("the component has no kernel of this name")
+
+
+def taking(function: Any, arguments: Sequence[str]) -> Any:
+    """A kernel that takes all of these arguments and passes `function` those that it names."""
+    passed = ", ".join(taken(function, arguments))
+    text = f"def adapter({', '.join(arguments)}):\n    kernel({passed})"
+    scope: dict[str, Any] = {"kernel": function, "__name__": function.__module__, TEXT: text}
+    exec(compile(text, "arguments of a kernel", "exec"), scope)  # noqa: S102
+    return kernel(scope["adapter"])
 
 
 def with_globals(function: Any, name: str, **replaced: Any) -> Any:

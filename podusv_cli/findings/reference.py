@@ -89,15 +89,10 @@ def _motion(target: Vector) -> tuple[Vector, Vector, Vector]:
 def _loads(scenario: Scenario, time: Vector, target: Vector, turn: Vector) -> Vector:
     """The disturbance on a hull at the target's position and velocity."""
     sea, vessel = scenario.closed_loop().disturbance, scenario.vessel
-    written = np.zeros((len(time), 3 + len(sea.signals)))
-    k, table = bundle(sea.constants_with(vessel)), sea.table_for(vessel, float(time[-1]))
-    evaluate = sea.kernel_with(vessel)
     course = np.arctan2(target[:, 3] + 0.0, target[:, 2] + 0.0)  # -0.0 is no half turn
     speed = np.hypot(target[:, 2], target[:, 3])
     states = np.column_stack([target[:, :2], course, speed, 0.0 * speed, turn])
-    for t, x, row in zip(time.tolist(), states, written, strict=True):
-        evaluate(t, x, k, table, row)
-    return written[:, :3]
+    return sea.loads(vessel, time.tolist(), states)
 
 
 def _balance(scenario: Scenario, b_v: float) -> Callable[[float, float], tuple[float, float]]:

@@ -12,7 +12,7 @@ PEAK_U, PEAK_R, TV_U, TV_R, LAST_U, LAST_R, SETTLED, SIZE = range(8)
 
 
 @kernel
-def watch(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
+def watch(t: float, row: Vector, k: Any, seen: Vector) -> None:
     """Gather the largest demands, and the sum of their changes."""
     u, r = row[int(k.demand)], row[int(k.demand) + 1]
     seen[PEAK_U] = max(seen[PEAK_U], abs(u))

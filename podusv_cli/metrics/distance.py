@@ -17,7 +17,7 @@ ACROSS, ALONG, SETTLED = range(3, 6)
 
 
 @kernel
-def watch(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
+def watch(t: float, weight: float, row: Vector, k: Any, seen: Vector) -> None:
     """Gather integrals of z_e and |z_e - standoff|, and when z_e last left the settling radius."""
     z_e = row[DISTANCE]
     if t == 0.0:

@@ -11,7 +11,7 @@ TIME, EFFORT_U, EFFORT_R, ENERGY, SATURATED, INTEGRALS = range(6)
 
 
 @kernel
-def watch(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
+def watch(weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
     """Gather squared loads, their work, and the time in saturation."""
     tau = int(k.tau)
     add(seen, INTEGRALS, TIME, weight)

@@ -13,7 +13,7 @@ SIZE = 2 * INTEGRALS
 
 
 @kernel
-def watch(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
+def watch(weight: float, s: Vector, k: Any, seen: Vector) -> None:
     """Gather the squared errors of the estimate."""
     at = int(k.estimate)
     x, y, psi = s[at] - s[0], s[at + 1] - s[1], s[at + 2] - s[2]

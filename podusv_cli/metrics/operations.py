@@ -13,7 +13,7 @@ import numpy as np
 
 from podusv_cli.components.paths.base import TARGET
 from podusv_cli.core.elementary import arctangent
-from podusv_cli.core.kernel import bundle, scratch, transplanted
+from podusv_cli.core.kernel import bundle, call, scratch, transplanted
 from podusv_cli.core.recording import Recording
 from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop
 from podusv_cli.engine.running.replay import logged_rows
@@ -118,9 +118,12 @@ def operations(loop: ClosedLoop, recording: Recording) -> dict[str, float]:
     rows = logged_rows(loop, recording, 3)
     t, target, state, memory = np.split(rows[len(rows) // 2], ENDS)
     constants = law.constants_with(loop.nominal)
-    outputs = np.zeros(2), np.zeros(len(memory)), np.zeros(len(law.signals))
-    vectors = (state, memory, target, law.table(), *outputs, np.zeros(law.workspace()))
-    x, m, d, table, *out = map(tally.vector, vectors)
+    vectors = {
+        "x": state, "memory": memory, "target": target, "table": law.table(), "tau": np.zeros(2),
+        "rate": np.zeros(len(memory)), "signals": np.zeros(len(law.signals)),
+        "work": np.zeros(law.workspace()),
+    }  # fmt: skip
+    counted = {name: tally.vector(vector) for name, vector in vectors.items()}
     k: Any = {name: tally.number(number) for name, number in constants.items()}
-    tally.kernel(law.law)(tally.number(t[0]), x, m, d, bundle(k), table, *out)
+    call(tally.kernel(law.law), t=tally.number(t[0]), k=bundle(k), **counted)
     return {law_operations.name: float(tally.count)}

@@ -11,7 +11,7 @@ import numpy as np
 
 from podusv_cli.core import registry
 from podusv_cli.core.errors import LawError, in_a_line
-from podusv_cli.core.kernel import Vector, kernel, specialise, tail
+from podusv_cli.core.kernel import Vector, kernel, specialise, tail, taking
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.engine.loop.closed_loop import ClosedLoop, Observer
 from podusv_cli.engine.step.grid import TimeGrid
@@ -38,6 +38,9 @@ Parts = tuple[tuple[Accumulator, int], ...]
 COUNT = 0  # placeholder: how many numbers `first_kernel` gathers
 
 
+WATCH = ("t", "weight", "s", "row", "k", "seen")  # the arguments of an accumulator's kernel
+
+
 @kernel
 def first_kernel(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
     """Placeholder of the first accumulator's kernel; does nothing after the last one."""
@@ -60,7 +63,7 @@ def _watch(parts: Parts) -> Callable[..., None]:
     if not parts:
         return first_kernel
     (first, count), *others = parts
-    kernels = {"first_kernel": first.watch, "other_kernels": _watch(tuple(others))}
+    kernels = {"first_kernel": taking(first.watch, WATCH), "other_kernels": _watch(tuple(others))}
     return specialise(chained, "metrics", COUNT=count, **kernels)  # type: ignore[no-any-return]
 
 

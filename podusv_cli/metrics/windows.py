@@ -7,7 +7,6 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
-from typing import Any
 
 from podusv_cli.core.kernel import Vector, kernel, specialise
 from podusv_cli.engine.step.layout import DISTANCE
@@ -25,7 +24,7 @@ NONE: tuple[Windows, Radii] = ((), ())
 
 
 @kernel
-def window(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
+def window(t: float, row: Vector, seen: Vector) -> None:
     """Gather z_e^2 from one instant to the next, both in the window, and the largest z_e."""
     z_e = row[DISTANCE]
     if t >= FROM - NEAR and t <= TO + NEAR:
@@ -37,7 +36,7 @@ def window(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector
 
 
 @kernel
-def outside(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
+def outside(t: float, row: Vector, seen: Vector) -> None:
     """Gather when z_e was last beyond the radius, and the last instant."""
     if t == 0.0:
         seen[OUTSIDE] = -1.0  # not outside so far

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from podusv_cli.core.errors import UsageError
-from podusv_cli.core.kernel import Vector, bundle
+from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
 from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop
 from podusv_cli.scenario.model import Scenario
@@ -50,12 +50,7 @@ class Problem:
 
     def loads(self, times: Sequence[float]) -> Vector:
         """The disturbance (b_u, b_v, b_r) at each of these times, a row each."""
-        sea, vessel = self.loop.disturbance, self.loop.vessel
-        k, table = bundle(sea.constants_with(vessel)), sea.table_for(vessel, self.duration)
-        rows, evaluate = np.zeros((len(times), 3 + len(sea.signals))), sea.kernel_with(vessel)
-        for t, row in zip(times, rows, strict=True):
-            evaluate(t, np.zeros(6), k, table, row)
-        return rows[:, :3]
+        return self.loop.disturbance.loads(self.loop.vessel, times, np.zeros((len(times), 6)))
 
     def places(self, times: Sequence[float]) -> Vector:
         """Where the target is at each of these times, a row each."""

@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from podusv_cli.components.paths.base import TARGET
-from podusv_cli.core.kernel import Vector, bundle
+from podusv_cli.core.kernel import Vector, bundle, call
 from podusv_cli.engine.running.continuous import Slope, continuous
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.verification.step_halving import Level, Progress
@@ -103,7 +103,7 @@ def _with_iae(scenario: Scenario, slope: Slope) -> Slope:
     k, table = bundle(path.constants()), path.table()
 
     def f(t: float, s: Vector) -> Vector:
-        path.evaluate(t, k, table, target)
+        call(path.evaluate, t=t, k=k, table=table, target=target)
         return np.append(slope(t, s[:-1]), math.hypot(target[0] - s[0], target[1] - s[1]))
 
     return f

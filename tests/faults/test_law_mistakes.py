@@ -161,7 +161,7 @@ def _line(name: str) -> int:
 ASKED: dict[type[Controller], str] = {
     Starting: "KeyError: 'trim' (test_law_mistakes.py, line ",
     Sampling: "IndexError: index 3 is out of bounds for axis 0 with size 0 (test_law_mistakes.py, ",
-    Settling: "NotImplementedError:  (base.py, line ",
+    Settling: "NotImplementedError: the component has no kernel of this name (kernel.py, line ",
 }
 
 

@@ -17,7 +17,11 @@ from podusv_cli.core import plugins
 MISTAKES = {
     "undeclared": ("(E_CT,)", '("e_ct",)', "declares 'e_ct', which is no Signal"),
     "two kinds": ('["cross_track"] =', '["other"] =', "its kind is no fixed word; write kind: "),
-    "other arguments": ("law(t, x, ", "law(t, ", "10 were given"),
+    "other arguments": (
+        "law(t, x, ",
+        "law(t, y, ",
+        "'y' is none of its arguments (allowed: t, x, memory, ",
+    ),
     "numpy": ("push(k)", "np.dot(x, x)", "cannot become machine code"),
     "no constant": (
         "return PUSH * k.gain",

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from podusv_cli.plugin import Accumulator, Metric, Vector, gathered, kernel
 
 
 @kernel
-def watch(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
+def watch(s: Vector, seen: Vector) -> None:
     """Keep the largest |y|; s begins with (x, y, psi, u, v, r)."""
     seen[0] = max(seen[0], abs(s[1]))
 

@@ -18,7 +18,7 @@ class Lawn(Path):
 
     @staticmethod
     @kernel
-    def evaluate(t: float, k: Any, table: Vector, target: Vector) -> None:
+    def evaluate(t: float, k: Any, target: Vector) -> None:
         """Position, velocity and acceleration."""
         omega = 2.0 * math.pi * k.speed / k.length
         target[0], target[2], target[4] = k.speed * t, k.speed, 0.0

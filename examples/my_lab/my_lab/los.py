@@ -41,9 +41,14 @@ class LineOfSight(Controller):
     @staticmethod
     @kernel
     def law(
-        t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
-        tau: Vector, rate: Vector, signals: Vector, work: Vector,
-    ) -> None:  # fmt: skip
+        x: Vector,
+        memory: Vector,
+        target: Vector,
+        k: Any,
+        tau: Vector,
+        rate: Vector,
+        signals: Vector,
+    ) -> None:
         """Errors along and across the path, then PID."""
         chi = math.atan2(target[3], target[2])
         speed = math.sqrt(target[2] * target[2] + target[3] * target[3])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, ClassVar
 
 import numpy as np
@@ -16,12 +17,19 @@ from podusv_cli.components.actuators.command import (
     failing,
 )
 from podusv_cli.core.component import Component, value
-from podusv_cli.core.kernel import Vector, bundle, kernel
+from podusv_cli.core.kernel import Vector, absent, bundle, call, kernel
 from podusv_cli.core.signal import Signal
 
 SMALL = 1e-3  # of a demand or a state, for finite differences
 ROUNDS = 20  # of Newton's method
 SATURATION = Signal("saturated", "1", "1 while the actuator limits what the law asked for", "sat")
+
+
+@kernel
+def lose_evenly(k: Any, tau: Vector) -> None:
+    """The loads that are left of those that `drive` wrote, once the actuator has failed."""
+    for i in range(3):
+        tau[i] *= k.failure_effectiveness
 
 
 class Actuator(Component):
@@ -32,6 +40,10 @@ class Actuator(Component):
     [N], tau_r [N m]) it writes the loads (tau_u, tau_v, tau_r) into `tau`, the rate of its state
     into `rate`, and one number for each of its `signals`. Limits act here, inside the right-hand
     side.
+
+    `lose(state, k, table, tau, signals)` is a kernel that leaves a part of the loads and signals
+    that `drive` wrote, once the actuator has failed; by default `k.failure_effectiveness` times the
+    loads. Kernels take those of their arguments that they name.
 
     `states` and `signals` declare every number; the numbers of one vector have the same signal,
     which has an axis.
@@ -59,23 +71,9 @@ class Actuator(Component):
         """What `drive` writes into `signals`."""
         return ()
 
-    @staticmethod
-    def drive(
-        t: float, x: Vector, state: Vector, demand: Vector, k: Any, table: Vector,
-        tau: Vector, rate: Vector, signals: Vector,
-    ) -> None:  # fmt: skip
-        """Write loads, rates and signals; every actuator has its own."""
-        raise NotImplementedError
+    drive: ClassVar[Callable[..., None]] = staticmethod(absent)
 
-    @staticmethod
-    @kernel
-    def lose(state: Vector, k: Any, table: Vector, tau: Vector, signals: Vector) -> None:
-        """Leave a part of the loads and signals that `drive` wrote, once the actuator has failed.
-
-        By default `k.failure_effectiveness` times the loads.
-        """
-        for i in range(3):
-            tau[i] *= k.failure_effectiveness
+    lose: ClassVar[Callable[..., None]] = staticmethod(lose_evenly)
 
     def drive_with(self) -> Drive:
         """`drive` with command path and failure; `drive` itself where it has neither.
@@ -132,8 +130,10 @@ class Actuator(Component):
     def _driven(self, x: Vector, state: Vector, demand: Vector) -> tuple[Vector, Vector]:
         """Loads and rate of the state."""
         tau, rate, signals = np.zeros(3), np.zeros(len(state)), np.zeros(len(self.signals))
-        k, table = bundle(self.constants()), self.table()
-        self.drive(0.0, x, state, demand, k, table, tau, rate, signals)
+        call(
+            self.drive, t=0.0, x=x, state=state, demand=demand, k=bundle(self.constants()),
+            table=self.table(), tau=tau, rate=rate, signals=signals,
+        )  # fmt: skip
         return tau, rate
 
     def input_matrix(self) -> Vector:

@@ -13,10 +13,12 @@ from typing import Any
 
 from podusv_cli.core.component import Component, value
 from podusv_cli.core.finding import Sentences, before
-from podusv_cli.core.kernel import Vector, kernel, scratch, specialise, tail
+from podusv_cli.core.kernel import Vector, kernel, scratch, specialise, tail, taking
 from podusv_cli.core.signal import Signal
 
 Drive = Callable[..., None]
+DRIVE = ("t", "x", "state", "demand", "k", "table", "tau", "rate", "signals")  # its arguments
+LOSE = ("state", "k", "table", "tau", "signals")  # those of `lose`
 
 GIVEN = (
     Signal("tau_u_in", "N", "surge force that the actuator is given", r"\tau_{u,\mathrm{in}}"),
@@ -115,15 +117,17 @@ def _failing(
 @cache
 def commanded(drive: Drive) -> Drive:
     """A kernel with the command path before `drive`; the same one for the same kernel."""
-    made: Drive = specialise(_commanded, f"{drive.__qualname__}_commanded", _inner=drive)
+    inner = taking(drive, DRIVE)
+    made: Drive = specialise(_commanded, f"{drive.__qualname__}_commanded", _inner=inner)
     return made
 
 
 @cache
 def failing(drive: Drive, lose: Drive) -> Drive:
     """A kernel with the failure behind `drive`; the same one for the same kernels."""
+    inner, lost = taking(drive, DRIVE), taking(lose, LOSE)
     made: Drive = specialise(
-        _failing, f"{drive.__qualname__}_failing", _inner=drive, _lost=lose
+        _failing, f"{drive.__qualname__}_failing", _inner=inner, _lost=lost
     )  # fmt: skip
     return made
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 from podusv_cli.components.actuators.base import Actuator
 from podusv_cli.core.kernel import Vector, kernel
@@ -16,10 +16,7 @@ class Ideal(Actuator):
 
     @staticmethod
     @kernel
-    def drive(
-        t: float, x: Vector, state: Vector, demand: Vector, k: Any, table: Vector,
-        tau: Vector, rate: Vector, signals: Vector,
-    ) -> None:  # fmt: skip
+    def drive(demand: Vector, tau: Vector) -> None:
         """tau = (tau_u, 0, tau_r)."""
         tau[0] = demand[0]
         tau[1] = 0.0

@@ -35,7 +35,7 @@ from podusv_cli.components.actuators.propeller import (
     thrust,
 )
 from podusv_cli.core.component import Presets, value
-from podusv_cli.core.kernel import Vector, bundle, kernel, scratch, tail
+from podusv_cli.core.kernel import Vector, bundle, call, kernel, scratch, tail
 from podusv_cli.core.signal import Signal
 
 SATURATED, SPEED_LIMITED, ANGLE_LIMITED, RATE_LIMITED, FLAGS = range(5)
@@ -213,7 +213,10 @@ class Pods(Actuator):
         tau, rate, state = np.zeros(3), np.zeros(count), self.rest()
         signals = np.zeros(len(self.signals))
         for _ in range(ROUNDS):
-            self.drive(0.0, x, state, demand, k, table, tau, rate, signals)
+            call(
+                self.drive, x=x, state=state, demand=demand, k=k, table=table, tau=tau, rate=rate,
+                signals=signals,
+            )  # fmt: skip
             command = signals[FLAGS : FLAGS + count]
             if np.allclose(state, command, rtol=1e-9, atol=0.0):
                 break
@@ -252,8 +255,8 @@ class Pods(Actuator):
     @staticmethod
     @kernel
     def drive(
-        t: float, x: Vector, state: Vector, demand: Vector, k: Any, table: Vector,
-        tau: Vector, rate: Vector, signals: Vector,
+        x: Vector, state: Vector, demand: Vector, k: Any, table: Vector, tau: Vector, rate: Vector,
+        signals: Vector,
     ) -> None:  # fmt: skip
         """Loads from the pods' states; rates towards what the demand asks for."""
         count = int(k.count)

@@ -29,10 +29,7 @@ class Saturated(Actuator):
 
     @staticmethod
     @kernel
-    def drive(
-        t: float, x: Vector, state: Vector, demand: Vector, k: Any, table: Vector,
-        tau: Vector, rate: Vector, signals: Vector,
-    ) -> None:  # fmt: skip
+    def drive(demand: Vector, k: Any, tau: Vector, signals: Vector) -> None:
         """Each demand clipped by itself; `saturated` is 1 while either is."""
         tau[0] = min(max(demand[0], -k.surge_limit), k.surge_limit)
         tau[1] = 0.0

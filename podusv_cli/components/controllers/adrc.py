@@ -14,12 +14,9 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-import numpy as np
-
 from podusv_cli.components.controllers.base import Slots, each
 from podusv_cli.components.controllers.hand_point import PSI_F, HandController, hand_errors, push
 from podusv_cli.components.controllers.observer import B_R, B_U, B_V, ObservingController, observe
-from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.kernel import Vector, kernel
 
 LAGGED = 6  # position in the memory, behind the observer
@@ -34,10 +31,6 @@ class Adrc(HandController, ObservingController):
         """The observer and the lagged heading."""
         return super().slots() + each((PSI_F,))
 
-    def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
-        """Velocities and heading as they are, and no load."""
-        return np.append(super().start(x, target, nominal), x[2])
-
     def gains(self) -> tuple[tuple[str, float, float], ...]:
         """Of a hull at rest."""
         surge, yaw = self.rate_gains()
@@ -46,8 +39,8 @@ class Adrc(HandController, ObservingController):
     @staticmethod
     @kernel
     def law(
-        t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
-        tau: Vector, rate: Vector, signals: Vector, work: Vector,
+        x: Vector, memory: Vector, target: Vector, k: Any, tau: Vector, rate: Vector,
+        signals: Vector,
     ) -> None:  # fmt: skip
         """A + k_v s along and across the bow, less the observed loads."""
         h = hand_errors(x, memory[LAGGED], target, k)

@@ -17,8 +17,6 @@ from __future__ import annotations
 import math
 from typing import Any, ClassVar, Literal
 
-import numpy as np
-
 from podusv_cli.components.controllers.base import Slots, each
 from podusv_cli.components.controllers.guidance import (
     STEERED,
@@ -29,7 +27,6 @@ from podusv_cli.components.controllers.guidance import (
 )
 from podusv_cli.components.controllers.observer import B_R, B_U, ObservingController, observe
 from podusv_cli.components.vessels.plant import surge_force, yaw_moment
-from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.kinematics import wrap
@@ -79,10 +76,6 @@ class Alos(LineOfSight, ObservingController):
         """The observer, then crab angle and offset."""
         return (*super().slots(), *each(LEARNT))
 
-    def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
-        """Nothing is learnt yet."""
-        return np.concatenate([super().start(x, target, nominal), np.zeros(2)])
-
     def gains(self) -> tuple[tuple[str, float, float], ...]:
         """The yaw rate's gain with that of the heading."""
         return ("k_u", self.k_u, self.omega_u), ("k_r", self.k_r + self.k_psi, self.omega_r)
@@ -90,8 +83,8 @@ class Alos(LineOfSight, ObservingController):
     @staticmethod
     @kernel
     def law(
-        t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
-        tau: Vector, rate: Vector, signals: Vector, work: Vector,
+        x: Vector, memory: Vector, target: Vector, k: Any, tau: Vector, rate: Vector,
+        signals: Vector,
     ) -> None:  # fmt: skip
         """Heading to the line of sight less the crab angle; speed along the course."""
         at = course_frame(x, target, k)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
 
 from podusv_cli.components.controllers.velocity_loop import Axis, Loop
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import Component
-from podusv_cli.core.kernel import Vector
+from podusv_cli.core.kernel import Vector, absent
 from podusv_cli.core.signal import Signal
 
 Slots = tuple[tuple[Signal, int], ...]
@@ -38,7 +41,8 @@ class Trial(NamedTuple):
 class Controller(Component):
     """A law from (state, target) to a demand (tau_u [N], tau_r [N m]).
 
-    `law(t, x, memory, target, k, table, tau, rate, signals, work)` is a kernel. It reads the time
+    `law(t, x, memory, target, k, table, tau, rate, signals, work)` is a kernel. It takes those of
+    these arguments that it names, as the other kernels do. It reads the time
     t [s], the state x = (x, y, psi, u, v, r), its own `memory`, the `target` (see
     `paths.base.TARGET`) and its constants `k`, which hold its fields and the *nominal* vessel's
     coefficients. It writes the demand into `tau`, the rate of its memory into `rate`, and one
@@ -73,25 +77,9 @@ class Controller(Component):
         """The law's kind."""
         return str(type(self).model_fields["kind"].default)
 
-    @staticmethod
-    def law(
-        t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
-        tau: Vector, rate: Vector, signals: Vector, work: Vector,
-    ) -> None:  # fmt: skip
-        """Write demand, rates and signals; every law has its own."""
-        raise NotImplementedError
-
-    @staticmethod
-    def sample(t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector) -> None:
-        """Change the memory at a sampling instant."""
-        raise NotImplementedError
-
-    @staticmethod
-    def after_saturation(
-        t: float, memory: Vector, demand: Vector, tau: Vector, k: Any, table: Vector, rate: Vector
-    ) -> None:
-        """Change the memory's rate in the light of the loads (tau_u, tau_v, tau_r) that act."""
-        raise NotImplementedError
+    law: ClassVar[Callable[..., None]] = staticmethod(absent)
+    sample: ClassVar[Callable[..., None]] = staticmethod(absent)
+    after_saturation: ClassVar[Callable[..., None]] = staticmethod(absent)
 
     def wants_loads(self) -> bool:
         """Whether the law has to know the loads that act."""
@@ -133,8 +121,8 @@ class Controller(Component):
         return 1
 
     def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
-        """The memory at t = 0 for the state x and the target there."""
-        raise NotImplementedError
+        """The memory at t = 0 for the state x and the target there; all zero by default."""
+        return np.zeros(sum(size for _, size in self.slots()))
 
     def fixed_signals(self) -> dict[Signal, Vector]:
         """Arrays worth logging that do not change during a run."""

@@ -13,6 +13,7 @@ from typing import Any, ClassVar, Literal, NamedTuple
 from podusv_cli.components.controllers.base import Controller
 from podusv_cli.components.controllers.constant_bearing import Moving, approach, turn_rate
 from podusv_cli.components.vessels.plant import surge_force, sway_force, yaw_moment
+from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import value
 from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import Vector, kernel
@@ -100,6 +101,12 @@ class HandController(Controller):
     k_p: float = value(0.5, "1/s", "gain of the distance, near the target", gt=0)
     U: float = value(1.25, "m/s", "largest wanted speed, about 1.2 times that at full thrust", gt=0)
     k_v: float = value(1.0, "1/s", "gain of the velocity that the hand point lacks", gt=0)
+
+    def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
+        """The lagged heading, which comes last in the memory, as the heading is."""
+        memory = super().start(x, target, nominal)
+        memory[-1] = x[2]
+        return memory
 
     def rate_gains(self) -> tuple[float, float]:
         """What answers a change of u and of r [1/s], at rest, with the part of A in it."""

@@ -20,7 +20,6 @@ import numpy as np
 from podusv_cli.components.controllers.base import Slots, each
 from podusv_cli.components.controllers.hand_point import PSI_F, HandController, hand_errors, push
 from podusv_cli.components.controllers.velocity_loop import Axis, Loop
-from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.signal import Signal
@@ -42,10 +41,6 @@ class HandPosition(HandController):
         """Integrals and the lagged heading."""
         return each((*INTEGRALS, PSI_F))
 
-    def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
-        """Integrals at zero, the heading as it is."""
-        return np.array([0.0, 0.0, x[2]])
-
     def wants_loads(self) -> bool:
         """Always, for anti-windup."""
         return True
@@ -63,9 +58,7 @@ class HandPosition(HandController):
 
     @staticmethod
     @kernel
-    def after_saturation(
-        t: float, memory: Vector, demand: Vector, tau: Vector, k: Any, table: Vector, rate: Vector
-    ) -> None:
+    def after_saturation(demand: Vector, tau: Vector, k: Any, rate: Vector) -> None:
         """Back-calculation with the tracking time k_v/k_i (Astrom and Hagglund; Hanus)."""
         share = k.k_i / k.k_v
         rate[I_A] += share * (tau[0] - demand[0]) / k.m11
@@ -74,8 +67,8 @@ class HandPosition(HandController):
     @staticmethod
     @kernel
     def law(
-        t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
-        tau: Vector, rate: Vector, signals: Vector, work: Vector,
+        x: Vector, memory: Vector, target: Vector, k: Any, tau: Vector, rate: Vector,
+        signals: Vector,
     ) -> None:  # fmt: skip
         """A + k_v s + I along and across the bow."""
         h = hand_errors(x, memory[LAGGED], target, k)

@@ -25,7 +25,6 @@ from podusv_cli.components.controllers.guidance import (
     wanted_speed,
 )
 from podusv_cli.components.controllers.velocity_loop import Axis, Loop
-from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.kinematics import wrap
@@ -50,19 +49,13 @@ class LosPid(LineOfSight):
         """The integrals."""
         return each(INTEGRALS)
 
-    def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
-        """No integral."""
-        return np.zeros(2)
-
     def wants_loads(self) -> bool:
         """Always, for anti-windup."""
         return True
 
     @staticmethod
     @kernel
-    def after_saturation(
-        t: float, memory: Vector, demand: Vector, tau: Vector, k: Any, table: Vector, rate: Vector
-    ) -> None:
+    def after_saturation(demand: Vector, tau: Vector, k: Any, rate: Vector) -> None:
         """Back-calculation with the tracking times 1/omega (Astrom and Hagglund)."""
         rate[FORCE] += k.omega_u * (tau[0] - demand[0])
         rate[MOMENT] += k.omega_psi * (tau[2] - demand[1])
@@ -86,8 +79,8 @@ class LosPid(LineOfSight):
     @staticmethod
     @kernel
     def law(
-        t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
-        tau: Vector, rate: Vector, signals: Vector, work: Vector,
+        x: Vector, memory: Vector, target: Vector, k: Any, tau: Vector, rate: Vector,
+        signals: Vector,
     ) -> None:  # fmt: skip
         """The heading is damped by the yaw rate itself; its integral holds a steady turn."""
         at = course_frame(x, target, k)

@@ -9,10 +9,7 @@ from __future__ import annotations
 import math
 from typing import Any, ClassVar
 
-import numpy as np
-
-from podusv_cli.components.controllers.base import Controller, Slots, Trial
-from podusv_cli.components.vessels.vessel import Vessel
+from podusv_cli.components.controllers.base import Controller, Trial
 from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.signal import Signal
@@ -37,14 +34,6 @@ class Manoeuvre(Controller):
     thrust: float = value(2.0, "N", "thrust, the same all the time", gt=0)
     lever: float = value(0.5, "m", "distance of the thrust behind the body origin", gt=0)
     execute: float = value(60.0, "s", "time at which steering begins; steady speed by then", ge=0)
-
-    def slots(self) -> Slots:
-        """No memory, but for trials that have to remember."""
-        return ()
-
-    def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
-        """All zero."""
-        return np.zeros(sum(size for _, size in self.slots()))
 
     def trial(self) -> Trial:
         """When steering begins; positive angles steer to starboard."""

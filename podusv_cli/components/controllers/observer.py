@@ -67,7 +67,9 @@ class ObservingController(Controller):
 
     def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
         """The velocities as they are, and no load."""
-        return np.array([x[3], x[4], x[5], 0.0, 0.0, 0.0])
+        memory = super().start(x, target, nominal)
+        memory[: V_HAT + 2] = x[3:6]
+        return memory
 
     def wants_loads(self) -> bool:
         """Always: the observer has to know the loads that act."""
@@ -75,9 +77,7 @@ class ObservingController(Controller):
 
     @staticmethod
     @kernel
-    def after_saturation(
-        t: float, memory: Vector, demand: Vector, tau: Vector, k: Any, table: Vector, rate: Vector
-    ) -> None:
+    def after_saturation(demand: Vector, tau: Vector, k: Any, rate: Vector) -> None:
         """Put the loads that act in place of the demand."""
         rate[U_HAT] += (tau[0] - demand[0]) / k.m11
         rate[V_HAT] += tau[1] / k.m22

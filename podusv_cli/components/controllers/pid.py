@@ -25,7 +25,7 @@ from podusv_cli.components.controllers.tracking import (
 from podusv_cli.components.controllers.velocity_loop import Axis, Loop
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import value
-from podusv_cli.core.kernel import Vector, bundle, kernel, scratch
+from podusv_cli.core.kernel import Vector, kernel, scratch
 from podusv_cli.core.signal import Signal
 
 INTEGRAL_U, INTEGRAL_R, LAG_U, LAG_R = 2, 3, 4, 5
@@ -92,10 +92,7 @@ class Pid(TrackingController):
         """Integrals at zero, lagged errors at zero or at the error."""
         memory = super().start(x, target, nominal)
         if self.lag_start == "error":
-            constants, seen = self.constants_with(nominal), np.array(memory)
-            k = bundle(constants)
-            self.sample(0.0, x, seen, target, k, self.table())
-            e = track(x, seen, self.aim(x, memory, target, constants), k)
+            e, k = self.first_errors(x, memory, target, nominal)
             u_d, r_d = reference(e, target, k)
             memory[[LAG_U, LAG_R]] = u_d - x[3], r_d - x[5]
         return memory
@@ -119,9 +116,7 @@ class Pid(TrackingController):
 
     @staticmethod
     @kernel
-    def after_saturation(
-        t: float, memory: Vector, demand: Vector, tau: Vector, k: Any, table: Vector, rate: Vector
-    ) -> None:
+    def after_saturation(demand: Vector, tau: Vector, k: Any, rate: Vector) -> None:
         """Back-calculation with the tracking time K_P/K_I (Astrom and Hagglund; Hanus)."""
         rate[INTEGRAL_U] += (tau[0] - demand[0]) / k.K_Pu
         rate[INTEGRAL_R] += (tau[2] - demand[1]) / k.K_Pr
@@ -129,8 +124,8 @@ class Pid(TrackingController):
     @staticmethod
     @kernel
     def law(
-        t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
-        tau: Vector, rate: Vector, signals: Vector, work: Vector,
+        x: Vector, memory: Vector, target: Vector, k: Any, tau: Vector, rate: Vector,
+        signals: Vector,
     ) -> None:  # fmt: skip
         """tau = K_P e + K_I integral + K_D (e - lag)/T_d on both axes."""
         aim = take_aim(x, memory, target, k, scratch(6))

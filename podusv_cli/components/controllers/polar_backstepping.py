@@ -32,7 +32,7 @@ from podusv_cli.components.controllers.velocity_loop import AdaptedBound, Axis, 
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import value
 from podusv_cli.core.derived import difference
-from podusv_cli.core.kernel import Vector, bundle, kernel, scratch, tail
+from podusv_cli.core.kernel import Vector, kernel, scratch, tail
 from podusv_cli.core.signal import Signal
 
 B_HAT_U, B_HAT_R, WEIGHTS = 2, 3, 4
@@ -104,8 +104,8 @@ def compensation(memory: Vector, k: Any, rate: Vector) -> tuple[float, float]:
 
 @kernel
 def polar_backstepping(
-    t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
-    tau: Vector, rate: Vector, signals: Vector, work: Vector,
+    x: Vector, memory: Vector, target: Vector, k: Any, table: Vector, tau: Vector, rate: Vector,
+    signals: Vector, work: Vector,
 ) -> None:  # fmt: skip
     """Demand (26), (35) and memory rates (27), (28), (36), (37), see `controllers.base`.
 
@@ -197,9 +197,7 @@ class PolarBackstepping(TrackingController):
 
     @staticmethod
     @kernel
-    def after_saturation(
-        t: float, memory: Vector, demand: Vector, tau: Vector, k: Any, table: Vector, rate: Vector
-    ) -> None:
+    def after_saturation(demand: Vector, tau: Vector, k: Any, rate: Vector) -> None:
         """Add what the loads fall short of the demand."""
         at = int(k.auxiliary)
         rate[at] += (tau[0] - demand[0]) / k.m11
@@ -276,10 +274,7 @@ class FilteredBackstepping(PolarBackstepping):
         """The filter at zero or settled on the virtual control."""
         memory = super().start(x, target, nominal)
         if self.filter_start == "alpha":
-            constants, seen = self.constants_with(nominal), np.array(memory)
-            k = bundle(constants)
-            self.sample(0.0, x, seen, target, k, self.table())
-            e = track(x, seen, self.aim(x, memory, target, constants), k)
+            e, _ = self.first_errors(x, memory, target, nominal)
             at = WEIGHTS + 2 * self.network.count
             memory[at : at + 2] = e.alpha_u, e.alpha_r
         return memory

@@ -10,7 +10,6 @@ import numpy as np
 from pydantic import field_validator, model_validator
 
 from podusv_cli.components.controllers.base import Controller
-from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import value
 from podusv_cli.core.interpolation import cubic, linear, segment
 from podusv_cli.core.kernel import Vector, kernel, tail
@@ -95,16 +94,9 @@ class Schedule(Controller):
         rates = np.gradient(state, times.ravel(), axis=0)
         return np.concatenate([times.ravel(), np.hstack([demand, state, rates, gains]).ravel()])
 
-    def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
-        """No memory."""
-        return np.zeros(0)
-
     @staticmethod
     @kernel
-    def law(
-        t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
-        tau: Vector, rate: Vector, signals: Vector, work: Vector,
-    ) -> None:  # fmt: skip
+    def law(t: float, x: Vector, k: Any, table: Vector, tau: Vector, signals: Vector) -> None:
         """The demand at t, and what the state's errors add."""
         count, width = int(k.rows_count), int(k.row_width)
         i = min(segment(t, count, table), count - 2)

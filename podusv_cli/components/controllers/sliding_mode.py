@@ -23,7 +23,6 @@ import numpy as np
 from podusv_cli.components.controllers.base import Slots, each
 from podusv_cli.components.controllers.hand_point import PSI_F, HandController, hand_errors, push
 from podusv_cli.components.controllers.velocity_loop import Axis, Loop
-from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.signal import Signal
@@ -67,10 +66,6 @@ class SlidingMode(HandController):
         """What super-twisting has learnt, and the lagged heading."""
         return each((*TWISTED, PSI_F))
 
-    def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
-        """Nothing learnt, the heading as it is."""
-        return np.array([0.0, 0.0, x[2]])
-
     def wants_loads(self) -> bool:
         """Always, for anti-windup; the first order has nothing that could wind up."""
         return True
@@ -94,9 +89,7 @@ class SlidingMode(HandController):
 
     @staticmethod
     @kernel
-    def after_saturation(
-        t: float, memory: Vector, demand: Vector, tau: Vector, k: Any, table: Vector, rate: Vector
-    ) -> None:
+    def after_saturation(demand: Vector, tau: Vector, k: Any, rate: Vector) -> None:
         """Learn the less, the more acceleration the actuator falls short of, against eta."""
         a, b = (tau[0] - demand[0]) / k.m11, k.hand * (tau[2] - demand[1]) / k.m33
         rate[Z_A] *= k.eta * k.eta / (k.eta * k.eta + a * a)
@@ -105,8 +98,8 @@ class SlidingMode(HandController):
     @staticmethod
     @kernel
     def law(
-        t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
-        tau: Vector, rate: Vector, signals: Vector, work: Vector,
+        x: Vector, memory: Vector, target: Vector, k: Any, tau: Vector, rate: Vector,
+        signals: Vector,
     ) -> None:  # fmt: skip
         """A plus the reaching law along and across the bow; no load is known."""
         h = hand_errors(x, memory[LAGGED], target, k)

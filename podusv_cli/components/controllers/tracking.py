@@ -13,10 +13,11 @@ from pydantic import model_validator
 
 from podusv_cli.components.controllers.base import Approach, Controller, Slots, each
 from podusv_cli.components.controllers.crab import SWAY, take_aim
+from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import value
 from podusv_cli.core.derived import difference
 from podusv_cli.core.elementary import cos_sin
-from podusv_cli.core.kernel import Vector, bundle, kernel, scratch
+from podusv_cli.core.kernel import Vector, bundle, call, kernel, scratch
 from podusv_cli.core.kinematics import direction, wrap
 from podusv_cli.core.signal import Signal
 
@@ -222,7 +223,7 @@ class TrackingController(Controller):
 
     @staticmethod
     @kernel
-    def sample(t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector) -> None:
+    def sample(t: float, x: Vector, memory: Vector, target: Vector, k: Any) -> None:
         """Take the target's direction for the difference and for holding."""
         aim = take_aim(x, memory, target, k, scratch(6))
         hold(t, x, memory, aim, k)
@@ -235,6 +236,15 @@ class TrackingController(Controller):
         x_e, y_e = self.aim(x, memory, target, k)[:2] - x[:2]
         memory[PSI_D_HELD] = direction(x_e, y_e) if x_e or y_e else direction(*target[2:4])
         return memory
+
+    def first_errors(
+        self, x: Vector, memory: Vector, target: Vector, nominal: Vessel
+    ) -> tuple[Tracking, Any]:
+        """The errors at the start, with this memory once it has taken a sample; the constants."""
+        constants, seen = self.constants_with(nominal), np.array(memory)
+        k = bundle(constants)
+        call(self.sample, t=0.0, x=x, memory=seen, target=target, k=k, table=self.table())
+        return track(x, seen, self.aim(x, memory, target, constants), k), k
 
     @staticmethod
     def aim(x: Vector, memory: Vector, target: Vector, k: dict[str, float]) -> Vector:

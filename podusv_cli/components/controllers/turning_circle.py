@@ -20,9 +20,6 @@ class TurningCircle(Manoeuvre):
 
     @staticmethod
     @kernel
-    def law(
-        t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
-        tau: Vector, rate: Vector, signals: Vector, work: Vector,
-    ) -> None:  # fmt: skip
+    def law(t: float, k: Any, tau: Vector, signals: Vector) -> None:
         """Straight, then at the angle."""
         steered(k.angle if t >= k.execute else 0.0, k, tau, signals)

@@ -104,8 +104,8 @@ class VelocityVector(ObservingController):
     @staticmethod
     @kernel
     def law(
-        t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
-        tau: Vector, rate: Vector, signals: Vector, work: Vector,
+        x: Vector, memory: Vector, target: Vector, k: Any, tau: Vector, rate: Vector,
+        signals: Vector,
     ) -> None:  # fmt: skip
         """Yaw first: turn the velocity vector; surge as far as it points the right way."""
         wanted = guidance(x, target, k)

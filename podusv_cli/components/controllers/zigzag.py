@@ -45,7 +45,7 @@ class Zigzag(Manoeuvre):
 
     @staticmethod
     @kernel
-    def sample(t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector) -> None:
+    def sample(t: float, x: Vector, memory: Vector, k: Any) -> None:
         """Begin, or reverse."""
         if t >= k.execute and memory[0] == 0.0:
             memory[0], memory[1] = 1.0, x[2]
@@ -54,10 +54,7 @@ class Zigzag(Manoeuvre):
 
     @staticmethod
     @kernel
-    def law(
-        t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
-        tau: Vector, rate: Vector, signals: Vector, work: Vector,
-    ) -> None:  # fmt: skip
+    def law(memory: Vector, k: Any, tau: Vector, rate: Vector, signals: Vector) -> None:
         """At the angle, to the side of the moment."""
         steered(memory[0] * k.angle, k, tau, signals)
         rate[0] = rate[1] = 0.0

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from typing import Any, ClassVar
+from collections.abc import Callable, Iterable, Iterator
+from typing import ClassVar
+
+import numpy as np
 
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import Component
-from podusv_cli.core.kernel import Vector
+from podusv_cli.core.kernel import Vector, absent, bundle, call
 from podusv_cli.core.signal import Signal
 
 # First-order motion in waves and its velocity, which sensors see on top of the vessel's state. A
@@ -31,20 +33,19 @@ FLOW = (
 )  # fmt: skip
 
 
-# The arguments of a disturbance's kernel, and those which it may do without.
+# The arguments of a disturbance's kernel.
 ARGUMENTS = ("t", "x", "k", "table", "b", "again", "stage")
-OPTIONAL = ("again", "stage")
 
 
 class Disturbance(Component):
     """A load on the hull in the body frame.
 
-    `evaluate(t, x, k, table, b)` is a kernel that writes (b_u [N], b_v [N], b_r [N m]) at time
-    t [s] and state x = (x, y, psi, u, v, r) into `b`, and behind them one number for each of its
-    `signals`. One that does not look at x says so with `of_time`, and is not asked twice for the
-    same t. One that takes much time may have two arguments more, numbers that are 0 or 1: where
-    `again` is 1, `b` still has what it wrote for this t and maybe another x; where `stage` is 1, a
-    step is under way, and its signals are not needed.
+    `evaluate(t, x, k, table, b, again, stage)` is a kernel and takes those of these arguments that
+    it names. It writes (b_u [N], b_v [N], b_r [N m]) at time t [s] and state x = (x, y, psi, u, v,
+    r) into `b`, and behind them one number for each of its `signals`. One that does not look at x
+    says so with `of_time`, and is not asked twice for the same t. Two numbers that are 0 or 1 say
+    what need not be computed: where `again` is 1, `b` still has what it wrote for this t and maybe
+    another x; where `stage` is 1, a step is under way, and its signals are not needed.
     """
 
     noun: ClassVar[str] = "disturbance"
@@ -59,10 +60,7 @@ class Disturbance(Component):
         """What `evaluate` writes behind the load."""
         return ()
 
-    @staticmethod
-    def evaluate(t: float, x: Vector, k: Any, table: Vector, b: Vector) -> None:
-        """Write the load; every disturbance has its own."""
-        raise NotImplementedError
+    evaluate: ClassVar[Callable[..., None]] = staticmethod(absent)
 
     def told(self) -> Iterator[tuple[Disturbance, tuple[Signal, ...]]]:
         """Each of its parts, with the signals that are logged because of it."""
@@ -75,6 +73,16 @@ class Disturbance(Component):
     def constant_of(self, position: int, name: str) -> str:
         """What `constants_with` calls this constant of the part at this position of `each`."""
         return name
+
+    def loads(self, vessel: Vessel, times: Iterable[float], states: Iterable[Vector]) -> Vector:
+        """The loads (b_u, b_v, b_r) on this vessel at each of these times [s] and states."""
+        times = list(times)
+        rows = np.zeros((len(times), 3 + len(self.signals)))
+        k, table = bundle(self.constants_with(vessel)), self.table_for(vessel, max(times))
+        evaluate = self.kernel_with(vessel)
+        for t, x, b in zip(times, states, rows, strict=True):
+            call(evaluate, t=t, x=x, k=k, table=table, b=b, again=0.0, stage=0.0)
+        return rows[:, :3]
 
     def kernel_with(self, vessel: Vessel) -> Callable[..., None]:
         """The kernel for constants of this vessel; the same function for every vessel."""

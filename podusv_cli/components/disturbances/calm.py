@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 from podusv_cli.components.disturbances.base import Disturbance
 from podusv_cli.core.kernel import Vector, kernel
@@ -16,7 +16,7 @@ class Calm(Disturbance):
 
     @staticmethod
     @kernel
-    def evaluate(t: float, x: Vector, k: Any, table: Vector, b: Vector) -> None:
+    def evaluate(b: Vector) -> None:
         """Zero."""
         b[0] = b[1] = b[2] = 0.0
 

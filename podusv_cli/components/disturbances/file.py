@@ -66,7 +66,7 @@ class FromFile(Disturbance):
 
     @staticmethod
     @kernel
-    def evaluate(t: float, x: Vector, k: Any, table: Vector, b: Vector) -> None:
+    def evaluate(t: float, k: Any, table: Vector, b: Vector) -> None:
         """The load between the two rows around t."""
         count = int(k.count)
         i = min(segment(t, count, table), count - 2)

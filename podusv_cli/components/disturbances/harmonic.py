@@ -93,7 +93,7 @@ class HarmonicDisturbance(Disturbance):
 
     @staticmethod
     @kernel
-    def evaluate(t: float, x: Vector, k: Any, table: Vector, b: Vector) -> None:
+    def evaluate(t: float, k: Any, table: Vector, b: Vector) -> None:
         """Equation (52), scaled."""
         waves, count = scratch(LANES), int(k.waves)
         for i in range(filled(count, WAVES)):

@@ -37,7 +37,7 @@ class Step(Disturbance):
 
     @staticmethod
     @kernel
-    def evaluate(t: float, x: Vector, k: Any, table: Vector, b: Vector) -> None:
+    def evaluate(t: float, k: Any, b: Vector) -> None:
         """The share of the load that has set in, times the load."""
         share = 1.0 if t >= k.time + k.ramp else 0.0
         if k.time < t < k.time + k.ramp:

@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from podusv_cli.components.disturbances.base import ARGUMENTS, OPTIONAL, Disturbance
+from podusv_cli.components.disturbances.base import ARGUMENTS, Disturbance
 from podusv_cli.components.vessels.vessel import Vessel
-from podusv_cli.core.kernel import Vector, accepted, constants_type, kernel, scratch, shared, tail
+from podusv_cli.core.kernel import Vector, constants_type, kernel, scratch, shared, tail, taken
 from podusv_cli.core.plugins import TEXT
 from podusv_cli.core.signal import Signal
 
@@ -116,7 +116,7 @@ def _sum(parts: Sequence[Part]) -> Callable[..., None]:
     """
     scope: dict[str, Any] = {"scratch": scratch, "tail": tail, "shared": shared}
     scope["__name__"] = __name__  # podusv's own, which may use `shared`
-    lines = ["def evaluate(t, x, k, table, b, again=0.0, stage=0.0):", "    u = v = r = 0.0"]
+    lines = [f"def evaluate({', '.join(ARGUMENTS)}):", "    u = v = r = 0.0"]
     written: set[int] = set()
     count = Counter(place for part in parts for place in part.places)
     for i, part in enumerate(parts):
@@ -133,7 +133,7 @@ def _lines(i: int, part: Part, written: Set[int], alone: bool) -> Iterator[str]:
     given = ", ".join(f"k.part{i}_{name}" for name in part.constants)
     own = {"k": f"Constants{i}({given})", "table": f"tail(table, begin{i})", "b": f"load{i}"}
     own |= {} if alone else {"again": "0.0"}
-    passed = (own.get(a, a) for a in accepted(part.evaluate, ARGUMENTS, OPTIONAL))
+    passed = (own.get(a, a) for a in taken(part.evaluate, ARGUMENTS))
     yield f"    load{i} = scratch({3 + len(part.places)})"
     yield f"    begin{i} = int(shared(table[{i}]))"
     for j, place in enumerate(part.places):

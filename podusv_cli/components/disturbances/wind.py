@@ -171,10 +171,7 @@ class Wind(Disturbance):
 
     @staticmethod
     @kernel
-    def evaluate(
-        t: float, x: Vector, k: Any, table: Vector, b: Vector, again: float = 0.0,
-        stage: float = 0.0,
-    ) -> None:  # fmt: skip
+    def evaluate(t: float, x: Vector, k: Any, table: Vector, b: Vector, again: float) -> None:
         """The load, the wind's speed and where it comes from; the speed depends on t alone."""
         c_psi, s_psi = cos_sin(x[2])
         speed = b[3] if again > 0.0 else k.mean + _gust(t, int(k.lanes), table)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from collections.abc import Callable
+from typing import ClassVar
 
 import numpy as np
 
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import Component
-from podusv_cli.core.kernel import Vector
+from podusv_cli.core.kernel import Vector, absent
 from podusv_cli.core.signal import STATE, Signal
 
 # Not `u_hat`: laws with an observer of their own log that.
@@ -45,17 +46,8 @@ class Estimator(Component):
         """For each number of the state the key and value of the noise that is assumed, or ""."""
         return (("", 0.0),) * len(ESTIMATE)
 
-    @staticmethod
-    def correct(t: float, seen: Vector, state: Vector, k: Any, table: Vector) -> None:
-        """Take what was delivered at this instant into the state."""
-        raise NotImplementedError
-
-    @staticmethod
-    def follow(
-        t: float, seen: Vector, tau: Vector, state: Vector, k: Any, table: Vector, rate: Vector
-    ) -> None:
-        """Write the rate of the state."""
-        raise NotImplementedError
+    correct: ClassVar[Callable[..., None]] = staticmethod(absent)
+    follow: ClassVar[Callable[..., None]] = staticmethod(absent)
 
     def needs(self) -> tuple[bool, ...]:
         """Which of x, y, psi, u, v, r have to be measured."""

@@ -138,7 +138,7 @@ class ExtendedKalmanFilter(Estimator):
 
     @staticmethod
     @kernel
-    def correct(t: float, seen: Vector, state: Vector, k: Any, table: Vector) -> None:
+    def correct(seen: Vector, state: Vector, k: Any) -> None:
         """Take in what was delivered, one value after the other."""
         sigma = scratch(6)
         sigma[0], sigma[1], sigma[2] = k.sigma_p, k.sigma_p, k.sigma_psi
@@ -150,9 +150,7 @@ class ExtendedKalmanFilter(Estimator):
 
     @staticmethod
     @kernel
-    def follow(
-        t: float, seen: Vector, tau: Vector, state: Vector, k: Any, table: Vector, rate: Vector
-    ) -> None:
+    def follow(tau: Vector, state: Vector, k: Any, rate: Vector) -> None:
         """The nominal vessel, and how far the estimate may be off it."""
         cosine, sine = cos_sin(state[2])
         b, f, q = scratch(3), scratch(54), scratch(9)

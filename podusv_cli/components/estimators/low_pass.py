@@ -44,14 +44,12 @@ class LowPass(Estimator):
 
     @staticmethod
     @kernel
-    def correct(t: float, seen: Vector, state: Vector, k: Any, table: Vector) -> None:
+    def correct() -> None:
         """Nothing jumps."""
 
     @staticmethod
     @kernel
-    def follow(
-        t: float, seen: Vector, tau: Vector, state: Vector, k: Any, table: Vector, rate: Vector
-    ) -> None:
+    def follow(seen: Vector, state: Vector, k: Any, rate: Vector) -> None:
         """Go towards the values delivered last."""
         north = (seen[VALUE] - state[0]) / k.T_p
         east = (seen[VALUE + 1] - state[1]) / k.T_p

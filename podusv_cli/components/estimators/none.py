@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
 
 from podusv_cli.components.estimators.base import Estimator
 from podusv_cli.components.measurements.base import FRESH
@@ -16,7 +16,7 @@ class NoEstimator(Estimator):
 
     @staticmethod
     @kernel
-    def correct(t: float, seen: Vector, state: Vector, k: Any, table: Vector) -> None:
+    def correct(seen: Vector, state: Vector) -> None:
         """Take over what is new."""
         for i in range(6):
             if seen[FRESH + i] != 0.0:
@@ -24,9 +24,7 @@ class NoEstimator(Estimator):
 
     @staticmethod
     @kernel
-    def follow(
-        t: float, seen: Vector, tau: Vector, state: Vector, k: Any, table: Vector, rate: Vector
-    ) -> None:
+    def follow(rate: Vector) -> None:
         """Nothing moves between two deliveries."""
         for i in range(6):
             rate[i] = 0.0

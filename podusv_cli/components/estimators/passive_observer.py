@@ -132,7 +132,7 @@ class PassiveObserver(Estimator):
 
     @staticmethod
     @kernel
-    def correct(t: float, seen: Vector, state: Vector, k: Any, table: Vector) -> None:
+    def correct(seen: Vector, state: Vector) -> None:
         """Put the predicted measurement to what was delivered; a heading by the nearest turn."""
         for i in range(2):
             if seen[FRESH + i] != 0.0:
@@ -143,9 +143,7 @@ class PassiveObserver(Estimator):
 
     @staticmethod
     @kernel
-    def follow(
-        t: float, seen: Vector, tau: Vector, state: Vector, k: Any, table: Vector, rate: Vector
-    ) -> None:
+    def follow(tau: Vector, state: Vector, k: Any, rate: Vector) -> None:
         """The observer's equations."""
         cosine, sine = cos_sin(state[SEEN + 2])
         e_x = state[SEEN] - state[0] - state[WAVE]

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any, ClassVar
+from collections.abc import Callable, Iterator
+from typing import ClassVar
 
 import numpy as np
 
 from podusv_cli.core.component import Component
-from podusv_cli.core.kernel import Vector
+from podusv_cli.core.kernel import Vector, absent
 from podusv_cli.core.signal import STATE, Signal
 
 # Where `seen` has, for each of the six quantities of the vessel's state: the value that was
@@ -34,12 +34,7 @@ class Measurement(Component):
         """The measured values that are logged, in the order of the state."""
         return ()
 
-    @staticmethod
-    def sense(
-        t: float, instant: float, x: Vector, b: Vector, k: Any, table: Vector, seen: Vector
-    ) -> None:
-        """Update what is seen; every kind that is not exact has its own."""
-        raise NotImplementedError
+    sense: ClassVar[Callable[..., None]] = staticmethod(absent)
 
     def measured(self) -> tuple[bool, ...]:
         """Which of x, y, psi, u, v, r are measured."""

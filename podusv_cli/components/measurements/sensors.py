@@ -170,9 +170,7 @@ class Sensors(Measurement):
 
     @staticmethod
     @kernel
-    def sense(
-        t: float, instant: float, x: Vector, b: Vector, k: Any, table: Vector, seen: Vector
-    ) -> None:
+    def sense(instant: float, x: Vector, b: Vector, k: Any, table: Vector, seen: Vector) -> None:
         """Sample what is due, with its error; deliver what has waited long enough."""
         for i in range(6):
             head = tail(table, HEAD * i)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from podusv_cli.core.component import Component
-from podusv_cli.core.kernel import Vector, bundle
+from podusv_cli.core.kernel import Vector, absent, bundle, call
 
 Point = tuple[float, float]
 
@@ -34,17 +34,14 @@ class Path(Component):
 
     noun: ClassVar[str] = "path"
 
-    @staticmethod
-    def evaluate(t: float, k: Any, table: Vector, target: Vector) -> None:
-        """Write the target at time t; every path has its own."""
-        raise NotImplementedError
+    evaluate: ClassVar[Callable[..., None]] = staticmethod(absent)
 
     def targets(self, times: Iterable[float]) -> Vector:
         """The target at each of these times [s], a row of `TARGET` each."""
         times = list(times)
         rows, k, table = np.zeros((len(times), len(TARGET))), bundle(self.constants()), self.table()
         for t, row in zip(times, rows, strict=True):
-            self.evaluate(t, k, table, row)
+            call(self.evaluate, t=t, k=k, table=table, target=row)
         return rows
 
     def waypoints(self) -> tuple[Point, ...]:

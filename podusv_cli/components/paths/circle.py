@@ -37,7 +37,7 @@ class Circle(Path):
 
     @staticmethod
     @kernel
-    def evaluate(t: float, k: Any, table: Vector, target: Vector) -> None:
+    def evaluate(t: float, k: Any, target: Vector) -> None:
         """Uniform rotation; with y to the east, a growing angle turns to starboard."""
         rate = (1.0 - 2.0 * k.turn) * k.speed / k.radius
         on_circle(k.radius, k.angle + rate * t, rate, target)

@@ -27,7 +27,7 @@ class FigureEight(Path):
 
     @staticmethod
     @kernel
-    def evaluate(t: float, k: Any, table: Vector, target: Vector) -> None:
+    def evaluate(t: float, k: Any, target: Vector) -> None:
         """Two harmonic motions, the eastward one twice as fast."""
         rate = 2.0 * math.pi / k.period
         north, east = 0.5 * k.length, 0.5 * k.breadth

@@ -21,7 +21,7 @@ class Line(Path):
 
     @staticmethod
     @kernel
-    def evaluate(t: float, k: Any, table: Vector, target: Vector) -> None:
+    def evaluate(t: float, k: Any, target: Vector) -> None:
         """Uniform motion."""
         target[2] = k.speed * math.cos(k.course)
         target[3] = k.speed * math.sin(k.course)

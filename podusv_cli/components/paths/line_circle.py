@@ -66,7 +66,7 @@ class LineCircle(Path):
 
     @staticmethod
     @kernel
-    def evaluate(t: float, k: Any, table: Vector, target: Vector) -> None:
+    def evaluate(t: float, k: Any, target: Vector) -> None:
         """Path (53)."""
         if t <= k.switch:
             _straight(t, k, target)

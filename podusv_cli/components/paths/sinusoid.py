@@ -27,7 +27,7 @@ class Sinusoid(Path):
 
     @staticmethod
     @kernel
-    def evaluate(t: float, k: Any, table: Vector, target: Vector) -> None:
+    def evaluate(t: float, k: Any, target: Vector) -> None:
         """Uniform motion along the axis, harmonic motion across it."""
         rate = 2.0 * math.pi * k.speed / k.wavelength
         cosine, sine = cos_sin(rate * t)

@@ -51,10 +51,9 @@ def check_kernel(function: Any) -> None:
             raise LawError(f"kernel {one.__qualname__} ({place}): {text}")
 
 
-def check_arguments(function: Any, places: Collection[int]) -> None:
+def check_arguments(function: Any, names: Collection[str]) -> None:
     """Raise LawError for a kernel that writes to one of these arguments, which it may only read."""
     node = _source(function)
-    names = [a.arg for i, a in enumerate(node.args.args) if i in places] if node else []
     for part in ast.walk(node) if node else ():
         match part:
             case ast.Subscript(value=ast.Name(id=name), ctx=ast.Store()) if name in names:

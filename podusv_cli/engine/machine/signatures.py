@@ -1,7 +1,7 @@
 """The few signatures that the loop calls through.
 
-A component's kernel takes its constants as a named tuple `k`; the loop hands over a bare vector
-`p`. `bind` makes the door between the two.
+A component's kernel takes those arguments that it names, its constants as a named tuple `k`; the
+loop hands over all of them, and `k` as a bare vector. `bind` makes the adapter between the two.
 
 As machine code all of them follow C's calling convention, whose types are given here by ctypes.
 """
@@ -14,8 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from podusv_cli.components.disturbances.base import OPTIONAL
-from podusv_cli.core.kernel import LANES, Vector, accepted, unpacker
+from podusv_cli.core.kernel import LANES, Vector, taken, unpacker
 
 NUMBER, WHOLE = c_double, c_int64
 NUMBERS = ("t", "instant", "weight", "again", "stage")
@@ -24,16 +23,16 @@ VECTOR = POINTER(NUMBER)
 # instant's position, its weight in an integral [s], and whether an evaluation is one more at its
 # instant or a stage within a step are numbers, all others vectors.
 SIGNATURES = {
-    "path": "t p table target",
-    "disturbance": "t x p table b again stage",
-    "law": "t x memory target p table tau rate signals work",
-    "sample": "t x memory target p table",
-    "actuator": "t x state demand p table tau rate signals",
-    "after_saturation": "t memory demand tau p table rate",
-    "measurement": "t instant x b p table seen",
-    "correct": "t seen state p table",
-    "follow": "t seen tau state p table rate",
-    "observer": "t weight s row p seen",
+    "path": "t k table target",
+    "disturbance": "t x k table b again stage",
+    "law": "t x memory target k table tau rate signals work",
+    "sample": "t x memory target k table",
+    "actuator": "t x state demand k table tau rate signals",
+    "after_saturation": "t memory demand tau k table rate",
+    "measurement": "t instant x b k table seen",
+    "correct": "t seen state k table",
+    "follow": "t seen tau state k table rate",
+    "observer": "t weight s row k seen",
 }
 PROTOTYPES: dict[str, Any] = {
     part: CFUNCTYPE(None, *(NUMBER if a in NUMBERS else VECTOR for a in arguments.split()))
@@ -61,20 +60,16 @@ EVALUATE_ALL = CFUNCTYPE(None, PROTOTYPES["law"], WHOLE, WHOLE, WHOLE, *[VECTOR]
 
 
 def bind(part: str, inner: Any, names: tuple[str, ...], alike: Set[str] = frozenset()) -> Any:
-    """The door of a part to the kernel `inner`, whose constants have these names.
+    """The adapter of a part to the kernel `inner`, whose constants have these names.
 
-    Those in `alike` are the same in all runs that march side by side.
+    Those in `alike` are the same in all runs that march side by side. Raises LawError for a kernel
+    that names an argument which the part does not have.
     """
     arguments = SIGNATURES[part].split()
-    passed = ", ".join("named(p)" if a == "p" else a for a in taken(part, inner))
+    passed = ", ".join("named(k)" if a == "k" else a for a in taken(inner, arguments))
     scope: dict[str, Any] = {"kernel": inner, "named": unpacker(names, alike)}
     exec(f"def {part}_entry({', '.join(arguments)}):\n    kernel({passed})", scope)  # noqa: S102
     return scope[f"{part}_entry"]
-
-
-def taken(part: str, inner: Any) -> list[str]:
-    """Which arguments of a part its kernel takes."""
-    return accepted(inner, SIGNATURES[part].split(), OPTIONAL)
 
 
 def pointer(vector: Vector) -> Any:

@@ -15,7 +15,7 @@ import numpy as np
 from podusv_cli.components.vessels.vessel import COEFFICIENTS
 from podusv_cli.core.component import called
 from podusv_cli.core.errors import LawError, in_a_line
-from podusv_cli.core.kernel import Vector, bundle
+from podusv_cli.core.kernel import Vector, bundle, call
 from podusv_cli.core.signal import NAME, Signal
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
 from podusv_cli.engine.machine.kernel_faults import check_arguments, check_kernel
@@ -24,7 +24,7 @@ from podusv_cli.engine.running.watch import Work
 PROVENANCE = "provenance"  # is a group in every log
 UNWRITTEN = -1.234567890123e-290  # no law writes just this
 FLOAT_AS_COUNT = "'float' object cannot be interpreted as an integer"
-READ = (1, 2, 3, 5)  # x, memory, target and table among a law's arguments
+READ = ("x", "memory", "target", "table")  # arguments that a law may only read
 # What a law's arithmetic may raise: the run tells it, as divergence.
 OF_NUMBERS = (ArithmeticError, ValueError)
 
@@ -92,11 +92,12 @@ def evaluated(loop: ClosedLoop, before: float) -> tuple[Vector, Vector, Vector]:
     law, memory, target = loop.controller, loop.first_memory(), loop.first_target()
     x, k, table = np.array(loop.start), bundle(law.constants_with(loop.nominal)), law.table()
     tau, rate, signals = (np.full(n, before) for n in (2, len(memory), len(law.signals)))
-    if law.sample_period() > 0:
-        law.sample(0.0, x, memory, target, k, table)
     read = {"x": x, "memory": memory, "target": target, "table": table}
+    if law.sample_period() > 0:
+        call(law.sample, t=0.0, k=k, **read)
     before_it = {name: vector.copy() for name, vector in read.items()}
-    law.law(0.0, x, memory, target, k, table, tau, rate, signals, np.zeros(law.workspace()))
+    work = np.zeros(law.workspace())
+    call(law.law, t=0.0, **read, k=k, tau=tau, rate=rate, signals=signals, work=work)
     for name, vector in read.items():
         same = (vector == before_it[name]) | (np.isnan(vector) & np.isnan(before_it[name]))
         if len(changed := np.flatnonzero(~same)):
@@ -113,7 +114,10 @@ def _ask(loop: ClosedLoop) -> None:
         raise LawError(f"{called(law)}: it leaves {left} unwritten")
     if law.wants_loads():
         k, memory = bundle(law.constants_with(loop.nominal)), loop.first_memory()
-        law.after_saturation(0.0, memory, tau, np.zeros(3), k, law.table(), rate)
+        call(
+            law.after_saturation, t=0.0, memory=memory, demand=tau, tau=np.zeros(3), k=k,
+            table=law.table(), rate=rate,
+        )  # fmt: skip
 
 
 def _check_signals(loop: ClosedLoop) -> None:
