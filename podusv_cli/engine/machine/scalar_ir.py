@@ -8,7 +8,8 @@ from typing import Any
 import llvmlite.binding as llvm
 
 RETURN = -1  # stands for a block behind all others
-EXCEPTION = "%a1"  # where numba's functions leave what they raise; the march never looks there
+# Where numba's functions leave their result, and what they raise, which nobody looks at.
+RESULT, EXCEPTION = "%a0", "%a1"
 
 
 class NotForLanes(TypeError):
@@ -27,6 +28,11 @@ class Instruction:
     words: str  # its text without the name: flags, predicates and types of memory stand there
     block: int
     sources: list[int] = field(default_factory=list)  # of a phi: the block of every operand
+
+    @property
+    def typed(self) -> list[tuple[str, str]]:
+        """Every operand with its type."""
+        return list(zip(self.operands, self.kinds, strict=True))
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +77,8 @@ def prepared(module: Any, name: str, machine: Any) -> Any:
     return module.get_function(name)
 
 
-def read(function: Any) -> Function:
-    """The function as values, without what only tells of exceptions. Raises NotForLanes."""
+def read(function: Any, unread: tuple[str, ...]) -> Function:
+    """The function as values, without stores to arguments in `unread`. Raises NotForLanes."""
     kinds = _named(function)
     rows = [list(block.instructions) for block in function.blocks]
     lines = [line.strip() for line in str(function).splitlines() if line.startswith("  ")]
@@ -82,7 +88,7 @@ def read(function: Any) -> Function:
     blocks = [[_read(one, i, next(texts), kinds) for one in row] for i, row in enumerate(rows)]
     arguments = [(f"%{a.name}", kinds[a.name]) for a in function.arguments]
     successors = [_successors(row[-1]) for row in blocks]
-    _clean(blocks)
+    _clean(blocks, unread)
     return Function(arguments, blocks, successors)
 
 
@@ -134,17 +140,16 @@ def _successors(last: Instruction) -> list[int]:
         return [RETURN]
     if last.opcode != "br":
         raise NotForLanes(f"a block that ends with {last.opcode}")
-    targets = zip(last.operands, last.kinds, strict=True)
-    goals = [int(name[1:]) for name, kind in targets if kind == "label"][::-1]
+    goals = [int(name[1:]) for name, kind in last.typed if kind == "label"][::-1]
     if len(goals) > len(set(goals)):
         raise NotForLanes("a branch with one way")
     return goals
 
 
-def _clean(blocks: list[list[Instruction]]) -> None:
-    """Drop what is stored for whoever catches an exception, and then what nobody reads."""
+def _clean(blocks: list[list[Instruction]], unread: tuple[str, ...]) -> None:
+    """Drop stores to places that nobody reads, and then what is not used."""
     for row in blocks:
-        row[:] = [o for o in row if not (o.opcode == "store" and o.operands[1] == EXCEPTION)]
+        row[:] = [o for o in row if not (o.opcode == "store" and o.operands[1] in unread)]
     count = -1
     while count != sum(map(len, blocks)):
         count = sum(map(len, blocks))

@@ -22,12 +22,11 @@ LANEWISE = {  # an operation of one type, with its result of this type, of i1 or
     "frem", "fneg", "freeze", "fcmp", "icmp", "fptosi", "fptoui", "sitofp", "uitofp", "zext",
     "sext", "trunc", "bitcast", "fpext", "fptrunc", *DIVISIONS,
 }  # fmt: skip
-# LLVM's own functions, which it has for vectors, too; the last argument of some is no number.
-VECTOR_FUNCTIONS = {
+# LLVM's own functions of exact results, for vectors, too; the last argument of some is a flag.
+EXACT = {
     "fabs", "sqrt", "floor", "ceil", "trunc", "rint", "nearbyint", "round", "roundeven", "copysign",
-    "minnum", "maxnum", "minimum", "maximum", "smax", "smin", "umax", "umin", "abs", "sin", "cos",
-    "tan", "exp", "exp2", "log", "log2", "log10", "pow", "fma", "fshl", "fshr", "ctpop",
-    "is.fpclass", "ctlz", "cttz", "scmp", "ucmp",
+    "smax", "smin", "umax", "umin", "abs", "fshl", "fshr", "ctpop", "ctlz", "cttz", "is.fpclass",
+    "scmp", "ucmp",
 }  # fmt: skip
 FLAGGED = ("abs", "ctlz", "cttz", "is.fpclass")
 SPOKEN_TO_COMPILER = ("llvm.lifetime", "llvm.assume", "llvm.experimental.noalias")
@@ -77,24 +76,14 @@ class Instructions(Values):
         else:
             raise NotForLanes(one.words)
 
-    def _typed(self, one: Instruction, start: int = 0) -> str:
-        """The operands with their types, as they are here."""
-        pairs = list(zip(one.operands, one.kinds, strict=True))[start:]
-        if self.differs(one.name):
-            return ", ".join(f"{lanes(kind)} {self.wide(o, kind)}" for o, kind in pairs)
-        return ", ".join(f"{kind} {self.plain(o, kind)}" for o, kind in pairs)
-
     def _lanewise(self, one: Instruction) -> None:
-        """An operation on the numbers of every lane, as it is on one; no lane that is not in the
-        block divides by zero, which would end the process.
-        """
-        kind = one.kinds[0]
-        words = one.words[: one.words.index(f" {kind} ")]
-        as_is = self.wide if self.differs(one.name) else self.plain
-        operands = [as_is(operand, kind) for operand in one.operands]
-        if one.opcode in DIVISIONS and self.differs(one.name):
+        """An operation on the numbers of every lane, as it is on one."""
+        kind, differs = one.kinds[0], self.differs(one.name)
+        operands = [self.wide(o, kind) if differs else self.plain(o) for o in one.operands]
+        if differs and one.opcode in DIVISIONS:  # by zero, one would end the process
             operands[1] = self._only_here(one, operands[1], kind, f"splat ({kind} 1)")
-        over = lanes(kind) if self.differs(one.name) else kind
+        words = one.words[: one.words.index(f" {kind} ")]
+        over = lanes(kind) if differs else kind
         to = f" to {self.kind(one)}" if " to " in one.words else ""
         self.set(one, f"{words} {over} {', '.join(operands)}{to}")
 
@@ -106,11 +95,9 @@ class Instructions(Values):
         return self.let(f"select {MASK} {self.mask(one.block)}, {over} {value}, {over} {other}")
 
     def _select(self, one: Instruction) -> None:
-        condition = one.operands[0]
-        if self.differs(one.name) and not self.differs(condition):
-            self.set(one, f"select i1 {self.plain(condition, 'i1')}, {self._typed(one, 1)}")
-        else:
-            self.set(one, f"select {self._typed(one)}")
+        (condition, *_), differs = one.operands, self.differs(one.name)
+        chosen = self.typed(one.typed[:1], differs and self.differs(condition))
+        self.set(one, f"select {chosen}, {self.typed(one.typed[1:], differs)}")
 
     def _alloca(self, one: Instruction) -> None:
         if one.operands != ["1"]:
@@ -123,12 +110,10 @@ class Instructions(Values):
         if self.masks.points_at(one.name) == LANES_MEMORY:
             kind = room(kind)
         if not self.differs(one.name):
-            self.set(one, f"getelementptr {kind}, {self._typed(one)}")
+            self.set(one, f"getelementptr {kind}, {self.typed(one.typed, False)}")
             return
-        base, *places = zip(one.operands, one.kinds, strict=True)
-        begin = f"{lanes('ptr')} {self.wide(*base)}"
-        rest = [f"{lanes(k)} {self.wide(o, k)}" if o[0] == "%" else f"{k} {o}" for o, k in places]
-        self.set(one, f"getelementptr {kind}, {', '.join([begin, *rest])}")
+        parts = [self.typed([(o, k)], o.startswith("%")) for o, k in one.typed]
+        self.set(one, f"getelementptr {kind}, {', '.join(parts)}")
 
     def _check_size(self, one: Instruction, pointer: str, kind: str) -> None:
         """Refuse memory that is read as numbers of another size than it has: lanes would mix."""
@@ -161,7 +146,7 @@ class Instructions(Values):
             places = self._addresses(one, pointer, one.kind)
             self.by_lane(one, [self.let(f"load {one.kind}, ptr {place}") for place in places])
             return
-        where = self.plain(pointer, "ptr")
+        where = self.plain(pointer)
         aligned = f", align {SIZES[one.kind] * LANES}" if self.differs(one.name) else ""
         self.set(one, f"load {self.kind(one)}, ptr {where}{aligned}")
 
@@ -170,7 +155,7 @@ class Instructions(Values):
         if self.masks.points_at(pointer) == PLAIN_MEMORY:
             if self.differs(number) or self.differs(pointer) or self.masks.of[one.block] != EVERY:
                 raise NotForLanes(f"a number of one lane for all of them: {one.words}")
-            self.put(f"store {kind} {self.plain(number, kind)}, ptr {self.plain(pointer, 'ptr')}")
+            self.put(f"store {kind} {self.plain(number)}, ptr {self.plain(pointer)}")
             return
         self._check_size(one, pointer, kind)
         new = self.wide(number, kind)
@@ -178,7 +163,7 @@ class Instructions(Values):
             for lane, place in enumerate(self._addresses(one, pointer, kind)):
                 self.put(f"store {kind} {self.number(new, kind, lane)}, ptr {place}")
             return
-        where = f"ptr {self.plain(pointer, 'ptr')}, align {SIZES[kind] * LANES}"
+        where = f"ptr {self.plain(pointer)}, align {SIZES[kind] * LANES}"
         if self.masks.of[one.block] != EVERY:
             new = self._only_here(one, new, kind, self.let(f"load {lanes(kind)}, {where}"))
         self.put(f"store {lanes(kind)} {new}, {where}")
@@ -194,16 +179,11 @@ class Instructions(Values):
             self._call_part(one)
         elif {*one.kinds[:-1], one.kind} - NUMBERS:
             raise NotForLanes(f"a call: {one.words}")
-        elif not self.differs(one.name):
-            given = self._typed_arguments(one)
-            self._declare(name, one.kind, one.kinds[:-1])
-            self.set(one, f'call {one.kind} @"{name}"({given})')
-        else:
+        elif self.differs(one.name):
             self._call_in_lanes(one, "llvm.sqrt.f64" if name == "sqrt" else name)
-
-    def _typed_arguments(self, one: Instruction) -> str:
-        pairs = zip(one.operands[:-1], one.kinds[:-1], strict=True)
-        return ", ".join(f"{kind} {self.plain(o, kind)}" for o, kind in pairs)
+        else:
+            self._declare(name, one.kind, one.kinds[:-1])
+            self.set(one, f'call {one.kind} @"{name}"({self.typed(one.typed[:-1], False)})')
 
     def _declare(self, name: str, kind: str, kinds: list[str]) -> None:
         self.declared[name] = f'declare {kind} @"{name}"({", ".join(kinds)}) #1'
@@ -212,40 +192,37 @@ class Instructions(Values):
         """A part of the loop, which has its own code for lanes."""
         if self.masks.of[one.block] != EVERY or any(map(self.differs, one.operands)):
             raise NotForLanes(f"a call that not every lane makes: {one.words}")
-        self.put(f"call void {self.plain(one.operands[-1], 'ptr')}({self._typed_arguments(one)})")
+        given = self.typed(one.typed[:-1], False)
+        self.put(f"call void {self.plain(one.operands[-1])}({given})")
 
     def _call_in_lanes(self, one: Instruction, name: str) -> None:
-        """A mathematical function: LLVM's own for vectors, any other one lane by lane."""
-        kinds, pairs = one.kinds[:-1], list(zip(one.operands, one.kinds, strict=True))[:-1]
-        if not name.startswith("llvm."):
-            self._declare(name, one.kind, kinds)
-            vectors = [(self.wide(o, kind), kind) for o, kind in pairs]
+        """A function without effects: one of exact results for all lanes, else lane by lane."""
+        operands = one.typed[:-1]
+        short = re.sub(r"(\.[if]\d+)+$", "", name.removeprefix("llvm."))
+        if not name.startswith("llvm.") or short not in EXACT:
+            self._declare(name, one.kind, one.kinds[:-1])
+            vectors = [(self.wide(o, kind), kind) for o, kind in operands]
             rows = [
                 ", ".join(f"{kind} {self.number(v, kind, lane)}" for v, kind in vectors)
                 for lane in range(LANES)
             ]
             self.by_lane(one, [self.let(f'call {one.kind} @"{name}"({row})') for row in rows])
             return
-        short = re.sub(r"(\.[if]\d+)+$", "", name.removeprefix("llvm."))
-        if short not in VECTOR_FUNCTIONS:
-            raise NotForLanes(f"{name} of numbers that differ")
-        flag = [pairs.pop()] if short in FLAGGED else []
-        given = [(lanes(kind), self.wide(o, kind)) for o, kind in pairs]
-        given += [(kind, o) for o, kind in flag]
-        full = f"llvm.{short}" + re.sub(
-            r"\.([if]\d+)", rf".v{LANES}\1", name.removeprefix(f"llvm.{short}")
-        )
-        self._declare(full, lanes(one.kind), [kind for kind, _ in given])
-        typed = ", ".join(f"{kind} {value}" for kind, value in given)
-        self.set(one, f'call {lanes(one.kind)} @"{full}"({typed})')
+        flags = [f"{kind} {o}" for o, kind in operands[-1:] if short in FLAGGED]
+        given = [self.typed([o], True) for o in operands[: len(operands) - len(flags)]] + flags
+        ending = re.sub(r"\.([if]\d+)", rf".v{LANES}\1", name.removeprefix(f"llvm.{short}"))
+        kinds = [lanes(kind) for _, kind in operands[: len(operands) - len(flags)]]
+        kinds += [kind for _, kind in operands[len(kinds) :]]
+        self._declare(f"llvm.{short}{ending}", lanes(one.kind), kinds)
+        self.set(one, f'call {lanes(one.kind)} @"llvm.{short}{ending}"({", ".join(given)})')
 
     def _call_shared(self, one: Instruction) -> None:
         """`kernel.shared`: the number of the first lane."""
         number, kind = one.operands[0], one.kinds[0]
         if self.differs(number):
-            self.set(one, f"extractelement {lanes(kind)} {self.plain(number, kind)}, i32 0")
+            self.set(one, f"extractelement {lanes(kind)} {self.plain(number)}, i32 0")
         else:
-            self.set(one, f"freeze {kind} {self.plain(number, kind)}")
+            self.set(one, f"freeze {kind} {self.plain(number)}")
 
     def _call_lanes_any(self, one: Instruction) -> None:
         """`kernel.lanes_any`."""
@@ -254,9 +231,9 @@ class Instructions(Values):
 
     def _call_lane_true(self, one: Instruction) -> None:
         """`kernel.lane_true`."""
-        mask, lane = self.wide(one.operands[0], "i1"), self.plain(one.operands[1], "i64")
+        mask, lane = self.wide(one.operands[0], "i1"), self.plain(one.operands[1])
         self.set(one, f"extractelement {MASK} {mask}, i64 {lane}")
 
     def _call_lane_numbers(self, one: Instruction) -> None:
         """`kernel.lane_numbers`."""
-        self.set(one, f"getelementptr i8, ptr {self.plain(one.operands[0], 'ptr')}, i64 0")
+        self.set(one, f"getelementptr i8, ptr {self.plain(one.operands[0])}, i64 0")

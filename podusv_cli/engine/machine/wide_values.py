@@ -77,7 +77,7 @@ class Values:
         if one.name in self.read_elsewhere:
             self.put(f"store {self.kind(one)} {one.name}, ptr {self._place(one.name)}")
 
-    def plain(self, name: str, kind: str) -> str:
+    def plain(self, name: str) -> str:
         """An operand as it is: a constant, a number, or one a lane."""
         one = self.masks.values.get(name)
         if one is None or one.opcode == "alloca":
@@ -89,15 +89,21 @@ class Values:
     def wide(self, name: str, kind: str) -> str:
         """An operand in every lane."""
         if self.differs(name):
-            return self.plain(name, kind)
+            return self.plain(name)
         if name in (*NOTHING, "zeroinitializer"):
             return name
         if name[0] not in "%@" and kind != "ptr":
             return f"splat ({kind} {name})"
         key = f"lanes of {name}"
         if key not in self.known:
-            self.known[key] = self.everywhere(self.plain(name, kind), kind)
+            self.known[key] = self.everywhere(self.plain(name), kind)
         return self.known[key]
+
+    def typed(self, operands: list[tuple[str, str]], wide: bool) -> str:
+        """Operands with their types, each as it is or in every lane."""
+        if wide:
+            return ", ".join(f"{lanes(kind)} {self.wide(o, kind)}" for o, kind in operands)
+        return ", ".join(f"{kind} {self.plain(o)}" for o, kind in operands)
 
     def everywhere(self, value: str, kind: str) -> str:
         """A number in every lane."""
@@ -165,12 +171,9 @@ class Values:
         kind, place = self.kind(phi), self._place(phi.name, "phi")
         if operand in NOTHING:
             return
-        value = (
-            self.wide(operand, phi.kind)
-            if self.differs(phi.name)
-            else (self.plain(operand, phi.kind))
-        )
-        if mask and self.differs(phi.name):
+        differs = self.differs(phi.name)
+        value = self.wide(operand, phi.kind) if differs else self.plain(operand)
+        if mask and differs:
             old = self.let(f"load {kind}, ptr {place}")
             value = self.let(f"select {MASK} {mask}, {kind} {value}, {kind} {old}")
         self.put(f"store {kind} {value}, ptr {place}")

@@ -9,7 +9,7 @@ from typing import Any
 
 import llvmlite.binding as llvm
 
-from podusv_cli.engine.machine.scalar_ir import RETURN, prepared, read
+from podusv_cli.engine.machine.scalar_ir import EXCEPTION, RESULT, RETURN, prepared, read
 from podusv_cli.engine.machine.wide_instructions import Instructions, is_cheap
 from podusv_cli.engine.machine.wide_masks import PLAIN_MEMORY, Masks
 from podusv_cli.engine.machine.wide_order import END, Level, Loop, Node
@@ -25,7 +25,8 @@ def widened(module: Any, name: str, memory: list[str], result: str, machine: Any
     by numba, which hands over two more in front of them: where the result of type `result` (""
     for none) is written, and where an exception. Raises NotForLanes.
     """
-    function = read(prepared(module, name, machine))
+    unread = (EXCEPTION,) if result else (RESULT, EXCEPTION)
+    function = read(prepared(module, name, machine), unread)
     kinds = [PLAIN_MEMORY, PLAIN_MEMORY, *memory]
     names = [argument for argument, _ in function.arguments]
     masks = Masks(function, {a: kind for a, kind in zip(names, kinds, strict=True) if kind})
@@ -138,7 +139,7 @@ class Blocks(Instructions):
             self._take_along(block, targets[0], 0)
             self.put(f"br label %{self._goal(level, waiting, targets[0])}")
         else:
-            condition = self.plain(self.function.blocks[block][-1].operands[0], "i1")
+            condition = self.plain(self.function.blocks[block][-1].operands[0])
             labels = [f"way.{block}.{way}" for way, _ in enumerate(targets)]
             self.put(f"br i1 {condition}, label %{labels[0]}, label %{labels[1]}")
             known = dict(self.known)
