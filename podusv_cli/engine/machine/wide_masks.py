@@ -92,11 +92,8 @@ class Masks:
 
     def splits(self, block: int) -> bool:
         """Whether a block ends with a branch on which lanes may differ."""
-        return (
-            self.function.blocks[block][-1].operands[0] in self.differing
-            if (len(self.function.successors[block]) > 1)
-            else False
-        )
+        last, targets = self.function.blocks[block][-1], self.function.successors[block]
+        return len(targets) > 1 and last.operands[0] in self.differing
 
     def _parts(self, node: Node) -> bool:
         return node in self.ragged if isinstance(node, Loop) else self.splits(node)

@@ -23,6 +23,7 @@ from podusv_cli.core import kernel
 from podusv_cli.core.errors import in_a_line
 from podusv_cli.engine.machine import compile_numba, widening
 from podusv_cli.engine.machine.object_cache import Code, target
+from podusv_cli.engine.machine.scalar_ir import NotForLanes
 from podusv_cli.engine.machine.signatures import LANE_VECTOR
 from podusv_cli.engine.machine.wide_masks import LANES_MEMORY, PLAIN_MEMORY
 
@@ -40,6 +41,10 @@ def object_code(function: Any, prototype: Any) -> Code:
         raise TypeError(in_a_line(error)) from error
     except NumbaError as error:
         return Code("", compile_numba.in_short(str(error)).encode())
+    except NotForLanes as error:
+        return Code("", f"its machine code cannot be widened: {error}".encode())
+    except TypeError as error:  # says what and where
+        return Code("", str(error).encode())
     except Exception as error:
         return Code("", in_a_line(error).encode())
 
