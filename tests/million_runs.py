@@ -12,7 +12,7 @@ import numpy as np
 
 from podusv_cli.scenario.load import load, tree_yaml
 from podusv_cli.studies.study.plan import plan
-from podusv_cli.studies.study.store import Store
+from podusv_cli.studies.study.store import SCENARIO, Store
 from podusv_cli.studies.study.unit import Unit, UnitResult
 from podusv_cli.workflows import studies, sweep
 
@@ -26,7 +26,7 @@ def units(folder: Path) -> None:
     loaded = load(CONFIG, [f"sweep.draws={DRAWS}", *NO_LOGS])
     store, chance = Store(folder, plan(loaded)), np.random.default_rng(1)
     store.open("now")
-    (folder / sweep.SCENARIO).write_text(tree_yaml(loaded))
+    (folder / SCENARIO).write_text(tree_yaml(loaded))
     for law in store.plan.laws:
         for first in range(0, DRAWS, SIZE):
             n = min(SIZE, DRAWS - first)

@@ -113,12 +113,6 @@ def test_a_march_lets_go_of_the_interpreters_lock() -> None:
         assert not prototype._flags_ & FUNCFLAG_PYTHONAPI
 
 
-def test_progress_comes_to_one() -> None:
-    fractions: list[float] = []
-    simulate_many([adrift()] * 4, TimeGrid(0.01, 10), progress=fractions.append)
-    assert fractions == [0.25, 0.5, 0.75, 1.0]
-
-
 def interrupted(loops: list[ClosedLoop], grid: TimeGrid) -> Batch:
     """A batch of one worker whose user interrupts after two runs."""
 

@@ -12,7 +12,7 @@ from plugin_samples import LAW
 
 from podusv_cli.core.errors import ScenarioError, UsageError
 from podusv_cli.scenario.load import load_text
-from podusv_cli.studies.bench.cases import AXES, Case, Wanted, cases, shipped_bench
+from podusv_cli.studies.bench.cases import AXES, Case, Selection, cases, shipped_bench
 from podusv_cli.studies.bench.optima import Least, wanted
 from podusv_cli.studies.bench.page import as_markdown, page
 from podusv_cli.studies.bench.runs import FAILED, BenchRun, play
@@ -100,7 +100,7 @@ def test_a_profile_ends_at_the_share_of_cases_that_the_law_does():
 
 
 def test_cases_are_every_task_with_every_vessel_in_every_condition(bench):
-    found = {case.place: case for case in cases(Wanted(bench))}
+    found = {case.place: case for case in cases(Selection(bench))}
     names = (("model", "otter"), ("circle", "line"), ("calm", "told"))
     assert list(found) == list(product(*names))
     told = found["otter", "line", "told"].laws["li"]
@@ -111,7 +111,7 @@ def test_cases_are_every_task_with_every_vessel_in_every_condition(bench):
 
 def test_choices_and_changes_are_taken(bench):
     chosen = {"tasks": ["line"], "vessels": ["otter"], "conditions": ["told"]}
-    (case,) = cases(Wanted(bench, overrides=["simulation.duration=3"], chosen=chosen))
+    (case,) = cases(Selection(bench, overrides=["simulation.duration=3"], chosen=chosen))
     assert case.place == ("otter", "line", "told")
     assert case.laws["pid"].simulation.duration == 3.0
 
@@ -125,20 +125,20 @@ def test_choices_and_changes_are_taken(bench):
 )
 def test_an_unknown_name_is_told_with_those_that_there_are(bench, chosen, told):
     with pytest.raises(UsageError, match=told.replace("?", r"\?")):
-        list(cases(Wanted(bench, chosen=chosen)))
+        list(cases(Selection(bench, chosen=chosen)))
 
 
 def test_a_folder_without_tasks_and_a_condition_without_its_vessel_are_told(bench, tmp_path):
     with pytest.raises(UsageError, match="it has no folder vessels"):
-        list(cases(Wanted(tmp_path)))
+        list(cases(Selection(tmp_path)))
     (bench / "conditions/told/otter.yaml").unlink()
     with pytest.raises(UsageError, match="no file for the vessel otter"):
-        list(cases(Wanted(bench)))
+        list(cases(Selection(bench)))
 
 
 def test_a_law_s_python_file_in_place_of_a_scenario_is_told(bench):
     with pytest.raises(UsageError, match=r"my_law.py is Python; write a YAML file with `plugins:"):
-        list(cases(Wanted(bench, laws=[Path("my_law.py")])))
+        list(cases(Selection(bench, laws=[Path("my_law.py")])))
 
 
 def test_a_long_name_may_be_broken_in_the_head_of_the_case_table():
@@ -154,7 +154,7 @@ def test_a_median_over_failures_is_a_cross_on_the_page():
 def test_a_mistake_in_a_layer_is_told_with_its_file_and_line(bench):
     (bench / "tasks/line.yaml").write_text("path: {kind: lime}\n")
     with pytest.raises(ScenarioError, match=r"line\.yaml:1:14: path\.kind"):
-        list(cases(Wanted(bench)))
+        list(cases(Selection(bench)))
 
 
 def test_a_law_that_fails_is_a_row_and_costs_no_other(bench):
@@ -222,7 +222,7 @@ def test_the_told_hulls_of_the_shipped_bench_are_a_quarter_off():
         ("hull_heavy", 1.25, 0.75),
     ):
         chosen = {"tasks": ["line"], "conditions": [condition]}
-        for case in cases(Wanted(shipped_bench(), chosen=chosen)):
+        for case in cases(Selection(shipped_bench(), chosen=chosen)):
             law = case.laws["pid"]
             for name in inertia | {n for n in type(law.vessel).model_fields if "_" in n}:
                 true, told = getattr(law.vessel, name), getattr(law.nominal, name)
@@ -244,7 +244,7 @@ def test_every_file_of_the_shipped_bench_makes_a_case_that_is_valid():
     assert len(names["conditions"]) == 7
     every = {"vessels": names["vessels"], "tasks": ["line"], "conditions": names["conditions"]}
     tasks = {"vessels": ["otter"], "conditions": ["calm"]}
-    made = [*cases(Wanted(folder, chosen=every)), *cases(Wanted(folder, chosen=tasks))]
+    made = [*cases(Selection(folder, chosen=every)), *cases(Selection(folder, chosen=tasks))]
     assert {case.task for case in made} == set(names["tasks"])
     for case in made:
         for law in case.laws.values():
@@ -269,7 +269,7 @@ def test_ratios_to_the_optimum_are_those_of_the_cases_that_have_one():
 
 def test_cases_that_differ_in_what_laws_know_share_an_optimum_and_pods_have_none():
     chosen = {"tasks": ["line"], "vessels": ["revolt"]}
-    every = list(cases(Wanted(shipped_bench(), chosen=chosen)))
+    every = list(cases(Selection(shipped_bench(), chosen=chosen)))
     done = [
         BenchRun(case.place, law, "finished", "", {"iae": iae}, np.zeros((2, 4)))
         for case in every

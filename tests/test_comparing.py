@@ -8,11 +8,10 @@ import pandas as pd
 import pytest
 from old_results import draw_quickly
 
-from podusv_cli.comparison.differences import differences
 from podusv_cli.core.errors import ScenarioError
 from podusv_cli.process.extras import Extras
 from podusv_cli.scenario.load import load
-from podusv_cli.workflows import compare, members, run
+from podusv_cli.workflows import compare, run
 
 SCENARIO = """
 vessel: {preset: paper_nonlinear}
@@ -61,12 +60,6 @@ def test_run_takes_the_one_controller_and_says_what_it_left(config, tmp_path):
     assert not alone.claims
 
 
-@pytest.mark.slow
-def test_runs_of_a_comparison_keep_their_order(done):
-    parts = members.from_folder(done.folder)
-    assert [part.label for part in parts] == ["fast", "slow", "pid"]
-
-
 def test_planted_claims_get_their_verdicts_with_numbers(done):
     verdicts = json.loads((done.folder / "claims.json").read_text())["claims"]
     assert [v["verdict"] for v in verdicts] == ["reproduced", "not reproduced"]
@@ -97,7 +90,7 @@ def test_runs_that_all_diverge_are_still_reported(config, tmp_path):
     request = run.Request(("start.u=1e300",), tmp_path / "x")
     done = compare.compare([config], request)
     assert all(ending.startswith("diverged at t = 0 s") for ending in done.result.endings.values())
-    assert {verdict.answer for verdict in done.result.verdicts} == {"cannot tell"}
+    assert {verdict.verdict for verdict in done.result.verdicts} == {"cannot tell"}
     assert (done.folder / "report.html").is_file()
 
 
@@ -107,15 +100,6 @@ def test_a_run_cannot_take_the_place_of_the_figures(config, tmp_path):
         compare.compare([config], request)
 
 
-def test_several_scenarios_are_named_by_themselves(config, tmp_path):
-    for name in ("one", "two"):
-        text = SCENARIO[: SCENARIO.index("controllers:")]
-        (tmp_path / f"{name}.yaml").write_text(text)
-    items = [tmp_path / "one.yaml", tmp_path / "two.yaml"]
-    result = compare.compare(items, quick("simulation.duration=2", out=tmp_path / "x")).result
-    assert list(result.table.columns) == ["one", "two"]
-
-
 def test_other_differences_are_named(done, config, tmp_path):
     limits = quick("actuator.surge_limit=4", out=tmp_path / "x")
     other = compare.compare([config, done.folder / "fast"], limits).result
@@ -123,15 +107,6 @@ def test_other_differences_are_named(done, config, tmp_path):
         "actuator.surge_limit": {"fast": 4.0, "slow": 4.0, "pid": 4.0, "fast_2": 8.0}
     }
     assert not done.result.differences
-
-
-def test_differences_see_every_key_but_the_controllers():
-    first = {"start": {"x": 0.0}, "controller": {"k": 1}, "name": "a", "path": {"kind": "line"}}
-    second = {"start": {"x": 1.0}, "controller": {"k": 2}, "name": "b", "path": {"kind": "circle"}}
-    assert differences({"a": first, "b": second}) == {
-        "start.x": {"a": 0.0, "b": 1.0},
-        "path.kind": {"a": "line", "b": "circle"},
-    }
 
 
 def test_costs_are_measured_side_by_side(done, monkeypatch):
@@ -161,9 +136,3 @@ def test_the_report_needs_nothing_from_outside(done):
     assert links.found
     assert all(link.startswith(("data:", "#")) for link in links.found)
     assert not re.search(r"url\((?!#)|@import|\bimport\(|fetch\(|XMLHttpRequest|new Image", page)
-
-
-def test_the_report_tells_everything(done):
-    page = (done.folder / "report.html").read_text()
-    for expected in ("Fast is faster.", "not reproduced", "fast.iae = ", "controller slow", "0.02"):
-        assert expected in page

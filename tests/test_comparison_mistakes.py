@@ -6,7 +6,7 @@ from test_comparison_words import RUNS
 
 from podusv_cli.comparison.expressions import parse
 from podusv_cli.core.signal import Signal
-from podusv_cli.scenario.expressions import ExpressionError
+from podusv_cli.expressions.reading import ExpressionError
 
 
 @pytest.mark.parametrize(

@@ -152,7 +152,7 @@ def test_a_claim_whose_premise_fails_cannot_be_told(given, answer, reason):
     claim = Claim(says="x", source="x", given=given, expect=expect)
     trees = (parse(text, RUNS, ABOUT) for text in (expect, given))
     (found,) = judge([ParsedClaim("C", claim, *trees)], RUNS)
-    assert found.answer == answer
+    assert found.verdict == answer
     assert found.reason.startswith(reason)
     assert bool(found.reason) == bool(reason)
 

@@ -3,9 +3,8 @@
 import inspect
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from importlib import import_module
-from typing import Any
 
 import numpy as np
 import pytest
@@ -19,9 +18,10 @@ from podusv_cli.components.measurements.exact import Exact
 from podusv_cli.components.paths.base import TARGET
 from podusv_cli.components.vessels.vessel import COEFFICIENTS, Vessel
 from podusv_cli.core import registry
-from podusv_cli.core.kernel import Vector, bundle, call, is_kernel
+from podusv_cli.core.kernel import is_kernel
 from podusv_cli.engine.loop.columns import names
 from podusv_cli.scenario.explain import signals
+from podusv_cli.testing import is_finite, keeps_its_declaration, remembers_nothing
 
 EVERY = [(room, name, kind) for room in ROOMS for name, kind in kinds(room).items()]
 every_kind = pytest.mark.parametrize(
@@ -48,67 +48,12 @@ def parts(kind: type[BaseModel]) -> Iterator[type[BaseModel]]:
             yield from parts(inner)
 
 
-class Call:
-    """A kernel's arguments at a random instant: what it reads, and what it must fill."""
-
-    def __init__(self, room: str, component: Any, seed: int) -> None:
-        random = np.random.default_rng(seed)
-        law = component if room == "controllers" else kinds("controllers")["pid"]()
-        at = next(situations(law, 1, seed))
-        self.t = float(random.uniform(0, 300))
-        self.reads, sizes = self._shape(room, component, at, random)
-        self.writes = {name: np.full(size, np.nan) for name, size in sizes.items()}
-        self.kernel: Callable[..., None] = getattr(component, KERNELS[room])
-
-    def _shape(
-        self, room: str, component: Any, at: Any, random: Any
-    ) -> tuple[dict[str, Any], dict[str, int]]:
-        if room == "disturbances":
-            k, table = component.constants_with(NONLINEAR), component.table_for(NONLINEAR, 300.0)
-            reads = {"x": at.x, "k": bundle(k), "table": table, "again": 0.0, "stage": 0.0}
-            return reads, {"b": 3 + len(component.signals)}
-        if room == "estimators":
-            k, state = bundle(component.constants_with(NONLINEAR)), component.start(at.x, NONLINEAR)
-            seen = np.concatenate([at.x + random.normal(0, 0.1, 6), np.ones(12)])
-            tau, table = random.normal(0, 5, 3), component.table()
-            reads = {"seen": seen, "tau": tau, "state": state, "k": k, "table": table}
-            return reads, {"rate": len(state)}
-        k, table = bundle(component.constants()), component.table()
-        if room == "paths":
-            return {"k": k, "table": table}, {"target": 6}
-        if room == "actuators":
-            count = len(component.states)
-            state = component.rest() + random.normal(0, 0.1, count)
-            demand = random.normal(0, 5, 2)
-            reads = {"x": at.x, "state": state, "demand": demand, "k": k, "table": table}
-            return reads, {"tau": 3, "rate": count, "signals": len(component.signals)}
-        k = bundle(component.constants_with(NONLINEAR))
-        reads = {"x": at.x, "memory": at.memory, "target": at.target, "k": k, "table": table}
-        sizes = {"tau": 2, "rate": len(at.memory), "signals": len(component.signals)}
-        return reads, sizes | {"work": component.workspace()}
-
-    def __call__(self) -> list[Vector]:
-        """Fresh outputs, without the scratch."""
-        written = {name: vector.copy() for name, vector in self.writes.items()}
-        call(self.kernel, t=self.t, **self.reads, **written)
-        return [vector for name, vector in written.items() if name != "work"]
-
-
-# What a measurement writes is its memory too; tests/test_testing_seeing.py asks it.
-WRITING = [(room, kind) for room, _, kind in EVERY if room != "measurements"]
-
-
-@pytest.mark.parametrize(("room", "kind"), WRITING)
-def test_every_output_is_written_and_nothing_is_remembered_or_changed(room, kind):
-    asked = [Call(room, example(kind), seed) for seed in range(50)]
-    before = [[np.array(argument) for argument in one.reads.values()] for one in asked]
-    first = [one() for one in asked]
-    assert all(np.isfinite(out).all() for written in first for out in written)
-    again = [one() for one in reversed(asked)][::-1]
-    after = [[np.array(argument) for argument in one.reads.values()] for one in asked]
-    for one, other in zip(first + before, again + after, strict=True):
-        for a, b in zip(one, other, strict=True):
-            np.testing.assert_array_equal(a, b)
+@every_kind
+@pytest.mark.parametrize("check", [keeps_its_declaration, is_finite, remembers_nothing])
+def test_podusv_s_own_keep_the_contract_of_plug_ins(room, kind, check):
+    """Its other checks, of runs: test_testing_seeing.py and faults/test_determinism.py."""
+    if kind is not Exact:  # which has no kernel
+        check(example(kind))
 
 
 @every_kind

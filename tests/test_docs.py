@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
 from collections.abc import Callable, Iterator
 from datetime import date
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import pytest
@@ -14,9 +16,11 @@ import yaml
 from command_samples import ROOT, commanded
 
 import podusv_cli
+from podusv_cli.components.measurements.sensors import Sensors
 from podusv_cli.figures.drawing import FIGURES
 from podusv_cli.findings.finding import finding_kinds
 from podusv_cli.metrics.table import METRICS
+from podusv_cli.scenario.load import load_text
 
 PAGES = [
     path.relative_to(ROOT).as_posix()
@@ -187,3 +191,80 @@ def test_a_file_or_target_that_is_not_there_is_noticed() -> None:
         "tests/none.py",
         "nothing",
     ]
+
+
+# --- the pages about the sea and sensors say what the code and the shipped scenarios do
+
+SEA, MEASUREMENTS = ((ROOT / "docs" / name).read_text() for name in ("sea.md", "measurements.md"))
+
+
+def cells(line):
+    return [cell.strip() for cell in line.strip("|").split("|")]
+
+
+def test_the_example_of_a_list_is_a_scenario_whose_loads_all_act():
+    (block,) = re.findall(r"```yaml\n(.*?)```", SEA, re.S)
+    scenario = load_text(block, "a.yaml").scenario
+    kinds = [part.kind for part in scenario.disturbance]
+    assert kinds == ["harmonic", "current", "wind", "waves"]
+    again = load_text(block, "a.yaml", ["disturbance[3].seed=2"]).scenario.disturbance
+    assert [part.seed for part in again[1:]] == [1, 1, 2]
+    (line,) = re.findall(r"`(disturbance\[3\].seed: .*?)` below `vary:`", SEA)
+    study = f"{block}sweep:\n  draws: 2\n  vary:\n    {line}\n"
+    assert load_text(study, "a.yaml").scenario.sweep.vary["disturbance[3].seed"].seed
+
+
+@pytest.mark.parametrize("state", range(2, 7))
+def test_the_table_of_sea_states_is_that_of_the_shipped_scenarios(state):
+    (row,) = (cells(line) for line in SEA.splitlines() if line.startswith(f"| {state} |"))
+    text = (ROOT / "configs" / "sea" / f"state_{state}.yaml").read_text()
+    parts = {part["kind"]: part for part in yaml.safe_load(text)["disturbance"]}
+    model = [parts["waves"]["height"], parts["waves"]["period"], parts["wind"]["speed"]]
+    assert [float(cell) for cell in row[4:7]] == model
+    assert "on the ship waves of {} m and {} s and a wind of {} m/s".format(*row[1:4]) in text
+
+
+def test_the_sensors_that_are_on_by_default_are_documented():
+    found = [cells(line) for line in MEASUREMENTS.splitlines() if line.startswith("| `")]
+    documented = {row[0].strip("`"): (float(row[2]), float(row[3])) for row in found}
+    sensors = Sensors().instruments()
+    assert documented == {name: (one.period, one.noise) for name, (one, _) in sensors.items()}
+
+
+# --- the notebooks in examples/
+
+NOTEBOOKS = sorted((ROOT / "examples").glob("*.ipynb"))
+every_notebook = pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+MOST_RUNS = 4
+
+
+def notebook_cells(path: Path) -> list[dict[str, Any]]:
+    """The cells of a notebook."""
+    return json.loads(path.read_text())["cells"]
+
+
+def test_there_are_notebooks():
+    assert {path.stem for path in NOTEBOOKS} == {"first_run", "monte_carlo", "own_law"}
+
+
+@every_notebook
+def test_a_notebook_has_no_outputs(path):
+    assert json.loads(path.read_text())["nbformat"] == 4
+    code = [cell for cell in notebook_cells(path) if cell["cell_type"] == "code"]
+    assert code
+    assert not any(cell["outputs"] or cell["execution_count"] for cell in code)
+
+
+@pytest.mark.slow  # simulates all that the notebooks show
+@every_notebook
+def test_the_cells_of_a_notebook_run(path, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code = ["".join(cell["source"]) for cell in notebook_cells(path) if cell["cell_type"] == "code"]
+    text = "\n".join(code).replace("RUNS = 200", f"RUNS = {MOST_RUNS}")
+    names: dict[str, Any] = {}
+    exec(compile(text, str(path), "exec"), names)  # noqa: S102
+    if "run" in names:
+        assert names["run"].status == "finished"
+        assert "<img " in names["run"]._repr_html_()
+    if "many" in names:
+        assert list(names["many"]["status"]) == ["finished"] * MOST_RUNS

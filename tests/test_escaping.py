@@ -18,6 +18,7 @@ from test_comparison_page import page
 from podusv_cli.cli import progress, terminal
 from podusv_cli.comparison import claims, report, table
 from podusv_cli.core import escaping
+from podusv_cli.expressions.verdict import as_markdown
 from podusv_cli.pages.page import environment
 from podusv_cli.storage import csv_files, json_files
 
@@ -115,10 +116,10 @@ def test_the_tables_of_a_comparison_hold_no_label_that_is_more_than_text():
 def test_the_verdicts_in_markdown_are_text():
     plain = verdicts()[0]
     odd = {name: f"{name} {EVIL}" for name in ("says", "source", "remark")}
-    verdict = claims.Verdict(
-        "name", plain.claim.model_copy(update=odd), "cannot tell", {EVIL: 1.0}, EVIL
+    verdict = claims.RunsVerdict(
+        "name", plain.claim.model_copy(update=odd), None, {EVIL: 1.0}, EVIL
     )
-    text = claims.as_markdown([verdict])
+    text = as_markdown([verdict])
     assert not nasty(text)
     assert "<script>" not in text
     assert "\n#" not in text

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from conftest import NONLINEAR, PAPER, Constant, adrift, corrected, example, run
-from estimator_samples import ESTIMATED, Steady, Taken, delivered, errors, sailed
+from estimator_samples import Steady, Taken, delivered, errors, sailed
 
 from podusv_cli.components.actuators.saturated import Saturated
 from podusv_cli.components.controllers.base import Controller
@@ -14,7 +14,7 @@ from podusv_cli.components.estimators.low_pass import LowPass
 from podusv_cli.components.estimators.none import NoEstimator
 from podusv_cli.components.estimators.passive_observer import PassiveObserver
 from podusv_cli.components.measurements.sensors import Sensor, Sensors
-from podusv_cli.core.kernel import call, is_kernel
+from podusv_cli.core.kernel import call
 from podusv_cli.core.registry import kinds
 from podusv_cli.scenario.explain import signals
 
@@ -24,47 +24,10 @@ NOISY = Taken(every=10, sigma_p=0.02, sigma_psi=0.005, sigma_nu=0.02, velocities
 
 
 @pytest.mark.parametrize("kind", EVERY)
-def test_machine_code_estimates_as_plain_python_does(kind):
-    fast, plain = (sailed(kind(), NOISY, 0.6, compiled=how) for how in (True, False))
-    for part in kind().states:
-        np.testing.assert_allclose(fast[part.name], plain[part.name], rtol=1e-9, atol=1e-12)
-
-
-@pytest.mark.parametrize("kind", EVERY)
-def test_its_first_states_are_the_estimate_and_it_starts_with_the_truth(kind):
-    assert tuple(part.name for part in kind().states[:6]) == ESTIMATED
-    assert not errors(sailed(kind(), Taken(velocities=True), 0.1))[0].any()
-
-
-@pytest.mark.parametrize("kind", EVERY)
 def test_no_law_logs_a_name_that_an_estimator_logs(kind):
     for law in kinds("podusv_cli.components.controllers", Controller).values():
         loop = corrected(controller=example(law), measurement=Taken(), estimator=kind())
         assert {part.name for part in kind().states} <= set(loop.about())
-
-
-@pytest.mark.parametrize("kind", EVERY)
-def test_it_writes_every_rate_and_changes_nothing_that_it_reads(kind):
-    estimator, random = kind(), np.random.default_rng(1)
-    seen, state, k = delivered(estimator, random.normal(size=6), random.normal(size=6))
-    tau, rate = random.normal(size=3), np.full(len(state), np.nan)
-    read = [part.copy() for part in (seen, tau, state)]
-    call(
-        estimator.follow,
-        t=0.0,
-        seen=seen,
-        tau=tau,
-        state=state,
-        k=k,
-        table=estimator.table(),
-        rate=rate,
-    )
-    assert np.isfinite(rate).all()
-    assert all(map(np.array_equal, read, (seen, tau, state)))
-    call(estimator.correct, t=0.0, seen=seen, state=state, k=k, table=estimator.table())
-    np.testing.assert_array_equal(seen, read[0])
-    assert is_kernel(kind.follow)
-    assert is_kernel(kind.correct)
 
 
 @pytest.mark.parametrize("kind", EVERY)

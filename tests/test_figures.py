@@ -1,14 +1,36 @@
 """Figures by their data: which line shows which numbers, under which label, on which scale."""
 
+import math
+from pathlib import Path
+
 import numpy as np
 import pytest
 from drawn_samples import CENTER, WIDTH, drawn, line, panels, recording, scenario, shown
 from known_signals import ABOUT
+from matplotlib.cbook import is_math_text
+from rerun_samples import made
+from scenario_samples import SOUND
 
+from podusv_cli.comparison.claims import parse_claims, peaks
+from podusv_cli.core import escaping
+from podusv_cli.core.spectrum import periodogram
 from podusv_cli.figures import style
+from podusv_cli.figures.animation import stage
 from podusv_cli.figures.curves import thinned
-from podusv_cli.figures.drawing import FIGURES, draw
-from podusv_cli.figures.style import FEWEST, LOOKS, WIDTHS, axis_label, look, places
+from podusv_cli.figures.drawing import FIGURES, draw, dressed
+from podusv_cli.figures.style import (
+    FEWEST,
+    LOOKS,
+    WIDTHS,
+    axis_label,
+    house_style,
+    image,
+    look,
+    new_figure,
+    places,
+)
+from podusv_cli.scenario.load import load
+from podusv_cli.workflows.members import from_folder
 
 
 @pytest.fixture(scope="module")
@@ -194,3 +216,115 @@ def test_the_same_runs_give_the_same_bytes_without_a_date(two, form):
     assert first == second
     assert not any(word in first for word in (b"CreationDate", b"dc:date", b"Software"))
     assert first.startswith({"png": b"\x89PNG", "pdf": b"%PDF", "svg": b"<?xml"}[form])
+
+
+# --- labels of runs in figures
+
+# An odd and an even number of $, what they would enclose, and what a legend would leave out.
+ODD = ["_a$x^{2$b \\frac{ 3$", "$\\undefined$\udcff\x1b[31m\n"]
+SCENARIO = SOUND.replace("kind: ideal", "kind: pod, preset: otter").replace("pid", "dsc").replace(
+    "{kind: none}", "[{kind: wind, speed: 1.0}, {kind: current, speed: 0.1}]"
+)  # fmt: skip
+SCENARIO += "measurement: {kind: sensors}\n"
+QUICK = ("errors", "trajectory", "pods")
+BRIEF = "name: x\nsimulation: {step: 0.01, duration: 0.1, compiled: false}\n"
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    """Runs of which every figure can be drawn, along paths of their own."""
+    place = tmp_path_factory.mktemp("runs")
+    folders = [made(place / x, f"path.x={x}", text=SCENARIO + BRIEF) for x in ("1", "2")]
+    (one,), (other,) = map(from_folder, folders)
+    parts = zip(ODD, (one, other), strict=True)
+    return dressed([(label, part.run.recording, part.scenario) for label, part in parts])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name not in QUICK)) for name in FIGURES]
+)
+def test_every_figure_shows_labels_as_they_are(runs, name):
+    assert FIGURES[name].fits(runs)
+    with house_style():
+        figure = FIGURES[name].family(runs, 2)
+        assert b"<svg" in image(figure, "svg")
+    (legend,) = figure.legends or [None]
+    named = [text.get_text() for text in legend.get_texts()] if legend else []
+    ours = [text for text in named if text in (run.name for run in runs)]
+    assert ours == [run.name for run in runs] or not ours
+    assert not any(map(is_math_text, ours))
+
+
+def test_an_animation_shows_labels_as_they_are(runs):
+    with house_style():
+        figure = new_figure(1, 3.0)
+        stage(figure.add_subplot(), runs)(0.05)
+        figure.legend()
+        assert image(figure, "png")
+
+
+@pytest.mark.parametrize("text", [*ODD, "", "_", "$", "a\\$b", "50$ or 60$", "ψ _ x"], ids=ascii)
+def test_the_text_of_a_figure_reads_as_it_was(text):
+    found = escaping.figure(text)
+    assert not is_math_text(found)
+    assert not found.startswith("_")
+    assert found.replace(r"\$", "$").removeprefix(" ") == escaping.visible(text)
+
+
+def test_a_run_whose_name_looks_hidden_is_in_the_legend(runs):
+    with house_style():
+        figure = FIGURES["errors"].family(runs, 2)
+    assert [text.get_text() for text in figure.legends[0].get_texts()][:2] == [
+        f" {escaping.visible(ODD[0])}".replace("$", r"\$"),
+        escaping.visible(ODD[1]).replace("$", r"\$"),
+    ]
+
+
+# --- the spectrum of the settled demand, and lines at peaks that claims name
+
+CONFIGS = Path(__file__).parents[1] / "configs"
+
+
+def test_the_periodogram_has_the_power_of_the_signal():
+    t = np.arange(0, 100, 0.01)
+    y = 3.0 + 2.0 * np.sin(0.5 * t) + 0.1 * np.cos(40.0 * t)
+    rates, power = periodogram(t, y)
+    assert np.sum(power) == pytest.approx(2.0 + 0.005, rel=2e-3)
+    assert math.sqrt(np.sum(power[rates > 2.0])) == pytest.approx(0.1 / math.sqrt(2.0), rel=1e-4)
+    assert rates[np.argmax(power)] == pytest.approx(0.5, abs=rates[1])
+    alternating = 100.0 * (-1.0) ** np.arange(1000)
+    assert math.sqrt(np.sum(periodogram(t[:1000], alternating)[1])) == pytest.approx(
+        100.0, rel=2e-3
+    )
+    assert [len(part) for part in periodogram(t[:3], y[:3])] == [0, 0]
+
+
+def test_a_claim_that_names_a_peak_is_found_and_drawn_in_the_panel_of_the_demand():
+    loaded = load(CONFIGS / "paper/figures_compare_standoff.yaml")
+    found = peaks(parse_claims(loaded))
+    assert found == {"tau_u_cmd": 300.0, "tau_r_cmd": 1000.0}
+    runs = dressed([("a", recording(), scenario())], found)
+    with house_style():
+        axes = FIGURES["controls"].family(runs, 2).axes
+    levels = {
+        panel.get_ylabel(): sorted(
+            line.get_ydata()[0] for line in panel.lines if "claim" in line.get_label()
+        )
+        for panel in axes[::3]
+    }
+    assert list(levels.values()) == [[], [-300.0, 300.0], [], [-1000.0, 1000.0]]
+
+
+def test_the_spectrum_shows_a_cycle_of_the_settled_demand():
+    cycling = recording(period=0.01, tau_u_cmd=lambda t: np.sin(0.5 * t) + 50.0 * np.sin(70.0 * t))
+    surge, yaw = drawn(
+        "spectrum", shown(("calm", recording(period=0.01)), ("cycling", cycling))
+    ).axes
+    peaks_at = {}
+    for curve in surge.lines:
+        rates, rms = curve.get_xdata(), curve.get_ydata()
+        peaks_at[curve.get_label()] = rates[np.argmax(rms)], max(rms)
+    assert peaks_at["cycling"] == pytest.approx((70.0, 50.0 / math.sqrt(2.0)), rel=0.3)
+    assert peaks_at["calm"][0] < 1.0
+    assert [line.get_label() for line in yaw.lines] == ["disturbance", "calm", "cycling"]

@@ -1,13 +1,23 @@
 """Findings about the law: told where they hold, borne out by simulation."""
 
+import json
+import math
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
-from findings_samples import BARE, codes, finding, late, log, scene, simulated
+from command_samples import Said
+from conftest import PACKAGE
+from findings_samples import BARE, CONFIGS, PLAIN, codes, finding, late, log, scene, simulated
 
 from podusv_cli.components.controllers.velocity_loop import Loop
+from podusv_cli.core.finding import Finding
 from podusv_cli.engine.running.continuous import continuous
-from podusv_cli.findings.finding import preflight
+from podusv_cli.findings.finding import merged, preflight
+from podusv_cli.findings.outcome import saturated
 from podusv_cli.findings.stability import loops, rk4_growth, sampled_growth
+from podusv_cli.scenario.load import load
 
 LONG = "simulation.duration=120"
 PRINTED = "controller.coupling=printed"
@@ -159,3 +169,192 @@ def test_a_held_feedback_is_an_euler_step_of_the_period(count):
     # e' = -a, a' = e, both held: one step of Euler, which spirals out by sqrt(1 + T^2).
     swing = bare_loop([0.0, -1.0], [[1.0, 0.0]])
     assert sampled_growth(swing, 0.5 / count, count) == pytest.approx(np.hypot(1.0, 0.5))
+
+
+# --- findings about disturbances, sensors and the command path
+
+SENSORS = "measurement={kind: sensors}"
+FILTER = "estimator={kind: ekf}"
+
+
+def sea(*kinds):
+    return f"disturbance=[{', '.join(kinds)}]"
+
+
+STEP = sea("{kind: none}", "{kind: step, b_u: 2, time: %s}")
+WAVES = sea("{kind: waves, height: %s, period: 0.5}")
+WIND = sea("{kind: wind, speed: 1, gusts: %s}")
+SIGMA = "estimator={kind: ekf, sigma_psi: %s}"
+CASES = [  # code, its key, overrides with it, and without
+    ("large-angle", "disturbance[0].direction", [sea("{kind: current, direction: 225}")],
+     [sea("{kind: current, direction: 3.9}")]),
+    ("late-load", "disturbance[1].time", [STEP % 20], [STEP % 19]),
+    ("load-between-steps", "disturbance[1].time", [STEP % 10.005], [STEP % 10.01]),
+    ("load-between-steps", "disturbance[1].time", [STEP % 10.005],
+     [STEP % "10.005, ramp: 1"]),
+    ("late-outage", "measurement", ["measurement={kind: sensors, position: {outages: [[20, 30]]}}"],
+     ["measurement={kind: sensors, position: {outages: [[19, 30]]}}"]),
+    ("dead-zone", "actuator.command.dead_zone_u",
+     ["actuator={kind: saturated, surge_limit: 8, command: {dead_zone_u: 20}}"],
+     ["actuator={kind: saturated, surge_limit: 8, command: {dead_zone_u: 1}}"]),
+    ("dead-zone", "actuator.command.dead_zone_r",
+     ["actuator={kind: saturated, yaw_limit: 2, command: {dead_zone_r: 2}}"],
+     ["actuator={kind: ideal, command: {dead_zone_r: 2}}"]),
+    ("estimator-noise", "estimator.sigma_psi", [SENSORS, SIGMA % 0.0024], [SENSORS, FILTER]),
+    ("estimator-noise", "estimator.sigma_psi", [SENSORS, SIGMA % 0.011], [SENSORS, SIGMA % 0.009]),
+    ("estimator-noise", "estimator.sigma_psi", [SENSORS, SIGMA % 0.011],
+     [SENSORS, SIGMA % 0.011, sea("{kind: waves, height: 0.02, period: 2}")]),
+    ("steep-waves", "disturbance[0].height", [WAVES % 0.5], [WAVES % 0.05]),
+    ("model-gusts", "disturbance[0].gusts", [WIND % "norsok"], [WIND % "none"]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("code", "key", "doubtful", "sound"), CASES)
+def test_what_can_hardly_be_meant_is_told_at_its_key(code, key, doubtful, sound):
+    assert finding(code, *doubtful).where == key
+    assert code not in codes(*sound)
+
+
+def test_a_load_after_the_run_never_acts_and_one_before_its_end_does():
+    short = ("simulation.duration=2", "controller={kind: pid}")
+    assert "late-load" in codes(*short, STEP % 2)
+    assert not log(*short, STEP % 2)["b_u"][:-1].any()
+    assert "late-load" not in codes(*short, STEP % 1)
+    assert log(*short, STEP % 1)["b_u"][-2] == 2.0
+
+
+def test_a_dead_zone_beyond_the_limit_takes_all_that_the_limit_allows():
+    gentle = "controller={kind: pid, K_Pu: 1, K_Iu: 0, K_Du: 0}"
+    limited = "actuator={kind: saturated, surge_limit: 8, command: {dead_zone_u: %s}}"
+    for zone, moves in ((20, False), (0.5, True)):
+        out = log(gentle, limited % zone)
+        assert 1.0 < abs(out["tau_u_cmd"]).max() < 8.0
+        assert out["tau_u"].any() == moves
+
+
+def test_steepness_is_that_of_waves_of_the_peak_s_period():
+    length = 9.81 * 0.5**2 / (2.0 * math.pi)
+    for share, told in ((0.99, False), (1.01, True)):
+        assert ("steep-waves" in codes(WAVES % (share * length / 7.0))) is told
+
+
+@pytest.mark.parametrize(
+    ("override", "says"),
+    [
+        (("actuator={kind: saturated, surge_limit: 2, command: {delay: 0.1}}",), "delay of 0.1 s"),
+        ((SENSORS,), "sensors with noise and delay"),
+        (("control.period=0.1",), "a control period of 0.1 s"),
+    ],
+)
+def test_what_makes_the_demand_swing_is_told_in_place_of_windup(override, says):
+    tight = ("actuator={kind: saturated, surge_limit: 2.0}", "simulation.duration=5")
+    (text,) = saturated.search(scene(*tight, *override).alone(), log(*tight))
+    assert says in text
+    assert "anti_windup" not in text
+    (text,) = saturated.search(scene(*tight).alone(), log(*tight))
+    assert text.endswith("consider anti_windup: auxiliary")
+
+
+# --- where warnings go, how they look there, and how they are silenced
+
+SHORT = ("--set", "simulation.duration=1", "--set", "actuator={kind: ideal}", "--no-figures")
+SWAYING = (
+    "--set",
+    "vessel.preset=paper",
+    "--set",
+    "silence=[path-bend, bound-growing, never-settles]",
+)
+
+
+def scenario_file(name: str) -> str:
+    return str(CONFIGS / name)
+
+
+def test_warnings_come_on_stderr_in_json_and_in_the_run_folder(podusv):
+    bad = ("run", scenario_file("corrected.yaml"), *SWAYING, *SHORT)
+    said: Said = podusv(*bad, "--out", "out", "--json")
+    assert said.code == 0
+    lines = said.err.splitlines()
+    assert {line.partition(":")[0] for line in lines} == {
+        "warning[sway-drift]", "warning[sway-unstable]"
+    }  # fmt: skip
+    printed = json.loads(said.out)["warnings"]
+    assert [f"warning[{w['code']}]: {w['where']}: {w['text']}" for w in printed] == lines
+    assert json.loads(Path("out/metrics.json").read_text())["warnings"] == printed
+    assert podusv(*bad, "--out", "quiet", "-q").err == ""
+
+
+def test_what_is_silenced_is_not_shown(podusv):
+    bad = (
+        "--set",
+        "vessel.preset=paper",
+        "--set",
+        "silence=[sway-drift, sway-unstable, bound-growing, never-settles]",
+    )
+    assert podusv("run", scenario_file("corrected.yaml"), *bad, *SHORT, "--out", "o").err == ""
+    said = podusv("validate", scenario_file("corrected.yaml"), *bad)
+    assert "sway" not in said.out
+    assert "path-bend" in said.out
+
+
+def test_an_unknown_code_is_refused_with_a_suggestion(podusv):
+    said = podusv("validate", "a.yaml", "--set", "silence=[path-jumps]")
+    assert said.code == 2
+    assert "did you mean 'path-jump'?" in said.err
+
+
+def test_findings_that_not_all_runs_share_name_their_runs():
+    shared, some, own = (Finding(code, "actuator", code) for code in ("a", "b", "c"))
+    found = merged({"x": [shared, some], "y": [some, shared, own], "z": [shared, own, own]})
+    assert [str(finding) for finding in found] == [
+        "warning[a]: actuator: a", "warning[b]: x, y: actuator: b", "warning[c]: y, z: actuator: c",
+    ]  # fmt: skip
+    assert merged({"x": [shared], "there already": []})[0].runs == ("x",)
+    assert merged({"x": [shared]}) == [shared]
+
+
+def transcripts() -> list[tuple[str, list[str]]]:
+    """Every `podusv validate` of docs/findings.md, with the lines shown below it."""
+    text = (PACKAGE.parent / "docs" / "findings.md").read_text()
+    blocks = re.findall(r"^    \$ podusv validate (\S+)\n((?:    .*\n)+)", text, re.MULTILINE)
+    return [(config, shown.replace("\n    ", "\n")[4:].splitlines()) for config, shown in blocks]
+
+
+def test_docs_show_what_a_terminal_shows(podusv, monkeypatch):
+    monkeypatch.setattr("podusv_cli.cli.terminal.sys.stdout.isatty", lambda: True, raising=False)
+    monkeypatch.setenv("COLUMNS", "100")
+    monkeypatch.chdir(PACKAGE.parent)
+    assert len(transcripts()) == 2
+    for config, shown in transcripts():
+        assert podusv("validate", config).out.splitlines() == shown
+
+
+def test_findings_are_wrapped_on_a_terminal_and_whole_in_a_pipe(podusv, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "60")
+    validate, run = (
+        (command, scenario_file("corrected.yaml"), *SWAYING, *SHORT[:4])
+        for command in ("validate", "run")
+    )
+    whole = podusv(*validate).out.splitlines()[2:]
+    assert podusv(*run, "--no-figures", "--out", "a").err.splitlines() == whole
+    assert len(whole) == 2
+    for stream in ("stdout", "stderr"):
+        monkeypatch.setattr(
+            f"podusv_cli.cli.terminal.sys.{stream}.isatty", lambda: True, raising=False
+        )
+    err = podusv(*run, "--no-figures", "--out", "b").err
+    out = podusv(*validate).out
+    for shown in (out[out.index("warning") :].splitlines(), err.splitlines()):
+        assert max(map(len, shown)) <= 60 < len(shown) * 60 / 2
+        assert " ".join(line.strip() for line in shown) == " ".join(whole)
+
+
+def test_silencing_is_no_difference_between_runs_and_survives_resolving(podusv):
+    loud = (*PLAIN, "silence=[path-jump, saturated]")
+    assert load(CONFIGS / "corrected.yaml", loud).scenario.silence == ("path-jump", "saturated")
+    run = ("run", scenario_file("corrected.yaml"), *SHORT)
+    podusv(*run, "--out", "a")
+    podusv(*run, "--set", "silence=[saturated]", "--out", "b")
+    assert load("a/resolved.yaml").scenario.silence == ()
+    assert load("b/resolved.yaml").scenario.silence == ("saturated",)
+    assert "silence" not in podusv("compare", "a", "b", "--no-figures", "--out", "ab").err

@@ -1,6 +1,7 @@
 """Findings about path, hull and actuator: told where they hold, borne out by simulation."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,8 +11,11 @@ from findings_samples import codes, finding, late, log, scene
 from podusv_cli.components.vessels.plant import plant
 from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.findings.finding import Case
+from podusv_cli.findings.proof import conditions
 from podusv_cli.findings.reference import drift, reference
 from podusv_cli.findings.task import sliding_distance
+from podusv_cli.findings.values import damping_sign
+from podusv_cli.scenario.load import load
 
 LONG = "simulation.duration=300"
 SWITCH = 15.0
@@ -256,3 +260,83 @@ def test_a_pod_that_turns_too_little_drives_the_hull_ahead_and_that_is_told():
     assert "thrust-short" not in codes(*sets(1.2))
     assert late("z_e", *sets(0.15)).min() < 0.3  # of the standoff of 0.5 m
     assert np.abs(late("z_e", *sets(1.2)) - 0.5).max() < 0.1
+
+
+# --- gain conditions in words
+
+CONFIGS = Path(__file__).parent.parent / "configs/paper"
+
+
+def said(name: str, *sets: str) -> list[str]:
+    return list(conditions(load(CONFIGS / f"{name}.yaml", sets).scenario))
+
+
+@pytest.mark.parametrize(("k_psie", "holds"), [(0.051, True), (0.049, False)])
+def test_the_corrected_limit_of_k_psie_is_a_quarter_of_one_over_A(k_psie, holds):
+    (line,) = said("corrected", f"controller.k_psie={k_psie}", "controller.A_r=5")
+    assert ("all hold; lambda" in line) == holds
+    assert (f"k_psie = {k_psie} fails: it must exceed 0.05" in line) != holds
+
+
+def test_the_printed_sign_asks_for_more_than_the_printed_gains():
+    (line,) = said("printed")
+    assert "k_ze = 0.1 fails: it must exceed 0.336" in line  # 1/(4 A_u) + 1/(k_ue - 1/2)
+    assert "as printed: all hold" in line
+
+
+def test_every_law_with_a_lyapunov_function_has_its_line():
+    assert [line.partition(",")[0] for line in said("corrected_compare")] == [
+        "proposed", "dsc", "li",
+    ]  # fmt: skip
+
+
+# --- findings about signs and units
+
+STILL = ("disturbance={kind: none}", "simulation.duration=60")
+
+
+@pytest.mark.parametrize("name", ["X_uu", "X_uuu", "Y_vv", "N_rr"])
+def test_damping_that_drives_is_told_at_its_key_once(name):
+    case = Case(scene(f"vessel.{name}=1.32"))
+    (told,) = damping_sign.findings(case.scenario.controller, case)
+    assert (told.code, told.where) == ("damping-sign", f"vessel.{name}")
+    assert "-1.32?" in told.text
+
+
+def test_a_hull_with_damping_of_the_wrong_sign_has_to_be_held_back():
+    wrong, right = (*STILL, "vessel.X_uu=8.0"), (*STILL, "vessel.X_uu=-8.0")
+    assert "damping-sign" in codes(*wrong)
+    assert late("tau_u", *wrong).max() < -0.5
+    assert "damping-sign" not in codes(*right)
+    assert late("tau_u", *right).min() > 0.5
+
+
+def test_added_mass_of_the_wrong_sign_makes_the_hull_lighter():
+    """From rest, under a constant thrust: less mass, more acceleration."""
+    thrust = (*STILL, "controller={kind: turning_circle}")
+    wrong, right = (*thrust, "vessel.X_udot=12.0"), (*thrust, "vessel.X_udot=-12.0")
+    told = finding("added-mass-sign", *wrong)
+    assert told.where == "vessel.X_udot"
+    assert "m11 = 11.8 kg" in told.text  # 23.8 - 12
+    assert "-12?" in told.text
+    assert "added-mass-sign" not in codes(*right)
+    speeds = [log(*one)["u"][10] for one in (wrong, right)]
+    assert speeds[0] / speeds[1] == pytest.approx(35.8 / 11.8, rel=0.01)
+
+
+def test_what_the_law_is_told_is_looked_at_too():
+    assert finding("damping-sign", "nominal.Y_vv=36.0").where == "nominal.Y_vv"
+
+
+def test_no_vessel_that_podusv_brings_along_drives_itself():
+    for name in VESSELS:
+        assert not {"damping-sign", "added-mass-sign"} & codes(f"vessel={{preset: {name}}}")
+
+
+@pytest.mark.parametrize("key", ["start.psi", "path.course"])
+def test_degrees_are_told_and_radians_are_not(key):
+    told = finding("large-angle", f"{key}=-90")
+    assert told.where == key
+    assert "-90 deg is -1.571" in told.text
+    assert "large-angle" not in codes(f"{key}={-math.pi / 2}")
+    assert "large-angle" not in codes(f"{key}={2 * math.pi}")

@@ -4,6 +4,7 @@ import os
 import re
 import shutil
 import subprocess
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -97,3 +98,21 @@ def test_a_step_replaces_committed_files_and_adds_none(checkout):
         assert step(checkout, "one", 0).returncode == 0
         found = {path.name: path.read_text() for path in place.iterdir()}
         assert found == {"comparison.csv": "new\n", "mine.txt": "mine\n"}
+
+
+# --- the lower bounds in pyproject.toml are those that `make test-oldest` installs
+
+
+def said(command: str) -> str:
+    """What a shell command prints, at the top of the checkout."""
+    return subprocess.run(
+        command, shell=True, cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout
+
+
+def test_the_oldest_set_has_every_dependency_at_its_lower_bound():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    shown = said("make --dry-run test-oldest")
+    listing = shown[shown.index("sed ") : shown.index("pyproject.toml")] + "pyproject.toml"
+    pins = said(listing)
+    assert pins.split() == [bound.replace(">=", "==") for bound in project["dependencies"]]

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import NONLINEAR, PAPER, Answer, Situation, ask, corrected, run, situations
+from conftest import NONLINEAR, Answer, Situation, ask, corrected, run, situations
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -112,14 +112,6 @@ def test_the_sign_of_the_coupling_changes_its_own_terms_only(kind):
         np.testing.assert_allclose(one.tau - other.tau, [surge, yaw], rtol=1e-9, atol=1e-10)
         np.testing.assert_array_equal(one.rate, other.rate)
         assert one.signals == other.signals
-
-
-@pytest.mark.parametrize("kind", POLAR)
-def test_only_the_nominal_vessel_s_inertia_enters_a_filtered_law(kind):
-    law = kind()
-    for at in situations(law, 20):
-        same = np.array_equal(ask(law, *at, NONLINEAR).tau, ask(law, *at, PAPER).tau)
-        assert same == (kind is not Backstepping)
 
 
 def test_pid_is_three_gains_on_the_velocity_errors():

@@ -1,12 +1,17 @@
 """Operations of a law, counted: by hand for a small kernel, and by differences for the laws."""
 
+from __future__ import annotations
+
 import math
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 
+from podusv_cli.components.paths.line import Line
+from podusv_cli.components.paths.sinusoid import Sinusoid
 from podusv_cli.core.kernel import kernel, scratch
+from podusv_cli.engine.loop.recent import Recent
 from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.metrics.operations import Tally, operations
 from podusv_cli.scenario.load import load
@@ -57,3 +62,25 @@ def test_nodes_cost_the_same_in_every_law_that_has_them():
     )  # f_hat, and both adaptations
     # the law without a filter differentiates its virtual controls instead
     assert few["li"] - few["proposed"] == many["li"] - many["proposed"] > 0
+
+
+# --- what methods gave last is used again for the very same objects only
+
+
+def test_the_very_same_object_is_not_asked_again() -> None:
+    """One that is equal is, since zeros of both signs are equal."""
+    recall, line = Recent(), Line(course=0.5)
+    first = recall(line.constants)
+    assert recall(line.constants) is first
+    assert recall(Line(course=0.5).constants) is not first
+    assert recall(Line(course=0.25).constants)["course"] == 0.25
+
+
+def test_other_arguments_and_other_kinds_are_apart() -> None:
+    """Kinds do not drive each other out."""
+    recall, line, sine = Recent(), Line(course=0.5), Sinusoid(course=0.75)
+    first = recall(line.constants)
+    assert recall(sine.constants)["course"] == 0.75
+    assert recall(line.constants) is first
+    early, late = recall(line.targets, (0.0,)), recall(line.targets, (8.0,))
+    assert early[0, 0] != late[0, 0]

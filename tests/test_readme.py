@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import re
 import shlex
+import shutil
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -148,3 +150,44 @@ def test_a_mistake_in_a_law_gets_the_message_of_the_page(
     message = message.replace(" 10 s of computing", " 0.3 s of computing")
     assert re.search(pattern(message), " ".join((said.err + said.out).split())), said.err
     assert said.code in (2, 3)
+
+
+# --- what docs/logs.md shows is run
+
+PAGE = "docs/logs.md"
+OCTAVE = shutil.which("octave-cli")
+
+
+def logs_blocks(language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", text_of(PAGE), re.DOTALL)
+
+
+def make_runs(podusv: Command) -> None:
+    for words, code, _ in dialogues(PAGE):
+        assert podusv(*words, "--no-figures").code == code
+
+
+def test_the_python_blocks_run(podusv: Command) -> None:
+    make_runs(podusv)
+    known: dict[str, object] = {}
+    for block in logs_blocks("python"):
+        exec(block, known)  # noqa: S102
+    assert len(logs_blocks("python")) == 2
+    assert float(known["x"][-1]) == known["run"]["x"][-1]  # type: ignore[index]
+    header = Path("both/comparison.csv").read_text().splitlines()[0]
+    assert header.startswith("metric,unit,first,other,")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(OCTAVE is None, reason="needs Octave")
+def test_octave_reads_the_same_numbers(podusv: Command) -> None:
+    import podusv_cli
+
+    make_runs(podusv)
+    (block,) = logs_blocks("octave")
+    hidden = 'set(0, "defaultfigurevisible", "off");\n' + re.sub(r"^plot.*$", "", block, flags=re.M)
+    done = subprocess.run(
+        [str(OCTAVE), "--quiet", "--eval", hidden], capture_output=True, text=True
+    )
+    run = podusv_cli.open_run("first")
+    assert done.stdout == f"{run['x'][-1]:.6f} {run.metrics['iae']:.6f}\n", done.stderr

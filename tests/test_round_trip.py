@@ -79,27 +79,28 @@ def test_a_run_of_every_component_is_plotted_repeated_and_compared(
     assert files(tmp_path / "b")["log.h5"] == files(tmp_path / "c")["log.h5"]
 
 
-# What others extend, no scenarios in themselves.
-PARTS = {f"paper/{name}.yaml" for name in ("base", "claims", "ablation_laws")}
 CONFIGS = ROOT / "configs"
 SHIPPED = {path.relative_to(CONFIGS).as_posix(): path for path in CONFIGS.rglob("*.yaml")}
-
 # Of these others are made, which have the same keys: by other numbers, or by `extends`.
 ALIKE = {
     *(f"sea/state_{state}.yaml" for state in (2, 3, 5, 6)),
     *(f"studies/sea_state_{state}.yaml" for state in (2, 6)),
     *(f"studies/tune_{name}.yaml" for name in ("phases", "hull")),
-}  # fmt: skip
+    *(name for name in SHIPPED if name.startswith("bench/")),
+}
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=[pytest.mark.slow] * (name in ALIKE))
-        for name in sorted(SHIPPED.keys() - PARTS)
-        if not name.startswith("bench/")
-    ],
-)
-def test_every_run_of_a_shipped_scenario_reads_back(name):
-    for scenario in load(SHIPPED[name]).scenario.singles().values():
-        assert load_stored(resolved_yaml(scenario), "resolved.yaml").scenario == scenario
+@pytest.mark.parametrize("name", sorted(SHIPPED))
+def test_a_shipped_scenario_says_what_it_is_for_and_every_run_of_it_reads_back(name):
+    path = SHIPPED[name]
+    first, second, *_ = path.read_text().splitlines()
+    assert first.startswith("# ")
+    prefix = "# yaml-language-server: $schema="
+    assert second.startswith(prefix)
+    assert (path.parent / second.removeprefix(prefix)).resolve().name == "schema.json"
+    if "not meant to be run" in first:
+        return
+    scenario = load(path).scenario
+    assert scenario.description
+    for one in () if name in ALIKE else scenario.singles().values():
+        assert load_stored(resolved_yaml(one), "resolved.yaml").scenario == one

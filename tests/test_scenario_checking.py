@@ -33,10 +33,6 @@ def test_a_preset_that_is_no_word_is_unknown(preset):
     assert "vessel.preset: " in line
 
 
-def test_a_sound_scenario_has_no_findings():
-    assert told() == []
-
-
 @pytest.mark.parametrize(
     ("text", "says"),
     [

@@ -1,6 +1,7 @@
 """Explanations: of every key, generated from the models."""
 
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 from annotated_types import Ge, Gt, Le, Lt
@@ -12,11 +13,25 @@ from pydantic.types import Strict
 
 from podusv_cli.comparison.settings import settings
 from podusv_cli.components.measurements.sensors import Sensor, Sensors
+from podusv_cli.components.vessels.vessel import VESSELS as SHIPPED
 from podusv_cli.core.component import Component
+from podusv_cli.findings.finding import finding_kinds
 from podusv_cli.scenario.explain import Row, UnknownKeyError, explain, kinds
-from podusv_cli.scenario.keys import BOUNDS, PATTERNS_IN_WORDS, limits, members, sections
+from podusv_cli.scenario.keys import (
+    BOUNDS,
+    NAME,
+    NUMBER,
+    PATTERNS_IN_WORDS,
+    SCENARIO,
+    limits,
+    members,
+    sections,
+)
 from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.presets import preset_names
+from podusv_cli.scenario.schema import json_schema
 from podusv_cli.scenario.sections import Claim
+from podusv_cli.scenario.yaml_tree import dotted
 
 
 def models(model: type[Component] = Scenario) -> Iterator[type[Component]]:
@@ -35,7 +50,6 @@ def _classes(annotation: object) -> Iterator[type[Component]]:
 
 
 MODELS = list(dict.fromkeys(models()))
-FIELDS = [(model, name) for model in MODELS for name in model.model_fields]
 SECTIONS = {
     name: sections(field.annotation)
     for name, field in Scenario.model_fields.items()
@@ -54,36 +68,32 @@ def test_the_models_are_all_found():
     assert {"Network", "Harmonic", "Claim", "Pid"} <= {model.__name__ for model in MODELS}
 
 
-@pytest.mark.parametrize(
-    ("model", "name"), FIELDS, ids=lambda part: getattr(part, "__name__", part)
-)
-def test_every_field_has_a_meaning_a_unit_and_limits_that_can_be_put_in_words(model, name):
-    field = model.model_fields[name]
-    assert name == "kind" or (field.description or "").strip()
-    assert not (field.description or "").endswith("."), "meanings are phrases"
-    if {int, float} & set(members(field.annotation)):
-        assert isinstance(field.json_schema_extra, dict)
-        assert isinstance(field.json_schema_extra["unit"], str)
-    said = limits(field)
-    for data in field.metadata:
-        known = isinstance(data, (Gt, Ge, Lt, Le, Strict, Discriminator)) or hasattr(
-            data, "pattern"
-        )
-        assert known, f"{data} is in no message, explanation or range"
-    assert set(said) <= {*BOUNDS, "pattern"}
-    assert said.get("pattern") in {None, *PATTERNS_IN_WORDS}
+@pytest.mark.parametrize("model", MODELS, ids=lambda model: model.__name__)
+def test_every_field_has_a_meaning_a_unit_and_limits_that_can_be_put_in_words(model):
+    for name, field in model.model_fields.items():
+        assert name == "kind" or (field.description or "").strip(), name
+        assert not (field.description or "").endswith("."), f"{name}: meanings are phrases"
+        if {int, float} & set(members(field.annotation)):
+            assert isinstance(field.json_schema_extra["unit"], str), name
+        for data in field.metadata:
+            known = isinstance(data, (Gt, Ge, Lt, Le, Strict, Discriminator))
+            assert known or hasattr(data, "pattern"), f"{data} is in no message or explanation"
+        said = limits(field)
+        assert set(said) <= {*BOUNDS, "pattern"}
+        assert said.get("pattern") in {None, *PATTERNS_IN_WORDS}
 
 
-@pytest.mark.parametrize(("route", "path"), KEYS)
-def test_every_key_is_explained_by_its_path_and_by_its_route(route, path):
-    for row in (explain(route)[0], *(row for row in explain(path) if row.key == path)):
-        assert row.key == path
-        assert row.meaning
-        assert row.type
-        assert row.default or row.type in ("keys", "kinds")
-    last = path.rpartition(".")[2]
-    # A name that is a section, too, means the section.
-    assert any(row.key in (path, last) for row in explain(last))
+@pytest.mark.parametrize("section", SECTIONS)
+def test_every_key_is_explained_by_its_path_and_by_its_route(section):
+    for route, path in (key for key in KEYS if key[0].startswith(f"{section}.")):
+        for row in (explain(route)[0], *(row for row in explain(path) if row.key == path)):
+            assert row.key == path
+            assert row.meaning
+            assert row.type
+            assert row.default or row.type in ("keys", "kinds")
+        last = path.rpartition(".")[2]
+        # A name that is a section, too, means the section.
+        assert any(row.key in (path, last) for row in explain(last)), path
 
 
 def test_without_a_key_the_sections_are_explained():
@@ -176,10 +186,9 @@ def test_a_default_is_what_the_section_has_when_it_is_left_out():
     assert [row.default for row in explain("nominal.X_uu")] == ["the vessel's"]
 
 
-@pytest.mark.parametrize("name", ABOUT)
-def test_every_signal_is_explained(name):
-    signal = ABOUT[name]
-    assert Row(name, signal.meaning, "signal", signal.unit) in explain(name)
+def test_every_signal_is_explained():
+    for name, signal in ABOUT.items():
+        assert Row(name, signal.meaning, "signal", signal.unit) in explain(name)
 
 
 @pytest.mark.parametrize(
@@ -224,3 +233,116 @@ def test_the_unit_of_a_sensor_s_errors_is_that_of_what_it_measures():
     told = {one.key: one.unit for one in settings(Sensors(position=Sensor(noise=0.5)))}
     assert told["position.noise"] == "m"
     assert told["yaw_rate.bias"] == "rad/s"
+
+
+# --- the JSON schema
+
+SCHEMA = json_schema(tuple(finding_kinds()))
+# Every word of draft-07 that the models need; a new one wants a look at how it is converted.
+WORDS = {
+    "$schema", "title", "definitions", "description", "default", "type", "properties", "items",
+    "additionalItems", "additionalProperties", "minItems", "maxItems", "minimum",
+    "exclusiveMinimum", "maximum", "exclusiveMaximum", "pattern", "enum", "const", "anyOf",
+    "allOf", "$ref",
+}  # fmt: skip
+
+
+def schemas(schema: Any) -> Iterator[dict[str, Any]]:
+    """The schema and all that are in it."""
+    if not isinstance(schema, dict):
+        return
+    yield schema
+    for word in ("properties", "definitions"):
+        for part in schema.get(word, {}).values():
+            yield from schemas(part)
+    for word in ("anyOf", "allOf", "items"):
+        parts = schema.get(word, [])
+        for part in parts if isinstance(parts, list) else [parts]:
+            yield from schemas(part)
+    yield from schemas(schema.get("additionalProperties"))
+
+
+def target(schema: dict[str, Any]) -> dict[str, Any]:
+    """The schema, or what it refers to."""
+    reference = next(
+        (part["$ref"] for part in [schema, *schema.get("allOf", [])] if "$ref" in part), ""
+    )
+    return SCHEMA["definitions"][reference.rpartition("/")[2]] if reference else schema
+
+
+def places(schema: dict[str, Any], path: tuple[str, ...]) -> list[dict[str, Any]]:
+    """Every schema for the key at a path, whatever the kind."""
+    found = [target(schema)]
+    for step in path:
+        inside = [target(part) for one in found for part in one.get("anyOf", [one])]
+        if step == NAME:
+            found = [
+                target(one["additionalProperties"])
+                for one in inside
+                if "additionalProperties" in one
+            ]
+            continue
+        if step == NUMBER:
+            found = [target(one["items"]) for one in inside if "items" in one]
+            continue
+        found = [one["properties"][step] for one in inside if step in one.get("properties", {})]
+    return found
+
+
+def test_the_schema_uses_the_words_of_draft_07_only():
+    assert SCHEMA["$schema"] == "http://json-schema.org/draft-07/schema#"
+    assert {word for schema in schemas(SCHEMA) for word in schema} <= WORDS
+
+
+def test_every_reference_leads_somewhere_and_stands_alone():
+    references = [schema for schema in schemas(SCHEMA) if "$ref" in schema]
+    assert references
+    for schema in references:
+        assert list(schema) == ["$ref"], "draft-07 ignores what stands beside a reference"
+        assert schema["$ref"].removeprefix("#/definitions/") in SCHEMA["definitions"]
+
+
+def test_lists_of_fixed_length_are_closed():
+    lists = [schema for schema in schemas(SCHEMA) if isinstance(schema.get("items"), list)]
+    assert lists
+    for schema in lists:
+        assert schema["additionalItems"] is False
+        assert len(schema["items"]) == schema["minItems"] == schema["maxItems"]
+
+
+def test_no_key_is_required_and_no_unknown_one_allowed():
+    sections_of_keys = [schema for schema in schemas(SCHEMA) if "properties" in schema]
+    assert len(sections_of_keys) > 10
+    for schema in sections_of_keys:
+        assert schema["additionalProperties"] is False
+        assert "required" not in schema
+
+
+def test_a_file_can_extend_another():
+    one, several = SCHEMA["properties"]["extends"]["anyOf"]
+    assert (one["type"], several["type"], several["items"]["type"]) == ("string", "array", "string")
+    assert set(SCHEMA["properties"]) == {"extends", *Scenario.model_fields}
+
+
+def test_every_key_of_the_models_is_there_with_its_meaning_and_unit():
+    for key in (key for key in SCENARIO.all() if not key.is_kind):
+        found = places(SCHEMA, key.path)
+        assert found, dotted(key.route)
+        if key.path[-1] != "kind":
+            unit = (key.field.json_schema_extra or {}).get("unit")
+            shown = f"{key.field.description} [{unit}]" if unit else key.field.description
+            assert shown in [schema["description"] for schema in found]
+
+
+def test_a_kind_is_one_word_and_a_preset_one_of_the_vessels():
+    laws = sections(Scenario.model_fields["controller"].annotation)
+    assert {schema["const"] for schema in places(SCHEMA, ("controller", "kind"))} == set(laws)
+    (preset,) = places(SCHEMA, ("vessel", "preset"))
+    assert preset["enum"] == ["", *preset_names(SHIPPED)]
+
+
+def test_defaults_are_there_but_where_they_depend_on_the_place():
+    assert places(SCHEMA, ("simulation", "step"))[0]["default"] == 0.01
+    assert "default" not in places(SCHEMA, ("vessel", "X_uu"))[0], "it is the preset's"
+    assert "default" not in places(SCHEMA, ("disturbance", "b_u", "sin"))[0], "b_v has another one"
+    assert places(SCHEMA, ("disturbance", "b_u"))[0]["default"]["sin"] == 0.1

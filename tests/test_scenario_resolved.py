@@ -7,16 +7,18 @@ import yaml
 from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
-from scenario_samples import SOUND, loaded
+from scenario_samples import SOUND, loaded, write
 
 from podusv_cli.core.component import Component
 from podusv_cli.scenario.keys import limits, members, sections
-from podusv_cli.scenario.load import HEADING, load_stored, load_text, resolved_yaml, values
+from podusv_cli.scenario.limits import LEAST_COMPRESSED, Size, needed
+from podusv_cli.scenario.load import HEADING, load, load_stored, load_text, resolved_yaml, values
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sections import LABEL
 from podusv_cli.scenario.sweep import Sweep
 from podusv_cli.scenario.tune import Tune
-from podusv_cli.scenario.yaml_text import read
+from podusv_cli.scenario.yaml_text import MAX_NODES, read
+from podusv_cli.storage import json_files, manifest
 
 LARGEST = 1e6  # inertia of more than this overflows where two are multiplied
 TEXT = st.text(st.characters(exclude_categories=("Cs", "Cc"), include_characters="\t\n"))
@@ -141,20 +143,6 @@ def test_a_resolved_scenario_reads_back_to_the_same_bits(data):
     assert repr(again) == repr(scenario), "-0.0 equals 0.0, but is not the same number"
 
 
-def test_a_sea_seen_through_sensors_reads_back_to_the_same_bits():
-    sea = "[{kind: step}, {kind: current, speed: 0.1}, {kind: waves, height: 0.1, period: 2.0}]"
-    text = SOUND.replace("disturbance: {kind: none}", f"disturbance: {sea}")
-    assert text != SOUND
-    text += (
-        "measurement: {kind: sensors, velocity: null, heading: {outages: [[1, 2]], delay: 0.1}}\n"
-    )
-    text += "estimator: {kind: ekf}\n"
-    scenario = load_text(text, "a.yaml").scenario
-    again = load_stored(resolved_yaml(scenario), "resolved.yaml").scenario
-    assert again == scenario
-    assert repr(again) == repr(scenario)
-
-
 def test_every_value_is_written_out_and_none_is_a_default_any_more():
     first = loaded(SOUND)
     again = load_text(resolved_yaml(first.scenario), "resolved.yaml")
@@ -214,3 +202,43 @@ def test_values_are_all_leaves_by_their_dotted_keys():
     assert found["path.kind"] == "line"
     assert found["controllers"] == {}
     assert not any(content for content in found.values() if isinstance(content, dict))
+
+
+# --- what podusv accepts, it reads back afterwards; what runs need of the disk
+
+
+@pytest.fixture
+def of_two_files(tmp_path, monkeypatch):
+    """A scenario of more values than one file may have."""
+    monkeypatch.chdir(tmp_path)
+    several = MAX_NODES // 3 - 100
+    write("base.yaml", f"path: {{kind: waypoints, points: {[[i, 0.0] for i in range(several)]}}}\n")
+    codes = ", ".join(["saturated"] * several)
+    rest = "".join(line for line in SOUND.splitlines(True) if not line.startswith("path"))
+    write("a.yaml", f"extends: base.yaml\n{rest}silence: [{codes}]\n")
+    return load("a.yaml").scenario
+
+
+@pytest.mark.slow
+def test_a_scenario_of_several_long_files_is_read_back(of_two_files):
+    text = resolved_yaml(of_two_files)
+    assert load_stored(text, "resolved.yaml").scenario == of_two_files
+
+
+@pytest.mark.slow
+def test_the_manifest_of_many_runs_is_read_back(tmp_path):
+    entry = manifest.FileEntry(sha256="a" * 64, bytes=10**9)
+    names = ("scenario.yaml", "resolved.yaml", "log.h5", "metrics.json", "metrics.csv",
+             "theory.json", "figures/controls.png", "provenance.json", "manifest.json",
+             "missing.json")  # fmt: skip
+    files = {f"a_rather_long_name_of_law_{i:04}/{n}": entry for i in range(3000) for n in names}
+    whole = manifest.Manifest(podusv_format=1, status="finished", files=files)
+    (tmp_path / "manifest.json").write_bytes(json_files.encode(whole.model_dump()))
+    assert len(manifest.read(tmp_path).files) == len(files)
+
+
+@pytest.mark.parametrize(("at_once", "largest"), [(1, 1000), (2, 1100), (3, 1110), (9, 1110)])
+def test_runs_made_at_once_may_be_those_that_need_the_most_disk(at_once, largest):
+    sizes = [Size(1, 1, 50, 0.0, scratch, compressed=True) for scratch in (100, 10, 1000)]
+    packed = LEAST_COMPRESSED * 150
+    assert needed(sizes, at_once) == pytest.approx(packed + largest)

@@ -6,7 +6,7 @@ import pytest
 
 from podusv_cli.comparison.curves import REDUCERS
 from podusv_cli.comparison.expressions import OPERATIONS
-from podusv_cli.scenario.expressions import FUNCTIONS, ExpressionError
+from podusv_cli.expressions.reading import FUNCTIONS, ExpressionError
 from podusv_cli.studies.study.claims import parse
 from podusv_cli.studies.study.expressions import parse_success
 from podusv_cli.studies.study.samples import STATISTICS

@@ -10,10 +10,10 @@ import pytest
 from scipy.special import bdtr
 from study_samples import Made, claim, judged, study
 
+from podusv_cli.expressions.verdict import as_markdown
 from podusv_cli.studies.study import statistics as st
 from podusv_cli.studies.study.claims import judge
 from podusv_cli.studies.study.expressions import parse_success, succeeded
-from podusv_cli.studies.study.verdict import as_markdown
 
 inf, nan = math.inf, math.nan
 LAWS = ["proposed", "pid", "li"]

@@ -14,7 +14,7 @@ from podusv_cli.studies.study import cluster as clusters
 from podusv_cli.studies.study import dispatch as marching
 from podusv_cli.studies.study.cluster import Cluster
 from podusv_cli.studies.study.dispatch import march
-from podusv_cli.studies.study.remote import BITS, Recipe, Terms
+from podusv_cli.studies.study.remote import BITS, Expectation, StudyText
 from podusv_cli.studies.study.store import Store
 from podusv_cli.studies.study.unit import STATUSES
 
@@ -41,7 +41,7 @@ class Impatient(SimpleQueue):
 
 
 def cluster(client, mixed=False):
-    made = Cluster(client, Recipe("text"), Terms(REPORT, mixed))
+    made = Cluster(client, StudyText("text"), Expectation(REPORT, mixed))
     made._finished = Impatient()
     made._finished.client = client
     return made

@@ -12,14 +12,14 @@ STUDY, PROVENANCE = "study.json", "provenance.json"
 REMOVED = object()
 VALUES = [None, [], {}, "x", -1, 1.5, 10**290, True, [1], {"a": [1]}]
 DAMAGES = [
-    *((STUDY, (key,), value) for key in ("identity", "history") for value in VALUES[3:8]),
+    *((STUDY, (key,), value) for key in ("identity", "history") for value in VALUES[3:5]),
     *((STUDY, (key,), REMOVED) for key in ("draws", "identity", "history")),
-    *((STUDY, ("draws",), value) for value in VALUES[:6]),
-    *((STUDY, ("history", 0), value) for value in VALUES),
-    *((STUDY, ("history", 0, "draws"), value) for value in (None, "x", 0, [])),
-    *((PROVENANCE, ("sittings",), value) for value in (None, {}, "x", 1.5, [None], [{}], [[]])),
+    *((STUDY, ("draws",), value) for value in VALUES[3:6]),
+    *((STUDY, ("history", 0), value) for value in VALUES[6:]),
+    *((STUDY, ("history", 0, "draws"), value) for value in ("x", 0)),
+    *((PROVENANCE, ("sittings",), value) for value in ({}, 1.5, [None], [[]])),
     *((PROVENANCE, ("sittings", 0, key), REMOVED) for key in ("started", "runs", "podusv")),
-    *((PROVENANCE, ("sittings", 0, "platform"), value) for value in (None, {}, 1.5, [])),
+    *((PROVENANCE, ("sittings", 0, "platform"), value) for value in ({}, [])),
     *((PROVENANCE, ("sittings", 0, "timed_runs"), value) for value in ({"pid": 0}, {"pid": "x"})),
 ]
 COMMANDS = [("report", "--no-figures"), ("run", "--draws", "5"), ("merge", "--out", "merged")]
@@ -62,7 +62,7 @@ def test_a_damaged_record_is_told_in_a_sentence(study, podusv, name, place, valu
 
 
 @pytest.mark.parametrize("name", [STUDY, PROVENANCE])
-@pytest.mark.parametrize("length", [0, 1, 40, -3])
+@pytest.mark.parametrize("length", [0, -3])
 def test_a_record_that_is_cut_is_told_in_a_sentence(study, podusv, name, length):
     (study / name).write_text((study / name).read_text()[:length])
     said = podusv("sweep", "report", study, "--no-figures")
@@ -71,7 +71,7 @@ def test_a_record_that_is_cut_is_told_in_a_sentence(study, podusv, name, length)
 
 
 @pytest.mark.parametrize("key", ["identity", "history", "idle"])
-@pytest.mark.parametrize("value", [REMOVED, None, [1], "x", 1.5])
+@pytest.mark.parametrize("value", [REMOVED, "x"])
 def test_a_damaged_search_is_told_in_a_sentence(tmp_path, podusv, key, value):
     pytest.importorskip("optuna")
     tune = "tune: {budget: 16, train: 2, validate: 2}\n"

@@ -14,7 +14,7 @@ from small_study import TEXT, made, small
 from podusv_cli.core.errors import StorageError
 from podusv_cli.studies.study.cluster import connected
 from podusv_cli.studies.study.dispatch import march
-from podusv_cli.studies.study.remote import Recipe
+from podusv_cli.studies.study.remote import StudyText
 from podusv_cli.studies.study.store import RUNS, Store
 
 PATIENCE = 60.0  # s
@@ -39,7 +39,7 @@ def test_a_worker_that_is_killed_changes_no_byte(distributed, tmp_path):
             killed.append(next(iter(local.workers.values())).pid)
             os.kill(killed[0], signal.SIGKILL)
 
-    recipe = Recipe(TEXT)
+    recipe = StudyText(TEXT)
     with (
         distributed.LocalCluster(2, threads_per_worker=1, dashboard_address=None) as local,
         connected(local.scheduler_address, recipe, store.seal, mixed=False) as engine,
@@ -113,6 +113,6 @@ def test_no_scheduler_is_a_sentence(distributed, monkeypatch):
     monkeypatch.setattr("podusv_cli.studies.study.cluster.PATIENCE", 0.3)
     with (
         pytest.raises(StorageError, match=r"--scheduler tcp://127.0.0.1:9: no scheduler answers"),
-        connected("tcp://127.0.0.1:9", Recipe(TEXT), "", mixed=False),
+        connected("tcp://127.0.0.1:9", StudyText(TEXT), "", mixed=False),
     ):
         pass

@@ -7,7 +7,7 @@ from plugin_samples import LAW
 from small_study import TEXT
 
 from podusv_cli.engine.running import watch as march
-from podusv_cli.studies.study.sittings import sittings
+from podusv_cli.studies.study.sessions import sessions
 from podusv_cli.studies.study.unit import STATUSES
 from podusv_cli.workflows import sweep
 
@@ -63,10 +63,10 @@ def test_every_fault_is_that_of_its_run(study):
 
 
 def test_how_a_process_ended_is_told(study):
-    runs, (sitting,) = study.results.runs, sittings(study.folder)
+    runs, (session,) = study.results.runs, sessions(study.folder)
     ended = np.flatnonzero(runs.drawn["start.x"] == -2.0)
-    assert set(sitting["ended"]) == {f"mine[0] draw {draw}" for draw in ended}
-    assert set(sitting["ended"].values()) == {"its process ended with exit code -9, 2 times"}
+    assert set(session["ended"]) == {f"mine[0] draw {draw}" for draw in ended}
+    assert set(session["ended"].values()) == {"its process ended with exit code -9, 2 times"}
 
 
 def test_the_exit_code_of_a_report_says_so(podusv, study):

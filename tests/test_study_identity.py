@@ -202,8 +202,8 @@ def told_as(folder, machine):
     """Have the sittings of a study tell another processor."""
     path = folder / "provenance.json"
     content = json.loads(path.read_text())
-    for sitting in content["sittings"]:
-        sitting["platform"]["processor"] = machine
+    for session in content["sittings"]:
+        session["platform"]["processor"] = machine
     path.write_text(json.dumps(content))
 
 

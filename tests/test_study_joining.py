@@ -13,8 +13,8 @@ from small_study import TEXT, made, small
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.storage import provenance
 from podusv_cli.studies.study import store as stores
-from podusv_cli.studies.study.joining import _machine, join, missing
-from podusv_cli.studies.study.store import RUNS, Store
+from podusv_cli.studies.study.joining import _machine, gaps, join
+from podusv_cli.studies.study.store import RUNS, SCENARIO, Store
 from podusv_cli.workflows import sweep as workflow
 from podusv_cli.workflows.merge import merge
 
@@ -27,7 +27,7 @@ def shards(tmp_path_factory):
     folder = tmp_path_factory.mktemp("shards")
     stores = [made(folder / str(n), part=(n, SHARDS)) for n in range(1, SHARDS + 1)]
     for store in stores:
-        (store.folder / workflow.SCENARIO).write_text(TEXT)
+        (store.folder / SCENARIO).write_text(TEXT)
     return [store.folder for store in stores]
 
 
@@ -106,7 +106,7 @@ def test_a_missing_shard_is_told(shards, tmp_path):
     assert done.missing_runs == ("missing: draws 5 to 9, 30 to 34 of every law and cell",)
     store = Store(tmp_path / "most", small())
     next(store.folder.glob("units/li-*")).unlink()
-    assert [line.split(" of ")[1] for line in missing(store)] == ["pid", "li"]
+    assert [line.split(" of ")[1] for line in gaps(store)] == ["pid", "li"]
 
 
 def test_what_cannot_be_the_outcome_is_refused(shards, tmp_path):
@@ -116,7 +116,7 @@ def test_what_cannot_be_the_outcome_is_refused(shards, tmp_path):
     with pytest.raises(UsageError, match="is one of the studies"):
         merged(shards[:3], tmp_path / "link")
     other = made(tmp_path / "other", seed=8, draws=1)
-    (other.folder / workflow.SCENARIO).write_text(TEXT.replace("seed: 7", "seed: 8"))
+    (other.folder / SCENARIO).write_text(TEXT.replace("seed: 7", "seed: 8"))
     with pytest.raises(UsageError, match=r"sweep.seed: 8, not 7"):
         merged([shards[0], other.folder], tmp_path / "all")
     assert not (tmp_path / "all").exists()

@@ -11,7 +11,7 @@ import pytest
 from installed_sample import LAB, install
 from plugin_samples import LAW
 from small_study import TEXT
-from test_plugins_everywhere import MORE
+from test_plugins import MORE
 
 from podusv_cli.core.plugins import MODULES, installed
 from podusv_cli.workflows import sweep

@@ -12,8 +12,8 @@ from test_study_dask import DASK, PATIENCE, background, until
 from podusv_cli.core.errors import LawError, ScenarioError
 from podusv_cli.studies.study import remote
 from podusv_cli.studies.study.joining import digests
-from podusv_cli.studies.study.remote import Recipe
-from podusv_cli.studies.study.store import RUNS
+from podusv_cli.studies.study.remote import StudyText
+from podusv_cli.studies.study.store import RUNS, SCENARIO
 from podusv_cli.studies.study.unit import Unit, make
 from podusv_cli.workflows import run as running
 from podusv_cli.workflows import studies, sweep
@@ -79,9 +79,9 @@ def test_no_metric_has_the_name_of_another_column(config, name):
 def test_a_worker_needs_no_file_of_a_plugin(config, tmp_path, monkeypatch):
     """It gets the text, and makes the same bits."""
     study = swept(config, tmp_path / "study", overrides=["sweep.draws=8"]).folder
-    text, unit = (study / sweep.SCENARIO).read_text(), Unit("mine", 0, 0, 4)
+    text, unit = (study / SCENARIO).read_text(), Unit("mine", 0, 0, 4)
     store = studies.stored(study, trusted=True)
-    recipe = Recipe(text, tuple(store.plan.scenario.plugin_files().items()))
+    recipe = StudyText(text, tuple(store.plan.scenario.plugin_files().items()))
     ours = digests(make(store.plan, unit))
     study.rename(tmp_path / "gone")
     theirs = digests(make(remote._plan(recipe), unit))

@@ -16,7 +16,7 @@ from test_report_chase import BROWSER, QUIET, WIDTHS, needs_browser
 
 from podusv_cli.process.extras import Extras
 from podusv_cli.storage import files
-from podusv_cli.studies.study import bars, figures, outputs, pictures, report
+from podusv_cli.studies.study import bars, figures, outputs, report
 from podusv_cli.workflows import sweep
 
 SUCCESS = "  success: finished and iae <= 0.215\n  claims:\n"
@@ -126,7 +126,7 @@ def test_no_figures_are_drawn_where_none_are_wanted(drawn, tmp_path):
 
 
 def test_a_study_with_a_grid_has_figures_of_cells_and_of_the_grid(whole):
-    names = [one.name for one in pictures.sketches(whole.results, [])]
+    names = [one.name for one in figures.sketches(whole.results, {})]
     assert {"distribution-iae-cell0", "failures-iae-cell3", "grid-failed", "grid-iae"} <= {*names}
     assert len({*names}) == len(names)
 
@@ -150,14 +150,14 @@ def test_a_figure_that_fails_costs_nothing_else(drawn, monkeypatch, tmp_path):
 
 
 def test_an_interrupt_while_figures_are_drawn_costs_figures_alone(drawn, tmp_path, monkeypatch):
-    def interrupted(results, tracks, extras):
+    def interrupted(listed, extras):
         extras.interrupted = True
         return {}, []
 
     folder = tmp_path / "stopped"
     shutil.copytree(drawn.folder, folder)
     (folder / "summary.csv").unlink()
-    monkeypatch.setattr(pictures, "drawn", interrupted)
+    monkeypatch.setattr("podusv_cli.studies.sketch.rendered", interrupted)
     with pytest.raises(KeyboardInterrupt, match=f"podusv sweep report {folder}"):
         sweep.report(folder, sweep.Request())
     same = (drawn.folder / "summary.csv").read_bytes()
@@ -168,7 +168,7 @@ def test_an_interrupt_while_figures_are_drawn_costs_figures_alone(drawn, tmp_pat
 
 def test_the_heatmap_has_every_cell_in_its_place(whole):
     results = whole.results
-    panel = pictures._panel(results, "pid", "iae", 2)
+    panel = figures._panel(results, "pid", "iae", 2)
     table = results.summary[(results.summary.law == "pid") & (results.summary.metric == "iae")]
     for label, median in zip(table.cell, table.q50, strict=True):
         values = dict(part.split(" = ") for part in label.split(", "))

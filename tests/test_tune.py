@@ -14,7 +14,7 @@ from tune_samples import planned, searched, toy, tuned
 from podusv_cli.scenario.load import load
 from podusv_cli.studies.study.unit import UnitResult
 from podusv_cli.studies.tuning import sampler, trials
-from podusv_cli.studies.tuning.pictures import sketches
+from podusv_cli.studies.tuning.figures import sketches
 from podusv_cli.studies.tuning.remarks import remarks
 from podusv_cli.studies.tuning.sampler import Sampler
 from podusv_cli.studies.tuning.search import Search, _far
@@ -22,7 +22,7 @@ from podusv_cli.studies.tuning.space import Gain
 from podusv_cli.studies.tuning.trials import CUT, FINISHED, PRUNED, Trial, best, front
 from podusv_cli.studies.tuning.validation import chosen
 
-BUDGET = 100
+BUDGET = 64
 
 
 @pytest.fixture

@@ -17,7 +17,7 @@ from podusv_cli.scenario.yaml_tree import DISTRIBUTIONS, RANGE
 from podusv_cli.studies.study.draws import SWEEP, table, words
 from podusv_cli.studies.tuning.check import tune_faults
 from podusv_cli.studies.tuning.objective import (
-    Runs,
+    Outcomes,
     evaluate,
     excess,
     parse_inequality,
@@ -141,7 +141,7 @@ def test_a_gain_is_tried_in_four_digits_within_its_range():
     assert (gain.bound(0.0), gain.bound(99.0), gain.bound(20000.0)) == ("", "", "")
 
 
-RUNS = Runs(
+RUNS = Outcomes(
     {"iae": np.array([1.0, 2.0, 3.0, np.nan]), "tv_tau_u": np.array([4.0, 4.0, 8.0, 1.0])},
     np.array([False, False, False, True]),
 )
@@ -174,7 +174,7 @@ def test_a_failed_run_is_the_worst_of_every_statistic(text, number):
 
 
 def test_what_nobody_knows_is_the_worst():
-    runs = Runs({"iae": np.full(4, np.nan)}, np.zeros(4, bool))
+    runs = Outcomes({"iae": np.full(4, np.nan)}, np.zeros(4, bool))
     assert evaluate(parse_objective("median(iae)", METRICS), runs, METRICS) == math.inf
     assert evaluate(parse_objective("median(iae) - median(iae)", METRICS), runs, METRICS) > 1e300
 

@@ -12,7 +12,7 @@ from podusv_cli.studies.tuning.plan import TunePlan
 from podusv_cli.studies.tuning.search import Search
 from podusv_cli.workflows import tune as workflow
 
-# They have times, and the report the last sitting.
+# They have times, and the report the last session.
 MADE_ANEW = {"provenance.json", "manifest.json", "tune.json", "study.json", "report.html"}
 
 LAW = '''"""A law whose tau_u varies by its distance from a known gain."""

@@ -50,13 +50,13 @@ def bench(
     """
     from podusv_cli.cli.progress import progress_bars
     from podusv_cli.studies.bench.cases import (  # heavy imports only when needed
-        Wanted,
+        Selection,
         shipped_bench,
     )
     from podusv_cli.workflows import bench as workflow
 
     chosen = {"tasks": task or (), "vessels": vessel or (), "conditions": condition or ()}
-    wanted = Wanted(folder or shipped_bench(), laws or (), assign or (), chosen)
+    wanted = Selection(folder or shipped_bench(), laws or (), assign or (), chosen)
     request = workflow.Request(out, force, figures, workers, sys.argv, optimum)
     with progress_bars(wanted=not (quiet or as_json)) as bars:
         done = workflow.bench(wanted, request, bars)

@@ -96,7 +96,7 @@ def _report(done: Compared, verbose: bool) -> None:
     echo_table(head, cells(result.table, result.metrics, result.unsettled))
     echo(NOTE)
     for v in result.verdicts:
-        echo_entry(v.name, v.claim.says, v.evidence(), facts=v.answer)
+        echo_entry(v.name, v.claim.says, v.evidence(), facts=v.verdict)
     if verbose:
         for label, timing in result.timings.items():
             shown = ", ".join(f"{name} {seconds:.3f}" for name, seconds in timing.items())

@@ -69,12 +69,13 @@ def run(
     hung or was invalid, and when a kept log differs from the table; runs that diverge are results.
     """
     from podusv_cli.workflows import sweep as workflow  # heavy imports only when needed
+    from podusv_cli.workflows.many_runs import Request
 
     changes = [*(assign or ()), *([f"sweep.draws={draws}"] if draws else [])]
     with StudyLine(wanted=not (quiet or as_json)) as line:
-        request = workflow.Request(
-            changes, out, seconds(until), workers, part_of(shard), sys.argv, plugin or (), figures,
-            scheduler, allow_mixed, trust, line.say, line.warn,
+        request = Request(
+            changes, out, workers, sys.argv, plugin or (), figures, scheduler, allow_mixed, trust,
+            seconds(until), part_of(shard), line.say, line.warn,
             None if quiet or as_json else line.note,
         )  # fmt: skip
         done = workflow.run(Path(config), request, line.tell)
@@ -168,11 +169,10 @@ def report(
 ) -> None:  # fmt: skip
     """Make the tables, verdicts and figures of a study anew, of what is there."""
     from podusv_cli.workflows import sweep as workflow
+    from podusv_cli.workflows.many_runs import Request
 
     with StudyLine(wanted=not (quiet or as_json)) as line:
-        request = workflow.Request(
-            argv=sys.argv, figures=figures, trust=trust, say=line.say, warn=line.warn
-        )
+        request = Request(argv=sys.argv, figures=figures, trust=trust, say=line.say, warn=line.warn)
         done = workflow.report(study, request)
     _tell(done, as_json=as_json, quiet=quiet)
 
@@ -188,7 +188,7 @@ def merge(
 ) -> None:
     """Join the runs of several folders of one study, as `--shard` makes them."""
     from podusv_cli.workflows import merge as joining
-    from podusv_cli.workflows.sweep import Request
+    from podusv_cli.workflows.many_runs import Request
 
     with StudyLine(wanted=not (quiet or as_json)) as line:
         request = Request(argv=sys.argv, figures=figures, trust=trust, say=line.say, warn=line.warn)

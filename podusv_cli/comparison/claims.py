@@ -6,25 +6,19 @@ import ast
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, Self
+from typing import Self
 
 from podusv_cli.comparison.curves import Source
 from podusv_cli.comparison.expressions import Evaluation, parse, with_labels
 from podusv_cli.core.errors import ScenarioError
-from podusv_cli.core.escaping import markdown, markdown_cell, markdown_code
+from podusv_cli.core.escaping import markdown
+from podusv_cli.expressions.reading import ExpressionError
+from podusv_cli.expressions.verdict import Verdict, as_markdown
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import CLOCKED, METRICS
 from podusv_cli.scenario import explain
-from podusv_cli.scenario.expressions import ExpressionError
 from podusv_cli.scenario.load import Loaded
 from podusv_cli.scenario.sections import Claim
-
-Answer = Literal["reproduced", "not reproduced", "cannot tell"]
-ANSWERS: dict[bool | None, Answer] = {
-    True: "reproduced",
-    False: "not reproduced",
-    None: "cannot tell",
-}
 
 
 @dataclass(frozen=True)
@@ -47,16 +41,13 @@ class ParsedClaim:
 
 
 @dataclass(frozen=True)
-class Verdict:
-    """The verdict on a claim.
+class RunsVerdict(Verdict):
+    """The verdict on a claim about runs.
 
     `numbers` are those that were compared, by their text, NaN where missing; `reason` says why the
     answer is "cannot tell", else it is empty.
     """
 
-    name: str
-    claim: Claim
-    answer: Answer
     numbers: dict[str, float]
     reason: str = ""
 
@@ -80,7 +71,7 @@ class Verdict:
         return {
             "claim": self.name,
             **self.claim.model_dump(),
-            "verdict": self.answer,
+            "verdict": self.verdict,
             "numbers": numbers,
             "reason": self.reason,
         }
@@ -129,45 +120,27 @@ def peaks(claims: Sequence[ParsedClaim]) -> dict[str, float]:
 def judge(
     claims: Sequence[ParsedClaim], runs: Mapping[str, Source],
     metrics: Mapping[str, Metric] = METRICS,
-) -> list[Verdict]:  # fmt: skip
+) -> list[RunsVerdict]:  # fmt: skip
     """A verdict on every claim; `runs` by label."""
     return [_verdict(parsed, runs, metrics) for parsed in claims]
 
 
 def _verdict(
     parsed: ParsedClaim, runs: Mapping[str, Source], metrics: Mapping[str, Metric]
-) -> Verdict:
+) -> RunsVerdict:
     evaluation = Evaluation(runs, parsed.claim.tolerance, metrics)
     if parsed.given and (given := evaluation.holds(parsed.given)) is not True:
         doubts = "; ".join(dict.fromkeys(evaluation.doubts))
         unknown = f"whether the premise holds is unknown: {doubts}"
         reason = unknown if given is None else f"the premise does not hold: {parsed.claim.given}"
-        return Verdict(parsed.name, parsed.claim, ANSWERS[None], evaluation.numbers, reason)
+        return RunsVerdict(parsed.name, parsed.claim, None, evaluation.numbers, reason)
     evaluation = Evaluation(runs, parsed.claim.tolerance, metrics)
     answer = evaluation.holds(parsed.expect)
     reason = "; ".join(dict.fromkeys(evaluation.doubts)) if answer is None else ""
-    return Verdict(parsed.name, parsed.claim, ANSWERS[answer], evaluation.numbers, reason)
+    return RunsVerdict(parsed.name, parsed.claim, answer, evaluation.numbers, reason)
 
 
-def _condition(claim: Claim) -> str:
-    given = f", given {markdown_code(claim.given)}" if claim.given else ""
-    return markdown_code(claim.expect) + given
-
-
-def as_markdown(verdicts: Sequence[Verdict], timed: Sequence[Verdict] = (), place: str = "") -> str:
-    """The verdicts as a table, followed by remarks; verdicts on `timed` claims are in `place`."""
-    rows = [
-        f"| {markdown_cell(v.name)} | "
-        f"{markdown_cell(v.claim.says)} ({markdown_cell(v.claim.source)}) | "
-        f"**{v.answer}** | {_condition(v.claim)}, tolerance {v.claim.tolerance:g} | "
-        f"{markdown_cell(v.evidence())} |"
-        for v in verdicts
-    ]
-    remarks = [
-        f"- {markdown(v.name)}: {markdown(v.claim.remark)}" for v in verdicts if v.claim.remark
-    ]
-    remarks += [
-        f"- {markdown(v.name)}: judged by times, which never repeat; see {place}" for v in timed
-    ]
-    head = ["| | claim | verdict | put as | numbers |", "|---|---|---|---|---|"]
-    return "\n".join([*head, *rows, *(["", *remarks] if remarks else []), ""])
+def with_timed(verdicts: Sequence[RunsVerdict], timed: Sequence[RunsVerdict], place: str) -> str:
+    """The verdicts in Markdown; those on `timed` claims are in another place."""
+    elsewhere = f"judged by times, which never repeat; see {place}"
+    return as_markdown(verdicts, [f"- {markdown(v.name)}: {elsewhere}" for v in timed])

@@ -12,34 +12,34 @@ from __future__ import annotations
 
 import ast
 import math
-import operator
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field
-from itertools import pairwise
+from typing import Any, ClassVar
 
 import numpy as np
 
 from podusv_cli.comparison import curves
 from podusv_cli.comparison.curves import REDUCERS, SETTINGS, CannotTell, Curve, Quantity, Source
 from podusv_cli.comparison.entries import CHECKS
-from podusv_cli.comparison.tolerance import SIGNS
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.signal import Signal
-from podusv_cli.metrics.metric import Metric
-from podusv_cli.metrics.table import METRICS
-from podusv_cli.scenario.expressions import (
+from podusv_cli.expressions.margins import SIGNS, around, below
+from podusv_cli.expressions.reading import (
     ExpressionError,
-    all_hold,
     function,
     known,
     literal,
     refuse,
     syntax_tree,
 )
+from podusv_cli.expressions.walk import Condition, Walk
+from podusv_cli.metrics.metric import Metric
+from podusv_cli.metrics.table import METRICS
 from podusv_cli.theory.derived import DERIVED
 
 EXAMPLE = "a.iae < b.iae"
+STRICT = (ast.Lt, ast.Gt)  # too close to tell where the difference is within the tolerance
 # norms of the weights, which have one value for every node of a network
 NORMS = {derived.needs[0]: name for name, derived in DERIVED.items() if len(derived.needs) == 1}
 
@@ -91,7 +91,7 @@ class _Example:
 
 
 @dataclass
-class Evaluation:
+class Evaluation(Walk):
     """One evaluation of an expression, with the evidence that it collects.
 
     `numbers` are those that were compared, by their text, NaN where missing; `doubts` say why.
@@ -102,50 +102,36 @@ class Evaluation:
     metrics: Mapping[str, Metric] = field(default_factory=lambda: METRICS)
     numbers: dict[str, float] = field(default_factory=dict)
     doubts: list[str] = field(default_factory=list)
+    signs: ClassVar = {**SIGNS, ast.Eq: lambda a, b, margin: abs(a - b) <= around(b, margin)}
 
     def holds(self, node: ast.expr) -> bool | None:
-        """Whether a condition holds; None where that is unknown.
+        """Whether a condition holds; None where that is unknown. Raises ExpressionError."""
+        (answer,) = self.condition(node).answers()
+        return answer
 
-        Every part is evaluated, so that all numbers are shown and all mistakes found.
-        """
-        match node:
-            case ast.Compare():
-                return self._comparison(node)
-            case ast.Call():
-                return self._check(node)
-            case ast.UnaryOp(op=ast.Not(), operand=part):
-                answer = self.holds(part)
-                return None if answer is None else not answer
-            case ast.BoolOp(op=ast.And(), values=parts):
-                return all_hold([self.holds(part) for part in parts])
-            case ast.BoolOp():
-                refuse(node, "join conditions with `and` only")
-        refuse(node, f"not a condition; compare numbers, or use one of {', '.join(CHECKS)}")
-
-    def _comparison(self, node: ast.Compare) -> bool | None:
-        """All links of a < b <= c."""
-        if any(type(sign) not in SIGNS for sign in node.ops):
-            refuse(node, "compare with <, <=, >, >=, ==")
-        sides = [(side, self._number(side)) for side in (node.left, *node.comparators)]
-        links = zip(node.ops, pairwise(sides), strict=True)
-        return all_hold([self._link(sign, *left, *right) for sign, (left, right) in links])
-
-    def _link(
+    def link(
         self, sign: ast.cmpop, left: ast.expr, a: float, right: ast.expr, b: float
-    ) -> bool | None:
-        if math.isnan(a) or math.isnan(b):
-            return None
+    ) -> Condition:
+        """Whether one number compares so with the next; unknown where they are too close."""
         never = a == b == math.inf
-        answer = None if never else SIGNS[type(sign)](a, b, self.tolerance)
-        if answer is None:
+        if math.isnan(a) or math.isnan(b):
+            return Condition.of([None])
+        if never or (isinstance(sign, STRICT) and self._close(a, b)):
             within = f"differ by no more than the tolerance of {self.tolerance:g}"
             why = "never happen" if never else within
             self.doubts.append(f"{ast.unparse(left)} and {ast.unparse(right)} {why}")
-        return answer
+            return Condition.of([None])
+        return Condition.known(self.signs[type(sign)](a, b, self.tolerance))
 
-    def _number(self, node: ast.expr) -> float:
-        """One side of a comparison, kept as evidence; NaN where it is unknown."""
-        doubts, number, text = len(self.doubts), self.value(node), ast.unparse(node)
+    def _close(self, a: float, b: float) -> bool:
+        """Whether neither is smaller by more than a margin that there is."""
+        apart = below(a, b, self.tolerance) or below(b, a, self.tolerance)
+        return not apart and around(max(abs(a), abs(b)), self.tolerance) > 0.0
+
+    def side(self, node: ast.expr) -> float:
+        """A number, kept as evidence; NaN where it is unknown."""
+        doubts, text = len(self.doubts), ast.unparse(node)
+        number: Quantity = self.value(node)
         if isinstance(number, Curve):
             refuse(
                 node, f"a signal over time; reduce it to a number with one of {', '.join(REDUCERS)}"
@@ -171,7 +157,10 @@ class Evaluation:
                 )
         return False
 
-    def _check(self, node: ast.Call) -> bool | None:
+    def property(self, node: ast.expr) -> Condition:
+        """A check of a run."""
+        if not isinstance(node, ast.Call):
+            refuse(node, f"not a condition; compare numbers, or use one of {', '.join(CHECKS)}")
         name = known(function(node), CHECKS, "check")
         if len(node.args) != 1 or not isinstance(node.args[0], ast.Name):
             refuse(node, "a check takes the name of one run")
@@ -181,26 +170,21 @@ class Evaluation:
         self.numbers[text] = math.nan if answer is None else float(answer)
         if answer is None:
             self.doubts.append(f"{text}: {label} {run.ending}")
-        return answer
+        return Condition.of([answer])
 
-    def value(self, node: ast.expr) -> Quantity:
+    def calculated(self, operation: Callable[..., Any], parts: Sequence[Quantity]) -> Quantity:
+        """At the times that all curves cover."""
+        return curves.pointwise(operation, parts)
+
+    def quantity(self, node: ast.expr) -> Quantity:
         """A number, NaN where it is unknown, or a curve. Raises CannotTell for an unknown curve."""
         match node:
-            case ast.Constant():
-                return literal(node)
             case ast.Attribute(value=ast.Name(id=label), attr=name):
                 run = self._run(label)
                 if name in self.metrics:
                     about = self.metrics[name]
                     return self._or_doubt(lambda: curves.metric(label, run, about))
                 return curves.signal(label, run, name)
-            case ast.UnaryOp(op=ast.USub(), operand=part):
-                return curves.pointwise(operator.neg, [self.value(part)])
-            case ast.BinOp(left=left, right=right, op=sign) if type(sign) in ARITHMETIC:
-                parts = [self.value(left), self.value(right)]
-                return curves.pointwise(ARITHMETIC[type(sign)], parts)
-            case ast.BinOp():
-                refuse(node, "calculate with + - * / only")
             case ast.Call():
                 return self._call(node)
         refuse(node, "no meaning here; write run.metric or run.signal")
@@ -213,7 +197,7 @@ class Evaluation:
         if len(node.args) != count:
             refuse(node, f"{name} takes {count} argument(s)")
         if operation:
-            return curves.pointwise(operation, [self.value(part) for part in node.args])
+            return self.calculated(operation, [self.value(part) for part in node.args])
         return curves.rate(self._curve(node.args[0]))
 
     def _curve(self, node: ast.expr) -> Curve:
@@ -258,7 +242,4 @@ def with_labels(tree: ast.expr, labels: Mapping[str, str]) -> ast.expr:
     return tree
 
 
-ARITHMETIC: dict[type[ast.operator], Callable[..., object]] = {
-    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: np.divide,
-}  # fmt: skip
 OPERATIONS = {"abs": (1, np.abs), "hypot": (2, np.hypot)}  # with their number of arguments

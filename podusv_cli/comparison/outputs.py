@@ -44,7 +44,7 @@ class Result:
     endings: Mapping[str, str]
     differences: Mapping[str, Mapping[str, Any]]
     table: pd.DataFrame
-    verdicts: Sequence[claims.Verdict]
+    verdicts: Sequence[claims.RunsVerdict]
     timings: Mapping[str, Mapping[str, float]]
     warnings: Mapping[str, Sequence[Finding]]
     metrics: Mapping[str, Metric] = field(default_factory=lambda: METRICS)  # that the table knows
@@ -82,12 +82,12 @@ def _forms(result: Result) -> dict[str, Callable[[], bytes]]:
         TIMING: lambda: json_files.encode({**_claims(timed), "metrics": times}),
     }
     if result.verdicts:
-        forms["claims.md"] = lambda: claims.as_markdown(judged, timed, TIMING).encode()
+        forms["claims.md"] = lambda: claims.with_timed(judged, timed, TIMING).encode()
         forms["claims.json"] = lambda: json_files.encode(_claims(judged))
     return forms
 
 
-def _claims(verdicts: Iterable[claims.Verdict]) -> dict[str, Any]:
+def _claims(verdicts: Iterable[claims.RunsVerdict]) -> dict[str, Any]:
     return {"format": 1, "claims": [verdict.as_json() for verdict in verdicts]}
 
 

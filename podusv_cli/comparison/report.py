@@ -10,12 +10,13 @@ from typing import Any
 import pandas as pd
 
 from podusv_cli.comparison import chase, settings, stability
-from podusv_cli.comparison.claims import ANSWERS, Verdict
+from podusv_cli.comparison.claims import RunsVerdict
 from podusv_cli.comparison.differences import as_text
 from podusv_cli.comparison.table import cells, leaders
 from podusv_cli.core.component import Component
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.plugins import Plugins
+from podusv_cli.expressions.verdict import by_answer
 from podusv_cli.findings.finding import finding_kinds
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import METRICS
@@ -36,7 +37,7 @@ class Story:
     differences: Mapping[str, Mapping[str, Any]]
     noticed: Sequence[Finding]
     table: pd.DataFrame
-    verdicts: Sequence[Verdict]
+    verdicts: Sequence[RunsVerdict]
     theories: Mapping[str, Mapping[str, Any]]  # theory.json of the runs that have one
     figures: Sequence[Picture]
     provenance: Mapping[str, Any]
@@ -58,7 +59,7 @@ def page(story: Story) -> str:
         scenario=story.scenario,
         bad={label: ending for label, ending in story.endings.items() if ending},
         differing=as_text(story.differences),
-        answers=_answers(story.verdicts),
+        answers=by_answer(story.verdicts),
         leaders={label: names for label, names in best.items() if names},
         noticed=_by_code(story.noticed, story.scenario.plugged),
         metrics={str(name): story.metrics[str(name)] for name in story.table.index},
@@ -73,15 +74,6 @@ def page(story: Story) -> str:
         provenance=[(key, value_text(value)) for key, value in flat(story.provenance)],
         chase_json=Markup(chase.as_json(dict(story.chase))),
     )  # fmt: skip
-
-
-def _answers(verdicts: Sequence[Verdict]) -> dict[str, list[tuple[int, Verdict]]]:
-    """The verdicts with their numbers by answer."""
-    numbered = [*enumerate(verdicts, 1)]
-    return {
-        answer: [(i, verdict) for i, verdict in numbered if verdict.answer == answer]
-        for answer in ANSWERS.values()
-    }
 
 
 def _by_code(findings: Sequence[Finding], plugins: Plugins) -> dict[str, tuple[str, list[Finding]]]:

@@ -18,7 +18,7 @@ from podusv_cli.storage.files import LOCKS, make_folder, names_inside, storage_e
 if TYPE_CHECKING:
     from filelock import BaseFileLock
 
-# What a writer makes; tables are also made while runs still come, and both note their sittings.
+# What a writer makes; tables are also made while runs still come, and both note their sessions.
 RUNS, TABLES, PROVENANCE = LOCKS
 PATIENCE = 600.0  # s that a driver waits for another process to finish the tables
 WITHOUT_LOCKS = (errno.ENOSYS, errno.ENOLCK, errno.ENOTSUP)  # what such a file system answers

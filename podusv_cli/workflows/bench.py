@@ -19,7 +19,7 @@ from podusv_cli.process.workers import Outcome, Report, run_all
 from podusv_cli.storage import csv_files, provenance
 from podusv_cli.storage.run_folder import RunWriter
 from podusv_cli.studies.bench import optima, page, standing
-from podusv_cli.studies.bench.cases import Case, Wanted, cases
+from podusv_cli.studies.bench.cases import Case, Selection, cases
 from podusv_cli.studies.bench.optima import Least
 from podusv_cli.studies.bench.runs import BenchRun, crashed, play
 
@@ -68,7 +68,7 @@ class Benched:
         }  # fmt: skip
 
 
-def bench(wanted: Wanted, request: Request, progress: Progress | None = None) -> Benched:
+def bench(wanted: Selection, request: Request, progress: Progress | None = None) -> Benched:
     """Simulate every law in every case and write the leaderboard.
 
     Raises UsageError (without CasADi, too, if optima are wanted), ScenarioError, LawError before
@@ -85,8 +85,7 @@ def bench(wanted: Wanted, request: Request, progress: Progress | None = None) ->
         found = list(_solved(every, runs, request, progress, extras)) if request.optimum else []
         made = standing.with_optima(made, found) if found else made
         with interrupts_deferred():
-            draw = (lambda: _drawn(runs, made)) if request.figures else list
-            figures: list[Picture] = extras.attempt("figures", draw) or []
+            figures = _drawn(runs, made, extras) if request.figures else []
             plugins = dict.fromkeys(
                 p for case in every for law in case.laws.values() for p in law.plugged
             )
@@ -152,20 +151,11 @@ def _play(case: Case, tell: Callable[[float], None]) -> list[BenchRun]:
     return runs
 
 
-def _drawn(runs: Sequence[BenchRun], made: pd.DataFrame) -> list[Picture]:
-    from podusv_cli.figures.style import house_style, image
-    from podusv_cli.studies.bench.figures import profiles, tracks  # matplotlib is slow to import
+def _drawn(runs: Sequence[BenchRun], made: pd.DataFrame, extras: Extras) -> list[Picture]:
+    from podusv_cli.studies.bench.figures import sketches  # matplotlib is slow to import
+    from podusv_cli.studies.sketch import rendered
 
-    laws = list(standing.leaderboard(made).index)
-    with house_style():
-        caption = "performance profiles: share of all cases by ratio to the best law's IAE"
-        drawn = [Picture("profiles", caption, image(profiles(made), "svg"))]
-        for vessel in dict.fromkeys(run.place[0] for run in runs):
-            shown = [run for run in runs if run.place[0] == vessel]
-            caption = f"tracks of {vessel}; path grey, failed runs orange, all conditions; north up"
-            png = image(tracks(shown, laws), "png")  # as outlines, 3000 tracks take 8 MB
-            drawn.append(Picture(f"tracks-{vessel}", caption, png, form="png"))
-    return drawn
+    return rendered(sketches(runs, made), extras)[1]
 
 
 def _write(

@@ -15,7 +15,7 @@ from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sections import LONGEST_NAME
 from podusv_cli.storage.run_folder import LOGS
 from podusv_cli.studies.study.draws import drawn, draws
-from podusv_cli.studies.study.keep import Kept, Wanted, found, unmade
+from podusv_cli.studies.study.keep import Kept, KeptRun, found, unmade
 from podusv_cli.studies.study.plan import Plan
 from podusv_cli.studies.study.results import Results
 from podusv_cli.workflows.execute import Task, execute, warm_up
@@ -26,7 +26,7 @@ def alone(plan: Plan, law: str, cell: int, draw: int) -> Scenario:
     """The scenario of one run of a study, under a name of its own."""
     (numbers,) = draws(plan.sweep, draw, 1)
     one = drawn(plan.single(law, cell), plan.sweep.vary, numbers)
-    end = f"-{Wanted(law, cell, draw, '').name}"
+    end = f"-{KeptRun(law, cell, draw, '').name}"
     return one.model_copy(update={"name": f"{one.name[: LONGEST_NAME - len(end)]}{end}"})
 
 
@@ -61,7 +61,7 @@ def keep(
 
 
 def _task(
-    folder: Path, plan: Plan, one: Wanted, argv: Sequence[str], *, figures: bool
+    folder: Path, plan: Plan, one: KeptRun, argv: Sequence[str], *, figures: bool
 ) -> Task:  # fmt: skip
     scenario = alone(plan, one.law, one.cell, one.draw)
     return Task(

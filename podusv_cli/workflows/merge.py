@@ -11,11 +11,12 @@ from podusv_cli.storage import files
 from podusv_cli.storage.writer import TABLES, sole_writer
 from podusv_cli.studies.study import record
 from podusv_cli.studies.study.dispatch import Tally
-from podusv_cli.studies.study.joining import join, missing, mixture
-from podusv_cli.studies.study.sittings import Sitting
+from podusv_cli.studies.study.joining import gaps, join, mixture
+from podusv_cli.studies.study.sessions import Session
 from podusv_cli.studies.study.store import SCENARIO, Store
+from podusv_cli.workflows.many_runs import Request
 from podusv_cli.workflows.studies import stored
-from podusv_cli.workflows.sweep import Request, Swept, answered
+from podusv_cli.workflows.sweep import Swept, answered
 
 
 def merge(studies: Sequence[Path], out: Path, request: Request) -> Swept:
@@ -47,13 +48,13 @@ def _joined(
     """Write the runs of the others into a study, and judge it where it is whole."""
     out, plugged = store.folder, store.plan.scenario.plugged
     store.open(started.isoformat(timespec="seconds"), texts)
-    sitting = Sitting(out, request.argv, started, plugged, [other.folder for other in others])
+    session = Session(out, request.argv, started, plugged, [other.folder for other in others])
     join(store, others)
-    sitting.end(0)
+    session.end(0)
     if mixed := mixture(out):
         request.warn(mixed)
     tally = Tally.of(store.covered())
     if tally.made < tally.wanted:
-        return Swept(out, tally, missing_runs=tuple(missing(store)))
+        return Swept(out, tally, missing_runs=tuple(gaps(store)))
     store.write_runs()
     return answered(store, request)

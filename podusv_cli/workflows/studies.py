@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shlex
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -14,16 +14,7 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.core.escaping import visible
 from podusv_cli.core.plugins import ABSENT
 from podusv_cli.scenario import plugins
-from podusv_cli.scenario.load import (
-    LOOKED_AT,
-    Loaded,
-    Plugged,
-    load,
-    load_stored,
-    resolved_yaml,
-    tree_yaml,
-)
-from podusv_cli.scenario.messages import Check
+from podusv_cli.scenario.load import resolved_yaml
 from podusv_cli.scenario.phrases import unknown
 from podusv_cli.storage import files, json_files
 from podusv_cli.storage.run_folder import STUDY
@@ -31,13 +22,9 @@ from podusv_cli.studies.study import outputs, record
 from podusv_cli.studies.study.plan import KERNELS, differing, disagreements, plan
 from podusv_cli.studies.study.store import RUNS, SCENARIO, Store
 from podusv_cli.workflows.keep import alone, seen_from
+from podusv_cli.workflows.many_runs import Tell, kept_scenario, silent
 
 FORMATS = ("csv", "parquet")
-Warn = Callable[[str], None]
-
-
-def silent(text: str) -> None:
-    """Tell nobody."""
 
 
 @dataclass(frozen=True)
@@ -68,36 +55,8 @@ def check_study(folder: Path) -> None:
         raise UsageError(f"{folder} is not the folder of a study: it has no {STUDY}")
 
 
-def scenario_of(
-    config: Path, overrides: Sequence[str], checks: Sequence[Check], added: Sequence[str], *,
-    trusted: bool,
-) -> Loaded:  # fmt: skip
-    """The scenario of a file, or of the folder of a study or search, to be simulated.
-
-    Plug-in files of a folder are executed only where they are `trusted`; `added` are others. Raises
-    ScenarioError, and StorageError for a damaged folder.
-    """
-    if not config.is_dir():
-        return load(config, overrides, checks, added)
-    return _kept(config, overrides, checks, added, partial(plugins.loaded, trusted=trusted))
-
-
-def scenario_texts(loaded: Loaded) -> dict[str, str]:
-    """The scenario and its plug-ins, by the names of their files in the folder."""
-    return {SCENARIO: tree_yaml(loaded), **loaded.scenario.plugin_files()}
-
-
-def _kept(
-    folder: Path, overrides: Sequence[str] = (), checks: Sequence[Check] = (),
-    added: Sequence[str] = (), plugged: Plugged = LOOKED_AT,
-) -> Loaded:  # fmt: skip
-    """The scenario that a folder keeps; no link to another file, either."""
-    path = folder / SCENARIO
-    return load_stored(files.read_text(path), str(path), overrides, checks, added, plugged)
-
-
 def stored(
-    study: Path, warn: Warn = silent, *, trusted: bool = False, to_run: bool = False
+    study: Path, warn: Tell = silent, *, trusted: bool = False, to_run: bool = False
 ) -> Store:
     """The store of a study's folder, for reading.
 
@@ -111,7 +70,7 @@ def stored(
     there = record.read(study)
     looked_at = partial(plugins.recorded, (), parts=there.parts(), metrics=there.foreign())
     needed = partial(plugins.loaded, trusted=trusted)
-    made = plan(_kept(study, plugged=needed if trusted or to_run else looked_at))
+    made = plan(kept_scenario(study, plugged=needed if trusted or to_run else looked_at))
     if ABSENT in made.scenario.plugged:
         made = replace(made, record=there)
     told, ours = there.identity, json_files.plain(made.stated)
@@ -128,7 +87,7 @@ def stored(
     return store
 
 
-def status(study: Path, warn: Warn = silent) -> Made:
+def status(study: Path, warn: Tell = silent) -> Made:
     """How far a study is. Raises UsageError, StorageError."""
     store = stored(study, warn)
     rows = [
@@ -165,7 +124,7 @@ def draw(
     return path
 
 
-def export(study: Path, form: str, out: Path | None, warn: Warn = silent) -> Path:
+def export(study: Path, form: str, out: Path | None, warn: Tell = silent) -> Path:
     """Write all runs as one table. Raises UsageError, StorageError."""
     if form not in FORMATS:
         raise UsageError(unknown(f"format {form!r}", form, FORMATS))

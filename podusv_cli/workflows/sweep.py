@@ -2,72 +2,49 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from podusv_cli.comparison.claims import parse_claims
 from podusv_cli.core.errors import UsageError
-from podusv_cli.findings.finding import unknown_codes
+from podusv_cli.core.recording import Status
 from podusv_cli.process.extras import Extras, Missing
 from podusv_cli.process.interrupts import interrupts_deferred
 from podusv_cli.scenario import plugins
-from podusv_cli.scenario.limits import limits
-from podusv_cli.scenario.load import Loaded
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sweep import Keep
-from podusv_cli.storage import manifest
 from podusv_cli.storage.writer import PATIENCE, TABLES, sole_writer
 from podusv_cli.studies.study import outputs
 from podusv_cli.studies.study.check import sweep_faults, unjudged
-from podusv_cli.studies.study.cluster import engine
-from podusv_cli.studies.study.dispatch import Engine, Gaps, Part, Tally, Tell, march
+from podusv_cli.studies.study.dispatch import Engine, Gaps, Tally, Tell, march
 from podusv_cli.studies.study.estimate import check_fits, estimate, pilot
 from podusv_cli.studies.study.invalid import check_draws
 from podusv_cli.studies.study.joining import mixture
 from podusv_cli.studies.study.keep import contradiction, found, unmade
 from podusv_cli.studies.study.plan import plan
-from podusv_cli.studies.study.remote import Recipe
 from podusv_cli.studies.study.results import Results, judged
-from podusv_cli.studies.study.sittings import Sitting
-from podusv_cli.studies.study.store import SCENARIO, Store
+from podusv_cli.studies.study.sessions import Session
+from podusv_cli.studies.study.store import Store
 from podusv_cli.workflows.keep import keep
-from podusv_cli.workflows.run import RESULTS
-from podusv_cli.workflows.studies import (
-    Warn,
-    check_study,
-    scenario_of,
+from podusv_cli.workflows.many_runs import (
+    WHOLE,
+    Request,
+    engine_for,
+    finish,
+    interrupted,
+    loaded_for,
+    refused,
     scenario_texts,
-    silent,
-    stored,
 )
+from podusv_cli.workflows.run import RESULTS
+from podusv_cli.workflows.studies import check_study, stored
 
-WHOLE: Part = (1, 1)  # the only shard
-
-
-@dataclass(frozen=True)
-class Request:
-    """The options of `podusv sweep run`; see its help."""
-
-    overrides: Sequence[str] = ()
-    out: Path | None = None
-    seconds: float = math.inf  # of computing, after which no unit is begun
-    workers: int = 0
-    shard: Part = WHOLE
-    argv: Sequence[str] = ()
-    plugins: Sequence[str] = ()
-    figures: bool = True
-    scheduler: str = ""  # of a Dask cluster, as tcp://host:port
-    mixed: bool = False  # whether its workers may compute other bits than this machine
-    trust: bool = False  # whether plug-in files of a study's folder may be executed
-    say: Callable[[str], None] = lambda text: None  # what is done after the last run
-    warn: Warn = silent  # is told what is odd, and no error
-    begin: Callable[..., None] | None = None  # is told what the missing runs need
+NO_SWEEP = (
+    "which says what is to be drawn; see docs/studies.md, or start from one: podusv init "
+    "studies/hull_and_sea"
+)
 
 
 @dataclass(frozen=True)
@@ -113,25 +90,24 @@ def run(config: Path, request: Request, tell: Tell) -> Swept:
 
 def _run(store: Store, request: Request, started: datetime, tell: Tell) -> Swept:
     """Simulate what is missing of a study whose folder is open, and judge it if it is whole."""
-    with _engine(store, request) as found:
-        tally, whole = _marched(store, request, started, found, tell)
-    refused = tuple(found.told().get("refused", {}).values())
+    with engine_for(request, store.folder, store.plan.scenario, store.seal) as engine:
+        tally, whole = _marched(store, request, started, engine, tell)
+    swept = Swept(store.folder, tally, refused=refused(engine))
     if whole and request.shard != WHOLE:
         whole = _is_whole(store)
-        if not whole:
-            return Swept(store.folder, tally, part_is_whole=True, refused=refused)
+        swept = replace(swept, part_is_whole=not whole)
     if not whole:
-        return Swept(store.folder, tally, refused=refused)
+        return swept
     with sole_writer(store.folder, TABLES, PATIENCE, request.warn):
         store.write_runs()
-        return replace(answered(store, request), refused=refused)
+        return replace(answered(store, request), refused=swept.refused)
 
 
 def _marched(
     store: Store, request: Request, started: datetime, engine: Engine, tell: Tell
 ) -> tuple[Tally, bool]:
-    """Simulate what is missing, and note the sitting; how far it is, and if it is whole."""
-    sitting = Sitting(store.folder, request.argv, started, store.plan.scenario.plugged)
+    """Simulate what is missing, and note the session; how far it is, and if it is whole."""
+    session = Session(store.folder, request.argv, started, store.plan.scenario.plugged)
     seen = Tally(0)
 
     def told(tally: Tally) -> None:
@@ -145,12 +121,11 @@ def _marched(
             begin=partial(_announce, store, request, engine.workers),
         )  # fmt: skip
     except KeyboardInterrupt as stop:
-        again = plugins.again("sweep run", store.folder)
         made = f"the {seen.made} runs that are made" if seen.made else "all runs that were made"
-        raise KeyboardInterrupt(f"interrupted; {made} are kept, continue with: {again}") from stop
+        raise interrupted(made, "sweep run", store.folder) from stop
     finally:
         timed = {"processor_s": seen.computed, "timed_runs": seen.ran}
-        sitting.end(seen.made - seen.before, {**timed, "ended": seen.ended, **engine.told()})
+        session.end(seen.made - seen.before, {**timed, "ended": seen.ended, **engine.told()})
 
 
 def _announce(store: Store, request: Request, workers: int, missing: Gaps) -> None:
@@ -165,13 +140,6 @@ def _announce(store: Store, request: Request, workers: int, missing: Gaps) -> No
         request.begin(*need.in_words())
 
 
-def _engine(store: Store, request: Request) -> AbstractContextManager[Engine]:
-    """Where units are made."""
-    text = (store.folder / SCENARIO).read_text(encoding="utf-8")
-    recipe = Recipe(text, tuple(store.plan.scenario.plugin_files().items()))
-    return engine(request.scheduler, request.workers, recipe, store.seal, mixed=request.mixed)
-
-
 def _is_whole(store: Store) -> bool:
     """Whether all runs of the study are there."""
     tally = Tally.of(store.covered())
@@ -180,33 +148,18 @@ def _is_whole(store: Store) -> bool:
 
 def _planned(config: Path, request: Request) -> tuple[Store, dict[str, str]]:
     """The store of a new study, or of one that is to be continued; its scenario and plug-ins."""
-    given = config.is_dir()
-    if given:
+    if config.is_dir():
         check_study(config)
-    if request.out and request.out.exists() and not request.out.is_dir():
-        raise UsageError(f"--out {request.out} is a file; name a folder")
-    loaded = _loaded(config, request)
-    folder = request.out or (config if given else default_folder(loaded.scenario))
-    return Store(folder, plan(loaded)), scenario_texts(loaded)
+    loaded = loaded_for("sweep", NO_SWEEP, config, request, [sweep_faults])
+    if remark := unjudged(loaded.scenario):
+        request.warn(remark)
+    own = config if config.is_dir() else default_folder(loaded.scenario)
+    return Store(request.out or own, plan(loaded)), scenario_texts(loaded)
 
 
 def default_folder(scenario: Scenario) -> Path:
     """Where the study of a scenario goes that is given no place."""
     return RESULTS / f"{scenario.name}-sweep"
-
-
-def _loaded(config: Path, request: Request) -> Loaded:
-    checks = (unknown_codes, limits(allow_large=True), sweep_faults)
-    loaded = scenario_of(config, request.overrides, checks, request.plugins, trusted=request.trust)
-    if loaded.scenario.sweep is None:
-        raise UsageError(
-            f"{config} has no key `sweep`, which says what is to be drawn; see docs/studies.md, or "
-            "start from one: podusv init studies/hull_and_sea"
-        )
-    parse_claims(loaded)
-    if remark := unjudged(loaded.scenario):
-        request.warn(remark)
-    return loaded
 
 
 def answered(store: Store, request: Request) -> Swept:
@@ -236,12 +189,8 @@ def answered(store: Store, request: Request) -> Swept:
             outputs.write_tables(store.folder, results)
         request.say("drawing figures and writing the report")
         outputs.write_report(store.folder, results, kept, extras, figures=request.figures)
-        if extras.interrupted:
-            raise KeyboardInterrupt(
-                "interrupted; runs, tables and verdicts are whole, the rest is made by: "
-                f"{plugins.again('sweep report', store.folder)}"
-            )
-        manifest.write(store.folder, "finished" if whole else "interrupted")
+        status: Status = "finished" if whole else "interrupted"
+        finish(store.folder, extras, "runs, tables and verdicts", "sweep report", status)
         tally = Tally(results.wanted, results.made)
         return Swept(store.folder, tally, results, tuple(extras.missing))
 
@@ -254,7 +203,7 @@ def report(study: Path, request: Request) -> Swept:
         store = stored(study, request.warn, trusted=request.trust)
         if not Tally.of(store.covered()).made:
             raise UsageError(f"{study} has no runs yet: {plugins.again('sweep run', study)}")
-        Sitting(study, request.argv, started, store.plan.scenario.plugged).end(0)
+        Session(study, request.argv, started, store.plan.scenario.plugged).end(0)
         store.write_runs()
         if not store.runs().common.any():
             raise UsageError(

@@ -3,29 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from podusv_cli.comparison.claims import parse_claims
-from podusv_cli.core.errors import UsageError
-from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.process.extras import Extras, Missing
 from podusv_cli.process.interrupts import interrupts_deferred
-from podusv_cli.scenario import plugins
-from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Loaded
-from podusv_cli.storage import files, manifest
+from podusv_cli.storage import files
 from podusv_cli.storage.writer import sole_writer
 from podusv_cli.studies.study.check import sweep_faults
-from podusv_cli.studies.study.cluster import engine
 from podusv_cli.studies.study.dispatch import Engine, Tally
 from podusv_cli.studies.study.plan import digest
-from podusv_cli.studies.study.remote import Recipe
-from podusv_cli.studies.study.sittings import Sitting
-from podusv_cli.studies.study.store import SCENARIO
+from podusv_cli.studies.study.sessions import Session
 from podusv_cli.studies.study.unit import prepare
 from podusv_cli.studies.tuning import folder as place
 from podusv_cli.studies.tuning import outputs
@@ -40,27 +31,22 @@ from podusv_cli.studies.tuning.search import Search
 from podusv_cli.studies.tuning.space import with_gains
 from podusv_cli.studies.tuning.trials import best
 from podusv_cli.studies.tuning.validation import validate
+from podusv_cli.workflows.many_runs import (
+    Request,
+    engine_for,
+    finish,
+    interrupted,
+    loaded_for,
+    refused,
+    scenario_texts,
+)
 from podusv_cli.workflows.run import RESULTS
-from podusv_cli.workflows.studies import scenario_of, scenario_texts
 
 Tell = Callable[[Tally, str], None]
-
-
-@dataclass(frozen=True)
-class Request:
-    """The options of `podusv tune`; see its help."""
-
-    overrides: Sequence[str] = ()
-    out: Path | None = None
-    workers: int = 0
-    argv: Sequence[str] = ()
-    plugins: Sequence[str] = ()
-    figures: bool = True
-    say: Callable[[str], None] = lambda text: None
-    scheduler: str = ""  # of a Dask cluster, as tcp://host:port
-    mixed: bool = False  # whether its workers may compute other bits than this machine
-    trust: bool = False  # whether plug-in files of a search's folder may be executed
-    begin: Callable[[str], None] = lambda text: None  # is told what the search is to simulate
+NO_TUNE = (
+    "which says how many runs a search has; see docs/tuning.md, or start from one: podusv init "
+    "studies/tune_small"
+)
 
 
 @dataclass(frozen=True)
@@ -107,37 +93,27 @@ def _tuned(
     plan = replace(plan, idle=told.idle if told else _idle(plan, request))
     stamp = started.isoformat(timespec="seconds")
     place.write(folder, plan, told, stamp, scenario_texts(loaded))
-    request.begin(f"{plan.size}; in {folder}")
-    with _engine(plan, folder, request) as found:
-        results = _simulated(plan, folder, request, started, found, tell)
-    refused = tuple(found.told().get("refused", {}).values())
-    return replace(_written(results, folder, request), refused=refused)
+    if request.begin:
+        request.begin(f"{plan.size}; in {folder}")
+    with engine_for(request, folder, plan.scenario, digest(plan.base.identity)) as engine:
+        results = _simulated(plan, folder, request, started, engine, tell)
+    return replace(_written(results, folder, request), refused=refused(engine))
 
 
 def _loaded(config: Path, request: Request) -> tuple[Loaded, Path]:
     """The scenario, and the folder of the search."""
-    given = config.is_dir()
-    if given:
+    if config.is_dir():
         place.check(config)
-    if request.out and request.out.exists() and not request.out.is_dir():
-        raise UsageError(f"--out {request.out} is a file; name a folder")
-    checks = (unknown_codes, limits(allow_large=True), sweep_faults, tune_faults)
-    loaded = scenario_of(config, request.overrides, checks, request.plugins, trusted=request.trust)
-    if loaded.scenario.tune is None:
-        raise UsageError(
-            f"{config} has no key `tune`, which says how many runs a search has; see "
-            "docs/tuning.md, or start from one: podusv init studies/tune_small"
-        )
-    parse_claims(loaded)
-    own = config if given else RESULTS / f"{loaded.scenario.name}-tune"
+    loaded = loaded_for("tune", NO_TUNE, config, request, [sweep_faults, tune_faults])
+    own = config if config.is_dir() else RESULTS / f"{loaded.scenario.name}-tune"
     return loaded, request.out or own
 
 
 def _simulated(
     plan: TunePlan, folder: Path, request: Request, started: datetime, engine: Engine, tell: Tell
 ) -> Results:
-    """Search and validate what is not there yet, and note the sitting."""
-    sitting = Sitting(folder, request.argv, started, plan.scenario.plugged)
+    """Search and validate what is not there yet, and note the session."""
+    session = Session(folder, request.argv, started, plan.scenario.plugged)
     made = {"search": 0, "validation": 0}
 
     def searched(tally: Tally, searches: Sequence[Search]) -> None:
@@ -156,15 +132,13 @@ def _simulated(
         trials = {law: found for law, found in trials.items() if found}
         winners = {law: [best(one) for one in found] for law, found in trials.items()}
         stamp = started.isoformat(timespec="seconds")
-        runs = validate(plan, winners, folder, stamp, engine, validated)
+        return Results(
+            plan, trials, winners, validate(plan, winners, folder, stamp, engine, validated)
+        )
     except KeyboardInterrupt as stop:
-        again = plugins.again("tune", folder)
-        raise KeyboardInterrupt(
-            f"interrupted; all batches that were finished are kept, continue with: {again}"
-        ) from stop
+        raise interrupted("all batches that were finished", "tune", folder) from stop
     finally:
-        sitting.end(sum(made.values()), engine.told())
-    return Results(plan, trials, winners, runs)
+        session.end(sum(made.values()), engine.told())
 
 
 def _prepare(plan: TunePlan) -> None:
@@ -185,14 +159,6 @@ def _idle(plan: TunePlan, request: Request) -> dict[str, tuple[str, ...]]:
     request.say("looking for gains that change nothing")
     _prepare(plan)
     return find_idle(plan, request.workers)
-
-
-def _engine(plan: TunePlan, folder: Path, request: Request) -> AbstractContextManager[Engine]:
-    """Where trials and fresh draws are simulated."""
-    text = (folder / SCENARIO).read_text(encoding="utf-8")
-    recipe = Recipe(text, tuple(plan.scenario.plugin_files().items()))
-    seal = digest(plan.base.identity)
-    return engine(request.scheduler, request.workers, recipe, seal, mixed=request.mixed)
 
 
 def _searches(plan: TunePlan, folder: Path) -> list[Search]:
@@ -224,10 +190,5 @@ def _written(results: Results, folder: Path, request: Request) -> Tuned:
         request.say("drawing figures and writing the report")
         extras = Extras()
         outputs.write_report(folder, results, extras, figures=request.figures)
-        if extras.interrupted:
-            raise KeyboardInterrupt(
-                "interrupted; gains and tables are whole, the rest is made by: "
-                f"{plugins.again('tune', folder)}"
-            )
-        manifest.write(folder, "finished")
+        finish(folder, extras, "gains and tables", "tune")
         return Tuned(folder, results, tuple(extras.missing))

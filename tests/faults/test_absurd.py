@@ -167,10 +167,12 @@ def test_logs_that_cannot_be_read_back_are_not_made_for_it(podusv, command):
     assert told.endswith(")\n")
 
 
+# Each sets the width of a row or the number of rows in another way.
 SHAPES: list[dict[str, Any]] = [
-    {"kind": kind, "every": every, "monitor": monitor, "period": period}
-    for kind in ("adaptive_neural", "backstepping", "dsc", "pid")
-    for every, monitor, period in ((1, "true", 0), (3, "false", 0), (4, "true", 0.02))
+    {"kind": "adaptive_neural", "every": 1, "monitor": "true", "period": 0},
+    {"kind": "backstepping", "every": 3, "monitor": "true", "period": 0},
+    {"kind": "dsc", "every": 4, "monitor": "false", "period": 0.02},
+    {"kind": "pid", "every": 1, "monitor": "true", "period": 0.02},
 ]
 
 

@@ -1,20 +1,27 @@
 """Damaged results: the manifest tells, or else the reader does; soon, in a line, and from no other
-file."""
+file.
+"""
 
 import json
 import os
 import subprocess
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 import pytest
 from counts import count
 from damages import FOREIGN, HDF5, OTHERS, PIPE, TEXTS, YAML
 from damaging import __file__ as DAMAGING
-from rerun_samples import made
-from storage_samples import ENVIRONMENT, deadline
+from damaging import damaged
+from rerun_samples import copied, made, relogged
+from storage_samples import ENVIRONMENT, deadline, files
+
+from podusv_cli.core.errors import StorageError
+from podusv_cli.storage import manifest
+from podusv_cli.workflows import members
 
 SCENARIO = """
 name: whole
@@ -29,13 +36,7 @@ CALLS, MEMORY = 20_000_000, 300  # that opening a run may take; MiB
 JSON = ("metrics.json", "provenance.json", "theory.json")
 UNREAD = ("scenario.yaml", "metrics.csv")
 READ = ("log.h5", "resolved.yaml", *JSON)
-FEW = ("log.h5", "resolved.yaml", "theory.json", "metrics.csv")  # one of each sort
-LENGTHY = ("comments", "lines", "many", "wide", "keys")  # take seconds to read
-
-
-def unless_lengthy(ways: Iterable[str]) -> list[Any]:
-    """All ways; those that take long are slow tests."""
-    return [pytest.param(way, marks=[pytest.mark.slow] * (way in LENGTHY)) for way in ways]
+FEW = ("log.h5", "theory.json")
 
 
 class Outcome(NamedTuple):
@@ -154,21 +155,17 @@ def test_what_stands_in_place_of_a_file(opened, what):
         check(what, opened(f"become manifest.json {what}"), "refused")
 
 
-@pytest.mark.parametrize("which", unless_lengthy(TEXTS))
+@pytest.mark.parametrize("which", TEXTS)
 def test_json_that_podusv_does_not_write(opened, which):
-    check(which, opened(f"text manifest.json {which}"), "refused")
-    large = which in ("wide", "keys")
-    for name in JSON[-1:] if large else count(JSON[-1:], JSON):
-        way = f"!text {name} {which}"
-        check(way, opened(way), "same" if large else "refused")
+    for name in ("manifest.json", *count(JSON[-1:], JSON)):
+        way = f"{'!' * (name in JSON)}text {name} {which}"
+        check(way, opened(way), "refused")
 
 
 WRONG = [
-    *(f"metrics.json metrics {value}" for value in ("[]", "1", "null", "drop")),
-    *(f"metrics.json metrics.iae {value}" for value in ("true", '"1"', "[1]", "{}", '"nan"')),
-    *(f"theory.json windows {value}" for value in ("[]", "1", "null", '{"a": 1}', "drop")),
-    *(f"theory.json conditions {value}" for value in ("1", "[1]", '[{"holds": false}]', "drop")),
-    "theory.json conditions [{}]", "theory.json windows.whole.largest_V []",
+    "metrics.json metrics []", "metrics.json metrics drop", "metrics.json metrics.iae true",
+    'metrics.json metrics.iae "1"', 'theory.json windows {"a": 1}', "theory.json windows drop",
+    'theory.json conditions [{"holds": false}]', "theory.json windows.whole.largest_V []",
     'theory.json windows.whole.corrected.bound "a"', "theory.json assumptions [[]]",
 ]  # fmt: skip
 
@@ -178,9 +175,9 @@ def test_values_of_another_type(opened, what):
     check(what, opened(f"!entry {what}"), "refused")
 
 
-@pytest.mark.parametrize("which", unless_lengthy(YAML))
+@pytest.mark.parametrize("which", YAML)
 def test_a_scenario_that_podusv_does_not_write(opened, which):
-    check(which, opened(f"!yaml {which}"), "same" if which == "comments" else "refused")
+    check(which, opened(f"!yaml {which}"), "refused")
 
 
 @pytest.mark.parametrize(
@@ -188,3 +185,120 @@ def test_a_scenario_that_podusv_does_not_write(opened, which):
 )
 def test_a_log_of_another_program(opened, way):
     check(way, opened(f"!{way}"), "refused")
+
+
+# --- logs that are whole and yet not a run's
+
+
+def _without(*names: str) -> Callable[[dict[str, Any]], None]:
+    return lambda signals: [signals.pop(name) for name in names] and None
+
+
+def _with(name: str, row: int, number: float) -> Callable[[dict[str, Any]], None]:
+    return lambda signals: signals[name].__setitem__(row, number)
+
+
+def _backwards(signals: dict[str, Any]) -> None:
+    signals["time"] = np.ascontiguousarray(signals["time"][::-1])
+
+
+UNSOUND = {
+    "no position": (_without("x"), "it has no x"),
+    "no demand": (_without("tau_r_cmd"), "it has no tau_r_cmd"),
+    "no terms": (_without("V_W_u"), "it has no V_W_u"),
+    "not a number": (_with("psi", 3, np.nan), "psi holds something that is no finite number"),
+    "infinite time": (_with("time", -1, np.inf), "time holds something that is no finite"),
+    "beyond the engine": (_with("y", 0, -1e305), "y holds something that is no finite number"),
+    "backwards": (_backwards, "its times do not increase"),
+    "twice": (_with("time", 3, 0.02), "its times do not increase"),
+}
+
+
+@pytest.mark.parametrize("case", UNSOUND)
+def test_a_log_that_lacks_what_every_run_has(run, tmp_path, case):
+    change, words = UNSOUND[case]
+    other = copied(run, tmp_path / "other", log_h5=relogged(run, change))
+    with pytest.raises(StorageError, match=words):
+        members.from_folder(other)
+
+
+def test_a_law_is_not_timed_with_the_memory_of_another(run, tmp_path):
+    # In machine code it would read beyond the end of what it remembers.
+    def shorter(signals: dict[str, Any]) -> None:
+        for name in ("W_hat_u", "W_hat_r"):
+            del signals[name]
+
+    other = copied(run, tmp_path / "other", log_h5=relogged(run, shorter))
+    assert members.from_folder(other)  # it can be drawn
+    with pytest.raises(StorageError, match="W_hat_u does not have 27 values in a row"):
+        members.comparable(other)
+
+
+# --- comparisons
+
+
+@pytest.fixture
+def comparison(run, tmp_path):
+    for label in ("a", "b"):
+        copied(run, tmp_path / "two" / label)
+    (tmp_path / "two/comparison.csv").write_text("metric,unit,b,a\niae,m s,1,2\n")
+    manifest.write(tmp_path / "two", "finished")
+    return tmp_path / "two"
+
+
+def labels(folder: Path) -> list[str]:
+    return [part.label for part in members.from_folder(folder)]
+
+
+@pytest.mark.parametrize("what", ["folder", "pipe", "empty", "noise"])
+def test_a_damaged_table_of_a_comparison(comparison, what):
+    table = comparison / "comparison.csv"
+    table.unlink()
+    OTHERS[what](table)
+    with deadline(), pytest.raises(StorageError, match=r"comparison\.csv"):
+        members.from_folder(comparison)
+
+
+def test_links_among_runs_do_not_count(run, comparison):
+    (comparison / "c").symlink_to(run)
+    assert labels(comparison) == ["b", "a"]
+    (comparison / "manifest.json").unlink()
+    assert labels(comparison) == ["a", "b"]
+
+
+def test_a_log_that_is_no_file_is_no_reason_to_overlook_its_run(comparison):
+    (comparison / "manifest.json").unlink()
+    (comparison / "a/log.h5").unlink()
+    os.mkfifo(comparison / "a/log.h5")
+    with pytest.raises(StorageError, match=r"log\.h5"):
+        members.from_folder(comparison)
+
+
+# --- commands
+
+
+@pytest.mark.parametrize(
+    "way", ["cut log.h5 5000", "!text metrics.json nan", "become manifest.json pipe"]
+)
+def test_every_command_says_so_in_a_line_and_leaves_nothing(run, tmp_path, podusv, way):
+    folder = run.with_name("commanded")
+    damaged(run, folder, way)
+    before = files(folder) if "pipe" not in way else {}
+    for words in (["plot", folder], ["plot", run, folder], ["compare", run, folder],
+                  ["rerun", folder], ["diff", run, folder]):  # fmt: skip
+        with deadline():
+            said = podusv(*words)
+        assert (said.code, said.out) == (5, ""), (words, said)
+        assert said.err.count("\n") == 1, said.err
+        assert str(folder) in said.err
+    assert [path.name for path in tmp_path.iterdir()] == ["a.yaml"]
+    assert before == (files(folder) if "pipe" not in way else {})
+
+
+def test_a_run_folder_is_no_scenario_damaged_or_not(run, podusv):
+    folder = run.with_name("commanded")
+    damaged(run, folder, "become log.h5 pipe")
+    for path in (run, folder):
+        said = podusv("validate", path)
+        assert said.code == 2
+        assert said.err.count("\n") == 1

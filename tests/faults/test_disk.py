@@ -23,8 +23,6 @@ from old_results import (
 )
 from storage_samples import deadline, files
 
-from podusv_cli.engine.machine import code_folder, object_cache
-from podusv_cli.engine.machine.object_cache import Code
 from podusv_cli.storage import manifest
 
 FULL = Path("/dev/full")
@@ -88,23 +86,6 @@ def fill(free: int) -> None:
     """Leave that many bytes on this disk."""
     disk = os.statvfs(".")
     Path("filler").write_bytes(bytes(disk.f_bavail * disk.f_bsize - free))
-
-
-@needs_mount
-def test_a_full_disk_for_compiled_code_costs_time_and_nothing_else(tmp_path, monkeypatch):
-    monkeypatch.setenv("PODUSV_CACHE", str(tmp_path / "cache"))
-    law = Code("law", b"\x90" * 100_000)
-
-    def on_a_small_disk() -> tuple[set[str], bool]:
-        small_disk(str(tmp_path), 20_000)
-        folder = code_folder.code_folder.__wrapped__("0123456789abcdef")
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(code_folder, "code_folder", lambda name: folder)
-            patch.setattr(object_cache, "_loaded", lambda prototype, code: code)
-            made = object_cache.stored(None, "law", lambda: law)
-        return {path.name for path in folder.iterdir()}, made == law
-
-    assert in_a_child(on_a_small_disk) == ({code_folder.MARK}, True)
 
 
 @needs_full

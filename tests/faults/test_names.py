@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 from command_samples import BASE, commanded, write
+from scenario_samples import told
 
 from podusv_cli.storage import manifest
 
@@ -28,24 +29,27 @@ ODD = [
     "\uff0e\uff0e",
     "",
 ]
+NAMED = {
+    "name": "name: {}",
+    "label": "controllers: {{{}: {{kind: dsc}}}}",
+    "claim": 'claims: {{{}: {{says: s, source: p, expect: "1 < 2"}}}}',
+}
 
 
-@pytest.mark.parametrize("name", [*LEAVING, *ODD, "a" * 81, "a" * 300], ids=ascii)
-@pytest.mark.parametrize("where", ["name", "label", "claim", "assigned"])
+@pytest.mark.parametrize("where", NAMED)
+def test_a_name_that_is_no_plain_word_is_told_in_a_line(where):
+    for name in (*LEAVING, *ODD, "a" * 81, "a" * 300):
+        (line,) = told(f"{BASE}{NAMED[where].format(json.dumps(name))}\n")
+        assert line.isprintable()
+
+
+@pytest.mark.parametrize("name", ["../up", "ship\u202e"], ids=ascii)
+@pytest.mark.parametrize("where", [*NAMED, "assigned"])
 def test_a_name_that_is_no_plain_word_is_refused(podusv, name, where):
-    words: list[str] = []
-    quoted = json.dumps(name)
-    text = {
-        "name": f"name: {quoted}",
-        "label": f"controllers: {{{quoted}: {{kind: dsc}}}}",
-        "claim": f'claims: {{{quoted}: {{says: s, source: p, expect: "1 < 2"}}}}',
-        "assigned": "",
-    }[where]
-    if where == "assigned":
-        words = ["--set", f"name={name}"]
+    text = NAMED[where].format(json.dumps(name)) if where in NAMED else ""
+    words = [] if where in NAMED else ["--set", f"name={name}"]
     said = podusv("compare", write("a.yaml", f"{BASE}{text}\n"), "--no-figures", *words)
-    assert said.code == 2
-    assert said.out == ""
+    assert (said.code, said.out) == (2, "")
     assert said.err.count("\n") == 1
     assert said.err.rstrip("\n").isprintable()
     assert [path.name for path in Path().iterdir()] == ["a.yaml"]
@@ -82,13 +86,6 @@ def test_a_link_in_place_of_the_folder_is_left_alone(podusv, target, force):
     assert said.err.count("\n") == 1
     assert Path("x").is_symlink()
     assert [path.name for path in Path("elsewhere").iterdir()] == ["kept"]
-
-
-def test_a_folder_reached_by_a_link_is_a_folder(podusv):
-    Path("real").mkdir()
-    Path("link").symlink_to("real")
-    said = podusv("run", write("a.yaml", BASE), "--out", "link/x", "--no-figures", "-q")
-    assert (said.code, manifest.check(Path("real/x")).status) == (0, "finished")
 
 
 def test_out_may_begin_with_a_dash_and_hold_any_letters(podusv):

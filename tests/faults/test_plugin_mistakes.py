@@ -15,14 +15,8 @@ from podusv_cli.core import plugins
 
 # What is written in place of what, and what is said.
 MISTAKES = {
-    "undeclared": ("(E_CT,)", '("e_ct",)', "declares 'e_ct', which is no Signal"),
     "two kinds": ('["cross_track"] =', '["other"] =', "its kind is no fixed word; write kind: "),
-    "other arguments": (
-        "law(t, x, ",
-        "law(t, y, ",
-        "'y' is none of its arguments (allowed: t, x, memory, ",
-    ),
-    "numpy": ("push(k)", "np.dot(x, x)", "cannot become machine code"),
+    "other arguments": ("law(t, x, ", "law(t, y, ", "'y' is none of its arguments (allowed: "),
     "no constant": (
         "return PUSH * k.gain",
         "return PUSH * k.gian",
@@ -30,8 +24,6 @@ MISTAKES = {
     ),
     "no rate": ("        rate[0] = signals[0]\n", "", "it leaves the rate of drift unwritten"),
     "wrong shape": ("np.zeros(1)", "np.zeros(2)", "a memory of shape (2,), its slots are (1,)"),
-    "too many": ("rate[0] =", "rate[1] =", "IndexError: index 1 is out of bounds"),
-    "no kernel": ("@kernel\ndef push", "def push", "cannot become machine code"),
     "slots raise": ("return ((DRIFT, 1),)", "return self.nothing", "AttributeError"),
     "no slots": ("return ((DRIFT, 1),)", "return 5", "TypeError"),
     "start raises": ("return np.zeros(1)", "return 1 / 0", "ZeroDivisionError"),

@@ -7,9 +7,12 @@ import os
 import pty
 import signal
 import sys
+import threading
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
 from command_samples import (
@@ -20,15 +23,20 @@ from command_samples import (
     ROOT,
     SIGNALS,
     TWO,
+    commanded,
     gone,
     send,
     under_way,
     wait_for,
     write,
-)  # fmt: skip
+)  # fmt: skip  # fmt: skip
+from storage_samples import files
 
+from podusv_cli.process.workers import INTERRUPTED, Outcome
 from podusv_cli.storage import manifest
 from podusv_cli.storage.run_folder import open_run
+from podusv_cli.verification import step_halving
+from podusv_cli.workflows import compare, execute
 
 INTERRUPTS = pytest.mark.parametrize(("number", "code"), MOSTLY_SIGINT)
 SLOW_MODULE = """
@@ -196,3 +204,149 @@ def test_in_a_law_that_never_returns(number, code):
     assert (got, out) == (code, "pid interrupted: x\n")
     assert err.startswith("a.yaml: interrupted after t = ")
     assert open_run(Path("x")).recording["time"][-1] < 0.5
+
+
+# --- interrupts of runs and comparisons
+
+COMPARE = ("compare", "--out", "x", "--no-figures")
+
+
+@pytest.fixture
+def podusv(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    return commanded(monkeypatch, capsys)
+
+
+def test_nothing_finished_leaves_nothing(podusv, monkeypatch):
+    lost = Outcome(failure=INTERRUPTED, interrupted=True)
+    monkeypatch.setattr(compare, "run_all", lambda jobs, *rest: [lost] * len(jobs))
+    said = podusv("compare", "--no-figures", write("two.yaml", TWO), "--out", "x")
+    assert said == (130, "", "interrupted before any run finished; nothing was written\n")
+    assert [path.name for path in Path().iterdir()] == ["two.yaml"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("number", "code", "times"), [(signal.SIGINT, 130, 3), (signal.SIGTERM, 143, 1)]
+)
+def test_an_interrupted_comparison_keeps_what_it_has(podusv, number, code, times):
+    write("short.yaml", BASE)
+    write("long.yaml", LONG)
+    with under_way(*COMPARE, "short.yaml", "long.yaml") as process:
+        wait_for(".x.podusv-*.part/new/short/manifest.json")
+        send(process, number, times)
+        out, err = process.communicate(timeout=PATIENCE)
+        assert process.returncode == code, err
+        assert gone(process)
+    assert "long: interrupted after t = " in err
+    assert "Traceback" not in err
+    assert "compared 2 runs: x" in out
+    assert manifest.check(Path("x")).status == "interrupted"
+    assert manifest.check(Path("x/short")).status == "finished"
+    assert manifest.check(Path("x/long")).status == "interrupted"
+    assert not list(Path().glob(".x*"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("number", "code"), MOSTLY_SIGINT)
+def test_an_interrupt_while_drawing_costs_the_figures_only(podusv, number, code):
+    config = write("two.yaml", TWO)
+    with under_way("compare", config, "--out", "x") as process:
+        wait_for(".x.podusv-*.part/new/comparison.csv")
+        send(process, number, 1)
+        out, err = process.communicate(timeout=PATIENCE)
+        assert process.returncode == code, err
+        assert gone(process)
+    assert "compared 2 runs: x" in out
+    assert err == "interrupted; the runs made so far are compared, without figures\n"
+    assert manifest.check(Path("x")).status == "interrupted"
+    assert manifest.check(Path("x/soft")).status == "finished"
+    assert "two (interrupted)</h1>" in Path("x/report.html").read_text()
+    assert not Path("x/figures").exists()
+
+
+def soon(number: signal.Signals, work: Callable[..., object]) -> Callable[..., object]:
+    """The work, with a signal to this process after it has begun."""
+
+    def begun(*args: object, **options: object) -> object:
+        threading.Timer(0.1, os.kill, (os.getpid(), number)).start()
+        return work(*args, **options)
+
+    return begun
+
+
+@pytest.mark.parametrize(("number", "code"), [*SIGNALS, (signal.SIGHUP, 129)])
+def test_an_interrupted_run_is_kept(podusv, number, code, monkeypatch):
+    monkeypatch.setattr(execute, "simulate", soon(number, execute.simulate))
+    said = podusv("run", write("long.yaml", LONG), "--out", "x")
+    assert said.code == code
+    assert said.err.startswith("long.yaml: interrupted after t = ")
+    assert manifest.check(Path("x")).status == "interrupted"
+    assert 0 < open_run(Path("x")).recording["time"][-1] < 2e5
+
+
+def test_an_interrupted_run_takes_no_finished_ones_place(podusv, monkeypatch):
+    assert podusv("run", write("short.yaml", BASE), "--out", "x", "--no-figures").code == 0
+    old = files(Path("x"))
+    monkeypatch.setattr(execute, "simulate", soon(signal.SIGINT, execute.simulate))
+    said = podusv("run", write("long.yaml", LONG), "--out", "x", "--force")
+    assert (said.code, said.out) == (130, "pid interrupted: x-2\n")
+    assert files(Path("x")) == old
+    assert manifest.check(Path("x-2")).status == "interrupted"
+
+
+def test_a_fault_after_an_interrupt_is_told(podusv, monkeypatch):
+    def faulty(*args: object) -> None:
+        raise TypeError("no such thing")
+
+    monkeypatch.setattr(execute, "simulate", soon(signal.SIGINT, execute.simulate))
+    monkeypatch.setattr(execute, "_write", faulty)
+    said = podusv("run", write("long.yaml", LONG), "--out", "x")
+    assert said == (130, "", "podusv: interrupted, and then TypeError: no such thing\n")
+    assert not Path("x").exists()
+
+
+@pytest.mark.parametrize(("number", "code"), SIGNALS)
+@pytest.mark.parametrize("stage", ["_drawn", "_cost", "_write"])
+def test_a_run_that_is_interrupted_after_its_simulation_is_whole(
+    podusv, number, code, stage, monkeypatch
+):
+    write_all = execute._write
+
+    def written(*given: Any) -> object:
+        """What is being written is written to its end."""
+        os.kill(os.getpid(), number)
+        return write_all(*given)
+
+    slow = soon(number, lambda *given: time.sleep(60))
+    monkeypatch.setattr(execute, stage, written if stage == "_write" else slow)
+    said = podusv("run", write("short.yaml", BASE), "--out", "x")
+    assert said.code == code
+    assert said.err.startswith("short.yaml: interrupted after the simulation; log.h5 is complete")
+    assert manifest.check(Path("x")).status == "interrupted"
+    assert open_run(Path("x")).recording.status == "finished"
+    assert not Path("x/figures").exists()
+
+
+def test_an_interrupted_verification_says_that_nothing_was_written(podusv, monkeypatch):
+    monkeypatch.setattr(step_halving, "simulate", soon(signal.SIGINT, step_halving.simulate))
+    said = podusv("verify", write("long.yaml", LONG), "--out", "x.json")
+    text = "long.yaml: interrupted before all steps were simulated; nothing was written\n"
+    assert said == (130, "", text)
+    assert not Path("x.json").exists()
+
+
+def test_run_and_rerun_tell_an_interruption_in_the_same_words(podusv, monkeypatch):
+    simulate = execute.simulate
+
+    def interrupted(*args: object, **options: object) -> object:
+        os.kill(os.getpid(), signal.SIGINT)
+        return simulate(*args, **options)
+
+    assert podusv("run", write("short.yaml", BASE), "--out", "x", "--no-figures").code == 0
+    monkeypatch.setattr(execute, "simulate", interrupted)
+    run = podusv("run", "short.yaml", "--out", "y", "--no-figures")
+    rerun = podusv("rerun", "x")
+    assert (run.code, rerun.code) == (130, 130)
+    assert run.err.startswith("short.yaml: interrupted after t = ")
+    assert rerun.err == run.err.replace("short.yaml", "x")

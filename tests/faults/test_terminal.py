@@ -58,19 +58,6 @@ def test_closed_streams_are_as_good_as_dev_null(words):
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not FULL.exists(), reason="there is no /dev/full")
-@pytest.mark.parametrize(
-    ("words", "unbuffered"), [(("list",), ""), (("--version",), "1"), (("run", "--help"), "")]
-)
-def test_a_full_disk_behind_stdout_is_a_line(words, unbuffered):
-    extra = {"PYTHONUNBUFFERED": unbuffered}
-    with FULL.open("w") as full:
-        done = podusv(*words, extra=extra, stdout=full, stderr=subprocess.PIPE, text=True)
-    assert done.returncode == 5
-    assert done.stderr == "podusv: [Errno 28] No space left on device\n"
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("unbuffered", ["", "1"])
 def test_a_disk_that_fills_up_behind_stdout_is_a_line(unbuffered):
     """Half of the text is there, and it is known."""

@@ -23,7 +23,7 @@ AXES = ("vessels", "tasks", "conditions")  # folders, in the order in which case
 
 
 @dataclass(frozen=True)
-class Wanted:
+class Selection:
     """What of a bench is to be run: its folder, files with further laws, changes, and choices.
 
     An empty choice means all; `overrides` are such as `simulation.step=0.005`.
@@ -55,7 +55,7 @@ def shipped_bench() -> Path:
     return shipped.folder() / "bench"
 
 
-def cases(wanted: Wanted) -> Iterator[Case]:
+def cases(wanted: Selection) -> Iterator[Case]:
     """All cases, one by one. Raises UsageError for a folder or a name, ScenarioError for a file."""
     for path in wanted.laws:
         if path.suffix == ".py":
@@ -83,7 +83,7 @@ def cases(wanted: Wanted) -> Iterator[Case]:
         yield Case(vessel, task, condition, loaded.scenario.singles())
 
 
-def _chosen(wanted: Wanted, axis: str) -> dict[str, Path]:
+def _chosen(wanted: Selection, axis: str) -> dict[str, Path]:
     """Files, or folders of conditions, by name."""
     if not (wanted.folder / axis).is_dir():
         raise UsageError(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.figures.style import legend, look, new_figure
 from podusv_cli.studies.bench.runs import BenchRun
 from podusv_cli.studies.bench.standing import leaderboard, profile
+from podusv_cli.studies.sketch import COLUMNS, Sketch
 
 WORST = 4.0  # times the best law's IAE; the end of the profile's axis
 SMALL = 0.62  # inches, the side of a small multiple
@@ -28,9 +30,26 @@ LONGEST = 12  # letters of a law's name in one line
 APART = {"bottom": 0.01, "right": 0.995, "wspace": 0.06, "hspace": 0.06}
 
 
-def profiles(made: pd.DataFrame, columns: int = 2) -> Figure:
+def sketches(runs: Sequence[BenchRun], made: pd.DataFrame) -> Iterator[Sketch]:
+    """The profiles of all laws, and the tracks of each vessel."""
+    yield Sketch(
+        "profiles",
+        "performance profiles: share of all cases by ratio to the best law's IAE",
+        partial(profiles, made), ("svg",),
+    )  # fmt: skip
+    laws = list(leaderboard(made).index)
+    for vessel in dict.fromkeys(run.place[0] for run in runs):
+        shown = [run for run in runs if run.place[0] == vessel]
+        yield Sketch(
+            f"tracks-{vessel}",
+            f"tracks of {vessel}; path grey, failed runs orange, all conditions; north up",
+            partial(tracks, shown, laws), ("png",),  # as outlines, 3000 tracks take 8 MB
+        )  # fmt: skip
+
+
+def profiles(made: pd.DataFrame) -> Figure:
     """The share of cases that each law does within so many times the best law's IAE."""
-    figure = new_figure(columns, 3.2)
+    figure = new_figure(COLUMNS, 3.2)
     axes, ratios = figure.add_subplot(), np.geomspace(1.0, WORST, 300)
     for place, law in enumerate(leaderboard(made).index):
         color, linestyle, _ = look(place)
@@ -45,7 +64,7 @@ def profiles(made: pd.DataFrame, columns: int = 2) -> Figure:
     )  # fmt: skip
     axes.set_xticks([1, 1.2, 1.5, 2, 3, 4], ["1", "1.2", "1.5", "2", "3", "4"])
     axes.minorticks_off()
-    legend(figure, columns)
+    legend(figure, COLUMNS)
     return figure
 
 

@@ -25,7 +25,7 @@ STEPS = (0.4, 0.2)  # s, of the finest of three grids; the next where IPOPT find
 BEGINNINGS = 2  # how many laws the search begins from: the best of the case
 TASK = {"vessel", "start", "path", "disturbance", "actuator", "simulation"}
 
-Place = tuple[str, str, str]
+CaseName = tuple[str, str, str]
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Least:
     `start` is the law from whose run the search came to it.
     """
 
-    places: Sequence[Place]
+    places: Sequence[CaseName]
     iae: float
     step: float
     lowered: float
@@ -43,14 +43,14 @@ class Least:
 
 
 @dataclass(frozen=True)
-class Wanted:
+class Task:
     """Cases with one optimum, and the laws whose runs the search begins from."""
 
     cases: Sequence[Case]
     laws: Sequence[str]
 
 
-def wanted(every: Iterable[Case], runs: Sequence[BenchRun]) -> tuple[list[Wanted], list[str]]:
+def wanted(every: Iterable[Case], runs: Sequence[BenchRun]) -> tuple[list[Task], list[str]]:
     """What is to be solved, and a sentence for each actuator or load that cannot be."""
     tasks: dict[str, list[Case]] = {}
     refused: dict[str, None] = {}
@@ -62,7 +62,7 @@ def wanted(every: Iterable[Case], runs: Sequence[BenchRun]) -> tuple[list[Wanted
             refused[str(error).partition(": ")[2]] = None
             continue
         tasks.setdefault(first.model_dump_json(include=TASK), []).append(case)
-    return [Wanted(cases, _best(cases, runs)) for cases in tasks.values()], list(refused)
+    return [Task(cases, _best(cases, runs)) for cases in tasks.values()], list(refused)
 
 
 def _best(cases: Sequence[Case], runs: Sequence[BenchRun]) -> list[str]:
@@ -71,7 +71,7 @@ def _best(cases: Sequence[Case], runs: Sequence[BenchRun]) -> list[str]:
     return [run.law for run in sorted(done, key=lambda run: run.metrics["iae"])[:BEGINNINGS]]
 
 
-def least(of: Wanted, tell: Callable[[float], None]) -> Least:
+def least(of: Task, tell: Callable[[float], None]) -> Least:
     """The optimum of these cases. Raises NotConvergedError, UsageError without any beginning."""
     case = of.cases[0]
     places = [case.place for case in of.cases]

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from podusv_cli.studies.study.claims import Link, ParsedClaim
 from podusv_cli.studies.study.samples import FAILURES, SHARE
-from podusv_cli.studies.study.verdict import Part, StudyVerdict
+from podusv_cli.studies.study.verdict import Statistic, StudyVerdict
 
 SIGNS: dict[type[ast.cmpop], str] = {
     ast.Lt: "below", ast.LtE: "at most", ast.Gt: "above", ast.GtE: "at least",
@@ -35,14 +35,13 @@ class Bar(NamedTuple):
 
 def bars(claim: ParsedClaim, verdict: StudyVerdict) -> Iterator[Bar]:
     """A bar for each comparison of a claim in each cell."""
-    for links in claim.parsed.links.values():
-        for link in links:
-            for part in verdict.parts:
-                if part.statistic == link.text and part.n:
-                    yield _bar(link, part)
+    for link in claim.parsed.links:
+        for part in verdict.parts:
+            if part.statistic == link.text and part.n:
+                yield _bar(link, part)
 
 
-def _bar(link: Link, part: Part) -> Bar:
+def _bar(link: Link, part: Statistic) -> Bar:
     shares = isinstance(link.call.func, ast.Name) and link.call.func.id in (SHARE, FAILURES)
     first, last = _axis(link, part, shares=shares)
 
@@ -57,7 +56,7 @@ def _bar(link: Link, part: Part) -> Bar:
     return Bar(words, place(part.low), place(part.high), estimate, bound, asked, ends)
 
 
-def _axis(link: Link, part: Part, *, shares: bool) -> tuple[float, float]:
+def _axis(link: Link, part: Statistic, *, shares: bool) -> tuple[float, float]:
     """The ends of an axis that has bound and interval on it."""
     told = [n for n in (part.low, part.high, part.estimate, link.bound) if math.isfinite(n)]
     low, high = min(told), max(told)
@@ -66,7 +65,7 @@ def _axis(link: Link, part: Part, *, shares: bool) -> tuple[float, float]:
     return (max(low, 0.0), min(high, 1.0)) if shares else (low, high)
 
 
-def _words(link: Link, part: Part, *, shares: bool) -> str:
+def _words(link: Link, part: Statistic, *, shares: bool) -> str:
     estimate, low, high, bound = (
         _number(number, shares=shares)
         for number in (part.estimate, part.low, part.high, link.bound)

@@ -13,8 +13,8 @@ from podusv_cli.core.plugins import ABSENT
 from podusv_cli.core.signal import NAME, NAME_IN_WORDS
 from podusv_cli.engine.loop.closed_loop import ClosedLoop, Observer, entries
 from podusv_cli.engine.step.grid import TimeGrid
+from podusv_cli.expressions.reading import ExpressionError
 from podusv_cli.metrics.metric import Metric
-from podusv_cli.scenario.expressions import ExpressionError
 from podusv_cli.scenario.keys import Key
 from podusv_cli.scenario.load import values
 from podusv_cli.scenario.model import Scenario

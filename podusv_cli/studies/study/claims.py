@@ -14,19 +14,22 @@ import ast
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from podusv_cli.core.kernel import Vector
+from podusv_cli.expressions.margins import SIGNS
+from podusv_cli.expressions.reading import function, known, number, refuse, syntax_tree
+from podusv_cli.expressions.walk import Condition, Logic, all_of
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import METRICS
-from podusv_cli.scenario.expressions import all_hold, function, known, refuse, syntax_tree
-from podusv_cli.studies.study.expressions import SIGNS, OverLaws
-from podusv_cli.studies.study.runs import Mask, Runs
-from podusv_cli.studies.study.samples import FAILURES, SHARE, STATISTICS, Sample, number
+from podusv_cli.scenario.sweep import StudyClaim
+from podusv_cli.studies.study.expressions import OverLaws
+from podusv_cli.studies.study.runs import Mask, StudyRuns
+from podusv_cli.studies.study.samples import FAILURES, SHARE, STATISTICS, Sample
 from podusv_cli.studies.study.statistics import holm
-from podusv_cli.studies.study.verdict import Part, Stated, StudyVerdict
+from podusv_cli.studies.study.verdict import Statistic, StudyVerdict
 
 EXAMPLE = "share(a.iae < b.iae) >= 0.95"
 # of a number on the left of a comparison
@@ -50,13 +53,13 @@ class Parsed:
     """The syntax tree of a claim, its comparisons of statistics, and the laws that it is about."""
 
     tree: ast.expr
-    links: Mapping[ast.Compare, Sequence[Link]]
+    links: tuple[Link, ...] = ()
     laws: tuple[str, ...] = ()
 
     @cached_property
     def statistics(self) -> int:
         """How many different statistics the claim has."""
-        return len({link.text for links in self.links.values() for link in links})
+        return len({link.text for link in self.links}) or 1
 
 
 @dataclass(frozen=True)
@@ -64,7 +67,7 @@ class ParsedClaim:
     """A claim of a study with its name."""
 
     name: str
-    claim: Stated
+    claim: StudyClaim
     parsed: Parsed
 
 
@@ -92,67 +95,75 @@ class _Example:
 def parse(text: str, laws: Sequence[str], metrics: Mapping[str, Metric] = METRICS) -> Parsed:
     """A claim about these laws. Raises ExpressionError."""
     tree = syntax_tree(text, EXAMPLE)
-    links = {node: list(_compared(node)) for node in _comparisons(tree)}
-    tried = _Evaluation(_Example(laws, list(metrics)), Parsed(tree, links), metrics)
-    tried.answer(level=0.5)
-    return replace(tried.parsed, laws=tuple(dict.fromkeys(tried.laws)))
+    tried = _Evaluation(_Example(laws, list(metrics)), Parsed(tree), metrics)
+    tried.condition(tree)
+    return Parsed(tree, tuple(tried.links), tuple(dict.fromkeys(tried.laws)))
 
 
 def judge(
-    claims: Sequence[ParsedClaim], runs: Runs, level: float,
+    claims: Sequence[ParsedClaim], runs: StudyRuns, level: float,
     metrics: Mapping[str, Metric] = METRICS,
 ) -> list[StudyVerdict]:  # fmt: skip
     """A verdict on every claim; the probability that any is wrong is at most 1 - level."""
     tried = [_Evaluation(runs, c.parsed, metrics, c.claim.tolerance) for c in claims]
-    levels = holm(lambda i, at: tried[i].answer(at) is not None, len(tried), level)
-    return [_verdict(*each) for each in zip(claims, tried, levels, strict=True)]
+    levels = holm(lambda i, level: tried[i].at(level).answer is not None, len(tried), level)
+    return [_verdict(c, one.at(at)) for c, one, at in zip(claims, tried, levels, strict=True)]
 
 
 @dataclass
-class _Evaluation:
-    """The evaluation of one claim; statistics are computed once, by their text.
+class _Evaluation(Logic):
+    """The evaluation of one claim, in all cells, by intervals of which several share the level.
 
-    `whole` is False to leave out all draws in which a run crashed, hung or was invalid.
+    `samples` are those of each statistic, by its text: computed once for all levels. `whole` is
+    False to leave out all draws in which a run crashed, hung or was invalid.
     """
 
-    runs: Runs
+    runs: StudyRuns
     parsed: Parsed
     metrics: Mapping[str, Metric]
     tolerance: float = 0.0
+    level: float = 0.5
     whole: bool = True
     samples: dict[str, Samples] = field(default_factory=dict)
     laws: list[str] = field(default_factory=list)
+    links: list[Link] = field(default_factory=list)
 
-    def answer(self, level: float) -> bool | None:
+    def at(self, level: float) -> Self:
+        """The same at another level."""
+        return replace(self, level=level)
+
+    @property
+    def inside(self) -> float:
+        """The level of each interval."""
+        return 1.0 - (1.0 - self.level) / self.parsed.statistics
+
+    @property
+    def answers(self) -> list[bool | None]:
+        """Whether the claim holds in each cell."""
+        return self.condition(self.parsed.tree).answers()
+
+    @property
+    def answer(self) -> bool | None:
         """Whether the claim holds in all cells, or in none; None where that cannot be told."""
-        answers = set(self.answers(level))
+        answers = set(self.answers)
         return answers.pop() if len(answers) == 1 else None
 
-    def answers(self, level: float) -> list[bool | None]:
-        """Whether the claim holds in each cell."""
-        return [self.holds(self.parsed.tree, cell, level) for cell in range(len(self.runs.cells))]
+    def property(self, node: ast.expr) -> Condition:
+        """There are none."""
+        names = ", ".join(STATISTICS)
+        refuse(node, f"not a condition; compare one of {names} with a number")
 
-    def inside(self, level: float) -> float:
-        """The level of each interval: several statistics of a claim share what it leaves."""
-        return 1.0 - (1.0 - level) / self.parsed.statistics
+    def comparison(self, node: ast.Compare) -> Condition:
+        """Statistics compared with numbers, in each cell."""
+        links = list(_compared(node))
+        self.links += links
+        return all_of([Condition.of(self._held(link)) for link in links])
 
-    def holds(self, node: ast.expr, cell: int, level: float) -> bool | None:
-        """Whether a condition holds in a cell, which `_comparisons` found to be one."""
-        match node:
-            case ast.Compare():
-                return all_hold([self._held(each, cell, level) for each in self.parsed.links[node]])
-            case ast.UnaryOp(op=ast.Not(), operand=part):
-                answer = self.holds(part, cell, level)
-                return None if answer is None else not answer
-            case ast.BoolOp(values=parts):
-                return all_hold([self.holds(part, cell, level) for part in parts])
-        raise AssertionError(f"{ast.unparse(node)!r} was not refused")
-
-    def _held(self, link: Link, cell: int, level: float) -> bool | None:
+    def _held(self, link: Link) -> Iterator[bool | None]:
         if link.text not in self.samples:
             self.samples[link.text] = self._sampled(link.call)
-        sample = self.samples[link.text][cell]
-        return sample.holds(link.sign, link.bound, self.tolerance, self.inside(level))
+        for sample in self.samples[link.text]:
+            yield sample.holds(link.sign, link.bound, self.tolerance, self.inside)
 
     def _sampled(self, call: ast.Call) -> Samples:
         """The statistic's samples, from the draws that all of its laws have been through."""
@@ -168,33 +179,14 @@ class _Evaluation:
         done = self.runs.done(law)
         return done if self.whole else done & ~self.runs.broken(law)
 
-    def needed(self, level: float) -> list[int | None]:
+    def needed(self) -> list[int | None]:
         """For every comparison that is not decided in a cell, the draws that would decide it."""
-        inside = self.inside(level)
         return [
-            sample.needed(link.sign, link.bound, self.tolerance, inside)
-            for links in self.parsed.links.values()
-            for link in links
+            sample.needed(link.sign, link.bound, self.tolerance, self.inside)
+            for link in self.parsed.links
             for sample in self.samples[link.text]
-            if sample.holds(link.sign, link.bound, self.tolerance, inside) is None
+            if sample.holds(link.sign, link.bound, self.tolerance, self.inside) is None
         ]
-
-
-def _comparisons(node: ast.expr) -> Iterator[ast.Compare]:
-    """Every comparison of a statistic with a number in a claim. Raises ExpressionError."""
-    match node:
-        case ast.Compare():
-            yield node
-        case ast.UnaryOp(op=ast.Not(), operand=part):
-            yield from _comparisons(part)
-        case ast.BoolOp(op=ast.And(), values=parts):
-            for part in parts:
-                yield from _comparisons(part)
-        case ast.BoolOp():
-            refuse(node, "join conditions with `and` only")
-        case _:
-            names = ", ".join(STATISTICS)
-            refuse(node, f"not a condition; compare one of {names} with a number")
 
 
 def _compared(node: ast.Compare) -> Iterator[Link]:
@@ -234,16 +226,17 @@ def _checked(call: ast.Call, bound: float) -> None:
         refuse(call, f"is a share between 0 and 1, and cannot be compared with {bound:g}")
 
 
-def _verdict(parsed: ParsedClaim, tried: _Evaluation, level: float) -> StudyVerdict:
-    runs, laws, answer = tried.runs, parsed.parsed.laws, tried.answer(level)
-    broken = sum(int(np.sum(runs.broken(law) & runs.done(law))) for law in laws)
-    others = replace(tried, whole=False, samples={}, laws=[]) if broken else tried
+def _verdict(parsed: ParsedClaim, tried: _Evaluation) -> StudyVerdict:
+    runs, answers = tried.runs, tried.answers
+    broken = sum(int(np.sum(runs.broken(law) & runs.done(law))) for law in parsed.parsed.laws)
+    others = replace(tried, whole=False, samples={}) if broken else tried
     return StudyVerdict(
-        name=parsed.name, claim=parsed.claim, answer=answer, level=level, wanted=runs.wanted,
+        name=parsed.name, claim=parsed.claim, answer=tried.answer, level=tried.level,
+        wanted=runs.wanted,
         parts=[
-            Part.of(text, sample, tried.inside(level))
+            Statistic.of(text, sample, tried.inside)
             for text, samples in tried.samples.items() for sample in samples
         ],
-        by_cell=dict(zip(runs.cells, tried.answers(level), strict=True)),
-        needed=tried.needed(level), broken=broken, without_broken=others.answer(level),
+        by_cell=dict(zip(runs.cells, answers, strict=True)), needed=tried.needed(),
+        broken=broken, without_broken=others.answer,
     )  # fmt: skip

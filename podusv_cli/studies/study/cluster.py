@@ -20,7 +20,7 @@ from podusv_cli.process.workers import Outcome
 from podusv_cli.studies.study import remote
 from podusv_cli.studies.study.dispatch import Done, Engine, Processes, Units
 from podusv_cli.studies.study.plan import Variant
-from podusv_cli.studies.study.remote import Recipe, Reply, Terms
+from podusv_cli.studies.study.remote import Expectation, Reply, StudyText
 from podusv_cli.studies.study.unit import Unit
 
 WINDOW = 2  # units under way for each thread of a worker, so that none waits for this process
@@ -45,24 +45,24 @@ class Task:
 
 
 def engine(
-    scheduler: str, workers: int, recipe: Recipe, identity: str, *, mixed: bool
+    scheduler: str, workers: int, study: StudyText, identity: str, *, mixed: bool
 ) -> AbstractContextManager[Engine]:
     """Where units are made: processes of this machine, or the workers of a scheduler, if any."""
     if not scheduler:
         return nullcontext(Processes(workers))
-    return connected(scheduler, recipe, identity, mixed=mixed)
+    return connected(scheduler, study, identity, mixed=mixed)
 
 
 @contextmanager
-def connected(address: str, recipe: Recipe, identity: str, *, mixed: bool) -> Iterator[Cluster]:
+def connected(address: str, study: StudyText, identity: str, *, mixed: bool) -> Iterator[Cluster]:
     """The cluster of a scheduler, its workers checked; `identity` is the digest of the study's.
 
     Raises UsageError without Dask and for a worker that does not fit, StorageError without a
     scheduler.
     """
     with _client(address) as client:
-        ours = remote.report(recipe.text, recipe.plugins) | {"the study": identity}
-        cluster = Cluster(client, recipe, Terms(ours, mixed))
+        ours = remote.report(study.text, study.plugins) | {"the study": identity}
+        cluster = Cluster(client, study, Expectation(ours, mixed))
         cluster.check()
         yield cluster
 
@@ -84,9 +84,9 @@ def _client(address: str) -> Any:
 class Cluster:
     """Makes units on the workers of a cluster; an engine of `march`."""
 
-    def __init__(self, client: Any, recipe: Recipe, terms: Terms) -> None:
+    def __init__(self, client: Any, study: StudyText, expectation: Expectation) -> None:
         """Take a client of Dask, the study, and what every worker has to report."""
-        self._client, self._recipe, self._terms = client, recipe, terms
+        self._client, self._study, self._expectation = client, study, expectation
         self._threads, self._looked = dict[str, int](), -LOOK
         self._running, self._finished = dict[Any, Task](), SimpleQueue[Any]()
         self._again, self._suspects = deque[Task](), deque[Task]()
@@ -101,7 +101,7 @@ class Cluster:
                 "the scheduler has no workers yet; start one with `dask worker ADDRESS "
                 "--nthreads 1`, and run it again"
             )
-        text, plugins = self._recipe.text, self._recipe.plugins
+        text, plugins = self._study.text, self._study.plugins
         reports = {
             worker: self._client.submit(remote.report, text, plugins, workers=[worker], pure=False)
             for worker in sorted(self._threads)
@@ -119,7 +119,7 @@ class Cluster:
             raise UsageError(f"worker {worker} cannot load the study: {_words(error)}") from error
         finally:
             future.release()
-        if differing := self._terms.differing(told):
+        if differing := self._expectation.differing(told):
             raise UsageError(f"worker {worker} computes with something else: {differing}")
 
     def __call__(self, units: Units, done: Done) -> bool:
@@ -176,9 +176,9 @@ class Cluster:
 
     def _submit(self, task: Task) -> None:
         future = self._client.submit(
-            remote.made, self._recipe.text, self._recipe.plugins, astuple(task.unit),
-            self._terms.expected, astuple(task.variant) if task.variant else None,
-            mixed=self._terms.mixed, pure=False,
+            remote.made, self._study.text, self._study.plugins, astuple(task.unit),
+            self._expectation.expected, astuple(task.variant) if task.variant else None,
+            mixed=self._expectation.mixed, pure=False,
             workers=sorted(task.allowed) if task.allowed else None,
         )  # fmt: skip
         self._running[future] = task
@@ -212,7 +212,7 @@ class Cluster:
         if reply.outcome is None:
             self._refused[reply.worker] = (
                 f"worker {reply.worker} got no units, because it computes with something else: "
-                f"{self._terms.differing(reply.report)}"
+                f"{self._expectation.differing(reply.report)}"
             )
             self._again.append(task)
         elif reply.outcome.killed and not task.alone:

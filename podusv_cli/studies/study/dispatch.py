@@ -15,7 +15,7 @@ import numpy as np
 
 from podusv_cli.core.errors import PodusvError
 from podusv_cli.process.workers import Job, Outcome, available_workers, run_each
-from podusv_cli.studies.study.plan import Plan
+from podusv_cli.studies.study.plan import LawInCell, Plan
 from podusv_cli.studies.study.runs import Mask
 from podusv_cli.studies.study.runs_file import stretches
 from podusv_cli.studies.study.store import Store
@@ -28,7 +28,7 @@ MOST = 4096  # draws of a unit
 ENDED = "it ended its process, each time that it was made; provenance.json tells how"
 
 
-Part = tuple[int, int]  # a shard: its number from 1, and how many there are
+Shard = tuple[int, int]  # its number from 1, and how many there are
 
 
 @dataclass
@@ -67,7 +67,7 @@ class Tally:
 
 
 Tell = Callable[[Tally], None]
-Gaps = dict[tuple[str, int], int]  # how many runs, by law and cell
+Gaps = dict[LawInCell, int]  # how many runs, by law and cell
 # Numbered, with the study that each is of; after the last, there may be more.
 Units = Iterator[tuple[int, Plan, Unit]]
 Done = Callable[[int, Outcome], None]
@@ -119,7 +119,7 @@ class Processes:
 class Driver:
     """Hands out units, keeps what comes back, and finds the run that ends its process."""
 
-    def __init__(self, store: Store, tell: Tell, until: float, part: Part) -> None:
+    def __init__(self, store: Store, tell: Tell, until: float, part: Shard) -> None:
         """Units of this part are handed out until the monotonic time `until` [s]."""
         self.store, self.plan, self._tell, self._until = store, store.plan, tell, until
         there, inside = store.covered(), np.zeros(self.plan.sweep.draws, bool)
@@ -204,7 +204,7 @@ def shard(draws: int, number: int, count: int) -> slice:
 
 
 def march(
-    store: Store, tell: Tell, engine: Engine, *, seconds: float = math.inf, part: Part = (1, 1),
+    store: Store, tell: Tell, engine: Engine, *, seconds: float = math.inf, part: Shard = (1, 1),
     begin: Callable[[Gaps], None] = lambda missing: None,
 ) -> tuple[Tally, bool]:  # fmt: skip
     """Simulate what is missing, for so many seconds at most; how far it is, and if it is whole.

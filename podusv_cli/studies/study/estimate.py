@@ -19,10 +19,9 @@ from podusv_cli.process.workers import run_all
 from podusv_cli.scenario.limits import estimate as size_of_run
 from podusv_cli.storage.run_folder import check_free_space
 from podusv_cli.studies.study import runs_writer
-from podusv_cli.studies.study.plan import Plan
+from podusv_cli.studies.study.plan import LawInCell, Plan
 from podusv_cli.studies.study.unit import Unit, make, prepare
 
-Place = tuple[str, int]  # a law, and the number of a cell
 PILOT = 0.2  # s of processor time that the first runs of a law in a cell are to take
 MOST_RUNS = 32  # of a pilot
 MOST_STEPS = 100_000  # of a run of a pilot
@@ -77,7 +76,7 @@ def _between(ends: Sequence[float], words: Callable[[float], str]) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def pilot(plan: Plan) -> dict[Place, float]:
+def pilot(plan: Plan) -> dict[LawInCell, float]:
     """Processor time of a run [s] of every law and cell, of the first draws.
 
     Of many cells some are timed, and the others take the mean of the law. The runs are made in a
@@ -121,7 +120,7 @@ def _timed(plan: Plan, law: str, cell: int, progress: Callable[[float], None]) -
 
 
 def estimate(
-    plan: Plan, paces: Mapping[Place, float], missing: Mapping[Place, int], workers: int, *,
+    plan: Plan, paces: Mapping[LawInCell, float], missing: Mapping[LawInCell, int], workers: int, *,
     figures: bool = True,
 ) -> Estimate:  # fmt: skip
     """What so many runs of every law and cell need that are still missing, at these paces."""

@@ -10,21 +10,19 @@ the language.
 from __future__ import annotations
 
 import ast
-import operator
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 
 from podusv_cli.core.kernel import Vector
+from podusv_cli.expressions.margins import SIGNS, below
+from podusv_cli.expressions.reading import function, known, refuse, syntax_tree
+from podusv_cli.expressions.walk import Condition, Walk
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import METRICS
-from podusv_cli.scenario.expressions import function, known, literal, refuse, syntax_tree
-from podusv_cli.studies.study.runs import Mask, Runs, worst
-from podusv_cli.studies.study.statistics import at_most, below
+from podusv_cli.studies.study.runs import Mask, StudyRuns, worst
 
 # A failed run's metric in arithmetic: larger than any number of a run, and the same for all, so
 # that both failing gives a ratio of 1 and a difference of 0. What exceeds REAL is infinite.
@@ -32,51 +30,18 @@ FAILED, REAL = 1e100, 1e90
 FINISHED, SUCCESS = "finished", "success"
 
 
-class Condition(NamedTuple):
-    """Where a condition holds, and where it does not; unknown elsewhere."""
-
-    yes: Any
-    no: Any
-
-
 @dataclass
-class Walk(ABC):
+class OfRuns(Walk):
     """One walk over an expression about runs; `tolerance` is the margin of its comparisons."""
 
     metrics: Mapping[str, Metric] = field(default_factory=lambda: METRICS)
     tolerance: float = 0.0
     both_failed: list[Any] = field(default_factory=list)  # where both sides of a comparison are inf
     close: list[Any] = field(default_factory=list)  # where they differ by the margin or less
+    signs: ClassVar = SIGNS
 
-    @abstractmethod
-    def metric(self, node: ast.expr) -> Vector:
-        """A metric of every run. Raises ExpressionError where the node is none."""
-
-    @abstractmethod
-    def property(self, node: ast.expr) -> Mask:
-        """A property of every run. Raises ExpressionError where the node is none."""
-
-    def condition(self, node: ast.expr) -> Condition:
-        """Where a condition holds. Raises ExpressionError."""
-        match node:
-            case ast.Compare():
-                return self._comparison(node)
-            case ast.UnaryOp(op=ast.Not(), operand=part):
-                return Condition(*reversed(self.condition(part)))
-            case ast.BoolOp(op=ast.And(), values=parts):
-                return _all([self.condition(part) for part in parts])
-            case ast.BoolOp():
-                refuse(node, "join conditions with `and` only")
-        held = self.property(node)
-        return Condition(held, ~held)
-
-    def _comparison(self, node: ast.Compare) -> Condition:
-        if any(type(sign) not in SIGNS for sign in node.ops):
-            refuse(node, "compare with <, <=, >, >=")
-        sides = pairwise(self.number(side) for side in (node.left, *node.comparators))
-        return _all([self._link(sign, a, b) for sign, (a, b) in zip(node.ops, sides, strict=True)])
-
-    def _link(self, sign: ast.cmpop, a: Any, b: Any) -> Condition:
+    def link(self, sign: ast.cmpop, left: ast.expr, a: Any, right: ast.expr, b: Any) -> Condition:
+        """In which draws one side compares so with the next."""
         if np.ndim(a) and np.ndim(b):
             failed = np.isposinf(a) & np.isposinf(b)
             self.both_failed.append(failed)
@@ -85,23 +50,11 @@ class Walk(ABC):
         holds, unknown = SIGNS[type(sign)](a, b, self.tolerance), np.isnan(a) | np.isnan(b)
         return Condition(holds & ~unknown, ~holds & ~unknown)
 
-    def number(self, node: ast.expr) -> Any:
+    def side(self, node: ast.expr) -> Any:
         """One number for every run; +inf where a failed run makes it larger than any."""
-        values = np.asarray(self._value(node))
+        with np.errstate(all="ignore"):
+            values = np.asarray(self.value(node))
         return np.where(np.abs(values) > REAL, np.copysign(np.inf, values), values)
-
-    def _value(self, node: ast.expr) -> Any:
-        match node:
-            case ast.Constant():
-                return np.float64(literal(node))
-            case ast.UnaryOp(op=ast.USub(), operand=part):
-                return -self._value(part)
-            case ast.BinOp(left=left, right=right, op=sign) if type(sign) in ARITHMETIC:
-                with np.errstate(all="ignore"):
-                    return ARITHMETIC[type(sign)](self._value(left), self._value(right))
-            case ast.BinOp():
-                refuse(node, "calculate with + - * / only")
-        return self.metric(node)
 
     def countable(self, name: str, values: Vector, failed: Mask) -> Vector:
         """A metric with FAILED in place of infinity."""
@@ -110,13 +63,13 @@ class Walk(ABC):
 
 
 @dataclass
-class OverLaws(Walk):
+class OverLaws(OfRuns):
     """Expressions about the runs of all laws in a draw: `law.metric`, `finished(law)`."""
 
-    runs: Runs = field(kw_only=True)
+    runs: StudyRuns = field(kw_only=True)
     names: list[str] = field(default_factory=list)  # of the laws that were met in the expression
 
-    def metric(self, node: ast.expr) -> Vector:
+    def quantity(self, node: ast.expr) -> Vector:
         """`law.metric`."""
         match node:
             case ast.Attribute(value=ast.Name(id=label), attr=name):
@@ -126,7 +79,7 @@ class OverLaws(Walk):
                 refuse(node, "no function of numbers here; write law.metric, as in a.iae < b.iae")
         refuse(node, "no meaning here; write law.metric, as in a.iae")
 
-    def property(self, node: ast.expr) -> Mask:
+    def property(self, node: ast.expr) -> Condition:
         """`finished(law)` or `success(law)`."""
         properties: dict[str, Callable[[str], Mask]] = {
             FINISHED: self.runs.finished,
@@ -134,7 +87,8 @@ class OverLaws(Walk):
         }
         if not isinstance(node, ast.Call):
             refuse(node, "not a condition; compare numbers, or write finished(law) or success(law)")
-        return properties[known(function(node), properties, "property")](self.only(node))
+        held = properties[known(function(node), properties, "property")]
+        return Condition.known(held(self.only(node)))
 
     def only(self, node: ast.Call) -> str:
         """The law that is the only argument of a function. Raises ExpressionError."""
@@ -149,13 +103,13 @@ class OverLaws(Walk):
 
 
 @dataclass
-class OfOneRun(Walk):
+class OfOneRun(OfRuns):
     """Expressions about a single run: `finished`, and metrics by their names alone."""
 
     values: Mapping[str, Vector] = field(kw_only=True)
     ended: Mask = field(kw_only=True)
 
-    def metric(self, node: ast.expr) -> Vector:
+    def quantity(self, node: ast.expr) -> Vector:
         """A metric's name."""
         if not isinstance(node, ast.Name):
             refuse(node, "write metrics by their names alone, as in finished and z_e_steady <= 1.5")
@@ -163,12 +117,12 @@ class OfOneRun(Walk):
         values = self.values.get(name, np.full(np.shape(self.ended), np.nan))
         return np.where(self.ended, self.countable(name, values, ~self.ended), np.nan)
 
-    def property(self, node: ast.expr) -> Mask:
+    def property(self, node: ast.expr) -> Condition:
         """`finished`."""
         if not isinstance(node, ast.Name):
             refuse(node, "not a condition; compare metrics with numbers, or write finished alone")
         known(node.id, (FINISHED,), "property")
-        return self.ended
+        return Condition.known(self.ended)
 
 
 def parse_success(text: str, metrics: Mapping[str, Metric] = METRICS) -> ast.expr:
@@ -185,21 +139,3 @@ def succeeded(
     """Which runs of a law are a success; one is not where the condition is unknown."""
     held = OfOneRun(metrics, values=values, ended=finished).condition(tree).yes
     return np.broadcast_to(held, np.shape(finished))
-
-
-def _all(conditions: Collection[Condition]) -> Condition:
-    """All of them: not where one is not, unknown where one is unknown, else yes."""
-    every = list(conditions)
-    yes = np.logical_and.reduce([part.yes for part in every])
-    return Condition(yes, np.logical_or.reduce([part.no for part in every]))
-
-
-SIGNS: dict[type[ast.cmpop], Callable[[Any, Any, float], Any]] = {
-    ast.Lt: below,
-    ast.LtE: at_most,
-    ast.Gt: lambda a, b, margin: below(b, a, margin),
-    ast.GtE: lambda a, b, margin: at_most(-a, -b, margin),
-}
-ARITHMETIC: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
-    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: np.divide,
-}  # fmt: skip

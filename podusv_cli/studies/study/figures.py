@@ -1,12 +1,15 @@
-"""Figures of a study, as functions of plain arrays and tables; axes by quantiles, not by tails.
+"""Figures of a study: which there are, with their captions, and how each is drawn.
 
-Import this module where a figure is drawn, because matplotlib is slow to import. Draw and save
-inside `figures.style.house_style()`.
+They are drawn from plain arrays and tables; axes by quantiles, not by tails. Import this module
+where a figure is drawn, because matplotlib is slow to import.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import ast
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -17,9 +20,17 @@ from numpy.typing import NDArray
 
 from podusv_cli.core import escaping
 from podusv_cli.core.kernel import Vector
+from podusv_cli.core.quantities import raised
 from podusv_cli.figures.style import TARGET_LOOK, legend, look, new_figure
+from podusv_cli.scenario.phrases import as_yaml
+from podusv_cli.studies.sketch import COLUMNS, Sketch
 from podusv_cli.studies.study import statistics
+from podusv_cli.studies.study.expressions import FINISHED, parse_success, succeeded
+from podusv_cli.studies.study.keep import Track
+from podusv_cli.studies.study.results import Results
+from podusv_cli.studies.study.summary import has, values_of
 
+MOST_CELLS = 6  # of which each has figures of its own
 POINTS = 400  # of a curve
 TAIL = 0.005  # of the values beyond either end of an axis
 WIDE = 20.0  # a range this many times its lower end gets a logarithmic axis
@@ -32,11 +43,174 @@ CENTRED: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 6.0}
 UNKNOWN = "#BBBBBB"
 
 
-def distributions(
-    values: Mapping[str, Vector], label: str, level: float, columns: int = 1
-) -> Figure:
+def sketches(results: Results, tracks: Mapping[str, Sequence[Track]]) -> Iterator[Sketch]:
+    """The figures that the study has numbers for."""
+    cells = range(min(len(results.runs.cells), MOST_CELLS))
+    for name in results.shown:
+        for cell in cells:
+            yield from _distribution(results, name, cell)
+    for name in results.shown:
+        yield from _ratios(results, name)
+    for cell in cells:
+        yield from _failures(results, cell)
+    yield from _heatmaps(results)
+    for name in results.shown:
+        for cell in cells:
+            yield from _correlations(results, name, cell)
+    yield from _funnel(tracks)
+
+
+def _named(kind: str, results: Results, cell: int) -> str:
+    return f"{kind}-cell{cell}" if len(results.runs.cells) > 1 else kind
+
+
+def _at(results: Results, cell: int) -> str:
+    return f" at {results.runs.cells[cell]}" if results.runs.cells[cell] else ""
+
+
+def _label(results: Results, name: str) -> str:
+    return f"{name} [{raised(results.known[name].unit)}]"
+
+
+def _met(results: Results, name: str, cell: int) -> dict[str, Vector]:
+    """A metric of the draws that every law that has it was tried on, failures as infinity."""
+    runs, about = results.runs, results.known[name]
+    return {
+        law: values_of(runs, law, cell, about)[runs.done(law)[cell]]
+        for law in runs.laws if has(runs, law, cell, about)
+    }  # fmt: skip
+
+
+def _bands(level: float) -> str:
+    return "" if np.isnan(level) else f"; the bands are {100 * level:g} % intervals of each share"
+
+
+def _distribution(results: Results, name: str, cell: int) -> Iterator[Sketch]:
+    values, level = _met(results, name, cell), results.level
+    if values:
+        yield Sketch(
+            _named(f"distribution-{name}", results, cell),
+            f"distribution of {name} over all draws{_at(results, cell)}: "
+            f"{results.known[name].meaning}; a curve that is higher has smaller values, and one "
+            f"that ends below 100 % has failed runs{_bands(level)}",
+            partial(distributions, values, _label(results, name), level),
+        )
+
+
+def _ratios(results: Results, name: str) -> Iterator[Sketch]:
+    pairs, cells, level = results.pairs, results.runs.cells[:MOST_CELLS], results.level
+    if len(pairs) and len(rows := pairs[(pairs.metric == name) & pairs.cell.isin(cells)]):
+        yield Sketch(
+            f"ratios-{name}",
+            f"ratio of {name} between two laws in the same draw: its median"
+            f"{'' if np.isnan(level) else f' with a {100 * level:g} % interval'}; below 1, the law "
+            f"named first has the smaller value; wins are draws in which a law is better by more "
+            f"than {100 * float(rows.margin.iloc[0]):g} %",
+            partial(ratios, rows),
+        )
+
+
+def _failures(results: Results, cell: int) -> Iterator[Sketch]:
+    level = results.level
+    for name, threshold, values in _thresholds(results, cell):
+        yield Sketch(
+            _named(f"failures-{name}", results, cell),
+            f"failed draws{_at(results, cell)} if success asked for another threshold of {name}: "
+            f"the vertical line is the study's own, {threshold:g}; each curve ends at the share of "
+            f"runs that fail whatever the threshold{_bands(level)}",
+            partial(failure_rates, values, _label(results, name), threshold, level),
+        )
+
+
+def _thresholds(results: Results, cell: int) -> Iterator[tuple[str, float, dict[str, Vector]]]:
+    """Metrics that success limits from above, the limits, and values of each law's draws.
+
+    A run that fails for another reason has infinity.
+    """
+    tree = parse_success(results.plan.sweep.success, results.known)
+    parts = tree.values if isinstance(tree, ast.BoolOp) else [tree]
+    for part in parts:
+        match part:
+            case ast.Compare(
+                left=ast.Name(id=name), ops=[ast.Lt() | ast.LtE()],
+                comparators=[ast.Constant(value=limit)],
+            ):  # fmt: skip
+                others = [other for other in parts if other is not part]
+                yield name, float(str(limit)), _limited(results, name, others, cell)
+
+
+def _limited(
+    results: Results, name: str, others: Sequence[ast.expr], cell: int
+) -> dict[str, Vector]:
+    runs, found = results.runs, dict[str, Vector]()
+    rest = ast.BoolOp(ast.And(), [ast.Name(FINISHED), *others])
+    for law in runs.laws:
+        read = {metric: runs.metric(law, metric) for metric in runs.asked}
+        held = succeeded(rest, read, runs.finished(law), results.known)[cell]
+        values = np.where(held, runs.metric(law, name)[cell], np.inf)
+        found[law] = values[runs.done(law)[cell]]
+    return {law: values for law, values in found.items() if len(values)}
+
+
+def _heatmaps(results: Results) -> Iterator[Sketch]:
+    grid = results.plan.sweep.grid
+    if not grid:
+        return
+    first, *rest = grid
+    across = [as_yaml(value) for value in grid[first]]
+    down = [", ".join(map(as_yaml, values)) for values in product(*(grid[key] for key in rest))]
+    for name in ("failed", *results.shown):
+        panels = {law: _panel(results, law, name, len(across)) for law in results.runs.laws}
+        label = "failed [1]" if name == "failed" else _label(results, name)
+        what = "share of failed draws" if name == "failed" else f"median of {name}"
+        yield Sketch(
+            f"grid-{name}",
+            f"{what} in every cell of the grid: grey cells have a median that is a failure, or no "
+            f"runs",
+            partial(heatmaps, panels, label, (first, across), (", ".join(rest), down)),
+        )
+
+
+def _panel(results: Results, law: str, name: str, across: int) -> Vector:
+    """A number of every cell, a row for each combination of all keys but the first."""
+    table = results.summary
+    column = "failed" if name == "failed" else "q50"
+    rows = table[(table.law == law) & ((name == "failed") | (table.metric == name))]
+    found = rows.drop_duplicates("cell").set_index("cell")[column]
+    cells = np.array([found.get(label, np.nan) for label in results.runs.cells], float)
+    return cells.reshape(across, -1).T
+
+
+def _correlations(results: Results, name: str, cell: int) -> Iterator[Sketch]:
+    table = results.sensitivity
+    if not len(table):
+        return
+    rows = table[(table.metric == name) & (table.cell == results.runs.cells[cell])]
+    by_chance = "; the band is what quantities without influence reach by chance"
+    by_chance = "" if np.isnan(results.level) else by_chance
+    if rows.correlation.notna().any():
+        yield Sketch(
+            _named(f"sensitivity-{name}", results, cell),
+            f"what {name} depends on{_at(results, cell)}: rank correlation with the drawn "
+            f"quantities that matter most to any law{by_chance}; correlations see rising and "
+            "falling influence only",
+            partial(correlations, rows),
+        )
+
+
+def _funnel(tracks: Mapping[str, Sequence[Track]]) -> Iterator[Sketch]:
+    if count := sum(map(len, tracks.values())):
+        yield Sketch(
+            "funnel",
+            f"distance to the target over time in the {count} runs whose logs are kept: a "
+            "choice of failed, worst and named runs, not of typical ones",
+            partial(funnel, tracks),
+        )
+
+
+def distributions(values: Mapping[str, Vector], label: str, level: float) -> Figure:
     """The empirical distribution of a metric for every law; failures (+inf) are missing mass."""
-    figure = new_figure(columns, 2.6)
+    figure = new_figure(COLUMNS, 2.6)
     axes = figure.add_subplot()
     ends = _span(axes, values)
     for place, (law, numbers) in enumerate(values.items()):
@@ -44,15 +218,15 @@ def distributions(
         _share_curve(axes, place, _told(law, numbers), x, _at_most(numbers, x), len(numbers), level)
     axes.set_ylim(0.0, 100.0)
     axes.set(xlabel=label, ylabel="draws with at most this value [%]")
-    legend(figure, columns)
+    legend(figure, COLUMNS)
     return figure
 
 
 def failure_rates(
-    values: Mapping[str, Vector], label: str, threshold: float, level: float, columns: int = 1
+    values: Mapping[str, Vector], label: str, threshold: float, level: float
 ) -> Figure:
     """The share of draws that fail, were the metric's threshold another one; failures are +inf."""
-    figure = new_figure(columns, 2.6)
+    figure = new_figure(COLUMNS, 2.6)
     axes = figure.add_subplot()
     ends = _span(axes, values, threshold)
     for place, (law, numbers) in enumerate(values.items()):
@@ -63,16 +237,16 @@ def failure_rates(
     axes.set_ylim(50.0 / max(map(len, values.values())), 110.0)
     axes.set(xlabel=f"threshold of {label}", ylabel="failed draws [%]")
     axes.yaxis.set_major_formatter("{x:g}")
-    legend(figure, columns)
+    legend(figure, COLUMNS)
     return figure
 
 
-def ratios(pairs: pd.DataFrame, columns: int = 1) -> Figure:
+def ratios(pairs: pd.DataFrame) -> Figure:
     """The median paired ratio a / b with its interval, and how often each law wins.
 
     `pairs` are rows of `summary.pairs`, all of one metric.
     """
-    figure = new_figure(columns, FRAME + 2.0 * ROW * len(pairs))
+    figure = new_figure(COLUMNS, FRAME + 2.0 * ROW * len(pairs))
     axes = figure.add_subplot()
     rows = range(len(pairs))
     ends = _ratio_axis(axes, pairs)
@@ -94,14 +268,14 @@ def ratios(pairs: pd.DataFrame, columns: int = 1) -> Figure:
 
 def heatmaps(
     panels: Mapping[str, Vector], label: str, x: tuple[str, Sequence[str]],
-    y: tuple[str, Sequence[str]], columns: int = 2,
+    y: tuple[str, Sequence[str]],
 ) -> Figure:  # fmt: skip
     """A number of every cell for each law: columns are the values of x, rows those of y.
 
     `x` and `y` are grid keys with their values; NaN is a cell without one, inf a failure.
     """
     height = FRAME + 2.0 * ROW * len(y[1])
-    figure = new_figure(columns, height)
+    figure = new_figure(COLUMNS, height)
     every = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
     finite = np.concatenate([panel[np.isfinite(panel)] for panel in panels.values()])
     low, high = (finite.min(), finite.max()) if len(finite) else (0.0, 1.0)
@@ -121,7 +295,7 @@ def heatmaps(
     return figure
 
 
-def correlations(sensitivity: pd.DataFrame, columns: int = 1) -> Figure:
+def correlations(sensitivity: pd.DataFrame) -> Figure:
     """Rank correlations of a metric with the drawn quantities that matter most to any law.
 
     `sensitivity` are rows of `summary.sensitivity`, all of one metric and cell.
@@ -130,7 +304,7 @@ def correlations(sensitivity: pd.DataFrame, columns: int = 1) -> Figure:
     table = table[list(dict.fromkeys(sensitivity.law))]
     order = table.abs().max(axis=1).sort_values(ascending=False).index[:MOST_BARS]
     table, count = table.loc[order], len(table.columns)
-    figure = new_figure(columns, FRAME + (0.55 + 0.45 * count) * ROW * len(table))
+    figure = new_figure(COLUMNS, FRAME + (0.55 + 0.45 * count) * ROW * len(table))
     axes = figure.add_subplot()
     chance = float(sensitivity.by_chance.max())
     for place, law in enumerate(table.columns):
@@ -144,13 +318,13 @@ def correlations(sensitivity: pd.DataFrame, columns: int = 1) -> Figure:
     axes.set_ylim(len(table) - 0.4, -0.6)
     axes.set(xlim=(-1.0, 1.0), xlabel="rank correlation [1]")
     axes.grid(visible=False, axis="y")
-    legend(figure, columns)
+    legend(figure, COLUMNS)
     return figure
 
 
-def funnel(curves: Mapping[str, Sequence[tuple[Vector, Vector]]], columns: int = 2) -> Figure:
+def funnel(curves: Mapping[str, Sequence[Track]]) -> Figure:
     """The distance to the target over time of every run, in the colour of its law."""
-    figure = new_figure(columns, 2.6)
+    figure = new_figure(COLUMNS, 2.6)
     axes = figure.add_subplot()
     for place, (law, runs) in enumerate(curves.items()):
         color, linestyle, _ = look(place)
@@ -164,7 +338,7 @@ def funnel(curves: Mapping[str, Sequence[tuple[Vector, Vector]]], columns: int =
     axes.yaxis.set_major_formatter("{x:g}")
     axes.set(xlabel="$t$ [s]", ylabel="$z_e$ [m]")
     axes.margins(x=0.0)
-    legend(figure, columns)
+    legend(figure, COLUMNS)
     return figure
 
 

@@ -73,7 +73,7 @@ def invalid_draws(scenarios: Sequence[Scenario], sweep: Sweep, count: int) -> In
 
 
 @dataclass(frozen=True)
-class Part:
+class Section:
     """A section of a scenario, and those quantities that change it."""
 
     scenario: Scenario
@@ -118,7 +118,7 @@ class Part:
             return np.asarray(quantity.value(content(self.scenario, route(key)), column))
 
 
-def _different(scenarios: Sequence[Scenario], vary: Vary) -> Iterator[Part]:
+def _different(scenarios: Sequence[Scenario], vary: Vary) -> Iterator[Section]:
     """The sections that are drawn in, each once if it is the same in several scenarios."""
     sections: dict[str, dict[str, list[str]]] = {}
     for name, quantity in vary.items():
@@ -130,14 +130,14 @@ def _different(scenarios: Sequence[Scenario], vary: Vary) -> Iterator[Part]:
         for scenario in scenarios:
             if getattr(scenario, section) not in seen:
                 seen.append(getattr(scenario, section))
-                yield Part(scenario, section, own)
+                yield Section(scenario, section, own)
 
 
 def _row(given: Table, place: int | np.intp) -> Draw:
     return {name: column[place : place + 1].tolist()[0] for name, column in given.items()}
 
 
-def _reason(parts: Sequence[Part], draw: Draw) -> str:
+def _reason(parts: Sequence[Section], draw: Draw) -> str:
     return next(filter(None, (part.refusal(draw) for part in parts)))
 
 

@@ -12,13 +12,12 @@ import numpy as np
 from podusv_cli.core.errors import StorageError
 from podusv_cli.studies.study.runs import Mask
 from podusv_cli.studies.study.runs_file import stretches
-from podusv_cli.studies.study.sittings import NAME, sittings
+from podusv_cli.studies.study.sessions import NAME, sessions
 from podusv_cli.studies.study.store import Store
 from podusv_cli.studies.study.unit import UnitResult
 
 SIZE = 8  # bytes of a run's digest
 NOWHERE = -1  # the folder of a run that none has yet
-Place = tuple[str, int]  # a law, and the number of a cell
 
 
 def join(into: Store, others: Sequence[Store]) -> None:
@@ -112,8 +111,8 @@ def mixture(folder: Path) -> str:
 
 
 def _machines(folder: Path) -> list[str]:
-    # A sitting that was killed has no end, and does not know how many runs it made.
-    made = (one for one in sittings(folder) if one["runs"] or one["finished"] is None)
+    # A session that was killed has no end, and does not know how many runs it made.
+    made = (one for one in sessions(folder) if one["runs"] or one["finished"] is None)
     return list(dict.fromkeys(map(_machine, made)))
 
 
@@ -123,15 +122,15 @@ def machines(folder: Path) -> str:
     return " and ".join(found) or f"a machine that its {NAME} does not tell"
 
 
-def _machine(sitting: Mapping[str, Any]) -> str:
-    platform, packages = sitting["platform"], sitting["packages"]
+def _machine(session: Mapping[str, Any]) -> str:
+    platform, packages = session["platform"], session["packages"]
     return (
-        f"{platform['processor']} ({platform['libc']}, podusv {sitting['podusv']}, "
-        f"Python {sitting['python']}, numpy {packages['numpy']}, numba {packages['numba']})"
+        f"{platform['processor']} ({platform['libc']}, podusv {session['podusv']}, "
+        f"Python {session['python']}, numpy {packages['numpy']}, numba {packages['numba']})"
     )
 
 
-def missing(store: Store) -> list[str]:
+def gaps(store: Store) -> list[str]:
     """Which draws are not there, a sentence for all laws and cells that lack the same ones."""
     lacking: dict[str, list[str]] = {}
     covered = store.covered()

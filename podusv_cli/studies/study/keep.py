@@ -22,9 +22,10 @@ from podusv_cli.studies.study.results import Results
 from podusv_cli.studies.study.runs_file import Table
 
 POINTS = 2000  # of a kept run's curve in a figure
+Track = tuple[Vector, Vector]  # time [s] and distance to the target [m]
 
 
-class Wanted(NamedTuple):
+class KeptRun(NamedTuple):
     """A run that is to be kept, and why."""
 
     law: str
@@ -45,28 +46,19 @@ class Kept:
     `difference` is "" where all metrics are equal to the last bit.
     """
 
-    wanted: Wanted
+    wanted: KeptRun
     run: Run | None
     difference: str = ""
 
 
-@dataclass(frozen=True)
-class Track:
-    """The distance to the target over time of a kept run."""
-
-    law: str
-    time: Vector
-    distance: Vector
-
-
-def wanted(results: Results) -> list[Wanted]:
+def wanted(results: Results) -> list[KeptRun]:
     """The runs that `sweep.keep` asks for, each once, by law.
 
     Failed runs are the first that diverged or were no success; a run that crashed, hung or was
     invalid has no log. The worst have the largest value of a metric among those that succeeded.
     """
     keep = results.plan.sweep.keep
-    found: dict[tuple[str, int, int], Wanted] = {}
+    found: dict[tuple[str, int, int], KeptRun] = {}
     for law in results.runs.laws:
         for one in (
             *_failed(results.runs, law, keep.failed),
@@ -77,31 +69,31 @@ def wanted(results: Results) -> list[Wanted]:
     return list(found.values())
 
 
-def unmade(folder: Path, results: Results) -> list[Wanted]:
+def unmade(folder: Path, results: Results) -> list[KeptRun]:
     """The runs that are to be kept and are not there yet."""
     return [one for one in wanted(results) if not (folder / LOGS / one.name).exists()]
 
 
-def _failed(runs: Table, law: str, count: int) -> Iterator[Wanted]:
+def _failed(runs: Table, law: str, count: int) -> Iterator[KeptRun]:
     for draw, cell in np.argwhere(runs.failed(law).T)[:count].tolist():
-        yield Wanted(law, cell, draw, "failed")
+        yield KeptRun(law, cell, draw, "failed")
 
 
-def _worst(results: Results, law: str, name: str, count: int) -> Iterator[Wanted]:
+def _worst(results: Results, law: str, name: str, count: int) -> Iterator[KeptRun]:
     runs = results.runs
     values = np.where(runs.success(law), runs.metric(law, name), np.nan)
     order = np.argsort(-values, axis=None, kind="stable")[: min(count, np.isfinite(values).sum())]
     for rank, place in enumerate(order.tolist(), 1):
         cell, draw = divmod(place, runs.wanted)
-        yield Wanted(law, cell, draw, f"{name}: number {rank} of the largest")
+        yield KeptRun(law, cell, draw, f"{name}: number {rank} of the largest")
 
 
-def _named(runs: Table, law: str, draws: Iterable[int]) -> Iterator[Wanted]:
+def _named(runs: Table, law: str, draws: Iterable[int]) -> Iterator[KeptRun]:
     done = runs.done(law)
     for draw in draws:
         for cell in range(len(runs.cells)):
             if draw < runs.wanted and done[cell, draw]:
-                yield Wanted(law, cell, draw, "named in sweep.keep.draws")
+                yield KeptRun(law, cell, draw, "named in sweep.keep.draws")
 
 
 def found(folder: Path, results: Results, extras: Extras) -> list[Kept]:
@@ -114,7 +106,7 @@ def found(folder: Path, results: Results, extras: Extras) -> list[Kept]:
     return kept
 
 
-def _opened(path: Path, one: Wanted, results: Results, extras: Extras) -> Kept:
+def _opened(path: Path, one: KeptRun, results: Results, extras: Extras) -> Kept:
     if not path.exists():
         return Kept(one, None)
     try:
@@ -127,7 +119,7 @@ def _opened(path: Path, one: Wanted, results: Results, extras: Extras) -> Kept:
     return Kept(one, run, difference(run, one, results.runs))
 
 
-def difference(run: Run, one: Wanted, runs: Table) -> str:
+def difference(run: Run, one: KeptRun, runs: Table) -> str:
     """The first metric in which a run differs from the table, with both values; "" if none does."""
     for name in runs.metrics:
         ours, theirs = run.metrics.get(name), float(runs.metric(one.law, name)[one.cell, one.draw])
@@ -148,10 +140,14 @@ def contradiction(kept: Sequence[Kept]) -> str:
     )
 
 
-def tracks(kept: Sequence[Kept], extras: Extras) -> list[Track]:
-    """The distance to the target in every kept log that has it."""
-    made = [extras.made(f"the track of {one.wanted.name}", partial(_track, one)) for one in kept]
-    return [track for track in made if track]
+def tracks(kept: Sequence[Kept], extras: Extras) -> dict[str, list[Track]]:
+    """The distance to the target over time in every kept log that has it, by law."""
+    found: dict[str, list[Track]] = {}
+    for one in kept:
+        track = extras.made(f"the track of {one.wanted.name}", partial(_track, one))
+        if track:
+            found.setdefault(one.wanted.law, []).append(track)
+    return found
 
 
 def _track(one: Kept) -> Track | None:
@@ -159,4 +155,4 @@ def _track(one: Kept) -> Track | None:
         return None
     log = one.run.recording
     rows = np.unique(np.linspace(0, len(log["time"]) - 1, POINTS).astype(int))
-    return Track(one.wanted.law, log["time"][rows], log["z_e"][rows])
+    return log["time"][rows], log["z_e"][rows]

@@ -10,17 +10,18 @@ import pandas as pd
 
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.escaping import markdown
+from podusv_cli.expressions.verdict import as_markdown
 from podusv_cli.pages.page import Picture, sentence
 from podusv_cli.process.extras import Extras
 from podusv_cli.storage import csv_files, files
 from podusv_cli.storage.json_files import encode
 from podusv_cli.storage.run_folder import MISSING
-from podusv_cli.studies.study import pictures, report, summary, verdict
+from podusv_cli.studies.study import summary
 from podusv_cli.studies.study.keep import Kept, tracks
 from podusv_cli.studies.study.results import Results
 from podusv_cli.studies.study.runs import AXES, ENDING
 from podusv_cli.studies.study.runs_file import Table
-from podusv_cli.studies.study.sittings import timing
+from podusv_cli.studies.study.sessions import timing
 from podusv_cli.studies.study.unit import STATUSES
 
 FIGURES, REPORT = "figures", "report.html"
@@ -29,7 +30,7 @@ FIGURES, REPORT = "figures", "report.html"
 def write_tables(folder: Path, results: Results) -> None:
     """Write tables and verdicts into the study's folder. Raises StorageError."""
     told = {"format": 1, "claims": [one.as_json() for one in results.verdicts]}
-    judged = verdict.as_markdown(results.verdicts)
+    judged = as_markdown(results.verdicts)
     if results.contradicted:
         told["contradicted"] = results.contradicted
         judged = f"{markdown(sentence(results.contradicted))}\n"
@@ -52,9 +53,14 @@ def write_report(
     What fails is noted in the `extras`. Files of an earlier report that are not made again are
     removed: they would tell of other runs.
     """
+    from podusv_cli.studies.study import report
+
     drawn, shown = dict[str, bytes](), list[Picture]()
     if figures:
-        drawn, shown = pictures.drawn(results, tracks(kept, extras), extras)
+        from podusv_cli.studies.sketch import rendered  # matplotlib is slow to import
+        from podusv_cli.studies.study.figures import sketches
+
+        drawn, shown = rendered(sketches(results, tracks(kept, extras)), extras)
     page = extras.made(REPORT, lambda: report.page(folder, results, kept, shown, extras.missing))
     publish(folder, drawn, page, extras)
 

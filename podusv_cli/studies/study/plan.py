@@ -28,6 +28,7 @@ from podusv_cli.studies.study.record import Record
 # Sections of a scenario that change no number of a study.
 COSMETIC = ("name", "description", "log", "silence", "claims", "controllers", "sweep", "tune")
 MOST_NAMED = 4  # keys that a message about another study names
+LawInCell = tuple[str, int]  # a law, and the number of a cell
 KERNELS = " kernels"  # ends the key of the digest of a law's compiled source
 
 

@@ -34,7 +34,7 @@ Plugins = tuple[tuple[str, str], ...]  # name and text of each file
 
 
 @dataclass(frozen=True)
-class Recipe:
+class StudyText:
     """A study as text, and its plug-in files by name."""
 
     text: str
@@ -42,7 +42,7 @@ class Recipe:
 
 
 @lru_cache(PLANS)
-def _placed(recipe: Recipe) -> tuple[Plan, TemporaryDirectory[str]]:
+def _placed(recipe: StudyText) -> tuple[Plan, TemporaryDirectory[str]]:
     """The plan, and the folder that its plug-ins were read from; gone when it is forgotten."""
     folder = TemporaryDirectory(prefix="podusv-")
     for name, text in recipe.plugins:
@@ -52,17 +52,17 @@ def _placed(recipe: Recipe) -> tuple[Plan, TemporaryDirectory[str]]:
     return plan(load_text(recipe.text, str(Path(folder.name, "scenario.yaml")))), folder
 
 
-def _plan(recipe: Recipe) -> Plan:
+def _plan(recipe: StudyText) -> Plan:
     return _placed(recipe)[0]
 
 
 @lru_cache(PLANS)
-def _variant(recipe: Recipe, told: tuple[Any, ...]) -> Plan:
+def _variant(recipe: StudyText, told: tuple[Any, ...]) -> Plan:
     return _plan(recipe).varied(Variant(*told))
 
 
 @lru_cache(PLANS)
-def _report(recipe: Recipe) -> Report:
+def _report(recipe: StudyText) -> Report:
     made = _plan(recipe)
     told = {"podusv": podusv_cli.__version__, "Python": platform.python_version()}
     told |= {name: version(name) for name in PACKAGES}
@@ -78,11 +78,11 @@ def _report(recipe: Recipe) -> Report:
 
 def report(text: str, plugins: Plugins) -> Report:
     """Versions, digests of all kernels and of the study, and digests of the bits of some runs."""
-    return dict(_report(Recipe(text, plugins)))
+    return dict(_report(StudyText(text, plugins)))
 
 
 @dataclass(frozen=True)
-class Terms:
+class Expectation:
     """The report that workers have to give; with `mixed` the bits of runs may be others."""
 
     report: Mapping[str, str]
@@ -91,13 +91,13 @@ class Terms:
     @property
     def expected(self) -> str:
         """A digest of what has to be the same."""
-        return digest(firm(self.report, mixed=self.mixed))
+        return digest(comparable(self.report, mixed=self.mixed))
 
     def differing(self, told: Mapping[str, str]) -> str:
         """What is different in a worker's report, and a remedy; "" where nothing is."""
         found = [
             f"{name} is {told.get(name, 'not there')}, not {word}"
-            for name, word in firm(self.report, mixed=self.mixed).items()
+            for name, word in comparable(self.report, mixed=self.mixed).items()
             if told.get(name) != word
         ]
         bits = all(line.startswith(BITS) for line in found)
@@ -105,7 +105,7 @@ class Terms:
         return f"{'; '.join(found)}; {remedy}, or leave the worker out" if found else ""
 
 
-def firm(told: Mapping[str, str], *, mixed: bool) -> Report:
+def comparable(told: Mapping[str, str], *, mixed: bool) -> Report:
     """The part of a report that has to be the same on all workers."""
     return {name: word for name, word in told.items() if not (mixed and name.startswith(BITS))}
 
@@ -130,8 +130,8 @@ def made(
     """Make a unit (law, cell, first draw, number of draws) of a study or a variant, on a worker."""
     from distributed import get_worker
 
-    told, outcome, recipe = report(text, plugins), None, Recipe(text, plugins)
-    if digest(firm(told, mixed=mixed)) == expected:
+    told, outcome, recipe = report(text, plugins), None, StudyText(text, plugins)
+    if digest(comparable(told, mixed=mixed)) == expected:
         plan = _variant(recipe, variant) if variant else _plan(recipe)
         job = partial(timed, plan, Unit(*unit))
         outcome = outcome_of(job, lambda fraction: None, Interrupts())

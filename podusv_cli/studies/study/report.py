@@ -2,27 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from podusv_cli.expressions.verdict import by_answer
 from podusv_cli.pages.page import Picture, environment, flat, value_text
 from podusv_cli.process.extras import Missing
 from podusv_cli.scenario.phrases import as_yaml
 from podusv_cli.scenario.sweep import Sweep
 from podusv_cli.studies.study.bars import bars
 from podusv_cli.studies.study.keep import Kept
-from podusv_cli.studies.study.results import Results, digits
+from podusv_cli.studies.study.results import Results
 from podusv_cli.studies.study.runs import Mask
-from podusv_cli.studies.study.sittings import sittings
+from podusv_cli.studies.study.sessions import sessions
+from podusv_cli.studies.study.statistics import Interval, digits
 from podusv_cli.studies.study.unit import STATUSES
-from podusv_cli.studies.study.verdict import ANSWERS, StudyVerdict
 from podusv_cli.studies.study.words import in_words
 
 FIRST = 20  # rows of a table of runs
-SITTING = ("started", "duration_s", "runs", "podusv", "python", "platform.processor", "argv")
+SESSION = ("started", "duration_s", "runs", "podusv", "python", "platform.processor", "argv")
 
 
 class Row(NamedTuple):
@@ -59,7 +60,7 @@ def page(
         scenario=plan.scenario,
         sweep=plan.sweep,
         several=len(results.runs.cells) > 1,
-        answers=_answers(results.verdicts),
+        answers=by_answer(results.verdicts),
         claims=[(v, [*bars(p, v)]) for p, v in zip(results.parsed, results.verdicts, strict=True)],
         laws=list(_laws(results)),
         broken=runs_that(results, results.runs.broken),
@@ -73,19 +74,10 @@ def page(
         beside=numbered[: len(beside)],
         figures=numbered,
         missing=[str(one) for one in missing],
-        sittings=_sittings(folder),
-        latest=[(key, value_text(value)) for key, value in flat((sittings(folder) or [{}])[-1])],
+        sittings=_sessions(folder),
+        latest=[(key, value_text(value)) for key, value in flat((sessions(folder) or [{}])[-1])],
         first=FIRST,
     )  # fmt: skip
-
-
-def _answers(verdicts: Sequence[StudyVerdict]) -> dict[str, list[tuple[int, StudyVerdict]]]:
-    """The verdicts with their numbers by answer."""
-    numbered = [*enumerate(verdicts, 1)]
-    return {
-        answer: [(i, verdict) for i, verdict in numbered if verdict.verdict == answer]
-        for answer in ANSWERS.values()
-    }
 
 
 def _laws(results: Results) -> Iterator[tuple[str, str, str, str, list[str]]]:
@@ -94,14 +86,9 @@ def _laws(results: Results) -> Iterator[tuple[str, str, str, str, list[str]]]:
         law, cell = map(str, at)
         one, medians = rows.iloc[0], rows.set_index("metric").q50
         failed = f"{round(one.failed * one.n)} of {one.n}"
-        share = _interval(100 * one.failed_low, 100 * one.failed_high, "{:.3g}".format, " %")
-        yield (
-            law,
-            cell,
-            failed,
-            share,
-            [digits(medians.get(name, np.nan)) for name in results.shown],
-        )
+        share = Interval.of(one, "failed").ends(".3g%")
+        numbers = [digits(medians.get(name, np.nan)) for name in results.shown]
+        yield law, cell, failed, share, numbers
 
 
 def runs_that(results: Results, are: Any) -> Rows:
@@ -140,13 +127,8 @@ def _pairs(results: Results) -> list[Any]:
     """The rows of the shown metrics, in their order."""
     rows: list[Any] = results.pairs.to_dict("records")
     for row in rows:
-        row["interval"] = _interval(row["ratio_low"], row["ratio_high"], "{:.4g}".format)
+        row["interval"] = Interval.of(row, "ratio").ends(".4g")
     return [row for name in results.shown for row in rows if row["metric"] == name]
-
-
-def _interval(low: float, high: float, words: Callable[[float], str], unit: str = "") -> str:
-    """Both ends, or `-` where there is no interval."""
-    return f"{words(low)} to {words(high)}{unit}" if low == low else "-"
 
 
 def _numbers(results: Results) -> list[list[str]]:
@@ -155,7 +137,7 @@ def _numbers(results: Results) -> list[list[str]]:
     return [
         [one["law"], one["cell"], one["metric"], one["unit"],
          *(digits(one[q]) for q in ("q05", "q25", "q50")),
-         _interval(one["q50_low"], one["q50_high"], digits),
+         Interval.of(one, "q50").ends(""),
          *(digits(one[q]) for q in ("q75", "q95"))]
         for one in rows if one["metric"] in results.shown
     ]  # fmt: skip
@@ -180,6 +162,6 @@ def _beside(figures: Sequence[Picture]) -> list[Picture]:
     return [first[kind] for kind in ("distribution", "ratios") if kind in first]
 
 
-def _sittings(folder: Path) -> list[list[str]]:
-    told = [dict(flat(one)) for one in sittings(folder)]
-    return [[value_text(one.get(key)) for key in SITTING] for one in told]
+def _sessions(folder: Path) -> list[list[str]]:
+    told = [dict(flat(one)) for one in sessions(folder)]
+    return [[value_text(one.get(key)) for key in SESSION] for one in told]

@@ -14,6 +14,7 @@ from podusv_cli.metrics.metric import Metric
 from podusv_cli.studies.study import claims, summary, verdict
 from podusv_cli.studies.study.plan import Plan
 from podusv_cli.studies.study.runs_file import Table
+from podusv_cli.studies.study.statistics import Interval, digits
 
 ALWAYS = ("iae", "z_e_steady")  # metrics that the answer has beside those of claims
 MARGIN = 0.01  # relative, of pairs
@@ -90,9 +91,7 @@ class Results:
     def _row(self, mine: pd.DataFrame) -> list[str]:
         if not len(mine):  # no run yet
             return ["-"] * (1 + len(self.shown))
-        first = mine.iloc[0]
-        share, low, high = (100.0 * first[name] for name in ("failed", "failed_low", "failed_high"))
-        failed = f"{share:.3g} %" + (f" [{low:.3g}, {high:.3g}]" if low == low else "")
+        failed = f"{Interval.of(mine.iloc[0], 'failed'):.3g%}"
         return [failed, *(digits(mine.q50.get(name, np.nan)) for name in self.shown)]
 
     def as_json(self) -> dict[str, Any]:
@@ -104,13 +103,6 @@ class Results:
             "summary": self.summary.to_dict("records"),
             "claims": [one.as_json() for one in self.verdicts],
         }
-
-
-def digits(number: float) -> str:
-    """A metric over all draws; infinite is a failed run, not a number is none."""
-    if np.isnan(number):
-        return "-"
-    return "failed" if np.isinf(number) else f"{number:.5g}"
 
 
 def judged(plan: Plan, runs: Table) -> Results:

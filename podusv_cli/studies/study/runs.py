@@ -21,7 +21,7 @@ DRAWN = "drawn"  # the group of drawn quantities
 OWN = (*AXES, *FAILED, "status", "until", DRAWN, SEAL, SEAL_OF_THE_REST)  # are no metrics
 
 
-class Runs(Protocol):
+class StudyRuns(Protocol):
     """Arrays over (cell, draw); every law meets the same draws."""
 
     @property

@@ -20,7 +20,7 @@ from podusv_cli.metrics.table import METRICS
 from podusv_cli.storage import hdf5
 from podusv_cli.studies.study.expressions import FINISHED, parse_success, succeeded
 from podusv_cli.studies.study.runs import AXES, DRAWN, FAILED, OWN, SEAL, SEAL_OF_THE_REST, Mask
-from podusv_cli.studies.study.unit import BROKEN, MISSING, STATUSES, Codes, Unit, UnitResult
+from podusv_cli.studies.study.unit import BROKEN, NOT_MADE, STATUSES, Codes, Unit, UnitResult
 
 Known = Mapping[str, Metric]
 ROWS = 4096  # runs read or written at a time
@@ -50,7 +50,7 @@ def digest_of_the_rest(file: h5py.File) -> str:
 
 
 class Table:
-    """runs.h5, open for reading: the `Runs` of a study; arrays are read when they are asked for."""
+    """runs.h5, open for reading, as `StudyRuns`; arrays are read when they are asked for."""
 
     def __init__(self, path: Path, success: str = FINISHED, known: Known = METRICS) -> None:
         """`success` is the expression for a run's. Raises StorageError for a damaged file."""
@@ -96,7 +96,7 @@ class Table:
 
     def tried(self, law: str) -> Mask:
         """Whether a run was tried."""
-        return np.not_equal(self.status(law), MISSING)
+        return np.not_equal(self.status(law), NOT_MADE)
 
     @cached_property
     def common(self) -> Mask:
@@ -158,7 +158,7 @@ class Table:
         for position, law in enumerate(self.laws):
             status = self.status(law)
             for cell in range(len(self.cells)):
-                for rows in stretches(status[cell] != MISSING):
+                for rows in stretches(status[cell] != NOT_MADE):
                     for first in range(rows.start, rows.stop, ROWS):
                         part = range(first, min(first + ROWS, rows.stop))
                         yield self._unit(position, law, cell, part, status[cell])

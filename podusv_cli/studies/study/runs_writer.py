@@ -13,58 +13,42 @@ import h5py
 import numpy as np
 
 from podusv_cli.core.errors import StorageError
-from podusv_cli.metrics.metric import Metric
 from podusv_cli.process.temporary_names import temporary_name
 from podusv_cli.storage.files import new_file, storage_errors
 from podusv_cli.storage.log import FILE, UNDATED, LogLayout, describe, write_at
+from podusv_cli.studies.study.draws import table
+from podusv_cli.studies.study.plan import Plan
 from podusv_cli.studies.study.runs import DRAWN, SEAL, SEAL_OF_THE_REST
 from podusv_cli.studies.study.runs_file import ROWS, digest, digest_of_the_rest
-from podusv_cli.studies.study.unit import MISSING, STATUSES, UnitResult
+from podusv_cli.studies.study.unit import NOT_MADE, STATUSES, UnitResult
 
 BLOCK = 2**20  # bytes written and read at a time
 NUMBERS = "iuf"  # numpy's kinds of numbers
 HEAD = 1200  # bytes of what the file says of an array, roughly
+Results = Callable[[], Iterable[UnitResult]]  # all runs that there are, from the first again
 
 
-@dataclass(frozen=True)
-class Header:
-    """What the table is about: labels of the axes, the identity, what was drawn, and metrics."""
-
-    title: str
-    identity: str
-    laws: Sequence[str]
-    cells: Sequence[str]
-    wanted: int  # draws of each cell
-    draws: Callable[[int, int], Mapping[str, Any]]  # first, count -> every drawn quantity
-    metrics: Mapping[str, Metric]
-
-    @property
-    def shape(self) -> tuple[int, int, int]:
-        """Of every array of runs."""
-        return len(self.laws), len(self.cells), self.wanted
-
-
-def write(path: Path, header: Header, results: Sequence[UnitResult] | Any) -> None:
-    """Write the table, in place of an older one. `results` can be gone through more than once.
+def write(path: Path, plan: Plan, identity: str, results: Results) -> None:
+    """Write the table of a study, in place of an older one.
 
     Raises StorageError; the older table is then still there.
     """
     part = path.with_name(temporary_name())
     try:
         causes = {
-            (header.laws.index(r.unit.law), r.unit.cell, r.unit.first + i): cause
-            for r in results for i, cause in enumerate(r.causes) if cause
+            (plan.laws.index(r.unit.law), r.unit.cell, r.unit.first + i): cause
+            for r in results() for i, cause in enumerate(r.causes) if cause
         }  # fmt: skip
-        places = _lay_out(part, header, dict(sorted(causes.items())))
+        places = _lay_out(part, plan, identity, dict(sorted(causes.items())))
         with storage_errors(f"cannot write {path}"):
-            _fill(part, header, places, results)
+            _fill(part, plan, places, results())
             os.replace(part, path)
     finally:
         part.unlink(missing_ok=True)
 
 
 @dataclass(frozen=True)
-class Room:
+class Extent:
     """Where an array is in the file, and its type and shape."""
 
     offset: int
@@ -87,35 +71,37 @@ class Room:
 
 
 def _lay_out(
-    part: Path, header: Header, causes: Mapping[tuple[int, int, int], str]
-) -> dict[str, Room]:
+    part: Path, plan: Plan, identity: str, causes: Mapping[tuple[int, int, int], str]
+) -> dict[str, Extent]:
     """Make the file with everything but long arrays; the places of these."""
-    layout, places = LogLayout(), dict[str, Room]()
+    layout, places, wanted = LogLayout(), dict[str, Extent](), plan.sweep.draws
+    cells, known = [cell.label for cell in plan.cells], plan.scenario.known_metrics()
+    shape = len(plan.laws), len(cells), wanted
     with h5py.File(layout, "w", **FILE, **UNDATED) as file:
-        facts = {"title": header.title, "identity": header.identity, "status": " ".join(STATUSES)}
-        describe(file, facts)
-        scales = [_labels(file, "law", header.laws), _labels(file, "cell", header.cells)]
-        scales.append(_labels(file, "draw", np.arange(header.shape[2], dtype=np.int32)))
-        for name, first in header.draws(0, 1).items():
+        title = plan.scenario.name
+        describe(file, {"title": title, "identity": identity, "status": " ".join(STATUSES)})
+        scales = [_labels(file, "law", plan.laws), _labels(file, "cell", cells)]
+        scales.append(_labels(file, "draw", np.arange(wanted, dtype=np.int32)))
+        for name, first in table(plan.sweep, 0, 1, plan.stream).items():
             if first.dtype.kind in NUMBERS:
                 path = f"{DRAWN}/{name}"
-                places[path] = _room(file, path, first.dtype, (header.wanted,), ())
+                places[path] = _extent(file, path, first.dtype, (wanted,), ())
             else:
-                words = header.draws(0, header.wanted)[name]
+                words = table(plan.sweep, 0, wanted, plan.stream)[name]
                 file.create_dataset(f"{DRAWN}/{name}", data=_column(words))
         file.create_dataset("failed_run", data=np.array(list(causes), np.int64).reshape(-1, 3))
         file.create_dataset("failed_cause", data=_labelled(list(causes.values()) or [""]))
         kinds: dict[str, Any] = {"status": np.uint8, "until": np.float64}
-        kinds |= dict.fromkeys(header.metrics, np.float64)
+        kinds |= dict.fromkeys(plan.metrics, np.float64)
         for name, kind in kinds.items():
-            places[name] = _room(file, name, kind, header.shape, scales)
-        for name, metric in header.metrics.items():
-            describe(file[name], {"units": metric.unit, "long_name": metric.meaning})
+            places[name] = _extent(file, name, kind, shape, scales)
+        for name in plan.metrics:
+            describe(file[name], {"units": known[name].unit, "long_name": known[name].meaning})
         for seal in (SEAL, SEAL_OF_THE_REST):
-            places[seal] = _room(file, seal, np.uint8, (64,), ())
+            places[seal] = _extent(file, seal, np.uint8, (64,), ())
     with new_file(part, layout.size) as out:
         layout.write_to(out)
-        out.truncate(max(layout.size, *(room.end for room in places.values())))
+        out.truncate(max(layout.size, *(extent.end for extent in places.values())))
     return places
 
 
@@ -125,9 +111,9 @@ def bytes_of(shape: tuple[int, int, int], metrics: int, drawn: int) -> int:
     return int(np.prod(shape)) * of_a_run + shape[2] * (4 + 8 * drawn) + HEAD * (metrics + 2)
 
 
-def _room(
+def _extent(
     file: h5py.File, name: str, kind: Any, shape: tuple[int, ...], scales: Sequence[h5py.Dataset]
-) -> Room:
+) -> Extent:
     """An array whose numbers podusv writes."""
     made = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
     made.set_obj_track_times(False)
@@ -140,7 +126,7 @@ def _room(
     dataset = h5py.Dataset(made)
     for position, scale in enumerate(scales):
         dataset.dims[position].attach_scale(scale)
-    return Room(made.get_offset(), little, shape)
+    return Extent(made.get_offset(), little, shape)
 
 
 def _labels(file: h5py.File, axis: str, labels: Any) -> h5py.Dataset:
@@ -160,32 +146,33 @@ def _column(drawn: Any) -> Any:
     return _labelled(values.tolist()) if values.dtype.kind == "U" else values
 
 
-def _fill(part: Path, header: Header, places: dict[str, Room], results: Iterable[Any]) -> None:
+def _fill(part: Path, plan: Plan, places: dict[str, Extent], results: Iterable[UnitResult]) -> None:
     """Write the long arrays, piece by piece. (An array in memory that is the file would take as
     much memory, and a full disk would end the process.)
     """
     seal, rest = places.pop(SEAL), places.pop(SEAL_OF_THE_REST)
+    wanted = plan.sweep.draws
     drawn = {name: places.pop(name) for name in list(places) if name.startswith(f"{DRAWN}/")}
     with part.open("r+b", buffering=0) as out:
-        for first in range(0, header.wanted if drawn else 0, ROWS):
-            columns = header.draws(first, min(ROWS, header.wanted - first))
-            for name, room in drawn.items():
-                numbers = columns[name.removeprefix(f"{DRAWN}/")]
-                write_at(out, room.place(first), room.content(numbers))
-        for name, room in places.items():
-            _blank(out, room, MISSING if name == "status" else np.nan)
+        for first in range(0, wanted if drawn else 0, ROWS):
+            columns = table(plan.sweep, first, min(ROWS, wanted - first), plan.stream)
+            for name, extent in drawn.items():
+                column = columns[name.removeprefix(f"{DRAWN}/")]
+                write_at(out, extent.place(first), extent.content(column))
+        for name, extent in places.items():
+            _blank(out, extent, NOT_MADE if name == "status" else np.nan)
         for result in results:
             unit = result.unit
-            if unit.draws.stop > header.wanted:
+            if unit.draws.stop > wanted:
                 raise StorageError(
-                    f"cannot write runs.h5 of {header.wanted} draws: there are runs of "
+                    f"cannot write runs.h5 of {wanted} draws: there are runs of "
                     f"{unit.draws.stop} draws, which another process has added; run it again"
                 )
-            at = (header.laws.index(unit.law), unit.cell, unit.first)
+            at = (plan.laws.index(unit.law), unit.cell, unit.first)
             arrays = {**result.metrics, "status": result.status, "until": result.until}
             for name, numbers in arrays.items():
                 write_at(out, places[name].place(*at), places[name].content(numbers))
-        found = digest(piece for room in places.values() for piece in _pieces(out, room))
+        found = digest(piece for extent in places.values() for piece in _pieces(out, extent))
         write_at(out, seal.offset, found.encode())
         with h5py.File(part, "r") as file:
             found = digest_of_the_rest(file)
@@ -193,14 +180,14 @@ def _fill(part: Path, header: Header, places: dict[str, Room], results: Iterable
         os.fsync(out.fileno())
 
 
-def _blank(out: Any, room: Room, content: float) -> None:
-    for start in range(room.offset, room.end, BLOCK):
-        count = (min(BLOCK, room.end - start)) // room.kind.itemsize
-        write_at(out, start, room.content(np.full(count, content)))
+def _blank(out: Any, extent: Extent, content: float) -> None:
+    for start in range(extent.offset, extent.end, BLOCK):
+        count = (min(BLOCK, extent.end - start)) // extent.kind.itemsize
+        write_at(out, start, extent.content(np.full(count, content)))
 
 
-def _pieces(out: Any, room: Room) -> Iterator[bytes]:
+def _pieces(out: Any, extent: Extent) -> Iterator[bytes]:
     """The bytes of an array in the file, piece by piece."""
-    for start in range(room.offset, room.end, BLOCK):
+    for start in range(extent.offset, extent.end, BLOCK):
         out.seek(start)
-        yield out.read(min(BLOCK, room.end - start))
+        yield out.read(min(BLOCK, extent.end - start))

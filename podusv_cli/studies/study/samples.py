@@ -7,13 +7,15 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from podusv_cli.core.kernel import Vector
-from podusv_cli.scenario.expressions import function, literal, refuse
+from podusv_cli.expressions.margins import SIGNS
+from podusv_cli.expressions.reading import function, number, refuse
 from podusv_cli.studies.study import statistics
-from podusv_cli.studies.study.expressions import SIGNS, OverLaws
+from podusv_cli.studies.study.expressions import OverLaws
 from podusv_cli.studies.study.runs import Mask
 from podusv_cli.studies.study.statistics import Interval
 
@@ -31,21 +33,19 @@ class Sample(ABC):
     unknown: int
     both_failed: int = field(default=0, kw_only=True)
     close: int = field(default=0, kw_only=True)
+    has_margin: ClassVar[bool]  # of the bound that the statistic is compared with
 
     @abstractmethod
     def interval(self, level: float) -> Interval:
         """The statistic with its interval."""
 
     @abstractmethod
-    def holds(self, sign: ast.cmpop, bound: float, margin: float, level: float) -> bool | None:
-        """Whether the comparison holds all over the interval, or nowhere in it; else None."""
-
-    @abstractmethod
     def needed(self, sign: ast.cmpop, bound: float, margin: float, level: float) -> int | None:
         """Draws that would decide a comparison if they continue like these; None: none would."""
 
-    def _holds(self, sign: ast.cmpop, bound: float, margin: float, level: float) -> bool | None:
-        found = self.interval(level)
+    def holds(self, sign: ast.cmpop, bound: float, margin: float, level: float) -> bool | None:
+        """Whether the comparison holds all over the interval, or nowhere in it; else None."""
+        found, margin = self.interval(level), margin if self.has_margin else 0.0
         ends = [bool(SIGNS[type(sign)](end, bound, margin)) for end in (found.low, found.high)]
         return ends[0] if self.n and ends[0] == ends[1] else None
 
@@ -55,16 +55,13 @@ class Share(Sample):
     """A share of draws: those in which something held. The margin is inside what held."""
 
     yes: int
+    has_margin = False
 
     def interval(self, level: float) -> Interval:
         """Clopper and Pearson's."""
         if not self.n:
             return Interval(math.nan, 0.0, 1.0)
         return statistics.share(self.yes, self.n, level, self.unknown)
-
-    def holds(self, sign: ast.cmpop, bound: float, margin: float, level: float) -> bool | None:
-        """The bound of a share has no margin."""
-        return self._holds(sign, bound, 0.0, level)
 
     def needed(self, sign: ast.cmpop, bound: float, margin: float, level: float) -> int | None:
         """As if the share stayed as it is."""
@@ -77,16 +74,13 @@ class Quantile(Sample):
 
     values: Vector
     q: float
+    has_margin = True
 
     def interval(self, level: float) -> Interval:
         """Between two of the values."""
         if not self.n:
             return Interval(math.nan, -math.inf, math.inf)
         return statistics.quantile(self.values, self.q, level)
-
-    def holds(self, sign: ast.cmpop, bound: float, margin: float, level: float) -> bool | None:
-        """The bound has the margin."""
-        return self._holds(sign, bound, margin, level)
 
     def needed(self, sign: ast.cmpop, bound: float, margin: float, level: float) -> int | None:
         """As if the share of values beyond the bound stayed as it is, which decides just so."""
@@ -97,14 +91,7 @@ class Quantile(Sample):
         return statistics.needed(held, self.q if upper else 1.0 - self.q, level)
 
 
-def number(node: ast.expr) -> float:
-    """A number as written, with its sign. Raises ExpressionError."""
-    match node:
-        case ast.UnaryOp(op=ast.USub(), operand=part):
-            return -literal(part)
-    return literal(node)
-
-
+SHARE, FAILURES, QUANTILE, MEDIAN = "share", "failures", "quantile", "median"
 # Statistics: from the call and a walk over runs to the sample of a cell, among its used draws.
 Sampler = Callable[[str, int, Mask], Sample]
 
@@ -132,20 +119,34 @@ def _failures(call: ast.Call, walk: OverLaws) -> Sampler:
 
 
 def _quantile(call: ast.Call, walk: OverLaws) -> Sampler:
-    node, share = _arguments(call, 2, "a number of each draw and a share: quantile(a.iae, 0.95)")
-    q = number(share)
-    if not 0.0 < q < 1.0:
-        refuse(call, "the share must lie between 0 and 1, as in quantile(a.iae, 0.95)")
-    return _at_share(node, q, walk)
+    return _at_share(*part_of(call, DRAWS), walk)
 
 
-def _median(call: ast.Call, walk: OverLaws) -> Sampler:
-    node = _arguments(call, 1, "one number of each draw, as in median(a.iae / b.iae)")[0]
-    return _at_share(node, statistics.MEDIAN, walk)
+class Wording(NamedTuple):
+    """What messages call a run, a number and a ratio of numbers."""
+
+    each: str
+    number: str
+    ratio: str
+
+
+DRAWS = Wording("draw", "a.iae", "a.iae / b.iae")
+
+
+def part_of(call: ast.Call, wording: Wording) -> tuple[ast.expr, float]:
+    """What a median or quantile is of, and its share from 0 to 1. Raises ExpressionError."""
+    if function(call) == MEDIAN:
+        wanted = f"one number of each {wording.each}, as in median({wording.ratio})"
+        return _arguments(call, 1, wanted)[0], statistics.MEDIAN
+    example = f"quantile({wording.number}, 0.95)"
+    node, share = _arguments(call, 2, f"a number of each {wording.each} and a share: {example}")
+    if not 0.0 < number(share) < 1.0:
+        refuse(call, f"the share must lie between 0 and 1, as in {example}")
+    return node, number(share)
 
 
 def _at_share(node: ast.expr, q: float, walk: OverLaws) -> Sampler:
-    values = walk.number(node)
+    values = walk.side(node)
 
     def sample(label: str, cell: int, used: Mask) -> Quantile:
         chosen = values[cell][used]
@@ -160,7 +161,6 @@ def _arguments(call: ast.Call, count: int, wanted: str) -> list[ast.expr]:
     return call.args
 
 
-SHARE, FAILURES = "share", "failures"
 STATISTICS: dict[str, Callable[[ast.Call, OverLaws], Sampler]] = {
-    SHARE: _share, FAILURES: _failures, "quantile": _quantile, "median": _median,
+    SHARE: _share, FAILURES: _failures, QUANTILE: _quantile, MEDIAN: _quantile,
 }  # fmt: skip

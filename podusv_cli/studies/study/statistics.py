@@ -13,11 +13,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from math import inf, nan
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
 from podusv_cli.core.kernel import Vector
+from podusv_cli.expressions.margins import below
 
 MOST = 1_000_000_000  # draws; beyond this `needed` gives up
 MEDIAN = 0.5
@@ -29,6 +30,41 @@ class Interval(NamedTuple):
     estimate: Any
     low: Any
     high: Any
+
+    @classmethod
+    def of(cls, row: Any, name: str) -> Self:
+        """That of a number in a row of a table, which has it in `columns`."""
+        return cls(row[name], row[f"{name}_low"], row[f"{name}_high"])
+
+    def columns(self, name: str) -> dict[str, Any]:
+        """The number and the ends by the names of their columns."""
+        return {name: self.estimate, f"{name}_low": self.low, f"{name}_high": self.high}
+
+    def __format__(self, form: str) -> str:
+        """`0.12 [0.1, 0.14]`, or the estimate alone where there is no interval.
+
+        With a % at its end the form is that of percentages; an empty one is as `digits`.
+        """
+        estimate, low, high = self._texts(form)
+        ends = "" if np.isnan(self.low) else f" [{low}, {high}]"
+        return f"{estimate}{' %' if form.endswith('%') else ''}{ends}"
+
+    def ends(self, form: str) -> str:
+        """`0.1 to 0.14`, or `-` where there is no interval."""
+        _, low, high = self._texts(form)
+        unit = " %" if form.endswith("%") else ""
+        return "-" if np.isnan(self.low) else f"{low} to {high}{unit}"
+
+    def _texts(self, form: str) -> list[str]:
+        factor, form = (100.0, form[:-1]) if form.endswith("%") else (1.0, form)
+        return [f"{factor * number:{form}}" if form else digits(number) for number in self]
+
+
+def digits(number: float) -> str:
+    """A metric over all draws; infinite is a failed run, not a number is none."""
+    if np.isnan(number):
+        return "-"
+    return "failed" if np.isinf(number) else f"{number:.5g}"
 
 
 def share(yes: Any, n: Any, level: float, unknown: Any = 0) -> Interval:
@@ -89,21 +125,6 @@ def _at(ordered: Vector, rank: int) -> Any:
     if 1 <= rank <= n:
         return ordered[..., rank - 1][()]
     return np.full(ordered.shape[:-1], inf if rank > n else -inf)[()]
-
-
-def below(a: Any, b: Any, margin: float) -> Any:
-    """Where a is smaller than b by more than the margin, relative to the larger of the two."""
-    with np.errstate(invalid="ignore"):
-        return np.subtract(b, a) > _around(np.maximum(np.abs(a), np.abs(b)), margin)
-
-
-def at_most(a: Any, b: Any, margin: float) -> Any:
-    """Where a exceeds b by no more than the margin, relative to b."""
-    return np.less_equal(a, np.add(b, _around(b, margin)))
-
-
-def _around(number: Any, margin: float) -> Any:
-    return margin * np.abs(np.where(np.isfinite(number), number, 0.0))
 
 
 @dataclass(frozen=True)

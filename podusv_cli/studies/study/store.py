@@ -17,10 +17,9 @@ import hashlib
 import io
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass
-from functools import partial
+from dataclasses import asdict
 from itertools import chain
 from pathlib import Path
 from types import MappingProxyType
@@ -35,7 +34,6 @@ from podusv_cli.scenario.plugins import again
 from podusv_cli.storage import files, hdf5, json_files
 from podusv_cli.storage.run_folder import STUDY
 from podusv_cli.studies.study import record, runs_file, runs_writer
-from podusv_cli.studies.study.draws import table
 from podusv_cli.studies.study.plan import Plan, digest, disagreements
 from podusv_cli.studies.study.runs import Mask
 from podusv_cli.studies.study.unit import Unit, UnitResult
@@ -131,7 +129,8 @@ class Store:
 
     def write(self, result: UnitResult) -> None:
         """Keep the result of a unit. Raises StorageError."""
-        name = "{}-{}-{}-{}.h5".format(*_place(result.unit, self.plan))
+        unit = result.unit
+        name = f"{unit.law}-{unit.cell}-{unit.first}-{unit.count}.h5"
         files.write_bytes(self.folder / UNITS / name, encoded(result, self.seal))
 
     def results(self) -> Iterator[UnitResult]:
@@ -152,7 +151,7 @@ class Store:
         StorageError.
         """
         paths = [path for path in self._units() if undamaged(_content(path), self.seal)]
-        self._write_table(lambda: self._these(paths))
+        runs_writer.write(self.folder / RUNS, self.plan, self.seal, lambda: self._these(paths))
         if all(self.runs().tried(law).all() for law in self.plan.laws):
             with files.storage_errors(f"cannot remove the files in {self.folder / UNITS}"):
                 for path in paths:
@@ -168,15 +167,6 @@ class Store:
                     "runs; restore the file"
                 )
             yield result
-
-    def _write_table(self, results: Callable[[], Iterator[UnitResult]]) -> None:
-        plan, known = self.plan, self.plan.scenario.known_metrics()
-        header = runs_writer.Header(
-            plan.scenario.name, self.seal, plan.laws, [cell.label for cell in plan.cells],
-            plan.sweep.draws, partial(table, plan.sweep, stream=plan.stream),
-            {name: known[name] for name in plan.metrics},
-        )  # fmt: skip
-        runs_writer.write(self.folder / RUNS, header, _Again(results))
 
     def runs(self) -> runs_file.Table:
         """The runs of a study that has runs.h5. Raises StorageError, also for altered numbers."""
@@ -213,20 +203,6 @@ class Store:
             if unit := undamaged(_content(path), self.seal):
                 there[unit.law, unit.cell][unit.first : unit.draws.stop] = True
         return there
-
-
-@dataclass(frozen=True)
-class _Again:
-    """Something that can be gone through more than once."""
-
-    make: Callable[[], Iterator[UnitResult]]
-
-    def __iter__(self) -> Iterator[UnitResult]:
-        return self.make()
-
-
-def _place(unit: Unit, plan: Plan) -> tuple[str, int, int, int]:
-    return unit.law, unit.cell, unit.first, unit.count
 
 
 def encoded(result: UnitResult, seal: str) -> bytes:

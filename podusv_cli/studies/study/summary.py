@@ -14,7 +14,7 @@ from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import CLOCKED, METRICS
 from podusv_cli.storage import csv_files
 from podusv_cli.studies.study import statistics
-from podusv_cli.studies.study.runs import Mask, Runs, worst
+from podusv_cli.studies.study.runs import Mask, StudyRuns, worst
 
 LEVEL = 0.95
 MARGIN = 0.01  # relative; of pairs
@@ -22,7 +22,7 @@ QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 Known = Mapping[str, Metric]
 
 
-def summary(runs: Runs, level: float = LEVEL, metrics: Known = METRICS) -> pd.DataFrame:
+def summary(runs: StudyRuns, level: float = LEVEL, metrics: Known = METRICS) -> pd.DataFrame:
     """For every law, cell and metric: failures and quantiles over all draws, with intervals."""
     rows = [
         {**_failures(runs, law, cell, level), "metric": name, "unit": metrics[name].unit,
@@ -34,26 +34,29 @@ def summary(runs: Runs, level: float = LEVEL, metrics: Known = METRICS) -> pd.Da
 
 
 def pairs(
-    runs: Runs, margin: float = MARGIN, level: float = LEVEL, metrics: Known = METRICS
-) -> pd.DataFrame:
+    runs: StudyRuns, margin: float = MARGIN, level: float = LEVEL, metrics: Known = METRICS,
+    names: Mapping[str, str] | None = None,
+) -> pd.DataFrame:  # fmt: skip
     """For every metric, cell and two laws a and b: who wins how often, and the median of a / b.
 
-    Of the draws that both laws met. A win is a smaller metric by more than the margin.
+    Of the draws that both laws met. A win is a smaller metric by more than the margin. `names` are
+    those of the runs' laws that are compared, by their names in the table; by default all.
     """
+    laws = names or {law: law for law in runs.laws}
     rows = [
         {"metric": name, "cell": runs.cells[cell], "a": a, "b": b, "margin": margin,
          **_pair(of_a[used], of_b[used], margin, level)}
         for name in _names(runs, metrics) for cell in range(len(runs.cells))
-        for a, b in combinations(runs.laws, 2)
-        for of_a, of_b in [(values_of(runs, law, cell, metrics[name]) for law in (a, b))]
-        for used in [runs.done(a)[cell] & runs.done(b)[cell]]
-        if all(has(runs, law, cell, metrics[name]) for law in (a, b))
+        for (a, one), (b, other) in combinations(laws.items(), 2)
+        for of_a, of_b in [(values_of(runs, law, cell, metrics[name]) for law in (one, other))]
+        for used in [runs.done(one)[cell] & runs.done(other)[cell]]
+        if all(has(runs, law, cell, metrics[name]) for law in (one, other))
     ]  # fmt: skip
     return pd.DataFrame(rows)
 
 
 def sensitivity(
-    runs: Runs, draws: Mapping[str, Any], level: float = LEVEL, metrics: Known = METRICS
+    runs: StudyRuns, draws: Mapping[str, Any], level: float = LEVEL, metrics: Known = METRICS
 ) -> pd.DataFrame:
     """Spearman's rank correlation of every metric with every drawn number, by law and cell.
 
@@ -87,17 +90,17 @@ def as_csv(frame: pd.DataFrame) -> str:
     return csv_files.text(frame, "%.6g")
 
 
-def _names(runs: Runs, metrics: Known) -> list[str]:
+def _names(runs: StudyRuns, metrics: Known) -> list[str]:
     """The metrics of these runs in the order of tables, without measured times."""
     return [name for name in metrics if name in runs.metrics and name not in CLOCKED]
 
 
-def values_of(runs: Runs, law: str, cell: int, about: Metric) -> Vector:
+def values_of(runs: StudyRuns, law: str, cell: int, about: Metric) -> Vector:
     """A metric of every draw of a cell; +inf for a run that failed."""
     return worst(about, runs.metric(law, about.name)[cell], ~runs.success(law)[cell])
 
 
-def has(runs: Runs, law: str, cell: int, about: Metric) -> bool:
+def has(runs: StudyRuns, law: str, cell: int, about: Metric) -> bool:
     """Whether the law has the metric: a run that succeeded has it, or there is no such run."""
     succeeded = runs.done(law)[cell] & runs.success(law)[cell]
     values = values_of(runs, law, cell, about)[succeeded]
@@ -105,7 +108,7 @@ def has(runs: Runs, law: str, cell: int, about: Metric) -> bool:
 
 
 def _columns(
-    runs: Runs, law: str, cell: int, metrics: Known
+    runs: StudyRuns, law: str, cell: int, metrics: Known
 ) -> Iterator[tuple[str, Vector]]:  # fmt: skip
     """Every metric that the law has, over the draws of a cell that it met."""
     for name in _names(runs, metrics):
@@ -113,13 +116,13 @@ def _columns(
             yield name, values_of(runs, law, cell, metrics[name])[runs.done(law)[cell]]
 
 
-def _failures(runs: Runs, law: str, cell: int, level: float) -> dict[str, Any]:
+def _failures(runs: StudyRuns, law: str, cell: int, level: float) -> dict[str, Any]:
     done: Mask = runs.done(law)[cell]
     failed, n = int(np.sum(done & ~runs.success(law)[cell])), int(np.sum(done))
     return {
         "law": law, "cell": runs.cells[cell], "n": n,
         "broken": int(np.sum(done & runs.broken(law)[cell])),
-        **_named("failed", statistics.share(failed, n, level)),
+        **statistics.share(failed, n, level).columns("failed"),
     }  # fmt: skip
 
 
@@ -127,7 +130,7 @@ def _quantiles(values: Vector, level: float) -> dict[str, Any]:
     found: dict[str, Any] = {"unknown": int(np.isnan(values).sum())}
     intervals = statistics.quantiles(values, QUANTILES, level)
     for q, interval in zip(QUANTILES, intervals, strict=True):
-        found |= _named(f"q{round(100 * q):02d}", interval)
+        found |= interval.columns(f"q{round(100 * q):02d}")
     return found
 
 
@@ -136,10 +139,6 @@ def _pair(a: Vector, b: Vector, margin: float, level: float) -> dict[str, Any]:
     ratio = statistics.quantile(statistics.ratios(a, b), statistics.MEDIAN, level)
     return {
         "n": found.n, "ties": found.ties, "both_failed": found.both_failed,
-        "unknown": found.unknown, **_named("a_wins", found.win_rate(level)),
-        **_named("b_wins", found.loss_rate(level)), **_named("ratio", ratio),
+        "unknown": found.unknown, **found.win_rate(level).columns("a_wins"),
+        **found.loss_rate(level).columns("b_wins"), **ratio.columns("ratio"),
     }  # fmt: skip
-
-
-def _named(name: str, found: statistics.Interval) -> dict[str, Any]:
-    return {name: found.estimate, f"{name}_low": found.low, f"{name}_high": found.high}

@@ -20,7 +20,7 @@ from podusv_cli.studies.study.plan import Plan, watching
 # How a run can end. The position is the code in files; "missing" is a run that is not made yet.
 STATUSES = ("finished", "diverged", "hung", "crashed", "invalid", "missing")
 BROKEN = ("hung", "crashed", "invalid")  # no results of the law
-MISSING = STATUSES.index("missing")
+NOT_MADE = STATUSES.index("missing")
 Codes = npt.NDArray[np.uint8]
 
 

@@ -5,45 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal, Protocol, Self
+from typing import Self
 
-from podusv_cli.core.escaping import markdown, markdown_cell, markdown_code
+from podusv_cli.expressions.verdict import ANSWERS, Verdict
 from podusv_cli.studies.study.samples import Sample
-
-Answer = Literal["reproduced", "not reproduced", "cannot tell"]
-ANSWERS: dict[bool | None, Answer] = {
-    True: "reproduced",
-    False: "not reproduced",
-    None: "cannot tell",
-}
-
-
-class Stated(Protocol):
-    """A claim as it is written in a scenario."""
-
-    @property
-    def says(self) -> str:
-        """The claim in a sentence."""
-
-    @property
-    def source(self) -> str:
-        """Where it was published."""
-
-    @property
-    def expect(self) -> str:
-        """The claim as an expression."""
-
-    @property
-    def tolerance(self) -> float:
-        """The margin of its comparisons."""
-
-    @property
-    def remark(self) -> str:
-        """Choices made where the source is silent."""
+from podusv_cli.studies.study.statistics import Interval
 
 
 @dataclass(frozen=True)
-class Part:
+class Statistic:
     """A statistic of a claim in one cell, with its interval at this level.
 
     `unknown` draws lack a number. `both_failed` and `close` are draws without a winner.
@@ -76,8 +46,8 @@ class Part:
         counts += [f"both failed in {self.both_failed}"] if self.both_failed else []
         counts += [f"{self.close} within the margin"] if self.close else []
         counts += [f"a number is missing in {self.unknown}"] if self.unknown else []
-        interval = f"{self.estimate:.4g} [{self.low:.4g}, {self.high:.4g}]"
-        return f"{self.statistic}{at} = {interval} ({', '.join(counts)})"
+        interval = Interval(self.estimate, self.low, self.high)
+        return f"{self.statistic}{at} = {interval:.4g} ({', '.join(counts)})"
 
     def as_json(self) -> dict[str, object]:
         """Plain data; what is infinite or undefined is None."""
@@ -85,28 +55,20 @@ class Part:
 
 
 @dataclass(frozen=True, kw_only=True)
-class StudyVerdict:
+class StudyVerdict(Verdict):
     """The verdict on a claim about a study; `level` is that of the claim after Holm's correction.
 
     `needed` are the draws of a cell that would decide what is open, None where no number would.
     `broken` runs crashed, hung or were invalid; `without_broken` is the answer without their draws.
     """
 
-    name: str
-    claim: Stated
-    answer: bool | None
     level: float
     wanted: int
-    parts: Sequence[Part]
+    parts: Sequence[Statistic]
     by_cell: dict[str, bool | None]
     needed: Sequence[int | None]
     broken: int
     without_broken: bool | None
-
-    @property
-    def verdict(self) -> Answer:
-        """The answer in words."""
-        return ANSWERS[self.answer]
 
     @property
     def draws(self) -> int:
@@ -182,20 +144,3 @@ class StudyVerdict:
 
 def _plain(value: object) -> object:
     return value if not isinstance(value, float) or math.isfinite(value) else None
-
-
-def as_markdown(verdicts: Sequence[StudyVerdict]) -> str:
-    """The verdicts as a table, followed by remarks."""
-    rows = [
-        f"| {markdown_cell(v.name)} | "
-        f"{markdown_cell(v.claim.says)} ({markdown_cell(v.claim.source)}) | "
-        f"**{v.verdict}**{', preliminary' if v.preliminary else ''} | "
-        f"{markdown_code(v.claim.expect)}, tolerance {v.claim.tolerance:g} | "
-        f"{markdown_cell(v.evidence())} |"
-        for v in verdicts
-    ]
-    remarks = [
-        f"- {markdown(v.name)}: {markdown(v.claim.remark)}" for v in verdicts if v.claim.remark
-    ]
-    head = ["| | claim | verdict | put as | numbers |", "|---|---|---|---|---|"]
-    return "\n".join([*head, *rows, *(["", *remarks] if remarks else []), ""])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from podusv_cli.scenario.expressions import ExpressionError
+from podusv_cli.expressions.reading import ExpressionError
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.tune import Tune
 from podusv_cli.scenario.yaml_tree import Route

@@ -1,13 +1,14 @@
-"""Figures of a search, as functions of plain tables.
+"""Figures of a search: which there are, with their captions, and how each is drawn.
 
-Import this module where a figure is drawn, because matplotlib is slow to import. Draw and save
-inside `figures.style.house_style()`.
+They are drawn from plain tables. Import this module where a figure is drawn, because matplotlib is
+slow to import.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,11 @@ from matplotlib.ticker import NullFormatter
 from podusv_cli.core import escaping
 from podusv_cli.core.kernel import Vector
 from podusv_cli.figures.style import TARGET_LOOK, legend, look, new_figure
-from podusv_cli.studies.tuning.space import Gain
+from podusv_cli.studies.sketch import COLUMNS, Sketch
+from podusv_cli.studies.study.figures import ratios
+from podusv_cli.studies.tuning.results import Results
+from podusv_cli.studies.tuning.space import Gain, units_of
+from podusv_cli.studies.tuning.trials import front
 
 ROW, FRAME = 0.2, 0.75  # inches: a row of a chart, and what is around the rows
 ACROSS = 4  # small panels in a row
@@ -28,10 +33,91 @@ TOP = 2.0  # times the scenario's objective, where an axis ends
 SMALL: dict[str, Any] = {"fontsize": 6.5}
 
 
-def before_and_after(laws: pd.DataFrame, label: str, columns: int = 2) -> Figure:
+def sketches(results: Results) -> Iterator[Sketch]:
+    """The figures that there are numbers for."""
+
+    objective = results.plan.tune.objectives[0]
+    yield Sketch(
+        "validation",
+        f"{objective} on the fresh draws, before (hollow) and after the search (filled), with "
+        f"{100 * results.level:g} % intervals",
+        partial(before_and_after, results.laws, results.label(0)),
+    )
+    if results.winners:
+        yield from _of_searches(results, objective)
+
+
+def _of_searches(results: Results, objective: str) -> Iterator[Sketch]:
+
+    yield Sketch(
+        "history",
+        f"best {objective} on the training draws so far, a curve for each repeat: the curves begin "
+        "with the scenario's gains; one rises where a trial holds the inequalities better",
+        partial(history, results.history, results.label(0)),
+    )
+    rows = results.pairs[(results.pairs["when"] == "tuning")]
+    rows = rows[rows.metric == (results.shown[0])]
+    if len(rows):
+        yield Sketch(
+            "ratios",
+            f"what the search changed in {results.shown[0]}: the median ratio of each law after "
+            "and before in the same fresh draw, with its interval; below 1 is better",
+            partial(ratios, rows),
+        )
+    if len(results.plan.objectives) > 1:
+        yield _front(results)
+    if len(results.importance):
+        yield Sketch(
+            "importance",
+            "importance of each gain: the share of the variation between good trials and all that "
+            "it explains (PED-ANOVA); the lines go from the least to the most of all repeats and "
+            "parts of the trials",
+            partial(importance, results.importance),
+        )
+    for law in results.winners:
+        yield _slices(results, law, objective)
+
+
+def _front(results: Results) -> Sketch:
+
+    points = {
+        law: np.array(sorted(t.values for trials in all_ for t in front(trials))).reshape(-1, 2)
+        for law, all_ in results.trials.items()
+    }
+    taken = {law: results.winner(law).values for law in results.winners}
+    first = {law: all_[0][0].values for law, all_ in results.trials.items()}
+    labels = results.label(0), results.label(1)
+    return Sketch(
+        "front",
+        "Pareto front of the training draws: trials that no other trial of the law is better than "
+        "in both objectives; a star is what was taken, a cross are the scenario's gains",
+        partial(pareto, points, taken, first, labels),
+    )
+
+
+def _slices(results: Results, law: str, objective: str) -> Sketch:
+    tried = pd.DataFrame(
+        [
+            {**trial.gains, "objective": trial.values[0], "repeat": repeat}
+            for repeat, trials in enumerate(results.trials[law]) for trial in trials
+        ]
+    )  # fmt: skip
+    return Sketch(
+        f"slices-{law}",
+        f"every trial of {law} by each of its gains: {objective} over the draws that the trial "
+        "met, a colour for each repeat; the full line is the gain that was found, the broken one "
+        "the scenario's",
+        partial(
+            slices, tried, results.plan.gains[law], results.winner(law).gains,
+            results.label(0), units_of(results.plan.laws[law]),
+        ),
+    )  # fmt: skip
+
+
+def before_and_after(laws: pd.DataFrame, label: str) -> Figure:
     """The objective of every law with its interval, before and after, best law on top."""
     ordered = laws.sort_values("objective_after", ignore_index=True)
-    figure = new_figure(columns, FRAME + 1.4 * ROW * len(ordered))
+    figure = new_figure(COLUMNS, FRAME + 1.4 * ROW * len(ordered))
     axes = figure.add_subplot()
     for row, law in ordered.iterrows():
         place = float(str(row))
@@ -46,7 +132,7 @@ def before_and_after(laws: pd.DataFrame, label: str, columns: int = 2) -> Figure
     axes.set_yticks(range(len(ordered)), [escaping.figure(law) for law in ordered.law])
     axes.set_ylim(len(ordered) - 0.4, -0.6)
     axes.set_xlabel(escaping.figure(label))
-    legend(figure, columns)
+    legend(figure, COLUMNS)
     return figure
 
 
@@ -59,9 +145,9 @@ def _ranged(axes: Axes, y: float, law: Any, when: str, fill: str) -> None:
         axes.plot(estimate, y, "o", markersize=3.6, color=colour, markerfacecolor=fill)
 
 
-def history(trials: pd.DataFrame, label: str, columns: int = 2) -> Figure:
+def history(trials: pd.DataFrame, label: str) -> Figure:
     """The best objective so far over simulated runs."""
-    figure = new_figure(columns, 2.8)
+    figure = new_figure(COLUMNS, 2.8)
     axes = figure.add_subplot()
     for place, (law, rows) in enumerate(trials.groupby("law", sort=False)):
         colour, style, _ = look(place)
@@ -71,16 +157,16 @@ def history(trials: pd.DataFrame, label: str, columns: int = 2) -> Figure:
                 linestyle=style, linewidth=0.9, label=escaping.figure(str(law)) if not i else None,
             )  # fmt: skip
     axes.set(xlabel="simulated runs of a search", ylabel=f"best {escaping.figure(label)} so far")
-    legend(figure, columns)
+    legend(figure, COLUMNS)
     return figure
 
 
 def pareto(
     fronts: Mapping[str, Vector], taken: Mapping[str, Sequence[float]],
-    first: Mapping[str, Sequence[float]], labels: tuple[str, str], columns: int = 2,
+    first: Mapping[str, Sequence[float]], labels: tuple[str, str],
 ) -> Figure:  # fmt: skip
     """The front of every law, what was taken, and where the scenario's gains are."""
-    figure = new_figure(columns, 3.2)
+    figure = new_figure(COLUMNS, 3.2)
     axes = figure.add_subplot()
     for place, (law, points) in enumerate(fronts.items()):
         colour, _, marker = look(place)
@@ -91,17 +177,17 @@ def pareto(
         axes.plot(*taken[law], marker="*", markersize=9.0, color=colour, linestyle="none")
         axes.plot(*first[law], marker="x", markersize=5.0, color=colour, linestyle="none")
     axes.set(xlabel=escaping.figure(labels[0]), ylabel=escaping.figure(labels[1]))
-    legend(figure, columns)
+    legend(figure, COLUMNS)
     return figure
 
 
-def importance(table: pd.DataFrame, columns: int = 2) -> Figure:
+def importance(table: pd.DataFrame) -> Figure:
     """A panel for each law with a bar for each gain."""
     laws = list(dict.fromkeys(table.law))
     across = min(len(laws), ACROSS - 1)
     down = math.ceil(len(laws) / across)
     most = int(table.groupby("law").size().max())
-    figure = new_figure(columns, down * (0.45 + 0.13 * most))
+    figure = new_figure(COLUMNS, down * (0.45 + 0.13 * most))
     panels = figure.subplots(down, across, squeeze=False).ravel()
     for law, axes in zip(laws, panels, strict=False):
         rows = table[table.law == law].sort_values("importance", ascending=False)
@@ -119,12 +205,12 @@ def importance(table: pd.DataFrame, columns: int = 2) -> Figure:
 
 def slices(
     tried: pd.DataFrame, gains: Sequence[Gain], found: Mapping[str, Any], label: str,
-    units: Mapping[str, str], columns: int = 2,
+    units: Mapping[str, str],
 ) -> Figure:  # fmt: skip
     """A panel for each gain of a law, a point for each trial."""
     across = min(len(gains), ACROSS)
     down = math.ceil(len(gains) / across)
-    figure = new_figure(columns, 0.3 + PANEL * down)
+    figure = new_figure(COLUMNS, 0.3 + PANEL * down)
     panels = figure.subplots(down, across, squeeze=False, sharey=True)
     values = tried.objective.to_numpy(float)
     shown = values[np.isfinite(values)]

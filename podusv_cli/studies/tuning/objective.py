@@ -11,30 +11,32 @@ from __future__ import annotations
 
 import ast
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
 from podusv_cli.core.kernel import Vector
+from podusv_cli.expressions.margins import SIGNS
+from podusv_cli.expressions.reading import function, known, literal, number, refuse, syntax_tree
+from podusv_cli.expressions.walk import ARITHMETIC, Condition
 from podusv_cli.metrics.metric import Metric
-from podusv_cli.scenario.expressions import function, known, literal, refuse, syntax_tree
 from podusv_cli.studies.study import statistics
-from podusv_cli.studies.study.expressions import ARITHMETIC, SIGNS, Walk
+from podusv_cli.studies.study.expressions import OfRuns
 from podusv_cli.studies.study.runs import Mask
-from podusv_cli.studies.study.samples import number
+from podusv_cli.studies.study.samples import FAILURES, MEDIAN, QUANTILE, Wording, part_of
 
 EXAMPLE, INEQUALITY = "median(iae)", "failures <= 0.05"
-FAILURES, MEDIAN, QUANTILE = "failures", "median", "quantile"
 STATISTICS = (MEDIAN, QUANTILE)
+RUNS = Wording("run", "iae", "iae")
 INVENTED = 1000  # runs on which an expression is tried
 UPWARD = (ast.Gt, ast.GtE)
 SCALING = (ast.Mult, ast.Div)  # a negative part turns round what the other means
 FALLING = (ast.Sub, ast.Div)  # the more of the second part, the less of the whole
 
 
-class Runs(NamedTuple):
+class Outcomes(NamedTuple):
     """The runs of one law with the same gains: metrics by name, and which runs failed."""
 
     metrics: Mapping[str, Vector]
@@ -51,13 +53,13 @@ class Inequality(NamedTuple):
 
 
 @dataclass
-class OfRuns(Walk):
+class OfGains(OfRuns):
     """A number of each run, from metrics by their names alone; failed runs are the worst."""
 
-    runs: Runs = field(kw_only=True)
+    runs: Outcomes = field(kw_only=True)
     names: list[str] = field(default_factory=list)  # of the metrics that were met
 
-    def metric(self, node: ast.expr) -> Vector:
+    def quantity(self, node: ast.expr) -> Vector:
         """A metric's name."""
         if not isinstance(node, ast.Name):
             refuse(node, "write metrics by their names alone, as in median(iae)")
@@ -66,7 +68,7 @@ class OfRuns(Walk):
         values = self.runs.metrics.get(name, np.full(self.runs.failed.shape, np.nan))
         return self.countable(name, values, self.runs.failed)
 
-    def property(self, node: ast.expr) -> Mask:
+    def property(self, node: ast.expr) -> Condition:
         """There are none."""
         refuse(node, "no condition here; write a number, as in median(iae)")
 
@@ -106,8 +108,8 @@ def _names(tree: ast.expr, metrics: Mapping[str, Metric]) -> list[str]:
     These are many and all differ, so that a spread of theirs is not zero. Raises ExpressionError.
     """
     numbers = np.random.default_rng(0).uniform(1.0, 2.0, (len(metrics), INVENTED))
-    walk = OfRuns(
-        metrics, runs=Runs(dict(zip(metrics, numbers, strict=True)), np.zeros(INVENTED, bool))
+    walk = OfGains(
+        metrics, runs=Outcomes(dict(zip(metrics, numbers, strict=True)), np.zeros(INVENTED, bool))
     )
     with np.errstate(all="ignore"):
         found = _evaluated(tree, walk, math.inf)
@@ -117,25 +119,25 @@ def _names(tree: ast.expr, metrics: Mapping[str, Metric]) -> list[str]:
 
 
 def evaluate(
-    tree: ast.expr, runs: Runs, metrics: Mapping[str, Metric], worst: float = math.inf
+    tree: ast.expr, runs: Outcomes, metrics: Mapping[str, Metric], worst: float = math.inf
 ) -> float:
     """The number of an objective; infinite where it is the worst or not known.
 
     `worst` is minus infinity where less is worse.
     """
     with np.errstate(all="ignore"):
-        found = float(_evaluated(tree, OfRuns(metrics, runs=runs), worst))
+        found = float(_evaluated(tree, OfGains(metrics, runs=runs), worst))
     return found if math.isfinite(found) else math.inf
 
 
-def excess(one: Inequality, runs: Runs, metrics: Mapping[str, Metric]) -> float:
+def excess(one: Inequality, runs: Outcomes, metrics: Mapping[str, Metric]) -> float:
     """By how much an inequality does not hold, relative to its bound; 0 or less where it holds."""
     found = evaluate(one.tree, runs, metrics, -math.inf if one.upward else math.inf)
     over = one.bound - found if one.upward and math.isfinite(found) else found - one.bound
     return over / (abs(one.bound) or 1.0)
 
 
-def _evaluated(node: ast.expr, walk: OfRuns, worst: float) -> Any:
+def _evaluated(node: ast.expr, walk: OfGains, worst: float) -> Any:
     match node:
         case ast.Constant():
             return np.float64(literal(node))
@@ -162,35 +164,18 @@ def _is_negative(node: ast.expr) -> bool:
     return isinstance(node, ast.UnaryOp)
 
 
-def _quantile(call: ast.Call, walk: OfRuns, worst: float) -> Any:
+def _quantile(call: ast.Call, walk: OfGains, worst: float) -> Any:
     share = share_of(call)
     return statistics.quantile(numbers_of(call, walk, worst), share, 0.5).estimate
 
 
-def numbers_of(call: ast.Call, walk: OfRuns, worst: float = math.inf) -> Vector:
+def numbers_of(call: ast.Call, walk: OfGains, worst: float = math.inf) -> Vector:
     """What a statistic is of: a number of each run, the worst where it failed or is not known."""
-    values = np.broadcast_to(walk.number(call.args[0]), walk.runs.failed.shape)
+    values = np.broadcast_to(walk.side(call.args[0]), walk.runs.failed.shape)
     return np.where(walk.runs.failed | np.isnan(values), worst, values)
 
 
 def share_of(call: ast.Call) -> float:
     """Which quantile a statistic is, from 0 to 1. Raises ExpressionError."""
-    return _shares[known(function(call), STATISTICS, "statistic")](call)
-
-
-def _half(call: ast.Call) -> float:
-    if len(call.args) != 1:
-        refuse(call, "median takes one number of each run, as in median(iae)")
-    return statistics.MEDIAN
-
-
-def _share(call: ast.Call) -> float:
-    if len(call.args) != 2:
-        refuse(call, "quantile takes a number of each run and a share: quantile(iae, 0.95)")
-    share = number(call.args[1])
-    if not 0.0 < share < 1.0:
-        refuse(call, "the share must lie between 0 and 1, as in quantile(iae, 0.95)")
-    return share
-
-
-_shares: dict[str, Callable[[ast.Call], float]] = {MEDIAN: _half, QUANTILE: _share}
+    known(function(call), STATISTICS, "statistic")
+    return part_of(call, RUNS)[1]

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from podusv_cli.pages.page import Picture
 from podusv_cli.process.extras import Extras
 from podusv_cli.storage import files
 from podusv_cli.studies.study.outputs import publish
 from podusv_cli.studies.study.summary import as_csv
 from podusv_cli.studies.tuning.results import Results
-
-TABLES = ("laws", "limits", "validation", "gains", "importance", "history")
 
 
 def write_tables(folder: Path, results: Results) -> None:
@@ -24,8 +23,13 @@ def write_tables(folder: Path, results: Results) -> None:
 
 def write_report(folder: Path, results: Results, extras: Extras, *, figures: bool) -> None:
     """Draw the figures and write the report; what fails is noted. Raises StorageError."""
-    from podusv_cli.studies.tuning import pictures, report
+    from podusv_cli.studies.tuning import report
 
-    drawn, shown = pictures.drawn(results, extras) if figures else ({}, [])
+    drawn, shown = dict[str, bytes](), list[Picture]()
+    if figures:
+        from podusv_cli.studies.sketch import rendered  # matplotlib is slow to import
+        from podusv_cli.studies.tuning.figures import sketches
+
+        drawn, shown = rendered(sketches(results), extras)
     page = extras.made("report.html", lambda: report.page(folder, results, shown, extras.missing))
     publish(folder, drawn, page, extras)

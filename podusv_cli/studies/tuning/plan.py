@@ -18,7 +18,12 @@ from podusv_cli.studies.study.cells import Cell
 from podusv_cli.studies.study.check import singles
 from podusv_cli.studies.study.expressions import parse_success, succeeded
 from podusv_cli.studies.study.unit import STATUSES, UnitResult
-from podusv_cli.studies.tuning.objective import Inequality, Runs, parse_inequality, parse_objective
+from podusv_cli.studies.tuning.objective import (
+    Inequality,
+    Outcomes,
+    parse_inequality,
+    parse_objective,
+)
 from podusv_cli.studies.tuning.space import Gain, gains
 
 TRAIN, VALIDATE = "tune", "tune validation"  # streams of draws, beside a sweep's own
@@ -135,7 +140,7 @@ class TunePlan:
         told = tuple((name, law, tuple(new.items())) for name, (law, new) in laws.items())
         return self.base.varied(study.Variant(stream, draws, told))
 
-    def runs(self, results: list[UnitResult]) -> Runs:
+    def runs(self, results: list[UnitResult]) -> Outcomes:
         """The runs of some units, in their order; failed is what the study calls no success."""
         import numpy as np
 
@@ -146,7 +151,7 @@ class TunePlan:
             for name in names
         }
         ended = np.concatenate([one.status == STATUSES.index("finished") for one in results])
-        return Runs(metrics, ~succeeded(self._success, metrics, ended, self.metrics))
+        return Outcomes(metrics, ~succeeded(self._success, metrics, ended, self.metrics))
 
     @cached_property
     def identity(self) -> dict[str, Any]:

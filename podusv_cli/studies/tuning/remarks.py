@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
+from podusv_cli.studies.study.statistics import Interval
 from podusv_cli.studies.tuning.plan import ENOUGH, is_few
 from podusv_cli.studies.tuning.results import MARGIN, Results
 from podusv_cli.studies.tuning.trials import FINISHED
@@ -32,8 +33,7 @@ def _answer(results: Results) -> Iterator[str]:
             yield (
                 f"{best} has the least {results.plan.tune.objectives[0]} after the search; in the "
                 f"same draw, the median ratio of {metric} of {row['a']} and {row['b']} is "
-                f"{row['ratio']:.3f} [{row['ratio_low']:.3f}, {row['ratio_high']:.3f}]: "
-                f"{_verdict(row)}"
+                f"{Interval.of(row, 'ratio'):.3f}: {_verdict(row)}"
             )
 
 

@@ -9,8 +9,8 @@ from typing import Any
 
 from podusv_cli.pages.page import Picture, environment, flat, value_text
 from podusv_cli.process.extras import Missing
-from podusv_cli.studies.study.results import digits
-from podusv_cli.studies.study.sittings import sittings
+from podusv_cli.studies.study.sessions import sessions
+from podusv_cli.studies.study.statistics import Interval, digits
 from podusv_cli.studies.study.words import in_words
 from podusv_cli.studies.tuning.remarks import remarks
 from podusv_cli.studies.tuning.results import OBJECTIVES, Results
@@ -47,7 +47,7 @@ def page(
         figures=numbered,
         metrics=plan.metrics,
         missing=[str(one) for one in missing],
-        latest=[(key, value_text(value)) for key, value in flat((sittings(folder) or [{}])[-1])],
+        latest=[(key, value_text(value)) for key, value in flat((sessions(folder) or [{}])[-1])],
     )  # fmt: skip
 
 
@@ -66,15 +66,7 @@ def _laws(results: Results) -> Iterator[dict[str, Any]]:
 def intervals(row: Any, when: str) -> str:
     """Every objective with its interval."""
     names = [f"{name}_{when}" for name in OBJECTIVES]
-    return " and ".join(_interval(row, name) for name in names if name in row)
-
-
-def _interval(row: Any, name: str) -> str:
-    """A number with its interval, where it has one."""
-    estimate, low, high = (row[f"{name}{end}"] for end in ("", "_low", "_high"))
-    if math.isnan(low):
-        return digits(estimate)
-    return f"{digits(estimate)} [{digits(low)}, {digits(high)}]"
+    return " and ".join(f"{Interval.of(row, name)}" for name in names if name in row)
 
 
 def percent(row: Any, name: str) -> str:
@@ -84,7 +76,7 @@ def percent(row: Any, name: str) -> str:
 
 def ratio(row: Any) -> str:
     """A median ratio with its interval."""
-    return f"{row['ratio']:.3f} [{row['ratio_low']:.3f}, {row['ratio_high']:.3f}]"
+    return f"{Interval.of(row, 'ratio'):.3f}"
 
 
 def spread(row: Any) -> str:
@@ -124,8 +116,7 @@ def _gains(results: Results) -> Iterator[dict[str, Any]]:
         at = (row["law"], row["gain"])
         told = "-"
         if share is not None and at in share.index:
-            one = share.loc[at]
-            told = f"{100 * one.importance:.0f} % [{100 * one.low:.0f}, {100 * one.high:.0f}]"
+            told = f"{Interval(*share.loc[at]):.0f%}"
         numbers = {name: value_text(row[name]) for name in ("before", "after")}
         numbers |= {name: _end(row[name]) for name in ("low", "high")}
         yield row | numbers | {"unit": units[row["law"]][row["gain"]], "share": told}

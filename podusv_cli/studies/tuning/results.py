@@ -17,8 +17,8 @@ from podusv_cli.studies.study.runs_file import Table
 from podusv_cli.studies.study.statistics import Interval
 from podusv_cli.studies.tuning.objective import (
     Inequality,
-    OfRuns,
-    Runs,
+    OfGains,
+    Outcomes,
     evaluate,
     excess,
     named,
@@ -29,7 +29,7 @@ from podusv_cli.studies.tuning.plan import TunePlan
 from podusv_cli.studies.tuning.sampler import importances
 from podusv_cli.studies.tuning.space import Gain
 from podusv_cli.studies.tuning.trials import FINISHED, Trial
-from podusv_cli.studies.tuning.validation import View, chosen, repeated, tuned
+from podusv_cli.studies.tuning.validation import chosen, repeated, tuned
 
 ALWAYS = ("iae", "z_e_steady")  # metrics that the tables have beside those of the objective
 OBJECTIVES = ("objective", "second_objective")  # columns
@@ -76,10 +76,10 @@ class Results:
         """The trial whose gains are taken."""
         return self.winners[law][chosen(self.winners[law])]
 
-    def met(self, name: str) -> Runs:
+    def met(self, name: str) -> Outcomes:
         """The fresh runs of a law by the name of the table."""
         metrics = {n: self.runs.metric(name, n)[0] for n in self.runs.metrics}
-        return Runs(metrics, ~self.runs.success(name)[0])
+        return Outcomes(metrics, ~self.runs.success(name)[0])
 
     @cached_property
     def laws(self) -> pd.DataFrame:
@@ -105,9 +105,9 @@ class Results:
         for when, name in (("before", law), ("after", self.after(law))):
             runs = self.met(name)
             failed = statistics.share(int(runs.failed.sum()), len(runs.failed), self.level)
-            told |= _interval(f"failed_{when}", failed)
+            told |= failed.columns(f"failed_{when}")
             for i, tree in enumerate(self.plan.objectives):
-                told |= _interval(f"{OBJECTIVES[i]}_{when}", self.objective(runs, tree))
+                told |= self.objective(runs, tree).columns(f"{OBJECTIVES[i]}_{when}")
         found = self.pairs
         own = found[(found["when"] == "tuning") & (found.a == tuned(law))]
         own = own[own.metric == self.shown[0]]
@@ -119,12 +119,12 @@ class Results:
         )
         return told
 
-    def objective(self, runs: Runs, tree: ast.expr) -> Interval:
+    def objective(self, runs: Outcomes, tree: ast.expr) -> Interval:
         """An objective, with an interval where it is one quantile of one number."""
         found = evaluate(tree, runs, self.plan.metrics)
         if not isinstance(tree, ast.Call):
             return Interval(found, math.nan, math.nan)
-        values = numbers_of(tree, OfRuns(self.plan.metrics, runs=runs))
+        values = numbers_of(tree, OfGains(self.plan.metrics, runs=runs))
         ends = statistics.quantile(values, share_of(tree), self.level)
         return Interval(found, ends.low, ends.high)
 
@@ -146,7 +146,7 @@ class Results:
     def _limit(self, one: Inequality, name: str) -> dict[str, Any]:
         runs = self.met(name)
         holds = excess(one, runs, self.plan.metrics) <= 0.0
-        return {**_interval("value", self.objective(runs, one.tree)), "holds": holds}
+        return {**self.objective(runs, one.tree).columns("value"), "holds": holds}
 
     def spread(self, law: str) -> list[float]:
         """The objective on the fresh draws of every repeat's winner."""
@@ -161,17 +161,15 @@ class Results:
     @cached_property
     def pairs(self) -> pd.DataFrame:
         """Two laws in the same fresh draws: all before, all after, and each after and before."""
-        laws, known = list(self.plan.laws), self.plan.metrics
-        views = [
-            ("before", View(self.runs, {law: law for law in laws}, self.shown)),
-            ("after", View(self.runs, {law: self.after(law) for law in laws}, self.shown)),
-            *(
-                ("tuning", View(self.runs, {tuned(law): tuned(law), law: law}, self.shown))
-                for law in self.winners
-            ),
+        known = {name: about for name, about in self.plan.metrics.items() if name in self.shown}
+        compared = [
+            ("before", {law: law for law in self.plan.laws}),
+            ("after", {law: self.after(law) for law in self.plan.laws}),
+            *(("tuning", {tuned(law): tuned(law), law: law}) for law in self.winners),
         ]
         tables = [
-            summary.pairs(view, MARGIN, self.level, known).assign(when=when) for when, view in views
+            summary.pairs(self.runs, MARGIN, self.level, known, names).assign(when=when)
+            for when, names in compared
         ]
         return pd.concat([one for one in tables if len(one)] or tables, ignore_index=True)
 
@@ -234,10 +232,6 @@ def _ends(gain: Gain) -> dict[str, float]:
     """The ends of a range; words have none."""
     low, high = (math.nan, math.nan) if gain.words else (gain.low, gain.high)
     return {"low": low, "high": high}
-
-
-def _interval(name: str, found: Interval) -> dict[str, Any]:
-    return {name: found.estimate, f"{name}_low": found.low, f"{name}_high": found.high}
 
 
 def _range(values: Sequence[float]) -> dict[str, float]:

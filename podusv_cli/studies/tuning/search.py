@@ -17,7 +17,7 @@ from podusv_cli.core.errors import StorageError
 from podusv_cli.studies.study import plan as study
 from podusv_cli.studies.study.unit import STATUSES, Unit, UnitResult
 from podusv_cli.studies.tuning import trials
-from podusv_cli.studies.tuning.objective import Runs, evaluate, excess
+from podusv_cli.studies.tuning.objective import Outcomes, evaluate, excess
 from podusv_cli.studies.tuning.plan import TRAIN, TunePlan
 from podusv_cli.studies.tuning.sampler import Sampler
 from podusv_cli.studies.tuning.space import with_gains
@@ -49,7 +49,7 @@ class Search:
     """The search for the gains of a law with one of the tuner's seeds."""
 
     def __init__(self, plan: TunePlan, law: str, repeat: int, folder: Path) -> None:
-        """Nothing is asked yet. `folder` holds the trials of an earlier sitting, if any."""
+        """Nothing is asked yet. `folder` holds the trials of an earlier session, if any."""
         self.plan, self.law, self.repeat, self._folder = plan, law, repeat, folder
         assert plan.scenario.sweep
         seed = [plan.scenario.sweep.seed, repeat, law]
@@ -78,7 +78,7 @@ class Search:
     def begin(self) -> list[tuple[int, study.Plan, Unit]]:
         """The first units of the next batch that has to be simulated; none when the budget is used.
 
-        Batches that an earlier sitting has finished are told to the sampler.
+        Batches that an earlier session has finished are told to the sampler.
         """
         while (left := self.plan.tune.budget - self.spent) > 0:
             self._ask(left)
@@ -190,15 +190,15 @@ class Search:
         self.trials += made
         self._batch += 1
 
-    def _runs(self, one: Attempt) -> Runs:
+    def _runs(self, one: Attempt) -> Outcomes:
         return self.plan.runs(one.results)
 
-    def _first(self, one: Attempt) -> Runs:
+    def _first(self, one: Attempt) -> Outcomes:
         """The runs of the first draws."""
         metrics, failed = self._runs(one)
-        return Runs({n: v[: self.first] for n, v in metrics.items()}, failed[: self.first])
+        return Outcomes({n: v[: self.first] for n, v in metrics.items()}, failed[: self.first])
 
-    def _values(self, runs: Runs) -> tuple[float, ...]:
+    def _values(self, runs: Outcomes) -> tuple[float, ...]:
         return tuple(evaluate(tree, runs, self.plan.metrics) for tree in self.plan.objectives)
 
 

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
-from podusv_cli.core.kernel import Vector
 from podusv_cli.storage import files, json_files
 from podusv_cli.storage.run_folder import STUDY
 from podusv_cli.studies.study import record
 from podusv_cli.studies.study.dispatch import Engine, Tally, march
 from podusv_cli.studies.study.plan import Plan, disagreements
-from podusv_cli.studies.study.runs import Mask
 from podusv_cli.studies.study.runs_file import Table
 from podusv_cli.studies.study.store import RUNS, UNITS, Store
 from podusv_cli.studies.tuning.plan import VALIDATE, Named, TunePlan
@@ -68,7 +66,7 @@ def validate(
 
 
 def _clear(folder: Path, plan: Plan) -> None:
-    """Remove the runs of other gains, which an earlier sitting with a smaller budget found.
+    """Remove the runs of other gains, which an earlier session with a smaller budget found.
 
     study.json goes last, because a folder without it that is not empty is no study.
     """
@@ -83,47 +81,3 @@ def _clear(folder: Path, plan: Plan) -> None:
             shutil.rmtree(folder / UNITS)
         for path in (folder / RUNS, folder / STUDY):
             path.unlink(missing_ok=True)
-
-
-@dataclass(frozen=True)
-class View:
-    """Some laws of a table under other names, and some of its metrics: the `Runs` of a study."""
-
-    table: Table
-    names: Mapping[str, str]  # the table's, by name here
-    metrics: Sequence[str]
-
-    @property
-    def laws(self) -> Sequence[str]:
-        """Names of the laws."""
-        return list(self.names)
-
-    @property
-    def cells(self) -> Sequence[str]:
-        """The only cell."""
-        return self.table.cells
-
-    @property
-    def wanted(self) -> int:
-        """Draws that were asked for."""
-        return self.table.wanted
-
-    def metric(self, law: str, name: str) -> Vector:
-        """A metric of every run."""
-        return self.table.metric(self.names[law], name)
-
-    def done(self, law: str) -> Mask:
-        """Whether a run was tried."""
-        return self.table.done(self.names[law])
-
-    def finished(self, law: str) -> Mask:
-        """Whether a run reached its end."""
-        return self.table.finished(self.names[law])
-
-    def success(self, law: str) -> Mask:
-        """Whether a run was a success."""
-        return self.table.success(self.names[law])
-
-    def broken(self, law: str) -> Mask:
-        """Whether a run crashed, hung or was invalid."""
-        return self.table.broken(self.names[law])

@@ -89,6 +89,14 @@ def function(node: ast.Call) -> str:
     return node.func.id
 
 
+def number(node: ast.expr) -> float:
+    """A number as written, with its sign. Raises ExpressionError."""
+    match node:
+        case ast.UnaryOp(op=ast.USub(), operand=part):
+            return -literal(part)
+    return literal(node)
+
+
 def literal(node: ast.expr) -> float:
     """A number as written. Raises ExpressionError."""
     number = getattr(node, "value", None)
@@ -97,10 +105,3 @@ def literal(node: ast.expr) -> float:
     if abs(number) > LARGEST:
         raise ExpressionError(f"a number is too large, the largest is {LARGEST:g}")
     return float(number)
-
-
-def all_hold(answers: Collection[bool | None]) -> bool | None:
-    """False where one is False, else None where one is None, else True."""
-    if any(answer is False for answer in answers):
-        return False
-    return None if None in answers else True

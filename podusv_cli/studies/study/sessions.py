@@ -1,4 +1,4 @@
-"""provenance.json of a study: every sitting in which it was computed, with machine and versions."""
+"""provenance.json of a study: every session in which it was computed, with machine and versions."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ NAME = "provenance.json"
 
 
 class _Noted(BaseModel):
-    """What is read of a sitting; there may be more."""
+    """What is read of a session; there may be more."""
 
     model_config = ConfigDict(strict=True)
     started: str
@@ -44,24 +44,24 @@ class _Noted(BaseModel):
     processor_s: dict[str, float] = {}
 
 
-def _noted(sitting: dict[str, Any]) -> dict[str, Any]:
-    _Noted.model_validate(sitting)
-    return sitting
+def _noted(session: dict[str, Any]) -> dict[str, Any]:
+    _Noted.model_validate(session)
+    return session
 
 
 class _Provenance(BaseModel):
     sittings: list[Annotated[dict[str, Any], AfterValidator(_noted)]]
 
 
-def sittings(folder: Path) -> list[dict[str, Any]]:
-    """The sittings of a study so far, the oldest first. Raises StorageError."""
+def sessions(folder: Path) -> list[dict[str, Any]]:
+    """The sessions of a study so far, the oldest first. Raises StorageError."""
     path = folder / NAME
     return json_files.read_as(path, _Provenance).sittings if path.exists() else []
 
 
 def timing(folder: Path) -> dict[str, Any]:
-    """How long the runs of each law took, over all sittings. Raises StorageError."""
-    every = sittings(folder)
+    """How long the runs of each law took, over all sessions. Raises StorageError."""
+    every = sessions(folder)
     runs, seconds = Counter[str](), Counter[str]()
     for one in every:
         runs.update(one.get("timed_runs", {}))
@@ -74,19 +74,19 @@ def timing(folder: Path) -> dict[str, Any]:
     return {"format": 1, "laws": laws, "sittings": [{k: one[k] for k in keys} for one in every]}
 
 
-class Sitting:
-    """One sitting, noted when it begins and again when its runs are over.
+class Session:
+    """One session, noted when it begins and again when its runs are over.
 
-    A report may note its own sitting while runs still come.
+    A report may note its own session while runs still come.
     """
 
     def __init__(
         self, folder: Path, argv: Sequence[str], started: datetime, plugins: Iterable[Plugin],
         others: Iterable[Path] = (),
     ) -> None:  # fmt: skip
-        """Note the sitting, after those of `others`, whose runs it takes over.
+        """Note the session, after those of `others`, whose runs it takes over.
 
-        The manifest of an earlier sitting is removed, because the folder is no longer finished.
+        The manifest of an earlier session is removed, because the folder is no longer finished.
         Raises StorageError.
         """
         self._folder, self._started = folder, started
@@ -95,9 +95,9 @@ class Sitting:
         with files.storage_errors(f"cannot remove {folder / manifest.NAME}"):
             (folder / manifest.NAME).unlink(missing_ok=True)
         with sole_writer(folder, PROVENANCE, PATIENCE):
-            earlier = sittings(folder)
+            earlier = sessions(folder)
             for other in others:
-                earlier += [one for one in sittings(other) if one not in earlier]
+                earlier += [one for one in sessions(other) if one not in earlier]
             self._place = len(earlier)
             self._write(earlier)
 
@@ -106,7 +106,7 @@ class Sitting:
         times = provenance.times(self._started, datetime.now(UTC))
         self._origin |= {**times, "runs": runs, **told}
         with sole_writer(self._folder, PROVENANCE, PATIENCE):
-            self._write(sittings(self._folder))
+            self._write(sessions(self._folder))
 
     def _write(self, noted: list[dict[str, Any]]) -> None:
         noted[self._place : self._place + 1] = [self._origin]

@@ -1,0 +1,62 @@
+"""Figures of studies, searches and benches: each a name, a caption, and what draws it.
+
+Import this module where a figure is drawn, because matplotlib is slow to import.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from podusv_cli.figures.style import house_style, image
+from podusv_cli.pages.page import Picture
+from podusv_cli.process.extras import Extras, Missing
+from podusv_cli.process.interrupts import interrupts_enabled
+from podusv_cli.process.workers import run_all
+
+COLUMNS = 2  # of a journal page, in width
+
+
+@dataclass(frozen=True)
+class Sketch:
+    """A figure that is still to be drawn: its file's name, its caption, and what draws it."""
+
+    name: str
+    caption: str
+    draw: Callable[[], Figure]
+    forms: tuple[str, ...] = ("png", "svg")  # the first is that of the file, the last of a report
+
+
+def rendered(sketches: Iterable[Sketch], extras: Extras) -> tuple[dict[str, bytes], list[Picture]]:
+    """Figures, each drawn in a process of its own: files by name, and as pictures of a report.
+
+    A figure that cannot be drawn is missing among the `extras`.
+    """
+    files: dict[str, bytes] = {}
+    pictures: list[Picture] = []
+    wanted = extras.made("the list of figures", lambda: list(sketches)) or []
+    outcomes = () if extras.interrupted else run_all([partial(_images, one) for one in wanted])
+    for sketch, outcome in zip(wanted, outcomes, strict=bool(outcomes)):
+        extras.interrupted |= outcome.interrupted
+        if outcome.result:
+            file, shown = sketch.forms[0], sketch.forms[-1]
+            files[f"{sketch.name}.{file}"] = outcome.result[file]
+            content = outcome.result[shown]
+            pictures.append(Picture(sketch.name, sketch.caption, content, form=shown))
+        elif not outcome.interrupted:
+            extras.missing.append(Missing(f"figure {sketch.name}", outcome.failure))
+    return files, pictures
+
+
+def _images(sketch: Sketch, tell: Callable[[float], None]) -> dict[str, bytes]:
+    with (
+        interrupts_enabled(), house_style(), np.errstate(all="ignore"), warnings.catch_warnings()
+    ):  # fmt: skip
+        warnings.simplefilter("ignore")  # of numbers near the end of all, as diverged runs have
+        figure = sketch.draw()
+        return {form: image(figure, form) for form in sketch.forms}

@@ -1,0 +1,121 @@
+"""What `podusv sweep run` and `podusv tune` share: options, scenario, engine, session, ending."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from podusv_cli.comparison.claims import parse_claims
+from podusv_cli.core.errors import UsageError
+from podusv_cli.core.recording import Status
+from podusv_cli.findings.finding import unknown_codes
+from podusv_cli.process.extras import Extras
+from podusv_cli.scenario import plugins
+from podusv_cli.scenario.limits import limits
+from podusv_cli.scenario.load import LOOKED_AT, Loaded, Plugged, load, load_stored, tree_yaml
+from podusv_cli.scenario.messages import Check
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.storage import files, manifest
+from podusv_cli.studies.study.cluster import engine
+from podusv_cli.studies.study.dispatch import Engine, Shard
+from podusv_cli.studies.study.remote import StudyText
+from podusv_cli.studies.study.store import SCENARIO
+
+WHOLE: Shard = (1, 1)  # the only shard
+Tell = Callable[..., None]
+
+
+def silent(*text: str) -> None:
+    """Tell nobody."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """The options of commands that make many runs; see the help of `podusv sweep run`."""
+
+    overrides: Sequence[str] = ()
+    out: Path | None = None
+    workers: int = 0
+    argv: Sequence[str] = ()
+    plugins: Sequence[str] = ()
+    figures: bool = True
+    scheduler: str = ""  # of a Dask cluster, as tcp://host:port
+    mixed: bool = False  # whether its workers may compute other bits than this machine
+    trust: bool = False  # whether plug-in files of the folder may be executed
+    seconds: float = math.inf  # of computing, after which no unit of a study is begun
+    shard: Shard = WHOLE
+    say: Tell = silent  # what is done beside the runs
+    warn: Tell = silent  # is told what is odd, and no error
+    begin: Tell | None = None  # is told what the missing runs need
+
+
+def loaded_for(
+    key: str, advice: str, config: Path, request: Request, faults: Sequence[Check]
+) -> Loaded:
+    """The scenario with this key, of a file or of a folder that is to be continued.
+
+    Plug-in files of a folder are executed only where the request trusts them. Raises ScenarioError,
+    UsageError, with the advice where there is no such key, and StorageError for a damaged folder.
+    """
+    if request.out and request.out.exists() and not request.out.is_dir():
+        raise UsageError(f"--out {request.out} is a file; name a folder")
+    given = request.overrides, (unknown_codes, limits(allow_large=True), *faults), request.plugins
+    if config.is_dir():
+        loaded = kept_scenario(config, *given, partial(plugins.loaded, trusted=request.trust))
+    else:
+        loaded = load(config, *given)
+    if getattr(loaded.scenario, key) is None:
+        raise UsageError(f"{config} has no key `{key}`, {advice}")
+    parse_claims(loaded)
+    return loaded
+
+
+def kept_scenario(
+    folder: Path, overrides: Sequence[str] = (), checks: Sequence[Check] = (),
+    added: Sequence[str] = (), plugged: Plugged = LOOKED_AT,
+) -> Loaded:  # fmt: skip
+    """The scenario that a folder keeps; no link to another file, either."""
+    path = folder / SCENARIO
+    return load_stored(files.read_text(path), str(path), overrides, checks, added, plugged)
+
+
+def scenario_texts(loaded: Loaded) -> dict[str, str]:
+    """The scenario and its plug-ins, by the names of their files in the folder."""
+    return {SCENARIO: tree_yaml(loaded), **loaded.scenario.plugin_files()}
+
+
+def engine_for(
+    request: Request, folder: Path, scenario: Scenario, seal: str
+) -> AbstractContextManager[Engine]:
+    """Where the units of a folder are made, whose study has this seal."""
+    recipe = StudyText(files.read_text(folder / SCENARIO), tuple(scenario.plugin_files().items()))
+    return engine(request.scheduler, request.workers, recipe, seal, mixed=request.mixed)
+
+
+def refused(engine: Engine) -> tuple[str, ...]:
+    """Why workers of a cluster got no units."""
+    return tuple(engine.told().get("refused", {}).values())
+
+
+def interrupted(kept: str, command: str, folder: Path) -> KeyboardInterrupt:
+    """What ends a command that was interrupted: what it leaves there, and how to go on."""
+    again = plugins.again(command, folder)
+    return KeyboardInterrupt(f"interrupted; {kept} are kept, continue with: {again}")
+
+
+def finish(
+    folder: Path, extras: Extras, whole: str, command: str, status: Status = "finished"
+) -> None:
+    """Write the manifest; KeyboardInterrupt in its place where figures or logs were interrupted.
+
+    `whole` says what is there all the same, and `command` makes the rest.
+    """
+    if extras.interrupted:
+        raise KeyboardInterrupt(
+            f"interrupted; {whole} are whole, the rest is made by: {plugins.again(command, folder)}"
+        )
+    manifest.write(folder, status)
