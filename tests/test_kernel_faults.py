@@ -21,7 +21,7 @@ from podusv_cli.engine.machine.kernel_faults import (
     faults,
     unsupported,
 )
-from podusv_cli.engine.machine.lane_source import has_source, source
+from podusv_cli.engine.machine.kernel_source import has_source, source
 
 SOUND = {
     "set in both branches": "if x[0] > 0.0:\n q = 1.0\nelse:\n q = 2.0\ny = q",

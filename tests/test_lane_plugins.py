@@ -16,7 +16,7 @@ from test_lanes import same
 from benchmarks.variants import variants
 from podusv_cli.core.kernel import LANES
 from podusv_cli.engine.loop.closed_loop import Observer
-from podusv_cli.engine.machine.lane_source import OtherSource, source
+from podusv_cli.engine.machine.kernel_source import OtherSource, source
 from podusv_cli.engine.running.batch import simulate_many
 from podusv_cli.engine.running.lanes import why_alone
 from podusv_cli.engine.step.grid import TimeGrid
@@ -40,7 +40,7 @@ ENDLESS = """
 
 
 @pytest.mark.parametrize(("old", "new"), [("x + x", "x - x"), ("0.5", "0.75"), ("0.5 *", "1 *")])
-def test_a_file_that_was_edited_is_not_rewritten(tmp_path: Path, old: str, new: str) -> None:
+def test_a_file_that_was_edited_is_not_read(tmp_path: Path, old: str, new: str) -> None:
     """Its kernel may be another one by now than the one that is loaded."""
     path = tmp_path / "edited.py"
     path.write_text(TEXT)

@@ -46,6 +46,17 @@ def named_kernels(function: Any) -> dict[str, Any]:
     return {name: thing for name, thing in found.items() if is_kernel(thing)}
 
 
+def whole_numbers(function: Any) -> frozenset[str]:
+    """Constants that a kernel, or one that it calls, makes whole numbers of: `int(k.count)`."""
+    code = [i for i in dis.get_instructions(function) if i.opname != "PUSH_NULL"]
+    found = {
+        attribute.argval
+        for called, _, attribute in zip(code, code[1:], code[2:], strict=False)
+        if called.argval == "int" and attribute.opname == "LOAD_ATTR"
+    }
+    return frozenset(found).union(*map(whole_numbers, named_kernels(function).values()))
+
+
 @kernel
 def tail(vector: Vector, start: int) -> Vector:
     """The part of `vector` from index `start` on, sharing its memory."""
@@ -70,6 +81,24 @@ def widest() -> None:
 def shared(number: float) -> float:
     """A number that is the same in all runs that march side by side."""
     return number
+
+
+@kernel
+def lanes_any(truth: bool) -> bool:
+    """Whether something is true in any of the runs that march side by side."""
+    return truth
+
+
+@kernel
+def lane_true(truth: bool, lane: int) -> bool:
+    """Whether something is true in the run of this lane."""
+    return truth
+
+
+@kernel
+def lane_numbers(vector: Vector) -> Vector:
+    """A vector's numbers one by one: the first number of every lane, then the second, ..."""
+    return vector
 
 
 @kernel
@@ -167,12 +196,14 @@ def whole_lanes(count: int) -> int:
     return -(-count // LANES) * LANES
 
 
-def unpacker(names: tuple[str, ...]) -> Callable[[Vector], Any]:
-    """A kernel from a vector to the named tuple of these constants.
+def unpacker(names: tuple[str, ...], alike: Collection[str] = ()) -> Callable[[Vector], Any]:
+    """A kernel from a vector to the named tuple of these constants; those in `alike` are `shared`.
 
     Its source is written out, one index a field: compiled code has no calls of variable length.
     """
-    fields = ", ".join(f"p[{i}]" for i in range(len(names)))
-    scope: dict[str, Any] = {"Constants": constants_type(names)}
+    fields = ", ".join(
+        f"shared(p[{i}])" if name in alike else f"p[{i}]" for i, name in enumerate(names)
+    )
+    scope: dict[str, Any] = {"Constants": constants_type(names), "shared": shared}
     exec(f"def named(p):\n    return Constants({fields})", scope)  # noqa: S102
     return kernel(scope["named"])  # type: ignore[no-any-return]

@@ -13,12 +13,12 @@ from pathlib import Path
 from typing import Any, cast
 
 from podusv_cli.core.errors import LawError
-from podusv_cli.engine.machine import lane_doors, object_cache, signatures
+from podusv_cli.engine.machine import object_cache, signatures
 from podusv_cli.engine.machine.kernel_faults import check_kernel, unsupported
 from podusv_cli.engine.step.lane_march import advance_lanes
 from podusv_cli.process.interrupts import interrupts_deferred
 
-LANES_BY = "lane_numba"  # what compiles kernels for lanes
+LANES_BY = "wide_numba"  # what compiles kernels for lanes
 RULES = (
     "a kernel is marked with @kernel, reads and writes numbers of vectors one by one (x[2], "
     "tau[0] = ...), calls math.sin and the like and other kernels, and allocates, prints and "
@@ -58,7 +58,7 @@ def lane_entry(part: str, inner: Any, names: tuple[str, ...], alike: frozenset[s
 @cache
 def lane_routine() -> Any:
     """The compiled march of a run in every lane."""
-    return compiled(advance_lanes, lane_doors.ADVANCE_LANES, "", LANES_BY)
+    return compiled(advance_lanes, signatures.ADVANCE_LANES, "", LANES_BY)
 
 
 def has_lanes(parts: Sequence[tuple[str, Any, tuple[str, ...], frozenset[str]]]) -> bool:
@@ -72,7 +72,8 @@ def _lane_door(
     part: str, inner: Any, names: tuple[str, ...], alike: frozenset[str]
 ) -> tuple[Any, Any, str]:
     label = f"lanes_{part}_entry_{inner.__module__}_{inner.__qualname__}"
-    return lane_doors.bind(part, inner, names, alike), lane_doors.PROTOTYPES[part], label
+    bound = signatures.bind(part, inner, names, alike)
+    return bound, signatures.LANE_PROTOTYPES[part], label
 
 
 @cache

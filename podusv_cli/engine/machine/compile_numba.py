@@ -25,6 +25,7 @@ INNER = OPTIONS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # call
 
 
 # An intrinsic gives numba the signature of a primitive of `core.kernel`, and its LLVM code.
+@intrinsic
 def tail_of(typing: Any, vector: Any, start: Any) -> Any:
     """`kernel.tail`."""
 
@@ -34,17 +35,15 @@ def tail_of(typing: Any, vector: Any, start: Any) -> Any:
     return vector(vector, types.int64), code
 
 
-def scratch_of(number: Any) -> Any:
-    """`kernel.scratch` with room for numbers of this type."""
+@intrinsic(prefer_literal=True)
+def scratch_of(typing: Any, count: Any) -> Any:
+    """`kernel.scratch`."""
 
-    def typed(typing: Any, count: Any) -> Any:
-        def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            kind, size = context.get_value_type(number), count.literal_value
-            return cgutils.alloca_once(builder, kind, size)  # type: ignore[no-untyped-call]
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        kind, size = context.get_value_type(types.float64), count.literal_value
+        return cgutils.alloca_once(builder, kind, size)  # type: ignore[no-untyped-call]
 
-        return types.CPointer(number)(count), code  # type: ignore[no-untyped-call]
-
-    return intrinsic(prefer_literal=True)(typed)
+    return types.CPointer(types.float64)(count), code  # type: ignore[no-untyped-call]
 
 
 @intrinsic
@@ -59,8 +58,7 @@ def widest(typing: Any) -> Any:
 
 
 PRIMITIVES = {
-    kernel.tail: intrinsic(tail_of), kernel.scratch: scratch_of(types.float64),
-    kernel.widest: widest,
+    kernel.tail: tail_of, kernel.scratch: scratch_of, kernel.widest: widest,
 }  # fmt: skip
 
 
@@ -69,18 +67,14 @@ def object_code(function: Any, prototype: Any) -> Code:
 
     Raises TypeError for a kernel that needs more than arithmetic and the mathematical library.
     """
-    return translated(function, _with_inlined, signature(prototype, from_ctypes))
-
-
-def translated(function: Any, prepare: Any, typed: Any) -> Code:
-    """Object code of what `prepare` makes of a kernel, with this signature of numba's types."""
     linecache.checkcache()  # numba shows lines from there; a file may have been edited meanwhile
     try:
-        compiled = cfunc(typed, **OPTIONS)(prepare(function))
+        typed = signature(prototype, from_ctypes)
+        compiled = cfunc(typed, **OPTIONS)(_with_inlined(function))
     except NumbaError as error:
-        raise TypeError(_in_short(str(error))) from error
+        raise TypeError(in_short(str(error))) from error
     module = llvm.parse_assembly(compiled.inspect_llvm())
-    _check_calls(module, function.__qualname__)
+    check_calls(module, function.__qualname__)
     return Code(compiled.native_name, target().emit_object(module))
 
 
@@ -92,7 +86,7 @@ def inlined(function: Any) -> Any:
     return njit(**INNER)(_with_inlined(function))
 
 
-def _in_short(told: str) -> str:
+def in_short(told: str) -> str:
     """What numba says of the innermost place, and where that is."""
     reason = re.search(r"raised a specific error:\n +TypingError: (.*)", told)
     words = (
@@ -124,7 +118,7 @@ def signature(prototype: Any, type_of: Any) -> Any:
     return typed(prototype._restype_)(*map(typed, prototype._argtypes_))
 
 
-def _check_calls(module: Any, name: str) -> None:
+def check_calls(module: Any, name: str) -> None:
     """Refuse code that calls an unknown function: loading it would end the process silently."""
     process = ctypes.CDLL(None)
     declared = [f.name for f in module.functions if f.is_declaration]

@@ -19,7 +19,7 @@ import numpy as np
 from podusv_cli.core.errors import LawError
 from podusv_cli.core.kernel import is_kernel, named_kernels
 from podusv_cli.engine.machine.kernel_reads import Reads, whole_number
-from podusv_cli.engine.machine.lane_source import OtherSource, has_source, source
+from podusv_cli.engine.machine.kernel_source import OtherSource, has_source, source
 
 OWN = "podusv_cli."  # modules whose kernels a test looks at
 # What there is no machine code for, and what to write in its place.

@@ -193,6 +193,6 @@ def _(thing: Any, names: Iterable[str], told: dict[Any, int]) -> Iterator[str]:
 @cache
 def translators() -> str:
     """Digest of podusv's files that turn kernels into machine code."""
-    package = Path(__file__).resolve().parents[1]
+    package = Path(__file__).resolve().parents[2]
     files = sorted(path for pattern in TRANSLATORS for path in package.glob(pattern))
     return _digest(b"\0".join(path.read_bytes() for path in files))

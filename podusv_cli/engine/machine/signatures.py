@@ -8,13 +8,13 @@ As machine code all of them follow C's calling convention, whose types are given
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from ctypes import CFUNCTYPE, POINTER, c_double, c_int64
 from typing import Any
 
 import numpy as np
 
-from podusv_cli.core.kernel import Vector, taken, unpacker
+from podusv_cli.core.kernel import LANES, Vector, taken, unpacker
 
 NUMBER, WHOLE = c_double, c_int64
 NUMBERS = ("t", "instant", "weight", "again", "stage")
@@ -46,17 +46,28 @@ RATES_ALONG = CFUNCTYPE(
     None, *(PROTOTYPES[part] for part in RIGHT_HAND_SIDE),
     WHOLE, VECTOR, VECTOR, POINTER(VECTOR), POINTER(WHOLE),
 )  # fmt: skip
+# The same where every number of a vector is one number a lane.
+LANE_VECTOR = POINTER(NUMBER * LANES)
+LANE_PROTOTYPES: dict[str, Any] = {
+    part: CFUNCTYPE(None, *(NUMBER if a in NUMBERS else LANE_VECTOR for a in arguments.split()))
+    for part, arguments in SIGNATURES.items()
+}
+ADVANCE_LANES = CFUNCTYPE(
+    WHOLE, *LANE_PROTOTYPES.values(), WHOLE, WHOLE, NUMBER, POINTER(LANE_VECTOR), POINTER(WHOLE),
+    WHOLE, VECTOR, VECTOR,
+)  # fmt: skip
 EVALUATE_ALL = CFUNCTYPE(None, PROTOTYPES["law"], WHOLE, WHOLE, WHOLE, *[VECTOR] * 5)
 
 
-def bind(part: str, inner: Any, names: tuple[str, ...]) -> Any:
+def bind(part: str, inner: Any, names: tuple[str, ...], alike: Set[str] = frozenset()) -> Any:
     """The adapter of a part to the kernel `inner`, whose constants have these names.
 
-    Raises LawError for a kernel that names an argument which the part does not have.
+    Those in `alike` are the same in all runs that march side by side. Raises LawError for a kernel
+    that names an argument which the part does not have.
     """
     arguments = SIGNATURES[part].split()
     passed = ", ".join("named(k)" if a == "k" else a for a in taken(inner, arguments))
-    scope: dict[str, Any] = {"kernel": inner, "named": unpacker(names)}
+    scope: dict[str, Any] = {"kernel": inner, "named": unpacker(names, alike)}
     exec(f"def {part}_entry({', '.join(arguments)}):\n    kernel({passed})", scope)  # noqa: S102
     return scope[f"{part}_entry"]
 

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from podusv_cli.components.measurements.base import KNOWN, OWN
-from podusv_cli.core.kernel import LANES, Vector
+from podusv_cli.core.kernel import LANES, Vector, whole_numbers
 from podusv_cli.engine.loop.closed_loop import ClosedLoop, Observer, entries
-from podusv_cli.engine.machine import lane_doors, lane_source, signatures
+from podusv_cli.engine.machine import signatures
 from podusv_cli.engine.machine.kernel_faults import check_kernel
 from podusv_cli.engine.running.watch import Ending
 from podusv_cli.engine.step.grid import TimeGrid
@@ -27,11 +27,6 @@ from podusv_cli.engine.step.relay import COUNT
 
 NUMBER = 8  # bytes
 FEWEST = 3  # runs; fewer take no longer alone
-# What numba says of numbers that differ between runs, in the words of its types.
-TYPES = (
-    "lanes(...) are numbers that may differ between runs; the count of a `for` may not (write "
-    "`while`), and no text and no None may depend on them"
-)
 WORTH = 20_000_000  # instants of a batch, from which on compiling takes less than it gains
 MARCHING = -1.0  # stands for the instants that a lane has reached
 
@@ -47,11 +42,11 @@ def alike(loop: ClosedLoop, observer: Observer) -> dict[str, frozenset[str]]:
         "measurement": loop.measurement.choices(), "correct": loop.estimator.choices(),
         "follow": loop.estimator.choices(),
     }  # fmt: skip
-    whole = {part: lane_source.whole_numbers(inner) for part, inner, _ in entries(loop, observer)}
+    whole = {part: whole_numbers(inner) for part, inner, _ in entries(loop, observer)}
     whole["disturbance"] = frozenset(
         loop.disturbance.constant_of(i, name)
         for i, part in enumerate(loop.disturbance.each())
-        for name in lane_source.whole_numbers(part.kernel_with(loop.vessel))
+        for name in whole_numbers(part.kernel_with(loop.vessel))
     )
     for one in (("law", "sample", "after_saturation"), ("correct", "follow")):  # of one component
         whole |= dict.fromkeys(one, frozenset().union(*(whole[part] for part in one)))
@@ -75,8 +70,8 @@ def marcher(loop: ClosedLoop, observer: Observer) -> Callable[..., int]:
     def compiled_march(
         last: int, h: float, vectors: list[Vector], plan: Plan, under_way: Vector, ends: Vector
     ) -> int:
-        pointers = (lane_doors.LANE_VECTOR * len(vectors))(
-            *(vector.ctypes.data_as(lane_doors.LANE_VECTOR) for vector in vectors)
+        pointers = (signatures.LANE_VECTOR * len(vectors))(
+            *(vector.ctypes.data_as(signatures.LANE_VECTOR) for vector in vectors)
         )
         return int(
             march(
@@ -236,5 +231,5 @@ def why_alone(loop: ClosedLoop, observer: Observer) -> str:
         places(loop, observer)
         marcher(loop, observer)
     except TypeError as error:
-        return f"{error}; {TYPES}" if "lanes(" in str(error) else str(error)
+        return str(error)
     return ""

@@ -1,50 +1,27 @@
 """The march of several runs side by side, a run in every lane.
 
-These kernels are for lanes only, so their branches stay as they are written. Their words stand for
-those of `lane_parts`.
+A number that is read from a vector differs from lane to lane; what is stored differs, too.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-from podusv_cli.core.kernel import LANES, Vector, kernel, tail
+from podusv_cli.core.kernel import (
+    LANES,
+    Vector,
+    kernel,
+    lane_numbers,
+    lane_true,
+    lanes_any,
+    tail,
+)
 from podusv_cli.engine.step.layout import STOP, Function
 from podusv_cli.engine.step.relay import begin_step
 from podusv_cli.engine.step.rk4 import finite, load, measure, named_plan, named_wires, rates, step
 from podusv_cli.engine.step.sampled import perceive, sample_and_hold
 
 REACHED = STOP + 1  # in `under_way`: how many instants each lane reached, below 0 while it marches
-
-
-@kernel
-def lanes_and(one: Any, other: Any) -> Any:
-    """Where both masks are true."""
-    raise NotImplementedError
-
-
-@kernel
-def lanes_not(mask: Any) -> Any:
-    """Where a mask is not true."""
-    raise NotImplementedError
-
-
-@kernel
-def lanes_any(mask: Any) -> bool:
-    """Whether a mask is true in any lane."""
-    raise NotImplementedError
-
-
-@kernel
-def lane_true(mask: Any, lane: int) -> bool:
-    """Whether a mask is true in this lane."""
-    raise NotImplementedError
-
-
-@kernel
-def lane_numbers(vector: Vector) -> Vector:
-    """A vector's numbers one by one: the first number of every lane, then the second, ..."""
-    raise NotImplementedError
 
 
 @kernel
@@ -116,7 +93,7 @@ def advance_lanes(
             sample_and_hold(k, t, h, path, law, sample, after, c, n)
         rates(t, c.s, c.stages, path, law, actuator, after, follow, c, n, again)
         measure(c.s, c.row)
-        lost = lanes_not(lanes_and(finite(n.states, c.s), finite(n.columns, c.row)))
+        lost = not (finite(n.states, c.s) and finite(n.columns, c.row))
         if lanes_any(lost) and end_lanes(k, lost, c, n, size, under_way, ends) == 0:
             return k
         weight = 0.5 * h if k == 0 or k == n.steps else h

@@ -1,25 +1,14 @@
-"""The source of kernels, for what is made of it."""
+"""The source of kernels, for what is said of it."""
 
 from __future__ import annotations
 
 import ast
 import linecache
-from collections.abc import Iterator
 from functools import cache
 from types import CodeType
 from typing import Any
 
 from podusv_cli.core import plugins
-from podusv_cli.core.kernel import named_kernels
-
-
-class NotForLanes(TypeError):
-    """A kernel that cannot be rewritten for lanes."""
-
-
-def refused(node: Any, text: str) -> NotForLanes:
-    """The error for a statement or an expression that cannot be rewritten."""
-    return NotForLanes(f"line {node.lineno}: {text}")
 
 
 class OtherSource(TypeError):
@@ -75,27 +64,3 @@ def _functions(text: str, filename: str) -> tuple[dict[Any, ast.FunctionDef], di
         codes[code.co_name, code.co_firstlineno] = code
         waiting += [part for part in code.co_consts if isinstance(part, CodeType)]
     return nodes, codes
-
-
-@cache
-def whole_numbers(function: Any) -> frozenset[str]:
-    """Constants that a kernel, or one that it calls, makes whole numbers of: `int(k.count)`."""
-    return frozenset(_whole_numbers(function, set()))
-
-
-def _whole_numbers(function: Any, done: set[Any]) -> Iterator[str]:
-    if function in done:
-        return
-    done.add(function)
-    if not has_source(function):
-        return
-    for node in ast.walk(source(function)):
-        if (
-            isinstance(node, ast.Call)
-            and isinstance(node.func, ast.Name)
-            and node.func.id == "int"
-            and isinstance(node.args[0], ast.Attribute)
-        ):
-            yield node.args[0].attr
-    for called in named_kernels(function).values():
-        yield from _whole_numbers(called, done)

@@ -1,0 +1,239 @@
+"""Instructions of scalar code in all lanes.
+
+A vector has number i of every lane, then number i + 1 of every lane. So a place in it is as many
+bytes from its beginning as in scalar code, times the number of lanes.
+"""
+
+from __future__ import annotations
+
+import re
+
+from podusv_cli.core.kernel import LANES
+from podusv_cli.engine.machine.scalar_ir import Instruction, NotForLanes
+from podusv_cli.engine.machine.wide_masks import EVERY, LANES_MEMORY, PLAIN_MEMORY, Masks
+from podusv_cli.engine.machine.wide_values import MASK, Values, lanes
+
+NUMBER = 8  # bytes of what a vector has
+SIZES = {"double": NUMBER, "i64": NUMBER, "ptr": NUMBER, "float": 4, "i32": 4, "i16": 2, "i8": 1}
+NUMBERS = {"double", "float", "i64", "i32", "i16", "i8", "i1"}
+DIVISIONS = ("sdiv", "udiv", "srem", "urem")
+LANEWISE = {  # an operation of one type, with its result of this type, of i1 or of another one
+    "add", "sub", "mul", "shl", "lshr", "ashr", "and", "or", "xor", "fadd", "fsub", "fmul", "fdiv",
+    "frem", "fneg", "freeze", "fcmp", "icmp", "fptosi", "fptoui", "sitofp", "uitofp", "zext",
+    "sext", "trunc", "bitcast", "fpext", "fptrunc", *DIVISIONS,
+}  # fmt: skip
+# LLVM's own functions of exact results, for vectors, too; the last argument of some is a flag.
+EXACT = {
+    "fabs", "sqrt", "floor", "ceil", "trunc", "rint", "nearbyint", "round", "roundeven", "copysign",
+    "smax", "smin", "umax", "umin", "abs", "fshl", "fshr", "ctpop", "ctlz", "cttz", "is.fpclass",
+    "scmp", "ucmp",
+}  # fmt: skip
+FLAGGED = ("abs", "ctlz", "cttz", "is.fpclass")
+SPOKEN_TO_COMPILER = ("llvm.lifetime", "llvm.assume", "llvm.experimental.noalias")
+MOST_CHEAP = 12  # instructions of a block that takes no longer than to jump over it
+
+
+def room(kind: str) -> str:
+    """The type of memory that has this for every lane."""
+    if array := re.fullmatch(r"\[(\d+) x (.*)\]", kind):
+        return f"[{array[1]} x {room(array[2])}]"
+    if kind not in SIZES:
+        raise NotForLanes(f"memory for {kind}")
+    return f"[{LANES} x {kind}]"
+
+
+def in_memory(alloca: Instruction) -> str:
+    """The type that an `alloca` makes room for."""
+    return alloca.words.removeprefix("alloca ").split(", ")[0]
+
+
+def is_cheap(row: list[Instruction]) -> bool:
+    """Whether a block may as well be computed where no lane is in it: few numbers, no memory."""
+    harmless = LANEWISE - {*DIVISIONS} | {"select", "phi", "br"}
+    return len(row) <= MOST_CHEAP and all(one.opcode in harmless for one in row)
+
+
+class Instructions(Values):
+    """Writes instructions."""
+
+    def __init__(self, masks: Masks) -> None:
+        """Nothing is written yet."""
+        super().__init__(masks)
+        self.declared: dict[str, str] = {}
+        self.sizes = {
+            one.name: SIZES.get(re.sub(r"\[\d+ x |\]", "", in_memory(one)), 0)
+            for one in masks.values.values()
+            if one.opcode == "alloca"
+        }
+        self.places.append(f"%nowhere = alloca [{LANES} x i64], align 64")
+
+    def write(self, one: Instruction) -> None:
+        """Write an instruction. Raises NotForLanes."""
+        if one.opcode in LANEWISE:
+            self._lanewise(one)
+        elif write := getattr(self, f"_{one.opcode}", None):
+            write(one)
+        else:
+            raise NotForLanes(one.words)
+
+    def _lanewise(self, one: Instruction) -> None:
+        """An operation on the numbers of every lane, as it is on one."""
+        kind, differs = one.kinds[0], self.differs(one.name)
+        operands = [self.wide(o, kind) if differs else self.plain(o) for o in one.operands]
+        if differs and one.opcode in DIVISIONS:  # by zero, one would end the process
+            operands[1] = self._only_here(one, operands[1], kind, f"splat ({kind} 1)")
+        words = one.words[: one.words.index(f" {kind} ")]
+        over = lanes(kind) if differs else kind
+        to = f" to {self.kind(one)}" if " to " in one.words else ""
+        self.set(one, f"{words} {over} {', '.join(operands)}{to}")
+
+    def _only_here(self, one: Instruction, value: str, kind: str, other: str) -> str:
+        """A value in the lanes that are in the block, and another one elsewhere."""
+        if self.masks.of[one.block] == EVERY:
+            return value
+        over = lanes(kind)
+        return self.let(f"select {MASK} {self.mask(one.block)}, {over} {value}, {over} {other}")
+
+    def _select(self, one: Instruction) -> None:
+        (condition, *_), differs = one.operands, self.differs(one.name)
+        chosen = self.typed(one.typed[:1], differs and self.differs(condition))
+        self.set(one, f"select {chosen}, {self.typed(one.typed[1:], differs)}")
+
+    def _alloca(self, one: Instruction) -> None:
+        if one.operands != ["1"]:
+            raise NotForLanes(f"memory of a size that is computed: {one.words}")
+        self.places.append(f"{one.name} = alloca {room(in_memory(one))}, align 64")
+
+    def _getelementptr(self, one: Instruction) -> None:
+        kind = one.words.split(", ptr ")[0].split(" ", 1)[1]
+        kind = re.sub(r"^(inbounds|nuw|nusw| )+", "", kind)
+        if self.masks.points_at(one.name) == LANES_MEMORY:
+            kind = room(kind)
+        if not self.differs(one.name):
+            self.set(one, f"getelementptr {kind}, {self.typed(one.typed, False)}")
+            return
+        parts = [self.typed([(o, k)], o.startswith("%")) for o, k in one.typed]
+        self.set(one, f"getelementptr {kind}, {', '.join(parts)}")
+
+    def _check_size(self, one: Instruction, pointer: str, kind: str) -> None:
+        """Refuse memory that is read as numbers of another size than it has: lanes would mix."""
+        root = self.masks.values.get(pointer)
+        while root and root.opcode == "getelementptr":
+            root = self.masks.values.get(root.operands[0])
+        sizes = self.sizes if root and root.opcode in ("phi", "select") else {}
+        size = {*sizes.values(), self.sizes.get(root.name if root else "", NUMBER)}
+        if size != {SIZES.get(kind)}:
+            raise NotForLanes(f"memory that is read otherwise than it was written: {one.words}")
+
+    def _addresses(self, one: Instruction, pointer: str, kind: str) -> list[str]:
+        """Where each lane's number lies; for lanes that are not in the block it is nowhere."""
+        nowhere = ""
+        if self.masks.of[one.block] != EVERY:
+            nowhere = self.everywhere("%nowhere", "ptr")
+        where = self._only_here(one, self.wide(pointer, "ptr"), "ptr", nowhere)
+        begins = [self.number(where, "ptr", lane) for lane in range(LANES)]
+        if self.masks.points_at(pointer) == PLAIN_MEMORY:
+            return begins
+        return [self.let(f"getelementptr {kind}, ptr {p}, i64 {i}") for i, p in enumerate(begins)]
+
+    def _load(self, one: Instruction) -> None:
+        pointer = one.operands[0]
+        if "volatile" in one.words or "atomic" in one.words:
+            raise NotForLanes(one.words)
+        if self.masks.points_at(pointer) == LANES_MEMORY:
+            self._check_size(one, pointer, one.kind)
+        if self.differs(pointer):
+            places = self._addresses(one, pointer, one.kind)
+            self.by_lane(one, [self.let(f"load {one.kind}, ptr {place}") for place in places])
+            return
+        where = self.plain(pointer)
+        aligned = f", align {SIZES[one.kind] * LANES}" if self.differs(one.name) else ""
+        self.set(one, f"load {self.kind(one)}, ptr {where}{aligned}")
+
+    def _store(self, one: Instruction) -> None:
+        (number, pointer), kind = one.operands, one.kinds[0]
+        if self.masks.points_at(pointer) == PLAIN_MEMORY:
+            if self.differs(number) or self.differs(pointer) or self.masks.of[one.block] != EVERY:
+                raise NotForLanes(f"a number of one lane for all of them: {one.words}")
+            self.put(f"store {kind} {self.plain(number)}, ptr {self.plain(pointer)}")
+            return
+        self._check_size(one, pointer, kind)
+        new = self.wide(number, kind)
+        if self.differs(pointer):
+            for lane, place in enumerate(self._addresses(one, pointer, kind)):
+                self.put(f"store {kind} {self.number(new, kind, lane)}, ptr {place}")
+            return
+        where = f"ptr {self.plain(pointer)}, align {SIZES[kind] * LANES}"
+        if self.masks.of[one.block] != EVERY:
+            new = self._only_here(one, new, kind, self.let(f"load {lanes(kind)}, {where}"))
+        self.put(f"store {lanes(kind)} {new}, {where}")
+
+    def _call(self, one: Instruction) -> None:
+        called = one.operands[-1]
+        name = called.strip('@"')
+        if name.startswith(SPOKEN_TO_COMPILER):
+            return
+        if name.startswith("podusv."):
+            getattr(self, f"_call_{name.removeprefix('podusv.')}")(one)
+        elif called.startswith("%"):
+            self._call_part(one)
+        elif {*one.kinds[:-1], one.kind} - NUMBERS:
+            raise NotForLanes(f"a call: {one.words}")
+        elif self.differs(one.name):
+            self._call_in_lanes(one, "llvm.sqrt.f64" if name == "sqrt" else name)
+        else:
+            self._declare(name, one.kind, one.kinds[:-1])
+            self.set(one, f'call {one.kind} @"{name}"({self.typed(one.typed[:-1], False)})')
+
+    def _declare(self, name: str, kind: str, kinds: list[str]) -> None:
+        self.declared[name] = f'declare {kind} @"{name}"({", ".join(kinds)}) #1'
+
+    def _call_part(self, one: Instruction) -> None:
+        """A part of the loop, which has its own code for lanes."""
+        if self.masks.of[one.block] != EVERY or any(map(self.differs, one.operands)):
+            raise NotForLanes(f"a call that not every lane makes: {one.words}")
+        given = self.typed(one.typed[:-1], False)
+        self.put(f"call void {self.plain(one.operands[-1])}({given})")
+
+    def _call_in_lanes(self, one: Instruction, name: str) -> None:
+        """A function without effects: one of exact results for all lanes, else lane by lane."""
+        operands = one.typed[:-1]
+        short = re.sub(r"(\.[if]\d+)+$", "", name.removeprefix("llvm."))
+        if not name.startswith("llvm.") or short not in EXACT:
+            self._declare(name, one.kind, one.kinds[:-1])
+            vectors = [(self.wide(o, kind), kind) for o, kind in operands]
+            rows = [
+                ", ".join(f"{kind} {self.number(v, kind, lane)}" for v, kind in vectors)
+                for lane in range(LANES)
+            ]
+            self.by_lane(one, [self.let(f'call {one.kind} @"{name}"({row})') for row in rows])
+            return
+        flags = [f"{kind} {o}" for o, kind in operands[-1:] if short in FLAGGED]
+        given = [self.typed([o], True) for o in operands[: len(operands) - len(flags)]] + flags
+        ending = re.sub(r"\.([if]\d+)", rf".v{LANES}\1", name.removeprefix(f"llvm.{short}"))
+        kinds = [lanes(kind) for _, kind in operands[: len(operands) - len(flags)]]
+        kinds += [kind for _, kind in operands[len(kinds) :]]
+        self._declare(f"llvm.{short}{ending}", lanes(one.kind), kinds)
+        self.set(one, f'call {lanes(one.kind)} @"llvm.{short}{ending}"({", ".join(given)})')
+
+    def _call_shared(self, one: Instruction) -> None:
+        """`kernel.shared`: the number of the first lane."""
+        number, kind = one.operands[0], one.kinds[0]
+        if self.differs(number):
+            self.set(one, f"extractelement {lanes(kind)} {self.plain(number)}, i32 0")
+        else:
+            self.set(one, f"freeze {kind} {self.plain(number)}")
+
+    def _call_lanes_any(self, one: Instruction) -> None:
+        """`kernel.lanes_any`."""
+        whole = self.let(f"bitcast {MASK} {self.wide(one.operands[0], 'i1')} to i{LANES}")
+        self.set(one, f"icmp ne i{LANES} {whole}, 0")
+
+    def _call_lane_true(self, one: Instruction) -> None:
+        """`kernel.lane_true`."""
+        mask, lane = self.wide(one.operands[0], "i1"), self.plain(one.operands[1])
+        self.set(one, f"extractelement {MASK} {mask}, i64 {lane}")
+
+    def _call_lane_numbers(self, one: Instruction) -> None:
+        """`kernel.lane_numbers`."""
+        self.set(one, f"getelementptr i8, ptr {self.plain(one.operands[0])}, i64 0")

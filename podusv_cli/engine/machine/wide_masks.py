@@ -1,0 +1,183 @@
+"""What differs between lanes: values, ways through branches, and the lanes that are in a block.
+
+A branch whose condition is the same in all lanes stays a branch. Where it differs, both ways are
+gone, one after the other, each by its own lanes: what is not gone at once *waits* (partial control
+flow linearisation; Moll and Hack, PLDI 2018). The lanes in a block are its mask. Blocks that are
+always gone by the same lanes have one mask, which is named after the first of them.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from typing import Any
+
+from podusv_cli.engine.machine.scalar_ir import Function, Instruction, NotForLanes
+from podusv_cli.engine.machine.wide_order import END, Level, Loop, Node, Order
+
+EVERY = "every"  # the mask of all lanes
+# What a call gives that is the same in all lanes, whatever it is given.
+SAME = ("podusv.shared", "podusv.lanes_any", "podusv.lane_true")
+NOTHING = ("undef", "poison")
+LANES_MEMORY, PLAIN_MEMORY = "lanes", "plain"
+
+
+class Masks:
+    """`memory` tells by argument whether what it points at has a number for every lane."""
+
+    def __init__(self, function: Function, memory: dict[str, str]) -> None:
+        """Raises NotForLanes for pointers that are computed in a way that cannot be followed."""
+        self.function, self.order, self.memory = function, Order(function), dict(memory)
+        self.values = function.values
+        self.differing: set[str] = set()
+        self.joins: set[int] = set()  # blocks whose phis take numbers from several masks
+        self.ragged: set[Loop] = set()  # loops that the lanes leave in different rounds
+        self.readers: dict[str, list[Instruction]] = defaultdict(list)
+        for row in function.blocks:
+            for one in row:
+                for operand in one.operands:
+                    self.readers[operand].append(one)
+        self._follow_pointers()
+        for one in self.values.values():
+            if one.opcode == "load" and self.points_at(one.operands[0]) == LANES_MEMORY:
+                self._differ(one.name)
+        known = -1
+        while known != (known := len(self.differing) + len(self.joins) + len(self.ragged)):
+            self._wait()
+            self._find_masks()
+            self._find_joins()
+            self._find_ragged()
+
+    def points_at(self, pointer: str) -> str:
+        """The kind of memory that a pointer points at."""
+        if pointer in NOTHING:
+            return ""
+        return self.memory.get(pointer, "") if pointer.startswith("%") else PLAIN_MEMORY
+
+    def _follow_pointers(self) -> None:
+        pointers = [one for one in self.values.values() if one.kind == "ptr"]
+        while True:
+            new = {p.name: self._kind(p) for p in pointers if p.name not in self.memory}
+            new = {name: kind for name, kind in new.items() if kind}
+            if not new:
+                return
+            self.memory |= new
+
+    def _kind(self, one: Instruction) -> str:
+        if one.opcode == "alloca":
+            return LANES_MEMORY
+        if one.opcode == "load" and self.points_at(one.operands[0]) != LANES_MEMORY:
+            return LANES_MEMORY if self.points_at(one.operands[0]) else ""
+        if one.opcode == "call":
+            return PLAIN_MEMORY
+        if one.opcode not in ("getelementptr", "phi", "select", "freeze"):
+            raise NotForLanes(f"a pointer that is computed: {one.words}")
+        several = {"phi": one.operands, "select": one.operands[1:]}
+        kinds = {self.points_at(o) for o in several.get(one.opcode, one.operands[:1])} - {""}
+        if len(kinds) > 1:
+            raise NotForLanes(f"a pointer to a constant, or to a number: {one.words}")
+        return kinds.pop() if kinds else ""
+
+    def _differ(self, name: str) -> None:
+        """Note a value that differs between lanes, and all that is computed from it."""
+        waiting = [name]
+        while waiting:
+            if (name := waiting.pop()) not in self.differing:
+                self.differing.add(name)
+                waiting += [one.name for one in self.readers[name] if self._passes_on(one)]
+
+    @staticmethod
+    def _passes_on(one: Instruction) -> bool:
+        called = one.operands[-1].strip('@"') if one.opcode == "call" else ""
+        return bool(one.name) and not called.startswith(("%", *SAME))
+
+    def splits(self, block: int) -> bool:
+        """Whether a block ends with a branch on which lanes may differ."""
+        last, targets = self.function.blocks[block][-1], self.function.successors[block]
+        return len(targets) > 1 and last.operands[0] in self.differing
+
+    def _parts(self, node: Node) -> bool:
+        return node in self.ragged if isinstance(node, Loop) else self.splits(node)
+
+    def _wait(self) -> None:
+        """By level and node, which nodes wait while control is there."""
+        self.waiting: dict[Loop | None, dict[Node, set[Node]]] = {}
+        for loop, level in self.order.levels.items():
+            waiting: dict[Node, set[Node]] = {node: set() for node in level.place}
+            self.waiting[loop] = waiting
+            for node in level.nodes:
+                targets, here = level.successors[node], waiting[node]
+                ways = [set(targets)] if self._parts(node) else [{t} for t in targets]
+                skipped = [here] if here else []
+                for goals in [*(here | way for way in ways), *skipped]:
+                    first = level.first(goals)
+                    waiting[first] |= goals - {first}
+
+    def edge(self, begin: int, end: int) -> Any:
+        """The mask of all lanes that go this way, or None where a branch picks them."""
+        ragged = any(loop in self.ragged for loop in self.order.around(begin, end))
+        return None if ragged or self.splits(begin) else self.of[begin]
+
+    def forward(self, block: int) -> list[int]:
+        """The blocks that lead to one, but for those behind it in its loop."""
+        loop = self.order.inner[block]
+        back = loop.blocks if loop and loop.header == block else ()
+        return [begin for begin in self.order.leads[block] if begin not in back]
+
+    def _find_masks(self) -> None:
+        """By block its mask."""
+        self.of: dict[int, Any] = {}
+        self.entering: dict[Loop, Any] = {}
+        self._find_masks_in(None)
+
+    def _find_masks_in(self, loop: Loop | None) -> None:
+        level = self.order.levels[loop]
+        before: dict[Node, Any] = {}
+        held = set().union(*self.waiting[loop].values())
+        for node in level.nodes:
+            block = node.header if isinstance(node, Loop) else node
+            before[node] = self._mask(level, node, block, before, held)
+            if isinstance(node, Loop):
+                self.entering[node] = before[node]
+                self._find_masks_in(node)
+            else:
+                self.of[node] = before[node]
+
+    def _mask(self, level: Level, node: Node, block: int, before: Any, held: set[Node]) -> Any:
+        if node not in level.parent:
+            if level.loop is None:
+                return EVERY
+            return block if level.loop in self.ragged else self.entering[level.loop]
+        parent = level.parent[node]
+        if node in level.later[parent]:  # all lanes that come to the one come to the other
+            return before[parent]
+        edges = {self.edge(begin, block) for begin in self.forward(block)}
+        if len(edges) == 1 and None not in edges and node not in held:
+            return edges.pop()
+        return block
+
+    def _find_joins(self) -> None:
+        for block, row in enumerate(self.function.blocks):
+            edges = {self.edge(begin, block) for begin in self.forward(block)}
+            if len(edges) > 1 or None in edges:
+                self.joins.add(block)
+            for one in row:
+                if one.opcode == "phi" and self._is_mixed(one, block in self.joins):
+                    self._differ(one.name)
+
+    def _is_mixed(self, phi: Instruction, joins: bool) -> bool:
+        """Whether lanes may get different numbers though each of these is the same in all."""
+        if joins and len(set(phi.operands) - {*NOTHING}) > 1:
+            return True
+        computed = [self.values[o].block for o in phi.operands if o in self.values]
+        return any(
+            loop in self.ragged for b in computed for loop in self.order.around(b, phi.block)
+        )
+
+    def _find_ragged(self) -> None:
+        for loop in self.order.loops[::-1]:  # the inner ones first
+            ways = [(b, s) for b in loop.blocks for s in self.function.successors[b]]
+            leaving = [(begin, end) for begin, end in ways if end not in loop.blocks]
+            entered = self.of[loop.header]
+            waits = any(self.waiting[loop].get(node) for node in (END, *(b for b, _ in leaving)))
+            if waits or any(self.edge(*way) != entered for way in leaving):
+                self.ragged.add(loop)

@@ -1,0 +1,149 @@
+# mypy: disable-error-code="no-untyped-call,attr-defined"
+"""Object code of kernels for lanes: numba makes scalar code, which `widening` widens."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import llvmlite.binding as llvm
+from llvmlite import ir
+from numba import njit, types
+from numba.core import cgutils, config
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.errors import NumbaError
+from numba.core.typing.ctypes_utils import from_ctypes
+from numba.extending import intrinsic
+
+from podusv_cli.core import kernel
+from podusv_cli.core.errors import in_a_line
+from podusv_cli.engine.machine import compile_numba, widening
+from podusv_cli.engine.machine.object_cache import Code, target
+from podusv_cli.engine.machine.scalar_ir import NotForLanes
+from podusv_cli.engine.machine.signatures import LANE_VECTOR
+from podusv_cli.engine.machine.wide_masks import LANES_MEMORY, PLAIN_MEMORY
+
+
+def object_code(function: Any, prototype: Any) -> Code:
+    """Object code of a kernel for lanes and all kernels it calls, or why there is none.
+
+    Raises TypeError where that need not be so the next time.
+    """
+    try:
+        module = _module(function, prototype)
+        compile_numba.check_calls(module, function.__qualname__)
+        return Code(widening.NAME, target().emit_object(module))
+    except (MemoryError, OSError) as error:
+        raise TypeError(in_a_line(error)) from error
+    except NumbaError as error:
+        return Code("", compile_numba.in_short(str(error)).encode())
+    except NotForLanes as error:
+        return Code("", f"its machine code cannot be widened: {error}".encode())
+    except TypeError as error:  # says what and where
+        return Code("", str(error).encode())
+    except Exception as error:
+        return Code("", in_a_line(error).encode())
+
+
+def _module(function: Any, prototype: Any) -> Any:
+    signature = compile_numba.signature(prototype, _type)
+    compiled = njit(**compile_numba.INNER)(_with_inlined(function))
+    with _unoptimised():
+        compiled.compile(signature.args)
+    scalar = compiled.overloads[signature.args]
+    module = llvm.parse_assembly(scalar.library.get_llvm_str())
+    memory = [_memory(kind) for kind in prototype._argtypes_]
+    result = "i64" if prototype._restype_ else ""
+    name = scalar.fndesc.llvm_func_name
+    return widening.widened(module, name, memory, result, target())
+
+
+@contextmanager
+def _unoptimised() -> Iterator[None]:
+    """Have numba leave its code as it comes, which `widening` works on."""
+    with global_compiler_lock:
+        before = config.OPT
+        config.OPT = type(before)(0)
+        try:
+            yield
+        finally:
+            config.OPT = before
+
+
+def _type(kind: Any) -> Any:
+    """numba's type of an argument of scalar code."""
+    if kind and issubclass(kind, ctypes._Pointer):
+        return types.CPointer(_type(kind._type_))
+    return types.float64 if kind and issubclass(kind, ctypes.Array) else from_ctypes(kind)
+
+
+def _memory(kind: Any) -> str:
+    """What an argument points at."""
+    if kind is LANE_VECTOR:
+        return LANES_MEMORY
+    return PLAIN_MEMORY if issubclass(kind, (ctypes._Pointer, ctypes._CFuncPtr)) else ""
+
+
+def _mark(name: str, result: Any = None) -> Any:
+    """A call that numba's code has for a primitive of `core.kernel`, and that widening replaces."""
+
+    def typed(given: Any) -> Any:
+        kinds = [types.unliteral(kind) for kind in given]
+        back = result or kinds[0]
+
+        def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            kind = ir.FunctionType(context.get_value_type(back), [a.type for a in arguments])
+            called = cgutils.get_or_insert_function(builder.module, kind, f"podusv.{name}")
+            called.attributes.add("readnone")
+            called.attributes.add("nounwind")
+            return builder.call(called, arguments)
+
+        return back(*kinds), code
+
+    llvm.add_symbol(f"podusv.{name}", 1)  # numba links its code, too, which nobody calls
+    return typed
+
+
+SHARED, ANY = _mark("shared"), _mark("lanes_any", types.boolean)
+TRUE, NUMBERS = _mark("lane_true", types.boolean), _mark("lane_numbers")
+
+
+@intrinsic
+def _filled(typing: Any, whole: Any, count: Any) -> Any:
+    """`kernel.filled`: a register holds several lanes, and no rounds."""
+    return types.int64(types.int64, types.int64), lambda c, b, s, arguments: arguments[1]
+
+
+PRIMITIVES = compile_numba.PRIMITIVES | {
+    kernel.filled: _filled,
+    kernel.shared: intrinsic(lambda typing, number: SHARED([number])),
+    kernel.lanes_any: intrinsic(lambda typing, mask: ANY([mask])),
+    kernel.lane_true: intrinsic(lambda typing, mask, lane: TRUE([mask, lane])),
+    kernel.lane_numbers: intrinsic(lambda typing, vector: NUMBERS([vector])),
+}
+
+
+@cache
+def inlined(function: Any) -> Any:
+    """The kernel and all kernels it calls, as a numba function to be compiled into its caller."""
+    if function in PRIMITIVES:
+        return PRIMITIVES[function]
+    return njit(**compile_numba.INNER)(_with_inlined(function))
+
+
+def _with_inlined(function: Any) -> Any:
+    """A copy of the kernel whose globals have numba functions in place of other kernels."""
+    named = kernel.named_kernels(function)
+    place = function.__code__.co_filename
+    ours = place.startswith("<") or function.__module__.startswith("podusv_cli.")
+    if kernel.shared in named.values() and not ours:
+        line = f"{Path(place).name}, line {function.__code__.co_firstlineno}"
+        raise TypeError(
+            f"{line}: shared is for podusv's own kernels, whose runs are sorted by what is shared"
+        )
+    inner = {name: inlined(called) for name, called in named.items()}
+    return kernel.with_globals(function, function.__qualname__, **inner)
