@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from podusv_cli.scenario.load import load_text
-from podusv_cli.studies.study.dispatch import Processes, march
+from podusv_cli.studies.study.dispatch import Processes, dispatch
 from podusv_cli.studies.study.plan import plan
 from podusv_cli.studies.study.store import SCENARIO, Store
 
@@ -39,7 +39,7 @@ def made(folder: Path, workers=1, part=(1, 1), **changes):
     """The store of the study, simulated into a folder; runs.h5 where it is whole."""
     store = Store(folder, small(**changes))
     store.open("now")
-    _, whole = march(store, lambda tally: None, Processes(workers), part=part)
+    _, whole = dispatch(store, lambda tally: None, Processes(workers), part=part)
     if whole and part == (1, 1):
         store.write_runs()
     return store

@@ -29,7 +29,7 @@ from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.metric import close_integrals
 from podusv_cli.metrics.operations import operations
 from podusv_cli.metrics.table import METRICS, metrics_with, observer
-from podusv_cli.metrics.windows import NAMED, called
+from podusv_cli.metrics.windows import NAMED, find
 from podusv_cli.scenario.load import load_text
 from podusv_cli.studies.study.expressions import parse_success
 
@@ -384,12 +384,12 @@ def test_a_window_that_cannot_be_is_told_with_its_place(section, told):
 
 
 def test_the_name_of_a_metric_that_a_scenario_names_is_explained():
-    metric = called("error_my_line_rms", METRICS)
+    metric = find("error_my_line_rms", METRICS)
     assert metric is not None
     assert metric.unit == "m"
-    assert called("iae", METRICS) is METRICS["iae"]
-    assert called("error__rms", METRICS) is None
-    assert called("iae_line", METRICS) is None
+    assert find("iae", METRICS) is METRICS["iae"]
+    assert find("error__rms", METRICS) is None
+    assert find("iae_line", METRICS) is None
 
 
 def test_runs_with_windows_and_runs_without_share_a_table(podusv):

@@ -13,7 +13,7 @@ from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.studies.study import cluster as clusters
 from podusv_cli.studies.study import dispatch as marching
 from podusv_cli.studies.study.cluster import Cluster
-from podusv_cli.studies.study.dispatch import march
+from podusv_cli.studies.study.dispatch import dispatch
 from podusv_cli.studies.study.remote import BITS, Expectation, StudyText
 from podusv_cli.studies.study.store import Store
 from podusv_cli.studies.study.unit import STATUSES
@@ -55,7 +55,7 @@ def stub(names="ab", **others):
 def marched(folder, client, tell=lambda tally: None, mixed=False, **changes):
     store, engine = Store(folder, small(**changes)), cluster(client, mixed)
     store.open("now")
-    return store, engine, march(store, tell, engine)
+    return store, engine, dispatch(store, tell, engine)
 
 
 def statuses(store):

@@ -13,7 +13,7 @@ from small_study import TEXT, made, small
 
 from podusv_cli.core.errors import StorageError
 from podusv_cli.studies.study.cluster import connected
-from podusv_cli.studies.study.dispatch import march
+from podusv_cli.studies.study.dispatch import dispatch
 from podusv_cli.studies.study.remote import StudyText
 from podusv_cli.studies.study.store import RUNS, Store
 
@@ -44,7 +44,7 @@ def test_a_worker_that_is_killed_changes_no_byte(distributed, tmp_path):
         distributed.LocalCluster(2, threads_per_worker=1, dashboard_address=None) as local,
         connected(local.scheduler_address, recipe, store.seal, mixed=False) as engine,
     ):
-        _, finished = march(store, tell, engine)
+        _, finished = dispatch(store, tell, engine)
     assert finished
     assert killed
     store.write_runs()

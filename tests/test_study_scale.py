@@ -11,7 +11,7 @@ from small_study import small
 from stub_cluster import REPORT, StubClient
 from test_study_cluster import cluster, instant  # noqa: F401  # a fixture
 
-from podusv_cli.studies.study.dispatch import AIM, march
+from podusv_cli.studies.study.dispatch import AIM, dispatch
 from podusv_cli.studies.study.store import Store
 
 WORKERS = [f"tcp://10.0.0.{number}:8786" for number in range(200)]
@@ -23,7 +23,7 @@ def marched(folder, draws):
     client = StubClient(plan.metrics, dict.fromkeys(WORKERS, REPORT), seconds=AIM / 8)
     store = Store(folder, plan)
     store.open("now")
-    return store, client, march(store, lambda tally: None, cluster(client))
+    return store, client, dispatch(store, lambda tally: None, cluster(client))
 
 
 @pytest.mark.slow

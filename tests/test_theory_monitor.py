@@ -35,7 +35,7 @@ from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop
 from podusv_cli.engine.loop.columns import by_name, names
 from podusv_cli.engine.running.replay import rates_replay
 from podusv_cli.engine.step.grid import TimeGrid
-from podusv_cli.engine.step.layout import Plan
+from podusv_cli.engine.step.layout import Layout
 from podusv_cli.theory.ideal_weights import unloaded_accelerations
 from podusv_cli.theory.lyapunov import TERMS
 from podusv_cli.theory.monitor import Monitored, monitored
@@ -137,7 +137,7 @@ TINY = 1e-5  # s
 
 def moving(loop: ClosedLoop, law: PolarBackstepping, x: Vector, memory: Vector) -> Recording:
     """Three rows: a state, and where the flow comes from and goes to in a tiny time."""
-    plan: Plan = loop.layout(TimeGrid(0.01, 1))
+    plan: Layout = loop.layout(TimeGrid(0.01, 1))
     labels = names(loop)[: 1 + plan.states]
     t, s = 20.0, np.concatenate([target_at(loop.path, 20.0)[:2] + x[:2] * 0.5, x[2:], memory])
 

@@ -7,7 +7,7 @@ from podusv_cli.studies.study.dispatch import Processes
 from podusv_cli.studies.study.unit import prepare
 from podusv_cli.studies.tuning import trials
 from podusv_cli.studies.tuning.check import tune_faults
-from podusv_cli.studies.tuning.dispatch import march
+from podusv_cli.studies.tuning.dispatch import dispatch
 from podusv_cli.studies.tuning.plan import TunePlan
 from podusv_cli.studies.tuning.search import Search
 from podusv_cli.workflows import tune as workflow
@@ -142,5 +142,5 @@ def searched(folder, *changes, engine=None):
     (folder / trials.FOLDER).mkdir(exist_ok=True)
     found = [Search(plan, "toy", repeat, folder) for repeat in range(plan.tune.repeats)]
     prepare(plan.base, "toy", 0)  # before the fork
-    march(found, engine or Processes(1), lambda tally, searches: None)
+    dispatch(found, engine or Processes(1), lambda tally, searches: None)
     return found

@@ -66,10 +66,10 @@ def _show_metrics(found: RunDifference) -> None:
     from podusv_cli.comparison.run_difference import relative
     from podusv_cli.core.plugins import installed
     from podusv_cli.metrics.table import metrics_with
-    from podusv_cli.metrics.windows import called
+    from podusv_cli.metrics.windows import find
 
     known = metrics_with(installed())
-    units = {name: metric.unit for name in found.metrics if (metric := called(name, known))}
+    units = {name: metric.unit for name in found.metrics if (metric := find(name, known))}
     rows = [
         [name, units.get(name, ""), _number(a), _number(b), _number(relative(a, b), "+.2g")]
         for name, (a, b) in found.metrics.items()

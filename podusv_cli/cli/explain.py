@@ -39,7 +39,7 @@ def explain(
     """
     from podusv_cli.findings.finding import finding_kinds
     from podusv_cli.metrics.table import metrics_with
-    from podusv_cli.metrics.windows import called
+    from podusv_cli.metrics.windows import find
     from podusv_cli.scenario.explain import UnknownKeyError
     from podusv_cli.scenario.explain import explain as rows
     from podusv_cli.scenario.plugins import on_hand
@@ -48,7 +48,7 @@ def explain(
     findings, metrics = finding_kinds(plugins), metrics_with(plugins)
     if key in findings:
         _echo_finding(findings[key])
-    elif metric := called(key or "", metrics):
+    elif metric := find(key or "", metrics):
         echo_entry(key or "", metric.meaning, facts=f"metric [{metric.unit}]")
     else:
         try:

@@ -144,9 +144,9 @@ def _next(done: Swept) -> str:
     """What to do with an unfinished study."""
     if done.part_is_whole:
         return "this shard is done: join all of them with podusv sweep merge"
-    from podusv_cli.scenario.plugins import again
+    from podusv_cli.scenario.plugins import continue_with
 
-    return f"continue with: {again('sweep run', done.folder)}"
+    return f"continue with: {continue_with('sweep run', done.folder)}"
 
 
 @command

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from podusv_cli.comparison.entries import Entry
 from podusv_cli.metrics.distance import OF_OPTIMUM
-from podusv_cli.process.extras import Extras, Missing
+from podusv_cli.process.extras import Extras, Failure
 
 TASK = ("vessel", "start", "path", "disturbance", "actuator")
 
@@ -29,7 +29,7 @@ def related(entries: Sequence[Entry], extras: Extras) -> list[Entry]:
             elif optima:
                 what = ", ".join(_other(entry, optima[0]))
                 why = f"the optimum {optima[0].label} has another {what}"
-                extras.missing.append(Missing(f"{ratio.name} of {entry.label}", why))
+                extras.missing.append(Failure(f"{ratio.name} of {entry.label}", why))
     return found
 
 

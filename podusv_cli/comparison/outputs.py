@@ -16,7 +16,7 @@ from podusv_cli.findings.finding import merged
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import CLOCKED, METRICS
 from podusv_cli.pages.page import Picture
-from podusv_cli.process.extras import Extras, Missing
+from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage import json_files
 from podusv_cli.storage.run_folder import RunWriter
@@ -118,7 +118,7 @@ def drawn(
     for name in names:
         if not known[name].fits(shown):
             wanted = ", ".join(known[name].signals)
-            extras.missing.append(Missing(f"figure {name}", f"no run logged any of {wanted}"))
+            extras.missing.append(Failure(f"figure {name}", f"no run logged any of {wanted}"))
     names = tuple(dict.fromkeys(names)) or tuple(known)
     formats = tuple(dict.fromkeys((*formats, IN_REPORT)))
     return draw_in_parallel(shown, names, formats, extras, progress=tell, workers=workers)

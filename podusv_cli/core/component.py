@@ -149,7 +149,7 @@ def wrong_default(owner: Component) -> str:
     return ""
 
 
-def called(owner: Component) -> str:
+def describe(owner: Component) -> str:
     """`law mine (mine.py, line 12)`: a component's kind, and where its class is written."""
     kind, place = type(owner), ""
     with suppress(OSError, TypeError):  # made where there is no source

@@ -18,10 +18,10 @@ def misfit(time: float, step: float) -> str:
     """What is wrong with a time above 0 that is no whole number of steps; else empty."""
     if whole_steps(time, step):
         return ""
-    return f"{time:g} s is no whole number of steps of {step:g} s{fitting(time, step)}"
+    return f"{time:g} s is no whole number of steps of {step:g} s{nearest_hint(time, step)}"
 
 
-def fitting(time: float, step: float) -> str:
+def nearest_hint(time: float, step: float) -> str:
     """A hint with the nearest time that fits; the smaller one in the middle of two."""
     count = time / step
     return f"; try {max(1, math.ceil(count - 0.5)) * step:.10g}" if count < 1e12 else ""

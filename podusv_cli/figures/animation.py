@@ -56,13 +56,16 @@ def stage(axes: Axes, runs: Sequence[Shown]) -> Callable[[float], None]:
     A run that has ended stays where it is, its hull pale.
     """
     chased = [
-        (target.recording, axes.plot([], [], "o", color=target.look["color"], markersize=4)[0])
+        (
+            target.recording,
+            axes.plot([], [], "o", color=target.line_style["color"], markersize=4)[0],
+        )
         for target in targets(runs)
     ]
     for target in targets(runs):
-        axes.plot(target.recording["y_d"], target.recording["x_d"], **target.look)
+        axes.plot(target.recording["y_d"], target.recording["x_d"], **target.line_style)
     scale = enlargement(runs)
-    tracks = [axes.plot([], [], **run.look)[0] for run in runs]
+    tracks = [axes.plot([], [], **run.line_style)[0] for run in runs]
     hulls = [Polygon(np.zeros((5, 2)), color=run.color) for run in runs]
     for outline in hulls:
         axes.add_patch(outline)

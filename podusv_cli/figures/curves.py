@@ -60,7 +60,7 @@ def draw_signal(
         if not beside:
             draw_run(axes, run, curve, fitted=run in fitted)
         elif differ(run, name, beside):
-            thin = {**run.look, **THIN, "label": f"_{run.name}, {name}"}
+            thin = {**run.line_style, **THIN, "label": f"_{run.name}, {name}"}
             draw_curve(axes, curve, fitted=run in fitted, **thin)
 
 
@@ -88,7 +88,7 @@ def draw_run(
 
     A run that did not finish has an x below the instant of its end; the curve may end anywhere.
     """
-    mark(draw_curve(axes, curve, fitted=fitted, **run.look, **look), run)
+    mark(draw_curve(axes, curve, fitted=fitted, **run.line_style, **look), run)
     if not run.whole and len(curve[0]) and curve[0][-1] == run.end:
         below = axes.get_xaxis_transform()
         axes.plot([run.end], [0.0], transform=below, clip_on=False, color=run.color, **CUT)

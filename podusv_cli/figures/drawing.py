@@ -15,8 +15,8 @@ from podusv_cli.core.escaping import visible
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.core.recording import Recording
 from podusv_cli.figures.sheet import Sheet
-from podusv_cli.figures.style import FORMATS, Shown, house_style, image, look, places
-from podusv_cli.process.extras import Extras, Missing
+from podusv_cli.figures.style import FORMATS, Shown, house_style, image, nth_style, places
+from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_enabled
 from podusv_cli.process.workers import run_all
 from podusv_cli.scenario.model import Scenario
@@ -51,7 +51,7 @@ def dressed(
     """
     count = len(runs)
     shown = [
-        Shown(visible(label), recording, scenario, *look(i), places(i, count), peaks or {})
+        Shown(visible(label), recording, scenario, *nth_style(i), places(i, count), peaks or {})
         for i, (label, recording, scenario) in enumerate(runs)
         if len(recording["time"]) > 1
     ]
@@ -85,7 +85,7 @@ def draw_in_parallel(
     def drawn(name: str) -> dict[str, bytes]:
         return dict(draw(runs, [name], formats, columns))
 
-    def job(name: str, tell: Callable[[float], None]) -> tuple[dict[str, bytes], list[Missing]]:
+    def job(name: str, tell: Callable[[float], None]) -> tuple[dict[str, bytes], list[Failure]]:
         own = Extras()
         with interrupts_enabled():
             files = own.made(f"figure {name}", partial(drawn, name))
@@ -104,7 +104,7 @@ def draw_in_parallel(
         raise KeyboardInterrupt
     found: dict[str, bytes] = {}
     for name, outcome in zip(names, outcomes, strict=True):
-        files, missing = outcome.result or ({}, [Missing(f"figure {name}", outcome.failure)])
+        files, missing = outcome.result or ({}, [Failure(f"figure {name}", outcome.failure)])
         found |= files
         extras.missing += missing
     return found

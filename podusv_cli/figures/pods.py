@@ -43,7 +43,7 @@ def pods(runs: Sequence[Shown], columns: int) -> Figure:
 
 def _draw(axes: Axes, run: Shown, names: tuple[str, str], pod: int, *, fitted: bool) -> None:
     actual, asked = names
-    thin: dict[str, Any] = {**run.look, **THIN, "label": f"_{run.name}, {asked}"}
+    thin: dict[str, Any] = {**run.line_style, **THIN, "label": f"_{run.name}, {asked}"}
     if _has(run, asked, pod):
         draw_curve(axes, _curve(run, asked, pod), fitted=fitted, **thin)
     if _has(run, actual, pod):

@@ -37,7 +37,7 @@ def spectrum(runs: Sequence[Shown], columns: int) -> Figure:
         for run in (run for run in whole[:1] if run.has(load)):
             _draw(axes, run, load, **SEA)
         for run in (run for run in whole if run.has(demand)):
-            mark(_draw(axes, run, demand, **run.look), run)
+            mark(_draw(axes, run, demand, **run.line_style), run)
         _scales(axes)
         axes.set_title(AXES[demand])
         axes.set_xlabel("angular frequency [rad/s]")

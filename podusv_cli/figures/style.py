@@ -94,7 +94,7 @@ class Shown:
         return self.scenario.steady_from()
 
     @property
-    def look(self) -> dict[str, Any]:
+    def line_style(self) -> dict[str, Any]:
         """Keyword arguments of `Axes.plot`; a legend tells how a run ended that did not finish."""
         ending = "" if self.whole else f" ({self.recording.status} at {self.end:g} s)"
         return {"color": self.color, "linestyle": self.linestyle, "label": self.name + ending}
@@ -128,7 +128,7 @@ class Shown:
         return float(self.signal(name)[self.row(t)])
 
 
-def look(place: int) -> tuple[str, Any, str]:
+def nth_style(place: int) -> tuple[str, Any, str]:
     """Colour, line style and marker of the run in this place; the first 100 differ."""
     count = len(LOOKS)
     return LOOKS[place % count][0], *LOOKS[(place + place // count) % count][1:]

@@ -32,7 +32,7 @@ class Target:
     """A target, the runs that follow it, how it is drawn, and a log that holds its whole track."""
 
     runs: Sequence[Shown]
-    look: dict[str, Any]
+    line_style: dict[str, Any]
     recording: Recording
 
 
@@ -53,8 +53,8 @@ def _target(group: Sequence[Shown], *, only: bool) -> Target:
     if only:
         return Target(group, {**TARGET_LOOK, "label": "target"}, longest)
     label = f"target of {', '.join(run.name for run in group)}"
-    look = {**TARGET_LOOK, "linestyle": group[0].linestyle, "label": label}
-    return Target(group, look, longest)
+    style = {**TARGET_LOOK, "linestyle": group[0].linestyle, "label": label}
+    return Target(group, style, longest)
 
 
 def enlargement(runs: Sequence[Shown]) -> float:
@@ -222,7 +222,7 @@ def _close_up(axes: Axes, view: View) -> tuple[tuple[float, float], float]:
     for run in view.runs:
         axes.add_patch(Polygon(hull_of(run, view.t, 1.0), **_outline(run)))
     aim = [[view.runs[0].at(view.t, name)] for name in ("y_d", "x_d")]
-    label = f"{view.target.look['label']} at this time"
+    label = f"{view.target.line_style['label']} at this time"
     axes.plot(*aim, **MARK, marker="+", markersize=7, label=label)
     at = np.array([[run.at(view.t, name) for name in ("y", "x")] for run in view.runs])
     length = max(run.length for run in view.runs)
@@ -238,10 +238,10 @@ def _draw_tracks(axes: Axes, ahead: Sequence[Target], runs: Sequence[Shown], spa
     """Tracks of targets, and of runs with their markers, during a time [s]."""
     for target in ahead:
         rows = _rows(target.recording, span)
-        axes.plot(target.recording["y_d"][rows], target.recording["x_d"][rows], **target.look)
+        axes.plot(target.recording["y_d"][rows], target.recording["x_d"][rows], **target.line_style)
     for run in runs:
         log, rows = run.recording, _rows(run.recording, span)
-        (track,) = axes.plot(log["y"][rows], log["x"][rows], **run.look)
+        (track,) = axes.plot(log["y"][rows], log["x"][rows], **run.line_style)
         mark(track, run, log["time"][rows])
 
 

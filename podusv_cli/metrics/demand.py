@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from podusv_cli.core.kernel import Vector, kernel
-from podusv_cli.metrics.metric import Accumulator, Layout, Metric, Result, gathered
+from podusv_cli.metrics.metric import Accumulator, Measured, Metric, Result, gathered
 
 PEAK_U, PEAK_R, TV_U, TV_R, LAST_U, LAST_R, SETTLED, SIZE = range(8)
 
@@ -31,7 +31,7 @@ def _variation(position: int) -> Result:
     return lambda seen, step: float(seen[position]) if seen[SETTLED] > 1.0 else math.nan
 
 
-def _constants(layout: Layout) -> dict[str, float]:
+def _constants(layout: Measured) -> dict[str, float]:
     return {"demand": float(layout.plan.demand), "steady_from": layout.steady_from}
 
 

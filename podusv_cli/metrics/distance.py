@@ -7,7 +7,7 @@ from typing import Any
 
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.engine.step.layout import DISTANCE
-from podusv_cli.metrics.metric import Accumulator, Layout, Metric, Result, add, gathered, ratio
+from podusv_cli.metrics.metric import Accumulator, Measured, Metric, Result, add, gathered, ratio
 from podusv_cli.metrics.windows import settled_from
 
 # Positions of the gathered numbers: integrals over the run, and over the steady window.
@@ -52,7 +52,7 @@ def watch_settled(t: float, weight: float, s: Vector, row: Vector, k: Any, seen:
         add(seen, SETTLED, ALONG, share * along * along)
 
 
-def _constants(layout: Layout) -> dict[str, float]:
+def _constants(layout: Measured) -> dict[str, float]:
     approach = layout.loop.controller.approach()
     return {
         "steady_from": layout.steady_from,

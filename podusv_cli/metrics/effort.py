@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from podusv_cli.core.kernel import Vector, kernel
-from podusv_cli.metrics.metric import Accumulator, Layout, Metric, add, gathered, ratio
+from podusv_cli.metrics.metric import Accumulator, Measured, Metric, add, gathered, ratio
 
 TIME, EFFORT_U, EFFORT_R, ENERGY, SATURATED, INTEGRALS = range(6)
 
@@ -22,7 +22,7 @@ def watch(weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
         add(seen, INTEGRALS, SATURATED, weight * row[int(k.saturated)])
 
 
-def _constants(layout: Layout) -> dict[str, float]:
+def _constants(layout: Measured) -> dict[str, float]:
     return {"tau": float(layout.plan.tau), "saturated": float(layout.column("saturated"))}
 
 

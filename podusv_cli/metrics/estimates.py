@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from podusv_cli.core.kernel import Vector, kernel
-from podusv_cli.metrics.metric import Accumulator, Layout, Metric, Result, add
+from podusv_cli.metrics.metric import Accumulator, Measured, Metric, Result, add
 
 TIME, POSITION, HEADING, VELOCITY, YAW_RATE, INTEGRALS = range(6)
 SIZE = 2 * INTEGRALS
@@ -25,11 +25,11 @@ def watch(weight: float, s: Vector, k: Any, seen: Vector) -> None:
     add(seen, INTEGRALS, YAW_RATE, weight * r * r)
 
 
-def _size(layout: Layout) -> int:
+def _size(layout: Measured) -> int:
     return SIZE if layout.plan.estimate else 0
 
 
-def _constants(layout: Layout) -> dict[str, float]:
+def _constants(layout: Measured) -> dict[str, float]:
     return {"estimate": float(layout.plan.estimate)}
 
 

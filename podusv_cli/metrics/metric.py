@@ -11,15 +11,15 @@ import numpy as np
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.signal import check_words
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
-from podusv_cli.engine.step.layout import Plan
+from podusv_cli.engine.step.layout import Layout
 
 
 @dataclass(frozen=True)
-class Layout:
+class Measured:
     """A loop, the columns of its rows, and the scenario's settings of metrics."""
 
     loop: ClosedLoop
-    plan: Plan
+    plan: Layout
     steady_from: float  # s
     settling_radius: float  # m
 
@@ -68,8 +68,8 @@ class Accumulator:
     """
 
     watch: Callable[..., None]
-    size: Callable[[Layout], int]
-    constants: Callable[[Layout], dict[str, float]]
+    size: Callable[[Measured], int]
+    constants: Callable[[Measured], dict[str, float]]
     integrals: int = 0
     differing: tuple[str, ...] = ()
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from podusv_cli.components.actuators.propeller import DELTA, LIMITED
 from podusv_cli.core.kernel import Vector, kernel, tail
-from podusv_cli.metrics.metric import Accumulator, Layout, Metric, add, gathered, ratio
+from podusv_cli.metrics.metric import Accumulator, Measured, Metric, add, gathered, ratio
 
 TIME, ENERGY, SPEED, ANGLE, RATE, INTEGRALS = range(6)
 TRAVEL, LAST_DELTA = 2 * INTEGRALS, 2 * INTEGRALS + 1  # the last angle of every pod
@@ -31,15 +31,15 @@ def watch(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector)
         seen[INTEGRALS + ENERGY] += share
 
 
-def _count(layout: Layout) -> int:
+def _count(layout: Measured) -> int:
     return layout.loop.actuator.states.count(DELTA)
 
 
-def _size(layout: Layout) -> int:
+def _size(layout: Measured) -> int:
     return LAST_DELTA + _count(layout) if _count(layout) else 0
 
 
-def _constants(layout: Layout) -> dict[str, float]:
+def _constants(layout: Measured) -> dict[str, float]:
     limits, power = layout.column(LIMITED[0].name), layout.column("power")
     return {"pods": float(_count(layout)), "limits": float(limits), "power": float(power)}
 

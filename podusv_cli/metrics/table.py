@@ -15,7 +15,7 @@ from podusv_cli.core.kernel import Vector, kernel, specialise, tail, taking
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.engine.loop.closed_loop import ClosedLoop, Observer
 from podusv_cli.engine.step.grid import TimeGrid
-from podusv_cli.metrics.metric import Accumulator, Layout, Metric, close_integrals
+from podusv_cli.metrics.metric import Accumulator, Measured, Metric, close_integrals
 from podusv_cli.metrics.windows import NONE, Radii, Windows, named
 
 
@@ -74,7 +74,7 @@ class Metrics(Observer):
     parts: Parts
     step: float  # s
     known: Mapping[str, Metric]
-    layout: Layout
+    layout: Measured
 
     def constants_for(self, loop: ClosedLoop) -> dict[str, float]:
         """The constants of all accumulators in a run of this loop.
@@ -143,7 +143,7 @@ def observer(
     It serves all loops of the same structure: each has constants of its own. Raises LawError for a
     metric whose accumulator does not answer.
     """
-    layout = Layout(loop, loop.layout(grid), grid.last_part(steady_fraction), settling_radius)
+    layout = Measured(loop, loop.layout(grid), grid.last_part(steady_fraction), settling_radius)
     sizes = {part: _asked(part, metric, layout)[0] for part, metric in _accumulators(known).items()}
     parts = tuple((part, size) for part, size in sizes.items() if size)
     differing = frozenset(name for part, _ in parts for name in part.differing)
@@ -160,7 +160,7 @@ def _accumulators(known: Mapping[str, Metric]) -> dict[Accumulator, str]:
     return {metric.accumulator: name for name, metric in known.items() if metric.accumulator}
 
 
-def _asked(part: Accumulator, metric: str, layout: Layout) -> tuple[int, dict[str, float]]:
+def _asked(part: Accumulator, metric: str, layout: Measured) -> tuple[int, dict[str, float]]:
     """How many numbers an accumulator gathers in a loop, and its constants; none for 0 numbers."""
     try:
         size = part.size(layout)

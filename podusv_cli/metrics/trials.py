@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from podusv_cli.core.kernel import Vector, kernel
-from podusv_cli.metrics.metric import Accumulator, Layout, Metric, Result
+from podusv_cli.metrics.metric import Accumulator, Measured, Metric, Result
 
 # Positions of what is gathered: where the trial begins, then what it has led to.
 BEGUN, X_0, Y_0, PSI_0 = range(4)
@@ -58,7 +58,7 @@ def watch_zigzag(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: 
 def _sizes(turn: int, zigzag: int) -> Any:
     """How many numbers are gathered of each kind of trial."""
 
-    def size(layout: Layout) -> int:
+    def size(layout: Measured) -> int:
         trial = layout.loop.controller.trial()
         if trial is None:
             return 0
@@ -67,7 +67,7 @@ def _sizes(turn: int, zigzag: int) -> Any:
     return size
 
 
-def _constants(layout: Layout) -> dict[str, float]:
+def _constants(layout: Measured) -> dict[str, float]:
     trial = layout.loop.controller.trial()
     return {"trial_execute": trial.execute, "trial_switch": trial.switch} if trial else {}
 

@@ -109,7 +109,7 @@ def named(windows: Windows, radii: Radii) -> dict[str, Metric]:
     return {metric.name: metric for metric in found}
 
 
-def called(name: str, known: Mapping[str, Metric]) -> Metric | None:
+def find(name: str, known: Mapping[str, Metric]) -> Metric | None:
     """The metric of this name, of which a scenario may have chosen a part; None for no metric."""
     word = "[a-z][a-z0-9_]*"
     fits = (m for m in known.values() if re.fullmatch(m.name.replace(NAMED, word), name))

@@ -14,7 +14,7 @@ Result = TypeVar("Result")
 
 
 @dataclass(frozen=True)
-class Missing:
+class Failure:
     """A part of a result that could not be made or has another problem: why, and the traceback."""
 
     what: str
@@ -42,7 +42,7 @@ class Extras:
     def __init__(self, interrupted: bool = False) -> None:
         """With `interrupted`, `attempt` does nothing."""
         self.interrupted = interrupted
-        self.missing: list[Missing] = []
+        self.missing: list[Failure] = []
 
     def made(self, what: str, work: Callable[[], Result]) -> Result | None:
         """What the work returns, or None where it fails; `what` names it in the message."""
@@ -77,4 +77,4 @@ class Extras:
         if isinstance(error, StorageError):
             raise error
         trace = "".join(traceback.format_exception(error))
-        self.missing.append(Missing(what, in_a_line(error), trace))
+        self.missing.append(Failure(what, in_a_line(error), trace))

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from podusv_cli.components.estimators.none import NoEstimator
-from podusv_cli.core.component import called, wrong_default
+from podusv_cli.core.component import describe, wrong_default
 from podusv_cli.core.errors import LawError, in_a_line
 from podusv_cli.core.signal import Signal
-from podusv_cli.core.steps import fitting, misfit, whole_steps
+from podusv_cli.core.steps import misfit, nearest_hint, whole_steps
 from podusv_cli.scenario.sections import CLAIM, CLAIM_IN_WORDS, LABEL, LABEL_IN_WORDS
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def _defaults(scenario: Scenario) -> Conflicts:
     }  # fmt: skip
     for key, part in {**others, **scenario.laws()}.items():
         if told := wrong_default(part):
-            yield key, f"{called(part)}: {told}"
+            yield key, f"{describe(part)}: {told}"
 
 
 def _summands(scenario: Scenario) -> Conflicts:
@@ -62,7 +62,7 @@ def _unanswered(scenario: Scenario) -> Conflicts:
         try:
             law.sample_period(), law.declared()
         except Exception as error:
-            yield key, f"{called(law)}: asked what it logs, {in_a_line(error)}"
+            yield key, f"{describe(law)}: asked what it logs, {in_a_line(error)}"
 
 
 def _times(scenario: Scenario) -> Conflicts:
@@ -97,7 +97,7 @@ def _samples(scenario: Scenario) -> Conflicts:
     for key, sample in _sampled(scenario).items():
         if period and sample and not whole_steps(sample, period):
             text = f"{sample:g} s is no whole number of control periods of {period:g} s"
-            yield key, text + fitting(sample, period)
+            yield key, text + nearest_hint(sample, period)
 
 
 def _seeing(scenario: Scenario) -> Conflicts:

@@ -12,11 +12,11 @@ from podusv_cli.core.component import Component
 from podusv_cli.core.errors import PodusvError
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.core.signal import Signal
-from podusv_cli.scenario.keys import MISSING, NAME, NUMBER, Key, either, keys_of
+from podusv_cli.scenario.keys import NAME, NO_DEFAULT, NUMBER, Key, either, keys_of
 from podusv_cli.scenario.model import scenario_class
 from podusv_cli.scenario.phrases import as_yaml, did_you_mean
 from podusv_cli.scenario.presets import preset_names, preset_text, with_presets
-from podusv_cli.scenario.yaml_tree import dotted, route, whole_names
+from podusv_cli.scenario.yaml_tree import dotted, route, with_dotted_key
 
 BOOLEANS = {"true or false": ("true", "false")}
 # What a file may leave out although the model has no default for it, and where it comes from.
@@ -70,7 +70,9 @@ def explain(
         return [EXTENDS, *_rows(top.keys.values())]
     if name == EXTENDS.key:
         return [EXTENDS]
-    place = tuple(NUMBER if str(step).isdecimal() else step for step in whole_names(route(name)))
+    place = tuple(
+        NUMBER if str(step).isdecimal() else step for step in with_dotted_key(route(name))
+    )
     keys = top.follow(place) if place else []
     found = _with_contents(keys) or _named(name, top, plugins)
     if not found:
@@ -207,6 +209,6 @@ def _default(key: Key) -> str:
         return FILLED_IN[key.path]
     if key.path[0] in FROM_PRESET and key.path != ("vessel", "preset"):
         return FROM_PRESET[str(key.path[0])]
-    if key.default is MISSING or key.name == "kind":
+    if key.default is NO_DEFAULT or key.name == "kind":
         return "required"
     return as_yaml(key.default)

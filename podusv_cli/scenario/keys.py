@@ -21,7 +21,7 @@ from podusv_cli.scenario.sections import NAME_IN_WORDS
 from podusv_cli.scenario.yaml_tree import Route
 
 NAME, NUMBER = "NAME", "NUMBER"  # stand for the names in a mapping, the positions in a list
-MISSING = PydanticUndefined  # the default of a field that has none
+NO_DEFAULT = PydanticUndefined  # the default of a field that has none
 BOUNDS = {
     "gt": (">", "above"), "ge": (">=", "not below"), "lt": ("<", "below"), "le": ("<=", "not above")
 }  # fmt: skip
@@ -50,7 +50,7 @@ class Key:
     path: Route
     annotation: Any
     field: FieldInfo | None = None
-    default: Any = MISSING
+    default: Any = NO_DEFAULT
     route: Route = ()
     kind: str = ""
     model: type[Component] = Scenario
@@ -157,7 +157,12 @@ class Key:
             if types:
                 path, route = (*self.path, step), (*self.route, step)
                 return replace(
-                    self, path=path, annotation=types[0], field=None, default=MISSING, route=route
+                    self,
+                    path=path,
+                    annotation=types[0],
+                    field=None,
+                    default=NO_DEFAULT,
+                    route=route,
                 )
         return None
 

@@ -19,10 +19,10 @@ from podusv_cli.scenario.yaml_tree import (
     Route,
     bracketed,
     dotted,
-    fitting,
     merge,
     steps_of,
-    whole_names,
+    with_dotted_key,
+    without_misfits,
 )
 
 FLOW = ("[", "{", "'", '"')  # what lists, mappings and text in quotes start with
@@ -61,7 +61,7 @@ def _settings(source: str, overrides: Sequence[str], faults: list[Fault]) -> Nod
 
 
 def _over(base: Node, top: Node, faults: list[Fault]) -> Node:
-    return merge(base, fitting(base, top, faults))
+    return merge(base, without_misfits(base, top, faults))
 
 
 def _layers(text: str, source: str, faults: list[Fault], placed: bool) -> list[Node]:
@@ -161,7 +161,7 @@ def _override_tree(override: str, faults: list[Fault]) -> Node:
     name, equals, text = override.partition("=")
     shown = override if override.isprintable() else ascii(override)
     mark = Mark(f"--set {shown}")
-    keys = list(whole_names(steps_of(name.strip())))
+    keys = list(with_dotted_key(steps_of(name.strip())))
     node: Node | None = None
     if not equals or not all(keys):
         faults.append(Fault(mark, "", "write it as --set section.key=value"))

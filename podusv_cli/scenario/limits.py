@@ -107,11 +107,11 @@ def limits(
 
     insist = f", or insist with {insist}" if insist else ""
 
-    def look(scenario: Scenario) -> list[tuple[str, str]]:
+    def check_size(scenario: Scenario) -> list[tuple[str, str]]:
         too_large = _too_large(scenario, allow_large, read_back, insist)
         return [] if scenario.conflicts() else list(islice(too_large, 1))
 
-    return look
+    return check_size
 
 
 def _too_large(scenario: Scenario, allow_large: bool, read_back: bool, insist: str) -> Conflicts:

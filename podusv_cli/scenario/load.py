@@ -27,9 +27,9 @@ from podusv_cli.scenario.yaml_tree import (
     Route,
     dotted,
     find,
-    fitting,
     merge,
     plain,
+    without_misfits,
 )
 
 # Values; several times those of one file, since a scenario may extend files with long lists.
@@ -60,7 +60,7 @@ class Loaded:
     def changed(self, top: Node, checks: Sequence[Check] = ()) -> Scenario:
         """The scenario of the same tree with another merged over it. Raises ScenarioError."""
         faults: list[Fault] = []
-        root = merge(self.root, fitting(self.root, top, faults))
+        root = merge(self.root, without_misfits(self.root, top, faults))
         source = self.root.mark.source
         return _checked(root, self.scenario.plugged, source, faults, checks)[0]
 

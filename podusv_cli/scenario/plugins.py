@@ -213,7 +213,7 @@ def recorded(
     return root, (*known, ABSENT, told, *_stand_ins(root, parts, scenario_class(known)))
 
 
-def again(command: str, folder: File) -> str:
+def continue_with(command: str, folder: File) -> str:
     """The command line that goes on with a folder, which may have plug-in files of its own."""
     trust = " --trust" if (folder / FOLDER).is_dir() else ""
     return f"podusv {command} {shlex.quote(str(folder))}{trust}"

@@ -19,7 +19,7 @@ from podusv_cli.scenario.phrases import found, quoted, unknown
 from podusv_cli.scenario.sections import NAME, NAME_IN_WORDS
 from podusv_cli.scenario.shipped import PREFIX
 from podusv_cli.scenario.yaml_text import read
-from podusv_cli.scenario.yaml_tree import Fault, Node, Route, dotted, fitting, merge
+from podusv_cli.scenario.yaml_tree import Fault, Node, Route, dotted, merge, without_misfits
 
 # Sections whose entries have names of the user's. An entry that is null takes out an inherited one,
 # and a section that is null all of them.
@@ -246,7 +246,7 @@ def _over_preset(
         return given
     if preset.content in names:
         base = preset_file(presets, str(preset.content), faults, plugins)
-        return merge(base, fitting(base, given, faults, (key,))) if base else given
+        return merge(base, without_misfits(base, given, faults, (key,))) if base else given
     if ABSENT in plugins:
         return given
     what = f"{presets.noun} {found(preset.content, preset.text)}"

@@ -105,7 +105,7 @@ def bracketed(key: str) -> str:
     return re.sub(r"\.(\d+)(?=\.|\[|$)", r"[\1]", key)
 
 
-def whole_names(steps: Route) -> Route:
+def with_dotted_key(steps: Route) -> Route:
     """The steps of a key, of which `vessel.m` in `sweep.vary.vessel.m.times` is a single one."""
     above, rest = steps[:2], steps[2:]
     if above not in NAMED_BY_KEYS:
@@ -180,7 +180,7 @@ def merge(base: Node, top: Node, *, by_kind: bool = True) -> Node:
     return replace(top, content=entries, faulty=top.faulty or base.faulty)
 
 
-def fitting(base: Node, top: Node, faults: list[Fault], at: Route = ()) -> Node:
+def without_misfits(base: Node, top: Node, faults: list[Fault], at: Route = ()) -> Node:
     """`top`, without what it has at places that lists of `base` do not have; these are faults.
 
     A mapping with a kind replaces a list.
@@ -201,7 +201,7 @@ def fitting(base: Node, top: Node, faults: list[Fault], at: Route = ()) -> Node:
         return top
     below = base.mapping or {str(i): entry for i, entry in enumerate(entries)}
     both = {
-        key: fitting(below[key], entry, faults, (*at, key)) if key in below else entry
+        key: without_misfits(below[key], entry, faults, (*at, key)) if key in below else entry
         for key, entry in top.mapping.items()
     }
     return replace(top, content=both)

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 from podusv_cli.figures.style import house_style, image
 from podusv_cli.pages.page import Picture
-from podusv_cli.process.extras import Extras, Missing
+from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_enabled
 from podusv_cli.process.workers import run_all
 
@@ -49,7 +49,7 @@ def rendered(sketches: Iterable[Sketch], extras: Extras) -> tuple[dict[str, byte
             content = outcome.result[shown]
             pictures.append(Picture(sketch.name, sketch.caption, content, form=shown))
         elif not outcome.interrupted:
-            extras.missing.append(Missing(f"figure {sketch.name}", outcome.failure))
+            extras.missing.append(Failure(f"figure {sketch.name}", outcome.failure))
     return files, pictures
 
 

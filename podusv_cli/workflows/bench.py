@@ -13,7 +13,7 @@ import pandas as pd
 
 from podusv_cli.optimum.collocation import casadi
 from podusv_cli.pages.page import Picture
-from podusv_cli.process.extras import Extras, Missing
+from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_deferred
 from podusv_cli.process.workers import Outcome, Report, run_all
 from podusv_cli.storage import csv_files, provenance
@@ -118,7 +118,7 @@ def _solved(
 ) -> Iterator[Least]:  # fmt: skip
     """The optima of all cases; what has none is added to `extras`."""
     wanted, refused = optima.wanted(every, runs)
-    extras.missing += [Missing("an optimum for some cases", why) for why in refused]
+    extras.missing += [Failure("an optimum for some cases", why) for why in refused]
 
     def advance(position: int, fraction: float) -> None:
         if progress:
@@ -132,7 +132,7 @@ def _solved(
             yield outcome.result
         else:
             place = ", ".join(one.cases[0].place)
-            extras.missing.append(Missing(f"the optimum of {place}", outcome.failure))
+            extras.missing.append(Failure(f"the optimum of {place}", outcome.failure))
 
 
 def _run_all(

@@ -22,7 +22,7 @@ from podusv_cli.core.recording import Status
 from podusv_cli.findings.finding import merged
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.table import CLOCKED
-from podusv_cli.process.extras import Extras, Missing
+from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.process.workers import Outcome, available_workers, run_all
 from podusv_cli.scenario.limits import estimate, needed
@@ -45,7 +45,7 @@ class Compared:
     folder: Path
     result: outputs.Result
     status: Status  # "interrupted" where a run or the figures were, else "finished"
-    missing: tuple[Missing, ...] = ()  # in the comparison and its runs
+    missing: tuple[Failure, ...] = ()  # in the comparison and its runs
 
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints of a comparison."""

@@ -23,7 +23,7 @@ from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.findings.finding import postflight, preflight
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.operations import operations
-from podusv_cli.process.extras import Extras, Missing
+from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.process.workers import Outcome
 from podusv_cli.scenario.limits import HELD, estimate
@@ -94,7 +94,7 @@ class Finished:
     timing: dict[str, float]
     others: tuple[str, ...] = ()  # runs of a comparison that the scenario also has
     warnings: tuple[Finding, ...] = ()
-    missing: tuple[Missing, ...] = ()
+    missing: tuple[Failure, ...] = ()
     units: Mapping[str, str] = field(default_factory=dict)  # of all metrics, in their order
 
     def as_json(self) -> dict[str, Any]:

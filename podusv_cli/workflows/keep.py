@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from podusv_cli.process.extras import Extras, Missing
+from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_enabled
 from podusv_cli.process.workers import run_all
 from podusv_cli.scenario.load import resolved_yaml
@@ -55,7 +55,7 @@ def keep(
     outcomes = run_all([partial(execute, task) for task in tasks], workers=workers)
     for one, outcome in zip(missing, outcomes, strict=True):
         if outcome.failure:
-            extras.missing.append(Missing(f"{LOGS}/{one.name}", outcome.failure))
+            extras.missing.append(Failure(f"{LOGS}/{one.name}", outcome.failure))
     extras.interrupted |= any(outcome.interrupted for outcome in outcomes)
     return found(folder, results, extras)
 

@@ -103,7 +103,7 @@ def refused(engine: Engine) -> tuple[str, ...]:
 
 def interrupted(kept: str, command: str, folder: Path) -> KeyboardInterrupt:
     """What ends a command that was interrupted: what it leaves there, and how to go on."""
-    again = plugins.again(command, folder)
+    again = plugins.continue_with(command, folder)
     return KeyboardInterrupt(f"interrupted; {kept} are kept, continue with: {again}")
 
 
@@ -115,7 +115,6 @@ def finish(
     `whole` says what is there all the same, and `command` makes the rest.
     """
     if extras.interrupted:
-        raise KeyboardInterrupt(
-            f"interrupted; {whole} are whole, the rest is made by: {plugins.again(command, folder)}"
-        )
+        rest = plugins.continue_with(command, folder)
+        raise KeyboardInterrupt(f"interrupted; {whole} are whole, the rest is made by: {rest}")
     manifest.write(folder, status)

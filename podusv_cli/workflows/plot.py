@@ -19,7 +19,7 @@ from podusv_cli.figures.animation import FILE, animate
 from podusv_cli.figures.drawing import check_names, draw_in_parallel, dressed, figures_of
 from podusv_cli.figures.sheet import Sheet
 from podusv_cli.figures.style import Shown
-from podusv_cli.process.extras import Extras, Missing
+from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.scenario.plugins import recorded
 from podusv_cli.storage import files, manifest
 from podusv_cli.workflows.members import Member, from_folder
@@ -35,7 +35,7 @@ class Drawn:
     files: Sequence[Path]
     replaced: Sequence[Path]  # of `files`, those that existed with other content
     empty: Mapping[str, str]  # runs with nothing to draw, and how they ended
-    missing: Sequence[Missing]  # figures that could not be drawn
+    missing: Sequence[Failure]  # figures that could not be drawn
     differences: Mapping[str, Mapping[str, Any]]  # between the runs, besides the controller
 
 

@@ -14,7 +14,7 @@ from typing import Any
 from podusv_cli.comparison.run_difference import RunDifference, difference
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.recording import Status
-from podusv_cli.process.extras import Missing
+from podusv_cli.process.extras import Failure
 from podusv_cli.process.workers import INTERRUPTED, available_workers
 from podusv_cli.scenario.limits import estimate, limits, needed
 from podusv_cli.scenario.plugins import loaded
@@ -37,7 +37,7 @@ class Repeated:
     was: Status
     status: Status
     found: RunDifference
-    missing: Sequence[Missing] = ()  # from the repeated run
+    missing: Sequence[Failure] = ()  # from the repeated run
     message: str = ""  # why the repeated run did not finish
 
     @property

@@ -10,7 +10,7 @@ from typing import Any
 
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.recording import Status
-from podusv_cli.process.extras import Extras, Missing
+from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_deferred
 from podusv_cli.scenario import plugins
 from podusv_cli.scenario.model import Scenario
@@ -18,7 +18,7 @@ from podusv_cli.scenario.sweep import Keep
 from podusv_cli.storage.writer import PATIENCE, TABLES, sole_writer
 from podusv_cli.studies.study import outputs
 from podusv_cli.studies.study.check import sweep_faults, unjudged
-from podusv_cli.studies.study.dispatch import Engine, Gaps, Tally, Tell, march
+from podusv_cli.studies.study.dispatch import Engine, Gaps, Tally, Tell, dispatch
 from podusv_cli.studies.study.estimate import check_fits, estimate, pilot
 from podusv_cli.studies.study.invalid import check_draws
 from podusv_cli.studies.study.joining import mixture
@@ -54,7 +54,7 @@ class Swept:
     folder: Path
     tally: Tally
     results: Results | None = None
-    missing: tuple[Missing, ...] = ()  # of figures, report and kept logs
+    missing: tuple[Failure, ...] = ()  # of figures, report and kept logs
     missing_runs: tuple[str, ...] = ()  # after a merge, in words
     part_is_whole: bool = False  # the runs of a shard are made, others are missing
     refused: tuple[str, ...] = ()  # workers of a cluster that got no units, and why
@@ -116,7 +116,7 @@ def _marched(
         tell(tally)
 
     try:
-        return march(
+        return dispatch(
             store, told, engine, seconds=request.seconds, part=request.shard,
             begin=partial(_announce, store, request, engine.workers),
         )  # fmt: skip
@@ -202,12 +202,14 @@ def report(study: Path, request: Request) -> Swept:
     with sole_writer(study, TABLES):  # as draws and runs may be added until it is locked
         store = stored(study, request.warn, trusted=request.trust)
         if not Tally.of(store.covered()).made:
-            raise UsageError(f"{study} has no runs yet: {plugins.again('sweep run', study)}")
+            raise UsageError(
+                f"{study} has no runs yet: {plugins.continue_with('sweep run', study)}"
+            )
         Session(study, request.argv, started, store.plan.scenario.plugged).end(0)
         store.write_runs()
         if not store.runs().common.any():
             raise UsageError(
                 f"no draw in {study} has runs of all laws yet, so they cannot be compared; "
-                f"continue: {plugins.again('sweep run', study)}"
+                f"continue: {plugins.continue_with('sweep run', study)}"
             )
         return answered(store, request)

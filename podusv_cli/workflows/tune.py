@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from podusv_cli.process.extras import Extras, Missing
+from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_deferred
 from podusv_cli.scenario.load import Loaded
 from podusv_cli.storage import files
@@ -21,7 +21,7 @@ from podusv_cli.studies.study.unit import prepare
 from podusv_cli.studies.tuning import folder as place
 from podusv_cli.studies.tuning import outputs
 from podusv_cli.studies.tuning.check import tune_faults
-from podusv_cli.studies.tuning.dispatch import march
+from podusv_cli.studies.tuning.dispatch import dispatch
 from podusv_cli.studies.tuning.idle import find_idle
 from podusv_cli.studies.tuning.plan import TRAIN, TunePlan
 from podusv_cli.studies.tuning.remarks import remarks
@@ -55,7 +55,7 @@ class Tuned:
 
     folder: Path
     results: Results
-    missing: tuple[Missing, ...] = ()  # of figures and report
+    missing: tuple[Failure, ...] = ()  # of figures and report
     refused: tuple[str, ...] = ()  # workers of a cluster that got no units, and why
 
     def as_json(self) -> dict[str, Any]:
@@ -127,7 +127,7 @@ def _simulated(
     try:
         searches = _searches(plan, folder)
         _prepare(plan)
-        march(searches, engine, searched)
+        dispatch(searches, engine, searched)
         trials = {law: [s.trials for s in searches if s.law == law] for law in plan.gains}
         trials = {law: found for law, found in trials.items() if found}
         winners = {law: [best(one) for one in found] for law, found in trials.items()}

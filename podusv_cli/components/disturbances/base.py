@@ -127,6 +127,6 @@ class Disturbance(Component):
         """Whether it has gusts with a spectrum of the open sea."""
         return False
 
-    def alike_in_table(self) -> list[int]:
+    def shared_places(self) -> list[int]:
         """Places in the table that all runs side by side have to share; its kernel's `shared`."""
         return []

@@ -83,9 +83,9 @@ class Total(Disturbance):
         starts = np.cumsum([len(tables), *map(len, tables[:-1])]).astype(float)
         return np.concatenate([starts, *tables])
 
-    def alike_in_table(self) -> list[int]:
+    def shared_places(self) -> list[int]:
         """Where the parts' tables begin. Raises TypeError for a part with places of its own."""
-        if any(part.alike_in_table() for part in self.parts):
+        if any(part.shared_places() for part in self.parts):
             raise TypeError("a part of the list has places in its table that runs have to share")
         return list(range(len(self.parts)))
 

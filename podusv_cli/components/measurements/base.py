@@ -60,7 +60,7 @@ class Measurement(Component):
         """Its table, for a run of so many steps; noise is a function of seed and sample."""
         return self.table()
 
-    def alike_in_table(self) -> list[int]:
+    def shared_places(self) -> list[int]:
         """Places in the table that all runs side by side have to share; its kernel's `shared`."""
         return []
 

@@ -152,7 +152,7 @@ class Sensors(Measurement):
                 errors.append(row)
         return np.concatenate([*heads, *errors]).astype(float)
 
-    def alike_in_table(self) -> list[int]:
+    def shared_places(self) -> list[int]:
         """All of the heads but the resolutions."""
         heads = range(HEAD * len(STATE))
         return [place for place in heads if place % HEAD != RESOLUTION]

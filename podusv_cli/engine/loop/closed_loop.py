@@ -19,7 +19,7 @@ from podusv_cli.components.measurements.exact import Exact
 from podusv_cli.components.paths.base import TARGET, Path
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core import signal
-from podusv_cli.core.component import called
+from podusv_cli.core.component import describe
 from podusv_cli.core.errors import LawError
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.recording import Allocate
@@ -27,7 +27,7 @@ from podusv_cli.core.signal import LOOP, Signal
 from podusv_cli.core.steps import whole_steps
 from podusv_cli.engine.loop.recent import Recall, call
 from podusv_cli.engine.step.grid import TimeGrid
-from podusv_cli.engine.step.layout import HELD_SIGNALS, Plan, Wires
+from podusv_cli.engine.step.layout import HELD_SIGNALS, Layout, Vectors
 from podusv_cli.engine.step.relay import relay
 
 STATE = tuple(state.name for state in signal.STATE)
@@ -128,12 +128,12 @@ class ClosedLoop:
         if len(known) != len(STATE) or not marks or len(measurement.signals) != sum(known):
             what = f"{len(measurement.signals)} signals, and measures {sum(known)} of {len(STATE)}"
             raise LawError(
-                f"{called(measurement)}: it declares {what}; `first` has to say the same"
+                f"{describe(measurement)}: it declares {what}; `first` has to say the same"
             )
         states, begun = len(self.estimator.states), len(self.estimator.start(start, self.nominal))
         if not begun == states >= len(STATE):
             raise LawError(
-                f"{called(self.estimator)}: it starts with {begun} numbers and declares {states} "
+                f"{describe(self.estimator)}: it starts with {begun} numbers and declares {states} "
                 f"states; both have to be the same, {len(STATE)} or more"
             )
 
@@ -171,16 +171,16 @@ class ClosedLoop:
         """Every signal that the loop logs, by name. Raises LawError where two have one name."""
         self.check_seeing()
         law, actuator = self.controller, self.actuator
-        own = (partial(called, actuator), (*actuator.states, *actuator.signals_with))
+        own = (partial(describe, actuator), (*actuator.states, *actuator.signals_with))
         loop = (lambda: "the closed loop", LOOP)
         others = (
-            *((partial(called, part), signals) for part, signals in self.disturbance.told()),
-            (partial(called, self.measurement), self.measurement.signals),
-            (partial(called, self.estimator), self.estimated()),
+            *((partial(describe, part), signals) for part, signals in self.disturbance.told()),
+            (partial(describe, self.measurement), self.measurement.signals),
+            (partial(describe, self.estimator), self.estimated()),
         )
-        return signal.by_name((loop, (partial(called, law), law.declared()), own, *others))
+        return signal.by_name((loop, (partial(describe, law), law.declared()), own, *others))
 
-    def layout(self, grid: TimeGrid) -> Plan:
+    def layout(self, grid: TimeGrid) -> Layout:
         """Sizes and offsets of the loop on this grid."""
         law, actuator = self.controller, self.actuator
         estimate = len(STATE) + len(actuator.states)
@@ -190,7 +190,7 @@ class ClosedLoop:
             len(self.measurement.signals),
         ]  # fmt: skip
         signals, demand, tau, b, flags, sensed, columns = np.cumsum(sizes).tolist()
-        return Plan(
+        return Layout(
             states=memory + sum(size for _, size in law.slots()),
             estimate=estimate if self.measured else 0, memory=memory,
             signals=signals, demand=demand, tau=tau, b=b,
@@ -253,10 +253,10 @@ def _seeing(loop: ClosedLoop, recall: Recall) -> Iterator[tuple[str, Any, tuple[
 
 
 @np.errstate(all="ignore")
-def wire(
-    loop: ClosedLoop, plan: Plan, observer: Observer, grid: TimeGrid, rows: int = 1,
+def vectors_of(
+    loop: ClosedLoop, layout: Layout, observer: Observer, grid: TimeGrid, rows: int = 1,
     allocate: Allocate = np.empty, recall: Recall = call,
-) -> Wires:  # fmt: skip
+) -> Vectors:  # fmt: skip
     """The loop's vectors, ready for the march to begin, with room for this many logged rows.
 
     Numbers beyond all limits are for the run to tell.
@@ -271,7 +271,7 @@ def wire(
     if loop.measured:
         estimate = estimator.start(start, loop.nominal)
     duration, motion = grid.steps * grid.step, _wave_motion(disturbance)
-    return Wires(
+    return Vectors(
         path=numbers(path.constants), path_table=recall(path.table),
         disturbance=numbers(disturbance.constants_with, loop.vessel),
         disturbance_table=recall(disturbance.table_for, loop.vessel, duration),
@@ -284,11 +284,11 @@ def wire(
         vessel=numbers(loop.vessel.constants),
         observer=numbers(observer.constants_for, loop),
         s=np.concatenate([start, recall(actuator.rest), estimate, loop.first_memory(recall)]),
-        row=np.zeros(plan.columns), stages=np.zeros(5 * plan.states),
+        row=np.zeros(layout.columns), stages=np.zeros(5 * layout.states),
         sensed=measurement.first(start, grid.step),
         relay=relay(actuator.delay(), grid), held=np.zeros(HELD_SIGNALS + len(law.signals)),
         work=np.zeros(law.workspace()), seen=np.zeros(observer.size), under_way=np.zeros(2),
-        log=allocate(rows * plan.width),
+        log=allocate(rows * layout.width),
     )  # fmt: skip
 
 

@@ -19,7 +19,7 @@ from podusv_cli.core.errors import PodusvError, in_a_line
 from podusv_cli.core.escaping import visible
 from podusv_cli.core.kernel import Vector
 from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop, Observer
-from podusv_cli.engine.running.batch_threads import BatchRun, Common, Thread
+from podusv_cli.engine.running.batch_threads import BatchRun, Common, Group
 from podusv_cli.engine.running.lanes import FEWEST, Sorter
 from podusv_cli.engine.running.simulate import why
 from podusv_cli.engine.running.watch import Ending
@@ -80,11 +80,11 @@ class Batch:
 
     def note(self, run: BatchRun, ending: Ending, grid: TimeGrid) -> None:
         """Enter how a run ended."""
-        i, wires = run.position, run.wires
+        i, vectors = run.position, run.vectors
         self.reached[i], self.status[i] = ending.reached, ending.status
-        self.state[i], self.seen[i] = wires.s[: len(STATE)], wires.seen
+        self.state[i], self.seen[i] = vectors.s[: len(STATE)], vectors.seen
         if ending.status not in ("finished", "interrupted"):
-            self.cause[i] = why(ending, run.loop, grid, wires)
+            self.cause[i] = why(ending, run.loop, grid, vectors)
 
     def refuse(self, position: int, status: str, cause: str) -> None:
         """Enter that a run cannot begin."""
@@ -135,8 +135,8 @@ class _Runs:
         self._common = Common(like, grid, observer) if like else None
         self._progress = progress or (lambda fraction: None)
         self._lanes = Sorter(observer, len(loops) * (grid.steps + 1), lanes)
-        self._ready: list[Thread] = []
-        self._busy: list[Thread] = []
+        self._ready: list[Group] = []
+        self._busy: list[Group] = []
         self._over, self._settled = 0, False
 
     def march(self, workers: int) -> None:
@@ -160,7 +160,7 @@ class _Runs:
         """Make a run, and have it march alone, or wait for others to march beside it."""
         run = self._made(position)
         if run:
-            self._together(self._lanes.sorted(run.wires, run))
+            self._together(self._lanes.sorted(run.vectors, run))
         else:
             self._count()
 
@@ -233,7 +233,7 @@ class _Runs:
             self._busy.remove(thread)
             self._enter(thread)
 
-    def _enter(self, thread: Thread) -> None:
+    def _enter(self, thread: Group) -> None:
         """Enter how the runs of a thread ended; which of several hangs, shows each alone."""
         if thread.work.result is None and len(thread.runs) > 1:
             thread.work.stop()

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from podusv_cli.core.kernel import LANES, whole_lanes
-from podusv_cli.engine.loop.closed_loop import ClosedLoop, Observer, entries, wire
+from podusv_cli.engine.loop.closed_loop import ClosedLoop, Observer, entries, vectors_of
 from podusv_cli.engine.loop.recent import Recent
 from podusv_cli.engine.running.lanes import Lanes
 from podusv_cli.engine.running.simulate import marcher
 from podusv_cli.engine.running.watch import Bell, Ending, Work
 from podusv_cli.engine.step.grid import TimeGrid
-from podusv_cli.engine.step.layout import Plan, Wires
+from podusv_cli.engine.step.layout import Layout, Vectors
 
 NUMBER = 8  # bytes; LANES numbers are a cache line
 
@@ -27,11 +27,11 @@ class BatchRun:
 
     position: int
     loop: ClosedLoop
-    wires: Wires
+    vectors: Vectors
 
 
 @dataclass(frozen=True, eq=False)
-class Thread:
+class Group:
     """Runs that a thread marches over; `endings` tells how each of them ended.
 
     It is told whether the thread was stopped.
@@ -53,11 +53,11 @@ class Common:
     recall: Recent = field(default_factory=Recent)
 
     @cached_property
-    def structure(self) -> tuple[Plan, list[Any]]:
+    def structure(self) -> tuple[Layout, list[Any]]:
         """The layout, and the kernels with the names of their constants."""
         return self._structure_of(self.like)
 
-    def _structure_of(self, loop: ClosedLoop) -> tuple[Plan, list[Any]]:
+    def _structure_of(self, loop: ClosedLoop) -> tuple[Layout, list[Any]]:
         return loop.layout(self.grid), list(entries(loop, self.observer, self.recall))
 
     @cached_property
@@ -77,29 +77,29 @@ class Common:
 
     def run(self, position: int, loop: ClosedLoop) -> BatchRun:
         """A run that is ready to start."""
-        plan = self.structure[0]
-        wires = wire(loop, plan, self.observer, self.grid, recall=self.recall)
-        return BatchRun(position, loop, _apart(wires))
+        layout = self.structure[0]
+        vectors = vectors_of(loop, layout, self.observer, self.grid, recall=self.recall)
+        return BatchRun(position, loop, _apart(vectors))
 
-    def alone(self, run: BatchRun) -> Thread:
+    def alone(self, run: BatchRun) -> Group:
         """The thread of one run."""
-        plan, last = self.structure[0], self.grid.steps + 1
-        function = partial(self.advance, 0, last, self.grid.step, run.wires, plan)
-        work = Work(function, run.wires.under_way, self.bell)
+        layout, last = self.structure[0], self.grid.steps + 1
+        function = partial(self.advance, 0, last, self.grid.step, run.vectors, layout)
+        work = Work(function, run.vectors.under_way, self.bell)
 
         def endings(stopped: bool) -> list[Ending]:
             if stopped and work.reached < last:
                 return [Ending(work.reached, "interrupted")]
             return [work.ending(last)]
 
-        return Thread([run], work, endings)
+        return Group([run], work, endings)
 
-    def together(self, runs: list[BatchRun], advance: Callable[..., int]) -> Thread:
+    def together(self, runs: list[BatchRun], advance: Callable[..., int]) -> Group:
         """The thread of runs side by side."""
         last = self.grid.steps + 1
-        lanes = Lanes.of([run.wires for run in runs], self.structure[0])
+        lanes = Lanes.of([run.vectors for run in runs], self.structure[0])
         work = Work(lanes.march(advance, self.grid), lanes.under_way, self.bell)
-        return Thread(runs, work, lambda stopped: lanes.endings(work.reached, last))
+        return Group(runs, work, lambda stopped: lanes.endings(work.reached, last))
 
 
 def _kinds(loop: ClosedLoop) -> str:
@@ -107,15 +107,15 @@ def _kinds(loop: ClosedLoop) -> str:
     return ", ".join(type(part).__name__ for part in parts)
 
 
-def _apart(wires: Wires) -> Wires:
+def _apart(vectors: Vectors) -> Vectors:
     """The vectors in memory of their own, each from a new cache line on.
 
     Cores that write to one line wait for each other.
     """
-    ends = np.cumsum([0, *(whole_lanes(len(vector)) for vector in wires)]).tolist()
+    ends = np.cumsum([0, *(whole_lanes(len(vector)) for vector in vectors)]).tolist()
     room = np.zeros(ends[-1] + LANES)
     room = room[-(room.ctypes.data // NUMBER) % LANES :]
-    own = [room[at : at + len(v)] for at, v in zip(ends, wires, strict=False)]
-    for vector, content in zip(own, wires, strict=True):
+    own = [room[at : at + len(v)] for at, v in zip(ends, vectors, strict=False)]
+    for vector, content in zip(own, vectors, strict=True):
         vector[:] = content
-    return Wires(*own)
+    return Vectors(*own)

@@ -13,7 +13,7 @@ from numbers import Real
 import numpy as np
 
 from podusv_cli.components.vessels.vessel import COEFFICIENTS
-from podusv_cli.core.component import called
+from podusv_cli.core.component import describe
 from podusv_cli.core.errors import LawError, in_a_line
 from podusv_cli.core.kernel import Vector, bundle, call
 from podusv_cli.core.signal import NAME, Signal
@@ -41,10 +41,10 @@ def check_law(loop: ClosedLoop) -> None:
     check_kernel(law)
     check_kernel(loop.path.evaluate)
     with np.errstate(all="ignore"):
-        asked(called(loop.path), loop.path.table)
-        asked(called(loop.path), loop.first_target, OF_NUMBERS)
-        asked(called(loop.controller), partial(_check_declared, loop))
-        asked(called(loop.controller), partial(_ask, loop), OF_NUMBERS)
+        asked(describe(loop.path), loop.path.table)
+        asked(describe(loop.path), loop.first_target, OF_NUMBERS)
+        asked(describe(loop.controller), partial(_check_declared, loop))
+        asked(describe(loop.controller), partial(_ask, loop), OF_NUMBERS)
     check_arguments(law, READ)
 
 
@@ -78,13 +78,13 @@ def _check_declared(loop: ClosedLoop) -> None:
     memory, declared = loop.first_memory(), (sum(size for _, size in law.slots()),)
     if np.shape(memory) != declared:
         shapes = f"it starts with a memory of shape {np.shape(memory)}, its slots are {declared}"
-        raise LawError(f"{called(law)}: {shapes}")
+        raise LawError(f"{describe(law)}: {shapes}")
     table = law.table()
     if not (isinstance(table, np.ndarray) and table.dtype == np.float64 and table.ndim == 1):
-        raise LawError(f"{called(law)}: its table is no vector of float64; write np.array([1.0])")
+        raise LawError(f"{describe(law)}: its table is no vector of float64; write np.array([1.0])")
     for name, number in law.constants_with(loop.nominal).items():
         if not (name.isidentifier() and isinstance(number, Real)):
-            raise LawError(f"{called(law)}: its constant {name} = {number!r} is no named number")
+            raise LawError(f"{describe(law)}: its constant {name} = {number!r} is no named number")
 
 
 def evaluated(loop: ClosedLoop, before: float) -> tuple[Vector, Vector, Vector]:
@@ -101,7 +101,9 @@ def evaluated(loop: ClosedLoop, before: float) -> tuple[Vector, Vector, Vector]:
     for name, vector in read.items():
         same = (vector == before_it[name]) | (np.isnan(vector) & np.isnan(before_it[name]))
         if len(changed := np.flatnonzero(~same)):
-            raise LawError(f"{called(law)}: it writes {name}[{changed[0]}], which it may only read")
+            raise LawError(
+                f"{describe(law)}: it writes {name}[{changed[0]}], which it may only read"
+            )
     return tau, rate, signals
 
 
@@ -111,7 +113,7 @@ def _ask(loop: ClosedLoop) -> None:
     names = ("tau_u_cmd", "tau_r_cmd", *(part.name for part in law.signals), *slots)
     outputs = zip(names, (*tau, *signals, *rate), strict=True)
     if left := next((name for name, number in outputs if number == UNWRITTEN), ""):
-        raise LawError(f"{called(law)}: it leaves {left} unwritten")
+        raise LawError(f"{describe(law)}: it leaves {left} unwritten")
     if law.wants_loads():
         k, memory = bundle(law.constants_with(loop.nominal)), loop.first_memory()
         call(
@@ -124,12 +126,12 @@ def _check_signals(loop: ClosedLoop) -> None:
     """LawError for what the log could not take, or would mix up."""
     law = loop.controller
     if isinstance(law.signals, str):
-        raise LawError(f"{called(law)}: its signals are no tuple; write (Signal(...),)")
+        raise LawError(f"{describe(law)}: its signals are no tuple; write (Signal(...),)")
     loop.about()
     try:
         _check_axes(loop)
     except LawError as error:
-        raise LawError(f"{called(law)}: {error}") from error
+        raise LawError(f"{describe(law)}: {error}") from error
 
 
 def _check_axes(loop: ClosedLoop) -> None:

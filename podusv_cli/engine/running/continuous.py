@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from podusv_cli.core.kernel import Vector
-from podusv_cli.engine.loop.closed_loop import ClosedLoop, Observer, wire
+from podusv_cli.engine.loop.closed_loop import ClosedLoop, Observer, vectors_of
 from podusv_cli.engine.running.simulate import marcher
 from podusv_cli.engine.step.grid import TimeGrid
 
@@ -28,16 +28,16 @@ def continuous(loop: ClosedLoop, duration: float, *, compiled: bool = True) -> t
     if loop.actuator.delay() > 0:
         raise ValueError("an actuator with a delay has no continuous right-hand side")
     grid = TimeGrid(1.0, 1, log_every=2)
-    plan = loop.layout(grid)
-    wires = wire(loop, plan, Observer(), TimeGrid(duration, 1))
+    layout = loop.layout(grid)
+    vectors = vectors_of(loop, layout, Observer(), TimeGrid(duration, 1))
     march = marcher(loop, Observer(), compiled)
 
     def slope(t: float, s: Vector) -> Vector:
         # The march over instant 1 of a grid with step t and no step after it: rates, no more.
-        wires.s[:] = s
+        vectors.s[:] = s
         with np.errstate(all="ignore"):
-            if march(1, 2, t, wires, plan) != 2:
+            if march(1, 2, t, vectors, layout) != 2:
                 raise ArithmeticError(f"not finite at t = {t:.6g} s")
-        return wires.stages[: plan.states].copy()
+        return vectors.stages[: layout.states].copy()
 
-    return slope, wires.s.copy()
+    return slope, vectors.s.copy()

@@ -22,7 +22,7 @@ from podusv_cli.engine.machine.kernel_faults import check_kernel
 from podusv_cli.engine.running.watch import Ending
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.engine.step.lane_march import REACHED
-from podusv_cli.engine.step.layout import Plan, Wires
+from podusv_cli.engine.step.layout import Layout, Vectors
 from podusv_cli.engine.step.relay import COUNT
 
 NUMBER = 8  # bytes
@@ -68,15 +68,15 @@ def marcher(loop: ClosedLoop, observer: Observer) -> Callable[..., int]:
     march = compile.lane_routine()
 
     def compiled_march(
-        last: int, h: float, vectors: list[Vector], plan: Plan, under_way: Vector, ends: Vector
+        last: int, h: float, vectors: list[Vector], layout: Layout, under_way: Vector, ends: Vector
     ) -> int:
         pointers = (signatures.LANE_VECTOR * len(vectors))(
             *(vector.ctypes.data_as(signatures.LANE_VECTOR) for vector in vectors)
         )
         return int(
             march(
-                *doors, 0, last, h, pointers, signatures.whole_numbers(plan),
-                len(vectors[Wires._fields.index("seen")]) // LANES,
+                *doors, 0, last, h, pointers, signatures.whole_numbers(layout),
+                len(vectors[Vectors._fields.index("seen")]) // LANES,
                 signatures.pointer(under_way), signatures.pointer(ends),
             )
         )  # fmt: skip
@@ -93,7 +93,7 @@ def is_compiled(loop: ClosedLoop, observer: Observer) -> bool:
 
 
 def places(loop: ClosedLoop, observer: Observer) -> list[tuple[int, list[int]]]:
-    """Where the numbers that are alike lie: positions of vectors in `Wires`, and in these."""
+    """Where the numbers that are alike lie: positions of vectors in `Vectors`, and in these."""
     shared = alike(loop, observer)
     names = {part: names for part, _, names in entries(loop, observer)}
     names["estimator"], shared["estimator"] = names["correct"], shared["correct"]
@@ -110,12 +110,12 @@ def places(loop: ClosedLoop, observer: Observer) -> list[tuple[int, list[int]]]:
         )
     }
     found |= {
-        "disturbance_table": loop.disturbance.alike_in_table(),
-        "measurement_table": loop.measurement.alike_in_table(),
+        "disturbance_table": loop.disturbance.shared_places(),
+        "measurement_table": loop.measurement.shared_places(),
         "sensed": list(range(KNOWN, OWN)) if loop.measured else [],
         "relay": [COUNT],
     }
-    return [(Wires._fields.index(vector), inside) for vector, inside in found.items()]
+    return [(Vectors._fields.index(vector), inside) for vector, inside in found.items()]
 
 
 def _room(count: int) -> Vector:
@@ -137,41 +137,43 @@ def _side_by_side(vectors: Sequence[Vector]) -> Vector:
 class Lanes:
     """Runs that march side by side. `runs` are their own vectors, which get the result."""
 
-    runs: Sequence[Wires]
+    runs: Sequence[Vectors]
     vectors: list[Vector]
-    plan: Plan
+    layout: Layout
     under_way: Vector
     ends: Vector
 
     @classmethod
-    def of(cls, runs: Sequence[Wires], plan: Plan) -> Lanes:
+    def of(cls, runs: Sequence[Vectors], layout: Layout) -> Lanes:
         """Side by side, ready for the march."""
-        size = plan.states + plan.columns + len(runs[0].seen)
+        size = layout.states + layout.columns + len(runs[0].seen)
         under_way = np.zeros(REACHED + LANES)
         under_way[REACHED : REACHED + len(runs)] = MARCHING
         vectors = [_side_by_side(several) for several in zip(*runs, strict=True)]
-        return cls(runs, vectors, plan, under_way, np.zeros(LANES * size))
+        return cls(runs, vectors, layout, under_way, np.zeros(LANES * size))
 
     def march(self, advance: Callable[..., int], grid: TimeGrid) -> Callable[[], int]:
         """A function that marches over the grid."""
         last = grid.steps + 1
-        return partial(advance, last, grid.step, self.vectors, self.plan, self.under_way, self.ends)
+        return partial(
+            advance, last, grid.step, self.vectors, self.layout, self.under_way, self.ends
+        )
 
     def endings(self, reached: int, last: int) -> list[Ending]:
         """How each run ended, where the march stopped at `reached`; its vectors are filled in."""
         return [self._ending(lane, reached, last) for lane in range(len(self.runs))]
 
     def _ending(self, lane: int, reached: int, last: int) -> Ending:
-        wires, ended = self.runs[lane], self.under_way[REACHED + lane]
-        vectors = Wires(*self.vectors)
+        vectors, ended = self.runs[lane], self.under_way[REACHED + lane]
+        vectors = Vectors(*self.vectors)
         kept = [vector[lane::LANES] for vector in (vectors.s, vectors.row, vectors.seen)]
         if ended != MARCHING:
             kept = np.split(
                 self.ends.reshape(LANES, -1)[lane], np.cumsum([len(part) for part in kept])[:-1]
             )
-        wires.s[:], wires.row[:], wires.seen[:] = (
+        vectors.s[:], vectors.row[:], vectors.seen[:] = (
             part[: len(own)]
-            for part, own in zip(kept, (wires.s, wires.row, wires.seen), strict=True)
+            for part, own in zip(kept, (vectors.s, vectors.row, vectors.seen), strict=True)
         )
         if ended != MARCHING:
             return Ending(int(ended), "diverged")
@@ -201,11 +203,11 @@ class Sorter:
     def _is_worth(self, loop: ClosedLoop) -> bool:
         return self._instants >= WORTH or is_compiled(loop, self._observer)
 
-    def sorted(self, wires: Wires, run: Any) -> list[Any]:
+    def sorted(self, vectors: Vectors, run: Any) -> list[Any]:
         """The runs to start now that this one is ready."""
         if not self.advance:
             return [run]
-        kind = tuple(float(wires[at][i]) for at, inside in self._places for i in inside)
+        kind = tuple(float(vectors[at][i]) for at, inside in self._places for i in inside)
         waiting = self._waiting.setdefault(kind, [])
         waiting.append(run)
         if len(waiting) < LANES:

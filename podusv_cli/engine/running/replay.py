@@ -10,12 +10,12 @@ import numpy as np
 
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
-from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop, Observer, entries, wire
+from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop, Observer, entries, vectors_of
 from podusv_cli.engine.loop.columns import by_name, names
 from podusv_cli.engine.machine import signatures
 from podusv_cli.engine.step import rk4 as closed_loop
 from podusv_cli.engine.step.grid import TimeGrid
-from podusv_cli.engine.step.layout import Plan, Wires
+from podusv_cli.engine.step.layout import Layout, Vectors
 from podusv_cli.engine.step.relay import COUNT
 
 
@@ -77,20 +77,20 @@ def rates_replay(
     rates of an estimator are left out: they depend on measurements, which the loop's
     state does not hold.
     """
-    plan = loop.layout(grid)._replace(hold_every=0, measured=0)
-    labels, split, about = names(loop), 1 + plan.states, loop.about()
+    layout = loop.layout(grid)._replace(hold_every=0, measured=0)
+    labels, split, about = names(loop), 1 + layout.states, loop.about()
     state = list(dict.fromkeys(labels[:split]))
-    wires = wire(loop, plan, Observer(), grid)
-    wires.relay[COUNT] = 0.0
+    vectors = vectors_of(loop, layout, Observer(), grid)
+    vectors.relay[COUNT] = 0.0
     run = _rates_runner(loop, compiled)
 
     def replayed(recording: Recording) -> Replayed:
         logged = np.column_stack([recording[name] for name in state])
-        out = np.zeros((len(logged), plan.states + plan.columns))
-        run(len(logged), logged.ravel(), out.reshape(-1), wires, plan)
+        out = np.zeros((len(logged), layout.states + layout.columns))
+        run(len(logged), logged.ravel(), out.reshape(-1), vectors, layout)
         return Replayed(
-            by_name(labels[1:split], out[:, : plan.states], about),
-            by_name(labels[split:], out[:, plan.states :], about),
+            by_name(labels[1:split], out[:, : layout.states], about),
+            by_name(labels[split:], out[:, layout.states :], about),
         )
 
     return replayed
@@ -108,8 +108,10 @@ def _rates_runner(loop: ClosedLoop, compiled: bool) -> Callable[..., None]:
     doors = [compile.entry(*part) for part in chosen]
     run = compile.routine(closed_loop.rates_along, signatures.RATES_ALONG)
 
-    def compiled_run(count: int, logged: Vector, out: Vector, wires: Wires, plan: Plan) -> None:
-        vectors, sizes = signatures.pointers(wires), signatures.whole_numbers(plan)
+    def compiled_run(
+        count: int, logged: Vector, out: Vector, vectors: Vectors, layout: Layout
+    ) -> None:
+        vectors, sizes = signatures.pointers(vectors), signatures.whole_numbers(layout)
         run(*doors, count, signatures.pointer(logged), signatures.pointer(out), vectors, sizes)
 
     return compiled_run

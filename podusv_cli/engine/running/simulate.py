@@ -11,14 +11,21 @@ import numpy as np
 from podusv_cli.components.paths.base import TARGET
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Allocate, Recording, Status
-from podusv_cli.engine.loop.closed_loop import DEMAND, STATE, ClosedLoop, Observer, entries, wire
+from podusv_cli.engine.loop.closed_loop import (
+    DEMAND,
+    STATE,
+    ClosedLoop,
+    Observer,
+    entries,
+    vectors_of,
+)
 from podusv_cli.engine.loop.columns import by_name, names
 from podusv_cli.engine.machine import signatures
 from podusv_cli.engine.running.check import asked, check_law
-from podusv_cli.engine.running.watch import Ending, Word, march
+from podusv_cli.engine.running.watch import Ending, Word, watch
 from podusv_cli.engine.step import rk4 as closed_loop
 from podusv_cli.engine.step.grid import TimeGrid
-from podusv_cli.engine.step.layout import Plan, Wires
+from podusv_cli.engine.step.layout import Layout, Vectors
 from podusv_cli.process.interrupts import interrupts_deferred
 
 # What a log says of a run, by how its march ended.
@@ -45,15 +52,15 @@ def simulate(
     """
     observer, about = observer or Observer(), loop.about()
     loop.check_fit(grid.step)
-    plan = loop.layout(grid)
-    wires, last = wire(loop, plan, observer, grid, grid.rows, allocate), plan.steps + 1
-    advance = partial(marcher(loop, observer, compiled), 0, last, grid.step, wires, plan)
+    layout = loop.layout(grid)
+    vectors, last = vectors_of(loop, layout, observer, grid, grid.rows, allocate), layout.steps + 1
+    advance = partial(marcher(loop, observer, compiled), 0, last, grid.step, vectors, layout)
     with np.errstate(all="ignore"), interrupts_deferred():
-        ending = march(
-            advance, last, wires.under_way,
+        ending = watch(
+            advance, last, vectors.under_way,
             progress and (lambda reached: progress(reached / last)),
         )  # fmt: skip
-        return replace(_record(loop, grid, wires, plan, ending), about=about)
+        return replace(_record(loop, grid, vectors, layout, ending), about=about)
 
 
 def ready(loop: ClosedLoop, grid: TimeGrid, observer: Observer, compiled: bool) -> None:
@@ -63,7 +70,7 @@ def ready(loop: ClosedLoop, grid: TimeGrid, observer: Observer, compiled: bool) 
     """
     check_law(loop)
     loop.check_fit(grid.step)
-    asked("the closed loop", partial(wire, loop, loop.layout(grid), observer, grid))
+    asked("the closed loop", partial(vectors_of, loop, loop.layout(grid), observer, grid))
     marcher(loop, observer, compiled)
 
 
@@ -75,11 +82,11 @@ def marcher(loop: ClosedLoop, observer: Observer, compiled: bool) -> Callable[..
     from podusv_cli.engine.machine import compile  # a loop in plain Python needs no compiler
 
     doors = [compile.entry(*part) for part in entries(loop, observer)]
-    march = compile.routine(closed_loop.advance, signatures.ADVANCE)
+    watch = compile.routine(closed_loop.advance, signatures.ADVANCE)
 
-    def compiled_march(first: int, last: int, h: float, wires: Wires, plan: Plan) -> int:
-        vectors, sizes = signatures.pointers(wires), signatures.whole_numbers(plan)
-        return int(march(*doors, first, last, h, vectors, sizes))
+    def compiled_march(first: int, last: int, h: float, vectors: Vectors, layout: Layout) -> int:
+        vectors, sizes = signatures.pointers(vectors), signatures.whole_numbers(layout)
+        return int(watch(*doors, first, last, h, vectors, sizes))
 
     return compiled_march
 
@@ -91,27 +98,27 @@ def _logged(loop: ClosedLoop, table: Vector) -> dict[str, Vector]:
 
 
 def _record(
-    loop: ClosedLoop, grid: TimeGrid, wires: Wires, plan: Plan, ending: Ending
+    loop: ClosedLoop, grid: TimeGrid, vectors: Vectors, layout: Layout, ending: Ending
 ) -> Recording:
-    rows = -(-ending.reached // plan.log_every)
-    signals = _logged(loop, wires.log.reshape(-1, plan.width)[:rows])
+    rows = -(-ending.reached // layout.log_every)
+    signals = _logged(loop, vectors.log.reshape(-1, layout.width)[:rows])
     status, message = RECORDED[ending.status], ""
     if status == "interrupted":
         message = f"interrupted after t = {max(ending.reached - 1, 0) * grid.step:.6g} s"
     if status == "diverged":
-        message = f"diverged {why(ending, loop, grid, wires)}; {_last_words(signals)}"
+        message = f"diverged {why(ending, loop, grid, vectors)}; {_last_words(signals)}"
     fixed = {part.name: array for part, array in loop.controller.fixed_signals().items()}
-    return Recording(status, loop.controller.label, signals, fixed, wires.seen.copy(), message)
+    return Recording(status, loop.controller.label, signals, fixed, vectors.seen.copy(), message)
 
 
-def why(ending: Ending, loop: ClosedLoop, grid: TimeGrid, wires: Wires) -> str:
+def why(ending: Ending, loop: ClosedLoop, grid: TimeGrid, vectors: Vectors) -> str:
     """When and why a march that nobody interrupted did not reach its last instant."""
     at = ending.reached * grid.step
-    return f"at t = {at:.6g} s: {ending.cause or _culprit(wires, names(loop), at)}"
+    return f"at t = {at:.6g} s: {ending.cause or _culprit(vectors, names(loop), at)}"
 
 
-def _culprit(wires: Wires, labels: list[str], at: float) -> str:
-    now = np.concatenate([[at], wires.s, wires.row])
+def _culprit(vectors: Vectors, labels: list[str], at: float) -> str:
+    now = np.concatenate([[at], vectors.s, vectors.row])
     named = zip(labels, now, strict=True)
     bad = next((name for name, x in named if not abs(x) <= closed_loop.LARGEST), "?")
     return f"{bad} is not finite"

@@ -42,7 +42,7 @@ class Ending(NamedTuple):
 class Work:
     """A function that runs in a thread of its own; `result` or `error` is set when it is over.
 
-    `under_way` is the vector of that name in `Wires`. The thread rings `bell` when it ends.
+    `under_way` is the vector of that name in `Vectors`. The thread rings `bell` when it ends.
     """
 
     def __init__(
@@ -132,7 +132,7 @@ class Work:
         self._bell.put(None)
 
 
-def march(
+def watch(
     advance: Callable[[], int], last: int, under_way: Vector,
     progress: Callable[[int], None] | None = None,
 ) -> Ending:  # fmt: skip

@@ -69,7 +69,7 @@ def end_lanes(k: int, lost: Any, c: Any, n: Any, size: int, under_way: Vector, e
 def advance_lanes(
     path: Function, disturbance: Function, law: Function, sample: Function, actuator: Function,
     after: Function, measurement: Function, correct: Function, follow: Function, observe: Function,
-    first: int, last: int, h: float, wires: Any, plan: Any, size: int, under_way: Vector,
+    first: int, last: int, h: float, vectors: Any, layout: Any, size: int, under_way: Vector,
     ends: Vector,
 ) -> int:  # fmt: skip
     """`closed_loop.advance` for all lanes, without a log.
@@ -77,7 +77,7 @@ def advance_lanes(
     A lane whose numbers are not finite goes on without an effect on the others. Returns the first
     instant that was not begun, or at which no lane was left, or `last`.
     """
-    c, n = named_wires(wires), named_plan(plan)
+    c, n = named_wires(vectors), named_plan(layout)
     for k in range(first, last):
         if under_way[STOP] != 0.0:
             return k

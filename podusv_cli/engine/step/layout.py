@@ -10,7 +10,7 @@ from podusv_cli.core.kernel import Vector, kernel
 Function = Callable[..., None]
 
 
-class Plan(NamedTuple):
+class Layout(NamedTuple):
     """Sizes, offsets and periods of a closed loop, all whole numbers."""
 
     states: int  # length of s
@@ -40,7 +40,7 @@ class Plan(NamedTuple):
         return 1 + self.states + self.columns
 
 
-class Wires(NamedTuple):
+class Vectors(NamedTuple):
     """Vectors of a closed loop: constants of every part, then what the march writes to."""
 
     path: Vector

@@ -3,7 +3,7 @@
 State s: the vessel's (x, y, psi, u, v, r), the actuator's states, the estimator's, the law's
 memory.
 Row: target, distance to it, law's signals, demand, tau, b and the disturbance's signals,
-actuator's signals, measured values; offsets are in `Plan`.
+actuator's signals, measured values; offsets are in `Layout`.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from podusv_cli.engine.step.layout import (
     HELD_X,
     STOP,
     Function,
-    Plan,
-    Wires,
+    Layout,
+    Vectors,
     shifted,
 )
 from podusv_cli.engine.step.relay import BEGAN, GIVEN, begin_step, pass_on
@@ -36,7 +36,7 @@ LARGEST = 1e300
 # Vector to named coefficients of the vessel; the plant is the one part that never varies.
 coefficients = unpacker(COEFFICIENTS)
 # Machine code gets both as bare numbers, one by the other.
-named_wires, named_plan = unpacker(Wires._fields), unpacker(Plan._fields)
+named_wires, named_plan = unpacker(Vectors._fields), unpacker(Layout._fields)
 
 
 @kernel
@@ -51,7 +51,7 @@ def through_water(s: Vector, flow: Vector, x: Vector) -> None:
 
 @kernel
 def drive(
-    t: float, s: Vector, ds: Vector, demand: Vector, actuator: Function, c: Wires, n: Plan
+    t: float, s: Vector, ds: Vector, demand: Vector, actuator: Function, c: Vectors, n: Layout
 ) -> None:
     """The actuator's loads, rates and signals, from the vessel's motion through the water."""
     row, x = c.row, s
@@ -66,7 +66,7 @@ def drive(
 
 @kernel
 def load(
-    t: float, s: Vector, disturbance: Function, c: Wires, n: Plan, again: bool, stage: bool
+    t: float, s: Vector, disturbance: Function, c: Vectors, n: Layout, again: bool, stage: bool
 ) -> None:
     """Put the disturbance at t and s into the row; in a stage within a step its load is enough.
 
@@ -83,7 +83,7 @@ def load(
 def rates(
     t: float, s: Vector, ds: Vector,
     path: Function, law: Function, actuator: Function, after: Function, follow: Function,
-    c: Wires, n: Plan, again: bool,
+    c: Vectors, n: Layout, again: bool,
 ) -> None:  # fmt: skip
     """Right-hand side of the closed loop at time t, whose load is in the row; fills the row.
 
@@ -132,7 +132,7 @@ def measure(s: Vector, row: Vector) -> None:
 def step(
     t: float, h: float,
     path: Function, disturbance: Function, law: Function, actuator: Function, after: Function,
-    follow: Function, c: Wires, n: Plan,
+    follow: Function, c: Vectors, n: Layout,
 ) -> None:  # fmt: skip
     """Classical RK4 from t to t + h; the first stage has been evaluated already."""
     s, count = c.s, n.states
@@ -162,7 +162,7 @@ def finite(count: int, vector: Vector) -> bool:
 
 
 @kernel
-def write_row(k: int, t: float, c: Wires, n: Plan) -> None:
+def write_row(k: int, t: float, c: Vectors, n: Layout) -> None:
     """Log t, s and the row."""
     s, row = c.s, c.row
     out = tail(c.log, k // n.log_every * (1 + n.states + n.columns))
@@ -177,7 +177,7 @@ def write_row(k: int, t: float, c: Wires, n: Plan) -> None:
 def instant(
     k: int, first: int, h: float, path: Function, disturbance: Function, law: Function,
     sample: Function, actuator: Function, after: Function, measurement: Function,
-    correct: Function, follow: Function, observe: Function, c: Wires, n: Plan,
+    correct: Function, follow: Function, observe: Function, c: Vectors, n: Layout,
 ) -> bool:  # fmt: skip
     """Measure, sample, evaluate, observe and log instant k; whether all its numbers are finite."""
     t = k * h
@@ -205,13 +205,13 @@ def instant(
 def advance(
     path: Function, disturbance: Function, law: Function, sample: Function, actuator: Function,
     after: Function, measurement: Function, correct: Function, follow: Function, observe: Function,
-    first: int, last: int, h: float, wires: Any, plan: Any,
+    first: int, last: int, h: float, vectors: Any, layout: Any,
 ) -> int:  # fmt: skip
     """March over the instants first .. last - 1.
 
     Returns the first instant that is not finite, or that was not begun, or `last`.
     """
-    c, n = named_wires(wires), named_plan(plan)
+    c, n = named_wires(vectors), named_plan(layout)
     for k in range(first, last):
         if c.under_way[STOP] != 0.0:
             return k
@@ -228,7 +228,7 @@ def advance(
 def advance_plainly(
     path: Function, disturbance: Function, law: Function, sample: Function, actuator: Function,
     after: Function, measurement: Function, correct: Function, follow: Function, observe: Function,
-    first: int, last: int, h: float, c: Wires, n: Plan,
+    first: int, last: int, h: float, c: Vectors, n: Layout,
 ) -> int:  # fmt: skip
     """`advance` as plain Python, whose `math` raises where machine code gives no number."""
     for k in range(first, last):
@@ -269,10 +269,10 @@ def evaluate_all(
 @kernel
 def rates_along(
     path: Function, disturbance: Function, law: Function, actuator: Function, after: Function,
-    follow: Function, count: int, logged: Vector, out: Vector, wires: Any, plan: Any,
+    follow: Function, count: int, logged: Vector, out: Vector, vectors: Any, layout: Any,
 ) -> None:  # fmt: skip
     """For each of `count` logged rows of t, s: the rates of s, then the row, into `out`."""
-    c, n = named_wires(wires), named_plan(plan)
+    c, n = named_wires(vectors), named_plan(layout)
     for i in range(count):
         here = tail(logged, i * (1 + n.states))
         there = tail(out, i * (n.states + n.columns))

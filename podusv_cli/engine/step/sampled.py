@@ -10,15 +10,15 @@ from podusv_cli.engine.step.layout import (
     HELD_TARGET,
     HELD_X,
     Function,
-    Plan,
-    Wires,
+    Layout,
+    Vectors,
     shifted,
 )
 
 
 @kernel
 def held_rates(
-    t: float, memory: Vector, rate: Vector, law: Function, after: Function, c: Wires, n: Plan
+    t: float, memory: Vector, rate: Vector, law: Function, after: Function, c: Vectors, n: Layout
 ) -> None:
     """Rates of the law's memory with the sample at t held, and the loads of the period before."""
     row, held = c.row, c.held
@@ -31,7 +31,7 @@ def held_rates(
 
 
 @kernel
-def update(t: float, h: float, law: Function, after: Function, c: Wires, n: Plan) -> None:
+def update(t: float, h: float, law: Function, after: Function, c: Vectors, n: Layout) -> None:
     """Take the sample at t into the law's memory: RK4 over the period that ends, sample held."""
     count, memory = n.states - n.memory, tail(c.s, n.memory)
     k1 = tail(c.stages, n.memory)
@@ -52,7 +52,7 @@ def update(t: float, h: float, law: Function, after: Function, c: Wires, n: Plan
 @kernel
 def sample_and_hold(
     k: int, t: float, h: float, path: Function, law: Function, sample: Function, after: Function,
-    c: Wires, n: Plan,
+    c: Vectors, n: Layout,
 ) -> None:  # fmt: skip
     """What happens at instants only: the law's own samples, and the hold of sampled control."""
     given, row, held = tail(c.s, n.estimate), c.row, c.held
@@ -75,7 +75,9 @@ def sample_and_hold(
 
 
 @kernel
-def perceive(k: int, t: float, measurement: Function, correct: Function, c: Wires, n: Plan) -> None:
+def perceive(
+    k: int, t: float, measurement: Function, correct: Function, c: Vectors, n: Layout
+) -> None:
     """Measure at instant k, and take what is delivered into the estimate.
 
     Leaves the measured values behind the other signals in the row, which has the disturbance.

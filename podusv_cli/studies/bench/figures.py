@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from podusv_cli.core import escaping
 from podusv_cli.core.kernel import Vector
-from podusv_cli.figures.style import legend, look, new_figure
+from podusv_cli.figures.style import legend, new_figure, nth_style
 from podusv_cli.studies.bench.runs import BenchRun
 from podusv_cli.studies.bench.standing import leaderboard, profile
 from podusv_cli.studies.sketch import COLUMNS, Sketch
@@ -52,7 +52,7 @@ def profiles(made: pd.DataFrame) -> Figure:
     figure = new_figure(COLUMNS, 3.2)
     axes, ratios = figure.add_subplot(), np.geomspace(1.0, WORST, 300)
     for place, law in enumerate(leaderboard(made).index):
-        color, linestyle, _ = look(place)
+        color, linestyle, _ = nth_style(place)
         share = 100.0 * profile(made, law, ratios)
         axes.plot(
             ratios, share, color=color, linestyle=linestyle, label=escaping.figure(law), zorder=3
@@ -98,7 +98,7 @@ def _small(axes: Axes, runs: Sequence[BenchRun]) -> None:
     for spine in axes.spines.values():
         spine.set_linewidth(0.3)
     for run in sorted(runs, key=lambda run: not run.good):
-        axes.plot(*run.track.T[1::-1], color=look(0)[0] if run.good else LOST, linewidth=0.5)
+        axes.plot(*run.track.T[1::-1], color=nth_style(0)[0] if run.good else LOST, linewidth=0.5)
     longest = max((run.track for run in runs), key=len)
     if len(longest):
         _frame(axes, longest)

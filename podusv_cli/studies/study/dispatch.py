@@ -203,7 +203,7 @@ def shard(draws: int, number: int, count: int) -> slice:
     return slice((number - 1) * draws // count, number * draws // count)
 
 
-def march(
+def dispatch(
     store: Store, tell: Tell, engine: Engine, *, seconds: float = math.inf, part: Shard = (1, 1),
     begin: Callable[[Gaps], None] = lambda missing: None,
 ) -> tuple[Tally, bool]:  # fmt: skip

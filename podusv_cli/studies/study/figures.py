@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from podusv_cli.core import escaping
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.quantities import raised
-from podusv_cli.figures.style import TARGET_LOOK, legend, look, new_figure
+from podusv_cli.figures.style import TARGET_LOOK, legend, new_figure, nth_style
 from podusv_cli.scenario.phrases import as_yaml
 from podusv_cli.studies.sketch import COLUMNS, Sketch
 from podusv_cli.studies.study import statistics
@@ -252,13 +252,17 @@ def ratios(pairs: pd.DataFrame) -> Figure:
     ends = _ratio_axis(axes, pairs)
     for row, (_, pair) in zip(rows, pairs.iterrows(), strict=True):
         low, high = np.clip([pair.ratio_low, pair.ratio_high], *ends)
-        axes.plot([low, high], [row, row], color=look(0)[0], linewidth=1.6, solid_capstyle="butt")
+        axes.plot(
+            [low, high], [row, row], color=nth_style(0)[0], linewidth=1.6, solid_capstyle="butt"
+        )
         if ends[0] <= pair.ratio <= ends[1]:
-            axes.plot(pair.ratio, row, color=look(0)[0], marker="o", markersize=3.6)
+            axes.plot(pair.ratio, row, color=nth_style(0)[0], marker="o", markersize=3.6)
         for end in {low: pair.ratio_low, high: pair.ratio_high}.items():
             if end[0] != end[1]:  # beyond the axis
                 mark = "<" if end[0] == ends[0] else ">"
-                axes.plot(end[0], row, color=look(0)[0], marker=mark, markersize=4, clip_on=False)
+                axes.plot(
+                    end[0], row, color=nth_style(0)[0], marker=mark, markersize=4, clip_on=False
+                )
     axes.axvline(1.0, **TARGET_LOOK)
     axes.set_yticks(rows, [_pair(pair) for _, pair in pairs.iterrows()])
     axes.set_ylim(len(pairs) - 0.4, -0.6)
@@ -309,7 +313,9 @@ def correlations(sensitivity: pd.DataFrame) -> Figure:
     chance = float(sensitivity.by_chance.max())
     for place, law in enumerate(table.columns):
         at = np.arange(len(table)) + (place - (count - 1) / 2) * 0.8 / count
-        axes.barh(at, table[law], 0.7 / count, color=look(place)[0], label=escaping.figure(law))
+        axes.barh(
+            at, table[law], 0.7 / count, color=nth_style(place)[0], label=escaping.figure(law)
+        )
     if np.isfinite(chance):
         look_of_chance: dict[str, Any] = {"color": "#E4E4E4", "linewidth": 0.0, "zorder": 0.0}
         axes.axvspan(-chance, chance, label="by chance", **look_of_chance)
@@ -327,7 +333,7 @@ def funnel(curves: Mapping[str, Sequence[Track]]) -> Figure:
     figure = new_figure(COLUMNS, 2.6)
     axes = figure.add_subplot()
     for place, (law, runs) in enumerate(curves.items()):
-        color, linestyle, _ = look(place)
+        color, linestyle, _ = nth_style(place)
         for number, (time, distance) in enumerate(runs):
             label = escaping.figure(law) if not number else "_"
             shown = np.maximum(distance, LEAST_DISTANCE)
@@ -367,7 +373,7 @@ def _share_curve(
     axes: Axes, place: int, label: str, x: Vector, counts: NDArray[np.int_], n: int, level: float,
 ) -> None:  # fmt: skip
     """A share of draws [%] over x as steps, within its intervals."""
-    color, linestyle, _ = look(place)
+    color, linestyle, _ = nth_style(place)
     percent = [100.0 * np.asarray(part) for part in statistics.share(counts, n, level)]
     axes.plot(x, percent[0], color=color, linestyle=linestyle, label=label, drawstyle="steps-post")
     axes.fill_between(x, percent[1], percent[2], color=color, step="post", **BAND)

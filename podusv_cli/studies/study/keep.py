@@ -16,7 +16,7 @@ import numpy as np
 
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.kernel import Vector
-from podusv_cli.process.extras import Extras, Missing
+from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.storage.run_folder import LOGS, Run, open_run
 from podusv_cli.studies.study.results import Results
 from podusv_cli.studies.study.runs_file import Table
@@ -100,7 +100,7 @@ def found(folder: Path, results: Results, extras: Extras) -> list[Kept]:
     """The kept runs, compared with the table; one that is not there or differs is missing."""
     kept = [_opened(folder / LOGS / one.name, one, results, extras) for one in wanted(results)]
     extras.missing += [
-        Missing(f"{LOGS}/{one.wanted.name}", one.difference, problem="differs from runs.h5")
+        Failure(f"{LOGS}/{one.wanted.name}", one.difference, problem="differs from runs.h5")
         for one in kept if one.difference
     ]  # fmt: skip
     return kept
@@ -113,7 +113,7 @@ def _opened(path: Path, one: KeptRun, results: Results, extras: Extras) -> Kept:
         run = open_run(path)
     except StorageError as error:
         extras.missing.append(
-            Missing(f"{LOGS}/{one.name}", str(error), problem="could not be read")
+            Failure(f"{LOGS}/{one.name}", str(error), problem="could not be read")
         )
         return Kept(one, None)
     return Kept(one, run, difference(run, one, results.runs))

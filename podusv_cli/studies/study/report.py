@@ -10,7 +10,7 @@ import numpy as np
 
 from podusv_cli.expressions.verdict import by_answer
 from podusv_cli.pages.page import Picture, environment, flat, value_text
-from podusv_cli.process.extras import Missing
+from podusv_cli.process.extras import Failure
 from podusv_cli.scenario.phrases import as_yaml
 from podusv_cli.scenario.sweep import Sweep
 from podusv_cli.studies.study.bars import bars
@@ -47,7 +47,7 @@ class Rows(NamedTuple):
 
 def page(
     folder: Path, results: Results, kept: Sequence[Kept], figures: Sequence[Picture],
-    missing: Sequence[Missing],
+    missing: Sequence[Failure],
 ) -> str:  # fmt: skip
     """The whole report."""
     plan, beside = results.plan, _beside(figures)

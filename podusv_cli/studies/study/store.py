@@ -29,7 +29,7 @@ import numpy as np
 
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.metrics.table import metrics_with
-from podusv_cli.scenario.plugins import again
+from podusv_cli.scenario.plugins import continue_with
 from podusv_cli.storage import files, json_files
 from podusv_cli.storage.run_folder import STUDY
 from podusv_cli.studies.study import record, runs_file, runs_writer
@@ -178,7 +178,7 @@ class Store:
         except StorageError as error:
             raise StorageError(
                 f"{error}; restore the file, or move it away and simulate its runs again with: "
-                f"{again('sweep run', self.folder)}"
+                f"{continue_with('sweep run', self.folder)}"
             ) from error
         return found
 

@@ -68,7 +68,7 @@ class Driver:
         self._waiting.extend((search, asked) for asked in units)
 
 
-def march(searches: Sequence[Search], engine: Engine, tell: Tell) -> Tally:
+def dispatch(searches: Sequence[Search], engine: Engine, tell: Tell) -> Tally:
     """Bring all searches to the end of their budget.
 
     Every batch is on the disk before the next of its search is asked for. Raises PodusvError where

@@ -19,7 +19,7 @@ from matplotlib.ticker import NullFormatter
 
 from podusv_cli.core import escaping
 from podusv_cli.core.kernel import Vector
-from podusv_cli.figures.style import TARGET_LOOK, legend, look, new_figure
+from podusv_cli.figures.style import TARGET_LOOK, legend, new_figure, nth_style
 from podusv_cli.studies.sketch import COLUMNS, Sketch
 from podusv_cli.studies.study.figures import ratios
 from podusv_cli.studies.tuning.results import Results
@@ -122,9 +122,9 @@ def before_and_after(laws: pd.DataFrame, label: str) -> Figure:
     for row, law in ordered.iterrows():
         place = float(str(row))
         _ranged(axes, place - 0.16, law, "before", "none")
-        _ranged(axes, place + 0.16, law, "after", look(1)[0])
-    for when, fill in (("before", "none"), ("after", look(1)[0])):
-        colour = look(1 if when == "after" else 0)[0]
+        _ranged(axes, place + 0.16, law, "after", nth_style(1)[0])
+    for when, fill in (("before", "none"), ("after", nth_style(1)[0])):
+        colour = nth_style(1 if when == "after" else 0)[0]
         axes.plot(
             [], [], "o-", color=colour, markerfacecolor=fill, markersize=3.6, linewidth=1.2,
             label=f"{when} the search",
@@ -138,7 +138,7 @@ def before_and_after(laws: pd.DataFrame, label: str) -> Figure:
 
 def _ranged(axes: Axes, y: float, law: Any, when: str, fill: str) -> None:
     estimate, low, high = (law[f"objective_{when}{end}"] for end in ("", "_low", "_high"))
-    colour = look(0)[0] if when == "before" else look(1)[0]
+    colour = nth_style(0)[0] if when == "before" else nth_style(1)[0]
     if np.isfinite([low, high]).all():
         axes.plot([low, high], [y, y], color=colour, linewidth=1.2, solid_capstyle="butt")
     if math.isfinite(estimate):
@@ -150,7 +150,7 @@ def history(trials: pd.DataFrame, label: str) -> Figure:
     figure = new_figure(COLUMNS, 2.8)
     axes = figure.add_subplot()
     for place, (law, rows) in enumerate(trials.groupby("law", sort=False)):
-        colour, style, _ = look(place)
+        colour, style, _ = nth_style(place)
         for i, (_, one) in enumerate(rows.groupby("repeat")):
             axes.step(
                 one.spent, one.best.replace(np.inf, np.nan), where="post", color=colour,
@@ -169,7 +169,7 @@ def pareto(
     figure = new_figure(COLUMNS, 3.2)
     axes = figure.add_subplot()
     for place, (law, points) in enumerate(fronts.items()):
-        colour, _, marker = look(place)
+        colour, _, marker = nth_style(place)
         axes.plot(
             *points.T, marker=marker, markersize=3.0, color=colour, linewidth=0.8,
             label=escaping.figure(law),
@@ -192,7 +192,7 @@ def importance(table: pd.DataFrame) -> Figure:
     for law, axes in zip(laws, panels, strict=False):
         rows = table[table.law == law].sort_values("importance", ascending=False)
         places = range(len(rows))
-        axes.barh(places, 100.0 * rows.importance, color=look(0)[0], alpha=0.55, height=0.7)
+        axes.barh(places, 100.0 * rows.importance, color=nth_style(0)[0], alpha=0.55, height=0.7)
         axes.hlines(places, 100.0 * rows.low, 100.0 * rows.high, color="#333333", linewidth=0.7)
         axes.set_yticks(places, [escaping.figure(key) for key in rows.gain], fontsize=5.5)
         axes.set_ylim(most - 0.4, -0.6)
@@ -238,7 +238,9 @@ def _slice(axes: Axes, gain: Gain, tried: pd.DataFrame, found: Any) -> None:
         own, mark = places.get(gain.own), places[found]
     else:
         x, own, mark = tried[gain.key], gain.own, found
-    axes.scatter(x, tried.objective, s=2.5, c=[look(i)[0] for i in tried.repeat], linewidths=0.0)
+    axes.scatter(
+        x, tried.objective, s=2.5, c=[nth_style(i)[0] for i in tried.repeat], linewidths=0.0
+    )
     axes.axvline(mark, **TARGET_LOOK)
     if own is not None:
         axes.axvline(own, **{**TARGET_LOOK, "linestyle": "--"})

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from podusv_cli.pages.page import Picture, environment, flat, value_text
-from podusv_cli.process.extras import Missing
+from podusv_cli.process.extras import Failure
 from podusv_cli.studies.study.sessions import sessions
 from podusv_cli.studies.study.statistics import Interval, digits
 from podusv_cli.studies.study.words import in_words
@@ -20,7 +20,7 @@ FEW = 15  # pairs that are shown at once
 
 
 def page(
-    folder: Path, results: Results, figures: Sequence[Picture], missing: Sequence[Missing]
+    folder: Path, results: Results, figures: Sequence[Picture], missing: Sequence[Failure]
 ) -> str:
     """The whole report."""
     plan = results.plan

@@ -10,7 +10,7 @@ from pathlib import Path
 from podusv_cli.storage import files, json_files
 from podusv_cli.storage.run_folder import STUDY
 from podusv_cli.studies.study import record
-from podusv_cli.studies.study.dispatch import Engine, Tally, march
+from podusv_cli.studies.study.dispatch import Engine, Tally, dispatch
 from podusv_cli.studies.study.plan import Plan, disagreements
 from podusv_cli.studies.study.runs_file import Table
 from podusv_cli.studies.study.store import RUNS, UNITS, Store
@@ -60,7 +60,7 @@ def validate(
     store = Store(folder / FOLDER, made)
     _clear(store.folder, made)
     store.open(started)
-    march(store, tell, engine)
+    dispatch(store, tell, engine)
     store.write_runs()
     return store.runs()
 
