@@ -15,7 +15,6 @@ from typing import Any, cast
 from podusv_cli.core.errors import LawError
 from podusv_cli.engine.machine import object_cache, signatures
 from podusv_cli.engine.machine.kernel_faults import check_kernel, unsupported
-from podusv_cli.engine.step.lane_march import advance_lanes
 from podusv_cli.process.interrupts import interrupts_deferred
 
 LANES_BY = "wide_numba"  # what compiles kernels for lanes
@@ -52,23 +51,19 @@ def lane_entry(part: str, inner: Any, names: tuple[str, ...], alike: frozenset[s
 
     Raises TypeError for a kernel that cannot go another way in every lane.
     """
-    return compiled(*_lane_door(part, inner, names, alike), LANES_BY)
+    return compiled(*_lane_adapter(part, inner, names, alike), LANES_BY)
 
 
-@cache
-def lane_routine() -> Any:
-    """The compiled march of a run in every lane."""
-    return compiled(advance_lanes, signatures.ADVANCE_LANES, "", LANES_BY)
-
-
-def has_lanes(parts: Sequence[tuple[str, Any, tuple[str, ...], frozenset[str]]]) -> bool:
+def has_lanes(
+    parts: Sequence[tuple[str, Any, tuple[str, ...], frozenset[str]]], march: Any
+) -> bool:
     """Whether all of these parts are compiled for lanes, and the march."""
-    doors = [_lane_door(*part) for part in parts]
-    pieces = [(function, label) for function, _, label in doors]
-    return all(object_cache.is_kept(_name(*piece)) for piece in (*pieces, (advance_lanes, "")))
+    adapters = [_lane_adapter(*part) for part in parts]
+    pieces = [(function, label) for function, _, label in adapters]
+    return all(object_cache.is_kept(_name(*piece)) for piece in (*pieces, (march, "")))
 
 
-def _lane_door(
+def _lane_adapter(
     part: str, inner: Any, names: tuple[str, ...], alike: frozenset[str]
 ) -> tuple[Any, Any, str]:
     label = f"lanes_{part}_entry_{inner.__module__}_{inner.__qualname__}"
@@ -77,9 +72,9 @@ def _lane_door(
 
 
 @cache
-def routine(function: Any, prototype: Any) -> Any:
+def routine(function: Any, prototype: Any, compiler: str = "compile_numba") -> Any:
     """A compiled kernel of the engine itself."""
-    return compiled(function, prototype)
+    return compiled(function, prototype, compiler=compiler)
 
 
 def compiled(

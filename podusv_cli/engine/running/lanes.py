@@ -21,7 +21,7 @@ from podusv_cli.engine.machine import signatures
 from podusv_cli.engine.machine.kernel_faults import check_kernel
 from podusv_cli.engine.running.watch import Ending
 from podusv_cli.engine.step.grid import TimeGrid
-from podusv_cli.engine.step.lane_march import REACHED
+from podusv_cli.engine.step.lane_march import REACHED, advance_lanes
 from podusv_cli.engine.step.layout import Layout, Vectors
 from podusv_cli.engine.step.relay import COUNT
 
@@ -64,8 +64,8 @@ def marcher(loop: ClosedLoop, observer: Observer) -> Callable[..., int]:
     shared, parts = alike(loop, observer), list(entries(loop, observer))
     for _, inner, _ in parts:
         check_kernel(inner)
-    doors = [compile.lane_entry(*part, shared[part[0]]) for part in parts]
-    march = compile.lane_routine()
+    adapters = [compile.lane_entry(*part, shared[part[0]]) for part in parts]
+    march = compile.routine(advance_lanes, signatures.ADVANCE_LANES, compile.LANES_BY)
 
     def compiled_march(
         last: int, h: float, vectors: list[Vector], layout: Layout, under_way: Vector, ends: Vector
@@ -75,7 +75,7 @@ def marcher(loop: ClosedLoop, observer: Observer) -> Callable[..., int]:
         )
         return int(
             march(
-                *doors, 0, last, h, pointers, signatures.whole_numbers(layout),
+                *adapters, 0, last, h, pointers, signatures.whole_numbers(layout),
                 len(vectors[Vectors._fields.index("seen")]) // LANES,
                 signatures.pointer(under_way), signatures.pointer(ends),
             )
@@ -89,7 +89,8 @@ def is_compiled(loop: ClosedLoop, observer: Observer) -> bool:
     from podusv_cli.engine.machine import compile
 
     shared = alike(loop, observer)
-    return compile.has_lanes([(*part, shared[part[0]]) for part in entries(loop, observer)])
+    parts = [(*part, shared[part[0]]) for part in entries(loop, observer)]
+    return compile.has_lanes(parts, advance_lanes)
 
 
 def places(loop: ClosedLoop, observer: Observer) -> list[tuple[int, list[int]]]:

@@ -101,17 +101,17 @@ def _rates_runner(loop: ClosedLoop, compiled: bool) -> Callable[..., None]:
     parts = list(entries(loop, Observer()))
     chosen = [part for part in parts if part[0] in signatures.RIGHT_HAND_SIDE]
     if not compiled:
-        doors = [signatures.bind(*part) for part in chosen]
-        return lambda *rest: closed_loop.rates_along(*doors, *rest)
+        adapters = [signatures.bind(*part) for part in chosen]
+        return lambda *rest: closed_loop.rates_along(*adapters, *rest)
     from podusv_cli.engine.machine import compile  # a loop in plain Python needs no compiler
 
-    doors = [compile.entry(*part) for part in chosen]
+    adapters = [compile.entry(*part) for part in chosen]
     run = compile.routine(closed_loop.rates_along, signatures.RATES_ALONG)
 
     def compiled_run(
         count: int, logged: Vector, out: Vector, vectors: Vectors, layout: Layout
     ) -> None:
         vectors, sizes = signatures.pointers(vectors), signatures.whole_numbers(layout)
-        run(*doors, count, signatures.pointer(logged), signatures.pointer(out), vectors, sizes)
+        run(*adapters, count, signatures.pointer(logged), signatures.pointer(out), vectors, sizes)
 
     return compiled_run

@@ -77,16 +77,16 @@ def ready(loop: ClosedLoop, grid: TimeGrid, observer: Observer, compiled: bool) 
 def marcher(loop: ClosedLoop, observer: Observer, compiled: bool) -> Callable[..., int]:
     """The march of this loop, `closed_loop.advance` less its functions, compiled if need be."""
     if not compiled:
-        doors = [signatures.bind(*part) for part in entries(loop, observer)]
-        return lambda *rest: closed_loop.advance_plainly(*doors, *rest)
+        adapters = [signatures.bind(*part) for part in entries(loop, observer)]
+        return lambda *rest: closed_loop.advance_plainly(*adapters, *rest)
     from podusv_cli.engine.machine import compile  # a loop in plain Python needs no compiler
 
-    doors = [compile.entry(*part) for part in entries(loop, observer)]
+    adapters = [compile.entry(*part) for part in entries(loop, observer)]
     watch = compile.routine(closed_loop.advance, signatures.ADVANCE)
 
     def compiled_march(first: int, last: int, h: float, vectors: Vectors, layout: Layout) -> int:
         vectors, sizes = signatures.pointers(vectors), signatures.whole_numbers(layout)
-        return int(watch(*doors, first, last, h, vectors, sizes))
+        return int(watch(*adapters, first, last, h, vectors, sizes))
 
     return compiled_march
 
