@@ -348,6 +348,13 @@ def test_what_translates_is_in_the_digest_of_the_folder():
     assert found <= files
 
 
+def test_without_one_of_them_the_digest_is_another(monkeypatch):
+    whole = object_cache.translators.__wrapped__()
+    for pattern in object_cache.TRANSLATORS:
+        monkeypatch.setattr(object_cache, "TRANSLATORS", (pattern,))
+        assert object_cache.translators.__wrapped__() != whole
+
+
 @pytest.mark.slow
 def test_loading_takes_no_compiler_and_a_run_no_tables_or_plots(tmp_path):
     script = """
