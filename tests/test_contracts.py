@@ -117,7 +117,7 @@ def test_the_kernels_are_marked_for_the_compiler(room, kind):
     if component == Exact():  # nothing is called
         return
     assert is_kernel(getattr(kind, KERNELS[room]))
-    if isinstance(component, Controller) and component.sample_period() > 0:
+    if isinstance(component, Controller) and component.takes_samples():
         assert is_kernel(component.sample)
 
 
