@@ -5,11 +5,12 @@ from collections.abc import Callable
 from typing import Any
 
 from podusv_cli.components.controllers.pid import Pid
-from podusv_cli.core.kernel import Vector, kernel
+from podusv_cli.core.kernel import Vector, kernel, taking
+from podusv_cli.engine.machine.signatures import SIGNATURES
 
 BEGIN, END = 0.4999, 0.5001
 MANY = 100_000_000
-plain = Pid.law
+plain = taking(Pid.law, SIGNATURES["law"].split())
 
 
 @kernel
