@@ -72,6 +72,11 @@ def _times(scenario: Scenario) -> Conflicts:
         "control.period": scenario.control.period,
         "actuator.command.delay": scenario.actuator.delay(),
         **_sampled(scenario),
+        **{
+            f"{key}.execute": law.trial().execute
+            for key, law in scenario.laws().items()
+            if law.trial()
+        },
     }
     if max(times.values()) / step > MOST_INSTANTS:
         key, time = max(times.items(), key=lambda item: item[1])

@@ -39,7 +39,7 @@ def steered(angle: float, side: float, k: Any, tau: Vector, signals: Vector) -> 
 @kernel
 def begun(t: float, k: Any) -> bool:
     """Whether the trial has begun at this instant; t is a whole number of steps, but rounded."""
-    return t > k.execute - NEAR
+    return bool(t > k.execute - NEAR)
 
 
 class Manoeuvre(Controller):

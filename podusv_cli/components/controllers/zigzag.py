@@ -14,7 +14,21 @@ from podusv_cli.core.signal import Signal
 HEADING = Signal("psi_0", "rad", "heading at which the trial began", r"\psi_0")
 NEXT = Signal("next_side", "1", "side to which the trial steers at the end of the step")
 LOOKED = Signal("looked", "s", "when the heading was looked at last")
-AT_SIDE, AT_HEADING, AT_NEXT, AT_TIME = range(4)  # positions in the memory
+RATE = Signal("r_looked", "rad/s", "yaw rate at that time")
+MEMORY = (SIDE, HEADING, NEXT, LOOKED, RATE)
+AT_SIDE, AT_HEADING, AT_NEXT, AT_TIME, AT_RATE, SIZE = range(6)  # positions in the memory
+
+
+@kernel
+def within(left: float, side: float, r: float, t: float, memory: Vector) -> float:
+    """After which share of the step the heading will have turned by `left` more; 1 if not in it."""
+    step = t - memory[AT_TIME]
+    gained = side * (r - memory[AT_RATE])  # yaw rate to that side, over the last step
+    turn = step * (side * r + 0.5 * gained)  # to that side, over the next step
+    if not 0.0 < left < turn:
+        return 1.0
+    share = left / turn
+    return float(left / (step * (side * r + 0.5 * gained * share)))
 
 
 class Zigzag(Manoeuvre):
@@ -35,7 +49,7 @@ class Zigzag(Manoeuvre):
 
     def slots(self) -> Slots:
         """The side, the heading of the approach, the side at the end of the step, the last look."""
-        return each((SIDE, HEADING, NEXT, LOOKED))
+        return each(MEMORY)
 
     def trial(self) -> Trial:
         """With the change of heading at which steering is reversed."""
@@ -50,24 +64,25 @@ class Zigzag(Manoeuvre):
     def sample(t: float, x: Vector, memory: Vector, k: Any) -> None:
         """Begin, or reverse.
 
-        Where the heading will have changed by `switch` within the step, at its present rate, the
-        side of the step is the mean of both: then the impulse of the steering is right.
+        Where the heading will have changed by `switch` within the step, as its rate and
+        acceleration say, the side of the step is the mean of both: then the impulse of the
+        steering is right.
         """
         side = memory[AT_NEXT]
         if side == 0.0 and begun(t, k):
             side, memory[AT_HEADING] = 1.0, x[2]
-        left = k.switch - side * (x[2] - memory[AT_HEADING])
         memory[AT_SIDE] = memory[AT_NEXT] = side
-        ahead = side * x[5] * (t - memory[AT_TIME]) if k.check_every == 0.0 else 0.0
-        if side != 0.0 and left <= max(ahead, 0.0):
+        left = k.switch - side * (x[2] - memory[AT_HEADING])
+        share = within(left, side, x[5], t, memory) if k.check_every == 0.0 else 1.0
+        if side != 0.0 and (left <= 0.0 or share < 1.0):
             memory[AT_NEXT] = -side
-            memory[AT_SIDE] = side * (2.0 * left / ahead - 1.0) if left > 0.0 else -side
-        memory[AT_TIME] = t
+            memory[AT_SIDE] = side * (2.0 * share - 1.0) if left > 0.0 else -side
+        memory[AT_TIME], memory[AT_RATE] = t, x[5]
 
     @staticmethod
     @kernel
     def law(memory: Vector, k: Any, tau: Vector, rate: Vector, signals: Vector) -> None:
         """At the angle, to the side of the moment."""
         steered(k.angle if memory[AT_NEXT] != 0.0 else 0.0, memory[AT_SIDE], k, tau, signals)
-        for i in range(4):
+        for i in range(SIZE):
             rate[i] = 0.0
