@@ -21,7 +21,7 @@ from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.engine.step.grid import TimeGrid
-from podusv_cli.metrics import distance, windows
+from podusv_cli.metrics import distance
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.metric import close_integrals
 from podusv_cli.metrics.operations import operations
@@ -86,8 +86,7 @@ def test_metrics_follow_their_definitions(limited):
     log, got = limited
     t = log["time"]
     expected = by_definition(log, t >= 0.75 * t[-1])
-    last = np.flatnonzero(log["z_e"] > 2.0)[-1]
-    expected["settling_time"] = np.interp(-2.0, -log["z_e"][last : last + 2], t[last : last + 2])
+    expected["settling_time"] = t[log["z_e"] > 2.0][-1] + 0.01
     assert {name: got[name] for name in expected} == pytest.approx(expected, rel=1e-12)
     assert 0 < got["saturated_fraction"] < 1
 
@@ -225,15 +224,13 @@ def test_settled_from_the_start_is_zero():
     assert got["settling_time"] == 0.0
 
 
-def test_settling_is_timed_on_a_straight_line_between_instants_and_counts_in_the_last_one():
-    """z_e = |3 - t| comes to 1 m at 2 s, and leaves again at 4 s."""
-    for step in (0.3, 0.7, 0.9):
-        seen, times = np.zeros(3), np.arange(0.0, 3.9, step)
-        for t in times:
-            windows.settle(t, abs(3.0 - t), 1.0, seen)
-        assert windows.since(seen) == pytest.approx(2.0, abs=1e-12)
-        windows.settle(4.1, 1.1, 1.0, seen)
-        assert np.isnan(windows.since(seen))
+def test_settling_in_the_last_instant_counts_whatever_the_rounding():
+    seen, step = np.zeros(distance.SIZE), 0.01
+    for last in range(2, 200):
+        seen[distance.NOW], seen[distance.OUTSIDE] = last * step, (last - 1) * step
+        assert METRICS["settling_time"].result(seen, step) == pytest.approx(last * step)
+        seen[distance.OUTSIDE] = last * step
+        assert np.isnan(METRICS["settling_time"].result(seen, step))
 
 
 def test_every_metric_is_computed_and_documented(limited):

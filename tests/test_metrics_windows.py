@@ -61,7 +61,7 @@ def test_an_error_over_a_window_follows_its_definition(run):
 def test_a_further_radius_has_the_settling_time_of_that_radius(run):
     log, got = run
     t, z_e = log["time"], log["z_e"]
-    assert got["settling_time_far"] == pytest.approx(t[z_e > 9.0][-1] + 0.005, abs=0.005)
+    assert got["settling_time_far"] == pytest.approx(t[z_e > 9.0][-1] + 0.01)
     assert math.isnan(got["settling_time_near"])  # the standoff is larger
 
 

@@ -8,7 +8,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
 
-from podusv_cli.core.interpolation import passed
 from podusv_cli.core.kernel import Vector, kernel, specialise
 from podusv_cli.engine.step.layout import DISTANCE
 from podusv_cli.metrics.metric import Accumulator, Metric, Result
@@ -17,8 +16,7 @@ NAMED = "NAME"  # stands for a scenario's word in the name of a metric
 NEAR = 1e-9  # s; an instant this near to an end of a window belongs to it
 FROM, TO, RADIUS = math.inf, math.inf, 0.0  # placeholders of one window [s] and one radius [m]
 LENGTH, SQUARE, LARGEST, NOW, LAST, WINDOW = range(6)
-SINCE, LATEST, LATEST_Z, SETTLING = range(4)
-OUTSIDE = -1.0  # in place of a time
+OUTSIDE, ENDS, SETTLING = range(3)
 
 Windows = tuple[tuple[str, tuple[float, float]], ...]  # from and to [s]
 Radii = tuple[tuple[str, float], ...]  # m
@@ -39,27 +37,18 @@ def window(t: float, row: Vector, seen: Vector) -> None:
 
 @kernel
 def outside(t: float, row: Vector, seen: Vector) -> None:
-    """Gather since when z_e is within the radius."""
-    settle(t, row[DISTANCE], RADIUS, seen)
+    """Gather when z_e was last beyond the radius, and the last instant."""
+    if t == 0.0:
+        seen[OUTSIDE] = -1.0  # not outside so far
+    if row[DISTANCE] > RADIUS:
+        seen[OUTSIDE] = t
+    seen[ENDS] = t
 
 
-@kernel
-def settle(t: float, z_e: float, radius: float, seen: Vector) -> None:
-    """Gather since when z_e is within the radius, by a straight line between two instants.
-
-    `seen` has this time, then time and z_e of the last instant.
-    """
-    if z_e > radius:
-        seen[SINCE] = OUTSIDE
-    elif seen[SINCE] == OUTSIDE and t > 0.0:
-        share = passed(radius, seen[LATEST_Z], z_e)
-        seen[SINCE] = seen[LATEST] + share * (t - seen[LATEST])
-    seen[LATEST], seen[LATEST_Z] = t, z_e
-
-
-def since(seen: Vector) -> float:
-    """The time from which z_e stayed within the radius [s]; NaN where it ended outside."""
-    return float(seen[SINCE]) if seen[SINCE] != OUTSIDE else math.nan
+def settled_from(outside: float, now: float, step: float) -> float:
+    """The first instant after the last one outside [s]; NaN where that is the last of the run."""
+    inside_from = float(outside) + step if outside >= 0.0 else 0.0
+    return inside_from if inside_from < now + 0.5 * step else math.nan
 
 
 ERROR_RMS = Metric(
@@ -107,7 +96,9 @@ def _of_radius(name: str, radius: float) -> Metric:
     watch = specialise(outside, f"outside_{name}", RADIUS=radius)
     of = Accumulator(watch, lambda layout: SETTLING, lambda layout: {})
     meaning = f"time from which z_e stays within {radius:g} m"
-    return _named(SETTLED, name, meaning, of, lambda seen, step: since(seen))
+    return _named(
+        SETTLED, name, meaning, of, lambda seen, step: settled_from(seen[OUTSIDE], seen[ENDS], step)
+    )
 
 
 @cache  # an accumulator's numbers are found by the accumulator itself
