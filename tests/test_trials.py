@@ -8,6 +8,7 @@ from scipy.integrate import solve_ivp
 
 from podusv_cli.components.vessels.plant import plant
 from podusv_cli.core.kernel import bundle
+from podusv_cli.findings.outcome import trial_unfinished
 from podusv_cli.process.extras import Extras
 from podusv_cli.scenario.load import load_text
 from podusv_cli.scenario.shipped import file_of
@@ -129,6 +130,21 @@ def test_a_trial_that_does_not_get_so_far_has_no_number():
     assert math.isnan(found["tactical_diameter"])
     _, _, short = done("zigzag_20", *IDEAL, "simulation.duration=21")
     assert math.isnan(short["overshoot_1"])
+
+
+def test_a_trial_that_does_not_lead_to_its_numbers_is_told():
+    """CyberShip II turns on and on at 10 deg behind its pods; the Otter reverses."""
+    scenario, log, found = done("zigzag_10", "simulation.duration=80")
+    assert math.isnan(found["overshoot_1"])
+    (text,) = trial_unfinished.search(scenario, log)
+    assert text.startswith("the zig-zag reverses 1 times, and its second overshoot needs 3; ")
+    scenario, log, found = done("zigzag_10", *IDEAL, *OTTER)
+    assert found["overshoot_2"] > 0.0
+    assert list(trial_unfinished.search(scenario, log)) == []
+    scenario, log, _ = done("turning_circle", *IDEAL, "simulation.duration=21")
+    assert "its diameter needs 180" in next(trial_unfinished.search(scenario, log))
+    scenario, log, _ = done("turning_circle", *IDEAL)
+    assert list(trial_unfinished.search(scenario, log)) == []
 
 
 def test_only_trials_have_the_metrics_of_trials():
