@@ -256,7 +256,7 @@ def _law(law: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vec
     memory, k = law.start(x, target, usual_vessel()), bundle(law.constants_with(usual_vessel()))
     memory = memory + random.normal(0.0, 0.1, len(memory))
     outputs = [np.full(size, np.nan) for size in (2, len(memory), len(law.signals))]
-    if law.sample_period() > 0:
+    if law.takes_samples():
         call(law.sample, t=t, x=x, memory=memory, target=target, k=k, table=law.table())
     tau, rate, signals = outputs
     call(

@@ -16,7 +16,7 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop
 
 # A trial takes samples, so it is no differential equation; a schedule does not look at the target.
-CONTINUOUS = {n: k for n, k in kinds("controllers").items() if not example(k).sample_period()}
+CONTINUOUS = {n: k for n, k in kinds("controllers").items() if not example(k).takes_samples()}
 MIRRORED = {name: kind for name, kind in kinds("controllers").items() if name != "schedule"}
 # Without the kink at the edge of the boundary layer, which no order survives.
 WITHIN_LAYER = {"sliding_mode": {"phi": 10.0}}

@@ -63,7 +63,7 @@ def test_the_kernels_are_marked_for_the_compiler(room, kind):
         return
     assert is_kernel(getattr(kind, KERNELS[room]))
     assert room != "estimators" or is_kernel(kind.correct)
-    if isinstance(component, Controller) and component.sample_period() > 0:
+    if isinstance(component, Controller) and component.takes_samples():
         assert is_kernel(component.sample)
 
 

@@ -1,5 +1,6 @@
 """Laws with line-of-sight guidance: their frame, what is derived, and what they promise."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 import sympy as sp
 from conftest import NONLINEAR, ask, corrected, run, situations
 from law_samples import STEADY, WRONG, rms, task
+from scipy.integrate import solve_ivp
 
 from podusv_cli.components.actuators.saturated import Saturated
 from podusv_cli.components.controllers.alos import CRAB, Alos, learning
@@ -67,7 +69,8 @@ def test_the_rates_of_the_errors_are_their_derivatives():
         velocity = (over_ground.real, over_ground.imag)
         expected = rate(*state[:2], *target[:2], *velocity, *target[2:])
         at = course_frame(state, target, k)
-        found = (at.along_rate, at.across_rate, line_of_sight(at, 0.1, 0.0, k)[1])
+        sight_rate = line_of_sight(at, max(at.along, 0.0), 0.1, 0.0, k)[1]
+        found = (at.along_rate, at.across_rate, sight_rate)
         assert found == pytest.approx(expected, rel=1e-9)
 
 
@@ -82,7 +85,8 @@ def test_far_behind_the_line_of_sight_is_that_to_the_target_and_near_it_to_the_l
     D = k.lookahead
     for behind, across, ahead in ((30.0, 40.0, 30.0), (0.0, 1.0, D), (-5.0, 1.0, D)):
         x, target = np.array([0, across, 0, 0, 0, 0.0]), np.array([behind, 0, 1, 0, 0, 0.0])
-        angle, _ = line_of_sight(course_frame(x, target, k), 0.0, 0.0, k)
+        at = course_frame(x, target, k)
+        angle, _ = line_of_sight(at, max(at.along, 0.0), 0.0, 0.0, k)
         assert angle == pytest.approx(-np.arctan2(across, ahead), rel=5e-3)
 
 
@@ -249,3 +253,35 @@ def test_learning_the_crab_angle_is_worth_several_times_the_error_on_the_line(la
     assert rms(learnt, 60, 100) < 0.06
     assert rms(learnt, 150) < 0.1
     assert rms(learnt, 150) < 0.6 * rms(plain, 150)
+
+
+# t, beta_hat and psi_ref by MSS's ALOSpsi (commit 736a3d1, GNU Octave 7.3; D = 10 m, gamma = 0.002,
+# steps of 1 ms) on a path of course atan(1/2), at y_e = 30 exp(-t/20) - 2 sin(0.1 t).
+ALOS = (
+    (0.0, 0.0, -0.785398163397), (5.0, 0.0932481991685, -0.780602897992),
+    (20.0, 0.336015113389, -0.617085644118), (40.0, 0.558025598331, -0.602859149292),
+    (60.0, 0.710534667291, -0.449320095803),
+)  # fmt: skip
+
+
+def test_alos_as_published_is_that_of_its_author_from_far_off_the_path():
+    law, course = Alos(learns="published", lookahead=10.0, gamma=0.002), math.atan2(1.0, 2.0)
+    k = bundle(law.constants_with(NONLINEAR))
+
+    def across(t):
+        return 30.0 * math.exp(-t / 20.0) - 2.0 * math.sin(0.1 * t)
+
+    found = solve_ivp(
+        lambda t, crab: [learning(across(t), crab[0], 0.0, k)[0]], (0.0, 60.0), [0.0],
+        t_eval=[t for t, *_ in ALOS], rtol=1e-10, atol=1e-12,
+    )  # fmt: skip
+    assert found.y[0] == pytest.approx([beta for _, beta, _ in ALOS], abs=2e-5)
+    for t, beta, psi in ALOS:
+        memory = np.zeros(8)
+        memory[CRAB] = beta
+        # 12 m behind a target that goes along the path
+        at = across(t) * np.array([-math.sin(course), math.cos(course)])
+        x = np.concatenate([at, [0.3, 0.5, 0.0, 0.0]])
+        ahead = 12.0 * np.array([math.cos(course), math.sin(course)])
+        target = np.concatenate([ahead, 0.05 * ahead, np.zeros(2)])
+        assert ask(law, x, memory, target, NONLINEAR).signals["psi_r"] == pytest.approx(psi)

@@ -1,4 +1,4 @@
-"""Reading between the rows of a table; for kernels."""
+"""Reading between the rows of a table, and between two instants; for kernels."""
 
 from __future__ import annotations
 
@@ -23,6 +23,12 @@ def segment(t: float, count: int, times: Vector) -> int:
 def linear(s: float, before: float, after: float) -> float:
     """The straight line from `before` at s = 0 to `after` at s = 1."""
     return before + s * (after - before)
+
+
+@kernel
+def passed(level: float, before: float, after: float) -> float:
+    """Where on the straight line from `before` (0) to `after` (1) the level is passed."""
+    return (level - before) / (after - before)
 
 
 @kernel

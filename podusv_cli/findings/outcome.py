@@ -10,6 +10,7 @@ from podusv_cli.core.recording import Recording
 from podusv_cli.scenario.model import Scenario
 
 LONG = 0.02  # fraction of the run; shorter saturation is no finding
+REVERSALS = 3  # of a zig-zag with two overshoots
 
 
 @after(
@@ -105,3 +106,23 @@ def _arrives(errors: Vector, fraction: float, radius: float) -> bool:
     half = -(-len(errors) // 2)
     earlier, later = float(errors[:half].mean()), float(errors[-half:].mean())
     return (earlier - later) / (0.5 * fraction) > later - radius
+
+
+@after(
+    "trial-unfinished", about="controller", meaning="the trial has not led to all of its numbers",
+    condition="a zig-zag reverses fewer than three times, or a circle turns by less than 180 deg",
+    remedy="simulate longer; a hull that keeps turning the first way is unstable for this trial",
+)  # fmt: skip
+def trial_unfinished(scenario: Scenario, log: Recording) -> Sentences:
+    """A manoeuvring trial ends before its last number is there, or never reverses."""
+    trial = scenario.controller.trial()
+    steering = rows_where(log, lambda part: part["time"] >= trial.execute) if trial else np.zeros(0)
+    if trial is None or not steering.any():
+        return
+    turned = float(np.ptp(log["psi"][steering]))
+    reversals = int((np.diff(np.sign(log["delta_s"][steering])) != 0.0).sum())
+    if trial.switch and reversals < REVERSALS:
+        what = f"reverses {reversals} times, and its second overshoot needs {REVERSALS}"
+        yield f"the zig-zag {what}; the heading has changed by {np.degrees(turned):.0f} deg in all"
+    if not trial.switch and turned < np.pi:
+        yield f"the circle turns by {np.degrees(turned):.0f} deg, and its diameter needs 180"

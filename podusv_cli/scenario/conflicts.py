@@ -66,12 +66,13 @@ def _unanswered(scenario: Scenario) -> Conflicts:
 
 
 def _times(scenario: Scenario) -> Conflicts:
-    step = scenario.simulation.step
+    step, laws = scenario.simulation.step, scenario.laws().items()
     times = {
         "simulation.duration": scenario.simulation.duration,
         "control.period": scenario.control.period,
         "actuator.command.delay": scenario.actuator.delay(),
         **_sampled(scenario),
+        **{f"{key}.execute": trial.execute for key, law in laws if (trial := law.trial())},
     }
     if max(times.values()) / step > MOST_INSTANTS:
         key, time = max(times.items(), key=lambda item: item[1])

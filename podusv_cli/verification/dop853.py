@@ -42,7 +42,7 @@ def why_skipped(scenario: Scenario, levels: list[Level]) -> str:
 REASONS: tuple[tuple[Callable[[Scenario, list[Level]], bool], str], ...] = (
     (lambda scenario, _: scenario.control.period > 0, "the law's output is held (control.period)"),
     (
-        lambda scenario, _: scenario.controller.sample_period() > 0,
+        lambda scenario, _: scenario.controller.takes_samples(),
         "the law takes samples (a difference quotient, or a held direction)",
     ),
     (

@@ -37,16 +37,21 @@ LEARNT = (
     Signal("crab", "rad", "learnt crab angle", r"\hat\beta"),
     Signal("offset", "m", "what the integral adds to the cross-track error", r"\sigma y_i"),
 )
-INTEGRAL = 1.0
+ADAPTIVE, INTEGRAL, PUBLISHED = 0.0, 1.0, 2.0  # places among the choices of `learns`
 
 
 @kernel
 def learning(across: float, crab: float, offset: float, k: Any) -> tuple[float, float]:
-    """Rates of crab angle and offset; one is always 0. The angle stays within +-crab_m."""
+    """Rates of crab angle and offset; one is always 0.
+
+    The angle stays within +-crab_m, but for the published law.
+    """
     shifted = across + offset
     squared = k.lookahead * k.lookahead + shifted * shifted
     if k.learns == INTEGRAL:
         return 0.0, k.sigma * k.lookahead * across / squared
+    if k.learns == PUBLISHED:
+        return k.gamma * k.lookahead * across / math.sqrt(squared), 0.0
     rate = k.gamma * k.lookahead * k.lookahead * across / squared
     stuck = abs(crab) >= k.crab_m and rate * crab > 0.0
     return (0.0 if stuck else rate), 0.0
@@ -59,9 +64,10 @@ class Alos(LineOfSight, ObservingController):
     signals: ClassVar[tuple[Signal, ...]] = STEERED
     lookahead: float = value(0.7, "m", "distance ahead on the path that the bow aims at", gt=0)
     U: float = value(1.1, "m/s", "largest wanted surge velocity", gt=0)
-    learns: Literal["adaptive", "integral"] = value(
-        "adaptive", "", "how the crab angle is found: adapted as an angle (ALOS, Fossen 2023), or "
-        "by an integral of the cross-track error (ILOS, Borhaug et al. 2008)",
+    learns: Literal["adaptive", "integral", "published"] = value(
+        "adaptive", "", "how the crab angle is found: adapted as an angle (after ALOS, Fossen "
+        "2023, but slower far from the line), by an integral of the cross-track error (ILOS, "
+        "Borhaug et al. 2008), or by ALOS as published, whose lookahead does not grow",
     )  # fmt: skip
     gamma: float = value(0.2, "rad/(m s)", "gain of the adapted angle", ge=0)
     crab_m: float = value(0.5, "rad", "largest adapted angle", gt=0)
@@ -91,7 +97,8 @@ class Alos(LineOfSight, ObservingController):
         u, v, r = x[3], x[4], x[5]
         crab, offset = memory[CRAB], memory[OFFSET]
         crab_rate, offset_rate = learning(at.across, crab, offset, k)
-        sight, sight_rate = line_of_sight(at, offset, offset_rate, k)
+        behind = 0.0 if k.learns == PUBLISHED else max(at.along, 0.0)
+        sight, sight_rate = line_of_sight(at, behind, offset, offset_rate, k)
         psi_r = wrap(at.course - crab + sight)
         psi_e = wrap(psi_r - x[2])
         turn = at.turn - crab_rate + sight_rate

@@ -49,7 +49,8 @@ class Controller(Component):
     number for each of its `signals`; `work` is scratch of `workspace()` numbers.
 
     `sample(t, x, memory, target, k, table)` is a kernel that may change `memory`; it is called at
-    every multiple of `sample_period()`, before anything else sees that instant.
+    every multiple of `sample_period()`, before anything else sees that instant; where this is 0 and
+    `takes_samples()`, at every step.
 
     `after_saturation(t, memory, demand, tau, k, table, rate)` is a kernel that may change the
     `rate` that `law` wrote, once the actuator has made loads `tau` of the `demand`; it is called
@@ -88,6 +89,10 @@ class Controller(Component):
     def sample_period(self) -> float:
         """Seconds between two calls of `sample`; 0 where the law needs none."""
         return 0.0
+
+    def takes_samples(self) -> bool:
+        """Whether `sample` is called; without a period at every step, or once a control period."""
+        return self.sample_period() > 0.0
 
     def slots(self) -> Slots:
         """Signal and length of every part of the memory, in order."""

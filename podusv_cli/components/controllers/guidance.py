@@ -58,13 +58,14 @@ def course_frame(x: Vector, target: Vector, k: Any) -> Frame:
 
 
 @kernel
-def line_of_sight(at: Frame, offset: float, offset_rate: float, k: Any) -> tuple[float, float]:
+def line_of_sight(
+    at: Frame, behind: float, offset: float, offset_rate: float, k: Any
+) -> tuple[float, float]:
     """Angle [rad] from the course to the line of sight, and its rate.
 
-    It goes to the point of the line that lies the lookahead ahead, or at the target if that is
-    further. `offset` [m] is added to the distance across.
+    It goes to the point of the line that lies the lookahead ahead; with the vessel `behind` [m] the
+    target, to the target if that is further. `offset` [m] is added to the distance across.
     """
-    behind = max(at.along, 0.0)
     ahead = math.sqrt(k.lookahead * k.lookahead + behind * behind)
     across = at.across + offset
     rate = ahead * (at.across_rate + offset_rate) - across * behind / ahead * at.along_rate

@@ -84,7 +84,7 @@ class LosPid(LineOfSight):
     ) -> None:  # fmt: skip
         """The heading is damped by the yaw rate itself; its integral holds a steady turn."""
         at = course_frame(x, target, k)
-        sight, _ = line_of_sight(at, 0.0, 0.0, k)
+        sight, _ = line_of_sight(at, max(at.along, 0.0), 0.0, 0.0, k)
         psi_r = wrap(at.course + sight)
         u_d = wanted_speed(x, at, k)
         w_u, w_psi = k.omega_u, k.omega_psi

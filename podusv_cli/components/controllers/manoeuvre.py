@@ -14,17 +14,32 @@ from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.signal import Signal
 
+NEAR = 1e-9  # s
+SIDE = Signal(
+    "side", "1", "side to which the trial steers: 1 starboard, -1 port, 0 before it; in a step in "
+    "which it changes, the mean over the step",
+)  # fmt: skip
 STEERING = Signal(
     "delta_s", "rad", "angle at which the thrust steers, positive to starboard", r"\delta_s"
 )
 
 
 @kernel
-def steered(angle: float, k: Any, tau: Vector, signals: Vector) -> None:
-    """The demand of a thrust that acts `lever` behind the origin and steers at `angle` [rad]."""
+def steered(angle: float, side: float, k: Any, tau: Vector, signals: Vector) -> None:
+    """The demand of a thrust that acts `lever` behind the origin and steers at `angle` [rad].
+
+    A side of 1 is starboard, -1 port; between them it is the mean over a step in which the side
+    changes.
+    """
     tau[0] = k.thrust * math.cos(angle)
-    tau[1] = k.thrust * k.lever * math.sin(angle)
-    signals[0] = angle
+    tau[1] = k.thrust * k.lever * math.sin(angle) * side
+    signals[0] = angle * side
+
+
+@kernel
+def begun(t: float, k: Any) -> bool:
+    """Whether the trial has begun at this instant; t is a whole number of steps, but rounded."""
+    return bool(t > k.execute - NEAR)
 
 
 class Manoeuvre(Controller):
@@ -33,7 +48,16 @@ class Manoeuvre(Controller):
     signals: ClassVar[tuple[Signal, ...]] = (STEERING,)
     thrust: float = value(2.0, "N", "thrust, the same all the time", gt=0)
     lever: float = value(0.5, "m", "distance of the thrust behind the body origin", gt=0)
-    execute: float = value(60.0, "s", "time at which steering begins; steady speed by then", ge=0)
+    execute: float = value(
+        60.0,
+        "s",
+        "time at which steering begins, a whole number of steps; steady speed by then",
+        ge=0,
+    )
+
+    def takes_samples(self) -> bool:
+        """The side of the steering is a part of the memory, which changes at instants only."""
+        return True
 
     def trial(self) -> Trial:
         """When steering begins; positive angles steer to starboard."""

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any, Literal
 
-from podusv_cli.components.controllers.manoeuvre import Manoeuvre, steered
+from podusv_cli.components.controllers.base import Slots, each
+from podusv_cli.components.controllers.manoeuvre import SIDE, Manoeuvre, begun, steered
 from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, kernel
 
@@ -18,8 +19,19 @@ class TurningCircle(Manoeuvre):
         math.radians(35.0), "rad", "angle of the thrust to starboard", gt=0, le=0.5 * math.pi
     )
 
+    def slots(self) -> Slots:
+        """Whether it steers."""
+        return each((SIDE,))
+
     @staticmethod
     @kernel
-    def law(t: float, k: Any, tau: Vector, signals: Vector) -> None:
+    def sample(t: float, memory: Vector, k: Any) -> None:
+        """Begin."""
+        memory[0] = 1.0 if begun(t, k) else 0.0
+
+    @staticmethod
+    @kernel
+    def law(memory: Vector, k: Any, tau: Vector, rate: Vector, signals: Vector) -> None:
         """Straight, then at the angle."""
-        steered(k.angle if t >= k.execute else 0.0, k, tau, signals)
+        steered(k.angle if memory[0] > 0.0 else 0.0, 1.0, k, tau, signals)
+        rate[0] = 0.0

@@ -5,15 +5,30 @@ from __future__ import annotations
 import math
 from typing import Any, ClassVar, Literal
 
-from podusv_cli.components.controllers.base import Slots, Trial
-from podusv_cli.components.controllers.manoeuvre import Manoeuvre, steered
+from podusv_cli.components.controllers.base import Slots, Trial, each
+from podusv_cli.components.controllers.manoeuvre import SIDE, Manoeuvre, begun, steered
 from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.signal import Signal
 
-SIDE = Signal("side", "1", "side to which the trial steers: 1 starboard, -1 port, 0 before it")
 HEADING = Signal("psi_0", "rad", "heading at which the trial began", r"\psi_0")
-MEMORY = ((SIDE, 1), (HEADING, 1))
+NEXT = Signal("next_side", "1", "side to which the trial steers at the end of the step")
+LOOKED = Signal("looked", "s", "when the heading was looked at last")
+RATE = Signal("r_looked", "rad/s", "yaw rate at that time")
+MEMORY = (SIDE, HEADING, NEXT, LOOKED, RATE)
+AT_SIDE, AT_HEADING, AT_NEXT, AT_TIME, AT_RATE, SIZE = range(6)  # positions in the memory
+
+
+@kernel
+def within(left: float, side: float, r: float, t: float, memory: Vector) -> float:
+    """After which share of the step the heading will have turned by `left` more; 1 if not in it."""
+    step = t - memory[AT_TIME]
+    gained = side * (r - memory[AT_RATE])  # yaw rate to that side, over the last step
+    turn = step * (side * r + 0.5 * gained)  # to that side, over the next step
+    if not 0.0 < left < turn:
+        return 1.0
+    share = left / turn
+    return float(left / (step * (side * r + 0.5 * gained * share)))
 
 
 class Zigzag(Manoeuvre):
@@ -28,12 +43,13 @@ class Zigzag(Manoeuvre):
         math.radians(10.0), "rad", "change of heading at which steering is reversed", gt=0
     )
     check_every: float = value(
-        0.01, "s", "time between two looks at the heading, a whole number of steps", gt=0
-    )
+        0.0, "s", "time between two looks at the heading, a whole number of steps; 0: steering is "
+        "reversed when the heading has changed by `switch`, also within a step", ge=0,
+    )  # fmt: skip
 
     def slots(self) -> Slots:
-        """The side, and the heading of the approach."""
-        return MEMORY
+        """The side, the heading of the approach, the side at the end of the step, the last look."""
+        return each(MEMORY)
 
     def trial(self) -> Trial:
         """With the change of heading at which steering is reversed."""
@@ -46,15 +62,27 @@ class Zigzag(Manoeuvre):
     @staticmethod
     @kernel
     def sample(t: float, x: Vector, memory: Vector, k: Any) -> None:
-        """Begin, or reverse."""
-        if t >= k.execute and memory[0] == 0.0:
-            memory[0], memory[1] = 1.0, x[2]
-        if memory[0] * (x[2] - memory[1]) >= k.switch:
-            memory[0] = -memory[0]
+        """Begin, or reverse.
+
+        Where the heading will have changed by `switch` within the step, as its rate and
+        acceleration say, the side of the step is the mean of both: then the impulse of the
+        steering is right.
+        """
+        side = memory[AT_NEXT]
+        if side == 0.0 and begun(t, k):
+            side, memory[AT_HEADING] = 1.0, x[2]
+        memory[AT_SIDE] = memory[AT_NEXT] = side
+        left = k.switch - side * (x[2] - memory[AT_HEADING])
+        share = within(left, side, x[5], t, memory) if k.check_every == 0.0 else 1.0
+        if side != 0.0 and (left <= 0.0 or share < 1.0):
+            memory[AT_NEXT] = -side
+            memory[AT_SIDE] = side * (2.0 * share - 1.0) if left > 0.0 else -side
+        memory[AT_TIME], memory[AT_RATE] = t, x[5]
 
     @staticmethod
     @kernel
     def law(memory: Vector, k: Any, tau: Vector, rate: Vector, signals: Vector) -> None:
         """At the angle, to the side of the moment."""
-        steered(memory[0] * k.angle, k, tau, signals)
-        rate[0] = rate[1] = 0.0
+        steered(k.angle if memory[AT_NEXT] != 0.0 else 0.0, memory[AT_SIDE], k, tau, signals)
+        for i in range(SIZE):
+            rate[i] = 0.0

@@ -197,14 +197,17 @@ class ClosedLoop:
             flow=_flow(self.disturbance, b) if actuator.feels_motion else 0,
             flags=flags, sensed=sensed, columns=columns,
             steps=grid.steps, log_every=grid.log_every, hold_every=grid.hold_every,
-            sample_every=_sample_steps(law.sample_period(), grid),
+            sample_every=_sample_steps(law, grid),
             measured=int(self.measured), update_first=int(grid.update_first),
             load_of_time=int(self.disturbance.of_time), wants_loads=int(law.wants_loads()),
             relayed=int(actuator.is_relayed),
         )  # fmt: skip
 
 
-def _sample_steps(period: float, grid: TimeGrid) -> int:
+def _sample_steps(law: Controller, grid: TimeGrid) -> int:
+    period = law.sample_period()
+    if law.takes_samples() and not period:
+        return grid.hold_every or 1
     count = whole_steps(period, grid.step)
     if count is None or (period > 0 and count == 0):
         raise ValueError(
@@ -226,7 +229,7 @@ def entries(
     law, path, disturbance, actuator = loop.controller, loop.path, loop.disturbance, loop.actuator
     constants = tuple(recall(law.constants_with, loop.nominal))
     # What does nothing reads no constants: its machine code is the same for every law.
-    sample = (law.sample, constants) if law.sample_period() > 0 else (_no_sample, ())
+    sample = (law.sample, constants) if law.takes_samples() else (_no_sample, ())
     told = law.wants_loads()
     after_saturation = (law.after_saturation, constants) if told else (_ignore_loads, ())
     yield "path", path.evaluate, tuple(recall(path.constants))

@@ -93,7 +93,7 @@ def evaluated(loop: ClosedLoop, before: float) -> tuple[Vector, Vector, Vector]:
     x, k, table = np.array(loop.start), bundle(law.constants_with(loop.nominal)), law.table()
     tau, rate, signals = (np.full(n, before) for n in (2, len(memory), len(law.signals)))
     read = {"x": x, "memory": memory, "target": target, "table": table}
-    if law.sample_period() > 0:
+    if law.takes_samples():
         call(law.sample, t=0.0, k=k, **read)
     before_it = {name: vector.copy() for name, vector in read.items()}
     work = np.zeros(law.workspace())

@@ -23,7 +23,7 @@ def continuous(loop: ClosedLoop, duration: float, *, compiled: bool = True) -> t
     """
     if loop.measured:
         raise ValueError("a law that works with measurements has no continuous right-hand side")
-    if loop.controller.sample_period() > 0:
+    if loop.controller.takes_samples():
         raise ValueError("a law that takes samples has no continuous right-hand side")
     if loop.actuator.delay() > 0:
         raise ValueError("an actuator with a delay has no continuous right-hand side")
