@@ -242,7 +242,7 @@ TABLE: dict[str, list[Row]] = {
     ("replace=self._force and whole and not missing", "replace=self._force and whole",
      "test_a_lesser_one_takes_no_place"),
     ("    if len(entries) != len(pairs):", "    if False:",
-     "test_every_command_says_so_in_a_line_and_leaves_nothing"),
+     "test_json_that_podusv_does_not_write"),
     ("not math.isfinite(value) else value", "math.isnan(value) else value",
      "test_trials_read_back_with_infinite_numbers"),
 ],
