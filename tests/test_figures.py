@@ -25,8 +25,8 @@ from podusv_cli.figures.style import (
     axis_label,
     house_style,
     image,
-    look,
     new_figure,
+    nth_style,
     places,
 )
 from podusv_cli.scenario.load import load
@@ -110,10 +110,10 @@ def test_every_run_has_its_own_look_and_its_name_in_the_legend(two):
 
 
 def test_ten_runs_differ_in_colour_in_line_style_and_in_marker():
-    for parts in zip(*(look(i) for i in range(10)), strict=True):
+    for parts in zip(*(nth_style(i) for i in range(10)), strict=True):
         assert len(set(map(str, parts))) == 10
-    assert [look(i) for i in range(len(LOOKS))] == list(LOOKS)
-    assert len({str(look(i)) for i in range(100)}) == 100
+    assert [nth_style(i) for i in range(len(LOOKS))] == list(LOOKS)
+    assert len({str(nth_style(i)) for i in range(100)}) == 100
 
 
 @pytest.mark.parametrize("count", [2, 4, 9, 30])

@@ -58,7 +58,7 @@ def damping(p: Vessel, nu: Any) -> Any:
     V, R = abs(v), abs(r)
     return -np.array([
         [p.X_u + p.X_uu * abs(u) + p.X_uuu * u**2, 0, 0],
-        [0, p.Y_v + p.Y_vv * V + p.Y_vvv * v**2 + p.Y_rv * R, p.Y_r + p.Y_vr * V + p.Y_rr * R],
+        [0, p.Y_v + p.Y_vv * V + p.Y_rv * R, p.Y_r + p.Y_vr * V + p.Y_rr * R],
         [0, p.N_v + p.N_vv * V + p.N_rv * R, p.N_r + p.N_vr * V + p.N_rr * R],
     ])  # fmt: skip
 

@@ -10,20 +10,14 @@ from podusv_cli.core.component import unit_of
 from podusv_cli.core.finding import At, Sentences, before
 from podusv_cli.findings.finding import Case
 
-DAMPING = (
-    "X_uu",
-    "X_uuu",
-    "Y_vv",
-    "Y_vvv",
-    "N_rr",
-)  # a positive linear one is refused by the model
+DAMPING = ("X_uu", "X_uuu", "Y_vv", "N_rr")  # a positive linear one is refused by the model
 ADDED_MASS = {"X_udot": "m11", "Y_vdot": "m22", "N_rdot": "m33"}  # and the inertia it belongs to
 TURN = 2.0 * math.pi
 
 
 @before(
     "damping-sign", about="vessel", meaning="nonlinear damping drives the motion",
-    condition="X_uu, X_uuu, Y_vv, Y_vvv or N_rr is positive",
+    condition="X_uu, X_uuu, Y_vv or N_rr is positive",
     remedy="make the coefficient negative, as damping is published",
 )  # fmt: skip
 def damping_sign(case: Case) -> Sentences:

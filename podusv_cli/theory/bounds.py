@@ -245,20 +245,22 @@ class SwayBound:
 def sway_push(vessel: Vessel, log: Recording, now: Replayed) -> tuple[Vector, Vector]:
     """The sway force at every row [N]: without damping, and m11 |u| |r| + |b_v| of (51).
 
-    The first is |m22 v' - (Y_v + Y_vv |v| + Y_vvv v^2) v|, with cross terms and the actuator's
-    sway force. For the paper's vessel it never exceeds the second.
+    The first is |m22 v' - (Y_v + Y_vv |v|) v|, with cross terms and the actuator's sway force. For
+    the paper's vessel it never exceeds the second.
     """
     v = log["v"]
-    damping = (vessel.Y_v + vessel.Y_vv * np.abs(v) + vessel.Y_vvv * v * v) * v
+    damping = (vessel.Y_v + vessel.Y_vv * np.abs(v)) * v
     printed = vessel.m11 * np.abs(log["u"] * log["r"]) + np.abs(now.signals["b_v"])
     return np.abs(vessel.m22 * now.rates["v"] - damping), printed
 
 
 def sway_bound(vessel: Vessel, push: float, printed_push: float) -> SwayBound:
     """The sway speed at which damping equals the push; infinite without positive damping."""
-    d22, damping = -vessel.Y_v, [-vessel.Y_vvv, -vessel.Y_vv, -vessel.Y_v]
+    d22, d_vv = -vessel.Y_v, -vessel.Y_vv
     value = math.inf
-    if min(damping) >= 0.0 < max(damping):  # one root is positive, the others lie to the left
-        value = float(np.roots([*damping, -push]).real.max())
+    if d22 > 0.0 and d_vv >= 0.0:
+        value = 2.0 * push / (d22 + math.sqrt(d22 * d22 + 4.0 * d_vv * push))
+    elif d22 == 0.0 and d_vv > 0.0:
+        value = math.sqrt(push / d_vv)
     printed = printed_push / d22 if d22 > 0.0 else math.inf
     return SwayBound(push, value, printed_push, printed)

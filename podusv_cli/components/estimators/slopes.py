@@ -22,8 +22,7 @@ def force_slopes(u: float, v: float, r: float, k: Any, s: Vector) -> None:
     s[1] = k.m22 * r
     s[2] = k.m22 * v + 2.0 * k.m23 * r
     s[3] = -k.m11 * r
-    s[4] = k.Y_v + 2.0 * k.Y_vv * abs(v) + 3.0 * k.Y_vvv * v * v + k.Y_rv * abs(r)
-    s[4] += k.Y_vr * sign(v) * r
+    s[4] = k.Y_v + 2.0 * k.Y_vv * abs(v) + k.Y_rv * abs(r) + k.Y_vr * sign(v) * r
     s[5] = k.Y_rv * sign(r) * v + k.Y_r + k.Y_vr * abs(v) + 2.0 * k.Y_rr * abs(r) - k.m11 * u
     s[6] = (k.m11 - k.m22) * v - k.m23 * r
     s[7] = k.N_v + 2.0 * k.N_vv * abs(v) + k.N_rv * abs(r) + k.N_vr * sign(v) * r

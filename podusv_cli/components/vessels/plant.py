@@ -21,7 +21,7 @@ def surge_force(u: float, v: float, r: float, k: Any) -> float:
 @kernel
 def sway_force(u: float, v: float, r: float, k: Any) -> float:
     """Coriolis and damping force along sway [N], row 2 of -C nu - D nu."""
-    from_sway = (k.Y_v + k.Y_vv * abs(v) + k.Y_vvv * v * v + k.Y_rv * abs(r)) * v
+    from_sway = (k.Y_v + k.Y_vv * abs(v) + k.Y_rv * abs(r)) * v
     from_yaw = (k.Y_r + k.Y_vr * abs(v) + k.Y_rr * abs(r)) * r
     return float(-k.m11 * u * r + from_sway + from_yaw)
 

@@ -45,7 +45,6 @@ class Vessel(Component):
     X_uuu: float = _damping("kg s/m2", "surge, times u^3")
     Y_v: float = _damping("kg/s", "sway, linear", le=0)
     Y_vv: float = _damping("kg/m", "sway, times |v|v")
-    Y_vvv: float = _damping("kg s/m2", "sway, times v^3")
     Y_rv: float = _damping("kg", "sway, times |r|v")
     Y_r: float = _damping("kg m/s", "sway from yaw, linear")
     Y_vr: float = _damping("kg", "sway from yaw, times |v|r")

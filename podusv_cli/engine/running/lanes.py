@@ -165,16 +165,16 @@ class Lanes:
         return [self._ending(lane, reached, last) for lane in range(len(self.runs))]
 
     def _ending(self, lane: int, reached: int, last: int) -> Ending:
-        vectors, ended = self.runs[lane], self.under_way[REACHED + lane]
-        vectors = Vectors(*self.vectors)
-        kept = [vector[lane::LANES] for vector in (vectors.s, vectors.row, vectors.seen)]
+        own, ended = self.runs[lane], self.under_way[REACHED + lane]
+        together = Vectors(*self.vectors)
+        kept = [vector[lane::LANES] for vector in (together.s, together.row, together.seen)]
         if ended != MARCHING:
             kept = np.split(
                 self.ends.reshape(LANES, -1)[lane], np.cumsum([len(part) for part in kept])[:-1]
             )
-        vectors.s[:], vectors.row[:], vectors.seen[:] = (
-            part[: len(own)]
-            for part, own in zip(kept, (vectors.s, vectors.row, vectors.seen), strict=True)
+        own.s[:], own.row[:], own.seen[:] = (
+            part[: len(vector)]
+            for part, vector in zip(kept, (own.s, own.row, own.seen), strict=True)
         )
         if ended != MARCHING:
             return Ending(int(ended), "diverged")
