@@ -81,7 +81,7 @@ def compare(
         echo("interrupted; the runs made so far are compared, without figures", err=True)
         raise typer.Exit(INTERRUPTED)
     if done.result.entries and not quiet:
-        echo(_advice(items, assign or ()), err=True)
+        echo(_advice(items, assign or (), plugin or ()), err=True)
     page = done.folder / "report.html"
     if page.exists() and not (as_json or quiet):
         echo(f"report: {page}")
@@ -105,9 +105,10 @@ def _report(done: Compared, verbose: bool) -> None:
     echo(f"compared {count} {'run' if count == 1 else 'runs'}: {done.folder}")
 
 
-def _advice(items: Sequence[str], assign: Sequence[str]) -> str:
+def _advice(items: Sequence[str], assign: Sequence[str], plugin: Sequence[str]) -> str:
     """How to find out whether the numbers have converged."""
     scenario = next((item for item in items if not Path(item).is_dir()), "SCENARIO")
     changes = [word for change in assign for word in ("--set", change)]
-    command = shlex.join(["podusv", "verify", scenario, *changes])
+    files = [word for file in plugin for word in ("--plugin", file)]
+    command = shlex.join(["podusv", "verify", scenario, *changes, *files])
     return f"the numbers may not have converged; check them: {command}"

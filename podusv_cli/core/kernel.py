@@ -14,7 +14,7 @@ from collections import namedtuple
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from types import FunctionType
+from types import FunctionType, MethodType
 from typing import Any, TypeVar
 
 import numpy as np
@@ -117,6 +117,8 @@ def taken(function: Any, offered: Collection[str]) -> tuple[str, ...]:
     """
     code = function.__code__
     names: tuple[str, ...] = code.co_varnames[: code.co_argcount]
+    if isinstance(function, MethodType):
+        raise LawError(f"kernel {function.__qualname__} is a method; write @staticmethod above it")
     for name in names:
         if name not in offered:
             place = f"{Path(code.co_filename).name}, line {code.co_firstlineno}"
@@ -130,9 +132,17 @@ def call(function: Any, **offered: Any) -> Any:
     return function(*(offered[name] for name in taken(function, offered)))
 
 
-def absent() -> None:
-    """Stands for a kernel that a component of its own has to write."""
-    raise NotImplementedError("the component has no kernel of this name")
+class NoKernel(LawError):
+    """A component lacks a kernel."""
+
+
+def absent(name: str) -> Callable[[], None]:
+    """What stands for a kernel of this name until a component has one of its own."""
+
+    def none() -> None:
+        raise NoKernel(f"no kernel `{name}`; write one below @staticmethod and @kernel")
+
+    return none
 
 
 def taking(function: Any, arguments: Sequence[str]) -> Any:

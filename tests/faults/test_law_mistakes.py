@@ -161,7 +161,6 @@ def _line(name: str) -> int:
 ASKED: dict[type[Controller], str] = {
     Starting: "KeyError: 'trim' (test_law_mistakes.py, line ",
     Sampling: "IndexError: index 3 is out of bounds for axis 0 with size 0 (test_law_mistakes.py, ",
-    Settling: "NotImplementedError: the component has no kernel of this name (kernel.py, line ",
 }
 
 
@@ -169,6 +168,18 @@ ASKED: dict[type[Controller], str] = {
 def test_all_its_functions_are_asked(law):
     place = f"law constant (test_law_mistakes.py, line {_line(law.__name__)})"
     assert refused(law).startswith(f"{place}, evaluated once before the run: {ASKED[law]}")
+
+
+def test_a_kernel_that_is_not_there_is_named():
+    place = f"law constant (test_law_mistakes.py, line {_line('Settling')})"
+    assert refused(Settling).startswith(f"{place}: no kernel `after_saturation`; write one below")
+
+
+def test_a_kernel_that_is_a_method_is_told_what_it_lacks():
+    class Bound(Constant):
+        law = kernel(lambda self, tau: None)  # type: ignore[assignment]
+
+    assert "is a method; write @staticmethod above it" in refused(Bound)
 
 
 def helper(t: float) -> float:

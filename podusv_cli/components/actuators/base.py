@@ -71,7 +71,7 @@ class Actuator(Component):
         """What `drive` writes into `signals`."""
         return ()
 
-    drive: ClassVar[Callable[..., None]] = staticmethod(absent)
+    drive: ClassVar[Callable[..., None]] = staticmethod(absent("drive"))
 
     lose: ClassVar[Callable[..., None]] = staticmethod(lose_evenly)
 

@@ -78,9 +78,9 @@ class Controller(Component):
         """The law's kind."""
         return str(type(self).model_fields["kind"].default)
 
-    law: ClassVar[Callable[..., None]] = staticmethod(absent)
-    sample: ClassVar[Callable[..., None]] = staticmethod(absent)
-    after_saturation: ClassVar[Callable[..., None]] = staticmethod(absent)
+    law: ClassVar[Callable[..., None]] = staticmethod(absent("law"))
+    sample: ClassVar[Callable[..., None]] = staticmethod(absent("sample"))
+    after_saturation: ClassVar[Callable[..., None]] = staticmethod(absent("after_saturation"))
 
     def wants_loads(self) -> bool:
         """Whether the law has to know the loads that act."""

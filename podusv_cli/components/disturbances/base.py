@@ -60,7 +60,7 @@ class Disturbance(Component):
         """What `evaluate` writes behind the load."""
         return ()
 
-    evaluate: ClassVar[Callable[..., None]] = staticmethod(absent)
+    evaluate: ClassVar[Callable[..., None]] = staticmethod(absent("evaluate"))
 
     def told(self) -> Iterator[tuple[Disturbance, tuple[Signal, ...]]]:
         """Each of its parts, with the signals that are logged because of it."""

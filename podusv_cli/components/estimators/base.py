@@ -46,8 +46,8 @@ class Estimator(Component):
         """For each number of the state the key and value of the noise that is assumed, or ""."""
         return (("", 0.0),) * len(ESTIMATE)
 
-    correct: ClassVar[Callable[..., None]] = staticmethod(absent)
-    follow: ClassVar[Callable[..., None]] = staticmethod(absent)
+    correct: ClassVar[Callable[..., None]] = staticmethod(absent("correct"))
+    follow: ClassVar[Callable[..., None]] = staticmethod(absent("follow"))
 
     def needs(self) -> tuple[bool, ...]:
         """Which of x, y, psi, u, v, r have to be measured."""

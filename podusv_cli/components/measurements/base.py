@@ -34,7 +34,7 @@ class Measurement(Component):
         """The measured values that are logged, in the order of the state."""
         return ()
 
-    sense: ClassVar[Callable[..., None]] = staticmethod(absent)
+    sense: ClassVar[Callable[..., None]] = staticmethod(absent("sense"))
 
     def measured(self) -> tuple[bool, ...]:
         """Which of x, y, psi, u, v, r are measured."""

@@ -34,7 +34,7 @@ class Path(Component):
 
     noun: ClassVar[str] = "path"
 
-    evaluate: ClassVar[Callable[..., None]] = staticmethod(absent)
+    evaluate: ClassVar[Callable[..., None]] = staticmethod(absent("evaluate"))
 
     def targets(self, times: Iterable[float]) -> Vector:
         """The target at each of these times [s], a row of `TARGET` each."""

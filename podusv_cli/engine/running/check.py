@@ -15,7 +15,7 @@ import numpy as np
 from podusv_cli.components.vessels.vessel import COEFFICIENTS
 from podusv_cli.core.component import describe
 from podusv_cli.core.errors import LawError, in_a_line
-from podusv_cli.core.kernel import Vector, bundle, call
+from podusv_cli.core.kernel import NoKernel, Vector, bundle, call
 from podusv_cli.core.signal import NAME, Signal
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
 from podusv_cli.engine.machine.kernel_faults import check_arguments, check_kernel
@@ -52,6 +52,8 @@ def asked(part: str, ask: Callable[[], object], left: tuple[type[Exception], ...
     """Ask, and raise LawError for any exception but those that are `left` for the run to tell."""
     work = Work(lambda: int(ask() is None))
     work.finish()
+    if isinstance(work.error, NoKernel):
+        raise LawError(f"{part}: {work.error}") from work.error
     if isinstance(work.error, LawError):
         raise work.error
     if work.result is None and not isinstance(work.error, left):
