@@ -1,5 +1,6 @@
 """Machine code on disk: found again, and never older than the source it was made from."""
 
+import errno
 import json
 import math
 import os
@@ -378,3 +379,14 @@ finally:
     modules("first")  # fills the cache where it is empty
     heavy = {"numba", "pandas", "matplotlib", "scipy", "rich", "numpy.ma"}
     assert not modules("second") & heavy
+
+
+def test_a_disk_that_takes_no_code_costs_time_and_nothing_else(tmp_path, monkeypatch):
+    def full(path, code):
+        raise OSError(errno.ENOSPC, "no space left on device")
+
+    monkeypatch.setenv("PODUSV_CACHE", str(tmp_path))
+    monkeypatch.setattr(object_cache, "_write", full)
+    monkeypatch.setattr(object_cache, "_loaded", lambda prototype, code: code)
+    made = object_cache.Code("law", b"code")
+    assert object_cache.stored(None, "law_that_is_not_kept", lambda: made) == made

@@ -1,8 +1,8 @@
 """The convention for code that runs inside the compiled loop.
 
 A kernel is a plain Python function on floats and vectors. It can be called as it is (tests and
-the uncompiled engine do), and `engine.compile` compiles it with every kernel that it calls. In
-compiled code a vector is a bare pointer: index it, pass `tail(v, n)` for the part from n on, and
+the uncompiled engine do), and `engine.machine.compile` compiles it with every kernel that it calls.
+In compiled code a vector is a bare pointer: index it, pass `tail(v, n)` for the part from n on, and
 never ask for its length.
 """
 

@@ -134,9 +134,9 @@ def simulate_many(
     `workers` runs are simulated at a time (0: one a core). No logs are kept.
 
     By default runs march eight side by side where the code for that is compiled already, or where
-    the batch has 20 million steps or more in all (`engine.lanes.WORTH`). `side_by_side=True`
-    compiles the code, which takes 10 to 20 s once and is kept on disk; `False` has runs march one
-    by one. No bit of the result depends on it.
+    the batch has 20 million steps or more in all. `side_by_side=True` compiles the code, which
+    takes 10 to 20 s once and is kept on disk; `False` has runs march one by one. No bit of the
+    result depends on it.
 
     Raises ScenarioError, LawError, and ValueError for unknown keys, unequal lengths, values out of
     range and a negative number of workers.

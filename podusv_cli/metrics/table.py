@@ -69,7 +69,7 @@ def _watch(parts: Parts) -> Callable[..., None]:
 
 @dataclass(frozen=True, kw_only=True)
 class Metrics(Observer):
-    """An observer for `engine.simulate` that gathers the numbers of all metrics."""
+    """An observer for `engine.running.simulate` that gathers the numbers of all metrics."""
 
     parts: Parts
     step: float  # s

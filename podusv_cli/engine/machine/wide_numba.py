@@ -45,8 +45,6 @@ def object_code(function: Any, prototype: Any) -> Code:
         return Code("", f"its machine code cannot be widened: {error}".encode())
     except TypeError as error:  # says what and where
         return Code("", str(error).encode())
-    except Exception as error:
-        return Code("", in_a_line(error).encode())
 
 
 def _module(function: Any, prototype: Any) -> Any:

@@ -64,7 +64,7 @@ class Batch:
 
     finished      it reached the last instant
     diverged      a number is not finite
-    hung          a step took more than `march.PATIENCE` of processor time
+    hung          a step took more than `watch.PATIENCE` of processor time
     crashed       the law, or another part, raised an exception
     invalid       its loop cannot be made, or has another structure than the others
     interrupted   an interrupt stopped it, or kept it from beginning

@@ -13,7 +13,7 @@ from podusv_cli.core.recording import Recording
 from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop, Observer, entries, vectors_of
 from podusv_cli.engine.loop.columns import by_name, names
 from podusv_cli.engine.machine import signatures
-from podusv_cli.engine.step import rk4 as closed_loop
+from podusv_cli.engine.step import rk4
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.engine.step.layout import Layout, Vectors
 from podusv_cli.engine.step.relay import COUNT
@@ -45,7 +45,7 @@ def replayer(
     p = np.array(list(constants.values()))
     buffers = (rows.ravel(), p, loop.controller.table(), np.zeros(2), np.zeros(room))
     vectors = [signatures.pointer(buffer) for buffer in buffers]
-    replay: Callable[..., None] = compile.routine(closed_loop.evaluate_all, signatures.EVALUATE_ALL)
+    replay: Callable[..., None] = compile.routine(rk4.evaluate_all, signatures.EVALUATE_ALL)
     law = compile.entry("law", loop.controller.law, tuple(constants))
 
     def timed() -> float:
@@ -97,16 +97,16 @@ def rates_replay(
 
 
 def _rates_runner(loop: ClosedLoop, compiled: bool) -> Callable[..., None]:
-    """`closed_loop.rates_along` of this loop less its functions."""
+    """`rk4.rates_along` of this loop less its functions."""
     parts = list(entries(loop, Observer()))
     chosen = [part for part in parts if part[0] in signatures.RIGHT_HAND_SIDE]
     if not compiled:
         adapters = [signatures.bind(*part) for part in chosen]
-        return lambda *rest: closed_loop.rates_along(*adapters, *rest)
+        return lambda *rest: rk4.rates_along(*adapters, *rest)
     from podusv_cli.engine.machine import compile  # a loop in plain Python needs no compiler
 
     adapters = [compile.entry(*part) for part in chosen]
-    run = compile.routine(closed_loop.rates_along, signatures.RATES_ALONG)
+    run = compile.routine(rk4.rates_along, signatures.RATES_ALONG)
 
     def compiled_run(
         count: int, logged: Vector, out: Vector, vectors: Vectors, layout: Layout

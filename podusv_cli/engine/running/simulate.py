@@ -23,7 +23,7 @@ from podusv_cli.engine.loop.columns import by_name, names
 from podusv_cli.engine.machine import signatures
 from podusv_cli.engine.running.check import asked, check_law
 from podusv_cli.engine.running.watch import Ending, Word, watch
-from podusv_cli.engine.step import rk4 as closed_loop
+from podusv_cli.engine.step import rk4
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.engine.step.layout import Layout, Vectors
 from podusv_cli.process.interrupts import interrupts_deferred
@@ -75,14 +75,14 @@ def ready(loop: ClosedLoop, grid: TimeGrid, observer: Observer, compiled: bool) 
 
 
 def marcher(loop: ClosedLoop, observer: Observer, compiled: bool) -> Callable[..., int]:
-    """The march of this loop, `closed_loop.advance` less its functions, compiled if need be."""
+    """The march of this loop, `rk4.advance` less its functions, compiled if need be."""
     if not compiled:
         adapters = [signatures.bind(*part) for part in entries(loop, observer)]
-        return lambda *rest: closed_loop.advance_plainly(*adapters, *rest)
+        return lambda *rest: rk4.advance_plainly(*adapters, *rest)
     from podusv_cli.engine.machine import compile  # a loop in plain Python needs no compiler
 
     adapters = [compile.entry(*part) for part in entries(loop, observer)]
-    watch = compile.routine(closed_loop.advance, signatures.ADVANCE)
+    watch = compile.routine(rk4.advance, signatures.ADVANCE)
 
     def compiled_march(first: int, last: int, h: float, vectors: Vectors, layout: Layout) -> int:
         vectors, sizes = signatures.pointers(vectors), signatures.whole_numbers(layout)
@@ -120,7 +120,7 @@ def why(ending: Ending, loop: ClosedLoop, grid: TimeGrid, vectors: Vectors) -> s
 def _culprit(vectors: Vectors, labels: list[str], at: float) -> str:
     now = np.concatenate([[at], vectors.s, vectors.row])
     named = zip(labels, now, strict=True)
-    bad = next((name for name, x in named if not abs(x) <= closed_loop.LARGEST), "?")
+    bad = next((name for name, x in named if not abs(x) <= rk4.LARGEST), "?")
     return f"{bad} is not finite"
 
 

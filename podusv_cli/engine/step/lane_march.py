@@ -18,7 +18,15 @@ from podusv_cli.core.kernel import (
 )
 from podusv_cli.engine.step.layout import STOP, Function
 from podusv_cli.engine.step.relay import begin_step
-from podusv_cli.engine.step.rk4 import finite, load, measure, named_plan, named_wires, rates, step
+from podusv_cli.engine.step.rk4 import (
+    finite,
+    load,
+    measure,
+    named_layout,
+    named_vectors,
+    rates,
+    step,
+)
 from podusv_cli.engine.step.sampled import perceive, sample_and_hold
 
 REACHED = STOP + 1  # in `under_way`: how many instants each lane reached, below 0 while it marches
@@ -72,18 +80,18 @@ def advance_lanes(
     first: int, last: int, h: float, vectors: Any, layout: Any, size: int, under_way: Vector,
     ends: Vector,
 ) -> int:  # fmt: skip
-    """`closed_loop.advance` for all lanes, without a log.
+    """`rk4.advance` for all lanes, without a log.
 
     A lane whose numbers are not finite goes on without an effect on the others. Returns the first
     instant that was not begun, or at which no lane was left, or `last`.
     """
-    c, n = named_wires(vectors), named_plan(layout)
+    c, n = named_vectors(vectors), named_layout(layout)
     for k in range(first, last):
         if under_way[STOP] != 0.0:
             return k
         under_way[0] = k
         t = k * h
-        again = k > first and t == (k - 1) * h + h  # see `closed_loop.instant`
+        again = k > first and t == (k - 1) * h + h  # see `rk4.instant`
         if n.relayed > 0:
             begin_step(k, t, c.relay)
         load(t, c.s, disturbance, c, n, again, False)

@@ -61,7 +61,7 @@ class Vectors(NamedTuple):
     row: Vector
     stages: Vector  # four rates and one intermediate state
     sensed: Vector  # what was measured, see `measurements.base`
-    relay: Vector  # demands on their way to the actuator, see `engine.relay`
+    relay: Vector  # demands on their way to the actuator, see `engine.step.relay`
     held: Vector  # t, x, target of the last sample; demand and signals that nobody reads
     work: Vector
     seen: Vector  # the observer's

@@ -36,7 +36,7 @@ LARGEST = 1e300
 # Vector to named coefficients of the vessel; the plant is the one part that never varies.
 coefficients = unpacker(COEFFICIENTS)
 # Machine code gets both as bare numbers, one by the other.
-named_wires, named_plan = unpacker(Vectors._fields), unpacker(Layout._fields)
+named_vectors, named_layout = unpacker(Vectors._fields), unpacker(Layout._fields)
 
 
 @kernel
@@ -211,7 +211,7 @@ def advance(
 
     Returns the first instant that is not finite, or that was not begun, or `last`.
     """
-    c, n = named_wires(vectors), named_plan(layout)
+    c, n = named_vectors(vectors), named_layout(layout)
     for k in range(first, last):
         if c.under_way[STOP] != 0.0:
             return k
@@ -272,7 +272,7 @@ def rates_along(
     follow: Function, count: int, logged: Vector, out: Vector, vectors: Any, layout: Any,
 ) -> None:  # fmt: skip
     """For each of `count` logged rows of t, s: the rates of s, then the row, into `out`."""
-    c, n = named_wires(vectors), named_plan(layout)
+    c, n = named_vectors(vectors), named_layout(layout)
     for i in range(count):
         here = tail(logged, i * (1 + n.states))
         there = tail(out, i * (n.states + n.columns))

@@ -235,7 +235,7 @@ def decoded(content: bytes, seal: str) -> UnitResult | None:
         status = np.frombuffer(content, np.uint8, unit.count, end + table.nbytes)
         metrics = dict(zip(names, table[:-1], strict=True))
         return UnitResult(unit, metrics, status, table[-1], tuple(facts["causes"]))
-    except (ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError, RecursionError):
         return None
 
 
