@@ -41,20 +41,25 @@ def is_kernel(thing: object) -> bool:
 
 def named_kernels(function: Any) -> dict[str, Any]:
     """The kernels among the globals that a function names, by name."""
-    named = {i.argval for i in dis.get_instructions(function) if i.opname == "LOAD_GLOBAL"}
-    found = {name: function.__globals__.get(name) for name in named}
+    found = {name: function.__globals__.get(name) for name in _read_in(function.__code__)[0]}
     return {name: thing for name, thing in found.items() if is_kernel(thing)}
 
 
 def whole_numbers(function: Any) -> frozenset[str]:
     """Constants that a kernel, or one that it calls, makes whole numbers of: `int(k.count)`."""
-    code = [i for i in dis.get_instructions(function) if i.opname != "PUSH_NULL"]
-    found = {
+    whole = _read_in(function.__code__)[1]
+    return whole.union(*map(whole_numbers, named_kernels(function).values()))
+
+
+@cache
+def _read_in(code: Any) -> tuple[frozenset[str], frozenset[str]]:
+    """Names of globals that code reads, and of attributes that it makes whole numbers of."""
+    steps = [i for i in dis.get_instructions(code) if i.opname != "PUSH_NULL"]
+    return frozenset(i.argval for i in steps if i.opname == "LOAD_GLOBAL"), frozenset(
         attribute.argval
-        for called, _, attribute in zip(code, code[1:], code[2:], strict=False)
+        for called, _, attribute in zip(steps, steps[1:], steps[2:], strict=False)
         if called.argval == "int" and attribute.opname == "LOAD_ATTR"
-    }
-    return frozenset(found).union(*map(whole_numbers, named_kernels(function).values()))
+    )
 
 
 @kernel
