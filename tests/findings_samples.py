@@ -1,6 +1,6 @@
 """Scenarios from overrides of the corrected one, their findings, and their runs."""
 
-from functools import cache
+from functools import lru_cache
 
 import numpy as np
 from conftest import PACKAGE
@@ -38,7 +38,7 @@ def finding(code: str, *overrides: str) -> Finding:
     return next(f for f in preflight(scene(*overrides)) if f.code == code)
 
 
-@cache
+@lru_cache(maxsize=3)  # a recording takes up to 40 MB, which every process started after it copies
 def simulated(*overrides: str) -> tuple[Recording, dict[str, float]]:
     """The run of that scenario, and its metrics."""
     scenario = scene(*overrides).alone()

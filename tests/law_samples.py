@@ -1,6 +1,6 @@
 """What tests of laws share: constant loads, a hull that is told wrong, the paper's task."""
 
-from functools import cache
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ STEADY = HarmonicDisturbance(b_u=MEAN, b_v=MEAN, b_r=MEAN)
 WRONG = NONLINEAR.model_copy(update={"m": 20.0, "X_u": -1.5, "Y_vv": -20.0, "N_r": -1.0})
 
 
-@cache
+@lru_cache(maxsize=3)  # a recording takes up to 40 MB, which every process started after it copies
 def task(law: Any, **options: Any) -> Recording:
     """The paper's task, corrected, within its limits."""
     return run(corrected(controller=law, actuator=Saturated()), 310.0, **options)

@@ -60,6 +60,7 @@ def test_every_law_leaves_the_same_files(tmp_path, law):
     same_files(tmp_path, text)
 
 
+@pytest.mark.slow
 def test_pods_leave_the_same_files(tmp_path):
     same_files(tmp_path, SCENARIO.format(actuator=POD, law="pid", period=0, compiled="false"))
 

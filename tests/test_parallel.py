@@ -92,6 +92,7 @@ def test_interrupted_jobs_bring_home_what_they_have():
     assert (outcome.result, outcome.interrupted) == ("half of it", True)
 
 
+@pytest.mark.slow
 def test_an_interrupted_caller_leaves_no_process(tmp_path):
     started = []
 

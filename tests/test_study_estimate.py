@@ -39,6 +39,7 @@ def bytes_in(folder):
     return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
 
 
+@pytest.mark.slow
 def test_the_disk_is_what_was_said_within_30_percent(tmp_path):
     config = written(
         tmp_path / "long.yaml", ("duration: 1.0", "duration: 60.0"),
@@ -62,6 +63,7 @@ def test_the_table_of_a_large_study_is_what_was_said(tmp_path):
     assert said == pytest.approx((store.folder / RUNS).stat().st_size, rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_pilot_takes_some_runs_of_every_law_as_its_pace(monkeypatch):
     """The clock goes on by 0.05 s a run; then the runs of a law that take 0.2 s are enough."""
     spent = [0.0]

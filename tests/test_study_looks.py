@@ -107,6 +107,7 @@ def test_what_needs_the_code_asks_for_trust(study, planted, tmp_path, monkeypatc
     assert (planted / MARK).exists()
 
 
+@pytest.mark.slow
 def test_logs_are_made_where_the_plug_ins_are_trusted(study, podusv):
     shutil.rmtree(study / "logs")
     said = podusv("sweep", "report", study, "--no-figures")
@@ -151,6 +152,7 @@ def installed_lab(tmp_path, monkeypatch):
         del sys.modules[name]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("installed_lab")
 def test_a_study_of_an_installed_package_asks_for_no_trust(tmp_path, podusv):
     text = (LAB / "scenario.yaml").read_text().replace("duration: 20.0", "duration: 0.5")

@@ -36,6 +36,7 @@ def config(tmp_path):
     return tmp_path / "own/mine.yaml"
 
 
+@pytest.mark.slow
 def test_a_study_keeps_its_plugin(config, tmp_path, monkeypatch):
     study = swept(config, tmp_path / "study", overrides=["sweep.draws=8"]).folder
     first = (study / RUNS).read_bytes()

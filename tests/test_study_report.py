@@ -104,6 +104,7 @@ def test_what_was_varied_is_told_in_words(told):
     assert ["disturbance.scale", "0.5, 1"] in rows
 
 
+@pytest.mark.slow
 def test_figures_are_files_and_pictures(drawn):
     names = {path.stem for path in (drawn.folder / "figures").iterdir()}
     assert names == {

@@ -66,6 +66,7 @@ def test_a_driver_does_not_keep_others_from_looking(study, podusv):
         assert podusv("sweep", "status", study).code == 0
 
 
+@pytest.mark.slow
 def test_a_driver_waits_for_the_tables(study, podusv, monkeypatch):
     """A report is being written; were it never to end, the runs would be kept all the same."""
     monkeypatch.setattr("podusv_cli.workflows.sweep.PATIENCE", 0.1)

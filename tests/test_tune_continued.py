@@ -119,6 +119,7 @@ def whole(tmp_path_factory):
     return tuned(tmp_path_factory.mktemp("whole"), ONCE, workers=2)
 
 
+@pytest.mark.slow
 def test_a_search_in_parts_equals_one_in_one_go(whole, tmp_path):
     """Interrupted in the search, then in the validation; with other workers."""
 

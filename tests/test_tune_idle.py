@@ -32,6 +32,7 @@ def test_a_number_that_no_kernel_reads_is_idle_and_the_others_are_gains(tmp_path
     assert find_idle(plan, 1) == {"toy": ("unread",)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("changes", "found"),
     [

@@ -113,6 +113,7 @@ def test_the_error_that_is_estimated_is_the_error_that_there_is(smooth):
     assert smooth.distances()["iae"] < 1e-6
 
 
+@pytest.mark.slow
 def test_dop853_starts_anew_where_the_path_jumps():
     jumping, smooth = (
         scene(

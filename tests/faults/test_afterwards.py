@@ -77,6 +77,7 @@ def test_the_log_is_kept_and_what_is_missing_is_told(podusv, monkeypatch, what, 
     assert podusv("compare", "x", "--no-figures", "--out", "y").code == (3 if code else 0)
 
 
+@pytest.mark.slow
 def test_one_figure_that_fails_costs_no_other(podusv, monkeypatch):
     monkeypatch.setitem(FIGURES, "errors", replace(FIGURES["errors"], family=broken))
     said = podusv("run", write("a.yaml", ADAPTIVE), "--out", "x", "-q")

@@ -144,6 +144,7 @@ def test_a_law_that_returns_after_it_was_abandoned_goes_no_step_further(monkeypa
     assert max(times) <= 0.06
 
 
+@pytest.mark.slow
 def test_computing_counts_and_not_the_clock(monkeypatch):
     """A process that was stopped for an hour, or a busy machine, is no law that hangs."""
     import time

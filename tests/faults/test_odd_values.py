@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Iterator
 from typing import Any
 
+import pytest
 import yaml
 from counts import count
 
@@ -87,6 +88,7 @@ def verdict(text: str) -> str:
     return "ok"
 
 
+@pytest.mark.slow
 def test_an_odd_value_is_taken_or_told_in_a_sentence():
     base = yaml.safe_load(TEXT)
     assert verdict(TEXT) == "ok"

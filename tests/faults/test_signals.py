@@ -140,6 +140,7 @@ def test_a_lost_terminal_ends_a_run_and_keeps_it():
     assert 0 < open_run(Path("x")).recording["time"][-1] < 1e5
 
 
+@pytest.mark.slow
 def test_a_lost_terminal_ends_a_comparison_and_keeps_it():
     scenarios = write("short.yaml", BASE), write("long.yaml", LONG)
     words = ("compare", *scenarios, "--out", "x", "--no-figures")
@@ -192,6 +193,7 @@ patch(execute, "_write", deaf)
     assert not Path("x").exists()
 
 
+@pytest.mark.slow
 @INTERRUPTS
 def test_in_a_law_that_never_returns(number, code):
     """Machine code hears nothing: the run is kept up to there, the law is left behind."""

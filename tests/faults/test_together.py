@@ -77,6 +77,7 @@ def test_of_those_that_want_one_name_one_gets_it(podusv, words):
     assert not left_over()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", ["x", "new"])
 def test_of_those_that_replace_the_last_one_stays(podusv, place):
     gains = ("30.0", "40.0", "50.0")

@@ -52,6 +52,7 @@ def test_a_worker_killed_twice_is_reported_and_the_others_finish(tmp_path, monke
     assert sorted(p.name for p in Path("x").iterdir() if p.is_dir()) == ["a", "b"]
 
 
+@pytest.mark.slow
 def test_workers_do_not_outlive_a_comparison_that_is_killed(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names = [write("a.yaml", LONG), write("b.yaml", LONG)]
