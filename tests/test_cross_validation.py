@@ -5,10 +5,11 @@ PVS: github.com/cybergalactic/PythonVehicleSimulator, commit c717e07 of 2025-05-
 
 Accelerations and the turn are those of the Otter: `otter(x, n, 0, 0, V_c, beta_c)` of MSS, and
 `otter.dynamics` of PVS, whose step of Euler's method over 1 s from nu gives nu + nu'. PVS has its
-payload of 25 kg, other added mass and other yaw inertia, so it is a second hull. Three things that
-a plant in three degrees of freedom has not were switched off in both: the cross-flow drag
+payload of 25 kg, other added mass and other yaw inertia, so it is a second hull. Three things were
+switched off in both, so that the rest can be compared to the last digit: the cross-flow drag
 (`crossFlowDrag` gives zeros), the height of the centre of gravity (its z is 0, so that roll and
 pitch stay at rest), and in PVS the payload's trim moment (`mp` is 0 after the masses are made).
+The preset `otter`, whose drag is a fit, is compared with the whole of `otter.m` further down.
 
 All numbers are rounded to 12 digits.
 """
@@ -17,7 +18,7 @@ import math
 
 import numpy as np
 import pytest
-from conftest import Constant, adrift, run
+from conftest import VESSELS, Constant, adrift, run
 
 from podusv_cli.components.disturbances import spectra
 from podusv_cli.components.disturbances.current import Current
@@ -141,6 +142,29 @@ def test_a_minutes_turn_in_a_current_is_that_of_mss_by_the_same_method():
     found = turned(HULLS["MSS"], 0.1)
     for time, expected in TURN.items():
         np.testing.assert_allclose(found[round(time / 0.1)], expected, rtol=0, atol=1e-10)
+
+
+# Left and right propeller [rad/s]: yaw rate [rad/s], radius [m], and x, y, psi of the whole of
+# `otter.m`, nothing switched off, after 60 s from rest in calm water.
+WHOLE = {
+    (100, 95): (0.26592, 9.884, (8.5218, 19.7514, 15.3873)),
+    (100, 80): (0.27260, 8.30, (-0.4552, 16.8069, 16.0513)),
+    (100, 60): (0.28516, 6.57, (-5.4073, 9.6820, 16.9202)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("turns", WHOLE)
+def test_the_otter_with_its_drag_turns_as_the_whole_program_does(turns):
+    """Without the four terms of cross-flow drag it is 13 to 18 m and 3 to 6.5 rad off."""
+    left, right = (0.01108 * n**2 for n in turns)
+    law = Constant(surge=left + right, yaw=0.395 * (left - right))
+    log = run(adrift(vessel=VESSELS["otter"], controller=law, start=(0.0,) * 6), 60.0, 0.02)
+    rate, radius, (x, y, psi) = WHOLE[turns]
+    end = {name: log[name][-1] for name in ("x", "y", "psi", "u", "v", "r")}
+    assert end["r"] == pytest.approx(rate, rel=0.007)
+    assert math.hypot(end["u"], end["v"]) / end["r"] == pytest.approx(radius, rel=0.007)
+    assert math.hypot(end["x"] - x, end["y"] - y) < 0.75
+    assert end["psi"] == pytest.approx(psi, abs=0.08)
 
 
 def test_a_minutes_turn_of_pvs_goes_to_podusvs_as_its_steps_get_smaller():
