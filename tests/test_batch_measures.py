@@ -46,6 +46,7 @@ simulation: {step: 0.01, duration: 6.0}
 ).scenario
 TRIALS = {
     "zigzag": {"execute": 0.5, "switch": 0.05, "thrust": 3.0, "lever": 1.0},
+    "stopping": {"execute": 0.5, "thrust": 4.0, "astern": 4.0},
     "turning_circle": {"execute": 0.5, "thrust": 4.0, "lever": 2.0},
 }
 SENSORS = {"measurement": example(kinds("measurements")["sensors"])}

@@ -91,5 +91,5 @@ def test_python_alternatives_are_slower_at_the_same_accuracy():
 def test_every_law_with_a_feedback_is_timed():
     """A schedule and the manoeuvres of trials need no more than a few operations."""
     known = kinds("podusv_cli.components.controllers", Controller)
-    untimed = {"schedule", "turning_circle", "zigzag"}
+    untimed = {"schedule", "stopping", "turning_circle", "zigzag"}
     assert {loop.controller.kind for loop in rivals().values()} == set(known) - untimed

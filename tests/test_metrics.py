@@ -14,6 +14,7 @@ from podusv_cli.components.actuators.saturated import Saturated
 from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
 from podusv_cli.components.controllers.backstepping import Backstepping
 from podusv_cli.components.controllers.pid import Pid
+from podusv_cli.components.controllers.stopping import Stopping
 from podusv_cli.components.controllers.turning_circle import TurningCircle
 from podusv_cli.components.controllers.zigzag import Zigzag
 from podusv_cli.components.estimators.none import NoEstimator
@@ -242,7 +243,7 @@ def test_every_metric_is_computed_and_documented(limited):
     log, got = limited
     (cost,) = law_costs([(corrected(), log)])
     _, of_pods = gathered(corrected(actuator=example(Pods)), steps=10)
-    trials = (corrected(controller=TurningCircle()), corrected(controller=Zigzag()))
+    trials = [corrected(controller=kind()) for kind in (TurningCircle, Zigzag, Stopping)]
     of_trials = {name for trial in trials for name in gathered(trial, steps=10)[1]}
     seeing = corrected(measurement=Sensors(), estimator=NoEstimator())
     of_estimates = set(gathered(seeing, steps=10)[1])

@@ -15,13 +15,24 @@ from podusv_cli.scenario.shipped import file_of
 from podusv_cli.workflows.execute import Stopwatch, simulated, summary
 
 LEVER, EXECUTE = 0.499, 20.0
+OF_TRIALS = (
+    "advance", "transfer", "tactical_diameter", "turning_diameter", "overshoot_1", "overshoot_2",
+    "initial_turning", "track_reach", "head_reach", "stopping_time",
+)  # fmt: skip
 IDEAL = ["actuator={kind: ideal}", f"controller.execute={EXECUTE}", "simulation.duration=80"]
 OTTER = ["vessel.preset=otter", "controller.thrust=60"]
+# A hull that is unstable on a straight course, in place of the shipped trials' Otter.
+MODEL = f"""vessel: {{preset: cybership2}}
+start: {{u: 0.5}}
+actuator: {{kind: pod, preset: cybership2_pod, neglect_sway_force: false}}
+controller: {{thrust: 1.5, lever: {LEVER}, execute: 60.0}}
+simulation: {{duration: 140.0}}
+"""
 
 
-def done(name, *sets):
+def done(name, *sets, hull=MODEL):
     """Scenario, recording and metrics of a shipped trial."""
-    text = f"extends: podusv:trials/{name}.yaml\nname: trial\n"
+    text = f"extends: podusv:trials/{name}.yaml\nname: trial\n{hull}"
     scenario = load_text(text, "trial.yaml", sets).scenario.alone()
     recording = simulated(scenario, Stopwatch())
     return scenario, recording, summary(scenario, recording, Extras())
@@ -98,6 +109,13 @@ def test_overshoots_of_a_zigzag_are_those_of_an_independent_integration():
             overshoots.append(-side * (peak[2] - begun[2]) - degrees)
         state = integrated(scenario, side * degrees, state, crossing(begun, degrees, side))
     assert [found["overshoot_1"], found["overshoot_2"]] == pytest.approx(overshoots, abs=1e-6)
+    first = solve_ivp(
+        slope(scenario, degrees), (0.0, 60.0), begun, events=crossing(begun, degrees),
+        rtol=1e-10, atol=1e-12, max_step=1e-3,
+    )  # fmt: skip
+    way = np.trapezoid(np.hypot(first.y[3], first.y[4]), first.t)
+    off = 5e-5  # the heading bends within a step: U (r'/r) h^2 / 8
+    assert found["initial_turning"] == pytest.approx(way, abs=off)
     sides = np.sign(log["delta_s"][log["time"] >= EXECUTE])
     assert set(sides.tolist()) == {1.0, -1.0}
 
@@ -145,6 +163,37 @@ def test_a_trial_that_does_not_lead_to_its_numbers_is_told():
     assert "its diameter needs 180" in next(trial_unfinished.search(scenario, log))
     scenario, log, _ = done("turning_circle", *IDEAL)
     assert list(trial_unfinished.search(scenario, log)) == []
+
+
+@pytest.mark.parametrize("astern", [40.0, 78.0])
+def test_a_stopping_hull_with_linear_damping_goes_as_far_as_algebra_says(astern):
+    """m u' = -F - d u from u_0: (m/d)(u_0 - (F/d) ln(1 + d u_0/F)) in (m/d) ln(1 + d u_0/F)."""
+    sets = ["actuator={kind: ideal}", f"controller.astern={astern}", "simulation.duration=30"]
+    scenario, log, found = done("stopping", *sets, hull="")
+    mass, damping = scenario.vessel.m11, -scenario.vessel.X_u
+    u_0 = scenario.controller.thrust / damping  # the approach is steady
+    logarithm = math.log(1.0 + damping * u_0 / astern)
+    way = mass / damping * (u_0 - astern / damping * logarithm)
+    assert found["stopping_time"] == pytest.approx(mass / damping * logarithm, abs=2e-5)
+    acceleration = (astern + damping * u_0) / mass, astern / mass  # at its beginning and end
+    by_trapezoids = way + 0.01**2 / 12 * (acceleration[0] - acceleration[1])
+    assert found["track_reach"] == pytest.approx(by_trapezoids, abs=1e-7)
+    assert found["head_reach"] == pytest.approx(way, abs=1e-6)
+    assert abs(log["u"][-1]) < 0.02, "no thrust once it lies still"
+    assert list(trial_unfinished.search(scenario, log)) == []
+
+
+def test_a_hull_that_still_goes_ahead_is_told():
+    scenario, log, found = done("stopping", "simulation.duration=20.3", hull="")
+    assert math.isnan(found["track_reach"])
+    assert "the hull still goes ahead at" in next(trial_unfinished.search(scenario, log))
+
+
+@pytest.mark.parametrize("name", ["turning_circle", "zigzag_10", "zigzag_20", "stopping"])
+def test_a_shipped_trial_leads_to_all_of_its_numbers(name):
+    scenario, log, found = done(name, hull="")
+    assert list(trial_unfinished.search(scenario, log)) == []
+    assert all(math.isfinite(found[key]) for key in found if key in OF_TRIALS)
 
 
 def test_only_trials_have_the_metrics_of_trials():

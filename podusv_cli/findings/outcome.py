@@ -108,21 +108,48 @@ def _arrives(errors: Vector, fraction: float, radius: float) -> bool:
     return (earlier - later) / (0.5 * fraction) > later - radius
 
 
+def _reversals(part: dict[str, Vector], turned: float) -> str | None:
+    """What a zig-zag has not come to."""
+    count = int((np.diff(np.sign(part["delta_s"])) != 0.0).sum())
+    if count >= REVERSALS:
+        return None
+    return (
+        f"the zig-zag reverses {count} times, and its second overshoot needs {REVERSALS}; the "
+        f"heading has changed by {np.degrees(turned):.0f} deg in all"
+    )
+
+
+def _turn(part: dict[str, Vector], turned: float) -> str | None:
+    """What a turning circle has not come to."""
+    degrees = f"the circle turns by {np.degrees(turned):.0f} deg, and its diameter needs 180"
+    return degrees if turned < np.pi else None
+
+
+def _way(part: dict[str, Vector], turned: float) -> str | None:
+    """What a stopping trial has not come to."""
+    slowest = float(part["u"].min())
+    left = f"the hull still goes ahead at {slowest:.2g} m/s, and its track reach needs 0"
+    return left if slowest > 0.0 else None
+
+
+UNFINISHED = {"zig-zag": _reversals, "turning circle": _turn, "stopping": _way}
+
+
 @after(
     "trial-unfinished", about="controller", meaning="the trial has not led to all of its numbers",
-    condition="a zig-zag reverses fewer than three times, or a circle turns by less than 180 deg",
+    condition="a zig-zag reverses fewer than three times, a circle turns by less than 180 deg, or "
+    "a hull with thrust astern still goes ahead at the end",
     remedy="simulate longer; a hull that keeps turning the first way is unstable for this trial",
 )  # fmt: skip
 def trial_unfinished(scenario: Scenario, log: Recording) -> Sentences:
     """A manoeuvring trial ends before its last number is there, or never reverses."""
     trial = scenario.controller.trial()
-    steering = rows_where(log, lambda part: part["time"] >= trial.execute) if trial else np.zeros(0)
-    if trial is None or not steering.any():
+    under_way = (
+        rows_where(log, lambda part: part["time"] >= trial.execute) if trial else np.zeros(0)
+    )
+    if trial is None or not under_way.any():
         return
-    turned = float(np.ptp(log["psi"][steering]))
-    reversals = int((np.diff(np.sign(log["delta_s"][steering])) != 0.0).sum())
-    if trial.switch and reversals < REVERSALS:
-        what = f"reverses {reversals} times, and its second overshoot needs {REVERSALS}"
-        yield f"the zig-zag {what}; the heading has changed by {np.degrees(turned):.0f} deg in all"
-    if not trial.switch and turned < np.pi:
-        yield f"the circle turns by {np.degrees(turned):.0f} deg, and its diameter needs 180"
+    part = {name: log[name][under_way] for name in ("psi", "u", "delta_s") if name in log}
+    what = UNFINISHED[trial.manoeuvre](part, float(np.ptp(part["psi"])))
+    if what:
+        yield what

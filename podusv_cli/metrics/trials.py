@@ -10,11 +10,12 @@ from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.metrics.metric import Accumulator, Measured, Metric, Result
 from podusv_cli.metrics.windows import NEAR
 
-# Positions of what is gathered: where the trial begins, then what it has led to, then the instant
-# before: changed heading, way along and across.
-BEGUN, X_0, Y_0, PSI_0 = range(4)
-ADVANCE, TRANSFER, TACTICAL, STEADY, CHANGED, ALONG, ACROSS, TURNED = range(4, 12)
-PHASE, LARGEST, FIRST, SECOND, LATEST, RATE, ZIGZAGGED = range(4, 11)
+# Positions of what is gathered: where the trial begins, and the way since then with the time and
+# speed of the instant before; then what the trial has led to, and more of the instant before.
+BEGUN, X_0, Y_0, PSI_0, WAY, LATEST, SPEED = range(7)
+ADVANCE, TRANSFER, TACTICAL, STEADY, CHANGED, ALONG, ACROSS, TURNED = range(7, 15)
+PHASE, LARGEST, INITIAL, FIRST, SECOND, RATE, REACHED, ZIGZAGGED = range(7, 15)
+TRACK, HEAD, STOPPED, SURGE, AHEAD, STILL = range(7, 13)
 
 
 @kernel
@@ -22,9 +23,20 @@ def begin(t: float, s: Vector, k: Any, seen: Vector) -> bool:
     """Whether the trial is under way; notes the state at its start."""
     if t <= k.trial_execute - NEAR:
         return False
+    speed = math.sqrt(s[3] * s[3] + s[4] * s[4])
     if seen[BEGUN] == 0.0:
         seen[BEGUN], seen[X_0], seen[Y_0], seen[PSI_0] = 1.0, s[0], s[1], s[2]
+    else:
+        seen[WAY] += 0.5 * (seen[SPEED] + speed) * (t - seen[LATEST])
+    seen[SPEED] = speed
     return True
+
+
+@kernel
+def last_part(share: float, t: float, before: float, seen: Vector) -> float:
+    """Of the way of the last step what lies beyond a share of it; `before` is the speed before."""
+    at = linear(share, before, seen[SPEED])
+    return float(0.5 * (at + seen[SPEED]) * (1.0 - share) * (t - seen[LATEST]))
 
 
 @kernel
@@ -42,13 +54,14 @@ def watch_turn(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Ve
             share = passed(math.pi, seen[CHANGED], changed)
             seen[TACTICAL] = linear(share, seen[ACROSS], across)
         seen[CHANGED], seen[ALONG], seen[ACROSS] = changed, along, across
-        speed = math.sqrt(s[3] * s[3] + s[4] * s[4])
-        seen[STEADY] = 2.0 * speed / max(abs(s[5]), 1e-12)
+        seen[STEADY] = 2.0 * seen[SPEED] / max(abs(s[5]), 1e-12)
+        seen[LATEST] = t
 
 
 @kernel
 def watch_zigzag(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
     """Gather how far the heading goes on after the second and third execute."""
+    before = seen[SPEED]
     if begin(t, s, k, seen):
         side = 1.0 if seen[PHASE] % 2.0 == 0.0 else -1.0
         changed = s[2] - seen[PSI_0]
@@ -61,7 +74,10 @@ def watch_zigzag(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: 
                 beyond, -side * (changed - 0.5 * (1.0 - share) * s[5] * (t - seen[LATEST]))
             )
         seen[LARGEST] = max(seen[LARGEST], beyond)
-        seen[LATEST], seen[RATE] = t, s[5]
+        if seen[INITIAL] == 0.0 and changed >= k.trial_switch:
+            share = passed(k.trial_switch, seen[REACHED], changed)
+            seen[INITIAL] = seen[WAY] - last_part(share, t, before, seen)
+        seen[LATEST], seen[RATE], seen[REACHED] = t, s[5], changed
         if side * changed >= k.trial_switch:
             if seen[PHASE] == 1.0:
                 seen[FIRST] = seen[LARGEST] - k.trial_switch
@@ -71,16 +87,32 @@ def watch_zigzag(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: 
             seen[LARGEST] = 0.0
 
 
-def _sizes(turn: int, zigzag: int) -> Any:
-    """How many numbers are gathered of each kind of trial."""
+@kernel
+def watch_stop(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
+    """Gather the way until the surge speed passes zero."""
+    before = seen[SPEED]
+    if begin(t, s, k, seen):
+        x, y = s[0] - seen[X_0], s[1] - seen[Y_0]
+        ahead = x * math.cos(seen[PSI_0]) + y * math.sin(seen[PSI_0])
+        if s[3] <= 0.0 and seen[SURGE] > 0.0:
+            share, step = passed(0.0, seen[SURGE], s[3]), t - seen[LATEST]
+            # The speed is zero there, and the way along a parabola between the two instants.
+            seen[TRACK] = seen[WAY] - 0.5 * step * (seen[SPEED] + (1.0 - share) * before)
+            bend = 0.5 * share * (1.0 - share) * step * (seen[SURGE] - s[3])
+            seen[HEAD] = linear(share, seen[AHEAD], ahead) + bend
+            seen[STOPPED] = seen[LATEST] + share * step - k.trial_execute
+        seen[SURGE] = s[3] if seen[TRACK] == 0.0 else 0.0
+        seen[AHEAD], seen[LATEST] = ahead, t
 
-    def size(layout: Measured) -> int:
+
+def _sizes(manoeuvre: str, size: int) -> Any:
+    """How many numbers are gathered: none in other trials."""
+
+    def size_of(layout: Measured) -> int:
         trial = layout.loop.controller.trial()
-        if trial is None:
-            return 0
-        return zigzag if trial.switch else turn
+        return size if trial is not None and trial.manoeuvre == manoeuvre else 0
 
-    return size
+    return size_of
 
 
 def _constants(layout: Measured) -> dict[str, float]:
@@ -93,8 +125,9 @@ def _reached(position: int) -> Result:
     return lambda seen, step: float(seen[position]) or math.nan
 
 
-OF_TURN = Accumulator(watch_turn, _sizes(TURNED, 0), _constants)
-OF_ZIGZAG = Accumulator(watch_zigzag, _sizes(0, ZIGZAGGED), _constants)
+OF_TURN = Accumulator(watch_turn, _sizes("turning circle", TURNED), _constants)
+OF_ZIGZAG = Accumulator(watch_zigzag, _sizes("zig-zag", ZIGZAGGED), _constants)
+OF_STOP = Accumulator(watch_stop, _sizes("stopping", STILL), _constants)
 advance = Metric(
     "advance", "m", "way along the approach until the heading has changed by 90 deg", OF_TURN,
     _reached(ADVANCE), 8,
@@ -117,3 +150,19 @@ overshoot_1 = Metric(
 overshoot_2 = Metric(
     "overshoot_2", "rad", "second overshoot angle of a zig-zag", OF_ZIGZAG, _reached(SECOND), 8
 )
+initial_turning = Metric(
+    "initial_turning", "m", "way until the heading of a zig-zag has first changed by `switch`",
+    OF_ZIGZAG, _reached(INITIAL), 8,
+)  # fmt: skip
+track_reach = Metric(
+    "track_reach", "m", "way from full astern until the surge speed is zero", OF_STOP,
+    _reached(TRACK), 8,
+)  # fmt: skip
+head_reach = Metric(
+    "head_reach", "m", "way along the approach from full astern until the surge speed is zero",
+    OF_STOP, _reached(HEAD), 8,
+)  # fmt: skip
+stopping_time = Metric(
+    "stopping_time", "s", "time from full astern until the surge speed is zero", OF_STOP,
+    _reached(STOPPED), 8,
+)  # fmt: skip

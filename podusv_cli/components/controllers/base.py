@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
@@ -29,11 +29,12 @@ class Approach(NamedTuple):
 
 
 class Trial(NamedTuple):
-    """A manoeuvring trial: when it begins [s], and the change of heading that reverses it [rad].
+    """A manoeuvring trial: which, when it begins [s], and what change of heading reverses it [rad].
 
     `switch` is 0 where nothing is reversed.
     """
 
+    manoeuvre: Literal["turning circle", "zig-zag", "stopping"]
     execute: float
     switch: float = 0.0
 

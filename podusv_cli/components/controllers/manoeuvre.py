@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import Any, ClassVar
 
-from podusv_cli.components.controllers.base import Controller, Trial
+from podusv_cli.components.controllers.base import Controller
 from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.signal import Signal
@@ -43,22 +43,21 @@ def begun(t: float, k: Any) -> bool:
 
 
 class Manoeuvre(Controller):
-    """Straight ahead until `execute`, then steered; the path and its target are left aside."""
+    """Straight ahead until `execute`, then another way; the path and its target are left aside."""
 
-    signals: ClassVar[tuple[Signal, ...]] = (STEERING,)
-    thrust: float = value(2.0, "N", "thrust, the same all the time", gt=0)
-    lever: float = value(0.5, "m", "distance of the thrust behind the body origin", gt=0)
+    thrust: float = value(2.0, "N", "thrust of the approach", gt=0)
     execute: float = value(
-        60.0,
-        "s",
-        "time at which steering begins, a whole number of steps; steady speed by then",
+        60.0, "s", "time at which the trial begins, a whole number of steps; steady speed by then",
         ge=0,
-    )
+    )  # fmt: skip
 
     def takes_samples(self) -> bool:
-        """The side of the steering is a part of the memory, which changes at instants only."""
+        """How far the trial is, is a part of the memory, which changes at instants only."""
         return True
 
-    def trial(self) -> Trial:
-        """When steering begins; positive angles steer to starboard."""
-        return Trial(self.execute)
+
+class Steering(Manoeuvre):
+    """The thrust of the approach, steered; positive angles steer to starboard."""
+
+    signals: ClassVar[tuple[Signal, ...]] = (STEERING,)
+    lever: float = value(0.5, "m", "distance of the thrust behind the body origin", gt=0)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from typing import Any, Literal
 
-from podusv_cli.components.controllers.base import Slots, each
-from podusv_cli.components.controllers.manoeuvre import SIDE, Manoeuvre, begun, steered
+from podusv_cli.components.controllers.base import Slots, Trial, each
+from podusv_cli.components.controllers.manoeuvre import SIDE, Steering, begun, steered
 from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, kernel
 
 
-class TurningCircle(Manoeuvre):
+class TurningCircle(Steering):
     """Steers at `angle` to starboard from `execute` on (IMO MSC.137(76), 35 deg)."""
 
     kind: Literal["turning_circle"] = "turning_circle"
@@ -22,6 +22,10 @@ class TurningCircle(Manoeuvre):
     def slots(self) -> Slots:
         """Whether it steers."""
         return each((SIDE,))
+
+    def trial(self) -> Trial:
+        """Nothing is reversed."""
+        return Trial("turning circle", self.execute)
 
     @staticmethod
     @kernel

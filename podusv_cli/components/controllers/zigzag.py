@@ -6,7 +6,7 @@ import math
 from typing import Any, ClassVar, Literal
 
 from podusv_cli.components.controllers.base import Slots, Trial, each
-from podusv_cli.components.controllers.manoeuvre import SIDE, Manoeuvre, begun, steered
+from podusv_cli.components.controllers.manoeuvre import SIDE, Steering, begun, steered
 from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.signal import Signal
@@ -31,7 +31,7 @@ def within(left: float, side: float, r: float, t: float, memory: Vector) -> floa
     return float(left / (step * (side * r + 0.5 * gained * share)))
 
 
-class Zigzag(Manoeuvre):
+class Zigzag(Steering):
     """The angle/switch zig-zag, first to starboard (IMO MSC.137(76): 10/10 and 20/20 deg)."""
 
     kind: Literal["zigzag"] = "zigzag"
@@ -53,7 +53,7 @@ class Zigzag(Manoeuvre):
 
     def trial(self) -> Trial:
         """With the change of heading at which steering is reversed."""
-        return Trial(self.execute, self.switch)
+        return Trial("zig-zag", self.execute, self.switch)
 
     def sample_period(self) -> float:
         """As often as the heading is looked at."""
