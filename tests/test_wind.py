@@ -105,6 +105,13 @@ def test_the_profile_is_logarithmic():
     assert Wind(speed=10.0).mean == 10.0
 
 
+def test_norsok_gusts_have_norsok_s_profile():
+    """C = 0.0573 sqrt(1 + 0.15 U10), whatever the drag: 0.8632 of 8 m/s at 2 m."""
+    low = Wind(speed=8.0, at=2.0, gusts="norsok", drag=0.01)
+    assert low.mean / 8.0 == pytest.approx(0.8632144598, rel=1e-9)
+    assert Wind(speed=8.0, at=2.0).mean / 8.0 == pytest.approx(0.7948361170, rel=1e-9)
+
+
 @pytest.mark.parametrize("gusts", ["norsok", "harris"])
 def test_gusts_have_the_variance_of_their_spectrum_and_no_mean(gusts):
     sea = Wind(speed=12.0, gusts=gusts, at=8.0, components=60)

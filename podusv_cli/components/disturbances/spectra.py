@@ -67,14 +67,15 @@ def jonswap(rate: Vector, height: float, peak: float, gamma: float) -> Vector:
 
 
 @cache
-def peak_period(gamma: float, period: Period) -> float:
+def peak_period(gamma: float, period: Period, lowest: float = 0.3, highest: float = 300.0) -> float:
     """The peak's period as a multiple of another period of the same sea, by moments m_n.
 
+    The moments are those of the band between `lowest` and `highest`, in terms of the peak's rate.
     Mean: 2 pi m0/m1. Zero-crossing: 2 pi sqrt(m0/m2).
     """
     if period == "peak":
         return 1.0
-    edges = exponential(np.linspace(math.log(0.3), math.log(300.0), 4001))
+    edges = growing_edges(max(lowest, 1.0 / FAR), highest, 4000)
     rate, width = (edges[1:] + edges[:-1]) / 2.0, np.diff(edges)
     energy = jonswap(rate, 4.0, 1.0, gamma) * width
     m0, m1, m2 = (math.fsum(moment) for moment in (energy, energy * rate, energy * rate * rate))
@@ -110,13 +111,35 @@ def in_bins(density: Density, edges: Vector) -> Vector:
     return np.asarray(sum(samples) * width / SAMPLES)
 
 
-def cosines(variance: Vector, edges: Vector, seed: int, stream: str) -> Cosines:
+def as_given(count: int, seed: int, stream: str) -> Vector:
+    """Factors on the variance of `count` components: 1."""
+    return np.ones(count)
+
+
+def rayleigh(count: int, seed: int, stream: str) -> Vector:
+    """Factors on the variance of `count` components whose amplitudes are Rayleigh's.
+
+    They are exponential variates of mean 1. With them a sum of cosines is a sample of a Gaussian
+    process, and its variance scatters from seed to seed as that of a sea does; with the same
+    amplitudes for every seed it hardly does (Tucker, Challenor and Carter 1984).
+    """
+    return np.asarray(-logarithm(1.0 - uniforms((seed, stream, "amplitude"), 0, count)))
+
+
+AMPLITUDES = {"deterministic": as_given, "random": rayleigh}
+
+
+def cosines(
+    variance: Vector, edges: Vector, seed: int, stream: str, amplitudes: str = "deterministic"
+) -> Cosines:
     """One component a bin: its rate uniform in the bin, its phase uniform in a turn.
 
-    Its amplitude is sqrt(2 variance), so that the sum has the variance of all bins together. Rates
-    that are drawn have no common period, so the sum does not repeat itself.
+    Its amplitude is sqrt(2 variance), so that the sum has the variance of all bins together, or
+    drawn with that mean square. Rates that are drawn have no common period, so the sum does not
+    repeat itself.
     """
     count = len(variance)
+    variance = variance * AMPLITUDES[amplitudes](count, seed, stream)
     inside = uniforms((seed, stream, "rate"), 0, count)
     rate = edges[:-1] + np.diff(edges) * inside
     phase = 2.0 * math.pi * uniforms((seed, stream, "phase"), 0, count)

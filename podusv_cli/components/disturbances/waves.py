@@ -65,7 +65,10 @@ class Waves(Disturbance):
     height: float = value(..., "m", "significant wave height Hs", ge=1e-6, le=1e3)
     period: float = value(..., "s", "period of the waves, see `period_is`", ge=1e-3, le=1e4)
     period_is: spectra.Period = value(
-        "peak", "", "which period: of the spectrum's peak, mean (T1), or zero-crossing (Tz)"
+        "peak",
+        "",
+        "which period: of the spectrum's peak, or mean (T1) or zero-crossing (Tz) of the "
+        "waves between `lowest` and `highest`",
     )
     direction: float = value(
         0.0, "rad", "where the waves come from: 0 north, pi/2 east", ge=-1e6, le=1e6
@@ -78,6 +81,10 @@ class Waves(Disturbance):
         0, "", "n of the directions' density cos^2n; 0: all waves in one direction", ge=0, le=50
     )
     components: int = value(100, "", "how many cosines", ge=1, le=10_000)
+    amplitudes: Literal["deterministic", "random"] = value(
+        "deterministic", "", "of the components: those of the spectrum for every seed, or drawn "
+        "so that the height scatters between seeds as a sea's does",
+    )  # fmt: skip
     lowest: float = value(
         0.5, "", "least frequency of a component, in terms of the peak's", gt=0, le=1e3
     )
@@ -104,7 +111,7 @@ class Waves(Disturbance):
                 f"lowest {self.lowest:g} must be below highest {self.highest:g}, both in terms of "
                 "the peak's frequency"
             )
-        kept = math.fsum(self._variance()) / (self.height / 4.0) ** 2
+        kept = math.fsum(self._variance(4.0, 1.0))
         if not kept >= LEAST:
             raise ValueError(
                 f"between lowest {self.lowest:g} and highest {self.highest:g} the spectrum has "
@@ -121,7 +128,8 @@ class Waves(Disturbance):
     @property
     def peak(self) -> float:
         """The peak's angular frequency [rad/s]."""
-        return 2.0 * math.pi / (self.period * spectra.peak_period(self._gamma, self.period_is))
+        to_peak = spectra.peak_period(self._gamma, self.period_is, self.lowest, self.highest)
+        return 2.0 * math.pi / (self.period * to_peak)
 
     def sea(self) -> tuple[float, float]:
         """Height and peak."""
@@ -131,21 +139,21 @@ class Waves(Disturbance):
     def _gamma(self) -> float:
         return self.gamma if self.spectrum == "jonswap" else 1.0
 
-    def _edges(self) -> Vector:
-        return spectra.even_edges(
-            self.lowest * self.peak, self.highest * self.peak, self.components
-        )
+    def _edges(self, peak: float) -> Vector:
+        return spectra.even_edges(self.lowest * peak, self.highest * peak, self.components)
 
-    def _variance(self) -> Vector:
+    def _variance(self, height: float, peak: float) -> Vector:
         def density(rate: Vector) -> Vector:
-            return spectra.jonswap(rate, self.height, self.peak, self._gamma)
+            return spectra.jonswap(rate, height, peak, self._gamma)
 
-        return spectra.in_bins(density, self._edges())
+        return spectra.in_bins(density, self._edges(peak))
 
     def table(self) -> Vector:
         """Rows of rates and phases in turns, wave numbers, amplitudes, directions of travel."""
-        count = self.components
-        drawn = spectra.cosines(self._variance(), self._edges(), self.seed, STREAM)
+        count, peak = self.components, self.peak
+        variance = self._variance(self.height, peak)
+        edges = self._edges(peak)
+        drawn = spectra.cosines(variance, edges, self.seed, STREAM, self.amplitudes)
         away = spectra.directions(self.spreading, count, self.seed, STREAM)
         c, s = np.transpose([cos_sin(self._travel + angle) for angle in away.tolist()])
         number = drawn.rate * drawn.rate / spectra.GRAVITY

@@ -67,10 +67,24 @@ def blendermann(u_r: float, v_r: float, k: Any, b: Vector) -> None:
         b[2] = (k.s_L - LEVER * (angle - 0.5 * math.pi) * k.length) * b[1]
 
 
+def _logarithmic(wind: Wind) -> float:
+    """C of the profile over a surface with this drag."""
+    return 2.5 * math.sqrt(wind.drag)
+
+
+def _norsok(wind: Wind) -> float:
+    """C of NORSOK N-003."""
+    return 0.0573 * math.sqrt(1.0 + 0.15 * wind.speed)
+
+
+SHEAR = {"none": _logarithmic, "harris": _logarithmic, "norsok": _norsok}  # C, by the gusts
+
+
 class Wind(Disturbance):
     """Wind from one direction, with gusts: a load on what the vessel has above the water.
 
-    The mean at `at` follows the logarithmic profile U = U10 (1 + 2.5 sqrt(drag) ln(at/10)). Gusts
+    The mean at `at` follows the logarithmic profile U = U10 (1 + C ln(at/10)): C = 2.5 sqrt(drag),
+    or with gusts of NORSOK N-003 its own C = 0.0573 sqrt(1 + 0.15 U10) of the hour's mean. Gusts
     are a sum of cosines with the spectrum chosen, the same all over the vessel and along the mean
     wind only. The load is the steady one of the relative wind at every instant.
     """
@@ -84,8 +98,8 @@ class Wind(Disturbance):
         10.0, "m", "height at which the wind is taken that acts on the vessel", gt=0, le=1e3
     )
     drag: float = value(
-        0.0026, "", "drag coefficient of the sea's surface, of the profile and the Harris spectrum",
-        gt=0, le=0.1,
+        0.0026, "", "drag coefficient of the sea's surface, of the profile and the Harris spectrum "
+        "(`norsok` has a profile of its own)", gt=0, le=0.1,
     )  # fmt: skip
     gusts: Literal["none", "norsok", "harris"] = value(
         "none", "", "spectrum of the gusts: none, NORSOK (Froya), or Harris"
@@ -106,7 +120,7 @@ class Wind(Disturbance):
                 "0.5 are usual"
             )
         if self.mean <= 0.0:
-            calm = 10.0 * math.exp(-0.4 / math.sqrt(self.drag))
+            calm = 10.0 * math.exp(-1.0 / SHEAR[self.gusts](self))
             raise ValueError(
                 f"at {self.at:g} m the profile has no wind left, which ends {calm:.3g} m above the "
                 "sea; give a larger `at`"
@@ -116,7 +130,7 @@ class Wind(Disturbance):
     @property
     def mean(self) -> float:
         """The mean speed at the height where it acts [m/s]."""
-        return self.speed * (1.0 + 2.5 * math.sqrt(self.drag) * math.log(self.at / 10.0))
+        return self.speed * (1.0 + SHEAR[self.gusts](self) * math.log(self.at / 10.0))
 
     @property
     def signals(self) -> tuple[Signal, ...]:
