@@ -243,7 +243,7 @@ WORDS = {
     "$schema", "title", "definitions", "description", "default", "type", "properties", "items",
     "additionalItems", "additionalProperties", "minItems", "maxItems", "minimum",
     "exclusiveMinimum", "maximum", "exclusiveMaximum", "pattern", "enum", "const", "anyOf",
-    "allOf", "$ref",
+    "allOf", "$ref", "required",
 }  # fmt: skip
 
 
@@ -292,6 +292,19 @@ def places(schema: dict[str, Any], path: tuple[str, ...]) -> list[dict[str, Any]
 def test_the_schema_uses_the_words_of_draft_07_only():
     assert SCHEMA["$schema"] == "http://json-schema.org/draft-07/schema#"
     assert {word for schema in schemas(SCHEMA) for word in schema} <= WORDS
+
+
+def test_a_list_of_disturbances_is_not_empty_and_has_whole_parts():
+    """A section may lack what the file below gives; an entry of a list has no file below."""
+    (several,) = (s for s in SCHEMA["properties"]["disturbance"]["anyOf"] if "items" in s)
+    assert several["minItems"] == 1
+    needed = {
+        target(one)["properties"]["kind"]["const"]: set(one["required"])
+        for one in several["items"]["anyOf"]
+    }
+    assert needed["waves"] == {"kind", "height", "period"}
+    assert needed["none"] == {"kind"}
+    assert "required" not in SCHEMA["definitions"]["Waves"]
 
 
 def test_every_reference_leads_somewhere_and_stands_alone():

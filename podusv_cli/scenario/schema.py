@@ -25,8 +25,8 @@ def json_schema(codes: Sequence[str], plugins: Plugins = ()) -> dict[str, Any]:
 
     Kinds and presets of these plug-ins are among podusv's own.
 
-    No key is required, since any may come from the file that this one extends, and defaults are
-    given where they do not depend on anything else.
+    No key is required but in a list of disturbances, since any may come from the file that this one
+    extends, and defaults are given where they do not depend on anything else.
     """
     top = keys_of(scenario_class(plugins))
     made = top.scenario.model_json_schema()
@@ -39,6 +39,9 @@ def json_schema(codes: Sequence[str], plugins: Plugins = ()) -> dict[str, Any]:
         properties["preset"]["enum"] = ["", *preset_names(presets, plugins)]
     scenario = _converted(made)
     scenario["properties"]["silence"]["items"]["enum"] = list(codes)
+    for part in scenario["properties"]["disturbance"]["anyOf"]:
+        if part.get("type") == "array":
+            part |= {"minItems": 1, "items": _whole(part["items"], made["$defs"])}
     names = {"type": "array", "items": {"type": "string"}}
     either = [{"type": "string"}, names]
     extends = {"anyOf": either, "description": EXTENDS.meaning}
@@ -52,6 +55,15 @@ def json_schema(codes: Sequence[str], plugins: Plugins = ()) -> dict[str, Any]:
 def schema_text(codes: Sequence[str], plugins: Plugins = ()) -> str:
     """The schema as a file, ending with a newline; arguments as for `json_schema`."""
     return json.dumps(json_schema(codes, plugins), indent=2) + "\n"
+
+
+def _whole(items: dict[str, Any], definitions: Mapping[str, Any]) -> dict[str, Any]:
+    """Items of a list with the keys that they need, which no other file can give."""
+    choices = []
+    for one in items["anyOf"]:
+        needed = definitions[one["$ref"].rpartition("/")[2]].get("required", [])
+        choices.append({"allOf": [one], "required": ["kind", *needed]})
+    return {"anyOf": choices}
 
 
 def _name(model: type[Component], definitions: Mapping[str, Any]) -> str:
