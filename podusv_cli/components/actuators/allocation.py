@@ -52,39 +52,39 @@ class Reach(NamedTuple):
 
 
 @kernel
-def reach(n: float, delta: float, gain: float, pod: Vector, k: Any) -> Reach:
+def reach(n: float, delta: float, flow: float, pod: Vector, k: Any) -> Reach:
     """The pod's reach within its limits and, with a horizon, within that time from n and delta."""
     low, high, n_low, n_high = -pod[ANGLE], pod[ANGLE], -pod[N_ASTERN], pod[N_AHEAD]
     if k.horizon > 0.0:
         turn, change = pod[DELTA_RATE] * k.horizon, pod[N_RATE] * k.horizon
         low, high = within(delta - turn, low, high), within(delta + turn, low, high)
         n_low, n_high = within(n - change, n_low, 0.0), within(n + change, 0.0, n_high)
-    ahead, astern = thrust(n_high, gain, pod, k), -thrust(n_low, gain, pod, k)
+    ahead, astern = thrust(n_high, flow, pod, k), -thrust(n_low, flow, pod, k)
     return Reach(low, high, max(0.0, astern), max(0.0, ahead))
 
 
 @kernel
 def allocate(
-    state: Vector, demand: Vector, gains: Vector, k: Any, table: Vector, T: Vector, delta: Vector
+    state: Vector, demand: Vector, flows: Vector, k: Any, table: Vector, T: Vector, delta: Vector
 ) -> bool:
     """Thrusts [N] and angles [rad] for the demand; whether they make it.
 
-    `gains` are the pods' `propeller.speed_gain`.
+    `flows` are the pods' `propeller.inflow`.
     """
     if k.closed_form > 0.0:
-        at, answer = reach(state[0], state[1], gains[0], table, k), scratch(2)
+        at, answer = reach(state[0], state[1], flows[0], table, k), scratch(2)
         Y_wanted = demand[1] / table[X]
         one_pod(
             demand[0], Y_wanted, at.low, at.high, at.most_astern, at.most_ahead, k.priority, answer
         )
         T[0], delta[0] = answer[0], answer[1]
         return made(demand, at.most_ahead, at.most_ahead * abs(table[X]), k, table, T, delta)
-    return by_least_squares(state, demand, gains, k, table, T, delta)
+    return by_least_squares(state, demand, flows, k, table, T, delta)
 
 
 @kernel
 def by_least_squares(
-    state: Vector, demand: Vector, gains: Vector, k: Any, table: Vector, T: Vector, delta: Vector
+    state: Vector, demand: Vector, flows: Vector, k: Any, table: Vector, T: Vector, delta: Vector
 ) -> bool:
     """`allocate` for several pods, see `several_pods`.
 
@@ -97,7 +97,7 @@ def by_least_squares(
     all_u, all_r = 0.0, 0.0
     for i in range(count):
         pod = tail(table, i * WIDTH)
-        at = reach(state[i], state[count + i], gains[i], pod, k)
+        at = reach(state[i], state[count + i], flows[i], pod, k)
         most[i] = max(at.most_ahead, at.most_astern, 1e-12)
         low[i], high[i] = at.low, at.high
         shape(at, pod, most[i], tail(sectors, i * SECTOR))
@@ -153,8 +153,8 @@ def made(
 
 
 @kernel
-def speeds(count: int, T: Vector, gains: Vector, k: Any, table: Vector, n: Vector) -> None:
+def speeds(count: int, T: Vector, flows: Vector, k: Any, table: Vector, n: Vector) -> None:
     """Propeller speeds for these thrusts."""
     for i in range(count):
         pod = tail(table, i * WIDTH)
-        n[i] = within(speed_for(T[i], gains[i], pod, k), -pod[N_ASTERN], pod[N_AHEAD])
+        n[i] = within(speed_for(T[i], flows[i], pod, k), -pod[N_ASTERN], pod[N_AHEAD])

@@ -20,6 +20,9 @@ class Pod(Component):
     T_nn: float = value(..., "N s2", "thrust over |n|n ahead, at rest", gt=0)
     T_nn_astern: float = value(..., "N s2", "thrust over |n|n astern, at rest", gt=0)
     T_nV: float = value(0.0, "N s2/m", "change of thrust over |n| times speed", ge=0)
+    T_nV_astern: float | None = value(
+        None, "N s2/m", "the same with the propeller astern; without it as ahead", ge=0
+    )
     n_max: float = value(..., "1/s", "largest propeller speed ahead", gt=0)
     n_max_astern: float = value(..., "1/s", "largest propeller speed astern", ge=0)
     n_rate: float = value(..., "1/s2", "fastest change of the propeller's speed", gt=0)
@@ -36,10 +39,11 @@ class Pod(Component):
 
     def numbers(self) -> list[float]:
         """The pod's row in the actuator's table, see `propeller`."""
+        astern = self.T_nV if self.T_nV_astern is None else self.T_nV_astern
         return [
-            self.x, self.y, self.T_nn, self.T_nn_astern, self.T_nV, self.n_max, self.n_max_astern,
-            self.angle_limit, self.n_rate, self.angle_rate, self.n_lag, self.angle_lag,
-            self.power_nnn or 0.0,
+            self.x, self.y, self.T_nn, self.T_nn_astern, self.T_nV, astern, self.n_max,
+            self.n_max_astern, self.angle_limit, self.n_rate, self.angle_rate, self.n_lag,
+            self.angle_lag, self.power_nnn or 0.0,
         ]  # fmt: skip
 
 

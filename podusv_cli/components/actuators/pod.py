@@ -31,7 +31,7 @@ from podusv_cli.components.actuators.propeller import (
     WIDTH,
     X,
     Y,
-    speed_gain,
+    inflow,
     thrust,
 )
 from podusv_cli.core.component import Presets, value
@@ -46,13 +46,13 @@ SMALL = 1e-3  # of what the pods can do, for finite differences
 
 
 @kernel
-def act(state: Vector, gains: Vector, k: Any, table: Vector, tau: Vector, thrusts: Vector) -> None:
+def act(state: Vector, flows: Vector, k: Any, table: Vector, tau: Vector, thrusts: Vector) -> None:
     """Loads (9) of all pods as they stand, and the thrust of each."""
     count = int(k.count)
     tau[0] = tau[1] = tau[2] = 0.0
     for i in range(count):
         pod, delta = tail(table, i * WIDTH), state[count + i]
-        T = thrust(state[i], gains[i], pod, k)
+        T = thrust(state[i], flows[i], pod, k)
         along, across = T * math.cos(delta), T * math.sin(delta)
         thrusts[i] = T
         tau[0] += along
@@ -261,12 +261,12 @@ class Pods(Actuator):
         """Loads from the pods' states; rates towards what the demand asks for."""
         count = int(k.count)
         command, thrusts = tail(signals, FLAGS), tail(signals, FLAGS + 2 * count)
-        gains, T = scratch(MOST_PODS), scratch(MOST_PODS)
+        flows, T = scratch(MOST_PODS), scratch(MOST_PODS)
         for i in range(count):
-            gains[i] = speed_gain(x, tail(table, i * WIDTH), state[count + i], k)
-        act(state, gains, k, table, tau, thrusts)
-        met = allocate(state, demand, gains, k, table, T, tail(command, count))
-        speeds(count, T, gains, k, table, command)
+            flows[i] = inflow(x, tail(table, i * WIDTH), state[count + i], k)
+        act(state, flows, k, table, tau, thrusts)
+        met = allocate(state, demand, flows, k, table, T, tail(command, count))
+        speeds(count, T, flows, k, table, command)
         # What is no number must not get lost between limits.
         lost = 0.0 * (demand[0] + demand[1])
         for i in range(2 * count):

@@ -38,14 +38,14 @@ PHYSICAL = 0.0
 
 # A pod's numbers in the actuator's table, by position.
 (
-    X, Y, T_AHEAD, T_ASTERN, T_NV, N_AHEAD, N_ASTERN, ANGLE, N_RATE, DELTA_RATE, N_LAG, DELTA_LAG,
-    POWER, WIDTH,
-) = range(14)  # fmt: skip
+    X, Y, T_AHEAD, T_ASTERN, T_NV, T_NV_ASTERN, N_AHEAD, N_ASTERN, ANGLE, N_RATE, DELTA_RATE, N_LAG,
+    DELTA_LAG, POWER, WIDTH,
+) = range(15)  # fmt: skip
 
 
 @kernel
-def speed_gain(x: Vector, pod: Vector, delta: float, k: Any) -> float:
-    """What |n| is multiplied with in the thrust, N s: T_nV times a speed, with its sign.
+def inflow(x: Vector, pod: Vector, delta: float, k: Any) -> float:
+    """What T_nV is multiplied with in the thrust: a speed [m/s], with its sign.
 
     The physical form loses thrust with the advance speed V_a, the water's speed along the
     propeller's axis at the pod; the printed (8) gains with the vessel's speed V, both ways alike.
@@ -53,25 +53,27 @@ def speed_gain(x: Vector, pod: Vector, delta: float, k: Any) -> float:
     """
     if k.thrust_form == PHYSICAL:
         ahead, aside = x[3] - pod[Y] * x[5], x[4] + pod[X] * x[5]
-        return float(-pod[T_NV] * (ahead * math.cos(delta) + aside * math.sin(delta)))
-    return float(pod[T_NV] * math.sqrt(x[3] * x[3] + x[4] * x[4]))
+        return float(-(ahead * math.cos(delta) + aside * math.sin(delta)))
+    return math.sqrt(x[3] * x[3] + x[4] * x[4])
 
 
 @kernel
-def thrust(n: float, gain: float, pod: Vector, k: Any) -> float:
-    """Thrust [N] at the propeller speed n: T_nn |n| n + gain |n|, or as printed + gain n."""
+def thrust(n: float, flow: float, pod: Vector, k: Any) -> float:
+    """Thrust [N] at the propeller speed n: T_nn |n| n + T_nV flow |n|, or as printed flow n."""
     T_nn = pod[T_AHEAD] if n >= 0.0 else pod[T_ASTERN]
+    gain = (pod[T_NV] if n >= 0.0 else pod[T_NV_ASTERN]) * flow
     return float(T_nn * abs(n) * n + gain * (abs(n) if k.thrust_form == PHYSICAL else n))
 
 
 @kernel
-def speed_for(T: float, gain: float, pod: Vector, k: Any) -> float:
+def speed_for(T: float, flow: float, pod: Vector, k: Any) -> float:
     """A propeller speed n with thrust(n) = T [N]: never astern for T >= 0, never ahead for T < 0.
 
     In the water's flow a propeller that turns slowly brakes, so n jumps where T changes sign.
     """
     if T >= 0.0:
-        return float(_positive_root(pod[T_AHEAD], gain, T))
+        return float(_positive_root(pod[T_AHEAD], pod[T_NV] * flow, T))
+    gain = pod[T_NV_ASTERN] * flow
     along = -gain if k.thrust_form == PHYSICAL else gain
     return float(-_positive_root(pod[T_ASTERN], along, -T))
 
