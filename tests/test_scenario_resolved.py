@@ -233,7 +233,7 @@ def test_the_manifest_of_many_runs_is_read_back(tmp_path):
              "theory.json", "figures/controls.png", "provenance.json", "manifest.json",
              "missing.json")  # fmt: skip
     files = {f"a_rather_long_name_of_law_{i:04}/{n}": entry for i in range(3000) for n in names}
-    whole = manifest.Manifest(podusv_format=1, status="finished", files=files)
+    whole = manifest.Manifest(podusv_format=manifest.FORMAT, status="finished", files=files)
     (tmp_path / "manifest.json").write_bytes(json_files.encode(whole.model_dump()))
     assert len(manifest.read(tmp_path).files) == len(files)
 
