@@ -40,7 +40,7 @@ def test_findings_come_in_the_order_of_the_scenario_s_sections():
     ]
     assert sections == sorted(sections)
     assert {kind.when for kind in finding_kinds().values()} == {"before", "after"}
-    assert len(finding_kinds()) == 41
+    assert len(finding_kinds()) == 43
 
 
 @pytest.mark.parametrize("code", finding_kinds())
@@ -110,6 +110,42 @@ def test_long_saturation_is_told_with_its_times():
     (text,) = told("saturated", tight, "controller.anti_windup=auxiliary")
     assert "its memory does not wind up" in text
     assert told("saturated", "actuator={kind: saturated, surge_limit: 1e6, yaw_limit: 1e6}") == []
+
+
+def moving(u, v, r, **water):
+    """Findings about the envelope of a hull that moves like this from 2 s to 3 s of 20 s."""
+    out = log()
+    under_way = (out["time"] >= 2.0) & (out["time"] <= 3.0)
+    signals = {name: under_way * value for name, value in {"u": u, "v": v, "r": r, **water}.items()}
+    found = postflight(scene().alone(), changed(out, psi=0.0 * out["psi"], **signals))
+    return [finding.text for finding in found if finding.code == "outside-envelope"]
+
+
+@pytest.mark.parametrize(
+    ("velocities", "says"),
+    [
+        ((0.93, 0.0, 0.0), ["a speed of up to 0.92 m/s, and this run has 0.93 m/s"]),
+        ((0.8, 0.5, 0.0), ["a speed of up", "up to 0.524 rad, and this run has 0.559 rad"]),
+        ((0.05, 0.05, 0.0), []),  # at rest a hull has any drift angle
+        ((-0.5, 0.0, 0.0), ["and this run has 3.14 rad"]),
+        ((0.5, 0.0, -0.73), ["a yaw rate of up to 0.72 rad/s, and this run has 0.73 rad/s"]),
+        ((0.9, 0.3, 0.71), ["a speed of up"]),
+        ((0.9, 0.1, 0.71), []),
+    ],
+)  # fmt: skip
+def test_motion_beyond_what_was_measured_is_told(velocities, says):
+    found = moving(*velocities)
+    assert len(found) == len(says)
+    for text, part in zip(found, says, strict=True):
+        assert part in text
+        assert "from 2 s to 3 s" in text
+
+
+def test_the_envelope_is_that_of_motion_through_the_water():
+    assert moving(1.0, 0.0, 0.0, V_c=0.2, beta_c=0.0) == []
+    assert len(moving(0.8, 0.0, 0.0, V_c=0.2, beta_c=math.pi)) == 1
+    (text,) = moving(0.0, 0.0, 0.0, V_c=0.3, beta_c=math.pi / 2)
+    assert "a drift angle" in text
 
 
 def test_a_law_without_integral_is_not_told_that_it_winds_up():

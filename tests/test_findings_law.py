@@ -205,6 +205,11 @@ CASES = [  # code, its key, overrides with it, and without
     ("estimator-noise", "estimator.sigma_psi", [SENSORS, SIGMA % 0.011],
      [SENSORS, SIGMA % 0.011, sea("{kind: waves, height: 0.02, period: 2}")]),
     ("steep-waves", "disturbance[0].height", [WAVES % 0.5], [WAVES % 0.05]),
+    ("few-components", "disturbance[0].components",
+     [sea("{kind: waves, height: 0.05, period: 1, components: 69}")],  # 3.5 times 20 periods: 70
+     [sea("{kind: waves, height: 0.05, period: 1, components: 71}")]),
+    ("few-components", "disturbance[0].components",
+     [sea("{kind: wind, speed: 1, gusts: norsok, components: 1}")], [WIND % "norsok"]),
     ("model-gusts", "disturbance[0].gusts", [WIND % "norsok"], [WIND % "none"]),
 ]  # fmt: skip
 
@@ -262,7 +267,7 @@ SWAYING = (
     "--set",
     "vessel.preset=paper",
     "--set",
-    "silence=[path-bend, bound-growing, never-settles]",
+    "silence=[path-bend, bound-growing, never-settles, outside-envelope]",
 )
 
 
@@ -289,7 +294,7 @@ def test_what_is_silenced_is_not_shown(podusv):
         "--set",
         "vessel.preset=paper",
         "--set",
-        "silence=[sway-drift, sway-unstable, bound-growing, never-settles]",
+        "silence=[sway-drift, sway-unstable, bound-growing, never-settles, outside-envelope]",
     )
     assert podusv("run", scenario_file("corrected.yaml"), *bad, *SHORT, "--out", "o").err == ""
     said = podusv("validate", scenario_file("corrected.yaml"), *bad)

@@ -25,12 +25,12 @@ from podusv_cli.core.errors import ScenarioError
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.engine.step.grid import TimeGrid
-from podusv_cli.metrics import distance
 from podusv_cli.metrics.cost import law_costs
+from podusv_cli.metrics.distance import OF_OPTIMUM
 from podusv_cli.metrics.metric import close_integrals
 from podusv_cli.metrics.operations import operations
 from podusv_cli.metrics.table import METRICS, metrics_with, observer
-from podusv_cli.metrics.windows import NAMED, find
+from podusv_cli.metrics.windows import CROSSED, NAMED, SETTLING, find, settle, settled_from
 from podusv_cli.scenario.load import load_text
 from podusv_cli.studies.study.expressions import parse_success
 
@@ -88,11 +88,17 @@ def by_definition(log, steady):
     }
 
 
+def crossing(t, z_e, radius):
+    """Where the last straight line from beyond the radius to within meets it."""
+    i = np.flatnonzero(z_e > radius)[-1]
+    return np.interp(-radius, -z_e[i : i + 2], t[i : i + 2])
+
+
 def test_metrics_follow_their_definitions(limited):
     log, got = limited
     t = log["time"]
     expected = by_definition(log, t >= 0.75 * t[-1])
-    expected["settling_time"] = t[log["z_e"] > 2.0][-1] + 0.01
+    expected["settling_time"] = crossing(t, log["z_e"], 2.0)
     assert {name: got[name] for name in expected} == pytest.approx(expected, rel=1e-12)
     assert 0 < got["saturated_fraction"] < 1
 
@@ -230,13 +236,16 @@ def test_settled_from_the_start_is_zero():
     assert got["settling_time"] == 0.0
 
 
-def test_settling_in_the_last_instant_counts_whatever_the_rounding():
-    seen, step = np.zeros(distance.SIZE), 0.01
-    for last in range(2, 200):
-        seen[distance.NOW], seen[distance.OUTSIDE] = last * step, (last - 1) * step
-        assert METRICS["settling_time"].result(seen, step) == pytest.approx(last * step)
-        seen[distance.OUTSIDE] = last * step
-        assert np.isnan(METRICS["settling_time"].result(seen, step))
+def test_settling_is_read_between_the_instants():
+    """z_e falls to 1 m in 5.4 s, jumps to 4 m, and falls for good, past 3 m at 20 s by 0.21 m/s."""
+    for step in (0.3, 0.07):
+        seen = np.zeros(SETTLING)
+        for t in np.arange(0.0, 40.0, step):
+            z_e = 3.0 - 0.37 * t if t < 5.4 else 3.0 - 0.21 * (t - 20.0) if t > 12.0 else 4.0
+            settle(t, z_e, 2.0, 0, seen)
+        assert settled_from(seen[CROSSED]) == pytest.approx(20.0 + 1.0 / 0.21, rel=1e-12)
+    settle(40.0, 2.1, 2.0, 0, seen)
+    assert math.isnan(settled_from(seen[CROSSED]))
 
 
 def test_every_metric_is_computed_and_documented(limited):
@@ -248,7 +257,7 @@ def test_every_metric_is_computed_and_documented(limited):
     seeing = corrected(measurement=Sensors(), estimator=NoEstimator())
     of_estimates = set(gathered(seeing, steps=10)[1])
     always = {name for name in METRICS if NAMED not in name}
-    compared = {metric.name for metric in distance.OF_OPTIMUM.values()}  # known to comparisons only
+    compared = {metric.name for metric in OF_OPTIMUM.values()}  # known to comparisons only
     simulated = set(got | cost | operations(corrected(), log) | of_pods) | of_estimates | of_trials
     assert always == simulated | compared
     assert set(of_pods) > set(got)
@@ -314,7 +323,7 @@ def test_an_error_over_a_window_follows_its_definition(run):
 def test_a_further_radius_has_the_settling_time_of_that_radius(run):
     log, got = run
     t, z_e = log["time"], log["z_e"]
-    assert got["settling_time_far"] == pytest.approx(t[z_e > 9.0][-1] + 0.01)
+    assert got["settling_time_far"] == pytest.approx(crossing(t, z_e, 9.0), rel=1e-12)
     assert math.isnan(got["settling_time_near"])  # the standoff is larger
 
 

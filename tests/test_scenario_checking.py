@@ -220,11 +220,11 @@ def test_a_wrong_component_is_one_sentence_at_its_place(sound, wrong, says):
         (
             "B_u: adaptve",
             [
-                "8: B_u: must be adaptive or a number [1/s], found 'adaptve'; did you mean "
+                "8: B_u: must be adaptive or a number above 0 [1/s], found 'adaptve'; did you mean "
                 "'adaptive'?"
             ],
         ),
-        ("B_u: true", ["8: B_u: must be adaptive or a number [1/s], found true"]),
+        ("B_u: true", ["8: B_u: must be adaptive or a number above 0 [1/s], found true"]),
         (
             "network: {nodes: [3, 3.0, 1e1]}",
             [

@@ -6,9 +6,14 @@ import numpy as np
 
 from podusv_cli.core.finding import Sentences, after, rows_where, times_of
 from podusv_cli.core.kernel import Vector
-from podusv_cli.core.recording import Recording
+from podusv_cli.core.recording import Recording, blocks
 from podusv_cli.scenario.model import Scenario
 
+PLACES = {
+    "speed": ("speed", "m/s"),
+    "drift": ("drift angle", "rad"),
+    "yaw_rate": ("yaw rate", "rad/s"),
+}
 LONG = 0.02  # fraction of the run; shorter saturation is no finding
 REVERSALS = 3  # of a zig-zag with two overshoots
 
@@ -54,6 +59,38 @@ def _switching(scenario: Scenario) -> list[str]:
         *([] if scenario.measurement.is_exact else ["sensors with noise and delay"]),
         *([f"a control period of {period:g} s"] if period else []),
     ]
+
+
+@after(
+    "outside-envelope", about="vessel", meaning="the hull leaves what its numbers hold for",
+    condition=f"for over {LONG:.0%} of the run the speed, the drift angle or the yaw rate through "
+    "the water exceeds vessel.envelope",
+    remedy="ask for less speed or turn, or take a vessel that was measured there",
+)  # fmt: skip
+def outside_envelope(scenario: Scenario, log: Recording) -> Sentences:
+    """The run is an extrapolation of what was measured, or fitted, of the hull."""
+    envelope = scenario.vessel.envelope
+    if envelope is None:
+        return
+    parts = [envelope.shares(*_through_water(log.part(rows))) for rows in blocks(len(log["u"]))]
+    for name, (word, unit) in PLACES.items():
+        share, limit = np.concatenate([part[name] for part in parts]), getattr(envelope, name)
+        outside = share > 1.0
+        if outside.mean() > LONG:
+            yield (
+                f"the hull's numbers hold for a {word} of up to {limit:g} {unit}, and this run has "
+                f"{share.max() * limit:.3g} {unit}, beyond the limit {times_of(log, outside)}; ask "
+                "for less speed or turn, or take a vessel that was measured there"
+            )
+
+
+def _through_water(log: Recording) -> tuple[Vector, Vector, Vector]:
+    """u, v [m/s] and r [rad/s] of the hull beside the water around it."""
+    u, v = log["u"], log["v"]
+    if "V_c" in log:
+        u = u - log["V_c"] * np.cos(log["beta_c"] - log["psi"])
+        v = v - log["V_c"] * np.sin(log["beta_c"] - log["psi"])
+    return u, v, log["r"]
 
 
 @after(

@@ -122,6 +122,26 @@ def steep_waves(case: Case) -> Sentences:
 
 
 @before(
+    "few-components", about="disturbance", meaning="a sea of too few cosines for its run",
+    condition="the components, weighted by the square of their energy, are further apart than "
+    "1/duration",
+    remedy="take more components",
+)  # fmt: skip
+def few_components(case: Case) -> Sentences:
+    """The variance of such a sum scatters between seeds otherwise than that of a sea."""
+    duration = case.scenario.simulation.duration
+    for key, part in case.scenario.disturbances().items():
+        count, wanted = part.resolving(duration)
+        if count < wanted:
+            yield At(
+                f"{key}.components",
+                f"{count} cosines are too few for {duration:g} s: from seed to seed, the energy of "
+                f"their sum does not vary as a sea's does; take {wanted} or more for a study over "
+                "seeds",
+            )
+
+
+@before(
     "model-gusts", about="disturbance", meaning="a gust spectrum of the open sea on a model",
     condition=f"a gust spectrum, and a vessel shorter than {MODEL:g} m",
     remedy="leave gusts out, or simulate at full scale",

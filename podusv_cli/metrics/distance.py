@@ -8,28 +8,24 @@ from typing import Any
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.engine.step.layout import DISTANCE
 from podusv_cli.metrics.metric import Accumulator, Measured, Metric, Result, add, gathered, ratio
-from podusv_cli.metrics.windows import settled_from
+from podusv_cli.metrics.windows import CROSSED, SETTLING, settle, settled_from
 
 # Positions of the gathered numbers: integrals over the run, and over the steady window.
 TIME, ABSOLUTE, ERROR, SQUARE, TIMED, INTEGRALS = range(6)
-OUTSIDE, NOW, SIZE = range(2 * INTEGRALS, 2 * INTEGRALS + 3)
+RADIUS = 2 * INTEGRALS
 ACROSS, ALONG, SETTLED = range(3, 6)
 
 
 @kernel
 def watch(t: float, weight: float, row: Vector, k: Any, seen: Vector) -> None:
-    """Gather integrals of z_e and |z_e - standoff|, and when z_e last left the settling radius."""
+    """Gather integrals of z_e and |z_e - standoff|, and when z_e came within a radius."""
     z_e = row[DISTANCE]
-    if t == 0.0:
-        seen[OUTSIDE] = -1.0  # not outside so far
     add(seen, INTEGRALS, TIME, weight)
     add(seen, INTEGRALS, ABSOLUTE, weight * z_e)
     add(seen, INTEGRALS, ERROR, weight * abs(z_e - k.standoff))
     add(seen, INTEGRALS, SQUARE, weight * z_e * z_e)
     add(seen, INTEGRALS, TIMED, weight * t * z_e)
-    seen[NOW] = t
-    if z_e > k.settling_radius:
-        seen[OUTSIDE] = t
+    settle(t, z_e, k.settling_radius, RADIUS, seen)
 
 
 @kernel
@@ -66,7 +62,7 @@ def _rmse(seen: Vector, step: float) -> float:
 
 
 def _settling_time(seen: Vector, step: float) -> float:
-    return settled_from(seen[OUTSIDE], seen[NOW], step)
+    return settled_from(seen[RADIUS + CROSSED])
 
 
 def _rms(position: int) -> Result:
@@ -74,7 +70,7 @@ def _rms(position: int) -> Result:
     return lambda seen, step: math.sqrt(mean(seen, step))
 
 
-OF = Accumulator(watch, lambda layout: SIZE, _constants, INTEGRALS, ("standoff",))
+OF = Accumulator(watch, lambda layout: RADIUS + SETTLING, _constants, INTEGRALS, ("standoff",))
 OF_SETTLED = Accumulator(
     watch_settled, lambda layout: 2 * SETTLED, _constants, SETTLED, ("standoff",)
 )

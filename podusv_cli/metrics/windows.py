@@ -16,7 +16,7 @@ NAMED = "NAME"  # stands for a scenario's word in the name of a metric
 NEAR = 1e-9  # s; an instant this near to an end of a window belongs to it
 FROM, TO, RADIUS = math.inf, math.inf, 0.0  # placeholders of one window [s] and one radius [m]
 LENGTH, SQUARE, LARGEST, NOW, LAST, WINDOW = range(6)
-OUTSIDE, ENDS, SETTLING = range(3)
+CROSSED, BEFORE, DISTANCE_BEFORE, SETTLING = range(4)
 
 Windows = tuple[tuple[str, tuple[float, float]], ...]  # from and to [s]
 Radii = tuple[tuple[str, float], ...]  # m
@@ -36,19 +36,28 @@ def window(t: float, row: Vector, seen: Vector) -> None:
 
 
 @kernel
-def outside(t: float, row: Vector, seen: Vector) -> None:
-    """Gather when z_e was last beyond the radius, and the last instant."""
-    if t == 0.0:
-        seen[OUTSIDE] = -1.0  # not outside so far
-    if row[DISTANCE] > RADIUS:
-        seen[OUTSIDE] = t
-    seen[ENDS] = t
+def settle(t: float, z_e: float, radius: float, at: int, seen: Vector) -> None:
+    """Gather when z_e last came within the radius, by a straight line between two instants.
+
+    The numbers stand from `at` on, 0 before the run. The time is infinite while z_e is beyond.
+    """
+    if z_e > radius:
+        seen[at + CROSSED] = math.inf
+    elif seen[at + CROSSED] == math.inf:
+        before, beyond = seen[at + BEFORE], seen[at + DISTANCE_BEFORE] - radius
+        seen[at + CROSSED] = before + (t - before) * beyond / (beyond + radius - z_e)
+    seen[at + BEFORE], seen[at + DISTANCE_BEFORE] = t, z_e
 
 
-def settled_from(outside: float, now: float, step: float) -> float:
-    """The first instant after the last one outside [s]; NaN where that is the last of the run."""
-    inside_from = float(outside) + step if outside >= 0.0 else 0.0
-    return inside_from if inside_from < now + 0.5 * step else math.nan
+@kernel
+def within(t: float, row: Vector, seen: Vector) -> None:
+    """Gather when z_e last came within the radius."""
+    settle(t, row[DISTANCE], RADIUS, 0, seen)
+
+
+def settled_from(crossed: float) -> float:
+    """When z_e last came within a radius [s]; NaN where it is beyond at the end of the run."""
+    return float(crossed) if crossed < math.inf else math.nan
 
 
 ERROR_RMS = Metric(
@@ -93,12 +102,10 @@ def _of_window(name: str, start: float, to: float) -> tuple[Metric, Metric]:
 
 
 def _of_radius(name: str, radius: float) -> Metric:
-    watch = specialise(outside, f"outside_{name}", RADIUS=radius)
+    watch = specialise(within, f"within_{name}", RADIUS=radius)
     of = Accumulator(watch, lambda layout: SETTLING, lambda layout: {})
     meaning = f"time from which z_e stays within {radius:g} m"
-    return _named(
-        SETTLED, name, meaning, of, lambda seen, step: settled_from(seen[OUTSIDE], seen[ENDS], step)
-    )
+    return _named(SETTLED, name, meaning, of, lambda seen, step: settled_from(seen[CROSSED]))
 
 
 @cache  # an accumulator's numbers are found by the accumulator itself

@@ -203,9 +203,19 @@ def members(annotation: Any) -> tuple[Any, ...]:
 
 def limits(field: FieldInfo | None) -> dict[str, Any]:
     """The field's limits by pydantic's names: gt, ge, lt, le, pattern."""
-    names, metadata = (*BOUNDS, "pattern"), field.metadata if field else ()
+    names, metadata = (*BOUNDS, "pattern"), [*_metadata(field)] if field else ()
     found = ((name, getattr(data, name, None)) for data in metadata for name in names)
     return {name: limit for name, limit in found if limit is not None}
+
+
+def _metadata(field: FieldInfo) -> Iterator[Any]:
+    """What limits the field, or the number that the field may be beside a word."""
+    yield from field.metadata
+    for member in get_args(field.annotation):
+        if get_origin(member) is Annotated:
+            yield from (
+                limit for info in member.__metadata__ for limit in getattr(info, "metadata", ())
+            )
 
 
 def sections(annotation: Any) -> dict[str, type[Component]]:

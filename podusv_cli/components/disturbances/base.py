@@ -123,6 +123,13 @@ class Disturbance(Component):
         """Significant height [m] and the peak's angular frequency [rad/s]; no height: no waves."""
         return 0.0, 1.0
 
+    def resolving(self, duration: float) -> tuple[int, int]:
+        """How many cosines it sums, and how many let a run of `duration` [s] scatter as the sea.
+
+        The scatter is that of the variance between seeds. 0, 0 where nothing is summed.
+        """
+        return 0, 0
+
     def has_gusts(self) -> bool:
         """Whether it has gusts with a spectrum of the open sea."""
         return False

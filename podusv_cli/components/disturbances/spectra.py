@@ -42,7 +42,8 @@ class Cosines(NamedTuple):
     phase: Vector
 
 
-def _power(x: Vector, exponent: float) -> Vector:
+def power(x: Vector, exponent: float | Vector) -> Vector:
+    """x^exponent for positive x."""
     return exponential(np.maximum(exponent * logarithm(x), SMALLEST))
 
 
@@ -89,9 +90,9 @@ def norsok(frequency: Vector, speed: float, height: float) -> Vector:
     in the crate ndspec 0.1.1, froya.rs, and in a second program, which agree.
     """
     z, u = np.array([height / 10.0]), np.array([speed / 10.0])
-    x = 172.0 * frequency * _power(z, 2.0 / 3.0) * _power(u, -0.75)
-    scale = 320.0 * u * u * _power(z, 0.45)
-    return np.asarray(scale * _power(1.0 + _power(x, NORSOK_N), -5.0 / (3.0 * NORSOK_N)))
+    x = 172.0 * frequency * power(z, 2.0 / 3.0) * power(u, -0.75)
+    scale = 320.0 * u * u * power(z, 0.45)
+    return np.asarray(scale * power(1.0 + power(x, NORSOK_N), -5.0 / (3.0 * NORSOK_N)))
 
 
 def harris(frequency: Vector, speed: float, drag: float) -> Vector:
@@ -101,7 +102,7 @@ def harris(frequency: Vector, speed: float, drag: float) -> Vector:
     public program with NORSOK's spectrum beside it; both are those of Fossen's handbook.
     """
     x = HARRIS_LENGTH * frequency / speed
-    return np.asarray(4.0 * drag * HARRIS_LENGTH * speed * _power(2.0 + x * x, -5.0 / 6.0))
+    return np.asarray(4.0 * drag * HARRIS_LENGTH * speed * power(2.0 + x * x, -5.0 / 6.0))
 
 
 def in_bins(density: Density, edges: Vector) -> Vector:
@@ -127,11 +128,21 @@ def rayleigh(count: int, seed: int, stream: str) -> Vector:
 
 
 AMPLITUDES = {"deterministic": as_given, "random": rayleigh}
+Amplitudes = Literal["random", "deterministic"]
 
 
-def cosines(
-    variance: Vector, edges: Vector, seed: int, stream: str, amplitudes: str = "deterministic"
-) -> Cosines:
+def resolving(variance: Vector, edges: Vector, duration: float) -> int:
+    """How many components leave a Gaussian process's scatter to sums over `duration` [s].
+
+    The variance of such a sum scatters by the sum of all v^2, with v of each bin; that of the
+    process by the integral of S^2 over the duration. They are equal where the bins, weighted by
+    S^2, are 1/duration wide. `edges` in Hz.
+    """
+    wide = np.sum(variance**2) / np.sum(variance**2 / np.diff(edges))
+    return math.ceil(len(variance) * duration * wide)
+
+
+def cosines(variance: Vector, edges: Vector, seed: int, stream: str, amplitudes: str) -> Cosines:
     """One component a bin: its rate uniform in the bin, its phase uniform in a turn.
 
     Its amplitude is sqrt(2 variance), so that the sum has the variance of all bins together, or

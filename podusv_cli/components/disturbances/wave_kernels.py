@@ -10,8 +10,9 @@ from podusv_cli.core.elementary import cos_sin, cos_sin_of_turns
 from podusv_cli.core.kernel import LANES, Vector, kernel, scratch, widest
 
 TURN = 2.0 * math.pi
-# Room for partial sums: of an envelope, of it and the motion, of four envelopes, of these as well.
-PAIR, LONG_ROOM, FACES, SHORT_ROOM = 2 * LANES, 6 * LANES, 8 * LANES, 15 * LANES
+# Room for partial sums: of two envelopes, of them and the motion, of four envelopes, of these as
+# well.
+PAIRS, LONG_ROOM, FACES, SHORT_ROOM = 4 * LANES, 9 * LANES, 8 * LANES, 15 * LANES
 
 
 @kernel
@@ -57,35 +58,45 @@ def long_crested(
     s_gamma = c_psi * k.s_beta - s_psi * k.c_beta
     way = (k.c_beta * x[0] + k.s_beta * x[1]) / TURN
     if stage > 0.0:
-        envelope = _long_envelope(t, way, k, table)
+        along, across = _long_envelopes(t, way, k, table)
     else:
-        envelope = _long_motion(t, x, way, c_gamma, s_gamma, k, table, b)
-    b[0] = k.drift_u * c_gamma * abs(c_gamma) * envelope
-    b[1] = k.drift_v * s_gamma * abs(s_gamma) * envelope
+        along, across = _long_motion(t, x, way, c_gamma, s_gamma, k, table, b)
+    b[0] = k.drift_u * c_gamma * abs(c_gamma) * along
+    b[1] = k.drift_v * s_gamma * abs(s_gamma) * across
     b[2] = k.drift_arm * b[1]
 
 
 @kernel
-def _long_envelope(t: float, way: float, k: Any, table: Vector) -> float:
-    """Its squared magnitude. Sums lie in the kernel of their loop, or it gets no vector code."""
-    count, sums = int(k.lanes), scratch(PAIR)
+def _reflected(j: int, i: int, c: float, s: float, count: int, table: Vector, sums: Vector) -> None:
+    """Add to the envelopes of what bow or stern and what the sides reflect of a component."""
+    ends, sides = table[6 * count + i], table[7 * count + i]
+    sums[j] += ends * c
+    sums[LANES + j] += ends * s
+    sums[2 * LANES + j] += sides * c
+    sums[3 * LANES + j] += sides * s
+
+
+@kernel
+def _long_envelopes(t: float, way: float, k: Any, table: Vector) -> tuple[float, float]:
+    """Their squared magnitudes. Sums lie in the kernel of their loop, or it gets no vector code."""
+    count, sums = int(k.lanes), scratch(PAIRS)
     widest()
-    cleared(PAIR, sums)
+    cleared(PAIRS, sums)
     for block in range(count // GROUP):
         for j in range(LANES):
             for half in range(2):
-                c, s = _wave(t, way, block * GROUP + half * LANES + j, count, table)
-                sums[j] += c
-                sums[LANES + j] += s
-    return _square(sums, 0)
+                i = block * GROUP + half * LANES + j
+                c, s = _wave(t, way, i, count, table)
+                _reflected(j, i, c, s, count, table, sums)
+    return _square(sums, 0), _square(sums, 2)
 
 
 @kernel
 def _long_motion(
     t: float, x: Vector, way: float, c_gamma: float, s_gamma: float, k: Any, table: Vector,
     b: Vector,
-) -> float:  # fmt: skip
-    """Put first-order motion, its velocity and the elevation into b; as `_long_envelope`."""
+) -> tuple[float, float]:  # fmt: skip
+    """Put first-order motion, its velocity and the elevation into b; as `_long_envelopes`."""
     count, sums = int(k.lanes), scratch(LONG_ROOM)
     slow = k.long2 * c_gamma * c_gamma + k.wide2 * s_gamma * s_gamma
     both, speed = c_gamma * s_gamma, (c_gamma * x[3] + s_gamma * x[4]) / TURN
@@ -102,20 +113,20 @@ def _long_motion(
                 part = 1.0 / (1.0 + slow * square)
                 c_felt, s_felt = c * part * part, s * part * part
                 met, fading = table[i] - number * speed, turning * square * part
-                sums[j] += c
-                sums[LANES + j] += s
-                sums[2 * LANES + j] += s_felt
-                sums[3 * LANES + j] += c_felt * number
-                sums[4 * LANES + j] += c_felt * met - s_felt * fading
-                sums[5 * LANES + j] -= (s_felt * met + c_felt * fading) * number
-    moved, rate = k.motion * _added(sums, 2), k.motion * TURN * _added(sums, 4)
+                _reflected(j, i, c, s, count, table, sums)
+                sums[4 * LANES + j] += s_felt
+                sums[5 * LANES + j] += c_felt * number
+                sums[6 * LANES + j] += c_felt * met - s_felt * fading
+                sums[7 * LANES + j] -= (s_felt * met + c_felt * fading) * number
+                sums[8 * LANES + j] += c
+    moved, rate = k.motion * _added(sums, 4), k.motion * TURN * _added(sums, 6)
     b[3], b[4] = moved * k.c_beta, moved * k.s_beta
-    b[5] = -k.motion * c_gamma * s_gamma * _added(sums, 3)
+    b[5] = -k.motion * c_gamma * s_gamma * _added(sums, 5)
     turned = s_gamma * s_gamma - c_gamma * c_gamma
     _hull_axes(rate * k.c_beta, rate * k.s_beta, x, b)
-    b[8] = -k.motion * (both * TURN * _added(sums, 5) + turned * x[5] * _added(sums, 3))
-    b[9] = _added(sums, 0)
-    return _square(sums, 0)
+    b[8] = -k.motion * (both * TURN * _added(sums, 7) + turned * x[5] * _added(sums, 5))
+    b[9] = _added(sums, 8)
+    return _square(sums, 0), _square(sums, 2)
 
 
 @kernel
@@ -134,10 +145,14 @@ def short_crested(
 
 
 @kernel
-def _facing(j: int, c: float, s: float, c_gamma: float, s_gamma: float, sums: Vector) -> None:
-    """Add to the envelopes of waves from ahead, from astern, from port and from starboard."""
-    ahead, astern = max(c_gamma, 0.0), max(-c_gamma, 0.0)
-    right, left = max(s_gamma, 0.0), max(-s_gamma, 0.0)
+def _facing(
+    j: int, i: int, c: float, s: float, c_gamma: float, s_gamma: float, count: int, table: Vector,
+    sums: Vector,
+) -> None:  # fmt: skip
+    """Add to the envelopes of what is reflected ahead, astern, to port and to starboard."""
+    ends, sides = table[6 * count + i], table[7 * count + i]
+    ahead, astern = ends * max(c_gamma, 0.0), ends * max(-c_gamma, 0.0)
+    right, left = sides * max(s_gamma, 0.0), sides * max(-s_gamma, 0.0)
     sums[j] += ahead * c
     sums[LANES + j] += ahead * s
     sums[2 * LANES + j] += astern * c
@@ -170,7 +185,7 @@ def _short_envelopes(
                 c_beta, s_beta = table[4 * count + i], table[5 * count + i]
                 c, s = _wave(t, c_beta * north + s_beta * east, i, count, table)
                 c_gamma, s_gamma = c_psi * c_beta + s_psi * s_beta, c_psi * s_beta - s_psi * c_beta
-                _facing(j, c, s, c_gamma, s_gamma, sums)
+                _facing(j, i, c, s, c_gamma, s_gamma, count, table, sums)
     _drift(sums, k, b)
 
 
@@ -191,7 +206,7 @@ def _short_motion(
                 c_beta, s_beta = table[4 * count + i], table[5 * count + i]
                 c, s = _wave(t, c_beta * north + s_beta * east, i, count, table)
                 c_gamma, s_gamma = c_psi * c_beta + s_psi * s_beta, c_psi * s_beta - s_psi * c_beta
-                _facing(j, c, s, c_gamma, s_gamma, sums)
+                _facing(j, i, c, s, c_gamma, s_gamma, count, table, sums)
                 slow = k.long2 * c_gamma * c_gamma + k.wide2 * s_gamma * s_gamma
                 square, both = number * number, c_gamma * s_gamma
                 part = 1.0 / (1.0 + slow * square)

@@ -26,21 +26,25 @@ and R a) from one side, with what passes from the other; as no energy is lost, t
 rho g (R a)^2/2 a metre (Maruo 1960). A hull is taken as a box: ends of width B against waves
 from ahead or astern, sides of length L against the rest, so that X = c_u cos(gamma)
 |cos(gamma)| a^2 with c_u = rho g R_u^2 B/2, and Y likewise with L. Newman's approximation of
-the products of two waves makes the load c |sum of a |cos(gamma)| e^(i phase)|^2, which changes
-slowly. R does not depend on the frequency here; a real hull reflects hardly any long waves.
+the products of two waves makes the load c |sum of a R |cos(gamma)| e^(i phase)|^2, which changes
+slowly, with c = rho g B/2 or rho g L/2. By default every component has its own R, by
+`reflection.py`: hulls reflect hardly any of the waves that are much longer than they are.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from typing import Any, ClassVar, Literal, Self
+from functools import partial
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from podusv_cli.components.disturbances import spectra
 from podusv_cli.components.disturbances.base import WAVE_MOTION, Disturbance
+from podusv_cli.components.disturbances.reflection import BOW_AND_STERN, SIDES, Curve, reflected
+from podusv_cli.components.disturbances.torsethaugen import peaks, torsethaugen
 from podusv_cli.components.disturbances.wave_kernels import TURN, long_crested, short_crested
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import value
@@ -50,14 +54,20 @@ from podusv_cli.core.signal import Signal
 
 STREAM = "waves"
 LEAST = 0.01  # of the spectrum's energy that the cut-offs must leave
+Share = Literal["curve"] | Annotated[float, Field(ge=0, le=1)]
 ELEVATION = Signal("zeta", "m", "elevation of the sea where the vessel is", r"\zeta")
+
+
+def _shares(chosen: Share, curve: Curve, size: Vector) -> Vector:
+    """The reflected share of each component."""
+    return reflected(curve, size) if chosen == "curve" else np.full(len(size), float(chosen))
 
 
 class Waves(Disturbance):
     """Irregular waves as a sum of cosines: motion for the sensors, and slow drift as a load.
 
-    Motion is that of the water, filtered over the hull; drift has one coefficient per axis, from
-    the share of the waves that the hull reflects. Long waves, no resonance, no heave, roll, pitch.
+    Motion is that of the water, filtered over the hull; drift comes from the share of each wave
+    that the hull reflects. Long waves, no resonance, no heave, roll, pitch.
     """
 
     adds_up: ClassVar[bool] = True  # swell and a wind sea
@@ -73,17 +83,18 @@ class Waves(Disturbance):
     direction: float = value(
         0.0, "rad", "where the waves come from: 0 north, pi/2 east", ge=-1e6, le=1e6
     )
-    spectrum: Literal["jonswap", "ittc"] = value(
-        "jonswap", "", "JONSWAP, or the ITTC's modified Pierson-Moskowitz spectrum"
-    )
+    spectrum: Literal["jonswap", "ittc", "torsethaugen"] = value(
+        "jonswap", "", "JONSWAP, the ITTC's modified Pierson-Moskowitz spectrum, or Torsethaugen's "
+        "of a wind sea and a swell at full scale",
+    )  # fmt: skip
     gamma: float = value(3.3, "", "peakedness of the JONSWAP spectrum", ge=1, le=7)
     spreading: int = value(
         0, "", "n of the directions' density cos^2n; 0: all waves in one direction", ge=0, le=50
     )
     components: int = value(100, "", "how many cosines", ge=1, le=10_000)
-    amplitudes: Literal["deterministic", "random"] = value(
-        "deterministic", "", "of the components: those of the spectrum for every seed, or drawn "
-        "so that the height scatters between seeds as a sea's does",
+    amplitudes: spectra.Amplitudes = value(
+        "random", "", "of the components: drawn, so that the height scatters between seeds as a "
+        "sea's does, or those of the spectrum for every seed",
     )  # fmt: skip
     lowest: float = value(
         0.5, "", "least frequency of a component, in terms of the peak's", gt=0, le=1e3
@@ -92,16 +103,16 @@ class Waves(Disturbance):
         4.0, "", "largest frequency of a component, in terms of the peak's", gt=0, le=1e3
     )
     motion: float = value(1.0, "", "factor on first-order motion; 0: none", ge=0)
-    reflection_u: float = value(
-        0.3, "", "share of a wave's amplitude that bow and stern reflect; podusv's choice", ge=0,
-        le=1,
+    reflection_u: Share = value(
+        "curve", "", "share of a wave's amplitude that bow and stern reflect; `curve`: by the "
+        "length of each wave, as strip theory has it for two ships",
     )  # fmt: skip
-    reflection_v: float = value(
-        0.3, "", "share of a wave's amplitude that the sides reflect; podusv's choice", ge=0, le=1
+    reflection_v: Share = value(
+        "curve", "", "share of a wave's amplitude that the sides reflect, likewise"
     )
     drift_arm: float = value(0.0, "m", "where the drift force in sway acts, ahead of the origin")
     seed: int = value(
-        1, "", "of rates, phases and directions", ge=0, lt=2**63
+        1, "", "of rates, phases, amplitudes and directions", ge=0, lt=2**63
     )  # fmt: skip
 
     @model_validator(mode="after")
@@ -111,7 +122,9 @@ class Waves(Disturbance):
                 f"lowest {self.lowest:g} must be below highest {self.highest:g}, both in terms of "
                 "the peak's frequency"
             )
-        kept = math.fsum(self._variance(4.0, 1.0))
+        if self.spectrum == "torsethaugen":
+            self._both_peaks_fit()
+        kept = math.fsum(self._variance()) / (self.height / 4.0) ** 2
         if not kept >= LEAST:
             raise ValueError(
                 f"between lowest {self.lowest:g} and highest {self.highest:g} the spectrum has "
@@ -119,6 +132,19 @@ class Waves(Disturbance):
                 "and 4 keep nearly all"
             )
         return self
+
+    def _both_peaks_fit(self) -> None:
+        """Raise ValueError for a period that is not the peak's, and for a peak that is cut off."""
+        if self.period_is != "peak":
+            raise ValueError("period_is must be peak for the torsethaugen spectrum")
+        _, other = peaks(self.height, self.period)
+        if other.height and not self.lowest < (ratio := self.period / other.period) < self.highest:
+            raise ValueError(
+                f"the second peak, of {other.height:.3g} m and {other.period:.3g} s, has "
+                f"{ratio:.3g} of the first one's frequency, beyond lowest {self.lowest:g} or "
+                f"highest {self.highest:g}; "
+                f"take lowest {0.6 * ratio:.2g} or highest {3.0 * ratio:.2g}"
+            )
 
     @property
     def signals(self) -> tuple[Signal, ...]:
@@ -128,37 +154,41 @@ class Waves(Disturbance):
     @property
     def peak(self) -> float:
         """The peak's angular frequency [rad/s]."""
-        to_peak = spectra.peak_period(self._gamma, self.period_is, self.lowest, self.highest)
-        return 2.0 * math.pi / (self.period * to_peak)
+        gamma = self.gamma if self.spectrum == "jonswap" else 1.0
+        to_peak = spectra.peak_period(gamma, self.period_is, self.lowest, self.highest)
+        return TURN / (self.period * to_peak)
 
     def sea(self) -> tuple[float, float]:
         """Height and peak."""
         return self.height, self.peak
 
-    @property
-    def _gamma(self) -> float:
-        return self.gamma if self.spectrum == "jonswap" else 1.0
+    def resolving(self, duration: float) -> tuple[int, int]:
+        """3.5 components for every period of the peak, with the default cut-offs."""
+        edges = self._edges() / TURN
+        return self.components, spectra.resolving(self._variance(), edges, duration)
 
-    def _edges(self, peak: float) -> Vector:
-        return spectra.even_edges(self.lowest * peak, self.highest * peak, self.components)
+    def _edges(self) -> Vector:
+        """Edges of the bins [rad/s]."""
+        low, high = self.lowest * self.peak, self.highest * self.peak
+        return spectra.even_edges(low, high, self.components)
 
-    def _variance(self, height: float, peak: float) -> Vector:
-        def density(rate: Vector) -> Vector:
-            return spectra.jonswap(rate, height, peak, self._gamma)
+    def _variance(self) -> Vector:
+        """The variance in each bin [m2]."""
+        return spectra.in_bins(partial(DENSITY[self.spectrum], self), self._edges())
 
-        return spectra.in_bins(density, self._edges(peak))
-
-    def table(self) -> Vector:
-        """Rows of rates and phases in turns, wave numbers, amplitudes, directions of travel."""
-        count, peak = self.components, self.peak
-        variance = self._variance(self.height, peak)
-        edges = self._edges(peak)
-        drawn = spectra.cosines(variance, edges, self.seed, STREAM, self.amplitudes)
-        away = spectra.directions(self.spreading, count, self.seed, STREAM)
+    def table_for(self, vessel: Vessel, duration: float) -> Vector:
+        """Rows of rates and phases in turns, wave numbers, amplitudes, directions, reflections."""
+        count, stream = self.components, (self.seed, STREAM)
+        drawn = spectra.cosines(self._variance(), self._edges(), *stream, self.amplitudes)
+        away = spectra.directions(self.spreading, count, *stream)
         c, s = np.transpose([cos_sin(self._travel + angle) for angle in away.tolist()])
         number = drawn.rate * drawn.rate / spectra.GRAVITY
-        rows = np.zeros((6, spectra.whole_groups(count)))
-        rows[:, :count] = drawn.rate / TURN, drawn.phase / TURN, number, drawn.amplitude, c, s
+        ends = _shares(self.reflection_u, BOW_AND_STERN, number * vessel.length)
+        sides = _shares(self.reflection_v, SIDES, number * vessel.beam)
+        rows = np.zeros((8, spectra.whole_groups(count)))
+        rows[:, :count] = (
+            drawn.rate / TURN, drawn.phase / TURN, number, drawn.amplitude, c, s, ends, sides,
+        )  # fmt: skip
         return rows.ravel()
 
     @property
@@ -174,8 +204,7 @@ class Waves(Disturbance):
             "lanes": float(spectra.whole_groups(self.components)), "motion": self.motion,
             "c_beta": float(c_beta), "s_beta": float(s_beta),
             "long2": vessel.length**2 / 48.0, "wide2": vessel.beam**2 / 48.0,
-            "drift_u": pressure * self.reflection_u**2 * vessel.beam,
-            "drift_v": pressure * self.reflection_v**2 * vessel.length,
+            "drift_u": pressure * vessel.beam, "drift_v": pressure * vessel.length,
             "drift_arm": self.drift_arm,
         }  # fmt: skip
 
@@ -202,3 +231,18 @@ class Waves(Disturbance):
     ) -> None:  # fmt: skip
         """Of long-crested waves; see `kernel_with`."""
         long_crested(t, x, k, table, b, again, stage)
+
+
+def _jonswap(sea: Waves, rate: Vector) -> Vector:
+    return spectra.jonswap(rate, sea.height, sea.peak, sea.gamma)
+
+
+def _ittc(sea: Waves, rate: Vector) -> Vector:
+    return spectra.jonswap(rate, sea.height, sea.peak, 1.0)
+
+
+def _torsethaugen(sea: Waves, rate: Vector) -> Vector:
+    return torsethaugen(rate, sea.height, sea.peak)
+
+
+DENSITY = {"jonswap": _jonswap, "ittc": _ittc, "torsethaugen": _torsethaugen}

@@ -105,12 +105,16 @@ class Wind(Disturbance):
         "none", "", "spectrum of the gusts: none, NORSOK (Froya), or Harris"
     )
     components: int = value(50, "", "how many cosines make the gusts", ge=1, le=10_000)
+    amplitudes: spectra.Amplitudes = value(
+        "random", "", "of the cosines: drawn, so that gusts scatter between seeds as the wind's "
+        "do, or those of the spectrum for every seed",
+    )  # fmt: skip
     lowest: float = value(
         1.0 / 600.0, "Hz", "least frequency of a gust; slower changes belong to the mean", gt=0
     )
     highest: float = value(0.5, "Hz", "largest frequency of a gust", gt=0)
     density: float = value(1.225, "kg/m3", "density of the air", gt=0)
-    seed: int = value(1, "", "of rates and phases of the gusts", ge=0, lt=2**63)
+    seed: int = value(1, "", "of rates, phases and amplitudes of the gusts", ge=0, lt=2**63)
 
     @model_validator(mode="after")
     def _blows(self) -> Self:
@@ -141,12 +145,24 @@ class Wind(Disturbance):
         """Whether a spectrum is given."""
         return self.gusts != "none"
 
+    def resolving(self, duration: float) -> tuple[int, int]:
+        """The cosines of the gusts; bins grow with frequency, and the energy lies low."""
+        if self.gusts == "none":
+            return 0, 0
+        edges = self._edges()
+        variance = spectra.in_bins(self._density, edges)
+        return self.components, spectra.resolving(variance, edges, duration)
+
+    def _edges(self) -> Vector:
+        return spectra.growing_edges(self.lowest, self.highest, self.components)
+
     def table(self) -> Vector:
         """Rows of rates and phases in turns, and amplitudes; no rows without gusts."""
         if self.gusts == "none":
             return np.zeros(1)
-        edges = spectra.growing_edges(self.lowest, self.highest, self.components)
-        drawn = spectra.cosines(spectra.in_bins(self._density, edges), edges, self.seed, STREAM)
+        edges = self._edges()
+        variance = spectra.in_bins(self._density, edges)
+        drawn = spectra.cosines(variance, edges, self.seed, STREAM, self.amplitudes)
         rows = np.zeros((3, spectra.whole_groups(self.components)))
         phase = drawn.phase / (2.0 * math.pi)
         rows[:, : self.components] = drawn.rate, phase, drawn.amplitude

@@ -6,6 +6,7 @@ from typing import Any, Self
 
 from pydantic import model_validator
 
+from podusv_cli.components.vessels.envelope import Envelope
 from podusv_cli.components.vessels.windage import Windage
 from podusv_cli.core.component import Component, Presets, value
 
@@ -57,6 +58,9 @@ class Vessel(Component):
     N_rr: float = _damping("kg m2", "yaw, times |r|r")
     windage: Windage | None = value(
         None, "", "what the wind acts on; without it the vessel is in no wind"
+    )
+    envelope: Envelope | None = value(
+        None, "", "motion that the numbers hold for; a run that leaves it gets a finding"
     )
 
     @model_validator(mode="after")

@@ -1,0 +1,91 @@
+"""Torsethaugen's spectrum of a wind sea and a swell together, for seas of full size.
+
+Torsethaugen (1996): Model for a doubly peaked wave spectrum, SINTEF STF22 A96204; seen in
+cybergalactic/MSS, torsetSpectrum.m. It was fitted to measurements of the North Sea, in metres and
+seconds, and does not scale to models. There each peak is scaled by a fit of its integral, which
+leaves the significant height 0.4 to 1.6 % too large; here by the integral itself.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from podusv_cli.components.disturbances import spectra
+from podusv_cli.components.disturbances.spectra import GRAVITY, SMALLEST, power
+from podusv_cli.core.kernel import Vector
+from podusv_cli.core.portable import exponential
+
+DEVELOPED = 6.6  # s/m^(1/3): fully developed seas have the period 6.6 Hs^(1/3)
+STEEPEST, LONGEST = 2.0, 25.0  # s/sqrt(m) of the steepest sea, s of the longest swell
+WHOLE = spectra.growing_edges(0.1, 100.0, 2000)  # of a peak's frequency
+
+
+class Peak(NamedTuple):
+    """Significant height [m], period [s] and shape of one of the two peaks."""
+
+    height: float
+    period: float
+    gamma: float
+    n: float
+    m: float
+
+    def shape(self, ratio: Vector) -> Vector:
+        """Density over the ratio to the peak's frequency, before it is scaled."""
+        width = np.where(ratio < 1.0, 0.07, 0.09)
+        bell = exponential(np.maximum(-0.5 * ((ratio - 1.0) / width) ** 2, SMALLEST))
+        fall = exponential(np.maximum(-self.n / self.m * power(ratio, -self.m), SMALLEST))
+        return power(ratio, -self.n) * fall * power(np.full_like(bell, self.gamma), bell)
+
+    @property
+    def whole(self) -> float:
+        """The integral of the shape."""
+        return math.fsum(spectra.in_bins(self.shape, WHOLE))
+
+    def density(self, rate: Vector) -> Vector:
+        """Density [m2 s] at `rate` [rad/s]."""
+        per_rate = self.period / (2.0 * math.pi)
+        scale = self.height**2 / 16.0 * per_rate / self.whole
+        return np.asarray(scale * self.shape(np.maximum(rate * per_rate, 1e-3)))
+
+
+def _power(x: float, exponent: float) -> float:
+    return float(power(np.array([x]), exponent)[0]) if x else 0.0
+
+
+def _e(x: float) -> float:
+    return float(exponential(np.array([max(x, SMALLEST)]))[0])
+
+
+def _gamma(height: float, steepness: float) -> float:
+    return 35.0 * (1.0 + 3.5 * _e(-height)) * _power(steepness, 0.857)
+
+
+def peaks(height: float, period: float) -> tuple[Peak, Peak]:
+    """The peak at `period` [s], and the other one: a swell, or where that is one, a wind sea."""
+    developed, n = DEVELOPED * _power(height, 1.0 / 3.0), 0.5 * math.sqrt(height) + 3.2
+    if period < developed:
+        young = (developed - period) / (developed - STEEPEST * math.sqrt(height))
+        share = 0.3 * _e(-((young / 0.5) ** 2)) + 0.7
+        steepness = 2.0 * math.pi / GRAVITY * share * height / period**2
+        first = Peak(share * height, period, _gamma(height, steepness), n, 4.0)
+        rest = math.sqrt(1.0 - share**2) * height
+        return first, Peak(rest, developed + 2.0, 1.0, n, 4.0)
+    old = (period - developed) / (LONGEST - developed)
+    share = 0.4 * _e(-((old / 0.3) ** 2)) + 0.6
+    steepness = 2.0 * math.pi / GRAVITY * height / developed**2
+    first = Peak(share * height, period, _gamma(height, steepness) * (1.0 + 6.0 * old), n, 4.0)
+    rest = math.sqrt(1.0 - share**2) * height
+    other = Peak(rest, 1.0, 1.0, n, 4.0 * (1.0 - 0.7 * _e(-height / 3.0)))
+    level = 0.08 * (1.0 - _e(-height / 3.0)) * _power(0.4, n)
+    return first, other._replace(
+        period=_power(rest**2 / (16.0 * level * other.whole), 1.0 / (n - 1.0))
+    )
+
+
+def torsethaugen(rate: Vector, height: float, peak: float) -> Vector:
+    """Density [m2 s] of the surface elevation at `rate` [rad/s]; `peak` is the first peak's."""
+    both = peaks(height, 2.0 * math.pi / peak)
+    return np.asarray(sum(one.density(rate) for one in both if one.height > 0.0))
