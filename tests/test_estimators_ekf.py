@@ -137,7 +137,7 @@ class Truth:
         vectors = (self.seen, self.state, self.p, self.table)
         self.doors["correct"](0.0, *map(signatures.pointer, vectors))
         e = self.state[:N] - self.at
-        return float(e @ np.linalg.solve(square(self.state[N:]), e))
+        return float(e @ np.linalg.solve(square(self.state[N:-2]), e))
 
 
 def test_the_errors_are_consistent_with_the_covariance():
@@ -149,6 +149,9 @@ def test_the_errors_are_consistent_with_the_covariance():
             truth.move(0.02)
         found.append(truth.deliver())
     assert np.mean(found[25:]) == pytest.approx(N, rel=0.18)
+    squares, count = truth.state[-2:]
+    assert count == 3 * 600
+    assert squares / count == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / count))
 
 
 def test_the_covariance_stays_symmetric_and_positive():
@@ -196,7 +199,7 @@ def test_a_value_corrects_as_the_formula_says_and_nothing_new_corrects_nothing(p
     seen, state, k = delivered(ekf, np.zeros(6), np.full(6, 5.0))
     before = np.random.default_rng(2).normal(size=(N, N))
     before = before @ before.T
-    state[N:] = before[UPPER]
+    state[N:-2] = before[UPPER]
     seen[6:12] = 0.0
     unchanged = state.copy()
     call(ekf.correct, t=0.0, seen=seen, state=state, k=k, table=np.zeros(1))
@@ -211,4 +214,26 @@ def test_a_value_corrects_as_the_formula_says_and_nothing_new_corrects_nothing(p
     np.testing.assert_allclose(state[:N], innovation * gain, rtol=1e-12)
     joseph = np.eye(N) - np.outer(gain, row)
     after = joseph @ before @ joseph.T + sigma**2 * np.outer(gain, gain)
-    np.testing.assert_allclose(square(state[N:]), after, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(square(state[N:-2]), after, rtol=1e-9, atol=1e-9)
+    variance = before[place, place] + sigma**2
+    np.testing.assert_allclose(state[-2:], [innovation**2 / variance, 1.0], rtol=1e-12)
+
+
+def test_a_late_position_corrects_by_the_derivative_of_where_the_hull_was():
+    """Against one step of the general formula, with differences of p - delay R(psi) nu."""
+    random, late = np.random.default_rng(7), 0.4
+    ekf = ExtendedKalmanFilter(delay_p=late)
+    seen, state, k = delivered(ekf, np.zeros(6), np.zeros(6))
+    x, before = random.normal(size=N), random.normal(size=(N, N))
+    before = before @ before.T
+    state[:N], state[N:-2] = x, before[UPPER]
+
+    def measured(at: Vector) -> float:
+        return float(at[1] - late * (np.sin(at[2]) * at[3] + np.cos(at[2]) * at[4]))
+
+    seen[6:12] = [0, 1, 0, 0, 0, 0]
+    seen[1] = 0.3
+    call(ekf.correct, t=0.0, seen=seen, state=state, k=k, table=np.zeros(1))
+    row = np.array([(measured(x + d) - measured(x - d)) / 2e-6 for d in 1e-6 * np.eye(N)])
+    gain = before @ row / (row @ before @ row + k.sigma_p**2)
+    np.testing.assert_allclose(state[:N], x + gain * (0.3 - measured(x)), rtol=1e-7)

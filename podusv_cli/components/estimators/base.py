@@ -42,6 +42,15 @@ class Estimator(Component):
         """Every number of its state, in order; the estimate first."""
         return ESTIMATE
 
+    @property
+    def covariance(self) -> tuple[int, int]:
+        """Where in its state the covariance of its errors begins, and of how many numbers it is.
+
+        The upper triangle by rows, the six of the estimate first; behind it the sum of all squared
+        innovations over their variances, and their number. 0, 0 without one.
+        """
+        return 0, 0
+
     def assumed_noise(self) -> tuple[tuple[str, float], ...]:
         """For each number of the state the key and value of the noise that is assumed, or ""."""
         return (("", 0.0),) * len(ESTIMATE)

@@ -12,7 +12,11 @@ matrix has to be inverted: for value z of state i with standard deviation sigma
 
     s = P_ii + sigma^2,   x += P_:i (z - x_i)/s,   P -= P_:i P_i:/s
 
-and for the heading z - x_i is brought into (-pi, pi]. Source: A. Gelb (ed.), "Applied Optimal
+and for the heading z - x_i is brought into (-pi, pi]. A position that is delivered `delay_p` after
+it was sampled is z = eta - delay_p R(psi) nu, to first order in the delay, and the same formulas
+hold with its derivative h in place of the unit vector: s = h P h^T + sigma^2, x += P h^T (z -
+z_est)/s.
+Source: A. Gelb (ed.), "Applied Optimal
 Estimation", MIT Press 1974, table 6.1-1, for the filter; sequential scalar updates are exact since
 the measurements' errors are independent. P is a part of the loop's state and integrated with it, as
 its upper triangle by rows.
@@ -37,10 +41,16 @@ from podusv_cli.core.signal import Signal
 
 N = 9  # numbers that are estimated: pose, velocities, loads
 MOVING = 6  # of them, those that something known makes change
+PACKED = N * (N + 1) // 2
 COVARIANCE = Signal(
     "P_est", "", "covariance of the estimate's errors and the loads', upper triangle by rows; each "
     "entry in the product of two units", "P", ("entry",),
 )  # fmt: skip
+
+INNOVATIONS = (
+    Signal("nis_sum", "1", "sum of all squared innovations so far, each over its variance"),
+    Signal("nis_count", "1", "how many measured values were taken in so far"),
+)
 
 
 @kernel
@@ -76,19 +86,42 @@ def spread(f: Vector, packed: Vector, q: Vector, rate: Vector) -> None:
 
 
 @kernel
-def take_in(i: int, innovation: float, sigma: float, state: Vector) -> None:
-    """Correct estimate and covariance by one measured value."""
-    full = scratch(81)
+def take_in(h: Vector, innovation: float, sigma: float, state: Vector) -> None:
+    """Correct estimate and covariance by one measured value, whose derivative is h."""
+    full, ph = scratch(81), scratch(9)
     packed = tail(state, N)
     unpacked(packed, full)
-    gain = 1.0 / (full[N * i + i] + sigma * sigma)
+    variance = sigma * sigma
     for j in range(N):
-        state[j] += full[N * j + i] * gain * innovation
+        ph[j] = 0.0
+        for c in range(MOVING):
+            ph[j] += full[N * j + c] * h[c]
+    for j in range(MOVING):
+        variance += h[j] * ph[j]
+    gain = 1.0 / variance
+    for j in range(N):
+        state[j] += ph[j] * gain * innovation
     at = 0
     for j in range(N):
         for c in range(j, N):
-            packed[at] -= full[N * j + i] * gain * full[N * i + c]
+            packed[at] -= ph[j] * gain * ph[c]
             at += 1
+    packed[at] += innovation * gain * innovation
+    packed[at + 1] += 1.0
+
+
+@kernel
+def derivative(i: int, delay: float, state: Vector, h: Vector) -> float:
+    """h of the measured value i, and by how much a late position is ahead of the one measured."""
+    for j in range(MOVING):
+        h[j] = 1.0 if j == i else 0.0
+    if i > 1:
+        return 0.0
+    c, s = cos_sin(state[2])
+    ahead, aside = (c, -s) if i == 0 else (s, c)  # (u, v) on the axis of this value
+    h[2] = -delay * (state[3] * aside - state[4] * ahead)
+    h[3], h[4] = -delay * ahead, -delay * aside
+    return delay * (state[3] * ahead + state[4] * aside)
 
 
 @kernel
@@ -115,6 +148,7 @@ class ExtendedKalmanFilter(Estimator):
     q_b_psi: float = value(0.05, "N m/sqrt(s)", "how fast the load's moment wanders", ge=0)
     sigma_b: float = value(1.0, "N", "standard deviation of the force at the start", ge=0)
     sigma_b_psi: float = value(0.5, "N m", "standard deviation of the moment at the start", ge=0)
+    delay_p: float = value(0.0, "s", "age of a measured position when it is delivered", ge=0)
     sigma_p: float = value(0.02, "m", "standard deviation of a measured position, each axis", gt=0)
     sigma_psi: float = value(0.005, "rad", "standard deviation of a measured heading", gt=0)
     sigma_u: float = value(0.02, "m/s", "standard deviation of a measured surge velocity", gt=0)
@@ -123,8 +157,13 @@ class ExtendedKalmanFilter(Estimator):
 
     @property
     def states(self) -> tuple[Signal, ...]:
-        """The estimate, the load, the covariance."""
-        return (*ESTIMATE, *LOADS, *[COVARIANCE] * (N * (N + 1) // 2))
+        """The estimate, the load, the covariance, the innovations."""
+        return (*ESTIMATE, *LOADS, *[COVARIANCE] * PACKED, *INNOVATIONS)
+
+    @property
+    def covariance(self) -> tuple[int, int]:
+        """Behind the loads."""
+        return N, N
 
     def assumed_noise(self) -> tuple[tuple[str, float], ...]:
         """The standard deviations that measurements are taken to have."""
@@ -140,13 +179,14 @@ class ExtendedKalmanFilter(Estimator):
     @kernel
     def correct(seen: Vector, state: Vector, k: Any) -> None:
         """Take in what was delivered, one value after the other."""
-        sigma = scratch(6)
+        sigma, h = scratch(6), scratch(6)
         sigma[0], sigma[1], sigma[2] = k.sigma_p, k.sigma_p, k.sigma_psi
         sigma[3], sigma[4], sigma[5] = k.sigma_u, k.sigma_v, k.sigma_r
         for i in range(MOVING):
             if seen[FRESH + i] != 0.0:
-                innovation = seen[VALUE + i] - state[i]
-                take_in(i, wrap(innovation) if i == 2 else innovation, sigma[i], state)
+                late = derivative(i, k.delay_p, state, h)
+                innovation = seen[VALUE + i] - (state[i] - late)
+                take_in(h, wrap(innovation) if i == 2 else innovation, sigma[i], state)
 
     @staticmethod
     @kernel
@@ -167,7 +207,7 @@ class ExtendedKalmanFilter(Estimator):
         """The truth; of the load nothing is known but how large it may be."""
         force, moment = (self.sigma_b, self.sigma_b_psi) if self.bias else (0.0, 0.0)
         unsure = np.diag(np.square([0.0] * MOVING + [force, force, moment]))
-        return np.concatenate([x, np.zeros(3), unsure[np.triu_indices(N)]])
+        return np.concatenate([x, np.zeros(3), unsure[np.triu_indices(N)], np.zeros(2)])
 
     def needs(self) -> tuple[bool, ...]:
         """The pose; velocities are taken in where they are measured."""

@@ -1,0 +1,87 @@
+"""Metrics that hold an estimator's errors against the covariance that it believes in.
+
+Y. Bar-Shalom, X. R. Li, T. Kirubarajan, "Estimation with Applications to Tracking and Navigation",
+Wiley 2001, section 5.4: the squared error over its covariance (NEES) of a consistent filter has
+the mean 6 for a state of six numbers, the squared innovation over its variance (NIS) the mean 1
+for every measured value that is taken in by itself.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from podusv_cli.core.kernel import Vector, kernel, scratch, tail
+from podusv_cli.core.kinematics import wrap
+from podusv_cli.metrics.metric import Accumulator, Measured, Metric, add, ratio
+
+TIME, SQUARE, INTEGRALS = range(3)
+OPENED, SUM, COUNT, SUM_BEFORE, COUNT_BEFORE, SIZE = range(2 * INTEGRALS, 2 * INTEGRALS + 6)
+SIX = 6
+
+
+@kernel
+def factor(packed: Vector, order: int, lower: Vector) -> bool:
+    """Cholesky factor of the first six rows of a packed upper triangle; whether there is one."""
+    for i in range(SIX):
+        for j in range(i + 1):
+            total = packed[order * j - j * (j - 1) // 2 + i - j]
+            for c in range(j):
+                total -= lower[SIX * i + c] * lower[SIX * j + c]
+            if i == j and not total > 0.0:
+                return False
+            lower[SIX * i + j] = math.sqrt(total) if i == j else total / lower[SIX * j + j]
+    return True
+
+
+@kernel
+def squared(error: Vector, lower: Vector) -> float:
+    """error^T P^-1 error, with the factor of P."""
+    square = 0.0
+    for i in range(SIX):
+        for c in range(i):
+            error[i] -= lower[SIX * i + c] * error[c]
+        error[i] /= lower[SIX * i + i]
+        square += error[i] * error[i]
+    return square
+
+
+@kernel
+def watch(t: float, weight: float, s: Vector, k: Any, seen: Vector) -> None:
+    """Gather squared errors and squared innovations over the steady window."""
+    if t >= k.steady_from:
+        at, order = int(k.estimate), int(k.order)
+        after = at + int(k.covariance) + order * (order + 1) // 2
+        if seen[OPENED] == 0.0:
+            seen[OPENED], seen[SUM_BEFORE], seen[COUNT_BEFORE] = 1.0, s[after], s[after + 1]
+        seen[SUM], seen[COUNT] = s[after] - seen[SUM_BEFORE], s[after + 1] - seen[COUNT_BEFORE]
+        error, lower = scratch(6), scratch(36)
+        for i in range(SIX):
+            error[i] = s[at + i] - s[i]
+        error[2] = wrap(error[2])
+        if factor(tail(s, at + int(k.covariance)), order, lower):
+            add(seen, INTEGRALS, TIME, weight)
+            add(seen, INTEGRALS, SQUARE, weight * squared(error, lower))
+
+
+def _size(layout: Measured) -> int:
+    return SIZE if layout.plan.estimate and layout.loop.estimator.covariance[1] else 0
+
+
+def _constants(layout: Measured) -> dict[str, float]:
+    at, order = layout.loop.estimator.covariance
+    return {
+        "estimate": float(layout.plan.estimate), "covariance": float(at), "order": float(order),
+        "steady_from": layout.steady_from,
+    }  # fmt: skip
+
+
+OF = Accumulator(watch, _size, _constants, INTEGRALS)
+nees = Metric(
+    "nees", "1", "mean squared error of the estimate over its covariance, steady window; 6 where "
+    "the filter is consistent", OF, ratio(SQUARE, TIME), 7,
+)  # fmt: skip
+nis = Metric(
+    "nis", "1", "mean squared innovation over its variance, steady window; 1 where the filter is "
+    "consistent", OF, ratio(SUM, COUNT), 7,
+)  # fmt: skip
