@@ -24,8 +24,8 @@ PODS := kept dropped ideal no_anti_windup single
 ABLATIONS := ablation ablation_figures ablation_standoff ablation_gains ablation_gains_figures \
     ablation_gains_standoff ablation_pid
 TABLES := unknown:unknown_dynamics discrete:discrete_signals limits:period_limits learnt:learnt gains:fixed_gains
-SEAS := exact sensors sensors_alone current state_3 state_5 state_6 rare rare_told pods delay thruster_failure dead_zone
-STUDIES := hull_and_sea unknown_dynamics rivals sea_state_2 sea_state_4 sea_state_6
+SEAS := exact sensors sensors_alone current state_3 state_5 state_6 rare untold rare_untold pods delay thruster_failure dead_zone
+STUDIES := hull_and_sea unknown_dynamics rivals sea_state_4 sea_state_6 sea_untold
 SEARCHES := phases hull sensors network sliding
 COMPARISONS := printed_compare figures_compare figures_compare_standoff corrected_compare
 

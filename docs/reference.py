@@ -54,7 +54,7 @@ def pictures() -> Iterable[tuple[str, bytes]]:
         runs = [
             (name, podusv.simulate(one).recording, one)
             for name, one in scenario.singles().items()
-            if name in ("proposed", "pid")
+            if name in ("adaptive_neural", "pid")
         ]
         left = [name for name in FIGURES if f"{name}.png" not in drawn]
         drawn |= dict(draw(dressed(runs), left, ["png"]))

@@ -15,7 +15,7 @@ disturbance: {kind: harmonic}
 actuator: {kind: saturated}
 controllers:
   pid: {kind: pid}
-  li: {kind: backstepping}
+  li: {kind: full_backstepping}
 simulation: {duration: 1.0, step: 0.02}
 sweep:
   seed: 7

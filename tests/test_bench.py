@@ -20,7 +20,7 @@ from podusv_cli.studies.bench.standing import leaderboard, middle, profile, tabl
 
 LAYERS = {
     "laws.yaml": "vessel: {preset: paper_nonlinear}\n"
-    "controllers: {pid: {kind: pid}, li: {kind: backstepping}}\n"
+    "controllers: {pid: {kind: pid}, li: {kind: full_backstepping}}\n"
     "simulation: {step: 0.02, duration: 2.0}\nmetrics: {settling_radius: 30.0}\n"
     "start: {x: -10.0, y: -10.0}\nactuator: {kind: saturated}\n",
     "tasks/line.yaml": "path: {kind: line}\n",

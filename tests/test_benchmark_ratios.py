@@ -45,7 +45,7 @@ def test_a_run_takes_less_time_than_in_plain_c(level, case):
     assert ratios["podusv with metrics / C -O3"] < 1.0
 
 
-@pytest.mark.parametrize("law", ["adaptive_neural", "dsc", "backstepping", "pid"])
+@pytest.mark.parametrize("law", ["adaptive_neural", "dsc", "full_backstepping", "pid"])
 def test_a_run_of_the_usual_size(level, law):
     ratios = level(Case(law, "" if law == "pid" else "27 grid"))
     assert ratios["podusv / C -O3"] <= 0.8

@@ -20,7 +20,7 @@ CONTINUOUS = {n: k for n, k in kinds("controllers").items() if not example(k).ta
 MIRRORED = {name: kind for name, kind in kinds("controllers").items() if name != "schedule"}
 # Without the kink at the edge of the boundary layer, which no order survives.
 WITHIN_LAYER = {"sliding_mode": {"phi": 10.0}}
-FAST = dict.fromkeys(("adaptive_neural", "dsc", "backstepping", "pid"), 0.002)  # s
+FAST = dict.fromkeys(("adaptive_neural", "dsc", "full_backstepping", "pid"), 0.002)  # s
 
 
 def smooth(law: Any) -> ClosedLoop:

@@ -11,16 +11,16 @@ from pydantic import ValidationError
 
 from podusv_cli.components.actuators.saturated import Saturated
 from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
-from podusv_cli.components.controllers.backstepping import Backstepping
 from podusv_cli.components.controllers.crab import SWAY, observe_sway, on_path, take_aim
 from podusv_cli.components.controllers.dsc import DynamicSurface
+from podusv_cli.components.controllers.full_backstepping import FullBackstepping
 from podusv_cli.components.controllers.pid import Pid
 from podusv_cli.components.paths.circle import Circle
 from podusv_cli.components.paths.line import Line
 from podusv_cli.components.vessels.plant import plant, sway_force
 from podusv_cli.core.kernel import bundle
 
-KINDS = (AdaptiveNeural, DynamicSurface, Backstepping, Pid)
+KINDS = (AdaptiveNeural, DynamicSurface, FullBackstepping, Pid)
 
 
 def crab(kind: Any, **fields: Any) -> Any:

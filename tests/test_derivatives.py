@@ -10,7 +10,11 @@ import sympy as sp
 from conftest import NONLINEAR, PAPER, Situation, situations
 from mpmath import mp
 
-from podusv_cli.components.controllers.backstepping import Backstepping, alpha_r_rate, alpha_u_rate
+from podusv_cli.components.controllers.full_backstepping import (
+    FullBackstepping,
+    alpha_r_rate,
+    alpha_u_rate,
+)
 from podusv_cli.components.controllers.tracking import track
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.kernel import Vector, bundle
@@ -52,7 +56,7 @@ def reference(preset: str) -> Callable[..., tuple[Any, Any]]:
     return sp.lambdify(arguments, [along(alpha_u), along(alpha_r)], "mpmath")  # type: ignore
 
 
-def both(law: Backstepping, p: Vessel, at: Situation, tau_u: float) -> tuple[Any, Any, float]:
+def both(law: FullBackstepping, p: Vessel, at: Situation, tau_u: float) -> tuple[Any, Any, float]:
     """The kernels' rates, sympy's, and the half turn of the folding."""
     k = bundle(law.constants_with(p))
     e = track(at.x, at.memory, at.target, k)
@@ -68,7 +72,7 @@ def both(law: Backstepping, p: Vessel, at: Situation, tau_u: float) -> tuple[Any
 @pytest.mark.parametrize("fold", ["none", "joint", "printed"])
 @pytest.mark.parametrize("p", [PAPER, NONLINEAR], ids=["paper", "paper_nonlinear"])
 def test_rates_are_those_along_the_nominal_flow(p, fold):
-    law = Backstepping(fold=fold, **GAINS)
+    law = FullBackstepping(fold=fold, **GAINS)
     turned = 0
     for at in situations(law, 60):
         found, expected, half_turn = both(law, p, at, tau_u=3.7)
@@ -78,7 +82,7 @@ def test_rates_are_those_along_the_nominal_flow(p, fold):
 
 
 def test_the_yaw_rate_feels_the_surge_force_that_was_just_asked_for():
-    law = Backstepping(**GAINS)
+    law = FullBackstepping(**GAINS)
     at = next(situations(law, 1))
     low, high = (both(law, NONLINEAR, at, tau_u) for tau_u in (0.0, 50.0))
     assert low[0][0] == high[0][0]
@@ -86,7 +90,7 @@ def test_the_yaw_rate_feels_the_surge_force_that_was_just_asked_for():
     np.testing.assert_allclose(high[0], high[1], rtol=1e-12)
 
 
-def candidate(law: Backstepping, x: Vector, target: Vector) -> float:
+def candidate(law: FullBackstepping, x: Vector, target: Vector) -> float:
     """The part of (46) that does not adapt, with beta = alpha."""
     e = track(x, np.zeros(60), target, bundle(law.constants_with(NONLINEAR)))
     u_e, r_e = x[3] - e.alpha_u, x[5] - e.alpha_r

@@ -146,7 +146,9 @@ def test_the_numbers_of_the_pods_are_the_committed_ones() -> None:
     for row in rows("docs/pod.md")[:3]:
         name = row[0].split("`")[1]
         table = pd.read_csv(ROOT / f"results/pod/{name}/comparison.csv", index_col=0)
-        found = table.loc["iae", ["proposed", "dsc", "li", "pid"]].astype(float)
+        found = table.loc["iae", ["adaptive_neural", "dsc", "full_backstepping", "pid"]].astype(
+            float
+        )
         assert row[1:] == [f"{number:.0f}" for number in found]
 
 

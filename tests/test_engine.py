@@ -25,7 +25,7 @@ from hypothesis import strategies as st
 
 from podusv_cli.components.actuators.saturated import Saturated
 from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
-from podusv_cli.components.controllers.backstepping import Backstepping
+from podusv_cli.components.controllers.full_backstepping import FullBackstepping
 from podusv_cli.components.controllers.pid import Pid
 from podusv_cli.components.disturbances.calm import Calm
 from podusv_cli.components.disturbances.harmonic import HarmonicDisturbance
@@ -126,7 +126,7 @@ def test_whole_steps_are_found_and_nothing_else(steps, step):
 
 def test_every_row_is_one_instant():
     """Each column of a row belongs to the row's own time and state, not to a stage in between."""
-    law = Backstepping()
+    law = FullBackstepping()
     told, start = VESSELS["cybership2"], SMOOTH_START
     loop = corrected(controller=law, nominal=told, actuator=Saturated(), start=start)
     out = run(loop, 0.5, compiled=False)

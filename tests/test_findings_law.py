@@ -175,6 +175,10 @@ def test_a_held_feedback_is_an_euler_step_of_the_period(count):
 
 SENSORS = "measurement={kind: sensors}"
 FILTER = "estimator={kind: ekf}"
+LATE, TOLD_LATE = (
+    "measurement={kind: sensors, position: {delay: 0.1}}",
+    FILTER[:-1] + ", delay_p: 0.1}",
+)
 
 
 def sea(*kinds):
@@ -204,6 +208,11 @@ CASES = [  # code, its key, overrides with it, and without
     ("estimator-noise", "estimator.sigma_psi", [SENSORS, SIGMA % 0.011], [SENSORS, SIGMA % 0.009]),
     ("estimator-noise", "estimator.sigma_psi", [SENSORS, SIGMA % 0.011],
      [SENSORS, SIGMA % 0.011, sea("{kind: waves, height: 0.02, period: 2}")]),
+    ("estimator-delay", "estimator.delay_p",
+     [LATE, FILTER],
+     [LATE, TOLD_LATE]),
+    ("estimator-delay", "estimator.delay_p", [SENSORS, TOLD_LATE],
+     [LATE, "estimator={kind: low_pass}"]),
     ("steep-waves", "disturbance[0].height", [WAVES % 0.5], [WAVES % 0.05]),
     ("few-components", "disturbance[0].components",
      [sea("{kind: waves, height: 0.05, period: 1, components: 69}")],  # 3.5 times 20 periods: 70

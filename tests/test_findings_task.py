@@ -54,7 +54,7 @@ def test_a_corner_of_the_path_is_told_and_the_virtual_speed_jumps():
 
 
 def test_a_bend_of_the_path_is_told_and_only_a_law_with_accelerations_steps():
-    path, law = turning("velocity"), "controller={kind: backstepping}"
+    path, law = turning("velocity"), "controller={kind: full_backstepping}"
     assert codes(path) & {"path-jump", "path-corner", "path-bend"} == {"path-bend"}
     assert "0.015 m/s2 at 15 s" in finding("path-bend", path).text
     out = log(path, law, ON_TARGET)
@@ -286,7 +286,7 @@ def test_the_printed_sign_asks_for_more_than_the_printed_gains():
 
 def test_every_law_with_a_lyapunov_function_has_its_line():
     assert [line.partition(",")[0] for line in said("corrected_compare")] == [
-        "proposed", "dsc", "li",
+        "adaptive_neural", "dsc", "full_backstepping",
     ]  # fmt: skip
 
 

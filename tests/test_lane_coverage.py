@@ -25,7 +25,12 @@ from podusv_cli.scenario.load import load
 
 GRID = TimeGrid(0.01, 200)
 LAWS = kinds("podusv_cli.components.controllers", Controller)
-TESTED = ("adaptive_neural", "pid", "dsc", "backstepping")  # by `test_lanes`, with its actuators
+TESTED = (
+    "adaptive_neural",
+    "pid",
+    "dsc",
+    "full_backstepping",
+)  # by `test_lanes`, with its actuators
 QUICK = ("zigzag", "schedule")  # samples, and a table; the compiler takes seconds for others
 SCENARIOS = ("sea/delay", "sea/dead_zone", "sea/sensors", "sea/state_4", "sea/pods",
              "sea/thruster_failure", "pod/kept", "pod/single")  # fmt: skip
@@ -92,7 +97,7 @@ def test_numbers_of_paths_and_currents_differ_from_run_to_run() -> None:
 @pytest.mark.parametrize("name", but_quick(SCENARIOS, ("sea/delay",)))
 def test_a_sea_with_all_that_belongs_to_it_marches_side_by_side(name: str) -> None:
     """A scenario that podusv ships, from other starts."""
-    scenario = load(ROOT / "configs" / f"{name}.yaml").scenario.singles()["proposed"]
+    scenario = load(ROOT / "configs" / f"{name}.yaml").scenario.singles()["adaptive_neural"]
     base = scenario.closed_loop()
     together, alone = both(spread(base), replace(scenario.time_grid(), steps=200))
     same(together, alone)

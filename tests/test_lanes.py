@@ -29,7 +29,7 @@ from podusv_cli.metrics.table import observer
 from podusv_cli.scenario.load import load
 
 ROOT = Path(__file__).resolve().parent.parent
-SLOW = [pytest.param(law, marks=pytest.mark.slow) for law in ("dsc", "backstepping")]
+SLOW = [pytest.param(law, marks=pytest.mark.slow) for law in ("dsc", "full_backstepping")]
 GRID = TimeGrid(0.01, 400)
 COUNT = 11  # a whole bundle, and one with lanes left over
 SCENARIO = load(ROOT / "configs" / "paper" / "corrected.yaml").scenario

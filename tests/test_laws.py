@@ -10,15 +10,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural, shunting_rate
-from podusv_cli.components.controllers.backstepping import Backstepping, alpha_r_rate, alpha_u_rate
 from podusv_cli.components.controllers.dsc import DynamicSurface
+from podusv_cli.components.controllers.full_backstepping import (
+    FullBackstepping,
+    alpha_r_rate,
+    alpha_u_rate,
+)
 from podusv_cli.components.controllers.network import activation
 from podusv_cli.components.controllers.pid import Pid
 from podusv_cli.components.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.components.controllers.tracking import Tracking, track
 from podusv_cli.core.kernel import Vector, bundle
 
-POLAR = (AdaptiveNeural, DynamicSurface, Backstepping)
+POLAR = (AdaptiveNeural, DynamicSurface, FullBackstepping)
 UNEQUAL = {
     "k_ue": 3.0, "k_re": 30.0, "Gamma_u": 90.0, "Gamma_r": 80.0, "sigma_u": 0.2, "sigma_r": 0.3,
     "gamma_u": 700.0, "gamma_r": 600.0, "sigma_bu": 0.02, "sigma_br": 0.03, "b_hat_u0": 0.1,
@@ -91,7 +95,7 @@ def test_demand_and_adaptation_are_26_to_28_and_35_to_37(kind):
         )
         W_rate = Gamma[:, None] * (np.outer(error * m, Phi) - sigma[:, None] * W_hat)
         np.testing.assert_allclose(found.rate[4:58], W_rate.ravel(), rtol=1e-12, atol=1e-12)
-        if kind is not Backstepping:
+        if kind is not FullBackstepping:
             np.testing.assert_allclose(found.rate[58:], beta_dot, rtol=1e-12)
         assert not found.rate[:2].any()
         said = [found.signals[name] for name in ("u_e", "r_e", "f_hat_u", "f_hat_r")]
@@ -105,7 +109,7 @@ def test_the_sign_of_the_coupling_changes_its_own_terms_only(kind):
         (one, e), (other, _) = evaluate(printed, at), evaluate(right, at)
         surge = -2 * e.z_e * math.cos(e.psi_e)
         yaw = -2 * e.psi_e
-        if kind is Backstepping:
+        if kind is FullBackstepping:
             # The surge force asked for is part of the derivative of alpha_r.
             sine = math.sin(e.psi_e - e.half_turn)
             yaw += NONLINEAR.m33 * surge / NONLINEAR.m11 * sine / e.distance
@@ -190,7 +194,7 @@ def test_a_law_works_where_the_direction_is_held(kind):
 
 
 def test_while_held_the_full_law_s_derivatives_are_those_of_a_fixed_direction():
-    law = Backstepping(hold_below=2.0, k_psie=0.7)
+    law = FullBackstepping(hold_below=2.0, k_psie=0.7)
     x, target = np.array([0, 0, 0.1, 0.3, 0.1, 0.2]), np.array([0.9, 0.3, 0.5, 0.1, 0, 0])
     memory = law.start(x, target, NONLINEAR)
     k = bundle(law.constants_with(NONLINEAR))

@@ -12,11 +12,12 @@ from podusv_cli.comparison.claims import parse_claims
 from podusv_cli.components.actuators.pod import Pod, Pods
 from podusv_cli.components.actuators.saturated import Saturated
 from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
-from podusv_cli.components.controllers.backstepping import Backstepping
+from podusv_cli.components.controllers.full_backstepping import FullBackstepping
 from podusv_cli.components.controllers.pid import Pid
 from podusv_cli.components.controllers.stopping import Stopping
 from podusv_cli.components.controllers.turning_circle import TurningCircle
 from podusv_cli.components.controllers.zigzag import Zigzag
+from podusv_cli.components.estimators.ekf import ExtendedKalmanFilter
 from podusv_cli.components.estimators.none import NoEstimator
 from podusv_cli.components.measurements.sensors import Sensors
 from podusv_cli.components.paths.line_circle import LineCircle
@@ -119,6 +120,32 @@ def test_errors_of_the_estimate_follow_their_definitions(compiled):
     assert got["estimate_heading_rms"] == rms("psi")
     assert got["estimate_velocity_rms"] == rms("u", "v")
     assert got["estimate_yaw_rate_rms"] == rms("r")
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_consistency_of_a_filter_follows_its_definition(compiled):
+    """e^T P^-1 e and innovations over the steady window, from the log by numpy."""
+    loop = corrected(measurement=Sensors(), estimator=ExtendedKalmanFilter())
+    log, got = gathered(loop, steps=200, compiled=compiled, steady_fraction=0.25)
+    late = log["time"] >= 1.5 - 1e-9
+    names = ("x", "y", "psi", "u", "v", "r")
+    error = np.transpose([log[f"{name}_est"] - log[name] for name in names])
+    P = np.zeros((len(late), 9, 9))
+    above = np.triu_indices(9)
+    P[:, above[0], above[1]] = P[:, above[1], above[0]] = log["P_est"]
+    square = np.einsum(
+        "ni,ni->n",
+        error,
+        np.linalg.solve(P[:, :6, :6] + 1e-30 * np.eye(6), error[..., None])[..., 0],
+    )
+    t = log["time"][late]
+    weight = np.full(late.sum(), 0.01)
+    weight[-1] = 0.005
+    assert got["nees"] == pytest.approx((weight * square[late]).sum() / weight.sum(), rel=1e-6)
+    taken, count = (np.ptp(log[name][late]) for name in ("nis_sum", "nis_count"))
+    assert got["nis"] == pytest.approx(taken / count, rel=1e-12)
+    assert t[0] == pytest.approx(1.5)
+    assert 0.1 < got["nis"] < 5.0
 
 
 def test_a_run_without_sensors_has_no_errors_of_an_estimate(limited):
@@ -254,7 +281,7 @@ def test_every_metric_is_computed_and_documented(limited):
     _, of_pods = gathered(corrected(actuator=example(Pods)), steps=10)
     trials = [corrected(controller=kind()) for kind in (TurningCircle, Zigzag, Stopping)]
     of_trials = {name for trial in trials for name in gathered(trial, steps=10)[1]}
-    seeing = corrected(measurement=Sensors(), estimator=NoEstimator())
+    seeing = corrected(measurement=Sensors(), estimator=ExtendedKalmanFilter())
     of_estimates = set(gathered(seeing, steps=10)[1])
     always = {name for name in METRICS if NAMED not in name}
     compared = {metric.name for metric in OF_OPTIMUM.values()}  # known to comparisons only
@@ -267,7 +294,7 @@ def test_every_metric_is_computed_and_documented(limited):
 @pytest.mark.benchmark
 def test_full_derivatives_cost_more_than_pid():
     """A replay that timed nothing would not tell the cheapest law from the dearest."""
-    dear, cheap = corrected(controller=Backstepping()), corrected(controller=Pid())
+    dear, cheap = corrected(controller=FullBackstepping()), corrected(controller=Pid())
     costs = law_costs([(loop, gathered(loop, steps=500)[0]) for loop in (dear, cheap)])
     assert costs[0]["law_ns"] > 1.3 * costs[1]["law_ns"] > 0
 
@@ -318,6 +345,7 @@ def test_an_error_over_a_window_follows_its_definition(run):
         rms = np.sqrt(np.trapezoid(z_e[inside] ** 2, t[inside]) / np.ptp(t[inside]))
         assert got[f"error_{name}_rms"] == pytest.approx(rms, rel=1e-12)
         assert got[f"error_{name}_max"] == z_e[inside].max()
+        assert got[f"e_{name}_max"] == abs(z_e[inside] - 0.5).max()
 
 
 def test_a_further_radius_has_the_settling_time_of_that_radius(run):

@@ -58,10 +58,14 @@ def test_nodes_cost_the_same_in_every_law_that_has_them():
     more = {name: many[name] - few[name] for name in few}
     assert more["pid"] == 0
     assert (
-        more["proposed"] == more["dsc"] == more["li"] > 117 * 2 * 4
+        more["adaptive_neural"] == more["dsc"] == more["full_backstepping"] > 117 * 2 * 4
     )  # f_hat, and both adaptations
     # the law without a filter differentiates its virtual controls instead
-    assert few["li"] - few["proposed"] == many["li"] - many["proposed"] > 0
+    assert (
+        few["full_backstepping"] - few["adaptive_neural"]
+        == many["full_backstepping"] - many["adaptive_neural"]
+        > 0
+    )
 
 
 # --- what methods gave last is used again for the very same objects only

@@ -22,6 +22,7 @@ from podusv_cli.scenario.load import load
 from podusv_cli.workflows import compare, run
 
 ROOT = Path(__file__).parent.parent
+FULL = "full_backstepping"
 NAMES = ("printed_compare", "figures_compare", "figures_compare_standoff", "corrected_compare")
 LETTERS = dict(zip("PFSC", NAMES, strict=True))  # as results/README.md calls them
 SOON = ("corrected_compare",)  # in `make test` already
@@ -92,7 +93,7 @@ def rerun(scenario):
     return Entry("", run, scenario)
 
 
-def signs(letter, sets, laws=("proposed", "li", "pid")):
+def signs(letter, sets, laws=("adaptive_neural", "full_backstepping", "pid")):
     """Claim and sign of a comparison with some keys set anew."""
     loaded = load(ROOT / f"configs/paper/{LETTERS[letter]}.yaml", sets)
     entries = {name: rerun(loaded.scenario.singles()[name]) for name in laws}
@@ -100,7 +101,11 @@ def signs(letter, sets, laws=("proposed", "li", "pid")):
         parsed
         for parsed in parse_claims(loaded)
         if parsed.name != "C14"
-        and not any(f"{law}." in parsed.claim.expect for law in ("li", "pid") if law not in laws)
+        and not any(
+            f"{law}." in parsed.claim.expect
+            for law in ("full_backstepping", "pid")
+            if law not in laws
+        )
     ]
     return {v.name: SIGNS[v.verdict] for v in judge(told, entries)}
 
@@ -154,7 +159,7 @@ def test_the_readme_tells_the_committed_verdicts():
 )
 def test_a_law_that_is_not_bounded_is_told(letter, keys, claim):
     assert committed(letter)[claim] == "+"
-    assert signs(letter, keys, laws=("proposed",))[claim] == "-"
+    assert signs(letter, keys, laws=("adaptive_neural",))[claim] == "-"
 
 
 def test_weights_that_take_a_sample_before_the_demand_do_not_cycle():
@@ -163,13 +168,13 @@ def test_weights_that_take_a_sample_before_the_demand_do_not_cycle():
         "control.update=before",
         "controller.first_difference=from_start",
     )
-    assert signs("S", keys, laws=("proposed",))["C11c"] == "+"
+    assert signs("S", keys, laws=("adaptive_neural",))["C11c"] == "+"
 
 
 def test_with_narrow_nodes_the_heading_creeps_to_a_right_angle_and_the_run_diverges():
     keys = ("controller.network.spread=0.4", "simulation.duration=1240")
     scenario = load(ROOT / "configs/paper/figures_compare_standoff.yaml", keys).scenario
-    assert rerun(scenario.singles()["proposed"]).ending.startswith("diverged at t = 785.")
+    assert rerun(scenario.singles()["adaptive_neural"]).ending.startswith("diverged at t = 785.")
 
 
 # --- results/claim.md tells the committed tables, and a few of these are made anew
@@ -178,7 +183,7 @@ PAPER = ROOT / "results/paper"
 CLAIM = (ROOT / "results/claim.md").read_text()
 ABLATIONS = {"F": "ablation_figures", "S": "ablation_standoff", "C": "ablation"}
 LAWS = (
-    "proposed", "one_node", "nodes_8", "nodes_125", "no_bounds", "no_network", "neither",
+    "adaptive_neural", "one_node", "nodes_8", "nodes_125", "no_bounds", "no_network", "neither",
     "high_gain", "equal_gain_1", "equal_gain_27",
 )  # fmt: skip
 
@@ -224,7 +229,7 @@ def test_parts_switched_off() -> None:
 
 def test_pid_without_windup() -> None:
     table = pd.read_csv(PAPER / "ablation_pid/comparison.csv", index_col=0)
-    laws = ("proposed", "pid", "pid_no_integral", "pid_anti_windup")
+    laws = ("adaptive_neural", "pid", "pid_no_integral", "pid_anti_windup")
     for law, (_, error, settled, energy) in zip(laws, rows("PID"), strict=True):
         found = table[law]
         assert same(error, found["iae_e"])
@@ -242,28 +247,39 @@ def test_what_the_networks_learn() -> None:
 def test_wrong_vessels() -> None:
     table = pd.read_csv(PAPER / "unknown_dynamics.csv", index_col=[0, 1])
     error = table["iae_e"].unstack()[
-        ["proposed", "dsc", "li", "pid", "no_adaptation", "equal_gain"]
+        ["adaptive_neural", "dsc", "full_backstepping", "pid", "no_adaptation", "equal_gain"]
     ]
     page = rows("Wrong vessels")
     assert len(page) == 12
     for name, *numbers in page:
         assert all(map(same, numbers, error.loc[name])), name
     change = (error[error.index.str.startswith("told")] / error.loc["as it is"] - 1).abs().max()
-    assert change["proposed"] < 0.004
+    assert change["adaptive_neural"] < 0.004
     assert change["equal_gain"] < 0.00003
     assert round(100 * change.max(), 2) == round(100 * change["no_adaptation"], 2) == 1.34
-    ratio = error["equal_gain"] / error["proposed"] - 1
+    ratio = error["equal_gain"] / error["adaptive_neural"] - 1
     assert ratio.abs().max() < 0.005
     assert ratio[ratio.index.str.startswith("true")].abs().max() < 0.0004
-    family = error[["proposed", "dsc", "li"]]
+    family = error[["adaptive_neural", "dsc", "full_backstepping"]]
     assert (family.max(axis=1) / family.min(axis=1) - 1).max() < 0.053
-    assert (len(error), int((error["li"] < error["proposed"]).sum())) == (43, 40)
+    assert (len(error), int((error["full_backstepping"] < error["adaptive_neural"]).sum())) == (
+        43,
+        40,
+    )
 
 
 @pytest.mark.parametrize("update", ["after", "before"])
 def test_sampled_control(update: str) -> None:
     table = pd.read_csv(PAPER / "discrete_signals.csv", index_col=[0, 1, 2])
-    columns = ["F proposed", "S proposed", "S dsc", "S li", "S pid", "C proposed", "C pid"]
+    columns = [
+        "F adaptive_neural",
+        "S adaptive_neural",
+        "S dsc",
+        "S full_backstepping",
+        "S pid",
+        "C adaptive_neural",
+        "C pid",
+    ]
     page = rows("Sampled control", which=("after", "before").index(update))
     assert len(page) == {"after": 6, "before": 5}[update]
     for period, *numbers in page:
@@ -290,11 +306,11 @@ def test_the_longest_period_is_the_predicted_one() -> None:
 def test_settled_velocity_errors_tell_the_gain() -> None:
     table = pd.read_csv(PAPER / "fixed_gains.csv", index_col=[0, 1])
     for law, *numbers in rows("Parts switched off", which=1):
-        name = "proposed" if law == "proposed" else f"k_{''.join(law.split()[1:-1])}"
+        name = "adaptive_neural" if law == "adaptive_neural" else f"k_{''.join(law.split()[1:-1])}"
         errors = (table.loc[r, name][e] for r in "CS" for e in ("rms_u_e", "rms_r_e"))
         assert all(same(told, 1e3 * error) for told, error in zip(numbers, errors, strict=True))
     for reading in "FSC":
-        ratio = table.loc[reading, "k_13208"] / table.loc[reading, "proposed"]
+        ratio = table.loc[reading, "k_13208"] / table.loc[reading, "adaptive_neural"]
         assert abs(ratio["rms_u_e"] - 1.0) < 0.003
         assert abs(ratio["rms_r_e"] - 1.0) < 0.003
 
@@ -310,13 +326,15 @@ def test_the_limit_of_pid_is_that_of_its_lag() -> None:
 def test_a_few_cases_come_out_again() -> None:
     claim = module()
     table = pd.read_csv(PAPER / "unknown_dynamics.csv", index_col=[0, 1])
-    cases = dict(claim.mismatched(claim.laws(claim.READINGS["C"])["proposed"]))
+    cases = dict(claim.mismatched(claim.laws(claim.READINGS["C"])["adaptive_neural"]))
     for name in ("told all of it +50 %", "true all of it -30 %"):
-        committed = dict(table.loc[name, "proposed"])
+        committed = dict(table.loc[name, "adaptive_neural"])
         assert claim.errors(cases[name]) == pytest.approx(committed, rel=1e-3)
     periods = pd.read_csv(PAPER / "discrete_signals.csv", index_col=[0, 1, 2, 3])
-    again = claim.cycle(claim.sampled(claim.READINGS["S"], 20, "after")["proposed"])
-    assert again == pytest.approx(dict(periods.loc["S", "proposed", "after", 0.01]), rel=1e-4)
+    again = claim.cycle(claim.sampled(claim.READINGS["S"], 20, "after")["adaptive_neural"])
+    assert again == pytest.approx(
+        dict(periods.loc["S", "adaptive_neural", "after", 0.01]), rel=1e-4
+    )
 
 
 # --- docs/laws.md compares the laws as the committed study of rivals has them
@@ -328,7 +346,7 @@ ROWS = {
     "`velocity_vector`": "velocity_vector", "`adrc`": "adrc", "`hand_position`": "hand_position",
     "`sliding_mode`": "sliding_mode", "`sliding_mode`, `super_twisting`": "super_twisting",
     "`alos`": "alos", "`alos`, `integral`": "ilos", "`los_pid`": "los_pid", "`pid`": "pid",
-    "`adaptive_neural`": "adaptive_neural", "`dsc`": "dsc", "`backstepping`": "backstepping",
+    "`adaptive_neural`": "adaptive_neural", "`dsc`": "dsc", "`full_backstepping`": FULL,
     "`adaptive_neural` as published": "adaptive_neural_published",
     "`pid` as published": "pid_published", "`adaptive_neural`, `crab`": "adaptive_crab",
     "`adaptive_neural`, `crab`, `k_ze` 0.2, `k_psie` 0.5": "adaptive_crab_tuned",

@@ -51,12 +51,12 @@ def test_the_findings_are_those_of_the_runs():
     assert f"{pods[0]} to {pods[-1]} of 32 cases" in WORDS
     assert {count(law, "condition in ('calm', 'sea', 'sampled')") for law in hand} == {0}
     assert [count(law, "condition == 'pod' and vessel == 'otter'") for law in hand] == [0, 1, 1, 1]
-    family = ("dsc", "li", "proposed", "proposed_crab")
+    family = ("dsc", "full_backstepping", "adaptive_neural", "adaptive_neural_crab")
     sampled = [count(law, "condition == 'sampled'") for law in family]
     assert f"in {min(sampled)} to {max(sampled)} of 32 cases, PID in one" in WORDS
     assert count("pid", "condition == 'sampled'") == 1
     corners = "task in ('lawnmower', 'square')"
-    assert f"fails in {count('li', corners)} of 56 cases" in WORDS
+    assert f"fails in {count('full_backstepping', corners)} of 56 cases" in WORDS
     assert f"`dsc` in {count('dsc', corners)}." in WORDS
     assert count("velocity_vector", "task == 'station' and condition == 'pod'") == 3
     resting = count("los_pid", "task == 'station'")
@@ -97,7 +97,7 @@ def test_the_ranks_by_condition_are_those_of_the_runs(law, condition, told):
 # --- tuned gains
 
 TUNED = pd.read_csv(RESULTS / "bench" / "tuned_runs.csv")
-RENAMED = {"adaptive_neural": "proposed", "adaptive_crab": "proposed_crab", "backstepping": "li"}
+RENAMED = {"adaptive_crab": "adaptive_neural_crab"}
 
 
 def test_the_tuned_laws_have_the_gains_that_were_found():
@@ -128,7 +128,9 @@ def test_the_table_of_tuned_gains_is_that_of_the_runs():
     np.testing.assert_allclose(TUNED.ratio, done / best, rtol=1e-5)
 
 
-@pytest.mark.parametrize(("law", "told"), [("proposed", 37), ("dsc", 40), ("li", 39)])
+@pytest.mark.parametrize(
+    ("law", "told"), [("adaptive_neural", 37), ("dsc", 40), ("full_backstepping", 39)]
+)
 def test_what_the_paper_s_laws_gain_is_what_the_page_says(law, told):
     place = ["task", "condition"]
     before, after = (
@@ -142,13 +144,12 @@ def test_what_the_paper_s_laws_gain_is_what_the_page_says(law, told):
 def test_behind_pods_and_at_rest_tuned_laws_fail_where_the_page_says():
     lost = TUNED[TUNED.status != "finished"]
     pods = lost[lost.condition == "pod"].groupby("law").size()
-    assert pods[["adrc_tuned", "dsc_tuned", "li_tuned", "adrc", "hand_position"]].tolist() == [
-        8, 8, 8, 2, 7,
-    ]  # fmt: skip
-    assert pods["proposed_tuned"] == len(lost[lost.law == "proposed_tuned"]) == 2
-    assert not {"hand_position_tuned", "dsc", "li"} & set(pods.index)
-    assert set(lost[lost.law == "proposed_crab_tuned"].task) == {"station"}
-    assert len(lost[lost.law == "proposed_crab_tuned"]) == 7
+    laws = ["adrc_tuned", "dsc_tuned", "full_backstepping_tuned", "adrc", "hand_position"]
+    assert pods[laws].tolist() == [8, 8, 8, 2, 7]
+    assert pods["adaptive_neural_tuned"] == len(lost[lost.law == "adaptive_neural_tuned"]) == 2
+    assert not {"hand_position_tuned", "dsc", "full_backstepping"} & set(pods.index)
+    assert set(lost[lost.law == "adaptive_neural_crab_tuned"].task) == {"station"}
+    assert len(lost[lost.law == "adaptive_neural_crab_tuned"]) == 7
 
 
 # --- optima
@@ -261,7 +262,7 @@ def test_the_total_variations_behind_sensors_are_those_of_the_fresh_draws():
 
 STUDIES = RESULTS.parent / "configs" / "studies"
 STUDIES_PAGE = (RESULTS / "studies.md").read_text()
-LAWS = {"proposed": "proposed", "DSC": "dsc", "Li": "li", "PID": "pid"}
+LAWS = {law: law for law in ("adaptive_neural", "dsc", "full_backstepping", "pid")}
 ABLATED = LAWS | {"no adaptation": "no_adaptation"}
 HULLS, TOLD = STUDIES_PAGE.split("## True hull and told hull")
 
@@ -289,18 +290,18 @@ def test_the_table_of_laws_is_that_of_the_study(study, text, laws):
 
 def test_the_sentences_about_pairs_are_those_of_the_study():
     pairs = table("pairs.csv").query("metric == 'iae'").set_index(["a", "b"])
-    for b, wins, losses in (("pid", "77.5", "21.9"), ("li", "5.0", "73.1")):
-        found = pairs.loc["proposed", b]
+    for b, wins, losses in (("pid", "77.5", "21.9"), ("full_backstepping", "5.0", "73.1")):
+        found = pairs.loc["adaptive_neural", b]
         assert (f"{100 * found.a_wins:.1f}", f"{100 * found.b_wins:.1f}") == (wins, losses)
         assert wins in STUDIES_PAGE
         assert losses in STUDIES_PAGE
-    ratio = pairs.loc["proposed", "li"]
+    ratio = pairs.loc["adaptive_neural", "full_backstepping"]
     told = f"{ratio.ratio:.3f} [{ratio.ratio_low:.3f}, {ratio.ratio_high:.3f}]"
     assert told in " ".join(STUDIES_PAGE.split())
 
 
 def test_hulls_matter_less_than_the_start():
-    found = table("sensitivity.csv").query("metric == 'iae' and law == 'proposed'")
+    found = table("sensitivity.csv").query("metric == 'iae' and law == 'adaptive_neural'")
     by = found.set_index("quantity")["correlation"].abs()
     assert round(by["start.x"], 2) == 0.77
     hull = [q for q in by.index if not q.startswith(("start.", "disturbance."))]
@@ -315,7 +316,9 @@ def test_the_sentences_about_told_hulls_are_those_of_the_study():
         "U1": "reproduced", "U2": "not reproduced", "U3": "reproduced", "U4": "reproduced",
     }  # fmt: skip
     pairs = table("pairs.csv", "unknown_dynamics").query("metric == 'iae'").set_index(["a", "b"])
-    adapted, li, pid = (pairs.loc["proposed", law] for law in ("no_adaptation", "li", "pid"))
+    adapted, li, pid = (
+        pairs.loc["adaptive_neural", law] for law in ("no_adaptation", "full_backstepping", "pid")
+    )
     assert (adapted.n, adapted.a_wins, li.a_wins) == (2000, 1.0, 0.0)
     for one in (adapted, li):
         assert f"{one.ratio:.3f} [{one.ratio_low:.3f}, {one.ratio_high:.3f}]" in text
@@ -325,13 +328,13 @@ def test_the_sentences_about_told_hulls_are_those_of_the_study():
     assert f"better in {100 * pid.b_wins:.1f} % [{low:.1f}, {high:.1f}]" in text
     summary = table("summary.csv", "unknown_dynamics").query("metric == 'z_e_steady'")
     steady = summary.set_index("law")
-    assert steady.loc["proposed"].q95 < 0.502
+    assert steady.loc["adaptive_neural"].q95 < 0.502
     assert f"without adaptation the median is {steady.loc['no_adaptation'].q50:.2f} m" in text
 
 
 def test_what_the_laws_are_told_hardly_matters():
     found = table("sensitivity.csv", "unknown_dynamics").query("metric == 'iae'")
-    by = found[found.law == "proposed"].set_index("quantity")["correlation"].abs().round(2)
+    by = found[found.law == "adaptive_neural"].set_index("quantity")["correlation"].abs().round(2)
     told = [q for q in by.index if q.startswith(("nominal.", "told_"))]
     assert len(told) == 4
     assert by[told].max() <= 0.04
@@ -342,25 +345,31 @@ def test_what_the_laws_are_told_hardly_matters():
 def test_the_sentences_about_the_error_beyond_the_standoff_are_those_of_the_studies():
     text = " ".join(STUDIES_PAGE.split())
     hulls, told = (
-        table("pairs.csv", study).query("metric == 'iae_e'").set_index(["a", "b"]).loc["proposed"]
+        table("pairs.csv", study)
+        .query("metric == 'iae_e'")
+        .set_index(["a", "b"])
+        .loc["adaptive_neural"]
         for study in ("hull_and_sea", "unknown_dynamics")
     )
-    pid, li = hulls.loc["pid"], hulls.loc["li"]
+    pid, li = hulls.loc["pid"], hulls.loc["full_backstepping"]
     assert f"better in {100 * pid.a_wins:.1f} % and worse in {100 * pid.b_wins:.1f} %" in text
     assert f"by the error in {100 * li.b_wins:.1f} % and {100 * li.a_wins:.1f} %" in text
     assert f"the errors {li.ratio:.3f} [{li.ratio_low:.3f}, {li.ratio_high:.3f}]" in text
     assert (
         f"{100 * (li.ratio - 1):.0f} % worse in the median" in (RESULTS / "README.md").read_text()
     )
-    for law in ("no_adaptation", "li"):
+    for law in ("no_adaptation", "full_backstepping"):
         one = told.loc[law]
         assert f"{one.ratio:.3f} [{one.ratio_low:.3f}, {one.ratio_high:.3f}]" in text
-    assert f"with Li better in {100 * told.loc['li'].b_wins:.1f} %" in text
+    assert (
+        f"with full backstepping better in {100 * told.loc['full_backstepping'].b_wins:.1f} %"
+        in text
+    )
     assert told.loc["pid"].a_wins == 1.0
 
 
 def test_the_told_mass_sets_peak_demand_and_settled_error():
-    found = table("sensitivity.csv", "unknown_dynamics").query("law == 'proposed'")
+    found = table("sensitivity.csv", "unknown_dynamics").query("law == 'adaptive_neural'")
     by = found.set_index(["metric", "quantity"])["correlation"]
     told = " ".join(TOLD.split())
     assert f"the peak demand ({by['peak_tau_u', 'nominal.m']:.2f})" in told

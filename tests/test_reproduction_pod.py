@@ -16,7 +16,7 @@ NAMES = ("ideal", "kept", "dropped", "single", "no_anti_windup")
 SOON = (
     "single",
 )  # the others take half a minute, and what `make test` sees of them is in the lines
-LAWS = ["proposed", "dsc", "li", "pid"]
+LAWS = ["adaptive_neural", "dsc", "full_backstepping", "pid"]
 FOUND = (ROOT / "results/pod.md").read_text()
 
 
@@ -53,15 +53,15 @@ def test_the_table_in_words_is_the_committed_one():
 @pytest.mark.parametrize(
     ("name", "law", "metric", "unit", "told"),
     [
-        ("dropped", "proposed", "energy_pod", 1, "({} against "),
-        ("kept", "proposed", "energy_pod", 1, " against {} J)"),
-        ("dropped", "proposed", "angle_travel", 1, "({} against "),
-        ("kept", "proposed", "angle_travel", 1, " against {} rad)"),
-        ("dropped", "proposed", "at_angle_limit", 100, "for {} % of the time"),
-        ("kept", "proposed", "at_angle_limit", 100, "instead of {} %"),
+        ("dropped", "adaptive_neural", "energy_pod", 1, "({} against "),
+        ("kept", "adaptive_neural", "energy_pod", 1, " against {} J)"),
+        ("dropped", "adaptive_neural", "angle_travel", 1, "({} against "),
+        ("kept", "adaptive_neural", "angle_travel", 1, " against {} rad)"),
+        ("dropped", "adaptive_neural", "at_angle_limit", 100, "for {} % of the time"),
+        ("kept", "adaptive_neural", "at_angle_limit", 100, "instead of {} %"),
         ("no_anti_windup", "pid", "energy_pod", 1, "({} against "),
         ("kept", "pid", "energy_pod", 1, " against {} J)"),
-        ("no_anti_windup", "li", "peak_tau_u", 1e-3, "(up to {} kN)"),
+        ("no_anti_windup", "full_backstepping", "peak_tau_u", 1e-3, "(up to {} kN)"),
         ("single", "pid", "saturated_fraction", 100, "({} % of the time out of"),
     ],
 )
@@ -73,18 +73,18 @@ def test_a_number_in_the_text_is_the_committed_one(name, law, metric, unit, told
 def test_which_law_arrives_first_is_as_committed():
     settling = committed("kept").loc["settling_time", LAWS].astype(float)
     assert settling.idxmin() == "pid"
-    assert f"({settling['pid']:.1f} against {settling['proposed']:.1f} s)" in FOUND
+    assert f"({settling['pid']:.1f} against {settling['adaptive_neural']:.1f} s)" in FOUND
 
 
 @pytest.mark.parametrize(
-    ("name", "keys", "proposed", "pid"),
+    ("name", "keys", "adaptive_neural", "pid"),
     [pytest.param(*line, marks=[pytest.mark.slow] * (i % 4 > 0)) for i, line in enumerate(LINES)],
 )
-def test_what_the_findings_hang_on_comes_out(name, keys, proposed, pid):
+def test_what_the_findings_hang_on_comes_out(name, keys, adaptive_neural, pid):
     singles = load(
         ROOT / f"configs/pod/{name}.yaml", re.findall("`(.*?)`", keys)
     ).scenario.singles()
-    for law, told in (("proposed", proposed), ("pid", pid)):
+    for law, told in (("adaptive_neural", adaptive_neural), ("pid", pid)):
         iae = rerun(singles[law]).run.metrics["iae"]
         assert iae == pytest.approx(int(told), abs=0.6, rel=1e-3)
 
@@ -102,14 +102,14 @@ def test_the_lines_that_say_so_are_there():
     ],
 )
 def test_what_else_costs_at_the_propeller_comes_out(name, keys, told):
-    law = load(ROOT / f"configs/pod/{name}.yaml", keys).scenario.singles()["proposed"]
+    law = load(ROOT / f"configs/pod/{name}.yaml", keys).scenario.singles()["adaptive_neural"]
     assert told.format(round(rerun(law).run.metrics["energy_pod"])) in FOUND
 
 
 def test_unequal_thrust_holds_twice_the_disturbance_as_told():
     keys = ("disturbance.scale=2",)
-    law = load(ROOT / "configs/pod/kept.yaml", keys).scenario.singles()["proposed"]
+    law = load(ROOT / "configs/pod/kept.yaml", keys).scenario.singles()["adaptive_neural"]
     got = rerun(law).run.metrics
     assert f"limit for {100 * got['at_angle_limit']:.0f} % of the time" in FOUND
     assert f"(z_e {got['z_e_steady']:.3f} m, no more propeller energy" in FOUND
-    assert got["energy_pod"] < float(committed("kept").loc["energy_pod", "proposed"])
+    assert got["energy_pod"] < float(committed("kept").loc["energy_pod", "adaptive_neural"])

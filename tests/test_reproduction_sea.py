@@ -14,7 +14,14 @@ from podusv_cli.workflows import compare, run
 ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "results" / "sea.md").read_text()
 PERIODS = ("0.1", "0.5", "2.0")
-LAWS = ("velocity_vector", "proposed", "dsc", "li", "proposed_anti_windup", "pid")
+LAWS = (
+    "velocity_vector",
+    "adaptive_neural",
+    "dsc",
+    "full_backstepping",
+    "adaptive_neural_anti_windup",
+    "pid",
+)
 
 
 def study(state):
@@ -66,8 +73,10 @@ def failed(state, period, law):
 
 
 def test_how_often_a_law_that_is_told_of_the_loads_fails():
-    assert {failed(n, p, "proposed_anti_windup") for n in STUDIES for p in PERIODS[:2]} == {20}
-    rare = [failed(n, "2.0", "proposed_anti_windup") for n in STUDIES]
+    assert {failed(n, p, "adaptive_neural_anti_windup") for n in STUDIES for p in PERIODS[:2]} == {
+        20
+    }
+    rare = [failed(n, "2.0", "adaptive_neural_anti_windup") for n in STUDIES]
     assert "all draws at 10 and 2 Hz, and in {}, {} and {} of 20 at 0.5 Hz".format(*rare) in WORDS
 
 
@@ -90,8 +99,8 @@ def test_what_fewer_positions_cost_is_as_in_the_studies():
     def cost(state, law):
         return f"{largest(state, '2.0', law) - largest(state, '0.1', law):.0f}"
 
-    theirs, ours = ([cost(n, law) for n in STUDIES] for law in ("proposed", LAWS[0]))
-    assert "cost `proposed` {} and {} mm in states 2 and 4".format(*theirs) in WORDS
+    theirs, ours = ([cost(n, law) for n in STUDIES] for law in ("adaptive_neural", LAWS[0]))
+    assert "cost `adaptive_neural` {} and {} mm in states 2 and 4".format(*theirs) in WORDS
     assert "`velocity_vector` {}, {} and {} mm in states 2, 4 and 6".format(*ours) in WORDS
 
 
@@ -109,7 +118,9 @@ def number(name, law, metric):
     return float(SINGLE[name].loc[metric, law])
 
 
-@pytest.mark.parametrize("law", ["proposed", "dsc", "li", "pid", "velocity_vector"])
+@pytest.mark.parametrize(
+    "law", ["adaptive_neural", "dsc", "full_backstepping", "pid", "velocity_vector"]
+)
 def test_what_sensors_cost_is_as_in_the_comparisons(law):
     true, *seen = (number(n, law, "tv_tau_u") for n in ("exact", "sensors", "sensors_alone"))
     place = 2 if law in LAWS[:4] else 1
@@ -117,7 +128,9 @@ def test_what_sensors_cost_is_as_in_the_comparisons(law):
     assert [re.sub(r"^(\d) (\d{3})$", r"\1\2", cell) for cell in row(law, place)] == told
 
 
-@pytest.mark.parametrize("law", ["proposed", "dsc", "li", "pid", "velocity_vector"])
+@pytest.mark.parametrize(
+    "law", ["adaptive_neural", "dsc", "full_backstepping", "pid", "velocity_vector"]
+)
 def test_what_actuators_cost_is_as_in_the_comparisons(law):
     names = ("pods", "delay", "thruster_failure", "dead_zone")
     told = [
@@ -158,29 +171,33 @@ def test_what_is_said_of_remark_8_is_as_in_the_tables():
     demand = {
         (name, law): number(name, law, "tv_tau_u")
         for name in ("sensors", "sensors_alone")
-        for law in ("proposed", "dsc", "li")
+        for law in ("adaptive_neural", "dsc", "full_backstepping")
     }
-    filtered = 1.0 - demand["sensors", "proposed"] / demand["sensors", "li"]
-    alone = demand["sensors_alone", "proposed"] / demand["sensors_alone", "li"] - 1.0
+    filtered = 1.0 - demand["sensors", "adaptive_neural"] / demand["sensors", "full_backstepping"]
+    alone = (
+        demand["sensors_alone", "adaptive_neural"] / demand["sensors_alone", "full_backstepping"]
+        - 1.0
+    )
     medians = [
-        1.0 - STUDIES[2].loc[(p, "proposed", "tv_tau_u")].q50 / li.q50
+        1.0 - STUDIES[2].loc[(p, "adaptive_neural", "tv_tau_u")].q50 / li.q50
         for p in PERIODS
-        for li in [STUDIES[2].loc[(p, "li", "tv_tau_u")]]
+        for li in [STUDIES[2].loc[(p, "full_backstepping", "tv_tau_u")]]
     ]
     low, high = (100 * f(medians) for f in (min, max))
     assert f"the variation is {100 * filtered:.0f} % smaller where the measurements" in WORDS
     assert f"the medians of sea state 2 it is {low:.0f} to {high:.0f} % smaller" in WORDS
     assert f"no difference is seen ({100 * alone:.0f} % larger, one run)" in WORDS
     ratios = [
-        demand[name, "dsc"] / demand[name, "proposed"] for name in ("sensors", "sensors_alone")
+        demand[name, "dsc"] / demand[name, "adaptive_neural"]
+        for name in ("sensors", "sensors_alone")
     ]
     assert max(abs(ratio - 1.0) for ratio in ratios) < 0.02
 
 
 def test_a_dead_zone_costs_what_is_told():
-    ideal, dead = (number(name, "proposed", "tv_tau_u") for name in ("exact", "dead_zone"))
+    ideal, dead = (number(name, "adaptive_neural", "tv_tau_u") for name in ("exact", "dead_zone"))
     assert f"the demand's variation grows from {ideal:.0f} to {dead:.0f} N" in WORDS
-    off = [number(name, "proposed", "error_after_rms") for name in ("exact", "dead_zone")]
+    off = [number(name, "adaptive_neural", "error_after_rms") for name in ("exact", "dead_zone")]
     assert off[1] == pytest.approx(off[0], rel=1e-3)
 
 

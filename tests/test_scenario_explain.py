@@ -169,7 +169,7 @@ def test_a_key_says_everything_that_its_field_says():
     assert fraction.range == "> 0, <= 1"
     (kind,) = explain("controller.kind")
     assert (kind.default, kind.choices) == ("required", tuple(components("controllers")))
-    assert fold.kinds == ("adaptive_neural", "backstepping", "dsc", "pid")
+    assert fold.kinds == ("adaptive_neural", "dsc", "full_backstepping", "pid")
 
 
 def test_kinds_in_which_a_key_is_the_same_share_a_row():
@@ -349,7 +349,9 @@ def test_every_key_of_the_models_is_there_with_its_meaning_and_unit():
 
 def test_a_kind_is_one_word_and_a_preset_one_of_the_vessels():
     laws = sections(Scenario.model_fields["controller"].annotation)
-    assert {schema["const"] for schema in places(SCHEMA, ("controller", "kind"))} == set(laws)
+    words = [one.get("enum", [one.get("const")]) for one in places(SCHEMA, ("controller", "kind"))]
+    assert {names[0] for names in words} == set(laws)
+    assert [names for names in words if len(names) > 1] == [["full_backstepping", "backstepping"]]
     (preset,) = places(SCHEMA, ("vessel", "preset"))
     assert preset["enum"] == ["", *preset_names(SHIPPED)]
 

@@ -66,7 +66,7 @@ def test_faults_of_claims_are_told_at_their_name():
         "a.yaml:8:6: claims.C2.says: missing; must be text",
         "a.yaml:8:6: claims.C2.expect: missing; must be text",
         "a.yaml:8:7: claims.C2.sayz: unknown key; did you mean 'says'? "
-        "(allowed: says, source, expect, given, tolerance, remark)",
+        "(allowed: says, source, expect, given, tolerance, untestable, remark)",
         "a.yaml:8:24: claims.C2.source: must be text, found 2",
         "a.yaml:8:38: claims.C2.tolerance: must be a number not below 0 and below 1, found 1",
     ]

@@ -94,6 +94,13 @@ def test_every_bin_has_its_energy_and_one_rate():
     assert 4.0 * math.sqrt(np.sum(made.amplitude**2) / 2.0) == pytest.approx(2.0, rel=4e-3)
 
 
+def test_factors_of_random_amplitudes_are_exponential_with_mean_one():
+    drawn = spectra.rayleigh(100_000, 3, "test")
+    assert drawn.mean() == pytest.approx(1.0, abs=0.01)
+    assert drawn.var() == pytest.approx(1.0, abs=0.03)
+    assert np.mean(drawn > 2.0) == pytest.approx(math.exp(-2.0), abs=0.004)
+
+
 def test_bins_that_grow_do_so_by_one_factor():
     edges = spectra.growing_edges(0.002, 0.5, 30)
     np.testing.assert_allclose(edges[[0, -1]], [0.002, 0.5], rtol=1e-12)

@@ -11,8 +11,8 @@ from conftest import NONLINEAR, PAPER
 from matplotlib.axes import Axes
 
 from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
-from podusv_cli.components.controllers.backstepping import Backstepping
 from podusv_cli.components.controllers.dsc import DynamicSurface
+from podusv_cli.components.controllers.full_backstepping import FullBackstepping
 from podusv_cli.components.controllers.network import Network
 from podusv_cli.components.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.core.recording import Recording
@@ -93,7 +93,7 @@ def test_lambda_is_what_the_worst_direction_leaves(coupling, k):
         (AdaptiveNeural(A_u=5.0), 0.05),
         (DynamicSurface(T_u=0.2), 0.05),
         (DynamicSurface(T_u=2.0), 0.5),
-        (Backstepping(), 0.0),
+        (FullBackstepping(), 0.0),
         (AdaptiveNeural(coupling="printed"), 0.05 + 1.0 / 3.5),
     ],
 )
@@ -293,8 +293,8 @@ def test_nearest_node_of_a_list_of_centres_far_from_all_of_them():
 
 
 def test_law_without_a_filter_has_no_filter_error(tmp_path):
-    request = Request(("simulation.duration=1", "controller={kind: backstepping}"), tmp_path / "r",
-                      figures=False)  # fmt: skip
+    short = ("simulation.duration=1", "controller={kind: full_backstepping}")
+    request = Request(short, tmp_path / "r", figures=False)
     log = read_log(run(CONFIGS / "theory/base.yaml", request).folder / "log.h5")
     assert not any(part.name in log for part in ERRORS)
     assert all(part.name in log for part in NETWORKS)

@@ -21,8 +21,8 @@ from conftest import (
 from podusv_cli.components.actuators.pod import Pod, Pods
 from podusv_cli.components.actuators.saturated import Saturated
 from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
-from podusv_cli.components.controllers.backstepping import Backstepping
 from podusv_cli.components.controllers.dsc import DynamicSurface
+from podusv_cli.components.controllers.full_backstepping import FullBackstepping
 from podusv_cli.components.controllers.network import activation
 from podusv_cli.components.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.components.disturbances.harmonic import HarmonicDisturbance
@@ -42,7 +42,7 @@ from podusv_cli.theory.monitor import Monitored, monitored
 from podusv_cli.theory.rates import error_rates
 
 GAINS: dict[str, Any] = {"Gamma_u": 1.0, "Gamma_r": 1.0, "gamma_u": 10.0, "gamma_r": 10.0}
-LAWS: list[PolarBackstepping] = [GENTLE, DynamicSurface(**GAINS), Backstepping(**GAINS)]
+LAWS: list[PolarBackstepping] = [GENTLE, DynamicSurface(**GAINS), FullBackstepping(**GAINS)]
 every_law = pytest.mark.parametrize("law", LAWS, ids=lambda law: law.label)
 
 
@@ -124,7 +124,7 @@ def test_rates_of_errors_are_derivatives_along_the_flow(law, options):
         pairs = {"z_e": e.z_e, "psi_e": e.psi_e, "u_e": e.u_e, "r_e": e.r_e, "y_u": e.y_u,
                  "y_r": e.y_r, "alpha_u": now.signals["alpha_u"],
                  "alpha_r": now.signals["alpha_r"]}  # fmt: skip
-        if isinstance(law, Backstepping):  # whose u_e is of alpha itself
+        if isinstance(law, FullBackstepping):  # whose u_e is of alpha itself
             assert e.y_u[1] == e.y_u_dot[1] == 0.0
         for name, along in pairs.items():
             quotient = (along[2] - along[0]) / (2.0 * TINY)

@@ -187,6 +187,10 @@ def test_a_hull_that_still_goes_ahead_is_told():
     scenario, log, found = done("stopping", "simulation.duration=20.3", hull="")
     assert math.isnan(found["track_reach"])
     assert "the hull still goes ahead at" in next(trial_unfinished.search(scenario, log))
+    scenario, log, _ = done("stopping", "simulation.duration=10", hull="")
+    assert "ends before the trial begins, at 20 s" in next(trial_unfinished.search(scenario, log))
+    scenario, log, _ = done("stopping", "start.u=0", "controller.execute=0", hull="")
+    assert "does not go ahead when" in next(trial_unfinished.search(scenario, log))
 
 
 @pytest.mark.parametrize("name", ["turning_circle", "zigzag_10", "zigzag_20", "stopping"])

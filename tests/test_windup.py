@@ -10,7 +10,7 @@ from test_pod import TWIN, pods
 
 from podusv_cli.components.actuators.saturated import Saturated
 from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
-from podusv_cli.components.controllers.backstepping import Backstepping
+from podusv_cli.components.controllers.full_backstepping import FullBackstepping
 from podusv_cli.components.controllers.pid import Pid
 from podusv_cli.core.kernel import bundle, call, is_kernel
 from podusv_cli.core.recording import Recording
@@ -62,7 +62,7 @@ def test_pid_no_longer_overruns_the_target_and_goes_on_astern():
     assert with_it["u"][late].mean() > 0.3
 
 
-@pytest.mark.parametrize("kind", [AdaptiveNeural, Backstepping])
+@pytest.mark.parametrize("kind", [AdaptiveNeural, FullBackstepping])
 def test_behind_a_real_pod_it_decides_whether_the_law_tracks(kind):
     slow = {"n_rate": 200.0, "n_lag": 0.1, "angle_rate": 1.75, "angle_lag": 0.1}
     pair = pods(*({**one, **slow} for one in TWIN))

@@ -204,7 +204,7 @@ def learnt() -> pd.DataFrame:
     """What the networks learn: the settled rms of f_hat less f, and less f + b/m."""
     rows = {}
     for reading, config in READINGS.items():
-        one = laws(config)["proposed"]
+        one = laws(config)["adaptive_neural"]
         _, log = made(one)
         loop = one.closed_loop()
         unloaded = unloaded_accelerations(loop, rates_replay(loop, one.time_grid())(log))
@@ -229,7 +229,7 @@ def gains() -> pd.DataFrame:
         (reading, label): one
         for reading, config in READINGS.items()
         for label, one in laws(config, *told).items()
-        if label in keys or label == "proposed"
+        if label in keys or label == "adaptive_neural"
     }
     index = pd.MultiIndex.from_tuples(runs, names=["reading", "law"])
     return pd.DataFrame(parallel(velocity_errors, list(runs.values())), index=index)

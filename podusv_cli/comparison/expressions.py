@@ -1,9 +1,9 @@
 """The expressions of claims: parsed once, checked and evaluated by one walk, never run as Python.
 
-    max(abs(proposed.tau_u)) == 300
-    proposed.iae < li.iae < pid.iae
-    mean(proposed.z_e, 200, 310) / mean(pid.z_e, 200, 310) < 0.5
-    finished(proposed) and not finished(pid)
+    max(abs(adaptive_neural.tau_u)) == 300
+    adaptive_neural.iae < full_backstepping.iae < pid.iae
+    mean(adaptive_neural.z_e, 200, 310) / mean(pid.z_e, 200, 310) < 0.5
+    finished(adaptive_neural) and not finished(pid)
 
 docs/claims.md describes the language.
 """

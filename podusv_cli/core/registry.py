@@ -47,10 +47,10 @@ def kinds(package: str, base: type[Kind], plugins: Plugins = ()) -> dict[str, ty
 
 
 def _kind(component: type[Component]) -> str:
+    """The first word of `kind`; further ones are names of before, which a validator translates."""
     field = component.model_fields["kind"]
-    if get_origin(field.annotation) is not Literal or get_args(field.annotation) != (
-        field.default,
-    ):
+    words = get_args(field.annotation) if get_origin(field.annotation) is Literal else ()
+    if not words or words[0] != field.default:
         raise LawError(
             f'{_place(component)}: its kind is no fixed word; write kind: Literal["mine"] = "mine"'
         )

@@ -15,6 +15,7 @@ PLACES = {
     "yaw_rate": ("yaw rate", "rad/s"),
 }
 LONG = 0.02  # fraction of the run; shorter saturation is no finding
+DOUBTFUL, TIMID = 2.0, 0.1  # NIS; podusv's choice
 REVERSALS = 3  # of a zig-zag with two overshoots
 
 
@@ -70,7 +71,7 @@ def _switching(scenario: Scenario) -> list[str]:
 def outside_envelope(scenario: Scenario, log: Recording) -> Sentences:
     """The run is an extrapolation of what was measured, or fitted, of the hull."""
     envelope = scenario.vessel.envelope
-    if envelope is None:
+    if envelope is None or not len(log["u"]):
         return
     parts = [envelope.shares(*_through_water(log.part(rows))) for rows in blocks(len(log["u"]))]
     for name, (word, unit) in PLACES.items():
@@ -79,8 +80,9 @@ def outside_envelope(scenario: Scenario, log: Recording) -> Sentences:
         if outside.mean() > LONG:
             yield (
                 f"the hull's numbers hold for a {word} of up to {limit:g} {unit}, and this run has "
-                f"{share.max() * limit:.3g} {unit}, beyond the limit {times_of(log, outside)}; ask "
-                "for less speed or turn, or take a vessel that was measured there"
+                f"{np.nanmax(share) * limit:.3g} {unit}, beyond the limit "
+                f"{times_of(log, outside)}; ask for less speed or turn, or take a vessel that was "
+                "measured there"
             )
 
 
@@ -91,6 +93,30 @@ def _through_water(log: Recording) -> tuple[Vector, Vector, Vector]:
         u = u - log["V_c"] * np.cos(log["beta_c"] - log["psi"])
         v = v - log["V_c"] * np.sin(log["beta_c"] - log["psi"])
     return u, v, log["r"]
+
+
+@after(
+    "inconsistent-filter", about="estimator",
+    meaning="innovations are not as large as the filter believes",
+    condition=f"the mean squared innovation over its variance (NIS) exceeds {DOUBTFUL:g} or is "
+    f"below {TIMID:g} over the steady window; 1 is consistent",
+    remedy="give the filter the noise that sensors have, with what waves add to it",
+)  # fmt: skip
+def inconsistent_filter(scenario: Scenario, log: Recording) -> Sentences:
+    """The estimator's own measure of its noise says that it is told wrong."""
+    late = np.flatnonzero(log["time"] >= scenario.steady_from())
+    if "nis_sum" not in log or not late.size:
+        return
+    squares, count = (np.ptp(log[name][late[[0, -1]]]) for name in ("nis_sum", "nis_count"))
+    nis = squares / count if count else 1.0
+    told = f"its innovations are {np.sqrt(nis):.2g} times what it believes (NIS {nis:.3g})"
+    if nis > DOUBTFUL:
+        yield (
+            f"{told}, so it follows noise as if it were motion; give it larger sigmas, which "
+            "count what waves add to the sensors' noise"
+        )
+    if nis < TIMID:
+        yield f"{told}, so it takes good measurements for noise; give it the sensors' noise"
 
 
 @after(
@@ -164,6 +190,8 @@ def _turn(part: dict[str, Vector], turned: float) -> str | None:
 
 def _way(part: dict[str, Vector], turned: float) -> str | None:
     """What a stopping trial has not come to."""
+    if part["u"][0] <= 0.0:
+        return "the hull does not go ahead when it is to stop; give it more speed"
     slowest = float(part["u"].min())
     left = f"the hull still goes ahead at {slowest:.2g} m/s, and its track reach needs 0"
     return left if slowest > 0.0 else None
@@ -181,10 +209,11 @@ UNFINISHED = {"zig-zag": _reversals, "turning circle": _turn, "stopping": _way}
 def trial_unfinished(scenario: Scenario, log: Recording) -> Sentences:
     """A manoeuvring trial ends before its last number is there, or never reverses."""
     trial = scenario.controller.trial()
-    under_way = (
-        rows_where(log, lambda part: part["time"] >= trial.execute) if trial else np.zeros(0)
-    )
-    if trial is None or not under_way.any():
+    if trial is None:
+        return
+    under_way = rows_where(log, lambda part: part["time"] >= trial.execute)
+    if not under_way.any():
+        yield f"the run ends before the trial begins, at {trial.execute:g} s; simulate longer"
         return
     part = {name: log[name][under_way] for name in ("psi", "u", "delta_s") if name in log}
     what = UNFINISHED[trial.manoeuvre](part, float(np.ptp(part["psi"])))

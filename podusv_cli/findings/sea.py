@@ -104,6 +104,23 @@ def estimator_noise(case: Case) -> Sentences:
 
 
 @before(
+    "estimator-delay", about="estimator", meaning="the filter assumes another age of positions",
+    condition="the filter's delay differs from that of the position's sensor",
+    remedy="give the estimator the sensor's delay",
+)  # fmt: skip
+def estimator_delay(case: Case) -> Sentences:
+    """The estimate is off along the motion by the difference times the speed."""
+    key, assumed = case.scenario.estimator.assumed_delay()
+    delay = case.scenario.measurement.delay_of_position()
+    if key and assumed != delay:
+        yield At(
+            f"estimator.{key}",
+            f"{assumed:g} s, while positions are delivered {delay:g} s late: the estimate is off "
+            f"by {abs(delay - assumed):g} s times the speed; give the estimator {delay:g}",
+        )
+
+
+@before(
     "steep-waves", about="disturbance", meaning="waves steeper than waves can stand",
     condition="Hs exceeds a seventh of the length of waves of the peak's period",
     remedy="take lower or longer waves; at model scale, times go by the root of the scale",
@@ -131,28 +148,28 @@ def few_components(case: Case) -> Sentences:
     """The variance of such a sum scatters between seeds otherwise than that of a sea."""
     duration = case.scenario.simulation.duration
     for key, part in case.scenario.disturbances().items():
-        count, wanted = part.resolving(duration)
+        count, wanted = part.cosines(), part.resolving(duration)
         if count < wanted:
             yield At(
                 f"{key}.components",
                 f"{count} cosines are too few for {duration:g} s: from seed to seed, the energy of "
-                f"their sum does not vary as a sea's does; take {wanted} or more for a study over "
-                "seeds",
+                f"their sum varies more than a sea's does; for a study over seeds take {wanted} or "
+                "more (10000 at most)",
             )
 
 
 @before(
-    "model-gusts", about="disturbance", meaning="a gust spectrum of the open sea on a model",
-    condition=f"a gust spectrum, and a vessel shorter than {MODEL:g} m",
-    remedy="leave gusts out, or simulate at full scale",
+    "model-gusts", about="disturbance", meaning="a spectrum of the open sea on a model",
+    condition=f"a spectrum of gusts, or Torsethaugen's, and a vessel shorter than {MODEL:g} m",
+    remedy="take another spectrum or none, or simulate at full scale",
 )  # fmt: skip
 def model_gusts(case: Case) -> Sentences:
-    """Gust spectra hold at full scale and do not scale with the vessel."""
+    """These spectra hold at full scale and do not scale with the vessel."""
     length = case.scenario.vessel.length
     for key, part in case.scenario.disturbances().items():
-        if part.has_gusts() and length < MODEL:
+        if (name := part.full_scale()) and length < MODEL:
             yield At(
-                f"{key}.gusts",
+                f"{key}.{name}",
                 f"this spectrum was measured over the open sea and does not scale to a vessel of "
-                f"{length:g} m; leave gusts out, or simulate at full scale",
+                f"{length:g} m; take another or none, or simulate at full scale",
             )

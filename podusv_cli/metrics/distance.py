@@ -7,7 +7,16 @@ from typing import Any
 
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.engine.step.layout import DISTANCE
-from podusv_cli.metrics.metric import Accumulator, Measured, Metric, Result, add, gathered, ratio
+from podusv_cli.metrics.metric import (
+    Accumulator,
+    Measured,
+    Metric,
+    Result,
+    add,
+    gathered,
+    ratio,
+    standoff_of,
+)
 from podusv_cli.metrics.windows import CROSSED, SETTLING, settle, settled_from
 
 # Positions of the gathered numbers: integrals over the run, and over the steady window.
@@ -49,12 +58,9 @@ def watch_settled(t: float, weight: float, s: Vector, row: Vector, k: Any, seen:
 
 
 def _constants(layout: Measured) -> dict[str, float]:
-    approach = layout.loop.controller.approach()
-    return {
-        "steady_from": layout.steady_from,
-        "settling_radius": layout.settling_radius,
-        "standoff": approach.standoff if approach else 0.0,
-    }
+    return standoff_of(layout) | {
+        "steady_from": layout.steady_from, "settling_radius": layout.settling_radius,
+    }  # fmt: skip
 
 
 def _rmse(seen: Vector, step: float) -> float:

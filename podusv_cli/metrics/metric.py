@@ -32,6 +32,12 @@ class Measured:
 Result = Callable[[Vector, float], float]
 
 
+def standoff_of(layout: Measured) -> dict[str, float]:
+    """The distance to the target that the law keeps on purpose, as a constant of a kernel."""
+    approach = layout.loop.controller.approach()
+    return {"standoff": approach.standoff if approach else 0.0}
+
+
 @kernel
 def add(seen: Vector, integrals: int, position: int, amount: float) -> None:
     """Add to an integral, and store the amount as that of the last instant."""

@@ -96,8 +96,9 @@ def watch_stop(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Ve
         ahead = x * math.cos(seen[PSI_0]) + y * math.sin(seen[PSI_0])
         if s[3] <= 0.0 and seen[SURGE] > 0.0:
             share, step = passed(0.0, seen[SURGE], s[3]), t - seen[LATEST]
-            # The speed is zero there, and the way along a parabola between the two instants.
-            seen[TRACK] = seen[WAY] - 0.5 * step * (seen[SPEED] + (1.0 - share) * before)
+            # The speed is that of sway there, and the way along a parabola between the instants.
+            still = share * abs(s[4]) - (1.0 - share) * before - seen[SPEED]
+            seen[TRACK] = seen[WAY] + 0.5 * step * still
             bend = 0.5 * share * (1.0 - share) * step * (seen[SURGE] - s[3])
             seen[HEAD] = linear(share, seen[AHEAD], ahead) + bend
             seen[STOPPED] = seen[LATEST] + share * step - k.trial_execute

@@ -7,15 +7,16 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 from podusv_cli.core.kernel import Vector, kernel, specialise
 from podusv_cli.engine.step.layout import DISTANCE
-from podusv_cli.metrics.metric import Accumulator, Metric, Result
+from podusv_cli.metrics.metric import Accumulator, Metric, Result, standoff_of
 
 NAMED = "NAME"  # stands for a scenario's word in the name of a metric
 NEAR = 1e-9  # s; an instant this near to an end of a window belongs to it
 FROM, TO, RADIUS = math.inf, math.inf, 0.0  # placeholders of one window [s] and one radius [m]
-LENGTH, SQUARE, LARGEST, NOW, LAST, WINDOW = range(6)
+LENGTH, SQUARE, LARGEST, BEYOND, NOW, LAST, WINDOW = range(7)
 CROSSED, BEFORE, DISTANCE_BEFORE, SETTLING = range(4)
 
 Windows = tuple[tuple[str, tuple[float, float]], ...]  # from and to [s]
@@ -24,14 +25,15 @@ NONE: tuple[Windows, Radii] = ((), ())
 
 
 @kernel
-def window(t: float, row: Vector, seen: Vector) -> None:
-    """Gather z_e^2 from one instant to the next, both in the window, and the largest z_e."""
+def window(t: float, row: Vector, k: Any, seen: Vector) -> None:
+    """Gather z_e^2 from one instant to the next, both in the window, and the largest errors."""
     z_e = row[DISTANCE]
     if t >= FROM - NEAR and t <= TO + NEAR:
         if t > 0.0 and seen[NOW] >= FROM - NEAR:
             seen[LENGTH] += t - seen[NOW]
             seen[SQUARE] += 0.5 * (t - seen[NOW]) * (z_e * z_e + seen[LAST] * seen[LAST])
         seen[LARGEST] = max(seen[LARGEST], z_e)
+        seen[BEYOND] = max(seen[BEYOND], abs(z_e - k.standoff))
     seen[NOW], seen[LAST] = t, z_e
 
 
@@ -68,6 +70,12 @@ ERROR_MAX = Metric(
     f"error_{NAMED}_max", "m", "largest z_e in a window that `metrics.windows` names",
     place=2, counts_standoff=True,
 )  # fmt: skip
+BEYOND_MAX = Metric(
+    f"e_{NAMED}_max",
+    "m",
+    "largest |z_e - standoff| in a window that `metrics.windows` names",
+    place=2,
+)
 SETTLED = Metric(
     f"settling_time_{NAMED}", "s", "time from which z_e stays within a radius of `metrics.radii`",
     place=2, happens=True, counts_standoff=True,
@@ -90,14 +98,18 @@ def _named(template: Metric, name: str, meaning: str, of: Accumulator, result: R
     )  # fmt: skip
 
 
-def _of_window(name: str, start: float, to: float) -> tuple[Metric, Metric]:
+def _of_window(name: str, start: float, to: float) -> tuple[Metric, ...]:
     watch = specialise(window, f"window_{name}", FROM=start, TO=to)
-    of = Accumulator(watch, lambda layout: WINDOW, lambda layout: {})
+    of = Accumulator(watch, lambda layout: WINDOW, standoff_of, differing=("standoff",))
     where = f"z_e from {start:g} s to {to:g} s"
     largest = _over(to, lambda seen: float(seen[LARGEST]))
+    beyond = _over(to, lambda seen: float(seen[BEYOND]))
     return (
         _named(ERROR_RMS, name, f"rms of {where}", of, _over(to, _rms)),
         _named(ERROR_MAX, name, f"largest {where}", of, largest),
+        _named(
+            BEYOND_MAX, name, f"largest |z_e - standoff| from {start:g} s to {to:g} s", of, beyond
+        ),
     )
 
 

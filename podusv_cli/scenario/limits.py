@@ -20,8 +20,9 @@ MOST_CONTENT = 4 * 10**9  # bytes of log that podusv reads back
 HELD = 256 * 2**20  # bytes of a log that is held in memory; a larger one is made on the disk
 WORKED = 64 * 2**20  # bytes of a larger log that are in memory at a time
 # Rough costs on one core (benchmarks/results.md): of a step, of a step for each number of the
-# law's memory, how many times longer both take in plain Python, and of a byte of log.
-STEP, MEMORY, PLAIN, BYTE = 1e-6, 6e-9, 5.0e2, 13e-9  # s, s, times, s
+# law's memory, for each cosine of the sea, how many times longer they take in plain Python, and of
+# a byte of log.
+STEP, MEMORY, COSINE, PLAIN, BYTE = 1e-6, 6e-9, 15e-9, 5.0e2, 13e-9  # s, s, s, times, s
 START = 0.5  # s, of a run of no steps
 PROCESS = 150 * 10**6  # bytes of memory without any log
 COMPRESSED = 0.7  # typical size of a compressed log over that of its content
@@ -76,7 +77,8 @@ def estimate(scenario: Scenario) -> Size:
     monitored = len(monitor.signals(loop, sampled=scenario.sampled)) if scenario.log.monitor else 0
     columns = len(names(loop)) - len(TARGET[2:]) + monitored
     content = grid.rows * columns * NUMBER
-    step = STEP + MEMORY * sum(size for _, size in law.slots())
+    cosines = sum(part.cosines() for part in scenario.disturbances().values())
+    step = STEP + MEMORY * sum(size for _, size in law.slots()) + COSINE * cosines
     pace = 1.0 if scenario.simulation.compiled else PLAIN
     seconds = START + grid.steps * step * pace + content * BYTE
     unlogged = len(TARGET[2:]) + (len(monitor.UNLOGGED) if monitored else 0)

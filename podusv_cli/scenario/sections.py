@@ -134,6 +134,10 @@ class Claim(Component):
     tolerance: float = value(
         0.05, "", "relative: how near `==` is, and how clear `<` and `>` have to be", ge=0, lt=1
     )
+    untestable: str = value(
+        "", "", "why no run at hand can decide it: the verdict is `cannot tell`, and what the runs "
+        "show of `expect` stands beside it",
+    )  # fmt: skip
     remark: str = value("", "", "choices made where the source is silent")
 
 

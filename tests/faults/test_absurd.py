@@ -170,7 +170,7 @@ def test_logs_that_cannot_be_read_back_are_not_made_for_it(podusv, command):
 # Each sets the width of a row or the number of rows in another way.
 SHAPES: list[dict[str, Any]] = [
     {"kind": "adaptive_neural", "every": 1, "monitor": "true", "period": 0},
-    {"kind": "backstepping", "every": 3, "monitor": "true", "period": 0},
+    {"kind": "full_backstepping", "every": 3, "monitor": "true", "period": 0},
     {"kind": "dsc", "every": 4, "monitor": "false", "period": 0.02},
     {"kind": "pid", "every": 1, "monitor": "true", "period": 0.02},
 ]

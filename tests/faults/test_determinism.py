@@ -23,7 +23,7 @@ from podusv_cli.comparison.log_difference import compare
 from podusv_cli.comparison.run_difference import CLOCKED
 from podusv_cli.components.actuators.saturated import Saturated
 from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
-from podusv_cli.components.controllers.backstepping import Backstepping
+from podusv_cli.components.controllers.full_backstepping import FullBackstepping
 from podusv_cli.components.paths.line_circle import LineCircle
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
 from podusv_cli.engine.running.simulate import simulate
@@ -48,7 +48,7 @@ PARTS: dict[str, dict[str, Any]] = {
     },
     "difference": {"controller": AdaptiveNeural(rate="difference", B_u=5.0)},
     "held direction": {"controller": AdaptiveNeural(hold_below=20.0)},
-    "folded": {"controller": Backstepping(fold="printed"), "start": ASTERN},
+    "folded": {"controller": FullBackstepping(fold="printed"), "start": ASTERN},
     "literal path": {"path": LineCircle(switch=0.05, reading="literal")},
 }  # fmt: skip
 

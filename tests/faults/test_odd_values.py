@@ -30,7 +30,7 @@ disturbance:
 measurement: {kind: sensors, position: {period: 0.2, delay: 0.2, outages: [[0.2, 0.4]]}}
 estimator: {kind: ekf}
 actuator: {kind: saturated, surge_limit: 8.0, command: {delay: 0.1}}
-controllers: {pid: {kind: pid, K_Pu: 10.0}, li: {kind: backstepping}}
+controllers: {pid: {kind: pid, K_Pu: 10.0}, li: {kind: full_backstepping}}
 start: {x: -1.0}
 simulation: {duration: 1.0, step: 0.02}
 metrics: {windows: {line: [0, 0.5]}, radii: {near: 1.0}}

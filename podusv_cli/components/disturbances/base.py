@@ -123,16 +123,20 @@ class Disturbance(Component):
         """Significant height [m] and the peak's angular frequency [rad/s]; no height: no waves."""
         return 0.0, 1.0
 
-    def resolving(self, duration: float) -> tuple[int, int]:
-        """How many cosines it sums, and how many let a run of `duration` [s] scatter as the sea.
+    def cosines(self) -> int:
+        """How many cosines it sums."""
+        return 0
 
-        The scatter is that of the variance between seeds. 0, 0 where nothing is summed.
+    def resolving(self, duration: float) -> int:
+        """How many cosines let the energy of a run of `duration` [s] vary with the seed as a sea's.
+
+        0 where none are summed, and where it is not to vary.
         """
-        return 0, 0
+        return 0
 
-    def has_gusts(self) -> bool:
-        """Whether it has gusts with a spectrum of the open sea."""
-        return False
+    def full_scale(self) -> str:
+        """The key of a spectrum that was measured over the open sea; "" without one."""
+        return ""
 
     def shared_places(self) -> list[int]:
         """Places in the table that all runs side by side have to share; its kernel's `shared`."""

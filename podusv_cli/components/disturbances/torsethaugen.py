@@ -3,12 +3,13 @@
 Torsethaugen (1996): Model for a doubly peaked wave spectrum, SINTEF STF22 A96204; seen in
 cybergalactic/MSS, torsetSpectrum.m. It was fitted to measurements of the North Sea, in metres and
 seconds, and does not scale to models. There each peak is scaled by a fit of its integral, which
-leaves the significant height 0.4 to 1.6 % too large; here by the integral itself.
+leaves the significant height 0.6 to 1.7 % too large; here by the integral itself.
 """
 
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,7 @@ from podusv_cli.components.disturbances.spectra import GRAVITY, SMALLEST, power
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.portable import exponential
 
+HIGHEST = 20.0  # m, podusv's limit: no such sea was measured
 DEVELOPED = 6.6  # s/m^(1/3): fully developed seas have the period 6.6 Hs^(1/3)
 STEEPEST, LONGEST = 2.0, 25.0  # s/sqrt(m) of the steepest sea, s of the longest swell
 WHOLE = spectra.growing_edges(0.1, 100.0, 2000)  # of a peak's frequency
@@ -42,13 +44,18 @@ class Peak(NamedTuple):
     @property
     def whole(self) -> float:
         """The integral of the shape."""
-        return math.fsum(spectra.in_bins(self.shape, WHOLE))
+        return _whole(self)
 
     def density(self, rate: Vector) -> Vector:
         """Density [m2 s] at `rate` [rad/s]."""
         per_rate = self.period / (2.0 * math.pi)
         scale = self.height**2 / 16.0 * per_rate / self.whole
         return np.asarray(scale * self.shape(np.maximum(rate * per_rate, 1e-3)))
+
+
+@lru_cache(maxsize=16)
+def _whole(peak: Peak) -> float:
+    return math.fsum(spectra.in_bins(peak.shape, WHOLE))
 
 
 def _power(x: float, exponent: float) -> float:
@@ -60,7 +67,8 @@ def _e(x: float) -> float:
 
 
 def _gamma(height: float, steepness: float) -> float:
-    return 35.0 * (1.0 + 3.5 * _e(-height)) * _power(steepness, 0.857)
+    """Peakedness; 1 of a sea so low that the fit would leave a dip."""
+    return max(35.0 * (1.0 + 3.5 * _e(-height)) * _power(steepness, 0.857), 1.0)
 
 
 def peaks(height: float, period: float) -> tuple[Peak, Peak]:

@@ -44,7 +44,12 @@ from pydantic import Field, model_validator
 from podusv_cli.components.disturbances import spectra
 from podusv_cli.components.disturbances.base import WAVE_MOTION, Disturbance
 from podusv_cli.components.disturbances.reflection import BOW_AND_STERN, SIDES, Curve, reflected
-from podusv_cli.components.disturbances.torsethaugen import peaks, torsethaugen
+from podusv_cli.components.disturbances.torsethaugen import (
+    HIGHEST,
+    LONGEST,
+    peaks,
+    torsethaugen,
+)
 from podusv_cli.components.disturbances.wave_kernels import TURN, long_crested, short_crested
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import value
@@ -53,6 +58,7 @@ from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.signal import Signal
 
 STREAM = "waves"
+BOTH = 0.95  # of the energy of two peaks that the cut-offs must leave
 LEAST = 0.01  # of the spectrum's energy that the cut-offs must leave
 Share = Literal["curve"] | Annotated[float, Field(ge=0, le=1)]
 ELEVATION = Signal("zeta", "m", "elevation of the sea where the vessel is", r"\zeta")
@@ -123,7 +129,7 @@ class Waves(Disturbance):
                 "the peak's frequency"
             )
         if self.spectrum == "torsethaugen":
-            self._both_peaks_fit()
+            self._suits_torsethaugen()
         kept = math.fsum(self._variance()) / (self.height / 4.0) ** 2
         if not kept >= LEAST:
             raise ValueError(
@@ -133,17 +139,23 @@ class Waves(Disturbance):
             )
         return self
 
-    def _both_peaks_fit(self) -> None:
-        """Raise ValueError for a period that is not the peak's, and for a peak that is cut off."""
+    def _suits_torsethaugen(self) -> None:
+        """Raise ValueError outside the spectrum's range, and where a peak is cut off."""
         if self.period_is != "peak":
             raise ValueError("period_is must be peak for the torsethaugen spectrum")
-        _, other = peaks(self.height, self.period)
-        if other.height and not self.lowest < (ratio := self.period / other.period) < self.highest:
+        if not (self.height <= HIGHEST and self.period < LONGEST):
             raise ValueError(
-                f"the second peak, of {other.height:.3g} m and {other.period:.3g} s, has "
-                f"{ratio:.3g} of the first one's frequency, beyond lowest {self.lowest:g} or "
-                f"highest {self.highest:g}; "
-                f"take lowest {0.6 * ratio:.2g} or highest {3.0 * ratio:.2g}"
+                f"the torsethaugen spectrum holds up to {HIGHEST:g} m and below {LONGEST:g} s, "
+                f"found {self.height:g} m and {self.period:g} s"
+            )
+        kept = math.fsum(self._variance()) / (self.height / 4.0) ** 2
+        if kept < BOTH:
+            ratio = self.period / peaks(self.height, self.period)[1].period
+            bound = f"lowest {0.6 * ratio:.2g}" if ratio < 1.0 else f"highest {3.0 * ratio:.2g}"
+            raise ValueError(
+                f"the second peak has {ratio:.3g} of the first one's frequency, and between lowest "
+                f"{self.lowest:g} and highest {self.highest:g} the spectrum has "
+                f"{100.0 * kept:.0f} % of its energy; take {bound}"
             )
 
     @property
@@ -162,10 +174,19 @@ class Waves(Disturbance):
         """Height and peak."""
         return self.height, self.peak
 
-    def resolving(self, duration: float) -> tuple[int, int]:
+    def full_scale(self) -> str:
+        """Torsethaugen's spectrum is one of the open sea."""
+        return "spectrum" if self.spectrum == "torsethaugen" else ""
+
+    def cosines(self) -> int:
+        """The components."""
+        return self.components
+
+    def resolving(self, duration: float) -> int:
         """3.5 components for every period of the peak, with the default cut-offs."""
-        edges = self._edges() / TURN
-        return self.components, spectra.resolving(self._variance(), edges, duration)
+        if self.amplitudes == "deterministic" or self.components == 1:
+            return 0
+        return spectra.resolving(self._variance(), self._edges() / TURN, duration)
 
     def _edges(self) -> Vector:
         """Edges of the bins [rad/s]."""

@@ -141,17 +141,21 @@ class Wind(Disturbance):
         """Speed and direction."""
         return SPEED, FROM
 
-    def has_gusts(self) -> bool:
-        """Whether a spectrum is given."""
-        return self.gusts != "none"
+    def full_scale(self) -> str:
+        """Spectra of gusts are those of the open sea."""
+        return "" if self.gusts == "none" else "gusts"
 
-    def resolving(self, duration: float) -> tuple[int, int]:
+    def cosines(self) -> int:
+        """Those of the gusts."""
+        return self.components if self.full_scale() else 0
+
+    def resolving(self, duration: float) -> int:
         """The cosines of the gusts; bins grow with frequency, and the energy lies low."""
-        if self.gusts == "none":
-            return 0, 0
+        if self.gusts == "none" or self.amplitudes == "deterministic":
+            return 0
         edges = self._edges()
         variance = spectra.in_bins(self._density, edges)
-        return self.components, spectra.resolving(variance, edges, duration)
+        return spectra.resolving(variance, edges, duration)
 
     def _edges(self) -> Vector:
         return spectra.growing_edges(self.lowest, self.highest, self.components)

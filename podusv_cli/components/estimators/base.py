@@ -55,6 +55,10 @@ class Estimator(Component):
         """For each number of the state the key and value of the noise that is assumed, or ""."""
         return (("", 0.0),) * len(ESTIMATE)
 
+    def assumed_delay(self) -> tuple[str, float]:
+        """The key and value [s] of the age that positions are taken to have; "" where none is."""
+        return "", 0.0
+
     correct: ClassVar[Callable[..., None]] = staticmethod(absent("correct"))
     follow: ClassVar[Callable[..., None]] = staticmethod(absent("follow"))
 

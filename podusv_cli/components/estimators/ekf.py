@@ -121,7 +121,7 @@ def derivative(i: int, delay: float, state: Vector, h: Vector) -> float:
     ahead, aside = (c, -s) if i == 0 else (s, c)  # (u, v) on the axis of this value
     h[2] = -delay * (state[3] * aside - state[4] * ahead)
     h[3], h[4] = -delay * ahead, -delay * aside
-    return delay * (state[3] * ahead + state[4] * aside)
+    return float(delay * (state[3] * ahead + state[4] * aside))
 
 
 @kernel
@@ -170,6 +170,10 @@ class ExtendedKalmanFilter(Estimator):
         names = ("sigma_p", "sigma_p", "sigma_psi", "sigma_u", "sigma_v", "sigma_r")
         return tuple((name, getattr(self, name)) for name in names)
 
+    def assumed_delay(self) -> tuple[str, float]:
+        """`delay_p`."""
+        return "delay_p", self.delay_p
+
     def constants(self) -> dict[str, float]:
         """Without a load, one that is 0 and does not wander."""
         without = {} if self.bias else dict.fromkeys(("q_b", "q_b_psi"), 0.0)
@@ -199,6 +203,7 @@ class ExtendedKalmanFilter(Estimator):
         b[2] = state[8]
         plant(state, tau, b, k, rate)
         rate[6] = rate[7] = rate[8] = 0.0
+        rate[N + PACKED] = rate[N + PACKED + 1] = 0.0
         slopes(state, b, cosine, sine, k, f)
         wanderings(k, q)
         spread(f, tail(state, N), q, tail(rate, N))

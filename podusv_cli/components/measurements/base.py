@@ -48,6 +48,10 @@ class Measurement(Component):
         """Standard deviation of the errors of each of x, y, psi, u, v, r."""
         return (0.0,) * len(STATE)
 
+    def delay_of_position(self) -> float:
+        """Age of a position when it is delivered [s]."""
+        return 0.0
+
     def constants_with(self, step: float, motion: int) -> dict[str, float]:
         """Its constants `k`, for a run with this step [s].
 

@@ -128,6 +128,10 @@ class Sensors(Measurement):
         each = [(math.hypot(one.noise, one.bias) if one else 0.0, n) for one, n in sensors]
         return tuple(noise for noise, count in each for _ in range(count))
 
+    def delay_of_position(self) -> float:
+        """That of the sensor."""
+        return self.position.delay
+
     @property
     def signals(self) -> tuple[Signal, ...]:
         """What is measured, as it was delivered last."""

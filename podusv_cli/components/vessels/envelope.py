@@ -18,7 +18,7 @@ class Envelope(Component):
     source: str = value("", "", "where the numbers come from")
     speed: float = value(..., "m/s", "largest speed", gt=0)
     drift: float = value(
-        ..., "rad", f"largest drift angle |atan2(v, u)| at speeds above {AT_REST:g} of the largest",
+        ..., "rad", f"largest drift angle |atan2(v, |u|)|, above {AT_REST:g} of the largest speed",
         gt=0, le=math.pi,
     )  # fmt: skip
     yaw_rate: float = value(..., "rad/s", "largest yaw rate, either way", gt=0)
@@ -26,5 +26,5 @@ class Envelope(Component):
     def shares(self, u: Vector, v: Vector, r: Vector) -> dict[str, Vector]:
         """Speed, drift angle and yaw rate over their limits, at velocities [m/s, m/s, rad/s]."""
         speed = np.hypot(u, v) / self.speed
-        drift = np.where(speed > AT_REST, np.abs(np.arctan2(v, u)) / self.drift, 0.0)
+        drift = np.where(speed > AT_REST, np.abs(np.arctan2(v, np.abs(u))) / self.drift, 0.0)
         return {"speed": speed, "drift": drift, "yaw_rate": np.abs(r) / self.yaw_rate}

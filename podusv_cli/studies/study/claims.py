@@ -1,9 +1,9 @@
 """Claims about a study: parsed once, checked and evaluated by one walk, judged by intervals.
 
-    share(proposed.iae < pid.iae) >= 0.95
-    failures(proposed) <= 0.01 and not failures(pid) <= 0.01
-    quantile(proposed.z_e_steady, 0.99) <= 0.6
-    median(proposed.iae / li.iae) <= 1.0
+    share(adaptive_neural.iae < pid.iae) >= 0.95
+    failures(adaptive_neural) <= 0.01 and not failures(pid) <= 0.01
+    quantile(adaptive_neural.z_e_steady, 0.99) <= 0.6
+    median(adaptive_neural.iae / full_backstepping.iae) <= 1.0
 
 docs/study_claims.md describes the language.
 """

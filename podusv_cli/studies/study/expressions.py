@@ -1,6 +1,6 @@
 """What expressions say about each run: values and conditions, computed for all runs at once.
 
-    proposed.iae < 0.9 * pid.iae and finished(pid)     about the runs of several laws in a draw
+    dsc.iae < 0.9 * pid.iae and finished(pid)          about the runs of several laws in a draw
     finished and z_e_steady <= 1.5                     about one run: when it is a success
 
 A condition holds, does not hold, or is unknown where a number is. docs/study_claims.md describes

@@ -1,7 +1,7 @@
 """Full backstepping: the same law with analytic derivatives of the virtual control.
 
 Source: stands for the comparison law of the paper's reference [25], whose text podusv does not
-have; it is therefore called Li-type. Derivatives use the nominal vessel with m23 r^2 and all its
+have. Derivatives use the nominal vessel with m23 r^2 and all its
 damping, of which (12) has less, but without disturbance, sway force and inertia coupling between
 sway and yaw.
 
@@ -14,6 +14,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any, ClassVar, Literal
+
+from pydantic import field_validator
 
 from podusv_cli.components.controllers.polar_backstepping import (
     PolarBackstepping,
@@ -71,10 +73,19 @@ def yaw_full(
     return e.alpha_r, alpha_r_rate(e, x, target, k, tau_u)
 
 
-class Backstepping(PolarBackstepping):
-    """Li-type adaptive backstepping without a filter, the paper's reference [25]."""
+class FullBackstepping(PolarBackstepping):
+    """Adaptive neural backstepping without a filter: the virtual controls' derivatives in full.
 
-    kind: Literal["backstepping"] = "backstepping"
+    It stands in for the paper's reference [25], whose text podusv does not have.
+    """
+
+    kind: Literal["full_backstepping", "backstepping"] = "full_backstepping"
     law: ClassVar[Callable[..., None]] = staticmethod(
-        specialise(polar_backstepping, "backstepping", surge=surge_full, yaw=yaw_full)
+        specialise(polar_backstepping, "full_backstepping", surge=surge_full, yaw=yaw_full)
     )
+
+    @field_validator("kind")
+    @classmethod
+    def _by_its_name(cls, kind: str) -> str:
+        """`backstepping`, its name in older scenarios, stays readable."""
+        return "full_backstepping"
