@@ -24,12 +24,12 @@ def pairs(ratio, low, high):
 )
 def test_the_answer_tells_the_least_objective_and_who_wins_in_the_same_draw(ratio, ends, says):
     results = SimpleNamespace(
-        laws=pd.DataFrame({"law": ["li", "pid", "dsc"], "objective_after": [3.0, 2.0, 9.0]}),
-        pairs=pairs(ratio, *ends), shown=["iae"],
+        laws=pd.DataFrame({"law": ["li", "pid", "dsc"], "repeats_median": [3.0, 2.0, 9.0]}),
+        searches=pairs(ratio, *ends), shown=["iae"],
         plan=SimpleNamespace(tune=SimpleNamespace(objectives=["median(iae)"])),
     )  # fmt: skip
     (text,) = remarks._answer(results)
-    assert text.startswith("pid has the least median(iae) after the search; in the same draw")
+    assert text.startswith("pid has the least median(iae) in the median of its searches")
     assert text.endswith(says)
 
 
@@ -64,3 +64,18 @@ def test_an_inequality_that_holds_in_training_only_is_told():
     (text,) = remarks._beyond(results)
     assert text.startswith("pid: quantile(tv_tau_u, 0.95) <= 20 held on the training draws; on the")
     assert text.endswith("it is 23.25")
+
+
+def test_one_search_a_law_is_told_to_be_chance():
+    plan = SimpleNamespace(tune=SimpleNamespace(repeats=1), laws={"pid": 0, "li": 0})
+    assert "no order of laws follows" in next(remarks._once(SimpleNamespace(plan=plan)))
+    plan.tune.repeats = 6
+    assert list(remarks._once(SimpleNamespace(plan=plan))) == []
+
+
+def test_a_gain_at_the_end_of_its_range_keeps_the_table_from_being_final():
+    row = {"law": "pid", "gain": "K_Pu", "low": 1.0, "high": 40.0}
+    results = SimpleNamespace(gains=pd.DataFrame([row | {"at": ""}, row | {"at": "upper"}]))
+    (text,) = remarks._bounds(results)
+    assert text.startswith("the table is not final")
+    assert text.endswith("pid: K_Pu at the upper end, 40")

@@ -15,7 +15,8 @@ from podusv_cli.studies.tuning.results import Results
 def write_tables(folder: Path, results: Results) -> None:
     """Write all tables. Raises StorageError."""
     tables = {
-        "laws": results.laws, "limits": results.limits, "validation": results.pairs,
+        "laws": results.laws, "searches": results.searches, "limits": results.limits,
+        "validation": results.pairs,
         "gains": results.gains, "importance": results.importance, "history": results.history,
     }  # fmt: skip
     files.write_all({folder / f"{name}.csv": as_csv(t).encode() for name, t in tables.items()})

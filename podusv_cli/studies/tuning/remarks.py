@@ -15,26 +15,34 @@ from podusv_cli.studies.tuning.trials import FINISHED
 def remarks(results: Results) -> list[str]:
     """The answer first, then what it hangs on, and what a user may want to change."""
     return [
-        *_answer(results), *_kept(results), *_idle(results), *_unsound(results), *_few(results),
-        *_overfitted(results), *_beyond(results), *_bounds(results),
+        *_answer(results), *_once(results), *_bounds(results), *_kept(results), *_idle(results),
+        *_unsound(results), *_few(results), *_overfitted(results), *_beyond(results),
     ]  # fmt: skip
 
 
 def _answer(results: Results) -> Iterator[str]:
-    """The two best laws, by their objective and in the same draw, which may disagree."""
-    ordered = results.laws.sort_values("objective_after").law.tolist()
+    """The two best laws by the median of their searches, and in the same draw."""
+    ordered = results.laws.sort_values("repeats_median").law.tolist()
     if len(ordered) < 2:
         return
     best, second = ordered[:2]
-    metric, pairs = results.shown[0], results.pairs
-    rows: Any = pairs[(pairs["when"] == "after") & (pairs.metric == metric)].to_dict("records")
+    rows: Any = results.searches.to_dict("records")
     for row in rows:
         if {row["a"], row["b"]} == {best, second}:
             yield (
-                f"{best} has the least {results.plan.tune.objectives[0]} after the search; in the "
-                f"same draw, the median ratio of {metric} of {row['a']} and {row['b']} is "
+                f"{best} has the least {results.plan.tune.objectives[0]} in the median of its "
+                f"searches; over searches and draws together, the median ratio of "
+                f"{results.shown[0]} of {row['a']} and {row['b']} is "
                 f"{Interval.of(row, 'ratio'):.3f}: {_verdict(row)}"
             )
+
+
+def _once(results: Results) -> Iterator[str]:
+    if results.plan.tune.repeats == 1 and len(results.plan.laws) > 1:
+        yield (
+            "one search for each law: no interval here counts what another seed of the tuner would "
+            "find, so no order of laws follows; give tune.repeats 6 or more"
+        )
 
 
 def _verdict(row: dict[str, Any]) -> str:
@@ -108,6 +116,13 @@ def _beyond(results: Results) -> Iterator[str]:
 
 
 def _bounds(results: Results) -> Iterator[str]:
-    for row in results.gains[results.gains["at"] != ""].to_dict("records"):
+    rows = results.gains[results.gains["at"] != ""].to_dict("records")
+    told = []
+    for row in rows:
         end = row["low"] if row["at"] == "lower" else row["high"]
-        yield f"{row['law']}: {row['gain']} is at the {row['at']} end of its range, {end:.4g}"
+        told.append(f"{row['law']}: {row['gain']} at the {row['at']} end, {end:.4g}")
+    if told:
+        yield (
+            "the table is not final, since gains are at an end of their range, and a wider one may "
+            f"give more: {'; '.join(told)}"
+        )

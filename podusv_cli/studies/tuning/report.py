@@ -53,13 +53,14 @@ def page(
 
 def _laws(results: Results) -> Iterator[dict[str, Any]]:
     """The rows of the answer, the best law after the search first."""
-    ordered: Any = results.laws.sort_values(["rank_after", "rank_before"]).to_dict("records")
+    keys = ["place_low", "place_high", "rank_after", "rank_before"]
+    ordered: Any = results.laws.sort_values(keys).to_dict("records")
     for row in ordered:
         yield row | {
             "before": intervals(row, "before"), "after": intervals(row, "after"),
             "failed": f"{percent(row, 'failed_before')}, then {percent(row, 'failed_after')}",
             "change": ratio(row) if row["runs"] else "-",
-            "spread": spread(row),
+            "spread": spread(row), "place": place(row),
         }  # fmt: skip
 
 
@@ -80,9 +81,17 @@ def ratio(row: Any) -> str:
 
 
 def spread(row: Any) -> str:
-    """The least and the largest objective of the repeats' winners."""
-    low, high = row["repeats_low"], row["repeats_high"]
-    return "-" if math.isnan(low) or low == high else f"{digits(low)} to {digits(high)}"
+    """The median, the least and the largest objective of the repeats' winners."""
+    middle, low, high = (row[f"repeats_{end}"] for end in ("median", "low", "high"))
+    if math.isnan(low) or low == high:
+        return "-"
+    return f"{digits(middle)} ({digits(low)} to {digits(high)})"
+
+
+def place(row: Any) -> str:
+    """The ranks that the law may have."""
+    low, high = row["place_low"], row["place_high"]
+    return f"{low}" if low == high else f"{low} to {high}"
 
 
 def _pairs(results: Results) -> Iterator[dict[str, Any]]:

@@ -15,6 +15,7 @@ import pandas as pd
 from podusv_cli.studies.study import statistics, summary
 from podusv_cli.studies.study.runs_file import Table
 from podusv_cli.studies.study.statistics import Interval
+from podusv_cli.studies.tuning import searches
 from podusv_cli.studies.tuning.objective import (
     Inequality,
     OfGains,
@@ -83,13 +84,39 @@ class Results:
 
     @cached_property
     def laws(self) -> pd.DataFrame:
-        """Every law: failures and objective before and after on the fresh draws, and its ranks."""
+        """Every law: failures and objective before and after on the fresh draws, and its ranks.
+
+        `place_low` and `place_high` are the ranks that it may have over all searches and draws.
+        """
         table = pd.DataFrame([self._law(law) for law in self.plan.laws])
         for when in ("before", "after"):
             ranks = table[f"objective_{when}"].replace(np.inf, 1e300).rank(method="min")
             table[f"rank_{when}"] = ranks.astype(int)
             table[f"better_than_{when}"] = [self._better_than(law, when) for law in table.law]
+        found = searches.places(self.searches, list(self.plan.laws))
+        table["place_low"], table["place_high"] = zip(
+            *(found[law] for law in table.law), strict=True
+        )
         return table
+
+    @cached_property
+    def searches(self) -> pd.DataFrame:
+        """Every pair of laws over all of their searches and the fresh draws."""
+        metric = self.shown[0]
+        runs = {}
+        for law in self.plan.laws:
+            met = [self.met(name) for name in self._searched(law)]
+            runs[law] = np.array(
+                [np.where(one.failed, np.inf, one.metrics[metric]).ravel() for one in met]
+            )
+        assert self.plan.scenario.sweep
+        return searches.ratios(runs, self.level, self.plan.scenario.sweep.seed)
+
+    def _searched(self, law: str) -> list[str]:
+        """The names of a law with the gains of each of its searches; its own where it has none."""
+        own = [repeated(law, repeat) for repeat in range(len(self.winners.get(law, ())))]
+        found = [name for name in (tuned(law), *own) if name in set(self.runs.laws)]
+        return found or [law]
 
     def _better_than(self, law: str, when: str) -> int:
         """How many laws this one is better than in the typical draw, the whole interval of it."""
@@ -114,9 +141,8 @@ class Results:
         for end in ("ratio", "ratio_low", "ratio_high"):
             told[end] = float(own[end].iloc[0]) if len(own) else 1.0
         spread = [v for v in self.spread(law) if math.isfinite(v)]
-        told["repeats_low"], told["repeats_high"] = (
-            (min(spread), max(spread)) if spread else (math.nan, math.nan)
-        )
+        ends = (float(np.median(spread)), min(spread), max(spread)) if spread else (math.nan,) * 3
+        told |= zip(("repeats_median", "repeats_low", "repeats_high"), ends, strict=True)
         return told
 
     def objective(self, runs: Outcomes, tree: ast.expr) -> Interval:
@@ -150,13 +176,10 @@ class Results:
 
     def spread(self, law: str) -> list[float]:
         """The objective on the fresh draws of every repeat's winner."""
-        names = set(self.runs.laws)
-        own = [repeated(law, repeat) for repeat in range(len(self.winners.get(law, ())))]
-        found = [tuned(law), *own] if law in self.winners else []
+        found = self._searched(law) if law in self.winners else []
         return [
-            evaluate(self.plan.objectives[0], self.met(name), self.plan.metrics)
-            for name in found if name in names
-        ]  # fmt: skip
+            evaluate(self.plan.objectives[0], self.met(name), self.plan.metrics) for name in found
+        ]
 
     @cached_property
     def pairs(self) -> pd.DataFrame:
