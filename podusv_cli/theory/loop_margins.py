@@ -9,8 +9,9 @@ from podusv_cli.core.component import describe
 from podusv_cli.core.errors import LawError
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
 from podusv_cli.engine.step.grid import TimeGrid
+from podusv_cli.theory.course import course
 from podusv_cli.theory.margins import Complex, Cut, Margins, delay_margin, margins, poles, stable
-from podusv_cli.theory.steady import Linear, course, linearised
+from podusv_cli.theory.steady import Linear, linearised
 
 AXES = {"surge": "u", "yaw": "r"}  # the loops, with the letters that their numbers end in
 NUMBERS = (

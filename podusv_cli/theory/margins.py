@@ -25,6 +25,7 @@ Complex = npt.NDArray[np.complex128]
 SLOWEST = 1e-5  # rad/s; slower motion is not looked at
 DENSITY = 60  # frequencies a decade
 AROUND = np.linspace(-3.0, 3.0, 13)  # times its decay, frequencies around that of every pole
+EQUAL = 1e-4  # of a pole; others that differ by less are the same
 BATCH = 256  # frequencies solved together
 STABLE = 1e-7  # of the largest pole; a real part up to this is zero
 
@@ -61,9 +62,9 @@ class Cut:
 
     def frequencies(self) -> Vector:
         """Frequencies [rad/s] that show every resonance, up to where L is below 1."""
-        poles = np.concatenate([np.linalg.eigvals(m) for m in (self.A, self.opened)])
+        poles = _distinct(np.concatenate([np.linalg.eigvals(m) for m in (self.A, self.opened)]))
         fast = max(abs(poles).max(), float(np.linalg.norm(self.C @ self.B)), 1.0)
-        slow = max(abs(poles)[abs(poles) > SLOWEST].min(initial=1.0) * 1e-2, SLOWEST)
+        slow = max(1e-2 * abs(poles).min(), SLOWEST)
         ends = math.log10(slow), math.log10(100.0 * fast)
         spread = np.logspace(*ends, int(DENSITY * (ends[1] - ends[0])))
         near = abs(poles.imag) + abs(poles.real) * AROUND[:, None]
@@ -91,6 +92,13 @@ class Margins:
     delay_margin: float = math.nan
     peak_S: float = math.nan
     peak_T: float = math.nan
+
+
+def _distinct(poles: Complex) -> Complex:
+    """The poles that are not too slow to be looked at, equal ones once."""
+    fast = np.append(poles[abs(poles) > SLOWEST], 1.0)
+    _, first = np.unique(np.round(np.log(fast.astype(complex)) / EQUAL), return_index=True)
+    return np.asarray(fast[first])
 
 
 def poles(A: Vector) -> Complex:
@@ -162,7 +170,7 @@ def _roots(f: Callable[[float], float], omega: Vector, values: Vector) -> list[f
     """Zeros of f between frequencies at which its values change sign."""
     from scipy.optimize import brentq  # slow to import
 
-    changes = np.flatnonzero(np.sign(values[:-1]) * np.sign(values[1:]) < 0)
+    changes = np.flatnonzero(np.diff(values > 0.0))
     return [float(brentq(f, omega[i], omega[i + 1], rtol=1e-12)) for i in changes]
 
 

@@ -54,12 +54,14 @@ def margins(config: Path, request: Request, at: float | None = None) -> Found:
     """The margins of all laws of a scenario, or of `request.controller`, written to `request.out`.
 
     Nothing is written without a place. `at` [s] is when the steady motion begins. Raises
-    ScenarioError, StorageError, UsageError for a time after the run, an unknown law or format, and
-    where no law has margins what is wrong with the first: LawError for a law that takes samples,
+    ScenarioError, StorageError, UsageError for a run folder, a time after the run, an unknown law or
+    format, and where no law has margins what is wrong with the first: LawError for a law that takes samples,
     NotConvergedError where there is no steady motion.
     """
+    if (config / "resolved.yaml").is_file():
+        raise UsageError(f"{config} is a run folder; give its resolved.yaml")
     started = datetime.now(UTC)
-    checks = (unknown_codes, limits(request.allow_large))
+    checks = (unknown_codes, limits(insist=""))
     loaded = load(config, request.overrides, checks, request.plugins)
     duration, label = loaded.scenario.simulation.duration, request.controller
     if at is not None and at > duration:
