@@ -15,6 +15,7 @@ from law_samples import STEADY
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
+from podusv_cli.comparison import table
 from podusv_cli.components.actuators.command import Command
 from podusv_cli.components.actuators.ideal import Ideal
 from podusv_cli.components.actuators.saturated import Saturated
@@ -345,6 +346,15 @@ def test_a_law_without_margins_is_told_beside_the_others(podusv):
     assert podusv("margins", "run").err == "run is a run folder; give its resolved.yaml\n"
     late = podusv("margins", "a.yaml", "--at", "41")
     assert (late.code, late.err) == (2, "--at 41: the run ends at 40 s; give an earlier time\n")
+
+
+def test_no_table_marks_the_smallest_margin():
+    runs = {
+        "a": {"iae_e": 1.0, "gain_margin_u": 2.0},
+        "b": {"iae_e": 2.0, "gain_margin_u": math.inf},
+    }
+    cells = {row[0]: row[2:] for row in table.cells(table.table(runs))}
+    assert cells == {"iae_e": ["1*", "2 (2)"], "gain_margin_u": ["2", "inf (inf)"]}
 
 
 def test_claims_compare_margins(podusv):

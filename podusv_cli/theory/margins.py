@@ -24,8 +24,6 @@ from podusv_cli.core.kernel import Vector
 Complex = npt.NDArray[np.complex128]
 SLOWEST = 1e-5  # rad/s; slower motion is not looked at
 DENSITY = 60  # frequencies a decade
-AROUND = np.linspace(-3.0, 3.0, 13)  # times its decay, frequencies around that of every pole
-EQUAL = 1e-4  # of a pole; others that differ by less are the same
 BATCH = 256  # frequencies solved together
 STABLE = 1e-7  # of the largest pole; a real part up to this is zero
 
@@ -61,15 +59,13 @@ class Cut:
         return np.asarray(np.take_along_axis(loci, np.argsort(np.abs(loci), axis=1), axis=1))
 
     def frequencies(self) -> Vector:
-        """Frequencies [rad/s] that show every resonance, up to where L is below 1."""
-        poles = _distinct(np.concatenate([np.linalg.eigvals(m) for m in (self.A, self.opened)]))
-        fast = max(abs(poles).max(), float(np.linalg.norm(self.C @ self.B)), 1.0)
-        slow = max(1e-2 * abs(poles).min(), SLOWEST)
-        ends = math.log10(slow), math.log10(100.0 * fast)
-        spread = np.logspace(*ends, int(DENSITY * (ends[1] - ends[0])))
-        near = abs(poles.imag) + abs(poles.real) * AROUND[:, None]
-        every = np.unique(np.concatenate([spread, abs(poles), near.ravel()]))
-        return np.asarray(every[(every >= slow) & (every <= 100.0 * fast)])
+        """Frequencies [rad/s] up to where L is below 1, with that of every resonance among them."""
+        sizes = np.abs(np.concatenate([np.linalg.eigvals(m) for m in (self.A, self.opened)]))
+        sizes = np.append(sizes[sizes > SLOWEST], 1.0)
+        slow = max(1e-2 * sizes.min(), SLOWEST)
+        fast = 1e2 * max(sizes.max(), float(np.linalg.norm(self.C @ self.B)))
+        count = int(DENSITY * math.log10(fast / slow))
+        return np.unique(np.append(np.geomspace(slow, fast, count), sizes))
 
 
 @dataclass(frozen=True)
@@ -92,13 +88,6 @@ class Margins:
     delay_margin: float = math.nan
     peak_S: float = math.nan
     peak_T: float = math.nan
-
-
-def _distinct(poles: Complex) -> Complex:
-    """The poles that are not too slow to be looked at, equal ones once."""
-    fast = np.append(poles[abs(poles) > SLOWEST], 1.0)
-    _, first = np.unique(np.round(np.log(fast.astype(complex)) / EQUAL), return_index=True)
-    return np.asarray(fast[first])
 
 
 def poles(A: Vector) -> Complex:

@@ -54,9 +54,9 @@ def margins(config: Path, request: Request, at: float | None = None) -> Found:
     """The margins of all laws of a scenario, or of `request.controller`, written to `request.out`.
 
     Nothing is written without a place. `at` [s] is when the steady motion begins. Raises
-    ScenarioError, StorageError, UsageError for a run folder, a time after the run, an unknown law or
-    format, and where no law has margins what is wrong with the first: LawError for a law that takes samples,
-    NotConvergedError where there is no steady motion.
+    ScenarioError, StorageError, UsageError for a run folder, a time after the run, an unknown law
+    or format. Where no law has margins it raises what is wrong with the first: LawError for a law
+    that takes samples, NotConvergedError where there is no steady motion.
     """
     if (config / "resolved.yaml").is_file():
         raise UsageError(f"{config} is a run folder; give its resolved.yaml")
