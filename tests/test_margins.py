@@ -40,7 +40,7 @@ from podusv_cli.findings import stability
 from podusv_cli.metrics.margins import OF_LOOP
 from podusv_cli.theory.course import course
 from podusv_cli.theory.loop_margins import LoopMargins, loop_margins
-from podusv_cli.theory.margins import Cut, delay_margin, margins
+from podusv_cli.theory.margins import Cut, _roots, delay_margin, margins
 
 GRID = TimeGrid(0.01, 3000)
 
@@ -101,10 +101,17 @@ def test_a_lead_is_a_lag_of_a_turn_less():
     )
 
 
-def test_a_crossover_at_a_frequency_that_is_looked_at_counts():
-    found = margins(fed_back(5.0, [1.0], [1.0, 0.0]))  # 5/s, whose pole is at -5
-    assert 5.0 in found.omega
-    assert found.crossovers == pytest.approx([5.0])
+def test_a_root_at_a_frequency_that_is_looked_at_counts_once():
+    omega = np.array([0.5, 1.0, 2.0])
+    assert _roots(lambda w: 1.0 - w, omega, 1.0 - omega) == pytest.approx([1.0])
+    assert _roots(lambda w: w - 1.0, omega, omega - 1.0) == pytest.approx([1.0])
+
+
+def test_an_undamped_plant_has_margins():
+    found = margins(fed_back(1.0, [1.0, 0.0], [1.0, 0.0, 1.0]))  # s/(s^2 + 1), infinite at 1 rad/s
+    golden = (1.0 + math.sqrt(5.0)) / 2.0
+    assert found.crossovers == pytest.approx([1.0 / golden, golden])
+    assert found.phase_margin == pytest.approx(math.pi / 2.0)
 
 
 def test_a_loop_that_never_reaches_one_has_no_limit_and_an_unstable_one_no_margin():

@@ -24,6 +24,7 @@ from podusv_cli.core.kernel import Vector
 Complex = npt.NDArray[np.complex128]
 SLOWEST = 1e-5  # rad/s; slower motion is not looked at
 DENSITY = 60  # frequencies a decade
+BESIDE = 1.0 + 1e-9  # times an undamped pole, where L is still finite
 BATCH = 256  # frequencies solved together
 STABLE = 1e-7  # of the largest pole; a real part up to this is zero
 
@@ -61,9 +62,9 @@ class Cut:
     def frequencies(self) -> Vector:
         """Frequencies [rad/s] up to where L is below 1, with that of every resonance among them."""
         sizes = np.abs(np.concatenate([np.linalg.eigvals(m) for m in (self.A, self.opened)]))
-        sizes = np.append(sizes[sizes > SLOWEST], 1.0)
-        slow = max(1e-2 * sizes.min(), SLOWEST)
-        fast = 1e2 * max(sizes.max(), float(np.linalg.norm(self.C @ self.B)))
+        sizes = BESIDE * sizes[sizes > SLOWEST]
+        slow = max(1e-2 * sizes.min(initial=1.0), SLOWEST)
+        fast = 1e2 * max(sizes.max(initial=1.0), float(np.linalg.norm(self.C @ self.B)))
         count = int(DENSITY * math.log10(fast / slow))
         return np.unique(np.append(np.geomspace(slow, fast, count), sizes))
 
