@@ -28,6 +28,7 @@ from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.distance import OF_OPTIMUM
+from podusv_cli.metrics.margins import OF_LOOP
 from podusv_cli.metrics.metric import close_integrals
 from podusv_cli.metrics.operations import operations
 from podusv_cli.metrics.table import METRICS, metrics_with, observer
@@ -284,7 +285,7 @@ def test_every_metric_is_computed_and_documented(limited):
     seeing = corrected(measurement=Sensors(), estimator=ExtendedKalmanFilter())
     of_estimates = set(gathered(seeing, steps=10)[1])
     always = {name for name in METRICS if NAMED not in name}
-    compared = {metric.name for metric in OF_OPTIMUM.values()}  # known to comparisons only
+    compared = {metric.name for metric in OF_OPTIMUM.values()} | set(OF_LOOP)  # there only
     simulated = set(got | cost | operations(corrected(), log) | of_pods) | of_estimates | of_trials
     assert always == simulated | compared
     assert set(of_pods) > set(got)

@@ -24,8 +24,8 @@ from podusv_cli.cli.sweep import sweep
 
 # NAME is the function NAME of cli/NAME.py
 COMMANDS = (
-    "init", "run", "compare", "rerun", "diff", "plot", "validate", "verify", "optimum", "explain",
-    "list", "schema", "new", "bench", "tune",
+    "init", "run", "compare", "rerun", "diff", "plot", "validate", "verify", "margins", "optimum",
+    "explain", "list", "schema", "new", "bench", "tune",
 )  # fmt: skip
 
 FIRST_STEPS = """\

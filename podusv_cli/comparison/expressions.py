@@ -145,14 +145,14 @@ class Evaluation(Walk):
         return number
 
     def _never(self, node: ast.expr) -> bool:
-        """Whether this is the time, or a multiple of the time, of an event that never happened."""
+        """Whether this is the time, or a multiple, of an event that never happens, or a margin."""
         match node:
             case ast.BinOp(left=ast.Constant(), right=part, op=ast.Mult()):
                 return self._never(part)
             case ast.Attribute(attr=name):
                 return (
                     name in self.metrics
-                    and self.metrics[name].happens
+                    and (self.metrics[name].happens or self.metrics[name].margin)
                     and self.value(node) == math.inf
                 )
         return False

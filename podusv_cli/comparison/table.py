@@ -78,13 +78,14 @@ def _unranked(frame: pd.DataFrame, known: Mapping[str, Metric] = METRICS) -> lis
     """Metrics in which no run is marked best.
 
     Measured times vary. Where a law keeps a standoff, being nearer to the target is not better.
+    Smaller margins are worse.
     """
     has_both = {"iae", "iae_e"} <= set(frame.index)
     standoff = has_both and bool((frame.loc["iae"].gt(frame.loc["iae_e"])).any())
     return [
         name
         for name in frame.index
-        if name in CLOCKED or (standoff and known[name].counts_standoff)
+        if name in CLOCKED or known[name].margin or (standoff and known[name].counts_standoff)
     ]
 
 
@@ -114,7 +115,7 @@ def _cell(number: float, first: float, best: float, position: int) -> str:
     if math.isnan(number):
         return "-"
     mark = "*" if _shown(number) == _shown(best) else ""
-    ratio = f" ({number / first:.3g})" if position and first and not math.isnan(first) else ""
+    ratio = f" ({number / first:.3g})" if position and first and math.isfinite(first) else ""
     return f"{_shown(number)}{mark}{ratio}"
 
 

@@ -82,14 +82,15 @@ class Accumulator:
 
 @dataclass(frozen=True)
 class Metric:
-    """A number that characterises a run; smaller is better for all metrics.
+    """A number that characterises a run; smaller is better for all but a `margin`.
 
     `result` takes the accumulator's numbers and the step [s], and is NaN for a run that ended
     before the metric is defined. A metric without an accumulator is measured after the run.
     `place` orders tables. `happens`: the metric is the time of an event, and NaN for a whole run
     means that it never happened. `counts_standoff`: a standoff that a law keeps on purpose makes it
-    worse, so that nobody is marked best where there is one. `symbol` is LaTeX for a formula, ""
-    where the name says it better.
+    worse, so that nobody is marked best where there is one. A `margin` is better the larger it is,
+    and infinite where nothing is too much; nobody is marked best. `symbol` is LaTeX for a formula,
+    "" where the name says it better.
     """
 
     name: str
@@ -100,6 +101,7 @@ class Metric:
     place: int = 100
     happens: bool = False
     counts_standoff: bool = False
+    margin: bool = False
     symbol: str = ""
 
     def __post_init__(self) -> None:

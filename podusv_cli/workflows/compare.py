@@ -15,6 +15,7 @@ from podusv_cli.comparison import claims, outputs, table
 from podusv_cli.comparison.curves import Source
 from podusv_cli.comparison.differences import differences
 from podusv_cli.comparison.entries import Absent, Entry, metrics_of
+from podusv_cli.comparison.margins import with_margins
 from podusv_cli.comparison.optimum import related
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.finding import Finding
@@ -199,7 +200,7 @@ def collect(
     entries = _with_costs(
         [Entry(m.label, runs[m.label], m.scenario) for m in members if m.label in runs], extras
     )
-    entries = related(entries, extras)
+    entries = with_margins(related(entries, extras), parsed, extras)
     sources: dict[str, Source] = {m.label: Absent(m.scenario, endings[m.label]) for m in members}
     sources |= {entry.label: entry for entry in entries}
     numbers: dict[str, dict[str, float]] = {m.label: {} for m in members}

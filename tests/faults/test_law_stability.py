@@ -1,5 +1,6 @@
 """Eigenvalues of the closed loop about steady motion on lines and circles, told right and wrong."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,8 @@ from podusv_cli.components.paths.line import Line
 from podusv_cli.components.vessels.plant import plant, surge_force, sway_force, yaw_moment
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.kernel import Vector, bundle
+from podusv_cli.engine.step.grid import TimeGrid
+from podusv_cli.theory.loop_margins import loop_margins
 
 SPEED, LOAD = 0.5, np.array([0.5, 0.5, 0.5])  # m/s; N and N m
 CAREFUL = VelocityVector(omega_v=0.2)
@@ -205,3 +208,16 @@ def test_a_small_error_decays_at_the_rate_of_the_slowest_eigenvalue(law):
     late = out["z_e"][(out["time"] > 60) & (out["time"] < 61)].max()
     later = out["z_e"][(out["time"] > 80) & (out["time"] < 81)].max()
     assert np.log(later / late) / 20.0 == pytest.approx(rate, rel=0.25)
+
+
+@pytest.mark.parametrize("law", [VelocityVector(), Adrc()])
+@pytest.mark.parametrize("turn", [0.0, TURN, -TURN])
+def test_the_loop_s_own_right_hand_side_has_the_same_eigenvalue(law, turn):
+    """`podusv margins` finds state of rest and derivatives by itself."""
+    path, start = Line(), (0.0, 0.0, 0.0, SPEED, 0.0, 0.0)
+    if turn:
+        path = Circle(radius=16.67, turn="starboard" if turn > 0 else "port")
+        start = (16.67, 0.0, math.copysign(np.pi / 2, turn), SPEED, 0.0, turn)
+    loop = corrected(controller=law, path=path, disturbance=STEADY, start=start)
+    found = loop_margins(loop, TimeGrid(0.01, 2000)).poles.real.max()
+    assert found == pytest.approx(growth(law, NONLINEAR, turn=turn), rel=1e-6)

@@ -16,7 +16,7 @@ from podusv_cli.engine.machine import signatures
 from podusv_cli.engine.step import rk4
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.engine.step.layout import Layout, Vectors
-from podusv_cli.engine.step.relay import COUNT
+from podusv_cli.engine.step.relay import COUNT, DEMANDS
 
 
 def logged_rows(loop: ClosedLoop, recording: Recording, most: int) -> Vector:
@@ -68,29 +68,47 @@ class Replayed:
     signals: dict[str, Vector]
 
 
+def rates_at(loop: ClosedLoop, grid: TimeGrid, *, compiled: bool = True) -> Callable[..., Vector]:
+    """A function from rows of (t, s) to rows of the rates of s there, then the loop's row.
+
+    The columns are those of `columns.names`. Control is taken as continuous, also where the run's
+    was sampled, and as without delay. The rates of an estimator are left out: they depend on
+    measurements, which the loop's state does not hold. As second argument the function takes rows
+    of (tau_u [N], tau_r [N m]) that reach the actuator in place of the law's demands.
+    """
+    layout = loop.layout(grid)._replace(hold_every=0, measured=0)
+    vectors = vectors_of(loop, layout, Observer(), grid)
+    vectors.relay[COUNT] = 0.0
+    run = _rates_runner(loop, compiled)
+
+    def at(rows: Vector, given: Vector | None = None) -> Vector:
+        out, there, plan = np.zeros((len(rows), layout.states + layout.columns)), vectors, layout
+        if given is not None:  # as if they had been on their way to the actuator
+            relay = np.concatenate([np.zeros(DEMANDS), given.ravel()])
+            relay[COUNT] = len(rows)
+            there, plan = vectors._replace(relay=relay), layout._replace(relayed=1)
+        run(len(rows), rows.ravel(), out.reshape(-1), there, plan)
+        return out
+
+    return at
+
+
 def rates_replay(
     loop: ClosedLoop, grid: TimeGrid, *, compiled: bool = True
 ) -> Callable[[Recording], Replayed]:
     """A function that gives the loop's right-hand side at every row of a recording of it.
 
-    Control is taken as continuous, also where the run's was sampled, and as without delay. The
-    rates of an estimator are left out: they depend on measurements, which the loop's
-    state does not hold.
+    As `rates_at` has it.
     """
-    layout = loop.layout(grid)._replace(hold_every=0, measured=0)
-    labels, split, about = names(loop), 1 + layout.states, loop.about()
+    labels, split, about = names(loop), 1 + loop.layout(grid).states, loop.about()
     state = list(dict.fromkeys(labels[:split]))
-    vectors = vectors_of(loop, layout, Observer(), grid)
-    vectors.relay[COUNT] = 0.0
-    run = _rates_runner(loop, compiled)
+    rates = rates_at(loop, grid, compiled=compiled)
 
     def replayed(recording: Recording) -> Replayed:
-        logged = np.column_stack([recording[name] for name in state])
-        out = np.zeros((len(logged), layout.states + layout.columns))
-        run(len(logged), logged.ravel(), out.reshape(-1), vectors, layout)
+        out = rates(np.column_stack([recording[name] for name in state]))
         return Replayed(
-            by_name(labels[1:split], out[:, : layout.states], about),
-            by_name(labels[split:], out[:, layout.states :], about),
+            by_name(labels[1:split], out[:, : split - 1], about),
+            by_name(labels[split:], out[:, split - 1 :], about),
         )
 
     return replayed

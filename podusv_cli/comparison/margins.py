@@ -1,0 +1,53 @@
+"""Margins of the compared runs' loops, where a claim names one."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from podusv_cli.comparison.claims import ParsedClaim
+from podusv_cli.comparison.entries import Entry
+from podusv_cli.core.errors import LawError, NotConvergedError
+from podusv_cli.metrics.margins import OF_LOOP
+from podusv_cli.process.extras import Extras, Failure
+from podusv_cli.process.interrupts import interrupts_enabled
+from podusv_cli.theory.loop_margins import loop_margins
+
+
+def with_margins(
+    entries: Sequence[Entry], claims: Sequence[ParsedClaim], extras: Extras
+) -> list[Entry]:
+    """The entries, each with those margins of its loop that the claims name.
+
+    A run whose loop has no margins has none; `extras` says why.
+    """
+    wanted = {name for claim in claims for name in _named(claim)} & OF_LOOP.keys()
+    return [_measured(entry, wanted, extras) for entry in entries] if wanted else list(entries)
+
+
+def _named(claim: ParsedClaim) -> Iterator[str]:
+    """The names after a dot in a claim's expressions."""
+    for tree in filter(None, (claim.expect, claim.given)):
+        yield from (node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute))
+
+
+def _measured(entry: Entry, wanted: set[str], extras: Extras) -> Entry:
+    what, scenario = f"margins of {entry.label}", entry.scenario
+    if scenario.recorded:
+        why = f"the plug-ins of its {', '.join(scenario.recorded)} are not here"
+        extras.missing.append(Failure(what, why))
+    if scenario.recorded or extras.interrupted:
+        return entry
+    try:
+        with interrupts_enabled():
+            found = loop_margins(
+                scenario.closed_loop(), scenario.time_grid(), compiled=scenario.simulation.compiled
+            ).numbers()
+    except KeyboardInterrupt:
+        extras.interrupted = True
+    except (LawError, NotConvergedError) as error:
+        extras.missing.append(Failure(what, str(error)))
+    else:
+        return replace(entry, cost={**entry.cost, **{name: found[name] for name in wanted}})
+    return entry

@@ -1,0 +1,65 @@
+"""The steady motion of a target: straight on or in a circle, at constant speed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from podusv_cli.components.paths.base import Path
+from podusv_cli.core.errors import NotConvergedError
+from podusv_cli.core.kernel import Vector
+
+INSTANTS = 1000  # of a run, among which a steady motion of the target is looked for
+NEAR = 1.0  # s before and after an instant, over which the target's motion is compared
+ALIKE = 1e-6  # of the target's speed; a larger change is one
+STRAIGHT = 1e-9  # rad/s
+
+
+@dataclass(frozen=True)
+class Course:
+    """A target's steady motion at a time [s]: position, velocity, rate of turn [rad/s]."""
+
+    time: float
+    position: Vector
+    velocity: Vector
+    turn: float
+
+    @property
+    def speed(self) -> float:
+        """In m/s."""
+        return math.hypot(*self.velocity)
+
+
+def course(path: Path, duration: float, at: float | None = None) -> Course:
+    """The target's steady motion at a time [s], or at the last time where there is one.
+
+    A straight line is preferred to a circle. Raises NotConvergedError where there is none.
+    """
+    times = np.linspace(0.0, duration, INSTANTS + 1)[::-1] if at is None else [at]
+    found = [one for one in (_course(path, float(t)) for t in times) if one]
+    straight = [one for one in found if abs(one.turn) < STRAIGHT]
+    if not found:
+        when = "at no time of the run" if at is None else f"not at t = {at:g} s"
+        raise NotConvergedError(
+            f"the target moves steadily (straight on or in a circle, at constant speed) {when}, "
+            "and margins are those of a steady motion; choose another time with --at SECONDS, or "
+            "another path, as with --set path.kind=line"
+        )
+    return (straight or found)[0]
+
+
+def _course(path: Path, t: float) -> Course | None:
+    """The motion at t, where it is steady from NEAR before it to NEAR after it."""
+    now, *around = path.targets([t, max(t - NEAR, 0.0), t + NEAR])
+    (x, y), (ahead, across) = now[2:4], now[4:6]
+    turn = (x * across - y * ahead) / max(x * x + y * y, 1e-300)
+    for sign, other in zip((-min(t, NEAR), NEAR), around, strict=True):
+        angle = turn * sign
+        cosine, sine = math.cos(angle), math.sin(angle)
+        same = (x * cosine - y * sine, y * cosine + x * sine, -turn * y, turn * x)
+        changed = [*(other[2:4] - same[:2]), *(now[4:6] - same[2:])]
+        if max(map(abs, changed)) > ALIKE * max(math.hypot(x, y), ALIKE):
+            return None
+    return Course(t, now[:2], now[2:4], turn)

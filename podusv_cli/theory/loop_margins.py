@@ -1,0 +1,97 @@
+"""Margins of a closed loop at the plant's input, in surge, in yaw and with both delayed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from podusv_cli.core.component import describe
+from podusv_cli.core.errors import LawError
+from podusv_cli.engine.loop.closed_loop import ClosedLoop
+from podusv_cli.engine.step.grid import TimeGrid
+from podusv_cli.theory.course import course
+from podusv_cli.theory.margins import Complex, Cut, Margins, delay_margin, margins, poles, stable
+from podusv_cli.theory.steady import Linear, linearised
+
+AXES = {"surge": "u", "yaw": "r"}  # the loops, with the letters that their numbers end in
+NUMBERS = (
+    "phase_margin", "gain_margin", "gain_reduction", "delay_margin", "peak_S", "peak_T",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class LoopMargins:
+    """Margins of the surge and of the yaw loop, and what they hold for.
+
+    Each loop is opened at the plant's input while the other is closed. `delay_margin` [s] is for
+    one delay of both of the law's demands, as `actuator.command.delay` is. `left_out` says what
+    of the scenario the loop is without.
+    """
+
+    linear: Linear
+    loops: dict[str, Margins]
+    delay_margin: float
+    left_out: tuple[str, ...]
+
+    @property
+    def poles(self) -> Complex:
+        """Of the closed loop [1/s], the slowest to decay first."""
+        return poles(self.linear.A)
+
+    @property
+    def stable(self) -> bool:
+        """Whether the closed loop comes back to its steady motion."""
+        return stable(self.linear.A)
+
+    @property
+    def open(self) -> tuple[str, ...]:
+        """The loops that are open: what acts on the hull does not answer its motion."""
+        rows = zip(AXES, self.linear.C, strict=True)
+        return tuple(axis for axis, row in rows if not row.any())
+
+    def numbers(self) -> dict[str, float]:
+        """The margins by the names that claims have for them (`metrics.margins`)."""
+        found = {
+            f"{name}_{AXES[axis]}": float(getattr(loop, name))
+            for axis, loop in self.loops.items() for name in NUMBERS
+        }  # fmt: skip
+        return found | {"delay_margin": self.delay_margin}
+
+
+def loop_margins(
+    loop: ClosedLoop, grid: TimeGrid, at: float | None = None, *, compiled: bool = True
+) -> LoopMargins:
+    """The margins of a loop about its steady motion at a time [s] of a run over this grid.
+
+    Without a time, at the last one at which the target goes straight on or in a circle. Raises
+    LawError for a law that takes samples, and NotConvergedError where there is no steady motion.
+    """
+    law = loop.controller
+    if law.takes_samples():
+        raise LawError(
+            f"{describe(law)}: it takes samples, and margins are those of a law that acts "
+            "continuously; set controller.rate=analytic and controller.hold_below=0 where it has "
+            "these keys, or choose another law"
+        )
+    found = linearised(
+        loop, course(loop.path, grid.steps * grid.step, at), grid.step, compiled=compiled
+    )
+    cuts = {
+        axis: Cut(found.A, found.B[:, [i]], found.C[[i]]) for i, axis in enumerate(AXES)
+    }  # fmt: skip
+    return LoopMargins(
+        found, {axis: margins(cut) for axis, cut in cuts.items()},
+        delay_margin(Cut(found.A, found.B_command, found.C_command)),
+        tuple(_left_out(loop, grid, found)),
+    )  # fmt: skip
+
+
+def _left_out(loop: ClosedLoop, grid: TimeGrid, found: Linear) -> Iterator[str]:
+    if loop.measured:
+        yield "measurement and estimator"
+    if grid.hold_every:
+        yield f"the sampling of the law every {grid.hold_every * grid.step:g} s"
+    if loop.actuator.delay():
+        yield f"the command's delay of {loop.actuator.delay():g} s"
+    if found.course.turn and not loop.disturbance.of_time:
+        yield "what the load does as the vessel turns with the circle"

@@ -1,0 +1,273 @@
+"""The steady motion of a closed loop on its path, and its linearisation there.
+
+Seen from a target that moves straight on or in a circle at constant speed, a settled vessel
+stands still. With q the loop's state relative to the target, and the load as it is at one instant,
+
+    q' = g(q),   g(q*) = 0,   A = dg/dq.
+
+Everything is numerical and from the engine's own right-hand side, so any law will do.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from podusv_cli.components.estimators.none import NoEstimator
+from podusv_cli.components.measurements.exact import Exact
+from podusv_cli.components.vessels.plant import plant
+from podusv_cli.core.errors import NotConvergedError
+from podusv_cli.core.kernel import Vector, bundle
+from podusv_cli.engine.loop.closed_loop import DEMAND, LOADS, ClosedLoop
+from podusv_cli.engine.loop.columns import names
+from podusv_cli.engine.running.replay import rates_at
+from podusv_cli.engine.running.simulate import simulate
+from podusv_cli.engine.step.grid import TimeGrid
+from podusv_cli.theory.course import Course
+
+SETTLING = 3000.0  # s, for which the vessel is left to settle on the steady motion
+MOST_EVALUATIONS = 20_000  # of the right-hand side while it settles
+ROUNDS = 30  # of Newton's method
+SETTLED = 1e-8  # of every state, or of 1: how far Newton's last step may go
+STEPS = (1e-4, 1e-5, 1e-6)  # of every state, or of 1: steps of differences, the first that will do
+CLOSE = 1e-2  # m; nearer to the target its direction may be singular
+CURVED = 1e-2  # of a row's largest derivative: how much the derivatives to both sides may differ
+
+WHAT_IT_TAKES = (
+    "margins are those of a law that settles behind a steady target; look at a run, or take a law "
+    "or gains that settle"
+)
+
+
+@dataclass(frozen=True)
+class Linear:
+    """A closed loop about its steady motion: q' = A q + B d, and loads on the hull C q.
+
+    q are those of the loop's states that change, relative to the target, as `states` names them
+    (m, rad, m/s, rad/s, units of the law's memory). d and the loads are (tau_u [N], tau_r [N m]) at
+    the plant's input. `B_command` and `C_command` are the same at the actuator's: what reaches it,
+    and what the law demands. A law that is told the loads sees what happens between the two, as a
+    delay, but not what happens behind the actuator.
+
+    `distance` is that to the target in the steady motion [m], `load` what is held (b_u, b_v, b_r),
+    `motion` the steady (u, v, r), `reach` how far the loop is linear, in units of each state.
+    """
+
+    A: Vector
+    B: Vector
+    C: Vector
+    B_command: Vector
+    C_command: Vector
+    states: tuple[str, ...]
+    course: Course
+    distance: float
+    load: Vector
+    motion: Vector
+    reach: float
+
+    @property
+    def singular(self) -> bool:
+        """Whether the target is so near that the vessel's smallest move changes its direction."""
+        return self.reach < STEPS[0] and self.distance < CLOSE
+
+
+def idealised(loop: ClosedLoop) -> ClosedLoop:
+    """The loop with exact measurements and without a delay of the command."""
+    actuator = loop.actuator
+    if actuator.command:
+        command = actuator.command.model_copy(update={"delay": 0.0})
+        actuator = actuator.model_copy(update={"command": command})
+    return replace(loop, actuator=actuator, measurement=Exact(), estimator=NoEstimator())
+
+
+def linearised(loop: ClosedLoop, along: Course, step: float, *, compiled: bool = True) -> Linear:
+    """The loop linearised about its steady motion along a course.
+
+    The vessel gets there as in a run with this `step` [s] up to the course's time. From then on the
+    target goes on as it does and the load keeps its value, until nothing changes any more. Raises
+    NotConvergedError where the vessel does not come to a steady motion, or where the right-hand
+    side has no derivative there.
+    """
+    loop = idealised(loop)
+    grid = TimeGrid(step, max(round(along.time / step), 1))
+    frame = _Frame(loop, grid, along, _arrived(loop, grid, compiled), compiled)
+    try:
+        with np.errstate(all="ignore"):
+            return _about(loop, frame, frame.steady(frame.settled(frame.start)))
+    except (ArithmeticError, np.linalg.LinAlgError) as error:
+        raise NotConvergedError(f"no steady motion was found: {error}; {WHAT_IT_TAKES}") from error
+
+
+def _about(loop: ClosedLoop, frame: _Frame, q: Vector) -> Linear:
+    jacobian, reach = frame.jacobian(q)
+    states = len(q)
+    moving = np.flatnonzero(jacobian[:states].any(axis=1))
+    outputs = jacobian[states:, moving]
+    return Linear(
+        A=jacobian[np.ix_(moving, moving)],
+        B=_inputs(loop, states)[moving],
+        C=outputs[:2],
+        B_command=frame.commanded(q)[moving],
+        C_command=outputs[2:],
+        states=tuple(frame.labels[1 + i] for i in moving),
+        course=frame.course,
+        distance=math.hypot(*q[:2]),
+        load=frame.row(q)[frame.loads],
+        motion=q[3:6],
+        reach=reach,
+    )
+
+
+def _arrived(loop: ClosedLoop, grid: TimeGrid, compiled: bool) -> Vector:
+    """The loop's state at the end of a run. Raises NotConvergedError where it diverges."""
+    log = simulate(loop, replace(grid, log_every=grid.steps), compiled=compiled)
+    if log.status == "interrupted":
+        raise KeyboardInterrupt
+    if log.status != "finished":
+        raise NotConvergedError(f"there is no steady motion: the run {log.message}")
+    state = dict.fromkeys(names(loop)[1 : 1 + loop.layout(grid).states])
+    return np.asarray(np.column_stack([log[name] for name in state])[-1])
+
+
+def _inputs(loop: ClosedLoop, states: int) -> Vector:
+    """Rates of the states by a surge force and by a yaw moment on the hull, shape (states, 2)."""
+    k, nothing, rates = bundle(loop.vessel.constants()), np.zeros(6), np.zeros((states, 2))
+    for column, tau in enumerate(np.eye(3)[[0, 2]]):
+        rate = np.zeros(6)
+        plant(nothing, tau, nothing, k, rate)
+        rates[:6, column] = rate
+    return rates
+
+
+class _Frame:
+    """The loop as a target sees it that moves on a course, its load held."""
+
+    def __init__(
+        self, loop: ClosedLoop, grid: TimeGrid, along: Course, s: Vector, compiled: bool
+    ) -> None:
+        self.labels = names(loop)
+        self.course = along
+        column = {name: i - 1 for i, name in enumerate(self.labels)}
+        self.loads = [column[name] for name in LOADS[3:]]
+        self._demands = [column[name] for name in DEMAND]
+        self._seen = [*range(len(s)), column["tau_u"], column["tau_r"], *self._demands]
+        self._rates = rates_at(loop, grid, compiled=compiled)
+        self._origin = np.zeros(len(s))
+        self._origin[:2] = along.position
+        self.start = s - self._origin
+        self._drift = np.zeros(len(s))
+        self._drift[:2] = along.velocity
+        self._turn_angles(loop)
+
+    def _turn_angles(self, loop: ClosedLoop) -> None:
+        """Let angles turn with the course: the heading, and those like it in the law's memory."""
+        about, turn, count = loop.about(), self.course.turn, len(self.start)
+        if turn:
+            pace = self.row(self.start)[:count] / turn
+            angles = [about[name].unit == "rad" for name in self.labels[1 : 1 + count]]
+            self._drift[np.array(angles) & (abs(pace - 1.0) < 0.5)] = turn
+            self._drift[2] = turn
+
+    def rows(self, q: Vector, given: Vector | None = None) -> Vector:
+        """For rows of q: rates of q, then the loop's row; `given` as `rates_at` has it."""
+        count = q.shape[1]
+        times = np.full((len(q), 1), self.course.time)
+        out = self._rates(np.hstack([times, q + self._origin]), given)
+        out[:, :count] -= self._drift
+        out[:, 0] += self.course.turn * q[:, 1]
+        out[:, 1] -= self.course.turn * q[:, 0]
+        return out
+
+    def row(self, q: Vector) -> Vector:
+        """The same for one q. Raises ArithmeticError where a rate is not finite."""
+        row = np.asarray(self.rows(q[None])[0])
+        if not np.isfinite(row).all():
+            raise ArithmeticError("a rate is not finite")
+        return row
+
+    def settled(self, q: Vector) -> Vector:
+        """Where the vessel is once it was left to settle, or as far as it came."""
+        from scipy.integrate import BDF  # slow to import
+
+        solver = BDF(
+            lambda _, q: self.row(q)[: len(q)], 0.0, q, SETTLING, rtol=1e-6, atol=1e-9,
+            jac=lambda _, q: self._central(q, STEPS[0])[: len(q)],
+        )  # fmt: skip
+        while solver.status == "running" and solver.nfev < MOST_EVALUATIONS:
+            solver.step()
+        return np.asarray(solver.y)
+
+    def steady(self, q: Vector) -> Vector:
+        """The q near this one that does not change, by Newton's method."""
+        for _ in range(ROUNDS):
+            rates, slopes = self.row(q)[: len(q)], self._central(q, STEPS[1])[: len(q)]
+            size = _size(q)
+            scaled = slopes * size
+            heights = np.maximum(abs(scaled).max(axis=1), 1e-12)
+            move = size * np.linalg.lstsq(scaled / heights[:, None], -rates / heights)[0]
+            q = q + move
+            if (abs(move) <= SETTLED * size).all() and (abs(rates) <= 1e-6 * heights).all():
+                return q
+        raise NotConvergedError(self._restless(q))
+
+    def _restless(self, q: Vector) -> str:
+        pace = abs(self.row(q)[: len(q)]) / _size(q)
+        return (
+            f"no steady motion was found from t = {self.course.time:g} s on: the vessel is "
+            f"{math.hypot(*q[:2]):.3g} m from the target, and {self.labels[1 + pace.argmax()]} "
+            f"changes most; {WHAT_IT_TAKES}"
+        )
+
+    def _central(self, q: Vector, relative: float) -> Vector:
+        """Derivatives of rates, loads and demands by q, shape (all of these, states)."""
+        return self._differences(q, relative)[0]
+
+    def _differences(self, q: Vector, relative: float) -> tuple[Vector, Vector]:
+        """Central differences, and by how much those to either side are off them."""
+        steps = relative * _size(q)
+        rows = self.rows(np.vstack([q + np.diag(steps), q - np.diag(steps), q]))[:, self._seen].T
+        above, below, here = np.split(rows, [len(q), 2 * len(q)], axis=1)
+        return (above - below) / (2.0 * steps), (above + below - 2.0 * here) / (2.0 * steps)
+
+    def jacobian(self, q: Vector) -> tuple[Vector, float]:
+        """Derivatives of rates, loads and demands by q, shape (all of these, states), and the step.
+
+        By central differences of two steps, extrapolated. Raises NotConvergedError where none of
+        the steps gives derivatives that are the same for half of it and to both sides.
+        """
+        for relative in STEPS:
+            coarse, _ = self._differences(q, relative)
+            fine, apart = self._differences(q, 0.5 * relative)
+            doubt = np.maximum(abs(coarse - fine), abs(apart)) * _size(q)
+            largest = (abs(fine) * _size(q)).max(axis=1, keepdims=True)
+            rounding = 1e-12 * np.maximum(abs(self.row(q)[self._seen]), 1.0)[:, None] / relative
+            if (doubt <= CURVED * largest + rounding).all():
+                return fine + (fine - coarse) / 3.0, relative
+        at = np.unravel_index(np.nanargmax(doubt / largest), doubt.shape)
+        raise NotConvergedError(self._no_derivative(q, int(at[1])))
+
+    def commanded(self, q: Vector) -> Vector:
+        """Derivatives of the rates by the demands that reach the actuator, shape (states, 2)."""
+        demand = self.row(q)[self._demands]
+        steps = STEPS[0] * _size(demand)
+        shifts = np.diag(steps)
+        rates = self.rows(np.tile(q, (4, 1)), np.vstack([demand + shifts, demand - shifts]))
+        above, below = np.split(rates[:, : len(q)], 2)
+        return np.asarray(((above - below) / (2.0 * steps[:, None])).T)
+
+    def _no_derivative(self, q: Vector, state: int) -> str:
+        distance = math.hypot(*q[:2])
+        why = "a limit, dead zone or step of law or actuator lies there"
+        if state < 2 and distance < CLOSE:
+            why = f"the target is {distance:.2g} m away, where its direction is singular"
+        return (
+            f"the loop has no derivative by {self.labels[1 + state]} at the steady motion: {why}; "
+            "margins need a smooth loop: choose a law with a standoff, another load or another "
+            "actuator"
+        )
+
+
+def _size(q: Vector) -> Vector:
+    return np.maximum(abs(q), 1.0)

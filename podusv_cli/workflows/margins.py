@@ -1,0 +1,119 @@
+"""`podusv margins`: loop margins of a scenario's laws, told and kept in a folder."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from podusv_cli.core.errors import LawError, NotConvergedError, UsageError
+from podusv_cli.findings.finding import unknown_codes
+from podusv_cli.metrics.margins import OF_LOOP
+from podusv_cli.process.interrupts import interrupts_deferred
+from podusv_cli.scenario.limits import limits
+from podusv_cli.scenario.load import load
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.storage import csv_files, provenance
+from podusv_cli.storage.run_folder import RunWriter
+from podusv_cli.theory.loop_margins import LoopMargins, loop_margins
+from podusv_cli.workflows.run import Request, single
+
+
+@dataclass(frozen=True)
+class Found:
+    """Margins of each law by its label, and why there are none for the others."""
+
+    laws: Mapping[str, LoopMargins]
+    failed: Mapping[str, str]
+    folder: Path | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        """What `--json` prints, and margins.json holds."""
+        return {
+            "format": 1, "folder": None if self.folder is None else str(self.folder),
+            "laws": {label: _as_json(law) for label, law in self.laws.items()},
+            "failed": dict(self.failed),
+        }  # fmt: skip
+
+
+def _as_json(law: LoopMargins) -> dict[str, Any]:
+    linear = law.linear
+    return {
+        "at": linear.course.time, "speed": linear.course.speed, "turn": linear.course.turn,
+        "z_e": linear.distance, "motion": linear.motion, "load": linear.load,
+        "left_out": law.left_out, "open": law.open, "stable": law.stable,
+        "poles": [[pole.real, pole.imag] for pole in law.poles],
+        "crossovers": {axis: loop.crossovers for axis, loop in law.loops.items()},
+        "margins": law.numbers(),
+    }  # fmt: skip
+
+
+def margins(config: Path, request: Request, at: float | None = None) -> Found:
+    """The margins of all laws of a scenario, or of `request.controller`, written to `request.out`.
+
+    Nothing is written without a place. `at` [s] is when the steady motion begins. Raises
+    ScenarioError, StorageError, UsageError for a run folder, a time after the run, an unknown law
+    or format. Where no law has margins it raises what is wrong with the first: LawError for a law
+    that takes samples, NotConvergedError where there is no steady motion.
+    """
+    if (config / "resolved.yaml").is_file():
+        raise UsageError(f"{config} is a run folder; give its resolved.yaml")
+    started = datetime.now(UTC)
+    checks = (unknown_codes, limits(insist=""))
+    loaded = load(config, request.overrides, checks, request.plugins)
+    duration, label = loaded.scenario.simulation.duration, request.controller
+    if at is not None and at > duration:
+        raise UsageError(f"--at {at:g}: the run ends at {duration:g} s; give an earlier time")
+    singles = {label: single(loaded, label)} if label else loaded.scenario.singles()
+    if request.out is None:
+        return _found(singles, at)
+    _check_formats(request.formats)
+    with RunWriter(request.out, force=request.force) as writer:
+        found = _found(singles, at)
+        with interrupts_deferred():
+            plugins = loaded.scenario.plugged
+            origin = provenance.collect(request.argv, started, datetime.now(UTC), plugins)
+            _write(writer, found, request.formats)
+            writer.add_json("provenance.json", origin)
+            return replace(found, folder=writer.finish("finished"))
+
+
+def _found(singles: Mapping[str, Scenario], at: float | None) -> Found:
+    laws: dict[str, LoopMargins] = {}
+    failed: dict[str, LawError | NotConvergedError] = {}
+    for label, scenario in singles.items():
+        try:
+            laws[label] = loop_margins(
+                scenario.closed_loop(), scenario.time_grid(), at,
+                compiled=scenario.simulation.compiled,
+            )  # fmt: skip
+        except (LawError, NotConvergedError) as error:
+            failed[label] = error
+    if not laws:
+        raise next(iter(failed.values()))
+    return Found(laws, {label: str(error) for label, error in failed.items()})
+
+
+def _check_formats(formats: Sequence[str]) -> None:
+    from podusv_cli.figures.drawing import check_names  # matplotlib is slow to import
+
+    check_names((), formats)
+
+
+def _write(writer: RunWriter, found: Found, formats: Sequence[str]) -> None:
+    """Margins as JSON and CSV, the curves, and the figure in each format."""
+    from podusv_cli.figures.margins import sensitivities  # matplotlib is slow to import
+    from podusv_cli.figures.style import house_style, image
+
+    writer.add_json("margins.json", found.as_json())
+    rows = [
+        [name, OF_LOOP[name].unit, *(law.numbers()[name] for law in found.laws.values())]
+        for name in OF_LOOP
+    ]
+    writer.add("margins.csv", csv_files.lines([["margin", "unit", *found.laws], *rows]).encode())
+    with house_style():
+        figure = sensitivities(found.laws)
+        for form in formats:
+            writer.add(f"figures/sensitivities.{form}", image(figure, form))
