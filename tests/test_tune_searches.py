@@ -1,4 +1,4 @@
-"""Laws over all of their searches: ratios, their intervals, and the places that these leave open."""
+"""Laws over all of their searches: ratios, their intervals, and the places they leave open."""
 
 import numpy as np
 import pytest
