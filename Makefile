@@ -23,7 +23,7 @@ TESTED_WITH := pytest pytest-xdist hypothesis sympy xarray h5netcdf netCDF4 impo
 PODS := kept dropped ideal no_anti_windup single
 ABLATIONS := ablation ablation_figures ablation_standoff ablation_gains ablation_gains_figures \
     ablation_gains_standoff ablation_pid
-TABLES := unknown:unknown_dynamics discrete:discrete_signals limits:period_limits learnt:learnt gains:fixed_gains
+TABLES := unknown:unknown_dynamics discrete:discrete_signals limits:period_limits learnt:learnt gains:fixed_gains networks:networks
 SEAS := exact sensors sensors_alone current state_3 state_5 state_6 rare untold rare_untold pods delay thruster_failure dead_zone
 STUDIES := hull_and_sea unknown_dynamics rivals sea_state_4 sea_state_6 sea_untold
 SEARCHES := phases hull sensors network sliding
@@ -58,6 +58,7 @@ claim: $(VENV)/run.done ## the paper's central claim: parts off, wrong vessels, 
 	    $(BIN)/python examples/reproduce/claim.py $${table%:*} > results/.table && \
 	    mv results/.table results/paper/$${table#*:}.csv || exit 1; \
 	done
+	@$(BIN)/python examples/reproduce/network_line.py results/paper/networks.csv results/paper/networks.png
 	@echo "what was found: results/claim.md"
 
 pod: $(VENV)/run.done ## the laws behind a pod, into results/.runs/pod/

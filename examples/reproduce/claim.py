@@ -1,6 +1,6 @@
 """Tables behind results/claim.md: a law that is told a wrong vessel, sampled control, and f_hat.
 
-    python examples/reproduce/claim.py unknown | discrete | limits | learnt | gains
+    python examples/reproduce/claim.py unknown | discrete | limits | learnt | gains | networks
 
 Each prints a CSV table. The scenarios are those of configs/paper; every number comes from a run.
 """
@@ -17,6 +17,8 @@ from typing import TypeVar
 import numpy as np
 import pandas as pd
 
+from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
+from podusv_cli.components.controllers.network import activation
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
 from podusv_cli.engine.running.replay import rates_replay
@@ -55,6 +57,8 @@ DIFFERENCE = 0.01  # s
 UPDATES = ("after", "before")  # the demand is formed; when the law's memory takes a sample
 # kg/s in surge by kg m2/s in yaw; the last has those on which the network settles
 GAINS = {100: 80, 200: 80, 400: 80, 800: 80, 1100: 80, 6660: 116, 13208: 191}
+LEAKAGES = (0.03, 0.1, 0.3, 1.0, 3.0)  # sigma_u
+FIXED = (500, 2000, 8000, 32000)  # kg/s
 LONGEST = 400  # steps of STEP: 0.2 s
 GROWS = 1 + 1e-9
 SETTLED = 0.8  # of the run, from where it counts as settled
@@ -235,6 +239,43 @@ def gains() -> pd.DataFrame:
     return pd.DataFrame(parallel(velocity_errors, list(runs.values())), index=index)
 
 
+def networks() -> pd.DataFrame:
+    """Networks of three sizes with five leakages, and fixed gains of the size that they act as.
+
+    `gain` is k_ue + m11^2 |Phi|^2/sigma_u with the settled mean of |Phi|^2; `product` is gain times
+    the settled rms of u_e, which does not change if the network acts as that gain.
+    """
+    told = {
+        (
+            nodes**3,
+            sigma,
+        ): f"{{kind: adaptive_neural, network: {{nodes: [{nodes}, {nodes}, {nodes}]}}, "
+        f"sigma_u: {sigma}}}"
+        for nodes in (2, 3, 5)
+        for sigma in LEAKAGES
+    }
+    told |= {(0, gain): f"{{{OFF}, k_ue: {gain}, k_re: 191}}" for gain in FIXED}
+    names = {key: f"case_{place}" for place, key in enumerate(told)}
+    sets = [f"controllers.{names[key]}={law}" for key, law in told.items()]
+    every = laws(READINGS["C"], *sets, "simulation.step=0.002", "log.every=5", "log.monitor=false")
+    index = pd.MultiIndex.from_tuples(told, names=["nodes", "sigma_u_or_gain"])
+    cases = [every[name] for name in names.values()]
+    return pd.DataFrame(parallel(acting_as, cases), index=index)
+
+
+def acting_as(scenario: Scenario) -> dict[str, float]:
+    """The gain that a law's network acts as in surge, the settled rms of u_e, and their product."""
+    _, log = made(scenario)
+    settled = slice(int(SETTLED * len(log["time"])), None)
+    nu = np.stack([log[name][settled] for name in "uvr"], axis=1)
+    law, hull = scenario.controller, scenario.closed_loop().nominal
+    assert isinstance(law, AdaptiveNeural)
+    phi2 = float(np.mean(np.sum(activation(law.network, nu) ** 2, axis=1)))
+    gain = law.k_ue + (hull.m11**2 * phi2 / law.sigma_u if law.Gamma_u else 0.0)
+    error = settled_rms(log["u_e"])
+    return {"phi2": phi2, "gain": gain, "rms_u_e": error, "product": gain * error}
+
+
 def velocity_errors(scenario: Scenario) -> dict[str, float]:
     """Errors of a run, with those of the velocities."""
     metrics, log = made(scenario)
@@ -253,6 +294,7 @@ def settled_rms(signal: Vector) -> float:
 
 TABLES: Mapping[str, Callable[[], pd.DataFrame]] = {
     "unknown": unknown, "discrete": discrete, "limits": limits, "learnt": learnt, "gains": gains,
+    "networks": networks,
 }  # fmt: skip
 
 if __name__ == "__main__":
