@@ -17,7 +17,10 @@ FIRST = 60  # failures that the page lists
 DARKEST = 10.0  # times the best law's IAE
 PALE, DARK = (236, 244, 250), (8, 64, 112)  # red, green, blue
 CROSS = "✗"
-HEADINGS = ("law", "mean rank", "failed", "median of IAE / best", "within 10 % of the best")
+HEADINGS = (
+    "law", "mean rank", "failed", "median of IAE / best", "beyond the standoff", "variation",
+    "within 10 % of the best",
+)  # fmt: skip
 
 
 class Cell(NamedTuple):
@@ -70,15 +73,17 @@ def _grids(optima: Sequence[Least]) -> dict[str, Any]:
 
 
 def headings(board: pd.DataFrame) -> list[str]:
-    """Of the leaderboard; the last where optima were found."""
-    return [*HEADINGS, *(["median of IAE / optimum"] if "of_optimum" in board else [])]
+    """Of the leaderboard: a rank for each vessel, and the last where optima were found."""
+    vessels = [f"rank {name}" for name in board if str(name).startswith("on ")]
+    return [*HEADINGS, *vessels, *(["median of IAE / optimum"] if "of_optimum" in board else [])]
 
 
 def told(row: Any) -> list[str]:
     """A law's row of the leaderboard below these headings, but for the law's name."""
     texts = [
         f"{row.mean_rank:.2f}", f"{row.failed:.0f} of {row.cases:.0f}", number(row.median_ratio),
-        f"{100 * row.close:.0f} %",
+        number(row.median_ratio_e), number(row.variation), f"{100 * row.close:.0f} %",
+        *(f"{row[name]:.2f}" for name in row.index if str(name).startswith("on ")),
     ]  # fmt: skip
     return [*texts, *([number(row.of_optimum)] if "of_optimum" in row else [])]
 

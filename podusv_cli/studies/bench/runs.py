@@ -22,8 +22,8 @@ FAILED = "not at its target"
 class BenchRun:
     """How a law did in a case.
 
-    `status` is finished, diverged, crashed, or FAILED where the mean distance over the steady
-    window exceeds the settling radius. `track` has rows x, y, x_d, y_d [m].
+    `status` is finished, diverged, crashed, or FAILED where the mean error beyond the standoff over
+    the steady window exceeds the settling radius. `track` has rows x, y, x_d, y_d [m].
     """
 
     place: tuple[str, str, str]
@@ -71,12 +71,12 @@ def _run(case: Case, law: str, scenario: Scenario) -> BenchRun:
         raise KeyboardInterrupt
     numbers = seeing.summary(recording.seen) if recording.seen is not None else {}
     track = np.stack([recording[name] for name in ("x", "y", "x_d", "y_d")], axis=1)
-    settled = numbers.get("z_e_steady", math.nan)
+    settled = numbers.get("e_steady", math.nan)
     if recording.status != "finished" or scenario.at_target(settled):
         return BenchRun(
             case.place, law, recording.status, _first(recording.message), numbers, track
         )
-    cause = f"{settled:.3g} m away over the steady window"
+    cause = f"{settled:.3g} m off over the steady window"
     return BenchRun(case.place, law, FAILED, cause, numbers, track)
 
 

@@ -12,15 +12,20 @@ from podusv_cli.studies.bench.optima import Least
 from podusv_cli.studies.bench.runs import BenchRun
 
 PLACE = ["vessel", "task", "condition"]
-COLUMNS = ("iae", "z_e_steady", "settling_time", "peak_tau_u", "peak_tau_r", "tv_tau_u", "tv_tau_r")
+COLUMNS = (
+    "iae", "iae_e", "z_e_steady", "e_steady", "settling_time", "peak_tau_u", "peak_tau_r",
+    "tv_tau_u", "tv_tau_r",
+)  # fmt: skip
+RATIOS = {"ratio": "iae", "ratio_e": "iae_e", "variation": "tv_tau_u"}
 CLOSE = 1.1  # times the best law's IAE counts as close
 
 
 def table(runs: Iterable[BenchRun]) -> pd.DataFrame:
-    """A row for each law in each case, with `ratio` (inf where it failed) and `rank`.
+    """A row for each law in each case, with ratios (inf where it failed) and `rank`.
 
-    `ratio` is its IAE over the least of the laws that are at their target. Ranks count from 1; laws
-    that failed share the mean of the last ranks.
+    `ratio` is its IAE over the least of the laws that are at their target, `ratio_e` the same of the
+    error beyond the standoff, `variation` that of the total variation of the surge demand. Ranks,
+    by IAE, count from 1; laws that failed share the mean of the last ranks.
     """
     rows = [
         {**dict(zip(PLACE, run.place, strict=True)), "law": run.law, "status": run.status,
@@ -28,11 +33,13 @@ def table(runs: Iterable[BenchRun]) -> pd.DataFrame:
         for run in runs
     ]  # fmt: skip
     made = pd.DataFrame(rows)
+    place = [made[name] for name in PLACE]
+    for name, column in RATIOS.items():
+        counted = made[column].where(made.status == "finished", np.inf)
+        best = counted.groupby(place, sort=False).transform("min")
+        made[name] = np.where(np.isfinite(counted), counted / best, np.inf)
     counted = made.iae.where(made.status == "finished", np.inf)
-    cases = counted.groupby([made[name] for name in PLACE], sort=False)
-    best = cases.transform("min")
-    made["ratio"] = np.where(np.isfinite(counted), counted / best, np.inf)
-    made["rank"] = cases.rank(method="average")
+    made["rank"] = counted.groupby(place, sort=False).rank(method="average")
     return made
 
 
@@ -52,7 +59,8 @@ def leaderboard(made: pd.DataFrame) -> pd.DataFrame:
 
     `close` is the share of cases in which the law's IAE is within 10 % of the best. `median_ratio`
     and `settled`, the distance over the steady window [m], are medians, with a run that failed or
-    ended early as inf; so is `of_optimum`, if the table has it, over cases with an optimum.
+    ended early as inf; so are `median_ratio_e` and `variation` (see `table`), and `of_optimum`, if
+    the table has it, over cases with an optimum. `on` and a vessel's name: its mean rank there.
     """
     laws = made.groupby("law", sort=False)
     board = pd.DataFrame(
@@ -61,10 +69,14 @@ def leaderboard(made: pd.DataFrame) -> pd.DataFrame:
             "failed": laws.status.agg(lambda status: int((status != "finished").sum())),
             "mean_rank": laws["rank"].mean(),
             "median_ratio": laws.ratio.agg(middle),
+            "median_ratio_e": laws.ratio_e.agg(middle),
+            "variation": laws.variation.agg(middle),
             "close": laws.ratio.agg(lambda ratio: float((ratio <= CLOSE).mean())),
             "settled": laws.z_e_steady.agg(lambda z_e: middle(z_e.fillna(np.inf))),
         }
     )
+    for vessel, rows in made.groupby("vessel", sort=False):
+        board[f"on {vessel}"] = rows.groupby("law", sort=False)["rank"].mean()
     if "of_optimum" in made:
         board["of_optimum"] = laws.of_optimum.agg(lambda ratio: middle(ratio.dropna()))
     return board.sort_values("mean_rank", kind="stable")
