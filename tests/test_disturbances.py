@@ -230,3 +230,17 @@ def test_a_wrong_record_is_told_in_a_sentence_that_repeats_none_of_it(rows, says
         FromFile(rows=rows)
     assert says in str(told.value)
     assert "s3cret" not in told.value.errors()[0]["msg"]
+
+
+@pytest.mark.parametrize("psi", [0.0, 0.7, -2.5])
+def test_loads_fixed_to_the_earth_push_to_the_same_side_at_every_heading(psi):
+    """R(psi) of the load is (b_u, b_v) of (52), whatever the heading; the moment is the same."""
+    times, states = [3.0, 41.0], [np.array([0, 0, psi, 0, 0, 0.0])] * 2
+    body, earth = (
+        HarmonicDisturbance(frame=frame, scale=1.5).loads(NONLINEAR, times, states)
+        for frame in ("body", "earth")
+    )
+    c, s = math.cos(psi), math.sin(psi)
+    pushed = [c * earth[:, 0] - s * earth[:, 1], s * earth[:, 0] + c * earth[:, 1], earth[:, 2]]
+    np.testing.assert_allclose(np.transpose(pushed), body, atol=1e-14)
+    assert (np.abs(earth) <= HarmonicDisturbance(frame="earth", scale=1.5).bounds()).all()

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
 from podusv_cli.components.disturbances.base import Disturbance
+from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import Component, value
 from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import LANES, Vector, filled, kernel, scratch, whole_lanes
@@ -58,10 +60,33 @@ class Harmonic(Component):
         return sum(moving, abs(mean))
 
 
-class HarmonicDisturbance(Disturbance):
-    """Loads of (52); the defaults are its numbers."""
+@kernel
+def harmonic(t: float, k: Any, table: Vector, b: Vector) -> None:
+    """Equation (52), scaled."""
+    waves, count = scratch(LANES), int(k.waves)
+    for i in range(filled(count, WAVES)):
+        cosine, sine = cos_sin(table[i] * t)
+        waves[i] = table[count + i] * cosine + table[2 * count + i] * sine
+    b[0] = k.scale * (k.b_u_mean + waves[0] + waves[3])
+    b[1] = k.scale * (k.b_v_mean + waves[1] + waves[4])
+    b[2] = k.scale * (k.b_r_mean + waves[2] + waves[5])
 
-    of_time: ClassVar[bool] = True
+
+@kernel
+def fixed_to_earth(t: float, x: Vector, k: Any, table: Vector, b: Vector) -> None:
+    """The same with the forces to the north and to the east."""
+    harmonic(t, k, table, b)
+    c, s = cos_sin(x[2])
+    b[0], b[1] = c * b[0] + s * b[1], c * b[1] - s * b[0]
+
+
+class HarmonicDisturbance(Disturbance):
+    """Loads of (52); the defaults are its numbers.
+
+    The paper's act along the hull's axes, whatever its heading. With `frame: earth` b_u acts to
+    the north and b_v to the east, as wind, waves and currents do.
+    """
+
     kind: Literal["harmonic"] = "harmonic"
     scale: float = value(1.0, "", "factor on all three axes", ge=0)
     b_u: Harmonic = value(
@@ -73,6 +98,19 @@ class HarmonicDisturbance(Disturbance):
     b_r: Harmonic = value(
         Harmonic(mean=0.5, sin=0.1, sin_rate=0.1, cos=0.1, cos_rate=0.2), "N m", "yaw moment"
     )
+
+    frame: Literal["body", "earth"] = value(
+        "body", "", "whose axes b_u and b_v have: the hull's, or north and east"
+    )
+
+    @property
+    def of_time(self) -> bool:  # type: ignore[override]
+        """In the hull's axes."""
+        return self.frame == "body"
+
+    def kernel_with(self, vessel: Vessel) -> Callable[..., None]:
+        """One for each frame."""
+        return self.evaluate if self.frame == "body" else fixed_to_earth
 
     def constants(self) -> dict[str, float]:
         """The fields' numbers, and the length of the table's rows."""
@@ -89,16 +127,6 @@ class HarmonicDisturbance(Disturbance):
     def bounds(self) -> tuple[float, float, float]:
         """The bound of every axis, scaled."""
         u, v, r = (self.scale * axis.bound() for axis in (self.b_u, self.b_v, self.b_r))
-        return u, v, r
+        return (u, v, r) if self.frame == "body" else (math.hypot(u, v), math.hypot(u, v), r)
 
-    @staticmethod
-    @kernel
-    def evaluate(t: float, k: Any, table: Vector, b: Vector) -> None:
-        """Equation (52), scaled."""
-        waves, count = scratch(LANES), int(k.waves)
-        for i in range(filled(count, WAVES)):
-            cosine, sine = cos_sin(table[i] * t)
-            waves[i] = table[count + i] * cosine + table[2 * count + i] * sine
-        b[0] = k.scale * (k.b_u_mean + waves[0] + waves[3])
-        b[1] = k.scale * (k.b_v_mean + waves[1] + waves[4])
-        b[2] = k.scale * (k.b_r_mean + waves[2] + waves[5])
+    evaluate: ClassVar[Callable[..., None]] = staticmethod(harmonic)

@@ -23,9 +23,9 @@ CLOSE = 1.1  # times the best law's IAE counts as close
 def table(runs: Iterable[BenchRun]) -> pd.DataFrame:
     """A row for each law in each case, with ratios (inf where it failed) and `rank`.
 
-    `ratio` is its IAE over the least of the laws that are at their target, `ratio_e` the same of the
-    error beyond the standoff, `variation` that of the total variation of the surge demand. Ranks,
-    by IAE, count from 1; laws that failed share the mean of the last ranks.
+    `ratio` is its IAE over the least of the laws that are at their target, `ratio_e` the same of
+    the error beyond the standoff, `variation` that of the total variation of the surge demand.
+    Ranks, by IAE, count from 1; laws that failed share the mean of the last ranks.
     """
     rows = [
         {**dict(zip(PLACE, run.place, strict=True)), "law": run.law, "status": run.status,
