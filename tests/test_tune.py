@@ -132,7 +132,7 @@ def test_the_gain_that_matters_is_the_important_one(done):
 
 def test_the_page_has_figures_and_no_broken_value(done):
     page = (done.folder / "report.html").read_text()
-    assert page.count("<figure") == 5
+    assert page.count("<figure") == 6
     assert not re.search(r">\s*nan\b|Undefined|\bNone<", page)
     names = {path.stem for path in (done.folder / "figures").iterdir()}
     assert names == {"validation", "history", "ratios", "importance", "slices-toy"}

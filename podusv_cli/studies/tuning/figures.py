@@ -43,6 +43,14 @@ def sketches(results: Results) -> Iterator[Sketch]:
         f"{100 * results.level:g} % intervals",
         partial(before_and_after, results.laws, results.label(0)),
     )
+    if len(results.effort):
+        yield Sketch(
+            "effort",
+            f"error against effort: the median {results.shown[0]} over the median total variation "
+            "of the surge demand on the fresh draws; hollow before, filled after each search of a "
+            "law, failed runs counted as the worst; down and to the left is better",
+            partial(effort, results.effort, results.shown[0]),
+        )
     if results.winners:
         yield from _of_searches(results, objective)
 
@@ -132,6 +140,25 @@ def before_and_after(laws: pd.DataFrame, label: str) -> Figure:
     axes.set_yticks(range(len(ordered)), [escaping.figure(law) for law in ordered.law])
     axes.set_ylim(len(ordered) - 0.4, -0.6)
     axes.set_xlabel(escaping.figure(label))
+    legend(figure, COLUMNS)
+    return figure
+
+
+def effort(table: pd.DataFrame, metric: str) -> Figure:
+    """Error over variation of the demand: each law before, and after each of its searches."""
+    figure = new_figure(COLUMNS, 3.4)
+    axes = figure.add_subplot()
+    for place, (law, rows) in enumerate(table.groupby("law", sort=False)):
+        colour, _, marker = nth_style(place)
+        look: dict[str, Any] = {"marker": marker, "color": colour, "linestyle": "none"}
+        for before, some in rows.groupby("before"):
+            axes.plot(
+                some.variation, some.error, markersize=4.5,
+                markerfacecolor="none" if before else colour,
+                label=None if before else escaping.figure(str(law)), **look,
+            )  # fmt: skip
+    axes.set(xscale="log", yscale="log", xlabel="total variation of the surge demand [N]")
+    axes.set_ylabel(f"median {escaping.figure(metric)} on fresh draws")
     legend(figure, COLUMNS)
     return figure
 

@@ -34,6 +34,7 @@ from podusv_cli.studies.tuning.validation import chosen, repeated, tuned
 
 ALWAYS = ("iae", "z_e_steady")  # metrics that the tables have beside those of the objective
 OBJECTIVES = ("objective", "second_objective")  # columns
+VARIATION = "tv_tau_u"
 MARGIN = 0.01  # relative, of pairs
 PARTS = 8  # of the trials; importances are computed without each, to see how sure they are
 FEWEST = 24  # trials that importances are computed from
@@ -182,6 +183,20 @@ class Results:
         ]
 
     @cached_property
+    def effort(self) -> pd.DataFrame:
+        """Medians of the first metric and of the demand's variation, before and of each search.
+
+        Empty where the runs have no total variation.
+        """
+        rows = [
+            {"law": law, "before": name == law, "error": median(self.met(name), self.shown[0]),
+             "variation": median(self.met(name), VARIATION)}
+            for law in self.plan.laws if VARIATION in self.runs.metrics
+            for name in dict.fromkeys((law, *self._searched(law)))
+        ]  # fmt: skip
+        return pd.DataFrame(rows, columns=["law", "before", "error", "variation"])
+
+    @cached_property
     def pairs(self) -> pd.DataFrame:
         """Two laws in the same fresh draws: all before, all after, and each after and before."""
         known = {name: about for name, about in self.plan.metrics.items() if name in self.shown}
@@ -249,6 +264,11 @@ class Results:
             case ast.Call(args=[ast.Name(id=name), *_]) if unit := self.plan.metrics[name].unit:
                 return f"{text} [{unit}]"
         return text
+
+
+def median(runs: Outcomes, metric: str) -> float:
+    """Of a metric over runs, with failed ones as the largest number."""
+    return float(np.median(np.where(runs.failed, np.inf, runs.metrics[metric])))
 
 
 def _ends(gain: Gain) -> dict[str, float]:
