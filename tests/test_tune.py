@@ -135,7 +135,7 @@ def test_the_page_has_figures_and_no_broken_value(done):
     assert page.count("<figure") == 6
     assert not re.search(r">\s*nan\b|Undefined|\bNone<", page)
     names = {path.stem for path in (done.folder / "figures").iterdir()}
-    assert names == {"validation", "history", "ratios", "importance", "slices-toy"}
+    assert names == {"validation", "effort", "history", "ratios", "importance", "slices-toy"}
 
 
 @pytest.mark.slow
