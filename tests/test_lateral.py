@@ -5,11 +5,16 @@ import pytest
 import sympy as sp
 from conftest import NONLINEAR, VESSELS
 from findings_samples import codes, finding, late
+from hypothesis import given
+from hypothesis import strategies as st
 from line_loops import furthest, line_eigenvalues
 
+from podusv_cli.components.controllers.momentum_schedule import Answer, schedule
 from podusv_cli.components.controllers.momentum_vector import MomentumVector
 from podusv_cli.components.controllers.velocity_vector import VelocityVector
+from podusv_cli.core.kernel import bundle
 from podusv_cli.theory.lateral import (
+    MomentumGains,
     SwayAnswer,
     growth,
     momentum_vector_gains,
@@ -102,6 +107,19 @@ def test_momentum_vector_s_polynomial_is_a_part_of_the_real_loop_and_stable(hull
         found = line_eigenvalues(law, hull, speed)
         assert furthest(np.roots(known), found) < 1e-4
         assert found.real.max() < 0.0
+
+
+@given(
+    told=st.floats(-0.5, 8.0), damping=st.floats(1e-3, 10.0), more=st.floats(0.0, 1.0),
+    trust=st.floats(1.0, 3.0),
+)  # fmt: skip
+def test_its_gains_bear_every_p_up_to_trust_times_the_told_one(told, damping, more, trust):
+    law = MomentumVector(trust=trust)
+    k = bundle(law.constants_with(NONLINEAR))
+    eta, k_b = schedule(Answer(told, damping), k)
+    true = SwayAnswer(told * (1.0 + more * (trust - 1.0)), damping)
+    gains = MomentumGains(eta, k_b, k.Q, k.S, 0.0)
+    assert growth(momentum_vector_polynomial(true, gains)) < 0.0
 
 
 def test_behind_pods_told_their_lever_it_is_as_stable():

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from podusv_cli.components.controllers.momentum_schedule import schedule
+from podusv_cli.components.controllers.momentum_schedule import resting_gain, schedule
 from podusv_cli.components.controllers.momentum_schedule import sway_answer as momentum_answer
 from podusv_cli.components.controllers.momentum_vector import MomentumVector
 from podusv_cli.components.controllers.velocity_vector import VelocityVector
@@ -112,8 +112,8 @@ def momentum_vector_gains(
     k = bundle(law.constants_with(vessel))
     answer = momentum_answer(V, v, v, 0.0, k)
     eta, k_b = schedule(answer, k)
-    Q, S = k.pace**2 * k.Q0, k.pace * k.S0
-    return SwayAnswer(*answer), MomentumGains(eta, k_b, Q, S, k_b * k.x_n / V)
+    k_b = min(k_b, resting_gain(0.0, V, k))
+    return SwayAnswer(*answer), MomentumGains(eta, k_b, k.Q, k.S, k_b * k.x_n / V)
 
 
 def growth(polynomial: Vector) -> float:

@@ -21,9 +21,9 @@ from podusv_cli.core.kernel import kernel
 T_D = 1.0  # s; a hull whose sway decays within this has less weight on it
 ETA_SHARE = 0.75  # of 1/p, the weight that the linear loop bears at most
 ACROSS_SHARE = 0.3  # of d/(p - 1), the gain that it bears at most
-ROUTH_SHARE = 0.9  # of the gain across the path at which the cubic term lags the heading
-RESTING = 0.05  # m/s; a slower target rests
-NEAR = 1.0  # m; a target at rest is approached slowly from here, beginning at twice this
+BANDWIDTH_SHARE = 0.9  # of Q (1 - eta p)/S, how fast the heading follows
+SLOW = 2.0  # times V_m; a target below this counts as one at rest, and less so up to twice this
+NEAR = 10.0  # s, times V_m; nearer to it the gain is the smaller one, and less so up to twice this
 REST_SHARE = 0.8  # of |Y_v|/m11
 ANGLE = 0.19  # rad; the moment is in proportion to the angle up to here at least
 
@@ -54,6 +54,12 @@ def neutral(nominal: Vessel, thrust_lever: float | None) -> dict[str, float]:
     return {"per_lever": per, "neutral_mass": mass, "x_n": x_n}
 
 
+def paced(m33: float, N_m: float, Q0: float, S0: float) -> dict[str, float]:
+    """The pace f, Q = f^2 Q0 [1/s2], S = f S0 [1/s] and Q/S, as constants of a law."""
+    f = pace(m33, N_m, Q0)
+    return {"pace": f, "Q": f * f * Q0, "S": f * S0, "Q_per_S": f * Q0 / S0}
+
+
 def pace(m33: float, N_m: float, Q0: float) -> float:
     """How fast the law may be, f; below 1 where it would ask for more than N_m at `ANGLE`."""
     return min(1.0, math.sqrt(N_m / (ANGLE * m33 * Q0)))
@@ -61,14 +67,16 @@ def pace(m33: float, N_m: float, Q0: float) -> float:
 
 @kernel
 def resting_gain(distance: float, speed: float, k: Any) -> float:
-    """k_p [1/s], or what a hull bears near a target that rests.
+    """k_p [1/s], or what a hull bears near a slow target.
 
     Sway of a hull that turns towards a target at rest grows where the gain exceeds |Y_v|/m11.
     """
-    if speed >= RESTING:
+    if speed >= 2.0 * SLOW * k.V_m:
         return float(k.k_p)
-    near = min(max(2.0 - distance / NEAR, 0.0), 1.0)
-    return float(k.k_p + near * (min(k.k_p, REST_SHARE * abs(k.Y_v) / k.m11) - k.k_p))
+    near = min(max(2.0 - distance / (NEAR * k.V_m), 0.0), 1.0)
+    slow = min(max(2.0 - speed / (SLOW * k.V_m), 0.0), 1.0)
+    bearable = min(k.k_p, REST_SHARE * abs(k.Y_v) / k.m11)
+    return float(k.k_p + near * slow * (bearable - k.k_p))
 
 
 @kernel
@@ -87,11 +95,10 @@ def sway_answer(V: float, v: float, v_l: float, turn: float, k: Any) -> Answer:
 def schedule(at: Answer, k: Any) -> Schedule:
     """eta and k_b; `trust` is by how much the true p may exceed the told one."""
     p = k.trust * at.p
-    Q, S = k.pace * k.pace * k.Q0, k.pace * k.S0
     eta = 1.0 / (1.0 + T_D * at.d / k.pace)
     k_b = k.pace * k.k_b0
     if p > ETA_SHARE:
         eta = min(eta, ETA_SHARE / p)
     if p > 1.0:
         k_b = min(k_b, ACROSS_SHARE * at.d / (p - 1.0))
-    return Schedule(eta, min(k_b, ROUTH_SHARE * Q / S * max(1.0 - eta * p, 0.0)))
+    return Schedule(eta, min(k_b, BANDWIDTH_SHARE * k.Q_per_S * max(1.0 - eta * p, 0.0)))

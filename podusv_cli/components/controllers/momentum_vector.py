@@ -20,6 +20,7 @@ from podusv_cli.components.controllers.constant_bearing import Moving, approach_
 from podusv_cli.components.controllers.momentum_schedule import (
     neutral,
     pace,
+    paced,
     resting_gain,
     schedule,
     sway_answer,
@@ -154,9 +155,10 @@ class MomentumVector(VelocitySteering):
         return memory
 
     def constants_with(self, nominal: Vessel) -> dict[str, float]:
-        """With those of the neutral point, and the pace."""
+        """With the neutral point, the gains at its pace and the yaw rate that N_m allows."""
         own = neutral(nominal, self.thrust_lever)
-        own["pace"] = pace(nominal.m33, self.N_m, self.Q0)
+        own |= paced(nominal.m33, self.N_m, self.Q0, self.S0)
+        own["fastest"] = min(self.r_m, math.sqrt(self.N_m / nominal.m33))
         return super().constants_with(nominal) | own
 
     def gains(self, axes: tuple[Axis, Axis]) -> tuple[tuple[str, float, float], ...]:
@@ -183,11 +185,9 @@ class MomentumVector(VelocitySteering):
         v_s = v_l + gains.eta * (v + k.x_n * (r - at.turn) - v_l) + k.T_v / k.pace * v_l_rate
         bow = aim(wanted, v_s, k)
         g = min(1.0, bow.speed / k.V_m)
-        r_m = min(k.r_m, math.sqrt(k.N_m / k.m33))
-        gain = k.pace * k.Q0 / k.S0
-        bend = gain * bow.chi_e / r_m
-        r_d = g * gain * bow.chi_e / math.sqrt(1.0 + bend * bend) + at.turn
-        tau[1] = moment_for(k.pace * k.S0 * (r_d - r), x, memory, k)
+        bend = k.Q_per_S * bow.chi_e / k.fastest
+        r_d = g * k.Q_per_S * bow.chi_e / math.sqrt(1.0 + bend * bend) + at.turn
+        tau[1] = moment_for(k.S * (r_d - r), x, memory, k)
         signals[0] = surge_demand(x, memory, wanted, bow, k, tau)
         signals[1], signals[2], signals[3] = r_d, v_s, bow.chi_e
         observe(x, memory, tau, k, rate)

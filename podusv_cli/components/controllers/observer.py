@@ -42,11 +42,8 @@ OBSERVED = (
 @kernel
 def sway_yaw_rates(sway: float, yaw: float, k: Any) -> tuple[float, float]:
     """(v', r') under a sway force [N] and a yaw moment [N m], by the nominal mass matrix."""
-    by_yaw, by_sway = k.m23 / k.m33, k.m32 / k.m22
-    return (
-        (sway - by_yaw * yaw) / (k.m22 - by_yaw * k.m32),
-        (yaw - by_sway * sway) / (k.m33 - by_sway * k.m23),
-    )
+    v_rate = (sway - k.by_yaw * yaw) / (k.m22 - k.by_yaw * k.m32)
+    return v_rate, (yaw - k.by_sway * sway) / (k.m33 - k.by_sway * k.m23)
 
 
 @kernel
@@ -96,6 +93,11 @@ class ObservingController(Controller):
         rate[U_HAT] += (tau[0] - demand[0]) / k.m11
         rate[V_HAT] += v_rate
         rate[R_HAT] += r_rate
+
+    def constants_with(self, nominal: Vessel) -> dict[str, float]:
+        """With what sway and yaw take from each other in the mass matrix."""
+        coupling = {"by_yaw": nominal.m23 / nominal.m33, "by_sway": nominal.m32 / nominal.m22}
+        return super().constants_with(nominal) | coupling
 
     def gains(self, axes: tuple[Axis, Axis]) -> tuple[tuple[str, float, float], ...]:
         """Key, gain [1/s] and observer bandwidth of the surge and of the yaw loop."""
