@@ -10,13 +10,8 @@ from law_samples import STEADY, WRONG, rms, task
 from test_pod import pods
 
 from podusv_cli.components.actuators.saturated import Saturated
-from podusv_cli.components.controllers.momentum_vector import (
-    MomentumVector,
-    guidance,
-    levelled,
-    moment_for,
-    seen,
-)
+from podusv_cli.components.controllers.momentum_guidance import guidance, levelled, seen
+from podusv_cli.components.controllers.momentum_vector import MomentumVector, moment_for
 from podusv_cli.components.disturbances.calm import Calm
 from podusv_cli.components.disturbances.current import Current
 from podusv_cli.components.paths.circle import Circle
