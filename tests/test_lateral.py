@@ -1,9 +1,11 @@
 """How sway answers yaw: the lateral loops of theory/lateral.py, and of the real closed loop."""
 
+import runpy
+
 import numpy as np
 import pytest
 import sympy as sp
-from conftest import NONLINEAR, VESSELS
+from conftest import NONLINEAR, PACKAGE, VESSELS
 from findings_samples import codes, finding, late
 from hypothesis import given
 from hypothesis import strategies as st
@@ -129,6 +131,14 @@ def test_behind_pods_told_their_lever_it_is_as_stable():
         found = line_eigenvalues(law, hull, 0.5, -1.0 / 0.5)
         assert furthest(np.roots(known), found) < 1e-4
         assert found.real.max() < 0.0
+
+
+@pytest.mark.slow
+def test_the_map_of_eigenvalues_is_drawn(tmp_path):
+    script = runpy.run_path(str(PACKAGE.parent / "examples/eigenvalue_map.py"))
+    script["draw"](tmp_path / "map.png")
+    assert (tmp_path / "map.png").stat().st_size > 20_000
+    assert script["momentum_growth"](1.5, 0.3) < 0.0 < script["vector_growth"](1.5, 0.3)
 
 
 # --- the finding
