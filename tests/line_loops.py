@@ -36,7 +36,20 @@ def line_eigenvalues(law: Any, vessel: Vessel, V: float, share: float = 0.0) -> 
         (line_rates(law, s + d, vessel, V, share) - line_rates(law, s - d, vessel, V, share)) / 2e-7
         for d in 1e-7 * np.eye(len(s))
     ]
-    return np.asarray(np.linalg.eigvals(np.transpose(columns)))
+    return moving_eigenvalues(law, np.transpose(columns))
+
+
+def places(law: Any, name: str) -> list[int]:
+    """Where a part of the memory lies in (x, memory)."""
+    return [6 + i for i, (signal, _) in enumerate(law.slots()) if signal.name == name]
+
+
+def moving_eigenvalues(law: Any, loop: Vector) -> Vector:
+    """Without what the law learns, whose rate is of second order and so a parameter here."""
+    learnt = places(law, "dP")
+    assert not loop[learnt].any()
+    kept = np.setdiff1d(np.arange(len(loop)), learnt)
+    return np.asarray(np.linalg.eigvals(loop[np.ix_(kept, kept)]))
 
 
 def furthest(found: Vector, among: Vector) -> float:

@@ -8,6 +8,7 @@ import pytest
 from conftest import NONLINEAR, VESSELS, ask, corrected, run, situations, target_at
 from law_samples import STEADY, WRONG, rms, task
 from test_pod import pods
+from test_velocity_vector import SAMPLED
 
 from podusv_cli.components.actuators.saturated import Saturated
 from podusv_cli.components.controllers.momentum_guidance import guidance, levelled, seen
@@ -21,6 +22,8 @@ from podusv_cli.components.vessels.plant import plant
 from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.core.kinematics import wrap
 from podusv_cli.core.recording import Recording
+from podusv_cli.findings.finding import preflight
+from podusv_cli.scenario.load import load_text
 
 LAW, CYBERSHIP, MILLIAMPERE = MomentumVector(), VESSELS["cybership2"], VESSELS["milliampere"]
 K = bundle(LAW.constants_with(NONLINEAR))
@@ -77,7 +80,8 @@ def test_its_moment_turns_the_hull_as_it_wants(hull, lever):
     for x, memory, _ in situations(LAW, 20):
         moment, rate = moment_for(0.3, x, memory, k), np.zeros(6)
         tau = np.array([0.0, -moment / lever if lever else 0.0, moment])
-        plant(x, tau, memory[3:6], bundle(hull.constants()), rate)
+        loads = memory[3:6] - [0.0, hull.m22 * memory[7] * x[5], 0.0]  # with what it has learnt
+        plant(x, tau, loads, bundle(hull.constants()), rate)
         assert rate[5] == pytest.approx(0.3, rel=1e-9)
 
 
@@ -86,7 +90,7 @@ def test_port_and_starboard_are_alike():
     mirror = np.array([1, -1, -1, 1, -1, -1.0])
     for x, memory, target in situations(LAW, 30):
         one = ask(LAW, x, memory, target, CYBERSHIP)
-        flip, held = np.array([1, -1, 1, -1, 1, -1.0]), np.array([*[1, -1, -1] * 2, -1])
+        flip, held = np.array([1, -1, 1, -1, 1, -1.0]), np.array([*[1, -1, -1] * 2, -1, 1, -1, -1])
         other = ask(LAW, x * mirror, memory * held, target * flip, CYBERSHIP)
         np.testing.assert_allclose(other.tau, one.tau * [1, -1], rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(other.rate, one.rate * held, rtol=1e-9, atol=1e-9)
@@ -117,6 +121,40 @@ def test_told_the_lever_it_leaves_no_offset_behind_a_pod_that_turns(path):
     assert last(out, 5.0).max() < 1e-6
 
 
+# --- what it learns: by how much more sway answers yaw than told
+
+SLIDES = NONLINEAR.model_copy(update={"Y_r": -7.0})
+MORE = 7.0 / NONLINEAR.m22  # m/s
+
+
+def untold(law: MomentumVector, **parts: Any) -> Recording:
+    """A hull that slides, told the paper's, from beside a line in calm water."""
+    loop = corrected(
+        controller=law, vessel=SLIDES, nominal=NONLINEAR, disturbance=Calm(),
+        path=Line(speed=0.5), start=(-1.0, 0.5, 0.0, 0.5, 0.0, 0.0), **parts,
+    )  # fmt: skip
+    return run(loop, 300.0, log_every=5)
+
+
+def test_the_observer_misses_the_sway_by_what_is_not_told_times_phi():
+    out = untold(MomentumVector(gamma=0.0))
+    assert abs(out["phi"]).max() > 0.01
+    np.testing.assert_allclose(out["v"] - out["v_hat"], -MORE * out["phi"], atol=1e-8)
+
+
+def test_a_hull_that_slides_more_than_told_is_learnt_and_comes_to_the_line():
+    known, learns = untold(MomentumVector(gamma=0.0)), untold(MomentumVector())
+    assert abs(known["r"][known["time"] > 250]).max() > 0.1  # it swings for ever
+    assert abs(learns["r"][learns["time"] > 250]).max() < 0.005
+    assert 0.5 * MORE < learns["dP"][-1] < 1.1 * MORE
+    assert last(learns, 50.0).max() < 0.05
+
+
+def test_told_exactly_it_learns_nothing_under_constant_loads():
+    out = run(corrected(controller=LAW, actuator=Saturated(), disturbance=STEADY), 200.0, step=0.02)
+    assert abs(out["dP"][-1]) < 0.02
+
+
 # --- what it reaches
 
 
@@ -126,6 +164,16 @@ def test_it_reaches_its_goals_on_the_paper_s_task():
     assert rms(out, 60, 100) <= 0.015
     assert rms(out, 150) <= 0.015
     assert abs(out["tau_u_cmd"]).max() <= 25.0
+
+
+@pytest.mark.parametrize(("period", "grows"), [(30, False), (40, True)])
+def test_the_period_that_its_loops_carry_is_the_one_that_the_run_carries(period, grows):
+    """0.3 s and 0.4 s: what `sampled-loop` tells before a run, and the run."""
+    text = SAMPLED.format(period=period / 100).replace("velocity_vector", "momentum_vector")
+    codes = [finding.code for finding in preflight(load_text(text, "a.yaml").scenario)]
+    assert ("sampled-loop" in codes) is grows
+    held = rms(task(LAW, hold_every=period), 150)
+    assert (held > 0.05) is grows
 
 
 @pytest.mark.parametrize("speed", [0.1, 0.3, 0.5])

@@ -8,6 +8,7 @@ import sympy as sp
 from conftest import NONLINEAR, VESSELS, ask, corrected, run, situations
 
 from podusv_cli.components.actuators.saturated import Saturated
+from podusv_cli.components.controllers.momentum_vector import MomentumVector
 from podusv_cli.components.controllers.observer import OBSERVED, ObservingController
 from podusv_cli.components.controllers.velocity_loop import Axis
 from podusv_cli.components.controllers.velocity_vector import VelocityVector
@@ -21,6 +22,7 @@ MEANS = (0.4, -0.3, 0.2)
 STEADY = HarmonicDisturbance(
     b_u=Harmonic(mean=MEANS[0]), b_v=Harmonic(mean=MEANS[1]), b_r=Harmonic(mean=MEANS[2])
 )
+QUIET = {MomentumVector: MomentumVector(gamma=0.0)}  # it would tell the observer what it learns
 SPEED = {"Alos": 0.4, "VelocityVector": 0.4, "MomentumVector": 0.4, "Adrc": 0.0}  # for loops
 CYBERSHIP, MILLIAMPERE = VESSELS["cybership2"], VESSELS["milliampere"]  # m23 and m32 differ in one
 OBSERVING = list(kinds("podusv_cli.components.controllers", ObservingController).values())
@@ -36,7 +38,7 @@ def mass_matrix(vessel: Vessel) -> Any:
 def test_limits_do_not_disturb_the_observer(kind, vessel):
     # With the true model the acceleration M^-1 (b - b_hat) that is missing under a constant load b
     # goes as (1 + omega t) e^(-omega t), whatever the actuator makes of the demand: no windup.
-    law, M = kind(), mass_matrix(vessel)
+    law, M = QUIET.get(kind, kind()), mass_matrix(vessel)
     loop = corrected(controller=law, vessel=vessel, actuator=Saturated(), disturbance=STEADY)
     out = run(loop, 14.0, step=0.005)
     assert out["saturated"].mean() > 0.4
@@ -66,6 +68,7 @@ def test_its_rates_are_those_of_the_vessel_and_a_double_pole(kind, vessel):
     omega = np.array([law.omega_u, law.omega_v, law.omega_r])
     k, rate = bundle(law.constants_with(vessel)), np.zeros(6)
     for at in situations(law, 50):
+        at.memory[6:] = 0.0  # what a law keeps beside the observer
         found = ask(law, *at, vessel)
         tau = np.array([found.tau[0], 0.7, 0.5 * found.tau[1]])  # what an actuator made of it
         call(

@@ -110,7 +110,7 @@ def momentum_vector_gains(
 ) -> tuple[SwayAnswer, MomentumGains]:
     """What the law takes p and d for, and its gains at the speed V [m/s] and load sway v [m/s]."""
     k = bundle(law.constants_with(vessel))
-    answer = momentum_answer(V, v, v, 0.0, k)
+    answer = momentum_answer(V, v, v, 0.0, 0.0, k)
     eta, k_b = schedule(answer, k)
     k_b = min(k_b, resting_gain(0.0, V, k))
     return SwayAnswer(*answer), MomentumGains(eta, k_b, k.Q, k.S, k_b * k.x_n / V)

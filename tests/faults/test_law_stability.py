@@ -7,6 +7,7 @@ import pytest
 from conftest import NONLINEAR, VESSELS, ask, corrected, run
 from counts import count
 from law_samples import STEADY
+from line_loops import moving_eigenvalues, places
 
 from podusv_cli.components.actuators.saturated import Saturated
 from podusv_cli.components.controllers.adrc import Adrc
@@ -59,7 +60,9 @@ def at_rest(law: Any, vessel: Vessel, told: Vessel, turn: float = 0.0) -> Vector
     x = np.array([0.0, 0.0, -np.arctan2(v, u), u, v, turn])
     memory = law.start(x, np.zeros(6), told)
     memory[3:6] = observed
-    return np.concatenate([x, memory])
+    s = np.concatenate([x, memory])
+    s[places(law, "phi_lag")] = turn / law.omega_v**2
+    return s
 
 
 def rates(law: Any, s: Vector, vessel: Vessel, told: Vessel, turn: float = 0.0) -> Vector:
@@ -70,9 +73,9 @@ def rates(law: Any, s: Vector, vessel: Vessel, told: Vessel, turn: float = 0.0) 
     tau = np.array([found.tau[0], 0.0, found.tau[1]])
     plant(x, tau, LOAD, bundle(vessel.constants()), out)
     out[:3] -= SPEED - turn * x[1], turn * x[0], turn
-    names = [signal.name for signal, _ in law.slots()]
-    found.rate[[i for i, name in enumerate(names) if name == "psi_f"]] -= turn  # a heading
-    return np.concatenate([out, found.rate])
+    all_rates = np.concatenate([out, found.rate])
+    all_rates[places(law, "psi_f")] -= turn  # a heading
+    return all_rates
 
 
 def growth(law: Any, vessel: Vessel, told: Vessel = NONLINEAR, turn: float = 0.0) -> float:
@@ -83,7 +86,7 @@ def growth(law: Any, vessel: Vessel, told: Vessel = NONLINEAR, turn: float = 0.0
         (rates(law, s + d, vessel, told, turn) - rates(law, s - d, vessel, told, turn)) / 2e-6
         for d in small * np.eye(len(s))
     ]
-    return float(np.linalg.eigvals(np.transpose(columns)).real.max())
+    return float(moving_eigenvalues(law, np.transpose(columns)).real.max())
 
 
 def unstable(law: Any, count: int, heavier_sway: bool) -> tuple[int, int]:

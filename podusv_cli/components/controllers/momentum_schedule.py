@@ -80,14 +80,17 @@ def resting_gain(distance: float, speed: float, k: Any) -> float:
 
 
 @kernel
-def sway_answer(V: float, v: float, v_l: float, turn: float, k: Any) -> Answer:
-    """p and d of the nominal vessel at the speed V [m/s], sway v [m/s], load sway v_l [m/s]."""
+def sway_answer(V: float, v: float, v_l: float, turn: float, more: float, k: Any) -> Answer:
+    """p and d of the nominal vessel at the speed V [m/s], sway v [m/s], load sway v_l [m/s].
+
+    `more` [m/s] is added to P.
+    """
     sway, bend = abs(v_l), abs(turn)
     linear = k.Y_v + k.Y_rv * bend + k.per_lever * (k.N_v + k.N_rv * bend + (k.m11 - k.m22) * V)
     present = math.sqrt(v_l * v_l + (v - v_l) * (v - v_l))
     d = max((2.0 * abs(k.Y_vv) * present - linear) / k.neutral_mass, 0.0)
     from_yaw = k.Y_r + k.Y_vr * sway + k.per_lever * (k.N_r + k.N_vr * sway - k.m23 * V)
-    P = (k.m11 * V - from_yaw) / k.neutral_mass - k.x_n * d
+    P = (k.m11 * V - from_yaw) / k.neutral_mass - k.x_n * d + more
     return Answer(P / V, d)
 
 

@@ -16,6 +16,12 @@ import math
 from typing import Any, Literal
 
 from podusv_cli.components.controllers.base import Slots, each
+from podusv_cli.components.controllers.momentum_adaptation import (
+    LEARNT,
+    MORE,
+    adapt,
+    answer_force,
+)
 from podusv_cli.components.controllers.momentum_guidance import guidance, levelled, seen
 from podusv_cli.components.controllers.momentum_schedule import (
     neutral,
@@ -44,7 +50,7 @@ V_L = Signal("v_l", "m/s", "sway velocity that the loads and the target's turn c
 @kernel
 def load_sway_rate(a: float, v_l: float, turn: float, memory: Vector, k: Any) -> float:
     """v_l': the sway of a hull that keeps to the target's turn under the observed loads."""
-    across = sway_force(a, v_l, turn, k) + memory[B_V]
+    across = sway_force(a, v_l, turn, k) + memory[B_V] + answer_force(turn, memory, k)
     across += k.per_lever * (yaw_moment(a, v_l, turn, k) + memory[B_R])
     return float(across / k.neutral_mass)
 
@@ -56,7 +62,8 @@ def moment_for(alpha: float, x: Vector, memory: Vector, k: Any) -> float:
     Sway follows by the full mass matrix, and by the sway force of a moment with a thrust lever.
     """
     u, v, r = x[3], x[4], x[5]
-    sway_rate = (sway_force(u, v, r, k) + memory[B_V] - k.m23 * alpha) / k.m22
+    across = sway_force(u, v, r, k) + memory[B_V] + answer_force(r, memory, k)
+    sway_rate = (across - k.m23 * alpha) / k.m22
     moment = k.m33 * alpha + k.m32 * sway_rate - yaw_moment(u, v, r, k) - memory[B_R]
     return float(moment * k.m22 / k.neutral_mass)
 
@@ -76,10 +83,13 @@ class MomentumVector(VelocitySteering):
         1.25, "", "how many times as much as told sway may answer yaw; more is safer and slower",
         ge=1,
     )  # fmt: skip
+    gamma: float = value(
+        0.2, "1/s", "how fast it learns by how much more sway answers yaw; 0: never", ge=0
+    )
 
     def slots(self) -> Slots:
-        """The observer, then the loads' sway."""
-        return super().slots() + each((V_L,))
+        """The observer, then the loads' sway and what is learnt of sway's answer."""
+        return super().slots() + each((V_L, *LEARNT))
 
     def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
         """The velocities as they are; the sway is taken for the loads'."""
@@ -111,7 +121,8 @@ class MomentumVector(VelocitySteering):
         along = levelled(at.k_p, at, closing)
         V_a, V_b = at.t_a + along.kappa * at.e_a, at.t_b + along.kappa * at.e_b
         V = max(math.sqrt(V_a * V_a + V_b * V_b), k.V_m)
-        gains = schedule(sway_answer(V, v, v_l, at.turn, k), k)
+        more = memory[MORE] * k.m22 / k.neutral_mass
+        gains = schedule(sway_answer(V, v, v_l, at.turn, more, k), k)
         wanted = guidance(x, at, along, min(gains.k_b, at.k_p), k)
 
         v_l_rate = load_sway_rate(wanted.a, v_l, at.turn, memory, k)
@@ -125,3 +136,4 @@ class MomentumVector(VelocitySteering):
         signals[1], signals[2], signals[3] = r_d, v_s, bow.chi_e
         observe(x, memory, tau, k, rate)
         rate[LOAD_SWAY] = v_l_rate
+        adapt(x, memory, k, rate)
