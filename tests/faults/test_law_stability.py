@@ -21,7 +21,7 @@ from podusv_cli.core.kernel import Vector, bundle
 
 SPEED, LOAD = 0.5, np.array([0.5, 0.5, 0.5])  # m/s; N and N m
 CAREFUL = VelocityVector(omega_v=0.2)
-WARY = MomentumVector(trust=1.8, omega_v=0.3)
+WARY = MomentumVector(trust=1.8, omega_v=0.3, gamma=0.0)
 TURN = SPEED / 16.67  # rad/s; the paper's circle
 CYBERSHIP = VESSELS["cybership2"]
 DAMPING = ("X_u", "X_uu", "X_uuu"), ("Y_v", "Y_vv"), ("N_r", "N_rr")

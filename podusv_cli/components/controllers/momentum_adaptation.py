@@ -25,6 +25,7 @@ LEARNT = (
     Signal("phi_lag", "rad s", "integral of phi", r"\int\phi"),
 )
 PHI_0 = 0.02  # rad; a slighter turning to and fro teaches less
+MOST = 0.2  # of U, what is learnt at most
 
 
 @kernel
@@ -35,7 +36,7 @@ def answer_force(r: float, memory: Vector, k: Any) -> float:
 
 @kernel
 def adapt(x: Vector, memory: Vector, k: Any, rate: Vector) -> None:
-    """Rates of what is learnt, within +-U/2; the observer is told the force that is known of."""
+    """Rates of what is learnt, within +-0.2 U; the observer is told the force that is known of."""
     r, phi, omega = x[5], memory[PHI], k.omega_v
     e_v, more = x[4] - memory[V_HAT], memory[MORE]
     v_rate, r_rate = sway_yaw_rates(answer_force(r, memory, k), 0.0, k)
@@ -44,5 +45,5 @@ def adapt(x: Vector, memory: Vector, k: Any, rate: Vector) -> None:
     rate[PHI] = r - omega * (2.0 * phi + omega * memory[LAG])
     rate[LAG] = phi
     learns = -k.gamma * phi * e_v / (PHI_0 * PHI_0 + phi * phi)
-    stuck = abs(more) >= 0.5 * k.U and learns * more > 0.0
+    stuck = abs(more) >= MOST * k.U and learns * more > 0.0
     rate[MORE] = 0.0 if stuck else learns

@@ -7,7 +7,7 @@ No moment changes the momentum M (v + x_n r) of the hull's neutral point: it mov
 alone, so the sway that answers yaw takes 1/d to decay. With p = P/V > 1 the way from yaw to the
 lateral position has a zero at d/(p - 1) in the right half plane, and a law that inverts the way is
 unstable. A law is stable with a weight eta below 1/p on this sway, and a gain across the path below
-d/(p - 1). docs/laws.md derives the polynomial.
+d/(p - 1). docs/theory.md has the polynomial.
 """
 
 from __future__ import annotations

@@ -5,9 +5,9 @@ that the loads cause counts in full, and of the part that yaw causes only as muc
 Source: ours, on the guidance of Breivik and Fossen (see `constant_bearing`).
 
 Proved: no offset in a steady state off the limits, for a told hull whose sway damping grows with
-sway; the linear loop on a straight line, told exactly, has the polynomial of docs/laws.md. Not
-proved: that it comes to the steady state from afar. Anti-windup: the observer is told the loads
-that act.
+sway; the linear loop on a straight line, told exactly, has the polynomial of docs/theory.md. Not
+proved: that it comes to the steady state from afar, nor the loop with what it learns. Anti-windup:
+the observer is told the loads that act.
 """
 
 from __future__ import annotations
