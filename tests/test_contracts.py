@@ -132,7 +132,8 @@ def test_kinds_and_class_names_are_unique():
 def test_a_law_s_own_constants_do_not_hide_the_vessel_s(kind):
     law = example(kind)
     assert not set(law.constants()) & set(NONLINEAR.constants())
-    assert law.constants_with(NONLINEAR) == NONLINEAR.constants() | law.constants()
+    own = NONLINEAR.constants() | law.constants()  # a law may derive more from both
+    assert own.items() <= law.constants_with(NONLINEAR).items()
 
 
 @pytest.mark.parametrize("kind", kinds("controllers").values(), ids=kinds("controllers"))

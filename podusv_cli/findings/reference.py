@@ -2,7 +2,8 @@
 
 A hull that follows moves at the target's speed over ground U. Its sway v balances the sway forces:
 Y(u, v, r) + b_v + tau_v = 0 with u^2 + v^2 = U^2. r is the turn rate of the target's course, b_v
-the mean load, and tau_v the sway force that the actuator produces with the yaw moment.
+the mean load, and tau_v the sway force that the actuator produces with the yaw moment
+-(N(u, v, r) + b_r).
 """
 
 from __future__ import annotations
@@ -66,7 +67,7 @@ def reference(scenario: Scenario) -> Reference:
     target = scenario.path.targets(time.tolist())
     speed, turn, along = _motion(target)
     load = _loads(scenario, time, target, turn)
-    balance = _balance(scenario, float(load[:, 1].mean()))
+    balance = _balance(scenario, float(load[:, 1].mean()), float(load[:, 2].mean()))
     nu = np.array([(*balance(U, r), r) for U, r in zip(speed.tolist(), turn.tolist(), strict=True)])
     held = np.where(np.isnan(nu), np.column_stack([speed, 0.0 * speed, turn]), nu)
     k = bundle(scenario.vessel.constants())
@@ -95,7 +96,9 @@ def _loads(scenario: Scenario, time: Vector, target: Vector, turn: Vector) -> Ve
     return sea.loads(vessel, time.tolist(), states)
 
 
-def _balance(scenario: Scenario, b_v: float) -> Callable[[float, float], tuple[float, float]]:
+def _balance(
+    scenario: Scenario, b_v: float, b_r: float
+) -> Callable[[float, float], tuple[float, float]]:
     """A function from speed U and turn rate r to steady surge and sway; NaN where none exist."""
     k, share = bundle(scenario.vessel.constants()), sway_share(scenario)
 
@@ -103,7 +106,7 @@ def _balance(scenario: Scenario, b_v: float) -> Callable[[float, float], tuple[f
     def steady(U: float, r: float) -> tuple[float, float]:
         def excess(v: float) -> float:
             u = math.sqrt(max(U * U - v * v, 0.0))
-            return sway_force(u, v, r, k) + b_v - share * yaw_moment(u, v, r, k)
+            return sway_force(u, v, r, k) + b_v - share * (yaw_moment(u, v, r, k) + b_r)
 
         v = root(excess, -U, U)
         return math.sqrt(max(U * U - v * v, 0.0)), v

@@ -17,6 +17,7 @@ from typing import Any, Literal
 from podusv_cli.components.controllers.base import Slots, each
 from podusv_cli.components.controllers.hand_point import PSI_F, HandController, hand_errors, push
 from podusv_cli.components.controllers.observer import B_R, B_U, B_V, ObservingController, observe
+from podusv_cli.components.controllers.velocity_loop import Axis
 from podusv_cli.core.kernel import Vector, kernel
 
 LAGGED = 6  # position in the memory, behind the observer
@@ -31,7 +32,7 @@ class Adrc(HandController, ObservingController):
         """The observer and the lagged heading."""
         return super().slots() + each((PSI_F,))
 
-    def gains(self) -> tuple[tuple[str, float, float], ...]:
+    def gains(self, axes: tuple[Axis, Axis]) -> tuple[tuple[str, float, float], ...]:
         """Of a hull at rest."""
         surge, yaw = self.rate_gains()
         return ("k_v", surge, self.omega_u), ("k_v", yaw, self.omega_r)

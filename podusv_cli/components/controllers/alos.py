@@ -26,6 +26,7 @@ from podusv_cli.components.controllers.guidance import (
     wanted_speed,
 )
 from podusv_cli.components.controllers.observer import B_R, B_U, ObservingController, observe
+from podusv_cli.components.controllers.velocity_loop import Axis
 from podusv_cli.components.vessels.plant import surge_force, yaw_moment
 from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, kernel
@@ -82,7 +83,7 @@ class Alos(LineOfSight, ObservingController):
         """The observer, then crab angle and offset."""
         return (*super().slots(), *each(LEARNT))
 
-    def gains(self) -> tuple[tuple[str, float, float], ...]:
+    def gains(self, axes: tuple[Axis, Axis]) -> tuple[tuple[str, float, float], ...]:
         """The yaw rate's gain with that of the heading."""
         return ("k_u", self.k_u, self.omega_u), ("k_r", self.k_r + self.k_psi, self.omega_r)
 

@@ -25,16 +25,23 @@ class Moving(NamedTuple):
 
 
 @kernel
+def approach_speed(e: Moving, V_d: Moving, U: float) -> float:
+    """s_max [m/s]: with it towards the target the vessel moves at U over ground."""
+    squared = e.x * e.x + e.y * e.y
+    per = 1.0 / math.sqrt(squared) if squared > 0.0 else 0.0
+    along = (V_d.x * e.x + V_d.y * e.y) * per
+    across = (V_d.x * e.y - V_d.y * e.x) * per
+    return max(math.sqrt(max(U * U - across * across, 0.0)) - along, SLOWEST)
+
+
+@kernel
 def approach(e: Moving, V_d: Moving, k: Any) -> Moving:
     """V_c = p_d' + kappa e and its rate; |V_c| stays below U if the target is slower.
 
     `e` is where the target is from here [m], `V_d` its velocity [m/s].
     """
     squared = e.x * e.x + e.y * e.y
-    per = 1.0 / math.sqrt(squared) if squared > 0.0 else 0.0
-    along = (V_d.x * e.x + V_d.y * e.y) * per
-    across = (V_d.x * e.y - V_d.y * e.x) * per
-    s_max = max(math.sqrt(max(k.U * k.U - across * across, 0.0)) - along, SLOWEST)
+    s_max = approach_speed(e, V_d, k.U)
     slope = (k.k_p / s_max) * (k.k_p / s_max)
     q2 = 1.0 / (1.0 + slope * squared)
     kappa = k.k_p * math.sqrt(q2)

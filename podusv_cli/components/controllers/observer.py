@@ -1,10 +1,11 @@
 """Extended state observer of the velocities: the load that the nominal vessel does not explain.
 
-For each axis, with inertia m, nominal Coriolis and damping force f and the load tau that acts,
+With the nominal mass matrix M, Coriolis and damping forces f and the loads tau that act,
 
-    nu_hat' = (tau + f + b_hat)/m + 2 omega (nu - nu_hat),   b_hat' = m omega^2 (nu - nu_hat).
+    nu_hat' = M^-1 (tau + f + b_hat) + 2 omega (nu - nu_hat),   b_hat' = M omega^2 (nu - nu_hat)
 
-Both poles are at -omega. Source: J. Han, "From PID to active disturbance rejection control", IEEE
+with omega diagonal. Both poles of each axis are at its -omega, also where sway and yaw are coupled
+by m23 and m32. Source: J. Han, "From PID to active disturbance rejection control", IEEE
 Trans. Industrial Electronics 56 (2009), 900-906; linear, and tuned by omega alone, after Z. Gao,
 "Scaling and bandwidth-parameterization based controller tuning", American Control Conference
 (2003), 4989-4996.
@@ -39,6 +40,13 @@ OBSERVED = (
 
 
 @kernel
+def sway_yaw_rates(sway: float, yaw: float, k: Any) -> tuple[float, float]:
+    """(v', r') under a sway force [N] and a yaw moment [N m], by the nominal mass matrix."""
+    v_rate = (sway - k.by_yaw * yaw) / (k.m22 - k.by_yaw * k.m32)
+    return v_rate, (yaw - k.by_sway * sway) / (k.m33 - k.by_sway * k.m23)
+
+
+@kernel
 def observe(x: Vector, memory: Vector, tau: Vector, k: Any, rate: Vector) -> None:
     """Rates of the observer as if the demand `tau` acted; `after_saturation` adds what differs."""
     u, v, r = x[3], x[4], x[5]
@@ -46,12 +54,14 @@ def observe(x: Vector, memory: Vector, tau: Vector, k: Any, rate: Vector) -> Non
     surge = tau[0] + surge_force(u, v, r, k) + memory[B_U]
     sway = sway_force(u, v, r, k) + memory[B_V]
     yaw = tau[1] + yaw_moment(u, v, r, k) + memory[B_R]
+    v_rate, r_rate = sway_yaw_rates(sway, yaw, k)
     rate[U_HAT] = surge / k.m11 + 2.0 * k.omega_u * e_u
-    rate[V_HAT] = sway / k.m22 + 2.0 * k.omega_v * e_v
-    rate[R_HAT] = yaw / k.m33 + 2.0 * k.omega_r * e_r
+    rate[V_HAT] = v_rate + 2.0 * k.omega_v * e_v
+    rate[R_HAT] = r_rate + 2.0 * k.omega_r * e_r
+    square_v, square_r = k.omega_v * k.omega_v, k.omega_r * k.omega_r
     rate[B_U] = k.m11 * k.omega_u * k.omega_u * e_u
-    rate[B_V] = k.m22 * k.omega_v * k.omega_v * e_v
-    rate[B_R] = k.m33 * k.omega_r * k.omega_r * e_r
+    rate[B_V] = k.m22 * k.omega_v * k.omega_v * e_v + k.m23 * square_r * e_r
+    rate[B_R] = k.m33 * k.omega_r * k.omega_r * e_r + k.m32 * square_v * e_v
 
 
 class ObservingController(Controller):
@@ -79,11 +89,17 @@ class ObservingController(Controller):
     @kernel
     def after_saturation(demand: Vector, tau: Vector, k: Any, rate: Vector) -> None:
         """Put the loads that act in place of the demand."""
+        v_rate, r_rate = sway_yaw_rates(tau[1], tau[2] - demand[1], k)
         rate[U_HAT] += (tau[0] - demand[0]) / k.m11
-        rate[V_HAT] += tau[1] / k.m22
-        rate[R_HAT] += (tau[2] - demand[1]) / k.m33
+        rate[V_HAT] += v_rate
+        rate[R_HAT] += r_rate
 
-    def gains(self) -> tuple[tuple[str, float, float], ...]:
+    def constants_with(self, nominal: Vessel) -> dict[str, float]:
+        """With what sway and yaw take from each other in the mass matrix."""
+        coupling = {"by_yaw": nominal.m23 / nominal.m33, "by_sway": nominal.m32 / nominal.m22}
+        return super().constants_with(nominal) | coupling
+
+    def gains(self, axes: tuple[Axis, Axis]) -> tuple[tuple[str, float, float], ...]:
         """Key, gain [1/s] and observer bandwidth of the surge and of the yaw loop."""
         raise NotImplementedError
 
@@ -92,7 +108,7 @@ class ObservingController(Controller):
 
         The nominal damping that the law cancels is taken to be the true one.
         """
-        return [_loop(axis, *gain) for axis, gain in zip(axes, self.gains(), strict=True)]
+        return [_loop(axis, *gain) for axis, gain in zip(axes, self.gains(axes), strict=True)]
 
 
 def _loop(axis: Axis, key: str, gain: float, omega: float) -> Loop:

@@ -1,0 +1,89 @@
+"""What laws share that turn the vector of velocity over ground: yaw first, surge as far as it fits.
+
+The bow turns until the wanted velocity and the predicted sway agree, by the angle chi_e. Surge
+waits for yaw: the vessel turns first. docs/laws.md has the equations.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar, Literal, NamedTuple
+
+from podusv_cli.components.controllers.observer import B_U, ObservingController
+from podusv_cli.components.vessels.plant import surge_force
+from podusv_cli.core.component import Positive, value
+from podusv_cli.core.kernel import Vector, kernel
+from podusv_cli.core.kinematics import direction
+from podusv_cli.core.signal import Signal
+
+SHORTER = 1.0  # the place of "shorter" among the choices of `astern`
+
+
+class Wanted(NamedTuple):
+    """The wanted velocity V_c in the body frame, its surge acceleration and its turn."""
+
+    a: float  # surge part of V_c [m/s]
+    b: float  # sway part of V_c [m/s]
+    A_a: float  # surge part of its rate A [m/s2]
+    turn: float  # rate of a direction that the law turns with [rad/s]
+    backward: bool  # whether V_c points against the target's course, and the bow does not
+
+
+class Aim(NamedTuple):
+    """How the bow stands to the wanted velocity."""
+
+    side: float  # -1 where the vessel backs up, else 1
+    speed: float  # of the wanted velocity less the predicted sway [m/s]
+    chi_e: float  # angle that the velocity vector has to turn by [rad]
+
+
+@kernel
+def aim(wanted: Wanted, v_s: float, k: Any) -> Aim:
+    """The angle to V_c less the sway velocity v_s [m/s] that the hull settles to."""
+    a, w = wanted.a, wanted.b - v_s
+    side = -1.0 if wanted.backward and a < 0.0 and k.astern == SHORTER else 1.0
+    return Aim(side, math.sqrt(a * a + w * w), direction(side * a, side * w))
+
+
+@kernel
+def surge_demand(x: Vector, memory: Vector, wanted: Wanted, at: Aim, k: Any, tau: Vector) -> float:
+    """Write the surge demand, as far as the velocity points the right way; the wanted velocity.
+
+    `tau[1]`, the yaw moment, is written already.
+    """
+    u, v, r, a = x[3], x[4], x[5], wanted.a
+    forward = at.side * a / at.speed if at.side * a > 0.0 and at.speed > 0.0 else 1.0
+    F = forward * k.N_m / max(abs(tau[1]), k.N_m)
+    u_d = a * F
+    ahead = min(max((wanted.A_a + r * wanted.b) * F, -k.a_m), k.a_m)
+    tau[0] = k.m11 * (ahead + k.k_u * (u_d - u)) - surge_force(u, v, r, k) - memory[B_U]
+    return float(u_d)
+
+
+class VelocitySteering(ObservingController):
+    """Keys of laws that turn the velocity vector."""
+
+    signals: ClassVar[tuple[Signal, ...]] = (
+        Signal("u_d", "m/s", "wanted surge velocity"),
+        Signal("r_d", "rad/s", "wanted yaw rate"),
+        Signal("v_s", "m/s", "sway velocity that the hull settles to, predicted"),
+        Signal(
+            "chi_e", "rad", "angle that the velocity vector has to turn by", r"\chi_e", wrapped=True
+        ),
+    )
+    no_gains: ClassVar[tuple[str, ...]] = ("thrust_lever",)  # where the pods are
+    k_p: float = value(0.5, "1/s", "gain of the distance, near the target", gt=0)
+    U: float = value(1.25, "m/s", "largest wanted speed, about 1.2 times that at full thrust", gt=0)
+    r_m: float = value(1.4, "rad/s", "yaw rate that a large angle approaches", gt=0)
+    k_u: float = value(0.75, "1/s", "gain of the surge velocity", gt=0)
+    V_m: float = value(0.1, "m/s", "speed below which a direction counts for less", gt=0)
+    a_m: float = value(1.0, "m/s2", "largest wanted acceleration used ahead", gt=0)
+    astern: Literal["never", "shorter"] = value(
+        "shorter", "", "what a vessel ahead of the target does: turns round, and again when it is "
+        "there (never), or backs up if its bow points to the target's course (shorter)",
+    )  # fmt: skip
+    thrust_lever: Positive | None = value(
+        None, "m", "distance behind the origin at which the pods turn, whose sway force makes the "
+        "moment; none where the moment comes without a sway force",
+    )  # fmt: skip
+    N_m: float = value(2.5, "N m", "moment beyond which surge yields to yaw", gt=0)
