@@ -25,8 +25,8 @@ ABLATIONS := ablation ablation_figures ablation_standoff ablation_gains ablation
     ablation_gains_standoff ablation_pid
 TABLES := unknown:unknown_dynamics discrete:discrete_signals limits:period_limits learnt:learnt gains:fixed_gains networks:networks
 SEAS := exact sensors sensors_alone current state_3 state_5 state_6 rare untold rare_untold pods delay thruster_failure dead_zone
-STUDIES := hull_and_sea unknown_dynamics rivals sea_state_4 sea_state_6 sea_untold
-SEARCHES := phases hull sensors network sliding
+STUDIES := hull_and_sea unknown_dynamics rivals rivals_cybership2 sea_state_4 sea_state_6 sea_untold
+SEARCHES := hull network
 COMPARISONS := printed_compare figures_compare figures_compare_standoff corrected_compare
 
 .DEFAULT_GOAL := help
@@ -100,8 +100,8 @@ tune: $(VENV)/dev.done ## the committed searches for gains, about half an hour o
 	@for name in $(SEARCHES); do \
 	    $(BIN)/podusv tune configs/studies/tune_$$name.yaml --out results/.tuning/$$name && \
 	    mkdir -p results/tuning/$$name/figures && \
-	    (cd results/.tuning/$$name && cp laws.csv limits.csv validation.csv gains.csv importance.csv ../../tuning/$$name && \
-	        cp figures/validation.png ../../tuning/$$name/figures) || exit 1; \
+	    (cd results/.tuning/$$name && cp laws.csv searches.csv limits.csv validation.csv gains.csv importance.csv ../../tuning/$$name && \
+	        cp figures/effort.png ../../tuning/$$name/figures) || exit 1; \
 	done
 	@echo "what was found: results/tuning.md; every table and figure: results/.tuning/*/report.html"
 
