@@ -263,7 +263,7 @@ def test_the_total_variations_behind_sensors_are_those_of_the_fresh_draws():
 STUDIES = RESULTS.parent / "configs" / "studies"
 STUDIES_PAGE = (RESULTS / "studies.md").read_text()
 LAWS = {law: law for law in ("adaptive_neural", "dsc", "full_backstepping", "pid")}
-ABLATED = LAWS | {"no adaptation": "no_adaptation"}
+ABLATED = LAWS | {"no adaptation": "no_adaptation", "equal gain": "equal_gain"}
 HULLS, TOLD = STUDIES_PAGE.split("## True hull and told hull")
 
 

@@ -24,8 +24,18 @@ def test_a_law_counts_by_the_median_of_its_searches_and_its_spread_is_in_the_int
     factors = np.array([0.7, 0.8, 0.9, 1.3, 1.4])[:, None]
     found = row(searches.ratios({"a": factors * BASE, "b": BASE[None]}, 0.95, 1), "a", "b")
     assert found["ratio"] == pytest.approx(0.9)
-    assert found["ratio_low"] == pytest.approx(0.7, abs=0.11)
-    assert found["ratio_high"] == pytest.approx(1.4, abs=0.11)
+    assert found["ratio_low"] < 0.75
+    assert found["ratio_high"] > 1.1
+
+
+def test_searches_that_fail_in_draws_of_their_own_do_not_make_a_law_that_never_fails():
+    """Each search fails in its own three fifths of the draws."""
+    broken = np.tile(0.9 * BASE, (5, 1))
+    for search, one in enumerate(broken):
+        one[[(search + i) % 5 for i in range(3)]] = np.inf
+        one.reshape(-1, 5)[:, [(search + i) % 5 for i in range(3)]] = np.inf
+    found = row(searches.ratios({"a": broken, "b": BASE[None]}, 0.95, 1), "a", "b")
+    assert found["ratio"] == np.inf
 
 
 def test_places_are_the_ranks_that_the_intervals_leave_open():
@@ -36,25 +46,33 @@ def test_places_are_the_ranks_that_the_intervals_leave_open():
     assert found == {"best": (1, 1), "one": (2, 3), "other": (2, 3), "last": (4, 4)}
 
 
-def test_failed_runs_are_the_worst_and_those_of_both_say_nothing():
-    broken = BASE.copy()
-    broken[:38] = np.inf
-    found = searches.ratios({"a": broken[None], "b": BASE[None], "c": broken[None]}, 0.95, 1)
-    assert row(found, "a", "b")["ratio"] == pytest.approx(1.0)
-    assert row(found, "a", "b")["ratio_high"] == np.inf
-    assert row(found, "a", "c")["ratio_high"] == pytest.approx(1.0)
+def test_a_law_that_fails_in_every_other_draw_has_no_interval_and_one_that_always_fails_is_worse():
+    half = BASE.copy()
+    half[::2] = np.inf
+    lost = np.full((1, len(BASE)), np.inf)
+    found = searches.ratios({"half": half[None], "whole": BASE[None], "lost": lost}, 0.95, 1)
+    assert [row(found, "half", "whole")[end] for end in ("ratio_low", "ratio_high")] == [0, np.inf]
+    assert row(found, "whole", "lost")["ratio_high"] == 0.0
+    assert searches.places(found, ["half", "whole", "lost"])["lost"] == (2, 3)
 
 
 @pytest.mark.slow
-def test_intervals_of_six_searches_hold_the_truth_about_as_often_as_they_say(monkeypatch):
-    """Searches that scatter by 10 %, draws by 5 % about them: 0.965 of 200 in a probe of 95 %."""
+def test_of_equal_laws_hardly_any_table_tells_one_apart_and_a_better_one_is_told(monkeypatch):
+    """Ten laws with six searches that scatter by 5 %; one that is 30 % better than nine others."""
     monkeypatch.setattr(searches, "SAMPLES", 400)
-    random, hits = np.random.default_rng(1), 0
-    for trial in range(100):
-        runs = {
-            law: BASE * np.exp(random.normal(0, 0.1, (6, 1)) + random.normal(0, 0.05, (6, 80)))
-            for law in "ab"
-        }
-        found = row(searches.ratios(runs, 0.95, trial), "a", "b")
-        hits += found["ratio_low"] <= 1.0 <= found["ratio_high"]
-    assert 88 <= hits <= 100
+    random, wrong, told = np.random.default_rng(1), 0, 0
+    for trial in range(40):
+        for best in (1.0, 0.7):
+            runs = {
+                f"law {i}": (best if i == 0 else 1.0)
+                * BASE
+                * np.exp(random.normal(0, 0.05, (6, 1)) + random.normal(0, 0.05, (6, 80)))
+                for i in range(10)
+            }
+            found = searches.places(searches.ratios(runs, 0.95, trial), list(runs))
+            if best == 1.0:
+                wrong += any(place != (1, 10) for place in found.values())
+            else:
+                told += found["law 0"] == (1, 1)
+    assert wrong <= 6, "of 40, in 2 of which a table at 95 % may err"
+    assert told >= 34

@@ -1,4 +1,4 @@
-"""Finding about a law that inverts how sway answers yaw, for a hull with which it cannot."""
+"""Finding about laws that steer the velocity, for hulls whose sway answers yaw too much."""
 
 from __future__ import annotations
 
@@ -7,32 +7,57 @@ from typing import Any
 
 import numpy as np
 
+from podusv_cli.components.controllers.momentum_vector import MomentumVector
+from podusv_cli.components.controllers.velocity_steering import VelocitySteering
 from podusv_cli.components.controllers.velocity_vector import VelocityVector
 from podusv_cli.core.finding import Sentences, before
 from podusv_cli.findings.finding import Case
 from podusv_cli.findings.reference import STANDING, sway_share
-from podusv_cli.theory.lateral import sway_answer, velocity_vector_loop
+from podusv_cli.theory.lateral import (
+    growth,
+    momentum_vector_gains,
+    momentum_vector_polynomial,
+    sway_answer,
+    velocity_vector_loop,
+)
+
+
+def _inverting(law: Any, case: Case, V: float, v: float) -> float:
+    """Growth [1/s] of a law that inverts the answer."""
+    loop = velocity_vector_loop(law, case.scenario.vessel, V, v, sway_share(case.scenario))
+    return float(np.linalg.eigvals(loop).real.max())
+
+
+def _weighing(law: Any, case: Case, V: float, v: float) -> float:
+    """Growth [1/s] of a law that weighs the answer."""
+    at = momentum_vector_gains(law, case.scenario.vessel, V, v)
+    return growth(momentum_vector_polynomial(*at))
+
+
+LOOPS = {
+    VelocityVector: (_inverting, "take momentum_vector, which pays for it under loads"),
+    MomentumVector: (_weighing, "take a larger trust, or smaller Q0 and k_b0"),
+}
 
 
 @before(
-    "sway-answers-yaw", about="controller", meaning="sway answers yaw more than the law can invert",
-    condition="on a straight line at the target's speed, told exactly, the law's polynomial has "
-    "a root in the right half plane",
-    remedy="take momentum_vector, or more speed", law=VelocityVector,
+    "sway-answers-yaw", about="controller", meaning="sway answers yaw more than the law bears",
+    condition="on a straight line at the target's speed, told exactly, the law's linear loop has a "
+    "root in the right half plane",
+    remedy="take momentum_vector, there a larger trust, or more speed", law=VelocitySteering,
 )  # fmt: skip
 def sway_answers_yaw(case: Case) -> Sentences:
     """The linear loop of docs/theory.md grows at the run's typical speed and sway."""
     scenario, (u, v, _) = case.scenario, case.reference.working.tolist()
-    law: Any = scenario.controller
     V = math.hypot(u, v)
     if V <= STANDING:
         return
-    loop = velocity_vector_loop(law, scenario.vessel, V, v, sway_share(scenario))
-    growth = float(np.linalg.eigvals(loop).real.max())
-    if growth > 0.0:
+    loop, remedy = LOOPS[type(scenario.controller)]
+    grows = loop(scenario.controller, case, V, v)
+    if grows > 0.0:
         p_eff = sway_answer(scenario.vessel, V, v).p
         yield (
             f"sway answers yaw with p_eff = (m11 V - Y_r)/(m22 V) = {p_eff:.3g} at V = {V:.3g} m/s:"
-            f" on a straight line the law, told exactly, grows at {growth:.2g} 1/s and swings for "
-            "ever; take momentum_vector, or more speed"
+            f" on a straight line the law, told exactly, grows at {grows:.2g} 1/s and swings for "
+            f"ever; {remedy}, or more speed"
         )

@@ -112,8 +112,8 @@ def inconsistent_filter(scenario: Scenario, log: Recording) -> Sentences:
     told = f"its innovations are {np.sqrt(nis):.2g} times what it believes (NIS {nis:.3g})"
     if nis > DOUBTFUL:
         yield (
-            f"{told}, so it follows noise as if it were motion; give it larger sigmas, which "
-            "count what waves add to the sensors' noise"
+            f"{told}: noise is larger than its sigmas, which have to count waves too, or the hull "
+            "moves otherwise than it predicts; give it larger sigmas, or larger q"
         )
     if nis < TIMID:
         yield f"{told}, so it takes good measurements for noise; give it the sensors' noise"

@@ -48,7 +48,10 @@ def squared(error: Vector, lower: Vector) -> float:
 
 @kernel
 def watch(t: float, weight: float, s: Vector, k: Any, seen: Vector) -> None:
-    """Gather squared errors and squared innovations over the steady window."""
+    """Gather squared errors and squared innovations over the steady window.
+
+    An error without a positive definite covariance is infinite.
+    """
     if t >= k.steady_from:
         at, order = int(k.estimate), int(k.order)
         after = at + int(k.covariance) + order * (order + 1) // 2
@@ -59,9 +62,10 @@ def watch(t: float, weight: float, s: Vector, k: Any, seen: Vector) -> None:
         for i in range(SIX):
             error[i] = s[at + i] - s[i]
         error[2] = wrap(error[2])
-        if factor(tail(s, at + int(k.covariance)), order, lower):
+        sound = factor(tail(s, at + int(k.covariance)), order, lower)
+        if t > 0.0:  # at the start the covariance is 0
             add(seen, INTEGRALS, TIME, weight)
-            add(seen, INTEGRALS, SQUARE, weight * squared(error, lower))
+            add(seen, INTEGRALS, SQUARE, weight * (squared(error, lower) if sound else math.inf))
 
 
 def _size(layout: Measured) -> int:

@@ -102,8 +102,8 @@ def _of_window(name: str, start: float, to: float) -> tuple[Metric, ...]:
     watch = specialise(window, f"window_{name}", FROM=start, TO=to)
     of = Accumulator(watch, lambda layout: WINDOW, standoff_of, differing=("standoff",))
     where = f"z_e from {start:g} s to {to:g} s"
-    largest = _over(to, lambda seen: float(seen[LARGEST]))
-    beyond = _over(to, lambda seen: float(seen[BEYOND]))
+    largest = _over(to, lambda seen: float(seen[LARGEST]) if seen[LENGTH] else math.nan)
+    beyond = _over(to, lambda seen: float(seen[BEYOND]) if seen[LENGTH] else math.nan)
     return (
         _named(ERROR_RMS, name, f"rms of {where}", of, _over(to, _rms)),
         _named(ERROR_MAX, name, f"largest {where}", of, largest),

@@ -91,7 +91,9 @@ def spread(row: Any) -> str:
 def place(row: Any) -> str:
     """The ranks that the law may have."""
     low, high = row["place_low"], row["place_high"]
-    return f"{low}" if low == high else f"{low} to {high}"
+    if math.isnan(low):
+        return "-"
+    return f"{low:.0f}" if low == high else f"{low:.0f} to {high:.0f}"
 
 
 def _pairs(results: Results) -> Iterator[dict[str, Any]]:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from podusv_cli.core.kernel import Vector
 from podusv_cli.studies.study import statistics, summary
 from podusv_cli.studies.study.runs_file import Table
 from podusv_cli.studies.study.statistics import Interval
@@ -87,14 +88,19 @@ class Results:
     def laws(self) -> pd.DataFrame:
         """Every law: failures and objective before and after on the fresh draws, and its ranks.
 
-        `place_low` and `place_high` are the ranks that it may have over all searches and draws.
+        `place_low` and `place_high` are the ranks that it may have over all searches and draws; NaN
+        where each law was searched once.
         """
         table = pd.DataFrame([self._law(law) for law in self.plan.laws])
         for when in ("before", "after"):
             ranks = table[f"objective_{when}"].replace(np.inf, 1e300).rank(method="min")
             table[f"rank_{when}"] = ranks.astype(int)
             table[f"better_than_{when}"] = [self._better_than(law, when) for law in table.law]
-        found = searches.places(self.searches, list(self.plan.laws))
+        found: dict[str, tuple[float, float]] = {
+            **searches.places(self.searches, [*self.plan.laws])
+        }
+        if self.plan.tune.repeats == 1:
+            found = dict.fromkeys(found, (math.nan, math.nan))
         table["place_low"], table["place_high"] = zip(
             *(found[law] for law in table.law), strict=True
         )
@@ -107,9 +113,7 @@ class Results:
         runs = {}
         for law in self.plan.laws:
             met = [self.met(name) for name in self._searched(law)]
-            runs[law] = np.array(
-                [np.where(one.failed, np.inf, one.metrics[metric]).ravel() for one in met]
-            )
+            runs[law] = np.array([worst_where_unknown(one, metric).ravel() for one in met])
         assert self.plan.scenario.sweep
         return searches.ratios(runs, self.level, self.plan.scenario.sweep.seed)
 
@@ -141,8 +145,8 @@ class Results:
         own = own[own.metric == self.shown[0]]
         for end in ("ratio", "ratio_low", "ratio_high"):
             told[end] = float(own[end].iloc[0]) if len(own) else 1.0
-        spread = [v for v in self.spread(law) if math.isfinite(v)]
-        ends = (float(np.median(spread)), min(spread), max(spread)) if spread else (math.nan,) * 3
+        spread = self.spread(law)
+        ends = float(np.median(spread)), min(spread), max(spread)
         told |= zip(("repeats_median", "repeats_low", "repeats_high"), ends, strict=True)
         return told
 
@@ -176,10 +180,10 @@ class Results:
         return {**self.objective(runs, one.tree).columns("value"), "holds": holds}
 
     def spread(self, law: str) -> list[float]:
-        """The objective on the fresh draws of every repeat's winner."""
-        found = self._searched(law) if law in self.winners else []
+        """The objective on the fresh draws of every repeat's winner, or of a law that is kept."""
         return [
-            evaluate(self.plan.objectives[0], self.met(name), self.plan.metrics) for name in found
+            evaluate(self.plan.objectives[0], self.met(name), self.plan.metrics)
+            for name in self._searched(law)
         ]
 
     @cached_property
@@ -266,9 +270,15 @@ class Results:
         return text
 
 
+def worst_where_unknown(runs: Outcomes, metric: str) -> Vector:
+    """A metric of runs; infinite where a run failed, and where it has none."""
+    numbers = np.where(runs.failed, np.inf, runs.metrics[metric])
+    return np.asarray(np.where(np.isnan(numbers), np.inf, numbers))
+
+
 def median(runs: Outcomes, metric: str) -> float:
-    """Of a metric over runs, with failed ones as the largest number."""
-    return float(np.median(np.where(runs.failed, np.inf, runs.metrics[metric])))
+    """Of a metric over runs."""
+    return float(np.median(worst_where_unknown(runs, metric)))
 
 
 def _ends(gain: Gain) -> dict[str, float]:

@@ -1,9 +1,11 @@
 """What laws reach over all of their searches: the result of a search is a random number, too.
 
-Repeats of a search differ in the tuner's random numbers alone. In each fresh draw a law counts by
-the median over its searches. The interval of a ratio of two laws is the percentile bootstrap over
-searches and draws together: both are drawn with replacement, the draws for all laws alike (B.
-Efron and R. Tibshirani, "An Introduction to the Bootstrap", Chapman and Hall 1993, section 13.3).
+Repeats of a search differ in the tuner's random numbers alone. A search counts by the median of a
+metric over the fresh draws, a law by the median of its searches. The intervals of the ratios of
+all pairs hold together: searches and draws are drawn with replacement, the draws for all laws
+alike, and the largest deviation of all pairs, in standard deviations, sets their width (B. Efron
+and R. Tibshirani, "An Introduction to the Bootstrap", Chapman and Hall 1993, chapter 8; J. Romano
+and M. Wolf, Econometrica 73 (2005), for the largest deviation).
 """
 
 from __future__ import annotations
@@ -17,42 +19,58 @@ import pandas as pd
 
 from podusv_cli.core.kernel import Vector
 
-SAMPLES = 1000
+SAMPLES = 2000
 COLUMNS = ["a", "b", "ratio", "ratio_low", "ratio_high"]
 
 
 def ratios(runs: Mapping[str, Vector], level: float, seed: int) -> pd.DataFrame:
-    """Every pair of laws: the median over draws of a/b, with its interval.
+    """Every pair of laws: the ratio a/b of what they reach, with intervals that hold together.
 
-    `runs` are numbers of each law, shape (search, draw), infinite for a run that failed. Draws in
-    which both failed are left out.
+    `runs` are numbers of each law, shape (search, draw), infinite for a run that failed. A pair of
+    which a sample is not finite has no interval, unless all samples are infinite on one side.
     """
     random = np.random.default_rng(seed)
-    draws = next(iter(runs.values())).shape[1] if runs else 0
-    met = random.integers(max(draws, 1), size=(SAMPLES, draws))
-    typical = {law: np.median(table, axis=0) for law, table in runs.items()}
-    resampled = {law: _resampled(table, met, random) for law, table in runs.items()}
-    ends = 50.0 * (1.0 - level), 50.0 * (1.0 + level)
-    rows = []
-    for a, b in combinations(runs, 2):
-        sampled = _typical_ratio(resampled[a], resampled[b])
-        low, high = np.percentile(sampled, ends, method="inverted_cdf")  # of infinity, too
-        rows.append((a, b, _typical_ratio(typical[a], typical[b]), low, high))
+    draws = next(iter(runs.values())).shape[1] if runs else 1
+    met = random.integers(draws, size=(SAMPLES, draws))
+    reached = {law: float(np.median(np.median(table, axis=1))) for law, table in runs.items()}
+    samples = {law: _sampled(table, met, random) for law, table in runs.items()}
+    pairs = list(combinations(runs, 2))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        found = [np.log(reached[a]) - np.log(reached[b]) for a, b in pairs]
+        spread = [np.log(samples[a]) - np.log(samples[b]) for a, b in pairs]
+    width = _width([s - f for s, f in zip(spread, found, strict=True)], level)
+    rows = [
+        (*pair, np.exp(ratio) if np.isfinite(ratio) else _sided(ratio), *_ends(ratio, each, width))
+        for pair, ratio, each in zip(pairs, found, spread, strict=True)
+    ]
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
-def _resampled(table: Vector, met: npt.NDArray[np.int64], random: np.random.Generator) -> Vector:
-    """For each sample, the medians over searches drawn with replacement, in the draws it has."""
+def _sampled(table: Vector, met: npt.NDArray[np.int64], random: np.random.Generator) -> Vector:
+    """What a law reaches in each sample of its searches and of the draws."""
     searches = random.integers(len(table), size=(SAMPLES, len(table)))
-    return np.stack([np.median(table[i][:, d], axis=0) for i, d in zip(searches, met, strict=True)])
+    by_search = np.stack([np.median(one[met], axis=1) for one in table], axis=1)
+    return np.asarray(np.median(np.take_along_axis(by_search, searches, axis=1), axis=1))
 
 
-def _typical_ratio(a: Vector, b: Vector) -> Vector:
-    """The median of a/b over draws, the last axis; NaN where both failed in all of them."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        each = a / b
-    each = np.where(np.isnan(each).all(axis=-1, keepdims=True), 1.0, each)
-    return np.asarray(np.nanmedian(each, axis=-1))
+def _width(off: list[Vector], level: float) -> float:
+    """How many standard deviations the largest deviation of all pairs stays within."""
+    sure = [one / one.std() for one in off if np.isfinite(one).all() and one.std() > 0.0]
+    return float(np.quantile(np.max(np.abs(sure), axis=0), level)) if sure else 0.0
+
+
+def _sided(ratio: float) -> float:
+    """A ratio of which one side, or both, failed."""
+    return 1.0 if np.isnan(ratio) else float(np.exp(ratio))
+
+
+def _ends(ratio: float, spread: Vector, width: float) -> tuple[float, float]:
+    if np.isfinite(spread).all():
+        half = width * spread.std()
+        return float(np.exp(ratio - half)), float(np.exp(ratio + half))
+    if np.isposinf(spread).all() or np.isneginf(spread).all():
+        return float(np.exp(ratio)), float(np.exp(ratio))
+    return 0.0, np.inf
 
 
 def places(pairs: pd.DataFrame, laws: list[str]) -> dict[str, tuple[int, int]]:
