@@ -314,6 +314,7 @@ def test_the_sentences_about_told_hulls_are_those_of_the_study():
     verdicts = json.loads((RESULTS / "studies/unknown_dynamics/claims.json").read_text())["claims"]
     assert {one["claim"]: one["verdict"] for one in verdicts} == {
         "U1": "reproduced", "U2": "not reproduced", "U3": "reproduced", "U4": "reproduced",
+        "U5": "not reproduced",
     }  # fmt: skip
     pairs = table("pairs.csv", "unknown_dynamics").query("metric == 'iae'").set_index(["a", "b"])
     adapted, li, pid = (
@@ -323,6 +324,9 @@ def test_the_sentences_about_told_hulls_are_those_of_the_study():
     for one in (adapted, li):
         assert f"{one.ratio:.3f} [{one.ratio_low:.3f}, {one.ratio_high:.3f}]" in text
     assert f"better by more than 1 % in {100 * li.b_wins:.1f} % of the draws and worse in n" in text
+    equal = pairs.loc["adaptive_neural", "equal_gain"]
+    assert f"{equal.ratio:.3f} [{equal.ratio_low:.3f}, {equal.ratio_high:.3f}]" in text
+    assert equal.a_wins == equal.b_wins == 0.0
     low, high = 100 * pid.b_wins_low, 100 * pid.b_wins_high
     assert f"worse in {100 * pid.a_wins:.1f} % of the draws (U3) and better in" in text
     assert f"better in {100 * pid.b_wins:.1f} % [{low:.1f}, {high:.1f}]" in text
@@ -387,3 +391,20 @@ def test_no_published_study_draws_what_a_metric_is_measured_by(config):
         for draw in draws(made.sweep, 0, 5):
             loop = drawn(single, made.sweep.vary, draw).closed_loop()
             assert watching.constants_for(loop) == same
+
+
+def test_the_table_of_cybership_ii_is_that_of_the_study():
+    numbers = table("summary.csv", "rivals_cybership2").set_index(["metric", "law"])
+    section = STUDIES_PAGE.partition("**On CyberShip II")[2]
+    rows = re.findall(r"^\| (\w+) \| (\S+) \| (\d+) \| (.*), (.*) \| (.*), (.*) \|$", section, re.M)
+    assert {row[0] for row in rows} == {law for _, law in numbers.index}
+    for law, failed, iae, *ends in rows:
+        settled, after = (numbers.loc[metric, law] for metric in ("e_steady", "error_after_max"))
+        assert failed == f"{100 * settled.failed:.1f}"
+        assert iae == f"{numbers.loc['iae', law].q50:.0f}"
+        millimetres = [1000 * one for row in (settled, after) for one in (row.q50, row.q95)]
+        assert ends == [f"{one:.0f}" if np.isfinite(one) else "fails" for one in millimetres]
+    pairs = table("pairs.csv", "rivals_cybership2").query("metric == 'iae'").set_index(["a", "b"])
+    found = pairs.loc["velocity_vector", "momentum_vector"]
+    told = f"{found.ratio:.3f} [{found.ratio_low:.3f}, {found.ratio_high:.3f}]"
+    assert f"`velocity_vector` / `momentum_vector` {told} in IAE" in " ".join(section.split())
