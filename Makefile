@@ -77,9 +77,6 @@ sea: $(VENV)/run.done ## single runs in a sea and through sensors, into results/
 bench-laws: $(VENV)/run.done ## all laws over standard tasks, into results/bench/
 	@$(BIN)/podusv bench --force --out results/.bench && mkdir -p results/bench && \
 	    cp results/.bench/leaderboard.md results/.bench/runs.csv results/bench
-	@$(BIN)/podusv bench --vessel paper_nonlinear --laws configs/bench/tuned.yaml --force --out results/.bench_tuned && \
-	    cp results/.bench_tuned/runs.csv results/bench/tuned_runs.csv && \
-	    cp results/.bench_tuned/leaderboard.md results/bench/tuned.md
 	@echo "what was found: results/bench.md; the page: results/.bench/report.html"
 
 docs: $(VENV)/dev.done ## the documentation as a site, into site/index.html
