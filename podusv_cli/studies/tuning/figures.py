@@ -30,6 +30,7 @@ ROW, FRAME = 0.2, 0.75  # inches: a row of a chart, and what is around the rows
 ACROSS = 4  # small panels in a row
 PANEL = 1.35  # inches, the height of a small panel
 TOP = 2.0  # times the scenario's objective, where an axis ends
+DECADE = 10.0  # largest over least number, from where an axis is logarithmic
 SMALL: dict[str, Any] = {"fontsize": 6.5}
 
 
@@ -157,7 +158,11 @@ def effort(table: pd.DataFrame, metric: str) -> Figure:
                 markerfacecolor="none" if before else colour,
                 label=None if before else escaping.figure(str(law)), **look,
             )  # fmt: skip
-    axes.set(xscale="log", yscale="log", xlabel="total variation of the surge demand [N]")
+    known = table.replace(np.inf, np.nan)
+    wide = {name: known[name].max() > DECADE * known[name].min() for name in ("variation", "error")}
+    axes.set_xscale("log" if wide["variation"] else "linear")
+    axes.set_yscale("log" if wide["error"] else "linear")
+    axes.set_xlabel("total variation of the surge demand [N]")
     axes.set_ylabel(f"median {escaping.figure(metric)} on fresh draws")
     legend(figure, COLUMNS)
     return figure
