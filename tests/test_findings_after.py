@@ -153,7 +153,7 @@ def test_a_filter_that_is_told_wrong_noise_is_told_by_its_innovations():
     seen = ("measurement={kind: sensors}", "simulation.duration=20")
     assert told("inconsistent-filter", *seen, "estimator={kind: ekf}") == []
     (text,) = told("inconsistent-filter", *seen, "estimator={kind: ekf, sigma_psi: 0.001}")
-    assert "give it larger sigmas, or larger q" in text
+    assert "give it larger sigmas first" in text
     dull = "estimator={kind: ekf, sigma_p: 1, sigma_psi: 1, sigma_u: 1, sigma_v: 1, sigma_r: 1}"
     (text,) = told("inconsistent-filter", *seen, dull)
     assert "it takes good measurements for noise" in text

@@ -134,6 +134,7 @@ def test_dop853_starts_anew_where_the_path_jumps():
 @pytest.mark.parametrize(
     ("overrides", "reason"),
     [
+        (["measurement={kind: sensors}", "estimator={kind: ekf}"], "works with measurements"),
         (DIFFERENCE, "takes samples"),
         (("control.period=0.01", "controller={kind: pid}"), "held"),
         (("actuator={kind: saturated}",), "limits the law"),

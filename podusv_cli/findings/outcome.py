@@ -113,7 +113,8 @@ def inconsistent_filter(scenario: Scenario, log: Recording) -> Sentences:
     if nis > DOUBTFUL:
         yield (
             f"{told}: noise is larger than its sigmas, which have to count waves too, or the hull "
-            "moves otherwise than it predicts; give it larger sigmas, or larger q"
+            "moves otherwise than it predicts; give it larger sigmas first, larger q only for a "
+            "hull that is not the one it is told"
         )
     if nis < TIMID:
         yield f"{told}, so it takes good measurements for noise; give it the sensors' noise"
@@ -134,8 +135,8 @@ def moves_away(scenario: Scenario, log: Recording) -> Sentences:
         yield (
             f"the vessel starts {start:.3g} m from the target and is {end:.3g} m away from it at "
             f"the end (mean over the steady window): {scenario.controller.label} does not track; "
-            "check signs and units of the law and of what it is told about the vessel, or take "
-            "larger gains"
+            "check signs and units of the law, of what it is told about the vessel, and its own "
+            "limits (defaults of U and N_m are for a model ship), or take larger gains"
         )
 
 

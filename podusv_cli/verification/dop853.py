@@ -46,6 +46,10 @@ REASONS: tuple[tuple[Callable[[Scenario, list[Level]], bool], str], ...] = (
         "the law takes samples (a difference quotient, or a held direction)",
     ),
     (
+        lambda scenario, _: not scenario.measurement.is_exact,
+        "the law works with measurements, which come at instants",
+    ),
+    (
         lambda scenario, _: scenario.actuator.is_relayed,
         "the actuator has a command path (actuator.command) or fails (actuator.failure)",
     ),
