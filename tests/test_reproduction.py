@@ -344,7 +344,8 @@ LAWS_PAGE = COMPARED.partition("\n## ")[0]
 STUDY = ROOT / "results" / "studies" / "rivals"
 SUMMARY = pd.read_csv(STUDY / "summary.csv").set_index(["law", "metric"])
 ROWS = {
-    "`velocity_vector`": "velocity_vector", "`adrc`": "adrc", "`hand_position`": "hand_position",
+    "`velocity_vector`": "velocity_vector", "`momentum_vector`": "momentum_vector",
+    "`adrc`": "adrc", "`hand_position`": "hand_position",
     "`sliding_mode`": "sliding_mode", "`sliding_mode`, `super_twisting`": "super_twisting",
     "`alos`": "alos", "`alos`, `integral`": "ilos", "`los_pid`": "los_pid", "`pid`": "pid",
     "`adaptive_neural`": "adaptive_neural", "`dsc`": "dsc", "`full_backstepping`": FULL,
