@@ -259,13 +259,16 @@ class _Frame:
 
     def _no_derivative(self, q: Vector, state: int) -> str:
         distance = math.hypot(*q[:2])
-        why = "a limit, dead zone or step of law or actuator lies there"
+        why = (
+            "a limit, dead zone or step of law or actuator lies there, or damping with |r| or |v| "
+            "of the hull, such as Y_rv, at r or v of 0"
+        )
         if state < 2 and distance < CLOSE:
             why = f"the target is {distance:.2g} m away, where its direction is singular"
         return (
             f"the loop has no derivative by {self.labels[1 + state]} at the steady motion: {why}; "
-            "margins need a smooth loop: choose a law with a standoff, another load or another "
-            "actuator"
+            "margins need a smooth loop: choose a law with a standoff, another load, another "
+            "actuator or a hull without that term"
         )
 
 
