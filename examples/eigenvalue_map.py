@@ -10,11 +10,9 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 import yaml
 from matplotlib.figure import Figure
@@ -25,6 +23,7 @@ from podusv_cli.components.controllers.momentum_vector import MomentumVector
 from podusv_cli.components.controllers.velocity_vector import VelocityVector
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.kernel import bundle
+from podusv_cli.figures.style import house_style
 from podusv_cli.theory.lateral import (
     MomentumGains,
     SwayAnswer,
@@ -105,7 +104,7 @@ def panel(
 
 def draw(place: Path) -> None:
     """Both laws side by side."""
-    with mpl.rc_context(fname=str(resources.files("podusv_cli.figures") / "podusv.mplstyle")):
+    with house_style():
         figure = Figure(figsize=(7.09, 3.2))
         left, right = figure.subplots(1, 2, sharey=True)
         panel(left, "velocity_vector", vector_growth, vector_hull)

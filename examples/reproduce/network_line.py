@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
-from podusv_cli.figures.style import TARGET_LOOK, new_figure, nth_style
+from podusv_cli.figures.style import TARGET_LOOK, house_style, image, new_figure, nth_style
 from podusv_cli.scenario.load import load
 from podusv_cli.theory.loop_margins import loop_margins
 
@@ -56,11 +56,12 @@ def sensitivities(axes: Axes) -> None:
 def main() -> None:
     """Draw both panels."""
     table, place = pd.read_csv(sys.argv[1], index_col="nodes"), Path(sys.argv[2])
-    figure = new_figure(2, 2.9)
-    left, right = figure.subplots(1, 2)
-    errors(left, table)
-    sensitivities(right)
-    figure.savefig(place, dpi=150, metadata={"Software": None})
+    with house_style():
+        figure = new_figure(2, 2.9)
+        left, right = figure.subplots(1, 2)
+        errors(left, table)
+        sensitivities(right)
+        place.write_bytes(image(figure, "png"))
 
 
 if __name__ == "__main__":
