@@ -53,6 +53,12 @@ def test_a_corner_of_the_path_is_told_and_the_virtual_speed_jumps():
     assert jump("alpha_u", not_there, ON_TARGET) < 0.01
 
 
+def test_a_corner_that_the_law_sees_rounded_is_not_told():
+    course = "path={kind: waypoints, legs: straight, points: [[0, 0], [9, 0], [9, 9]], fillet: %s}"
+    assert "path-corner" in codes(course % 0.0)
+    assert "path-corner" not in codes(course % 2.0)
+
+
 def test_a_bend_of_the_path_is_told_and_only_a_law_with_accelerations_steps():
     path, law = turning("velocity"), "controller={kind: full_backstepping}"
     assert codes(path) & {"path-jump", "path-corner", "path-bend"} == {"path-bend"}

@@ -43,6 +43,8 @@ CONSEQUENCES: dict[str, Callable[[float, Case], str]] = {
 def path_breaks(case: Case, what: str) -> Sentences:
     """Where the target's position, velocity or acceleration jumps within the run."""
     offset, unit = BREAKS[what]
+    if what == "velocity" and case.scenario.path.fillet_for_law():
+        return  # the law sees none
     for at in case.scenario.path.breaks():
         if at.what == what and at.time < case.scenario.simulation.duration:
             beside = BESIDE * max(at.time, 1.0)
@@ -60,7 +62,7 @@ def _path_break(code: str, what: str, remedy: str) -> FindingKind:
 
 
 path_jump = _path_break("path-jump", "position", "let the parts of the path meet")
-path_corner = _path_break("path-corner", "velocity", "round the corner")
+path_corner = _path_break("path-corner", "velocity", "set path.fillet, or round the corner")
 path_bend = _path_break(
     "path-bend", "acceleration", "none needed: Assumption 3 holds; a smooth path avoids the step"
 )

@@ -9,6 +9,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from podusv_cli.components.paths.fillet import Fillet
 from podusv_cli.core.component import Component
 from podusv_cli.core.kernel import Vector, absent, bundle, call
 
@@ -55,3 +56,7 @@ class Path(Component):
     def breaks(self) -> tuple[Break, ...]:
         """Times at which the target is not smooth, in order."""
         return ()
+
+    def fillet_for_law(self) -> Fillet | None:
+        """What rounds the corners that the law sees; None where it sees the target itself."""
+        return None

@@ -9,11 +9,13 @@ import numpy as np
 from pydantic import model_validator
 
 from podusv_cli.components.paths.base import Break, Path, Point
+from podusv_cli.components.paths.fillet import Fillet
 from podusv_cli.core.component import value
 from podusv_cli.core.interpolation import segment
 from podusv_cli.core.kernel import Vector, kernel
 
 ALIGNED = 1e-9  # of the speed; a smaller change of velocity is rounding
+FOREVER = 1e300  # s, the period of what never comes again
 LOOP = 2.0  # the place of "loop" among the choices of `after`, as kernels know it
 
 
@@ -38,6 +40,10 @@ class Waypoints(Path):
     legs: Literal["spline", "straight"] = value(
         "spline", "", "between the points: a smooth spline, or straight lines with corners"
     )
+    fillet: float = value(
+        0.0, "s", "the law sees each corner of straight legs as a parabola of this duration, half "
+        "of it before the corner; log and metrics have the corner. 0: it sees the corner", ge=0,
+    )  # fmt: skip
     after: Literal["continue", "stop", "loop"] = value(
         "continue", "", "after the last point: straight on, a stop, or from there to the first "
         "point and round again",
@@ -56,7 +62,18 @@ class Waypoints(Path):
                     "the times or the course are beyond all numbers; points are too far apart or "
                     "too near, or the speed is too small or too large"
                 )
+        self._check_fillet(np.diff(knots))
         return self
+
+    def _check_fillet(self, times: Vector) -> None:
+        if self.fillet > 0 and self.legs == "spline":
+            raise ValueError("a spline has no corners; write legs: straight, or leave fillet out")
+        if self.fillet > times.min():
+            leg, least = int(times.argmin()) + 1, times.min()
+            raise ValueError(
+                f"fillet = {self.fillet:g} s is longer than leg {leg} takes ({least:.4g} s); "
+                "a corner may begin after the middle of a leg only"
+            )
 
     def _has_numbers(self, knots: Vector) -> bool:
         """Whether a bound of all numbers on the way to the spline's coefficients is finite."""
@@ -74,18 +91,30 @@ class Waypoints(Path):
 
     def breaks(self) -> tuple[Break, ...]:
         """The corners, and the stop at the last point; of a loop those of the first round."""
-        corners = self._corners() if self.legs == "straight" else ()
-        stop = (float(self._knots()[-1]),) if self.after == "stop" else ()
-        return tuple(Break(time, "velocity") for time in (*corners, *stop))
+        if self.legs == "spline":
+            times = self._knots()[-1:] if self.after == "stop" else np.zeros(0)
+        else:
+            times, _ = self._corners()
+        return tuple(Break(time, "velocity") for time in times.tolist())
 
-    def _corners(self) -> tuple[float, ...]:
-        """When the target passes from a leg to one of another direction [s]."""
+    def fillet_for_law(self) -> Fillet | None:
+        """The corners; of a loop the first point has one too, from the second round on."""
+        if self.fillet == 0.0:
+            return None
+        (times, jumps), end = self._corners(), float(self._knots()[-1])
+        loop = self.after == "loop"
+        if loop and times[-1:] == end:
+            times, jumps = np.append(0.0, times), np.vstack([jumps[-1:], jumps])
+        return Fillet(self.fillet, end if loop else FOREVER, times, jumps) if len(times) else None
+
+    def _corners(self) -> tuple[Vector, Vector]:
+        """When the velocity jumps between straight legs, or at the stop [s], and by what [m/s]."""
         legs, knots = np.diff(self._course(), axis=0), self._knots()
         velocities = legs / np.diff(knots)[:, None]
-        if self.after == "loop":  # the last leg is followed by the first
-            velocities = np.vstack([velocities, velocities[:1]])
-        turns = np.abs(np.diff(velocities, axis=0)).max(axis=1) > ALIGNED * self.speed
-        return tuple(knots[1:][: len(turns)][turns].tolist())
+        after = {"loop": velocities[:1], "stop": np.zeros((1, 2)), "continue": velocities[-1:]}
+        jumps = np.diff(np.vstack([velocities, after[self.after]]), axis=0)
+        turns = np.abs(jumps).max(axis=1) > ALIGNED * self.speed
+        return knots[1:][turns], jumps[turns]
 
     def _course(self) -> Vector:
         """The points that the spline goes through; a loop ends where it begins."""

@@ -17,6 +17,7 @@ from podusv_cli.components.estimators.none import NoEstimator
 from podusv_cli.components.measurements.base import KNOWN, OWN, Measurement
 from podusv_cli.components.measurements.exact import Exact
 from podusv_cli.components.paths.base import TARGET, Path
+from podusv_cli.components.paths.fillet import law_of_rounded, sample_of_rounded
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core import signal
 from podusv_cli.core.component import describe
@@ -167,6 +168,18 @@ class ClosedLoop:
         """Where the target is at t = 0."""
         return np.asarray(self.path.targets(AT_START)[0])
 
+    def law_constants(self, recall: Recall = call) -> dict[str, float]:
+        """The law's constants, with those of the path's fillet where it has one."""
+        own: dict[str, float] = recall(self.controller.constants_with, self.nominal)
+        fillet = recall(self.path.fillet_for_law)
+        return own | fillet.constants(len(recall(self.controller.table))) if fillet else own
+
+    def law_table(self, recall: Recall = call) -> Vector:
+        """The law's table, and behind it the corners of the path's fillet."""
+        own: Vector = recall(self.controller.table)
+        fillet = recall(self.path.fillet_for_law)
+        return np.concatenate([own, fillet.rows()]) if fillet else own
+
     def about(self) -> dict[str, Signal]:
         """Every signal that the loop logs, by name. Raises LawError where two have one name."""
         self.check_seeing()
@@ -227,15 +240,18 @@ def entries(
 ) -> Iterator[tuple[str, Any, tuple[str, ...]]]:
     """Name, kernel and constants' names of every part, in the order the loop takes them."""
     law, path, disturbance, actuator = loop.controller, loop.path, loop.disturbance, loop.actuator
-    constants = tuple(recall(law.constants_with, loop.nominal))
+    constants = tuple(loop.law_constants(recall))
+    rounded = recall(path.fillet_for_law) is not None
+    steer = law_of_rounded(law.law) if rounded else law.law
+    take = sample_of_rounded(law.sample) if rounded and law.takes_samples() else law.sample
     # What does nothing reads no constants: its machine code is the same for every law.
-    sample = (law.sample, constants) if law.takes_samples() else (_no_sample, ())
+    sample = (take, constants) if law.takes_samples() else (_no_sample, ())
     told = law.wants_loads()
     after_saturation = (law.after_saturation, constants) if told else (_ignore_loads, ())
     yield "path", path.evaluate, tuple(recall(path.constants))
     loads = tuple(recall(disturbance.constants_with, loop.vessel))
     yield "disturbance", disturbance.kernel_with(loop.vessel), loads
-    yield "law", law.law, constants
+    yield "law", steer, constants
     yield "sample", *sample
     yield "actuator", actuator.drive_with(), tuple(recall(actuator.constants))
     yield "after_saturation", *after_saturation
@@ -278,7 +294,8 @@ def vectors_of(
         path=numbers(path.constants), path_table=recall(path.table),
         disturbance=numbers(disturbance.constants_with, loop.vessel),
         disturbance_table=recall(disturbance.table_for, loop.vessel, duration),
-        law=numbers(law.constants_with, loop.nominal), law_table=recall(law.table),
+        law=np.array(list(loop.law_constants(recall).values()) or [0.0]),
+        law_table=loop.law_table(recall),
         actuator=numbers(actuator.constants), actuator_table=recall(actuator.table),
         measurement=numbers(measurement.constants_with, grid.step, motion),
         measurement_table=recall(measurement.table_for, grid.step, grid.steps),

@@ -1,0 +1,114 @@
+"""Corners of a path rounded for the law: it begins its turn before the target does.
+
+The law is shown the mean of the target's positions from T/2 before an instant to T/2 after it.
+Where the velocity jumps by dv at t_c, between two straight legs, this differs from the target by
+
+    dv (T/2 - |t - t_c|)^2/(2 T)    for |t - t_c| < T/2
+
+so a corner becomes a parabola. The log, and all that is measured, have the target itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from podusv_cli.core.interpolation import segment
+from podusv_cli.core.kernel import Vector, kernel, scratch, specialise, tail, taking
+
+Kernel = Callable[..., None]
+LAW = ("t", "x", "memory", "target", "k", "table", "tau", "rate", "signals", "work")
+SAMPLE = ("t", "x", "memory", "target", "k", "table")
+
+
+@kernel
+def round_corner(t: float, k: Any, table: Vector, target: Vector, shown: Vector) -> None:
+    """shown = the target at t as the law sees it; `table` as in `Fillet.rows`."""
+    for i in range(6):
+        shown[i] = target[i]
+    count = int(k.fillet_corners)
+    lap = t - k.fillet_period * math.floor(t / k.fillet_period)
+    i = segment(lap + 0.5 * k.fillet, count, table)
+    s = lap - table[i]
+    left = 0.5 * k.fillet - abs(s)
+    if left > 0.0 and t > s:  # the first lap has no corner at its start
+        side = -left if s >= 0.0 else left
+        for axis in range(2):
+            rate = table[count + 2 * i + axis] / k.fillet
+            shown[axis] += 0.5 * rate * left * left
+            shown[2 + axis] += rate * side
+            shown[4 + axis] += rate
+
+
+def _inner_law(
+    t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector, tau: Vector,
+    rate: Vector, signals: Vector, work: Vector,
+) -> None:  # fmt: skip
+    """Stands for a law's `law`."""
+
+
+def _inner_sample(
+    t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector
+) -> None:
+    """Stands for a law's `sample`."""
+
+
+def _law(
+    t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector, tau: Vector,
+    rate: Vector, signals: Vector, work: Vector,
+) -> None:  # fmt: skip
+    """`law` of the rounded target."""
+    shown = scratch(6)
+    round_corner(t, k, tail(table, int(k.fillet_place)), target, shown)
+    _inner_law(t, x, memory, shown, k, table, tau, rate, signals, work)
+
+
+def _sample(t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector) -> None:
+    """`sample` of the rounded target."""
+    shown = scratch(6)
+    round_corner(t, k, tail(table, int(k.fillet_place)), target, shown)
+    _inner_sample(t, x, memory, shown, k, table)
+
+
+@cache
+def law_of_rounded(law: Kernel) -> Kernel:
+    """A law's kernel that is shown the rounded target; the same one for the same kernel."""
+    made: Kernel = specialise(_law, f"{law.__qualname__}_rounded", _inner_law=taking(law, LAW))
+    return made
+
+
+@cache
+def sample_of_rounded(sample: Kernel) -> Kernel:
+    """A law's `sample` that is shown the rounded target; the same one for the same kernel."""
+    inner = taking(sample, SAMPLE)
+    made: Kernel = specialise(_sample, f"{sample.__qualname__}_rounded", _inner_sample=inner)
+    return made
+
+
+@dataclass(frozen=True, eq=False)
+class Fillet:
+    """Corners, each with its time [s] and the jump of the velocity [m/s], rounded over `time` [s].
+
+    They come again after each `period` [s].
+    """
+
+    time: float
+    period: float
+    times: Vector
+    jumps: Vector  # a row of north and east a corner
+
+    def rows(self) -> Vector:
+        """The corners as the kernel reads them: times, then two jumps a corner."""
+        return np.concatenate([self.times, self.jumps.ravel()])
+
+    def constants(self, place: int) -> dict[str, float]:
+        """What the kernel reads from `k`, where `rows` begin at `place` of the law's table."""
+        return {
+            "fillet": self.time, "fillet_period": self.period,
+            "fillet_corners": float(len(self.times)), "fillet_place": float(place),
+        }  # fmt: skip
