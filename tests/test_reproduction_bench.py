@@ -338,3 +338,34 @@ def test_the_table_of_cybership_ii_is_that_of_the_study():
     found = pairs.loc["velocity_vector", "momentum_vector"]
     told = f"{found.ratio:.3f} [{found.ratio_low:.3f}, {found.ratio_high:.3f}]"
     assert f"`velocity_vector` / `momentum_vector` {told} in IAE" in " ".join(section.split())
+
+
+def test_the_sentences_about_forces_fixed_to_the_earth_are_those_of_the_study():
+    section = " ".join(
+        STUDIES_PAGE.partition("**With forces fixed")[2].partition("**On Cyber")[0].split()
+    )
+    fixed, body = (table("summary.csv", name) for name in ("rivals_earth", "rivals"))
+
+    def told(metric, law, column, scale=1.0):
+        rows = (one.set_index(["metric", "law"]).loc[metric, law][column] for one in (fixed, body))
+        return [scale * row for row in rows]
+
+    assert "{:.0f} in place of {:.0f} m s".format(*told("iae", "velocity_vector", "q50")) in section
+    after = told("error_after_max", "velocity_vector", "q50", 1000)
+    assert "{:.0f} in place of {:.0f} mm".format(*after) in section
+    lost = told("iae", "adaptive_neural", "failed", 100)
+    assert "{:.1f} % of the draws, in place of {:.1f} %".format(*lost) in section
+    pairs = table("pairs.csv", "rivals_earth").query("metric == 'iae'").set_index(["a", "b"])
+    for rival in ("momentum_vector", "adrc"):
+        found = pairs.loc["velocity_vector", rival]
+        ratio = f"{found.ratio:.3f} [{found.ratio_low:.3f}, {found.ratio_high:.3f}]"
+        assert (
+            f"`velocity_vector` / `{rival}` is {ratio}" in section
+            or f"`{rival}` {ratio}" in section
+        )
+    verdicts = [
+        json.loads((RESULTS / "studies" / name / "claims.json").read_text())
+        for name in ("rivals", "rivals_earth")
+    ]
+    seen = [[claim["verdict"] for claim in one["claims"]] for one in verdicts]
+    assert seen[0] == seen[1]
