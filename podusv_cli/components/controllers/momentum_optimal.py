@@ -4,9 +4,13 @@ On a straight line the neutral point's y, psi, z = v + x_n r and r obey
 
     y' = V psi + z,   psi' = r,   z' = -p V r - d z,   r' = alpha,
 
-and the law is alpha = -Q (k_b y/V + psi + eta z/V) - S r, a feedback of all four. Here it is the one
-with the least integral of q_y y^2 + q_psi psi^2 + q_r r^2 + alpha^2. Its weights are those for which
-Q0, S0 and k_b0 are optimal where sway does not answer yaw (p = 0). The closed loop's polynomial
+and the law, which steers the origin at y - x_n psi, is
+
+    alpha = -Q (k_b (y - x_n psi)/V + psi + eta z/V) - S r,
+
+a feedback of all four. Here it is the one with the least integral of
+q_y y^2 + q_psi psi^2 + q_r r^2 + alpha^2. Its weights are those for which Q0, S0 and k_b0 are
+optimal where sway does not answer yaw (p = 0). The closed loop's polynomial
 s^4 + a s^3 + b s^2 + c s + e has (Kalman, "When is a linear control system optimal?", 1964; derived
 in docs/theory.md)
 
@@ -79,20 +83,21 @@ def stable_factor(d: float, off: float, k: Any) -> Factor:
 
 
 @kernel
-def optimal(at: Answer, k: Any) -> YawGains:
-    """The optimal gains for sway that answers yaw exactly as told."""
+def optimal(at: Answer, V: float, k: Any) -> YawGains:
+    """The optimal gains at the speed V [m/s], for sway that answers yaw exactly as told."""
     d = max(at.d, SLIGHT)
     p = math.copysign(max(abs(at.p), SLIGHT), at.p)
     found = stable_factor(d, abs(1.0 - p), k)
-    S = found.a - d
-    Q = (found.c - k.across * (1.0 - p)) / d
-    return YawGains((1.0 + (S * d - found.b) / Q) / p, k.across / Q, S, Q / S)
+    S, heading = found.a - d, (found.c - k.across * (1.0 - p)) / d
+    Q = max(heading + k.across * k.x_n / V, SLIGHT)
+    eta = (heading + S * d - found.b) / (p * Q)
+    return YawGains(eta, k.across / Q, S, Q / S)
 
 
 @kernel
-def yaw_gains(at: Answer, k: Any) -> YawGains:
-    """Those of the schedule, or the optimal ones."""
+def yaw_gains(at: Answer, V: float, k: Any) -> YawGains:
+    """Those of the schedule, or the optimal ones, at the speed V [m/s]."""
     if k.gains == LQR:
-        return optimal(at, k)
+        return optimal(at, V, k)
     safe = schedule(at, k)
     return YawGains(safe.eta, safe.k_b, k.S, k.Q_per_S)

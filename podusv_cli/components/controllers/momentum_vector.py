@@ -128,7 +128,7 @@ class MomentumVector(VelocitySteering):
         V_a, V_b = at.t_a + along.kappa * at.e_a, at.t_b + along.kappa * at.e_b
         V = max(math.sqrt(V_a * V_a + V_b * V_b), k.V_m)
         more = memory[MORE] * k.m22 / k.neutral_mass
-        gains = yaw_gains(sway_answer(V, v, v_l, at.turn, more, k), k)
+        gains = yaw_gains(sway_answer(V, v, v_l, at.turn, more, k), V, k)
         wanted = guidance(x, at, along, min(gains.k_b, at.k_p), k)
 
         v_l_rate = load_sway_rate(wanted.a, v_l, at.turn, memory, k)
