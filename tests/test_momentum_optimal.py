@@ -1,5 +1,6 @@
 """`gains: lqr` of momentum_vector: optimal by scipy, the loop's poles, and what it reaches."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -46,6 +47,11 @@ def plant(p: float, d: float, V: float) -> tuple[Vector, Vector]:
     return own, np.array([[0.0], [0.0], [0.0], [1.0]])
 
 
+def borne(p: float) -> float:
+    """What the law takes p for."""
+    return math.copysign(max(abs(p), SLIGHT), p)
+
+
 def weight(k: Any, V: float) -> Vector:
     return np.diag([(k.across / V) ** 2, k.q_psi, 0.0, k.q_r])
 
@@ -72,7 +78,7 @@ def cost(K: Vector, k: Any, at: Answer, V: float) -> float:
 @given(**answers, x_n=st.floats(0.0, 0.3))
 def test_the_gains_are_those_of_scipy_s_riccati_equation(p, d, V, x_n):
     k = constants(x_n=x_n)
-    own, push = plant(p if abs(p) > SLIGHT else SLIGHT, d, V)
+    own, push = plant(borne(p), d, V)
     known = push.T @ solve_continuous_are(own, push, weight(k, V), np.eye(1))
     found = feedback(optimal(Answer(p, d), V, k), k, V)
     np.testing.assert_allclose(found, known[0], rtol=1e-4)
@@ -138,7 +144,7 @@ def test_the_equations_of_its_coefficients_are_the_factorisation():
 def test_the_loop_has_the_designed_polynomial_and_is_stable(p, d, V):
     k = constants()
     eta, k_b, S, Q_per_S = optimal(Answer(p, d), V, k)
-    p = p if abs(p) > SLIGHT else SLIGHT
+    p = borne(p)
     gains = MomentumGains(eta, k_b, Q_per_S * S, S, k_b * k.x_n / V)
     found = momentum_vector_polynomial(SwayAnswer(p, d), gains)
     design = [1.0, *stable_factor(d, abs(1.0 - p), k), k.across * d]
@@ -159,7 +165,9 @@ def test_newton_s_start_is_above_the_sum_of_the_roots_and_it_stays_there(d, off,
     ])  # fmt: skip
     known = np.sqrt(squares + 0j).real.sum()
     start = k.chain_S * np.sqrt(max(off, 1.0)) + d
-    assert known * (1 - 1e-6) <= stable_factor(d, off, k).a <= start * (1 + 1e-9)
+    found = stable_factor(d, off, k)
+    assert known * (1 - 1e-6) <= found.a <= start * (1 + 1e-9)
+    assert growth(np.array([1.0, *found, k.across * d])) < 0.0  # also where more steps are needed
 
 
 @pytest.mark.parametrize("hull", VESSELS.values(), ids=lambda hull: hull.preset)

@@ -74,7 +74,8 @@ def optimal_elsewhere(case: Case) -> Sentences:
     """Of drawn hulls +-30 % many are unstable with these gains (docs/theory.md)."""
     scenario = case.scenario
     law, true, told = scenario.controller, scenario.vessel, scenario.nominal
-    if law.gains != "lqr" or true.constants() == told.constants():
+    optimal = isinstance(law, MomentumVector) and law.gains == "lqr"
+    if not optimal or true.constants() == told.constants():
         return
     speed = math.hypot(*case.reference.working[:2].tolist())
     answers = ""
