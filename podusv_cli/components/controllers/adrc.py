@@ -32,7 +32,7 @@ class Adrc(HandController, ObservingController):
         """The observer and the lagged heading."""
         return super().slots() + each((PSI_F,))
 
-    def gains(self, axes: tuple[Axis, Axis]) -> tuple[tuple[str, float, float], ...]:
+    def axis_gains(self, axes: tuple[Axis, Axis]) -> tuple[tuple[str, float, float], ...]:
         """Of a hull at rest."""
         surge, yaw = self.rate_gains()
         return ("k_v", surge, self.omega_u), ("k_v", yaw, self.omega_r)

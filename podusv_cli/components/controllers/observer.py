@@ -99,7 +99,7 @@ class ObservingController(Controller):
         coupling = {"by_yaw": nominal.m23 / nominal.m33, "by_sway": nominal.m32 / nominal.m22}
         return super().constants_with(nominal) | coupling
 
-    def gains(self, axes: tuple[Axis, Axis]) -> tuple[tuple[str, float, float], ...]:
+    def axis_gains(self, axes: tuple[Axis, Axis]) -> tuple[tuple[str, float, float], ...]:
         """Key, gain [1/s] and observer bandwidth of the surge and of the yaw loop."""
         raise NotImplementedError
 
@@ -108,7 +108,7 @@ class ObservingController(Controller):
 
         The nominal damping that the law cancels is taken to be the true one.
         """
-        return [_loop(axis, *gain) for axis, gain in zip(axes, self.gains(axes), strict=True)]
+        return [_loop(axis, *gain) for axis, gain in zip(axes, self.axis_gains(axes), strict=True)]
 
 
 def _loop(axis: Axis, key: str, gain: float, omega: float) -> Loop:

@@ -65,7 +65,7 @@ class VelocityVector(VelocitySteering):
     T_v: float = value(5.0, "s", "time over which the sway velocity is predicted", ge=0)
     chi_m: float = value(0.3, "rad/s", "largest turn of the wanted velocity used ahead", gt=0)
 
-    def gains(self, axes: tuple[Axis, Axis]) -> tuple[tuple[str, float, float], ...]:
+    def axis_gains(self, axes: tuple[Axis, Axis]) -> tuple[tuple[str, float, float], ...]:
         """With the parts of A and of the angle's rate that act on the velocities."""
         surge, yaw = self.k_u + self.k_p, self.k_r + self.k_psi
         return ("k_u", surge, self.omega_u), ("k_r", yaw, self.omega_r)
