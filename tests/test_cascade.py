@@ -1,0 +1,142 @@
+"""The law cascade: against its linear loop, another program of it, and the page of its paper."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.linalg import solve_continuous_are
+
+import podusv_cli as podusv
+
+ROOT = Path(__file__).parents[1]
+CONFIGS = ROOT / "configs" / "lefeber_2003"
+RESULTS = ROOT / "results"
+PAGE = (RESULTS / "lefeber_2003.md").read_text()
+M11, M22, M33, D11, D22, D33 = 19.0, 35.2, 4.2, 4.0, 10.0, 1.0
+GAINS = np.array([10.28, -9.2, 4.44, -2.74])  # of u, v, z1, z2
+TURN = 0.05  # rad/s
+
+
+def plant(r: float, d22: float = D22) -> tuple[Any, Any]:
+    """Surge, sway and position in a steady turn, as deviations (u, v, z1, z2), and the force."""
+    A = [
+        [-D11 / M11, M22 * r / M11, 0, 0],
+        [-M11 * r / M22, -d22 / M22, 0, 0],
+        [1, 0, 0, r],
+        [0, 1, -r, 0],
+    ]
+    return np.array(A), np.array([[1 / M11], [0], [0], [0]])
+
+
+def slowest(r: float, gains: Any = GAINS, d22: float = D22) -> float:
+    """Real part of the slowest pole of the loop in a turn of r [rad/s]."""
+    A, B = plant(r, d22)
+    return float(np.linalg.eigvals(A - B * gains).real.max())
+
+
+def test_the_gains_are_optimal_for_a_turn_to_starboard_on_the_hull_with_10_and_1() -> None:
+    A, B = plant(TURN)
+    X = solve_continuous_are(A, B, np.diag([9.8, 90.9, 17.9, 9.3]), np.eye(1))
+    np.testing.assert_allclose((B.T @ X)[0], GAINS, atol=0.01)
+
+
+def test_poles_of_the_turn_the_line_the_other_side_and_the_other_damping() -> None:
+    assert slowest(TURN) == pytest.approx(-0.03559, abs=1e-5)
+    assert slowest(0.0) == pytest.approx(0.0, abs=1e-12)
+    assert slowest(-TURN) == pytest.approx(0.0264, abs=1e-4)
+    assert slowest(-TURN, GAINS * [1, -1, 1, -1]) == pytest.approx(slowest(TURN))
+    assert slowest(TURN, d22=1.0) == pytest.approx(0.0009, abs=5e-5)
+
+
+def by_hand(run: Any, turn: float, limit: float) -> Any:
+    """Ship and virtual ship with u_r, r_r constant, integrated by another program."""
+    v_r = float(run["v_ref"][0])
+    u_r = math.sqrt(0.05**2 - v_r**2)
+
+    def body(x: float, y: float, psi: float) -> Any:
+        return np.array([x * np.cos(psi) + y * np.sin(psi), y * np.cos(psi) - x * np.sin(psi)])
+
+    def rates(t: float, s: Any) -> Any:
+        x, y, psi, u, v, r, x_r, y_r, psi_r = s
+        z = body(x, y, psi) - body(x_r, y_r, psi_r)
+        surge = -M22 * v_r * turn + D11 * u_r - GAINS @ [u - u_r, v - v_r, *z]
+        yaw = -(M11 - M22) * u_r * v_r + D33 * turn - 9.02 * (r - turn) - 6.74 * (psi - psi_r)
+        surge, yaw = np.clip([surge, yaw], -limit, limit)
+        return [
+            u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi), r,
+            (M22 * v * r - D11 * u + surge) / M11, (-M11 * u * r - D22 * v) / M22,
+            ((M11 - M22) * u * v - D33 * r + yaw) / M33,
+            u_r * np.cos(psi_r) - v_r * np.sin(psi_r), u_r * np.sin(psi_r) + v_r * np.cos(psi_r),
+            turn,
+        ]  # fmt: skip
+
+    first = [run[name][0] for name in ("x", "y", "psi", "u", "v", "r", "x_d", "y_d", "psi_ref")]
+    times = run["time"]
+    return solve_ivp(
+        rates, (0, times[-1]), first, t_eval=times, rtol=1e-9, atol=1e-11, max_step=0.1
+    ).y
+
+
+@pytest.mark.parametrize("limit", [0.9, 100.0])
+def test_the_run_is_that_of_a_virtual_ship_with_its_own_equations(limit: float) -> None:
+    actuator = {"actuator.surge_limit": limit, "actuator.yaw_limit": limit}
+    run = podusv.simulate(
+        CONFIGS / "base.yaml", {"controller.kind": "cascade", "simulation.duration": 60} | actuator
+    )
+    other = by_hand(run, TURN, limit)
+    np.testing.assert_allclose([run["x"], run["y"], run["psi"]], other[:3], atol=2e-4)
+    np.testing.assert_allclose([run["x_d"], run["y_d"]], other[6:8], atol=1e-8)
+    assert run["z_e"].max() > 0.25
+
+
+def test_about_the_target_the_run_does_not_depend_on_where_the_coordinates_begin() -> None:
+    def ended(origin: str, shift: float) -> Any:
+        moved = {"path.x": 4.0 + shift, "start.x": 4.75 + shift, "simulation.duration": 30}
+        moved |= {"actuator": {"kind": "ideal"}}
+        law = {"controller.kind": "cascade", "controller.origin": origin}
+        return podusv.simulate(CONFIGS / "base.yaml", law | moved)["z_e"]
+
+    np.testing.assert_allclose(ended("target", 20.0), ended("target", 0.0), atol=1e-9)
+    assert np.abs(ended("earth", 20.0) - ended("earth", 0.0)).max() > 0.1
+
+
+def test_the_virtual_ship_starts_in_its_steady_turn_and_stays() -> None:
+    run = podusv.simulate(
+        CONFIGS / "base.yaml", {"controller.kind": "cascade", "simulation.duration": 20}
+    )
+    v_r = run["v_ref"]
+    u_r = np.sqrt(0.05**2 - v_r**2)
+    np.testing.assert_allclose(M11 * u_r * TURN, -D22 * v_r, rtol=1e-9)
+    assert np.ptp(v_r) < 1e-12
+
+
+def test_the_table_of_starts_is_that_of_the_study() -> None:
+    numbers = pd.read_csv(RESULTS / "lefeber_2003" / "summary.csv").query(
+        "metric == 'settling_time'"
+    )
+    numbers["law"] = numbers["law"].replace({"about_target": "cascade`, `origin: target"})
+    rows = re.findall(r"^\| `(.+)` \| (\d+); (\d+) \| (\w+); (\w+) \|$", PAGE, re.M)
+    assert {row[0] for row in rows} == set(numbers.law)
+    for law, *told in rows:
+        cells = numbers[numbers.law == law].sort_values("cell")
+        settled = [f"{q:.0f}" if np.isfinite(q) else "fails" for q in cells.q50]
+        assert told == [*(f"{500 * share:.0f}" for share in cells.failed), *settled]
+
+
+ROWS = re.findall(r"^\| (L\d+) \| (.+?) \| (.+?) \| (.+?) \|$", PAGE, re.M)
+
+
+@pytest.mark.parametrize("name", ["circle", "line", "port", "load", "damping"])
+def test_the_verdicts_on_the_page_are_those_of_the_comparison(name: str) -> None:
+    found = podusv.compare(CONFIGS / f"{name}.yaml", figures=False).claims
+    told = {claim: verdict for claim, _, verdict, _ in ROWS}
+    assert len(found)
+    for claim, row in found.iterrows():
+        assert told[str(claim)] == row["verdict"]
