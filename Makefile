@@ -27,6 +27,7 @@ TABLES := unknown:unknown_dynamics discrete:discrete_signals limits:period_limit
 SEAS := exact sensors sensors_alone current state_3 state_5 state_6 rare untold rare_untold pods delay thruster_failure dead_zone
 STUDIES := hull_and_sea unknown_dynamics rivals rivals_earth rivals_cybership2 sea_state_4 sea_state_6 sea_untold
 SEARCHES := hull network
+JUDGES := fresh cybership2 otter
 COMPARISONS := printed_compare figures_compare figures_compare_standoff corrected_compare
 
 .DEFAULT_GOAL := help
@@ -100,6 +101,10 @@ tune: $(VENV)/dev.done ## the committed searches for gains, about half an hour o
 	    mkdir -p results/tuning/$$name/figures && \
 	    (cd results/.tuning/$$name && cp laws.csv searches.csv limits.csv validation.csv gains.csv importance.csv ../../tuning/$$name && \
 	        cp figures/effort.png ../../tuning/$$name/figures) || exit 1; \
+	done
+	@for name in $(JUDGES); do \
+	    $(BIN)/python examples/reproduce/judge.py configs/studies/judge_$$name.yaml results/tuning/hull/gains.csv \
+	        results/tuning/judged/$$name || exit 1; \
 	done
 	@echo "what was found: results/tuning.md; every table and figure: results/.tuning/*/report.html"
 

@@ -188,6 +188,115 @@ def test_the_pairs_that_are_named_are_those_of_the_search(case):
         assert told == [f"{row[name]:.3f}" for name in ("ratio", "ratio_low", "ratio_high")]
 
 
+# --- gains judged on other hulls
+
+JUDGED = {
+    "fresh": "the same hulls",
+    "cybership2": "CyberShip II in m s",
+    "otter": "the Otter in m s",
+}
+ELSEWHERE = TUNING.partition("## Judged on another hull\n")[2].partition("\n## ")[0]
+
+
+def judged(hull, name="laws"):
+    return pd.read_csv(ROOT / "results" / "tuning" / "judged" / hull / f"{name}.csv")
+
+
+def cells(text):
+    return [
+        [c.strip() for c in row.strip("|").split("|")] for row in re.findall(r"^\|.*", text, re.M)
+    ]
+
+
+def after_over_before(row):
+    if not np.isfinite(row.ratio_high):
+        return f"{row.ratio:.2f}, open"
+    told = f"{row.ratio:.2f} [{row.ratio_low:.2f}, {row.ratio_high:.2f}]"
+    return f"**{told}**" if row.ratio_high < 1.0 or row.ratio_low > 1.0 else told
+
+
+def test_ratios_on_other_hulls_are_those_of_the_runs():
+    told = {row[0]: row[1:] for row in cells(ELSEWHERE.partition("<details>")[0])[2:]}
+    assert list(told) == list(judged("cybership2").law)
+    for place, hull in enumerate(JUDGED):
+        assert {row.law: after_over_before(row) for row in judged(hull).itertuples()} == {
+            law: row[place] for law, row in told.items()
+        }
+
+
+@pytest.mark.parametrize("hull", ["cybership2", "otter"])
+def test_the_table_of_a_hull_that_judges_is_that_of_the_runs(hull):
+    text = ELSEWHERE.partition(f"<summary>{JUDGED[hull]}</summary>")[2].partition("</details>")[0]
+    expected = []
+    for row in judged(hull).to_dict("records"):
+        ends = ("", "_low", "_high")
+        before, after = ([whole(row[f"{n}{end}"]) for end in ends] for n in ("before", "after"))
+        failed = [100 * row[f"failed_after{end}"] for end in ends]
+        expected.append(
+            [row["law"], place(row),
+             "{:.1f}, {:.1f} ({:.1f} to {:.1f})".format(100 * row["failed_before"], *failed),
+             "{} [{}, {}]".format(*before), "{} ({} to {})".format(*after),
+             f"{row['held_after']} of {row['searches']}"]
+        )  # fmt: skip
+    assert cells(text)[2:] == expected
+
+
+@pytest.mark.parametrize("hull", JUDGED)
+def test_all_sets_of_the_search_were_judged_on_the_draws_of_the_scenario(hull):
+    config = ROOT / "configs" / "studies" / f"judge_{hull}.yaml"
+    plan = TunePlan(load(config, (), [tune_faults]).scenario)
+    searched = TunePlan(load(config.parent / "tune_hull.yaml", (), [tune_faults]).scenario)
+    runs = judged(hull)
+    assert set(runs.law) == set(plan.laws) == set(tuning_table("hull", "laws").law)
+    assert set(runs.draws) == {plan.tune.validate}
+    assert set(runs.searches) == {searched.tune.repeats}
+    assert plan.base.sweep.seed != searched.base.sweep.seed
+    assert f"`{'configs/studies/' if hull == 'fresh' else ''}judge_{hull}.yaml`" in ELSEWHERE
+
+
+def test_the_sentences_about_other_hulls_are_those_of_the_runs():
+    other, fresh, otter = (judged(h).set_index("law") for h in ("cybership2", "fresh", "otter"))
+    better = other[other.ratio_high < 1.0]
+    ends = [100 * (1 - one) for one in (better.ratio.max(), better.ratio.min())]
+    assert "five laws are better with found gains, by {:.0f} to {:.0f} %".format(*ends) in ELSEWHERE
+    words = " ".join(ELSEWHERE.split())
+    four = ["adaptive_crab", "full_backstepping", "dsc", "adaptive_neural"]
+    assert set(better.index) == {*four, "super_twisting"}
+    assert set(fresh[fresh.ratio_high < 1.0].index) == {*four, "los_pid"}
+    assert set(otter[otter.ratio_high < 1.0].index) == {"adaptive_crab", "los_pid"}
+    assert not any((one.ratio_low > 1.0).any() for one in (other, fresh, otter))
+    vector = other.loc["velocity_vector"]
+    assert vector.after_low == vector.before
+    assert f"({vector.after_low:.0f} to {vector.after_high:.0f} m s)" in words
+    most = [100 * other.failed_after_high[law] for law in ("velocity_vector", "adrc")]
+    assert (
+        "fail in up to {:.0f} % of the draws; those of `adrc` fail in up to {:.0f} %".format(*most)
+        in words
+    )
+    assert f"one set of `adrc` fails in {most[1]:.0f} % of the draws" in " ".join(TUNING.split())
+    laws = ("adaptive_crab", "dsc", "full_backstepping", "adaptive_neural")
+    told = "in {:.0f}, {:.0f}, {:.0f} and {:.0f} % of the draws"
+    assert told.format(*(100 * otter.failed_after_high[law] for law in laws)) in words
+    held = [one.held_after.sum() for one in (other, fresh, otter)]
+    assert (*held, other.held_after["adaptive_crab"]) == (6, 80, 56, 4)
+    assert list(other.index[other.held_before]) == ["los_pid"]
+
+
+@pytest.mark.parametrize(("hull", "count"), [("cybership2", 22), ("fresh", 2), ("otter", 0)])
+def test_the_pairs_that_are_apart_on_other_hulls_are_those_of_the_runs(hull, count):
+    pairs = judged(hull, "searches")
+    apart = pairs[(pairs.ratio_high < 1.0) | (pairs.ratio_low > 1.0)]
+    assert (len(pairs), len(apart)) == (91, count)
+    behind = set(apart[(apart.b == "adaptive_crab") & (apart.ratio_low > 1.0)].a)
+    behind |= set(apart[(apart.a == "adaptive_crab") & (apart.ratio_high < 1.0)].b)
+    hand = {"hand_position", "sliding_mode", "super_twisting"}
+    assert behind == {
+        "cybership2": hand | {"alos", "ilos", "los_pid"},
+        "fresh": {"dsc", "full_backstepping"},
+        "otter": set(),
+    }[hull]  # fmt: skip
+
+
 # --- results/studies.md tells the committed tables of studies
 
 STUDIES = RESULTS.parent / "configs" / "studies"
