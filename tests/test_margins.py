@@ -249,6 +249,22 @@ def test_a_simulated_command_may_be_late_by_the_delay_margin(law, step, duration
     assert rates[0] < 0.0 < rates[1], (margin, rates)
 
 
+class Untold(VelocityVector):
+    """The same law that takes its demand for the load: any delay is behind what it is told."""
+
+    def wants_loads(self) -> bool:
+        """Not the loads that act."""
+        return False
+
+
+def test_both_loads_may_be_late_by_the_delay_margin_of_loads():
+    behind = of(VelocityVector()).delay_margin_loads
+    assert behind == pytest.approx(of(Untold()).delay_margin, rel=1e-6)
+    assert behind < 0.8 * of(VelocityVector()).delay_margin
+    rates = [growth(Untold(), round(part * behind, 2), 5e-3, 80.0, "v") for part in (0.96, 1.04)]
+    assert rates[0] < 0.0 < rates[1], rates
+
+
 def test_a_law_that_is_told_the_loads_bears_more_delay_before_the_actuator_than_behind_it():
     told, untold = (
         AdaptiveNeural(standoff=0.5, anti_windup="auxiliary"),
