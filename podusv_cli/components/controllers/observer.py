@@ -16,6 +16,7 @@ does not wind up while the actuator limits the demand.
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from typing import Any
 
 import numpy as np
@@ -99,9 +100,9 @@ class ObservingController(Controller):
         coupling = {"by_yaw": nominal.m23 / nominal.m33, "by_sway": nominal.m32 / nominal.m22}
         return super().constants_with(nominal) | coupling
 
+    @abstractmethod
     def gains(self, axes: tuple[Axis, Axis]) -> tuple[tuple[str, float, float], ...]:
         """Key, gain [1/s] and observer bandwidth of the surge and of the yaw loop."""
-        raise NotImplementedError
 
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
         """Error e = nu and memory (e_hat, b_hat/m): tau = -m_told (k e + b_hat/m_told - d e).
