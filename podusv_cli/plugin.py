@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import Any
 
 from podusv_cli.components.actuators.base import Actuator
-from podusv_cli.components.controllers.base import Approach, Controller, Slots
+from podusv_cli.components.controllers.base import Approach, Controller, Most, Slots
 from podusv_cli.components.controllers.velocity_loop import Axis, Loop
 from podusv_cli.components.disturbances.base import Disturbance
 from podusv_cli.components.estimators.base import Estimator
@@ -35,9 +35,9 @@ FIGURES = {
 
 __all__ = [
     "FRESH", "MEASURED", "VALUE", "Accumulator", "Actuator", "Approach", "Axis", "Controller",
-    "Disturbance", "Estimator", "Loop", "Measurement", "Metric", "Path", "Recording", "Signal",
-    "Slots", "Vector", "Vessel", "add", "after", "before", "cos_sin", "direction", "gathered",
-    "kernel", "ratio", "tail", "value", "wrap",
+    "Disturbance", "Estimator", "Loop", "Measurement", "Metric", "Most", "Path", "Recording",
+    "Signal", "Slots", "Vector", "Vessel", "add", "after", "before", "cos_sin", "direction",
+    "gathered", "kernel", "ratio", "tail", "value", "wrap",
 ]  # fmt: skip
 
 

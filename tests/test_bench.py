@@ -109,6 +109,21 @@ def test_cases_are_every_task_with_every_vessel_in_every_condition(bench):
     assert found["model", "circle", "calm"].laws["pid"].disturbance.kind == "none"
 
 
+def test_a_bench_may_change_the_shipped_layers_for_a_law_of_its_own(tmp_path):
+    layers = {
+        "laws.yaml": "controllers: {mine: {kind: velocity_vector}}",
+        "tasks/line.yaml": "",
+        "conditions/calm.yaml": "",
+        "vessels/otter.yaml": "controllers: {mine: {U: 2.0, N_m: 70.0}}",
+    }
+    for name, text in layers.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(f"extends: podusv:bench/{name}\n{text}\n")
+    (case,) = cases(Selection(tmp_path))
+    assert case.laws.keys() > {"mine", "pid", "los_pid"}
+    assert (case.laws["mine"].controller.U, case.laws["mine"].vessel.m) == (2.0, 55.0)
+
+
 def test_choices_and_changes_are_taken(bench):
     chosen = {"tasks": ["line"], "vessels": ["otter"], "conditions": ["told"]}
     (case,) = cases(Selection(bench, overrides=["simulation.duration=3"], chosen=chosen))

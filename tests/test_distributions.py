@@ -147,3 +147,8 @@ def test_choices_and_whole_numbers_are_equally_likely_and_keep_their_types() -> 
 def test_what_is_no_distribution_is_told(made: Any, words: str) -> None:
     with pytest.raises(ValidationError, match=words):
         Distribution.model_validate(made)
+
+
+def test_what_distributions_share_is_none():
+    with pytest.raises(TypeError, match="whole"):
+        Bounded()

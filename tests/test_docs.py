@@ -21,6 +21,7 @@ from podusv_cli.figures.drawing import FIGURES
 from podusv_cli.findings.finding import finding_kinds
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.scenario.load import load_text
+from podusv_cli.studies.study.check import DRAWN
 
 PAGES = [
     path.relative_to(ROOT).as_posix()
@@ -270,3 +271,10 @@ def test_the_cells_of_a_notebook_run(path, tmp_path, monkeypatch):
         assert "<img " in names["run"]._repr_html_()
     if "many" in names:
         assert list(names["many"]["status"]) == ["finished"] * MOST_RUNS
+
+
+def test_every_section_that_can_be_drawn_in_is_named() -> None:
+    (sentence,) = re.findall(
+        r"The sections (.*) can be drawn in", (ROOT / "docs" / "studies.md").read_text()
+    )
+    assert re.findall(r"`(\w+)`", sentence) == list(DRAWN)

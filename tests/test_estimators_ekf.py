@@ -137,7 +137,7 @@ class Truth:
         vectors = (self.seen, self.state, self.p, self.table)
         self.doors["correct"](0.0, *map(signatures.pointer, vectors))
         e = self.state[:N] - self.at
-        return float(e @ np.linalg.solve(square(self.state[N:-2]), e))
+        return float(e @ np.linalg.solve(square(self.state[N:-12]), e))
 
 
 def test_the_errors_are_consistent_with_the_covariance():
@@ -149,9 +149,10 @@ def test_the_errors_are_consistent_with_the_covariance():
             truth.move(0.02)
         found.append(truth.deliver())
     assert np.mean(found[25:]) == pytest.approx(N, rel=0.18)
-    squares, count = truth.state[-2:]
-    assert count == 3 * 600
-    assert squares / count == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / count))
+    squares, counts = truth.state[-12:-6], truth.state[-6:]
+    assert counts.tolist() == [600.0] * 3 + [0.0] * 3
+    np.testing.assert_allclose(squares[:3] / 600, 1.0, atol=4.0 * np.sqrt(2.0 / 600))
+    assert not squares[3:].any()
 
 
 def test_the_covariance_stays_symmetric_and_positive():
@@ -199,7 +200,7 @@ def test_a_value_corrects_as_the_formula_says_and_nothing_new_corrects_nothing(p
     seen, state, k = delivered(ekf, np.zeros(6), np.full(6, 5.0))
     before = np.random.default_rng(2).normal(size=(N, N))
     before = before @ before.T
-    state[N:-2] = before[UPPER]
+    state[N:-12] = before[UPPER]
     seen[6:12] = 0.0
     unchanged = state.copy()
     call(ekf.correct, t=0.0, seen=seen, state=state, k=k, table=np.zeros(1))
@@ -214,9 +215,11 @@ def test_a_value_corrects_as_the_formula_says_and_nothing_new_corrects_nothing(p
     np.testing.assert_allclose(state[:N], innovation * gain, rtol=1e-12)
     joseph = np.eye(N) - np.outer(gain, row)
     after = joseph @ before @ joseph.T + sigma**2 * np.outer(gain, gain)
-    np.testing.assert_allclose(square(state[N:-2]), after, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(square(state[N:-12]), after, rtol=1e-9, atol=1e-9)
     variance = before[place, place] + sigma**2
-    np.testing.assert_allclose(state[-2:], [innovation**2 / variance, 1.0], rtol=1e-12)
+    np.testing.assert_allclose(
+        state[[-12 + place, -6 + place]], [innovation**2 / variance, 1.0], rtol=1e-12
+    )
 
 
 def test_a_late_position_corrects_by_the_derivative_of_where_the_hull_was():
@@ -226,7 +229,7 @@ def test_a_late_position_corrects_by_the_derivative_of_where_the_hull_was():
     seen, state, k = delivered(ekf, np.zeros(6), np.zeros(6))
     x, before = random.normal(size=N), random.normal(size=(N, N))
     before = before @ before.T
-    state[:N], state[N:-2] = x, before[UPPER]
+    state[:N], state[N:-12] = x, before[UPPER]
 
     def measured(at: Vector) -> float:
         return float(at[1] - late * (np.sin(at[2]) * at[3] + np.cos(at[2]) * at[4]))

@@ -40,7 +40,7 @@ def test_findings_come_in_the_order_of_the_scenario_s_sections():
     ]
     assert sections == sorted(sections)
     assert {kind.when for kind in finding_kinds().values()} == {"before", "after"}
-    assert len(finding_kinds()) == 47
+    assert len(finding_kinds()) == 50
 
 
 @pytest.mark.parametrize("code", finding_kinds())
@@ -152,11 +152,24 @@ def test_the_envelope_is_that_of_motion_through_the_water():
 def test_a_filter_that_is_told_wrong_noise_is_told_by_its_innovations():
     seen = ("measurement={kind: sensors}", "simulation.duration=20")
     assert told("inconsistent-filter", *seen, "estimator={kind: ekf}") == []
-    (text,) = told("inconsistent-filter", *seen, "estimator={kind: ekf, sigma_psi: 0.001}")
-    assert "give it larger sigmas first" in text
+    sharp = told("inconsistent-filter", *seen, "estimator={kind: ekf, sigma_psi: 0.001}")
+    assert [text.split(" are ")[0] for text in sharp] == [
+        "innovations of the heading", "innovations of the yaw rate"
+    ]  # fmt: skip
+    assert "give it a larger sigma first" in sharp[0]
     dull = "estimator={kind: ekf, sigma_p: 1, sigma_psi: 1, sigma_u: 1, sigma_v: 1, sigma_r: 1}"
-    (text,) = told("inconsistent-filter", *seen, dull)
-    assert "it takes good measurements for noise" in text
+    texts = told("inconsistent-filter", *seen, dull)
+    assert len(texts) == 4
+    assert all("it takes good measurements for noise" in text for text in texts)
+
+
+@pytest.mark.parametrize(("count", "found"), [(8, 0), (9, 1)])  # chi-squared of 8: 2.9 in 1000
+def test_a_filter_is_told_wrong_only_where_chance_does_not_explain_it(count, found):
+    seen = ("measurement={kind: sensors}", "simulation.duration=20", "estimator={kind: ekf}")
+    counts = np.outer([0.0, 1.0], [0.0, 0.0, count, 0.0, 0.0, 0.0])
+    signals = {"time": np.array([18.0, 20.0]), "nis_sum": 3.2 * counts, "nis_count": counts}
+    search = finding_kinds()["inconsistent-filter"].search
+    assert len(list(search(scene(*seen).alone(), Recording("finished", "a", signals)))) == found
 
 
 def test_a_law_without_integral_is_not_told_that_it_winds_up():

@@ -187,6 +187,8 @@ def sea(*kinds):
 
 STEP = sea("{kind: none}", "{kind: step, b_u: 2, time: %s}")
 WAVES = sea("{kind: waves, height: %s, period: 0.5}")
+LASTING = "simulation.duration=20000"
+SWELL = "{kind: waves, height: 0.02, period: 2, seed: %d}"
 WIND = sea("{kind: wind, speed: 1, gusts: %s}")
 SIGMA = "estimator={kind: ekf, sigma_psi: %s}"
 CASES = [  # code, its key, overrides with it, and without
@@ -215,10 +217,15 @@ CASES = [  # code, its key, overrides with it, and without
      [LATE, "estimator={kind: low_pass}"]),
     ("steep-waves", "disturbance[0].height", [WAVES % 0.5], [WAVES % 0.05]),
     ("few-components", "disturbance[0].components",
-     [sea("{kind: waves, height: 0.05, period: 1, components: 69}")],  # 3.5 times 20 periods: 70
-     [sea("{kind: waves, height: 0.05, period: 1, components: 71}")]),
+     [sea("{kind: waves, height: 5e-4, period: 0.1, components: 690}")],  # 3.5 a period: 700
+     [sea("{kind: waves, height: 5e-4, period: 0.1, components: 710}")]),
     ("few-components", "disturbance[0].components",
-     [sea("{kind: wind, speed: 1, gusts: norsok, components: 1}")], [WIND % "norsok"]),
+     [sea("{kind: waves, height: 1e-3, period: 0.19}")],  # 105 periods
+     [sea("{kind: waves, height: 1e-3, period: 0.21}")]),
+    ("same-waves", "disturbance[1].seed", [sea(*[SWELL % 1] * 2)], [sea(SWELL % 1, SWELL % 2)]),
+    ("few-components", "disturbance[0].components",
+     [LASTING, sea("{kind: wind, speed: 1, gusts: norsok, components: 560}")],  # 568
+     [LASTING, sea("{kind: wind, speed: 1, gusts: norsok, components: 580}")]),
     ("model-gusts", "disturbance[0].gusts", [WIND % "norsok"], [WIND % "none"]),
 ]  # fmt: skip
 

@@ -346,3 +346,29 @@ def test_degrees_are_told_and_radians_are_not(key):
     assert "-90 deg is -1.571" in told.text
     assert "large-angle" not in codes(f"{key}={-math.pi / 2}")
     assert "large-angle" not in codes(f"{key}={2 * math.pi}")
+
+
+@pytest.mark.parametrize(
+    ("law", "says", "gained"),
+    [("los_pid", "never catches up", -0.1), ("velocity_vector", "nears it by 0.05 m/s", 0.05)],
+)
+def test_a_law_that_asks_for_less_speed_than_its_target_has_is_told(law, says, gained):
+    behind = ("disturbance={kind: none}", "path={kind: line, speed: 0.5}", "start={x: -9, y: 0}")
+    slow, fast = (f"controller={{kind: {law}, U: {U}}}" for U in (0.4, 0.7))
+    assert says in finding("slow-law", *behind, slow).text
+    assert "slow-law" not in codes(*behind, fast)
+    nearing = [
+        -np.diff(late("z_e", *behind, one)[[0, -1]])[0] / (20.0 / 3.0) for one in (slow, fast)
+    ]
+    assert nearing[0] == pytest.approx(gained, abs=0.01)
+    assert nearing[1] > gained + 0.05
+
+
+def test_a_law_that_counts_on_more_moment_than_there_is_is_told():
+    weak, across = "actuator={kind: saturated, yaw_limit: 0.5}", "start={x: 0, y: 5, psi: 1.5}"
+    short, told = (f"controller={{kind: velocity_vector, N_m: {N}}}" for N in (2.5, 0.5))
+    assert "the actuator gives 0.5 N m" in finding("moment-short", weak, across, short).text
+    assert "moment-short" not in codes(weak, across, told)
+    assert "moment-short" not in codes(across, short)
+    pushes = [np.abs(log(weak, across, law)["tau_u_cmd"][:500]).max() for law in (short, told)]
+    assert pushes[0] > 1.2 * pushes[1]

@@ -21,7 +21,7 @@ from podusv_cli.components.actuators.ideal import Ideal
 from podusv_cli.components.actuators.saturated import Saturated
 from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
 from podusv_cli.components.controllers.adrc import Adrc
-from podusv_cli.components.controllers.base import Controller
+from podusv_cli.components.controllers.base import Controller, Slots, each
 from podusv_cli.components.controllers.pid import Pid
 from podusv_cli.components.controllers.velocity_vector import VelocityVector
 from podusv_cli.components.disturbances.calm import Calm
@@ -33,6 +33,7 @@ from podusv_cli.components.paths.sinusoid import Sinusoid
 from podusv_cli.core.component import value
 from podusv_cli.core.errors import LawError, NotConvergedError
 from podusv_cli.core.kernel import Vector, kernel
+from podusv_cli.core.signal import Signal
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
 from podusv_cli.engine.running.continuous import continuous
 from podusv_cli.engine.step.grid import TimeGrid
@@ -167,6 +168,34 @@ def test_a_proportional_law_has_the_loop_of_its_formula():
     np.testing.assert_allclose(found.T, abs(k / (m * s + d + k)), rtol=1e-6)
 
 
+class Idle(Proportional):
+    """The same, with a memory that changes by rounding alone."""
+
+    kind: Literal["idle"] = "idle"  # type: ignore[assignment]
+
+    def slots(self) -> Slots:
+        """One number."""
+        return each((Signal("idle_sum", "1", "sum of next to nothing"),))
+
+    @staticmethod
+    @kernel
+    def law(x: Vector, target: Vector, k: Any, tau: Vector, rate: Vector) -> None:
+        """Plain proportional control of speed and heading."""
+        tau[0] = -k.k * (x[3] - target[2]) - k.X_u * target[2]
+        tau[1] = -3.0 * x[2] - 6.0 * x[5]
+        rate[0] = 1e-17 * x[3]
+
+
+def test_a_memory_that_changes_by_rounding_does_not_move():
+    hull = VESSELS["paper"]
+    plain, idle = (
+        loop_margins(calm(law, vessel=hull, nominal=hull), TimeGrid(0.01, 500), compiled=False)
+        for law in (Proportional(), Idle())
+    )
+    assert idle.linear.states == plain.linear.states
+    assert idle.numbers() == pytest.approx(plain.numbers())
+
+
 # --- the laws of the paper and ours
 
 
@@ -218,6 +247,22 @@ def test_a_simulated_command_may_be_late_by_the_delay_margin(law, step, duration
     shorter, longer = (step * round(part * margin / step) for part in (0.96, 1.04))
     rates = [growth(law, delay, step, duration, signal) for delay in (shorter, longer)]
     assert rates[0] < 0.0 < rates[1], (margin, rates)
+
+
+class Untold(VelocityVector):
+    """The same law that takes its demand for the load: any delay is behind what it is told."""
+
+    def wants_loads(self) -> bool:
+        """Not the loads that act."""
+        return False
+
+
+def test_both_loads_may_be_late_by_the_delay_margin_of_loads():
+    behind = of(VelocityVector()).delay_margin_loads
+    assert behind == pytest.approx(of(Untold()).delay_margin, rel=1e-6)
+    assert behind < 0.8 * of(VelocityVector()).delay_margin
+    rates = [growth(Untold(), round(part * behind, 2), 5e-3, 80.0, "v") for part in (0.96, 1.04)]
+    assert rates[0] < 0.0 < rates[1], rates
 
 
 def test_a_law_that_is_told_the_loads_bears_more_delay_before_the_actuator_than_behind_it():

@@ -121,3 +121,8 @@ def test_its_loops_are_the_law_s_own(kind, axis):
 
 def test_what_it_observes_is_logged_with_units():
     assert [signal.unit for signal in OBSERVED] == ["m/s", "m/s", "rad/s", "N", "N", "N m"]
+
+
+def test_a_law_with_the_observer_may_have_no_linear_loops():
+    axes = (Axis("surge", 1.0, 1.0, 0.0),) * 2
+    assert ObservingController().velocity_loops(axes, np.zeros(3)) == []

@@ -108,7 +108,9 @@ def test_overshoots_of_a_zigzag_are_those_of_an_independent_integration():
             peak = integrated(scenario, side * degrees, state, turning(-side))
             overshoots.append(-side * (peak[2] - begun[2]) - degrees)
         state = integrated(scenario, side * degrees, state, crossing(begun, degrees, side))
-    assert [found["overshoot_1"], found["overshoot_2"]] == pytest.approx(overshoots, abs=1e-6)
+    assert [found["overshoot_1"], found["overshoot_2"]] == pytest.approx(
+        np.degrees(overshoots), abs=6e-5
+    )
     first = solve_ivp(
         slope(scenario, degrees), (0.0, 60.0), begun, events=crossing(begun, degrees),
         rtol=1e-10, atol=1e-12, max_step=1e-3,
@@ -127,9 +129,9 @@ def test_overshoots_do_not_depend_on_the_step_as_the_time_between_looks_would_ha
         done("zigzag_20", *strong, f"simulation.step={step}")[2] for step in (0.02, 0.005)
     )
     late = done("zigzag_20", *strong, "simulation.step=0.005", "controller.check_every=0.02")[2]
-    for name, off in (("overshoot_1", 2e-5), ("overshoot_2", 2e-5)):
+    for name, off in (("overshoot_1", 1e-3), ("overshoot_2", 1e-3)):
         assert coarse[name] == pytest.approx(fine[name], abs=off)
-    assert late["overshoot_2"] > fine["overshoot_2"] + math.radians(0.02)
+    assert late["overshoot_2"] > fine["overshoot_2"] + 0.02
 
 
 def turning(side):
@@ -175,12 +177,29 @@ def test_a_stopping_hull_with_linear_damping_goes_as_far_as_algebra_says(astern)
     logarithm = math.log(1.0 + damping * u_0 / astern)
     way = mass / damping * (u_0 - astern / damping * logarithm)
     assert found["stopping_time"] == pytest.approx(mass / damping * logarithm, abs=2e-5)
-    acceleration = (astern + damping * u_0) / mass, astern / mass  # at its beginning and end
-    by_trapezoids = way + 0.01**2 / 12 * (acceleration[0] - acceleration[1])
-    assert found["track_reach"] == pytest.approx(by_trapezoids, abs=1e-7)
+    assert found["track_reach"] == pytest.approx(way, abs=1e-6)
     assert found["head_reach"] == pytest.approx(way, abs=1e-6)
     assert abs(log["u"][-1]) < 0.02, "no thrust once it lies still"
     assert list(trial_unfinished.search(scenario, log)) == []
+
+
+@pytest.mark.parametrize("wind", ["{kind: none}", "{kind: step, b_v: 20, time: 10}"])
+def test_no_track_is_shorter_than_the_way_ahead(wind):
+    found = done("stopping", f"disturbance={wind}", hull="")[2]
+    assert found["track_reach"] >= found["head_reach"] - 1e-9
+
+
+def test_a_trial_s_own_numbers_come_first_and_it_has_none_of_a_target(podusv):
+    said = podusv(
+        "run", "podusv:trials/zigzag_10.yaml", "--no-figures", "--out", "z"
+    ).out.splitlines()
+    assert [line.split()[::2] for line in said[:2]] == [
+        ["overshoot_1", "deg"],
+        ["overshoot_2", "deg"],
+    ]
+    assert not {"iae", "z_e_steady", "settling_time", "cross_track_rms"} & {
+        line.split()[0] for line in said
+    }
 
 
 def test_a_hull_that_still_goes_ahead_is_told():

@@ -16,7 +16,6 @@ import numpy as np
 
 from podusv_cli.components.controllers.base import Slots
 from podusv_cli.components.controllers.observer import B_U, OBSERVED, ObservingController, observe
-from podusv_cli.components.controllers.velocity_loop import Axis, Loop
 from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, kernel, tail
 from podusv_cli.core.signal import Signal
@@ -54,10 +53,6 @@ class Nmpc(ObservingController):
     def slots(self) -> Slots:
         """The observer, the unsolved problems and the plan."""
         return (*super().slots(), (UNSOLVED, 1), (PLAN, 2 * self.steps))
-
-    def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
-        """None that is linear."""
-        return []
 
     def sample_period(self) -> float:
         """The time between two plans."""

@@ -126,4 +126,6 @@ def _rows(label: str, law: LoopMargins) -> list[list[str]]:
         phase = f"{loop.phase_margin:.4g} ({math.degrees(loop.phase_margin):.1f} deg)"
         numbers = [f"{getattr(loop, name):.4g}" for name in NUMBERS[1:]]
         rows.append([label, axis, crossed, phase, *numbers])
-    return [*rows, [label, "both demands", *[""] * 4, f"{law.delay_margin:.4g}", "", ""]]
+    together = {"both demands": law.delay_margin, "both loads": law.delay_margin_loads}
+    more = [[label, what, *[""] * 4, f"{delay:.4g}", "", ""] for what, delay in together.items()]
+    return [*rows, *more]

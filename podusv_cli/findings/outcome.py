@@ -7,6 +7,7 @@ import numpy as np
 from podusv_cli.core.finding import Sentences, after, rows_where, times_of
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording, blocks
+from podusv_cli.metrics.consistency import mean_square
 from podusv_cli.scenario.model import Scenario
 
 PLACES = {
@@ -15,7 +16,11 @@ PLACES = {
     "yaw_rate": ("yaw rate", "rad/s"),
 }
 LONG = 0.02  # fraction of the run; shorter saturation is no finding
-DOUBTFUL, TIMID = 2.0, 0.1  # NIS; podusv's choice
+DOUBTFUL, TIMID, CHANCE = 2.0, 0.1, 1e-3  # NIS, and its probability; podusv's choice
+SENSORS = {
+    "position": slice(0, 2), "heading": slice(2, 3), "velocity": slice(3, 5),
+    "yaw rate": slice(5, 6),
+}  # fmt: skip
 REVERSALS = 3  # of a zig-zag with two overshoots
 
 
@@ -98,26 +103,39 @@ def _through_water(log: Recording) -> tuple[Vector, Vector, Vector]:
 @after(
     "inconsistent-filter", about="estimator",
     meaning="innovations are not as large as the filter believes",
-    condition=f"the mean squared innovation over its variance (NIS) exceeds {DOUBTFUL:g} or is "
-    f"below {TIMID:g} over the steady window; 1 is consistent",
+    condition="over the steady window the mean squared innovation over its variance (NIS) of a "
+    f"sensor exceeds {DOUBTFUL:g} or is below {TIMID:g}, 1 is consistent, and is so by chance less "
+    f"than once in {1.0 / CHANCE:.0f} runs (chi-squared with as many degrees as values)",
     remedy="give the filter the noise that sensors have, with what waves add to it",
 )  # fmt: skip
 def inconsistent_filter(scenario: Scenario, log: Recording) -> Sentences:
-    """The estimator's own measure of its noise says that it is told wrong."""
+    """The estimator's own measure of a sensor's noise says that it is told wrong."""
+    from scipy.special import chdtr, chdtrc  # slow to import
+
     late = np.flatnonzero(log["time"] >= scenario.steady_from())
     if "nis_sum" not in log or not late.size:
         return
-    squares, count = (np.ptp(log[name][late[[0, -1]]]) for name in ("nis_sum", "nis_count"))
-    nis = squares / count if count else 1.0
-    told = f"its innovations are {np.sqrt(nis):.2g} times what it believes (NIS {nis:.3g})"
-    if nis > DOUBTFUL:
-        yield (
-            f"{told}: noise is larger than its sigmas, which have to count waves too, or the hull "
-            "moves otherwise than it predicts; give it larger sigmas first, larger q only for a "
-            "hull that is not the one it is told"
+    squares, counts = (
+        np.ptp(log[name][late[[0, -1]]], axis=0) for name in ("nis_sum", "nis_count")
+    )
+    for sensor, places in SENSORS.items():
+        square, count = squares[places].sum(), counts[places].sum()
+        nis = mean_square(squares[places], counts[places])
+        told = (
+            f"innovations of the {sensor} are {np.sqrt(nis):.2g} times what it believes (NIS "
+            f"{nis:.3g} of {count:.0f} values)"
         )
-    if nis < TIMID:
-        yield f"{told}, so it takes good measurements for noise; give it the sensors' noise"
+        if nis > DOUBTFUL and chdtrc(count, square) < CHANCE:
+            yield (
+                f"{told}: noise is larger than its sigma, which has to count waves too, or the "
+                "hull moves otherwise than it predicts; give it a larger sigma first, larger q "
+                "only for a hull that is not the one it is told"
+            )
+        if nis < TIMID and chdtr(count, square) < CHANCE:
+            yield (
+                f"{told}, so it takes good measurements for noise; give it the sensor's noise, and "
+                "smaller q where it has that"
+            )
 
 
 @after(

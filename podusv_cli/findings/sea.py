@@ -12,6 +12,7 @@ from podusv_cli.findings.finding import Case
 GRAVITY = 9.81
 BREAKS = 1.0 / 7.0  # height over length at which waves break
 MODEL = 2.0  # m; gusts were measured for what is larger
+LONG = 350  # components that a run needs, 100 periods of a peak; shorter seas scatter anyhow
 FAR = 2.0  # factor between what an estimator assumes and what a sensor does
 
 
@@ -141,7 +142,7 @@ def steep_waves(case: Case) -> Sentences:
 @before(
     "few-components", about="disturbance", meaning="a sea of too few cosines for its run",
     condition="the components, weighted by the square of their energy, are further apart than "
-    "1/duration",
+    f"1/duration, in a run that needs {LONG} of them or more",
     remedy="take more components",
 )  # fmt: skip
 def few_components(case: Case) -> Sentences:
@@ -149,12 +150,31 @@ def few_components(case: Case) -> Sentences:
     duration = case.scenario.simulation.duration
     for key, part in case.scenario.disturbances().items():
         count, wanted = part.cosines(), part.resolving(duration)
-        if count < wanted:
+        if count < wanted and wanted >= LONG:
             yield At(
                 f"{key}.components",
                 f"{count} cosines are too few for {duration:g} s: from seed to seed, the energy of "
                 f"their sum varies more than a sea's does; for a study over seeds take {wanted} or "
                 "more (10000 at most)",
+            )
+
+
+@before(
+    "same-waves", about="disturbance", meaning="two seas of a list have the same phases",
+    condition="two entries of a kind that sums cosines have the same seed",
+    remedy="give each entry a seed of its own",
+)  # fmt: skip
+def same_waves(case: Case) -> Sentences:
+    """Random numbers depend on kind and seed, so swell and wind sea rise and fall together."""
+    first = dict[tuple[str, object], str]()
+    for key, part in case.scenario.disturbances().items():
+        values = part.model_dump()
+        same = first.setdefault((values["kind"], values.get("seed")), key)
+        if same != key and part.cosines():
+            yield At(
+                f"{key}.seed",
+                f"{values['seed']}, as {same} has: each cosine of the one has the phase of the "
+                "other's, so they are no independent seas; give it another seed",
             )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import partial
 
@@ -202,6 +203,39 @@ def _driven_ahead(case: Case, row: int) -> Sentences:
             f"force of {got:.3g} N where {needed:.3g} N keeps up, and the hull runs ahead; let the "
             "pods turn further, or take priority: surge"
         )
+
+
+@before(
+    "slow-law", about="controller.U", meaning="the law's largest speed is below the target's",
+    condition="U is below the median speed of the target along the path",
+    remedy="take a larger U, or slow the target down",
+)  # fmt: skip
+def slow_law(case: Case) -> Sentences:
+    """The law asks for less speed than the target has."""
+    most, speed = case.scenario.controller.most(), median(case.reference.speed)
+    if most.speed < speed:
+        nears = f"nears it by {most.creep:g} m/s at most" if most.creep else "never catches up"
+        yield (
+            f"{most.speed:g} m/s, while the target moves at {speed:.3g} m/s: the law {nears}; take "
+            f"a U above {speed:.3g}, or slow the target down"
+        )
+
+
+@before(
+    "moment-short", about="controller.N_m", meaning="the law counts on more moment than there is",
+    condition=f"less than {DELIVERED:.1%} of N_m is delivered to a hull at rest",
+    remedy="give the law the moment that the actuator has",
+)  # fmt: skip
+def moment_short(case: Case) -> Sentences:
+    """Surge yields to yaw only beyond a moment that the actuator cannot give."""
+    moment, actuator = case.scenario.controller.most().moment, case.scenario.actuator
+    if math.isfinite(moment):
+        got = float(actuator.settled(np.zeros(6), np.array([0.0, moment]))[2])
+        if got < DELIVERED * moment:
+            yield (
+                f"{moment:g} N m, and the actuator gives {got:.3g} N m: surge does not yield to "
+                f"yaw when the moment runs out; give the law {got:.2g} or less"
+            )
 
 
 @before(

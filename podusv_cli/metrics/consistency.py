@@ -16,8 +16,11 @@ from podusv_cli.core.kinematics import wrap
 from podusv_cli.metrics.metric import Accumulator, Measured, Metric, add, ratio
 
 TIME, SQUARE, INTEGRALS = range(3)
-OPENED, SUM, COUNT, SUM_BEFORE, COUNT_BEFORE, SIZE = range(2 * INTEGRALS, 2 * INTEGRALS + 6)
 SIX = 6
+OPENED = 2 * INTEGRALS
+BEFORE = OPENED + 1  # sums, then numbers of innovations as the window opened
+NOW = BEFORE + 2 * SIX
+SIZE = NOW + 2 * SIX
 
 
 @kernel
@@ -56,8 +59,11 @@ def watch(t: float, weight: float, s: Vector, k: Any, seen: Vector) -> None:
         at, order = int(k.estimate), int(k.order)
         after = at + int(k.covariance) + order * (order + 1) // 2
         if seen[OPENED] == 0.0:
-            seen[OPENED], seen[SUM_BEFORE], seen[COUNT_BEFORE] = 1.0, s[after], s[after + 1]
-        seen[SUM], seen[COUNT] = s[after] - seen[SUM_BEFORE], s[after + 1] - seen[COUNT_BEFORE]
+            seen[OPENED] = 1.0
+            for i in range(2 * SIX):
+                seen[BEFORE + i] = s[after + i]
+        for i in range(2 * SIX):
+            seen[NOW + i] = s[after + i]
         error, lower = scratch(6), scratch(36)
         for i in range(SIX):
             error[i] = s[at + i] - s[i]
@@ -80,6 +86,17 @@ def _constants(layout: Measured) -> dict[str, float]:
     }  # fmt: skip
 
 
+def mean_square(squares: Vector, counts: Vector) -> float:
+    """NIS: the mean squared innovation over its variance, from sums and numbers; NaN without."""
+    count = float(counts.sum())
+    return float(squares.sum()) / count if count else math.nan
+
+
+def _nis(seen: Vector, step: float) -> float:
+    gained = seen[NOW:SIZE] - seen[BEFORE:NOW]
+    return mean_square(gained[:SIX], gained[SIX:])
+
+
 OF = Accumulator(watch, _size, _constants, INTEGRALS)
 nees = Metric(
     "nees", "1", "mean squared error of the estimate over its covariance, steady window; 6 where "
@@ -87,5 +104,5 @@ nees = Metric(
 )  # fmt: skip
 nis = Metric(
     "nis", "1", "mean squared innovation over its variance, steady window; 1 where the filter is "
-    "consistent", OF, ratio(SUM, COUNT), 7,
+    "consistent", OF, _nis, 7,
 )  # fmt: skip

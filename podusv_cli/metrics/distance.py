@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any
 
 from podusv_cli.core.kernel import Vector, kernel
@@ -76,10 +77,9 @@ def _rms(position: int) -> Result:
     return lambda seen, step: math.sqrt(mean(seen, step))
 
 
-OF = Accumulator(watch, lambda layout: RADIUS + SETTLING, _constants, INTEGRALS, ("standoff",))
-OF_SETTLED = Accumulator(
-    watch_settled, lambda layout: 2 * SETTLED, _constants, SETTLED, ("standoff",)
-)
+_of_target = partial(Accumulator, differing=("standoff",), of_target=True)
+OF = _of_target(watch, lambda layout: RADIUS + SETTLING, _constants, INTEGRALS)
+OF_SETTLED = _of_target(watch_settled, lambda layout: 2 * SETTLED, _constants, SETTLED)
 iae = Metric(
     "iae", "m s", "integral of z_e", OF, gathered(ABSOLUTE), 1, counts_standoff=True,
     symbol=r"\int z_e\,\mathrm{d}t",

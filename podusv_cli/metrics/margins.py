@@ -25,6 +25,9 @@ gain_reduction_r = _number("gain_reduction_r", "1", "factor to which the yaw loo
 delay_margin_u = _margin("delay_margin_u", "s", "delay that the surge force may have")
 delay_margin_r = _margin("delay_margin_r", "s", "delay that the yaw moment may have")
 delay_margin = _margin("delay_margin", "s", "delay that both of the law's demands may have")
+delay_margin_loads = _margin(
+    "delay_margin_loads", "s", "delay that surge force and yaw moment may have together"
+)
 peak_S_u = _number("peak_S_u", "1", "largest sensitivity of the surge loop")
 peak_S_r = _number("peak_S_r", "1", "largest sensitivity of the yaw loop")
 peak_T_u = _number("peak_T_u", "1", "largest complementary sensitivity of the surge loop")
@@ -33,7 +36,7 @@ OF_LOOP = {
     metric.name: metric
     for metric in (
         phase_margin_u, phase_margin_r, gain_margin_u, gain_margin_r, gain_reduction_u,
-        gain_reduction_r, delay_margin_u, delay_margin_r, delay_margin, peak_S_u, peak_S_r,
-        peak_T_u, peak_T_r,
+        gain_reduction_r, delay_margin_u, delay_margin_r, delay_margin, delay_margin_loads,
+        peak_S_u, peak_S_r, peak_T_u, peak_T_r,
     )
 }  # fmt: skip

@@ -69,6 +69,9 @@ class Accumulator:
     of a batch has constants of its own, and the same size. Runs march side by side only with runs
     of equal constants, but for those named in `differing`.
 
+    `of_target`: what is gathered is about the target, which a manoeuvring trial does not have; it
+    is left out there.
+
     The first `integrals` numbers are integrals over time, made with `add`; the very first is the
     time itself. They are trapezoidal sums over the steps: `weight` [s] is that of the instant.
     """
@@ -78,6 +81,7 @@ class Accumulator:
     constants: Callable[[Measured], dict[str, float]]
     integrals: int = 0
     differing: tuple[str, ...] = ()
+    of_target: bool = False
 
 
 @dataclass(frozen=True)

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any
 
 from podusv_cli.core.interpolation import linear, passed
 from podusv_cli.core.kernel import Vector, kernel
-from podusv_cli.metrics.metric import Accumulator, Measured, Metric, Result
+from podusv_cli.metrics.metric import Accumulator, Measured, Metric
 from podusv_cli.metrics.windows import NEAR
 
-# Positions of what is gathered: where the trial begins, and the way since then with the time and
-# speed of the instant before; then what the trial has led to, and more of the instant before.
-BEGUN, X_0, Y_0, PSI_0, WAY, LATEST, SPEED = range(7)
-ADVANCE, TRANSFER, TACTICAL, STEADY, CHANGED, ALONG, ACROSS, TURNED = range(7, 15)
-PHASE, LARGEST, INITIAL, FIRST, SECOND, RATE, REACHED, ZIGZAGGED = range(7, 15)
-TRACK, HEAD, STOPPED, SURGE, AHEAD, STILL = range(7, 13)
+# Positions of what is gathered: where the trial begins, and the way since then with the time, speed
+# and place of the instant before; then what the trial has led to, and more of the instant before.
+BEGUN, X_0, Y_0, PSI_0, WAY, LATEST, SPEED, X, Y, OWN = range(10)
+ADVANCE, TRANSFER, TACTICAL, STEADY, CHANGED, ALONG, ACROSS, TURNED = range(OWN, OWN + 8)
+PHASE, LARGEST, INITIAL, FIRST, SECOND, RATE, REACHED, ZIGZAGGED = range(OWN, OWN + 8)
+TRACK, HEAD, STOPPED, SURGE, AHEAD, STILL = range(OWN, OWN + 6)
 
 
 @kernel
@@ -23,12 +24,13 @@ def begin(t: float, s: Vector, k: Any, seen: Vector) -> bool:
     """Whether the trial is under way; notes the state at its start."""
     if t <= k.trial_execute - NEAR:
         return False
-    speed = math.sqrt(s[3] * s[3] + s[4] * s[4])
     if seen[BEGUN] == 0.0:
         seen[BEGUN], seen[X_0], seen[Y_0], seen[PSI_0] = 1.0, s[0], s[1], s[2]
     else:
-        seen[WAY] += 0.5 * (seen[SPEED] + speed) * (t - seen[LATEST])
-    seen[SPEED] = speed
+        x, y = s[0] - seen[X], s[1] - seen[Y]
+        seen[WAY] += math.sqrt(x * x + y * y)
+    seen[SPEED] = math.sqrt(s[3] * s[3] + s[4] * s[4])
+    seen[X], seen[Y] = s[0], s[1]
     return True
 
 
@@ -90,15 +92,14 @@ def watch_zigzag(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: 
 @kernel
 def watch_stop(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
     """Gather the way until the surge speed passes zero."""
-    before = seen[SPEED]
+    before, way = seen[SPEED], seen[WAY]
     if begin(t, s, k, seen):
         x, y = s[0] - seen[X_0], s[1] - seen[Y_0]
         ahead = x * math.cos(seen[PSI_0]) + y * math.sin(seen[PSI_0])
         if s[3] <= 0.0 and seen[SURGE] > 0.0:
             share, step = passed(0.0, seen[SURGE], s[3]), t - seen[LATEST]
             # The speed is that of sway there, and the way along a parabola between the instants.
-            still = share * abs(s[4]) - (1.0 - share) * before - seen[SPEED]
-            seen[TRACK] = seen[WAY] + 0.5 * step * still
+            seen[TRACK] = way + 0.5 * share * step * (before + abs(s[4]))
             bend = 0.5 * share * (1.0 - share) * step * (seen[SURGE] - s[3])
             seen[HEAD] = linear(share, seen[AHEAD], ahead) + bend
             seen[STOPPED] = seen[LATEST] + share * step - k.trial_execute
@@ -121,49 +122,42 @@ def _constants(layout: Measured) -> dict[str, float]:
     return {"trial_execute": trial.execute, "trial_switch": trial.switch} if trial else {}
 
 
-def _reached(position: int) -> Result:
-    """The number, NaN where the trial did not get so far."""
-    return lambda seen, step: float(seen[position]) or math.nan
+def _number(of: Accumulator, position: int, name: str, unit: str, meaning: str) -> Metric:
+    """A gathered number, first in tables; NaN where the trial did not get so far."""
+    per = math.degrees(1.0) if unit == "deg" else 1.0
+    return Metric(
+        name, unit, meaning, of, lambda seen, step: per * float(seen[position]) or math.nan, 0
+    )
 
 
 OF_TURN = Accumulator(watch_turn, _sizes("turning circle", TURNED), _constants)
 OF_ZIGZAG = Accumulator(watch_zigzag, _sizes("zig-zag", ZIGZAGGED), _constants)
 OF_STOP = Accumulator(watch_stop, _sizes("stopping", STILL), _constants)
-advance = Metric(
-    "advance", "m", "way along the approach until the heading has changed by 90 deg", OF_TURN,
-    _reached(ADVANCE), 8,
-)  # fmt: skip
-transfer = Metric(
-    "transfer", "m", "way across the approach until the heading has changed by 90 deg", OF_TURN,
-    _reached(TRANSFER), 8,
-)  # fmt: skip
-tactical_diameter = Metric(
-    "tactical_diameter", "m", "way across the approach until it has changed by 180 deg", OF_TURN,
-    _reached(TACTICAL), 8,
-)  # fmt: skip
-turning_diameter = Metric(
-    "turning_diameter", "m", "diameter of the circle at the end, 2 U/|r|", OF_TURN,
-    _reached(STEADY), 8,
-)  # fmt: skip
-overshoot_1 = Metric(
-    "overshoot_1", "rad", "first overshoot angle of a zig-zag", OF_ZIGZAG, _reached(FIRST), 8
+_turn, _zigzag, _stop = (partial(_number, of) for of in (OF_TURN, OF_ZIGZAG, OF_STOP))
+advance = _turn(
+    ADVANCE, "advance", "m", "way along the approach until the heading has changed by 90 deg"
 )
-overshoot_2 = Metric(
-    "overshoot_2", "rad", "second overshoot angle of a zig-zag", OF_ZIGZAG, _reached(SECOND), 8
+transfer = _turn(
+    TRANSFER, "transfer", "m", "way across the approach until the heading has changed by 90 deg"
 )
-initial_turning = Metric(
-    "initial_turning", "m", "way until the heading of a zig-zag has first changed by `switch`",
-    OF_ZIGZAG, _reached(INITIAL), 8,
-)  # fmt: skip
-track_reach = Metric(
-    "track_reach", "m", "way from full astern until the surge speed is zero", OF_STOP,
-    _reached(TRACK), 8,
-)  # fmt: skip
-head_reach = Metric(
-    "head_reach", "m", "way along the approach from full astern until the surge speed is zero",
-    OF_STOP, _reached(HEAD), 8,
-)  # fmt: skip
-stopping_time = Metric(
-    "stopping_time", "s", "time from full astern until the surge speed is zero", OF_STOP,
-    _reached(STOPPED), 8,
-)  # fmt: skip
+tactical_diameter = _turn(
+    TACTICAL, "tactical_diameter", "m", "way across the approach until it has changed by 180 deg"
+)
+turning_diameter = _turn(
+    STEADY, "turning_diameter", "m", "diameter of the circle at the end, 2 U/|r|"
+)
+overshoot_1 = _zigzag(FIRST, "overshoot_1", "deg", "first overshoot angle of a zig-zag")
+overshoot_2 = _zigzag(SECOND, "overshoot_2", "deg", "second overshoot angle of a zig-zag")
+initial_turning = _zigzag(
+    INITIAL,
+    "initial_turning",
+    "m",
+    "way until the heading of a zig-zag has first changed by `switch`",
+)
+track_reach = _stop(TRACK, "track_reach", "m", "way from full astern until the surge speed is zero")
+head_reach = _stop(
+    HEAD, "head_reach", "m", "way along the approach from full astern until the surge speed is zero"
+)
+stopping_time = _stop(
+    STOPPED, "stopping_time", "s", "time from full astern until the surge speed is zero"
+)

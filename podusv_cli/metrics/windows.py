@@ -100,7 +100,9 @@ def _named(template: Metric, name: str, meaning: str, of: Accumulator, result: R
 
 def _of_window(name: str, start: float, to: float) -> tuple[Metric, ...]:
     watch = specialise(window, f"window_{name}", FROM=start, TO=to)
-    of = Accumulator(watch, lambda layout: WINDOW, standoff_of, differing=("standoff",))
+    of = Accumulator(
+        watch, lambda layout: WINDOW, standoff_of, differing=("standoff",), of_target=True
+    )
     where = f"z_e from {start:g} s to {to:g} s"
     largest = _over(to, lambda seen: float(seen[LARGEST]) if seen[LENGTH] else math.nan)
     beyond = _over(to, lambda seen: float(seen[BEYOND]) if seen[LENGTH] else math.nan)
@@ -115,7 +117,7 @@ def _of_window(name: str, start: float, to: float) -> tuple[Metric, ...]:
 
 def _of_radius(name: str, radius: float) -> Metric:
     watch = specialise(within, f"within_{name}", RADIUS=radius)
-    of = Accumulator(watch, lambda layout: SETTLING, lambda layout: {})
+    of = Accumulator(watch, lambda layout: SETTLING, lambda layout: {}, of_target=True)
     meaning = f"time from which z_e stays within {radius:g} m"
     return _named(SETTLED, name, meaning, of, lambda seen, step: settled_from(seen[CROSSED]))
 

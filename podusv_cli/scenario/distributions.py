@@ -7,6 +7,7 @@ have the same bits on every machine.
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Callable
 from functools import cached_property
 from typing import Any, Literal, Self
@@ -33,9 +34,9 @@ class Bounded(Component):
         None, "", "two bounds: only what is between them is drawn; none where left out"
     )
 
+    @abstractmethod
     def whole(self, u: Vector) -> Vector:
         """The values without `within`."""
-        raise NotImplementedError
 
     def at(self, u: Vector) -> Vector:
         """The values."""

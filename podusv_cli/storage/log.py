@@ -28,6 +28,7 @@ AXES = {
     "node": "network node",
     "input": "network input: u, v, r",
     "window": "part of the run: the whole, its settled end",
+    "measured": "measured quantity: x, y, psi, u, v, r",
     "pod": "pod, in the scenario's order",
 }
 ROWS = 4096  # written of all arrays in turn, since the engine stores a row's numbers side by side

@@ -24,13 +24,15 @@ class LoopMargins:
     """Margins of the surge and of the yaw loop, and what they hold for.
 
     Each loop is opened at the plant's input while the other is closed. `delay_margin` [s] is for
-    one delay of both of the law's demands, as `actuator.command.delay` is. `left_out` says what
-    of the scenario the loop is without.
+    one delay of both of the law's demands, as `actuator.command.delay` is, `delay_margin_loads` [s]
+    for one of both loads, behind the actuator. `left_out` says what of the scenario the loop is
+    without.
     """
 
     linear: Linear
     loops: dict[str, Margins]
     delay_margin: float
+    delay_margin_loads: float
     left_out: tuple[str, ...]
 
     @property
@@ -55,7 +57,8 @@ class LoopMargins:
             f"{name}_{AXES[axis]}": float(getattr(loop, name))
             for axis, loop in self.loops.items() for name in NUMBERS
         }  # fmt: skip
-        return found | {"delay_margin": self.delay_margin}
+        together = ("delay_margin", "delay_margin_loads")
+        return found | {name: float(getattr(self, name)) for name in together}
 
 
 def loop_margins(
@@ -82,6 +85,7 @@ def loop_margins(
     return LoopMargins(
         found, {axis: margins(cut) for axis, cut in cuts.items()},
         delay_margin(Cut(found.A, found.B_command, found.C_command)),
+        delay_margin(Cut(found.A, found.B, found.C)),
         tuple(_left_out(loop, grid, found)),
     )  # fmt: skip
 

@@ -33,6 +33,8 @@ ROUNDS = 30  # of Newton's method
 SETTLED = 1e-8  # of every state, or of 1: how far Newton's last step may go
 STEPS = (1e-4, 1e-5, 1e-6)  # of every state, or of 1: steps of differences, the first that will do
 CLOSE = 1e-2  # m; nearer to the target its direction may be singular
+NOTHING = 1e-12  # of the largest derivative: up to this a rate answers nothing but by rounding
+ROUNDED = 1e-14  # of the largest derivative: up to this a rate may be rounding
 CURVED = 1e-2  # of a row's largest derivative: how much the derivatives to both sides may differ
 
 WHAT_IT_TAKES = (
@@ -45,11 +47,11 @@ WHAT_IT_TAKES = (
 class Linear:
     """A closed loop about its steady motion: q' = A q + B d, and loads on the hull C q.
 
-    q are those of the loop's states that change, relative to the target, as `states` names them
-    (m, rad, m/s, rad/s, units of the law's memory). d and the loads are (tau_u [N], tau_r [N m]) at
-    the plant's input. `B_command` and `C_command` are the same at the actuator's: what reaches it,
-    and what the law demands. A law that is told the loads sees what happens between the two, as a
-    delay, but not what happens behind the actuator.
+    q are those of the loop's states that change by more than rounding, relative to the target, as
+    `states` names them (m, rad, m/s, rad/s, units of the law's memory). d and the loads are (tau_u
+    [N], tau_r [N m]) at the plant's input. `B_command` and `C_command` are the same at the
+    actuator's: what reaches it, and what the law demands. A law that is told the loads sees what
+    happens between the two, as a delay, but not what happens behind the actuator.
 
     `distance` is that to the target in the steady motion [m], `load` what is held (b_u, b_v, b_r),
     `motion` the steady (u, v, r), `reach` how far the loop is linear, in units of each state.
@@ -103,7 +105,8 @@ def linearised(loop: ClosedLoop, along: Course, step: float, *, compiled: bool =
 def _about(loop: ClosedLoop, frame: _Frame, q: Vector) -> Linear:
     jacobian, reach = frame.jacobian(q)
     states = len(q)
-    moving = np.flatnonzero(jacobian[:states].any(axis=1))
+    heights = (abs(jacobian[:states]) * _size(q)).max(axis=1)
+    moving = np.flatnonzero(heights > NOTHING * heights.max())
     outputs = jacobian[states:, moving]
     return Linear(
         A=jacobian[np.ix_(moving, moving)],
@@ -205,10 +208,13 @@ class _Frame:
             rates, slopes = self.row(q)[: len(q)], self._central(q, STEPS[1])[: len(q)]
             size = _size(q)
             scaled = slopes * size
-            heights = np.maximum(abs(scaled).max(axis=1), 1e-12)
+            heights = abs(scaled).max(axis=1)
+            most = heights.max()
+            heights = np.maximum(heights, NOTHING * most)
             move = size * np.linalg.lstsq(scaled / heights[:, None], -rates / heights)[0]
             q = q + move
-            if (abs(move) <= SETTLED * size).all() and (abs(rates) <= 1e-6 * heights).all():
+            still = abs(rates) <= 1e-6 * heights + ROUNDED * most
+            if (abs(move) <= SETTLED * size).all() and still.all():
                 return q
         raise NotConvergedError(self._restless(q))
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 from typing import Any, ClassVar, Literal
 
-from podusv_cli.components.controllers.base import Slots, each
+from podusv_cli.components.controllers.base import Most, Slots, each
 from podusv_cli.components.controllers.guidance import (
     STEERED,
     LineOfSight,
@@ -78,6 +78,10 @@ class Alos(LineOfSight, ObservingController):
     k_r: float = value(1.3, "1/s", "gain of the yaw rate", gt=0)
 
     N_m: float = value(2.5, "N m", "moment beyond which surge yields to yaw", gt=0)
+
+    def most(self) -> Most:
+        """U and N_m."""
+        return Most(self.U, moment=self.N_m)
 
     def slots(self) -> Slots:
         """The observer, then crab angle and offset."""

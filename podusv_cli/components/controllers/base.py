@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any, ClassVar, Literal, NamedTuple
 
@@ -26,6 +27,14 @@ class Approach(NamedTuple):
 
     gain: float
     standoff: float  # m
+
+
+class Most(NamedTuple):
+    """What a law counts on: a largest speed, and a largest moment that it is to ask for."""
+
+    speed: float = math.inf  # m/s
+    creep: float = 0.0  # m/s, by which it nears a target that is as fast
+    moment: float = math.inf  # N m
 
 
 class Trial(NamedTuple):
@@ -109,6 +118,10 @@ class Controller(Component):
     def approach(self) -> Approach | None:
         """How a law that points at the target drives towards it; None for any other law."""
         return None
+
+    def most(self) -> Most:
+        """The keys U and N_m of laws that have them; without limits for others."""
+        return Most()
 
     def optimum_of(self) -> str:
         """The metric that its motion minimises among all motions of the task; empty for laws."""

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from podusv_cli.core.kernel import kernel
 
-SLOWEST = 0.05  # m/s; the least speed at which a law approaches
+NEARS = 0.05  # m/s; the least speed at which a law approaches
 
 
 class Moving(NamedTuple):
@@ -31,7 +31,7 @@ def approach_speed(e: Moving, V_d: Moving, U: float) -> float:
     per = 1.0 / math.sqrt(squared) if squared > 0.0 else 0.0
     along = (V_d.x * e.x + V_d.y * e.y) * per
     across = (V_d.x * e.y - V_d.y * e.x) * per
-    return max(math.sqrt(max(U * U - across * across, 0.0)) - along, SLOWEST)
+    return max(math.sqrt(max(U * U - across * across, 0.0)) - along, NEARS)
 
 
 @kernel

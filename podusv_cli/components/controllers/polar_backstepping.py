@@ -6,6 +6,7 @@ model, by a first-order filter (DSC), or in full.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -24,7 +25,6 @@ from podusv_cli.components.controllers.network import (
 from podusv_cli.components.controllers.tracking import (
     HELD,
     TRACKED,
-    Tracking,
     TrackingController,
     track,
 )
@@ -32,7 +32,7 @@ from podusv_cli.components.controllers.velocity_loop import AdaptedBound, Axis, 
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import value
 from podusv_cli.core.derived import difference
-from podusv_cli.core.kernel import Vector, kernel, scratch, tail
+from podusv_cli.core.kernel import Vector, absent, kernel, scratch, tail
 from podusv_cli.core.signal import Signal
 
 B_HAT_U, B_HAT_R, WEIGHTS = 2, 3, 4
@@ -64,21 +64,11 @@ SHORTFALL = (
 )
 
 
-def surge(
-    e: Tracking, x: Vector, target: Vector, beta: Vector, rate: Vector, k: Any
-) -> tuple[float, float]:
-    """Stands for a law's differentiator in surge, put in with `specialise`: (beta_u, beta_u').
-
-    `beta` and `rate` are the filter's part of the memory (beta_u, beta_r) and of its rate.
-    """
-    raise NotImplementedError
-
-
-def yaw(
-    e: Tracking, x: Vector, target: Vector, beta: Vector, rate: Vector, k: Any, tau_u: float
-) -> tuple[float, float]:
-    """Stands for a law's differentiator in yaw: (beta_r, beta_r'); tau_u is known by then."""
-    raise NotImplementedError
+# Stand for a law's differentiators, put in with `specialise`: surge(e, x, target, beta, rate, k) is
+# (beta_u, beta_u'), yaw(..., tau_u), which knows tau_u, is (beta_r, beta_r'). `beta` and `rate` are
+# the filter's part of the memory (beta_u, beta_r) and of its rate.
+surge: Callable[..., Any] = absent("surge")
+yaw: Callable[..., Any] = absent("yaw")
 
 
 @kernel

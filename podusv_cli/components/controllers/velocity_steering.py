@@ -9,6 +9,8 @@ from __future__ import annotations
 import math
 from typing import Any, ClassVar, Literal, NamedTuple
 
+from podusv_cli.components.controllers.base import Most
+from podusv_cli.components.controllers.constant_bearing import NEARS
 from podusv_cli.components.controllers.observer import B_U, ObservingController
 from podusv_cli.components.vessels.plant import surge_force
 from podusv_cli.core.component import Positive, value
@@ -87,3 +89,7 @@ class VelocitySteering(ObservingController):
         "moment; none where the moment comes without a sway force",
     )  # fmt: skip
     N_m: float = value(2.5, "N m", "moment beyond which surge yields to yaw", gt=0)
+
+    def most(self) -> Most:
+        """U and N_m."""
+        return Most(self.U, NEARS, self.N_m)

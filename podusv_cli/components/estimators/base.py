@@ -46,8 +46,9 @@ class Estimator(Component):
     def covariance(self) -> tuple[int, int]:
         """Where in its state the covariance of its errors begins, and of how many numbers it is.
 
-        The upper triangle by rows, the six of the estimate first; behind it the sum of all squared
-        innovations over their variances, and their number. 0, 0 without one.
+        The upper triangle by rows, the six of the estimate first; behind it, for each of x, y, psi,
+        u, v, r, the sum of all squared innovations over their variances, then their numbers. 0, 0
+        without one.
         """
         return 0, 0
 

@@ -48,9 +48,15 @@ COVARIANCE = Signal(
 )  # fmt: skip
 
 INNOVATIONS = (
-    Signal("nis_sum", "1", "sum of all squared innovations so far, each over its variance"),
-    Signal("nis_count", "1", "how many measured values were taken in so far"),
-)
+    Signal(
+        "nis_sum", "1", "sum of all squared innovations so far, each over its variance; of x, y, "
+        "psi, u, v, r", axes=("measured",),
+    ),
+    Signal(
+        "nis_count", "1", "how many measured values were taken in so far; of x, y, psi, u, v, r",
+        axes=("measured",),
+    ),
+)  # fmt: skip
 
 
 @kernel
@@ -86,8 +92,8 @@ def spread(f: Vector, packed: Vector, q: Vector, rate: Vector) -> None:
 
 
 @kernel
-def take_in(h: Vector, innovation: float, sigma: float, state: Vector) -> None:
-    """Correct estimate and covariance by one measured value, whose derivative is h."""
+def take_in(i: int, h: Vector, innovation: float, sigma: float, state: Vector) -> None:
+    """Correct estimate and covariance by the measured value i, whose derivative is h."""
     full, ph = scratch(81), scratch(9)
     packed = tail(state, N)
     unpacked(packed, full)
@@ -106,8 +112,8 @@ def take_in(h: Vector, innovation: float, sigma: float, state: Vector) -> None:
         for c in range(j, N):
             packed[at] -= ph[j] * gain * ph[c]
             at += 1
-    packed[at] += innovation * gain * innovation
-    packed[at + 1] += 1.0
+    packed[at + i] += innovation * gain * innovation
+    packed[at + MOVING + i] += 1.0
 
 
 @kernel
@@ -158,7 +164,10 @@ class ExtendedKalmanFilter(Estimator):
     @property
     def states(self) -> tuple[Signal, ...]:
         """The estimate, the load, the covariance, the innovations."""
-        return (*ESTIMATE, *LOADS, *[COVARIANCE] * PACKED, *INNOVATIONS)
+        sums, counts = INNOVATIONS
+        return (
+            *ESTIMATE, *LOADS, *[COVARIANCE] * PACKED, *[sums] * MOVING, *[counts] * MOVING,
+        )  # fmt: skip
 
     @property
     def covariance(self) -> tuple[int, int]:
@@ -190,7 +199,7 @@ class ExtendedKalmanFilter(Estimator):
             if seen[FRESH + i] != 0.0:
                 late = derivative(i, k.delay_p, state, h)
                 innovation = seen[VALUE + i] - (state[i] - late)
-                take_in(h, wrap(innovation) if i == 2 else innovation, sigma[i], state)
+                take_in(i, h, wrap(innovation) if i == 2 else innovation, sigma[i], state)
 
     @staticmethod
     @kernel
@@ -203,7 +212,8 @@ class ExtendedKalmanFilter(Estimator):
         b[2] = state[8]
         plant(state, tau, b, k, rate)
         rate[6] = rate[7] = rate[8] = 0.0
-        rate[N + PACKED] = rate[N + PACKED + 1] = 0.0
+        for i in range(N + PACKED, N + PACKED + 2 * MOVING):
+            rate[i] = 0.0
         slopes(state, b, cosine, sine, k, f)
         wanderings(k, q)
         spread(f, tail(state, N), q, tail(rate, N))
@@ -212,7 +222,7 @@ class ExtendedKalmanFilter(Estimator):
         """The truth; of the load nothing is known but how large it may be."""
         force, moment = (self.sigma_b, self.sigma_b_psi) if self.bias else (0.0, 0.0)
         unsure = np.diag(np.square([0.0] * MOVING + [force, force, moment]))
-        return np.concatenate([x, np.zeros(3), unsure[np.triu_indices(N)], np.zeros(2)])
+        return np.concatenate([x, np.zeros(3), unsure[np.triu_indices(N)], np.zeros(12)])
 
     def needs(self) -> tuple[bool, ...]:
         """The pose; velocities are taken in where they are measured."""
