@@ -8,17 +8,20 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 import pytest
 from conftest import corrected
+from findings_samples import finding
 from pydantic import ValidationError
 
 from podusv_cli.components.controllers.base import Controller
 from podusv_cli.components.paths.fillet import round_corner
 from podusv_cli.components.paths.line import Line
 from podusv_cli.components.paths.waypoints import Waypoints
+from podusv_cli.core.errors import LawError, NotConvergedError
 from podusv_cli.core.kernel import Vector, bundle, kernel
 from podusv_cli.core.signal import Signal
 from podusv_cli.engine.running.batch import simulate_many
 from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.engine.step.grid import TimeGrid
+from podusv_cli.theory.course import course as steady
 
 CORNERS = ((0.0, 0.0), (4.0, 1.0), (5.0, 4.0), (1.0, 5.0))
 SEEN = tuple(Signal(name, "m", name) for name in ("north", "east", "north_rate", "east_rate"))
@@ -122,7 +125,39 @@ def test_runs_side_by_side_have_the_bits_that_they_have_alone() -> None:
 def test_a_fillet_is_refused_where_it_has_no_corner_or_no_room() -> None:
     with pytest.raises(ValidationError, match="a spline has no corners"):
         Waypoints(points=CORNERS, fillet=1.0)
-    with pytest.raises(ValidationError, match=r"longer than leg 2 takes \(6\.325 s\)"):
+    with pytest.raises(ValidationError, match=r"longer than leg 2 takes \(6\.32\d+ s\)"):
         course("continue", 6.4)
+    with pytest.raises(ValidationError, match=r"longer than leg 1 takes \(2 s\)"):
+        Waypoints(points=((0, 0), (1, 0), (1, 9), (9, 9)), legs="straight", fillet=3.0)
+    points = ((0.0, 0.0), (9.0, 0.0), (9.0, 9.0), (0.0, 1.0))
+    with pytest.raises(ValidationError, match="longer than leg 4"):  # it closes the loop
+        Waypoints(points=points, legs="straight", after="loop", fillet=2.5)
+    with pytest.raises(ValidationError, match="has none"):
+        Waypoints(points=((0, 0), (9, 0)), legs="straight", fillet=2.0)
     assert Line().fillet_for_law() is None
     assert course("loop", 0.0).fillet_for_law() is None
+
+
+def test_a_law_s_own_constant_of_the_name_is_refused() -> None:
+    class Named(Witness):
+        kind: Literal["named"] = "named"  # type: ignore[assignment]
+        fillet: float = 8.0
+
+    loop = replace(corrected(), controller=Named(), path=course("loop"))
+    with pytest.raises(LawError, match="another name"):
+        simulate(loop, TimeGrid(0.05, 10))
+
+
+def test_steady_motion_is_looked_for_outside_the_fillets() -> None:
+    path = course("continue", 6.0)
+    corner = path.breaks()[-1].time
+    near = course("continue", 0.0)
+    assert abs(steady(near, 60.0, corner + 1.5).time - corner) == pytest.approx(1.5)
+    with pytest.raises(NotConvergedError):
+        steady(path, 60.0, corner + 3.5)
+
+
+def test_the_acceleration_of_a_fillet_is_told_before_a_run() -> None:
+    points = "points: [[0, 0], [9, 0], [9, 9]]"
+    path = f"path={{kind: waypoints, legs: straight, {points}, fillet: 0.5}}"
+    assert "jumps by up to 1.41 m/s2" in finding("path-bend", path).text

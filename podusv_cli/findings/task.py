@@ -30,7 +30,8 @@ CONSEQUENCES: dict[str, Callable[[float, Case], str]] = {
         "the errors jump with it, and Assumption 3 (a smooth path) does not hold"
     ),
     "velocity": lambda size, case: (
-        "the virtual controls jump with it, and Assumption 3 (bounded acceleration) does not hold"
+        "the virtual controls jump with it, and Assumption 3 (bounded acceleration) does not hold; "
+        "set path.fillet, or round the corner"
     ),
     "acceleration": lambda size, case: (
         "position and velocity go on smoothly and Assumption 3 holds; a law that uses the "
@@ -44,8 +45,15 @@ CONSEQUENCES: dict[str, Callable[[float, Case], str]] = {
 def path_breaks(case: Case, what: str) -> Sentences:
     """Where the target's position, velocity or acceleration jumps within the run."""
     offset, unit = BREAKS[what]
-    if what == "velocity" and case.scenario.path.fillet_for_law():
+    fillet = case.scenario.path.fillet_for_law()
+    if fillet and what == "velocity":
         return  # the law sees none
+    if fillet and what == "acceleration":
+        size = float(fillet.steps().max())
+        yield (
+            f"in the fillets the acceleration that the law sees jumps by up to {size:.3g} m/s2; "
+            f"{CONSEQUENCES[what](size, case)}"
+        )
     for at in case.scenario.path.breaks():
         if at.what == what and at.time < case.scenario.simulation.duration:
             beside = BESIDE * max(at.time, 1.0)

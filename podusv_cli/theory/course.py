@@ -51,11 +51,13 @@ def course(path: Path, duration: float, at: float | None = None) -> Course:
 
 
 def _course(path: Path, t: float) -> Course | None:
-    """The motion at t, where it is steady from NEAR before it to NEAR after it."""
-    now, *around = path.targets([t, max(t - NEAR, 0.0), t + NEAR])
+    """The motion at t, where it is steady from NEAR before it to NEAR after it, as laws see it."""
+    fillet = path.fillet_for_law()
+    near = NEAR + (0.5 * fillet.time if fillet else 0.0)
+    now, *around = path.targets([t, max(t - near, 0.0), t + near])
     (x, y), (ahead, across) = now[2:4], now[4:6]
     turn = (x * across - y * ahead) / max(x * x + y * y, 1e-300)
-    for sign, other in zip((-min(t, NEAR), NEAR), around, strict=True):
+    for sign, other in zip((-min(t, near), near), around, strict=True):
         angle = turn * sign
         cosine, sine = math.cos(angle), math.sin(angle)
         same = (x * cosine - y * sine, y * cosine + x * sine, -turn * y, turn * x)

@@ -97,7 +97,9 @@ def _step(solver: object) -> str:
 
 def _pieces(scenario: Scenario, duration: float) -> Iterator[tuple[float, float]]:
     """Intervals between the path's breaks; each but the first starts just after its break."""
-    inner = [at.time for at in scenario.path.breaks() if 0.0 < at.time < duration]
+    fillet = scenario.path.fillet_for_law()
+    breaks = {at.time for at in scenario.path.breaks()} | set(fillet.edges() if fillet else ())
+    inner = sorted(time for time in breaks if 0.0 < time < duration)
     for begin, end in pairwise([0.0, *inner, duration]):
         yield (float(np.nextafter(begin, math.inf)) if begin else 0.0), end
 

@@ -32,7 +32,7 @@ from podusv_cli.core.kernel import kernel
 
 LQR = 1.0  # the place of "lqr" among the choices of `gains`
 NEWTON = 8  # steps; at the default gains a is exact to 1e-9 for p below 9
-SLIGHT = 1e-3  # a smaller |p|, or d [1/s], is taken for this: the gains have a limit there
+SLIGHT = 1e-3  # a smaller |p|, or d [1/s], is taken for this
 
 
 class YawGains(NamedTuple):

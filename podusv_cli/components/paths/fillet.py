@@ -106,6 +106,15 @@ class Fillet:
         """The corners as the kernel reads them: times, then two jumps a corner."""
         return np.concatenate([self.times, self.jumps.ravel()])
 
+    def edges(self) -> Vector:
+        """Times [s] at which the acceleration that the law sees jumps, in order."""
+        half = 0.5 * self.time
+        return np.column_stack([self.times - half, self.times + half]).ravel()
+
+    def steps(self) -> Vector:
+        """How large the acceleration of each corner is [m/s2]."""
+        return np.asarray(np.hypot(*self.jumps.T) / self.time)
+
     def constants(self, place: int) -> dict[str, float]:
         """What the kernel reads from `k`, where `rows` begin at `place` of the law's table."""
         return {

@@ -71,9 +71,11 @@ class Waypoints(Path):
         if self.fillet > times.min():
             leg, least = int(times.argmin()) + 1, times.min()
             raise ValueError(
-                f"fillet = {self.fillet:g} s is longer than leg {leg} takes ({least:.4g} s); "
-                "a corner may begin after the middle of a leg only"
+                f"fillet = {self.fillet:.7g} s is longer than leg {leg} takes ({least:.7g} s), so "
+                "two fillets could overlap"
             )
+        if self.fillet > 0 and not len(self._corners()[0]):
+            raise ValueError("a fillet rounds corners, and this path has none; leave it out")
 
     def _has_numbers(self, knots: Vector) -> bool:
         """Whether a bound of all numbers on the way to the spline's coefficients is finite."""

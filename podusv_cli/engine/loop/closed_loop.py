@@ -172,7 +172,15 @@ class ClosedLoop:
         """The law's constants, with those of the path's fillet where it has one."""
         own: dict[str, float] = recall(self.controller.constants_with, self.nominal)
         fillet = recall(self.path.fillet_for_law)
-        return own | fillet.constants(len(recall(self.controller.table))) if fillet else own
+        if fillet is None:
+            return own
+        corners: dict[str, float] = fillet.constants(len(recall(self.controller.table)))
+        if taken := sorted(own.keys() & corners):
+            raise LawError(
+                f"{describe(self.controller)}: path.fillet needs the name {taken[0]!r}, which is a "
+                "constant of this law; give it another name"
+            )
+        return own | corners
 
     def law_table(self, recall: Recall = call) -> Vector:
         """The law's table, and behind it the corners of the path's fillet."""
