@@ -68,6 +68,7 @@ def test_a_delay_longer_than_the_run_is_told_and_nothing_arrives():
     assert np.abs(late("tau_u", *gentle)).max() > 0.1
 
 
+CALM = ("disturbance={kind: none}", "start={x: -0.2, y: 0.1, u: 0.5}", "simulation.duration=80")
 PID = ("controller.kind=pid", "simulation.step=0.001", "simulation.duration=4")
 
 
@@ -77,6 +78,8 @@ PID = ("controller.kind=pid", "simulation.step=0.001", "simulation.duration=4")
         (0.02, 0.03, PID),
         (0.0015, 0.003, ("simulation.step=0.0005", "simulation.duration=4")),
         (0.12, 0.2, ("controller.kind=sliding_mode",)),
+        (0.6, 1.2, ("controller.kind=velocity_vector", *CALM)),
+        (0.4, 0.9, ("controller.kind=momentum_vector", "vessel.preset=cybership2", *CALM)),
     ],
 )
 def test_a_loop_that_is_too_fast_for_the_delay_is_told_and_oscillates(short, long, rest):

@@ -108,7 +108,7 @@ def delayed_loop(case: Case) -> Sentences:
                 yield (
                     f"the {loop.axis} {loop.name} grows with a delay of {delay:g} s; take a delay "
                     f"below {delay_margin(loop, delay):.2g} s, or a smaller "
-                    f"{fast_gain(case.scenario, nu, loop)}"
+                    f"{fast_gain(case.scenario, nu, loop)}; podusv margins has the whole loop's"
                 )
 
 

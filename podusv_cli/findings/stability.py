@@ -61,13 +61,13 @@ def _updated_first(loop: Loop, step: float, count: int) -> float:
 def delayed_growth(loop: Loop, delay: float) -> float:
     """Largest real part [1/s] of the loop's roots where the law's output acts after a delay [s].
 
-    e' = -d e + g . (e, m) a delay before. The roots are eigenvalues of the derivative along the
-    delayed demand, collocated at Chebyshev's points (Breda, Maset, Vermiglio, SIAM J. Sci. Comput.
-    27, 2005).
+    e' = -d e + g . (e, m) a delay before, which the memory of a law that is told the loads knows.
+    The roots are eigenvalues of the derivative along the delayed demand, collocated at Chebyshev's
+    points (Breda, Maset, Vermiglio, SIAM J. Sci. Comput. 27, 2005).
     """
-    n, now, late = len(loop.matrix), loop.matrix.copy(), np.zeros_like(loop.matrix)
-    now[0] -= loop.feedback
-    late[0] = loop.feedback
+    n, told = len(loop.matrix), np.zeros(len(loop.matrix) - 1) if loop.told is None else loop.told
+    late = np.outer(np.append(1.0, told), loop.feedback)
+    now = loop.matrix - late
     rates = np.kron(2.0 / delay * _chebyshev(NODES), np.eye(n))
     rates[:n] = 0.0
     rates[:n, :n], rates[:n, -n:] = now, late

@@ -68,11 +68,12 @@ class LosPid(LineOfSight):
         return [
             Loop(
                 surge.name, "omega_u", surge.damping, to_u * np.array([-2.0 * w_u, 1.0]),
-                np.array([[-w_u * w_u, 0.0]]), name="PI loop",
+                np.array([[-w_u * w_u, 0.0]]), name="PI loop", told=np.array([w_u / to_u]),
             ),
             Loop(
                 yaw.name, "omega_psi", yaw.damping, to_r * np.array([-3.0 * w, -3.0 * w * w, 1.0]),
                 np.array([[1.0, 0.0, 0.0], [0.0, -w * w * w, 0.0]]), name="PID loop",
+                told=np.array([0.0, w / to_r]),
             ),
         ]  # fmt: skip
 

@@ -120,4 +120,5 @@ def _loop(axis: Axis, key: str, gain: float, omega: float) -> Loop:
             [2.0 * omega - gain, -2.0 * omega, 0.0],
             [omega * omega, -omega * omega, 0.0],
         ]),
+        told=np.array([1.0 / ratio, 0.0]),
     )  # fmt: skip

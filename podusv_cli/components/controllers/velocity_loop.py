@@ -50,7 +50,9 @@ class AdaptedBound:
 class Loop:
     """A linearised velocity loop; `key` is the gain that mostly makes it fast, and `cause` why.
 
-    `name` is what messages call it, `bound` an adapted bound that acts on it.
+    `name` is what messages call it, `bound` an adapted bound that acts on it. A law that is told
+    the loads that act has `told`: where a delay makes g . (e, m) act late, m' gains `told` times
+    what acts less what is demanded.
     """
 
     axis: str
@@ -61,6 +63,7 @@ class Loop:
     cause: Cause = "loop"
     name: str = "velocity loop"
     bound: AdaptedBound | None = None
+    told: Vector | None = None  # shape (n,)
 
     @property
     def matrix(self) -> Vector:
