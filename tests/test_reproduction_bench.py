@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+import podusv_cli as podusv
 from podusv_cli.scenario.load import load
 from podusv_cli.studies.bench.cases import AXES, shipped_bench
 from podusv_cli.studies.bench.page import as_markdown
@@ -481,3 +482,30 @@ def test_the_sentences_about_forces_fixed_to_the_earth_are_those_of_the_study():
     ]
     seen = [[claim["verdict"] for claim in one["claims"]] for one in verdicts]
     assert seen[0] == seen[1]
+
+
+@pytest.mark.parametrize(
+    ("law", "keys", "low", "high", "lost"),
+    [
+        ("adaptive_crab", {"standoff_reference": "crab"}, 2.3e5, 4.4e7, 5),
+        ("adaptive_neural", {}, 5e4, 6e5, 2),
+    ],
+)
+def test_found_gains_of_the_paper_s_family_live_on_the_limit(law, keys, low, high, lost):
+    gains = tuning_table("hull", "gains").query("law == @law").set_index("gain")["repeats"]
+    sets = [
+        dict(zip(gains.index, map(float, one), strict=True))
+        for one in zip(*map(str.split, gains), strict=True)
+    ]
+    controllers = [keys | {"kind": "adaptive_neural", "anti_windup": "none"} | one for one in sets]
+    free = {
+        "actuator": {"kind": "ideal"}, "disturbance": {"kind": "none"},
+        "path": {"kind": "line", "speed": 0.5}, "simulation.duration": 0.5,
+    }  # fmt: skip
+    source = "podusv:paper/corrected.yaml"
+    ends = [podusv.simulate(source, free | {"controller": one}).status for one in controllers]
+    assert ends.count("diverged") == lost
+    peaks = [podusv.simulate(source, {"controller": one}).metrics.peak_tau_u for one in controllers]
+    assert [float(f"{end:.1e}") for end in (min(peaks), max(peaks))] == pytest.approx(
+        [low, high], rel=0.07
+    )
