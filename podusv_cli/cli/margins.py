@@ -124,8 +124,14 @@ def _rows(label: str, law: LoopMargins) -> list[list[str]]:
     for axis, loop in law.loops.items():
         crossed = ", ".join(f"{omega:.4g}" for omega in loop.crossovers) or "-"
         phase = f"{loop.phase_margin:.4g} ({math.degrees(loop.phase_margin):.1f} deg)"
-        numbers = [f"{getattr(loop, name):.4g}" for name in NUMBERS[1:]]
-        rows.append([label, axis, crossed, phase, *numbers])
+        known = phase if math.isfinite(loop.phase_margin) else _told(loop.phase_margin)
+        numbers = [_told(getattr(loop, name)) for name in NUMBERS[1:]]
+        rows.append([label, f"{axis} load", crossed, known, *numbers])
     together = {"both demands": law.delay_margin, "both loads": law.delay_margin_loads}
-    more = [[label, what, *[""] * 4, f"{delay:.4g}", "", ""] for what, delay in together.items()]
+    more = [[label, what, *[""] * 4, _told(delay), "", ""] for what, delay in together.items()]
     return [*rows, *more]
+
+
+def _told(number: float) -> str:
+    """A margin; - where the loop has none."""
+    return "-" if math.isnan(number) else f"{number:.4g}"
