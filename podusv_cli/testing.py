@@ -267,9 +267,12 @@ def _law(law: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vec
 
 
 def _path(path: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vector]:
-    out = np.full(len(TARGET), np.nan)
-    call(path.evaluate, t=t, k=bundle(path.constants()), table=path.table(), target=out)
-    return [out]
+    out, place = np.full(len(TARGET), np.nan), np.zeros(len(path.places))
+    k, table = bundle(path.constants_with(0.0)), path.table()
+    if path.follows:
+        call(path.locate, t=t, x=x, s=x, place=place, k=k, table=table)
+    call(path.evaluate, t=t, x=x, place=_to_read(place), k=k, table=table, target=out)
+    return [out, place]
 
 
 def _sea(sea: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vector]:

@@ -44,7 +44,7 @@ class Folder:
         self.metrics = metrics
         self.theory = {}
         t = np.linspace(0.0, 3.0, 4)
-        signals = {"time": t, "x": 2 * t, "x_d": 3 * t, "u": t}
+        signals = {"time": t, "x": 2 * t, "x_d": 3 * t, "z_e": t, "u": t}
         self.recording = Recording(status, "pid", signals, message=message, about=ABOUT)
 
 

@@ -137,7 +137,8 @@ def test_a_run_to_port_is_the_mirror_image_of_one_to_starboard(kind):
     )  # fmt: skip
     starboard, port = run(one, 10.0), run(other, 10.0)
     signs = {"y": -1, "psi": -1, "v": -1, "r": -1, "y_d": -1, "tau_r": -1, "b_v": -1, "b_r": -1}
-    for name in (*STATE, "x_d", "y_d", "tau_u", "tau_r", "b_u", "b_v", "b_r", "z_e"):
+    names = (*STATE, "x_d", "y_d", "tau_u", "tau_r", "b_u", "b_v", "b_r", "z_e")
+    for name in filter(starboard.signals.__contains__, names):  # a trial has no z_e
         image = signs.get(name, 1) * port[name]
         np.testing.assert_allclose(starboard[name], image, atol=1e-9 * (1 + abs(image).max()))
 

@@ -20,6 +20,7 @@ from podusv_cli.components.controllers.zigzag import Zigzag
 from podusv_cli.components.estimators.ekf import ExtendedKalmanFilter
 from podusv_cli.components.estimators.none import NoEstimator
 from podusv_cli.components.measurements.sensors import Sensors
+from podusv_cli.components.paths.legs import Legs
 from podusv_cli.components.paths.line_circle import LineCircle
 from podusv_cli.core.component import value
 from podusv_cli.core.errors import ScenarioError
@@ -284,9 +285,15 @@ def test_every_metric_is_computed_and_documented(limited):
     of_trials = {name for trial in trials for name in gathered(trial, steps=10)[1]}
     seeing = corrected(measurement=Sensors(), estimator=ExtendedKalmanFilter())
     of_estimates = set(gathered(seeing, steps=10)[1])
+    of_path = set(gathered(corrected(path=example(Legs)), steps=10)[1])
     always = {name for name in METRICS if NAMED not in name}
     compared = {metric.name for metric in OF_OPTIMUM.values()} | set(OF_LOOP)  # there only
-    simulated = set(got | cost | operations(corrected(), log) | of_pods) | of_estimates | of_trials
+    simulated = (
+        set(got | cost | operations(corrected(), log) | of_pods)
+        | of_estimates
+        | of_trials
+        | of_path
+    )
     assert always == simulated | compared
     assert set(of_pods) > set(got)
     assert all(metric.unit and metric.meaning for metric in METRICS.values())

@@ -175,7 +175,7 @@ def test_a_key_says_everything_that_its_field_says():
 def test_kinds_in_which_a_key_is_the_same_share_a_row():
     rows = explain("path.speed")
     assert [row.kinds for row in rows] == [
-        ("circle", "line"), ("line_circle",), ("sinusoid",), ("waypoints",)
+        ("circle", "line"), ("legs",), ("line_circle",), ("sinusoid",), ("waypoints",)
     ]  # fmt: skip
 
 

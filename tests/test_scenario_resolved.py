@@ -108,7 +108,7 @@ def possible(data: dict[str, Any]) -> Scenario:
         vessel.update(preset="paper", x_g=0.0, Y_rdot=0.0, N_vdot=0.0, X_udot=-1.0, Y_vdot=-1.0)
         vessel.update(N_rdot=-1.0)
     data["plugins"] = {}  # none of these files exists
-    if data["path"]["kind"] == "waypoints":
+    if data["path"]["kind"] in ("waypoints", "legs"):
         points = ((0.0, 0.0), (1.0, 0.5), *data["path"]["points"])
         data["path"].update(file=None, speed=0.5, points=tuple(dict.fromkeys(points)))
     if data["actuator"]["kind"] == "pod":

@@ -26,9 +26,10 @@ class Derived:
         return self.signal.name
 
 
-def difference(signal: Signal, minuend: str, subtrahend: str) -> Derived:
-    """One logged signal less another."""
-    return Derived(signal, (minuend, subtrahend), lambda log: log[minuend] - log[subtrahend])
+def difference(signal: Signal, minuend: str, subtrahend: str, *beside: str) -> Derived:
+    """One logged signal less another, where those `beside` them are logged, too."""
+    needs = (minuend, subtrahend, *beside)
+    return Derived(signal, needs, lambda log: log[minuend] - log[subtrahend])
 
 
 def norm(signal: Signal, vector: str) -> Derived:

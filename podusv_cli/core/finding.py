@@ -59,8 +59,9 @@ Sentences = Iterator[str | At]
 class FindingKind:
     """A kind of finding: its code, the key that it is about, what it means, before or after a run.
 
-    `search` yields the sentences. It is called for laws of the class `law` only. `condition` is
-    the threshold in words, `remedy` what the user can change.
+    `search` yields the sentences. It is called for laws of the class `law` only, and after a run
+    only where all signals in `needs` were logged. `condition` is the threshold in words, `remedy`
+    what the user can change.
     """
 
     name: str
@@ -71,10 +72,11 @@ class FindingKind:
     law: type[Any]
     condition: str = ""
     remedy: str = ""
+    needs: tuple[str, ...] = ()
 
     def findings(self, controller: object, *seen: object) -> Iterator[Finding]:
         """All findings of this kind; the arguments `seen` are passed on to `search`."""
-        if not isinstance(controller, self.law):
+        if not isinstance(controller, self.law) or not self._has_all(*seen):
             return
         try:
             for sentence in self.search(*seen):
@@ -86,6 +88,9 @@ class FindingKind:
             text = f"could not be looked for: {in_a_line(error)}"
             yield Finding(self.name, self.about, text)
 
+    def _has_all(self, *seen: Any) -> bool:
+        return all(name in seen[-1] for name in self.needs)
+
 
 Decorator = Callable[[Callable[..., Sentences]], FindingKind]
 
@@ -93,14 +98,14 @@ Decorator = Callable[[Callable[..., Sentences]], FindingKind]
 def _decorator(when: Literal["before", "after"]) -> Callable[..., Decorator]:
     def kind_of(
         name: str, *, about: str, meaning: str, condition: str = "", remedy: str = "",
-        law: type[Any] = object,
+        law: type[Any] = object, needs: tuple[str, ...] = (),
     ) -> Decorator:  # fmt: skip
         """Make a kind of finding of a function.
 
         `before` a run it takes a `Case`, `after` a run the scenario and its recording.
         """
         return lambda search: FindingKind(
-            name, about, meaning, when, search, law, condition, remedy
+            name, about, meaning, when, search, law, condition, remedy, needs
         )
 
     return kind_of

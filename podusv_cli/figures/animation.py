@@ -61,9 +61,10 @@ def stage(axes: Axes, runs: Sequence[Shown]) -> Callable[[float], None]:
             axes.plot([], [], "o", color=target.line_style["color"], markersize=4)[0],
         )
         for target in targets(runs)
+        if target.is_ahead
     ]
-    for target in targets(runs):
-        axes.plot(target.recording["y_d"], target.recording["x_d"], **target.line_style)
+    for target in (target for target in targets(runs) if target.in_sight):
+        axes.plot(*target.track(), **target.line_style)
     scale = enlargement(runs)
     tracks = [axes.plot([], [], **run.line_style)[0] for run in runs]
     hulls = [Polygon(np.zeros((5, 2)), color=run.color) for run in runs]

@@ -104,6 +104,10 @@ errors = _sheet(
     "resolves, with the standoff that the law keeps",
     "x_e", "y_e", "z_e", "psi_e", scales={"z_e": distance_axis}, source="the paper's figure 4",
 )  # fmt: skip
+following = _sheet(
+    "path", 2, "cross-track error of the active leg, the way along it, and its number",
+    "e_ct", "along_leg", "leg",
+)  # fmt: skip
 adaptation = _sheet(
     "adaptation", 5,
     "norms of the network weights, estimated bounds, network outputs, largest node output" + PEAKS,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Polygon, Rectangle
+from matplotlib.patches import Circle, Polygon, Rectangle
 
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
@@ -24,6 +24,7 @@ APART = 0.1  # lengths; nearer runs are nowhere apart
 NEAREST, FARTHEST = 2.0, 20.0  # lengths from the middle of the close-up to its edges
 POINTS = 3000  # of a track, at most about
 MARK: dict[str, Any] = {"color": "#444444", "linestyle": "none"}
+ACCEPTANCE: dict[str, Any] = {"fill": False, "edgecolor": "#888888", "linewidth": 0.5}
 WAYPOINT: dict[str, Any] = {**MARK, "marker": "s", "markersize": 5.0, "markerfacecolor": "none"}
 
 
@@ -34,6 +35,25 @@ class Target:
     runs: Sequence[Shown]
     line_style: dict[str, Any]
     recording: Recording
+
+    @property
+    def is_ahead(self) -> bool:
+        """Whether it is somewhere at a time: not on a path that is followed, nor in a trial."""
+        return self.in_sight and not self.runs[0].scenario.path.follows
+
+    @property
+    def in_sight(self) -> bool:
+        """Whether there is one; a manoeuvring trial has none."""
+        return not self.runs[0].scenario.controller.trial()
+
+    def track(self, span: Span = (0.0, np.inf)) -> tuple[Vector, Vector]:
+        """East and north [m] during a time [s]; all legs of a path, the track of a trial."""
+        if self.in_sight and not self.is_ahead:
+            north, east = np.array(self.runs[0].scenario.path.waypoints()).T
+            return east, north
+        rows, names = _rows(self.recording, span), ("y_d", "x_d") if self.is_ahead else ("y", "x")
+        east, north = (self.recording[name][rows] for name in names)
+        return east, north
 
 
 def targets(runs: Sequence[Shown]) -> list[Target]:
@@ -50,17 +70,18 @@ def targets(runs: Sequence[Shown]) -> list[Target]:
 
 def _target(group: Sequence[Shown], *, only: bool) -> Target:
     longest = max(group, key=lambda run: run.end).recording
+    word = "path" if group[0].scenario.path.follows else "target"
     if only:
-        return Target(group, {**TARGET_LOOK, "label": "target"}, longest)
-    label = f"target of {', '.join(run.name for run in group)}"
+        return Target(group, {**TARGET_LOOK, "label": word}, longest)
+    label = f"{word} of {', '.join(run.name for run in group)}"
     style = {**TARGET_LOOK, "linestyle": group[0].linestyle, "label": label}
     return Target(group, style, longest)
 
 
 def enlargement(runs: Sequence[Shown]) -> float:
     """How many times larger than life hulls must be drawn to be seen on a map of the whole run."""
-    tracks = [target.recording for target in targets(runs)]
-    spread = max(float(np.ptp(log["x_d"]) + np.ptp(log["y_d"])) for log in tracks)
+    tracks = [target.track() for target in targets(runs)]
+    spread = max(float(np.ptp(east) + np.ptp(north)) for east, north in tracks)
     return max(1.0, round(0.05 * spread / max(run.length for run in runs)))
 
 
@@ -69,8 +90,7 @@ def bounds(runs: Sequence[Shown]) -> tuple[Span, Span]:
 
     Where none finished, targets alone.
     """
-    logs = [target.recording for target in targets(runs)]
-    pairs = [(log["y_d"], log["x_d"]) for log in logs]
+    pairs = [target.track() for target in targets(runs)]
     pairs += [(run.recording["y"], run.recording["x"]) for run in runs if run.whole]
     pairs += [(run.recording["y"][:1], run.recording["x"][:1]) for run in runs]
     corners = ([(part.min(), part.max()) for part in parts] for parts in zip(*pairs, strict=True))
@@ -155,8 +175,15 @@ def _whole(axes: Axes, runs: Sequence[Shown]) -> None:
     if given:
         north, east = zip(*sorted(given), strict=True)
         axes.plot(east, north, **WAYPOINT, label="waypoint")
+    _accepting(axes, runs)
     words = f"hulls {scale:.0f} times as large" if scale > 1.0 else "hulls to scale"
     axes.set_title(words, loc="left")
+
+
+def _accepting(axes: Axes, runs: Sequence[Shown]) -> None:
+    """The circles within which the next leg of a path becomes active."""
+    for north, east, radius in sorted({c for run in runs for c in run.scenario.path.circles()}):
+        axes.add_patch(Circle((east, north), radius, **ACCEPTANCE))
 
 
 def _outline(run: Shown) -> dict[str, Any]:
@@ -195,7 +222,8 @@ def _views(runs: Sequence[Shown]) -> list[View]:
     kept = [run for run in finished if run in target.runs]
     last = min(run.end for run in kept)
     apart = _farthest_apart(kept, target, last)
-    aim = np.array([kept[0].at(last, name) for name in ("y_d", "x_d")])
+    names = ("y_d", "x_d") if target.is_ahead else ("y", "x")
+    aim = np.array([kept[0].at(last, name) for name in names])
     return [*apart, View("end", last, kept, target, aim)]
 
 
@@ -221,9 +249,10 @@ def _close_up(axes: Axes, view: View) -> tuple[tuple[float, float], float]:
     _draw_tracks(axes, [view.target], view.runs, span)
     for run in view.runs:
         axes.add_patch(Polygon(hull_of(run, view.t, 1.0), **_outline(run)))
-    aim = [[view.runs[0].at(view.t, name)] for name in ("y_d", "x_d")]
-    label = f"{view.target.line_style['label']} at this time"
-    axes.plot(*aim, **MARK, marker="+", markersize=7, label=label)
+    if view.target.is_ahead:
+        aim = [[view.runs[0].at(view.t, name)] for name in ("y_d", "x_d")]
+        label = f"{view.target.line_style['label']} at this time"
+        axes.plot(*aim, **MARK, marker="+", markersize=7, label=label)
     at = np.array([[run.at(view.t, name) for name in ("y", "x")] for run in view.runs])
     length = max(run.length for run in view.runs)
     away = 1.3 * float(np.max(np.hypot(*(at - view.middle).T)))
@@ -236,9 +265,8 @@ def _close_up(axes: Axes, view: View) -> tuple[tuple[float, float], float]:
 
 def _draw_tracks(axes: Axes, ahead: Sequence[Target], runs: Sequence[Shown], span: Span) -> None:
     """Tracks of targets, and of runs with their markers, during a time [s]."""
-    for target in ahead:
-        rows = _rows(target.recording, span)
-        axes.plot(target.recording["y_d"][rows], target.recording["x_d"][rows], **target.line_style)
+    for target in (target for target in ahead if target.in_sight):
+        axes.plot(*target.track(span), **target.line_style)
     for run in runs:
         log, rows = run.recording, _rows(run.recording, span)
         (track,) = axes.plot(log["y"][rows], log["x"][rows], **run.line_style)

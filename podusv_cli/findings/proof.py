@@ -41,7 +41,7 @@ def argument(scenario: Scenario) -> str:
 def conditions(scenario: Scenario) -> Iterator[str]:
     """A line for each law that the proof covers: lambda of (49), and which conditions fail."""
     for label, single in scenario.singles().items():
-        law = single.controller.lyapunov()
+        law = single.closed_loop().lyapunov()
         if law is not None:
             yield f"{label}, conditions of the stability proof: {_summary(law, single)}"
 

@@ -69,8 +69,8 @@ class Accumulator:
     of a batch has constants of its own, and the same size. Runs march side by side only with runs
     of equal constants, but for those named in `differing`.
 
-    `of_target`: what is gathered is about the target, which a manoeuvring trial does not have; it
-    is left out there.
+    `of_target`: what is gathered is about the distance to a target. Neither a manoeuvring trial nor
+    a path that is followed has one; it is left out there.
 
     The first `integrals` numbers are integrals over time, made with `add`; the very first is the
     time itself. They are trapezoidal sums over the steps: `weight` [s] is that of the instant.

@@ -162,7 +162,7 @@ def _accumulators(known: Mapping[str, Metric]) -> dict[Accumulator, str]:
 
 def _asked(part: Accumulator, metric: str, layout: Measured) -> tuple[int, dict[str, float]]:
     """How many numbers an accumulator gathers in a loop, and its constants; none for 0 numbers."""
-    if part.of_target and layout.loop.controller.trial():
+    if part.of_target and not layout.loop.has_target:
         return 0, {}
     try:
         size = part.size(layout)

@@ -61,6 +61,7 @@ def problem(scenario: Scenario, minimised: Minimised) -> Problem:
     """The problem of a scenario. Raises UsageError for one that cannot be solved here."""
     loop = scenario.closed_loop()
     kinds = {
+        "path": (not loop.path.follows, "targets with a timetable, from which z_e is measured"),
         "disturbance": (
             loop.disturbance.of_time,
             "loads that depend on time alone (a disturbance that does declares `of_time`)",

@@ -137,7 +137,7 @@ def _with_contents(keys: list[Key]) -> list[Row]:
 @cache
 def signals(plugins: Plugins = ()) -> tuple[Signal, ...]:
     """Every signal that a run of podusv can log or give; a name may have several meanings."""
-    parts = ("controllers", "disturbances", "actuators", "measurements", "estimators")
+    parts = ("controllers", "paths", "disturbances", "actuators", "measurements", "estimators")
     packages = ("core", *(f"components.{part}" for part in parts), "theory")
     rooms = (f"podusv_cli.{package}" for package in packages)
     return tuple(registry.signals(*rooms, plugins=plugins))

@@ -76,6 +76,11 @@ def loop_margins(
             "continuously; set controller.rate=analytic and controller.hold_below=0 where it has "
             "these keys, or choose another law"
         )
+    if loop.path.follows:
+        raise LawError(
+            f"{describe(loop.path)}: its target moves with the vessel, and margins are those of a "
+            "law that follows a target with a timetable; take one, as with --set path.kind=line"
+        )
     found = linearised(
         loop, course(loop.path, grid.steps * grid.step, at), grid.step, compiled=compiled
     )

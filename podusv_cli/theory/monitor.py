@@ -84,7 +84,7 @@ class Monitored:
 
 def signals(loop: ClosedLoop, *, sampled: bool) -> tuple[Signal, ...]:
     """The signals that the monitor adds over time; none for a law without V."""
-    law = loop.controller.lyapunov()
+    law = loop.lyapunov()
     if law is None:
         return ()
     rate = () if sampled else (V_DOT,)
@@ -102,7 +102,7 @@ def about(loop: ClosedLoop, *, sampled: bool) -> dict[str, Signal]:
 
 def prepare(loop: ClosedLoop, grid: TimeGrid, compiled: bool) -> None:
     """Compile and load the code that the monitor needs."""
-    if loop.controller.lyapunov() is not None:
+    if loop.lyapunov() is not None:
         rates_replay(loop, grid, compiled=compiled)
 
 
@@ -116,7 +116,7 @@ def monitored(
     sampled control, sensors or a delay there is no V' and no bound of V: old measurements act.
     `allocate` makes the arrays for the added signals.
     """
-    law, count = loop.controller.lyapunov(), len(recording["time"])
+    law, count = loop.lyapunov(), len(recording["time"])
     if law is None or not count:
         return None
     sampled = grid.hold_every > 0 or not loop.at_once

@@ -36,7 +36,7 @@ def _assumptions(
     loop: ClosedLoop, grid: TimeGrid, monitored: Monitored
 ) -> Iterator[dict[str, Any]]:
     """Assumptions behind V' <= -2 lambda V + Delta: whether each held, and its number if any."""
-    law, log, turn = loop.controller.lyapunov(), monitored.recording, monitored.traces["turn"]
+    law, log, turn = loop.lyapunov(), monitored.recording, monitored.traces["turn"]
     withheld = max(_withheld(monitored, "u"), _withheld(monitored, "r"))
     turned = int(np.count_nonzero(turn[1:] != turn[:-1]))
     alone = law.fold == "printed" and bool(np.any(turn < 0.0))

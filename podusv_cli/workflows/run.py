@@ -19,7 +19,7 @@ from podusv_cli.workflows.execute import Finished, Progress, Stopwatch, Task, ex
 RESULTS = Path("results")
 # The figures that take longest first; `sea` and `estimates` for runs that have waves, wind, current
 # or sensors
-DRAWN = ("estimates", "controls", "sea", "trajectory", "errors")
+DRAWN = ("estimates", "controls", "sea", "trajectory", "errors", "path")
 
 
 @dataclass(frozen=True)

@@ -153,7 +153,7 @@ def start_kick(case: Any) -> Sentences:
 @after(
     "near-target", about="controller.standoff", meaning="z_e came close to its singularity",
     condition=f"z_e below {NEAR:g} hull lengths, and hold_below is smaller than that",
-    remedy="take a standoff, or hold_below", law=TrackingController,
+    remedy="take a standoff, or hold_below", law=TrackingController, needs=("z_e",),
 )  # fmt: skip
 def near_target(scenario: Any, log: Recording) -> Sentences:
     """z_e comes near 0, where psi_d is not defined and w = psi_d' grows as 1/z_e.

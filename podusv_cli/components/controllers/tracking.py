@@ -39,7 +39,8 @@ R_E = Signal("r_e", "rad/s", "yaw rate error (32)")
 TRACKED = (PSI_D, PSI_E, ALPHA_U, ALPHA_R, U_E, R_E)
 X_E = Signal("x_e", "m", "target ahead of the vessel, north (18); derived, not logged")
 Y_E = Signal("y_e", "m", "target ahead of the vessel, east (18); derived, not logged")
-ahead_north, ahead_east = difference(X_E, "x_d", "x"), difference(Y_E, "y_d", "y")
+ahead_north = difference(X_E, "x_d", "x", "z_e")  # without z_e there is no target to be behind
+ahead_east = difference(Y_E, "y_d", "y", "z_e")
 
 # The first two numbers of the memory of every law that steers so.
 PSI_D_SAMPLE = Signal(

@@ -1,4 +1,10 @@
-"""What every path offers."""
+"""What every path offers.
+
+A path gives a target at each time. A path that is *followed* (`follows`) has no timetable: its
+target is the point of the path beside the vessel, and the distance to it says nothing about time.
+Where the vessel is on such a path are numbers of the loop's state, which `locate` sets at every
+instant, so that they are logged.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +18,7 @@ import numpy as np
 from podusv_cli.components.paths.fillet import Fillet
 from podusv_cli.core.component import Component
 from podusv_cli.core.kernel import Vector, absent, bundle, call
+from podusv_cli.core.signal import Signal
 
 Point = tuple[float, float]
 
@@ -29,24 +36,41 @@ class Break:
 class Path(Component):
     """A target moving in the plane.
 
-    `evaluate(t, k, table, target)` is a kernel that writes position [m], velocity [m/s] and
-    acceleration [m/s2] at time t [s] into `target`, in the order of `TARGET`.
+    `evaluate(t, x, place, k, table, target)` is a kernel that writes position [m], velocity [m/s]
+    and acceleration [m/s2] at time t [s] into `target`, in the order of `TARGET`. A path that is
+    followed reads the vessel's state x as the law is given it, and `place`, one number for each
+    signal of `places`; `locate(t, x, s, place, k, table)` sets these at every instant, with the
+    true state s.
     """
 
     noun: ClassVar[str] = "path"
+    follows: ClassVar[bool] = False
+    places: ClassVar[tuple[Signal, ...]] = ()
 
     evaluate: ClassVar[Callable[..., None]] = staticmethod(absent("evaluate"))
+    locate: ClassVar[Callable[..., None]] = staticmethod(absent("locate"))
 
     def targets(self, times: Iterable[float]) -> Vector:
-        """The target at each of these times [s], a row of `TARGET` each."""
+        """The target at each of these times [s], a row of `TARGET` each.
+
+        Of a path that is followed, for a vessel that is on it and as fast as it asks for.
+        """
         times = list(times)
         rows, k, table = np.zeros((len(times), len(TARGET))), bundle(self.constants()), self.table()
         for t, row in zip(times, rows, strict=True):
             call(self.evaluate, t=t, k=k, table=table, target=row)
         return rows
 
+    def constants_with(self, standoff: float) -> dict[str, float]:
+        """The constants for a law that keeps this distance [m] to its target on purpose."""
+        return self.constants()
+
     def waypoints(self) -> tuple[Point, ...]:
         """Points [m], north and east, that the path is made from; none for most paths."""
+        return ()
+
+    def circles(self) -> tuple[tuple[float, float, float], ...]:
+        """Where waypoints count as reached: centre north and east, and radius [m]; mostly none."""
         return ()
 
     def runs_on_from(self) -> float:

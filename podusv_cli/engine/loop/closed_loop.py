@@ -22,7 +22,8 @@ from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core import signal
 from podusv_cli.core.component import describe
 from podusv_cli.core.errors import LawError
-from podusv_cli.core.kernel import Vector, kernel
+from podusv_cli.core.kernel import Vector, bundle, kernel
+from podusv_cli.core.kernel import call as call_kernel
 from podusv_cli.core.recording import Allocate
 from podusv_cli.core.signal import LOOP, Signal
 from podusv_cli.core.steps import whole_steps
@@ -38,6 +39,11 @@ LOADS = ("tau_u", "tau_v", "tau_r", "b_u", "b_v", "b_r")
 
 @kernel
 def _see_nothing(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
+    pass
+
+
+@kernel
+def _no_place(t: float, x: Vector, s: Vector, place: Vector, k: Any, table: Vector) -> None:
     pass
 
 
@@ -116,6 +122,16 @@ class ClosedLoop:
         """Whether the true state acts on the actuator through the law without delay."""
         return not self.measured and self.actuator.delay() == 0.0
 
+    @property
+    def has_target(self) -> bool:
+        """Whether the distance to the target says how good the law is."""
+        return not (self.path.follows or self.controller.trial())
+
+    def lyapunov(self) -> Any:
+        """The law where (46) is its Lyapunov function; None where it sees another target."""
+        other = self.path.follows or self.path.fillet_for_law()
+        return None if other else self.controller.lyapunov()
+
     def check_seeing(self) -> None:
         """Raise LawError for a measurement or an estimator that is not what it declares.
 
@@ -160,13 +176,33 @@ class ClosedLoop:
 
     def first_memory(self, recall: Recall = call) -> Vector:
         """The law's memory at t = 0."""
-        target = np.asarray(recall(self.path.targets, AT_START)[0])
+        target = np.asarray(self.first_target(recall))
         with np.errstate(all="ignore"):  # a start beyond all numbers is for the run to tell
             return self.controller.start(np.array(self.start), target, self.nominal)
 
-    def first_target(self) -> Vector:
+    def first_target(self, recall: Recall = call) -> Vector:
         """Where the target is at t = 0."""
-        return np.asarray(self.path.targets(AT_START)[0])
+        if not self.path.follows:
+            return np.asarray(recall(self.path.targets, AT_START)[0])
+        x, place, target = np.array(self.start), self.first_place(), np.zeros(len(TARGET))
+        k, table = bundle(self.path_constants()), self.path.table()
+        call_kernel(self.path.evaluate, t=0.0, x=x, place=place, k=k, table=table, target=target)
+        return target
+
+    def path_constants(self, recall: Recall = call) -> dict[str, float]:
+        """The path's constants for this law."""
+        approach = self.controller.approach()
+        standoff = approach.standoff if approach else 0.0
+        constants: dict[str, float] = recall(self.path.constants_with, standoff)
+        return constants
+
+    def first_place(self) -> Vector:
+        """Where on a path that is followed the vessel is at t = 0."""
+        place, start = np.zeros(len(self.path.places)), np.array(self.start)
+        if self.path.follows:
+            k, table = bundle(self.path_constants()), self.path.table()
+            call_kernel(self.path.locate, t=0.0, x=start, s=start, place=place, k=k, table=table)
+        return place
 
     def law_constants(self, recall: Recall = call) -> dict[str, float]:
         """The law's constants, with those of the path's fillet where it has one."""
@@ -193,19 +229,22 @@ class ClosedLoop:
         self.check_seeing()
         law, actuator = self.controller, self.actuator
         own = (partial(describe, actuator), (*actuator.states, *actuator.signals_with))
-        loop = (lambda: "the closed loop", LOOP)
+        path = (partial(describe, self.path), self.path.places)
+        common = [one for one in LOOP if self.has_target or one.name != "z_e"]
+        loop = (lambda: "the closed loop", common)
         others = (
             *((partial(describe, part), signals) for part, signals in self.disturbance.told()),
             (partial(describe, self.measurement), self.measurement.signals),
             (partial(describe, self.estimator), self.estimated()),
         )
-        return signal.by_name((loop, (partial(describe, law), law.declared()), own, *others))
+        return signal.by_name((loop, path, (partial(describe, law), law.declared()), own, *others))
 
     def layout(self, grid: TimeGrid) -> Layout:
         """Sizes and offsets of the loop on this grid."""
         law, actuator = self.controller, self.actuator
         estimate = len(STATE) + len(actuator.states)
-        memory, load = estimate + len(self.estimated()), 3 + len(self.disturbance.signals)
+        place = estimate + len(self.estimated())
+        memory, load = place + len(self.path.places), 3 + len(self.disturbance.signals)
         sizes = [
             len(TARGET) + 1, len(law.signals), len(DEMAND), 3, load, len(actuator.signals_with),
             len(self.measurement.signals),
@@ -213,13 +252,14 @@ class ClosedLoop:
         signals, demand, tau, b, flags, sensed, columns = np.cumsum(sizes).tolist()
         return Layout(
             states=memory + sum(size for _, size in law.slots()),
-            estimate=estimate if self.measured else 0, memory=memory,
+            estimate=estimate if self.measured else 0, place=place, memory=memory,
             signals=signals, demand=demand, tau=tau, b=b,
             flow=_flow(self.disturbance, b) if actuator.feels_motion else 0,
             flags=flags, sensed=sensed, columns=columns,
             steps=grid.steps, log_every=grid.log_every, hold_every=grid.hold_every,
             sample_every=_sample_steps(law, grid),
             measured=int(self.measured), update_first=int(grid.update_first),
+            follows=int(self.path.follows),
             load_of_time=int(self.disturbance.of_time), wants_loads=int(law.wants_loads()),
             relayed=int(actuator.is_relayed),
         )  # fmt: skip
@@ -256,7 +296,9 @@ def entries(
     sample = (take, constants) if law.takes_samples() else (_no_sample, ())
     told = law.wants_loads()
     after_saturation = (law.after_saturation, constants) if told else (_ignore_loads, ())
-    yield "path", path.evaluate, tuple(recall(path.constants))
+    yield "path", path.evaluate, tuple(loop.path_constants(recall))
+    locate = (path.locate, tuple(loop.path_constants(recall))) if path.follows else (_no_place, ())
+    yield "locate", *locate
     loads = tuple(recall(disturbance.constants_with, loop.vessel))
     yield "disturbance", disturbance.kernel_with(loop.vessel), loads
     yield "law", steer, constants
@@ -299,7 +341,8 @@ def vectors_of(
         estimate = estimator.start(start, loop.nominal)
     duration, motion = grid.steps * grid.step, _wave_motion(disturbance)
     return Vectors(
-        path=numbers(path.constants), path_table=recall(path.table),
+        path=np.array(list(loop.path_constants(recall).values()) or [0.0]),
+        path_table=recall(path.table),
         disturbance=numbers(disturbance.constants_with, loop.vessel),
         disturbance_table=recall(disturbance.table_for, loop.vessel, duration),
         law=np.array(list(loop.law_constants(recall).values()) or [0.0]),
@@ -311,7 +354,9 @@ def vectors_of(
         estimator_table=recall(estimator.table),
         vessel=numbers(loop.vessel.constants),
         observer=numbers(observer.constants_for, loop),
-        s=np.concatenate([start, recall(actuator.rest), estimate, loop.first_memory(recall)]),
+        s=np.concatenate(
+            [start, recall(actuator.rest), estimate, loop.first_place(), loop.first_memory(recall)]
+        ),
         row=np.zeros(layout.columns), stages=np.zeros(5 * layout.states),
         sensed=measurement.first(start, grid.step),
         relay=relay(actuator.delay(), grid), held=np.zeros(HELD_SIGNALS + len(law.signals)),

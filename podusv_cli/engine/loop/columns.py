@@ -14,7 +14,8 @@ def names(loop: ClosedLoop) -> list[str]:
     """Names of a logged row's columns: time, state, row; a slot of size n has n columns."""
     law, actuator = loop.controller, loop.actuator
     slots = [part for part, size in law.slots() for _ in range(size)]
-    states = [part.name for part in (*actuator.states, *loop.estimated(), *slots)]
+    own_states = (*actuator.states, *loop.estimated(), *loop.path.places, *slots)
+    states = [part.name for part in own_states]
     parts = (
         law.signals, loop.disturbance.signals, actuator.signals_with, loop.measurement.signals
     )  # fmt: skip

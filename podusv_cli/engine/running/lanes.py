@@ -35,8 +35,9 @@ def alike(loop: ClosedLoop, observer: Observer) -> dict[str, frozenset[str]]:
     """By part the constants that all lanes have to share: choices, sizes and positions."""
     law, names = loop.controller, {part: names for part, _, names in entries(loop, observer)}
     chosen = {
-        "path": loop.path.choices(), "disturbance": loop.disturbance.choices(),
-        "actuator": loop.actuator.choices(), "law": law.choices(), "sample": law.choices(),
+        "path": loop.path.choices(), "locate": loop.path.choices(),
+        "disturbance": loop.disturbance.choices(), "actuator": loop.actuator.choices(),
+        "law": law.choices(), "sample": law.choices(),
         "after_saturation": law.choices(),
         "observer": frozenset(names["observer"]) - observer.differing,
         "measurement": loop.measurement.choices(), "correct": loop.estimator.choices(),
@@ -48,7 +49,11 @@ def alike(loop: ClosedLoop, observer: Observer) -> dict[str, frozenset[str]]:
         for i, part in enumerate(loop.disturbance.each())
         for name in whole_numbers(part.kernel_with(loop.vessel))
     )
-    for one in (("law", "sample", "after_saturation"), ("correct", "follow")):  # of one component
+    for one in (
+        ("path", "locate"),
+        ("law", "sample", "after_saturation"),
+        ("correct", "follow"),
+    ):  # of one component
         whole |= dict.fromkeys(one, frozenset().union(*(whole[part] for part in one)))
     return {part: (chosen[part] | whole[part]) & set(names[part]) for part in names}
 

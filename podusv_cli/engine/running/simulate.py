@@ -8,7 +8,6 @@ from functools import partial
 
 import numpy as np
 
-from podusv_cli.components.paths.base import TARGET
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Allocate, Recording, Status
 from podusv_cli.engine.loop.closed_loop import (
@@ -93,8 +92,9 @@ def marcher(loop: ClosedLoop, observer: Observer, compiled: bool) -> Callable[..
 
 def _logged(loop: ClosedLoop, table: Vector) -> dict[str, Vector]:
     """The signals of a recording in a table of logged rows."""
-    named = by_name(names(loop), table, loop.about())
-    return {name: column for name, column in named.items() if name not in TARGET[2:]}
+    about = loop.about()
+    named = by_name(names(loop), table, about)
+    return {name: column for name, column in named.items() if name in about}
 
 
 def _record(

@@ -75,8 +75,9 @@ def end_lanes(k: int, lost: Any, c: Any, n: Any, size: int, under_way: Vector, e
 
 @kernel
 def advance_lanes(
-    path: Function, disturbance: Function, law: Function, sample: Function, actuator: Function,
-    after: Function, measurement: Function, correct: Function, follow: Function, observe: Function,
+    path: Function, locate: Function, disturbance: Function, law: Function, sample: Function,
+    actuator: Function, after: Function, measurement: Function, correct: Function,
+    follow: Function, observe: Function,
     first: int, last: int, h: float, vectors: Any, layout: Any, size: int, under_way: Vector,
     ends: Vector,
 ) -> int:  # fmt: skip
@@ -97,6 +98,8 @@ def advance_lanes(
         load(t, c.s, disturbance, c, n, again, False)
         if n.measured > 0:
             perceive(k, t, measurement, correct, c, n)
+        if n.follows > 0:
+            locate(t, tail(c.s, n.estimate), c.s, tail(c.s, n.place), c.path, c.path_table)
         if n.sample_every > 0 or n.hold_every > 0:
             sample_and_hold(k, t, h, path, law, sample, after, c, n)
         rates(t, c.s, c.stages, path, law, actuator, after, follow, c, n, again)

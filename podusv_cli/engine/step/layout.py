@@ -15,6 +15,7 @@ class Layout(NamedTuple):
 
     states: int  # length of s
     estimate: int  # offset in s of the state that the law is given; 0: the true state
+    place: int  # offset in s of where on its path the vessel is, see `paths.base`
     memory: int  # offset of the law's memory in s
     signals: int  # offsets in the row
     demand: int
@@ -30,6 +31,7 @@ class Layout(NamedTuple):
     sample_every: int  # 0: the law takes no samples
     measured: int  # 1: the law is given an estimate from measurements
     update_first: int  # 1: a held law's memory takes a sample before the demand is formed
+    follows: int  # 1: the path depends on where the vessel is, not on the time
     load_of_time: int  # 1: the disturbance depends on time alone
     wants_loads: int  # 1: the law is told which loads really act
     relayed: int  # 1: the actuator has a command path or a failure

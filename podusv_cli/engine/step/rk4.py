@@ -1,7 +1,7 @@
 """The closed loop as kernels: right-hand side, RK4 step, and the march along the time grid.
 
-State s: the vessel's (x, y, psi, u, v, r), the actuator's states, the estimator's, the law's
-memory.
+State s: the vessel's (x, y, psi, u, v, r), the actuator's states, the estimator's, the place on a
+path that is followed, the law's memory.
 Row: target, distance to it, law's signals, demand, tau, b and the disturbance's signals,
 actuator's signals, measured values; offsets are in `Layout`.
 """
@@ -94,8 +94,8 @@ def rates(
     memory, memory_rate = tail(s, n.memory), tail(ds, n.memory)
     given = tail(s, n.estimate)  # the state that the law is given
     p, table, work = c.law, c.law_table, c.work
-    if not again:
-        path(t, c.path, c.path_table, row)
+    if not again or n.follows > 0:
+        path(t, given, tail(s, n.place), c.path, c.path_table, row)
     if n.hold_every > 0 and n.update_first > 0:
         for i in range(n.states - n.memory):
             memory_rate[i] = 0.0
@@ -175,8 +175,8 @@ def write_row(k: int, t: float, c: Vectors, n: Layout) -> None:
 
 @kernel
 def instant(
-    k: int, first: int, h: float, path: Function, disturbance: Function, law: Function,
-    sample: Function, actuator: Function, after: Function, measurement: Function,
+    k: int, first: int, h: float, path: Function, locate: Function, disturbance: Function,
+    law: Function, sample: Function, actuator: Function, after: Function, measurement: Function,
     correct: Function, follow: Function, observe: Function, c: Vectors, n: Layout,
 ) -> bool:  # fmt: skip
     """Measure, sample, evaluate, observe and log instant k; whether all its numbers are finite."""
@@ -188,6 +188,8 @@ def instant(
     load(t, c.s, disturbance, c, n, again, False)
     if n.measured > 0:
         perceive(k, t, measurement, correct, c, n)
+    if n.follows > 0:
+        locate(t, tail(c.s, n.estimate), c.s, tail(c.s, n.place), c.path, c.path_table)
     if n.sample_every > 0 or n.hold_every > 0:
         sample_and_hold(k, t, h, path, law, sample, after, c, n)
     rates(t, c.s, c.stages, path, law, actuator, after, follow, c, n, again)
@@ -203,8 +205,9 @@ def instant(
 
 @kernel
 def advance(
-    path: Function, disturbance: Function, law: Function, sample: Function, actuator: Function,
-    after: Function, measurement: Function, correct: Function, follow: Function, observe: Function,
+    path: Function, locate: Function, disturbance: Function, law: Function, sample: Function,
+    actuator: Function, after: Function, measurement: Function, correct: Function,
+    follow: Function, observe: Function,
     first: int, last: int, h: float, vectors: Any, layout: Any,
 ) -> int:  # fmt: skip
     """March over the instants first .. last - 1.
@@ -216,8 +219,8 @@ def advance(
         if c.under_way[STOP] != 0.0:
             return k
         if not instant(
-            k, first, h, path, disturbance, law, sample, actuator, after, measurement, correct,
-            follow, observe, c, n,
+            k, first, h, path, locate, disturbance, law, sample, actuator, after, measurement,
+            correct, follow, observe, c, n,
         ):  # fmt: skip
             return k
         if k < n.steps:
@@ -226,16 +229,17 @@ def advance(
 
 
 def advance_plainly(
-    path: Function, disturbance: Function, law: Function, sample: Function, actuator: Function,
-    after: Function, measurement: Function, correct: Function, follow: Function, observe: Function,
+    path: Function, locate: Function, disturbance: Function, law: Function, sample: Function,
+    actuator: Function, after: Function, measurement: Function, correct: Function,
+    follow: Function, observe: Function,
     first: int, last: int, h: float, c: Vectors, n: Layout,
 ) -> int:  # fmt: skip
     """`advance` as plain Python, whose `math` raises where machine code gives no number."""
     for k in range(first, last):
         try:
             if c.under_way[STOP] != 0.0 or not instant(
-                k, first, h, path, disturbance, law, sample, actuator, after, measurement, correct,
-                follow, observe, c, n,
+                k, first, h, path, locate, disturbance, law, sample, actuator, after, measurement,
+                correct, follow, observe, c, n,
             ):  # fmt: skip
                 return k
         except (ArithmeticError, ValueError):

@@ -58,7 +58,7 @@ def sample_and_hold(
     given, row, held = tail(c.s, n.estimate), c.row, c.held
     memory = tail(c.s, n.memory)
     p, table = c.law, c.law_table
-    path(t, c.path, c.path_table, row)
+    path(t, given, tail(c.s, n.place), c.path, c.path_table, row)
     if n.sample_every > 0 and k % n.sample_every == 0:
         sample(t, given, memory, row, p, table)
     if n.hold_every > 0 and k % n.hold_every == 0:

@@ -16,7 +16,7 @@ from podusv_cli.studies.study.plan import Plan
 from podusv_cli.studies.study.runs_file import Table
 from podusv_cli.studies.study.statistics import Interval, digits
 
-ALWAYS = ("iae", "z_e_steady")  # metrics that the answer has beside those of claims
+ALWAYS = ("iae", "z_e_steady", "e_ct_rms")  # metrics that the answer has beside those of claims
 MARGIN = 0.01  # relative, of pairs
 
 

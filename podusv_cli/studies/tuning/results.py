@@ -33,7 +33,11 @@ from podusv_cli.studies.tuning.space import Gain
 from podusv_cli.studies.tuning.trials import FINISHED, Trial
 from podusv_cli.studies.tuning.validation import chosen, repeated, tuned
 
-ALWAYS = ("iae", "z_e_steady")  # metrics that the tables have beside those of the objective
+ALWAYS = (
+    "iae",
+    "z_e_steady",
+    "e_ct_rms",
+)  # metrics that the tables have beside those of the objective
 OBJECTIVES = ("objective", "second_objective")  # columns
 VARIATION = "tv_tau_u"
 MARGIN = 0.01  # relative, of pairs

@@ -1,0 +1,58 @@
+"""Findings about a path that is followed without a timetable."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from podusv_cli.components.paths.base import Path
+from podusv_cli.core.finding import Sentences, after, before
+from podusv_cli.core.kernel import Vector
+from podusv_cli.core.recording import Recording
+from podusv_cli.findings.finding import Case
+from podusv_cli.scenario.model import Scenario
+
+ROOM = 2.0  # acceptance radii; a shorter leg is left before it is followed
+
+
+def _lengths(path: Path) -> Vector:
+    """Length of each leg [m]."""
+    return np.asarray(np.hypot(*np.diff(np.array(path.waypoints()), axis=0).T))
+
+
+@before(
+    "short-leg", about="path.points", meaning="a leg is over before the vessel can be on it",
+    condition=f"a leg is shorter than {ROOM:g} acceptance radii",
+    remedy="take a smaller acceptance radius, or fewer waypoints",
+)  # fmt: skip
+def short_leg(case: Case) -> Sentences:
+    """The circles of a leg's two waypoints overlap."""
+    path = case.scenario.path
+    if not path.follows:
+        return
+    lengths, radius = _lengths(path), path.circles()[0][2]
+    for leg in np.flatnonzero(lengths < ROOM * radius):
+        yield (
+            f"leg {leg} is {lengths[leg]:.3g} m long, and the acceptance radius of both its "
+            f"waypoints is {radius:g} m, so the vessel leaves it before it is on it; take "
+            "a smaller path.acceptance, or fewer waypoints"
+        )
+
+
+@after(
+    "never-arrives", about="path", meaning="legs are left at the end",
+    condition="the last waypoint is not reached by the end of the run",
+    remedy="simulate longer, take a larger acceptance radius, or path.switch: passed",
+    needs=("leg",),
+)  # fmt: skip
+def never_arrives(scenario: Scenario, log: Recording) -> Sentences:
+    """The run ends on its way, or round a waypoint that it missed."""
+    lengths, leg = _lengths(scenario.path), int(log["leg"][-1])
+    if log.status != "finished" or leg >= len(lengths):
+        return
+    missed = log["along_leg"][-1] > lengths[leg]
+    why = "it is past the end of that leg: take a larger path.acceptance, or path.switch: passed"
+    beside = f"{abs(log['e_ct'][-1]):.3g} m beside leg {leg}"
+    yield (
+        f"{leg} of {len(lengths)} legs are done at the end, {beside}; "
+        f"{why if missed else 'simulate longer, or ask for more speed'}"
+    )

@@ -1,0 +1,61 @@
+"""Metrics of a path that is followed without a timetable: how near, how far, how long."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from podusv_cli.components.paths.legs import E_CT, LEG
+from podusv_cli.core.kernel import Vector, kernel
+from podusv_cli.metrics.metric import Accumulator, Measured, Metric, add, ratio
+
+# Positions of the gathered numbers: integrals over the run, then what is no integral.
+TIME, SQUARE, LATE, LATE_ERROR, INTEGRALS = range(5)
+LARGEST = 2 * INTEGRALS
+DONE, ARRIVED, SIZE = range(LARGEST + 1, LARGEST + 4)
+
+
+@kernel
+def watch(t: float, weight: float, s: Vector, k: Any, seen: Vector) -> None:
+    """Gather the cross-track error and the legs that are done."""
+    place = int(k.place)
+    error, leg = abs(s[place + E_CT]), s[place + LEG]
+    add(seen, INTEGRALS, TIME, weight)
+    add(seen, INTEGRALS, SQUARE, weight * error * error)
+    late = weight if t >= k.steady_from else 0.0
+    add(seen, INTEGRALS, LATE, late)
+    add(seen, INTEGRALS, LATE_ERROR, late * error)
+    seen[LARGEST] = max(seen[LARGEST], error)
+    seen[DONE] = leg / k.legs
+    if leg >= k.legs and seen[ARRIVED] == 0.0:
+        seen[ARRIVED] = t
+
+
+def _constants(layout: Measured) -> dict[str, float]:
+    legs = float(len(layout.loop.path.waypoints()) - 1)
+    return {"steady_from": layout.steady_from, "place": float(layout.plan.place), "legs": legs}
+
+
+def _rms(seen: Vector, step: float) -> float:
+    return math.sqrt(seen[SQUARE] / seen[TIME]) if seen[TIME] else math.nan
+
+
+OF = Accumulator(
+    watch, lambda layout: SIZE if layout.loop.path.follows else 0, _constants, INTEGRALS
+)
+e_ct_rms = Metric("e_ct_rms", "m", "rms of the cross-track error", OF, _rms, 1)
+e_ct_max = Metric(
+    "e_ct_max", "m", "largest cross-track error", OF, lambda seen, step: float(seen[LARGEST]), 1
+)
+e_ct_steady = Metric(
+    "e_ct_steady", "m", "mean of the cross-track error's size over the steady window", OF,
+    ratio(LATE_ERROR, LATE), 1,
+)  # fmt: skip
+path_time = Metric(
+    "path_time", "s", "time at which the last waypoint is reached", OF,
+    lambda seen, step: float(seen[ARRIVED]) or math.nan, 1, happens=True,
+)  # fmt: skip
+path_done = Metric(
+    "path_done", "1", "share of the legs that are done at the end", OF,
+    lambda seen, step: float(seen[DONE]), 1, margin=True,
+)  # fmt: skip
