@@ -70,6 +70,19 @@ def test_a_vessel_is_written_with_a_task(podusv):
     assert "is a vessel of podusv" in podusv("new", "vessel", "otter").err
 
 
+def test_a_paper_is_written_as_a_folder_that_compares_and_draws(podusv):
+    said = podusv("new", "paper", "our_own")
+    assert "next: podusv compare our_own/task.yaml" in said.out
+    done = podusv("compare", "our_own/task.yaml", "--no-figures", "--out", "r")
+    assert done.code == 0
+    verdicts = json.loads(Path("r/claims.json").read_text())["claims"]
+    assert [claim["claim"] for claim in verdicts] == ["A1", "A2", "A3"]
+    assert "cannot tell" not in {claim["verdict"] for claim in verdicts}
+    assert podusv("validate", "our_own/starts.yaml").code == 0
+    assert "5 passed" in pytest_of("our_own/test_our_own.py")
+    assert "our_own/our_own.py exists" in podusv("new", "paper", "our_own").err
+
+
 METRIC = """
 from podusv_cli.core.kernel import kernel
 from podusv_cli.metrics.metric import Accumulator, Metric, gathered

@@ -15,7 +15,7 @@ def new(
         str,
         typer.Argument(
             metavar="WHAT",
-            help="law, path, disturbance, measurement, estimator, metric, figure or vessel.",
+            help="law, path, disturbance, measurement, estimator, metric, figure, vessel or paper.",
             autocompletion=parts,
         ),
     ],
@@ -24,7 +24,7 @@ def new(
     """Write a small working law, path, metric, ... of your own, with its test and a scenario.
 
     The files NAME.py, test_NAME.py and NAME.yaml appear in the current folder, for a vessel
-    NAME.yaml and NAME_line.yaml; none is replaced.
+    NAME.yaml and NAME_line.yaml, for a paper a folder NAME; none is replaced.
     """
     from podusv_cli.workflows import new as workflow  # heavy imports only when needed
 

@@ -74,6 +74,16 @@ PARTS = {
         {"$name.yaml": "vessel.yaml", "$name_line.yaml": "vessel_task.yaml"},
         ("podusv run $name_line.yaml",),
     ),
+    "paper": Part(
+        partial(kinds_of, Scenario, "controller"),
+        {
+            "$name/$name.py": "law.py", "$name/test_$name.py": "test.py",
+            "$name/vessel.yaml": "vessel.yaml", "$name/base.yaml": "paper_base.yaml",
+            "$name/task.yaml": "paper_task.yaml", "$name/starts.yaml": "paper_starts.yaml",
+            "$name/README.md": "paper_page.md",
+        },
+        ("podusv compare $name/task.yaml", "python -m pytest $name/test_$name.py"),
+    ),
 }  # fmt: skip
 
 
@@ -99,7 +109,7 @@ def new(what: str, name: str) -> Written:
     for place in places:
         if place.exists():
             raise StorageError(f"{place} exists; take another name, or another folder")
-    storage.write_all({place: _filled(form, words).encode() for place, form in places.items()})
+    storage.write_texts(Path(), {str(at): _filled(form, words) for at, form in places.items()})
     return Written(tuple(places), tuple(one.replace("$name", name) for one in part.commands))
 
 
