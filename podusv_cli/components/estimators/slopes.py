@@ -19,15 +19,17 @@ def sign(x: float) -> float:
 def force_slopes(u: float, v: float, r: float, k: Any, s: Vector) -> None:
     """Derivatives of (surge force, sway force, yaw moment) by (u, v, r), row by row."""
     s[0] = k.X_u + 2.0 * k.X_uu * abs(u) + 3.0 * k.X_uuu * u * u
-    s[1] = k.m22 * r
-    s[2] = k.m22 * v + 2.0 * k.m23 * r
-    s[3] = -k.m11 * r
+    s[1] = k.coriolis * (k.m22 * r)
+    s[2] = k.coriolis * (k.m22 * v + 2.0 * k.m23 * r)
+    s[3] = -k.coriolis * (k.m11 * r)
     s[4] = k.Y_v + 2.0 * k.Y_vv * abs(v) + k.Y_rv * abs(r) + k.Y_vr * sign(v) * r
-    s[5] = k.Y_rv * sign(r) * v + k.Y_r + k.Y_vr * abs(v) + 2.0 * k.Y_rr * abs(r) - k.m11 * u
-    s[6] = (k.m11 - k.m22) * v - k.m23 * r
+    s[5] = k.Y_rv * sign(r) * v + k.Y_r + k.Y_vr * abs(v) + 2.0 * k.Y_rr * abs(r)
+    s[5] -= k.coriolis * (k.m11 * u)
+    s[6] = k.coriolis * ((k.m11 - k.m22) * v - k.m23 * r)
     s[7] = k.N_v + 2.0 * k.N_vv * abs(v) + k.N_rv * abs(r) + k.N_vr * sign(v) * r
-    s[7] += (k.m11 - k.m22) * u
-    s[8] = k.N_rv * sign(r) * v + k.N_r + k.N_vr * abs(v) + 2.0 * k.N_rr * abs(r) - k.m23 * u
+    s[7] += k.coriolis * ((k.m11 - k.m22) * u)
+    s[8] = k.N_rv * sign(r) * v + k.N_r + k.N_vr * abs(v) + 2.0 * k.N_rr * abs(r)
+    s[8] -= k.coriolis * (k.m23 * u)
 
 
 @kernel

@@ -1,6 +1,7 @@
 """Kinetics of a surface vessel in the horizontal plane: M nu' + C(nu) nu + D(nu) nu = tau + b.
 
-The paper's (12) is the case where only the six diagonal linear terms are not zero.
+The paper's (12) is the case where only the six diagonal linear terms are not zero. A vessel may
+have a share of C nu only (`coriolis`); with all of it, adding what lacks changes no bit.
 """
 
 from __future__ import annotations
@@ -45,6 +46,10 @@ def plant(x: Vector, tau: Vector, b: Vector, k: Any, rate: Vector) -> None:
     surge = surge_force(u, v, r, k) + tau[0] + b[0]
     sway = sway_force(u, v, r, k) + tau[1] + b[1]
     yaw = yaw_moment(u, v, r, k) + tau[2] + b[2]
+    lacks, momentum = k.coriolis - 1.0, k.m22 * v + k.m23 * r
+    surge += lacks * (momentum * r)
+    sway -= lacks * (k.m11 * u * r)
+    yaw += lacks * (k.m11 * u * v - momentum * u)
     determinant = k.m22 * k.m33 - k.m23 * k.m32
     rate[3] = surge / k.m11
     rate[4] = (k.m33 * sway - k.m23 * yaw) / determinant
