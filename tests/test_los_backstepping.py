@@ -1,0 +1,174 @@
+"""The law los_backstepping: against its linear loop, another program of it, and its paper's page."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm
+
+import podusv_cli as podusv
+
+ROOT = Path(__file__).parents[1]
+CONFIGS = ROOT / "configs" / "fossen_2003"
+RESULTS = ROOT / "results"
+PAGE = (RESULTS / "fossen_2003.md").read_text()
+C, K, LENGTH, SPEED, W = 0.75, np.diag([25.0, 10.0, 2.5]), 1.255, 0.1, 0.9
+N = np.array([[2.0, 0, 0], [0, 7.0, 0.1], [0, 0.1, 0.5]])
+POINTS = np.array(
+    [(0.372, -0.181), (-0.628, 1.320), (0.372, 2.820), (1.872, 3.320),
+     (6.872, -0.681), (8.372, -0.181), (9.372, 1.320), (8.372, 2.820)]
+)  # fmt: skip
+START = {"x": -0.69, "y": -1.25, "psi": 1.78, "u": 0.1}
+
+
+def inertia(m33: float = 2.76) -> Any:
+    return np.array([[25.8, 0, 0], [0, 33.8, 1.0115], [0, 1.0115, m33]])
+
+
+def loop(m33: float = 2.76) -> Any:
+    """The source's error dynamics, of (z1, z2)."""
+    A = np.zeros((4, 4))
+    A[0] = [-C, 0, 0, 1]
+    A[1:, 1:] = -np.linalg.solve(inertia(m33), K)
+    A[1:, 0] = -np.linalg.solve(inertia(m33), [0, 0, 1])
+    return A
+
+
+def errors(run: Any) -> Any:
+    return np.array([run["z1"], run["z_u"], run["z_v"], run["z_r"]])
+
+
+def simulate(changes: dict[str, Any] | None = None, **law: Any) -> Any:
+    own = {"controller": {"kind": "los_backstepping"} | law}
+    return podusv.simulate(CONFIGS / "base.yaml", own | (changes or {}))
+
+
+def test_poles_and_what_is_left_after_ten_seconds_from_any_start() -> None:
+    poles = np.linalg.eigvals(loop())
+    told = [-0.969, -0.835 - 0.599j, -0.835 + 0.599j, -0.295]
+    np.testing.assert_allclose(np.sort_complex(poles), np.sort_complex(told), atol=5e-4)
+    for m33 in (2.76, 2.16):
+        assert np.linalg.norm(expm(10 * loop(m33)), 2) < 0.0535
+
+
+@pytest.mark.parametrize("state", [(1.0, 0.3, 0.1, -0.2), (-2.5, -0.2, -0.1, 0.1)])
+def test_the_errors_of_a_run_are_those_of_the_linear_loop(state: tuple[float, ...]) -> None:
+    psi, u, v, r = state
+    start = {"start": START | {"psi": psi, "u": u, "v": v, "r": r}, "simulation.duration": 12.0}
+    run = simulate(start, filter_start="sight")
+    found, A = errors(run), loop()
+    late = [expm(t * A) @ found[:, 0] for t in run["time"]]
+    np.testing.assert_allclose(found.T, late, atol=1e-7)
+    assert np.linalg.norm(found[:, run["time"] == 10.0]) < 0.06 * np.linalg.norm(found[:, 0])
+
+
+def controls(s: Any, leg: int, n: float) -> tuple[Any, Any]:
+    """Force and moment, and the rates of alpha_2 and of the filter."""
+    x, y, psi, u, v, r, a_2, psi_f, r_f, q_f = s
+    north, east = POINTS[leg + 1] - POINTS[leg]
+    alpha = np.arctan2(east, north)
+    e = -(x - POINTS[leg][0]) * np.sin(alpha) + (y - POINTS[leg][1]) * np.cos(alpha)
+    sight = alpha + np.arcsin(np.clip(-e / (n * LENGTH), -1, 1))
+    off = np.angle(np.exp(1j * (sight - psi_f)))
+    z1, M = psi - psi_f, inertia()
+    a_3, a_3_rate = -C * z1 + r_f, -C * (r - r_f) + q_f
+    a_2_rate = -7.0 * a_2 + (K[1, 1] - 7.0) * (v - a_2) - M[1, 2] * a_3_rate - 0.1 * r
+    a_2_rate /= M[1, 1]
+    surge = 2.0 * u - K[0, 0] * (u - SPEED)
+    yaw = M[2, 1] * a_2_rate + M[2, 2] * a_3_rate + 0.1 * v + 0.5 * r - K[2, 2] * (r - a_3) - z1
+    return [surge, yaw], [a_2_rate, r_f, q_f, W**3 * off - 3 * W**2 * r_f - 3 * W * q_f]
+
+
+def by_hand(n: float, load: float, coriolis: float) -> tuple[Any, list[float]]:
+    """The course by another program, a leg at a time; rows of t and s, and when legs end."""
+    M, L = inertia(), np.eye(3)
+
+    def rates(t: float, s: Any, leg: int) -> Any:
+        psi, nu = s[2], s[3:6]
+        (surge, yaw), memory = controls(s, leg, n)
+        u, v, r = nu
+        turning = coriolis * np.array(
+            [-(M[1, 1] * v + M[1, 2] * r) * r, M[0, 0] * u * r,
+             (M[1, 1] * v + M[1, 2] * r) * u - M[0, 0] * u * v]
+        )  # fmt: skip
+        force = surge * L[0] + load * L[1] + yaw * L[2] - N @ nu - turning
+        way = [u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi), r]
+        return [*way, *np.linalg.solve(M, force), *memory]
+
+    s, t, ends, rows = np.array([*START.values(), 0, 0, 0, START["psi"], 0, 0]), 0.0, [], []
+    for leg in range(7):
+
+        def near(t: float, s: Any, leg: int) -> float:
+            return float(np.hypot(*(s[:2] - POINTS[leg + 1])) - LENGTH)
+
+        near.terminal = True  # type: ignore[attr-defined]
+        part = solve_ivp(rates, (t, 400), s, args=(leg,), events=near, rtol=1e-9, atol=1e-11,
+                         max_step=0.5)  # fmt: skip
+        s, t = part.y[:, -1], part.t[-1]
+        ends.append(t)
+        rows.append(np.vstack([part.t, part.y]))
+    return np.hstack(rows), ends
+
+
+@pytest.mark.parametrize(
+    ("n", "load", "share"), [(2.0, 0, 0), (1.0, 0, 0), (2.0, 0.1, 0), (2.0, 0, 1)]
+)
+def test_the_run_is_that_of_another_program(n: float, load: float, share: float) -> None:
+    changes = {"disturbance": {"kind": "step", "b_v": load}, "vessel.coriolis": float(share)}
+    run = simulate(changes, circle=n * LENGTH)
+    rows, ends = by_hand(n, load, share)
+    t, leg = run["time"], run["leg"]
+    np.testing.assert_allclose([t[leg > i][0] for i in range(7)], ends, atol=0.05)
+    until = t < ends[-1]
+    for row, name in enumerate(("x", "y", "psi", "u", "v", "r", "alpha_2", "psi_f"), 1):
+        np.testing.assert_allclose(
+            run[name][until], np.interp(t[until], rows[0], rows[row]), atol=5e-3
+        )
+
+
+def test_the_expected_numbers_of_the_course() -> None:
+    run = simulate()
+    ends = [run["time"][run["leg"] > i][0] for i in range(6)]
+    np.testing.assert_allclose(ends, [14, 32, 46, 103, 117, 131], atol=1.0)
+    assert run.metrics.e_ct_max == pytest.approx(1.48, abs=5e-3)
+    assert run.metrics.peak_tau_u == pytest.approx(0.20, abs=5e-3)
+    assert run.metrics.peak_tau_r == pytest.approx(0.48, abs=5e-3)
+    assert at_leg_four(run) == pytest.approx(0.07, abs=5e-3)
+    assert at_leg_four(simulate(circle=LENGTH)) == pytest.approx(0.001, abs=5e-4)
+    assert simulate({"start.u": 0.0}).metrics.peak_tau_u == pytest.approx(2.5)
+
+
+def at_leg_four(run: Any) -> float:
+    """|e| in the last instant of the fourth leg."""
+    return float(np.abs(run["e_ct"][run["leg"] == 3][-1]))
+
+
+def test_the_errors_of_the_law_see_neither_circle_nor_path() -> None:
+    one, other = simulate(circle=LENGTH), simulate({"path.acceptance": 1.0})
+    assert np.abs(errors(one)).max() < 1e-12
+    assert np.abs(errors(other)).max() < 1e-12
+
+
+ROWS = re.findall(r"^\| ([FG]\d+[bc]?) \| (.+?) \| (.+?) \| (.+?) \|$", PAGE, re.M)
+VERDICTS = {claim: verdict for claim, _, verdict, _ in ROWS}
+COMPARISONS = ("course", "load", "limits", "cybership2", "damping", "beside")
+
+
+@cache
+def compared(name: str) -> Any:
+    return podusv.compare(CONFIGS / f"{name}.yaml", figures=False)
+
+
+@pytest.mark.parametrize("name", COMPARISONS)
+def test_the_verdicts_on_the_page_are_those_of_the_comparison(name: str) -> None:
+    found = compared(name).claims
+    assert len(found)
+    for claim, row in found.iterrows():
+        assert VERDICTS[str(claim)] == row["verdict"], claim
