@@ -77,8 +77,9 @@ class LosBackstepping(Controller):
     k2: float = value(10.0, "kg/s", "gain of the sway velocity in alpha_2", ge=0)
     k3: float = value(2.5, "kg m2/s", "gain of the yaw rate", ge=0)
     circle: float = value(
-        2.51, "m", "radius of the circle about the ship, n of its lengths; here two of 1.255 m", gt=0
-    )
+        2.51, "m", "radius of the circle about the ship, n of its lengths (here two of 1.255 m)",
+        gt=0,
+    )  # fmt: skip
     w: float = value(0.9, "1/s", "triple pole of the filter of the line of sight", gt=0)
     sway: Literal["accounted", "left_out"] = value(
         "accounted", "", "whether alpha_2' enters the moment, as in the source, or is left out",
