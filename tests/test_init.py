@@ -91,8 +91,8 @@ def test_init_lists_every_scenario_that_is_meant_to_be_run(podusv):
     others = {name[7:-5] for name in shipped.names()} - set(points)
     layers = {name for name in others if name.startswith("bench/")}
     assert others - layers == {
-        "fossen_2003/base", "lefeber_2003/base", "paper/base", "paper/claims", "paper/ablation_laws",
-        "theory/base", "trials/base",
+        "fossen_2003/base", "lefeber_2003/base", "paper/base", "paper/claims",
+        "paper/ablation_laws", "theory/base", "trials/base",
     }  # fmt: skip
     assert list(points)[:4] == [*FIRST]
     assert list(points)[4:] == sorted(set(points) - set(FIRST))

@@ -127,11 +127,11 @@ def test_the_run_is_that_of_another_program(n: float, load: float, share: float)
     rows, ends = by_hand(n, load, share)
     t, leg = run["time"], run["leg"]
     np.testing.assert_allclose([t[leg > i][0] for i in range(7)], ends, atol=0.05)
-    until = t < ends[-1]
+    early, until = t < ends[0], t < ends[-1]  # podusv turns up to a step after the circle is met
     for row, name in enumerate(("x", "y", "psi", "u", "v", "r", "alpha_2", "psi_f"), 1):
-        np.testing.assert_allclose(
-            run[name][until], np.interp(t[until], rows[0], rows[row]), atol=5e-3
-        )
+        other = np.interp(t, rows[0], rows[row])
+        np.testing.assert_allclose(run[name][early], other[early], atol=5e-4)
+        np.testing.assert_allclose(run[name][until], other[until], atol=1e-2)
 
 
 def test_the_expected_numbers_of_the_course() -> None:

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from scipy.optimize import root
 
 from podusv_cli.components.disturbances.harmonic import Harmonic, HarmonicDisturbance
-from podusv_cli.components.vessels.plant import plant
+from podusv_cli.components.vessels.plant import plant, surge_force, sway_force, yaw_moment
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.kernel import bundle
 from podusv_cli.core.kinematics import earth_velocity, wrap
@@ -22,7 +22,7 @@ velocities = st.tuples(speed, speed, speed).map(np.array)
 DAMPING = [name for name in Vessel.model_fields if name[0] in "XYN" and "dot" not in name]
 # No two of its numbers alike, and no symmetry of the added mass: each must stand in its place.
 UNLIKE = Vessel(
-    **VESSELS["cybership2"].model_dump() | {"Y_rdot": -0.4, "N_vdot": -0.7, "x_g": 0.03}
+    **VESSELS["cybership2"].model_dump() | {"Y_rdot": -0.4, "N_vdot": -0.7, "x_g": 0.03, "coriolis": 0.3}
     | {name: -0.1 - 0.17 * place for place, name in enumerate(DAMPING)}
 )  # fmt: skip
 every_vessel = pytest.mark.parametrize("vessel", VESSELS.values(), ids=VESSELS.keys())
@@ -45,11 +45,11 @@ def inertia(p: Vessel) -> Any:
 
 
 def coriolis(p: Vessel, nu: Any) -> Any:
-    """(6)."""
+    """(6), as much of it as the vessel has."""
     u, v, r = nu
     a_31 = (p.m - p.Y_vdot) * v + (p.m * p.x_g - p.Y_rdot) * r
     a_32 = -(p.m - p.X_udot) * u
-    return np.array([[0, 0, -a_31], [0, 0, -a_32], [a_31, a_32, 0]])
+    return p.coriolis * np.array([[0, 0, -a_31], [0, 0, -a_32], [a_31, a_32, 0]])
 
 
 def damping(p: Vessel, nu: Any) -> Any:
@@ -83,6 +83,19 @@ def test_the_plant_is_the_matrix_equation(nu, load, psi):
         np.testing.assert_allclose(rate[:3], J @ nu, atol=1e-14)
         expected = np.linalg.solve(inertia(p), balance(p, nu, load))
         np.testing.assert_allclose(rate[3:], expected, rtol=1e-12, atol=1e-12)
+
+
+@given(nu=velocities, load=velocities)
+def test_with_all_coriolis_terms_the_share_changes_no_bit(nu, load):
+    """Beside the same sums without it."""
+    for p in VESSELS.values():
+        p, k = p.model_copy(update={"coriolis": 1.0}), bundle(p.constants())
+        forces = [force(*nu, k) for force in (surge_force, sway_force, yaw_moment)]
+        surge, sway, yaw = np.array(forces) + 0.5 * load + 0.5 * load
+        lever = k.m22 * k.m33 - k.m23 * k.m32
+        told = [surge / k.m11, (k.m33 * sway - k.m23 * yaw) / lever]
+        told.append((k.m22 * yaw - k.m32 * sway) / lever)
+        np.testing.assert_array_equal(accelerations(p, nu, load), told)
 
 
 @given(nu=velocities, tau=st.tuples(speed, speed), b=velocities)
