@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from podusv_cli.components.vessels.plant import surge_force, sway_force, yaw_moment
+from podusv_cli.components.vessels.plant import lacking, surge_force, sway_force, yaw_moment
 from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.scenario.model import Scenario
 
@@ -71,9 +71,11 @@ def reference(scenario: Scenario) -> Reference:
     nu = np.array([(*balance(U, r), r) for U, r in zip(speed.tolist(), turn.tolist(), strict=True)])
     held = np.where(np.isnan(nu), np.column_stack([speed, 0.0 * speed, turn]), nu)
     k = bundle(scenario.vessel.constants())
-    demand = np.array(
-        [(-surge_force(u, v, r, k), -yaw_moment(u, v, r, k)) for u, v, r in held.tolist()]
+    less = np.array([lacking(u, v, r, k) for u, v, r in held.tolist()])
+    demand = -np.array(
+        [(surge_force(u, v, r, k), yaw_moment(u, v, r, k)) for u, v, r in held.tolist()]
     )
+    demand -= less[:, [0, 2]]
     demand[:, 0] += scenario.vessel.m11 * along
     return Reference(time, speed, nu, load, demand - load[:, [0, 2]])
 
@@ -106,7 +108,9 @@ def _balance(
     def steady(U: float, r: float) -> tuple[float, float]:
         def excess(v: float) -> float:
             u = math.sqrt(max(U * U - v * v, 0.0))
-            return sway_force(u, v, r, k) + b_v - share * (yaw_moment(u, v, r, k) + b_r)
+            _, across, turning = lacking(u, v, r, k)
+            moment = yaw_moment(u, v, r, k) + turning + b_r
+            return sway_force(u, v, r, k) + across + b_v - share * moment
 
         v = root(excess, -U, U)
         return math.sqrt(max(U * U - v * v, 0.0)), v

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from podusv_cli.components.controllers.velocity_loop import AdaptedBound, Axis, Cause, Loop
-from podusv_cli.components.vessels.plant import surge_force, yaw_moment
+from podusv_cli.components.vessels.plant import lacking, surge_force, yaw_moment
 from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.scenario.model import Scenario
 
@@ -111,6 +111,7 @@ def axes(scenario: Scenario, nu: Vector) -> tuple[Axis, Axis]:
     k, (u, v, r), small = bundle(scenario.vessel.constants()), nu.tolist(), 1e-4
     surge = surge_force(u - small, v, r, k) - surge_force(u + small, v, r, k)
     yaw = yaw_moment(u, v, r - small, k) - yaw_moment(u, v, r + small, k)
+    yaw += lacking(u, v, r - small, k)[2] - lacking(u, v, r + small, k)[2]
     vessel, nominal = scenario.vessel, scenario.nominal
     return (
         Axis("surge", vessel.m11, nominal.m11, surge / (2 * small * vessel.m11)),

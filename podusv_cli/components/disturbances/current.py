@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from podusv_cli.components.disturbances.base import FLOW, Disturbance
-from podusv_cli.components.vessels.plant import surge_force, sway_force, yaw_moment
+from podusv_cli.components.vessels.plant import lacking, surge_force, sway_force, yaw_moment
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import value
 from podusv_cli.core.elementary import cos_sin
@@ -93,4 +93,8 @@ class Current(Disturbance):
         b[0] = surge_force(u - u_c, v - v_c, r, k) - surge_force(u, v, r, k) + k.m11 * u_c_dot
         b[1] = sway_force(u - u_c, v - v_c, r, k) - sway_force(u, v, r, k) + k.m22 * v_c_dot
         b[2] = yaw_moment(u - u_c, v - v_c, r, k) - yaw_moment(u, v, r, k) + k.m32 * v_c_dot
+        past, still = lacking(u - u_c, v - v_c, r, k), lacking(u, v, r, k)
+        b[0] += past[0] - still[0]
+        b[1] += past[1] - still[1]
+        b[2] += past[2] - still[2]
         b[3], b[4] = V_c, beta_c

@@ -38,7 +38,13 @@ from pydantic import model_validator
 
 from podusv_cli.components.estimators.base import ESTIMATE, LOADS, POSE_ALONE, Estimator
 from podusv_cli.components.measurements.base import FRESH, VALUE
-from podusv_cli.components.vessels.plant import plant, surge_force, sway_force, yaw_moment
+from podusv_cli.components.vessels.plant import (
+    lacking,
+    plant,
+    surge_force,
+    sway_force,
+    yaw_moment,
+)
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import value
 from podusv_cli.core.elementary import cos_sin
@@ -79,9 +85,10 @@ def axis(i: int, drift: float, e: float, gain: float, state: Vector, k: Any, rat
 def simplified(state: Vector, k: Any, b: Vector) -> None:
     """Add to the load what leaves linear damping alone of the nominal vessel's forces."""
     u, v, r = state[3], state[4], state[5]
-    b[0] += k.X_u * u - surge_force(u, v, r, k)
-    b[1] += k.Y_v * v + k.Y_r * r - sway_force(u, v, r, k)
-    b[2] += k.N_v * v + k.N_r * r - yaw_moment(u, v, r, k)
+    less = lacking(u, v, r, k)
+    b[0] += k.X_u * u - surge_force(u, v, r, k) - less[0]
+    b[1] += k.Y_v * v + k.Y_r * r - sway_force(u, v, r, k) - less[1]
+    b[2] += k.N_v * v + k.N_r * r - yaw_moment(u, v, r, k) - less[2]
 
 
 class PassiveObserver(Estimator):

@@ -36,6 +36,14 @@ def yaw_moment(u: float, v: float, r: float, k: Any) -> float:
 
 
 @kernel
+def lacking(u: float, v: float, r: float, k: Any) -> tuple[float, float, float]:
+    """What has to be added to these forces [N, N, N m] for a vessel with a share of C nu only."""
+    less, momentum = k.coriolis - 1.0, k.m22 * v + k.m23 * r
+    yaw = k.m11 * u * v - momentum * u
+    return less * (momentum * r), -less * (k.m11 * u * r), less * yaw
+
+
+@kernel
 def plant(x: Vector, tau: Vector, b: Vector, k: Any, rate: Vector) -> None:
     """Rate of the state (x, y, psi, u, v, r) under forces tau and b, each (surge, sway, yaw).
 
@@ -43,13 +51,10 @@ def plant(x: Vector, tau: Vector, b: Vector, k: Any, rate: Vector) -> None:
     """
     earth_velocity(x, rate)
     u, v, r = x[3], x[4], x[5]
-    surge = surge_force(u, v, r, k) + tau[0] + b[0]
-    sway = sway_force(u, v, r, k) + tau[1] + b[1]
-    yaw = yaw_moment(u, v, r, k) + tau[2] + b[2]
-    lacks, momentum = k.coriolis - 1.0, k.m22 * v + k.m23 * r
-    surge += lacks * (momentum * r)
-    sway -= lacks * (k.m11 * u * r)
-    yaw += lacks * (k.m11 * u * v - momentum * u)
+    less = lacking(u, v, r, k)
+    surge = surge_force(u, v, r, k) + tau[0] + b[0] + less[0]
+    sway = sway_force(u, v, r, k) + tau[1] + b[1] + less[1]
+    yaw = yaw_moment(u, v, r, k) + tau[2] + b[2] + less[2]
     determinant = k.m22 * k.m33 - k.m23 * k.m32
     rate[3] = surge / k.m11
     rate[4] = (k.m33 * sway - k.m23 * yaw) / determinant

@@ -58,7 +58,7 @@ class Vessel(Component):
     N_rr: float = _damping("kg m2", "yaw, times |r|r")
     coriolis: float = value(
         1.0, "", "share of the Coriolis and centripetal terms in the motion, 0 for a model without "
-        "any; laws, a current and `passive_observer` count on all of them", ge=0, le=1,
+        "any; laws count on all of them", ge=0, le=1,
     )  # fmt: skip
     windage: Windage | None = value(
         None, "", "what the wind acts on; without it the vessel is in no wind"
