@@ -28,6 +28,8 @@ SEAS := exact sensors sensors_alone current state_3 state_5 state_6 rare untold 
 STUDIES := hull_and_sea unknown_dynamics rivals rivals_earth rivals_cybership2 sea_state_4 sea_state_6 sea_untold
 SEARCHES := hull network
 JUDGES := fresh cybership2 otter
+LEFEBER := circle line port load damping
+FOSSEN := course cybership2 damping load limits beside
 COMPARISONS := printed_compare figures_compare figures_compare_standoff corrected_compare
 
 .DEFAULT_GOAL := help
@@ -37,29 +39,32 @@ help: ## what can be made
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
 
 # Exit code 4: diverged, as it must. Exit code 3: some of the runs diverged; in figures_compare they must.
-reproduce: $(VENV)/run.done ## the paper, claim by claim, into results/.runs/paper/
-	@echo "$(words printed_from_zero $(COMPARISONS)) steps, two to eight minutes on two cores:"
-	@rm -f results/paper.log
-	@$(STEP) run paper printed_from_zero 4
+reproduce: $(VENV)/run.done ## three papers, claim by claim, into results/.runs/
+	@echo "$(words printed_from_zero $(COMPARISONS) $(LEFEBER) $(FOSSEN)) steps, two to eight minutes on two cores:"
+	@rm -f results/mu_2017.log results/lefeber_2003.log results/fossen_2003.log
+	@$(STEP) run mu_2017 printed_from_zero 4
 	@for name in $(COMPARISONS); do \
-	    $(STEP) compare paper $$name $$(case $$name in figures_compare) echo 3;; *) echo 0;; esac) || exit 1; \
+	    $(STEP) compare mu_2017 $$name $$(case $$name in figures_compare) echo 3;; *) echo 0;; esac) || exit 1; \
 	done
+	@for name in $(LEFEBER); do $(STEP) compare lefeber_2003 $$name 0 || exit 1; done
+	@for name in $(FOSSEN); do $(STEP) compare fossen_2003 $$name 0 || exit 1; done
 	@$(BIN)/python examples/reproduce/verdicts.py
-	@echo "what was found: results/README.md; every table, claim and figure: results/.runs/paper/*/report.html"
+	@$(BIN)/python examples/reproduce/papers.py mu_2017/corrected_compare lefeber_2003 fossen_2003
+	@echo "what was found: results/README.md, lefeber_2003.md, fossen_2003.md; every table, claim and figure: results/.runs/*/*/report.html"
 
 # In F and S the law without its network diverges, as it must: exit code 3.
 claim: $(VENV)/run.done ## the paper's central claim: parts off, wrong vessels, sampling
 	@echo "$(words $(ABLATIONS) $(TABLES)) steps, about ten minutes on two cores:"
-	@rm -f results/paper.log
+	@rm -f results/mu_2017.log
 	@for name in $(ABLATIONS); do \
-	    $(STEP) compare paper $$name $$(case $$name in ablation_figures|ablation_standoff|ablation_gains_figures) echo 3;; *) echo 0;; esac) || exit 1; \
+	    $(STEP) compare mu_2017 $$name $$(case $$name in ablation_figures|ablation_standoff|ablation_gains_figures) echo 3;; *) echo 0;; esac) || exit 1; \
 	done
 	@for table in $(TABLES); do \
 	    echo "  $${table#*:}" && \
 	    $(BIN)/python examples/reproduce/claim.py $${table%:*} > results/.table && \
-	    mv results/.table results/paper/$${table#*:}.csv || exit 1; \
+	    mv results/.table results/mu_2017/$${table#*:}.csv || exit 1; \
 	done
-	@$(BIN)/python examples/reproduce/network_line.py results/paper/networks.csv results/paper/networks.png
+	@$(BIN)/python examples/reproduce/network_line.py results/mu_2017/networks.csv results/mu_2017/networks.png
 	@echo "what was found: results/claim.md"
 
 pod: $(VENV)/run.done ## the laws behind a pod, into results/.runs/pod/

@@ -1,4 +1,4 @@
-"""What is measured: the closed loop of configs/paper/corrected.yaml with every law and network."""
+"""What is measured: the loop of configs/mu_2017/corrected.yaml with every law and network."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from podusv_cli.scenario.load import load
 from podusv_cli.scenario.model import Scenario
 
 ROOT = Path(__file__).resolve().parent.parent
-SCENARIO = ROOT / "configs" / "paper" / "corrected.yaml"
+SCENARIO = ROOT / "configs" / "mu_2017" / "corrected.yaml"
 RIVALS = ROOT / "configs" / "laws" / "rivals.yaml"  # all laws on the same task
 
 LAWS = ("adaptive_neural", "dsc", "backstepping", "pid")

@@ -1,4 +1,4 @@
-/* The closed loop of configs/paper/corrected.yaml as one plain C program.
+/* The closed loop of configs/mu_2017/corrected.yaml as one plain C program.
  *
  * What podusv is measured against, written the way a control engineer writes such a program by
  * hand: the scenario is fixed, its numbers are constants, the Gaussians of the network are summed

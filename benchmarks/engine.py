@@ -119,7 +119,7 @@ def seas(rounds: int = ROUNDS) -> dict[str, list[float]]:
         **{f"sea, sensors, {kind}": sea | sensors | {"estimator": {"kind": kind}}
            for kind in ("low_pass", "passive_observer", "ekf")},
     }  # fmt: skip
-    base = load(ROOT / "configs" / "paper" / "corrected.yaml").scenario
+    base = load(ROOT / "configs" / "mu_2017" / "corrected.yaml").scenario
     loops = {label: _changed(base, new).closed_loop() for label, new in told.items()}
     over = grid(log_every=10)
     timers = {
@@ -135,7 +135,7 @@ def _changed(scenario: Scenario, new: dict[str, Any]) -> Scenario:
 
 
 def _behind(name: str) -> ClosedLoop:
-    folder = "paper" if name == "corrected" else "pod"
+    folder = "mu_2017" if name == "corrected" else "pod"
     scenario = load(ROOT / "configs" / folder / f"{name}.yaml").scenario
     return replace(USUAL.loop(), actuator=scenario.actuator)
 

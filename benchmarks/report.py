@@ -14,9 +14,9 @@ Results = Mapping[str, Any]
 HEADING = """\
 # How fast podusv is
 
-Made by `make bench`. One run is the closed loop of `configs/paper/corrected.yaml`: 31 000 steps of
-RK4, every step logged. Times are medians with quartiles in brackets; what is compared is timed in
-turns, and ratios are medians of the ratios of one turn each. Below 1 podusv is the faster one.
+Made by `make bench`. One run is the closed loop of `configs/mu_2017/corrected.yaml`: 31 000 steps
+of RK4, every step logged. Times are medians with quartiles in brackets; what is compared is timed
+in turns, and ratios are medians of the ratios of one turn each. Below 1 podusv is the faster one.
 The engine, the C programs and the growth of a step are timed in processor time, which leaves out
 what else the machine does; all other times are those of the clock on the wall.
 """

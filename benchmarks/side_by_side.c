@@ -1,4 +1,4 @@
-/* Eight runs of configs/paper/corrected.yaml side by side, as structure of arrays in plain C.
+/* Eight runs of configs/mu_2017/corrected.yaml side by side, as structure of arrays in plain C.
  *
  * What `simulate_many` is measured against: adaptive_neural with 27 nodes, another scale of the
  * disturbance in every run. Every loop over lanes is straight arithmetic, which the compiler makes

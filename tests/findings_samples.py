@@ -14,7 +14,7 @@ from podusv_cli.scenario.load import load
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.workflows import execute
 
-CONFIGS = PACKAGE.parent / "configs" / "paper"
+CONFIGS = PACKAGE.parent / "configs" / "mu_2017"
 PLAIN = ("path={kind: line}", "actuator={kind: ideal}", "simulation.duration=20")
 # No adaptation, calm water: the bare linear loops.
 BARE = (

@@ -179,7 +179,7 @@ def test_the_documented_monte_carlo_runs(capsys: pytest.CaptureFixture[str]) -> 
     text = (ROOT / "docs" / "performance.md").read_text()
     (code,) = re.findall(r"```python\n(.*?simulate_many.*?)```", text, re.DOTALL)
     few = code.replace("(1000, 6)", "(4, 6)").replace('"configs/', f'"{ROOT}/configs/')
-    assert few.count("(4, 6)") == few.count(f"{ROOT}/configs/paper") == 1
+    assert few.count("(4, 6)") == few.count(f"{ROOT}/configs/mu_2017") == 1
     exec(few, {})  # noqa: S102
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "4 of 4 finished"

@@ -366,7 +366,7 @@ try:
 finally:
     print(*sys.modules, file=sys.stderr)
 """
-    scenario = PACKAGE.parent / "configs/paper/corrected.yaml"
+    scenario = PACKAGE.parent / "configs/mu_2017/corrected.yaml"
 
     def modules(out: str) -> set[str]:
         words = ["run", str(scenario), "--set", "simulation.duration=1.0", "--no-figures"]

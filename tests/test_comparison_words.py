@@ -15,7 +15,7 @@ from podusv_cli.comparison.expressions import Evaluation, parse, with_labels
 from podusv_cli.scenario.load import load
 from podusv_cli.scenario.sections import Claim
 
-CORRECTED = Path(__file__).parent.parent / "configs/paper/corrected.yaml"
+CORRECTED = Path(__file__).parent.parent / "configs/mu_2017/corrected.yaml"
 
 
 class Planted:

@@ -117,8 +117,8 @@ def test_the_wheel_alone_starts_from_an_empty_folder(python: Path, empty: Path) 
     names = "from podusv_cli.scenario import shipped; print(*shipped.names())"
     assert said(python, "-c", names, cwd=empty).split() == list(shipped.names())
     assert podusv("") == f"{FIRST_STEPS}\n"
-    assert "\npaper/corrected\n" in podusv("init")
-    assert podusv("init paper/corrected").endswith("next: podusv run corrected.yaml\n")
+    assert "\nmu_2017/corrected\n" in podusv("init")
+    assert podusv("init mu_2017/corrected").endswith("next: podusv run corrected.yaml\n")
     short = "--set simulation.duration=2"
     assert "adaptive_neural finished: " in podusv(f"run corrected.yaml {short}")
     assert "report: " in podusv(f"compare podusv:theory/sign.yaml {short}")

@@ -171,7 +171,7 @@ def test_every_option_of_the_errata_exists(
         assert podusv("explain", name).code == 0, name
 
 
-FOLDERS = r"(?:podusv_cli|tests|configs|docs|benchmarks|results/pod|results/paper|examples)"
+FOLDERS = r"(?:podusv_cli|tests|configs|docs|benchmarks|results/pod|results/mu_2017|examples)"
 
 
 def missing(text: str) -> Iterator[str]:

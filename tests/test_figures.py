@@ -301,7 +301,7 @@ def test_the_periodogram_has_the_power_of_the_signal():
 
 
 def test_a_claim_that_names_a_peak_is_found_and_drawn_in_the_panel_of_the_demand():
-    loaded = load(CONFIGS / "paper/figures_compare_standoff.yaml")
+    loaded = load(CONFIGS / "mu_2017/figures_compare_standoff.yaml")
     found = peaks(parse_claims(loaded))
     assert found == {"tau_u_cmd": 300.0, "tau_r_cmd": 1000.0}
     runs = dressed([("a", recording(), scenario())], found)

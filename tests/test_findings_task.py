@@ -270,7 +270,7 @@ def test_a_pod_that_turns_too_little_drives_the_hull_ahead_and_that_is_told():
 
 # --- gain conditions in words
 
-CONFIGS = Path(__file__).parent.parent / "configs/paper"
+CONFIGS = Path(__file__).parent.parent / "configs/mu_2017"
 
 
 def said(name: str, *sets: str) -> list[str]:

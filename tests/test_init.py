@@ -14,7 +14,7 @@ from podusv_cli.scenario.schema import schema_text
 from podusv_cli.workflows.init import FIRST, SCHEMA, starting_points
 
 CONFIGS = ROOT / "configs"
-TELLING = ("own_vessel", "paper/figures_compare", "pod/vessels/otter", "studies/hull_and_sea")
+TELLING = ("own_vessel", "mu_2017/figures_compare", "pod/vessels/otter", "studies/hull_and_sea")
 
 
 @pytest.fixture
@@ -37,17 +37,17 @@ def test_a_scenario_extends_a_shipped_one_from_anywhere(podusv):
     write("a.yaml", "extends: podusv:pod/kept.yaml\nname: kept\n")
     here, there = load("a.yaml"), load(CONFIGS / "pod/kept.yaml")
     assert here.scenario == there.scenario
-    assert here.origins["controller.k_ze"].startswith("podusv:paper/base.yaml:")
-    assert podusv("validate", "podusv:paper/corrected.yaml").out.startswith(
-        "podusv:paper/corrected.yaml: ok (corrected, adaptive_neural, "
+    assert here.origins["controller.k_ze"].startswith("podusv:mu_2017/base.yaml:")
+    assert podusv("validate", "podusv:mu_2017/corrected.yaml").out.startswith(
+        "podusv:mu_2017/corrected.yaml: ok (corrected, adaptive_neural, "
     )
 
 
 @pytest.mark.parametrize(
     ("name", "hint"),
     [
-        ("podusv:paper/corected.yaml", "; did you mean 'podusv:paper/corrected.yaml'?"),
-        ("podusv:../pyproject.toml", "; did you mean 'podusv:paper/corrected.yaml'?"),
+        ("podusv:mu_2017/corected.yaml", "; did you mean 'podusv:mu_2017/corrected.yaml'?"),
+        ("podusv:../pyproject.toml", "; did you mean 'podusv:pod/kept.yaml'?"),
         ("podusv:/etc/passwd/0123456789", ""),
         ("podusv:", ""),
     ],
@@ -61,7 +61,9 @@ def test_a_name_that_podusv_does_not_have_is_a_line(podusv, name, hint):
 
 
 def test_shipped_files_name_each_other_relative_to_themselves():
-    assert shipped.relative_to("podusv:pod/kept.yaml", "../paper/x.yaml") == "podusv:paper/x.yaml"
+    assert (
+        shipped.relative_to("podusv:pod/kept.yaml", "../mu_2017/x.yaml") == "podusv:mu_2017/x.yaml"
+    )
     assert shipped.relative_to("podusv:own.yaml", "x.yaml") == "podusv:x.yaml"
     assert shipped.relative_to("podusv:own.yaml", "podusv:b/x.yaml") == "podusv:b/x.yaml"
     assert shipped.relative_to("mine/own.yaml", "x.yaml") == "mine/x.yaml"
@@ -86,18 +88,27 @@ def test_bare_podusv_says_what_to_do_first_in_about_eight_lines(podusv):
     assert len(said.out.splitlines()) <= 9
 
 
+def test_a_folder_s_old_name_still_names_its_scenarios(podusv):
+    old, new = (
+        load(f"podusv:{name}/corrected_compare.yaml").scenario for name in ("paper", "mu_2017")
+    )
+    assert values(old) == values(new)
+    assert podusv("validate", "podusv:paper/corrected.yaml").code == 0
+    assert "did you mean" in podusv("validate", "podusv:paper/corected.yaml").err
+
+
 def test_init_lists_every_scenario_that_is_meant_to_be_run(podusv):
     points = starting_points()
     others = {name[7:-5] for name in shipped.names()} - set(points)
     layers = {name for name in others if name.startswith("bench/")}
     assert others - layers == {
-        "fossen_2003/base", "lefeber_2003/base", "paper/base", "paper/claims",
-        "paper/ablation_laws", "theory/base", "trials/base",
+        "fossen_2003/base", "lefeber_2003/base", "mu_2017/base", "mu_2017/claims",
+        "mu_2017/ablation_laws", "theory/base", "trials/base",
     }  # fmt: skip
     assert list(points)[:4] == [*FIRST]
     assert list(points)[4:] == sorted(set(points) - set(FIRST))
     first, rest = podusv("init").out.split("\n", 1)
-    assert first.startswith("to begin with: paper/corrected (a run), own_vessel (a hull of your")
+    assert first.startswith("to begin with: mu_2017/corrected (a run), own_vessel (a hull of your")
     assert all(f" {name} (" in first for name in FIRST)
     assert " ".join(rest.split()) == " ".join(
         [*(f"{name} {text}" for name, text in points.items()), "copy one to edit: podusv init NAME"]
@@ -127,30 +138,30 @@ def test_a_copy_anywhere_is_the_same_scenario(podusv, name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["own_vessel", "paper/printed", "pod/vessels/otter"])
+@pytest.mark.parametrize("name", ["own_vessel", "mu_2017/printed", "pod/vessels/otter"])
 def test_a_copy_is_called_as_the_file(podusv, name):
     assert podusv("init", name).code == 0
     assert {path.name for path in Path().iterdir()} == {f"{name.split('/')[-1]}.yaml", SCHEMA}
 
 
 def test_init_replaces_nothing(podusv):
-    assert podusv("init", "paper/corrected").code == 0
+    assert podusv("init", "mu_2017/corrected").code == 0
     write("corrected.yaml", "mine")
-    said = podusv("init", "podusv:paper/corrected.yaml")
+    said = podusv("init", "podusv:mu_2017/corrected.yaml")
     assert said == (5, "", "corrected.yaml exists; name another file with --out\n")
     assert Path("corrected.yaml").read_text() == "mine"
-    assert podusv("init", "paper/printed").code == 0  # beside the schema that is there
+    assert podusv("init", "mu_2017/printed").code == 0  # beside the schema that is there
     write(SCHEMA, "{}")
-    said = podusv("init", "paper/figures")
+    said = podusv("init", "mu_2017/figures")
     assert said == (5, "", f"{SCHEMA} exists and is no schema of podusv; move it, or use --out\n")
     assert not Path("figures.yaml").exists()
 
 
 def test_an_unknown_starting_point_is_a_line_with_those_that_there_are(podusv):
-    said = podusv("init", "paper/corected")
+    said = podusv("init", "mu_2017/corected")
     assert said.code == 2
     assert said.err.startswith(
-        "unknown starting point 'paper/corected'; did you mean 'paper/corrected'? (allowed: paper"
+        "unknown starting point 'mu_2017/corected'; did you mean 'mu_2017/corrected'? (allowed: "
     )
     assert re.search(r"(, \S+){4} and \d+ more, see podusv init\)$", said.err)
     assert said.err.count("\n") == 1
@@ -158,11 +169,11 @@ def test_an_unknown_starting_point_is_a_line_with_those_that_there_are(podusv):
 
 
 def test_the_copy_is_edited_and_resolved_like_any_scenario(podusv):
-    podusv("init", "paper/corrected")
+    podusv("init", "mu_2017/corrected")
     text = Path("corrected.yaml").read_text()
     write("corrected.yaml", text.replace("surge_limit: 8.0", "surge_limit: 9.0"))
     changed, base = (
         values(load("corrected.yaml").scenario),
-        values(load("podusv:paper/corrected.yaml").scenario),
+        values(load("podusv:mu_2017/corrected.yaml").scenario),
     )
     assert {key for key in base if changed[key] != base[key]} == {"actuator.surge_limit"}

@@ -181,7 +181,7 @@ def test_a_signal_is_an_array_and_an_unknown_one_is_told(kept):
 
 
 def test_a_run_that_diverges_is_a_run_and_its_warnings_are_there():
-    run = podusv.simulate("podusv:paper/printed_from_zero.yaml", {"simulation.duration": 1.0})
+    run = podusv.simulate("podusv:mu_2017/printed_from_zero.yaml", {"simulation.duration": 1.0})
     assert run.status == "diverged"
     assert run.message.startswith("diverged at t = 0.08 s")
     kept = np.trapezoid(run["z_e"], run["time"])  # up to the last row that was computed

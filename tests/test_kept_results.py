@@ -44,7 +44,7 @@ def test_what_is_committed_of_a_comparison_comes_out_the_same_every_time(
 
 
 def test_of_a_comparison_only_what_cannot_be_derived_is_committed():
-    listed = ["git", "ls-files", "results/paper", "results/pod", "results/sea"]
+    listed = ["git", "ls-files", "results/mu_2017", "results/pod", "results/sea"]
     told = subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=True).stdout
     names = {Path(path).name for path in told.splitlines() if path.count("/") > 2}
     assert names <= set(map(os.path.basename, KEPT))
@@ -59,8 +59,8 @@ def test_git_tracks_nothing_that_it_would_not_keep():
 @pytest.fixture
 def checkout(tmp_path):
     """A checkout with a committed result and a stub of podusv."""
-    (tmp_path / "results/paper/one").mkdir(parents=True)
-    (tmp_path / "results/paper/one/comparison.csv").write_text("old\n")
+    (tmp_path / "results/mu_2017/one").mkdir(parents=True)
+    (tmp_path / "results/mu_2017/one/comparison.csv").write_text("old\n")
     shutil.copy(ROOT / "examples/reproduce/step.sh", tmp_path / "step.sh")
     (tmp_path / "podusv").write_text(STUB)
     (tmp_path / "podusv").chmod(0o755)
@@ -69,7 +69,7 @@ def checkout(tmp_path):
 
 def step(checkout: Path, name: str, code: int) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        ["./step.sh", "compare", "paper", name, str(code)], cwd=checkout, text=True,
+        ["./step.sh", "compare", "mu_2017", name, str(code)], cwd=checkout, text=True,
         capture_output=True, env={**os.environ, "PODUSV": "./podusv"},
     )  # fmt: skip
 
@@ -78,7 +78,7 @@ def test_a_step_is_a_line_with_its_time_and_the_rest_is_in_a_file(checkout):
     done = step(checkout, "one", 0)
     assert (done.returncode, done.stderr) == (0, "")
     assert re.fullmatch(r"  one +\d+ s  done\n", done.stdout)
-    assert "2.118e+93" in (checkout / "results/paper.log").read_text()
+    assert "2.118e+93" in (checkout / "results/mu_2017.log").read_text()
     diverged = step(checkout, "figures", 3)
     assert re.fullmatch(r"  figures +\d+ s  done, some runs .* as expected\n", diverged.stdout)
 
@@ -88,11 +88,11 @@ def test_a_step_that_ends_otherwise_stops_and_shows_why(checkout):
     assert done.returncode == 1
     assert "exit code 3 in place of 0" in done.stdout
     assert "2.118e+93" in done.stdout
-    assert (checkout / "results/paper/one/comparison.csv").read_text() == "old\n"
+    assert (checkout / "results/mu_2017/one/comparison.csv").read_text() == "old\n"
 
 
 def test_a_step_replaces_committed_files_and_adds_none(checkout):
-    place = checkout / "results/paper/one"
+    place = checkout / "results/mu_2017/one"
     (place / "mine.txt").write_text("mine\n")
     for _ in range(2):
         assert step(checkout, "one", 0).returncode == 0

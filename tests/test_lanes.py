@@ -32,7 +32,7 @@ ROOT = Path(__file__).resolve().parent.parent
 SLOW = [pytest.param(law, marks=pytest.mark.slow) for law in ("dsc", "full_backstepping")]
 GRID = TimeGrid(0.01, 400)
 COUNT = 11  # a whole bundle, and one with lanes left over
-SCENARIO = load(ROOT / "configs" / "paper" / "corrected.yaml").scenario
+SCENARIO = load(ROOT / "configs" / "mu_2017" / "corrected.yaml").scenario
 
 
 STUDY = """

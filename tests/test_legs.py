@@ -24,7 +24,7 @@ SENSED: dict[str, Any] = {"measurement": {"kind": "sensors"}, "estimator": {"kin
 
 
 def run(law: str = "velocity_vector", **changes: Any) -> Any:
-    source = "podusv:paper/corrected.yaml"
+    source = "podusv:mu_2017/corrected.yaml"
     return package.simulate(source, SCENARIO | {"controller": {"kind": law}} | changes)
 
 
@@ -72,8 +72,8 @@ def test_laws_see_the_point_beside_them_or_their_standoff_ahead() -> None:
 
 def test_there_is_no_distance_to_a_target_anywhere(tmp_path: Any) -> None:
     log = package.run(
-        "podusv:paper/corrected.yaml", SCENARIO | {"simulation.duration": 20.0}, out=tmp_path / "r",
-        figures=False,
+        "podusv:mu_2017/corrected.yaml", SCENARIO | {"simulation.duration": 20.0},
+        out=tmp_path / "r", figures=False,
     )  # fmt: skip
     assert not {"z_e", "x_e"} & set(log.log)
     about = {"iae", "z_e_steady", "settling_time", "e_steady", "cross_track_rms"}
@@ -81,14 +81,14 @@ def test_there_is_no_distance_to_a_target_anywhere(tmp_path: Any) -> None:
     assert {"e_ct_rms", "e_ct_max", "path_done"} <= set(log.metrics.index)
     claim = {"A": {"says": "a", "source": "ours", "expect": "max(los_pid.z_e) < 1"}}
     laws = {"controllers": {"los_pid": {"kind": "los_pid"}}, "claims": claim}
-    found = package.compare("podusv:paper/corrected.yaml", SCENARIO | laws, figures=False)
+    found = package.compare("podusv:mu_2017/corrected.yaml", SCENARIO | laws, figures=False)
     assert found.claims.loc["A", "verdict"] == "cannot tell"
     assert "z_e" not in " ".join(map(str, found.table.index))
 
 
 def test_the_stability_monitor_is_off_where_the_law_sees_another_target() -> None:
     square = {"kind": "waypoints", "legs": "straight", "points": POINTS}
-    source, short = "podusv:paper/corrected.yaml", {"simulation.duration": 2.0}
+    source, short = "podusv:mu_2017/corrected.yaml", {"simulation.duration": 2.0}
     logs = [package.simulate(source, short | {"path": p}) for p in (square, square | {"fillet": 2})]
     assert ["V" in one.log for one in (*logs, run("adaptive_neural"))] == [True, False, False]
 
@@ -139,7 +139,9 @@ def test_sampled_control_follows_and_plain_python_has_the_same_bits() -> None:
 @pytest.mark.slow
 def test_runs_side_by_side_have_the_bits_that_they_have_alone() -> None:
     radii = {"path.acceptance": np.linspace(1.0, 4.0, 9)}
-    scenario = package.load("podusv:paper/corrected.yaml", SCENARIO | {"simulation.duration": 24.0})
+    scenario = package.load(
+        "podusv:mu_2017/corrected.yaml", SCENARIO | {"simulation.duration": 24.0}
+    )
     one, other = (
         package.simulate_many(scenario, radii, side_by_side=lanes) for lanes in (True, False)
     )

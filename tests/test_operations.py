@@ -44,7 +44,7 @@ def test_every_operation_is_counted_once_and_the_numbers_stay():
 
 
 def counts(*keys):
-    scenario = load(CONFIGS / "paper/corrected_compare.yaml", ["simulation.duration=1", *keys])
+    scenario = load(CONFIGS / "mu_2017/corrected_compare.yaml", ["simulation.duration=1", *keys])
     found = {}
     for name, one in scenario.scenario.singles().items():
         loop = one.closed_loop()

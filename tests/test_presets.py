@@ -23,7 +23,7 @@ PRESETS = ("printed", "printed_from_zero", "figures", "corrected")
 def runs(tmp_path_factory):
     root = tmp_path_factory.mktemp("runs")
     request = {name: running.Request(out=root / name, figures=False) for name in PRESETS}
-    return {name: running.run(CONFIGS / f"paper/{name}.yaml", request[name]) for name in PRESETS}
+    return {name: running.run(CONFIGS / f"mu_2017/{name}.yaml", request[name]) for name in PRESETS}
 
 
 def test_figures_recovers_the_papers_peaks(runs):
@@ -72,7 +72,7 @@ def test_printed_from_zero_diverges_at_once_and_is_kept(runs):
 def test_the_printed_bound_does_not_recover_the_peaks(tmp_path):
     adaptive = ("controller.B_u=adaptive", "controller.B_r=adaptive", "simulation.duration=1")
     request = running.Request(adaptive, tmp_path / "run", figures=False)
-    assert running.run(CONFIGS / "paper/figures.yaml", request).status == "diverged"
+    assert running.run(CONFIGS / "mu_2017/figures.yaml", request).status == "diverged"
 
 
 def test_a_run_folder_has_what_is_promised(runs):
@@ -82,7 +82,9 @@ def test_a_run_folder_has_what_is_promised(runs):
         "provenance.json", "manifest.json",
     }  # fmt: skip
     assert promised <= {path.name for path in folder.iterdir()}
-    assert (folder / "scenario.yaml").read_text() == (CONFIGS / "paper/corrected.yaml").read_text()
+    assert (folder / "scenario.yaml").read_text() == (
+        CONFIGS / "mu_2017/corrected.yaml"
+    ).read_text()
     metrics = json.loads((folder / "metrics.json").read_text())
     assert metrics["status"] == "finished"
     assert metrics["metrics"]["iae"] == runs["corrected"].metrics["iae"]

@@ -43,7 +43,7 @@ def untimed(runs):
 )
 def made(request, tmp_path_factory):
     target = tmp_path_factory.mktemp("reproduced") / request.param
-    config = ROOT / f"configs/paper/{request.param}.yaml"
+    config = ROOT / f"configs/mu_2017/{request.param}.yaml"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(compare, "law_costs", untimed)
         done = compare.compare([config], run.Request(out=target, figures=False))
@@ -54,7 +54,7 @@ def test_the_committed_table_is_what_comes_out(made):
     name, folder = made
     committed, new = (
         pd.read_csv(where / "comparison.csv", index_col=0)
-        for where in (ROOT / "results/paper" / name, folder)
+        for where in (ROOT / "results/mu_2017" / name, folder)
     )
     loose = [column for column in new if CHAOTIC.get(name, "-") in column]
     # Machines differ in the last bit of exp and sin; the laws are not chaotic beyond that.
@@ -68,14 +68,14 @@ def test_the_committed_verdicts_are_what_comes_out(made):
             c["claim"]: c["verdict"]
             for c in json.loads((where / "claims.json").read_text())["claims"]
         }
-        for where in (ROOT / "results/paper" / name, folder)
+        for where in (ROOT / "results/mu_2017" / name, folder)
     )
     assert new == committed
 
 
 def committed(letter):
     """Claim and sign, as committed; C14 is a time, measured anew by whoever asks, and not there."""
-    path = ROOT / "results/paper" / LETTERS[letter] / "claims.json"
+    path = ROOT / "results/mu_2017" / LETTERS[letter] / "claims.json"
     claims = json.loads(path.read_text())["claims"]
     return {c["claim"]: SIGNS[c["verdict"]] for c in claims}
 
@@ -95,7 +95,7 @@ def rerun(scenario):
 
 def signs(letter, sets, laws=("adaptive_neural", "full_backstepping", "pid")):
     """Claim and sign of a comparison with some keys set anew."""
-    loaded = load(ROOT / f"configs/paper/{LETTERS[letter]}.yaml", sets)
+    loaded = load(ROOT / f"configs/mu_2017/{LETTERS[letter]}.yaml", sets)
     entries = {name: rerun(loaded.scenario.singles()[name]) for name in laws}
     told = [
         parsed
@@ -173,13 +173,13 @@ def test_weights_that_take_a_sample_before_the_demand_do_not_cycle():
 
 def test_with_narrow_nodes_the_heading_creeps_to_a_right_angle_and_the_run_diverges():
     keys = ("controller.network.spread=0.4", "simulation.duration=1240")
-    scenario = load(ROOT / "configs/paper/figures_compare_standoff.yaml", keys).scenario
+    scenario = load(ROOT / "configs/mu_2017/figures_compare_standoff.yaml", keys).scenario
     assert rerun(scenario.singles()["adaptive_neural"]).ending.startswith("diverged at t = 785.")
 
 
 # --- results/claim.md tells the committed tables, and a few of these are made anew
 
-PAPER = ROOT / "results/paper"
+PAPER = ROOT / "results/mu_2017"
 CLAIM = (ROOT / "results/claim.md").read_text()
 ABLATIONS = {"F": "ablation_figures", "S": "ablation_standoff", "C": "ablation"}
 LAWS = (
@@ -378,3 +378,18 @@ def test_the_sentences_about_the_draws_are_those_of_the_study():
     ratio = pairs.loc["velocity_vector", "adrc"]
     assert round(1 / ratio.ratio, 3) == 1.032
     assert {SUMMARY.loc[(law, "iae")].failed for law in ("velocity_vector", "adrc", "alos")} == {0}
+
+
+@pytest.mark.parametrize("paper", ["lefeber_2003", "fossen_2003"])
+def test_the_front_page_counts_the_verdicts_of_each_paper(paper):
+    """The verdicts themselves are held to the runs by the tests of each law."""
+    front = (ROOT / "README.md").read_text()
+    page = (ROOT / "results" / f"{paper}.md").read_text()
+    verdicts = [
+        row[1] for row in re.findall(r"^\| [LF]\d+\w? \| (.+?) \| (.+?) \| .+ \|$", page, re.M)
+    ]
+    counts = [verdicts.count(one) for one in ("reproduced", "not reproduced", "cannot tell")]
+    (row,) = re.findall(
+        rf"^\|[^|]*results/{paper}\.md[^|]*\|[^|]*\| (\d+) \| (.*?) \|", front, re.M
+    )
+    assert row == (str(len(verdicts)), ", ".join(map(str, counts)))

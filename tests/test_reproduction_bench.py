@@ -502,7 +502,7 @@ def test_found_gains_of_the_paper_s_family_live_on_the_limit(law, keys, low, hig
         "actuator": {"kind": "ideal"}, "disturbance": {"kind": "none"},
         "path": {"kind": "line", "speed": 0.5}, "simulation.duration": 0.5,
     }  # fmt: skip
-    source = "podusv:paper/corrected.yaml"
+    source = "podusv:mu_2017/corrected.yaml"
     ends = [podusv.simulate(source, free | {"controller": one}).status for one in controllers]
     assert ends.count("diverged") == lost
     peaks = [podusv.simulate(source, {"controller": one}).metrics.peak_tau_u for one in controllers]

@@ -41,7 +41,7 @@ def test_a_scenario_written_as_one_file_changes_like_the_given_one(tmp_path: Pat
     kept = load_text(tree_yaml(given), "elsewhere/scenario.yaml")
     assert kept.scenario == given.scenario
     assert [cell.scenario for cell in cells(kept)] == [cell.scenario for cell in cells(given)]
-    for file in ("paper/corrected_compare", "pod/kept", "own_vessel"):
+    for file in ("mu_2017/corrected_compare", "pod/kept", "own_vessel"):
         given = load(ROOT / "configs" / f"{file}.yaml")
         assert load_text(tree_yaml(given), "scenario.yaml").scenario == given.scenario
 

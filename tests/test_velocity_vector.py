@@ -30,7 +30,7 @@ from podusv_cli.scenario.load import load, load_text
 LAW = VelocityVector()
 ROOT = Path(__file__).resolve().parent.parent
 SAMPLED = """
-extends: podusv:paper/base.yaml
+extends: podusv:mu_2017/base.yaml
 vessel: {{preset: paper_nonlinear}}
 path: {{reading: velocity}}
 actuator: {{kind: saturated}}

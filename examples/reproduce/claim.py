@@ -2,7 +2,7 @@
 
     python examples/reproduce/claim.py unknown | discrete | limits | learnt | gains | networks
 
-Each prints a CSV table. The scenarios are those of configs/paper; every number comes from a run.
+Each prints a CSV table. The scenarios are those of configs/mu_2017; every number comes from a run.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from podusv_cli.theory.ideal_weights import unloaded_accelerations
 from podusv_cli.workflows.execute import Stopwatch, simulated
 
 Case, Value = TypeVar("Case"), TypeVar("Value")
-PAPER = Path(__file__).parents[2] / "configs/paper"
+PAPER = Path(__file__).parents[2] / "configs/mu_2017"
 READINGS = {
     "F": "figures_compare.yaml",
     "S": "figures_compare_standoff.yaml",

@@ -1,6 +1,6 @@
 """The figure at the top of results/claim.md: networks beside fixed gains, and what differs.
 
-    python examples/reproduce/network_line.py results/paper/networks.csv results/paper/networks.png
+    python examples/reproduce/network_line.py TABLE.csv FIGURE.png
 
 Left: the settled error of the surge velocity over the gain that a network acts as. Right: the
 sensitivity |S| of the surge loop at the plant's input, of the paper's law and of the equal gain.
@@ -19,7 +19,7 @@ from podusv_cli.figures.style import TARGET_LOOK, house_style, image, new_figure
 from podusv_cli.scenario.load import load
 from podusv_cli.theory.loop_margins import loop_margins
 
-CORRECTED = Path(__file__).parents[2] / "configs/paper/corrected.yaml"
+CORRECTED = Path(__file__).parents[2] / "configs/mu_2017/corrected.yaml"
 FIXED = "controller={kind: adaptive_neural, Gamma_u: 0, Gamma_r: 0, gamma_u: 0, gamma_r: 0, "
 LAWS = {
     "network of 27 nodes": (),

@@ -32,7 +32,7 @@ FIRST_STEPS = """\
 podusv simulates and compares controllers for pod-propelled surface vessels. First steps:
 
   podusv init                              list the scenarios that come with podusv
-  podusv init paper/corrected              copy one here, to edit
+  podusv init mu_2017/corrected              copy one here, to edit
   podusv run corrected.yaml                simulate it: log, metrics and figures in results/
   podusv compare podusv:pod/kept.yaml      simulate and compare four laws: table and report
   podusv sweep --help                      judge laws by thousands of drawn hulls, seas, starts

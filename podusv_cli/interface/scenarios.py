@@ -43,7 +43,7 @@ def Scenario(sections: Mapping[str, Any] | None = None, /, **more: Any) -> model
     ... )
     >>> scenario.vessel.m, scenario.vessel.length, scenario.controller.kind
     (25.0, 1.255, 'pid')
-    >>> podusv.Scenario({"extends": "podusv:paper/corrected.yaml", "vessel": {"lenght": 2}})
+    >>> podusv.Scenario({"extends": "podusv:mu_2017/corrected.yaml", "vessel": {"lenght": 2}})
     Traceback (most recent call last):
     podusv_cli.core.errors.ScenarioError: scenario: vessel.lenght: unknown key; did you mean ...
     """
@@ -53,13 +53,13 @@ def Scenario(sections: Mapping[str, Any] | None = None, /, **more: Any) -> model
 def load(source: Source, changes: Changes | None = None) -> model.Scenario:
     """The scenario of a file, a dictionary or another scenario, with some values changed.
 
-    `source` may name a scenario of podusv (`podusv:paper/corrected.yaml`). `changes` are what
+    `source` may name a scenario of podusv (`podusv:mu_2017/corrected.yaml`). `changes` are what
     `--set` is on the command line: dotted keys and values. A vessel that is changed without
     `nominal` is also the one that the controller is told about, unless `source` is a scenario: that
     has a `nominal` of its own. Raises ScenarioError with every fault.
 
     >>> import podusv_cli as podusv
-    >>> scenario = podusv.load("podusv:paper/corrected.yaml", {"controller.k_ze": 0.2})
+    >>> scenario = podusv.load("podusv:mu_2017/corrected.yaml", {"controller.k_ze": 0.2})
     >>> scenario.controller.k_ze, scenario.actuator.surge_limit
     (0.2, 8.0)
     >>> podusv.load(scenario, {"path": {"kind": "circle", "radius": 20.0}}).path.radius

@@ -1,4 +1,4 @@
-"""The scenarios that come with podusv, by name: `podusv:paper/corrected.yaml`."""
+"""The scenarios that come with podusv, by name: `podusv:mu_2017/corrected.yaml`."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pathlib import Path
 from podusv_cli.scenario.phrases import did_you_mean
 
 PREFIX = "podusv:"
+RENAMED = "renamed.txt"  # beside the scenarios: a folder's old name and its new one, a line each
 FOLDER = "configs"  # a link to the checkout's folder; in an installed package the files themselves
 
 
@@ -22,9 +23,22 @@ def folder() -> Path:
 
 @cache
 def names() -> tuple[str, ...]:
-    """Every shipped file as a scenario names it, sorted: `podusv:paper/base.yaml`."""
+    """Every shipped file as a scenario names it, sorted: `podusv:mu_2017/base.yaml`."""
     paths = folder().rglob("*.yaml")
     return tuple(sorted(PREFIX + path.relative_to(folder()).as_posix() for path in paths))
+
+
+@cache
+def renamed() -> dict[str, str]:
+    """New names of folders by their old ones, which scenarios of users still have."""
+    words = (folder() / RENAMED).read_text("utf-8").split()
+    return dict(zip(words[::2], words[1::2], strict=True))
+
+
+def present(name: str) -> str:
+    """A shipped scenario's present name."""
+    first, slash, rest = name.removeprefix(PREFIX).partition("/")
+    return f"{PREFIX}{renamed().get(first, first)}{slash}{rest}"
 
 
 def file_of(name: str) -> str:
@@ -35,10 +49,10 @@ def file_of(name: str) -> str:
     """
     if not name.startswith(PREFIX):
         return name
-    if name not in names():
+    if present(name) not in names():
         hint = did_you_mean(name, names())
         raise ValueError(f"podusv has no scenario of this name{hint} (`podusv init` lists them)")
-    return str(folder() / name.removeprefix(PREFIX))
+    return str(folder() / present(name).removeprefix(PREFIX))
 
 
 def relative_to(source: str, name: str) -> str:

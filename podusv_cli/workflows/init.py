@@ -21,8 +21,8 @@ from podusv_cli.storage import files
 SCHEMA = "podusv.schema.json"
 # What to begin with, and what each shows.
 FIRST = {
-    "paper/corrected": "a run", "own_vessel": "a hull of your own",
-    "paper/corrected_compare": "a comparison of laws", "studies/hull_and_sea": "a study",
+    "mu_2017/corrected": "a run", "own_vessel": "a hull of your own",
+    "mu_2017/corrected_compare": "a comparison of laws", "studies/hull_and_sea": "a study",
 }  # fmt: skip
 EDITOR_LINE = re.compile(r"^# yaml-language-server: .*$", re.MULTILINE)
 

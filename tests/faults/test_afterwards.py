@@ -22,7 +22,7 @@ ADAPTIVE = BASE.replace("{kind: pid, K_Pu: 100.0}", "{kind: adaptive_neural}")
 TWO = ADAPTIVE + "controllers: {one: {}, other: {k_ue: 5.0}}\n"
 CLAIM = "claims: {C1: {says: it is so, source: here, expect: one.iae <= other.iae}}\n"
 DIVERGING = ("--set", "controller.Gamma_u=1e9", "--set", "actuator={kind: ideal}")
-CORRECTED = Path(__file__).parents[2] / "configs/paper/corrected.yaml"
+CORRECTED = Path(__file__).parents[2] / "configs/mu_2017/corrected.yaml"
 
 
 def broken(*given: Any, **more: Any) -> NoReturn:

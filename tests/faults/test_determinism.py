@@ -36,7 +36,7 @@ from podusv_cli.storage.log_reader import read_log
 from podusv_cli.workflows.execute import Task, execute
 
 ROOT = Path(__file__).parents[2]
-CORRECTED = str(ROOT / "configs/paper/corrected.yaml")
+CORRECTED = str(ROOT / "configs/mu_2017/corrected.yaml")
 INTEL = pytest.mark.skipif(
     platform.machine() not in ("x86_64", "AMD64"), reason="names instruction sets of x86"
 )

@@ -32,7 +32,7 @@ VALUES = (
 SHORT = "simulation.duration=0.5"
 EXTENDED = ("base.yaml", "claims.yaml", "ablation_laws.yaml")  # no scenarios in themselves
 PARTS = [
-    *(ROOT / "configs/paper" / name for name in EXTENDED),
+    *(ROOT / "configs/mu_2017" / name for name in EXTENDED),
     *(ROOT / "configs/bench").rglob("*.yaml"),
 ]
 MOST = count(16, 10**9)  # commands

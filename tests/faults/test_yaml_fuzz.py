@@ -161,7 +161,7 @@ TOLD = {
 @pytest.mark.parametrize("what", TOLD)
 def test_spoilt_files_are_told_and_nothing_else(tmp_path, what):
     shutil.copytree(CONFIGS, tmp_path / "configs")
-    draw, paper = random.Random(SEED), tmp_path / "configs/paper"
+    draw, paper = random.Random(SEED), tmp_path / "configs/mu_2017"
     files, tries, mutations = (
         sorted((tmp_path / "configs").rglob("*.yaml")),
         count(200, 10_000),
