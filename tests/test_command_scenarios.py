@@ -78,8 +78,8 @@ PID = ("controller.kind=pid", "simulation.step=0.001", "simulation.duration=4")
         (0.02, 0.03, PID),
         (0.0015, 0.003, ("simulation.step=0.0005", "simulation.duration=4")),
         (0.12, 0.2, ("controller.kind=sliding_mode",)),
-        (0.6, 1.2, ("controller.kind=velocity_vector", *CALM)),
-        (0.4, 0.9, ("controller.kind=momentum_vector", "vessel.preset=cybership2", *CALM)),
+        (0.6, 0.9, ("controller.kind=velocity_vector", *CALM)),
+        (0.4, 0.7, ("controller.kind=momentum_vector", "vessel.preset=cybership2", *CALM)),
     ],
 )
 def test_a_loop_that_is_too_fast_for_the_delay_is_told_and_oscillates(short, long, rest):

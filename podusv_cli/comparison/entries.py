@@ -79,7 +79,7 @@ class Entry:
     def off_target(self) -> bool:
         """Whether the run finished, but not at its target; no table ranks it."""
         finished = self.recording.status == "finished"
-        return finished and not self.scenario.at_target(self.metric("e_steady"))
+        return finished and not self.scenario.at_target(self.metrics())
 
     def signal(self, name: str) -> Vector:
         """A logged or derived signal; empty where the run has none of this name."""

@@ -27,12 +27,12 @@ def _lengths(path: Path) -> Vector:
 def short_leg(case: Case) -> Sentences:
     """The circles of a leg's two waypoints overlap."""
     path = case.scenario.path
-    if not path.follows:
+    if not path.circles():
         return
     lengths, radius = _lengths(path), path.circles()[0][2]
     for leg in np.flatnonzero(lengths < ROOM * radius):
         yield (
-            f"leg {leg} is {lengths[leg]:.3g} m long, and the acceptance radius of both its "
+            f"leg {leg} is {lengths[leg]:.3g} m long, and the acceptance radius of its "
             f"waypoints is {radius:g} m, so the vessel leaves it before it is on it; take "
             "a smaller path.acceptance, or fewer waypoints"
         )
@@ -42,7 +42,7 @@ def short_leg(case: Case) -> Sentences:
     "never-arrives", about="path", meaning="legs are left at the end",
     condition="the last waypoint is not reached by the end of the run",
     remedy="simulate longer, take a larger acceptance radius, or path.switch: passed",
-    needs=("leg",),
+    needs=("leg", "e_ct", "along_leg"),
 )  # fmt: skip
 def never_arrives(scenario: Scenario, log: Recording) -> Sentences:
     """The run ends on its way, or round a waypoint that it missed."""

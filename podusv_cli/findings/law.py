@@ -9,6 +9,7 @@ import numpy as np
 
 from podusv_cli.components.actuators.base import SATURATION
 from podusv_cli.components.controllers.velocity_loop import Cause, Loop
+from podusv_cli.core.errors import LawError, NotConvergedError
 from podusv_cli.core.finding import FindingKind, Sentences, before
 from podusv_cli.findings.finding import Case
 from podusv_cli.findings.stability import (
@@ -20,6 +21,8 @@ from podusv_cli.findings.stability import (
     rk4_growth,
     sampled_growth,
 )
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.theory.loop_margins import loop_margins
 
 UNSTABLE = 1.0 + 1e-6
 # by the cause that a law gives: what is too fast, which loop that is, and what should be smaller
@@ -91,16 +94,37 @@ stiff_adaptation, stiff_derivative, stiff_loop = map(_stiff, LOOPS)
 sampled_adaptation, sampled_derivative, sampled_loop = map(_sampled, LOOPS)
 
 
+def _margin(scenario: Scenario) -> float:
+    """The delay [s] that the loop bears; NaN where it has no steady motion, or is unstable."""
+    try:
+        found = loop_margins(
+            scenario.closed_loop(), scenario.time_grid(), compiled=scenario.simulation.compiled
+        )
+    except (LawError, NotConvergedError):
+        return math.nan
+    return found.delay_margin
+
+
 @before(
     "delayed-loop", about="actuator.command", meaning="a velocity loop too fast for the delay",
-    condition="a velocity loop of the law, stable without the delay, grows with it",
+    condition="the delay exceeds the delay margin of both demands (podusv margins); without a "
+    "steady motion, a velocity loop that is stable without the delay grows with it",
     remedy="take a shorter delay, or smaller gains",
 )  # fmt: skip
 def delayed_loop(case: Case) -> Sentences:
-    """The delay of the actuator's command makes a velocity loop of the law unstable."""
+    """The delay of the actuator's command makes the law's loop unstable.
+
+    Where the path has no steady motion, the velocity loops alone are looked at.
+    """
     delay = case.scenario.actuator.delay()
+    whole = _margin(case.scenario) if delay else math.nan
+    if delay > whole:
+        yield (
+            f"on the steady part of the path the loop grows with a delay of {delay:g} s; take a "
+            f"delay below {whole:.3g} s, or smaller gains"
+        )
     reported: set[str] = set()
-    for nu in (case.first_velocity, case.reference.working) if delay else ():
+    for nu in (case.first_velocity, case.reference.working) if delay and math.isnan(whole) else ():
         for loop in loops(case.scenario, nu):
             stable = np.isfinite(loop.matrix).all() and loop.growth < 0.0
             if stable and loop.axis not in reported and delayed_growth(loop, delay) > 0.0:
@@ -108,7 +132,7 @@ def delayed_loop(case: Case) -> Sentences:
                 yield (
                     f"the {loop.axis} {loop.name} grows with a delay of {delay:g} s; take a delay "
                     f"below {delay_margin(loop, delay):.2g} s, or a smaller "
-                    f"{fast_gain(case.scenario, nu, loop)}; podusv margins has the whole loop's"
+                    f"{fast_gain(case.scenario, nu, loop)}"
                 )
 
 

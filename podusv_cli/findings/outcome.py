@@ -174,7 +174,7 @@ def never_settles(scenario: Scenario, log: Recording) -> Sentences:
     standoff = approach.standoff if approach else 0.0
     errors = np.abs(log["z_e"][late] - standoff)
     error = float(errors.mean())
-    if not scenario.at_target(error):
+    if not scenario.at_target({"e_steady": error}):
         place = f"its standoff of {standoff:g} m" if standoff else "its target"
         nearing = _arrives(errors, scenario.metrics.steady_fraction, radius)
         remedy = "simulate longer" if nearing else "take larger gains, or add integral action"

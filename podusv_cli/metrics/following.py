@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from podusv_cli.components.paths.legs import E_CT, LEG
+from podusv_cli.components.paths.legs import E_CT, LEG, PLACES
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.metrics.metric import Accumulator, Measured, Metric, add, ratio
 
@@ -26,9 +26,9 @@ def watch(t: float, weight: float, s: Vector, k: Any, seen: Vector) -> None:
     add(seen, INTEGRALS, LATE, late)
     add(seen, INTEGRALS, LATE_ERROR, late * error)
     seen[LARGEST] = max(seen[LARGEST], error)
-    seen[DONE] = leg / k.legs
-    if leg >= k.legs and seen[ARRIVED] == 0.0:
+    if leg >= k.legs and seen[DONE] < 1.0:
         seen[ARRIVED] = t
+    seen[DONE] = leg / k.legs
 
 
 def _constants(layout: Measured) -> dict[str, float]:
@@ -41,7 +41,7 @@ def _rms(seen: Vector, step: float) -> float:
 
 
 OF = Accumulator(
-    watch, lambda layout: SIZE if layout.loop.path.follows else 0, _constants, INTEGRALS
+    watch, lambda layout: SIZE if layout.loop.path.places == PLACES else 0, _constants, INTEGRALS
 )
 e_ct_rms = Metric("e_ct_rms", "m", "rms of the cross-track error", OF, _rms, 1)
 e_ct_max = Metric(
@@ -53,7 +53,7 @@ e_ct_steady = Metric(
 )  # fmt: skip
 path_time = Metric(
     "path_time", "s", "time at which the last waypoint is reached", OF,
-    lambda seen, step: float(seen[ARRIVED]) or math.nan, 1, happens=True,
+    lambda seen, step: float(seen[ARRIVED]) if seen[DONE] == 1.0 else math.nan, 1, happens=True,
 )  # fmt: skip
 path_done = Metric(
     "path_done", "1", "share of the legs that are done at the end", OF,

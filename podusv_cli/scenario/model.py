@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Mapping
 from functools import cache
 from types import GenericAlias
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, SupportsIndex, TypeVar
@@ -214,11 +215,15 @@ class Scenario(Component):
         """When the part of the run begins that counts as settled [s]."""
         return self.time_grid().last_part(self.metrics.steady_fraction)
 
-    def at_target(self, error: float) -> bool:
-        """Whether a run with this mean error over the steady window [m] ends at its target.
+    def at_target(self, numbers: Mapping[str, float]) -> bool:
+        """Whether a run with these metrics ends at its target.
 
-        That is within `metrics.settling_radius`. A manoeuvring trial has no target to be at.
+        That is with `e_steady` within `metrics.settling_radius`, or with all legs of a path done
+        that is followed. A manoeuvring trial has no target to be at.
         """
+        if self.path.follows:
+            return numbers.get("path_done", 1.0) >= 1.0
+        error = numbers.get("e_steady", math.nan)
         return bool(self.controller.trial()) or error <= self.metrics.settling_radius
 
     def conflicts(self) -> list[tuple[str, str]]:

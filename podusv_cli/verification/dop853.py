@@ -46,6 +46,10 @@ REASONS: tuple[tuple[Callable[[Scenario, list[Level]], bool], str], ...] = (
         "the law takes samples (a difference quotient, or a held direction)",
     ),
     (
+        lambda scenario, _: scenario.path.follows,
+        "the active leg of the path changes at instants",
+    ),
+    (
         lambda scenario, _: not scenario.measurement.is_exact,
         "the law works with measurements, which come at instants",
     ),

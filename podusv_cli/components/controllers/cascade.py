@@ -111,7 +111,9 @@ class Cascade(Controller):
         turn, v_r = turn_rate(V_d, SLOWEST), memory[0]
         u_r = math.sqrt(max(speed * speed - v_r * v_r, 0.0))
         psi_r = direction(V_d.x, V_d.y) - direction(u_r, v_r)
-        faster = (V_d.x * V_d.rate_x + V_d.y * V_d.rate_y) / max(speed, SLOWEST)
+        rate[0] = sway_force(u_r, v_r, turn, k) / k.m22
+        power = V_d.x * V_d.rate_x + V_d.y * V_d.rate_y
+        faster = (power - v_r * rate[0]) / max(u_r, SLOWEST)
 
         away = 1.0 - k.origin
         mine, its = work, tail(work, 2)
@@ -123,5 +125,4 @@ class Cascade(Controller):
         tau[0] += cross * (k.k_v * (x[4] - v_r) + k.k_2 * z2_e) - k.k_1 * z1_e
         tau[1] = -yaw_moment(u_r, v_r, turn, k)
         tau[1] -= k.k_r * (x[5] - turn) + k.k_psi * wrap(x[2] - psi_r)
-        rate[0] = sway_force(u_r, v_r, turn, k) / k.m22
         signals[0], signals[1], signals[2], signals[3] = z1_e, z2_e, wrap(psi_r), turn

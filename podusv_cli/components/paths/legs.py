@@ -21,7 +21,7 @@ from pydantic import model_validator
 
 from podusv_cli.components.paths.base import Path, Point
 from podusv_cli.components.paths.waypoints import Waypoints
-from podusv_cli.core.component import Positive, value
+from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, kernel, scratch, tail
 from podusv_cli.core.signal import Signal
 
@@ -70,10 +70,6 @@ class Legs(Path):
         "circle", "", "when the next leg becomes active: within the acceptance radius of its first "
         "waypoint (circle), or also where the vessel is past the end of its leg (passed)",
     )  # fmt: skip
-    lead: Positive | None = value(
-        None, "m", "how far ahead of the vessel on the leg laws see their target; where left out, "
-        "the standoff of laws that keep one, else 0",
-    )  # fmt: skip
 
     @model_validator(mode="after")
     def _travelled(self) -> Self:
@@ -100,8 +96,8 @@ class Legs(Path):
         return super().constants() | {"legs": float(len(self.points) - 1)}
 
     def constants_with(self, standoff: float) -> dict[str, float]:
-        """With the lead that is left to the law."""
-        return self.constants() | {"lead": standoff if self.lead is None else self.lead}
+        """With the distance ahead of the vessel on the leg at which the law sees its target."""
+        return self.constants() | {"lead": standoff}
 
     def table(self) -> Vector:
         """The points, north and east in turn."""

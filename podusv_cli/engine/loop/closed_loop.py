@@ -197,12 +197,8 @@ class ClosedLoop:
         return constants
 
     def first_place(self) -> Vector:
-        """Where on a path that is followed the vessel is at t = 0."""
-        place, start = np.zeros(len(self.path.places)), np.array(self.start)
-        if self.path.follows:
-            k, table = bundle(self.path_constants()), self.path.table()
-            call_kernel(self.path.locate, t=0.0, x=start, s=start, place=place, k=k, table=table)
-        return place
+        """Where on a path that is followed the vessel is before the first instant looks: all 0."""
+        return np.zeros(len(self.path.places))
 
     def law_constants(self, recall: Recall = call) -> dict[str, float]:
         """The law's constants, with those of the path's fillet where it has one."""

@@ -40,6 +40,8 @@ def check_law(loop: ClosedLoop) -> None:
     law = loop.controller.law
     check_kernel(law)
     check_kernel(loop.path.evaluate)
+    if loop.path.follows:
+        check_kernel(loop.path.locate)
     with np.errstate(all="ignore"):
         asked(describe(loop.path), loop.path.table)
         asked(describe(loop.path), loop.first_target, OF_NUMBERS)

@@ -25,6 +25,8 @@ def continuous(loop: ClosedLoop, duration: float, *, compiled: bool = True) -> t
         raise ValueError("a law that works with measurements has no continuous right-hand side")
     if loop.controller.takes_samples():
         raise ValueError("a law that takes samples has no continuous right-hand side")
+    if loop.path.follows:
+        raise ValueError("a path that is followed has no continuous right-hand side")
     if loop.actuator.delay() > 0:
         raise ValueError("an actuator with a delay has no continuous right-hand side")
     grid = TimeGrid(1.0, 1, log_every=2)

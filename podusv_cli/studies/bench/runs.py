@@ -72,7 +72,7 @@ def _run(case: Case, law: str, scenario: Scenario) -> BenchRun:
     numbers = seeing.summary(recording.seen) if recording.seen is not None else {}
     track = np.stack([recording[name] for name in ("x", "y", "x_d", "y_d")], axis=1)
     settled = numbers.get("e_steady", math.nan)
-    if recording.status != "finished" or scenario.at_target(settled):
+    if recording.status != "finished" or scenario.at_target(numbers):
         return BenchRun(
             case.place, law, recording.status, _first(recording.message), numbers, track
         )

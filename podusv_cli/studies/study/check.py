@@ -254,8 +254,10 @@ def _by(others: list[str]) -> str:
 
 
 def _metrics(scenario: Scenario) -> dict[str, Metric]:
-    """The metrics that are gathered during a run."""
-    return {n: m for n, m in scenario.known_metrics().items() if m.accumulator}
+    """The metrics that are gathered during a run of any of its laws."""
+    laws = singles(scenario).values()
+    gathered = {part for law in laws for part, _ in law.observer().parts}
+    return {n: m for n, m in scenario.known_metrics().items() if m.accumulator in gathered}
 
 
 def _keep(scenario: Scenario, sweep: Sweep) -> Faults:
