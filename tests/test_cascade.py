@@ -10,10 +10,16 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from conftest import VESSELS
 from scipy.integrate import solve_ivp
 from scipy.linalg import solve_continuous_are
 
 import podusv_cli as podusv
+from podusv_cli.components.controllers.cascade import Cascade
+from podusv_cli.components.controllers.constant_bearing import Moving, turn_rate
+from podusv_cli.components.paths.sinusoid import Sinusoid
+from podusv_cli.components.vessels.plant import plant as plant_rates
+from podusv_cli.core.kernel import bundle, call
 
 ROOT = Path(__file__).parents[1]
 CONFIGS = ROOT / "configs" / "lefeber_2003"
@@ -128,6 +134,31 @@ def test_the_table_of_starts_is_that_of_the_study() -> None:
         cells = numbers[numbers.law == law].sort_values("cell")
         settled = [f"{q:.0f}" if np.isfinite(q) else "fails" for q in cells.q50]
         assert told == [*(f"{500 * share:.0f}" for share in cells.failed), *settled]
+
+
+def test_on_the_virtual_ship_the_demand_keeps_it_there_while_the_target_changes_its_speed() -> None:
+    """u' of the plant is that of u_r = sqrt(V^2 - v_r^2), by differences along the law's memory."""
+    law, path, hull = Cascade(), Sinusoid(amplitude=2.0, speed=0.3), VESSELS["cybership1"]
+    k, h = bundle(law.constants_with(hull)), 1e-4
+
+    def virtual(t: float, v_r: float) -> tuple[Any, Any]:
+        target = path.targets([t])[0]
+        x = np.array([*target[:2], 0.0, 0.0, v_r, turn_rate(Moving(*target[2:]), 1e-3)])
+        x[3] = math.sqrt(target[2] ** 2 + target[3] ** 2 - v_r**2)
+        x[2] = math.atan2(target[3], target[2]) - math.atan2(v_r, x[3])
+        return x, target
+
+    for t in (3.0, 8.0, 21.0):
+        x, target = virtual(t, -0.02)
+        tau, rate, out = np.zeros(2), np.zeros(1), np.zeros(6)
+        call(
+            law.law, x=x, memory=np.array([-0.02]), target=target, k=k, tau=tau, rate=rate,
+            signals=np.zeros(4), work=np.zeros(4),
+        )  # fmt: skip
+        plant_rates(x, np.array([tau[0], 0.0, tau[1]]), np.zeros(3), k, out)
+        near = [virtual(t + s, -0.02 + s * rate[0])[0][3] for s in (-h, h)]
+        assert out[3] == pytest.approx((near[1] - near[0]) / (2 * h), rel=1e-4)
+        assert abs(out[3]) > 1e-4
 
 
 ROWS = re.findall(r"^\| (L\d+) \| (.+?) \| (.+?) \| (.+?) \|$", PAGE, re.M)
