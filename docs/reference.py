@@ -25,7 +25,10 @@ from podusv_cli.scenario.keys import SCENARIO, Key
 from podusv_cli.scenario.presets import preset_names, preset_text, with_presets
 
 # A figure is drawn from runs of the first of these scenarios that has its signals.
-SHOWN = ("podusv:pod/kept.yaml", "podusv:sea/sensors.yaml", "podusv:sea/state_4.yaml")
+SHOWN = (
+    "podusv:pod/kept.yaml", "podusv:sea/sensors.yaml", "podusv:sea/state_4.yaml",
+    "podusv:laws/legs.yaml",
+)  # fmt: skip
 SECONDS = 60.0
 DRAWN = "figures"  # the folder of their pictures
 

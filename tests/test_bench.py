@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from command_samples import ROOT
 from plugin_samples import LAW
 
 from podusv_cli.core.errors import ScenarioError, UsageError
@@ -315,3 +316,27 @@ def test_the_command_finds_optima(bench, podusv):
     assert (runs.of_optimum[["calm", "told"]] > 1.0).all()
     assert runs.optimum["calm"].iloc[0] == optima.optimum[0]
     assert runs.optimum["pod"].isna().all()
+
+
+def test_on_legs_the_cross_track_error_counts_in_place_of_the_distance():
+    def on_legs(law, size, status="finished"):
+        numbers = {"e_ct_integral": size, "e_ct_steady": 0.1, "path_time": 30.0, "tv_tau_u": 1.0}
+        return BenchRun(("hull", "legs", "calm"), law, status, "", numbers, np.empty((0, 4)))
+
+    made = table([on_legs("a", 10.0), on_legs("b", 15.0), on_legs("c", 1.0, "not at its target")])
+    assert made.iae.tolist() == [10.0, 15.0, 1.0]
+    assert made.ratio.tolist() == [1.0, 1.5, np.inf]
+    assert made["rank"].tolist() == [1.0, 2.0, 3.0]
+    assert made.settling_time.tolist() == [30.0] * 3
+
+
+@pytest.mark.slow
+def test_the_bench_on_legs_is_what_its_page_says(podusv):
+    assert podusv("bench", str(ROOT / "configs/bench_legs"), "--no-figures", "--out", "b").code == 0
+    runs = pd.read_csv("b/runs.csv")
+    assert (len(runs), set(runs.status)) == (112, {"finished"})
+    ranks = runs.pivot_table("rank", "law", "vessel")
+    page = " ".join((ROOT / "docs/bench.md").read_text().split())
+    for law, hull in (("velocity_vector", "cybership2"), ("super_twisting", "paper_nonlinear")):
+        assert ranks[hull].idxmin() == law
+        assert f"`{law}` on `{hull}` ({ranks[hull].min():.2f})" in page

@@ -7,10 +7,10 @@ from typing import Any
 
 from podusv_cli.components.paths.legs import E_CT, LEG, PLACES
 from podusv_cli.core.kernel import Vector, kernel
-from podusv_cli.metrics.metric import Accumulator, Measured, Metric, add, ratio
+from podusv_cli.metrics.metric import Accumulator, Measured, Metric, add, gathered, ratio
 
 # Positions of the gathered numbers: integrals over the run, then what is no integral.
-TIME, SQUARE, LATE, LATE_ERROR, INTEGRALS = range(5)
+TIME, ABSOLUTE, SQUARE, LATE, LATE_ERROR, INTEGRALS = range(6)
 LARGEST = 2 * INTEGRALS
 DONE, ARRIVED, SIZE = range(LARGEST + 1, LARGEST + 4)
 
@@ -21,6 +21,7 @@ def watch(t: float, weight: float, s: Vector, k: Any, seen: Vector) -> None:
     place = int(k.place)
     error, leg = abs(s[place + E_CT]), s[place + LEG]
     add(seen, INTEGRALS, TIME, weight)
+    add(seen, INTEGRALS, ABSOLUTE, weight * error)
     add(seen, INTEGRALS, SQUARE, weight * error * error)
     late = weight if t >= k.steady_from else 0.0
     add(seen, INTEGRALS, LATE, late)
@@ -42,6 +43,9 @@ def _rms(seen: Vector, step: float) -> float:
 
 OF = Accumulator(
     watch, lambda layout: SIZE if layout.loop.path.places == PLACES else 0, _constants, INTEGRALS
+)
+e_ct_integral = Metric(
+    "e_ct_integral", "m s", "integral of the cross-track error's size", OF, gathered(ABSOLUTE), 1
 )
 e_ct_rms = Metric("e_ct_rms", "m", "rms of the cross-track error", OF, _rms, 1)
 e_ct_max = Metric(

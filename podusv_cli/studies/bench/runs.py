@@ -76,7 +76,10 @@ def _run(case: Case, law: str, scenario: Scenario) -> BenchRun:
         return BenchRun(
             case.place, law, recording.status, _first(recording.message), numbers, track
         )
+    left = numbers.get("path_done")
     cause = f"{settled:.3g} m off over the steady window"
+    if left is not None:
+        cause = f"{left:.0%} of the legs done"
     return BenchRun(case.place, law, FAILED, cause, numbers, track)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
@@ -16,6 +16,11 @@ COLUMNS = (
     "iae", "iae_e", "z_e_steady", "e_steady", "settling_time", "peak_tau_u", "peak_tau_r",
     "tv_tau_u", "tv_tau_r",
 )  # fmt: skip
+# What counts in their place where a path is followed
+FOLLOWED = {
+    "iae": "e_ct_integral", "iae_e": "e_ct_integral", "z_e_steady": "e_ct_steady",
+    "e_steady": "e_ct_steady", "settling_time": "path_time",
+}  # fmt: skip
 RATIOS = {"ratio": "iae", "ratio_e": "iae_e", "variation": "tv_tau_u"}
 CLOSE = 1.1  # times the best law's IAE counts as close
 
@@ -29,7 +34,7 @@ def table(runs: Iterable[BenchRun]) -> pd.DataFrame:
     """
     rows = [
         {**dict(zip(PLACE, run.place, strict=True)), "law": run.law, "status": run.status,
-         "cause": run.cause, **{name: run.metrics.get(name, np.nan) for name in COLUMNS}}
+         "cause": run.cause, **{name: _number(run.metrics, name) for name in COLUMNS}}
         for run in runs
     ]  # fmt: skip
     made = pd.DataFrame(rows)
@@ -41,6 +46,11 @@ def table(runs: Iterable[BenchRun]) -> pd.DataFrame:
     counted = made.iae.where(made.status == "finished", np.inf)
     made["rank"] = counted.groupby(place, sort=False).rank(method="average")
     return made
+
+
+def _number(metrics: Mapping[str, float], name: str) -> float:
+    """A metric, or what stands for it on a path that is followed; NaN where there is neither."""
+    return metrics.get(name, metrics.get(FOLLOWED.get(name, ""), np.nan))
 
 
 def with_optima(made: pd.DataFrame, optima: Sequence[Least]) -> pd.DataFrame:

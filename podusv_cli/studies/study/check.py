@@ -254,10 +254,10 @@ def _by(others: list[str]) -> str:
 
 
 def _metrics(scenario: Scenario) -> dict[str, Metric]:
-    """The metrics that are gathered during a run of any of its laws."""
-    laws = singles(scenario).values()
-    gathered = {part for law in laws for part, _ in law.observer().parts}
-    return {n: m for n, m in scenario.known_metrics().items() if m.accumulator in gathered}
+    """The metrics that are gathered during a run; none of a target where a path is followed."""
+    followed = not scenario.path.is_recorded and scenario.path.follows
+    gathered = {n: m for n, m in scenario.known_metrics().items() if m.accumulator}
+    return {n: m for n, m in gathered.items() if not (followed and m.accumulator.of_target)}
 
 
 def _keep(scenario: Scenario, sweep: Sweep) -> Faults:
