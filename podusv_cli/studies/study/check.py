@@ -256,8 +256,11 @@ def _by(others: list[str]) -> str:
 def _metrics(scenario: Scenario) -> dict[str, Metric]:
     """The metrics that are gathered during a run; none of a target where a path is followed."""
     followed = not scenario.path.is_recorded and scenario.path.follows
-    gathered = {n: m for n, m in scenario.known_metrics().items() if m.accumulator}
-    return {n: m for n, m in gathered.items() if not (followed and m.accumulator.of_target)}
+    return {
+        name: metric
+        for name, metric in scenario.known_metrics().items()
+        if metric.accumulator and not (followed and metric.accumulator.of_target)
+    }
 
 
 def _keep(scenario: Scenario, sweep: Sweep) -> Faults:
