@@ -22,7 +22,7 @@ def chase(runs: Sequence[Shown]) -> dict[str, Any]:
     """Where runs and targets are at up to FRAMES instants; {} where there is nothing to show."""
     from podusv_cli.figures.trajectory import bounds  # matplotlib is slow to import
 
-    moving = [run for run in runs if all(run.has(name) for name in (*WHERE, "x_d", "y_d"))]
+    moving = [run for run in runs if all(run.has(name) for name in WHERE)]
     if not moving:
         return {}
     (west, east), (south, north) = bounds(moving)
@@ -41,7 +41,8 @@ def as_json(content: dict[str, Any]) -> str:
 def _track(run: Shown) -> dict[str, Any]:
     count = len(run.recording["time"])
     rows = np.unique(np.linspace(0, count - 1, min(count, FRAMES)).round().astype(int))
-    names = ("time", *WHERE, "x_d", "y_d", "z_e")
+    names = ("time", *WHERE, *(("x_d", "y_d", "z_e") if run.has("z_e") else ()))
+    legs = np.array(run.scenario.path.waypoints() if run.scenario.path.follows else ())
     approach = run.scenario.controller.approach()
     stopped = f"{run.recording.status} at t = {run.end:g} s"
     return {
@@ -52,6 +53,7 @@ def _track(run: Shown) -> dict[str, Any]:
         "beam": run.scenario.vessel.beam,
         "standoff": approach.standoff if approach else 0.0,
         "ending": "" if run.whole else run.recording.message.partition(":")[0] or stopped,
+        "legs": [[_rounded(x) for x in axis] for axis in legs.T],
         **{
             name: [_rounded(x, DIGITS.get(name, MILLIMETRES)) for x in run.signal(name)[rows]]
             for name in names

@@ -34,14 +34,16 @@
     const i = row(run, t), j = Math.min(i + 1, run.time.length - 1);
     const part = j > i ? Math.min(1, (t - run.time[i]) / (run.time[j] - run.time[i])) : 0;
     const mix = (name) => run[name][i] + part * (run[name][j] - run[name][i]);
-    return { i, x: mix("x"), y: mix("y"), psi: run.psi[i] + part * turn(run.psi[j] - run.psi[i]), north: mix("x_d"), east: mix("y_d") };
+    const [north, east] = run.x_d ? [mix("x_d"), mix("y_d")] : [mix("x"), mix("y")];
+    return { i, x: mix("x"), y: mix("y"), psi: run.psi[i] + part * turn(run.psi[j] - run.psi[i]), north, east };
   };
 
   const points = (north, east) => north.map((x, i) => (x === null || east[i] === null ? "" : `${east[i]},${x}`));
   const world = make(map, "g", { class: "world" }), over = make(map, "g");
   for (const run of runs) {
     run.points = points(run.x, run.y);
-    make(world, "polyline", { points: points(run.x_d, run.y_d).join(" "), stroke: "#444", "stroke-width": 0.8 });
+    const course = run.x_d ? [run.x_d, run.y_d] : run.legs;
+    if (course.length) make(world, "polyline", { points: points(...course).join(" "), stroke: "#444", "stroke-width": 0.8 });
     make(world, "polyline", { points: run.points.join(" "), stroke: run.color, "stroke-width": 1.2, class: "ghost" });
     run.trail = make(world, "polyline", line(run, 2));
   }
@@ -89,7 +91,7 @@
       set(run.hull, "points", corners.join(" "));
       [["x1", 2, 0], ["y1", 2, 1], ["x2", 3, 0], ["y2", 3, 1]].forEach(([name, corner, axis]) => set(run.stern, name, corners[corner][axis]));
       for (const part of [run.hull, run.stern]) set(part, "class", over ? "lost" : "");
-      for (const part of [run.cross, run.ring]) part.style.display = over ? "none" : "";
+      for (const part of [run.cross, run.ring]) part.style.display = over || !run.x_d ? "none" : "";
       set(run.cross, "transform", `translate(${ox + k * east} ${oy - k * north})`);
       [["cx", ox + k * east], ["cy", oy - k * north], ["r", k * run.standoff]].forEach(([name, value]) => set(run.ring, name, value));
       stage.querySelectorAll(".key small")[place].textContent = over ? run.ending : "";
