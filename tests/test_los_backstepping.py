@@ -11,10 +11,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from conftest import VESSELS
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 import podusv_cli as podusv
+from podusv_cli.components.controllers.los_backstepping import LosBackstepping
+from podusv_cli.components.controllers.velocity_loop import Axis
+from podusv_cli.core.kernel import bundle, call
 
 ROOT = Path(__file__).parents[1]
 CONFIGS = ROOT / "configs" / "fossen_2003"
@@ -49,6 +53,47 @@ def errors(run: Any) -> Any:
 def simulate(changes: dict[str, Any] | None = None, **law: Any) -> Any:
     own = {"controller": {"kind": "los_backstepping"} | law}
     return podusv.simulate(CONFIGS / "base.yaml", own | (changes or {}))
+
+
+def asked(x: Any, target: Any, memory: Any) -> tuple[Any, Any]:
+    """Demand and rate of the memory, of the law told the paper's hull."""
+    law, hull = LosBackstepping(), VESSELS["cybership2_linear"]
+    tau, rate, k = np.zeros(2), np.zeros(4), bundle(law.constants_with(hull))
+    call(
+        law.law, x=np.array(x), memory=np.array(memory), target=np.array(target), k=k, tau=tau,
+        rate=rate, signals=np.zeros(5), work=np.zeros(law.workspace()),
+    )  # fmt: skip
+    return tau, rate
+
+
+def test_the_surge_demand_carries_a_target_that_gains_speed() -> None:
+    at, still = [0.0, 0.0, 0.6, 0.1, 0.0, 0.0], [0.0, 0.0, 0.08, 0.06, 0.0, 0.0]
+    gaining = [*still[:4], 0.8 * 0.02, 0.6 * 0.02]  # 0.02 m/s2 along its course
+    steady, faster = (asked(at, target, [0.0, 0.6, 0.0, 0.0])[0] for target in (still, gaining))
+    assert steady[0] == pytest.approx(2.0 * 0.1)  # n11 u
+    assert faster[0] - steady[0] == pytest.approx(25.8 * 0.02)
+
+
+@pytest.mark.parametrize("turns", [-1, 1])
+def test_a_whole_turn_of_heading_or_filter_changes_nothing(turns: int) -> None:
+    x, target = [0.0, 0.3, 3.1, 0.1, 0.01, 0.02], [0.0, 0.0, -0.1, 0.001, 0.0, 0.0]
+    memory, whole = [0.0, -3.1, 0.01, 0.0], 2 * np.pi * turns
+    own = asked(x, target, memory)
+    for other in (
+        asked([*x[:2], x[2] + whole, *x[3:]], target, memory),
+        asked(x, target, [memory[0], memory[1] + whole, *memory[2:]]),
+    ):
+        np.testing.assert_allclose(other[0], own[0], atol=1e-12)
+        np.testing.assert_allclose(other[1], own[1], atol=1e-12)
+    assert abs(own[0][1]) < 1.0  # z1 is 0.08 rad, not 6.2
+
+
+def test_its_velocity_loops_are_those_of_surge_and_of_yaw_at_a_held_heading() -> None:
+    surge, yaw = (Axis(name, m, m, 0.1) for name, m in (("surge", 25.8), ("yaw", 2.76)))
+    loops = LosBackstepping().velocity_loops((surge, yaw), np.zeros(3))
+    assert [one.growth for one in loops] == pytest.approx(
+        [-0.1 - 25.0 / 25.8, -0.1 - 2.5 / 2.76 - 0.75]
+    )
 
 
 def test_poles_and_what_is_left_after_ten_seconds_from_any_start() -> None:

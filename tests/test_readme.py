@@ -101,7 +101,10 @@ MISTAKES = {  # what is replaced in the page's law
     "a signal is not declared as one": ("= (HEADING_ERROR,)", '= ("heading_error",)'),
     "a rate or a signal is not written": ("rate[0] = k.K_i * missing", "pass"),
     "more written than declared": ("signals[0] =", "signals[1] ="),
-    "`start` and `slots` disagree": ("np.zeros(1)", "np.zeros(2)"),
+    "`start` and `slots` disagree": (
+        "    def slots(self)",
+        "    def start(self, x, target, nominal): return np.zeros(2)\n    def slots(self)",
+    ),
     "an unknown constant": ("k.K_u *", "k.K_w *"),
     "a default that is no number, or out of range": (
         "K_u: float = value(20.0",
@@ -144,7 +147,8 @@ def test_a_mistake_in_a_law_gets_the_message_of_the_page(
     write_files(page)
     law, (right, wrong) = Path("pursuit.py"), MISTAKES[mistake]
     assert right in law.read_text()
-    law.write_text(law.read_text().replace(right, wrong))
+    numbered = law.read_text().replace("import math\n", "import math, numpy as np\n")
+    law.write_text(numbered.replace(right, wrong))
     said = podusv("compare", "laws.yaml", "--set", "simulation.duration=1", "--no-figures")
     (message,) = re.findall(rf"^\| {re.escape(mistake)} \| `(.*)` \|$", text_of(page), re.MULTILINE)
     message = message.replace(" 10 s of computing", " 0.3 s of computing")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,8 @@ from podusv_cli.theory.lateral import (
     velocity_vector_loop,
 )
 
+Growth = Callable[[Any, Case, float, float], float]
+
 
 def _inverting(law: Any, case: Case, V: float, v: float) -> float:
     """Growth [1/s] of a law that inverts the answer."""
@@ -35,12 +38,14 @@ def _weighing(law: Any, case: Case, V: float, v: float) -> float:
 
 
 ALIKE = 0.01  # of a number; optimal gains bear a smaller difference
-LOOPS = {VelocityVector: _inverting, MomentumVector: _weighing}
 REMEDIES = {
     "schedule": "take a larger trust, or smaller Q0 and k_b0",
     "lqr": "take gains: schedule, or smaller Q0 and k_b0",
-    "": "take momentum_vector, which pays for it under loads",
-}  # by the key `gains`, which only one of the laws has
+}  # by the key `gains`
+LOOPS: dict[type[Any], tuple[Growth, Callable[[Any], str]]] = {
+    VelocityVector: (_inverting, lambda law: "take momentum_vector, which pays for it under loads"),
+    MomentumVector: (_weighing, lambda law: REMEDIES[law.gains]),
+}
 
 
 @before(
@@ -56,13 +61,14 @@ def sway_answers_yaw(case: Case) -> Sentences:
     if V <= STANDING:
         return
     law = scenario.controller
-    grows = LOOPS[type(law)](law, case, V, v)
+    loop, remedy = LOOPS[type(law)]
+    grows = loop(law, case, V, v)
     if grows > 0.0:
         p_eff = sway_answer(scenario.vessel, V, v).p
         yield (
             f"sway answers yaw with p_eff = (m11 V - Y_r)/(m22 V) = {p_eff:.3g} at V = {V:.3g} m/s:"
             f" on a straight line the law, told exactly, grows at {grows:.2g} 1/s and swings for "
-            f"ever; {REMEDIES[getattr(law, 'gains', '')]}, or more speed"
+            f"ever; {remedy(law)}, or more speed"
         )
 
 

@@ -11,19 +11,13 @@ so a corner becomes a parabola. The log, and all that is measured, have the targ
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 from typing import Any
 
 import numpy as np
 
 from podusv_cli.core.interpolation import segment
-from podusv_cli.core.kernel import Vector, kernel, scratch, specialise, tail, taking
-
-Kernel = Callable[..., None]
-LAW = ("t", "x", "memory", "target", "k", "table", "tau", "rate", "signals", "work")
-SAMPLE = ("t", "x", "memory", "target", "k", "table")
+from podusv_cli.core.kernel import Vector, kernel
 
 
 @kernel
@@ -43,51 +37,6 @@ def round_corner(t: float, k: Any, table: Vector, target: Vector, shown: Vector)
             shown[axis] += 0.5 * rate * left * left
             shown[2 + axis] += rate * side
             shown[4 + axis] += rate
-
-
-def _inner_law(
-    t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector, tau: Vector,
-    rate: Vector, signals: Vector, work: Vector,
-) -> None:  # fmt: skip
-    """Stands for a law's `law`."""
-
-
-def _inner_sample(
-    t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector
-) -> None:
-    """Stands for a law's `sample`."""
-
-
-def _law(
-    t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector, tau: Vector,
-    rate: Vector, signals: Vector, work: Vector,
-) -> None:  # fmt: skip
-    """`law` of the rounded target."""
-    shown = scratch(6)
-    round_corner(t, k, tail(table, int(k.fillet_place)), target, shown)
-    _inner_law(t, x, memory, shown, k, table, tau, rate, signals, work)
-
-
-def _sample(t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector) -> None:
-    """`sample` of the rounded target."""
-    shown = scratch(6)
-    round_corner(t, k, tail(table, int(k.fillet_place)), target, shown)
-    _inner_sample(t, x, memory, shown, k, table)
-
-
-@cache
-def law_of_rounded(law: Kernel) -> Kernel:
-    """A law's kernel that is shown the rounded target; the same one for the same kernel."""
-    made: Kernel = specialise(_law, f"{law.__qualname__}_rounded", _inner_law=taking(law, LAW))
-    return made
-
-
-@cache
-def sample_of_rounded(sample: Kernel) -> Kernel:
-    """A law's `sample` that is shown the rounded target; the same one for the same kernel."""
-    inner = taking(sample, SAMPLE)
-    made: Kernel = specialise(_sample, f"{sample.__qualname__}_rounded", _inner_sample=inner)
-    return made
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,7 +17,6 @@ from podusv_cli.components.estimators.none import NoEstimator
 from podusv_cli.components.measurements.base import KNOWN, OWN, Measurement
 from podusv_cli.components.measurements.exact import Exact
 from podusv_cli.components.paths.base import TARGET, Path
-from podusv_cli.components.paths.fillet import law_of_rounded, sample_of_rounded
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core import signal
 from podusv_cli.core.component import describe
@@ -28,6 +27,7 @@ from podusv_cli.core.recording import Allocate
 from podusv_cli.core.signal import LOOP, Signal
 from podusv_cli.core.steps import whole_steps
 from podusv_cli.engine.loop.recent import Recall, call
+from podusv_cli.engine.loop.rounded import law_of_rounded, sample_of_rounded
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.engine.step.layout import HELD_SIGNALS, Layout, Vectors
 from podusv_cli.engine.step.relay import relay
@@ -184,7 +184,11 @@ class ClosedLoop:
         """Where the target is at t = 0."""
         if not self.path.follows:
             return np.asarray(recall(self.path.targets, AT_START)[0])
-        x, place, target = np.array(self.start), self.first_place(), np.zeros(len(TARGET))
+        x, place, target = (
+            np.array(self.start),
+            np.zeros(len(self.path.places)),
+            np.zeros(len(TARGET)),
+        )
         k, table = bundle(self.path_constants()), self.path.table()
         call_kernel(self.path.evaluate, t=0.0, x=x, place=place, k=k, table=table, target=target)
         return target
@@ -195,10 +199,6 @@ class ClosedLoop:
         standoff = approach.standoff if approach else 0.0
         constants: dict[str, float] = recall(self.path.constants_with, standoff)
         return constants
-
-    def first_place(self) -> Vector:
-        """Where on a path that is followed the vessel is before the first instant looks: all 0."""
-        return np.zeros(len(self.path.places))
 
     def law_constants(self, recall: Recall = call) -> dict[str, float]:
         """The law's constants, with those of the path's fillet where it has one."""
@@ -351,7 +351,8 @@ def vectors_of(
         vessel=numbers(loop.vessel.constants),
         observer=numbers(observer.constants_for, loop),
         s=np.concatenate(
-            [start, recall(actuator.rest), estimate, loop.first_place(), loop.first_memory(recall)]
+            [start, recall(actuator.rest), estimate, np.zeros(len(path.places)),
+             loop.first_memory(recall)]
         ),
         row=np.zeros(layout.columns), stages=np.zeros(5 * layout.states),
         sensed=measurement.first(start, grid.step),
