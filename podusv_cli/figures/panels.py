@@ -99,11 +99,11 @@ def _sheet(
     return figure(name, caption=caption, signals=signals, place=place, source=source)(family)
 
 
-errors = _sheet(
-    "errors", 2, "tracking errors (18); the distance on a logarithmic axis, down to what the run "
+errors = figure(
+    "errors", place=2, signals=("x_e", "y_e", "z_e"), source="the paper's figure 4",
+    caption="tracking errors (18); the distance on a logarithmic axis, down to what the run "
     "resolves, with the standoff that the law keeps",
-    "x_e", "y_e", "z_e", "psi_e", scales={"z_e": distance_axis}, source="the paper's figure 4",
-)  # fmt: skip
+)(signals_over_time("x_e", "y_e", "z_e", "psi_e", scales={"z_e": distance_axis}))  # fmt: skip
 following = _sheet(
     "path", 2, "cross-track error of the active leg, the way along it, and its number",
     "e_ct", "along_leg", "leg",
