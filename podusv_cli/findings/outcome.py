@@ -110,11 +110,11 @@ def _through_water(log: Recording) -> tuple[Vector, Vector, Vector]:
 )  # fmt: skip
 def inconsistent_filter(scenario: Scenario, log: Recording) -> Sentences:
     """The estimator's own measure of a sensor's noise says that it is told wrong."""
-    from scipy.special import chdtr, chdtrc  # slow to import
-
     late = np.flatnonzero(log["time"] >= scenario.steady_from())
     if "nis_sum" not in log or not late.size:
         return
+    from scipy.special import chdtr, chdtrc  # slow to import
+
     squares, counts = (
         np.ptp(log[name][late[[0, -1]]], axis=0) for name in ("nis_sum", "nis_count")
     )
