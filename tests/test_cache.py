@@ -87,7 +87,7 @@ def cache(tmp_path, monkeypatch):
 
 
 def test_machine_code_is_what_the_kernel_computes():
-    code = compile.compiled(wrap, CFUNCTYPE(c_double, c_double))
+    code = compile.compiled(compile.Piece(wrap, CFUNCTYPE(c_double, c_double)))
     for angle in np.random.default_rng(1).uniform(-50, 50, 100):
         assert code(angle) == wrap(angle)
 
@@ -194,14 +194,14 @@ ONE_TO_ONE = CFUNCTYPE(c_double, c_double)
 
 def test_a_piece_that_is_damaged_or_anothers_is_made_anew(cache, monkeypatch):
     for function in (ready, doubled):
-        assert compile.compiled(function, ONE_TO_ONE)(2.5) == function(2.5)
+        assert compile.compiled(compile.Piece(function, ONE_TO_ONE))(2.5) == function(2.5)
     (path,), (other,) = (list(cache.rglob(f"{name}_*")) for name in ("ready", "doubled"))
     whole = path.read_bytes()
     middle = len(whole) // 2
     flipped = whole[:middle] + bytes([whole[middle] ^ 1]) + whole[middle + 1 :]
     for damaged in (b"", whole[:-1], whole[:300], flipped, whole + b".", other.read_bytes()):
         path.write_bytes(damaged)
-        assert compile.compiled(ready, ONE_TO_ONE)(2.5) == 2.5
+        assert compile.compiled(compile.Piece(ready, ONE_TO_ONE))(2.5) == 2.5
         assert object_cache._read(path) is not None
 
 
@@ -225,13 +225,38 @@ def test_pieces_are_whole_when_several_processes_write_them(cache, monkeypatch):
     assert list(cache.iterdir()) == [path]
 
 
+@pytest.mark.parametrize("processes", [1, 2])
+def test_what_is_missing_is_compiled_before_it_is_asked_for(cache, monkeypatch, processes):
+    """By several processes where there is enough of it; what cannot be compiled stops nothing."""
+
+    @kernel
+    def listing(x: float) -> float:
+        """The rules forbid this."""
+        return float(len([x]))
+
+    monkeypatch.setattr(compile, "available_workers", lambda: processes)
+    monkeypatch.setattr(compile, "SHARE", 1)
+    pieces = [compile.Piece(function, ONE_TO_ONE) for function in (listing, ready, doubled)]
+    fractions: list[float] = []
+    compile.prepare(pieces, fractions.append)
+    assert fractions[0] == 0.0
+    assert fractions[-1] == pytest.approx(1.0)
+    assert fractions == sorted(fractions)
+    assert [object_cache.is_kept(piece.name) for piece in pieces] == [False, True, True]
+    monkeypatch.setattr(compile.Piece, "compile", lambda piece: pytest.fail("compiled again"))
+    assert [compile.compiled(piece)(2.5) for piece in pieces[1:]] == [ready(2.5), doubled(2.5)]
+    fractions.clear()
+    compile.prepare(pieces[1:], fractions.append)
+    assert not fractions
+
+
 def test_a_full_disk_costs_time_only(cache, monkeypatch):
     def full(*paths: Any, **folders: Any) -> None:
         raise OSError("no space left on device")
 
     assert code_folder.code_folder(object_cache.translators())
     monkeypatch.setattr(os, "replace", full)
-    assert compile.compiled(ready, ONE_TO_ONE)(2.5) == 2.5
+    assert compile.compiled(compile.Piece(ready, ONE_TO_ONE))(2.5) == 2.5
     assert [path.name for path in cache.rglob("*.*")] == [code_folder.MARK]
 
 
@@ -250,7 +275,7 @@ def test_a_kernel_that_allocates_is_refused_and_not_left_to_end_the_process():
         return float(room[0])
 
     with pytest.raises(TypeError, match=r"allocating needs \w+, which is no function"):
-        compile.compiled(allocating, ONE_TO_ONE)
+        compile.compiled(compile.Piece(allocating, ONE_TO_ONE))
 
 
 # --- machine code on disk is never older than the source it was made from

@@ -179,7 +179,9 @@ KERNELS = (loops, places, returns, only_where_needed, whole)
 def test_every_lane_has_the_numbers_that_it_has_alone(watch: Any) -> None:
     """NaN and the signs of zeros included."""
     alone = compile.entry("observer", watch, ("nothing",))
-    side_by_side = compile.lane_entry("observer", watch, ("nothing",), frozenset())
+    side_by_side = compile.routine(
+        compile.lane_adapter("observer", watch, ("nothing",), frozenset())
+    )
     draws, nothing = np.random.default_rng(8), np.zeros((1, LANES))
     for turn in range(10):
         s, seen = draws.normal(0.0, 1.5, (3, LANES)), draws.normal(0.0, 1.0, (9, LANES))
@@ -200,6 +202,6 @@ def test_every_lane_has_the_numbers_that_it_has_alone(watch: Any) -> None:
 def test_a_number_of_one_run_is_not_taken_for_all_of_them() -> None:
     """The kernel marches alone, with the reason, also where that is on the disk already."""
     for _ in range(2):
-        compile.lane_entry.cache_clear()
+        compile.routine.cache_clear()
         with pytest.raises(TypeError, match=r"test_lane_kernels.py, line \d+: shared is for"):
-            compile.lane_entry("observer", first_run, ("nothing",), frozenset())
+            compile.routine(compile.lane_adapter("observer", first_run, ("nothing",), frozenset()))

@@ -52,7 +52,7 @@ def outcome(seed: int) -> str:
         alone = compile.entry("observer", watch, NAMES)
     except LawError:
         return "no kernel"
-    side_by_side = compile.lane_entry("observer", watch, NAMES, ALIKE)
+    side_by_side = compile.routine(compile.lane_adapter("observer", watch, NAMES, ALIKE))
     return "equal" if all(agrees(alone, side_by_side, turn) for turn in range(8)) else "differs"
 
 

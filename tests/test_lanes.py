@@ -184,7 +184,9 @@ def watch(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector)
 @pytest.mark.parametrize("t", [0.0, 6.0])
 def test_every_lane_goes_its_own_way_through_branches(t: float) -> None:
     """As the kernel does in plain Python, number by number."""
-    side_by_side = compile.lane_entry("observer", watch, ("limit",), frozenset({"limit"}))
+    side_by_side = compile.routine(
+        compile.lane_adapter("observer", watch, ("limit",), frozenset({"limit"}))
+    )
     draws = np.random.default_rng(4)
     for _ in range(20):
         s, row, seen = draws.normal(0.0, 2.0, (3, 4, LANES))

@@ -57,16 +57,17 @@ def compare(
     One scenario with `controllers`, several scenarios, finished runs, or any mixture. Exit code 3
     when a run failed or diverged; the others are compared all the same.
     """
-    from podusv_cli.cli.progress import progress_bars
+    from podusv_cli.cli.progress import compiling, progress_bars
     from podusv_cli.workflows import compare as workflow  # heavy imports only when needed
     from podusv_cli.workflows.run import Request
 
     warned = Warnings(quiet)
-    request = Request(
-        assign or (), out, force, figures, sys.argv, warned, allow_large, plugin or (),
-        figure or (), [name.strip() for name in form.split(",")], workers,
-    )  # fmt: skip
     with progress_bars(wanted=not (quiet or as_json)) as progress:
+        request = Request(
+            assign or (), out, force, figures, sys.argv, warned, allow_large, plugin or (),
+            figure or (), [name.strip() for name in form.split(",")], workers,
+            compiling=compiling(progress),
+        )  # fmt: skip
         done = workflow.compare([Path(item) for item in items], request, progress)
     echo_result(done, lambda: _report(done, verbose), as_json=as_json, quiet=quiet)
     for finding in done.warnings():

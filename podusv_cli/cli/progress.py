@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, Protocol
 
 import typer
 
@@ -24,8 +26,15 @@ PERIOD = 0.2  # s between two numbers of a study's line
 ERASED = "\r\x1b[K"
 
 
+class Bars(Protocol):
+    """Bars by name."""
+
+    def __call__(self, name: str, fraction: float, patience: float = PATIENCE) -> None:
+        """Draw a bar, so many seconds after the command began or later."""
+
+
 @contextmanager
-def progress_bars(*, wanted: bool) -> Iterator[Callable[[str, float], None] | None]:
+def progress_bars(*, wanted: bool) -> Iterator[Bars | None]:
     """A function to call with a run's name and the fraction done; a bar a run, on stderr.
 
     None if stderr is no terminal with colours. If the terminal is lost, the bars stop.
@@ -46,8 +55,8 @@ def progress_bars(*, wanted: bool) -> Iterator[Callable[[str, float], None] | No
     tasks: dict[str, TaskID] = {}
     with ExitStack() as stack:
 
-        def draw(name: str, fraction: float) -> None:
-            if not bars.live.is_started and time.monotonic() - began > PATIENCE:
+        def draw(name: str, fraction: float, patience: float) -> None:
+            if not bars.live.is_started and time.monotonic() - began > patience:
                 stack.callback(_stop, bars)
                 bars.start()
             if bars.live.is_started:
@@ -56,9 +65,9 @@ def progress_bars(*, wanted: bool) -> Iterator[Callable[[str, float], None] | No
                 bars.update(tasks[name], completed=fraction)
                 bars.refresh()
 
-        def advance(name: str, fraction: float) -> None:
+        def advance(name: str, fraction: float, patience: float = PATIENCE) -> None:
             with suppress(OSError):
-                draw(name, fraction)
+                draw(name, fraction, patience)
 
         yield advance
 
@@ -66,6 +75,11 @@ def progress_bars(*, wanted: bool) -> Iterator[Callable[[str, float], None] | No
 def _stop(bars: Progress) -> None:
     with suppress(OSError):
         bars.stop()
+
+
+def compiling(bars: Bars | None) -> Callable[[float], None] | None:
+    """The bar of what is compiled once, for all runs to come; it appears at once."""
+    return partial(bars, "compiling, once", patience=0.0) if bars else None
 
 
 class StudyLine:
@@ -78,17 +92,16 @@ class StudyLine:
     def tell(self, tally: Tally) -> None:
         """Show runs done, rate, time left and failures so far."""
         if time.monotonic() - self._last > PERIOD:
-            left = [f"{time_in_words(tally.left)} left"] if tally.made < tally.wanted else []
             self._show(
-                f"{tally.made} of {tally.wanted} runs", *left, f"{tally.failed} did not finish",
-                f"{tally.rate:.3g} a second", "Ctrl-C keeps what is done",
+                f"{tally.made} of {tally.wanted} runs", *_left(tally),
+                f"{tally.failed} did not finish", f"{tally.rate:.3g} a second",
+                "Ctrl-C keeps what is done",
             )  # fmt: skip
 
     def advance(self, tally: Tally, text: str) -> None:
         """Show runs done, time left, and what is told of them."""
         if time.monotonic() - self._last > PERIOD:
-            left = [f"{time_in_words(tally.left)} left"] if tally.made < tally.wanted else []
-            self._show(f"{tally.made} of {tally.wanted} runs", *left, text)
+            self._show(f"{tally.made} of {tally.wanted} runs", *_left(tally), text)
 
     def note(self, *lines: str) -> None:
         """Print lines that stay, in place of what is being done now."""
@@ -125,3 +138,9 @@ class StudyLine:
         if self._wanted and self._last:
             with suppress(OSError):
                 typer.echo(ERASED, nl=False, err=True)
+
+
+def _left(tally: Tally) -> list[str]:
+    """The time that is left, where that can be said."""
+    known = tally.made < tally.wanted and math.isfinite(tally.left)
+    return [f"{time_in_words(tally.left)} left"] if known else []

@@ -38,16 +38,16 @@ def run(
 
     Draws trajectory, errors and controls; `podusv plot RUN` draws all that the run has signals for.
     """
-    from podusv_cli.cli.progress import progress_bars
+    from podusv_cli.cli.progress import compiling, progress_bars
     from podusv_cli.workflows import run as workflow  # heavy imports only when they are needed
 
     warned = Warnings(quiet)
-    request = workflow.Request(
-        assign or (), out, force, figures, sys.argv, warned, allow_large, plugin or (),
-        controller=controller,
-    )  # fmt: skip
     with progress_bars(wanted=not (quiet or as_json)) as bars:
-        done = workflow.run(Path(config), request, bars and partial(bars, str(config)))
+        request = workflow.Request(
+            assign or (), out, force, figures, sys.argv, warned, allow_large, plugin or (),
+            controller=controller, compiling=compiling(bars),
+        )  # fmt: skip
+        done = workflow.run(Path(config), request, partial(bars, str(config)) if bars else None)
     echo_result(done, lambda: _report(done, verbose), as_json=as_json, quiet=quiet)
     for finding in done.warnings:
         warned(finding)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from types import GenericAlias
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, SupportsIndex, TypeVar
@@ -195,16 +195,18 @@ class Scenario(Component):
             settling_radius=self.metrics.settling_radius,
         )  # fmt: skip
 
-    def ready(self) -> None:
+    def ready(self, compiling: Callable[[float], None] | None = None) -> None:
         """Make every check of a run before its first step, and have its march compiled and loaded.
 
+        `compiling` is called with the fraction that is compiled, if there is anything to compile.
         Raises LawError.
         """
         from podusv_cli.engine.running.simulate import (
             ready,  # who reads scenarios simulates nothing
         )
 
-        ready(self.closed_loop(), self.time_grid(), self.observer(), self.simulation.compiled)
+        compiled = self.simulation.compiled
+        ready(self.closed_loop(), self.time_grid(), self.observer(), compiled, compiling)
 
     def known_metrics(self) -> dict[str, Metric]:
         """All metrics by name, with those of plug-ins, and of windows and radii named here."""

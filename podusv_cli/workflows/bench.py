@@ -78,8 +78,11 @@ def bench(wanted: Selection, request: Request, progress: Progress | None = None)
         casadi()
     started, every, extras = datetime.now(UTC), list(cases(wanted)), Extras()
     with RunWriter(request.out, force=request.force) as writer:
-        for scenario in (scenario for case in every for scenario in case.laws.values()):
+        scenarios = [scenario for case in every for scenario in case.laws.values()]
+        for position, scenario in enumerate(scenarios, 1):
             scenario.ready()
+            if progress:
+                progress("compiling, once", position / len(scenarios))
         runs = list(_simulated(every, request, progress))
         made = standing.table(runs)
         found = list(_solved(every, runs, request, progress, extras)) if request.optimum else []

@@ -161,7 +161,7 @@ def make_runs(
     wanted = [member for member in members if member.run is None]
     with interrupts_enabled():
         for member in wanted:
-            warm_up(member.scenario)
+            warm_up(member.scenario, request.compiling)
     tasks = [
         Task(
             member.scenario, member.text, folder / member.label,

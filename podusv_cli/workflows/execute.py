@@ -80,6 +80,7 @@ class Task:
     label: str = ""  # in figures; the law's kind by default
     noticed: Sequence[Finding] = ()
     held: int = HELD
+    compiling: Progress | None = None  # is called where there is code to compile
 
 
 @dataclass(frozen=True)
@@ -129,7 +130,7 @@ def execute(
     ):
         long = size.content > task.held and not task.scenario.log.compress
         allocate = partial(files.disk_array, writer.folder) if long else np.empty
-        recording = simulated(task.scenario, watch, progress, allocate)
+        recording = simulated(task.scenario, watch, progress, allocate, task.compiling)
         extras = Extras(recording.status == "interrupted")
         with watch.part("metrics"):
             gather = partial(summary, task.scenario, recording, extras)
@@ -184,12 +185,13 @@ def unwritten(outcomes: Iterable[Outcome]) -> str:
     return next(iter(causes), "")
 
 
-def warm_up(scenario: Scenario) -> None:
+def warm_up(scenario: Scenario, compiling: Progress | None = None) -> None:
     """Make every check of a run before its first step, and have all its code compiled and loaded.
 
+    `compiling` is called with the fraction that is compiled, if there is anything to compile.
     Raises LawError.
     """
-    scenario.ready()
+    scenario.ready(compiling)
     if scenario.log.monitor:
         loop, grid = scenario.closed_loop(), scenario.time_grid()
         monitor.prepare(loop, grid, scenario.simulation.compiled)
@@ -208,13 +210,13 @@ def examined(scenario: Scenario) -> list[Finding]:
 
 def simulated(
     scenario: Scenario, watch: Stopwatch, progress: Progress | None = None,
-    allocate: Allocate = np.empty,
+    allocate: Allocate = np.empty, compiling: Progress | None = None,
 ) -> Recording:  # fmt: skip
     """Simulate a scenario, observed for its metrics; `allocate` as `simulate` has it."""
     loop, grid, seeing = scenario.closed_loop(), scenario.time_grid(), scenario.observer()
     compiled = scenario.simulation.compiled
     with watch.part("compile"), interrupts_enabled():
-        warm_up(scenario)
+        warm_up(scenario, compiling)
     with watch.part("engine"):
         return simulate(
             loop, grid, observer=seeing, compiled=compiled, progress=progress, allocate=allocate

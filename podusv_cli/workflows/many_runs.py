@@ -88,6 +88,11 @@ def scenario_texts(loaded: Loaded) -> dict[str, str]:
     return {SCENARIO: tree_yaml(loaded), **loaded.scenario.plugin_files()}
 
 
+def compiling(request: Request, law: str) -> Callable[[float], None]:
+    """What says how much of a law's march is compiled."""
+    return lambda part: request.say(f"compiling {law}, once for all runs to come: {part:.0%}")
+
+
 def engine_for(
     request: Request, folder: Path, scenario: Scenario, seal: str
 ) -> AbstractContextManager[Engine]:

@@ -39,6 +39,7 @@ class Request:
     workers: int = 0  # processes at a time; 0: one a core
     controller: str = ""  # which of `controllers` to run
     trust: bool = False  # whether plug-in files of a finished run may be executed
+    compiling: Progress | None = None  # is called with the fraction compiled, if any is missing
 
 
 def run(config: Path, request: Request, progress: Progress | None = None) -> Finished:
@@ -66,6 +67,7 @@ def run_loaded(
     task = Task(
         scenario, loaded.text, target, force=request.force, named=request.out is not None,
         figures=DRAWN if request.figures else (), argv=request.argv, noticed=noticed,
+        compiling=request.compiling,
     )  # fmt: skip
     several = loaded.scenario.controllers  # one may be the `controller` under a name
     all_run = request.controller or list(several.values()) == [loaded.scenario.controller]

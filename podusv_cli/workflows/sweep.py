@@ -31,6 +31,7 @@ from podusv_cli.workflows.keep import keep
 from podusv_cli.workflows.many_runs import (
     WHOLE,
     Request,
+    compiling,
     engine_for,
     finish,
     interrupted,
@@ -82,7 +83,7 @@ def run(config: Path, request: Request, tell: Tell) -> Swept:
     store, texts = _planned(config, request)
     check_fits(store.plan, store.folder, request.shard[1])
     for law in store.plan.laws:  # before there is a folder that a mended law would not fit
-        store.plan.single(law, 0).ready()
+        store.plan.single(law, 0).ready(compiling(request, law))
     with sole_writer(store.folder):
         store.open(started.isoformat(timespec="seconds"), texts)
         return _run(store, request, started, tell)
@@ -136,7 +137,9 @@ def _announce(store: Store, request: Request, workers: int, missing: Gaps) -> No
     if missing and (invalid := check_draws(made)).count:
         request.warn(invalid.in_words())
     if request.begin and missing:
-        need = estimate(made, pilot(made), missing, workers, figures=request.figures)
+        request.say("timing some runs of every law")
+        paces = pilot(made, partial(compiling, request))
+        need = estimate(made, paces, missing, workers, figures=request.figures)
         request.begin(*need.in_words())
 
 

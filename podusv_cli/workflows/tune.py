@@ -33,6 +33,7 @@ from podusv_cli.studies.tuning.trials import best
 from podusv_cli.studies.tuning.validation import validate
 from podusv_cli.workflows.many_runs import (
     Request,
+    compiling,
     engine_for,
     finish,
     interrupted,
@@ -126,7 +127,7 @@ def _simulated(
 
     try:
         searches = _searches(plan, folder)
-        _prepare(plan)
+        _prepare(plan, request)
         dispatch(searches, engine, searched)
         trials = {law: [s.trials for s in searches if s.law == law] for law in plan.gains}
         trials = {law: found for law, found in trials.items() if found}
@@ -141,23 +142,23 @@ def _simulated(
         session.end(sum(made.values()), engine.told())
 
 
-def _prepare(plan: TunePlan) -> None:
+def _prepare(plan: TunePlan, request: Request) -> None:
     """Have all laws with gains compiled, with all of their options, before the fork.
 
     Raises LawError.
     """
     for law, gains in plan.gains.items():
-        runs = sum(plan.runs_wanted()[law])
+        runs, told = sum(plan.runs_wanted()[law]), compiling(request, law)
         options = [{gain.key: word} for gain in gains for word in gain.words]
         for new in options or [{}] if gains else []:
             if with_gains(plan.laws[law], new):
-                prepare(plan.variant({law: (law, new)}, TRAIN, 1), law, 0, runs)
+                prepare(plan.variant({law: (law, new)}, TRAIN, 1), law, 0, runs, told)
 
 
 def _idle(plan: TunePlan, request: Request) -> dict[str, tuple[str, ...]]:
     """The gains that change no run."""
+    _prepare(plan, request)
     request.say("looking for gains that change nothing")
-    _prepare(plan)
     return find_idle(plan, request.workers)
 
 

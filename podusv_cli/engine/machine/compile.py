@@ -6,18 +6,21 @@ numba is slow to import, so it is imported only for code that is not on the disk
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from functools import cache
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from functools import cache, partial
 from importlib import import_module
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 from podusv_cli.core.errors import LawError
 from podusv_cli.engine.machine import object_cache, signatures
 from podusv_cli.engine.machine.kernel_faults import check_kernel, unsupported
 from podusv_cli.process.interrupts import interrupts_deferred
+from podusv_cli.process.workers import available_workers, run_all
 
-LANES_BY = "wide_numba"  # what compiles kernels for lanes
+ALONE_BY, LANES_BY = "compile_numba", "wide_numba"  # what compiles kernels for a run, for lanes
+SHARE = 40_000  # size of what a process of its own compiles at least: about 3 s
 RULES = (
     "a kernel is marked with @kernel, reads and writes numbers of vectors one by one (x[2], "
     "tau[0] = ...), calls math.sin and the like and other kernels, and allocates, prints and "
@@ -25,18 +28,96 @@ RULES = (
 )
 
 
-@cache
-def entry(part: str, inner: Any, names: tuple[str, ...]) -> Any:
-    """The compiled kernel `inner` of a component, callable by the loop as this part.
+class Piece(NamedTuple):
+    """A kernel that becomes a C function with this prototype, and what its name begins with.
 
-    `names` are those of the component's constants. Raises LawError for a kernel that cannot be
-    compiled, or that would read what is not there.
+    `compiler` is the module that makes its object code, imported only where there is none yet.
+    """
+
+    function: Any
+    prototype: Any
+    label: str = ""
+    compiler: str = ALONE_BY
+
+    @property
+    def name(self) -> str:
+        """The name under which its code is kept."""
+        name = self.label or self.function.__qualname__
+        return re.sub(r"\W", "_", f"{name}_{object_cache.fingerprint(self.function)}")
+
+    @property
+    def size(self) -> int:
+        """How much there is to compile, as the length of all byte code."""
+        return sum(map(len, object_cache.ingredients(self.function, {})))
+
+    def compile(self) -> object_cache.Code:
+        """Its object code. Raises TypeError."""
+        # The compiler would swallow an interrupt, so interrupts wait for it, a second or two.
+        with interrupts_deferred():
+            module = import_module(f"podusv_cli.engine.machine.{self.compiler}")
+            return cast(object_cache.Code, module.object_code(self.function, self.prototype))
+
+
+def prepare(pieces: Sequence[Piece], tell: Callable[[float], None] | None = None) -> None:
+    """Have the code of these pieces on the disk, compiled by as many processes as there are cores.
+
+    `tell` is called with the fraction that is compiled, if there is anything to compile. A piece
+    that cannot be compiled is left to `compiled`, which says why. Raises KeyboardInterrupt.
+    """
+    missing = [piece for piece in pieces if not object_cache.is_kept(piece.name)]
+    if not (missing and object_cache.keeps()):
+        return
+    sizes = {piece: piece.size for piece in missing}
+    whole = sum(sizes.values())
+    shares: list[list[Piece]] = [
+        [] for _ in range(max(1, min(available_workers(), whole // SHARE)))
+    ]
+    for piece in sorted(missing, key=lambda piece: -sizes[piece]):
+        min(shares, key=lambda share: sum(sizes[one] for one in share)).append(piece)
+    done = [0.0] * len(shares)
+
+    def advance(share: int, size: float) -> None:
+        done[share] = size
+        if tell:
+            tell(sum(done) / whole)
+
+    advance(0, 0.0)
+    import_module(f"podusv_cli.engine.machine.{missing[0].compiler}")  # once, before the forks
+    if len(shares) == 1:
+        _keep(shares[0], partial(advance, 0))
+        return
+    outcomes = run_all([partial(_keep, share) for share in shares], advance)
+    if any(outcome.interrupted for outcome in outcomes):
+        raise KeyboardInterrupt
+
+
+def _keep(pieces: Sequence[Piece], tell: Callable[[float], None]) -> None:
+    """Compile pieces one by one, and tell the size of what is compiled so far."""
+    done = 0
+    for piece in pieces:
+        with suppress(TypeError):
+            object_cache.kept(piece.name, piece.compile)
+        done += piece.size
+        tell(float(done))
+
+
+@cache
+def adapter(part: str, inner: Any, names: tuple[str, ...]) -> Piece:
+    """The kernel `inner` of a component as what the loop calls as this part.
+
+    `names` are those of the component's constants. Raises LawError for a kernel that would read
+    what is not there.
     """
     check_kernel(inner)
     label = f"{part}_entry_{inner.__module__}_{inner.__qualname__}"
-    bound = signatures.bind(part, inner, names)
+    return Piece(signatures.bind(part, inner, names), signatures.PROTOTYPES[part], label)
+
+
+@cache
+def entry(part: str, inner: Any, names: tuple[str, ...]) -> Any:
+    """The same, compiled. Raises LawError also for a kernel that cannot be compiled."""
     try:
-        return compiled(bound, signatures.PROTOTYPES[part], label)
+        return compiled(adapter(part, inner, names))
     except TypeError as error:
         place = f"{Path(inner.__code__.co_filename).name}, line {inner.__code__.co_firstlineno}"
         reason = unsupported(inner) or f"{error}; {RULES}"
@@ -46,56 +127,23 @@ def entry(part: str, inner: Any, names: tuple[str, ...]) -> Any:
 
 
 @cache
-def lane_entry(part: str, inner: Any, names: tuple[str, ...], alike: frozenset[str]) -> Any:
-    """The same with a run in every lane; constants in `alike` are the same in all of them.
-
-    Raises TypeError for a kernel that cannot go another way in every lane.
-    """
-    return compiled(*_lane_adapter(part, inner, names, alike), LANES_BY)
-
-
-def has_lanes(
-    parts: Sequence[tuple[str, Any, tuple[str, ...], frozenset[str]]], march: Any
-) -> bool:
-    """Whether all of these parts are compiled for lanes, and the march."""
-    adapters = [_lane_adapter(*part) for part in parts]
-    pieces = [(function, label) for function, _, label in adapters]
-    return all(object_cache.is_kept(_name(*piece)) for piece in (*pieces, (march, "")))
-
-
-def _lane_adapter(
-    part: str, inner: Any, names: tuple[str, ...], alike: frozenset[str]
-) -> tuple[Any, Any, str]:
+def lane_adapter(part: str, inner: Any, names: tuple[str, ...], alike: frozenset[str]) -> Piece:
+    """The same with a run in every lane; constants in `alike` are the same in all of them."""
+    check_kernel(inner)
     label = f"lanes_{part}_entry_{inner.__module__}_{inner.__qualname__}"
     bound = signatures.bind(part, inner, names, alike)
-    return bound, signatures.LANE_PROTOTYPES[part], label
+    return Piece(bound, signatures.LANE_PROTOTYPES[part], label, LANES_BY)
 
 
 @cache
-def routine(function: Any, prototype: Any, compiler: str = "compile_numba") -> Any:
-    """A compiled kernel of the engine itself."""
-    return compiled(function, prototype, compiler=compiler)
+def routine(piece: Piece) -> Any:
+    """The compiled kernel, loaded once. Raises TypeError as `compiled`."""
+    return compiled(piece)
 
 
-def compiled(
-    function: Any, prototype: Any, label: str = "", compiler: str = "compile_numba"
-) -> Any:
-    """The kernel as a compiled C function with this ctypes prototype.
-
-    `compiler` is the module that makes its object code, imported only where there is none yet.
+def compiled(piece: Piece) -> Any:
+    """A kernel as ctypes calls it, compiled unless its code is on the disk.
 
     Raises TypeError for a kernel that needs more than arithmetic and the mathematical library.
     """
-
-    def compile_now() -> object_cache.Code:
-        # The compiler would swallow an interrupt, so interrupts wait for it, a second or two.
-        with interrupts_deferred():
-            module = import_module(f"podusv_cli.engine.machine.{compiler}")
-            return cast(object_cache.Code, module.object_code(function, prototype))
-
-    return object_cache.stored(prototype, _name(function, label), compile_now)
-
-
-def _name(function: Any, label: str) -> str:
-    name = f"{label or function.__qualname__}_{object_cache.fingerprint(function)}"
-    return re.sub(r"\W", "_", name)
+    return object_cache.stored(piece.prototype, piece.name, piece.compile)

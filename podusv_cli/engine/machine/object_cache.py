@@ -43,23 +43,38 @@ class Code(NamedTuple):
 
 def stored(prototype: Any, name: str, translate: Callable[[], Code]) -> Any:
     """The function of this name as ctypes calls it: found on disk, or translated and kept there."""
-    folder = code_folder.code_folder(translators())
-    path = folder / f"{name}.code" if folder else None
+    code = kept(name, translate)
+    if not code.symbol:
+        raise TypeError(code.content.decode())
+    return _loaded(prototype, code)
+
+
+def kept(name: str, translate: Callable[[], Code]) -> Code:
+    """The code of this name: found on disk, or translated and kept there."""
+    path = _path(name)
     code = _read(path) if path else None
     if code is None:
         code = translate()
         if path:
             with suppress(OSError):  # a full disk costs the next process its time, no more
                 _write(path, code)
-    if not code.symbol:
-        raise TypeError(code.content.decode())
-    return _loaded(prototype, code)
+    return code
 
 
 def is_kept(name: str) -> bool:
     """Whether a piece of this name is on the disk."""
+    path = _path(name)
+    return bool(path and path.exists())
+
+
+def keeps() -> bool:
+    """Whether there is a folder for pieces."""
+    return code_folder.code_folder(translators()) is not None
+
+
+def _path(name: str) -> Path | None:
     folder = code_folder.code_folder(translators())
-    return bool(folder and (folder / f"{name}.code").exists())
+    return folder / f"{name}.code" if folder else None
 
 
 def target() -> Any:

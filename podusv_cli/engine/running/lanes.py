@@ -18,7 +18,6 @@ from podusv_cli.components.measurements.base import KNOWN, OWN
 from podusv_cli.core.kernel import LANES, Vector, whole_numbers
 from podusv_cli.engine.loop.closed_loop import ClosedLoop, Observer, entries
 from podusv_cli.engine.machine import signatures
-from podusv_cli.engine.machine.kernel_faults import check_kernel
 from podusv_cli.engine.running.watch import Ending
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.engine.step.lane_march import REACHED, advance_lanes
@@ -58,7 +57,9 @@ def alike(loop: ClosedLoop, observer: Observer) -> dict[str, frozenset[str]]:
     return {part: (chosen[part] | whole[part]) & set(names[part]) for part in names}
 
 
-def marcher(loop: ClosedLoop, observer: Observer) -> Callable[..., int]:
+def marcher(
+    loop: ClosedLoop, observer: Observer, compiling: Callable[[float], None] | None = None
+) -> Callable[..., int]:
     """The compiled march of runs like this loop, side by side.
 
     Raises TypeError where a part cannot go another way in every lane, LawError for a kernel that
@@ -66,11 +67,9 @@ def marcher(loop: ClosedLoop, observer: Observer) -> Callable[..., int]:
     """
     from podusv_cli.engine.machine import compile  # only what marches side by side needs it
 
-    shared, parts = alike(loop, observer), list(entries(loop, observer))
-    for _, inner, _ in parts:
-        check_kernel(inner)
-    adapters = [compile.lane_entry(*part, shared[part[0]]) for part in parts]
-    march = compile.routine(advance_lanes, signatures.ADVANCE_LANES, compile.LANES_BY)
+    pieces = _pieces(loop, observer)
+    compile.prepare(pieces, compiling)
+    *adapters, march = map(compile.routine, pieces)
 
     def compiled_march(
         last: int, h: float, vectors: list[Vector], layout: Layout, under_way: Vector, ends: Vector
@@ -91,11 +90,19 @@ def marcher(loop: ClosedLoop, observer: Observer) -> Callable[..., int]:
 
 def is_compiled(loop: ClosedLoop, observer: Observer) -> bool:
     """Whether the march of runs like this loop is on the disk, or in memory."""
+    from podusv_cli.engine.machine import object_cache
+
+    return all(object_cache.is_kept(piece.name) for piece in _pieces(loop, observer))
+
+
+def _pieces(loop: ClosedLoop, observer: Observer) -> list[Any]:
+    """What is compiled for lanes: the parts, with what is alike in them, and the march."""
     from podusv_cli.engine.machine import compile
 
     shared = alike(loop, observer)
-    parts = [(*part, shared[part[0]]) for part in entries(loop, observer)]
-    return compile.has_lanes(parts, advance_lanes)
+    parts = [compile.lane_adapter(*part, shared[part[0]]) for part in entries(loop, observer)]
+    march = compile.Piece(advance_lanes, signatures.ADVANCE_LANES, compiler=compile.LANES_BY)
+    return [*parts, march]
 
 
 def places(loop: ClosedLoop, observer: Observer) -> list[tuple[int, list[int]]]:
@@ -227,17 +234,22 @@ class Sorter:
         return [runs for runs in self._waiting.values() if runs]
 
 
-def prepare(loop: ClosedLoop, observer: Observer, instants: int) -> None:
+def prepare(
+    loop: ClosedLoop, observer: Observer, instants: int,
+    compiling: Callable[[float], None] | None = None,
+) -> None:  # fmt: skip
     """Compile the march of runs like this loop, if so many instants in all are worth it."""
     if instants >= WORTH:
-        why_alone(loop, observer)
+        why_alone(loop, observer, compiling)
 
 
-def why_alone(loop: ClosedLoop, observer: Observer) -> str:
+def why_alone(
+    loop: ClosedLoop, observer: Observer, compiling: Callable[[float], None] | None = None
+) -> str:
     """Why runs like this loop cannot march side by side; empty where they can."""
     try:
         places(loop, observer)
-        marcher(loop, observer)
+        marcher(loop, observer, compiling)
     except TypeError as error:
         return str(error)
     return ""

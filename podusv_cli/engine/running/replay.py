@@ -45,7 +45,9 @@ def replayer(
     p = np.array(list(constants.values()))
     buffers = (rows.ravel(), p, loop.controller.table(), np.zeros(2), np.zeros(room))
     vectors = [signatures.pointer(buffer) for buffer in buffers]
-    replay: Callable[..., None] = compile.routine(rk4.evaluate_all, signatures.EVALUATE_ALL)
+    replay: Callable[..., None] = compile.routine(
+        compile.Piece(rk4.evaluate_all, signatures.EVALUATE_ALL)
+    )
     law = compile.entry("law", loop.controller.law, tuple(constants))
 
     def timed() -> float:
@@ -124,7 +126,7 @@ def _rates_runner(loop: ClosedLoop, compiled: bool) -> Callable[..., None]:
     from podusv_cli.engine.machine import compile  # a loop in plain Python needs no compiler
 
     adapters = [compile.entry(*part) for part in chosen]
-    run = compile.routine(rk4.rates_along, signatures.RATES_ALONG)
+    run = compile.routine(compile.Piece(rk4.rates_along, signatures.RATES_ALONG))
 
     def compiled_run(
         count: int, logged: Vector, out: Vector, vectors: Vectors, layout: Layout

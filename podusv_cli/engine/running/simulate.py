@@ -62,26 +62,34 @@ def simulate(
         return replace(_record(loop, grid, vectors, layout, ending), about=about)
 
 
-def ready(loop: ClosedLoop, grid: TimeGrid, observer: Observer, compiled: bool) -> None:
+def ready(
+    loop: ClosedLoop, grid: TimeGrid, observer: Observer, compiled: bool,
+    compiling: Callable[[float], None] | None = None,
+) -> None:  # fmt: skip
     """Make every check of a run before its first step, and have its march compiled and loaded.
 
+    `compiling` is called with the fraction that is compiled, if there is anything to compile.
     Raises LawError.
     """
     check_law(loop)
     loop.check_fit(grid.step)
     asked("the closed loop", partial(vectors_of, loop, loop.layout(grid), observer, grid))
-    marcher(loop, observer, compiled)
+    marcher(loop, observer, compiled, compiling)
 
 
-def marcher(loop: ClosedLoop, observer: Observer, compiled: bool) -> Callable[..., int]:
+def marcher(
+    loop: ClosedLoop, observer: Observer, compiled: bool,
+    compiling: Callable[[float], None] | None = None,
+) -> Callable[..., int]:  # fmt: skip
     """The march of this loop, `rk4.advance` less its functions, compiled if need be."""
     if not compiled:
         adapters = [signatures.bind(*part) for part in entries(loop, observer)]
         return lambda *rest: rk4.advance_plainly(*adapters, *rest)
     from podusv_cli.engine.machine import compile  # a loop in plain Python needs no compiler
 
-    adapters = [compile.entry(*part) for part in entries(loop, observer)]
-    watch = compile.routine(rk4.advance, signatures.ADVANCE)
+    parts, march = [*entries(loop, observer)], compile.Piece(rk4.advance, signatures.ADVANCE)
+    compile.prepare([*(compile.adapter(*part) for part in parts), march], compiling)
+    adapters, watch = [compile.entry(*part) for part in parts], compile.routine(march)
 
     def compiled_march(first: int, last: int, h: float, vectors: Vectors, layout: Layout) -> int:
         vectors, sizes = signatures.pointers(vectors), signatures.whole_numbers(layout)

@@ -26,6 +26,7 @@ AIM = 4.0  # s of computing that a unit is to take
 MOST = 4096  # draws of a unit
 # Causes are part of runs.h5, which has the same bytes whichever engine made it.
 ENDED = "it ended its process, each time that it was made; provenance.json tells how"
+EARLY = 3.0  # s in which a rate says little, as no unit or few are made
 
 
 Shard = tuple[int, int]  # its number from 1, and how many there are
@@ -62,8 +63,9 @@ class Tally:
 
     @property
     def left(self) -> float:
-        """Seconds that are left at this rate."""
-        return (self.wanted - self.made) / self.rate if self.rate else math.inf
+        """Seconds that are left at this rate; infinite while it is too early to tell."""
+        early = time.monotonic() - self.began < EARLY
+        return math.inf if early or not self.rate else (self.wanted - self.made) / self.rate
 
 
 Tell = Callable[[Tally], None]
@@ -219,6 +221,7 @@ def dispatch(
     for law, cell in missing:
         prepare(store.plan, law, cell)  # before the fork, so that no process compiles it again
     begin(missing)
+    driver.tally.began = time.monotonic()  # compiling and timing are over
     finished = engine(driver, driver.done)
     if driver.failure:
         raise PodusvError(driver.failure.failure)

@@ -76,18 +76,21 @@ def _between(ends: Sequence[float], words: Callable[[float], str]) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def pilot(plan: Plan) -> dict[LawInCell, float]:
+def pilot(
+    plan: Plan, compiling: Callable[[str], Callable[[float], None] | None] = lambda law: None
+) -> dict[LawInCell, float]:
     """Processor time of a run [s] of every law and cell, of the first draws.
 
     Of many cells some are timed, and the others take the mean of the law. The runs are made in a
     process of their own, since a law may end it or never return. A law that ends it in all cells
-    is left out. Raises LawError, and KeyboardInterrupt.
+    is left out. `compiling` gives for a law what `prepare` calls. Raises LawError, and
+    KeyboardInterrupt.
     """
     most = max(1, MOST_PLACES // len(plan.laws))
     cells = np.unique(np.linspace(0, len(plan.cells) - 1, most).astype(int)).tolist()
     places = [(law, cell) for law in plan.laws for cell in cells]
     for law, cell in places:
-        prepare(plan, law, cell)
+        prepare(plan, law, cell, compiling=compiling(law))
     outcomes = run_all([partial(_timed, plan, *place) for place in places], workers=1)
     if any(outcome.interrupted for outcome in outcomes):
         raise KeyboardInterrupt

@@ -62,16 +62,20 @@ class UnitResult:
     causes: tuple[str, ...]
 
 
-def prepare(plan: Plan, law: str, cell: int, runs: int = 0) -> None:
+def prepare(
+    plan: Plan, law: str, cell: int, runs: int = 0,
+    compiling: Callable[[float], None] | None = None,
+) -> None:  # fmt: skip
     """Check a law, and have its march compiled and loaded. Raises LawError.
 
-    `runs` is how many runs of it there will be, by default those of the plan.
+    `runs` is how many runs of it there will be, by default those of the plan. `compiling` is called
+    with the fraction that is compiled, if there is anything to compile.
     """
     scenario = plan.single(law, cell)
     loop, seeing = scenario.closed_loop(), watching(scenario)
-    ready(loop, scenario.time_grid(), seeing, compiled=True)
+    ready(loop, scenario.time_grid(), seeing, compiled=True, compiling=compiling)
     runs = runs or plan.sweep.draws * len(plan.cells)
-    lanes.prepare(loop, seeing, runs * scenario.time_grid().steps)
+    lanes.prepare(loop, seeing, runs * scenario.time_grid().steps, compiling)
 
 
 def make(
