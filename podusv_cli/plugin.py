@@ -30,7 +30,7 @@ from podusv_cli.metrics.metric import Accumulator, Metric, add, gathered, ratio
 
 FIGURES = {
     "figure": "sheet", "signals_over_time": "panels",
-    "Shown": "style", "axis_label": "style", "legend": "style", "new_figure": "style",
+    "Shown": "shown", "axis_label": "style", "legend": "style", "new_figure": "style",
 }  # fmt: skip
 
 __all__ = [

@@ -42,8 +42,8 @@ from podusv_cli.engine.loop.closed_loop import ClosedLoop
 from podusv_cli.engine.running.check import check_law
 from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.engine.step.grid import TimeGrid
-from podusv_cli.figures.drawing import dressed
 from podusv_cli.figures.sheet import Sheet
+from podusv_cli.figures.shown import dressed
 from podusv_cli.figures.style import house_style, image
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import metrics_with, observer

@@ -8,7 +8,8 @@ from known_signals import ABOUT
 from matplotlib.patches import Polygon
 
 from podusv_cli.core.recording import Recording
-from podusv_cli.figures.drawing import FIGURES, dressed
+from podusv_cli.figures.drawing import FIGURES
+from podusv_cli.figures.shown import dressed
 from podusv_cli.figures.style import house_style
 from podusv_cli.scenario.load import load_text
 

@@ -1,7 +1,10 @@
 """`podusv compare` on the command line: exit codes, what is told where, what is refused."""
 
+import base64
 import json
 import re
+import subprocess
+import sys
 from functools import partial
 from pathlib import Path
 
@@ -11,7 +14,7 @@ from drawn_samples import no_figures_but
 
 from podusv_cli.process.workers import Outcome
 from podusv_cli.storage import manifest
-from podusv_cli.workflows import compare, execute
+from podusv_cli.workflows import compare
 
 
 @pytest.fixture
@@ -233,7 +236,7 @@ def test_five_runs_are_tables_below_each_other_on_a_narrow_terminal(podusv, monk
 def test_the_last_line_tells_how_to_check_that_numbers_have_converged(podusv):
     config = write("one.yaml", BASE)
     said = podusv(config, "--out", "x", "--set", "description=two words")
-    assert said.out.splitlines()[-1] == "compared 1 run: x"
+    assert said.out.splitlines()[-2:] == ["compared 1 run: x", "report: x/report.html"]
     assert said.err.splitlines()[-1] == (
         "the numbers may not have converged; check them: "
         "podusv verify one.yaml --set 'description=two words'"
@@ -252,7 +255,7 @@ ALONE = SHORT.replace("controller: {kind: pid, K_Pu: 100.0}\n", "").replace(
 def test_controllers_need_no_controller(podusv, monkeypatch, capsys):
     assert "\ncontroller:" not in ALONE
     config, run = write("two.yaml", ALONE), commanded(monkeypatch, capsys)
-    assert podusv(config, "--out", "x").out.splitlines()[-1] == "compared 2 runs: x"
+    assert podusv(config, "--out", "x").out.splitlines()[-2] == "compared 2 runs: x"
     assert run("validate", config).out.startswith("two.yaml: ok (two, stiff, soft, 10 steps)\n")
     refused = (
         "two has several controllers; choose one with --controller (stiff, soft), or compare all: "
@@ -286,15 +289,14 @@ def figures(folder: str) -> set[str]:
     return {path.name for path in Path(folder, "figures").iterdir()}
 
 
-def figures_of_report(folder: str) -> int:
-    """How many different figures the report embeds; some it shows twice."""
+def figures_of_report(folder: str) -> set[str]:
+    """The figures that the report embeds, encoded."""
     page = Path(folder, "report.html").read_text()
-    return len(set(re.findall(r"data:image/svg\+xml;base64,([^\"]+)", page)))
+    return set(re.findall(r"data:image/png;base64,([^\"]+)", page))
 
 
 @pytest.mark.slow
-def test_only_what_is_asked_for_is_drawn_and_what_cannot_be_is_told(podusv, monkeypatch):
-    monkeypatch.setattr(execute, "_drawn", lambda *given: {})  # of each run
+def test_only_what_is_asked_for_is_drawn_and_what_cannot_be_is_told(podusv):
     config = write("two.yaml", FIGURED)
     asked = ("--figures", "--figure", "errors", "--figure", "pods", "--format", "pdf, png")
     said = podusv(config, "--out", "x", "--workers", "1", *asked)
@@ -302,17 +304,29 @@ def test_only_what_is_asked_for_is_drawn_and_what_cannot_be_is_told(podusv, monk
     assert "figure pods could not be made: no run logged any of n, " in said.err
     assert "traceback" not in said.err
     assert figures("x") == {"errors.pdf", "errors.png"}
-    assert figures_of_report("x") == 1
+    assert len(figures_of_report("x")) == 1
 
 
-@pytest.mark.slow
-def test_figures_are_png_and_the_report_has_them_all_the_same(podusv, monkeypatch):
-    monkeypatch.setattr(execute, "_drawn", lambda *given: {})
+def test_the_report_has_the_figures_as_they_are_written_and_runs_have_none(podusv):
     config = write("two.yaml", FIGURED)
     with no_figures_but("errors", "velocities"):
         assert podusv(config, "--out", "x", "--figures").code == 0
     assert figures("x") == {"errors.png", "velocities.png"}
-    assert figures_of_report("x") == 2
+    written = {Path("x/figures", name).read_bytes() for name in figures("x")}
+    assert {base64.b64decode(text) for text in figures_of_report("x")} == written
+    assert not list(Path("x").glob("*/figures"))
+
+
+def test_a_report_without_figures_has_tables_and_the_animation_and_loads_no_matplotlib(podusv):
+    config = write("two.yaml", SHORT)
+    assert podusv(config, "--out", "x").code == 0
+    page = Path("x/report.html").read_text()
+    assert {"Comparison", "chase-data"} <= set(re.findall(r"Comparison|chase-data", page))
+    assert not figures_of_report("x")
+    assert not Path("x/figures").exists()
+    code = "import sys, podusv_cli.comparison.outputs; print('matplotlib' in sys.modules)"
+    said = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert said.stdout == "False\n"
 
 
 @pytest.mark.parametrize(

@@ -17,18 +17,9 @@ from podusv_cli.core.spectrum import periodogram
 from podusv_cli.figures import style
 from podusv_cli.figures.animation import stage
 from podusv_cli.figures.curves import thinned
-from podusv_cli.figures.drawing import FIGURES, draw, dressed
-from podusv_cli.figures.style import (
-    FEWEST,
-    LOOKS,
-    WIDTHS,
-    axis_label,
-    house_style,
-    image,
-    new_figure,
-    nth_style,
-    places,
-)
+from podusv_cli.figures.drawing import FIGURES, draw
+from podusv_cli.figures.shown import FEWEST, LOOKS, dressed, nth_style, places
+from podusv_cli.figures.style import WIDTHS, axis_label, house_style, image, new_figure
 from podusv_cli.scenario.load import load
 from podusv_cli.workflows.members import from_folder
 

@@ -23,7 +23,8 @@ from matplotlib.patches import Polygon, Rectangle
 from PIL import Image
 
 from podusv_cli.figures import animation
-from podusv_cli.figures.trajectory import bounds, enlargement, hull_of
+from podusv_cli.figures.tracks import bounds
+from podusv_cli.figures.trajectory import enlargement, hull_of
 
 LENGTH = scenario().vessel.length
 

@@ -14,7 +14,7 @@ from podusv_cli.core.errors import StorageError
 from podusv_cli.figures import drawing
 from podusv_cli.process.extras import Extras
 from podusv_cli.process.interrupts import Interrupts, interrupts_deferred, interrupts_enabled
-from podusv_cli.process.workers import INTERRUPTED, Outcome, run_all
+from podusv_cli.process.workers import INTERRUPTED, Outcome, run_all, run_shares
 
 
 def square(number, progress):
@@ -76,6 +76,20 @@ def test_a_killed_worker_is_replaced_once(tmp_path):
     assert "2 times" in outcomes[2].failure
 
 
+def test_small_jobs_share_processes_and_their_outcomes_keep_the_order():
+    outcomes = run_shares([partial(square, n) for n in range(9)], workers=2)
+    assert [outcome.result for outcome in outcomes] == [n**2 for n in range(9)]
+    assert len({outcome.result for outcome in run_shares([process_id] * 9, workers=2)}) == 2
+    assert run_shares([]) == []
+
+
+def test_a_small_job_that_kills_its_process_or_fails_costs_no_other_its_result():
+    outcomes = run_shares([partial(square, 2), die, fail, partial(square, 3)], workers=1)
+    assert [outcome.result for outcome in outcomes] == [4, None, None, 9]
+    assert outcomes[1].killed
+    assert outcomes[2].failure == "the disk is full"
+
+
 def test_interrupted_jobs_bring_home_what_they_have():
     def interrupt(position, done):
         raise KeyboardInterrupt
@@ -116,8 +130,9 @@ def test_an_interrupted_caller_leaves_no_process(tmp_path):
 
 def test_an_interrupt_while_figures_are_drawn_is_one_and_no_bug(monkeypatch):
     monkeypatch.setattr(
-        drawing, "run_all", lambda jobs, *rest: [Outcome(failure=INTERRUPTED, interrupted=True)] * 2
-    )
+        drawing, "run_shares",
+        lambda jobs, *rest: [Outcome(failure=INTERRUPTED, interrupted=True)] * 2,
+    )  # fmt: skip
     with pytest.raises(KeyboardInterrupt):
         drawing.draw_in_parallel([], ["errors", "loads"], ["png"], Extras())
 

@@ -16,7 +16,8 @@ from podusv_cli.components.controllers.full_backstepping import FullBackstepping
 from podusv_cli.components.controllers.network import Network
 from podusv_cli.components.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.core.recording import Recording
-from podusv_cli.figures.drawing import FIGURES, dressed
+from podusv_cli.figures.drawing import FIGURES
+from podusv_cli.figures.shown import dressed
 from podusv_cli.figures.stability import FAR, POINTS
 from podusv_cli.scenario.load import load
 from podusv_cli.storage.log_reader import read_log

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from podusv_cli.figures.style import Shown
+from podusv_cli.figures.shown import Shown
+from podusv_cli.figures.tracks import bounds
 
 FRAMES = 1000  # of a run, at most
 WHERE = ("x", "y", "psi")  # without these a run cannot be shown
@@ -20,8 +20,6 @@ FAR = 1e9  # m; diverged runs end beyond any map
 
 def chase(runs: Sequence[Shown]) -> dict[str, Any]:
     """Where runs and targets are at up to FRAMES instants; {} where there is nothing to show."""
-    from podusv_cli.figures.trajectory import bounds  # matplotlib is slow to import
-
     moving = [run for run in runs if all(run.has(name) for name in WHERE)]
     if not moving:
         return {}

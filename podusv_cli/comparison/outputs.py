@@ -12,6 +12,7 @@ import pandas as pd
 from podusv_cli.comparison import chase, claims, report, table
 from podusv_cli.comparison.entries import Entry
 from podusv_cli.core.finding import Finding
+from podusv_cli.figures.shown import dressed
 from podusv_cli.findings.finding import merged
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import CLOCKED, METRICS
@@ -23,7 +24,7 @@ from podusv_cli.storage.run_folder import RunWriter
 
 TABLE = "comparison.csv"
 TIMING = "timing.json"
-IN_REPORT = "svg"  # the format of figures in report.html
+IN_REPORT = "png"  # the format of figures in report.html
 # Names that no run may have: files of the comparison's folder and columns of its table.
 RESERVED = (
     TABLE, "comparison.md", "comparison.tex", "claims.json", "claims.md", "figures",
@@ -102,17 +103,16 @@ def drawn(
     result: Result, extras: Extras, progress: Callable[[str, float], None] | None = None,
     names: Sequence[str] = (), formats: Sequence[str] = ("png",), workers: int = 0,
 ) -> dict[str, bytes]:  # fmt: skip
-    """The figures of all runs together by file name: as asked, and as SVG for the report.
+    """The figures of all runs together by file name: as asked, and as PNG for the report.
 
     Without `names` these are all that fit. `workers` processes draw at a time (0: one a core). A
     figure that was asked for and that no run has signals for is missing among the `extras`.
     """
     # matplotlib is slow to import
-    from podusv_cli.figures.drawing import draw_in_parallel, dressed, figures_of
+    from podusv_cli.figures.drawing import draw_in_parallel, figures_of
 
-    tell = progress and partial(progress, "drawing figures")
-    if tell:
-        tell(0.0)
+    tell = partial(progress or (lambda what, fraction: None), "drawing figures")
+    tell(0.0)
     shown = dressed([(e.label, e.recording, e.scenario) for e in result.entries], result.peaks)
     known = figures_of(run.scenario for run in shown)
     for name in names:
@@ -130,17 +130,15 @@ def as_report(
 ) -> str:  # fmt: skip
     """The HTML report; `figures` as `drawn` gives them."""
     pictures: list[Picture] = []
-    moving: dict[str, Any] = {}
     if figures:
-        # matplotlib is slow to import
-        from podusv_cli.figures.drawing import dressed, figures_of
+        from podusv_cli.figures.drawing import figures_of  # matplotlib is slow to import
 
         pictures = [
             Picture(name, sheet.caption, figures[f"{name}.{IN_REPORT}"], sheet.source)
             for name, sheet in figures_of(result.scenarios.values()).items()
             if f"{name}.{IN_REPORT}" in figures
         ]
-        moving = chase.chase(dressed([(e.label, e.recording, e.scenario) for e in result.entries]))
+    moving = chase.chase(dressed([(e.label, e.recording, e.scenario) for e in result.entries]))
     story = report.Story(
         title=title, scenario=next(iter(result.scenarios.values())),
         controllers={label: one.controller for label, one in result.scenarios.items()},

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 
 BYTES = {"bytes": 1.0, "kB": 1e3, "MB": 1e6, "GB": 1e9, "TB": 1e12, "PB": 1e15}
+RAISED = str.maketrans("0123456789-−", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁻")
 TIMES = {"s": 1.0, "min": 60.0, "h": 3600.0, "days": 86400.0, "years": 31557600.0}
 
 
@@ -21,6 +22,13 @@ def time_in_words(seconds: float) -> str:
 def raised(unit: str) -> str:
     """A unit with its powers raised, as LaTeX and matplotlib read it: `m$^2$ s` for `m2 s`."""
     return re.sub(r"(?<=[A-Za-z])(\d)", r"$^\1$", unit)
+
+
+def exponent(formula: str) -> str:
+    """A number that matplotlib set as a formula, as plain text: `2×10⁻³`."""
+    plain = re.sub(r"\\mathdefault\{((?:[^{}]|\{[^}]*\})*)\}|\$", r"\1", formula)
+    plain = plain.replace(r"\times", "×")
+    return re.sub(r"\^\{([^}]*)\}", lambda power: power[1].translate(RAISED), plain)
 
 
 def _in_words(amount: float, units: dict[str, float]) -> str:

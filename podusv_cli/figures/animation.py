@@ -8,12 +8,14 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from PIL import Image
 
-from podusv_cli.figures.style import Shown, house_style, legend
-from podusv_cli.figures.trajectory import bounds, enlargement, hull_of, map_axes, targets
+from podusv_cli.figures.page import Page
+from podusv_cli.figures.shown import Shown
+from podusv_cli.figures.style import house_style, legend
+from podusv_cli.figures.tracks import bounds, targets
+from podusv_cli.figures.trajectory import enlargement, hull_of, map_axes
 
 FILE = "animation.gif"
 FRAMES = 120
@@ -27,10 +29,10 @@ PALE = 0.25
 def animate(runs: Sequence[Shown]) -> bytes:
     """A GIF: tracks grow, hulls (enlarged) and targets move; same runs, same bytes."""
     with house_style():
-        figure = Figure(figsize=(SIZE, SIZE), dpi=DPI, layout="constrained")
+        figure = Page(figsize=(SIZE, SIZE), dpi=DPI)
         canvas = FigureCanvasAgg(figure)
         move = stage(figure.add_subplot(), runs)
-        legend(figure, 1)
+        legend(figure)
         frames = []
         for t in frame_times(runs):
             move(t)

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from podusv_cli.figures.curves import Span, compress, differ, draw_curve, draw_signal
 from podusv_cli.figures.panels import PEAKS, TIME
 from podusv_cli.figures.sheet import figure
-from podusv_cli.figures.style import Shown, axis_label, legend, new_figure
+from podusv_cli.figures.shown import Shown
+from podusv_cli.figures.style import axis_label, legend, new_figure
 
 EARLY = 0.005  # of the run: where the peaks are
 EARLY_ROWS = 20  # at least
@@ -45,7 +46,7 @@ def controls(runs: Sequence[Shown], columns: int) -> Figure:
             axes.set_ylabel(axis_label(runs, LOADS[load][kind]))
     for axes in cells[-1, -1] if columns == 2 else cells[:, -1, -1]:
         axes.set_xlabel(TIME)
-    legend(figure, columns)
+    legend(figure)
     return figure
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import largest
-from podusv_cli.figures.style import Shown
+from podusv_cli.figures.shown import Shown
 
 THIN: dict[str, Any] = {"linewidth": 0.5, "alpha": 0.6}
 MARK: dict[str, Any] = {"markersize": 3.2, "markerfacecolor": "white", "markeredgewidth": 0.7}
@@ -28,11 +27,11 @@ def thinned(t: Vector, y: Vector, points: int = 1500) -> tuple[Vector, Vector]:
     """At most about `points` samples that keep every extreme: the least and largest of each bin."""
     if len(t) <= points:
         return t, y
-    edges = np.linspace(0, len(t), points // 2 + 1).astype(int)
-    kept = {0, len(t) - 1}
-    for low, high in pairwise(edges):
-        kept |= {low + int(np.argmin(y[low:high])), low + int(np.argmax(y[low:high]))}
-    chosen = np.array(sorted(kept))
+    width = -(-len(t) // (points // 2))
+    whole = (len(t) - 1) // width * width  # the rest after it is no longer than a bin
+    bins, starts = y[:whole].reshape(-1, width), np.arange(0, whole, width)
+    ends = [0, whole + int(np.argmin(y[whole:])), whole + int(np.argmax(y[whole:])), len(t) - 1]
+    chosen = np.unique(np.concatenate([starts + bins.argmin(1), starts + bins.argmax(1), ends]))
     return t[chosen], y[chosen]
 
 

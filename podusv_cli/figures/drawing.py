@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cache, partial
 
 import numpy as np
 
 from podusv_cli.core import registry
 from podusv_cli.core.errors import UsageError
-from podusv_cli.core.escaping import visible
 from podusv_cli.core.plugins import Plugins
-from podusv_cli.core.recording import Recording
 from podusv_cli.figures.sheet import Sheet
-from podusv_cli.figures.style import FORMATS, Shown, house_style, image, nth_style, places
+from podusv_cli.figures.shown import Shown
+from podusv_cli.figures.style import FORMATS, house_style, image
 from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_enabled
-from podusv_cli.process.workers import run_all
+from podusv_cli.process.workers import run_shares
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import unknown
 
@@ -42,22 +40,6 @@ def figures_of(scenarios: Iterable[Scenario]) -> dict[str, Sheet]:
     return figures_with(tuple(dict.fromkeys(p for one in scenarios for p in one.plugged)))
 
 
-def dressed(
-    runs: Sequence[tuple[str, Recording, Scenario]], peaks: Mapping[str, float] | None = None
-) -> list[Shown]:
-    """Labelled recordings with their looks, in order; without those too short to draw.
-
-    A run alone has no markers. `peaks` are those of signals as claims about the runs name them.
-    """
-    count = len(runs)
-    shown = [
-        Shown(visible(label), recording, scenario, *nth_style(i), places(i, count), peaks or {})
-        for i, (label, recording, scenario) in enumerate(runs)
-        if len(recording["time"]) > 1
-    ]
-    return shown if count > 1 else [replace(run, marker="") for run in shown]
-
-
 def draw(
     runs: Sequence[Shown], names: Iterable[str], formats: Sequence[str], columns: int = 2
 ) -> Iterator[tuple[str, bytes]]:
@@ -73,33 +55,22 @@ def draw(
 
 def draw_in_parallel(
     runs: Sequence[Shown], names: Iterable[str], formats: Sequence[str], extras: Extras,
-    columns: int = 2, progress: Callable[[float], None] | None = None, workers: int = 0,
+    columns: int = 2, progress: Callable[[float], None] = lambda fraction: None, workers: int = 0,
 ) -> dict[str, bytes]:  # fmt: skip
-    """The same as `draw`, each of several figures in a process of its own.
+    """The same as `draw`, in processes of their own, each of which draws several figures.
 
     A figure that fails is missing among the `extras`. `progress` is called with the fraction of
-    figures that are over. Raises KeyboardInterrupt where several were interrupted.
+    figures that are over. Raises KeyboardInterrupt where one was interrupted.
     """
-    names, done = tuple(names), set[int]()
-
-    def drawn(name: str) -> dict[str, bytes]:
-        return dict(draw(runs, [name], formats, columns))
+    names = tuple(names)
 
     def job(name: str, tell: Callable[[float], None]) -> tuple[dict[str, bytes], list[Failure]]:
         own = Extras()
         with interrupts_enabled():
-            files = own.made(f"figure {name}", partial(drawn, name))
-        tell(1.0)
+            files = own.made(f"figure {name}", lambda: dict(draw(runs, [name], formats, columns)))
         return files or {}, own.missing
 
-    def tell(position: int, _: float) -> None:
-        done.add(position)
-        if progress:
-            progress(len(done) / len(names))
-
-    if len(names) == 1:
-        return extras.attempt(f"figure {names[0]}", partial(drawn, names[0])) or {}
-    outcomes = run_all([partial(job, name) for name in names], tell, workers)
+    outcomes = run_shares([partial(job, name) for name in names], progress, workers)
     if any(outcome.interrupted for outcome in outcomes):
         raise KeyboardInterrupt
     found: dict[str, bytes] = {}

@@ -15,7 +15,8 @@ from podusv_cli.core.signal import STATE
 from podusv_cli.figures.curves import draw_curve, draw_run, scaling, thinned
 from podusv_cli.figures.panels import TIME
 from podusv_cli.figures.sheet import figure
-from podusv_cli.figures.style import Shown, about, legend, new_figure, unit
+from podusv_cli.figures.shown import Shown
+from podusv_cli.figures.style import about, legend, new_figure, unit
 
 PANEL_HEIGHT = 1.15  # inches
 TRUE: dict[str, Any] = {"linewidth": 3.5, "alpha": 0.3, "linestyle": "-"}
@@ -45,7 +46,7 @@ def estimates(runs: Sequence[Shown], columns: int) -> Figure:
         errors.set_ylabel(f"error of ${symbol}$ [{unit_of}]")
     for axes in panels[-1]:
         axes.set_xlabel(TIME)
-    legend(figure, columns)
+    legend(figure)
     return figure
 
 

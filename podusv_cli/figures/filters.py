@@ -9,7 +9,8 @@ from matplotlib.figure import Figure
 from podusv_cli.figures.curves import compress, draw_run, draw_signal, scaling
 from podusv_cli.figures.panels import PEAKS, grid
 from podusv_cli.figures.sheet import figure
-from podusv_cli.figures.style import Shown, about, axis_label, legend, unit
+from podusv_cli.figures.shown import Shown
+from podusv_cli.figures.style import about, axis_label, legend, unit
 
 PAIRS = (("alpha_u", "beta_u"), ("alpha_r", "beta_r"))
 ERRORS = ("y_u", "y_r")
@@ -40,5 +41,5 @@ def filters(runs: Sequence[Shown], columns: int) -> Figure:
         draw_signal(axes, runs, error)
         axes.set_ylabel(axis_label(runs, error))
         compress(axes, runs, error)
-    legend(figure, columns, "virtual control before the filter" if filtered else "")
+    legend(figure, "virtual control before the filter" if filtered else "")
     return figure

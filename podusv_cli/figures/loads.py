@@ -12,7 +12,8 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.figures.curves import draw_shared
 from podusv_cli.figures.panels import grid
 from podusv_cli.figures.sheet import figure
-from podusv_cli.figures.style import Shown, about, axis_label, legend
+from podusv_cli.figures.shown import Shown
+from podusv_cli.figures.style import about, axis_label, legend
 
 SEA = ("b_u", "b_v", "b_r")
 
@@ -32,7 +33,7 @@ def loads(runs: Sequence[Shown], columns: int) -> Figure:
         axes.set_title(about(runs, name).meaning)
     if limited:
         _limits(panels[-1], limited)
-    legend(figure, columns)
+    legend(figure)
     return figure
 
 

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from matplotlib.figure import Figure
 
 from podusv_cli.core import escaping
-from podusv_cli.figures.style import TARGET_LOOK, legend, new_figure, nth_style
+from podusv_cli.figures.shown import TARGET_LOOK, nth_style
+from podusv_cli.figures.style import legend, new_figure
 from podusv_cli.theory.loop_margins import AXES, LoopMargins
 
 HEIGHT = 4.2  # inches
@@ -33,5 +34,5 @@ def sensitivities(laws: Mapping[str, LoopMargins], columns: int = 2) -> Figure:
         row[0].set_ylabel(title)
     for axes in panels[-1]:
         axes.set_xlabel("angular frequency [rad/s]")
-    legend(figure, columns)
+    legend(figure)
     return figure

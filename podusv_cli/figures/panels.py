@@ -12,8 +12,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from podusv_cli.figures.curves import compress, draw_signal
+from podusv_cli.figures.page import Page
 from podusv_cli.figures.sheet import Family, Sheet, figure
-from podusv_cli.figures.style import Shown, axis_label, legend, new_figure
+from podusv_cli.figures.shown import Shown
+from podusv_cli.figures.style import axis_label, legend, new_figure
 
 Scale = Callable[[Axes, Sequence[Shown]], None]
 
@@ -45,13 +47,13 @@ def signals_over_time(
                 scales[name](axes, [run for run in runs if run.has(name)])
             if compressed:
                 compress(axes, runs, name)
-        legend(figure, columns)
+        legend(figure)
         return figure
 
     return family
 
 
-def grid(count: int, columns: int) -> tuple[Figure, list[Axes]]:
+def grid(count: int, columns: int) -> tuple[Page, list[Axes]]:
     """A figure with panels over one time, row by row; one alone in the last row fills it."""
     rows = math.ceil(count / columns)
     figure = new_figure(columns, 0.7 + PANEL_HEIGHT * rows)

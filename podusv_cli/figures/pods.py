@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 from podusv_cli.core.kernel import Vector
 from podusv_cli.figures.curves import THIN, draw_curve, draw_run, scaling
 from podusv_cli.figures.sheet import figure
-from podusv_cli.figures.style import Shown, axis_label, legend, new_figure
+from podusv_cli.figures.shown import Shown
+from podusv_cli.figures.style import axis_label, legend, new_figure
 
 ROWS = (("n", "n_cmd"), ("n_part", "n_part_cmd"), ("delta", "delta_cmd"), ("power", ""))
 PANEL_HEIGHT = 1.5  # inches
@@ -37,7 +38,7 @@ def pods(runs: Sequence[Shown], columns: int) -> Figure:
     for pod, (top, bottom) in enumerate(zip(panels[0], panels[-1], strict=True)):
         top.set_title(f"pod {pod + 1}")
         bottom.set_xlabel("time [s]")
-    legend(figure, columns, "asked for by the allocation")
+    legend(figure, "asked for by the allocation")
     return figure
 
 

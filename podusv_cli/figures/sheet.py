@@ -10,7 +10,7 @@ from string import ascii_lowercase
 
 from matplotlib.figure import Figure
 
-from podusv_cli.figures.style import Shown
+from podusv_cli.figures.shown import Shown
 
 Family = Callable[[Sequence[Shown], int], Figure]
 

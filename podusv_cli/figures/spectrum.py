@@ -13,7 +13,8 @@ from matplotlib.lines import Line2D
 from podusv_cli.core.spectrum import periodogram
 from podusv_cli.figures.curves import mark
 from podusv_cli.figures.sheet import figure
-from podusv_cli.figures.style import Shown, about, legend, new_figure, unit
+from podusv_cli.figures.shown import Shown
+from podusv_cli.figures.style import about, legend, new_figure, unit
 
 DEMANDS = {"tau_u_cmd": "b_u", "tau_r_cmd": "b_r"}  # what the law demands, and what disturbs it
 AXES = {"tau_u_cmd": "surge", "tau_r_cmd": "yaw"}
@@ -42,7 +43,7 @@ def spectrum(runs: Sequence[Shown], columns: int) -> Figure:
         axes.set_title(AXES[demand])
         axes.set_xlabel("angular frequency [rad/s]")
         axes.set_ylabel(f"rms of ${about(runs, demand).symbol}$ [{unit(about(runs, demand))}]")
-    legend(figure, columns)
+    legend(figure)
     return figure
 
 

@@ -17,7 +17,8 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.figures.curves import draw_run, scaling, thinned
 from podusv_cli.figures.panels import TIME
 from podusv_cli.figures.sheet import figure
-from podusv_cli.figures.style import Shown, legend, new_figure
+from podusv_cli.figures.shown import Shown
+from podusv_cli.figures.style import legend, new_figure
 from podusv_cli.theory.lyapunov import TERMS, V_DOT, V
 
 POINTS = 600  # of a stack; every column is a mean, so that no extreme stands for its surroundings
@@ -55,12 +56,8 @@ def stability(runs: Sequence[Shown], columns: int) -> Figure:
     layers = [_shares(axes, run) for axes, run in zip(over_time[2:], runs, strict=True)]
     over_time[-1].set_xlabel(TIME)
     over_time[-1].set_xlim(0.0, max(run.end for run in runs))
-    over_time[-1].legend(
-        layers[-1], [f"${error}$" for error in LAYERS], title="terms of $V$, by their error",
-        loc="upper center", bbox_to_anchor=(0.5, -0.35), ncols=5 * columns,
-        handlelength=1.0, columnspacing=1.2,
-    )  # fmt: skip
-    legend(figure, columns)
+    figure.add_key(layers[-1], [f"${error}$" for error in LAYERS], below=True)
+    legend(figure)
     return figure
 
 

@@ -12,70 +12,21 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon, Rectangle
 
 from podusv_cli.core.kernel import Vector
-from podusv_cli.core.recording import Recording
 from podusv_cli.figures.curves import CUT, Span, mark, scaling
+from podusv_cli.figures.page import Page
 from podusv_cli.figures.sheet import figure
-from podusv_cli.figures.style import TARGET_LOOK, Shown, legend, new_figure
+from podusv_cli.figures.shown import Shown
+from podusv_cli.figures.style import legend, new_figure
+from podusv_cli.figures.tracks import Target, bounds, rows_of, targets
 
 HULL = np.array([(0.5, 0.0), (0.25, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.25, -0.5)])
 LAST_PART = 0.05  # of the run, in the close-up of the end
 INSTANTS = 2000  # at which the runs' distance from each other is looked at
 APART = 0.1  # lengths; nearer runs are nowhere apart
 NEAREST, FARTHEST = 2.0, 20.0  # lengths from the middle of the close-up to its edges
-POINTS = 3000  # of a track, at most about
 MARK: dict[str, Any] = {"color": "#444444", "linestyle": "none"}
 ACCEPTANCE: dict[str, Any] = {"fill": False, "edgecolor": "#888888", "linewidth": 0.5}
 WAYPOINT: dict[str, Any] = {**MARK, "marker": "s", "markersize": 5.0, "markerfacecolor": "none"}
-
-
-@dataclass(frozen=True)
-class Target:
-    """A target, the runs that follow it, how it is drawn, and a log that holds its whole track."""
-
-    runs: Sequence[Shown]
-    line_style: dict[str, Any]
-    recording: Recording
-
-    @property
-    def is_ahead(self) -> bool:
-        """Whether it is somewhere at a time: not on a path that is followed, nor in a trial."""
-        return self.in_sight and not self.runs[0].scenario.path.follows
-
-    @property
-    def in_sight(self) -> bool:
-        """Whether there is one; a manoeuvring trial has none."""
-        return not self.runs[0].scenario.controller.trial()
-
-    def track(self, span: Span = (0.0, np.inf)) -> tuple[Vector, Vector]:
-        """East and north [m] during a time [s]; all legs of a path, the track of a trial."""
-        if self.in_sight and not self.is_ahead:
-            north, east = np.array(self.runs[0].scenario.path.waypoints()).T
-            return east, north
-        rows, names = _rows(self.recording, span), ("y_d", "x_d") if self.is_ahead else ("y", "x")
-        east, north = (self.recording[name][rows] for name in names)
-        return east, north
-
-
-def targets(runs: Sequence[Shown]) -> list[Target]:
-    """Every target that differs from the others, as long as any of its runs lasts."""
-    groups: list[list[Shown]] = []
-    for run in runs:
-        group = next((g for g in groups if g[0].scenario.path == run.scenario.path), None)
-        if group is None:
-            groups.append([run])
-        else:
-            group.append(run)
-    return [_target(group, only=len(groups) == 1) for group in groups]
-
-
-def _target(group: Sequence[Shown], *, only: bool) -> Target:
-    longest = max(group, key=lambda run: run.end).recording
-    word = "path" if group[0].scenario.path.follows else "target"
-    if only:
-        return Target(group, {**TARGET_LOOK, "label": word}, longest)
-    label = f"{word} of {', '.join(run.name for run in group)}"
-    style = {**TARGET_LOOK, "linestyle": group[0].linestyle, "label": label}
-    return Target(group, style, longest)
 
 
 def enlargement(runs: Sequence[Shown]) -> float:
@@ -83,23 +34,6 @@ def enlargement(runs: Sequence[Shown]) -> float:
     tracks = [target.track() for target in targets(runs)]
     spread = max(float(np.ptp(east) + np.ptp(north)) for east, north in tracks)
     return max(1.0, round(0.05 * spread / max(run.length for run in runs)))
-
-
-def bounds(runs: Sequence[Shown]) -> tuple[Span, Span]:
-    """Limits east and north [m] of a map of the targets and of the runs that finished, if any.
-
-    Where none finished, targets alone.
-    """
-    pairs = [target.track() for target in targets(runs)]
-    pairs += [(run.recording["y"], run.recording["x"]) for run in runs if run.whole]
-    pairs += [(run.recording["y"][:1], run.recording["x"][:1]) for run in runs]
-    corners = ([(part.min(), part.max()) for part in parts] for parts in zip(*pairs, strict=True))
-    east, north = (np.ravel(extremes) for extremes in corners)
-    margin = 0.06 * max(float(np.ptp(east)), float(np.ptp(north)), 1.0)
-    return (
-        (float(east.min()) - margin, float(east.max()) + margin),
-        (float(north.min()) - margin, float(north.max()) + margin),
-    )
 
 
 def map_axes(axes: Axes, east: Span, north: Span) -> None:
@@ -140,11 +74,11 @@ def trajectory(runs: Sequence[Shown], columns: int) -> Figure:
         frame = Rectangle((left, low), width, width, fill=False, edgecolor="#444444", linewidth=0.5)
         whole.add_patch(frame)
         whole.annotate(letter, (left + width, low), (1, 0), textcoords="offset points", fontsize=6)
-    legend(figure, columns)
+    legend(figure)
     return figure
 
 
-def _sheet(asides: int, columns: int, shape: float) -> tuple[Figure, Axes, list[Axes]]:
+def _sheet(asides: int, columns: int, shape: float) -> tuple[Page, Axes, list[Axes]]:
     """A figure with a large panel and some small ones, beside each other or one below the other.
 
     `shape` is the large panel's width over its height.
@@ -268,12 +202,6 @@ def _draw_tracks(axes: Axes, ahead: Sequence[Target], runs: Sequence[Shown], spa
     for target in (target for target in ahead if target.in_sight):
         axes.plot(*target.track(span), **target.line_style)
     for run in runs:
-        log, rows = run.recording, _rows(run.recording, span)
+        log, rows = run.recording, rows_of(run.recording, span)
         (track,) = axes.plot(log["y"][rows], log["x"][rows], **run.line_style)
         mark(track, run, log["time"][rows])
-
-
-def _rows(log: Recording, span: Span) -> slice:
-    """The rows within a time, thinned in steps: by extremes a track would lose its shape."""
-    first, last = (int(row) for row in np.searchsorted(log["time"], span))
-    return slice(first, last + 1, max(1, (last + 1 - first) // POINTS))

@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 from podusv_cli.figures.curves import draw_signal
 from podusv_cli.figures.panels import TIME
 from podusv_cli.figures.sheet import figure
-from podusv_cli.figures.style import Shown, axis_label, legend, new_figure
+from podusv_cli.figures.shown import Shown
+from podusv_cli.figures.style import axis_label, legend, new_figure
 
 THIN = 0.6  # points: bounds, each in its run's line style
 REACH = 2.0  # widths; farther from every node a network says next to nothing
@@ -41,7 +42,7 @@ def validity(runs: Sequence[Shown], columns: int) -> Figure:
     end = max(run.end for run in runs)
     for axes in figure.axes:
         axes.set_xlim(0.0, end)
-    legend(figure, columns)
+    legend(figure)
     return figure
 
 

@@ -149,7 +149,8 @@ class Comparison:
 
 def figure(runs: Mapping[str, Run], name: str, columns: int = 2) -> Figure:
     """One of podusv's figures of several runs. Raises UsageError."""
-    from podusv_cli.figures.drawing import dressed, figures_of  # matplotlib is slow to import
+    from podusv_cli.figures.drawing import figures_of  # matplotlib is slow to import
+    from podusv_cli.figures.shown import dressed
     from podusv_cli.figures.style import house_style, image
 
     known = figures_of(run.scenario for run in runs.values())

@@ -23,13 +23,11 @@ class Picture(NamedTuple):
     caption: str
     file: bytes
     source: str = ""
-    form: str = "svg"  # or png
 
     @property
     def data(self) -> str:
-        """The picture as an address; inline markup of several figures would share its names."""
-        media = {"svg": "svg+xml"}.get(self.form, self.form)
-        return f"data:image/{media};base64,{base64.b64encode(self.file).decode()}"
+        """The picture, a PNG, as an address."""
+        return f"data:image/png;base64,{base64.b64encode(self.file).decode()}"
 
     @property
     def title(self) -> str:

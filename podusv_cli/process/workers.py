@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from pickle import PicklingError, UnpicklingError
@@ -29,6 +30,7 @@ Report = Callable[[int, float], None]
 GRACE = 1.5  # s after an interrupt, in which jobs may return a partial result
 INTERRUPTED = "interrupted"
 FORK = multiprocessing.get_context("fork")  # workers inherit imported and compiled code
+SHARE = 4  # small jobs, at least, that are worth a process
 TRIES = 2  # a job whose process is killed runs once more
 
 
@@ -69,6 +71,46 @@ def run_all(
     run_each(enumerate(jobs), outcomes.__setitem__, progress, workers)
     missing = Outcome(failure=INTERRUPTED, interrupted=True)
     return [outcomes.get(position, missing) for position in range(len(jobs))]
+
+
+def run_shares(
+    jobs: Sequence[Job], progress: Progress = lambda fraction: None, workers: int = 0
+) -> list[Outcome]:
+    """Run small jobs, several in a process, so that they share what it has loaded and cached.
+
+    `progress` is called with the fraction of jobs that are over. If a process is killed, each of
+    its jobs runs again in a process of its own. Jobs start with interrupts deferred.
+    """
+    count = min(workers or available_workers(), -(-len(jobs) // SHARE))
+    shares = [range(first, len(jobs), count) for first in range(count)]
+    done = dict.fromkeys(range(count), 0.0)
+
+    def advance(position: int, fraction: float) -> None:
+        done[position] = fraction * len(shares[position])
+        progress(sum(done.values()) / len(jobs))
+
+    together = [partial(_one_by_one, [jobs[number] for number in share]) for share in shares]
+    found: dict[int, Outcome] = {}
+    for share, whole in zip(shares, run_all(together, advance, workers), strict=True):
+        if whole.killed and len(share) > 1:
+            found |= zip(share, run_all([jobs[n] for n in share], workers=workers), strict=True)
+        else:
+            outcomes = whole.result or [whole] * len(share)
+            found |= zip(share, (replace(o, interrupted=whole.interrupted or o.interrupted)
+                                 for o in outcomes), strict=True)  # fmt: skip
+    return [found[number] for number in range(len(jobs))]
+
+
+def _one_by_one(jobs: Sequence[Job], tell: Progress) -> list[Outcome]:
+    outcomes: list[Outcome] = []
+    with interrupts_caught() as interrupts:
+        for job in jobs:
+            if interrupts.number:
+                outcomes.append(Outcome(failure=INTERRUPTED, interrupted=True))
+                continue
+            outcomes.append(outcome_of(job, lambda fraction: None, interrupts))
+            tell(len(outcomes) / len(jobs))
+    return outcomes
 
 
 def run_each(

@@ -17,7 +17,7 @@ from podusv_cli.figures.style import house_style, image
 from podusv_cli.pages.page import Picture
 from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_enabled
-from podusv_cli.process.workers import run_all
+from podusv_cli.process.workers import run_shares
 
 COLUMNS = 2  # of a journal page, in width
 
@@ -29,34 +29,30 @@ class Sketch:
     name: str
     caption: str
     draw: Callable[[], Figure]
-    forms: tuple[str, ...] = ("png", "svg")  # the first is that of the file, the last of a report
 
 
 def rendered(sketches: Iterable[Sketch], extras: Extras) -> tuple[dict[str, bytes], list[Picture]]:
-    """Figures, each drawn in a process of its own: files by name, and as pictures of a report.
+    """PNG pictures of figures, drawn in processes of their own: by file name, and of a report.
 
     A figure that cannot be drawn is missing among the `extras`.
     """
     files: dict[str, bytes] = {}
     pictures: list[Picture] = []
     wanted = extras.made("the list of figures", lambda: list(sketches)) or []
-    outcomes = () if extras.interrupted else run_all([partial(_images, one) for one in wanted])
+    outcomes = () if extras.interrupted else run_shares([partial(_image, one) for one in wanted])
     for sketch, outcome in zip(wanted, outcomes, strict=bool(outcomes)):
         extras.interrupted |= outcome.interrupted
         if outcome.result:
-            file, shown = sketch.forms[0], sketch.forms[-1]
-            files[f"{sketch.name}.{file}"] = outcome.result[file]
-            content = outcome.result[shown]
-            pictures.append(Picture(sketch.name, sketch.caption, content, form=shown))
+            files[f"{sketch.name}.png"] = outcome.result
+            pictures.append(Picture(sketch.name, sketch.caption, outcome.result))
         elif not outcome.interrupted:
             extras.missing.append(Failure(f"figure {sketch.name}", outcome.failure))
     return files, pictures
 
 
-def _images(sketch: Sketch, tell: Callable[[float], None]) -> dict[str, bytes]:
+def _image(sketch: Sketch, tell: Callable[[float], None]) -> bytes:
     with (
         interrupts_enabled(), house_style(), np.errstate(all="ignore"), warnings.catch_warnings()
     ):  # fmt: skip
         warnings.simplefilter("ignore")  # of numbers near the end of all, as diverged runs have
-        figure = sketch.draw()
-        return {form: image(figure, form) for form in sketch.forms}
+        return image(sketch.draw(), "png")

@@ -172,7 +172,7 @@ def _write(
         writer.add(OPTIMA, _csv(optima.table(found)))
     writer.add_json(ORIGIN, origin)
     for figure in figures:
-        writer.add(f"figures/{figure.name}.{figure.form}", figure.file)
+        writer.add(f"figures/{figure.name}.png", figure.file)
 
 
 def _csv(rows: pd.DataFrame) -> bytes:

@@ -113,8 +113,7 @@ def compare_gathered(
         plugins = dict.fromkeys(p for m in given.members for p in m.scenario.plugged)
         origin = provenance.collect(argv, started, datetime.now(UTC), plugins)
         outputs.write(writer, result, extras)
-        if request.figures:
-            _add_figures(writer, result, given.title, origin, extras, progress, request)
+        _add_report(writer, result, given.title, origin, extras, progress, request)
         writer.add_json("provenance.json", origin)
         writer.add_missing(extras)
         status: Status = "interrupted" if extras.interrupted else "finished"
@@ -165,7 +164,6 @@ def make_runs(
     tasks = [
         Task(
             member.scenario, member.text, folder / member.label,
-            figures=("controls",) if request.figures else (),
             argv=request.argv, label=member.label, noticed=member.noticed,
         )
         for member in wanted
@@ -239,13 +237,15 @@ def _with_costs(entries: Sequence[Entry], extras: Extras) -> list[Entry]:
     return [replace(entry, cost=by_label.get(entry.label, UNMEASURED)) for entry in entries]
 
 
-def _add_figures(
+def _add_report(
     writer: RunWriter, result: outputs.Result, title: str, origin: Mapping[str, Any],
     extras: Extras, progress: Progress | None, request: Request,
 ) -> None:  # fmt: skip
-    """Draw the figures, write those in the formats asked for, and the report, which has all."""
-    draw = partial(outputs.drawn, result, extras, progress, request.names, request.formats)
-    figures = extras.attempt("figures", partial(draw, request.workers)) or {}
+    """Draw the figures that are asked for, and write the report, which has them as PNG."""
+    figures: dict[str, bytes] = {}
+    if request.figures:
+        draw = partial(outputs.drawn, result, extras, progress, request.names, request.formats)
+        figures = extras.attempt("figures", partial(draw, request.workers)) or {}
     for name, content in figures.items():
         if name.rpartition(".")[2] in request.formats:
             writer.add(f"figures/{name}", content)

@@ -296,9 +296,9 @@ def _drawn(task: Task, recording: Recording, extras: Extras) -> dict[str, bytes]
         return {}
     from podusv_cli.figures.drawing import (  # matplotlib is slow to import
         draw_in_parallel,
-        dressed,
         figures_of,
     )
+    from podusv_cli.figures.shown import dressed
 
     shown = dressed([(task.label or recording.controller, recording, task.scenario)])
     known = figures_of([task.scenario])

@@ -16,9 +16,9 @@ from podusv_cli.comparison.differences import differences
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.core.escaping import visible
 from podusv_cli.figures.animation import FILE, animate
-from podusv_cli.figures.drawing import check_names, draw_in_parallel, dressed, figures_of
+from podusv_cli.figures.drawing import check_names, draw_in_parallel, figures_of
 from podusv_cli.figures.sheet import Sheet
-from podusv_cli.figures.style import Shown
+from podusv_cli.figures.shown import Shown, dressed
 from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.scenario.plugins import recorded
 from podusv_cli.storage import files, manifest

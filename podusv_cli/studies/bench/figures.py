@@ -13,7 +13,8 @@ from matplotlib.figure import Figure
 
 from podusv_cli.core import escaping
 from podusv_cli.core.kernel import Vector
-from podusv_cli.figures.style import legend, new_figure, nth_style
+from podusv_cli.figures.shown import nth_style
+from podusv_cli.figures.style import legend, new_figure
 from podusv_cli.studies.bench.runs import BenchRun
 from podusv_cli.studies.bench.standing import leaderboard, profile
 from podusv_cli.studies.sketch import COLUMNS, Sketch
@@ -35,16 +36,16 @@ def sketches(runs: Sequence[BenchRun], made: pd.DataFrame) -> Iterator[Sketch]:
     yield Sketch(
         "profiles",
         "performance profiles: share of all cases by ratio to the best law's IAE",
-        partial(profiles, made), ("svg",),
-    )  # fmt: skip
+        partial(profiles, made),
+    )
     laws = list(leaderboard(made).index)
     for vessel in dict.fromkeys(run.place[0] for run in runs):
         shown = [run for run in runs if run.place[0] == vessel]
         yield Sketch(
             f"tracks-{vessel}",
             f"tracks of {vessel}; path grey, failed runs orange, all conditions; north up",
-            partial(tracks, shown, laws), ("png",),  # as outlines, 3000 tracks take 8 MB
-        )  # fmt: skip
+            partial(tracks, shown, laws),
+        )
 
 
 def profiles(made: pd.DataFrame) -> Figure:
@@ -64,7 +65,7 @@ def profiles(made: pd.DataFrame) -> Figure:
     )  # fmt: skip
     axes.set_xticks([1, 1.2, 1.5, 2, 3, 4], ["1", "1.2", "1.5", "2", "3", "4"])
     axes.minorticks_off()
-    legend(figure, COLUMNS)
+    legend(figure)
     return figure
 
 

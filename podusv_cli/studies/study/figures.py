@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 from podusv_cli.core import escaping
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.quantities import raised
-from podusv_cli.figures.style import TARGET_LOOK, legend, new_figure, nth_style
+from podusv_cli.figures.shown import TARGET_LOOK, nth_style
+from podusv_cli.figures.style import legend, new_figure
 from podusv_cli.scenario.phrases import as_yaml
 from podusv_cli.studies.sketch import COLUMNS, Sketch
 from podusv_cli.studies.study import statistics
@@ -218,7 +219,7 @@ def distributions(values: Mapping[str, Vector], label: str, level: float) -> Fig
         _share_curve(axes, place, _told(law, numbers), x, _at_most(numbers, x), len(numbers), level)
     axes.set_ylim(0.0, 100.0)
     axes.set(xlabel=label, ylabel="draws with at most this value [%]")
-    legend(figure, COLUMNS)
+    legend(figure)
     return figure
 
 
@@ -237,7 +238,7 @@ def failure_rates(
     axes.set_ylim(50.0 / max(map(len, values.values())), 110.0)
     axes.set(xlabel=f"threshold of {label}", ylabel="failed draws [%]")
     axes.yaxis.set_major_formatter("{x:g}")
-    legend(figure, COLUMNS)
+    legend(figure)
     return figure
 
 
@@ -324,7 +325,7 @@ def correlations(sensitivity: pd.DataFrame) -> Figure:
     axes.set_ylim(len(table) - 0.4, -0.6)
     axes.set(xlim=(-1.0, 1.0), xlabel="rank correlation [1]")
     axes.grid(visible=False, axis="y")
-    legend(figure, COLUMNS)
+    legend(figure)
     return figure
 
 
@@ -344,7 +345,7 @@ def funnel(curves: Mapping[str, Sequence[Track]]) -> Figure:
     axes.yaxis.set_major_formatter("{x:g}")
     axes.set(xlabel="$t$ [s]", ylabel="$z_e$ [m]")
     axes.margins(x=0.0)
-    legend(figure, COLUMNS)
+    legend(figure)
     return figure
 
 

@@ -19,7 +19,8 @@ from matplotlib.ticker import NullFormatter
 
 from podusv_cli.core import escaping
 from podusv_cli.core.kernel import Vector
-from podusv_cli.figures.style import TARGET_LOOK, legend, new_figure, nth_style
+from podusv_cli.figures.shown import TARGET_LOOK, nth_style
+from podusv_cli.figures.style import legend, new_figure
 from podusv_cli.studies.sketch import COLUMNS, Sketch
 from podusv_cli.studies.study.figures import ratios
 from podusv_cli.studies.tuning.results import Results
@@ -141,7 +142,7 @@ def before_and_after(laws: pd.DataFrame, label: str) -> Figure:
     axes.set_yticks(range(len(ordered)), [escaping.figure(law) for law in ordered.law])
     axes.set_ylim(len(ordered) - 0.4, -0.6)
     axes.set_xlabel(escaping.figure(label))
-    legend(figure, COLUMNS)
+    legend(figure)
     return figure
 
 
@@ -164,7 +165,7 @@ def effort(table: pd.DataFrame, metric: str) -> Figure:
     axes.set_yscale("log" if wide["error"] else "linear")
     axes.set_xlabel("total variation of the surge demand [N]")
     axes.set_ylabel(f"median {escaping.figure(metric)} on fresh draws")
-    legend(figure, COLUMNS)
+    legend(figure)
     return figure
 
 
@@ -189,7 +190,7 @@ def history(trials: pd.DataFrame, label: str) -> Figure:
                 linestyle=style, linewidth=0.9, label=escaping.figure(str(law)) if not i else None,
             )  # fmt: skip
     axes.set(xlabel="simulated runs of a search", ylabel=f"best {escaping.figure(label)} so far")
-    legend(figure, COLUMNS)
+    legend(figure)
     return figure
 
 
@@ -209,7 +210,7 @@ def pareto(
         axes.plot(*taken[law], marker="*", markersize=9.0, color=colour, linestyle="none")
         axes.plot(*first[law], marker="x", markersize=5.0, color=colour, linestyle="none")
     axes.set(xlabel=escaping.figure(labels[0]), ylabel=escaping.figure(labels[1]))
-    legend(figure, COLUMNS)
+    legend(figure)
     return figure
 
 

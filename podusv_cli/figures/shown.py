@@ -1,0 +1,140 @@
+"""Runs as figures and animations show them: name, colour, line style, marker, signals."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from podusv_cli.core import escaping
+from podusv_cli.core.escaping import visible
+from podusv_cli.core.kernel import Vector
+from podusv_cli.core.recording import Recording
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.theory import derived
+
+# Okabe and Ito's palette and four of Tol's, with line styles and markers that tell the curves apart
+# in grey print too.
+LOOKS: tuple[tuple[str, Any, str], ...] = (
+    ("#0072B2", "-", "o"),
+    ("#D55E00", (0, (5, 1.5)), "s"),
+    ("#009E73", (0, (1.2, 1.2)), "^"),
+    ("#CC79A7", (0, (6, 1.5, 1.2, 1.5)), "D"),
+    ("#56B4E9", (0, (3, 1, 1, 1, 1, 1)), "v"),
+    ("#E69F00", (0, (9, 2)), "P"),
+    ("#332288", (0, (2.5, 1.2)), "<"),
+    ("#882255", (0, (8, 1.2, 3, 1.2)), ">"),
+    ("#999933", (0, (4, 1.2, 1.2, 1.2, 1.2, 1.2, 1.2, 1.2)), "X"),
+    ("#7A4B12", (0, (1.2, 2.4)), "*"),
+)
+MARKS = 24  # on the curves of a panel together
+FEWEST, MOST = 3, 8  # on a curve
+TARGET_LOOK: dict[str, Any] = {"color": "#444444", "linewidth": 0.8, "linestyle": "-"}
+ALONE = 9  # places of a run that is shown alone, both ends among them
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """A run with the name, colour, line style and marker under which every figure shows it.
+
+    `places` are fractions of a curve, in time, where its markers stand. `peaks` are those of
+    signals that a claim about the runs names.
+    """
+
+    label: str
+    recording: Recording
+    scenario: Scenario
+    color: str
+    linestyle: Any
+    marker: str
+    places: Vector
+    peaks: Mapping[str, float]
+
+    @property
+    def name(self) -> str:
+        """The label as every text of a figure has to have it."""
+        return escaping.figure(self.label)
+
+    @property
+    def length(self) -> float:
+        """Of the vessel [m]."""
+        return self.scenario.vessel.length
+
+    @property
+    def end(self) -> float:
+        """Time of the last row [s]."""
+        return float(self.recording["time"][-1])
+
+    @property
+    def steady_from(self) -> float:
+        """Start of the part that counts as settled [s]."""
+        return self.scenario.steady_from()
+
+    @property
+    def line_style(self) -> dict[str, Any]:
+        """Keyword arguments of `Axes.plot`; a legend tells how a run ended that did not finish."""
+        ending = "" if self.whole else f" ({self.recording.status} at {self.end:g} s)"
+        return {"color": self.color, "linestyle": self.linestyle, "label": self.name + ending}
+
+    @property
+    def whole(self) -> bool:
+        """Whether the run reached its end."""
+        return self.recording.status == "finished"
+
+    def has(self, name: str) -> bool:
+        """Whether the run has the signal, logged or derivable."""
+        return derived.has(self.recording, name, self.scenario.plugged)
+
+    def signal(self, name: str) -> Vector:
+        """A logged or derived signal."""
+        return derived.signal(self.recording, name, self.scenario.plugged)
+
+    def during(self, name: str, span: tuple[float, float] | None) -> tuple[Vector, Vector]:
+        """Time and a signal, all of it or that of a part [s]."""
+        t, y = self.recording["time"], self.signal(name)
+        first, last = span or (t[0], t[-1])
+        inside = slice(np.searchsorted(t, first), np.searchsorted(t, last, side="right"))
+        return t[inside], y[inside]
+
+    def row(self, t: float) -> int:
+        """The first row that is not before a time [s], else the last row."""
+        return min(int(np.searchsorted(self.recording["time"], t)), len(self.recording["time"]) - 1)
+
+    def at(self, t: float, name: str) -> float:
+        """A signal in the row of a time [s]."""
+        return float(self.signal(name)[self.row(t)])
+
+
+def nth_style(place: int) -> tuple[str, Any, str]:
+    """Colour, line style and marker of the run in this place; the first 100 differ."""
+    count = len(LOOKS)
+    return LOOKS[place % count][0], *LOOKS[(place + place // count) % count][1:]
+
+
+def places(place: int, count: int) -> Vector:
+    """Fractions of a curve where the run in this place of so many has its markers.
+
+    Those of one run stand midway between those of others, so that equal curves show all of them.
+    """
+    if count == 1:
+        return np.linspace(0.0, 1.0, ALONE)
+    marks = min(max(MARKS // count, FEWEST), MOST)
+    return np.asarray((np.arange(marks) + (place + 0.5) / count) / marks)
+
+
+def dressed(
+    runs: Sequence[tuple[str, Recording, Scenario]], peaks: Mapping[str, float] | None = None
+) -> list[Shown]:
+    """Labelled recordings with their looks, in order; without those too short to draw.
+
+    A run alone has no markers. `peaks` are those of signals as claims about the runs name them.
+    """
+    count = len(runs)
+    shown = [
+        Shown(visible(label), recording, scenario, *nth_style(i), places(i, count), peaks or {})
+        for i, (label, recording, scenario) in enumerate(runs)
+        if len(recording["time"]) > 1
+    ]
+    return shown if count > 1 else [replace(run, marker="") for run in shown]

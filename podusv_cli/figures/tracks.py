@@ -1,0 +1,90 @@
+"""Tracks of runs and of their targets in the plane, and what a map of them has to hold."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from podusv_cli.core.kernel import Vector
+from podusv_cli.core.recording import Recording
+from podusv_cli.figures.shown import TARGET_LOOK, Shown
+
+POINTS = 3000  # of a track, at most about
+
+Span = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Target:
+    """A target, the runs that follow it, how it is drawn, and a log that holds its whole track."""
+
+    runs: Sequence[Shown]
+    line_style: dict[str, Any]
+    recording: Recording
+
+    @property
+    def is_ahead(self) -> bool:
+        """Whether it is somewhere at a time: not on a path that is followed, nor in a trial."""
+        return self.in_sight and not self.runs[0].scenario.path.follows
+
+    @property
+    def in_sight(self) -> bool:
+        """Whether there is one; a manoeuvring trial has none."""
+        return not self.runs[0].scenario.controller.trial()
+
+    def track(self, span: Span = (0.0, np.inf)) -> tuple[Vector, Vector]:
+        """East and north [m] during a time [s]; all legs of a path, the track of a trial."""
+        if self.in_sight and not self.is_ahead:
+            north, east = np.array(self.runs[0].scenario.path.waypoints()).T
+            return east, north
+        rows, names = rows_of(self.recording, span), ("y_d", "x_d") if self.is_ahead else ("y", "x")
+        east, north = (self.recording[name][rows] for name in names)
+        return east, north
+
+
+def targets(runs: Sequence[Shown]) -> list[Target]:
+    """Every target that differs from the others, as long as any of its runs lasts."""
+    groups: list[list[Shown]] = []
+    for run in runs:
+        group = next((g for g in groups if g[0].scenario.path == run.scenario.path), None)
+        if group is None:
+            groups.append([run])
+        else:
+            group.append(run)
+    return [_target(group, only=len(groups) == 1) for group in groups]
+
+
+def _target(group: Sequence[Shown], *, only: bool) -> Target:
+    longest = max(group, key=lambda run: run.end).recording
+    word = "path" if group[0].scenario.path.follows else "target"
+    if only:
+        return Target(group, {**TARGET_LOOK, "label": word}, longest)
+    label = f"{word} of {', '.join(run.name for run in group)}"
+    style = {**TARGET_LOOK, "linestyle": group[0].linestyle, "label": label}
+    return Target(group, style, longest)
+
+
+def bounds(runs: Sequence[Shown]) -> tuple[Span, Span]:
+    """Limits east and north [m] of a map of the targets and of the runs that finished, if any.
+
+    Where none finished, targets alone.
+    """
+    pairs = [target.track() for target in targets(runs)]
+    pairs += [(run.recording["y"], run.recording["x"]) for run in runs if run.whole]
+    pairs += [(run.recording["y"][:1], run.recording["x"][:1]) for run in runs]
+    corners = ([(part.min(), part.max()) for part in parts] for parts in zip(*pairs, strict=True))
+    east, north = (np.ravel(extremes) for extremes in corners)
+    margin = 0.06 * max(float(np.ptp(east)), float(np.ptp(north)), 1.0)
+    return (
+        (float(east.min()) - margin, float(east.max()) + margin),
+        (float(north.min()) - margin, float(north.max()) + margin),
+    )
+
+
+def rows_of(log: Recording, span: Span) -> slice:
+    """The rows within a time, thinned in steps: by extremes a track would lose its shape."""
+    first, last = (int(row) for row in np.searchsorted(log["time"], span))
+    return slice(first, last + 1, max(1, (last + 1 - first) // POINTS))
