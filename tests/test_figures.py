@@ -1,6 +1,7 @@
 """Figures by their data: which line shows which numbers, under which label, on which scale."""
 
 import math
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -191,6 +192,32 @@ def test_every_figure_is_as_wide_as_its_page_and_names_its_axes(two, name, colum
     assert figure.get_size_inches()[0] == {1: 3.46, 2: 7.09}[columns] == WIDTHS[columns]
     assert all("[" in axes.get_ylabel() for axes in figure.axes if axes.get_ylabel())
     assert any(axes.get_xlabel() for axes in figure.axes)
+
+
+@pytest.mark.parametrize("columns", [1, 2])
+@pytest.mark.parametrize("name", FIGURES)
+def test_no_text_leaves_the_page_and_no_label_title_or_name_covers_another(two, name, columns):
+    if not FIGURES[name].fits(two):
+        pytest.skip("the sample logs lack what this figure shows")
+    with house_style():
+        figure = FIGURES[name].family(two, columns)
+        image(figure, "png")
+        page, panels = figure.bbox, [axes.get_window_extent() for axes in figure.axes]
+        kept = [
+            (text.get_text(), text.get_window_extent())
+            for axes in figure.axes
+            for text in (axes.xaxis.label, axes.yaxis.label, axes._left_title, axes.title)
+            if text.get_text()
+        ]
+        kept += [(text.get_text(), text.get_window_extent()) for text in figure.legends[0].texts]
+    for words, box in kept:
+        assert box.x0 >= page.x0 - 1.0, words
+        assert box.x1 <= page.x1 + 1.0, words
+        assert box.y0 >= page.y0 - 1.0, words
+        assert box.y1 <= page.y1 + 1.0, words
+        assert not any(box.padded(-2.0).overlaps(panel) for panel in panels), words
+    for (one, box), (other, beside) in combinations(kept, 2):
+        assert not box.padded(-2.0).overlaps(beside), (one, other)
 
 
 def test_a_figure_whose_signals_no_run_has_is_not_drawn():

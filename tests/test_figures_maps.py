@@ -1,6 +1,7 @@
 """The map of the tracks, by its data: positions, headings, limits, instants."""
 
 import io
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -17,12 +18,15 @@ from drawn_samples import (
     shown,
     title,
 )
+from known_signals import ABOUT
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon, Rectangle
 from PIL import Image
 
+from podusv_cli.core.signal import Signal
 from podusv_cli.figures import animation
+from podusv_cli.figures.style import image
 from podusv_cli.figures.tracks import bounds
 from podusv_cli.figures.trajectory import enlargement, hull_of
 
@@ -125,7 +129,7 @@ def gap(t, at, width):
 def test_a_close_up_shows_where_the_runs_are_farthest_apart():
     off = {"y": lambda t: np.sin(0.05 * t) + 4.0 * gap(t, 40.0, 5.0)}
     runs = shown(("a", recording()), ("b", recording(**off)))
-    whole, apart, end = drawn("trajectory", runs).axes
+    whole, apart, end, _ = drawn("trajectory", runs).axes
     assert title(apart).startswith("(b) largest gap, t = 40")
     assert title(end) == "(c) end, t = 100 s"
     east, north = (runs[0].recording[name][400] for name in ("y", "x"))
@@ -139,7 +143,7 @@ def test_a_close_up_shows_where_the_runs_are_farthest_apart():
 
 
 def test_the_close_up_shows_the_last_twentieth_to_scale(two):
-    whole, *_, end = drawn("trajectory", two).axes
+    whole, *_, end, _ = drawn("trajectory", two).axes
     for run in two:
         log, curve = run.recording, line(end, run.label)
         assert np.array_equal(curve.get_xdata(), log["y"][950:])
@@ -168,12 +172,69 @@ def test_the_close_up_shows_the_last_twentieth_to_scale(two):
 
 def test_the_close_up_marks_the_target_and_leaves_out_who_diverged():
     runs = shown(("good", recording()), ("bad", recording(end=60.0, status="diverged")))
-    end = drawn("trajectory", runs).axes[-1]
+    end = drawn("trajectory", runs).axes[-2]
     (cross,) = (curve for curve in end.lines if curve.get_marker() == "+")
     log = runs[0].recording
     assert (cross.get_xdata()[0], cross.get_ydata()[0]) == (log["y_d"][-1], log["x_d"][-1])
     assert "bad" not in [curve.get_label() for curve in end.lines]
     assert len(hulls(end)) == 1
+
+
+def test_runs_that_coincide_are_told_apart_by_their_distance_from_the_first(two):
+    *_, apart = drawn("trajectory", two).axes
+    (curve,) = apart.lines
+    log, first = two[1].recording, two[0].recording
+    expected = np.hypot(log["x"] - first["x"], log["y"] - first["y"])
+    assert (curve.get_label(), apart.get_yscale(), title(apart)) == ("b", "log", "(d) from a")
+    assert curve.get_ydata() == pytest.approx(expected)
+    equal = drawn("trajectory", shown(("a", recording()), ("b", recording()))).axes[-1]
+    assert np.all(equal.lines[0].get_ydata() == 1e-4)
+
+
+def test_a_run_alone_is_shown_with_its_distance_from_the_target():
+    run = shown(("a", recording()))
+    *_, distance = drawn("trajectory", run).axes
+    assert title(distance) == "(c) from the target"
+    assert np.array_equal(distance.lines[0].get_ydata(), run[0].recording["z_e"])
+
+
+def test_of_tracks_that_coincide_the_first_is_the_broadest_and_none_has_markers():
+    runs = shown(*((name, recording()) for name in "abc"))
+    whole = drawn("trajectory", runs).axes[0]
+    tracks = [line(whole, run.label) for run in runs]
+    widths = [track.get_linewidth() for track in tracks]
+    assert widths == sorted(widths, reverse=True)
+    assert widths[0] > 2.0 * widths[-1]
+    assert {track.get_marker() for track in tracks} == {"None"}
+
+
+@pytest.mark.parametrize("columns", [1, 2])
+@pytest.mark.parametrize("wide", [0.1, 1.0, 8.0])
+def test_a_map_of_any_shape_has_equal_scales_and_fills_its_panel(wide, columns):
+    far = {"x_d": lambda t: 0.5 * t / wide, "y_d": lambda t: 0.5 * t * wide}
+    figure = drawn("trajectory", shown(("a", recording(**far)), ("b", recording(**far))), columns)
+    image(figure, "png")
+    whole = figure.axes[0]
+    box = whole.get_window_extent()
+    assert box.width * np.ptp(whole.get_ylim()) == pytest.approx(
+        box.height * np.ptp(whole.get_xlim())
+    )
+    east, north = (np.ptp(far[name](np.array([0.0, 100.0]))) for name in ("y_d", "x_d"))
+    assert max(east / np.ptp(whole.get_xlim()), north / np.ptp(whole.get_ylim())) > 0.75
+
+
+def test_along_legs_the_close_up_shows_where_a_run_is_farthest_from_its_path():
+    legs = scenario(path="{kind: legs, points: [[0, 0], [20, 5], [35, -3]]}")
+    about = {**ABOUT, "e_ct": Signal("e_ct", "m", "cross-track error")}
+    off = recording(e_ct=lambda t: 3.0 * gap(t, 60.0, 5.0))
+    near = recording(e_ct=lambda t: 0.1 + 9.0 * gap(t, 1.0, 2.0))  # in the approach
+    runs = shown(*(
+        (name, replace(log, about=about), legs) for name, log in (("near", near), ("off", off))
+    ))  # fmt: skip
+    _, view, distance = drawn("trajectory", runs).axes
+    assert title(view) == "(b) farthest from the path, t = 60 s"
+    assert np.mean(view.get_xlim()) == pytest.approx(off["y"][600])
+    assert [line.get_label() for line in distance.lines] == ["near", "off"]
 
 
 def test_a_run_that_diverges_does_not_set_the_limits_of_the_map():
@@ -186,7 +247,7 @@ def test_a_run_that_diverges_does_not_set_the_limits_of_the_map():
 
 def test_every_differing_target_is_drawn_and_named():
     runs = different_targets()
-    whole, *_, end = drawn("trajectory", runs).axes
+    whole, *_, end, _ = drawn("trajectory", runs).axes
     labels = [curve.get_label() for curve in whole.lines if "target" in curve.get_label()]
     assert labels == ["target of a, c", "target of b, d"]
     second = line(whole, "target of b, d")

@@ -94,7 +94,8 @@ class Page(Figure):
         starts, ends = _spread(
             width, np.asarray(grid.get_width_ratios()), (EDGE, EDGE), left, right
         )
-        (numbers, _) = _most(columns, beside, beside, grid.ncols)
+        named = [n if axes.get_ylabel() else 0.0 for axes, n in zip(panels, beside, strict=True)]
+        numbers, _ = _most(columns, named, named, grid.ncols)
         for axes, row, column in zip(panels, rows, columns, strict=True):
             low, high = bottoms[row.stop - 1], tops[row.start]
             first, last = starts[column.start], ends[column.stop - 1]

@@ -12,17 +12,25 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon, Rectangle
 
 from podusv_cli.core.kernel import Vector
-from podusv_cli.figures.curves import CUT, Span, mark, scaling
+from podusv_cli.figures.curves import CUT, Span, draw_run, scaling
 from podusv_cli.figures.page import Page
 from podusv_cli.figures.sheet import figure
 from podusv_cli.figures.shown import Shown
-from podusv_cli.figures.style import legend, new_figure
+from podusv_cli.figures.style import WIDTHS, legend, new_figure
 from podusv_cli.figures.tracks import Target, bounds, rows_of, targets
 
 HULL = np.array([(0.5, 0.0), (0.25, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.25, -0.5)])
 LAST_PART = 0.05  # of the run, in the close-up of the end
 INSTANTS = 2000  # at which the runs' distance from each other is looked at
+APPROACH = 0.2  # of a run along a path, left out where its largest deviation is looked for
 APART = 0.1  # lengths; nearer runs are nowhere apart
+BROAD = (2.2, 0.8)  # points, the first and the last track
+HIGH_MAP = 3.1  # inches, the height of a map beside close-ups
+MAP_WIDTHS = (1.0, 3.6)  # inches, of such a map
+WIDE_MAP = 1.6  # times as wide as high, from where a map stands above the close-ups
+DEVIATION = "e_ct"  # from a path that is followed
+FRAME: dict[str, Any] = {"fill": False, "edgecolor": "#444444", "linewidth": 0.5}
+LEAST_DISTANCE = 1e-4  # m, on a logarithmic axis
 NEAREST, FARTHEST = 2.0, 20.0  # lengths from the middle of the close-up to its edges
 MARK: dict[str, Any] = {"color": "#444444", "linestyle": "none"}
 ACCEPTANCE: dict[str, Any] = {"fill": False, "edgecolor": "#888888", "linewidth": 0.5}
@@ -37,10 +45,10 @@ def enlargement(runs: Sequence[Shown]) -> float:
 
 
 def map_axes(axes: Axes, east: Span, north: Span) -> None:
-    """Make the axes a map with these limits [m] and equal scales."""
-    axes.set_xlim(*east)
-    axes.set_ylim(*north)
-    axes.set_aspect("equal", adjustable="box")
+    """Make the axes a map of at least these limits [m], with equal scales, that fills its panel."""
+    axes.set_xlim(*east, auto=None)  # may be widened
+    axes.set_ylim(*north, auto=None)
+    axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel("$y$ [m], east")
     axes.set_ylabel("$x$ [m], north")
 
@@ -58,47 +66,105 @@ def hull_of(run: Shown, t: float, scale: float) -> Vector:
 @figure(
     "trajectory", place=1, signals=("x", "y"), source="the paper's figure 3",
     caption="tracks and target: on a map with hulls enlarged, and close up, with hulls to scale, "
-    "where the runs are farthest apart and at the end; x marks where a run ended early",
+    "where the runs are farthest apart and at the end; how far each run is from the first at the "
+    "same time, or from its target or path; of tracks that coincide, the first is the broadest; x "
+    "marks where a run ended early",
 )  # fmt: skip
 def trajectory(runs: Sequence[Shown], columns: int) -> Figure:
-    """Tracks and target on a map, hulls enlarged to show the heading; close-ups aside."""
+    """Tracks and target on a map, hulls enlarged to show the heading; close-ups and distances."""
     east, north = bounds(runs)
     views = _views(runs)
+    compared = [run for run in runs if run in views[-1].target.runs]
     shape = float(np.ptp(east) / np.ptp(north))
-    figure, whole, asides = _sheet(len(views), columns, shape)
+    figure, whole, asides, below = _sheet(
+        len(views), len(compared) > 1 or bool(_own_distance(compared)), columns, shape
+    )
     _whole(whole, runs)
     _mark_ends(whole, runs, east, north)
     map_axes(whole, east, north)
     for axes, view, letter in zip(asides, views, "bc", strict=False):
-        (left, low), width = _close_up(axes, view)
-        frame = Rectangle((left, low), width, width, fill=False, edgecolor="#444444", linewidth=0.5)
-        whole.add_patch(frame)
+        _close_up(axes, view, runs)
+        (left, low), width = view.middle - view.reach, 2.0 * view.reach
+        whole.add_patch(Rectangle((left, low), width, width, **FRAME))
         whole.annotate(letter, (left + width, low), (1, 0), textcoords="offset points", fontsize=6)
+    if below:
+        _distances(below, compared)
     legend(figure)
     return figure
 
 
-def _sheet(asides: int, columns: int, shape: float) -> tuple[Page, Axes, list[Axes]]:
-    """A figure with a large panel and some small ones, beside each other or one below the other.
+def _sheet(
+    asides: int, distances: bool, columns: int, shape: float
+) -> tuple[Page, Axes, list[Axes], Axes | None]:
+    """A figure with a map that is so many times as wide as high, close-ups, and distances.
 
-    `shape` is the large panel's width over its height.
+    The map is as wide as its shape asks for: beside the rest, or, where it is wide, above it.
     """
-    if columns == 2:
-        part = 1.6 * float(np.clip(shape, 0.6, 1.2))
-        figure = new_figure(columns, 0.9 + float(np.clip(2.8 / shape, 2.1, 3.0)))
-        cells = figure.add_gridspec(1, 1 + asides, width_ratios=(part, *[1.0] * asides))
-        places = [cells[0, place] for place in range(1 + asides)]
+    high = columns == 2 and shape < WIDE_MAP
+    if high:
+        width = float(np.clip(HIGH_MAP * shape, *MAP_WIDTHS))
+        figure = new_figure(columns, HIGH_MAP + 0.9)
+        rest = (WIDTHS[columns] - width - 0.6) / asides
+        cells = figure.add_gridspec(
+            1 + distances, 1 + asides, width_ratios=(width, *[rest] * asides),
+            height_ratios=(1.5, 1.0)[: 1 + distances],
+        )  # fmt: skip
+        places = [cells[:, 0], *(cells[0, 1 + place] for place in range(asides))]
+        last = cells[1, 1:] if distances else None
     else:
-        height = float(np.clip(2.9 / shape, 1.6, 3.6))
-        figure = new_figure(columns, height + 2.8)
-        cells = figure.add_gridspec(2, asides, height_ratios=(height, 1.4))
+        height = float(np.clip((WIDTHS[columns] - 0.6) / shape, 1.2, WIDTHS[columns]))
+        beside = distances and columns == 2
+        rows = [height, 1.6, 1.1] if distances and not beside else [height, 1.6]
+        figure = new_figure(columns, sum(rows) + 0.6 * len(rows))
+        cells = figure.add_gridspec(
+            len(rows), asides + beside, height_ratios=rows,
+            width_ratios=[1.0] * asides + [2.0] * beside,
+        )  # fmt: skip
         places = [cells[0, :], *(cells[1, place] for place in range(asides))]
+        last = (cells[1, asides] if beside else cells[2, :]) if distances else None
     whole, *others = (figure.add_subplot(place) for place in places)
-    return figure, whole, others
+    return figure, whole, others, figure.add_subplot(last) if last is not None else None
+
+
+def _distances(axes: Axes, runs: Sequence[Shown]) -> None:
+    """How far each run is from the first at the same time, on a logarithmic axis.
+
+    On a path that is followed, how far it is from the path; a run alone, from its target.
+    """
+    first, *others = runs
+    if name := _own_distance(runs):
+        curves = {run: run.during(name, None) for run in runs}
+        axes.set_title("from the path" if name == DEVIATION else "from the target", loc="left")
+    else:
+        curves = {run: _between(first, run) for run in others}
+        axes.set_title(f"from {first.name}", loc="left")
+    for run, (t, distance) in curves.items():
+        curve = t, np.maximum(np.abs(distance), LEAST_DISTANCE)
+        draw_run(axes, run, curve, fitted=run in scaling(runs))
+    axes.set_yscale("log")
+    axes.set_xlabel("time [s]")
+    axes.set_ylabel("distance [m]")
+
+
+def _own_distance(runs: Sequence[Shown]) -> str:
+    """The signal that tells how far each run is from what it follows, "" for none."""
+    if all(run.scenario.path.follows and run.has(DEVIATION) for run in runs):
+        return DEVIATION
+    return "z_e" if len(runs) == 1 and runs[0].has("z_e") else ""
+
+
+def _between(first: Shown, run: Shown) -> tuple[Vector, Vector]:
+    """Time, and a run's distance from the first one at the same time [m]."""
+    t, _ = run.during("x", (0.0, first.end))
+    times = first.recording["time"]
+    apart = [
+        run.signal(name)[: len(t)] - np.interp(t, times, first.signal(name)) for name in ("x", "y")
+    ]
+    return t, np.hypot(*apart)
 
 
 def _whole(axes: Axes, runs: Sequence[Shown]) -> None:
-    _draw_tracks(axes, targets(runs), runs, (0.0, max(run.end for run in runs)))
+    _draw_tracks(axes, targets(runs), runs, (0.0, max(run.end for run in runs)), runs)
     scale = enlargement(runs)
     for run in runs:
         for t in run.places * run.end:
@@ -137,28 +203,59 @@ def _mark_ends(axes: Axes, runs: Sequence[Shown], east: Span, north: Span) -> No
 
 @dataclass(frozen=True)
 class View:
-    """A close-up: a time and its name, the runs there, their target, the middle [m] east, north."""
+    """A close-up: its name and time, tracks during a span [s], hulls, and what is seen.
+
+    That is a square about the middle [m] east, north, as far as `reach` [m] to all sides.
+    """
 
     name: str
     t: float
-    runs: Sequence[Shown]
+    tracks: Sequence[Shown]
+    span: Span
+    hulls: Sequence[Shown]
     target: Target
     middle: Vector
+    reach: float
 
 
 def _views(runs: Sequence[Shown]) -> list[View]:
     """Where runs that finished are farthest apart, if anywhere, and the end that all of them have.
 
-    Hulls are shown at one and the same time. Of several targets, the first with its runs.
+    Hulls are shown at one and the same time. Of several targets, the first with its runs. On a path
+    that is followed, runs are at other places at one time: shown is the largest deviation from it.
     """
     finished = scaling(runs)
     target = next(target for target in targets(runs) if finished[0] in target.runs)
     kept = [run for run in finished if run in target.runs]
     last = min(run.end for run in kept)
-    apart = _farthest_apart(kept, target, last)
+    if target.in_sight and not target.is_ahead and all(run.has(DEVIATION) for run in kept):
+        return [_deviation(kept, target, last)]
     names = ("y_d", "x_d") if target.is_ahead else ("y", "x")
     aim = np.array([kept[0].at(last, name) for name in names])
-    return [*apart, View("end", last, kept, target, aim)]
+    return [*_farthest_apart(kept, target, last), _at_once("end", last, kept, target, aim)]
+
+
+def _at_once(name: str, t: float, runs: Sequence[Shown], target: Target, middle: Vector) -> View:
+    """The runs at a time, with the tracks before and after it."""
+    last = min(run.end for run in runs)
+    span = t - LAST_PART * last, min(t + LAST_PART * last, last)
+    at = np.array([[run.at(t, name) for name in ("y", "x")] for run in runs])
+    away = 1.3 * float(np.max(np.hypot(*(at - middle).T)))
+    length = max(run.length for run in runs)
+    reach = min(max(NEAREST * length, away), FARTHEST * length)
+    return View(name, t, runs, span, runs, target, middle, reach)
+
+
+def _deviation(runs: Sequence[Shown], target: Target, last: float) -> View:
+    """Where a run is farthest from its path, once the approach is over."""
+    after = (APPROACH * last, last)
+    worst = max(runs, key=lambda run: float(np.max(np.abs(run.during(DEVIATION, after)[1]))))
+    t, error = np.abs(worst.during(DEVIATION, after))
+    instant = float(t[np.argmax(error)])
+    middle = np.array([worst.at(instant, name) for name in ("y", "x")])
+    reach = min(max(NEAREST * worst.length, 1.5 * float(error.max())), FARTHEST * worst.length)
+    name = "farthest from the path"
+    return View(name, instant, runs, (0.0, np.inf), [worst], target, middle, reach)
 
 
 def _farthest_apart(runs: Sequence[Shown], target: Target, last: float) -> list[View]:
@@ -173,35 +270,32 @@ def _farthest_apart(runs: Sequence[Shown], target: Target, last: float) -> list[
     if sizes[worst] < APART * runs[0].length or times[worst] > (1.0 - LAST_PART) * last:
         return []
     low, high = tracks[:, :, worst].min(axis=0), tracks[:, :, worst].max(axis=0)
-    return [View("largest gap", float(times[worst]), runs, target, 0.5 * (low + high))]
+    return [_at_once("largest gap", float(times[worst]), runs, target, 0.5 * (low + high))]
 
 
-def _close_up(axes: Axes, view: View) -> tuple[tuple[float, float], float]:
-    """Tracks around the time of the view, hulls to scale; corner and width of what is seen."""
-    last = min(run.end for run in view.runs)
-    span = view.t - LAST_PART * last, min(view.t + LAST_PART * last, last)
-    _draw_tracks(axes, [view.target], view.runs, span)
-    for run in view.runs:
+def _close_up(axes: Axes, view: View, among: Sequence[Shown]) -> None:
+    """Tracks around the time of the view, hulls to scale."""
+    _draw_tracks(axes, [view.target], view.tracks, view.span, among)
+    for run in view.hulls:
         axes.add_patch(Polygon(hull_of(run, view.t, 1.0), **_outline(run)))
     if view.target.is_ahead:
-        aim = [[view.runs[0].at(view.t, name)] for name in ("y_d", "x_d")]
+        aim = [[view.tracks[0].at(view.t, name)] for name in ("y_d", "x_d")]
         label = f"{view.target.line_style['label']} at this time"
         axes.plot(*aim, **MARK, marker="+", markersize=7, label=label)
-    at = np.array([[run.at(view.t, name) for name in ("y", "x")] for run in view.runs])
-    length = max(run.length for run in view.runs)
-    away = 1.3 * float(np.max(np.hypot(*(at - view.middle).T)))
-    reach = min(max(NEAREST * length, away), FARTHEST * length)
-    (left, low), (right, high) = view.middle - reach, view.middle + reach
+    (left, low), (right, high) = view.middle - view.reach, view.middle + view.reach
     map_axes(axes, (left, right), (low, high))
     axes.set_title(f"{view.name}, t = {view.t:.4g} s", loc="left")
-    return (left, low), 2.0 * reach
 
 
-def _draw_tracks(axes: Axes, ahead: Sequence[Target], runs: Sequence[Shown], span: Span) -> None:
-    """Tracks of targets, and of runs with their markers, during a time [s]."""
+def _draw_tracks(
+    axes: Axes, ahead: Sequence[Target], shown: Sequence[Shown], span: Span, among: Sequence[Shown]
+) -> None:
+    """Tracks of targets and runs during a time [s]; of equal ones, the first is the broadest."""
     for target in (target for target in ahead if target.in_sight):
         axes.plot(*target.track(span), **target.line_style)
-    for run in runs:
-        log, rows = run.recording, rows_of(run.recording, span)
-        (track,) = axes.plot(log["y"][rows], log["x"][rows], **run.line_style)
-        mark(track, run, log["time"][rows])
+    widths = np.linspace(*BROAD, len(among)) if len(among) > 1 else BROAD[1:]
+    for run, width in zip(among, widths, strict=True):
+        if run in shown:
+            log, rows = run.recording, rows_of(run.recording, span)
+            look = {**run.line_style, "linewidth": width, "solid_capstyle": "butt"}
+            axes.plot(log["y"][rows], log["x"][rows], **look)
