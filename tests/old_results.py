@@ -10,6 +10,7 @@ from command_samples import BASE, TWO, Command, Said, commanded, one_line, write
 from storage_samples import files
 
 from podusv_cli.figures import drawing
+from podusv_cli.figures.sheet import Sheet
 from podusv_cli.storage import manifest
 from podusv_cli.workflows import plot
 
@@ -32,8 +33,9 @@ def draw_quickly(patch: pytest.MonkeyPatch) -> None:
     """Make figures of which only the bytes matter."""
 
     def draw(
-        shown: object, names: Sequence[str], forms: Sequence[str], *more: object, **how: object
+        shown: object, sheets: Sequence[Sheet], forms: Sequence[str], *more: object, **how: object
     ) -> object:
+        names = [sheet.name for sheet in sheets]
         return {f"{name}.{form}": name.encode() * 1000 for name in names for form in forms}
 
     for room in (drawing, plot):

@@ -223,14 +223,16 @@ def test_no_text_leaves_the_page_and_no_label_title_or_name_covers_another(two, 
 def test_a_figure_whose_signals_no_run_has_is_not_drawn():
     runs = shown(("a", recording(without=FIGURES["filters"].signals)))
     assert not FIGURES["filters"].fits(runs)
-    names = [name for name, _ in draw(runs, ["filters", "velocities"], ("png",))]
+    names = [name for name, _ in draw(runs, [FIGURES["filters"], FIGURES["velocities"]], ("png",))]
     assert names == ["velocities.png"]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("form", ["png", pytest.param("pdf", marks=pytest.mark.slow), "svg"])
 def test_the_same_runs_give_the_same_bytes_without_a_date(two, form):
-    first, second = (dict(draw(two, ["errors"], (form,)))[f"errors.{form}"] for _ in range(2))
+    first, second = (
+        dict(draw(two, [FIGURES["errors"]], (form,)))[f"errors.{form}"] for _ in range(2)
+    )
     assert first == second
     assert not any(word in first for word in (b"CreationDate", b"dc:date", b"Software"))
     assert first.startswith({"png": b"\x89PNG", "pdf": b"%PDF", "svg": b"<?xml"}[form])

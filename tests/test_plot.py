@@ -3,7 +3,9 @@
 import os
 import subprocess
 import sys
+from dataclasses import replace
 
+import numpy as np
 import pytest
 from drawn_samples import no_figures_but, recording, scenario
 from storage_samples import log as encode
@@ -13,6 +15,7 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.core.recording import Recording
 from podusv_cli.figures import animation
 from podusv_cli.figures.drawing import FIGURES
+from podusv_cli.figures.style import Look, house_style
 from podusv_cli.scenario.load import resolved_yaml
 from podusv_cli.storage import run_folder
 from podusv_cli.workflows import plot as plotting
@@ -66,10 +69,9 @@ def stillborn(place):
     )
 
 
-def plot(*runs, out, figures=("velocities",), formats=("svg",), animate=False):
-    return plotting.plot(
-        runs, Request(out=out, names=figures, formats=formats), columns=1, animated=animate
-    )
+def plot(*runs, out, figures=("velocities",), formats=("svg",), animate=False, **choice):
+    choice = plotting.Choice(**{"look": Look(1), "animated": animate, **choice})
+    return plotting.plot(runs, Request(out=out, names=figures, formats=formats), choice)
 
 
 def words(path):
@@ -206,3 +208,105 @@ def test_the_command_prints_files_and_warns_beside_them(one, place, stillborn, t
         "simulation.duration: pid 100, brief 40",
     ):
         assert word in done.stderr
+
+
+# --- signals, a part of the time, names, size, type
+
+
+def curves(monkeypatch, *given, **options):
+    """What a figure of these runs is made of, drawn nowhere."""
+    kept = []
+
+    def draw(shown, sheets, formats, extras, look):
+        kept.append((shown, sheets, look))
+        return {}
+
+    with monkeypatch.context() as patch:
+        patch.setattr(plotting, "draw_in_parallel", draw)
+        plot(*given, figures=(), **options)
+    ((shown, sheets, look),) = kept
+    with house_style(look.style):
+        return [look.given_to(sheet.family(shown, look.columns)) for sheet in sheets]
+
+
+def test_any_signal_logged_or_derived_is_drawn_in_a_panel_of_its_own(one, tmp_path, monkeypatch):
+    (figure,) = curves(monkeypatch, one, out=tmp_path, signals=("psi", "x_e", "psi"))
+    assert [axes.get_ylabel() for axes in figure.axes] == [r"$\psi$ [rad]", "$x_e$ [m]"]
+    log = pid()
+    assert figure.axes[1].lines[0].get_ydata() == pytest.approx(log["x_d"] - log["x"])
+    assert plot(one, out=tmp_path, figures=(), signals=("psi", "u")).files == [
+        tmp_path / "psi-u.svg"
+    ]
+
+
+def test_all_components_of_a_vector_are_drawn_under_one_name(place, tmp_path, monkeypatch):
+    log = recording()
+    folder = keep(place / "vector", replace(log, fixed={}, controller="pid"))
+    (figure,) = curves(monkeypatch, folder, out=tmp_path, signals=("W_hat_u",))
+    drawn = [line.get_ydata() for line in figure.axes[0].lines]
+    assert np.array_equal(np.transpose(drawn), log["W_hat_u"])
+    assert [text.get_text() for text in figure.legends[0].texts] == ["vector"]
+
+
+def test_an_unknown_signal_is_refused_with_the_nearest_names(one, tmp_path):
+    with pytest.raises(UsageError, match=r"unknown signal 'psii'; did you mean 'psi'\?.*psi_e"):
+        plot(one, out=tmp_path, signals=("psii",))
+
+
+def test_only_the_part_that_is_asked_for_is_drawn(one, tmp_path, monkeypatch):
+    (figure,) = curves(monkeypatch, one, out=tmp_path, signals=("u",), since=10.0, until=60.0)
+    t = figure.axes[0].lines[0].get_xdata()
+    assert (t[0], t[-1]) == (10.0, 60.0)
+    with pytest.raises(UsageError, match=r"no run has two instants from 400 to inf s .*100 s"):
+        plot(one, out=tmp_path, since=400.0)
+
+
+def test_a_run_that_diverged_later_shows_no_end_in_the_part(place, tmp_path, monkeypatch):
+    bad = keep(place / "bad", pid(end=60.0, status="diverged"))
+    for until, name in ((50.0, "bad"), (70.0, "bad (diverged at 60 s)")):
+        (figure,) = curves(monkeypatch, bad, out=tmp_path, signals=("u",), until=until)
+        assert [text.get_text() for text in figure.legends[0].texts] == [name]
+
+
+def test_runs_keep_the_order_of_the_arguments_and_take_the_names_given(
+    one, other, tmp_path, monkeypatch
+):
+    def names(*runs, **options):
+        (figure,) = curves(monkeypatch, *runs, out=tmp_path, signals=("u",), **options)
+        return [text.get_text() for text in figure.legends[0].texts]
+
+    assert names(one, other) == ["pid (first)", "pid (second)"]
+    assert names(other, one) == ["pid (second)", "pid (first)"]
+    assert names(other, one, labels=("new", "old")) == ["new", "old"]
+    for labels in (("new",), ("same", "same")):
+        with pytest.raises(UsageError, match="--label: the 2 runs need a name each"):
+            plot(one, other, out=tmp_path, labels=labels)
+
+
+@pytest.mark.parametrize(
+    ("size", "width", "height"), [("4", 4.0, None), ("6.5x3", 6.5, 3.0), ("", 7.09, None)]
+)
+def test_a_figure_has_the_size_that_is_asked_for(one, tmp_path, monkeypatch, size, width, height):
+    look = plotting.look_of(2, size, "podusv")
+    (figure,) = curves(monkeypatch, one, out=tmp_path, signals=("u",), look=look)
+    assert figure.get_figwidth() == width
+    assert height in (None, figure.get_figheight())
+    assert look.columns == (1 if size == "4" else 2)
+
+
+def test_the_style_of_a_paper_has_serif_type_of_eight_points(one, tmp_path, monkeypatch):
+    look = plotting.look_of(1, "", "paper")
+    (figure,) = curves(monkeypatch, one, out=tmp_path, signals=("u",), look=look)
+    label = figure.axes[0].yaxis.label
+    assert (label.get_fontsize(), label.get_fontfamily()[0]) == (8.0, "STIXGeneral")
+    assert label.get_math_fontfamily() == "stix"
+
+
+@pytest.mark.parametrize(
+    ("size", "style", "told"),
+    [("3y", "podusv", "--size '3y': must be WIDTH"), ("0.5", "podusv", "from 1 to 40"),
+     ("5x90", "podusv", "from 1 to 40"), ("", "papr", "did you mean 'paper'")],
+)  # fmt: skip
+def test_a_size_or_style_that_there_is_not_is_refused(size, style, told):
+    with pytest.raises(UsageError, match=told):
+        plotting.look_of(2, size, style)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
@@ -20,10 +21,29 @@ def plot(
         list[str] | None,
         typer.Option(help="What to draw; repeatable, all by default.", autocompletion=figures),
     ] = None,
+    signal: Annotated[
+        list[str] | None,
+        typer.Option(help="A logged or derived signal; repeatable, a panel for each."),
+    ] = None,
+    since: Annotated[
+        float, typer.Option("--from", help="Time of the first instant [s].", show_default="start")
+    ] = -math.inf,
+    until: Annotated[
+        float, typer.Option("--to", help="Time of the last instant [s].", show_default="end")
+    ] = math.inf,
+    label: Annotated[
+        list[str] | None, typer.Option(help="Name of a run; repeatable, in the order of the runs.")
+    ] = None,
     form: Annotated[
         str, typer.Option("--format", help="png, pdf, svg; several with commas.")
     ] = "png",
     columns: Annotated[int, typer.Option(min=1, max=2, help="Width in columns of a page.")] = 2,
+    size: Annotated[
+        str, typer.Option(help="WIDTH or WIDTHxHEIGHT in inches, in place of columns.")
+    ] = "",
+    style: Annotated[
+        str, typer.Option(help="podusv, or paper: serif type of 8 points.")
+    ] = "podusv",
     animate: Annotated[bool, typer.Option("--animate", help="A GIF of the chase as well.")] = False,
     out: Annotated[
         Path, typer.Option(help="Folder for the figures; replaces those of the same name there.")
@@ -39,14 +59,17 @@ def plot(
 
     formats = [name.strip() for name in form.split(",")]
     request = Request(out=out, plugins=plugin or (), names=figure or (), formats=formats)
-    drawn = workflow.plot([Path(run) for run in runs], request, columns=columns, animated=animate)
+    choice = workflow.Choice(
+        signal or (), since, until, label or (), workflow.look_of(columns, size, style), animate
+    )
+    drawn = workflow.plot([Path(run) for run in runs], request, choice)
     for path in drawn.files:
         echo_path(path)
     for part in drawn.missing:
         echo(str(part), err=True)
     for path in drawn.replaced:
         echo(f"replaced what was in {path}", err=True)
-    for label, ending in drawn.empty.items():
-        echo(f"{label}: nothing to draw: {ending}", err=True)
+    for empty, ending in drawn.empty.items():
+        echo(f"{empty}: nothing to draw: {ending}", err=True)
     warn_of_differences(drawn.differences)
     raise typer.Exit(SOME_FAILED if drawn.missing else 0)

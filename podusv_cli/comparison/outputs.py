@@ -119,9 +119,9 @@ def drawn(
         if not known[name].fits(shown):
             wanted = ", ".join(known[name].signals)
             extras.missing.append(Failure(f"figure {name}", f"no run logged any of {wanted}"))
-    names = tuple(dict.fromkeys(names)) or tuple(known)
+    sheets = [known[name] for name in dict.fromkeys(names)] or list(known.values())
     formats = tuple(dict.fromkeys((*formats, IN_REPORT)))
-    return draw_in_parallel(shown, names, formats, extras, progress=tell, workers=workers)
+    return draw_in_parallel(shown, sheets, formats, extras, progress=tell, workers=workers)
 
 
 def as_report(

@@ -49,7 +49,10 @@ def animate(runs: Sequence[Shown]) -> bytes:
 
 def frame_times(runs: Sequence[Shown]) -> list[float]:
     """The instants [s] that are shown, from the start to the end of the longest run."""
-    return [float(t) for t in np.linspace(0.0, max(run.end for run in runs), FRAMES)]
+    return [
+        float(t)
+        for t in np.linspace(min(run.start for run in runs), max(run.end for run in runs), FRAMES)
+    ]
 
 
 def stage(axes: Axes, runs: Sequence[Shown]) -> Callable[[float], None]:

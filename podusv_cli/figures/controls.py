@@ -66,13 +66,13 @@ def _cells(figure: Figure, kinds: int, parts: Sequence[str], columns: int) -> ND
 
 def _spans(runs: Sequence[Shown]) -> dict[str, Span]:
     """Names and limits [s] of the parts to show."""
-    end = max(run.end for run in runs)
-    period = min(float(run.recording["time"][1]) for run in runs)
+    start, end = min(run.start for run in runs), max(run.end for run in runs)
+    period = min(float(np.diff(run.recording["time"][:2])[0]) for run in runs)
     settled = min(run.steady_from for run in runs)
     return {
-        "early": (0.0, min(end, max(EARLY * end, EARLY_ROWS * period))),
-        "whole run": (0.0, end),
-        "settled": (settled if settled < end else 0.0, end),
+        "early": (start, min(end, start + max(EARLY * (end - start), EARLY_ROWS * period))),
+        "whole run": (start, end),
+        "settled": (settled if start < settled < end else start, end),
     }
 
 

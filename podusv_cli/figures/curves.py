@@ -56,11 +56,21 @@ def draw_signal(
     fitted = scaling(having, span)
     for run in having:
         curve = run.during(name, span)
-        if not beside:
+        if curve[1].ndim > 1:
+            _draw_components(axes, run, curve, fitted=run in fitted)
+        elif not beside:
             draw_run(axes, run, curve, fitted=run in fitted)
         elif differ(run, name, beside):
             thin = {**run.line_style, **THIN, "label": f"_{run.name}, {name}"}
             draw_curve(axes, curve, fitted=run in fitted, **thin)
+
+
+def _draw_components(axes: Axes, run: Shown, curve: tuple[Vector, Vector], *, fitted: bool) -> None:
+    """All components of a vector over time, thin, with one name."""
+    t, vectors = curve
+    for number, y in enumerate(vectors.reshape(len(t), -1).T):
+        name = run.line_style["label"] if not number else f"_{number}"
+        draw_curve(axes, (t, y), fitted=fitted, **{**run.line_style, **THIN, "label": name})
 
 
 def draw_shared(axes: Axes, runs: Sequence[Shown], name: str) -> None:

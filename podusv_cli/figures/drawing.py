@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cache, partial
 
 import numpy as np
@@ -13,10 +13,10 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.figures.sheet import Sheet
 from podusv_cli.figures.shown import Shown
-from podusv_cli.figures.style import FORMATS, house_style, image
+from podusv_cli.figures.style import FORMATS, Look, house_style, image
 from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_enabled
-from podusv_cli.process.workers import run_shares
+from podusv_cli.process.workers import Progress, run_shares
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import unknown
 
@@ -33,6 +33,7 @@ def figures_with(plugins: Plugins) -> dict[str, Sheet]:
 
 
 FIGURES = figures_with(())
+SCREEN = Look()
 
 
 def figures_of(scenarios: Iterable[Scenario]) -> dict[str, Sheet]:
@@ -41,41 +42,42 @@ def figures_of(scenarios: Iterable[Scenario]) -> dict[str, Sheet]:
 
 
 def draw(
-    runs: Sequence[Shown], names: Iterable[str], formats: Sequence[str], columns: int = 2
+    runs: Sequence[Shown], sheets: Iterable[Sheet], formats: Sequence[str], look: Look = SCREEN
 ) -> Iterator[tuple[str, bytes]]:
     """File name and content of each figure that fits the runs, in each format."""
-    with house_style(), np.errstate(all="ignore"), warnings.catch_warnings():
+    with house_style(look.style), np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of numbers near the end of all, as diverged runs have
-        known = figures_of(run.scenario for run in runs)
-        for name in (name for name in names if known[name].fits(runs)):
-            figure = known[name].family(runs, columns)
+        for sheet in (sheet for sheet in sheets if sheet.fits(runs)):
+            figure = look.given_to(sheet.family(runs, look.columns))
             for form in formats:
-                yield f"{name}.{form}", image(figure, form)
+                yield f"{sheet.name}.{form}", image(figure, form)
 
 
 def draw_in_parallel(
-    runs: Sequence[Shown], names: Iterable[str], formats: Sequence[str], extras: Extras,
-    columns: int = 2, progress: Callable[[float], None] = lambda fraction: None, workers: int = 0,
+    runs: Sequence[Shown], sheets: Iterable[Sheet], formats: Sequence[str], extras: Extras,
+    look: Look = SCREEN, progress: Progress = lambda fraction: None, workers: int = 0,
 ) -> dict[str, bytes]:  # fmt: skip
     """The same as `draw`, in processes of their own, each of which draws several figures.
 
     A figure that fails is missing among the `extras`. `progress` is called with the fraction of
     figures that are over. Raises KeyboardInterrupt where one was interrupted.
     """
-    names = tuple(names)
+    sheets = tuple(sheets)
 
-    def job(name: str, tell: Callable[[float], None]) -> tuple[dict[str, bytes], list[Failure]]:
+    def job(sheet: Sheet, tell: Progress) -> tuple[dict[str, bytes], list[Failure]]:
         own = Extras()
         with interrupts_enabled():
-            files = own.made(f"figure {name}", lambda: dict(draw(runs, [name], formats, columns)))
+            drawn = partial(draw, runs, [sheet], formats, look)
+            files = own.made(f"figure {sheet.name}", lambda: dict(drawn()))
         return files or {}, own.missing
 
-    outcomes = run_shares([partial(job, name) for name in names], progress, workers)
+    outcomes = run_shares([partial(job, sheet) for sheet in sheets], progress, workers)
     if any(outcome.interrupted for outcome in outcomes):
         raise KeyboardInterrupt
     found: dict[str, bytes] = {}
-    for name, outcome in zip(names, outcomes, strict=True):
-        files, missing = outcome.result or ({}, [Failure(f"figure {name}", outcome.failure)])
+    for sheet, outcome in zip(sheets, outcomes, strict=True):
+        failed = [Failure(f"figure {sheet.name}", outcome.failure)]
+        files, missing = outcome.result or ({}, failed)
         found |= files
         extras.missing += missing
     return found

@@ -71,7 +71,13 @@ def _fresh(measured: Vector) -> NDArray[np.intp]:
 
 def _shade(panels: Sequence[Axes], runs: Sequence[Shown], place: int) -> None:
     """Shade the outages of the sensor of this quantity, in any of the runs."""
-    spans = {span for run in runs for span in run.scenario.measurement.outages_of_each()[place]}
+    start, end = min(run.start for run in runs), max(run.end for run in runs)
+    spans = {
+        (max(first, start), min(last, end))
+        for run in runs
+        for first, last in run.scenario.measurement.outages_of_each()[place]
+        if first < end and last > start
+    }
     for axes in panels:
         for first, last in sorted(spans):
             axes.axvspan(first, last, label="outage of the sensor", **OUTAGE)

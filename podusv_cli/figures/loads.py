@@ -42,7 +42,7 @@ def _limits(axes: Axes, runs: Sequence[Shown]) -> None:
     for place, run in enumerate(runs):
         spells = list(_spells(*run.during("saturated", None)))
         axes.broken_barh(spells, (place - 0.3, 0.6), color=run.color, linewidth=0.6)
-        axes.plot([0.0, run.end], [place, place], color=run.color, linewidth=0.4)
+        axes.plot([run.start, run.end], [place, place], color=run.color, linewidth=0.4)
     axes.set_yticks(range(len(runs)), [run.name for run in runs])
     axes.set_ylim(len(runs) - 0.4, -0.6)
     axes.set_title("limited by the actuator")

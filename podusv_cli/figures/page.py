@@ -43,6 +43,11 @@ class Page(Figure):
 
     head = foot = 0.0
 
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        """As matplotlib has it."""
+        super().__init__(*args, **kwargs)
+        self.keys: list[tuple[Sequence[Any], Sequence[str], bool]] = []
+
     def add_subplot(self, *args: Any, **kwargs: Any) -> Axes:
         """As matplotlib has it; a `Panel`."""
         panel: Axes = super().add_subplot(*args, **{"axes_class": Panel, **kwargs})
@@ -52,6 +57,15 @@ class Page(Figure):
         """Arrange the panels and draw them."""
         self.arrange()
         super().draw(renderer)
+
+    def resize(self, width: float, height: float) -> None:
+        """Give the page another size [inches]; its legends get as many rows as that asks for."""
+        self.set_size_inches(width, height)
+        keys, self.keys = self.keys, []
+        for legend in list(self.legends):
+            legend.remove()
+        for handles, names, below in keys:
+            self.add_key(handles, names, below=below)
 
     def add_key(self, handles: Sequence[Any], names: Sequence[str], *, below: bool = False) -> None:
         """A legend above (or below) all panels, in as few rows as its names fit into."""
@@ -67,6 +81,7 @@ class Page(Figure):
             handles, names, ncols=count, loc="lower center" if below else "upper center",
             bbox_to_anchor=(0.5, edge if below else 1.0 - edge), borderaxespad=0.0, borderpad=0.0,
         )  # fmt: skip
+        self.keys.append((handles, names, below))
         self.foot, self.head = (taken, self.head) if below else (self.foot, taken)
 
     def arrange(self) -> None:

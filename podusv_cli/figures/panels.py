@@ -53,6 +53,12 @@ def signals_over_time(
     return family
 
 
+def signals(*names: str) -> Sheet:
+    """A figure of these signals, named after them, each in a panel of its own."""
+    family = signals_over_time(*names)
+    return figure("-".join(names), caption=f"over time: {', '.join(names)}", signals=names)(family)
+
+
 def grid(count: int, columns: int) -> tuple[Page, list[Axes]]:
     """A figure with panels over one time, row by row; one alone in the last row fills it."""
     rows = math.ceil(count / columns)

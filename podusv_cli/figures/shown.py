@@ -63,6 +63,11 @@ class Shown:
         return self.scenario.vessel.length
 
     @property
+    def start(self) -> float:
+        """Time of the first row [s]."""
+        return float(self.recording["time"][0])
+
+    @property
     def end(self) -> float:
         """Time of the last row [s]."""
         return float(self.recording["time"][-1])
@@ -86,6 +91,13 @@ class Shown:
     def has(self, name: str) -> bool:
         """Whether the run has the signal, logged or derivable."""
         return derived.has(self.recording, name, self.scenario.plugged)
+
+    @property
+    def signals(self) -> list[str]:
+        """The signals over time that the run has, logged and derivable."""
+        found = derived.derived_with(self.scenario.plugged)
+        derivable = [name for name in found if self.has(name)]
+        return [*dict.fromkeys([*self.recording.signals, *derivable])]
 
     def signal(self, name: str) -> Vector:
         """A logged or derived signal."""

@@ -14,7 +14,7 @@ from podusv_cli.core.spectrum import periodogram
 from podusv_cli.figures.curves import mark
 from podusv_cli.figures.sheet import figure
 from podusv_cli.figures.shown import Shown
-from podusv_cli.figures.style import about, legend, new_figure, unit
+from podusv_cli.figures.style import about, legend, new_figure, remark, unit
 
 DEMANDS = {"tau_u_cmd": "b_u", "tau_r_cmd": "b_r"}  # what the law demands, and what disturbs it
 AXES = {"tau_u_cmd": "surge", "tau_r_cmd": "yaw"}
@@ -39,7 +39,10 @@ def spectrum(runs: Sequence[Shown], columns: int) -> Figure:
             _draw(axes, run, load, **SEA)
         for run in (run for run in whole if run.has(demand)):
             mark(_draw(axes, run, demand, **run.line_style), run)
-        _scales(axes)
+        if whole:
+            _scales(axes)
+        else:
+            remark(axes, "no run has a settled part here")
         axes.set_title(AXES[demand])
         axes.set_xlabel("angular frequency [rad/s]")
         axes.set_ylabel(f"rms of ${about(runs, demand).symbol}$ [{unit(about(runs, demand))}]")

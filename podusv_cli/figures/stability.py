@@ -28,7 +28,7 @@ LAYERS = {
     "y_r": "#8FD1BA", r"\tilde W_u": "#CC79A7", r"\tilde W_r": "#E6B8D2", r"\tilde b_u": "#555555",
     r"\tilde b_r": "#AAAAAA",
 }  # fmt: skip
-SUM = r"m$^2$, rad$^2$, J, ..."  # V adds numbers of different units, as (46) has it
+SUM = "SI"  # V adds numbers of different units, as (46) has it
 MIXED = f"${V.symbol}$ [{SUM}]"
 THIN = 0.6  # points: bounds, each in its run's line style
 OUTLINE: dict[str, Any] = {"color": "black", "linewidth": 0.9}
@@ -55,7 +55,7 @@ def stability(runs: Sequence[Shown], columns: int) -> Figure:
     _rate(over_time[1], runs)
     layers = [_shares(axes, run) for axes, run in zip(over_time[2:], runs, strict=True)]
     over_time[-1].set_xlabel(TIME)
-    over_time[-1].set_xlim(0.0, max(run.end for run in runs))
+    over_time[-1].set_xlim(min(run.start for run in runs), max(run.end for run in runs))
     figure.add_key(layers[-1], [f"${error}$" for error in LAYERS], below=True)
     legend(figure)
     return figure

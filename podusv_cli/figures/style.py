@@ -5,11 +5,13 @@ from __future__ import annotations
 import io
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -22,6 +24,8 @@ from podusv_cli.figures.shown import Shown
 from podusv_cli.theory import derived
 
 FORMATS = ("png", "pdf", "svg")
+# By name, the style files of a style, each on top of those before it.
+STYLES: dict[str, tuple[str, ...]] = {"podusv": ("podusv",), "paper": ("podusv", "paper")}
 WIDTHS = {1: 3.46, 2: 7.09}  # inches: one column and two columns of a journal page
 COLOURS = 256  # of a PNG; a curve and its soft edge take about ten, and the file a third
 
@@ -31,15 +35,33 @@ NO_STAMP: dict[str, dict[str, Any]] = {
 }
 
 
+@dataclass(frozen=True)
+class Look:
+    """Width in columns of a page, a size [inches] in place of that, and the names of style files.
+
+    Without a height figures have the height of their contents.
+    """
+
+    columns: int = 2
+    width: float | None = None
+    height: float | None = None
+    style: tuple[str, ...] = STYLES["podusv"]
+
+    def given_to(self, figure: Figure) -> Figure:
+        """The figure in this size, where one is given."""
+        if self.width and isinstance(figure, Page):
+            figure.resize(self.width, self.height or figure.get_figheight())
+        return figure
+
+
 @contextmanager
-def house_style() -> Iterator[None]:
-    """matplotlib's settings as in podusv.mplstyle, for figures made inside."""
+def house_style(names: Sequence[str] = STYLES["podusv"]) -> Iterator[None]:
+    """matplotlib's settings as in these style files beside this module, for figures made inside."""
     with mpl.rc_context():
         mpl.rcdefaults()
-        settings = mpl.rc_params_from_file(
-            Path(__file__).with_name("podusv.mplstyle"), use_default_template=False
-        )
-        mpl.rcParams.update(settings)
+        for name in names:
+            place = Path(__file__).with_name(f"{name}.mplstyle")
+            mpl.rcParams.update(mpl.rc_params_from_file(place, use_default_template=False))
         yield
 
 
@@ -61,6 +83,12 @@ def about(runs: Sequence[Shown], name: str) -> Signal:
 def axis_label(runs: Sequence[Shown], name: str) -> str:
     """Symbol and unit of a signal as an axis shows them."""
     return label(about(runs, name))
+
+
+def remark(axes: Axes, text: str) -> None:
+    """A line of text in the middle of a panel that has nothing to draw."""
+    axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", color="#444444")
+    axes.set(xticks=[], yticks=[])
 
 
 def label(signal: Signal) -> str:

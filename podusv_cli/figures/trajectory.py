@@ -167,7 +167,7 @@ def _whole(axes: Axes, runs: Sequence[Shown]) -> None:
     _draw_tracks(axes, targets(runs), runs, (0.0, max(run.end for run in runs)), runs)
     scale = enlargement(runs)
     for run in runs:
-        for t in run.places * run.end:
+        for t in run.start + run.places * (run.end - run.start):
             axes.add_patch(Polygon(hull_of(run, float(t), scale), **_outline(run)))
     starts = {(run.recording["y"][0], run.recording["x"][0]) for run in runs}
     axes.plot(*zip(*sorted(starts), strict=True), **MARK, marker="o", markersize=3.5, label="start")
@@ -260,7 +260,7 @@ def _deviation(runs: Sequence[Shown], target: Target, last: float) -> View:
 
 def _farthest_apart(runs: Sequence[Shown], target: Target, last: float) -> list[View]:
     """The view of the runs when they fill the largest box; none where that is in the last part."""
-    times = np.linspace(0.0, last, INSTANTS)
+    times = np.linspace(min(run.start for run in runs), last, INSTANTS)
     logs = [run.recording for run in runs]
     tracks = np.array(
         [[np.interp(times, log["time"], log[name]) for name in ("y", "x")] for log in logs]

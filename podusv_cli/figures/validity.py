@@ -39,9 +39,9 @@ def validity(runs: Sequence[Shown], columns: int) -> Figure:
         if name == "node_distance":
             axes.axhline(REACH, color="#444444", linewidth=0.6)
     _sway(figure.add_subplot(cells[rows, :]), runs)
-    end = max(run.end for run in runs)
+    span = min(run.start for run in runs), max(run.end for run in runs)
     for axes in figure.axes:
-        axes.set_xlim(0.0, end)
+        axes.set_xlim(*span)
     legend(figure)
     return figure
 

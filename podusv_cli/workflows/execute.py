@@ -302,5 +302,5 @@ def _drawn(task: Task, recording: Recording, extras: Extras) -> dict[str, bytes]
 
     shown = dressed([(task.label or recording.controller, recording, task.scenario)])
     known = figures_of([task.scenario])
-    fitting = [name for name in task.figures if known[name].fits(shown)]
+    fitting = [known[name] for name in task.figures if known[name].fits(shown)]
     return draw_in_parallel(shown, fitting, ("png",), extras)

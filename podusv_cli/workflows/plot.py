@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from collections import Counter
@@ -12,19 +13,27 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from podusv_cli.comparison.differences import differences
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.core.escaping import visible
+from podusv_cli.core.recording import Recording
+from podusv_cli.figures import panels
 from podusv_cli.figures.animation import FILE, animate
-from podusv_cli.figures.drawing import check_names, draw_in_parallel, figures_of
+from podusv_cli.figures.drawing import SCREEN, check_names, draw_in_parallel, figures_of
 from podusv_cli.figures.sheet import Sheet
 from podusv_cli.figures.shown import Shown, dressed
+from podusv_cli.figures.style import STYLES, Look
 from podusv_cli.process.extras import Extras, Failure
+from podusv_cli.scenario.phrases import unknown
 from podusv_cli.scenario.plugins import recorded
 from podusv_cli.storage import files, manifest
 from podusv_cli.workflows.members import Member, from_folder
 from podusv_cli.workflows.run import Request
 
+NARROW = 5.0  # inches; narrower figures have their panels in one column
+LARGEST = 40.0  # inches, of a figure
 STAMP = re.compile(r"\d{8}T\d{6}Z-[0-9a-f]{8}(-\d+)?")  # a run folder that nobody named
 
 
@@ -39,34 +48,93 @@ class Drawn:
     differences: Mapping[str, Mapping[str, Any]]  # between the runs, besides the controller
 
 
-def plot(
-    runs: Sequence[Path], request: Request, *, columns: int = 2, animated: bool = False
-) -> Drawn:
+@dataclass(frozen=True)
+class Choice:
+    """What `plot` draws beside figures by name, of which part of the runs [s], and how.
+
+    `labels` are names of the runs, in their order.
+    """
+
+    signals: Sequence[str] = ()
+    since: float = -math.inf
+    until: float = math.inf
+    labels: Sequence[str] = ()
+    look: Look = SCREEN
+    animated: bool = False
+
+
+def look_of(columns: int, size: str, style: str) -> Look:
+    """The look that is asked for; `size` is WIDTH or WIDTHxHEIGHT in inches. UsageError."""
+    if style not in STYLES:
+        raise UsageError(unknown(f"style {style!r}", style, STYLES))
+    if not size:
+        return Look(columns, style=STYLES[style])
+    numbers = re.fullmatch(r"(\d+(?:\.\d*)?)(?:x(\d+(?:\.\d*)?))?", size)
+    width, height = (float(part or 0.0) for part in numbers.groups()) if numbers else (0.0, 0.0)
+    if not 1.0 <= width <= LARGEST or (height and not 1.0 <= height <= LARGEST):
+        raise UsageError(
+            f"--size {size!r}: must be WIDTH or WIDTHxHEIGHT in inches, each from 1 to "
+            f"{LARGEST:g}, such as 5 or 5x3; --columns 1 and 2 are those of a journal page"
+        )
+    return Look(1 if width < NARROW else 2, width, height or None, STYLES[style])
+
+
+def plot(runs: Sequence[Path], request: Request, choice: Choice = Choice()) -> Drawn:
     """Draw finished runs, overlaid; files of the same names in the folder are replaced.
 
-    Raises UsageError for an unknown figure or format, for a figure that the runs lack the signals
-    of, and for a file that belongs to a finished folder; StorageError.
+    Raises UsageError for an unknown figure, signal or format, for a figure that the runs lack the
+    signals of, for labels that do not fit the runs, for a time that no run has, and for a file that
+    belongs to a finished folder; StorageError.
     """
     out, plugged = request.out or Path(), partial(recorded, request.plugins)
     members = _labelled(one for path in runs for one in from_folder(path, plugged=plugged))
+    members = _named(members, choice.labels)
     known = figures_of(member.scenario for member in members)
     check_names(request.names, request.formats, known)
-    shown = dressed([(m.label, m.run.recording, m.scenario) for m in members if m.run])
-    empty = _empty(members, shown)
-    names = _chosen(request.names, known, shown)
-    planned = [f"{name}.{form}" for name in names for form in request.formats]
-    planned += [FILE] * animated
+    whole = [(m.label, m.run.recording, m.scenario) for m in members if m.run]
+    empty = _empty(members, dressed(whole))
+    shown = dressed([(label, _during(log, choice), plan) for label, log, plan in whole])
+    if not shown:
+        ends = ", ".join(f"{label} ends at {log['time'][-1]:g} s" for label, log, _ in whole)
+        raise UsageError(
+            f"no run has two instants from {choice.since:g} to {choice.until:g} s ({ends})"
+        )
+    sheets = _chosen(request.names, known, shown, choice.signals)
+    planned = [f"{sheet.name}.{form}" for sheet in sheets for form in request.formats]
+    planned += [FILE] * choice.animated
     _check_not_finished(out, planned)
     files.check_places(out / name for name in planned)
     extras = Extras()
-    drawn = draw_in_parallel(shown, names, request.formats, extras, columns)
-    if animated:
+    drawn = draw_in_parallel(shown, sheets, request.formats, extras, choice.look)
+    if choice.animated:
         drawn |= extras.attempt(FILE, lambda: {FILE: animate(shown)}) or {}
     if extras.interrupted:
         raise KeyboardInterrupt("interrupted; no figure was written")
     replaced = _put(out, drawn)
     differing = differences({m.label: m.scenario.model_dump() for m in members})
     return Drawn([out / n for n in drawn], replaced, empty, extras.missing, differing)
+
+
+def _named(members: Sequence[Member], labels: Sequence[str]) -> list[Member]:
+    """The runs under the names that are given for them, if any."""
+    if not labels:
+        return list(members)
+    if len(labels) != len(members) or len({*labels}) < len(labels):
+        raise UsageError(
+            f"--label: the {len(members)} runs need a name each, no two the same, in their order: "
+            f"{', '.join(member.label for member in members)}"
+        )
+    return [replace(member, label=label) for member, label in zip(members, labels, strict=True)]
+
+
+def _during(log: Recording, choice: Choice) -> Recording:
+    """The part of a log that is asked for; one that ends before the run does is whole."""
+    t = log["time"]
+    first, last = np.searchsorted(t, [choice.since, np.nextafter(choice.until, math.inf)])
+    if (first, last) == (0, len(t)):
+        return log
+    part = log.part(slice(first, last))
+    return part if last == len(t) else replace(part, status="finished")
 
 
 def _labelled(members: Iterable[Member]) -> list[Member]:
@@ -117,13 +185,13 @@ LONGER_NAMES: tuple[Callable[[Member], str], ...] = (
 
 
 def _chosen(
-    asked: Sequence[str], known: Mapping[str, Sheet], shown: Sequence[Shown]
-) -> tuple[str, ...]:
+    asked: Sequence[str], known: Mapping[str, Sheet], shown: Sequence[Shown], signals: Sequence[str]
+) -> list[Sheet]:
     """The figures to draw: those that are asked for, or all that the runs have signals for.
 
     Raises UsageError for one that they have no signals for.
     """
-    fitting = tuple(name for name, sheet in known.items() if sheet.fits(shown))
+    fitting = {name: sheet for name, sheet in known.items() if sheet.fits(shown)}
     for name in asked:
         if name not in fitting:
             raise UsageError(
@@ -131,7 +199,14 @@ def _chosen(
                 f"{', '.join(run.label for run in shown)} logged none of these "
                 f"(figures there are: {', '.join(fitting)})"
             )
-    return tuple(dict.fromkeys(asked)) or fitting
+    signals = tuple(dict.fromkeys(signals))
+    there = dict.fromkeys(name for run in shown for name in run.signals)
+    for name in signals:
+        if name not in there:
+            raise UsageError(unknown(f"signal {name!r}", name, there, "log.h5 of the runs"))
+    sheets = [fitting[name] for name in dict.fromkeys(asked)]
+    sheets += [panels.signals(*signals)] if signals else []
+    return sheets or list(fitting.values())
 
 
 def _check_not_finished(out: Path, names: Iterable[str]) -> None:
