@@ -17,12 +17,16 @@ from benchmarks.cases import ROOT, SCENARIO
 from benchmarks.timing import quartiles
 
 REPEATS = 3
+COMPARED = SCENARIO.with_name("corrected_compare.yaml")  # four laws
+PODUSV = ("-m", "podusv_cli")
+LIBRARIES = ("-c", "import numpy, h5py, pydantic, typer, yaml, llvmlite")
 RUN = ("run", str(SCENARIO), "--json")
 LATER = {
     "podusv --help": ("--help",),
     "podusv validate": ("validate", str(SCENARIO)),
     "podusv run --no-figures": (*RUN, "--no-figures"),
     "podusv run": RUN,
+    "podusv compare": ("compare", str(COMPARED), "--json"),
 }
 # Runs the command that its arguments make. A process of its own, since memory that a child has
 # in common with a large parent when it is started counts as the child's.
@@ -36,13 +40,16 @@ print(code, took, used.ru_utime + used.ru_stime, used.ru_maxrss, file=sys.stderr
 """
 
 
-def spent(arguments: Sequence[str], folder: Path) -> dict[str, Any]:
+def spent(
+    arguments: Sequence[str], folder: Path, program: Sequence[str] = PODUSV
+) -> dict[str, Any]:
     """Seconds, those that processors were busy, peak memory in MB and output of podusv.
 
-    It runs in `folder` with its cache there. Raises RuntimeError where the command fails.
+    Or of another program of Python's. It runs in `folder` with its cache there. Raises RuntimeError
+    where the command fails.
     """
     paths = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
-    command = [sys.executable, "-S", "-c", MEASURE, sys.executable, "-m", "podusv_cli", *arguments]
+    command = [sys.executable, "-S", "-c", MEASURE, sys.executable, *program, *arguments]
     environment = os.environ | {"PODUSV_CACHE": str(folder / "cache"), "PYTHONPATH": paths}
     environment.pop("PYTHONDONTWRITEBYTECODE", None)  # an installed podusv has its byte code
     done = subprocess.run(
@@ -62,22 +69,29 @@ def spent(arguments: Sequence[str], folder: Path) -> dict[str, Any]:
 def commands() -> dict[str, dict[str, Any]]:
     """Quartiles of time and memory; the first run finds no compiled code, the later ones do.
 
-    Runs also say where the time of the last of them went.
+    Processors' time also beside that of importing podusv's libraries, measured in turn. Runs also
+    say where the time of the last of them went.
     """
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         first = spent((*RUN, "--no-figures", "--out", "first"), folder)
         found = {"podusv run --no-figures, for the first time": _summary(RUN, [first])}
         for label, arguments in LATER.items():
-            several = [spent(_apart(arguments, folder), folder) for _ in range(REPEATS)]
-            found[label] = _summary(arguments, several)
+            several, imports = [], []
+            for _ in range(REPEATS):
+                imports.append(spent((), folder, LIBRARIES)["busy"])
+                several.append(spent(_apart(arguments, folder), folder))
+            ratios = np.array([one["busy"] for one in several]) / imports
+            found[label] = _summary(arguments, several) | {"ratio": quartiles(ratios)}
+        report = next(folder.glob("*/report.html"))
+        found["podusv compare"]["report_megabytes"] = report.stat().st_size / 1e6
     return found
 
 
 def _apart(arguments: Sequence[str], folder: Path) -> Sequence[str]:
-    if arguments[0] != "run":
+    if arguments[0] not in ("run", "compare"):
         return arguments
-    return (*arguments, "--out", f"run-{len(list(folder.iterdir()))}")
+    return (*arguments, "--out", f"{arguments[0]}-{len(list(folder.iterdir()))}")
 
 
 def _summary(arguments: Sequence[str], several: list[dict[str, Any]]) -> dict[str, Any]:

@@ -50,6 +50,10 @@ def _seconds(command: str) -> Callable[[Results], float]:
     return lambda found: float(found["commands"][command]["seconds"][1])
 
 
+def _beside_imports(command: str) -> Callable[[Results], float]:
+    return lambda found: float(found["commands"][command]["ratio"][1])
+
+
 def _memory(command: str) -> Callable[[Results], float]:
     return lambda found: float(found["commands"][command]["megabytes"][1] - found["log_megabytes"])
 
@@ -86,6 +90,13 @@ GOALS = (
     Goal("peak memory less the log, with figures", 150.0, _memory("podusv run"), "MB"),
     Goal("`podusv run` without figures", 0.7, _seconds(RUN), "s"),
     Goal("`podusv run` with figures", 1.8, _seconds("podusv run"), "s"),
+    Goal("processors' time without figures, beside that of imports", 2, _beside_imports(RUN)),
+    Goal("the same with figures", 4.5, _beside_imports("podusv run")),
+    Goal("the same, a comparison of four laws with report", 12, _beside_imports("podusv compare")),
+    Goal(
+        "the report of that comparison", 3.0,
+        lambda found: float(found["commands"]["podusv compare"]["report_megabytes"]), "MB",
+    ),
     Goal("the very first run", 10.0, _seconds(f"{RUN}, for the first time"), "s"),
     Goal("`podusv --help`", 0.15, _seconds("podusv --help"), "s"),
 )  # fmt: skip
