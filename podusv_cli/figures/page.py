@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib import rcParams
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis, Tick, XAxis, YAxis
 from matplotlib.backend_bases import RendererBase
@@ -242,6 +243,10 @@ class Panel(Axes):
 
 class _Stamped(Axis):
     """An axis that moves one tick of each kind from place to place, drawing it there."""
+
+    def set_clip_path(self, path: Any, transform: Any = None) -> None:
+        """Of the axis alone: ticks lie inside, and minor ones that are not seen are not made."""
+        Artist.set_clip_path(self, path, transform)
 
     def draw(self, renderer: RendererBase, *args: Any, **kwargs: Any) -> None:
         """Draw grid, ticks, numbers and label."""
