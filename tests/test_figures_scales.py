@@ -218,10 +218,11 @@ def test_the_sea_is_shown_as_far_as_it_is_logged():
     figure = drawn("sea", shown(("a", recording(**SEA))))
     assert [axes.get_ylabel() for axes in figure.axes] == [
         r"$\zeta$ [m]", r"$\zeta$ [m]", "$V_w$ [m/s]", "$V_c$ [m/s]",
-        r"$\beta_c$ [rad]",
     ]  # fmt: skip
+    level = SEA["beta_c"](np.zeros(1))[0]
+    assert [text.get_text() for text in figure.texts] == [rf"constant: $\beta_c$ = {level:.4g} rad"]
     log = recording(**SEA)
-    for axes, name in zip(figure.axes[1:], SEA, strict=True):
+    for axes, name in zip(figure.axes[1:], ("zeta", "V_w", "V_c"), strict=True):
         assert np.array_equal(line(axes, "a").get_ydata(), log[name])
     calm = drawn("sea", shown(("a", recording(V_w=SEA["V_w"]))))
     assert [axes.get_ylabel() for axes in calm.axes] == ["$V_w$ [m/s]"]
@@ -284,3 +285,25 @@ def test_a_run_draws_estimates_by_default_if_it_has_any(tmp_path, measurement, m
     assert "sea" not in found
     assert found >= {"errors", "trajectory", "controls"}
     assert not done.missing
+
+
+def test_signals_that_never_change_are_a_line_of_text_with_each_run_s_value():
+    held = {"b_hat_r": lambda t: 0.25 + 0.0 * t}
+    same = drawn("adaptation", shown(("a", recording(**held)), ("b", recording(**held))))
+    assert r"$\hat b_r$ [N m]" not in panels(same)
+    assert [text.get_text() for text in same.texts] == [r"constant: $\hat b_r$ = 0.25 N m"]
+    other = recording(b_hat_r=lambda t: 0.5 + 0.0 * t)
+    apart = drawn("adaptation", shown(("a", recording(**held)), ("b", other)))
+    assert [text.get_text() for text in apart.texts] == [
+        r"constant: $\hat b_r$ = 0.25 (a), 0.5 (b) N m"
+    ]
+    changing = drawn("adaptation", shown(("a", recording(**held)), ("b", recording())))
+    assert r"$\hat b_r$ [N m]" in panels(changing)
+
+
+def test_a_calm_curve_lies_above_a_restless_one_and_equal_ones_keep_their_order():
+    restless = recording(u=lambda t: np.sin(40.0 * t))
+    runs = shown(("calm", recording()), ("restless", restless), ("alike", recording()))
+    calm, rough, alike = panels(drawn("velocities", runs))["$u$ [m/s]"].lines
+    assert calm.get_zorder() == alike.get_zorder() > rough.get_zorder()
+    assert rough.get_linewidth() < calm.get_linewidth()

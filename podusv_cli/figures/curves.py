@@ -18,6 +18,9 @@ MARK: dict[str, Any] = {"markersize": 3.2, "markerfacecolor": "white", "markered
 COMMON: dict[str, str] = {"color": "#444444", "linestyle": "-", "label": "all runs"}
 CUT: dict[str, Any] = {"marker": "x", "markersize": 5.0, "markeredgewidth": 1.2, "zorder": 5.0}
 TALL = 20.0  # a peak this many times the usual values gets a logarithmic axis
+DENSE = 60.0  # ranges that a curve runs through; from there it hides what is below it
+FINE = 0.5  # points, of such a curve
+APART = 1.5  # a curve that goes this many times as far up and down lies below the calmer one
 DECADES = 4  # at most, on the logarithmic axis of runs that finished
 
 Span = tuple[float, float]
@@ -51,18 +54,30 @@ def draw_signal(
     """Plot a signal of all runs that have it over time, or over a part of it [s].
 
     `beside` another signal it is drawn thin, not in the legend, and only where the two differ.
+    Dense curves are fine; a curve lies below those that are calmer.
     """
     having = [run for run in runs if run.has(name)]
     fitted = scaling(having, span)
-    for run in having:
-        curve = run.during(name, span)
+    curves = {run: run.during(name, span) for run in having}
+    ways = {run: _way(y) for run, (_, y) in curves.items()}
+    for run, curve in curves.items():
+        calmer = sum(way > APART * ways[run] for way in ways.values())
+        look: dict[str, Any] = {"zorder": 2.0 + 0.5 * calmer / len(having)}
+        if len(curve[1]) and ways[run] > DENSE * np.ptp(curve[1]):
+            look["linewidth"] = FINE
         if curve[1].ndim > 1:
             _draw_components(axes, run, curve, fitted=run in fitted)
         elif not beside:
-            draw_run(axes, run, curve, fitted=run in fitted)
+            draw_run(axes, run, curve, fitted=run in fitted, **look)
         elif differ(run, name, beside):
             thin = {**run.line_style, **THIN, "label": f"_{run.name}, {name}"}
             draw_curve(axes, curve, fitted=run in fitted, **thin)
+
+
+def _way(y: Vector) -> float:
+    """How far a signal goes up and down, as far as a page can show it."""
+    _, few = thinned(np.arange(len(y), dtype=float), y)
+    return float(np.sum(np.abs(np.diff(few, axis=0))))
 
 
 def _draw_components(axes: Axes, run: Shown, curve: tuple[Vector, Vector], *, fitted: bool) -> None:

@@ -13,7 +13,7 @@ from podusv_cli.figures.curves import draw_shared
 from podusv_cli.figures.panels import grid
 from podusv_cli.figures.sheet import figure
 from podusv_cli.figures.shown import Shown
-from podusv_cli.figures.style import about, axis_label, legend
+from podusv_cli.figures.style import about, axis_label, constants, legend
 
 SEA = ("b_u", "b_v", "b_r")
 
@@ -24,7 +24,8 @@ SEA = ("b_u", "b_v", "b_r")
 )  # fmt: skip
 def loads(runs: Sequence[Shown], columns: int) -> Figure:
     """The disturbance over time, once where all runs have the same; below, who is limited when."""
-    sea = [name for name in SEA if any(run.has(name) for run in runs)]
+    held = constants(runs, SEA)
+    sea = [name for name in SEA if name not in held and any(run.has(name) for run in runs)]
     limited = [run for run in runs if run.has("saturated")]
     figure, panels = grid(len(sea) + bool(limited), columns)
     for axes, name in zip(panels, sea, strict=False):
@@ -33,7 +34,7 @@ def loads(runs: Sequence[Shown], columns: int) -> Figure:
         axes.set_title(about(runs, name).meaning)
     if limited:
         _limits(panels[-1], limited)
-    legend(figure)
+    legend(figure, held=held)
     return figure
 
 

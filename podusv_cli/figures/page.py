@@ -85,6 +85,13 @@ class Page(Figure):
         self.keys.append((handles, names, below))
         self.foot, self.head = (taken, self.head) if below else (self.foot, taken)
 
+    def add_line(self, text: str) -> None:
+        """A line of text below all panels and legends."""
+        size = FontProperties(size=rcParams["legend.fontsize"]).get_size_in_points()
+        place = (self.foot + EDGE) / self.get_figheight()
+        self.text(0.5, place, text, ha="center", va="bottom", fontsize=size)
+        self.foot += (ROW * size + GAP) * POINT
+
     def arrange(self) -> None:
         """Give every panel its place: around it, what its own labels, title and numbers take."""
         panels = [axes for axes in self.axes if axes.get_visible() and axes.get_subplotspec()]

@@ -15,7 +15,7 @@ from podusv_cli.figures.curves import compress, draw_signal
 from podusv_cli.figures.page import Page
 from podusv_cli.figures.sheet import Family, Sheet, figure
 from podusv_cli.figures.shown import Shown
-from podusv_cli.figures.style import axis_label, legend, new_figure
+from podusv_cli.figures.style import axis_label, constants, legend, new_figure
 
 Scale = Callable[[Axes, Sequence[Shown]], None]
 
@@ -38,7 +38,8 @@ def signals_over_time(
     """
 
     def family(runs: Sequence[Shown], columns: int) -> Figure:
-        shown = [name for name in names if any(run.has(name) for run in runs)]
+        held = constants(runs, names)
+        shown = [name for name in names if name not in held and any(run.has(name) for run in runs)]
         figure, panels = grid(len(shown), columns)
         for axes, name in zip(panels, shown, strict=True):
             draw_signal(axes, runs, name)
@@ -47,7 +48,7 @@ def signals_over_time(
                 scales[name](axes, [run for run in runs if run.has(name)])
             if compressed:
                 compress(axes, runs, name)
-        legend(figure)
+        legend(figure, held=held)
         return figure
 
     return family

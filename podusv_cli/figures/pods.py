@@ -12,7 +12,7 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.figures.curves import THIN, draw_curve, draw_run, scaling
 from podusv_cli.figures.sheet import figure
 from podusv_cli.figures.shown import Shown
-from podusv_cli.figures.style import axis_label, legend, new_figure
+from podusv_cli.figures.style import axis_label, constants, legend, new_figure
 
 ROWS = (("n", "n_cmd"), ("n_part", "n_part_cmd"), ("delta", "delta_cmd"), ("power", ""))
 PANEL_HEIGHT = 1.5  # inches
@@ -27,7 +27,11 @@ def pods(runs: Sequence[Shown], columns: int) -> Figure:
     """A row for each of speed, angle and power, a column for each pod; actual over commanded."""
     having = [run for run in runs if run.has("delta")]
     count = max(run.recording["delta"].shape[1] for run in having)
-    rows = [names for names in ROWS if any(run.has(names[0]) for run in having)]
+    held = constants(having, [name for name, _ in ROWS])
+    rows = [
+        names for names in ROWS
+        if names[0] not in held and any(run.has(names[0]) for run in having)
+    ]  # fmt: skip
     figure = new_figure(columns, 0.7 + PANEL_HEIGHT * len(rows))
     panels = figure.subplots(len(rows), count, sharex=True, sharey="row", squeeze=False)
     for line, names in zip(panels, rows, strict=True):
@@ -38,7 +42,7 @@ def pods(runs: Sequence[Shown], columns: int) -> Figure:
     for pod, (top, bottom) in enumerate(zip(panels[0], panels[-1], strict=True)):
         top.set_title(f"pod {pod + 1}")
         bottom.set_xlabel("time [s]")
-    legend(figure, "asked for by the allocation")
+    legend(figure, "asked for by the allocation", held=held)
     return figure
 
 

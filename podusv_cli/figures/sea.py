@@ -13,7 +13,7 @@ from podusv_cli.figures.curves import Span, draw_shared, draw_signal
 from podusv_cli.figures.panels import TIME
 from podusv_cli.figures.sheet import figure
 from podusv_cli.figures.shown import Shown
-from podusv_cli.figures.style import about, axis_label, legend, new_figure
+from podusv_cli.figures.style import about, axis_label, constants, legend, new_figure
 
 ELEVATION = "zeta"
 SIGNALS = (ELEVATION, "V_w", "V_c", "beta_c")  # the wind's direction does not change
@@ -29,7 +29,8 @@ WAVES = 20  # in the panel of single waves
 )  # fmt: skip
 def sea(runs: Sequence[Shown], columns: int) -> Figure:
     """A panel for each signal over the whole run; above them, the last waves one by one."""
-    names = [name for name in SIGNALS if any(run.has(name) for run in runs)]
+    held = constants(runs, SIGNALS)
+    names = [name for name in SIGNALS if name not in held and any(run.has(name) for run in runs)]
     waves = int(ELEVATION in names)
     figure = new_figure(columns, 0.7 + PANEL_HEIGHT * (waves + len(names)))
     panels: list[Axes] = figure.subplots(waves + len(names), 1, squeeze=False)[:, 0].tolist()
@@ -42,7 +43,7 @@ def sea(runs: Sequence[Shown], columns: int) -> Figure:
         axes.set_ylabel(axis_label(runs, name))
         axes.set_title(about(runs, name).meaning)
     panels[-1].set_xlabel(TIME)
-    legend(figure)
+    legend(figure, held=held)
     return figure
 
 

@@ -112,7 +112,7 @@ def _bounds(run: Shown) -> Iterator[tuple[float, float, float]]:
 
 
 def _rate(axes: Axes, runs: Sequence[Shown]) -> None:
-    axes.set_ylabel(rf"${V_DOT.symbol}$ [({SUM})/s]")
+    axes.set_ylabel(rf"${V_DOT.symbol}$ [{SUM}/s]")
     runs = [run for run in runs if run.has("V_dot")]
     for run in runs:
         draw_run(axes, run, run.during("V_dot", None), fitted=run in scaling(runs))

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import matplotlib as mpl
@@ -85,6 +86,20 @@ def axis_label(runs: Sequence[Shown], name: str) -> str:
     return label(about(runs, name))
 
 
+def constants(runs: Sequence[Shown], names: Iterable[str]) -> dict[str, str]:
+    """The signals that no run changes, each with its value in words; none where all are such."""
+    held: dict[str, str] = {}
+    names = [name for name in names if any(run.has(name) for run in runs)]
+    for name in names:
+        values = {run.name: run.signal(name) for run in runs if run.has(name)}
+        if all(np.ptp(value) == 0.0 for value in values.values()):
+            levels = {label: f"{value.flat[0]:.4g}" for label, value in values.items()}
+            told = ", ".join(f"{level} ({label})" for label, level in levels.items())
+            level = told if len({*levels.values()}) > 1 else next(iter(levels.values()))
+            held[name] = f"${about(runs, name).symbol}$ = {level} {unit(about(runs, name))}"
+    return held if len(held) < len(names) else {}
+
+
 def remark(axes: Axes, text: str) -> None:
     """A line of text in the middle of a panel that has nothing to draw."""
     axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", color="#444444")
@@ -101,8 +116,11 @@ def unit(signal: Signal) -> str:
     return quantities.raised(signal.unit)
 
 
-def legend(figure: Page, thin: str = "") -> None:
-    """Every name in any panel once, above all panels; `thin` says what the thin curves are."""
+def legend(figure: Page, thin: str = "", held: Mapping[str, str] = MappingProxyType({})) -> None:
+    """Every name in any panel once, above all panels; `thin` says what the thin curves are.
+
+    Below all panels, the `constants` that have no panel.
+    """
     found = {
         label: handle
         for axes in figure.axes
@@ -112,6 +130,8 @@ def legend(figure: Page, thin: str = "") -> None:
         found[thin] = Line2D([], [], color="#444444", linewidth=0.5)
     if found:
         figure.add_key(list(found.values()), list(found))
+    if held:
+        figure.add_line(f"constant: {'; '.join(held.values())}")
 
 
 def image(figure: Figure, form: str) -> bytes:

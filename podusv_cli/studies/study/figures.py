@@ -37,6 +37,7 @@ TAIL = 0.005  # of the values beyond either end of an axis
 WIDE = 20.0  # a range this many times its lower end gets a logarithmic axis
 ROW, FRAME = 0.17, 0.75  # inches: a row of a chart, and what is around the rows
 LEAST_DISTANCE = 1e-3  # m, on a logarithmic axis
+HATCHES = ("", "//////", "......", "xxxxxx")  # of bars, which have no line style, in grey print
 MOST_BARS = 10  # quantities in a chart of correlations
 RATIOS = (1.01, 1.02, 1.05, 1.1, 1.2, 1.5, 2.0, 3.0, 5.0, 10.0, 30.0, 100.0, 1e3, 1e4, 1e6)
 BAND: dict[str, Any] = {"alpha": 0.18, "linewidth": 0.0}
@@ -281,7 +282,7 @@ def heatmaps(
     """
     height = FRAME + 2.0 * ROW * len(y[1])
     figure = new_figure(COLUMNS, height)
-    every = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
+    *every, scale = figure.subplots(1, len(panels) + 1, width_ratios=[1.0] * len(panels) + [0.05])
     finite = np.concatenate([panel[np.isfinite(panel)] for panel in panels.values()])
     low, high = (finite.min(), finite.max()) if len(finite) else (0.0, 1.0)
     for axes, (law, panel) in zip(every, panels.items(), strict=True):
@@ -291,12 +292,12 @@ def heatmaps(
         axes.set_title(escaping.figure(law))
         axes.set_facecolor(UNKNOWN)
         axes.grid(visible=False)
-        axes.tick_params(axis="y", length=0)
+        axes.tick_params(axis="y", length=0, labelleft=axes is every[0])
         axes.set_xticks(np.arange(len(x[1])) + 0.5, [escaping.figure(v) for v in x[1]])
         axes.set_xlabel(escaping.figure(x[0]))
     every[0].set_yticks(np.arange(len(y[1])) + 0.5, [escaping.figure(v) for v in y[1]])
     every[0].set_ylabel(escaping.figure(y[0]))
-    figure.colorbar(image, ax=list(every), label=label, fraction=0.05)
+    figure.colorbar(image, cax=scale, label=label, ticklocation="left")
     return figure
 
 
@@ -315,8 +316,9 @@ def correlations(sensitivity: pd.DataFrame) -> Figure:
     for place, law in enumerate(table.columns):
         at = np.arange(len(table)) + (place - (count - 1) / 2) * 0.8 / count
         axes.barh(
-            at, table[law], 0.7 / count, color=nth_style(place)[0], label=escaping.figure(law)
-        )
+            at, table[law], 0.7 / count, color=nth_style(place)[0], label=escaping.figure(law),
+            edgecolor="white", linewidth=0.0, hatch=HATCHES[place % len(HATCHES)],
+        )  # fmt: skip
     if np.isfinite(chance):
         look_of_chance: dict[str, Any] = {"color": "#E4E4E4", "linewidth": 0.0, "zorder": 0.0}
         axes.axvspan(-chance, chance, label="by chance", **look_of_chance)

@@ -25,13 +25,15 @@ from podusv_cli.studies.sketch import COLUMNS, Sketch
 from podusv_cli.studies.study.figures import ratios
 from podusv_cli.studies.tuning.results import Results
 from podusv_cli.studies.tuning.space import Gain, units_of
-from podusv_cli.studies.tuning.trials import front
+from podusv_cli.studies.tuning.trials import FINISHED, front
 
 ROW, FRAME = 0.2, 0.75  # inches: a row of a chart, and what is around the rows
 ACROSS = 4  # small panels in a row
 PANEL = 1.35  # inches, the height of a small panel
 TOP = 2.0  # times the scenario's objective, where an axis ends
 DECADE = 10.0  # largest over least number, from where an axis is logarithmic
+WHOLE: dict[str, Any] = {"s": 3.0, "linewidths": 0.0, "zorder": 3.0}
+PRUNED: dict[str, Any] = {"s": 5.0, "linewidths": 0.35, "zorder": 2.0}  # or cut
 SMALL: dict[str, Any] = {"fontsize": 6.5}
 
 
@@ -108,15 +110,16 @@ def _front(results: Results) -> Sketch:
 def _slices(results: Results, law: str, objective: str) -> Sketch:
     tried = pd.DataFrame(
         [
-            {**trial.gains, "objective": trial.values[0], "repeat": repeat}
+            {**trial.gains, "objective": trial.values[0], "repeat": repeat,
+             "whole": trial.status == FINISHED}
             for repeat, trials in enumerate(results.trials[law]) for trial in trials
         ]
     )  # fmt: skip
     return Sketch(
         f"slices-{law}",
         f"every trial of {law} by each of its gains: {objective} over the draws that the trial "
-        "met, a colour for each repeat; the full line is the gain that was found, the broken one "
-        "the scenario's",
+        "met, a colour for each repeat, hollow where the trial was pruned or cut; the full line is "
+        "the gain that was found, the broken one the scenario's",
         partial(
             slices, tried, results.plan.gains[law], results.winner(law).gains,
             results.label(0), units_of(results.plan.laws[law]),
@@ -259,7 +262,8 @@ def slices(
         panels[0, 0].set_ylim(low - 0.05 * (top - low), max(top, low + 1e-9))
     for axes in panels.ravel()[len(gains) :]:
         axes.set_visible(False)
-    figure.supylabel(escaping.figure(label), **SMALL)
+    for axes in panels[:, 0]:
+        axes.set_ylabel(escaping.figure(label), **SMALL)
     return figure
 
 
@@ -271,9 +275,13 @@ def _slice(axes: Axes, gain: Gain, tried: pd.DataFrame, found: Any) -> None:
         own, mark = places.get(gain.own), places[found]
     else:
         x, own, mark = tried[gain.key], gain.own, found
-    axes.scatter(
-        x, tried.objective, s=2.5, c=[nth_style(i)[0] for i in tried.repeat], linewidths=0.0
-    )
+    for (repeat, whole), some in tried.assign(x=x).groupby(["repeat", "whole"]):
+        colour = nth_style(int(str(repeat)))[0]
+        fill = colour if whole else "none"
+        axes.scatter(
+            some.x, some.objective, facecolors=fill, edgecolors=colour,
+            **WHOLE if whole else PRUNED,
+        )  # fmt: skip
     axes.axvline(mark, **TARGET_LOOK)
     if own is not None:
         axes.axvline(own, **{**TARGET_LOOK, "linestyle": "--"})
