@@ -1,6 +1,7 @@
 """The map of the tracks, by its data: positions, headings, limits, instants."""
 
 import io
+import shutil
 from dataclasses import replace
 from itertools import pairwise
 
@@ -325,10 +326,37 @@ def test_a_run_that_has_ended_stays_pale_where_it_was():
     assert axes.patches[0].get_alpha() == 1.0
 
 
+def test_the_close_up_of_a_film_goes_with_the_first_target_and_has_hulls_to_scale(two):
+    axes = Figure().add_subplot()
+    move = animation.stage(axes, two, near=True)
+    for t in (20.0, 70.0):
+        move(t)
+        log, row = two[0].recording, round(10 * t)
+        assert np.mean(axes.get_xlim()) == pytest.approx(log["y_d"][row])
+        assert np.mean(axes.get_ylim()) == pytest.approx(log["x_d"][row])
+        assert np.ptp(axes.get_xlim()) == pytest.approx(12.0 * LENGTH)
+        assert hulls(axes)[1][0] == pytest.approx(expected_hull(two[1].recording, t, 1.0)[0])
+
+
+def test_a_film_is_an_mp4_where_ffmpeg_is_there(monkeypatch):
+    for tool, name in ((None, "animation.gif"), ("/usr/bin/ffmpeg", "animation.mp4")):
+        monkeypatch.setattr(animation.shutil, "which", lambda _, tool=tool: tool)
+        assert animation.file_name() == name
+
+
+@pytest.mark.skipif(not shutil.which("ffmpeg"), reason="makes an MP4 with ffmpeg")
+@pytest.mark.slow
+def test_an_mp4_is_the_same_for_the_same_runs(two, monkeypatch):
+    monkeypatch.setattr(animation, "FRAMES", 3)
+    film = animation.animate(two, animation.MP4)
+    assert film[4:8] == b"ftyp"
+    assert animation.animate(two, animation.MP4) == film
+
+
 @pytest.mark.slow
 def test_a_film_has_a_picture_for_every_frame_and_the_same_bytes_twice(two, monkeypatch):
     monkeypatch.setattr(animation, "FRAMES", 4)
-    first, second = animation.animate(two), animation.animate(two)
+    first, second = animation.animate(two, animation.GIF), animation.animate(two, animation.GIF)
     assert first == second
     with Image.open(io.BytesIO(first)) as film:
         pictures = []
@@ -336,5 +364,5 @@ def test_a_film_has_a_picture_for_every_frame_and_the_same_bytes_twice(two, monk
         for number in range(4):
             film.seek(number)
             pictures.append(np.asarray(film.convert("L")))
-    assert pictures[0].shape == (440, 440)
+    assert pictures[0].shape == (440, 770)
     assert all(np.any(a != b) for a, b in pairwise(pictures))

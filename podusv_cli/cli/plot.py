@@ -44,7 +44,13 @@ def plot(
     style: Annotated[
         str, typer.Option(help="podusv, or paper: serif type of 8 points.")
     ] = "podusv",
-    animate: Annotated[bool, typer.Option("--animate", help="A GIF of the chase as well.")] = False,
+    animate: Annotated[
+        bool,
+        typer.Option("--animate", help="The chase as a film as well: MP4, GIF without ffmpeg."),
+    ] = False,
+    card: Annotated[
+        bool, typer.Option("--card", help="A picture of 1200 x 630 to share; others where named.")
+    ] = False,
     out: Annotated[
         Path, typer.Option(help="Folder for the figures; replaces those of the same name there.")
     ] = Path("figures"),
@@ -60,11 +66,19 @@ def plot(
     formats = [name.strip() for name in form.split(",")]
     request = Request(out=out, plugins=plugin or (), names=figure or (), formats=formats)
     choice = workflow.Choice(
-        signal or (), since, until, label or (), workflow.look_of(columns, size, style), animate
+        signal or (),
+        since,
+        until,
+        label or (),
+        workflow.look_of(columns, size, style),
+        animate,
+        card,
     )
     drawn = workflow.plot([Path(run) for run in runs], request, choice)
     for path in drawn.files:
         echo_path(path)
+    if animate and any(path.suffix == ".gif" for path in drawn.files):
+        echo("there is no ffmpeg here to make an MP4; the film is a GIF", err=True)
     for part in drawn.missing:
         echo(str(part), err=True)
     for path in drawn.replaced:

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Sequence
+import shutil
+import subprocess
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -17,34 +21,68 @@ from podusv_cli.figures.style import house_style, legend
 from podusv_cli.figures.tracks import bounds, targets
 from podusv_cli.figures.trajectory import enlargement, hull_of, map_axes
 
-FILE = "animation.gif"
+GIF, MP4 = "animation.gif", "animation.mp4"
 FRAMES = 120
 FRAME_MS = 80
-SIZE = 4.0  # inches
+SIZE = 7.0, 4.0  # inches
 DPI = 110
 STRIDE = 10  # rows between points of a track
+NEAR = 12.0  # lengths, the close-up's width
 PALE = 0.25
+# Raw pictures in, H.264 out that every browser plays; the same bytes for the same pictures.
+ENCODE = (
+    "-i", "-", "-c:v", "libx264", "-pix_fmt", "yuv420p", "-threads", "1", "-map_metadata", "-1",
+    "-fflags", "+bitexact", "-flags:v", "+bitexact", "-movflags", "+faststart",
+)  # fmt: skip
 
 
-def animate(runs: Sequence[Shown]) -> bytes:
-    """A GIF: tracks grow, hulls (enlarged) and targets move; same runs, same bytes."""
+def file_name() -> str:
+    """MP4 where ffmpeg is there to make it, else GIF."""
+    return MP4 if shutil.which("ffmpeg") else GIF
+
+
+def animate(runs: Sequence[Shown], name: str) -> bytes:
+    """The film, as the file of this name holds it: tracks grow, hulls and targets move.
+
+    On a map, where hulls are enlarged, and close up about the first target. The same runs give the
+    same bytes. Raises CalledProcessError where ffmpeg fails.
+    """
+    return _mp4(_frames(runs)) if name == MP4 else _gif(_frames(runs))
+
+
+def _frames(runs: Sequence[Shown]) -> Iterator[Image.Image]:
     with house_style():
-        figure = Page(figsize=(SIZE, SIZE), dpi=DPI)
+        figure = Page(figsize=SIZE, dpi=DPI)
         canvas = FigureCanvasAgg(figure)
-        move = stage(figure.add_subplot(), runs)
+        whole, near = figure.subplots(1, 2)
+        moves = [stage(whole, runs), stage(near, runs, near=True)]
         legend(figure)
-        frames = []
         for t in frame_times(runs):
-            move(t)
+            for move in moves:
+                move(t)
             canvas.draw()  # type: ignore[no-untyped-call]
-            pixels = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
-            picture = Image.fromarray(pixels).convert("RGB")
-            frames.append(picture.quantize(colors=64, dither=Image.Dither.NONE))
+            yield Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")  # type: ignore[no-untyped-call]
+
+
+def _gif(frames: Iterator[Image.Image]) -> bytes:
+    first, *rest = (frame.quantize(colors=64, dither=Image.Dither.NONE) for frame in frames)
     buffer = io.BytesIO()
-    frames[0].save(
-        buffer, "GIF", save_all=True, append_images=frames[1:], duration=FRAME_MS, loop=0
-    )
+    first.save(buffer, "GIF", save_all=True, append_images=rest, duration=FRAME_MS, loop=0)
     return buffer.getvalue()
+
+
+def _mp4(frames: Iterator[Image.Image]) -> bytes:
+    pictures = list(frames)
+    size = "x".join(map(str, pictures[0].size))
+    raw = ("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", str(1000 / FRAME_MS))
+    with TemporaryDirectory() as folder:  # its index is written last, at the beginning
+        place = Path(folder, MP4)
+        subprocess.run(
+            ["ffmpeg", "-loglevel", "error", *raw, *ENCODE, str(place)],
+            input=b"".join(picture.tobytes() for picture in pictures), check=True,
+            capture_output=True,
+        )  # fmt: skip
+        return place.read_bytes()
 
 
 def frame_times(runs: Sequence[Shown]) -> list[float]:
@@ -55,10 +93,11 @@ def frame_times(runs: Sequence[Shown]) -> list[float]:
     ]
 
 
-def stage(axes: Axes, runs: Sequence[Shown]) -> Callable[[float], None]:
+def stage(axes: Axes, runs: Sequence[Shown], *, near: bool = False) -> Callable[[float], None]:
     """Draw what stands still; the function moves the rest to a time [s].
 
-    A run that has ended stays where it is, its hull pale.
+    A run that has ended stays where it is, its hull pale. `near`, the map goes with the first
+    target, or the first run where there is none, and hulls are to scale.
     """
     chased = [
         (
@@ -70,7 +109,10 @@ def stage(axes: Axes, runs: Sequence[Shown]) -> Callable[[float], None]:
     ]
     for target in (target for target in targets(runs) if target.in_sight):
         axes.plot(*target.track(), **target.line_style)
-    scale = enlargement(runs)
+    scale = 1.0 if near else enlargement(runs)
+    reach = 0.5 * NEAR * max(run.length for run in runs)
+    followed = chased[0][0] if chased else runs[0].recording
+    place = ("y_d", "x_d") if chased else ("y", "x")
     tracks = [axes.plot([], [], **run.line_style)[0] for run in runs]
     hulls = [Polygon(np.zeros((5, 2)), color=run.color) for run in runs]
     for outline in hulls:
@@ -78,7 +120,13 @@ def stage(axes: Axes, runs: Sequence[Shown]) -> Callable[[float], None]:
     map_axes(axes, *bounds(runs))
 
     def move(t: float) -> None:
-        axes.set_title(f"t = {t:5.1f} s, hulls {scale:.0f} times as large")
+        if near:
+            row = min(int(np.searchsorted(followed["time"], t)), len(followed["time"]) - 1)
+            east, north = (float(followed[name][row]) for name in place)
+            axes.set_xlim(east - reach, east + reach, auto=None)
+            axes.set_ylim(north - reach, north + reach, auto=None)
+        words = "hulls to scale" if near else f"hulls {scale:.0f} times as large"
+        axes.set_title(f"t = {t:5.1f} s, {words}")
         for run, track, outline in zip(runs, tracks, hulls, strict=True):
             log, row = run.recording, run.row(t)
             rows = np.append(np.arange(0, row, STRIDE), row)

@@ -16,7 +16,7 @@ from podusv_cli.figures.curves import CUT, Span, draw_run, scaling
 from podusv_cli.figures.page import Page
 from podusv_cli.figures.sheet import figure
 from podusv_cli.figures.shown import Shown
-from podusv_cli.figures.style import WIDTHS, legend, new_figure
+from podusv_cli.figures.style import WIDTHS, legend, new_figure, remark
 from podusv_cli.figures.tracks import Target, bounds, rows_of, targets
 
 HULL = np.array([(0.5, 0.0), (0.25, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.25, -0.5)])
@@ -73,22 +73,22 @@ def hull_of(run: Shown, t: float, scale: float) -> Vector:
 def trajectory(runs: Sequence[Shown], columns: int) -> Figure:
     """Tracks and target on a map, hulls enlarged to show the heading; close-ups and distances."""
     east, north = bounds(runs)
-    views = _views(runs)
-    compared = [run for run in runs if run in views[-1].target.runs]
+    seen = views(runs)
+    compared = [run for run in runs if run in seen[-1].target.runs]
     shape = float(np.ptp(east) / np.ptp(north))
     figure, whole, asides, below = _sheet(
-        len(views), len(compared) > 1 or bool(_own_distance(compared)), columns, shape
+        len(seen), len(compared) > 1 or bool(_own_distance(compared)), columns, shape
     )
     _whole(whole, runs)
     _mark_ends(whole, runs, east, north)
     map_axes(whole, east, north)
-    for axes, view, letter in zip(asides, views, "bc", strict=False):
-        _close_up(axes, view, runs)
+    for axes, view, letter in zip(asides, seen, "bc", strict=False):
+        close_up(axes, view, runs)
         (left, low), width = view.middle - view.reach, 2.0 * view.reach
         whole.add_patch(Rectangle((left, low), width, width, **FRAME))
         whole.annotate(letter, (left + width, low), (1, 0), textcoords="offset points", fontsize=6)
     if below:
-        _distances(below, compared)
+        distances(below, compared)
     legend(figure)
     return figure
 
@@ -126,7 +126,7 @@ def _sheet(
     return figure, whole, others, figure.add_subplot(last) if last is not None else None
 
 
-def _distances(axes: Axes, runs: Sequence[Shown]) -> None:
+def distances(axes: Axes, runs: Sequence[Shown]) -> None:
     """How far each run is from the first at the same time, on a logarithmic axis.
 
     On a path that is followed, how far it is from the path; a run alone, from its target.
@@ -138,6 +138,9 @@ def _distances(axes: Axes, runs: Sequence[Shown]) -> None:
     else:
         curves = {run: _between(first, run) for run in others}
         axes.set_title(f"from {first.name}", loc="left")
+    if not curves:
+        remark(axes, "one run, and no target")
+        return
     for run, (t, distance) in curves.items():
         curve = t, np.maximum(np.abs(distance), LEAST_DISTANCE)
         draw_run(axes, run, curve, fitted=run in scaling(runs))
@@ -218,7 +221,7 @@ class View:
     reach: float
 
 
-def _views(runs: Sequence[Shown]) -> list[View]:
+def views(runs: Sequence[Shown]) -> list[View]:
     """Where runs that finished are farthest apart, if anywhere, and the end that all of them have.
 
     Hulls are shown at one and the same time. Of several targets, the first with its runs. On a path
@@ -273,7 +276,7 @@ def _farthest_apart(runs: Sequence[Shown], target: Target, last: float) -> list[
     return [_at_once("largest gap", float(times[worst]), runs, target, 0.5 * (low + high))]
 
 
-def _close_up(axes: Axes, view: View, among: Sequence[Shown]) -> None:
+def close_up(axes: Axes, view: View, among: Sequence[Shown]) -> None:
     """Tracks around the time of the view, hulls to scale."""
     _draw_tracks(axes, [view.target], view.tracks, view.span, among)
     for run in view.hulls:
