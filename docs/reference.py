@@ -17,7 +17,8 @@ import podusv_cli as podusv
 from podusv_cli.cli import app
 from podusv_cli.cli.exit_codes import MEANINGS
 from podusv_cli.core.signal import Signal
-from podusv_cli.figures.drawing import FIGURES, draw, dressed
+from podusv_cli.figures.drawing import FIGURES, draw
+from podusv_cli.figures.shown import dressed
 from podusv_cli.findings.finding import finding_kinds
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.scenario.explain import Row, explain, signals
@@ -59,7 +60,7 @@ def pictures() -> Iterable[tuple[str, bytes]]:
             for name, one in scenario.singles().items()
             if name in ("adaptive_neural", "pid")
         ]
-        left = [name for name in FIGURES if f"{name}.png" not in drawn]
+        left = [sheet for name, sheet in FIGURES.items() if f"{name}.png" not in drawn]
         drawn |= dict(draw(dressed(runs), left, ["png"]))
     return drawn.items()
 

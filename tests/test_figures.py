@@ -269,7 +269,7 @@ def test_every_figure_shows_labels_as_they_are(runs, name):
     with house_style():
         figure = FIGURES[name].family(runs, 2)
         assert b"<svg" in image(figure, "svg")
-    (legend,) = figure.legends or [None]
+    legend, *_ = figure.legends or [None]
     named = [text.get_text() for text in legend.get_texts()] if legend else []
     ours = [text for text in named if text in (run.name for run in runs)]
     assert ours == [run.name for run in runs] or not ours

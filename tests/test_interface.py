@@ -218,7 +218,7 @@ def test_a_comparison_has_table_claims_runs_and_figures():
     assert list(done.table) == list(done.runs) == ["stiff", "soft"]
     assert done.table.loc["iae", "stiff"] == done["stiff"].metrics["iae"]
     assert done.claims.loc["C1", "verdict"] == "reproduced"
-    assert (done.failed, done.report) == ({}, None)
+    assert (done.failed, done.report) == ({}, done.folder / "report.html")
     assert done["soft"].folder == Path("both/soft")
     assert isinstance(done.plot("errors"), Figure)
     page = done._repr_html_()

@@ -114,7 +114,7 @@ class Comparison:
     """Runs side by side.
 
     `table` has a row a metric and a column a run; `claims` a row for each claim of the scenario;
-    `failed` says why a run did not finish. `report` is the HTML page, None without figures.
+    `failed` says why a run did not finish. `report` is the HTML page, None where it failed.
     """
 
     folder: Path
