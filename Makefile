@@ -8,7 +8,7 @@ STEP := PODUSV=$(BIN)/podusv examples/reproduce/step.sh
 # A file to a core; what its tests share is made once.
 # Tests start processes, which would each translate podusv's source anew without byte code on disk.
 PYTEST := OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(BIN)/pytest --numprocesses auto --dist loadfile
-OURS := podusv_cli tests benchmarks examples docs
+OURS := podusv podusv_cli tests benchmarks examples docs
 # Every dependency of a run at its lower bound; what tests need beside them, as new as may be.
 OLDEST := .venv-oldest
 LOWEST := sed -n '/^dependencies = \[/,/^\]/s/^ *"\(.*\)>=\(.*\)",/\1==\2/p' pyproject.toml

@@ -13,7 +13,7 @@ from typing import Any
 
 import typer.main
 
-import podusv_cli as podusv
+import podusv
 from podusv_cli.cli import app
 from podusv_cli.cli.exit_codes import MEANINGS
 from podusv_cli.core.signal import Signal
@@ -196,14 +196,14 @@ def python_page() -> str:
     """The Python interface by its docstrings."""
     functions = [name for name in podusv.__all__ if not isinstance(getattr(podusv, name), type)]
     classes = [name for name in podusv.__all__ if isinstance(getattr(podusv, name), type)]
-    made = [f".. autofunction:: podusv_cli.{name}" for name in functions]
+    made = [f".. autofunction:: podusv.{name}" for name in functions]
     made += [
-        f".. autoclass:: podusv_cli.{n}\n   :members:\n   :special-members: __getitem__"
+        f".. autoclass:: podusv.{n}\n   :members:\n   :special-members: __getitem__"
         for n in classes
     ]
     parts = [
         "# Python interface",
-        "`import podusv_cli as podusv`. [podusv from Python](../python.md)",
+        "`import podusv`. [podusv from Python](../python.md)",
     ]
     return page([*parts, *(f"```{{eval-rst}}\n{text}\n```" for text in made)])
 

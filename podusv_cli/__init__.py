@@ -1,7 +1,7 @@
 """podusv: experiments with controllers for pod-propelled surface vessels.
 
-From Python: `import podusv_cli as podusv`; docs/python.md has examples. The names in `__all__` come
-from `podusv_cli.interface`, which is imported when the first of them is used.
+`import podusv` has the names in `__all__`. They come from `podusv_cli.interface`, which is imported
+when the first of them is used.
 """
 
 __version__ = "0.1.0"
@@ -14,7 +14,7 @@ __all__ = [
 def __getattr__(name: str) -> object:
     """A public name, on first use; `__init__.pyi` tells type checkers what it is."""
     if name not in __all__:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        raise AttributeError(f"module 'podusv' has no attribute {name!r}")
     from importlib import import_module  # which most commands do not need
 
     return getattr(import_module(f"{__name__}.interface"), name)

@@ -12,7 +12,7 @@ import pytest
 from conftest import NONLINEAR, ROOMS, corrected, example, kinds
 from scenario_samples import loaded
 
-import podusv_cli as podusv
+import podusv
 from benchmarks.variants import variants
 from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
 from podusv_cli.components.controllers.network import Network

@@ -14,7 +14,7 @@ from conftest import VESSELS
 from scipy.integrate import solve_ivp
 from scipy.linalg import solve_continuous_are
 
-import podusv_cli as podusv
+import podusv
 from podusv_cli.components.controllers.cascade import Cascade
 from podusv_cli.components.controllers.constant_bearing import Moving, turn_rate
 from podusv_cli.components.paths.sinusoid import Sinusoid

@@ -22,7 +22,8 @@ from podusv_cli.cli import FIRST_STEPS
 from podusv_cli.scenario import shipped
 
 pytestmark = pytest.mark.slow  # builds packages, and an environment compiles anew
-NEEDED = ("pyproject.toml", "README.md", "LICENSE", "podusv_cli", "configs")
+PACKAGES = ("podusv", "podusv_cli")
+NEEDED = ("pyproject.toml", "README.md", "LICENSE", *PACKAGES, "configs")
 BUILD = "import sys; from setuptools import build_meta; build_meta.build_{}(sys.argv[1])"
 
 
@@ -102,8 +103,9 @@ def test_the_wheel_has_metadata_types_licence_and_scenarios(
     assert about["Description-Content-Type"] == "text/markdown"
     assert about.get_payload() == (ROOT / "README.md").read_text()
     names = {*wheel.namelist()}
-    assert {"podusv_cli/py.typed", "podusv_cli/__init__.pyi", f"{info}/licenses/LICENSE"} <= names
-    assert {name.split("/")[0] for name in names} == {"podusv_cli", info}
+    typed = {f"{name}/{file}" for name in PACKAGES for file in ("py.typed", "__init__.pyi")}
+    assert {*typed, f"{info}/licenses/LICENSE"} <= names
+    assert {name.split("/")[0] for name in names} == {*PACKAGES, info}
     configs = {path.relative_to(ROOT).as_posix() for path in (ROOT / "configs").rglob("*.yaml")}
     assert {f"podusv_cli/{name}" for name in configs} <= names
 
@@ -112,7 +114,7 @@ def test_the_wheel_alone_starts_from_an_empty_folder(python: Path, empty: Path) 
     def podusv(words: str) -> str:
         return said(python.with_name("podusv"), *shlex.split(words), cwd=empty)
 
-    where = said(python, "-c", "import podusv_cli; print(podusv_cli.__file__)", cwd=empty)
+    where = said(python, "-c", "import podusv; print(podusv.__file__)", cwd=empty)
     assert Path(where).is_relative_to(python.parents[1])
     names = "from podusv_cli.scenario import shipped; print(*shipped.names())"
     assert said(python, "-c", names, cwd=empty).split() == list(shipped.names())

@@ -17,7 +17,7 @@ from command_samples import BASE, ROOT, write
 from matplotlib.figure import Figure
 from test_cli_words import python
 
-import podusv_cli as podusv
+import podusv
 from podusv_cli import interface
 from podusv_cli.core.errors import ScenarioError, UsageError
 from podusv_cli.engine.running import batch
@@ -61,10 +61,12 @@ def test_the_package_has_the_names_of_the_interface_and_its_stub():
 
 
 def test_importing_the_package_imports_nothing_else():
-    script = (
-        "import sys\nbefore = {*sys.modules}\nimport podusv_cli\nprint({*sys.modules} - before)"
-    )
-    assert python("-c", script).stdout == "{'podusv_cli'}\n"
+    script = "import sys; before = {*sys.modules}; import podusv; print({*sys.modules} - before)"
+    assert ast.literal_eval(python("-c", script).stdout) == {"podusv", "podusv_cli"}
+
+
+def test_the_package_is_a_command_too():
+    assert python("-m", "podusv", "--version").stdout == f"podusv {podusv.__version__}\n"
 
 
 @pytest.mark.parametrize("module", [scenarios, functions])

@@ -15,7 +15,7 @@ from conftest import VESSELS
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-import podusv_cli as podusv
+import podusv
 from podusv_cli.components.controllers.los_backstepping import LosBackstepping
 from podusv_cli.components.controllers.velocity_loop import Axis
 from podusv_cli.core.kernel import bundle, call

@@ -14,7 +14,7 @@ from command_samples import BASE, Command, one_line, write
 from plugin_samples import LAW, SCENARIO, TWO, put
 from test_cli_words import offered_for
 
-import podusv_cli as podusv_python
+import podusv as podusv_python
 from podusv_cli.core.plugins import from_file
 from podusv_cli.scenario.load import load, load_text
 from podusv_cli.scenario.model import Scenario, scenario_class

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-import podusv_cli as podusv
+import podusv
 from podusv_cli.scenario.load import load
 from podusv_cli.studies.bench.cases import AXES, shipped_bench
 from podusv_cli.studies.bench.page import as_markdown

@@ -39,7 +39,7 @@ def simulate(source: Source, changes: Changes | None = None) -> Run:
     A run that diverges is returned like any other, see `Run.status`. Ctrl-C ends the run and
     returns what was computed. Raises ScenarioError, and LawError for a law that fails.
 
-    >>> import podusv_cli as podusv
+    >>> import podusv
     >>> run = podusv.simulate("podusv:own_vessel.yaml", {"simulation.duration": 30.0})
     >>> run
     <podusv run pid: finished at 30 s>
@@ -67,7 +67,7 @@ def run(
     `out` is the folder, by default `results/<name>/<time>-<digest>`; a finished one is replaced
     only with `force`. Raises ScenarioError, LawError, StorageError.
 
-    >>> import podusv_cli as podusv
+    >>> import podusv
     >>> run = podusv.run("podusv:own_vessel.yaml", out="mine", figures=False)
     >>> run.status, sorted(path.name for path in run.folder.iterdir())[:3]
     ('finished', ['log.h5', 'manifest.json', 'metrics.csv'])
@@ -81,7 +81,7 @@ def run(
 def open_run(folder: str | os.PathLike[str]) -> Run:
     """A finished run, read from its folder. Raises StorageError where it is damaged.
 
-    >>> import podusv_cli as podusv
+    >>> import podusv
     >>> _ = podusv.run("podusv:own_vessel.yaml", out="kept", figures=False)
     >>> podusv.open_run("kept")
     <podusv run pid: finished at 120 s, kept>
@@ -102,7 +102,7 @@ def compare(
     One scenario with `controllers`, several scenarios, run folders, runs that have a folder, or any
     mixture. Raises ScenarioError, UsageError, StorageError.
 
-    >>> import podusv_cli as podusv
+    >>> import podusv
     >>> scenario = podusv.load("podusv:own_vessel.yaml", {"simulation.duration": 30.0})
     >>> gains = {"soft": {"K_Pu": 50.0}, "stiff": {"K_Pu": 200.0}}
     >>> comparison = podusv.compare(scenario, {"controllers": gains}, figures=False)
@@ -141,7 +141,7 @@ def simulate_many(
     Raises ScenarioError, LawError, and ValueError for unknown keys, unequal lengths, values out of
     range and a negative number of workers.
 
-    >>> import podusv_cli as podusv
+    >>> import podusv
     >>> scenario = podusv.load("podusv:own_vessel.yaml", {"simulation.duration": 30.0})
     >>> podusv.simulate_many(scenario, {"vessel.m": [50.0, 60.0]})[["vessel.m", "status"]]
        vessel.m    status
@@ -171,7 +171,7 @@ def verify(
     (NaN where there is none), the `relative_error`, and whether that is within `tolerance`. Raises
     ScenarioError, LawError.
 
-    >>> import podusv_cli as podusv
+    >>> import podusv
     >>> found = podusv.verify("podusv:own_vessel.yaml", {"simulation.duration": 20.0})
     >>> bool(found.loc[("pid", "iae"), "converged"])
     True

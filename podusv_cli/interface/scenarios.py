@@ -32,7 +32,7 @@ def Scenario(sections: Mapping[str, Any] | None = None, /, **more: Any) -> model
     scenario is a value that does not change; `load(scenario, {...})` makes another one. Raises
     ScenarioError with every fault.
 
-    >>> import podusv_cli as podusv
+    >>> import podusv
     >>> scenario = podusv.Scenario(
     ...     vessel={"preset": "paper_nonlinear", "m": 25.0},
     ...     path={"kind": "line", "speed": 0.5},
@@ -58,7 +58,7 @@ def load(source: Source, changes: Changes | None = None) -> model.Scenario:
     `nominal` is also the one that the controller is told about, unless `source` is a scenario: that
     has a `nominal` of its own. Raises ScenarioError with every fault.
 
-    >>> import podusv_cli as podusv
+    >>> import podusv
     >>> scenario = podusv.load("podusv:mu_2017/corrected.yaml", {"controller.k_ze": 0.2})
     >>> scenario.controller.k_ze, scenario.actuator.surge_limit
     (0.2, 8.0)

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from plugin_samples import LAW, SCENARIO, put
 
-import podusv_cli as podusv_python
+import podusv as podusv_python
 from podusv_cli.core import plugins
 
 # What is written in place of what, and what is said.
