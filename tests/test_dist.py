@@ -23,7 +23,7 @@ from podusv_cli.scenario import shipped
 
 pytestmark = pytest.mark.slow  # builds packages, and an environment compiles anew
 PACKAGES = ("podusv", "podusv_cli")
-NEEDED = ("pyproject.toml", "README.md", "LICENSE", *PACKAGES, "configs")
+NEEDED = ("pyproject.toml", "README.md", "LICENSE", *PACKAGES, "configs", "docs", "results")
 BUILD = "import sys; from setuptools import build_meta; build_meta.build_{}(sys.argv[1])"
 
 
@@ -108,6 +108,13 @@ def test_the_wheel_has_metadata_types_licence_and_scenarios(
     assert {name.split("/")[0] for name in names} == {*PACKAGES, info}
     configs = {path.relative_to(ROOT).as_posix() for path in (ROOT / "configs").rglob("*.yaml")}
     assert {f"podusv_cli/{name}" for name in configs} <= names
+    pages = {
+        f"{room}/{path.name}" for room in ("docs", "results") for path in (ROOT / room).glob("*.md")
+    }
+    assert {f"podusv_cli/{name}" for name in (*pages, "docs/index.rst")} <= names
+    assert not {
+        name for name in names if name.startswith("podusv_cli/docs/") and name.endswith(".py")
+    }
 
 
 def test_the_wheel_alone_starts_from_an_empty_folder(python: Path, empty: Path) -> None:
@@ -120,6 +127,8 @@ def test_the_wheel_alone_starts_from_an_empty_folder(python: Path, empty: Path) 
     assert said(python, "-c", names, cwd=empty).split() == list(shipped.names())
     assert podusv("") == f"{FIRST_STEPS}\n"
     assert "\nmu_2017/corrected\n" in podusv("init")
+    assert podusv("docs resume").startswith("podusv docs studies#resume-a-study")
+    assert podusv("docs results/README").startswith("# What was found\n")
     assert podusv("init mu_2017/corrected").endswith("next: podusv run corrected.yaml\n")
     short = "--set simulation.duration=2"
     assert "adaptive_neural finished: " in podusv(f"run corrected.yaml {short}")

@@ -25,7 +25,7 @@ from podusv_cli.cli.sweep import sweep
 # NAME is the function NAME of cli/NAME.py
 COMMANDS = (
     "init", "run", "compare", "rerun", "diff", "plot", "validate", "verify", "margins", "optimum",
-    "explain", "list", "schema", "new", "bench", "tune",
+    "explain", "list", "schema", "new", "bench", "tune", "docs",
 )  # fmt: skip
 
 FIRST_STEPS = """\
@@ -37,6 +37,7 @@ podusv simulates and compares controllers for pod-propelled surface vessels. Fir
   podusv compare podusv:pod/kept.yaml      simulate and compare four laws: table and report
   podusv sweep --help                      judge laws by thousands of drawn hulls, seas, starts
   podusv explain controller                what the keys of a scenario mean
+  podusv docs                              list the pages that come with podusv, or show one
   podusv --help                            all commands"""
 OBJECTS_BETWEEN_COLLECTIONS = 100_000
 

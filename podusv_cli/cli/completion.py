@@ -26,6 +26,14 @@ def starting_points(incomplete: str) -> Offered:
     return _beginning(incomplete, starting_points())
 
 
+def pages(incomplete: str) -> Offered:
+    """Pages of `podusv docs`."""
+    from podusv_cli.workflows.docs import contents
+
+    titles = {name: title for part in contents().values() for name, title in part.items()}
+    return _beginning(incomplete, titles)
+
+
 def parts(incomplete: str) -> Offered:
     """What `podusv new` writes."""
     from podusv_cli.workflows.new import PARTS

@@ -60,7 +60,7 @@ def explain(
         for row in found:
             _echo(row)
         if any(EQUATION.search(row.meaning) for row in found):
-            echo("", "(n) is equation n of the paper that docs/model.md cites")
+            echo("", "(n) is equation n of the paper that podusv docs model cites")
 
 
 def _echo_figure(name: str | None, plugins: Known) -> bool:

@@ -107,17 +107,17 @@ class Scenario(Component):
     log: Log = value(Log(), "", "logging")
     metrics: MetricSettings = value(MetricSettings(), "", "windows and thresholds of the metrics")
     silence: tuple[str, ...] = value(
-        (), "", "codes of findings that are not to be shown; see docs/findings.md", strict=False
+        (), "", "codes of findings that are not to be shown; see podusv docs findings", strict=False
     )
     plugins: dict[str, Required] = value(
-        {}, "", "files with laws and other components of your own; see docs/plugins.md"
+        {}, "", "files with laws and other components of your own; see podusv docs plugins"
     )
 
     sweep: Sweep | None = value(
-        None, "", "the study that `podusv sweep` makes of this scenario; see docs/studies.md"
+        None, "", "the study that `podusv sweep` makes of this scenario; see podusv docs studies"
     )
     tune: Tune | None = value(
-        None, "", "how `podusv tune` searches for gains of the laws; see docs/tuning.md"
+        None, "", "how `podusv tune` searches for gains of the laws; see podusv docs tuning"
     )
 
     def __reduce_ex__(self, protocol: SupportsIndex) -> str | tuple[Any, ...]:

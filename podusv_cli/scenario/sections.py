@@ -127,7 +127,7 @@ class Claim(Component):
 
     says: str = value(..., "", "the claim, in a sentence of your own")
     source: str = value(..., "", "where it was published: section, figure, equation")
-    expect: str = value(..., "", "the claim as an expression over runs; see docs/claims.md")
+    expect: str = value(..., "", "the claim as an expression over runs; see podusv docs claims")
     given: str = value(
         "", "", "a condition without which the claim has no meaning: if it fails, cannot tell"
     )

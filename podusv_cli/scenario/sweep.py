@@ -79,7 +79,7 @@ class StudyClaim(Component):
     says: str = value(..., "", "the claim, in a sentence of your own")
     source: str = value(..., "", "where it was published, or `ours`")
     expect: str = value(
-        ..., "", "the claim as an expression over all draws; see docs/study_claims.md"
+        ..., "", "the claim as an expression over all draws; see podusv docs study_claims"
     )
     tolerance: float = value(
         0.0,

@@ -43,8 +43,8 @@ from podusv_cli.workflows.run import RESULTS
 from podusv_cli.workflows.studies import check_study, stored
 
 NO_SWEEP = (
-    "which says what is to be drawn; see docs/studies.md, or start from one: podusv init "
-    "studies/hull_and_sea"
+    "which says what is to be drawn; see podusv docs studies, or start from one: podusv "
+    "init studies/hull_and_sea"
 )
 
 

@@ -45,8 +45,8 @@ from podusv_cli.workflows.run import RESULTS
 
 Tell = Callable[[Tally, str], None]
 NO_TUNE = (
-    "which says how many runs a search has; see docs/tuning.md, or start from one: podusv init "
-    "studies/tune_small"
+    "which says how many runs a search has; see podusv docs tuning, or start from one: podusv "
+    "init studies/tune_small"
 )
 
 

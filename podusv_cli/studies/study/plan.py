@@ -57,7 +57,7 @@ class Plan:
     def sweep(self) -> Sweep:
         """The study's settings. Raises UsageError where the scenario has none."""
         if self.scenario.sweep is None:
-            raise UsageError(f"{self.scenario.name} has no key `sweep`; see docs/studies.md")
+            raise UsageError(f"{self.scenario.name} has no key `sweep`; see podusv docs studies")
         return self.scenario.sweep
 
     @property

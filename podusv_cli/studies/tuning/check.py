@@ -30,7 +30,10 @@ def tune_faults(scenario: Scenario) -> list[tuple[Route, str]]:
 
 def _study(scenario: Scenario) -> Faults:
     if scenario.sweep is None:
-        yield ("tune",), "needs the key sweep: its `vary` says what is drawn; see docs/tuning.md"
+        yield (
+            ("tune",),
+            "needs the key sweep: its `vary` says what is drawn (podusv docs tuning)",
+        )
     elif scenario.sweep.grid:
         told = "needs a study without a grid: put what laws have to cope with under sweep.vary"
         yield ("tune",), f"{told}, and write `grid: {{{next(iter(scenario.sweep.grid))}: null}}`"

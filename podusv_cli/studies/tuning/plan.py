@@ -51,7 +51,7 @@ class TunePlan:
     def tune(self) -> Tune:
         """The settings of the search. Raises UsageError where the scenario has none."""
         if self.scenario.tune is None:
-            raise UsageError(f"{self.scenario.name} has no key `tune`; see docs/tuning.md")
+            raise UsageError(f"{self.scenario.name} has no key `tune`; see podusv docs tuning")
         return self.scenario.tune
 
     @cached_property

@@ -1,0 +1,70 @@
+"""`podusv docs`: the pages that come with podusv, on the terminal."""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import Annotated
+
+import typer
+
+from podusv_cli.cli import completion
+from podusv_cli.cli.terminal import WIDEST, columns, echo, echo_entry, supports_colours
+
+SHOWN = 12  # results of a search
+
+
+def docs(
+    words: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[PAGE or WORD]...",
+            help="A page (studies), a heading of one (studies#shards), or words to look for; "
+            "without any, all pages are listed.",
+            show_default=False,
+            autocompletion=completion.pages,
+        ),
+    ] = None,
+) -> None:
+    """Show the pages that come with podusv, or find those that have a word.
+
+    On a terminal a page is shown in a pager; q leaves it. In a pipe it is Markdown.
+    """
+    from podusv_cli.workflows import docs as workflow
+
+    wanted = " ".join(words or ())
+    if not wanted:
+        for caption, pages in workflow.contents().items():
+            echo(f"{caption}:")
+            for name, title in pages.items():
+                echo(f"  {name:<22} {title}")
+        echo("read one: podusv docs NAME; find a word: podusv docs WORD")
+    elif workflow.is_page(wanted):
+        _show(workflow.page(wanted))
+    else:
+        _list(wanted)
+
+
+def _list(wanted: str) -> None:
+    from podusv_cli.workflows.docs import search
+
+    found = search(wanted)
+    for section, line in found[:SHOWN]:
+        echo_entry(f"podusv docs {section.name}", line, facts=section.heading)
+    if len(found) > SHOWN:
+        echo(f"and {len(found) - SHOWN} more places")
+
+
+def _show(page: str) -> None:
+    """Print Markdown: rendered and paged on a terminal, as it is in a pipe."""
+    if not sys.stdout.isatty():
+        typer.echo(page, nl=False)
+        return
+    from rich.console import Console
+    from rich.markdown import Markdown
+
+    # less: leave at once what fits on the screen, pass colours on, leave the page on the screen
+    os.environ.setdefault("LESS", "FRX")
+    console = Console(width=min(WIDEST, columns()))
+    with console.pager(styles=supports_colours(sys.stdout)):
+        console.print(Markdown(page, hyperlinks=False, code_theme="bw"))

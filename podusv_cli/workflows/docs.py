@@ -1,0 +1,185 @@
+"""`podusv docs`: the pages that come with podusv, their sections, and a search in them."""
+
+from __future__ import annotations
+
+import posixpath
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import as_file, files
+from pathlib import Path
+
+from podusv_cli.core.errors import UsageError
+from podusv_cli.scenario import shipped
+from podusv_cli.scenario.phrases import did_you_mean, unknown
+
+CONTENTS = "index.rst"  # the contents of the site: captions, and the pages below each
+CAPTION = re.compile(r"^   :caption: (.+)$")
+ENTRY = re.compile(r"^   (?:.* <)?/?([\w/]+)>?$")
+HEADING = re.compile(r"^(#{1,4}) (.+)$")
+FENCE = re.compile(r"^ *```")
+LINK = re.compile(r"(!?)\[([^]]*)\]\(([^)\s]+)\)")
+IN_NAME, IN_HEADING, MOST = 100, 20, 10  # what a match counts; those in the text up to `MOST`
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading of a page and the text below it, up to the next heading."""
+
+    page: str
+    level: int
+    heading: str
+    text: str
+
+    @property
+    def name(self) -> str:
+        """What `podusv docs` takes: the page, or the page and the heading's anchor."""
+        return self.page if self.level == 1 else f"{self.page}#{anchor(self.heading)}"
+
+    def score(self, words: Sequence[re.Pattern[str]]) -> int:
+        """How well the section answers; 0 where a word is missing."""
+        if not all(word.search(f"{self.heading}\n{self.text}") for word in words):
+            return 0
+        named = self.level == 1 and all(word.search(self.page) for word in words)
+        headed = all(word.search(self.heading) for word in words)
+        count = min(len(word.findall(self.text)) for word in words)
+        return IN_NAME * named + IN_HEADING * headed + min(count, MOST)
+
+    def line(self, words: Sequence[re.Pattern[str]]) -> str:
+        """The first line of its text that has one of the words, else the first one."""
+        lines = [line.strip(" |>*-") for line in self.text.splitlines() if line.strip()]
+        found = (line for line in lines if any(word.search(line) for word in words))
+        return _plain(next(found, lines[0] if lines else ""))
+
+
+@cache
+def contents() -> dict[str, dict[str, str]]:
+    """Titles of the pages by name, below the captions of the site's contents and in its order."""
+    captions: dict[str, dict[str, str]] = {}
+    caption = ""
+    for line in (_folder("docs") / CONTENTS).read_text("utf-8").splitlines():
+        if begun := CAPTION.match(line):
+            caption = begun[1]
+        elif (entry := ENTRY.match(line)) and _file(entry[1]).is_file():
+            captions.setdefault(caption, {})[entry[1]] = sections(entry[1])[0].heading
+    return captions
+
+
+def names() -> tuple[str, ...]:
+    """The names of all pages, in the order of the contents."""
+    return tuple(name for pages in contents().values() for name in pages)
+
+
+def page(name: str) -> str:
+    """A page as Markdown, or the part of it below a heading: `studies`, `studies#in-shards`.
+
+    A name may be written as a file's, too (`docs/studies.md`). Raises UsageError for a heading that
+    the page does not have.
+    """
+    short, _, wanted = _short(name).partition("#")
+    parts = sections(short)
+    anchors = [anchor(part.heading) for part in parts]
+    if not wanted:
+        return _whole(parts)
+    if wanted not in anchors:
+        raise UsageError(unknown(f"heading {wanted!r} of {short}", wanted, anchors))
+    first = anchors.index(wanted)
+    rest = (i for i in range(first + 1, len(parts)) if parts[i].level <= parts[first].level)
+    return _whole(parts[first : next(rest, len(parts))])
+
+
+def is_page(name: str) -> bool:
+    """Whether a word is the name of a page, with or without a heading."""
+    return _short(name).partition("#")[0] in names()
+
+
+def search(text: str) -> list[tuple[Section, str]]:
+    """Sections that have all words of a text, the best first, each with a line of it.
+
+    Raises UsageError where there is none.
+    """
+    words = [re.compile(rf"\b{re.escape(word)}", re.IGNORECASE) for word in text.split()]
+    scored = [(part.score(words), part) for name in names() for part in sections(name)]
+    found = sorted((one for one in scored if one[0]), key=lambda one: -one[0])
+    if not found or not words:
+        raise UsageError(
+            f"no page is called {text!r} or has all words of it{did_you_mean(text, names())} "
+            "(`podusv docs` lists all pages)"
+        )
+    return [(part, part.line(words)) for _, part in found]
+
+
+@cache
+def sections(name: str) -> tuple[Section, ...]:
+    """The sections of a page; headings within code are none."""
+    return tuple(_sections(name, _file(name).read_text("utf-8")))
+
+
+def _sections(name: str, text: str) -> Iterator[Section]:
+    level, heading, lines, in_code = 0, "", list[str](), False
+    for line in text.splitlines():
+        in_code ^= bool(FENCE.match(line))
+        if (begun := HEADING.match(line)) and not in_code:
+            if heading:
+                yield Section(name, level, heading, "\n".join(lines))
+            level, heading, lines = len(begun[1]), begun[2], []
+        else:
+            lines.append(line)
+    yield Section(name, level, heading, "\n".join(lines))
+
+
+def _whole(parts: Sequence[Section]) -> str:
+    marked = (f"{'#' * part.level} {part.heading}\n{part.text}" for part in parts)
+    there = posixpath.dirname(f"{_place(parts[0].page)}.md")
+    return LINK.sub(lambda link: _reachable(link, there, parts[0].page), "\n".join(marked)) + "\n"
+
+
+def _reachable(link: re.Match[str], folder: str, page: str) -> str:
+    """A link to where a reader without a checkout gets; its words alone where there is nothing."""
+    picture, words, target = link.groups()
+    if picture:
+        return f"[figure: {words}]"
+    if "://" in target:
+        return link[0]
+    path, _, heading = target.partition("#")
+    place = posixpath.normpath(posixpath.join(folder, path)) if path else f"docs/{page}.md"
+    named = f"{_short(place)}{'#' if heading else ''}{heading}"
+    if is_page(named):
+        shown = f"`podusv docs {named}`"
+        return shown if words.endswith(".md") else f"{words} ({shown})"
+    scenario = shipped.PREFIX + place.removeprefix("configs/")
+    return f"`{scenario}`" if scenario in shipped.names() else words
+
+
+def _plain(line: str) -> str:
+    """Text without the marks of links."""
+    return LINK.sub(lambda link: link[2], line)
+
+
+def anchor(heading: str) -> str:
+    """What `#...` names a heading by, as GitHub forms it."""
+    return re.sub(r"[^\w\- ]", "", heading.lower()).strip().replace(" ", "-")
+
+
+def _short(name: str) -> str:
+    """A page's name of its file's in a checkout."""
+    path, mark, heading = name.partition("#")
+    return f"{path.removeprefix('docs/').removesuffix('.md')}{mark}{heading}"
+
+
+def _place(name: str) -> str:
+    """A page's file in a checkout, without suffix."""
+    return name if name.startswith("results/") else f"docs/{name}"
+
+
+def _file(name: str) -> Path:
+    room, _, rest = _place(name).partition("/")
+    return _folder(room) / f"{rest}.md"
+
+
+@cache
+def _folder(room: str) -> Path:
+    """Where pages are on this machine: a link to the checkout's folder, or what a wheel has."""
+    with as_file(files("podusv_cli") / room) as path:
+        return path
