@@ -354,3 +354,13 @@ def test_the_report_is_named_after_everything_else(tmp_path):
         lines = process.communicate(timeout=PATIENCE)[0].splitlines()
     assert lines[-1] == f"report: {tmp_path}/x/report.html"
     assert lines[-2].startswith("the numbers may not have converged")
+
+
+def test_the_table_here_may_be_of_some_metrics_alone(podusv):
+    made = podusv(write("two.yaml", TWO), "--out", "c", "--metric", "ise", "--metric", "iae")
+    rows = [line.split()[0] for line in made.out.splitlines()]
+    assert rows[:4] == ["metric", "ise", "iae", "*"]
+    assert len(Path("c/comparison.csv").read_text().splitlines()) > 10
+    wrong = podusv("c", "--metric", "iaee", "--out", "d")
+    assert (wrong.code, wrong.out, Path("d").exists()) == (2, "", False)
+    assert "unknown metric 'iaee'; did you mean 'iae_e'?" in wrong.err

@@ -49,7 +49,7 @@ def test_a_scenario_extends_a_shipped_one_from_anywhere(podusv):
         ("podusv:mu_2017/corected.yaml", "; did you mean 'podusv:mu_2017/corrected.yaml'?"),
         ("podusv:../pyproject.toml", "; did you mean 'podusv:pod/kept.yaml'?"),
         ("podusv:/etc/passwd/0123456789", ""),
-        ("podusv:", ""),
+        ("podusv:", "; did you mean 'podusv:demo.yaml'?"),
     ],
 )
 def test_a_name_that_podusv_does_not_have_is_a_line(podusv, name, hint):

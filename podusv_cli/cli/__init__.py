@@ -25,19 +25,18 @@ from podusv_cli.cli.sweep import sweep
 # NAME is the function NAME of cli/NAME.py
 COMMANDS = (
     "init", "run", "compare", "rerun", "diff", "plot", "validate", "verify", "margins", "optimum",
-    "explain", "list", "schema", "new", "bench", "tune", "docs",
+    "explain", "list", "schema", "new", "bench", "tune", "docs", "demo",
 )  # fmt: skip
 
 FIRST_STEPS = """\
 podusv simulates and compares controllers for pod-propelled surface vessels. First steps:
 
-  podusv init                              list the scenarios that come with podusv
-  podusv init mu_2017/corrected              copy one here, to edit
+  podusv demo                              see what it does: three laws, a chase, a page
+  podusv init mu_2017/corrected            copy a scenario here, to edit; podusv init lists them
   podusv run corrected.yaml                simulate it: log, metrics and figures in results/
   podusv compare podusv:pod/kept.yaml      simulate and compare four laws: table and report
   podusv sweep --help                      judge laws by thousands of drawn hulls, seas, starts
-  podusv explain controller                what the keys of a scenario mean
-  podusv docs                              list the pages that come with podusv, or show one
+  podusv docs                              the pages that come with podusv
   podusv --help                            all commands"""
 OBJECTS_BETWEEN_COLLECTIONS = 100_000
 

@@ -45,6 +45,14 @@ def compare(
     form: Annotated[
         str, typer.Option("--format", help="Of figures: png, pdf, svg; several with commas.")
     ] = "png",
+    metric: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="Show only this in the table here; repeatable.",
+            autocompletion=completion.metrics,
+        ),
+    ] = None,
     workers: options.Workers = 0,
     as_json: options.AsJson = False,
     allow_large: options.AllowLarge = False,
@@ -66,10 +74,10 @@ def compare(
         request = Request(
             assign or (), out, force, figures, sys.argv, warned, allow_large, plugin or (),
             figure or (), [name.strip() for name in form.split(",")], workers,
-            compiling=compiling(progress),
+            metrics=metric or (), compiling=compiling(progress),
         )  # fmt: skip
         done = workflow.compare([Path(item) for item in items], request, progress)
-    echo_result(done, lambda: _report(done, verbose), as_json=as_json, quiet=quiet)
+    echo_result(done, lambda: _report(done, verbose, metric or ()), as_json=as_json, quiet=quiet)
     for finding in done.warnings():
         warned(finding)
     warn_of_differences(done.result.differences)
@@ -89,21 +97,28 @@ def compare(
     raise typer.Exit(SOME_FAILED if any(done.result.endings.values()) else 0)
 
 
-def _report(done: Compared, verbose: bool) -> None:
-    from podusv_cli.comparison.table import NOTE, cells
-
+def _report(done: Compared, verbose: bool, metrics: Sequence[str]) -> None:
+    echo_comparison(done, metrics)
     result = done.result
-    head = ["metric", "unit", *map(str, result.table.columns)]
-    echo_table(head, cells(result.table, result.metrics, result.unsettled))
-    echo(NOTE)
-    for v in result.verdicts:
-        echo_entry(v.name, v.claim.says, v.evidence(), facts=v.verdict)
     if verbose:
         for label, timing in result.timings.items():
             shown = ", ".join(f"{name} {seconds:.3f}" for name, seconds in timing.items())
             echo(f"{label}: {shown}")
     count = len(result.entries)
     echo(f"compared {count} {'run' if count == 1 else 'runs'}: {done.folder}")
+
+
+def echo_comparison(done: Compared, metrics: Sequence[str] = ()) -> None:
+    """Print the table, or only its rows of some metrics, and what the claims came to."""
+    from podusv_cli.comparison.table import NOTE, cells
+
+    result = done.result
+    rows = cells(result.table, result.metrics, result.unsettled)
+    chosen = [row for name in metrics for row in rows if row[0] == name]
+    echo_table(["metric", "unit", *map(str, result.table.columns)], chosen if metrics else rows)
+    echo(NOTE)
+    for v in result.verdicts:
+        echo_entry(v.name, v.claim.says, v.evidence(), facts=v.verdict)
 
 
 def _advice(items: Sequence[str], assign: Sequence[str], plugin: Sequence[str]) -> str:

@@ -73,6 +73,14 @@ def figures(context: typer.Context, incomplete: str) -> Offered:
     return _beginning(incomplete, {name: sheet.caption for name, sheet in known.items()})
 
 
+def metrics(context: typer.Context, incomplete: str) -> Offered:
+    """Names of metrics."""
+    from podusv_cli.metrics.table import metrics_with
+
+    known = metrics_with(_plugins(context))
+    return _beginning(incomplete, {name: metric.meaning for name, metric in known.items()})
+
+
 def listed(context: typer.Context, incomplete: str) -> Offered:
     """Parts of `podusv list`."""
     from podusv_cli.cli.list import parts

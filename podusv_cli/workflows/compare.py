@@ -28,6 +28,7 @@ from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enable
 from podusv_cli.process.workers import Outcome, available_workers, run_all
 from podusv_cli.scenario.limits import estimate, needed
 from podusv_cli.scenario.load import resolved_yaml
+from podusv_cli.scenario.phrases import unknown
 from podusv_cli.storage import provenance
 from podusv_cli.storage.run_folder import RunWriter, default_folder, open_run
 from podusv_cli.workflows.execute import Task, execute, unwritten, warm_up
@@ -98,6 +99,7 @@ def compare_gathered(
     """The same for what is gathered already; `items` are the files and folders that it is from."""
     started, argv = datetime.now(UTC), list(request.argv)
     _check_figures(request, given.members)
+    _check_metrics(request, given.members)
     for finding in merged({member.label: member.noticed for member in given.members}):
         request.warn(finding)
     text = "".join(f"{one.label}\n{resolved_yaml(one.scenario)}" for one in given.members)
@@ -132,6 +134,16 @@ def _check_figures(request: Request, members: Sequence[Member]) -> None:
 
         sheets = figures_of(member.scenario for member in members)
         check_names(request.names, request.formats, sheets)
+
+
+def _check_metrics(request: Request, members: Sequence[Member]) -> None:
+    """UsageError for a metric that no run has."""
+    logged = (name for member in members if member.run for name in member.run.metrics)
+    declared = (name for member in members for name in member.scenario.known_metrics())
+    known = dict.fromkeys((*declared, *logged))
+    for name in request.metrics:
+        if name not in known:
+            raise UsageError(unknown(f"metric {name!r}", name, known, "podusv list metrics"))
 
 
 def _keep_apart(items: Sequence[Path], target: Path) -> None:
