@@ -1,10 +1,27 @@
 """podusv: experiments with controllers for pod-propelled surface vessels.
 
-`podusv docs python` has examples. All names are those of `podusv_cli`, which imports what is behind
-a name when it is first used.
+`podusv docs python` has examples. The names in `__all__` come from `podusv_cli.interface`, which is
+imported when the first of them is used.
 """
 
-from podusv_cli import __all__ as __all__
-from podusv_cli import __dir__ as __dir__
-from podusv_cli import __getattr__ as __getattr__
 from podusv_cli import __version__ as __version__
+
+__all__ = [
+    "Bench", "Comparison", "PodusvError", "Run", "Scenario", "Study", "Tuning", "bench", "compare",
+    "load", "open_run", "open_study", "optimum", "run", "simulate", "simulate_many", "sweep",
+    "tune", "verify",
+]  # fmt: skip
+
+
+def __getattr__(name: str) -> object:
+    """A public name, on first use; `__init__.pyi` tells type checkers what it is."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from importlib import import_module  # so that the package imports nothing before
+
+    return getattr(import_module("podusv_cli.interface"), name)
+
+
+def __dir__() -> list[str]:
+    """What an interpreter completes."""
+    return sorted([*globals(), *__all__])

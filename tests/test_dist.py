@@ -103,8 +103,8 @@ def test_the_wheel_has_metadata_types_licence_and_scenarios(
     assert about["Description-Content-Type"] == "text/markdown"
     assert about.get_payload() == (ROOT / "README.md").read_text()
     names = {*wheel.namelist()}
-    typed = {f"{name}/{file}" for name in PACKAGES for file in ("py.typed", "__init__.pyi")}
-    assert {*typed, f"{info}/licenses/LICENSE"} <= names
+    typed = {f"{name}/py.typed" for name in PACKAGES}
+    assert {*typed, "podusv/__init__.pyi", f"{info}/licenses/LICENSE"} <= names
     assert {name.split("/")[0] for name in names} == {*PACKAGES, info}
     configs = {path.relative_to(ROOT).as_posix() for path in (ROOT / "configs").rglob("*.yaml")}
     assert {f"podusv_cli/{name}" for name in configs} <= names

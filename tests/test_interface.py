@@ -3,9 +3,11 @@
 import ast
 import doctest
 import inspect
+import json
 import math
 import re
 import sys
+import traceback
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +23,7 @@ import podusv
 from podusv_cli import interface
 from podusv_cli.core.errors import ScenarioError, UsageError
 from podusv_cli.engine.running import batch
-from podusv_cli.interface import functions, scenarios
+from podusv_cli.interface import functions, scenarios, studies
 from podusv_cli.metrics.table import CLOCKED
 from podusv_cli.scenario.load import load as load_file
 
@@ -51,7 +53,7 @@ def test_the_package_has_the_names_of_the_interface_and_its_stub():
     assert podusv.__all__ == interface.__all__
     assert all(getattr(podusv, name) is getattr(interface, name) for name in podusv.__all__)
     assert set(podusv.__all__) < set(dir(podusv))
-    stub = ast.parse((ROOT / "podusv_cli/__init__.pyi").read_text())
+    stub = ast.parse((ROOT / "podusv/__init__.pyi").read_text())
     named = [
         part.asname for node in stub.body if isinstance(node, ast.ImportFrom) for part in node.names
     ]
@@ -69,18 +71,18 @@ def test_the_package_is_a_command_too():
     assert python("-m", "podusv", "--version").stdout == f"podusv {podusv.__version__}\n"
 
 
-@pytest.mark.parametrize("module", [scenarios, functions])
+@pytest.mark.parametrize("module", [scenarios, functions, studies])
 def test_the_examples_in_the_docstrings_run(module):
     found = doctest.testmod(module, optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
     assert found.failed == 0
-    assert found.attempted > 5
+    assert found.attempted >= 5
 
 
 def test_every_public_name_is_typed_and_has_an_example_or_is_a_result():
     for name in podusv.__all__:
         thing = getattr(podusv, name)
         assert inspect.getdoc(thing)
-        assert ">>> " in thing.__doc__ or name in ("Run", "Comparison")
+        assert ">>> " in thing.__doc__ or isinstance(thing, type)
         if inspect.isfunction(thing):
             signature = inspect.signature(thing)
             parts = [part.annotation for part in signature.parameters.values()]
@@ -206,10 +208,62 @@ def test_a_figure_shows_in_a_notebook(kept):
     assert isinstance(figure, Figure)
     png = figure._repr_png_()  # type: ignore[attr-defined]
     assert png.startswith(b"\x89PNG")
-    with pytest.raises(UsageError, match="unknown figure 'error'; did you mean 'errors'"):
+    with pytest.raises(UsageError, match="unknown figure or signal 'error'; did you mean 'errors'"):
         kept.plot("error")
     with pytest.raises(UsageError, match=r"figure 'pods' shows .* and pid logged none of it"):
         kept.plot("pods")
+
+
+def test_signals_are_drawn_over_time_one_a_panel(kept):
+    axes = kept.plot("psi", "tau_u").axes
+    assert [one.get_ylabel() for one in axes] == [r"$\psi$ [rad]", r"$\tau_u$ [N]"]
+    (line,) = axes[1].get_lines()
+    np.testing.assert_array_equal(line.get_ydata()[-1], kept["tau_u"][-1])
+    with pytest.raises(UsageError, match="unknown figure or signal 'pssi'; did you mean 'psi'"):
+        kept.plot("psi", "pssi")
+
+
+def test_an_animation_is_a_page_with_the_run_s_positions(kept, tmp_path):
+    played = kept.play()
+    played.save(tmp_path / "chase.html")
+    page = (tmp_path / "chase.html").read_text()
+    (told,) = re.findall(r'<script type="application/json" id="chase-data">(.*?)</script>', page)
+    assert json.loads(told)["runs"][0]["x"][-1] == pytest.approx(kept["x"][-1], abs=1e-3)
+    assert 'type="range"' in page
+    assert played._repr_html_().startswith('<iframe srcdoc="&lt;!doctype html&gt;')
+
+
+# --- errors
+
+
+def frames(error: BaseException) -> list[str]:
+    return [Path(frame.filename).name for frame in traceback.extract_tb(error.__traceback__)]
+
+
+def test_an_error_has_no_frames_of_podusv_but_its_border(kept):
+    for wrong in (
+        lambda: podusv.load({**SHORT, "strat": {}}),
+        lambda: podusv.simulate_many(SHORT, {"start.z": [1.0]}),
+        lambda: podusv.open_run("nowhere"),
+        lambda: kept.plot("error"),
+    ):
+        with pytest.raises(podusv.PodusvError) as told:
+            wrong()
+        assert set(frames(told.value)) == {"test_interface.py", "border.py"}
+        assert told.value.__cause__ is None
+        assert told.value.__suppress_context__
+
+
+def test_a_bug_and_an_interrupt_keep_their_frames(monkeypatch):
+    for raised in (KeyboardInterrupt(), ZeroDivisionError()):
+
+        def broken(*given, raised=raised):
+            raise raised
+
+        monkeypatch.setattr(functions, "_single", broken)
+        with pytest.raises(type(raised)) as told:
+            podusv.simulate(SHORT)
+        assert "functions.py" in frames(told.value)
 
 
 # --- comparisons
@@ -265,10 +319,14 @@ def test_verify_is_a_table_of_numbers():
 
 
 def test_the_example_in_the_documentation_runs(capsys):
-    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs/python.md").read_text(), re.DOTALL)
-    exec(code, {})  # noqa: S102
+    known: dict[str, Any] = {}
+    for code in re.findall(
+        r"```python\n(.*?)```", (ROOT / "docs/python.md").read_text(), re.DOTALL
+    ):
+        exec(code.replace('"draws": 200', '"draws": 2'), known)  # noqa: S102
     out = capsys.readouterr().out
     assert re.search(r"^soft +\d+\.\d+$", out, re.MULTILINE)
+    assert len(known["study"].table) == 2
 
 
 def test_the_documentation_names_all_that_there_is():

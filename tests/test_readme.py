@@ -185,7 +185,7 @@ def test_the_python_blocks_run(podusv: Command) -> None:
 @pytest.mark.slow
 @pytest.mark.skipif(OCTAVE is None, reason="needs Octave")
 def test_octave_reads_the_same_numbers(podusv: Command) -> None:
-    import podusv_cli
+    import podusv as podusv_package
 
     make_runs(podusv)
     (block,) = logs_blocks("octave")
@@ -193,5 +193,5 @@ def test_octave_reads_the_same_numbers(podusv: Command) -> None:
     done = subprocess.run(
         [str(OCTAVE), "--quiet", "--eval", hidden], capture_output=True, text=True
     )
-    run = podusv_cli.open_run("first")
+    run = podusv_package.open_run("first")
     assert done.stdout == f"{run['x'][-1]:.6f} {run.metrics['iae']:.6f}\n", done.stderr

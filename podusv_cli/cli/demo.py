@@ -45,12 +45,12 @@ def demo(
     echo(*(f"    {line}".rstrip() for line in text.splitlines()[HEADER:]))
     echo("", *MEANWHILE.splitlines(), "")
 
-    from podusv_cli.cli.progress import progress_bars
+    from podusv_cli.cli.progress import compiling, progress_bars
     from podusv_cli.workflows import compare as workflow  # heavy: after there is something to read
     from podusv_cli.workflows.run import Request
 
-    request = Request(out=out, force=force, argv=sys.argv)
     with progress_bars(wanted=True) as progress:
+        request = Request(out=out, force=force, argv=sys.argv, compiling=compiling(progress))
         done = workflow.compare([Path(SCENARIO)], request, progress)
     if done.status == "interrupted":
         echo(f"interrupted; the runs made so far are kept: {done.folder}", err=True)

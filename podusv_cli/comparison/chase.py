@@ -10,6 +10,7 @@ import numpy as np
 
 from podusv_cli.figures.shown import Shown
 from podusv_cli.figures.tracks import bounds
+from podusv_cli.pages.page import environment
 
 FRAMES = 1000  # of a run, at most
 WHERE = ("x", "y", "psi")  # without these a run cannot be shown
@@ -29,6 +30,16 @@ def chase(runs: Sequence[Shown]) -> dict[str, Any]:
         "end": _rounded(max(run.end for run in moving), DIGITS["time"]),
         "runs": [_track(run) for run in moving],
     }
+
+
+def page(runs: Sequence[Shown]) -> str:
+    """The animation alone, as a page that needs nothing else."""
+    from markupsafe import Markup  # with jinja2
+
+    moving = chase(runs)
+    template = environment("podusv_cli.comparison").get_template("play.html.j2")
+    title = ", ".join(run.label for run in runs)
+    return template.render(title=title, chase=moving, chase_json=Markup(as_json(moving)))
 
 
 def as_json(content: dict[str, Any]) -> str:

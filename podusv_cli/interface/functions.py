@@ -6,7 +6,7 @@ import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy.typing as npt
 import pandas as pd
@@ -17,6 +17,7 @@ from podusv_cli.core.finding import Finding
 from podusv_cli.engine.running import batch
 from podusv_cli.engine.running.check import check_law
 from podusv_cli.findings.finding import postflight, preflight
+from podusv_cli.interface.border import ParameterError
 from podusv_cli.interface.parameters import check_words, columns, scenarios
 from podusv_cli.interface.results import Comparison, Run
 from podusv_cli.interface.scenarios import Changes, Source, loaded
@@ -121,6 +122,31 @@ def compare(
     return Comparison(done.folder, _compared(done), done.result.table, claims, failed)
 
 
+def optimum(
+    source: Source, changes: Changes | None = None, *, minimise: Literal["iae", "ise"] = "iae",
+    step: float = 0.1, out: str | os.PathLike[str] | None = None, force: bool = False,
+    figures: bool = True,
+) -> Run:  # fmt: skip
+    """The motion of least error, found with everything known beforehand, repeated as a run.
+
+    `step` [s] is that of the finest of three grids. Needs CasADi (podusv[optimum]). Raises
+    ScenarioError, UsageError where CasADi is missing or cannot take the scenario,
+    NotConvergedError, StorageError.
+
+    >>> import podusv
+    >>> short = {"simulation.duration": 10.0}
+    >>> best = podusv.optimum("podusv:own_vessel.yaml", short, step=0.5, out="best", figures=False)
+    >>> best.scenario.controller.kind
+    'schedule'
+    """
+    from podusv_cli.workflows import optimum as finding
+
+    done = finding.optimum_of(
+        loaded(source, changes), _request(out, force, figures), minimise, step
+    )
+    return open_run(done.folder)
+
+
 def simulate_many(
     source: Source, parameters: Mapping[str, Sequence[Any] | npt.NDArray[Any]], *,
     workers: int = 0, side_by_side: bool | None = None,
@@ -150,7 +176,7 @@ def simulate_many(
     """
     scenario, given = _single(loaded(source)), columns(parameters)
     if workers < 0:
-        raise ValueError(f"workers = {workers}: must be 0 (one a core) or more")
+        raise ParameterError(f"workers = {workers}: must be 0 (one a core) or more")
     loop, watching = scenario.closed_loop(), scenario.observer()
     loops = [one.closed_loop() for one in scenarios(scenario, given)]
     check_law(loop)

@@ -10,6 +10,7 @@ import numpy as np
 from podusv_cli.core.component import Component
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
 from podusv_cli.engine.running.check import check_law
+from podusv_cli.interface.border import ParameterError
 from podusv_cli.scenario.load import values
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import as_yaml, unknown
@@ -25,9 +26,11 @@ def columns(parameters: Mapping[str, Any]) -> Columns:
     found = {key: _column(key, given) for key, given in parameters.items()}
     lengths = {key: len(column) for key, column in found.items()}
     if not found:
-        raise ValueError("no parameters: give a key and its values, as {'vessel.m': [20.0, 25.0]}")
+        raise ParameterError(
+            "no parameters: give a key and its values, as {'vessel.m': [20.0, 25.0]}"
+        )
     if len(set(lengths.values())) > 1:
-        raise ValueError(f"all parameters need one value a run; their lengths are {lengths}")
+        raise ParameterError(f"all parameters need one value a run; their lengths are {lengths}")
     return found
 
 
@@ -35,7 +38,7 @@ def _column(key: str, given: Any) -> list[Any]:
     array = np.asarray(given, object)
     if array.ndim != 1:
         what = f"an array of shape {array.shape}" if array.ndim else f"{given!r:.60}"
-        raise ValueError(f"{key}: must be a list or array with one value a run, found {what}")
+        raise ParameterError(f"{key}: must be a list or array with one value a run, found {what}")
     return [one.item() if isinstance(one, np.generic) else one for one in array.tolist()]
 
 
@@ -52,7 +55,7 @@ def scenarios(scenario: Scenario, given: Columns) -> list[Scenario]:
         try:
             made.append(with_values(scenario, numbers))
         except DrawError as error:
-            raise ValueError(f"row {row}: {error}") from error
+            raise ParameterError(f"row {row}: {error}") from error
     return made
 
 
@@ -62,18 +65,18 @@ def _steps(scenario: Scenario, name: str) -> Route:
     steps = route(key)
     section = str(steps[0]) if steps else ""
     if section not in DRAWN and section in Scenario.model_fields:
-        raise ValueError(
+        raise ParameterError(
             f"{name}: {section} is the same in all runs of a batch (allowed: keys of "
             f"{', '.join(DRAWN)}); to change it: podusv.load(source, {{{name!r}: ...}})"
         )
     if not steps or not has(scenario, key):
         known = [one for one in values(scenario) if has(scenario, one)]
         beyond = no_entry(scenario, steps)
-        raise ValueError(f"{name}: {beyond or unknown('key', key, known, 'podusv explain')}")
+        raise ParameterError(f"{name}: {beyond or unknown('key', key, known, 'podusv explain')}")
     if isinstance(content(scenario, steps), Component):
-        raise ValueError(f"{name}: is a section; name one of the keys in it")
+        raise ParameterError(f"{name}: is a section; name one of the keys in it")
     if steps[-1] in ("kind", "preset"):
-        raise ValueError(f"{name}: is the same in all runs of a batch; make a batch for each")
+        raise ParameterError(f"{name}: is the same in all runs of a batch; make a batch for each")
     return steps
 
 
@@ -89,7 +92,7 @@ def check_words(scenario: Scenario, loops: Sequence[ClosedLoop], given: Columns)
         check_law(loops[row])
         alike = (structure(loops[at], scenario.time_grid()) for at in (row, 0))
         if next(alike) != next(alike):
-            raise ValueError(
+            raise ParameterError(
                 f"row {row}: {_told(words, own)} changes how the loop is put together, and row 0 "
                 f"has {_told(words, rows[0][1])}; make a batch for each"
             )

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from html import escape
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,7 @@ import pandas as pd
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
+from podusv_cli.interface.border import explained
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import unknown
 from podusv_cli.theory import derived
@@ -22,6 +24,11 @@ from podusv_cli.theory import derived
 if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
+
+    from podusv_cli.figures.sheet import Family
+    from podusv_cli.figures.style import Shown
+
+FRAME = "width: 100%; height: 44em; border: 0"
 
 NO_XARRAY = (
     "run.log is an xarray.Dataset and xarray is not installed: pip install 'podusv[python]'; "
@@ -86,13 +93,20 @@ class Run:
             raise KeyError(unknown(f"signal {signal!r}", signal, log.signals))
         return derived.signal(log, signal, plugins)
 
-    def plot(self, name: str = "trajectory", *, columns: int = 2) -> Figure:
+    @explained
+    def plot(self, *names: str, columns: int = 2) -> Figure:
         """A matplotlib figure, which notebooks show; `podusv plot --help` tells of the files.
 
-        `columns` is its width in columns of a journal page. Raises UsageError for a figure that
-        podusv does not have or that the run has no signals for.
+        `names` are that of a figure (`"errors"`), or those of signals, each over time
+        (`"psi", "tau_u"`); the trajectory without any. `columns` is its width in columns of a
+        journal page. Raises UsageError for what podusv does not have or the run did not log.
         """
-        return figure({self.label: self}, name, columns)
+        return figure({self.label: self}, names, columns)
+
+    @explained
+    def play(self) -> Animation:
+        """The run as an animation with a slider, which notebooks show. Raises UsageError."""
+        return animation({self.label: self})
 
     def __repr__(self) -> str:
         """One line: what ran, how it ended, where it is."""
@@ -133,9 +147,15 @@ class Comparison:
         """The run of this label."""
         return self.runs[label]
 
-    def plot(self, name: str = "trajectory", *, columns: int = 2) -> Figure:
+    @explained
+    def plot(self, *names: str, columns: int = 2) -> Figure:
         """All runs in one matplotlib figure; as `Run.plot`."""
-        return figure(self.runs, name, columns)
+        return figure(self.runs, names, columns)
+
+    @explained
+    def play(self) -> Animation:
+        """All runs as one animation; as `Run.play`."""
+        return animation(self.runs)
 
     def __repr__(self) -> str:
         """One line: the runs, and where they are."""
@@ -147,24 +167,67 @@ class Comparison:
         return _html(lines, self.runs, self.table.to_html(border=0, float_format="{:.5g}".format))
 
 
-def figure(runs: Mapping[str, Run], name: str, columns: int = 2) -> Figure:
-    """One of podusv's figures of several runs. Raises UsageError."""
-    from podusv_cli.figures.drawing import figures_of  # matplotlib is slow to import
+@dataclass(frozen=True)
+class Animation:
+    """A page with the vessels chasing their target: play, pause, a slider, a close-up.
+
+    Notebooks show it; `save` writes it as a file that needs nothing else.
+    """
+
+    page: str
+
+    def save(self, file: str | PathLike[str]) -> None:
+        """Write the page as an HTML file."""
+        Path(file).write_text(self.page, "utf-8")
+
+    def _repr_html_(self) -> str:
+        """The page in a frame, whose styles and scripts stay inside."""
+        return f'<iframe srcdoc="{escape(self.page)}" style="{FRAME}"></iframe>'
+
+
+def animation(runs: Mapping[str, Run]) -> Animation:
+    """Runs chasing their target. Raises UsageError where no run has two rows."""
+    from podusv_cli.comparison.chase import page
+    from podusv_cli.figures.shown import dressed
+
+    shown = dressed([(label, run.recording, run.scenario) for label, run in runs.items()])
+    if not shown:
+        raise UsageError(f"there is nothing to show: {', '.join(map(repr, runs.values()))}")
+    return Animation(page(shown))
+
+
+def figure(runs: Mapping[str, Run], names: Sequence[str], columns: int = 2) -> Figure:
+    """One of podusv's figures of several runs, or their signals over time. Raises UsageError."""
     from podusv_cli.figures.shown import dressed
     from podusv_cli.figures.style import house_style, image
 
-    known = figures_of(run.scenario for run in runs.values())
-    if name not in known:
-        raise UsageError(unknown(f"figure {name!r}", name, known, "podusv list"))
     shown = dressed([(label, run.recording, run.scenario) for label, run in runs.items()])
-    if not shown or not known[name].fits(shown):
-        wanted = ", ".join(known[name].signals)
-        raise UsageError(f"figure {name!r} shows {wanted}, and {', '.join(runs)} logged none of it")
+    family = _family(runs, names or ("trajectory",), shown)
     with house_style():
-        drawn = known[name].family(shown, columns)
+        drawn = family(shown, columns)
     # A figure without pyplot is shown by notebooks only if it says how.
     vars(drawn)["_repr_png_"] = partial(image, drawn, "png")
     return drawn
+
+
+def _family(runs: Mapping[str, Run], names: Sequence[str], shown: Sequence[Shown]) -> Family:
+    """What draws a figure, or signals over time. Raises UsageError."""
+    from podusv_cli.figures.drawing import figures_of
+    from podusv_cli.figures.panels import signals_over_time
+
+    figures = figures_of(run.scenario for run in runs.values())
+    if len(names) == 1 and names[0] in figures:
+        sheet = figures[names[0]]
+        if not shown or not sheet.fits(shown):
+            logged = f"{', '.join(runs)} logged none of it"
+            raise UsageError(f"figure {names[0]!r} shows {', '.join(sheet.signals)}, and {logged}")
+        return sheet.family
+    signals = [signal for run in runs.values() for signal in run.recording.signals]
+    for name in names:
+        if not any(run.has(name) for run in shown):
+            known = (*figures, *dict.fromkeys(signals))
+            raise UsageError(unknown(f"figure or signal {name!r}", name, known, "podusv list"))
+    return signals_over_time(*names)
 
 
 def _html(lines: list[str], runs: Mapping[str, Run], table: str) -> str:
@@ -178,5 +241,5 @@ def _html(lines: list[str], runs: Mapping[str, Run], table: str) -> str:
 def _picture(runs: Mapping[str, Run]) -> str:
     from podusv_cli.figures.style import image
 
-    content: Any = image(figure(runs, "trajectory", 1), "png")
+    content: Any = image(figure(runs, ("trajectory",), 1), "png")
     return f'<img src="data:image/png;base64,{base64.b64encode(content).decode()}">'

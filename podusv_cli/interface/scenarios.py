@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import singledispatch
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from podusv_cli.scenario import model, plugins
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Loaded, load_text, yaml_text
 from podusv_cli.scenario.load import load as load_file
+from podusv_cli.scenario.messages import Check
 
 Changes = Mapping[str, Any]
 Source = str | os.PathLike[str] | Mapping[str, Any] | model.Scenario
@@ -68,32 +69,42 @@ def load(source: Source, changes: Changes | None = None) -> model.Scenario:
     return loaded(source, changes).scenario
 
 
-def loaded(source: Source, changes: Changes | None = None) -> Loaded:
-    """A scenario with its text and the origin of each value. Raises ScenarioError."""
-    return _loaded(source, [f"{key}={_json(value)}" for key, value in (changes or {}).items()])
-
-
 CHECKS = (unknown_codes, limits(read_back=True, insist=""))
 
 
+def loaded(
+    source: Source, changes: Changes | None = None, checks: Sequence[Check] = CHECKS
+) -> Loaded:
+    """A scenario with its text and the origin of each value. Raises ScenarioError."""
+    return _loaded(source, assignments(changes), checks)
+
+
+def assignments(changes: Changes | None) -> list[str]:
+    """Changes as `--set` takes them."""
+    return [f"{key}={_json(value)}" for key, value in (changes or {}).items()]
+
+
 @singledispatch
-def _loaded(source: Any, overrides: list[str]) -> Loaded:
-    return load_file(os.fspath(source), overrides, CHECKS)
+def _loaded(source: Any, overrides: list[str], checks: Sequence[Check]) -> Loaded:
+    return load_file(os.fspath(source), overrides, checks)
 
 
 @_loaded.register
-def _(source: model.Scenario, overrides: list[str]) -> Loaded:
+def _(source: model.Scenario, overrides: list[str], checks: Sequence[Check]) -> Loaded:
     derived = {plugins.KEY, *(["controller"] if source.open_choice else [])}
     sections = {key: part for key, part in source.model_dump().items() if key not in derived}
     files = [plugin for plugin in source.plugged if plugin.text]  # as they were when it was loaded
     text = yaml_text(sections)
-    return load_text(text, source.name, overrides, CHECKS, files, placed=False)
+    return load_text(text, source.name, overrides, checks, files, placed=False)
 
 
 @_loaded.register
-def _(source: Mapping, overrides: list[str]) -> Loaded:  # type: ignore[type-arg]
+def _(
+    source: Mapping,  # type: ignore[type-arg]
+    overrides: list[str], checks: Sequence[Check],
+) -> Loaded:  # fmt: skip
     text = yaml_text(_plain(source))
-    return load_text(text, IN_PYTHON, overrides, CHECKS, placed=False)
+    return load_text(text, IN_PYTHON, overrides, checks, placed=False)
 
 
 def _json(value: Any) -> str:

@@ -27,6 +27,9 @@ from podusv_cli.studies.study.store import SCENARIO
 
 WHOLE: Shard = (1, 1)  # the only shard
 Tell = Callable[..., None]
+# A scenario's file, the folder of what is to be continued, or a scenario from Python: that is
+# loaded with these checks.
+Source = Path | Callable[[Sequence[Check]], Loaded]
 
 
 def silent(*text: str) -> None:
@@ -54,7 +57,7 @@ class Request:
 
 
 def loaded_for(
-    key: str, advice: str, config: Path, request: Request, faults: Sequence[Check]
+    key: str, advice: str, config: Source, request: Request, faults: Sequence[Check]
 ) -> Loaded:
     """The scenario with this key, of a file or of a folder that is to be continued.
 
@@ -63,15 +66,24 @@ def loaded_for(
     """
     if request.out and request.out.exists() and not request.out.is_dir():
         raise UsageError(f"--out {request.out} is a file; name a folder")
-    given = request.overrides, (unknown_codes, limits(allow_large=True), *faults), request.plugins
-    if config.is_dir():
+    checks = (unknown_codes, limits(allow_large=True), *faults)
+    given = request.overrides, checks, request.plugins
+    if not isinstance(config, Path):
+        loaded = config(checks)
+    elif config.is_dir():
         loaded = kept_scenario(config, *given, partial(plugins.loaded, trusted=request.trust))
     else:
         loaded = load(config, *given)
     if getattr(loaded.scenario, key) is None:
-        raise UsageError(f"{config} has no key `{key}`, {advice}")
+        named = config if isinstance(config, Path) else loaded.scenario.name
+        raise UsageError(f"{named} has no key `{key}`, {advice}")
     parse_claims(loaded)
     return loaded
+
+
+def folder_of(config: Source) -> Path | None:
+    """The folder that is to be continued, None for a new study or search."""
+    return config if isinstance(config, Path) and config.is_dir() else None
 
 
 def kept_scenario(

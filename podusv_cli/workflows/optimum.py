@@ -20,7 +20,7 @@ from podusv_cli.optimum.collocation import Stage
 from podusv_cli.optimum.feedback import schedule
 from podusv_cli.optimum.problem import Minimised, Motion, Problem, problem
 from podusv_cli.scenario.limits import estimate, limits
-from podusv_cli.scenario.load import load, resolved_yaml
+from podusv_cli.scenario.load import Loaded, load, resolved_yaml
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sections import Control
 from podusv_cli.storage.run_folder import RunWriter, free_folder, open_run
@@ -76,6 +76,15 @@ def optimum(
     collocation.casadi()
     checks = (unknown_codes, limits(request.allow_large))
     loaded = load(config, request.overrides, checks, request.plugins)
+    return optimum_of(loaded, request, minimised, step, progress)
+
+
+def optimum_of(
+    loaded: Loaded, request: Request, minimised: Minimised, step: float,
+    progress: Progress | None = None,
+) -> Optimum:  # fmt: skip
+    """The same for a scenario that is loaded already."""
+    collocation.casadi()
     scenario = single(loaded, request.controller) if request.controller else loaded.scenario
     wanted = problem(scenario, minimised)
     check_figures(scenario)

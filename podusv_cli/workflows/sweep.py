@@ -31,9 +31,11 @@ from podusv_cli.workflows.keep import keep
 from podusv_cli.workflows.many_runs import (
     WHOLE,
     Request,
+    Source,
     compiling,
     engine_for,
     finish,
+    folder_of,
     interrupted,
     loaded_for,
     refused,
@@ -72,7 +74,7 @@ class Swept:
         }  # fmt: skip
 
 
-def run(config: Path, request: Request, tell: Tell) -> Swept:
+def run(config: Source, request: Request, tell: Tell) -> Swept:
     """Simulate what is missing of a study, and judge it once all of it is there.
 
     `config` is a scenario or the folder of a study. Raises ScenarioError, UsageError where the
@@ -149,14 +151,14 @@ def _is_whole(store: Store) -> bool:
     return tally.made == tally.wanted
 
 
-def _planned(config: Path, request: Request) -> tuple[Store, dict[str, str]]:
+def _planned(config: Source, request: Request) -> tuple[Store, dict[str, str]]:
     """The store of a new study, or of one that is to be continued; its scenario and plug-ins."""
-    if config.is_dir():
-        check_study(config)
+    if there := folder_of(config):
+        check_study(there)
     loaded = loaded_for("sweep", NO_SWEEP, config, request, [sweep_faults])
     if remark := unjudged(loaded.scenario):
         request.warn(remark)
-    own = config if config.is_dir() else default_folder(loaded.scenario)
+    own = there or default_folder(loaded.scenario)
     return Store(request.out or own, plan(loaded)), scenario_texts(loaded)
 
 

@@ -33,9 +33,11 @@ from podusv_cli.studies.tuning.trials import best
 from podusv_cli.studies.tuning.validation import validate
 from podusv_cli.workflows.many_runs import (
     Request,
+    Source,
     compiling,
     engine_for,
     finish,
+    folder_of,
     interrupted,
     loaded_for,
     refused,
@@ -71,7 +73,7 @@ class Tuned:
         }  # fmt: skip
 
 
-def tune(config: Path, request: Request, tell: Tell) -> Tuned:
+def tune(config: Source, request: Request, tell: Tell) -> Tuned:
     """Search gains for every law with equal budgets, and report them on fresh draws.
 
     `config` is a scenario or the folder of a search. Raises ScenarioError, UsageError where the
@@ -101,12 +103,12 @@ def _tuned(
     return replace(_written(results, folder, request), refused=refused(engine))
 
 
-def _loaded(config: Path, request: Request) -> tuple[Loaded, Path]:
+def _loaded(config: Source, request: Request) -> tuple[Loaded, Path]:
     """The scenario, and the folder of the search."""
-    if config.is_dir():
-        place.check(config)
+    if there := folder_of(config):
+        place.check(there)
     loaded = loaded_for("tune", NO_TUNE, config, request, [sweep_faults, tune_faults])
-    own = config if config.is_dir() else RESULTS / f"{loaded.scenario.name}-tune"
+    own = there or RESULTS / f"{loaded.scenario.name}-tune"
     return loaded, request.out or own
 
 

@@ -87,10 +87,7 @@ def _replace(folder: Path, contents: dict[str, bytes], only: Sequence[str] = ())
 
 def export(runs: Table, path: Path) -> None:
     """Write all runs as one table, a row a run: CSV, or Parquet where the name ends so."""
-    frames = [
-        _frame(runs, law, cell) for law in runs.laws for cell in range(len(runs.cells))
-    ]  # fmt: skip
-    whole = pd.concat(frames, ignore_index=True)
+    whole = as_frame(runs)
     if path.suffix == ".parquet":
         try:
             content = whole.to_parquet(index=False)
@@ -101,6 +98,14 @@ def export(runs: Table, path: Path) -> None:
     else:
         content = csv_files.text(whole).encode()
     files.write_bytes(path, content)
+
+
+def as_frame(runs: Table) -> pd.DataFrame:
+    """Every run that is made as a row: law, cell, draw, what was drawn, how it ended, metrics."""
+    frames = [
+        _frame(runs, law, cell) for law in runs.laws for cell in range(len(runs.cells))
+    ]  # fmt: skip
+    return pd.concat(frames, ignore_index=True)
 
 
 def _frame(runs: Table, law: str, cell: int) -> pd.DataFrame:

@@ -1,0 +1,33 @@
+"""Where errors leave podusv for Python: without its own frames, which tell a user nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+from typing import ParamSpec, TypeVar
+
+from podusv_cli.core.errors import PodusvError, UsageError
+
+Given = ParamSpec("Given")
+Result = TypeVar("Result")
+
+
+class ParameterError(UsageError, ValueError):
+    """A Python value that a function of podusv cannot take."""
+
+
+def explained(function: Callable[Given, Result]) -> Callable[Given, Result]:
+    """The function, whose errors of podusv's own have a traceback of one frame.
+
+    Notebooks and pytest leave that frame out, too. Interrupts and bugs keep theirs.
+    """
+
+    @wraps(function)
+    def called(*given: Given.args, **named: Given.kwargs) -> Result:
+        __tracebackhide__ = True
+        try:
+            return function(*given, **named)
+        except PodusvError as error:
+            raise error.with_traceback(None) from None
+
+    return called
