@@ -174,6 +174,8 @@ def gathered_number(metric: Metric, compiled: bool) -> float:
     )
     run = simulate(loop, grid, observer=seeing, compiled=compiled)
     assert run.seen is not None
+    if metric.of_log:
+        return float(metric.of_log(run))
     return seeing.summary(run.seen)[metric.name]
 
 

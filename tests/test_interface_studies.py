@@ -77,7 +77,8 @@ def test_a_study_is_opened_and_continued_from_its_folder() -> None:
 def test_a_search_gives_gains_by_law_and_ranks() -> None:
     pytest.importorskip("optuna")
     search = {
-        "budget": 8, "batch": 2, "train": 2, "repeats": 1, "validate": 4, "objective": "median(iae)",
+        "budget": 8, "batch": 2, "train": 2, "repeats": 1, "validate": 4,
+        "objective": "median(iae)",
         "space": {"around": 2.0},
     }  # fmt: skip
     found = podusv.tune(SHORT, {"sweep": SWEEP, "tune": search}, out="t", figures=False)

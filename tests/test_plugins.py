@@ -291,6 +291,44 @@ def test_claims_use_its_metric_and_derived_signal(podusv: Command, scenario: str
     assert "C1  reproduced" in said.out
 
 
+OF_LOG = """
+from podusv_cli.plugin import Metric
+
+eastmost = Metric("eastmost", "m", "largest y", of_log=lambda log: log["y"].max())
+broken = Metric("broken", "m", "none", of_log=lambda log: log["nothing"].max())
+"""
+
+
+def test_a_metric_may_be_a_function_of_the_log(podusv: Command) -> None:
+    text = SCENARIO + CLAIM.replace("min(cross_track.gap) < 0 and cross_track.largest_east > 1",
+                                    "cross_track.eastmost == max(cross_track.y)")  # fmt: skip
+    scenario = put(text, LAW + OF_LOG)
+    said = podusv("compare", scenario, "--out", "c", "--no-figures", "--metric", "eastmost")
+    assert "C1  reproduced" in said.out
+    run = podusv_python.open_run("c/cross_track")
+    assert run.metrics["eastmost"] == run["y"].max()
+    assert "broken" not in run.metrics
+    assert "metric broken" in said.err  # costs nothing else
+    assert podusv_python.simulate(scenario).metrics["eastmost"] == run.metrics["eastmost"]
+
+
+def test_a_study_keeps_no_logs_and_leaves_out_metrics_that_need_them(podusv: Command) -> None:
+    sweep = "\nsweep: {draws: 2, seed: 1, vary: {start.x: {uniform: [-6.0, -4.0]}}}\n"
+    scenario = put(SCENARIO + sweep, LAW + OF_LOG)
+    study = podusv_python.sweep(scenario, {"simulation.duration": 1.0}, figures=False)
+    assert "iae" in study.table
+    assert "eastmost" not in study.table
+    claims = {
+        "sweep.claims.S1": {
+            "says": "s",
+            "source": "p",
+            "expect": "median(cross_track.eastmost) > 0",
+        }
+    }
+    with pytest.raises(podusv_python.PodusvError, match="eastmost"):
+        podusv_python.sweep(scenario, claims, out="t")
+
+
 @pytest.mark.usefixtures("scenario")
 def test_python_knows_them() -> None:
     run = podusv_python.simulate("a.yaml")

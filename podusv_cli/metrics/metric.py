@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from podusv_cli.core.kernel import Vector, kernel
+from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import check_words
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
 from podusv_cli.engine.step.layout import Layout
@@ -89,7 +90,9 @@ class Metric:
     """A number that characterises a run; smaller is better for all but a `margin`.
 
     `result` takes the accumulator's numbers and the step [s], and is NaN for a run that ended
-    before the metric is defined. A metric without an accumulator is measured after the run.
+    before the metric is defined. `of_log`, in place of both, is a plain function of the log of a
+    run that is over; studies, searches and benches keep no logs, and leave it out. A metric with
+    neither is measured beside the runs.
     `place` orders tables. `happens`: the metric is the time of an event, and NaN for a whole run
     means that it never happened. `counts_standoff`: a standoff that a law keeps on purpose makes it
     worse, so that nobody is marked best where there is one. A `margin` is better the larger it is,
@@ -107,6 +110,7 @@ class Metric:
     counts_standoff: bool = False
     margin: bool = False
     symbol: str = ""
+    of_log: Callable[[Recording], float] | None = None
 
     def __post_init__(self) -> None:
         """Check the words. Raises ValueError."""

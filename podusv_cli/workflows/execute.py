@@ -234,7 +234,14 @@ def check_figures(scenario: Scenario) -> None:
 def summary(scenario: Scenario, recording: Recording, extras: Extras) -> dict[str, float]:
     """The metrics of a run that was observed; those that raise are missing among the extras."""
     seen = recording.seen
-    return scenario.observer().summary(seen, extras.note) if seen is not None else {}
+    numbers = scenario.observer().summary(seen, extras.note) if seen is not None else {}
+    for name, metric in scenario.known_metrics().items():
+        if metric.of_log and len(recording["time"]):
+            try:
+                numbers[name] = float(metric.of_log(recording))
+            except Exception as error:  # a plug-in's function may raise anything
+                extras.note(f"metric {name}", error)
+    return numbers
 
 
 def _cost(scenario: Scenario, recording: Recording) -> dict[str, float]:
