@@ -21,7 +21,7 @@ from podusv_cli import cli
 from podusv_cli.cli.exit_codes import PLEASE_REPORT, with_exit_codes
 from podusv_cli.core.errors import ScenarioError, StorageError
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.presets import preset_text, with_presets
+from podusv_cli.scenario.presets import preset_about, preset_names, preset_text, with_presets
 
 HEAVY = {
     "numpy", "scipy", "numba", "llvmlite", "pandas", "matplotlib", "h5py", "pydantic", "yaml",
@@ -345,3 +345,12 @@ def test_keys_kinds_figures_and_names_are_offered(
 ) -> None:
     script = "import sys\nfrom podusv_cli import cli\ncli.main()"
     assert set(offered_for(typed, tmp_path, script)) == offered
+
+
+def test_a_listed_vessel_has_its_size_and_a_sentence_that_tells_it_from_its_neighbours(podusv):
+    said = podusv("list", "vessels").out
+    assert "otter  length 2.0 m, beam 1.08 m, mass 55.0 kg\n    Otter, a 2 m catamaran" in said
+    for _, presets in with_presets().values():
+        sentences = [preset_about(presets, name) for name in preset_names(presets)]
+        assert all(sentences)
+        assert len({*sentences}) == len(sentences)

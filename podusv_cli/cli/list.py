@@ -12,6 +12,7 @@ from podusv_cli.cli.options import Plugins
 from podusv_cli.cli.terminal import echo, echo_entry
 
 if TYPE_CHECKING:
+    from podusv_cli.core.component import Presets
     from podusv_cli.core.plugins import Plugins as Known
 
 Entries = Iterable[tuple[str, str, str]]  # name, what it is, facts
@@ -59,14 +60,19 @@ def parts(plugins: Known) -> Iterator[Part]:
     from podusv_cli.metrics.table import metrics_with
     from podusv_cli.scenario.explain import first_sentence, kinds
     from podusv_cli.scenario.plugins import BASES
-    from podusv_cli.scenario.presets import preset_names, preset_text, with_presets
+    from podusv_cli.scenario.presets import preset_about, preset_names, preset_text, with_presets
 
     for section, summaries in kinds(plugins).items():
         words = (f"{section}s", f"{BASES[section].noun}s")
         yield Part(words, section, ((kind, text, "") for kind, text in summaries.items()))
     for key, (_, presets) in with_presets().items():
         texts = [
-            (name, first_sentence(preset_text(presets, name, "source", plugins)), "")
+            (
+                name,
+                preset_about(presets, name, plugins)
+                or first_sentence(preset_text(presets, name, "source", plugins)),
+                _size(presets, name, plugins),
+            )
             for name in preset_names(presets, plugins)
         ]
         words = (f"{key.partition('.')[0]}s", "presets")
@@ -75,6 +81,21 @@ def parts(plugins: Known) -> Iterator[Part]:
     yield Part(("metrics",), "metrics", metrics)
     yield Part(("figures",), "figures", _figures(plugins))
     yield Part(("findings",), "findings (silence)", _findings(plugins))
+
+
+SIZES = {"length": "m", "beam": "m", "m": "kg"}  # what tells vessels apart at once
+
+
+def _size(presets: Presets, name: str, plugins: Known) -> str:
+    """Length, beam and mass of a vessel; nothing of other presets."""
+    from podusv_cli.scenario.presets import preset_text
+
+    told = {key: preset_text(presets, name, key, plugins) for key in SIZES}
+    return ", ".join(
+        f"{key if key != 'm' else 'mass'} {number} {SIZES[key]}"
+        for key, number in told.items()
+        if number != "None"
+    )
 
 
 def _figures(plugins: Known) -> Entries:

@@ -76,6 +76,12 @@ def preset_text(presets: Presets, name: str, key: str, plugins: Plugins = ()) ->
     return str(node.get(key)) if node else ""
 
 
+def preset_about(presets: Presets, name: str, plugins: Plugins = ()) -> str:
+    """What a preset is: the comment that its file begins with; "" where there is none."""
+    first = _preset_files(presets, plugins)[name].read_text("utf-8").partition("\n")[0]
+    return first.removeprefix("#").strip() if first.startswith("#") else ""
+
+
 def with_presets(top: Key = SCENARIO) -> dict[str, tuple[type[Component], Presets]]:
     """Every class of components that has presets, and these, by `section.kind`."""
     sections = [inner for key in top.keys.values() for inner in (key, *key.kinds.values())]

@@ -50,7 +50,10 @@ def yaw_shunting(
 
 
 class AdaptiveNeural(FilteredBackstepping):
-    """The proposed law; `B_u`, `B_r` adaptive as printed, or numbers."""
+    """Backstepping with shunting filters and a network that learns: the law of Mu et al. (2017).
+
+    `B_u` and `B_r` are adaptive as printed, or numbers.
+    """
 
     kind: Literal["adaptive_neural"] = "adaptive_neural"
     A_u: float = value(5.0, "1/s", "passive decay A_1 of the shunting model in surge", gt=0)

@@ -50,7 +50,9 @@ def reference(e: Tracking, target: Vector, k: Any) -> tuple[float, float]:
 
 
 class Pid(TrackingController):
-    """Two PID loops on u_p = u_d - u and r_p = r_d - r with a lagged derivative.
+    """Two PID loops, on surge speed and yaw rate, with a lagged derivative.
+
+    They act on u_p = u_d - u and r_p = r_d - r.
 
     Section 3.1 defines u_d and r_d as the target's speed and its path's yaw rate. They feed back no
     position error, so by default they are replaced by the virtual controls. A difference quotient

@@ -40,7 +40,9 @@ def _rows(text: str) -> Vector:
 
 
 class Schedule(Controller):
-    """tau(t) = tau_s(t) + K(t) (x_s(t) - x), of which the rows give tau_s, x_s and K.
+    """Repeats a motion from a file, with feedback to it where the file has gains.
+
+    tau(t) = tau_s(t) + K(t) (x_s(t) - x), of which the rows give tau_s, x_s and K.
 
     Rows of three numbers (t, tau_u, tau_r) have no x_s: then there is no feedback. A hull that does
     not keep its course by itself needs feedback to repeat a motion: every rounding error grows.

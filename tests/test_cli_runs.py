@@ -1,0 +1,81 @@
+"""`podusv runs`: what is below a folder, by small files, whatever is in them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from command_samples import Command
+
+import podusv as podusv_python
+from podusv_cli.workflows import runs
+
+SWEEP = {"draws": 2, "seed": 1, "vary": {"start.x": {"uniform": [-6.0, -4.0]}}}
+SHORT = {"simulation.duration": 1.0}
+
+
+@pytest.fixture
+def results(podusv: Command) -> Path:
+    """Two runs of other masses, a study and a damaged run in folders of their own."""
+    source = "podusv:own_vessel.yaml"
+    for mass in (50.0, 60.0, 70.0):
+        changes, out = {**SHORT, "vessel.m": mass}, f"r/m/{mass:g}"
+        podusv_python.run(source, changes, out=out, figures=False)
+    podusv_python.sweep(source, {**SHORT, "sweep": SWEEP}, out="r/s", figures=False)
+    Path("r/m/70/manifest.json").write_text("{")
+    return Path("r")
+
+
+def listed(podusv: Command, *words: str) -> list[list[str]]:
+    said = podusv("runs", "r", *words)
+    assert (said.code, said.err) == (0, "")
+    return [line.split() for line in said.out.splitlines()[1:]]
+
+
+def test_a_line_each_the_latest_first_with_what_it_is(podusv: Command, results: Path) -> None:
+    told = json.loads(podusv("runs", "r", "--json").out)["runs"]
+    kinds = {one["folder"]: (one["kind"], one["status"], one["laws"]) for one in told}
+    assert kinds == {
+        "r/s": ("study", "finished", ["pid"]), "r/m/60": ("run", "finished", ["pid"]),
+        "r/m/50": ("run", "finished", ["pid"]), "r/m/70": ("run", "damaged", []),
+    }  # fmt: skip
+    assert told[0]["folder"] == "r/s"
+    assert told[1]["metrics"]["iae"] == podusv_python.open_run("r/m/60").metrics["iae"]
+
+
+def test_runs_are_chosen_by_their_scenario_and_sorted_by_a_metric(
+    podusv: Command, results: Path
+) -> None:
+    found = runs.runs(results, ["vessel.m=60"])
+    assert [str(one.folder) for one in found] == ["r/s", "r/m/60"]
+    energies = [one.metrics["energy"] for one in runs.runs(results, [], "energy")[:2]]
+    assert energies == sorted(energies)
+    rows = listed(podusv, "--sort", "energy", "--where", "controller.kind=pid")
+    assert [float(row[-2]) for row in rows] == pytest.approx(energies, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        (("nowhere",), "nowhere is no folder"),
+        (("r", "--sort", "enrgy"), "unknown metric 'enrgy'; did you mean 'energy'?"),
+        (("r", "--where", "vessel.mm=1"), "unknown key 'vessel.mm'; did you mean 'vessel.m'?"),
+        (("r", "--where", "vessel.m"), "write key=value"),
+        (("r/s", "--sort", "iae"), "only runs have metrics"),
+    ],
+)
+def test_what_cannot_be_is_a_sentence(
+    words: tuple[str, ...], why: str, podusv: Command, results: Path
+) -> None:
+    said = podusv("runs", *words)
+    assert said.code == 2
+    assert why in " ".join(said.err.split())
+
+
+def test_nothing_is_executed_and_no_link_followed(podusv: Command, results: Path) -> None:
+    (results / "m/50/resolved.yaml").write_text("!!python/object/apply:os.mkdir [hacked]\n")
+    (results / "loop").symlink_to(results.resolve())
+    assert len(listed(podusv)) == 4
+    assert len(runs.runs(results, ["vessel.m=60"])) == 2
+    assert not Path("hacked").exists()
