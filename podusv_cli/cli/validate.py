@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from podusv_cli.scenario.load import Loaded
     from podusv_cli.scenario.model import Scenario
     from podusv_cli.scenario.sweep import Sweep
+    from podusv_cli.scenario.yaml_tree import Route
 
 
 def validate(
@@ -39,10 +40,9 @@ def validate(
     from podusv_cli.scenario.limits import largest, limits
     from podusv_cli.scenario.load import load
     from podusv_cli.studies.study.check import sweep_faults
-    from podusv_cli.studies.tuning.check import tune_faults
     from podusv_cli.workflows.execute import examined, warm_up
 
-    checks = (unknown_codes, limits(allow_large), sweep_faults, tune_faults)
+    checks = (unknown_codes, limits(allow_large), sweep_faults, _tune_faults)
     loaded = load(config, assign or (), checks, plugin or ())
     parse_claims(loaded)
     scenario = loaded.scenario
@@ -58,6 +58,15 @@ def validate(
         if scenario.sweep:
             _tell_marches(scenario)
         _explain(loaded)
+
+
+def _tune_faults(scenario: Scenario) -> list[tuple[Route, str]]:
+    """What is wrong with a search; its modules are slow to import, and few scenarios have one."""
+    if scenario.tune is None:
+        return []
+    from podusv_cli.studies.tuning.check import tune_faults
+
+    return tune_faults(scenario)
 
 
 def _study(loaded: Loaded, sweep: Sweep) -> list[str]:
