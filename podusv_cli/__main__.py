@@ -1,6 +1,9 @@
-"""`podusv`, also as `python -m podusv_cli`."""
+"""`podusv`, also as `python -m podusv_cli` and `python -m podusv`."""
 
 import signal
+import sys
+
+ELSEWHERE = "podusv runs on Linux; on Windows use WSL, on macOS a container or virtual machine"
 
 
 def main() -> None:
@@ -8,6 +11,8 @@ def main() -> None:
 
     Python's own handler would print where in the imports it was.
     """
+    if sys.platform != "linux":
+        sys.exit(ELSEWHERE)
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # not so under nohup
         signal.signal(signal.SIGINT, signal.SIG_DFL)
     from podusv_cli import cli

@@ -101,7 +101,8 @@ def test_the_wheel_has_metadata_types_licence_and_scenarios(
     assert (about["Name"], about["Version"]) == ("podusv", __version__)
     assert (about["Requires-Python"], about["License-Expression"]) == (">=3.11", "MIT")
     assert about["Description-Content-Type"] == "text/markdown"
-    assert about.get_payload() == (ROOT / "README.md").read_text()
+    assert about["Author"] == "podusv contributors"
+    assert about.get_payload() == (ROOT / "podusv/README.md").read_text()
     names = {*wheel.namelist()}
     typed = {f"{name}/py.typed" for name in PACKAGES}
     assert {*typed, "podusv/__init__.pyi", f"{info}/licenses/LICENSE"} <= names
@@ -127,6 +128,8 @@ def test_the_wheel_alone_starts_from_an_empty_folder(python: Path, empty: Path) 
     assert said(python, "-c", names, cwd=empty).split() == list(shipped.names())
     assert podusv("") == f"{FIRST_STEPS}\n"
     assert "\nmu_2017/corrected\n" in podusv("init")
+    assert said(python, "-m", "podusv", "--version", cwd=empty) == f"podusv {__version__}\n"
+    assert "open this page in a browser: " in podusv("demo --no-browser --out demo")
     assert podusv("docs resume").startswith("podusv docs studies#resume-a-study")
     assert podusv("docs results/README").startswith("# What was found\n")
     assert podusv("init mu_2017/corrected").endswith("next: podusv run corrected.yaml\n")
