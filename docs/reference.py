@@ -7,6 +7,7 @@ git ignores.
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ from podusv_cli.metrics.table import METRICS
 from podusv_cli.scenario.explain import Row, explain, signals
 from podusv_cli.scenario.keys import SCENARIO, Key
 from podusv_cli.scenario.presets import preset_names, preset_text, with_presets
+from podusv_cli.scenario.shipped import file_of
 
 # A figure is drawn from runs of the first of these scenarios that has its signals.
 SHOWN = (
@@ -31,6 +33,16 @@ SHOWN = (
     "podusv:laws/legs.yaml",
 )  # fmt: skip
 SECONDS = 60.0
+# Runs to look at: scenarios that come with podusv, and which of their laws the gallery draws.
+GALLERY = {
+    "podusv:demo.yaml": (), "podusv:own_vessel.yaml": (),
+    "podusv:mu_2017/corrected_compare.yaml": ("adaptive_neural", "pid"),
+    "podusv:pod/kept.yaml": ("adaptive_neural", "pid"),
+    "podusv:sea/state_4.yaml": ("adaptive_neural", "pid"),
+    "podusv:laws/legs.yaml": ("los_pid", "velocity_vector"),
+    "podusv:trials/zigzag_20.yaml": (),
+}  # fmt: skip
+EDITOR_LINE = re.compile(r"^# yaml-language-server: .*\n", re.MULTILINE)
 DRAWN = "figures"  # the folder of their pictures
 
 
@@ -41,7 +53,7 @@ def write(folder: Path) -> None:
     pages |= {f"{section}s": kinds_page(section) for section in KINDS}
     for name, text in pages.items():
         _write(folder / f"{name}.md", text.encode())
-    for name, picture in pictures():
+    for name, picture in (*pictures(), *gallery_pictures()):
         _write(folder / DRAWN / name, picture)
 
 
@@ -63,6 +75,39 @@ def pictures() -> Iterable[tuple[str, bytes]]:
         left = [sheet for name, sheet in FIGURES.items() if f"{name}.png" not in drawn]
         drawn |= dict(draw(dressed(runs), left, ["png"]))
     return drawn.items()
+
+
+def gallery_pictures() -> Iterable[tuple[str, bytes]]:
+    """The tracks of every scenario of the gallery, over its whole time."""
+    for shown, laws in GALLERY.items():
+        singles = podusv.load(shown).singles()
+        runs = [
+            (label, podusv.simulate(one).recording, one)
+            for label, one in singles.items()
+            if label in (laws or singles)
+        ]
+        for _, picture in draw(dressed(runs), ["trajectory"], ["png"]):
+            yield f"{_picture(shown)}.png", picture
+
+
+def _picture(shown: str) -> str:
+    return shown.removeprefix("podusv:").removesuffix(".yaml").replace("/", "-")
+
+
+def gallery_page() -> str:
+    """Runs to look at, each with the YAML that makes it."""
+    parts = ["# Gallery", "Scenarios that come with podusv, and what they give."]
+    for shown in GALLERY:
+        loaded, name = podusv.load(shown), shown.removeprefix("podusv:").removesuffix(".yaml")
+        made = "compare" if loaded.controllers else "run"
+        yaml = Path(file_of(shown)).read_text("utf-8")
+        parts += [
+            f"## {name}", text(loaded.description),
+            f"![tracks of {name}]({DRAWN}/{_picture(shown)}.png)",
+            f"    podusv {made} {shown}\n    podusv init {name}    # a copy to edit",
+            f"```yaml\n{EDITOR_LINE.sub('', yaml).strip()}\n```",
+        ]  # fmt: skip
+    return page(parts)
 
 
 KINDS = {
@@ -212,6 +257,7 @@ PAGES: Mapping[str, Callable[[], str]] = {
     "scenario": scenario_page, "vessels": vessels_page, "signals": signals_page,
     "metrics": metrics_page, "findings": findings_page, "figures": figures_page,
     "commands": commands_page, "exit_codes": exit_codes_page, "python": python_page,
+    "gallery": gallery_page,
 }  # fmt: skip
 
 

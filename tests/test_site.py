@@ -17,6 +17,7 @@ import pytest
 from command_samples import ROOT
 from test_report_chase import BROWSER, QUIET, WIDTHS
 
+import podusv
 from podusv_cli.cli import COMMANDS
 from podusv_cli.cli.exit_codes import MEANINGS
 from podusv_cli.figures.drawing import FIGURES
@@ -25,11 +26,13 @@ from podusv_cli.metrics.table import METRICS
 from podusv_cli.scenario.explain import signals
 from podusv_cli.scenario.keys import SCENARIO
 from podusv_cli.scenario.presets import preset_names, with_presets
+from podusv_cli.scenario.shipped import file_of
 
 LOOKED_AT = (
-    "README", "docs/tutorial", "docs/metrics", "docs/model", "results/README",
-    "docs/reference/scenario", "docs/reference/controllers", "docs/reference/signals",
-    "docs/reference/figures", "docs/reference/python", "docs/reference/commands",
+    "docs/index", "docs/reference/gallery", "README", "docs/tutorial", "docs/metrics", "docs/model",
+    "results/README", "docs/reference/scenario", "docs/reference/controllers",
+    "docs/reference/signals", "docs/reference/figures", "docs/reference/python",
+    "docs/reference/commands",
 )  # fmt: skip
 
 
@@ -86,6 +89,22 @@ def test_every_page_is_in_the_contents():
     assert {name.removeprefix("docs/") for name in names} <= listed
 
 
+def test_the_gallery_shows_each_run_with_the_yaml_that_makes_it(reference: Any) -> None:
+    page = reference.gallery_page()
+    for shown in reference.GALLERY:
+        keys = re.findall(r"^\w+:", Path(file_of(shown)).read_text(), re.M)
+        assert keys
+        assert all(f"\n{key}" in page for key in keys)
+        assert re.search(rf"^    podusv (run|compare) {re.escape(shown)}$", page, re.M)
+    assert page.count("![tracks of ") == len(reference.GALLERY)
+
+
+def test_the_python_reference_has_every_public_name(reference: Any) -> None:
+    page = reference.python_page()
+    for name in podusv.__all__:
+        assert re.search(rf"auto(function|class):: podusv\.{name}$", page, re.M)
+
+
 def test_words_are_not_taken_for_markdown(reference: Any) -> None:
     assert reference.text("|a| * `b|c` <d> [e]") == r"\|a\| \* `b|c` \<d> \[e]"
     assert reference.code("|n|") == r"`\|n\|`"
@@ -130,6 +149,24 @@ def test_the_site_builds_without_a_warning_and_loads_nothing_from_elsewhere(site
         assert [one for one in seen.found if "//" in one] == [], page
     for style in site.rglob("*.css"):
         assert not re.search(r"url\([\"']?(https?:)?//", style.read_text()), style
+
+
+def found(site: Path, word: str) -> set[str]:
+    """The pages that the site's search finds for a stem, in text or headings."""
+    text = (site / "searchindex.js").read_text()
+    index = json.loads(text.removeprefix("Search.setIndex(").removesuffix(")"))
+    places = [index[kind].get(word, []) for kind in ("terms", "titleterms")]
+    every = [one for some in places for one in (some if isinstance(some, list) else [some])]
+    return {index["docnames"][one] for one in every}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("stem", "page"),
+    [("resum", "docs/studies"), ("mont", "docs/studies"), ("nois", "docs/measurements")],
+)
+def test_the_search_finds_what_people_look_for(site: Path, stem: str, page: str) -> None:
+    assert page in found(site, stem)
 
 
 MEASURE = """<pre id="told"></pre><script>

@@ -16,11 +16,12 @@ from podusv_cli.scenario.phrases import did_you_mean, unknown
 
 CONTENTS = "index.rst"  # the contents of the site: captions, and the pages below each
 CAPTION = re.compile(r"^   :caption: (.+)$")
-ENTRY = re.compile(r"^   (?:.* <)?/?([\w/]+)>?$")
+ENTRY = re.compile(r"^   (?:.* <)?/?((?:results/)?\w+)>?$")  # pages that are written, not made
 HEADING = re.compile(r"^(#{1,4}) (.+)$")
 FENCE = re.compile(r"^ *```")
 LINK = re.compile(r"(!?)\[([^]]*)\]\(([^)\s]+)\)")
-IN_NAME, IN_HEADING, MOST = 100, 20, 10  # what a match counts; those in the text up to `MOST`
+# What a match counts; those in the text up to `MOST`.
+IN_NAME, IN_TITLE, IN_HEADING, MOST = 100, 40, 20, 10
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,8 @@ class Section:
         named = self.level == 1 and all(word.search(self.page) for word in words)
         headed = all(word.search(self.heading) for word in words)
         count = min(len(word.findall(self.text)) for word in words)
-        return IN_NAME * named + IN_HEADING * headed + min(count, MOST)
+        weight = IN_TITLE if self.level == 1 else IN_HEADING
+        return IN_NAME * named + weight * headed + min(count, MOST)
 
     def line(self, words: Sequence[re.Pattern[str]]) -> str:
         """The first line of its text that has one of the words, else the first one."""
