@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import os
 import re
 import shutil
@@ -345,6 +346,19 @@ def test_keys_kinds_figures_and_names_are_offered(
 ) -> None:
     script = "import sys\nfrom podusv_cli import cli\ncli.main()"
     assert set(offered_for(typed, tmp_path, script)) == offered
+
+
+def test_what_was_completed_is_kept_until_podusv_changes(tmp_path: Path, monkeypatch) -> None:
+    typed = "podusv run --set controller.k_z"
+    monkeypatch.setenv("PODUSV_CACHE", str(tmp_path / "cache"))
+    first, second = (offered_for(typed, tmp_path, LOADED) for _ in range(2))
+    assert first[:-1] == second[:-1] != []
+    assert "podusv_cli.scenario.model" in first[-1]
+    assert "podusv_cli.scenario.model" not in second[-1]
+    (kept,) = tmp_path.rglob("completion/keys.json")
+    stale = {**json.loads(kept.read_text()), "state": "of an older podusv", "known": {}}
+    kept.write_text(json.dumps(stale))
+    assert offered_for(typed, tmp_path, LOADED)[:-1] == first[:-1]
 
 
 def test_a_listed_vessel_has_its_size_and_a_sentence_that_tells_it_from_its_neighbours(podusv):

@@ -1,29 +1,88 @@
 """What a shell completes after an option or as an argument: keys, kinds, figures, names.
 
-A shell asks at every Tab, so each function imports what it needs itself. What installed packages
-and the files after `--plugin` offer is completed too; a scenario's own plug-ins are not, since that
-would run them at every Tab.
+A shell asks at every Tab, so each function imports what it needs itself, and what it offers is kept
+on disk until podusv or an installed plug-in changes. What installed packages and the files after
+`--plugin` offer is completed too; a scenario's own plug-ins are not, since that would run them at
+every Tab.
 """
 
 from __future__ import annotations
 
+import json
+from contextlib import suppress
+from functools import wraps
 from typing import TYPE_CHECKING
 
 import typer
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
+    from pathlib import Path
 
     from podusv_cli.core.plugins import Plugins
 
 Offered = list[tuple[str, str]]
 
 
-def starting_points(incomplete: str) -> Offered:
+def kept(known: Callable[[Plugins], Mapping[str, str]]) -> Callable[[typer.Context, str], Offered]:
+    """What completes words that are known with these plug-ins, and what each means.
+
+    All of them are kept on disk, but for those of files after `--plugin`.
+    """
+
+    @wraps(known, assigned=("__name__", "__doc__"), updated=())
+    def complete(context: typer.Context, incomplete: str) -> Offered:
+        if context.params.get("plugin"):
+            return _beginning(incomplete, known(_plugins(context)))
+        from podusv_cli.engine.machine.code_folder import write
+
+        folder, state = _folder(), _state()
+        place = folder and folder / f"{known.__name__}.json"
+        with suppress(OSError, ValueError, KeyError):
+            there = json.loads(place.read_text("utf-8")) if place else {}
+            if there["state"] == state:
+                return _beginning(incomplete, there["known"])
+        found = dict(known(_plugins(context)))
+        with suppress(OSError):
+            if place:
+                write(place, json.dumps({"state": state, "known": found}).encode())
+        return _beginning(incomplete, found)
+
+    del complete.__wrapped__  # whose arguments are others than those that typer passes
+    return complete
+
+
+def _folder() -> Path | None:
+    """Where words are kept; None where nothing can be."""
+    import logging
+
+    from podusv_cli.engine.machine.code_folder import code_folder
+
+    logging.disable()  # a shell has no place for a message
+    return code_folder("completion")
+
+
+def _state() -> str:
+    """A digest of what podusv and the installed plug-ins are now."""
+    import hashlib
+    from pathlib import Path
+
+    import podusv_cli
+    from podusv_cli.core.plugins import installed
+
+    package = Path(podusv_cli.__file__).parent
+    times = [(str(path), path.stat().st_mtime_ns) for path in package.rglob("*.py")]
+    times += [(str(path), path.stat().st_mtime_ns) for path in package.rglob("*.yaml")]
+    plugins = [(plugin.name, plugin.sha256) for plugin in installed()]
+    return hashlib.sha256(repr((sorted(times), plugins)).encode()).hexdigest()
+
+
+@kept
+def starting_points(plugins: Plugins) -> Mapping[str, str]:
     """Names that `podusv init` takes."""
     from podusv_cli.workflows.init import starting_points
 
-    return _beginning(incomplete, starting_points())
+    return starting_points()
 
 
 def pages(incomplete: str) -> Offered:
@@ -41,11 +100,12 @@ def parts(incomplete: str) -> Offered:
     return _beginning(incomplete, dict.fromkeys(PARTS, ""))
 
 
-def keys(context: typer.Context, incomplete: str) -> Offered:
+@kept
+def keys(plugins: Plugins) -> Mapping[str, str]:
     """`controller.k_ze=` for `--set`; after the equals sign the words that the value may be."""
     from podusv_cli.scenario.explain import assignments
 
-    return _beginning(incomplete, assignments(_plugins(context)))
+    return assignments(plugins)
 
 
 def exports(incomplete: str) -> Offered:
@@ -55,7 +115,6 @@ def exports(incomplete: str) -> Offered:
 
 def laws(context: typer.Context, incomplete: str) -> Offered:
     """The laws of the study that is named before."""
-    import json
     from pathlib import Path
 
     try:
@@ -65,41 +124,40 @@ def laws(context: typer.Context, incomplete: str) -> Offered:
         return []  # no study, or none that can be read: there is no place for a message
 
 
-def figures(context: typer.Context, incomplete: str) -> Offered:
+@kept
+def figures(plugins: Plugins) -> Mapping[str, str]:
     """Names of figures."""
     from podusv_cli.figures.drawing import figures_with
 
-    known = figures_with(_plugins(context))
-    return _beginning(incomplete, {name: sheet.caption for name, sheet in known.items()})
+    return {name: sheet.caption for name, sheet in figures_with(plugins).items()}
 
 
-def metrics(context: typer.Context, incomplete: str) -> Offered:
+@kept
+def metrics(plugins: Plugins) -> Mapping[str, str]:
     """Names of metrics."""
     from podusv_cli.metrics.table import metrics_with
 
-    known = metrics_with(_plugins(context))
-    return _beginning(incomplete, {name: metric.meaning for name, metric in known.items()})
+    return {name: metric.meaning for name, metric in metrics_with(plugins).items()}
 
 
-def listed(context: typer.Context, incomplete: str) -> Offered:
+@kept
+def listed(plugins: Plugins) -> Mapping[str, str]:
     """Parts of `podusv list`."""
     from podusv_cli.cli.list import parts
 
-    found = (word for part in parts(_plugins(context)) for word in part.words)
-    return _beginning(incomplete, dict.fromkeys(found, ""))
+    return dict.fromkeys((word for part in parts(plugins) for word in part.words), "")
 
 
-def names(context: typer.Context, incomplete: str) -> Offered:
+@kept
+def names(plugins: Plugins) -> Mapping[str, str]:
     """What `podusv explain` explains: keys, kinds, signals, presets, metrics, findings."""
     from podusv_cli.findings.finding import finding_kinds
     from podusv_cli.metrics.table import metrics_with
     from podusv_cli.scenario.explain import names
 
-    plugins = _plugins(context)
     found = dict.fromkeys(names(plugins), "")
     found |= {name: metric.meaning for name, metric in metrics_with(plugins).items()}
-    found |= {name: finding.meaning for name, finding in finding_kinds(plugins).items()}
-    return _beginning(incomplete, found)
+    return found | {name: finding.meaning for name, finding in finding_kinds(plugins).items()}
 
 
 def _plugins(context: typer.Context) -> Plugins:
