@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from podusv_cli.figures.sheet import Family
-    from podusv_cli.figures.style import Shown
+    from podusv_cli.figures.shown import Shown
 
 FRAME = "width: 100%; height: 44em; border: 0"
 
