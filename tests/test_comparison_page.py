@@ -10,6 +10,7 @@ from html_tree import tree
 
 from podusv_cli.comparison import chase, report, settings, table
 from podusv_cli.core.finding import Finding
+from podusv_cli.metrics.table import METRICS
 from podusv_cli.pages.page import Picture
 
 MOVING = chase.chase(shown(("a", recording())))
@@ -64,8 +65,11 @@ def test_the_report_tells_how_runs_ended_and_differ():
 
 def test_the_report_has_the_table_with_numbers_to_the_right():
     told = tree(page())
-    row = next(row for row in told.all("tr") if row.all("td") and row.text.startswith("iae"))
-    assert told.rows()[told.all("tr").index(row)] == ["iae", "m s", "4", "2 (0.5)", "8 (2)", "-"]
+    row = next(
+        row for row in told.all("tr") if row.all("code") and row.all("code")[0].text == "iae"
+    )
+    assert row.all("abbr")[0].text == METRICS["iae"].row
+    assert told.rows()[told.all("tr").index(row)][1:] == ["m s", "4", "2 (0.5)", "8 (2)", "-"]
     assert [cell.text for cell in row.all(kind="number")] == ["4", "2 (0.5)", "8 (2)", "-"]
     assert [best.text for best in row.all("b")] == ["2 (0.5)"]
 
@@ -86,8 +90,9 @@ def test_the_answer_counts_the_claims_and_lists_them_in_words():
 def test_the_answer_says_who_is_best_in_what():
     answer = section("answer")
     assert [term.text for term in answer.all("dt")] == ["a smallest in 1", "b smallest in 1"]
-    assert [told.text for told in answer.all("dd")] == ["energy", "iae"]
-    assert answer.all("abbr")[1].attributes["title"] == "integral of z_e [m s]"
+    first = answer.all("dd")[0]
+    assert [told.text for told in answer.all("dd")] == [METRICS["energy"].row, "1 further number"]
+    assert first.all("abbr")[0].attributes["title"] == f"{METRICS['energy'].meaning} [J]"
     assert "Nothing to rank" in section("answer", table=FRAME[["a", "lost"]]).text
 
 

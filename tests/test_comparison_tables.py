@@ -10,6 +10,7 @@ from podusv_cli.comparison import claims, table
 from podusv_cli.comparison.differences import as_text, differences
 from podusv_cli.comparison.entries import CHECKS, Absent, Entry
 from podusv_cli.metrics.table import METRICS
+from podusv_cli.metrics.windows import NAMED, named
 
 # A key of every section that a run has besides its law, and another value.
 OTHERWISE = {
@@ -25,35 +26,57 @@ OTHERWISE = {
 
 def test_cells_have_number_mark_and_ratio():
     assert table.cells(FRAME) == [
-        ["iae", "m s", "4", "2* (0.5)", "8 (2)", "-"],
-        ["energy", "J", "0*", "3", "1", "-"],
-        ["law_ns", "ns", "10", "-", "5 (0.5)", "-"],
+        ["effort: work on the hull", "J", "0*", "3", "1", "-", "energy"],
+        ["time of one evaluation of the law", "ns", "10", "-", "5 (0.5)", "-", "law_ns"],
+        ["distance to the target, integrated", "m s", "4", "2* (0.5)", "8 (2)", "-", "iae"],
     ]
+
+
+def row(frame, name, **more):
+    """The cells of a metric, without what it is and its name."""
+    return next(cells[1:-1] for cells in table.cells(frame, **more) if cells[-1] == name)
+
+
+def test_the_numbers_that_matter_most_come_first_and_nothing_is_lost():
+    names = [name for name in METRICS if name != "law_ns"]
+    frame = table.table({"a": dict.fromkeys(names, 1.0)})
+    found = [cells[-1] for cells in table.cells(frame)]
+    first = [name for name in names if METRICS[name].headline]
+    assert found == [*first, *(name for name in names if not METRICS[name].headline)]
+    assert {"iae_e", "settling_time", "e_steady", "energy", "saturated_fraction"} <= set(first)
+
+
+def test_what_never_happened_in_a_run_that_finished_is_never_and_not_undefined():
+    runs = {"a": {"iae": 1.0, "settling_time": math.nan}, "lost": {"settling_time": math.nan}}
+    assert row(table.table(runs), "settling_time") == ["s", "never", "-"]
+    assert row(table.table(runs), "iae") == ["m s", "1*", "-"]
+
+
+def test_every_metric_says_what_it_is_in_words_and_no_two_say_the_same():
+    of_windows = named((("late", (5.0, 9.0)),), (("near", 0.5),))
+    metrics = [m for m in (METRICS | of_windows).values() if NAMED not in m.name]
+    words = [metric.row for metric in metrics]
+    assert len(set(words)) == len(words)
+    assert not [text for text in words if "_" in text or len(text) > 70]
 
 
 def test_a_run_that_does_not_end_at_its_target_is_never_the_best():
     unsettled = [str(FRAME.columns[1])]
-    assert table.cells(FRAME, unsettled=unsettled)[0] == [
-        "iae",
-        "m s",
-        "4*",
-        "2 (0.5)",
-        "8 (2)",
-        "-",
-    ]
+    assert row(FRAME, "iae", unsettled=unsettled) == ["m s", "4*", "2 (0.5)", "8 (2)", "-"]
     assert unsettled[0] not in table.leaders(FRAME, unsettled=unsettled)
     assert "4*" in table.as_markdown(FRAME, {}, unsettled=unsettled)
     assert r"\textbf{4}" in table.as_latex(FRAME, unsettled=unsettled)
+    assert r"\textbf{2}" not in table.as_latex(FRAME, unsettled=unsettled)
 
 
 def test_numbers_that_read_the_same_are_marked_the_same():
     frame = table.table({"a": {"iae": 0.500653}, "b": {"iae": 0.500649}, "c": {"iae": 0.50066}})
-    assert table.cells(frame) == [["iae", "m s", "0.50065*", "0.50065* (1)", "0.50066 (1)"]]
+    assert row(frame, "iae") == ["m s", "0.50065*", "0.50065* (1)", "0.50066 (1)"]
 
 
 def test_a_measured_time_is_never_marked_as_the_best():
     frame = table.table({"a": {"law_ns": 90.0}, "b": {"law_ns": 80.0}})
-    assert table.cells(frame) == [["law_ns", "ns", "90", "80 (0.889)"]]
+    assert row(frame, "law_ns") == ["ns", "90", "80 (0.889)"]
 
 
 def test_where_a_law_keeps_a_standoff_to_be_nearer_is_not_better():
@@ -72,9 +95,10 @@ def test_csv_has_units_first_and_ratios_last():
 def test_markdown_tells_how_runs_ended():
     text = table.as_markdown(FRAME, {"a": "", "lost": "killed"})
     lines = text.splitlines()
-    assert lines[0] == "| metric | unit | a | b | c | lost |"
-    assert lines[1] == "| --- | --- | ---: | ---: | ---: | ---: |"
-    assert lines[2] == "| iae | m s | 4 | 2* (0.5) | 8 (2) | - |"
+    assert lines[0] == "|  | unit | a | b | c | lost | name |"
+    assert lines[1] == "| --- | --- | ---: | ---: | ---: | ---: | --- |"
+    words = METRICS["iae"].row
+    assert lines[4] == f"| {words} | m s | 4 | 2* (0.5) | 8 (2) | - | `iae` |"
     assert lines[-2:] == ["", "- lost: killed"]
     assert table.as_markdown(FRAME, {"a": ""}).endswith(table.NOTE + "\n")
 
@@ -82,26 +106,32 @@ def test_markdown_tells_how_runs_ended():
 def test_latex_escapes_and_marks():
     frame = table.table({"a_b&~^\\{}": {"iae": 1.0}, "#$%": {"iae": 2.0}})
     lines = table.as_latex(frame).splitlines()
-    head = r"a\_b\&\textasciitilde{}\textasciicircum{}\textbackslash{}\{\} & \#\$\% \\"
-    assert lines[2].endswith(head)
-    assert lines[4] == r"$\int z_e\,\mathrm{d}t$ & m s & \textbf{1} & 2 (2) \\"
+    first = r"a\_b\&\textasciitilde{}\textasciicircum{}\textbackslash{}\{\}"
+    head = rf"\multicolumn{{2}}{{c}}{{{first}}} & \multicolumn{{3}}{{c}}{{\#\$\%}} \\"
+    assert lines[3].endswith(head)
+    assert lines[5] == r"$\int z_e\,\mathrm{d}t$ & m s & \textbf{1} &  & 2 &  & (2) \\"
 
 
-def test_latex_has_symbols_units_and_powers_of_ten_as_formulas():
+def test_latex_has_symbols_or_words_and_numbers_cut_at_their_point():
     numbers = {"effort_r": 1.5e7, "ise": 2e-9, "saturated_fraction": 0.5}
-    frame = table.table({"a": numbers, "b": {"effort_r": 3e12, "ise": 4e-2}})
-    rows = [line.removesuffix(r" \\").split(" & ") for line in table.as_latex(frame).splitlines()]
-    found = {row[0]: row[1:] for row in rows[4:-2]}
-    assert found == {
-        r"$\int z_e^2\,\mathrm{d}t$": [
-            "m$^2$ s", r"\textbf{\boldmath 2$\times10^{-9}$}", r"0.04 (2$\times10^{7}$)",
-        ],
-        r"$\int\tau_r^2\,\mathrm{d}t$": [
-            "N$^2$ m$^2$ s", r"\textbf{\boldmath 1.5$\times10^{7}$}",
-            r"3$\times10^{12}$ (2$\times10^{5}$)",
-        ],
-        r"saturated\_fraction": ["1", r"\textbf{0.5}", "-"],
-    }  # fmt: skip
+    lost = {"path_time": math.nan, "ise": 1.0}
+    runs = {"a": numbers | {"path_time": 7.5}, "b": {"effort_r": 3e12, "ise": 4e-2}, "c": lost}
+    text = table.as_latex(table.table(runs))
+    rows = [line.removesuffix(r" \\").split(" & ") for line in text.splitlines()]
+    found = {row[0]: row[1:] for row in rows[5:-2]}
+    assert found[r"$\int z_e^2\,\mathrm{d}t$"] == [
+        "m$^2$ s", r"\textbf{\boldmath 2}", r"\textbf{\boldmath $\times10^{-9}$}",
+        "0", ".04", r"(2$\times10^{7}$)", "1", "", r"(5$\times10^{8}$)",
+    ]  # fmt: skip
+    assert found[r"$\int\tau_r^2\,\mathrm{d}t$"][3:6] == [
+        "3", r"$\times10^{12}$", r"(2$\times10^{5}$)",
+    ]  # fmt: skip
+    words = METRICS["saturated_fraction"].row
+    assert found[words] == ["1", r"\textbf{0}", r"\textbf{.5}", "-", "", "", "-", "", ""]
+    assert found[METRICS["path_time"].row][-3:] == ["never", "", ""]
+    columns = text.splitlines()[1].partition("{tabular}")[2].replace("@{}", "").replace("@{ }", "")
+    assert {len(row) for row in rows[5:-2]} == {len(columns) - 2}
+    assert "booktabs" in text.splitlines()[0]
 
 
 def test_every_symbol_of_a_metric_can_be_set():

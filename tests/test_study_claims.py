@@ -181,7 +181,7 @@ def test_all_cells_have_to_agree() -> None:
         for pair in ((good, good), (bad, bad), (good, bad), (good, between))
     ]
     assert [v.answer for v in answers] == [True, False, None, None]
-    disagree = "the cells disagree: reproduced at scale=1, not reproduced at scale=2"
+    disagree = "the cells disagree: holds at scale=1, fails at scale=2"
     assert disagree in answers[2].evidence()
     assert answers[2].as_json()["needed"] is None
     assert "failures(a) at scale=1 = 0 [0, 0.01" in answers[0].evidence()
@@ -217,7 +217,7 @@ def test_an_unfinished_study_is_preliminary() -> None:
     verdict = judged(runs, "failures(a) <= 0.1")
     assert (verdict.answer, verdict.preliminary, verdict.draws) == (True, True, 150)
     assert "preliminary: 150 of 200 draws" in verdict.evidence()
-    assert "**reproduced**, preliminary" in as_markdown([verdict])
+    assert "**holds**, preliminary" in as_markdown([verdict])
     assert not judged(study(a=np.zeros(200)), "failures(a) <= 0.1").preliminary
 
 
@@ -239,7 +239,7 @@ def test_broken_runs_count_as_failed_and_are_named_where_they_decide() -> None:
     verdict = judged(runs, "failures(a) <= 0.05")
     assert verdict.answer is False
     assert "60 runs crashed, hung or were invalid, and count as failed" in verdict.evidence()
-    assert "without their draws it would be `reproduced`" in verdict.evidence()
+    assert "without their draws it would be `holds`" in verdict.evidence()
     harmless = judged(runs, "failures(a) <= 0.5")
     assert harmless.without_broken is harmless.answer is True
     assert "decide the verdict" not in harmless.evidence()

@@ -14,6 +14,7 @@ from small_study import written
 from study_samples import claim, judged, study
 from test_report_chase import BROWSER, QUIET, WIDTHS, needs_browser
 
+from podusv_cli.metrics.table import METRICS
 from podusv_cli.process.extras import Extras
 from podusv_cli.storage import files
 from podusv_cli.studies.study import bars, figures, outputs, report
@@ -212,7 +213,7 @@ def test_a_bar_has_interval_estimate_and_bound_in_their_order():
     bar = only_bar("share(a.iae < b.iae) >= 0.9", runs)
     assert 0.0 < bar.low < bar.estimate < bar.high < bar.bound < 100.0
     assert bar.asked == (bar.bound, 100.0)
-    assert bar.words.startswith("share(a.iae < b.iae): 70 %, between ")
+    assert bar.words.startswith("share(a.iae < b.iae): 70 % [60, 78.8]; compared with: ")
     assert bar.words.endswith("compared with: at least 90 %")
     low, high = (float(end.removesuffix(" %")) for end in bar.ends)
     assert low + bar.estimate / 100.0 * (high - low) == pytest.approx(70.0, abs=0.1)
@@ -222,7 +223,7 @@ def test_a_bar_with_an_open_end_runs_to_the_edge():
     runs = study(a=np.r_[np.arange(1.0, 18.0), [math.inf] * 3])
     bar = only_bar("quantile(a.iae, 0.8) <= 10", runs)
     assert bar.high == 100.0
-    assert "and a failure" in bar.words
+    assert "16 [12, failed]" in bar.words
     lost = only_bar("quantile(a.iae, 0.95) <= 10", runs)
     assert (lost.estimate, lost.words.split(": ")[1].split(",")[0]) == (None, "a failure")
 
@@ -251,7 +252,8 @@ def test_a_report_needs_nothing_else(drawn):
 
 def test_the_table_on_the_terminal_has_failures_in_percent(whole):
     head, (row, *_) = whole.results.cells()
-    assert head == ["law", "cell", "failed", "iae, median", "z_e_steady, median"]
+    words = [f"median of {METRICS[name].row}" for name in ("iae", "z_e_steady")]
+    assert head == ["law", "cell", "failed", f"{words[0]} [m s]", f"{words[1]} [m]"]
     assert row[:3] == ["pid", "disturbance.scale = 0.5, start.r = 0.0", "85.7 % [42.1, 99.6]"]
 
 

@@ -110,15 +110,15 @@ def _report(done: Compared, verbose: bool, metrics: Sequence[str]) -> None:
 
 def echo_comparison(done: Compared, metrics: Sequence[str] = ()) -> None:
     """Print the table, or only its rows of some metrics, and what the claims came to."""
-    from podusv_cli.comparison.table import NOTE, cells
+    from podusv_cli.comparison.table import NOTE, cells, head
 
     result = done.result
     rows = cells(result.table, result.metrics, result.unsettled)
-    chosen = [row for name in metrics for row in rows if row[0] == name]
-    echo_table(["metric", "unit", *map(str, result.table.columns)], chosen if metrics else rows)
+    chosen = [row for name in metrics for row in rows if row[-1] == name]
+    echo_table(head(result.table), chosen if metrics else rows)
     echo(NOTE)
     for v in result.verdicts:
-        echo_entry(v.name, v.claim.says, v.evidence(), facts=v.verdict)
+        echo_entry(v.name, v.claim.says, v.evidence(), facts=v.in_words)
 
 
 def _advice(items: Sequence[str], assign: Sequence[str], plugin: Sequence[str]) -> str:

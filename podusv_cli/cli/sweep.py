@@ -130,7 +130,7 @@ def _report(done: Swept) -> None:
         echo(f"{done.results.preliminary}; {_next(done)}")
     echo_table(*done.results.cells())
     for v in done.results.verdicts:
-        echo_entry(v.name, v.claim.says, v.evidence(), facts=v.verdict)
+        echo_entry(v.name, v.claim.says, v.evidence(), facts=v.in_words)
     if done.results.contradicted:
         echo(done.results.contradicted)
     if done.results.broken:

@@ -13,7 +13,7 @@ from podusv_cli.comparison.expressions import Evaluation, parse, with_labels
 from podusv_cli.core.errors import ScenarioError
 from podusv_cli.core.escaping import markdown
 from podusv_cli.expressions.reading import ExpressionError
-from podusv_cli.expressions.verdict import ANSWERS, Verdict, as_markdown
+from podusv_cli.expressions.verdict import Verdict, as_markdown
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import CLOCKED, METRICS
 from podusv_cli.scenario import explain
@@ -137,13 +137,12 @@ def _verdict(
     evaluation = Evaluation(runs, parsed.claim.tolerance, metrics)
     answer = evaluation.holds(parsed.expect)
     reason = "; ".join(dict.fromkeys(evaluation.doubts)) if answer is None else ""
-    if parsed.claim.untestable:
-        shown = f"what these runs show: {ANSWERS[answer]}"
-        reason = "; ".join(
-            filter(None, (f"not testable: {parsed.claim.untestable}", shown, reason))
-        )
-        answer = None
-    return RunsVerdict(parsed.name, parsed.claim, answer, evaluation.numbers, reason)
+    verdict = RunsVerdict(parsed.name, parsed.claim, answer, evaluation.numbers, reason)
+    if not parsed.claim.untestable:
+        return verdict
+    shown = f"what these runs show: {verdict.in_words}"
+    doubts = (f"not testable: {parsed.claim.untestable}", shown, reason)
+    return replace(verdict, answer=None, reason="; ".join(filter(None, doubts)))
 
 
 def with_timed(verdicts: Sequence[RunsVerdict], timed: Sequence[RunsVerdict], place: str) -> str:

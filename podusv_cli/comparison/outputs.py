@@ -11,6 +11,7 @@ import pandas as pd
 
 from podusv_cli.comparison import chase, claims, report, table
 from podusv_cli.comparison.entries import Entry
+from podusv_cli.components.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.core.finding import Finding
 from podusv_cli.figures.shown import dressed
 from podusv_cli.findings.finding import merged
@@ -133,8 +134,16 @@ def as_report(
     if figures:
         from podusv_cli.figures.drawing import figures_of  # matplotlib is slow to import
 
+        # the figures that podusv draws again are those of one paper
+        laws = [scenario.controller for scenario in result.scenarios.values()]
+        of_paper = any(isinstance(law, PolarBackstepping) for law in laws)
         pictures = [
-            Picture(name, sheet.caption, figures[f"{name}.{IN_REPORT}"], sheet.source)
+            Picture(
+                name,
+                sheet.caption,
+                figures[f"{name}.{IN_REPORT}"],
+                sheet.source if of_paper else "",
+            )
             for name, sheet in figures_of(result.scenarios.values()).items()
             if f"{name}.{IN_REPORT}" in figures
         ]

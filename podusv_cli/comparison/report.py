@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -12,7 +13,7 @@ import pandas as pd
 from podusv_cli.comparison import chase, settings, stability
 from podusv_cli.comparison.claims import RunsVerdict
 from podusv_cli.comparison.differences import as_text
-from podusv_cli.comparison.table import cells, leaders
+from podusv_cli.comparison.table import leaders, rows
 from podusv_cli.core.component import Component
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.plugins import Plugins
@@ -23,6 +24,7 @@ from podusv_cli.metrics.table import METRICS
 from podusv_cli.pages.page import Picture, environment, flat, value_text
 from podusv_cli.scenario.model import Scenario
 
+EQUATION = re.compile(r"\(\d+\)")  # of the first paper
 BESIDE = 2  # figures beside the answer: trajectory and errors
 
 
@@ -51,8 +53,10 @@ def page(story: Story) -> str:
     """The whole report."""
     from markupsafe import Markup  # with jinja2
 
-    figures = [*enumerate(story.figures, 1)]
+    figures, parts = [*enumerate(story.figures, 1)], _parts(story)
     best = leaders(story.table, story.metrics, story.unsettled)
+    table = rows(story.table, story.metrics, story.unsettled)
+    first = [row for row in table if row.metric.headline] or table
     return environment("podusv_cli.comparison").get_template("report.html.j2").render(
         title=story.title,
         story=story,
@@ -60,20 +64,28 @@ def page(story: Story) -> str:
         bad={label: ending for label, ending in story.endings.items() if ending},
         differing=as_text(story.differences),
         answers=by_answer(story.verdicts),
-        leaders={label: names for label, names in best.items() if names},
+        leaders={label: _told(names, story.metrics) for label, names in best.items() if names},
         noticed=_by_code(story.noticed, story.scenario.plugged),
-        metrics={str(name): story.metrics[str(name)] for name in story.table.index},
+        metrics={row.metric.name: row.metric for row in table},
         single=len(story.table.columns) == 1,
-        cells=cells(story.table, story.metrics, story.unsettled),
+        headlines=first,
+        others=table[len(first) :],
         stability=(stability.HEAD, [*stability.rows(story.theories)]),
         beside=figures[:BESIDE],
         figures=figures,
         changed=settings.changed(story.scenario),
         laws=settings.laws(story.controllers),
-        parts=_parts(story),
+        parts=parts,
+        cited=any(EQUATION.search(said) for _, said, _ in parts),
         provenance=[(key, value_text(value)) for key, value in flat(story.provenance)],
         chase_json=Markup(chase.as_json(dict(story.chase))),
     )  # fmt: skip
+
+
+def _told(names: Sequence[str], metrics: Mapping[str, Metric]) -> tuple[list[str], int]:
+    """Metrics in which a run is best: those that a reader sees first, and how many others."""
+    first = [name for name in names if metrics[name].headline]
+    return first, len(names) - len(first)
 
 
 def _by_code(findings: Sequence[Finding], plugins: Plugins) -> dict[str, tuple[str, list[Finding]]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Collection, Mapping
+from typing import NamedTuple
 
 import pandas as pd
 
@@ -14,12 +15,23 @@ from podusv_cli.metrics.table import CLOCKED, METRICS
 from podusv_cli.storage import csv_files
 
 METRIC = "metric"
+HEAD = ("", "unit")  # before the runs
+LAST = "name"  # of a metric in claims and in comparison.csv, after the runs
 NOTE = (
     "* smallest of its row among the runs that end at their target, except for measured times and, "
     "where a law keeps a standoff, for numbers that contain it; in brackets the ratio to the first "
     "run; - not defined, or the run did not finish"
 )
+PACKAGES = "% needs \\usepackage{booktabs}; numbers stand in two columns each, cut at their point"
+NUMBER = re.compile(r"(-?\d+)(\.\d+)?(?:e([+-]\d+))?")
 Names = Collection[str]
+
+
+class Row(NamedTuple):
+    """A metric's row: the metric, and for every run number and ratio to the first run."""
+
+    metric: Metric
+    texts: list[str]
 
 
 def table(
@@ -55,23 +67,40 @@ def as_csv(frame: pd.DataFrame, known: Mapping[str, Metric] = METRICS) -> str:
     return csv_files.text(with_ratios(frame, known).reset_index())
 
 
-def cells(
+def rows(
     frame: pd.DataFrame, known: Mapping[str, Metric] = METRICS, unsettled: Names = ()
-) -> list[list[str]]:
-    """Rows of text: metric, unit, then number and ratio to the first run; best marked with *.
+) -> list[Row]:
+    """All rows, those that a reader sees first before the others; best numbers marked with *.
 
     `unsettled` are the runs that do not end at their target; they are never the best.
     """
-    rows, unranked = [], _unranked(frame, known)
+    found, unranked = [], _unranked(frame, known)
+    whole = frame.notna().any()  # a run that did not finish has no metric
     for name, numbers in frame.iterrows():
         best = math.nan if name in unranked else numbers.drop(list(unsettled)).min()
-        first = numbers.iloc[0]
+        first, never = numbers.iloc[0], known[str(name)].happens
         texts = [
+            "never" if never and whole[label] and math.isnan(number) else
             _cell(number, first, math.nan if label in unsettled else best, i)
             for i, (label, number) in enumerate(numbers.items())
-        ]
-        rows.append([str(name), known[str(name)].unit, *texts])
-    return rows
+        ]  # fmt: skip
+        found.append(Row(known[str(name)], texts))
+    return sorted(found, key=lambda row: not row.metric.headline)
+
+
+def cells(
+    frame: pd.DataFrame, known: Mapping[str, Metric] = METRICS, unsettled: Names = ()
+) -> list[list[str]]:
+    """The rows as text: what the metric is, unit, a text a run, and the metric's name."""
+    return [
+        [metric.row, metric.unit, *texts, metric.name]
+        for metric, texts in rows(frame, known, unsettled)
+    ]
+
+
+def head(frame: pd.DataFrame) -> list[str]:
+    """What stands above the `cells`."""
+    return [*HEAD, *map(str, frame.columns), LAST]
 
 
 def _unranked(frame: pd.DataFrame, known: Mapping[str, Metric] = METRICS) -> list[str]:
@@ -130,8 +159,12 @@ def as_markdown(
         for label, lines in last.items()
         for line in lines
     ]
-    head = ["metric", "unit", *(escaping.markdown_cell(str(label)) for label in frame.columns)]
-    lines = [head, ["---", "---", *["---:"] * len(frame.columns)], *cells(frame, known, unsettled)]
+    texts = (
+        [escaping.markdown_cell(words), *numbers, escaping.markdown_code(name)]
+        for words, *numbers, name in cells(frame, known, unsettled)
+    )
+    top = [escaping.markdown_cell(label) for label in head(frame)]
+    lines = [top, ["---", "---", *["---:"] * len(frame.columns), "---"], *texts]
     return (
         "\n".join("| " + " | ".join(line) + " |" for line in lines)
         + f"\n\n{NOTE}\n"
@@ -142,22 +175,43 @@ def as_markdown(
 def as_latex(
     frame: pd.DataFrame, known: Mapping[str, Metric] = METRICS, unsettled: Names = ()
 ) -> str:
-    """The table in LaTeX (booktabs): symbols where metrics have one, the best of a row in bold."""
-    head = ["metric", "unit", *map(str, frame.columns)]
-    body = [[escaping.latex(cell) for cell in head]]
-    for name, unit, *numbers in cells(frame, known, unsettled):
-        symbol = known[name].symbol
-        shown = f"${symbol}$" if symbol else escaping.latex(name)
-        body.append([shown, quantities.raised(unit), *map(_marked, numbers)])
-    lines = [" & ".join(row) + r" \\" for row in body]
-    columns = "ll" + "r" * len(frame.columns)
-    opening = [rf"\begin{{tabular}}{{{columns}}}", r"\toprule", lines[0], r"\midrule"]
-    return "\n".join([*opening, *lines[1:], r"\bottomrule", r"\end{tabular}", ""])
+    """The table in LaTeX: symbols or words, decimal points aligned, the best of a row in bold.
+
+    Every number takes two columns, before and from its decimal point on; a run but the first has a
+    third with the ratio to the first.
+    """
+    spans = [2, *[3] * (len(frame.columns) - 1)]
+    labels = (
+        rf"\multicolumn{{{span}}}{{c}}{{{escaping.latex(str(label))}}}"
+        for span, label in zip(spans, frame.columns, strict=True)
+    )
+    lines = [" & ".join([*HEAD, *labels])]
+    for metric, texts in rows(frame, known, unsettled):
+        shown = f"${metric.symbol}$" if metric.symbol else escaping.latex(metric.row)
+        parts = [part for span, text in zip(spans, texts, strict=True) for part in _cut(text, span)]
+        lines.append(" & ".join([shown, quantities.raised(metric.unit), *parts]))
+    columns = "ll" + "".join("r@{}l" if span == 2 else "r@{}l@{ }r" for span in spans)
+    top, *body = (rf"{line} \\" for line in lines)
+    opening = [PACKAGES, rf"\begin{{tabular}}{{{columns}}}", r"\toprule", top, r"\midrule"]
+    return "\n".join([*opening, *body, r"\bottomrule", r"\end{tabular}", ""])
 
 
-def _marked(cell: str) -> str:
-    """A cell with powers of ten as formulas, which are bold with a number marked as the best."""
-    powers = re.sub(r"e([+-]\d+)", lambda found: rf"$\times10^{{{int(found[1])}}}$", cell)
-    number, marked, ratio = powers.partition("*")
-    bold = r"\boldmath " if "$" in number else ""
-    return rf"\textbf{{{bold}{number}}}{ratio}" if marked else number
+def _cut(text: str, span: int) -> list[str]:
+    """A cell in so many parts: up to the decimal point, the rest of the number, the ratio."""
+    number, _, ratio = text.partition(" ")
+    whole, point, power = _parts(number.removesuffix("*"))
+    cut = [whole, point + power]
+    if number.endswith("*"):
+        bold = r"\boldmath " if power else ""
+        cut = [part and rf"\textbf{{{bold}{part}}}" for part in cut]
+    ratio = ratio and f"({''.join(_parts(ratio.strip('()')))})"
+    return [*cut, *([ratio] if span > 2 else [])]
+
+
+def _parts(number: str) -> tuple[str, str, str]:
+    """A number before and from its decimal point, and its power of ten; words are all before."""
+    found = NUMBER.fullmatch(number)
+    if not found:
+        return number, "", ""
+    whole, point, power = found.groups("")
+    return whole, point, rf"$\times10^{{{int(power)}}}$" if power else ""

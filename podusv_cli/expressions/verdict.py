@@ -5,14 +5,18 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, TypeVar
+from typing import Any, Generic, Literal, NamedTuple, TypeVar
 
 from podusv_cli.core.escaping import markdown, markdown_cell, markdown_code
 
 Answer = Literal["reproduced", "not reproduced", "cannot tell"]
+# In JSON, and in words on claims that were published
 ANSWERS: dict[bool | None, Answer] = {
     True: "reproduced", False: "not reproduced", None: "cannot tell",
 }  # fmt: skip
+# In words on somebody's own claims
+OF_OWN: dict[bool | None, str] = {True: "holds", False: "fails", None: "cannot tell"}
+OWN = "ours"  # begins the source of a claim that was not published
 
 
 @dataclass(frozen=True)
@@ -25,8 +29,22 @@ class Verdict(ABC):
 
     @property
     def verdict(self) -> Answer:
-        """The answer in words."""
+        """The answer as JSON has it, the same words for all claims."""
         return ANSWERS[self.answer]
+
+    @property
+    def in_words(self) -> str:
+        """The answer as readers see it."""
+        return self.word_for(self.answer)
+
+    @property
+    def published(self) -> bool:
+        """Whether the claim has a published source, which runs can reproduce."""
+        return not self.claim.source.startswith(OWN)
+
+    def word_for(self, answer: bool | None) -> str:
+        """An answer on this claim as readers see it."""
+        return (ANSWERS if self.published else OF_OWN)[answer]
 
     @property
     def preliminary(self) -> bool:
@@ -44,7 +62,7 @@ class Verdict(ABC):
         return (
             f"| {markdown_cell(self.name)} | "
             f"{markdown_cell(claim.says)} ({markdown_cell(claim.source)}) | "
-            f"**{self.verdict}**{', preliminary' if self.preliminary else ''} | "
+            f"**{self.in_words}**{', preliminary' if self.preliminary else ''} | "
             f"{markdown_code(claim.expect)}{premise}, tolerance {claim.tolerance:g} | "
             f"{markdown_cell(self.evidence())} |"
         )
@@ -63,7 +81,25 @@ def as_markdown(verdicts: Sequence[Verdict], further: Sequence[str] = ()) -> str
     return "\n".join([*head, *(v.row() for v in verdicts), *(["", *below] if below else []), ""])
 
 
-def by_answer(verdicts: Sequence[AnyVerdict]) -> dict[Answer, list[tuple[int, AnyVerdict]]]:
-    """The verdicts with their numbers, by answer."""
+class Answered(NamedTuple, Generic[AnyVerdict]):
+    """The verdicts with one answer, by their numbers, and its word."""
+
+    answer: bool | None
+    words: str
+    verdicts: list[tuple[int, AnyVerdict]]
+
+
+def by_answer(verdicts: Sequence[AnyVerdict]) -> list[Answered[AnyVerdict]]:
+    """The verdicts with their numbers by answer, an answer that nobody got included.
+
+    Published claims come first. What cannot be told of either kind stands together, last.
+    """
     numbered = [*enumerate(verdicts, 1)]
-    return {word: [one for one in numbered if one[1].verdict == word] for word in ANSWERS.values()}
+    kinds = [kind for kind in (True, False) if kind in {v.published for v in verdicts}]
+    groups = [
+        Answered(answer, (ANSWERS if kind else OF_OWN)[answer],
+                 [one for one in numbered if (one[1].answer, one[1].published) == (answer, kind)])
+        for kind in kinds for answer in (True, False)
+    ]  # fmt: skip
+    open_ = [one for one in numbered if one[1].answer is None]
+    return [*groups, Answered(None, ANSWERS[None], open_)]

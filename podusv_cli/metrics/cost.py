@@ -15,9 +15,22 @@ REPLAYS = 25
 law_ns = Metric(
     "law_ns", "ns", "median processor time of one evaluation of the law over its logged states",
     place=200,
+    words="time of one evaluation of the law", headline=True,
 )  # fmt: skip
-low = Metric("law_ns_low", "ns", "lower quartile of that time over the replays", place=200)
-high = Metric("law_ns_high", "ns", "upper quartile of that time over the replays", place=200)
+low = Metric(
+    "law_ns_low",
+    "ns",
+    "lower quartile of that time over the replays",
+    place=200,
+    words="time of one evaluation, lower quartile",
+)
+high = Metric(
+    "law_ns_high",
+    "ns",
+    "upper quartile of that time over the replays",
+    place=200,
+    words="time of one evaluation, upper quartile",
+)
 QUARTILES = [REPLAYS * quarter // 4 for quarter in (1, 2, 3)]  # positions in the sorted times
 
 

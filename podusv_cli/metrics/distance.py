@@ -83,46 +83,66 @@ OF_SETTLED = _of_target(watch_settled, lambda layout: 2 * SETTLED, _constants, S
 iae = Metric(
     "iae", "m s", "integral of z_e", OF, gathered(ABSOLUTE), 1, counts_standoff=True,
     symbol=r"\int z_e\,\mathrm{d}t",
+    words="distance to the target, integrated",
 )  # fmt: skip
 ise = Metric(
     "ise", "m2 s", "integral of z_e^2", OF, gathered(SQUARE), 1, counts_standoff=True,
     symbol=r"\int z_e^2\,\mathrm{d}t",
+    words="squared distance to the target, integrated",
 )  # fmt: skip
 iae_of_optimum = Metric(
     "iae_of_optimum", "1", "iae over that of the optimum of the same task", place=1,
     counts_standoff=True,
+    words="integrated distance over that of the optimum", headline=True,
 )  # fmt: skip
 ise_of_optimum = Metric(
     "ise_of_optimum", "1", "ise over that of the optimum of the same task", place=1,
     counts_standoff=True,
+    words="integrated squared distance over that of the optimum",
 )  # fmt: skip
 OF_OPTIMUM = {"iae": iae_of_optimum, "ise": ise_of_optimum}  # known to comparisons only
 itae = Metric(
     "itae", "m s2", "integral of t z_e", OF, gathered(TIMED), 1, counts_standoff=True,
     symbol=r"\int t\,z_e\,\mathrm{d}t",
+    words="distance to the target times time, integrated",
 )  # fmt: skip
 rmse = Metric(
     "rmse", "m", "root of the mean of z_e^2", OF, _rmse, 1, counts_standoff=True,
     symbol=r"\mathrm{rms}(z_e)",
+    words="distance to the target, rms",
 )  # fmt: skip
 z_e_steady = Metric(
     "z_e_steady", "m", "mean of z_e over the steady window", OF_SETTLED, ratio(ABSOLUTE, TIME), 1,
     counts_standoff=True,
+    words="steady distance to the target",
 )  # fmt: skip
 settling_time = Metric(
     "settling_time", "s", "time from which z_e stays within the settling radius", OF,
     _settling_time, 1, happens=True, counts_standoff=True,
+    words="settled after", headline=True,
 )  # fmt: skip
-iae_e = Metric("iae_e", "m s", "integral of |z_e - standoff|", OF, gathered(ERROR), 2)
+iae_e = Metric(
+    "iae_e",
+    "m s",
+    "integral of |z_e - standoff|",
+    OF,
+    gathered(ERROR),
+    2,
+    words="tracking error, integrated",
+    headline=True,
+)
 e_steady = Metric(
     "e_steady", "m", "mean of |z_e - standoff| over the steady window", OF_SETTLED,
     ratio(ERROR, TIME), 2,
+    words="steady tracking error", headline=True,
 )  # fmt: skip
 cross_track_rms = Metric(
     "cross_track_rms", "m", "rms distance from the target across its course, steady window",
     OF_SETTLED, _rms(ACROSS), 2,
+    words="steady error across the course, rms",
 )  # fmt: skip
 along_track_rms = Metric(
     "along_track_rms", "m", "rms distance from the target along its course, steady window",
     OF_SETTLED, _rms(ALONG), 2, counts_standoff=True,
+    words="steady error along the course, rms",
 )  # fmt: skip

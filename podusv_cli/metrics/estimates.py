@@ -41,14 +41,28 @@ OF = Accumulator(watch, _size, _constants, INTEGRALS)
 position = Metric(
     "estimate_position_rms", "m", "rms distance between estimated and true position", OF,
     _rms(POSITION), 7,
+    words="error of the estimated position, rms", headline=True,
 )  # fmt: skip
 heading = Metric(
-    "estimate_heading_rms", "rad", "rms error of the estimated heading", OF, _rms(HEADING), 7
+    "estimate_heading_rms",
+    "rad",
+    "rms error of the estimated heading",
+    OF,
+    _rms(HEADING),
+    7,
+    words="error of the estimated heading, rms",
 )
 velocity = Metric(
     "estimate_velocity_rms", "m/s", "rms error of the estimated velocity, surge and sway together",
     OF, _rms(VELOCITY), 7,
+    words="error of the estimated velocity, rms",
 )  # fmt: skip
 yaw_rate = Metric(
-    "estimate_yaw_rate_rms", "rad/s", "rms error of the estimated yaw rate", OF, _rms(YAW_RATE), 7
+    "estimate_yaw_rate_rms",
+    "rad/s",
+    "rms error of the estimated yaw rate",
+    OF,
+    _rms(YAW_RATE),
+    7,
+    words="error of the estimated yaw rate, rms",
 )

@@ -97,7 +97,10 @@ class Metric:
     means that it never happened. `counts_standoff`: a standoff that a law keeps on purpose makes it
     worse, so that nobody is marked best where there is one. A `margin` is better the larger it is,
     and infinite where nothing is too much; nobody is marked best. `symbol` is LaTeX for a formula,
-    "" where the name says it better.
+    "" where words say it better.
+
+    `words` name it in a table, by default its meaning. A `headline` is one of the few numbers that
+    a reader sees first.
     """
 
     name: str
@@ -111,10 +114,23 @@ class Metric:
     margin: bool = False
     symbol: str = ""
     of_log: Callable[[Recording], float] | None = None
+    words: str = ""
+    headline: bool = False
 
     def __post_init__(self) -> None:
         """Check the words. Raises ValueError."""
-        check_words("metric", self.name, self.unit, self.meaning, self.symbol)
+        texts = (self.unit, self.meaning, self.symbol, self.words)
+        check_words("metric", self.name, *texts)
+
+    @property
+    def row(self) -> str:
+        """What a table calls it."""
+        return self.words or self.meaning
+
+    @property
+    def infinite(self) -> str:
+        """What it means that a number of many runs is infinite."""
+        return "never" if self.happens else "failed"
 
 
 def gathered(position: int) -> Result:

@@ -25,6 +25,7 @@ ENDS = (1, 1 + len(TARGET), 1 + len(TARGET) + len(STATE))
 law_operations = Metric(
     "law_operations", "1", "floating-point operations of one evaluation of the law",
     place=200,
+    words="operations of one evaluation of the law",
 )  # fmt: skip
 
 

@@ -48,18 +48,22 @@ OF = Accumulator(watch, _size, _constants, INTEGRALS)
 at_speed_limit = Metric(
     "at_speed_limit", "1", "part of the time with a propeller commanded to its speed limit", OF,
     ratio(SPEED, TIME), 6,
+    words="share of time at a propeller's speed limit",
 )  # fmt: skip
 at_angle_limit = Metric(
     "at_angle_limit", "1", "part of the time with a pod commanded to its angle limit", OF,
     ratio(ANGLE, TIME), 6,
+    words="share of time at a pod's angle limit",
 )  # fmt: skip
 at_rate_limit = Metric(
     "at_rate_limit", "1", "part of the time with a pod's angle at its rate limit", OF,
     ratio(RATE, TIME), 6,
+    words="share of time at a pod's rate limit",
 )  # fmt: skip
 energy = Metric(
     "energy_pod", "J", "integral of the propellers' power, where it is known", OF,
     gathered(ENERGY), 6,
+    words="work of the propellers",
 )  # fmt: skip
 travel = Metric(
     "angle_travel",

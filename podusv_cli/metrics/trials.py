@@ -122,12 +122,15 @@ def _constants(layout: Measured) -> dict[str, float]:
     return {"trial_execute": trial.execute, "trial_switch": trial.switch} if trial else {}
 
 
-def _number(of: Accumulator, position: int, name: str, unit: str, meaning: str) -> Metric:
+def _number(
+    of: Accumulator, position: int, name: str, unit: str, meaning: str, **words: Any
+) -> Metric:  # fmt: skip
     """A gathered number, first in tables; NaN where the trial did not get so far."""
     per = math.degrees(1.0) if unit == "deg" else 1.0
     return Metric(
-        name, unit, meaning, of, lambda seen, step: per * float(seen[position]) or math.nan, 0
-    )
+        name, unit, meaning, of, lambda seen, step: per * float(seen[position]) or math.nan, 0,
+        headline=True, **words,
+    )  # fmt: skip
 
 
 OF_TURN = Accumulator(watch_turn, _sizes("turning circle", TURNED), _constants)
@@ -135,29 +138,64 @@ OF_ZIGZAG = Accumulator(watch_zigzag, _sizes("zig-zag", ZIGZAGGED), _constants)
 OF_STOP = Accumulator(watch_stop, _sizes("stopping", STILL), _constants)
 _turn, _zigzag, _stop = (partial(_number, of) for of in (OF_TURN, OF_ZIGZAG, OF_STOP))
 advance = _turn(
-    ADVANCE, "advance", "m", "way along the approach until the heading has changed by 90 deg"
+    ADVANCE,
+    "advance",
+    "m",
+    "way along the approach until the heading has changed by 90 deg",
+    words="advance",
 )
 transfer = _turn(
-    TRANSFER, "transfer", "m", "way across the approach until the heading has changed by 90 deg"
+    TRANSFER,
+    "transfer",
+    "m",
+    "way across the approach until the heading has changed by 90 deg",
+    words="transfer",
 )
 tactical_diameter = _turn(
-    TACTICAL, "tactical_diameter", "m", "way across the approach until it has changed by 180 deg"
+    TACTICAL,
+    "tactical_diameter",
+    "m",
+    "way across the approach until it has changed by 180 deg",
+    words="tactical diameter",
 )
 turning_diameter = _turn(
-    STEADY, "turning_diameter", "m", "diameter of the circle at the end, 2 U/|r|"
+    STEADY,
+    "turning_diameter",
+    "m",
+    "diameter of the circle at the end, 2 U/|r|",
+    words="steady turning diameter",
 )
-overshoot_1 = _zigzag(FIRST, "overshoot_1", "deg", "first overshoot angle of a zig-zag")
-overshoot_2 = _zigzag(SECOND, "overshoot_2", "deg", "second overshoot angle of a zig-zag")
+overshoot_1 = _zigzag(
+    FIRST, "overshoot_1", "deg", "first overshoot angle of a zig-zag", words="first overshoot"
+)
+overshoot_2 = _zigzag(
+    SECOND, "overshoot_2", "deg", "second overshoot angle of a zig-zag", words="second overshoot"
+)
 initial_turning = _zigzag(
     INITIAL,
     "initial_turning",
     "m",
     "way until the heading of a zig-zag has first changed by `switch`",
+    words="initial turning",
 )
-track_reach = _stop(TRACK, "track_reach", "m", "way from full astern until the surge speed is zero")
+track_reach = _stop(
+    TRACK,
+    "track_reach",
+    "m",
+    "way from full astern until the surge speed is zero",
+    words="track reach",
+)
 head_reach = _stop(
-    HEAD, "head_reach", "m", "way along the approach from full astern until the surge speed is zero"
+    HEAD,
+    "head_reach",
+    "m",
+    "way along the approach from full astern until the surge speed is zero",
+    words="head reach",
 )
 stopping_time = _stop(
-    STOPPED, "stopping_time", "s", "time from full astern until the surge speed is zero"
+    STOPPED,
+    "stopping_time",
+    "s",
+    "time from full astern until the surge speed is zero",
+    words="stopped after",
 )

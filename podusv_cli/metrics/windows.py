@@ -91,10 +91,12 @@ def _rms(seen: Vector) -> float:
     return math.sqrt(seen[SQUARE] / seen[LENGTH]) if seen[LENGTH] else math.nan
 
 
-def _named(template: Metric, name: str, meaning: str, of: Accumulator, result: Result) -> Metric:
+def _named(
+    template: Metric, name: str, meaning: str, of: Accumulator, result: Result, words: str
+) -> Metric:  # fmt: skip
     return replace(
         template, name=template.name.replace(NAMED, name), meaning=meaning, accumulator=of,
-        result=result,
+        result=result, words=words,
     )  # fmt: skip
 
 
@@ -103,23 +105,29 @@ def _of_window(name: str, start: float, to: float) -> tuple[Metric, ...]:
     of = Accumulator(
         watch, lambda layout: WINDOW, standoff_of, differing=("standoff",), of_target=True
     )
-    where = f"z_e from {start:g} s to {to:g} s"
+    span = f"from {start:g} s to {to:g} s"
     largest = _over(to, lambda seen: float(seen[LARGEST]) if seen[LENGTH] else math.nan)
     beyond = _over(to, lambda seen: float(seen[BEYOND]) if seen[LENGTH] else math.nan)
     return (
-        _named(ERROR_RMS, name, f"rms of {where}", of, _over(to, _rms)),
-        _named(ERROR_MAX, name, f"largest {where}", of, largest),
         _named(
-            BEYOND_MAX, name, f"largest |z_e - standoff| from {start:g} s to {to:g} s", of, beyond
+            ERROR_RMS, name, f"rms of z_e {span}", of, _over(to, _rms), f"rms distance {span}"
         ),
-    )
+        _named(ERROR_MAX, name, f"largest z_e {span}", of, largest, f"largest distance {span}"),
+        _named(
+            BEYOND_MAX, name, f"largest |z_e - standoff| {span}", of, beyond,
+            f"largest error beyond the standoff {span}",
+        ),
+    )  # fmt: skip
 
 
 def _of_radius(name: str, radius: float) -> Metric:
     watch = specialise(within, f"within_{name}", RADIUS=radius)
     of = Accumulator(watch, lambda layout: SETTLING, lambda layout: {}, of_target=True)
     meaning = f"time from which z_e stays within {radius:g} m"
-    return _named(SETTLED, name, meaning, of, lambda seen, step: settled_from(seen[CROSSED]))
+    return _named(
+        SETTLED, name, meaning, of, lambda seen, step: settled_from(seen[CROSSED]),
+        f"within {radius:g} m after",
+    )  # fmt: skip
 
 
 @cache  # an accumulator's numbers are found by the accumulator itself

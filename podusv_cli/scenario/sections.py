@@ -123,10 +123,13 @@ class MetricSettings(Component):
 
 
 class Claim(Component):
-    """A published sentence, and how the runs are to decide on it."""
+    """A sentence, published or somebody's own, and how the runs are to decide on it."""
 
     says: str = value(..., "", "the claim, in a sentence of your own")
-    source: str = value(..., "", "where it was published: section, figure, equation")
+    source: str = value(
+        "ours", "", "where it was published: section, figure, equation; what begins with `ours` "
+        "was not published: it holds or fails, where a published claim is reproduced or not",
+    )  # fmt: skip
     expect: str = value(..., "", "the claim as an expression over runs; see podusv docs claims")
     given: str = value(
         "", "", "a condition without which the claim has no meaning: if it fails, cannot tell"

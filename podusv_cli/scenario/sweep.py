@@ -77,7 +77,10 @@ class StudyClaim(Component):
     """A sentence about all runs of a study, and how these decide on it."""
 
     says: str = value(..., "", "the claim, in a sentence of your own")
-    source: str = value(..., "", "where it was published, or `ours`")
+    source: str = value(
+        "ours", "", "where it was published; what begins with `ours` was not published: it holds "
+        "or fails, where a published claim is reproduced or not",
+    )  # fmt: skip
     expect: str = value(
         ..., "", "the claim as an expression over all draws; see podusv docs study_claims"
     )

@@ -9,12 +9,14 @@ from typing import NamedTuple
 
 from podusv_cli.studies.study.claims import Link, ParsedClaim
 from podusv_cli.studies.study.samples import FAILURES, SHARE
+from podusv_cli.studies.study.statistics import Interval, digits
 from podusv_cli.studies.study.verdict import Statistic, StudyVerdict
 
 SIGNS: dict[type[ast.cmpop], str] = {
     ast.Lt: "below", ast.LtE: "at most", ast.Gt: "above", ast.GtE: "at least",
 }  # fmt: skip
 UPWARD = (ast.Gt, ast.GtE)
+FORMS = {False: ".4g", True: ".3g%"}  # of shares
 MARGIN = 0.12  # of an axis beyond what is on it
 
 
@@ -51,9 +53,9 @@ def _bar(link: Link, part: Statistic) -> Bar:
     bound = place(link.bound)
     asked = (bound, 100.0) if isinstance(link.sign, UPWARD) else (0.0, bound)
     estimate = place(part.estimate) if math.isfinite(part.estimate) else None
-    ends = (_number(first, shares=shares), _number(last, shares=shares))
+    ends = [f"{Interval(end, math.nan, math.nan):{FORMS[shares]}}" for end in (first, last)]
     words = _words(link, part, shares=shares)
-    return Bar(words, place(part.low), place(part.high), estimate, bound, asked, ends)
+    return Bar(words, place(part.low), place(part.high), estimate, bound, asked, (ends[0], ends[1]))
 
 
 def _axis(link: Link, part: Statistic, *, shares: bool) -> tuple[float, float]:
@@ -66,18 +68,7 @@ def _axis(link: Link, part: Statistic, *, shares: bool) -> tuple[float, float]:
 
 
 def _words(link: Link, part: Statistic, *, shares: bool) -> str:
-    estimate, low, high, bound = (
-        _number(number, shares=shares)
-        for number in (part.estimate, part.low, part.high, link.bound)
-    )
     at = f" at {part.cell}" if part.cell else ""
-    asked = f"compared with: {SIGNS[type(link.sign)]} {bound}"
-    return f"{link.text}{at}: {estimate}, between {low} and {high}; {asked}"
-
-
-def _number(number: float, *, shares: bool) -> str:
-    if math.isnan(number):
-        return "unknown"
-    if math.isinf(number):
-        return "a failure" if number > 0 else "no limit"
-    return f"{100 * number:.3g} %" if shares else f"{number:.4g}"
+    interval = Interval(part.estimate, part.low, part.high).text(FORMS[shares])
+    bound = digits(link.bound * (100.0 if shares else 1.0), ".4g") + (" %" if shares else "")
+    return f"{link.text}{at}: {interval}; compared with: {SIGNS[type(link.sign)]} {bound}"

@@ -87,7 +87,10 @@ def _laws(results: Results) -> Iterator[tuple[str, str, str, str, list[str]]]:
         one, medians = rows.iloc[0], rows.set_index("metric").q50
         failed = f"{round(one.failed * one.n)} of {one.n}"
         share = Interval.of(one, "failed").ends(".3g%")
-        numbers = [digits(medians.get(name, np.nan)) for name in results.shown]
+        numbers = [
+            digits(medians.get(name, np.nan), infinite=results.known[name].infinite)
+            for name in results.shown
+        ]
         yield law, cell, failed, share, numbers
 
 
@@ -127,7 +130,7 @@ def _pairs(results: Results) -> list[Any]:
     """The rows of the shown metrics, in their order."""
     rows: list[Any] = results.pairs.to_dict("records")
     for row in rows:
-        row["interval"] = Interval.of(row, "ratio").ends(".4g")
+        row["ratio"] = Interval.of(row, "ratio").text(".4g")
     return [row for name in results.shown for row in rows if row["metric"] == name]
 
 
@@ -136,10 +139,11 @@ def _numbers(results: Results) -> list[list[str]]:
     rows: list[Any] = results.summary.to_dict("records")
     return [
         [one["law"], one["cell"], one["metric"], one["unit"],
-         *(digits(one[q]) for q in ("q05", "q25", "q50")),
-         Interval.of(one, "q50").ends(""),
-         *(digits(one[q]) for q in ("q75", "q95"))]
+         *(digits(one[q], infinite=word) for q in ("q05", "q25")),
+         Interval.of(one, "q50").text(infinite=word),
+         *(digits(one[q], infinite=word) for q in ("q75", "q95"))]
         for one in rows if one["metric"] in results.shown
+        for word in [results.known[one["metric"]].infinite]
     ]  # fmt: skip
 
 

@@ -70,9 +70,13 @@ class Results:
 
     @property
     def shown(self) -> list[str]:
-        """The metrics that the answer is about: those of the claims, and the most common."""
+        """The metrics that the answer is about: those of the claims, and the most common.
+
+        Those that a reader sees first come before the others.
+        """
         told = " ".join(claim.expect for claim in self.plan.sweep.claims.values())
-        return [m for m in self.runs.metrics if m in ALWAYS or f".{m}" in told]
+        shown = [m for m in self.runs.metrics if m in ALWAYS or f".{m}" in told]
+        return sorted(shown, key=lambda name: not self.known[name].headline)
 
     def without_verdicts(self, contradicted: str) -> Results:
         """The tables alone, where the runs are not what their logs say."""
@@ -80,19 +84,23 @@ class Results:
 
     def cells(self) -> tuple[list[str], list[list[str]]]:
         """Head and rows of the table of the answer: failures and medians of every law."""
-        head = ["law", "cell", "failed", *(f"{name}, median" for name in self.shown)]
+        several, about = len(self.runs.cells) > 1, [self.known[name] for name in self.shown]
+        medians = (f"median of {one.row} [{one.unit}]" for one in about)
+        head = ["law", *(["cell"] if several else []), "failed", *medians]
         rows = []
         for law in self.runs.laws:
             for cell in self.runs.cells:
                 mine = self.summary[(self.summary.law == law) & (self.summary.cell == cell)]
-                rows.append([law, cell or "-", *self._row(mine.set_index("metric"))])
+                place = [law, cell] if several else [law]
+                rows.append([*place, *self._row(mine.set_index("metric"))])
         return head, rows
 
     def _row(self, mine: pd.DataFrame) -> list[str]:
         if not len(mine):  # no run yet
             return ["-"] * (1 + len(self.shown))
         failed = f"{Interval.of(mine.iloc[0], 'failed'):.3g%}"
-        return [failed, *(digits(mine.q50.get(name, np.nan)) for name in self.shown)]
+        medians = ((mine.q50.get(name, np.nan), self.known[name].infinite) for name in self.shown)
+        return [failed, *(digits(number, infinite=word) for number, word in medians)]
 
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints."""

@@ -41,30 +41,45 @@ class Interval(NamedTuple):
         return {name: self.estimate, f"{name}_low": self.low, f"{name}_high": self.high}
 
     def __format__(self, form: str) -> str:
+        """`0.12 [0.1, 0.14]`, as `text` gives it."""
+        return self.text(form)
+
+    def text(self, form: str = "", infinite: str = "failed") -> str:
         """`0.12 [0.1, 0.14]`, or the estimate alone where there is no interval.
 
-        With a % at its end the form is that of percentages; an empty one is as `digits`.
+        With a % at its end the form is that of percentages; an empty one is as `digits`. Where the
+        ends print as the estimate does, words take their place.
         """
-        estimate, low, high = self._texts(form)
-        ends = "" if np.isnan(self.low) else f" [{low}, {high}]"
-        return f"{estimate}{' %' if form.endswith('%') else ''}{ends}"
+        estimate, low, high = self._texts(form, infinite)
+        whole = estimate + self._percent(form)
+        if np.isnan(self.low):
+            return whole
+        if not low == estimate == high:
+            return f"{whole} [{low}, {high}]"
+        return whole if np.isinf(self.estimate) else f"{whole}, no spread"
 
-    def ends(self, form: str) -> str:
-        """`0.1 to 0.14`, or `-` where there is no interval."""
-        _, low, high = self._texts(form)
-        unit = " %" if form.endswith("%") else ""
-        return "-" if np.isnan(self.low) else f"{low} to {high}{unit}"
+    def ends(self, form: str, infinite: str = "failed") -> str:
+        """`0.1 to 0.14`, one of both where they print the same, `-` without an interval."""
+        _, low, high = self._texts(form, infinite)
+        ends = low if low == high else f"{low} to {high}"
+        return "-" if np.isnan(self.low) else ends + self._percent(form)
 
-    def _texts(self, form: str) -> list[str]:
+    @staticmethod
+    def _percent(form: str) -> str:
+        return " %" if form.endswith("%") else ""
+
+    def _texts(self, form: str, infinite: str) -> list[str]:
         factor, form = (100.0, form[:-1]) if form.endswith("%") else (1.0, form)
-        return [f"{factor * number:{form}}" if form else digits(number) for number in self]
+        return [digits(factor * number, form or ".5g", infinite) for number in self]
 
 
-def digits(number: float) -> str:
-    """A metric over all draws; infinite is a failed run, not a number is none."""
+def digits(number: float, form: str = ".5g", infinite: str = "failed") -> str:
+    """A number over all draws; `infinite` says what its being infinite means, NaN is a dash."""
     if np.isnan(number):
         return "-"
-    return "failed" if np.isinf(number) else f"{number:.5g}"
+    if np.isinf(number):
+        return infinite if number > 0.0 else "no limit"
+    return f"{number:{form}}" if number else "0"
 
 
 def share(yes: Any, n: Any, level: float, unknown: Any = 0) -> Interval:

@@ -100,7 +100,7 @@ class StudyVerdict(Verdict):
         if self.broken:
             yield f"{self.broken} runs crashed, hung or were invalid, and count as failed"
         if self.without_broken != self.answer:
-            other = ANSWERS[self.without_broken]
+            other = self.word_for(self.without_broken)
             yield f"these runs decide the verdict: without their draws it would be `{other}`"
 
     @property
@@ -112,7 +112,7 @@ class StudyVerdict(Verdict):
         if not self.draws:
             return "no draw has runs of all laws in the claim"
         if None not in self.by_cell.values():
-            cells = (f"{ANSWERS[answer]} at {cell}" for cell, answer in self.by_cell.items())
+            cells = (f"{self.word_for(answer)} at {cell}" for cell, answer in self.by_cell.items())
             return f"the cells disagree: {', '.join(cells)}"
         if any(part.unknown == part.n for part in self.parts):
             return "no run has a number that the claim is about"

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from podusv_cli.studies.study.statistics import Interval
+from podusv_cli.studies.study.statistics import Interval, digits
 from podusv_cli.studies.tuning.plan import ENOUGH, is_few
 from podusv_cli.studies.tuning.results import MARGIN, Results
 from podusv_cli.studies.tuning.trials import FINISHED
@@ -101,8 +101,8 @@ def _overfitted(results: Results) -> Iterator[str]:
         taken, *others = results.spread(law)
         if others and taken > (1.0 + MARGIN) * min(others):
             yield (
-                f"{law}: the repeat that is best on the training draws has {taken:.4g} on the "
-                f"fresh ones, another {min(others):.4g}; more draws for training (tune.train) may "
+                f"{law}: the repeat that is best on the training draws has {digits(taken, '.4g')} "
+                f"on the fresh ones, another {digits(min(others), '.4g')}; more draws for training (tune.train) may "
                 "help"
             )
 
@@ -115,7 +115,7 @@ def _beyond(results: Results) -> Iterator[str]:
         if row["held_in_training"] and not row["holds"]:
             yield (
                 f"{row['law']}: {row['inequality']} held on the training draws; on the fresh ones "
-                f"it is {row['value']:.4g}"
+                f"it is {digits(row['value'], '.4g')}"
             )
 
 
