@@ -225,7 +225,7 @@ def test_a_bar_with_an_open_end_runs_to_the_edge():
     assert bar.high == 100.0
     assert "16 [12, failed]" in bar.words
     lost = only_bar("quantile(a.iae, 0.95) <= 10", runs)
-    assert (lost.estimate, lost.words.split(": ")[1].split(",")[0]) == (None, "a failure")
+    assert (lost.estimate, lost.words.split(": ")[1].split(",")[0]) == (None, "failed [17")
 
 
 # --- the page

@@ -78,13 +78,14 @@ def rows(
     whole = frame.notna().any()  # a run that did not finish has no metric
     for name, numbers in frame.iterrows():
         best = math.nan if name in unranked else numbers.drop(list(unsettled)).min()
-        first, never = numbers.iloc[0], known[str(name)].happens
+        first, metric = numbers.iloc[0], known[str(name)]
+        never = metric.happens & whole & numbers.isna()
         texts = [
-            "never" if never and whole[label] and math.isnan(number) else
+            "never" if never[label] else "no limit" if metric.margin and math.isinf(number) else
             _cell(number, first, math.nan if label in unsettled else best, i)
             for i, (label, number) in enumerate(numbers.items())
         ]  # fmt: skip
-        found.append(Row(known[str(name)], texts))
+        found.append(Row(metric, texts))
     return sorted(found, key=lambda row: not row.metric.headline)
 
 

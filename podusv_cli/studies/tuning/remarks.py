@@ -102,8 +102,8 @@ def _overfitted(results: Results) -> Iterator[str]:
         if others and taken > (1.0 + MARGIN) * min(others):
             yield (
                 f"{law}: the repeat that is best on the training draws has {digits(taken, '.4g')} "
-                f"on the fresh ones, another {digits(min(others), '.4g')}; more draws for training (tune.train) may "
-                "help"
+                f"on the fresh ones, another {digits(min(others), '.4g')}; more draws for training "
+                "(tune.train) may help"
             )
 
 
