@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -44,6 +45,16 @@ def test_a_planted_optimum_is_found(done):
     assert row["ratio_high"] < 0.05
     assert (row["rank_before"], row["rank_after"]) == (2, 1)
     assert (row["better_than_before"], row["better_than_after"]) == (0, 1)
+
+
+def test_a_law_that_does_not_end_at_its_target_has_no_rank(done):
+    far = done.results.plan.scenario
+    far = far.model_copy(
+        update={"metrics": far.metrics.model_copy(update={"settling_radius": 1e-9})}
+    )
+    results = replace(done.results, plan=replace(done.results.plan, scenario=far))
+    assert results.laws.rank_after.isna().all()
+    assert results.laws.place_low.isna().all()
 
 
 def test_every_search_spends_the_whole_budget_and_counts_pruned_trials(done):

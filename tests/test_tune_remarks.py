@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import pandas as pd
 import pytest
 
+from podusv_cli.metrics.table import METRICS
 from podusv_cli.studies.tuning import remarks
 from podusv_cli.studies.tuning.trials import CUT, FINISHED
 
@@ -24,10 +25,15 @@ def pairs(ratio, low, high):
 )
 def test_the_answer_tells_the_least_objective_and_who_wins_in_the_same_draw(ratio, ends, says):
     results = SimpleNamespace(
-        laws=pd.DataFrame({"law": ["li", "pid", "dsc"], "repeats_median": [3.0, 2.0, 9.0]}),
+        laws=pd.DataFrame({
+            "law": ["li", "pid", "dsc", "lost"], "repeats_median": [3.0, 2.0, 9.0, 1.0],
+            "rank_after": [2, 1, 3, None],
+        }),
         searches=pairs(ratio, *ends), shown=["iae"],
-        plan=SimpleNamespace(tune=SimpleNamespace(objectives=["median(iae)"])),
+        plan=SimpleNamespace(tune=SimpleNamespace(objectives=["median(iae)"]), metrics=METRICS),
     )  # fmt: skip
+    (unranked,) = remarks._unsettled(results)
+    assert unranked.endswith(": lost")
     (text,) = remarks._answer(results)
     assert text.startswith("pid has the least median(iae) in the median of its searches")
     assert text.endswith(says)

@@ -56,19 +56,17 @@ def tune(
 
 def _report(done: Tuned) -> None:
     from podusv_cli.studies.tuning.remarks import remarks
-    from podusv_cli.studies.tuning.report import intervals, percent, ratio, spread
+    from podusv_cli.studies.tuning.report import intervals, percent, ratio, spread, turned
 
     results = done.results
     rows = [
-        [row["law"], f"{row['rank_before']} -> {row['rank_after']}",
-         f"{row['better_than_before']} -> {row['better_than_after']}",
+        [row["law"], turned(row, "rank"), turned(row, "better_than"),
          intervals(row, "before"), intervals(row, "after"),
          ratio(row) if row["runs"] else "-",
          f"{percent(row, 'failed_before')} -> {percent(row, 'failed_after')}", spread(row)]
         for row in results.laws.sort_values("rank_after").to_dict("records")
     ]  # fmt: skip
-    first = results.shown[0] if results.shown else "metric"
-    ratios = f"{first}, after / before"
+    ratios = "ratio, after / before"
     head = ["law", "rank", "better than", "before", "after", ratios, "failed", "repeats"]
     echo(
         f"{' and '.join(results.plan.tune.objectives)} on {results.plan.tune.validate} fresh draws:"

@@ -141,8 +141,8 @@ def _verdict(
     if not parsed.claim.untestable:
         return verdict
     shown = f"what these runs show: {verdict.in_words}"
-    doubts = (f"not testable: {parsed.claim.untestable}", shown, reason)
-    return replace(verdict, answer=None, reason="; ".join(filter(None, doubts)))
+    reasons = (f"not testable: {parsed.claim.untestable}", shown, reason)
+    return replace(verdict, answer=None, reason="; ".join(filter(None, reasons)))
 
 
 def with_timed(verdicts: Sequence[RunsVerdict], timed: Sequence[RunsVerdict], place: str) -> str:

@@ -79,9 +79,9 @@ def rows(
     for name, numbers in frame.iterrows():
         best = math.nan if name in unranked else numbers.drop(list(unsettled)).min()
         first, metric = numbers.iloc[0], known[str(name)]
-        never = metric.happens & whole & numbers.isna()
+        never = numbers.index[whole & numbers.isna()] if metric.happens else ()
         texts = [
-            "never" if never[label] else "no limit" if metric.margin and math.isinf(number) else
+            "never" if label in never else "no limit" if metric.margin and math.isinf(number) else
             _cell(number, first, math.nan if label in unsettled else best, i)
             for i, (label, number) in enumerate(numbers.items())
         ]  # fmt: skip

@@ -12,6 +12,7 @@ from podusv_cli.core.escaping import lines
 if TYPE_CHECKING:
     from jinja2 import Environment
 
+NO_BREAK = "\N{NO-BREAK SPACE}"
 MOST_LINES = 3  # of a text that is shown as it is
 POWERS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -49,7 +50,9 @@ def environment(package: str) -> Environment:
         loader=loader, autoescape=True, finalize=_shown, undefined=StrictUndefined,
         trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
-    made.filters |= {"sentence": sentence, "raised": _raised}
+    made.filters |= {
+        "sentence": sentence, "raised": _raised, "number": _number, "label": _label
+    }  # fmt: skip
     return made
 
 
@@ -68,6 +71,21 @@ def sentence(text: str) -> str:
 def _raised(unit: str) -> str:
     """The unit with its powers raised."""
     return re.sub(r"(?<=[A-Za-z])\d", lambda power: power[0].translate(POWERS), unit)
+
+
+def _number(text: object) -> str:
+    """A number of a table with what stands in brackets, before which alone it may break."""
+    from markupsafe import escape  # with jinja2
+
+    whole = escape(lines(text)).replace(" ", NO_BREAK)
+    return re.sub(NO_BREAK + r"(?=[\[(])", " ", whole)
+
+
+def _label(text: object) -> str:
+    """A name of a run or law, which may break after its underscores."""
+    from markupsafe import Markup, escape  # with jinja2
+
+    return escape(lines(text)).replace("_", Markup("_<wbr>"))
 
 
 def flat(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:

@@ -17,14 +17,16 @@ ENOUGH_SEARCHES = 6  # with three, of 14 equal laws some are told apart in 40 % 
 def remarks(results: Results) -> list[str]:
     """The answer first, then what it hangs on, and what a user may want to change."""
     return [
-        *_answer(results), *_once(results), *_bounds(results), *_kept(results), *_idle(results),
-        *_unsound(results), *_few(results), *_overfitted(results), *_beyond(results),
+        *_answer(results), *_unsettled(results), *_once(results), *_bounds(results),
+        *_kept(results), *_idle(results), *_unsound(results), *_few(results),
+        *_overfitted(results), *_beyond(results),
     ]  # fmt: skip
 
 
 def _answer(results: Results) -> Iterator[str]:
     """The two best laws by the median of their searches, and in the same draw."""
-    ordered = results.laws.sort_values("repeats_median").law.tolist()
+    ranked = results.laws[results.laws.rank_after.notna()]
+    ordered = ranked.sort_values("repeats_median").law.tolist()
     if len(ordered) < 2:
         return
     best, second = ordered[:2]
@@ -33,10 +35,20 @@ def _answer(results: Results) -> Iterator[str]:
         if {row["a"], row["b"]} == {best, second}:
             yield (
                 f"{best} has the least {results.plan.tune.objectives[0]} in the median of its "
-                f"searches; the ratio of the median {results.shown[0]} of {row['a']} and "
+                f"searches; the ratio of the median {results.plan.metrics[results.shown[0]].row} "
+                f"({results.shown[0]}) of {row['a']} and "
                 f"{row['b']} over searches and draws is {Interval.of(row, 'ratio'):.3f}: "
                 f"{_verdict(row)}"
             )
+
+
+def _unsettled(results: Results) -> Iterator[str]:
+    laws = results.laws[results.laws.rank_after.isna()].law
+    if len(laws):
+        yield (
+            f"not ranked, since they do not end at their target in half of the fresh draws: "
+            f"{', '.join(laws)}"
+        )
 
 
 def _once(results: Results) -> Iterator[str]:

@@ -7,6 +7,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
+
 from podusv_cli.pages.page import Picture, environment, flat, value_text
 from podusv_cli.process.extras import Failure
 from podusv_cli.studies.study.sessions import sessions
@@ -35,6 +37,7 @@ def page(
         objectives=" and ".join(plan.tune.objectives),
         laws=list(_laws(results)),
         remarks=remarks(results),
+        words={name: about.row for name, about in plan.metrics.items()},
         pairs=list(_pairs(results)),
         few=FEW,
         metric=results.shown[0] if results.shown else "",
@@ -58,10 +61,19 @@ def _laws(results: Results) -> Iterator[dict[str, Any]]:
     for row in ordered:
         yield row | {
             "before": intervals(row, "before"), "after": intervals(row, "after"),
-            "failed": f"{percent(row, 'failed_before')}, then {percent(row, 'failed_after')}",
+            "failed": f"{percent(row, 'failed_before')} -> {percent(row, 'failed_after')}",
+            "rank": turned(row, "rank"), "better": turned(row, "better_than"),
             "change": ratio(row) if row["runs"] else "-",
             "spread": spread(row), "place": place(row),
         }  # fmt: skip
+
+
+def turned(row: Any, name: str) -> str:
+    """A count before and after; a dash for a law that is not ranked."""
+    return " -> ".join(
+        "-" if pd.isna(row[f"{name}_{when}"]) else f"{row[f'{name}_{when}']}"
+        for when in ("before", "after")
+    )
 
 
 def intervals(row: Any, when: str) -> str:

@@ -93,22 +93,35 @@ class Results:
         """Every law: failures and objective before and after on the fresh draws, and its ranks.
 
         `place_low` and `place_high` are the ranks that it may have over all searches and draws; NaN
-        where each law was searched once.
+        where each law was searched once. A law that does not settle has no rank and no place.
         """
         table = pd.DataFrame([self._law(law) for law in self.plan.laws])
         for when in ("before", "after"):
-            ranks = table[f"objective_{when}"].replace(np.inf, 1e300).rank(method="min")
-            table[f"rank_{when}"] = ranks.astype(int)
+            objectives = [
+                found if self.settles(law, when) and math.isfinite(found) else math.nan
+                for law, found in zip(table.law, table[f"objective_{when}"], strict=True)
+            ]
+            table[f"rank_{when}"] = pd.Series(objectives).rank(method="min").astype("Int64")
             table[f"better_than_{when}"] = [self._better_than(law, when) for law in table.law]
-        found: dict[str, tuple[float, float]] = {
-            **searches.places(self.searches, [*self.plan.laws])
-        }
-        if self.plan.tune.repeats == 1:
-            found = dict.fromkeys(found, (math.nan, math.nan))
+        found: dict[str, tuple[float, float]] = {}
+        if self.plan.tune.repeats > 1:
+            ranked = table.law[table.rank_after.notna()].tolist()
+            pairs = self.searches
+            found |= searches.places(pairs[pairs.a.isin(ranked) & pairs.b.isin(ranked)], ranked)
         table["place_low"], table["place_high"] = zip(
-            *(found[law] for law in table.law), strict=True
+            *(found.get(law, (math.nan, math.nan)) for law in table.law), strict=True
         )
         return table
+
+    def settles(self, law: str, when: str) -> bool:
+        """Whether a law ends at its target in at least half of the fresh draws, before or after."""
+        met = self.met(law if when == "before" else self.after(law))
+        scenario = self.plan.scenario.model_copy(update={"controller": self.plan.laws[law]})
+        ends = [
+            not failed and scenario.at_target({name: met.metrics[name][i] for name in met.metrics})
+            for i, failed in enumerate(met.failed)
+        ]
+        return 2 * sum(ends) >= len(ends)
 
     @cached_property
     def searches(self) -> pd.DataFrame:
