@@ -89,9 +89,12 @@ def test_the_answer_counts_the_claims_and_lists_them_in_words():
 
 def test_the_answer_says_who_is_best_in_what():
     answer = section("answer")
-    assert [term.text for term in answer.all("dt")] == ["a smallest in 1", "b smallest in 1"]
-    first = answer.all("dd")[0]
-    assert [told.text for told in answer.all("dd")] == [METRICS["energy"].row, "1 further number"]
+    assert [term.text for term in answer.all("dt")] == ["a", "b", "c"]
+    first, second, third = answer.all("dd")
+    effort = METRICS["energy"].row
+    assert first.text == f"{effort.capitalize()}: 0 J. Best in {effort}."
+    assert second.text == f"{effort.capitalize()}: 3 J. Best in 1 further number."
+    assert third.text == f"{effort.capitalize()}: 1 J."
     assert first.all("abbr")[0].attributes["title"] == f"{METRICS['energy'].meaning} [J]"
     assert "Nothing to rank" in section("answer", table=FRAME[["a", "lost"]]).text
 

@@ -3,28 +3,31 @@
 from __future__ import annotations
 
 import inspect
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import pandas as pd
 
 from podusv_cli.comparison import chase, settings, stability
 from podusv_cli.comparison.claims import RunsVerdict
 from podusv_cli.comparison.differences import as_text
-from podusv_cli.comparison.table import leaders, rows
+from podusv_cli.comparison.table import Row, leaders, rows
 from podusv_cli.core.component import Component
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.expressions.verdict import by_answer
 from podusv_cli.findings.finding import finding_kinds
 from podusv_cli.metrics.metric import Metric
-from podusv_cli.metrics.table import METRICS
+from podusv_cli.metrics.table import CLOCKED, METRICS
 from podusv_cli.pages.page import Picture, environment, flat, value_text
 from podusv_cli.scenario.model import Scenario
 
 EQUATION = re.compile(r"\(\d+\)")  # of the first paper
+MANY, FEW = 7, 8  # more runs than MANY stand below each other, with FEW numbers in a table
+FACTS = 3  # numbers of each run in the answer
 BESIDE = 2  # figures beside the answer: trajectory and errors
 
 
@@ -54,9 +57,9 @@ def page(story: Story) -> str:
     from markupsafe import Markup  # with jinja2
 
     figures, parts = [*enumerate(story.figures, 1)], _parts(story)
-    best = leaders(story.table, story.metrics, story.unsettled)
     table = rows(story.table, story.metrics, story.unsettled)
     first = [row for row in table if row.metric.headline] or table
+    standings = _standings(story, first)
     return environment("podusv_cli.comparison").get_template("report.html.j2").render(
         title=story.title,
         story=story,
@@ -64,9 +67,12 @@ def page(story: Story) -> str:
         bad={label: ending for label, ending in story.endings.items() if ending},
         differing=as_text(story.differences),
         answers=by_answer(story.verdicts),
-        leaders={label: _told(names, story.metrics) for label, names in best.items() if names},
+        standings=standings,
+        ranked=any(one.names or one.more for one in standings.values()),
         noticed=_by_code(story.noticed, story.scenario.plugged),
         metrics={row.metric.name: row.metric for row in table},
+        many=MANY,
+        few=FEW,
         single=len(story.table.columns) == 1,
         headlines=first,
         others=table[len(first) :],
@@ -82,10 +88,33 @@ def page(story: Story) -> str:
     )  # fmt: skip
 
 
-def _told(names: Sequence[str], metrics: Mapping[str, Metric]) -> tuple[list[str], int]:
-    """Metrics in which a run is best: those that a reader sees first, and how many others."""
-    first = [name for name in names if metrics[name].headline]
-    return first, len(names) - len(first)
+class Standing(NamedTuple):
+    """A run in the answer: facts, the first metrics in which it is the best, how many others."""
+
+    facts: list[str]
+    names: list[str]
+    more: int
+
+
+def _standings(story: Story, rows: Sequence[Row]) -> dict[str, Standing]:
+    """Every run that finished, by label; the rows are those that a reader sees first."""
+    best = leaders(story.table, story.metrics, story.unsettled)
+    told = {}
+    for label in story.table.columns[story.table.notna().any()]:
+        numbers = ((metric, story.table[label][metric.name]) for metric, _ in rows[:FACTS])
+        facts = [_fact(metric, number) for metric, number in numbers if metric.name not in CLOCKED]
+        names = best.get(label, [])
+        first = [name for name in names if story.metrics[name].headline]
+        told[str(label)] = Standing([*filter(None, facts)], first, len(names) - len(first))
+    return told
+
+
+def _fact(metric: Metric, number: float) -> str:
+    """A number in words; empty where there is none."""
+    if math.isnan(number):
+        return f"{metric.row}: never" if metric.happens else ""
+    colon, unit = "" if metric.happens else ":", "" if metric.unit == "1" else f" {metric.unit}"
+    return f"{metric.row}{colon} {number:.3g}{unit}"
 
 
 def _by_code(findings: Sequence[Finding], plugins: Plugins) -> dict[str, tuple[str, list[Finding]]]:

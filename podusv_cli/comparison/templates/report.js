@@ -43,18 +43,18 @@
   for (const run of runs) {
     run.points = points(run.x, run.y);
     const course = run.x_d ? [run.x_d, run.y_d] : run.legs;
-    if (course.length) make(world, "polyline", { points: points(...course).join(" "), stroke: "#444", "stroke-width": 0.8 });
+    if (course.length) make(world, "polyline", { points: points(...course).join(" "), class: "course", "stroke-width": 0.8 });
     make(world, "polyline", { points: run.points.join(" "), stroke: run.color, "stroke-width": 1.2, class: "ghost" });
     run.trail = make(world, "polyline", line(run, 2));
   }
   for (const run of runs) {
-    run.ring = make(over, "circle", { fill: "none", stroke: "#444", "stroke-dasharray": "2 2" });
-    run.cross = make(over, "path", { d: "M-5 0H5M0 -5V5", stroke: "#111", "stroke-width": 1.6 });
+    run.ring = make(over, "circle", { class: "ring" });
+    run.cross = make(over, "path", { d: "M-5 0H5M0 -5V5", class: "cross", "stroke-width": 1.6 });
     run.hull = make(over, "polygon", { fill: run.color, "fill-opacity": 0.55, stroke: run.color });
-    run.stern = make(over, "line", { stroke: "#111", "stroke-width": 1.5 });
+    run.stern = make(over, "line", { class: "stern", "stroke-width": 1.5 });
   }
-  const bar = make(map, "path", { stroke: "#444", fill: "none" }), barText = make(map, "text", { "text-anchor": "middle" });
-  make(make(map, "g", { transform: "translate(14 26)", stroke: "#444", fill: "none" }), "path", { d: "M0 6V-10M-4 -4L0 -10L4 -4" });
+  const bar = make(map, "path", { class: "compass" }), barText = make(map, "text", { "text-anchor": "middle" });
+  make(make(map, "g", { transform: "translate(14 26)", class: "compass" }), "path", { d: "M0 6V-10M-4 -4L0 -10L4 -4" });
   make(map, "text", { x: 14, y: 46, "text-anchor": "middle" }, "N");
 
   // From metres to pixels: the whole box, or twelve lengths around the first target.
@@ -90,7 +90,7 @@
         .map(([a, b]) => [ox + k * y + a * s + b * c, oy - k * x - a * c + b * s]);
       set(run.hull, "points", corners.join(" "));
       [["x1", 2, 0], ["y1", 2, 1], ["x2", 3, 0], ["y2", 3, 1]].forEach(([name, corner, axis]) => set(run.stern, name, corners[corner][axis]));
-      for (const part of [run.hull, run.stern]) set(part, "class", over ? "lost" : "");
+      for (const part of [run.hull, run.stern]) part.classList.toggle("lost", !!over);
       for (const part of [run.cross, run.ring]) part.style.display = over || !run.x_d ? "none" : "";
       set(run.cross, "transform", `translate(${ox + k * east} ${oy - k * north})`);
       [["cx", ox + k * east], ["cy", oy - k * north], ["r", k * run.standoff]].forEach(([name, value]) => set(run.ring, name, value));
@@ -113,7 +113,7 @@
     trace.replaceChildren();
     set(trace, "viewBox", `0 0 ${width} ${TALL}`);
     for (let power = low; power <= high; power++) {
-      make(trace, "path", { d: `M${LEFT} ${up(10 ** power)}H${width - RIGHT}`, stroke: "#ddd" });
+      make(trace, "path", { d: `M${LEFT} ${up(10 ** power)}H${width - RIGHT}`, class: "rule" });
       make(trace, "text", { x: LEFT - 6, y: up(10 ** power) + 4, "text-anchor": "end" }, `${+(10 ** power).toFixed(3)} m`);
     }
     const clip = make(make(trace, "clipPath", { id: "inside" }), "rect", { x: LEFT, y: TOP, width: Math.max(0, width - LEFT - RIGHT), height: TALL - TOP - BASE });
@@ -121,7 +121,7 @@
     for (const run of traced) make(inside, "polyline", { ...line(run, 1.4), points: run.z_e.map((z, i) => (z === null ? "" : `${across(run.time[i]).toFixed(1)},${up(z).toFixed(1)}`)).join(" ") });
     const tick = round(Math.max(end / 5, 110 * end / width));
     for (let i = 0; i * tick <= end; i++) make(trace, "text", { x: across(i * tick), y: TALL - 5, "text-anchor": "middle" }, `${+(i * tick).toPrecision(6)} s`);
-    cursor = make(trace, "path", { stroke: "#111" });
+    cursor = make(trace, "path", { class: "cursor" });
     trace.style.display = traced.length ? "" : "none";
   };
   const place = () => {
