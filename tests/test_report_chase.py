@@ -106,9 +106,9 @@ def test_runs_that_cannot_be_placed_have_no_animation():
 def test_no_text_ends_the_script_that_holds_it():
     odd = "</script><script>alert(1)</script><!--"
     told = tree(page(chase=chase.chase(shown((odd, recording())))))
-    data, code = told.all("script")
+    shared, data, _ = told.all("script")
     assert json.loads(data.raw)["runs"][0]["label"] == odd
-    assert "use strict" in code.raw
+    assert "use strict" in shared.raw
     assert odd in told.all("ul", kind="key")[0].text
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pandas as pd
 
-from podusv_cli.comparison import chase, claims, report, table
+from podusv_cli.comparison import chase, claims, report, table, traces
 from podusv_cli.comparison.entries import Entry
 from podusv_cli.components.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.core.finding import Finding
@@ -147,7 +147,7 @@ def as_report(
             for name, sheet in figures_of(result.scenarios.values()).items()
             if f"{name}.{IN_REPORT}" in figures
         ]
-    moving = chase.chase(dressed([(e.label, e.recording, e.scenario) for e in result.entries]))
+    shown = dressed([(e.label, e.recording, e.scenario) for e in result.entries])
     story = report.Story(
         title=title, scenario=next(iter(result.scenarios.values())),
         controllers={label: one.controller for label, one in result.scenarios.items()},
@@ -155,7 +155,7 @@ def as_report(
         differences=result.differences,
         noticed=merged(result.warnings), table=result.table, verdicts=result.verdicts,
         theories={entry.label: entry.run.theory for entry in result.entries if entry.run.theory},
-        figures=pictures, provenance=provenance, chase=moving, metrics=result.metrics,
-        unsettled=result.unsettled,
+        figures=pictures, provenance=provenance, chase=chase.chase(shown),
+        traces=traces.traces(shown), metrics=result.metrics, unsettled=result.unsettled,
     )  # fmt: skip
     return report.page(story)

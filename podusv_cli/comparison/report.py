@@ -15,6 +15,7 @@ from podusv_cli.comparison import chase, settings, stability
 from podusv_cli.comparison.claims import RunsVerdict
 from podusv_cli.comparison.differences import as_text
 from podusv_cli.comparison.table import Row, leaders, rows
+from podusv_cli.comparison.traces import PIECES
 from podusv_cli.core.component import Component
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.plugins import Plugins
@@ -48,6 +49,7 @@ class Story:
     provenance: Mapping[str, Any]
     missing: Sequence[str] = ()  # what could not be made, and why
     chase: Mapping[str, Any] = field(default_factory=dict)  # see `chase.chase`
+    traces: Mapping[str, Any] = field(default_factory=dict)  # see `traces.traces`
     metrics: Mapping[str, Metric] = field(default_factory=lambda: METRICS)  # of the table
     unsettled: Sequence[str] = ()  # runs that do not end at their target
 
@@ -85,6 +87,8 @@ def page(story: Story) -> str:
         cited=any(EQUATION.search(said) for _, said, _ in parts),
         provenance=[(key, value_text(value)) for key, value in flat(story.provenance)],
         chase_json=Markup(chase.as_json(dict(story.chase))),
+        traces_json=Markup(chase.as_json(dict(story.traces))),
+        pieces=PIECES,
     )  # fmt: skip
 
 

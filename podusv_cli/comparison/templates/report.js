@@ -1,4 +1,3 @@
-"use strict";
 (() => {
   const { box, end, runs } = JSON.parse(document.getElementById("chase-data").textContent);
   const stage = document.getElementById("stage");
@@ -9,15 +8,6 @@
   const LEAST = 22; // pixels of a hull's length
   const LOW = 1e-3, LEFT = 54, RIGHT = 20, TOP = 8, BASE = 20, TALL = 130; // the trace: metres, pixels
   let now = 0, playing = false, last = 0, width = 0, height = 0;
-
-  const make = (parent, tag, attributes = {}, text = "") => {
-    const element = document.createElementNS("http://www.w3.org/2000/svg", tag);
-    for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
-    element.textContent = text;
-    return parent.appendChild(element);
-  };
-  const set = (element, name, value) => element.setAttribute(name, value);
-  const line = (run, weight) => ({ stroke: run.color, "stroke-width": weight, "stroke-dasharray": run.dash.map((d) => d * weight).join(" ") });
 
   // The last frame that is not after the time.
   const row = (run, t) => {
@@ -65,11 +55,6 @@
     }
     const { north, east } = at(runs[0], now), k = Math.min(width, height) / (12 * Math.max(...runs.map((run) => run.length)));
     return { k, ox: width / 2 - k * east, oy: height / 2 + k * north };
-  };
-  // The largest of 1, 2, 5, 10, 20, ... that is not above.
-  const round = (most) => {
-    const power = 10 ** Math.floor(Math.log10(most));
-    return +([5, 2, 1].find((n) => n * power <= most) * power).toPrecision(1);
   };
   const scaleBar = (k) => {
     const length = round(width / 5 / k), x = width - 14 - k * length;
