@@ -62,10 +62,12 @@ def test_the_answer_comes_first(whole, told):
     answer = section(told, "answer")
     (verdict,) = whole.results.verdicts
     (counts,) = answer.all("div", kind="counts")
-    assert f"1 {verdict.verdict}" in counts.text
+    assert f"1 {verdict.in_words}" in counts.text
+    assert not verdict.published
     assert "S1 Li <b>tracks</b> better." in answer.text
     rows = answer.rows()
-    assert rows[0] == ["law", "cell", "failed", "share", "iae", "z_e_steady"]
+    words = [f"{METRICS[n].row} [{METRICS[n].unit}]" for n in ("iae", "z_e_steady")]
+    assert rows[0] == ["law", "cell", "failed", "share", *words]
     assert len(rows) == 1 + 2 * 4
     for law, cell, failed, *_ in rows[1:]:
         runs = whole.results.runs

@@ -22,6 +22,7 @@ from podusv_cli.studies.study.statistics import Interval, digits
 from podusv_cli.studies.study.unit import STATUSES
 from podusv_cli.studies.study.words import in_words
 
+FEW = 5  # laws, whose pairs are no more than ten
 FIRST = 20  # rows of a table of runs
 SESSION = ("started", "duration_s", "runs", "podusv", "python", "platform.processor", "argv")
 
@@ -50,7 +51,7 @@ def page(
     missing: Sequence[Failure],
 ) -> str:  # fmt: skip
     """The whole report."""
-    plan, beside = results.plan, _beside(figures)
+    plan, beside = results.plan, _beside(figures, len(results.runs.laws))
     ordered = [*beside, *(picture for picture in figures if picture not in beside)]
     numbered = [*enumerate(ordered, 1)]
     return environment("podusv_cli.studies.study").get_template("study.html.j2").render(
@@ -160,10 +161,11 @@ def _varied(sweep: Sweep, results: Results) -> list[tuple[str, str, str]]:
     ]
 
 
-def _beside(figures: Sequence[Picture]) -> list[Picture]:
-    """The first distribution and the first ratios."""
+def _beside(figures: Sequence[Picture], laws: int) -> list[Picture]:
+    """The first distribution, and the first ratios where these are few enough to stand there."""
     first = {picture.name.partition("-")[0]: picture for picture in reversed(figures)}
-    return [first[kind] for kind in ("distribution", "ratios") if kind in first]
+    kinds = ("distribution", "ratios") if laws <= FEW else ("distribution",)
+    return [first[kind] for kind in kinds if kind in first]
 
 
 def _sessions(folder: Path) -> list[list[str]]:
