@@ -83,7 +83,8 @@ def optimum(
 def _report(done: Optimum) -> None:
     from podusv_cli.optimum.collocation import TOLERANCE
 
-    name, unit = done.minimised, done.run.units[done.minimised]
+    name = done.minimised
+    _, unit = done.run.rows[name]
     rows = [
         [s.start, f"{s.step:.4g} s", f"{s.integral:.7g}", str(s.iterations), f"{s.seconds:.1f} s"]
         for s in done.stages

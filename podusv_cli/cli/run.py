@@ -62,13 +62,13 @@ def run(
 
 
 def _report(done: Finished, verbose: bool) -> None:
-    for name, unit in done.units.items():
-        if name in done.metrics and done.status == "finished":
-            number = done.metrics[name]
-            never = name.startswith("settling_time") and math.isnan(number)
-            shown = "never" if never else f"{number:.6g}"
-            echo(f"{name:<18} {shown:>12} {unit if shown != 'never' else ''}".rstrip())
+    rows = {name: row for name, row in done.rows.items() if name in done.metrics}
+    for name, (words, unit) in rows.items() if done.status == "finished" else ():
+        number = done.metrics[name]
+        never = name.startswith("settling_time") and math.isnan(number)
+        shown = f"{'never':>12}" if never else f"{number:>12.6g} {unit if unit != '1' else ''}"
+        echo(f"{words:<46} {shown:<20}  {name}")
     if verbose:
         for name, seconds in done.timing.items():
-            echo(f"{name:<18} {seconds:>12.4f} s")
+            echo(f"{name:<46} {seconds:>12.4f} s")
     echo(f"{done.controller} {done.status}: {done.folder}")

@@ -33,6 +33,12 @@ METRICS = metrics_with(())
 # Measured times, which never repeat
 CLOCKED = tuple(name for name, metric in METRICS.items() if metric.unit == "ns")
 
+
+def headlines_first(known: Mapping[str, Metric]) -> list[Metric]:
+    """The metrics in the order in which a reader sees them."""
+    return sorted(known.values(), key=lambda metric: not metric.headline)
+
+
 Failed = Callable[[str, Exception], None]
 Parts = tuple[tuple[Accumulator, int], ...]
 COUNT = 0  # placeholder: how many numbers `first_kernel` gathers

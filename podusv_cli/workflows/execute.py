@@ -23,6 +23,7 @@ from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.findings.finding import postflight, preflight
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.operations import operations
+from podusv_cli.metrics.table import headlines_first
 from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.process.workers import Outcome
@@ -96,7 +97,8 @@ class Finished:
     others: tuple[str, ...] = ()  # runs of a comparison that the scenario also has
     warnings: tuple[Finding, ...] = ()
     missing: tuple[Failure, ...] = ()
-    units: Mapping[str, str] = field(default_factory=dict)  # of all metrics, in their order
+    # words and unit of all metrics, those first that a reader sees first
+    rows: Mapping[str, tuple[str, str]] = field(default_factory=dict)
 
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints of a run."""
@@ -168,7 +170,7 @@ def execute(
     return Finished(
         final, recording.controller, status, message, metrics, watch.total(),
         warnings=warnings, missing=tuple(extras.missing),
-        units={name: m.unit for name, m in task.scenario.known_metrics().items()},
+        rows={m.name: (m.row, m.unit) for m in headlines_first(task.scenario.known_metrics())},
     )  # fmt: skip
 
 
