@@ -1,6 +1,7 @@
 """The HTML report, from numbers planted by hand."""
 
 import math
+from dataclasses import replace
 
 import pandas as pd
 import pytest
@@ -72,6 +73,36 @@ def test_the_report_has_the_table_with_numbers_to_the_right():
     assert told.rows()[told.all("tr").index(row)][1:] == ["m s", "4", "2 (0.5)", "8 (2)", "-"]
     assert [cell.text for cell in row.all(kind="number")] == ["4", "2 (0.5)", "8 (2)", "-"]
     assert [best.text for best in row.all("b")] == ["2 (0.5)"]
+
+
+def test_many_runs_stand_below_each_other_a_few_numbers_to_a_table():
+    labels = [f"a_long_label_of_a_run_{i}" for i in range(report.MANY + 1)]
+    names = [name for name in METRICS if name != "law_ns"]
+    frame = table.table({label: dict.fromkeys(names, 1.0) for label in labels})
+    told = section("comparison", table=frame)
+    tables = told.all("table")
+    assert [row[0] for row in tables[0].rows()[1:]] == labels
+    assert max(len(row) for one in tables for row in one.rows()) <= report.FEW + 1
+    shown = [code.text for one in tables for code in one.all("code")]
+    assert sorted(shown) == sorted(names)
+    few = section("comparison", table=frame[labels[: report.MANY]])
+    assert few.all("table")[0].rows()[0][2:] == labels[: report.MANY]
+
+
+def test_only_the_headline_numbers_are_unfolded():
+    told = section("comparison")
+    folded = [code.text for part in told.all("details", kind="others") for code in part.all("code")]
+    assert folded == ["iae"]
+    assert [code.text for code in told.all("table")[0].all("code")] == ["energy", "law_ns"]
+
+
+def test_what_is_ours_holds_or_fails_and_only_what_was_published_is_reproduced():
+    ours = [replace(v, claim=v.claim.model_copy(update={"source": "ours"})) for v in verdicts()]
+    (counts,) = section("answer", verdicts=ours).all("div", kind="counts")
+    assert counts.text == "1 holds 2 fail 1 cannot tell"
+    (counts,) = section("answer", verdicts=[*verdicts(), *ours]).all("div", kind="counts")
+    assert counts.text == "1 reproduced 2 not reproduced 1 holds 2 fail 2 cannot tell"
+    assert [v.as_json()["verdict"] for v in ours] == [v.verdict for v in verdicts()]
 
 
 def test_the_answer_counts_the_claims_and_lists_them_in_words():

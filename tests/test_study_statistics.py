@@ -258,3 +258,17 @@ def test_the_probability_that_any_null_is_decided_keeps_to_the_level(true_effect
         wrong += any(decided[round(0.05 / (1 - levels[i]))][k, i] for i in range(true_effects, 4))
     assert 0.02 < wrong / studies <= 0.05
     assert decided[1][:, true_effects:].any(axis=-1).mean() > 0.05  # without the correction
+
+
+def test_an_interval_without_width_is_said_once() -> None:
+    inf, nan = math.inf, math.nan
+    assert f"{st.Interval(0.12, 0.1, 0.14)}" == "0.12 [0.1, 0.14]"
+    assert f"{st.Interval(inf, inf, inf):.3f}" == "failed"
+    assert st.Interval(inf, inf, inf).text(infinite="never") == "never"
+    assert f"{st.Interval(12.0, 10.0, inf):.4g}" == "12 [10, failed]"
+    assert f"{st.Interval(0.0, 0.0, 0.0):.3f}" == "0, no spread"
+    assert f"{st.Interval(1.00001, 1.0, 1.00002):.3f}" == "1.000, no spread"
+    assert f"{st.Interval(0.125, 0.05, 0.25):.3g%}" == "12.5 % [5, 25]"
+    assert f"{st.Interval(2.0, nan, nan):.3f}" == "2.000"
+    assert st.Interval(inf, inf, inf).ends("") == "failed"
+    assert st.Interval(2.0, 1.0, inf).ends(".3g") == "1 to failed"
