@@ -64,7 +64,7 @@ def _shown(value: Any) -> Any:
 def sentence(text: str) -> str:
     """The text with a capital and a full stop; a symbol at the start stays as it is."""
     first = text.partition(" ")[0].rstrip(",;:")
-    start = text[:1].upper() if first.isalpha() and first.islower() else text[:1]
+    start = text[:1].upper() if first.replace("-", "").isalpha() and first.islower() else text[:1]
     return f"{start}{text[1:]}{'' if text.endswith('.') else '.'}"
 
 
