@@ -13,8 +13,8 @@ import numpy as np
 from podusv_cli.core.kernel import Vector
 from podusv_cli.figures.shown import Shown
 
-PIECES = 400  # of a run; a curve keeps the least and the largest number of each
-MOST = 24  # signals
+PIECES = 300  # of a run; a curve keeps the least and the largest number of each
+MOST = 20  # signals
 NUMBERED = re.compile(r" \(\d+\)")  # equations of the first paper, which few readers have at hand
 FIRST = ("z_e", "e_ct", "psi_e", "tau_u", "tau_r")  # which readers look at first
 
