@@ -9,6 +9,7 @@ from podusv_cli.interface import bench as bench
 from podusv_cli.interface import compare as compare
 from podusv_cli.interface import load as load
 from podusv_cli.interface import open_run as open_run
+from podusv_cli.interface import open_session as open_session
 from podusv_cli.interface import open_study as open_study
 from podusv_cli.interface import optimum as optimum
 from podusv_cli.interface import run as run

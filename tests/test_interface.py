@@ -23,7 +23,7 @@ import podusv
 from podusv_cli import interface
 from podusv_cli.core.errors import ScenarioError, UsageError
 from podusv_cli.engine.running import batch
-from podusv_cli.interface import functions, scenarios, studies
+from podusv_cli.interface import functions, scenarios, session, studies
 from podusv_cli.metrics.table import CLOCKED
 from podusv_cli.scenario.load import load as load_file
 
@@ -71,7 +71,7 @@ def test_the_package_is_a_command_too():
     assert python("-m", "podusv", "--version").stdout == f"podusv {podusv.__version__}\n"
 
 
-@pytest.mark.parametrize("module", [scenarios, functions, studies])
+@pytest.mark.parametrize("module", [scenarios, functions, session, studies])
 def test_the_examples_in_the_docstrings_run(module):
     found = doctest.testmod(module, optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
     assert found.failed == 0

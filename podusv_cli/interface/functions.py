@@ -75,7 +75,7 @@ def run(
     """
     given = loaded(source, changes)
     _single(given)
-    done = running.run_loaded(given, _request(out, force, figures))
+    done = running.run_loaded(given, request(out, force, figures))
     return open_run(done.folder)
 
 
@@ -114,8 +114,8 @@ def compare(
     """
     given = _several(sources)
     files = [_file(one) for one in given]
-    items, request = _items(given, files, changes), _request(out, force, figures)
-    done = comparing.compare_gathered(gathered(items), [f for f in files if f], request)
+    items, options = _items(given, files, changes), request(out, force, figures)
+    done = comparing.compare_gathered(gathered(items), [f for f in files if f], options)
     verdicts = [verdict.as_json() for verdict in done.result.verdicts]
     claims = pd.DataFrame(verdicts).set_index("claim") if verdicts else pd.DataFrame()
     failed = {label: text for label, text in done.result.endings.items() if text}
@@ -142,7 +142,7 @@ def optimum(
     from podusv_cli.workflows import optimum as finding
 
     done = finding.optimum_of(
-        loaded(source, changes), _request(out, force, figures), minimise, step
+        loaded(source, changes), request(out, force, figures), minimise, step
     )
     return open_run(done.folder)
 
@@ -226,7 +226,8 @@ def _single(given: Loaded) -> Scenario:
     return scenario.alone()
 
 
-def _request(out: Any, force: bool, figures: bool) -> running.Request:
+def request(out: Any, force: bool, figures: bool) -> running.Request:
+    """The options of a run that is written."""
     return running.Request(out=Path(out) if out is not None else None, force=force, figures=figures)
 
 

@@ -13,7 +13,7 @@ from podusv_cli.core.kernel import LANES, whole_lanes
 from podusv_cli.engine.loop.closed_loop import ClosedLoop, Observer, entries, vectors_of
 from podusv_cli.engine.loop.recent import Recent
 from podusv_cli.engine.running.lanes import Lanes
-from podusv_cli.engine.running.simulate import marcher
+from podusv_cli.engine.running.simulate import March, marcher
 from podusv_cli.engine.running.watch import Bell, Ending, Work
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.engine.step.layout import Layout, Vectors
@@ -61,8 +61,8 @@ class Common:
         return loop.layout(self.grid), list(entries(loop, self.observer, self.recall))
 
     @cached_property
-    def advance(self) -> Callable[..., int]:
-        """The compiled march."""
+    def advance(self) -> Callable[..., March]:
+        """What makes the compiled march of a run."""
         return marcher(self.like, self.observer, True)
 
     def check(self, loop: ClosedLoop) -> None:
@@ -84,7 +84,7 @@ class Common:
     def alone(self, run: BatchRun) -> Group:
         """The thread of one run."""
         layout, last = self.structure[0], self.grid.steps + 1
-        function = partial(self.advance, 0, last, self.grid.step, run.vectors, layout)
+        function = partial(self.advance(run.vectors, layout, self.grid.step), 0, last)
         work = Work(function, run.vectors.under_way, self.bell)
 
         def endings(stopped: bool) -> list[Ending]:

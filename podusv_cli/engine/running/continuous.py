@@ -38,7 +38,7 @@ def continuous(loop: ClosedLoop, duration: float, *, compiled: bool = True) -> t
         # The march over instant 1 of a grid with step t and no step after it: rates, no more.
         vectors.s[:] = s
         with np.errstate(all="ignore"):
-            if march(1, 2, t, vectors, layout) != 2:
+            if march(vectors, layout, t)(1, 2) != 2:
                 raise ArithmeticError(f"not finite at t = {t:.6g} s")
         return vectors.stages[: layout.states].copy()
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -27,6 +28,7 @@ from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.engine.step.layout import Layout, Vectors
 from podusv_cli.process.interrupts import interrupts_deferred
 
+March = Callable[[int, int], int]  # over instants first .. last - 1, see `rk4.advance`
 # What a log says of a run, by how its march ended.
 RECORDED: dict[Word, Status] = {
     "finished": "finished", "interrupted": "interrupted",
@@ -53,13 +55,13 @@ def simulate(
     loop.check_fit(grid.step)
     layout = loop.layout(grid)
     vectors, last = vectors_of(loop, layout, observer, grid, grid.rows, allocate), layout.steps + 1
-    advance = partial(marcher(loop, observer, compiled), 0, last, grid.step, vectors, layout)
+    advance = partial(marcher(loop, observer, compiled)(vectors, layout, grid.step), 0, last)
     with np.errstate(all="ignore"), interrupts_deferred():
         ending = watch(
             advance, last, vectors.under_way,
             progress and (lambda reached: progress(reached / last)),
         )  # fmt: skip
-        return replace(_record(loop, grid, vectors, layout, ending), about=about)
+        return replace(recorded(loop, grid, vectors, layout, ending), about=about)
 
 
 def ready(
@@ -80,22 +82,27 @@ def ready(
 def marcher(
     loop: ClosedLoop, observer: Observer, compiled: bool,
     compiling: Callable[[float], None] | None = None,
-) -> Callable[..., int]:  # fmt: skip
-    """The march of this loop, `rk4.advance` less its functions, compiled if need be."""
+) -> Callable[[Vectors, Layout, float], March]:  # fmt: skip
+    """What makes the march of loops like this one over such vectors, with a step [s].
+
+    It is compiled if need be. The vectors have to outlive the march.
+    """
     if not compiled:
-        adapters = [signatures.bind(*part) for part in entries(loop, observer)]
-        return lambda *rest: rk4.advance_plainly(*adapters, *rest)
+        plain: Any = partial(
+            rk4.advance_plainly, *(signatures.bind(*part) for part in entries(loop, observer))
+        )
+        return lambda c, n, h: lambda first, last: int(plain(first, last, h, c, n))
     from podusv_cli.engine.machine import compile  # a loop in plain Python needs no compiler
 
     parts, march = [*entries(loop, observer)], compile.Piece(rk4.advance, signatures.ADVANCE)
     compile.prepare([*(compile.adapter(*part) for part in parts), march], compiling)
     adapters, watch = [compile.entry(*part) for part in parts], compile.routine(march)
 
-    def compiled_march(first: int, last: int, h: float, vectors: Vectors, layout: Layout) -> int:
-        vectors, sizes = signatures.pointers(vectors), signatures.whole_numbers(layout)
-        return int(watch(*adapters, first, last, h, vectors, sizes))
+    def over(vectors: Vectors, layout: Layout, h: float) -> March:
+        pointers, sizes = signatures.pointers(vectors), signatures.whole_numbers(layout)
+        return lambda first, last: int(watch(*adapters, first, last, h, pointers, sizes))
 
-    return compiled_march
+    return over
 
 
 def _logged(loop: ClosedLoop, table: Vector) -> dict[str, Vector]:
@@ -105,9 +112,10 @@ def _logged(loop: ClosedLoop, table: Vector) -> dict[str, Vector]:
     return {name: column for name, column in named.items() if name in about}
 
 
-def _record(
+def recorded(
     loop: ClosedLoop, grid: TimeGrid, vectors: Vectors, layout: Layout, ending: Ending
 ) -> Recording:
+    """The recording of a march that ended so, its signals views of the log."""
     rows = -(-ending.reached // layout.log_every)
     signals = _logged(loop, vectors.log.reshape(-1, layout.width)[:rows])
     status, message = RECORDED[ending.status], ""

@@ -1,0 +1,94 @@
+"""A march in pieces: it stops where it is asked to, and goes on from there with the same bits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from podusv_cli.components.paths.base import TARGET
+from podusv_cli.core.kernel import Vector
+from podusv_cli.core.recording import Recording
+from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop, Observer, entries, vectors_of
+from podusv_cli.engine.machine import signatures
+from podusv_cli.engine.running.simulate import marcher, recorded
+from podusv_cli.engine.running.watch import Ending
+from podusv_cli.engine.step.grid import TimeGrid
+
+# The vectors that a march writes to, beside the log, whose later rows it writes again.
+CHANGING = ("s", "row", "stages", "sensed", "relay", "held", "work", "seen", "under_way")
+
+
+class Mark(NamedTuple):
+    """Where a march is: its next instant, and the vectors that change."""
+
+    reached: int
+    vectors: tuple[Vector, ...]
+
+
+class Pieces:
+    """The march of a loop over a grid, some instants at a time."""
+
+    def __init__(
+        self, loop: ClosedLoop, grid: TimeGrid, observer: Observer, *, compiled: bool = True
+    ) -> None:
+        """Nothing is marched yet. Raises LawError as `simulate`."""
+        loop.check_fit(grid.step)
+        self.loop, self.grid, self.reached = loop, grid, 0
+        self._layout = loop.layout(grid)
+        self.vectors = vectors_of(loop, self._layout, observer, grid, grid.rows)
+        self._given = self.vectors.s[self._layout.estimate :]
+        self._target = np.zeros(len(TARGET))
+        self._advance = marcher(loop, observer, compiled)(self.vectors, self._layout, grid.step)
+        self._aim = self._path(next(iter(entries(loop, observer))), compiled)
+
+    def to(self, instant: int) -> bool:
+        """March over the instants before this one; whether all their numbers are finite."""
+        self.reached = self._advance(self.reached, instant)
+        return self.reached == instant
+
+    @property
+    def time(self) -> float:
+        """The time of the next instant [s], or of the last."""
+        return min(self.reached, self.grid.steps) * self.grid.step
+
+    def state(self) -> Vector:
+        """(x, y, psi, u, v, r) at the next instant as a law is given it: true, or estimated.
+
+        An estimate has not yet seen what is measured at this instant.
+        """
+        return self._given[: len(STATE)].copy()
+
+    def target(self) -> Vector:
+        """The target at the next instant, as `TARGET`."""
+        self._aim(self.time)
+        return self._target.copy()
+
+    def _path(self, part: tuple[Any, ...], compiled: bool) -> Callable[[float], None]:
+        """What writes the target at a time [s], as the loop calls it."""
+        c, place = self.vectors, self.vectors.s[self._layout.place :]
+        vectors = (self._given, place, c.path, c.path_table, self._target)
+        if not compiled:
+            path = signatures.bind(*part)
+            return lambda t: path(t, *vectors)
+        from podusv_cli.engine.machine import compile  # a loop in plain Python needs no compiler
+
+        path, pointers = compile.entry(*part), [signatures.pointer(v) for v in vectors]
+        return lambda t: path(t, *pointers)
+
+    def mark(self) -> Mark:
+        """Where the march is, to come back to it."""
+        return Mark(self.reached, tuple(getattr(self.vectors, name).copy() for name in CHANGING))
+
+    def back(self, mark: Mark) -> None:
+        """Go on from a mark of this march."""
+        self.reached = mark.reached
+        for name, vector in zip(CHANGING, mark.vectors, strict=True):
+            getattr(self.vectors, name)[:] = vector
+
+    def recording(self) -> Recording:
+        """What is logged so far, as of a run that was stopped here."""
+        whole = self.reached > self.grid.steps
+        ending = Ending(self.reached, "finished" if whole else "interrupted")
+        return recorded(self.loop, self.grid, self.vectors, self._layout, ending)

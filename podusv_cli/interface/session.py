@@ -1,0 +1,194 @@
+"""A run step by step: a demand in, an observation out."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from podusv_cli.core.errors import UsageError
+from podusv_cli.core.kernel import Vector
+from podusv_cli.engine.running.pieces import Mark, Pieces
+from podusv_cli.interface.border import explained
+from podusv_cli.interface.functions import open_run, request
+from podusv_cli.interface.results import Run
+from podusv_cli.interface.scenarios import Changes, Source, loaded
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.workflows import run as running
+
+Status = Literal["running", "finished", "diverged"]
+MOST = 15_000  # demands of a session: a scenario with more is too long to be read back
+# Where a schedule of two rows has the demand of the first, which holds up to the second
+DEMAND = slice(2, 4)
+
+
+class Observation(NamedTuple):
+    """What a controller is given at an instant.
+
+    `state` is (x, y, psi, u, v, r) in m, rad, m/s and rad/s: the vessel's own, or the estimate
+    where the scenario has sensors; it has not seen what they measure at this very instant. `target`
+    is position, velocity and acceleration, north and east, in m, m/s and m/s2. `status` is
+    "running" until the duration is over or a number is not finite.
+    """
+
+    time: float
+    state: Vector
+    target: Vector
+    status: Status
+
+
+@dataclass(frozen=True, eq=False)
+class Bookmark:
+    """A place in a session, to come back to."""
+
+    mark: Mark
+    demands: tuple[tuple[float, float], ...]
+    status: Status
+
+
+def open_session(
+    source: Source, changes: Changes | None = None, *, period: float | None = None
+) -> Session:
+    """A scenario that waits for demands, in place of the controller that it names.
+
+    A demand holds for `period` seconds, by default `control.period`: a whole number of steps.
+    Raises ScenarioError, LawError, and UsageError without a period or with too many of them.
+
+    >>> import podusv
+    >>> session = podusv.open_session("podusv:own_vessel.yaml", period=0.1)
+    >>> seen = session.observe()
+    >>> while seen.time < 20.0:
+    ...     seen = session.step((300.0 * (1.5 - seen.state[3]), 0.0))
+    >>> session.close("straight_on", figures=False)
+    <podusv run schedule: finished at 20 s, straight_on>
+    """
+    scenario = loaded(source, changes).scenario
+    scenario = next(iter(scenario.singles().values())) if scenario.open_choice else scenario.alone()
+    period = period or scenario.control.period
+    if not period:
+        raise UsageError(
+            "open_session: for how long does a demand hold? give period=0.1 [s], or the scenario "
+            "a control.period"
+        )
+    return Session(_scheduled(scenario, period), period)
+
+
+class Session:
+    """A run that goes on as far as there are demands; made by `open_session`.
+
+    Its numbers have the same bits as those of a run of the same demands in one go, and that is what
+    `close` writes.
+    """
+
+    def __init__(self, scenario: Scenario, period: float) -> None:
+        """The run is at its begin."""
+        self.scenario, self.period = scenario, period
+        grid = scenario.time_grid()
+        self._status: Status = "running"
+        self._every, self._demands = grid.hold_every, list[tuple[float, float]]()
+        if grid.steps > MOST * self._every:
+            longest = MOST * period
+            raise UsageError(
+                f"open_session: simulation.duration {scenario.simulation.duration:g} s takes more "
+                f"than {MOST:,} demands of {period:g} s; ask for at most {longest:g} s, or for a "
+                "longer period"
+            )
+        scenario.ready()
+        loop, observer = scenario.closed_loop(), scenario.observer()
+        self._pieces = Pieces(loop, grid, observer, compiled=scenario.simulation.compiled)
+        self._demand = self._pieces.vectors.law_table[DEMAND]
+
+    def observe(self) -> Observation:
+        """The instant at which the next demand begins to act."""
+        pieces = self._pieces
+        return Observation(pieces.time, pieces.state(), pieces.target(), self._status)
+
+    @explained
+    def step(self, demand: Sequence[float] | Vector) -> Observation:
+        """Hold a demand (tau_u [N], tau_r [N m]) for a period; the instant after it.
+
+        Raises UsageError for a demand that is not two finite numbers and for a session that is
+        over; the session stays where it is.
+        """
+        tau_u, tau_r = self._checked(demand)
+        grid, pieces = self._pieces.grid, self._pieces
+        self._demand[0], self._demand[1] = tau_u, tau_r
+        self._demands.append((tau_u, tau_r))
+        reach = len(self._demands) * self._every
+        last = reach >= grid.steps
+        with np.errstate(all="ignore"):
+            fine = pieces.to(grid.steps + 1 if last else reach)
+        self._status = ("finished" if last else "running") if fine else "diverged"
+        return self.observe()
+
+    def _checked(self, demand: Sequence[float] | Vector) -> tuple[float, float]:
+        if self._status != "running":
+            raise UsageError(
+                f"session: the run has {self._status} at t = {self._pieces.time:g} s and takes no "
+                "more demands; close it, or go back with restore"
+            )
+        try:
+            tau_u, tau_r = (float(number) for number in demand)
+        except (TypeError, ValueError):
+            tau_u = tau_r = math.nan
+        if not (math.isfinite(tau_u) and math.isfinite(tau_r)):
+            raise UsageError(
+                f"session, t = {self._pieces.time:g} s: the demand is {demand!r}; give two finite "
+                "numbers, tau_u [N] and tau_r [N m]"
+            )
+        return tau_u, tau_r
+
+    def state(self) -> Bookmark:
+        """The place in the run, for `restore`."""
+        return Bookmark(self._pieces.mark(), tuple(self._demands), self._status)
+
+    def restore(self, place: Bookmark) -> Observation:
+        """Go on from a place in this run; what came after it is forgotten."""
+        self._pieces.back(place.mark)
+        self._demands, self._status = [*place.demands], place.status
+        return self.observe()
+
+    @property
+    def log(self) -> dict[str, Vector]:
+        """Every signal that is logged so far, by name."""
+        return dict(self._pieces.recording().signals)
+
+    @explained
+    def close(
+        self, out: str | os.PathLike[str] | None = None, *, force: bool = False,
+        figures: bool = True,
+    ) -> Run:  # fmt: skip
+        """Write the run as far as it went into a folder, as `podusv run` does it.
+
+        The scenario in it has the demands as a law `schedule`, so `podusv rerun` repeats it. Raises
+        UsageError where no demand was given, and StorageError; then the session is still there.
+        """
+        if not self._demands:
+            raise UsageError("session: nothing has been simulated yet; give it a demand with step")
+        given = loaded(_scheduled(self.scenario, self.period, self._demands))
+        return open_run(running.run_loaded(given, request(out, force, figures)).folder)
+
+
+def _scheduled(
+    scenario: Scenario, period: float, demands: Sequence[tuple[float, float]] = ()
+) -> Scenario:
+    """The scenario with a law that holds each of these demands for a period, and then ends.
+
+    Without demands it is as long as it was, with a demand that the session changes.
+    """
+    changes: dict[str, Any] = {"control.period": period}
+    step, every = scenario.simulation.step, round(period / scenario.simulation.step)
+    if demands:
+        changes["simulation.duration"] = len(demands) * every * step
+    # The last demand has rows at the end and after it, so that the end is no end of the schedule.
+    held = [*demands, demands[-1], demands[-1]] if demands else [(0.0, 0.0)]
+    times = [k * every * step for k in range(len(held))]
+    rows = [f"{t!r}, {tau_u!r}, {tau_r!r}" for t, (tau_u, tau_r) in zip(times, held, strict=True)]
+    if not demands:
+        rows.append(f"{2.0 * scenario.simulation.duration!r}, 0, 0")
+    changes["controller"] = {"kind": "schedule", "between": "hold", "rows": "\n".join(rows)}
+    return loaded(scenario, changes).scenario
