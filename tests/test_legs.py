@@ -10,7 +10,7 @@ import pytest
 from conftest import corrected
 from pydantic import ValidationError
 
-import podusv_cli as package
+import podusv as package
 from podusv_cli.components.paths.legs import Legs
 from podusv_cli.engine.step.grid import TimeGrid
 

@@ -141,9 +141,7 @@ def optimum(
     """
     from podusv_cli.workflows import optimum as finding
 
-    done = finding.optimum_of(
-        loaded(source, changes), request(out, force, figures), minimise, step
-    )
+    done = finding.optimum_of(loaded(source, changes), request(out, force, figures), minimise, step)
     return open_run(done.folder)
 
 
