@@ -25,7 +25,7 @@ from podusv_cli.cli.sweep import sweep
 # NAME is the function NAME of cli/NAME.py
 COMMANDS = (
     "init", "run", "compare", "rerun", "diff", "plot", "validate", "verify", "margins", "optimum",
-    "explain", "list", "schema", "new", "bench", "tune", "docs", "demo", "runs",
+    "explain", "list", "schema", "new", "bench", "tune", "docs", "demo", "runs", "export",
 )  # fmt: skip
 
 FIRST_STEPS = """\

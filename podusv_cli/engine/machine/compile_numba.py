@@ -67,15 +67,22 @@ def object_code(function: Any, prototype: Any) -> Code:
 
     Raises TypeError for a kernel that needs more than arithmetic and the mathematical library.
     """
+    symbol = "podusv_kernel"
+    return Code(symbol, target().emit_object(module(function, prototype, symbol)))
+
+
+def module(function: Any, prototype: Any, symbol: str) -> Any:
+    """The same before it is object code, with the C function under this name."""
     linecache.checkcache()  # numba shows lines from there; a file may have been edited meanwhile
     try:
         typed = signature(prototype, from_ctypes)
         compiled = cfunc(typed, **OPTIONS)(_with_inlined(function))
     except NumbaError as error:
         raise TypeError(in_short(str(error))) from error
-    module = llvm.parse_assembly(compiled.inspect_llvm())
-    check_calls(module, function.__qualname__)
-    return Code(compiled.native_name, target().emit_object(module))
+    made, name = llvm.parse_assembly(compiled.inspect_llvm()), compiled.native_name
+    check_calls(made, function.__qualname__)
+    made.get_function(name).name = symbol
+    return made
 
 
 @cache

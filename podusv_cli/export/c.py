@@ -1,0 +1,118 @@
+"""An exported law as C: a header, and the file that has its numbers and calls its object code."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from podusv_cli import __version__
+from podusv_cli.core.kernel import Vector
+from podusv_cli.export.law import (
+    DEMAND_NUMBERS,
+    LOAD_NUMBERS,
+    PARTS,
+    STATE_NUMBERS,
+    STEP,
+    TARGET_NUMBERS,
+    ExportedLaw,
+    Number,
+)
+
+IN_A_LINE = 4
+# Vectors of the loop that a law by itself has, as the C file calls them
+VECTORS = {
+    "law": "(double *)constants", "law_table": "(double *)table", "s": "law->state", "row": "row",
+    "stages": "law->stages", "held": "law->held", "work": "law->work",
+}  # fmt: skip
+ASSUMED = {
+    "saturated": "the demand before, cut at {0} N and {1} N m, acts",
+    "demand": "the demand before acts",
+}
+
+
+def sources(law: ExportedLaw) -> dict[str, str]:
+    """The text of law.h and law.c."""
+    about = told(law)
+    return {name: rendered(name, about) for name in ("law.h", "law.c")}
+
+
+def rendered(name: str, about: Mapping[str, Any]) -> str:
+    """A file of this name from its template."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined  # slow to import
+
+    environment = Environment(
+        loader=PackageLoader("podusv_cli.export"), undefined=StrictUndefined,
+        autoescape=lambda template: template is not None and ".xml" in template,
+        trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True,
+    )  # fmt: skip
+    return environment.get_template(f"{name}.j2").render(about)
+
+
+def told(law: ExportedLaw) -> dict[str, Any]:
+    """What templates show of a law."""
+    vectors, layout = law.vectors, law.layout
+    return {
+        "label": law.loop.controller.label, "name": _comment(law.scenario.name),
+        "version": __version__, "period": f"{law.period:g}", "signals": law.signals,
+        "memory": law.memory, "layout": layout, "texts": _texts(law), "parts": list(PARTS.values()),
+        "step": STEP, "h": literal(law.grid.step), "every": layout.hold_every, "tau": layout.tau,
+        "demand": layout.demand, "assumed": _assumed(law),
+        "sizes": {name: len(getattr(vectors, name)) for name in ("stages", "held", "work")},
+        "vectors": [VECTORS.get(name, "&unused") for name in vectors._fields],
+        "arrays": {
+            "constants": _lines(vectors.law), "table": _lines(vectors.law_table),
+            "start": _lines(vectors.s),
+        },
+    }  # fmt: skip
+
+
+def literal(number: float) -> str:
+    """The number in C, to its last bit."""
+    if math.isfinite(number):
+        return float(number).hex()
+    return "NAN" if math.isnan(number) else ("INFINITY" if number > 0 else "-INFINITY")
+
+
+def _lines(numbers: Vector) -> list[list[str]]:
+    words = [literal(number) for number in numbers.tolist()]
+    return [words[i : i + IN_A_LINE] for i in range(0, len(words), IN_A_LINE)]
+
+
+def _assumed(law: ExportedLaw) -> list[str]:
+    """The loads that act where nobody knows them: the demand, cut where the actuator cuts it."""
+    demands = [f"row[{law.layout.demand + i}]" for i in range(2)]
+    return [
+        demand
+        if math.isinf(limit)
+        else f"fmin(fmax({demand}, -{literal(limit)}), {literal(limit)})"
+        for demand, limit in zip(demands, law.limits, strict=True)
+    ]
+
+
+def _texts(law: ExportedLaw) -> Mapping[str, str]:
+    """What the header says of each vector."""
+    cut = any(map(math.isfinite, law.limits))
+    assumed = ASSUMED["saturated" if cut else "demand"]
+    return {
+        "state": _list(STATE_NUMBERS), "target": _list(TARGET_NUMBERS),
+        "loads": _list(LOAD_NUMBERS), "demand": _list(DEMAND_NUMBERS),
+        "signals": f"What the law says beside: {_list(law.signals) or 'nothing'}",
+        "memory": f"What it remembers: {_list(law.memory) or 'nothing'}",
+        "assumed": assumed.format(*(f"{x:g}" for x in law.limits)),
+    }  # fmt: skip
+
+
+def _list(numbers: Sequence[Number]) -> str:
+    return ",\n           ".join(
+        _comment(f"{one.name} [{one.unit}] {one.meaning}") for one in _few(numbers)
+    )
+
+
+def _few(numbers: Sequence[Number], most: int = 40) -> Iterable[Number]:
+    return numbers if len(numbers) <= most else [*numbers[:most], Number("...", "", "and so on")]
+
+
+def _comment(text: str) -> str:
+    """Text that ends no comment."""
+    return text.replace("*/", "* /")

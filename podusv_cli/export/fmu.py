@@ -1,0 +1,80 @@
+"""An exported law as a functional mock-up unit: FMI 2.0 for co-simulation."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import zipfile
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from podusv_cli.export import c, objects
+from podusv_cli.export.law import (
+    DEMAND_NUMBERS,
+    LOAD_NUMBERS,
+    STATE_NUMBERS,
+    TARGET_NUMBERS,
+    ExportedLaw,
+)
+from podusv_cli.export.link import shared_library
+
+STAMP = (1980, 1, 1, 0, 0, 0)  # of files in the archive: the same law gives the same bytes
+DIGITS = 32  # of the guid
+
+
+class Variable(NamedTuple):
+    """A variable of modelDescription.xml."""
+
+    name: str
+    unit: str
+    meaning: str
+    causality: str
+    start: str | None = None
+
+
+def variables(law: ExportedLaw, *, loads: bool) -> list[Variable]:
+    """Inputs, then demand, signals and memory: a variable's place is its reference."""
+    numbers = [*STATE_NUMBERS, *TARGET_NUMBERS, *(LOAD_NUMBERS if loads else ())]
+    starts = [*law.loop.start, *law.loop.first_target(), *([0.0] * 3 if loads else ())]
+    given = [
+        Variable(*number, "input", repr(float(start)))
+        for number, start in zip(numbers, starts, strict=True)
+    ]
+    said = [Variable(*number, "output") for number in (*DEMAND_NUMBERS, *law.signals)]
+    return [*given, *said, *(Variable(*number, "local") for number in law.memory)]
+
+
+def fmu(
+    law: ExportedLaw, text: str, platforms: Mapping[str, objects.Platform], *, loads: bool
+) -> bytes:
+    """The archive with a library for each platform, of the law's module `text`.
+
+    `loads` says whether those that act are inputs. Raises UsageError where a library cannot be
+    linked.
+    """
+    shown = variables(law, loads=loads)
+    starts = [c.literal(float(one.start)) for one in shown if one.start is not None]
+    sources = c.sources(law)
+    content = "".join([text, *sources.values(), *starts])
+    about = {
+        **c.told(law), "guid": hashlib.sha256(content.encode()).hexdigest()[:DIGITS],
+        "variables": shown, "starts": starts, "loads": loads,
+        "outputs": [i for i, one in enumerate(shown, 1) if one.causality == "output"],
+        "exact_period": c.literal(law.period), "stop": repr(law.scenario.simulation.duration),
+    }  # fmt: skip
+    files = {**sources, "fmu.c": c.rendered("fmu.c", about)}
+    members = {"modelDescription.xml": c.rendered("modelDescription.xml", about).encode()}
+    for name, platform in platforms.items():
+        inside = {file: part.encode() for file, part in files.items()}
+        inside["law.o"] = objects.object_file(text, platform)
+        library = shared_library(inside, name, platform)
+        members[f"binaries/{name}/law{platform.library}"] = library
+    return _archive(members)
+
+
+def _archive(members: Mapping[str, bytes]) -> bytes:
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in members.items():
+            archive.writestr(zipfile.ZipInfo(name, STAMP), content, zipfile.ZIP_DEFLATED)
+    return buffer.getvalue()

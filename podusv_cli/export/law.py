@@ -1,0 +1,203 @@
+"""The law of a scenario by itself: its code, its numbers, and what goes in and comes out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from ctypes import CFUNCTYPE, POINTER
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from podusv_cli.components.controllers.base import Slots
+from podusv_cli.components.paths.base import TARGET
+from podusv_cli.core.errors import UsageError
+from podusv_cli.core.kernel import Vector, bundle, call
+from podusv_cli.core.recording import Recording
+from podusv_cli.core.signal import LOOP, STATE, Signal
+from podusv_cli.engine.loop.closed_loop import DEMAND, ClosedLoop, entries
+from podusv_cli.engine.machine import signatures
+from podusv_cli.engine.machine.compile import Piece, adapter
+from podusv_cli.engine.step import law_alone
+from podusv_cli.engine.step.grid import TimeGrid
+from podusv_cli.engine.step.layout import HELD_SIGNALS, Layout, Vectors
+from podusv_cli.scenario.model import Scenario
+
+# What a part of the loop is called in the object file
+PARTS = {
+    "path": "podusv_target", "law": "podusv_law_rates", "sample": "podusv_law_sample",
+    "after_saturation": "podusv_law_loads",
+}  # fmt: skip
+STEP = "podusv_law_demand"
+PROTOTYPE = CFUNCTYPE(
+    None, *(signatures.PROTOTYPES[part] for part in PARTS),
+    signatures.WHOLE, signatures.NUMBER, POINTER(signatures.VECTOR), POINTER(signatures.WHOLE),
+)  # fmt: skip
+NOT_SAMPLED = (
+    "the law acts continuously in this scenario, and a computer on a boat takes samples; set "
+    "control.period to the time between two of them, as --set control.period=0.1 [s]"
+)
+
+
+class Number(NamedTuple):
+    """A number that goes in or comes out: its name, unit and meaning."""
+
+    name: str
+    unit: str
+    meaning: str
+
+
+def _number(one: Signal) -> Number:
+    return Number(one.name, one.unit, one.meaning)
+
+
+_LOGGED = {one.name: _number(one) for one in LOOP}
+_MOTION = (("position", "m"), ("velocity", "m/s"), ("acceleration", "m/s2"))
+TARGET_NUMBERS = tuple(
+    Number(name, unit, f"{what} of the target, {way}")
+    for name, ((what, unit), way) in zip(TARGET, product(_MOTION, ("north", "east")), strict=True)
+)
+STATE_NUMBERS = tuple(map(_number, STATE))
+DEMAND_NUMBERS = tuple(_LOGGED[name] for name in DEMAND)
+LOAD_NUMBERS = tuple(
+    Number(name, unit, f"{what} that acted since the sample before")
+    for name, unit, what in zip(
+        ("tau_u", "tau_v", "tau_r"), ("N", "N", "N m"),
+        ("surge force", "sway force", "yaw moment"), strict=True,
+    )
+)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class ExportedLaw:
+    """A sampled law as values: a state (x, memory), a row (target, distance, signals, demand, tau).
+
+    `vectors` are at the start of the scenario's run.
+    """
+
+    scenario: Scenario
+    loop: ClosedLoop
+    grid: TimeGrid
+    layout: Layout
+    vectors: Vectors
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> ExportedLaw:
+        """The law of a scenario with one. Raises UsageError where it takes no samples."""
+        loop, grid = scenario.closed_loop(), scenario.time_grid()
+        if not grid.hold_every:
+            raise UsageError(f"{scenario.name}: {NOT_SAMPLED}")
+        law, whole = loop.controller, loop.layout(grid)
+        memory, signals = whole.states - whole.memory, len(law.signals)
+        first = len(TARGET) + 1
+        layout = Layout(**dict.fromkeys(Layout._fields, 0))._replace(
+            states=len(STATE) + memory, memory=len(STATE), place=len(STATE) + memory,
+            signals=first, demand=first + signals, tau=first + signals + len(DEMAND),
+            columns=first + signals + len(DEMAND) + len(LOAD_NUMBERS), hold_every=whole.hold_every,
+            sample_every=whole.sample_every, update_first=whole.update_first,
+            wants_loads=whole.wants_loads,
+        )  # fmt: skip
+        vectors = Vectors(**{name: np.zeros(1) for name in Vectors._fields})._replace(
+            law=np.array(list(loop.law_constants().values()) or [0.0]),
+            law_table=loop.law_table(),
+            s=np.concatenate([np.zeros(len(STATE)), loop.first_memory()]),
+            row=np.zeros(layout.columns), stages=np.zeros(5 * layout.states),
+            held=np.zeros(HELD_SIGNALS + signals), work=np.zeros(law.workspace()),
+        )  # fmt: skip
+        return cls(scenario, loop, grid, layout, vectors)
+
+    @property
+    def period(self) -> float:
+        """Time between two samples [s]."""
+        return self.layout.hold_every * self.grid.step
+
+    @cached_property
+    def pieces(self) -> Mapping[str, Piece]:
+        """The kernels by the name of their C function."""
+        parts = {part: (part, inner, names) for part, inner, names in self._entries()}
+        found = {PARTS[part]: adapter(*parts[part]) for part in PARTS}
+        return {**found, STEP: Piece(law_alone.demand, PROTOTYPE)}
+
+    def _entries(self) -> Iterator[tuple[str, Any, tuple[str, ...]]]:
+        yield from (e for e in entries(self.loop, self.scenario.observer()) if e[0] != "path")
+        yield "path", law_alone.target_is_there, ()
+
+    @property
+    def _slots(self) -> Slots:
+        return self.loop.controller.slots()
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """Force [N] and moment [N m] at which the scenario's actuator cuts the demand."""
+        return self.loop.actuator.limits()
+
+    @cached_property
+    def signals(self) -> tuple[Number, ...]:
+        """What the law says beside its demand."""
+        return tuple(map(_number, self.loop.controller.signals))
+
+    @cached_property
+    def memory(self) -> tuple[Number, ...]:
+        """Every number that the law remembers, in order."""
+        return tuple(
+            Number(one.name if size == 1 else f"{one.name}[{i}]", one.unit, one.meaning)
+            for one, size in self._slots
+            for i in range(size)
+        )
+
+    @property
+    def columns(self) -> list[str]:
+        """What a row of `samples` has."""
+        given = (*STATE_NUMBERS, *TARGET_NUMBERS, *LOAD_NUMBERS)
+        said = (*DEMAND_NUMBERS, *self.signals, *self.memory)
+        return ["time", *(one.name for one in (*given, *said))]
+
+    def assumes(self, samples: Vector) -> bool:
+        """Whether the law needs no loads: it asks for none, or they are the demand, cut."""
+        if not self.loop.controller.wants_loads():
+            return True
+        loads, demand = (samples[:, self.columns.index(n) :] for n in ("tau_u", "tau_u_cmd"))
+        cut = np.clip(demand[:-1, :2], [-x for x in self.limits], self.limits)
+        return np.array_equal(loads[1:, :3], np.insert(cut, 1, 0.0, axis=1))
+
+    def as_json(self, platforms: Sequence[str], library: Sequence[str]) -> dict[str, Any]:
+        """What law.json says; `library` are functions that the law calls of another library."""
+        about = {
+            "inputs": (*STATE_NUMBERS, *TARGET_NUMBERS, *LOAD_NUMBERS), "demand": DEMAND_NUMBERS,
+            "signals": self.signals, "memory": self.memory,
+        }  # fmt: skip
+        return {
+            "format": 1, "law": self.loop.controller.label, "scenario": self.scenario.name,
+            "period": self.period, "platforms": list(platforms), "library": list(library),
+            **{name: [one._asdict() for one in numbers] for name, numbers in about.items()},
+        }  # fmt: skip
+
+    def samples(self, log: Recording) -> Vector:
+        """A row for each sample of a run: time, inputs, demand, signals, memory.
+
+        The loads of a row are those in the row of the log before, after which they do not change
+        where the actuator has no states.
+        """
+        rows = np.arange(0, len(log["time"]), self.layout.hold_every)
+        before = np.maximum(rows - 1, 0)
+        state = [log[one.name][rows] for one in STATE]
+        loads = [np.where(rows > 0, log[one.name][before], 0.0) for one in LOAD_NUMBERS]
+        said = [log[one.name][rows] for one in (*DEMAND_NUMBERS, *self.signals)]
+        memory = [log[one.name][rows].reshape(len(rows), -1) for one, _ in self._slots]
+        time = log["time"][rows]
+        return np.column_stack([time, *state, self._targets(log, rows), *loads, *said, *memory])
+
+    def _targets(self, log: Recording, rows: npt.NDArray[np.int_]) -> Vector:
+        """The target at these rows of a log; on a path that is followed it is beside the vessel."""
+        path, out = self.loop.path, np.zeros((len(rows), len(TARGET)))
+        k, table = bundle(self.loop.path_constants()), path.table()
+        for row, target in zip(rows, out, strict=True):
+            x = np.array([log[one.name][row] for one in STATE])
+            place = np.array([log[one.name][row] for one in path.places])
+            call(
+                path.evaluate, t=log["time"][row], x=x, place=place, k=k, table=table, target=target
+            )
+        return out

@@ -1,0 +1,59 @@
+"""Shared libraries from C and object files: by zig for any platform, by cc for this machine."""
+
+from __future__ import annotations
+
+import platform as platform_of_python
+import shutil
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from podusv_cli.core.errors import UsageError
+from podusv_cli.export.objects import Platform
+
+# The arithmetic of the C files is that of the run: no product is merged with a sum.
+OPTIONS = ("-shared", "-O2", "-ffp-contract=off")
+MACHINES = {
+    ("Linux", "x86_64"): "linux64", ("Linux", "aarch64"): "aarch64-linux",
+    ("Windows", "AMD64"): "win64", ("Darwin", "x86_64"): "darwin64",
+}  # fmt: skip
+NO_ZIG = (
+    "there is no linker for {0}: install zig with pip install 'podusv[export]', or export --c, "
+    "whose object files a compiler of your own links"
+)
+
+
+def shared_library(files: Mapping[str, bytes], name: str, platform: Platform) -> bytes:
+    """A shared library of C files (*.c, with their headers) and object files (*.o).
+
+    Raises UsageError where no linker is there, or it fails.
+    """
+    linker = _linker(name, platform)
+    with TemporaryDirectory() as folder:
+        for file, content in files.items():
+            (Path(folder) / file).write_bytes(content)
+        sources = [file for file in files if not file.endswith(".h")]
+        out = f"law{platform.library}"
+        done = subprocess.run(
+            [*linker, *OPTIONS, "-o", out, *sources, "-lm"], cwd=folder, capture_output=True,
+            text=True, check=False,
+        )  # fmt: skip
+        if done.returncode:
+            raise UsageError(f"the law cannot be linked for {name}: {done.stderr.strip()[-500:]}")
+        return (Path(folder) / out).read_bytes()
+
+
+def this_machine() -> str:
+    """The platform that this is, "" for none that there is an export for."""
+    return MACHINES.get((platform_of_python.system(), platform_of_python.machine()), "")
+
+
+def _linker(name: str, platform: Platform) -> Sequence[str]:
+    if find_spec("ziglang") and platform.zig:
+        return (sys.executable, "-m", "ziglang", "cc", "-target", platform.zig)
+    if name == this_machine() and (compiler := shutil.which("cc")):
+        return (compiler, "-fPIC")
+    raise UsageError(NO_ZIG.format(name))

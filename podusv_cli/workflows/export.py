@@ -1,0 +1,92 @@
+"""`podusv export`: the law of a scenario as C and as an FMU, with a run of it to check against."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.util import find_spec
+from pathlib import Path
+
+from podusv_cli.core.errors import UsageError
+from podusv_cli.core.kernel import Vector
+from podusv_cli.export import c, objects
+from podusv_cli.export.check import ABOUT, FMU, SAMPLES
+from podusv_cli.export.fmu import fmu
+from podusv_cli.export.law import ExportedLaw
+from podusv_cli.export.link import this_machine
+from podusv_cli.findings.finding import unknown_codes
+from podusv_cli.scenario.limits import limits
+from podusv_cli.scenario.load import load
+from podusv_cli.scenario.phrases import unknown
+from podusv_cli.storage import csv_files, provenance
+from podusv_cli.storage.run_folder import RunWriter
+from podusv_cli.workflows.execute import Stopwatch, simulated
+from podusv_cli.workflows.run import single
+
+IN_FMU = ("linux64", "win64", "aarch64-linux")  # where none is asked for and zig is there
+
+
+@dataclass(frozen=True)
+class Request:
+    """The options of `podusv export`; see its help."""
+
+    to: Path
+    overrides: Sequence[str] = ()
+    controller: str = ""
+    force: bool = False
+    c: bool = True
+    fmu: bool = True
+    platforms: Sequence[str] = ()
+    argv: Sequence[str] = ()
+    plugins: Sequence[str] = ()
+    say: Callable[[str], None] = lambda text: None  # what is being done
+
+
+def export(config: Path, request: Request) -> Path:
+    """Write the law into a folder. Raises ScenarioError, UsageError, LawError, StorageError."""
+    started = datetime.now(UTC)
+    for name in request.platforms:
+        if name not in objects.PLATFORMS:
+            raise UsageError(unknown(f"platform {name!r}", name, objects.PLATFORMS))
+    checks = (unknown_codes, limits(allow_large=False))
+    loaded = load(config, request.overrides, checks, request.plugins)
+    scenario = single(loaded, request.controller)
+    law = ExportedLaw.of(scenario)
+    with RunWriter(request.to, force=request.force) as writer:
+        request.say("simulating the run that the law is checked against")
+        samples = law.samples(simulated(scenario, Stopwatch()))
+        platforms = request.platforms or tuple(objects.PLATFORMS)
+        request.say(f"compiling {law.loop.controller.label} for {', '.join(platforms)}")
+        text = objects.together(law.pieces)
+        if request.c:
+            for name, content in c.sources(law).items():
+                writer.add(name, content.encode())
+            for name in platforms:
+                writer.add(f"{name}/law.o", objects.object_file(text, objects.PLATFORMS[name]))
+        if request.fmu:
+            linked = _linked(request)
+            request.say(f"linking an FMU for {', '.join(linked)}")
+            writer.add(FMU, fmu(law, text, linked, loads=not law.assumes(samples)))
+        writer.add(SAMPLES, _table(law, samples).encode())
+        writer.add_json(ABOUT, law.as_json(platforms, objects.library_functions(text)))
+        origin = provenance.collect(request.argv, started, datetime.now(UTC), scenario.plugged)
+        writer.add_json("provenance.json", origin)
+        return writer.finish("finished")
+
+
+def _linked(request: Request) -> Mapping[str, objects.Platform]:
+    """The platforms of the FMU. Raises UsageError for one that has no libraries."""
+    names = request.platforms or (IN_FMU if find_spec("ziglang") else (this_machine(),))
+    found = {name: objects.PLATFORMS[name] for name in names}
+    if alone := [name for name, platform in found.items() if not platform.library]:
+        raise UsageError(
+            f"{alone[0]} has no shared libraries, so an FMU cannot hold the law for it; export it "
+            "with --no-fmu"
+        )
+    return found
+
+
+def _table(law: ExportedLaw, samples: Vector) -> str:
+    """The samples with names and every bit."""
+    return csv_files.lines([law.columns, *samples.tolist()])
