@@ -27,7 +27,7 @@ MOST_RUNS = 32  # of a pilot
 MOST_STEPS = 100_000  # of a run of a pilot
 MOST_PLACES = 40  # laws and cells of which runs are timed
 # Rough costs (s of processor time, bytes), which matter in small studies only.
-REPORT, FIGURES, LOG, LOG_FIGURES = 4.0, 5.0, 0.5, 3.5
+REPORT, FIGURES, LOG, LOG_FIGURES = 2.0, 2.0, 0.5, 1.2
 HELD_BYTES = 32  # of a run in memory while tables are made: four numbers
 REPORT_BYTES, FIGURES_BYTES, LOG_BYTES, LOG_FIGURES_BYTES = 3.5e5, 1.2e6, 2e4, 3.5e5
 
