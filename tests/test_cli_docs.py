@@ -9,6 +9,7 @@ from collections.abc import Iterator
 import pytest
 from command_samples import ROOT, Command
 
+from podusv_cli.scenario import shipped
 from podusv_cli.workflows import docs
 
 SHIPPED = [*(ROOT / "docs").glob("*.md"), *(ROOT / "results").glob("*.md")]
@@ -31,6 +32,8 @@ def test_a_page_in_a_pipe_is_its_markdown_with_links_that_can_be_followed(
     for target in re.findall(r"`podusv docs ([^`]+)`", said.out):
         assert not docs.is_page(target) or docs.page(target).startswith("#"), target
     assert not re.search(r"\]\((?!\w+://)", said.out)  # a file of a checkout
+    named = re.findall(r"\bconfigs/([\w/]+\.yaml)", said.out)
+    assert not {f"podusv:{path}" for path in named} & {*shipped.names()}
 
 
 def test_a_heading_is_shown_with_what_is_below_it(podusv: Command) -> None:

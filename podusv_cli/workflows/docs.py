@@ -19,6 +19,7 @@ CAPTION = re.compile(r"^   :caption: (.+)$")
 ENTRY = re.compile(r"^   (?:.* <)?/?((?:results/)?\w+)>?$")  # pages that are written, not made
 HEADING = re.compile(r"^(#{1,4}) (.+)$")
 FENCE = re.compile(r"^ *```")
+CONFIG = re.compile(r"\bconfigs/([\w/]+\.yaml)")
 LINK = re.compile(r"(!?)\[([^]]*)\]\(([^)\s]+)\)")
 # What a match counts; those in the text up to `MOST`.
 IN_NAME, IN_TITLE, IN_HEADING, MOST = 100, 40, 20, 10
@@ -134,7 +135,14 @@ def _sections(name: str, text: str) -> Iterator[Section]:
 def _whole(parts: Sequence[Section]) -> str:
     marked = (f"{'#' * part.level} {part.heading}\n{part.text}" for part in parts)
     there = posixpath.dirname(f"{_place(parts[0].page)}.md")
-    return LINK.sub(lambda link: _reachable(link, there, parts[0].page), "\n".join(marked)) + "\n"
+    text = LINK.sub(lambda link: _reachable(link, there, parts[0].page), "\n".join(marked))
+    return CONFIG.sub(_shipped, text) + "\n"
+
+
+def _shipped(file: re.Match[str]) -> str:
+    """A scenario's file as every installation names it; the file where it is not shipped."""
+    scenario = shipped.PREFIX + file[1]
+    return scenario if scenario in shipped.names() else file[0]
 
 
 def _reachable(link: re.Match[str], folder: str, page: str) -> str:
