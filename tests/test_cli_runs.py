@@ -58,7 +58,7 @@ def test_runs_are_chosen_by_their_scenario_and_sorted_by_a_metric(
 @pytest.mark.parametrize(
     ("words", "why"),
     [
-        (("nowhere",), "nowhere is no folder"),
+        (("nowhere",), "nowhere is no folder; name the folder of your results: podusv runs"),
         (("r", "--sort", "enrgy"), "unknown metric 'enrgy'; did you mean 'energy'?"),
         (("r", "--where", "vessel.mm=1"), "unknown key 'vessel.mm'; did you mean 'vessel.m'?"),
         (("r", "--where", "vessel.m"), "write key=value"),

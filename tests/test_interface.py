@@ -290,6 +290,8 @@ def test_a_comparison_has_table_claims_runs_and_figures():
 def test_scenarios_runs_and_folders_are_compared(kept):
     other = podusv.load(SHORT, {"controller.K_Pu": 5.0, "name": "soft"})
     done = podusv.compare([kept, other], figures=False)
+    with pytest.raises(KeyError, match="unknown run 'nobody'"):
+        done["nobody"]
     assert list(done.table) == ["run", "soft"]
     assert done["run"].folder == kept.folder
     assert done.folder.parent == Path("results/run-soft")

@@ -49,7 +49,7 @@ def plot(
         typer.Option("--animate", help="The chase as a film as well: MP4, GIF without ffmpeg."),
     ] = False,
     card: Annotated[
-        bool, typer.Option("--card", help="A picture of 1200 x 630 to share; others where named.")
+        bool, typer.Option("--card", help="A picture of 1200 x 630; figures only with --figure.")
     ] = False,
     out: Annotated[
         Path, typer.Option(help="Folder for the figures; replaces those of the same name there.")

@@ -144,7 +144,9 @@ class Comparison:
         return page if page.exists() else None
 
     def __getitem__(self, label: str) -> Run:
-        """The run of this label."""
+        """The run of this label; KeyError with the labels that there are."""
+        if label not in self.runs:
+            raise KeyError(unknown(f"run {label!r}", label, self.runs))
         return self.runs[label]
 
     @explained

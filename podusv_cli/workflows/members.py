@@ -73,9 +73,9 @@ def from_folder(
 def _about_study(path: Path) -> str:
     """What to do instead of taking a study for a run."""
     kept = sorted(run for run in (path / LOGS).glob("*") if (run / LOG).is_file())
-    named = f"name one of the runs that it keeps, such as {kept[0]}" if kept else "it keeps no logs"
+    one = f"name one of the runs that it keeps, such as {kept[0]}, or " if kept else ""
     return (
-        f"{path} is a study, not a run; {named}, or get any of its runs as a scenario with: "
+        f"{path} is a study, not a run; {one}write any of its runs as a scenario: "
         f"podusv sweep draw {path} --law LAW --draw N"
     )
 

@@ -58,7 +58,9 @@ def runs(root: Path, where: Sequence[str] = (), sort: str = "") -> list[Found]:
     that is none, and for a key or metric that nothing here has.
     """
     if not root.is_dir():
-        raise UsageError(f"{root} is no folder")
+        raise UsageError(
+            f"{root} is no folder; name the folder of your results: podusv runs FOLDER"
+        )
     every = [*_below(root)]
     for condition in where:
         every = _holding(every, condition)
