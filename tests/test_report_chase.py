@@ -78,6 +78,16 @@ def test_positions_are_thinned_and_rounded_to_millimetres():
     assert len(short["time"]) == 101
 
 
+def test_the_map_has_room_for_a_hull_at_the_end_of_its_track():
+    (run,) = moving = shown(("a", recording(end=1.0)))
+    west, south, east, north = chase.chase(moving)["box"]
+    x, y = run.signal("x"), run.signal("y")
+    assert x.max() + run.length / 2 <= north
+    assert south <= x.min() - run.length / 2
+    assert y.max() + run.length / 2 <= east
+    assert west <= y.min() - run.length / 2
+
+
 def test_the_ends_of_runs_are_told():
     whole, lost, bare, apart = chase.chase(runs())["runs"]
     assert [run["ending"] for run in (whole, lost, bare)] == ["", "diverged at t = 40 s", ""]

@@ -25,8 +25,9 @@ def chase(runs: Sequence[Shown]) -> dict[str, Any]:
     if not moving:
         return {}
     (west, east), (south, north) = bounds(moving)
+    half = max(run.length for run in moving) / 2  # a hull reaches beyond its track
     return {
-        "box": [_rounded(edge) for edge in (west, south, east, north)],
+        "box": [_rounded(edge) for edge in (west - half, south - half, east + half, north + half)],
         "end": _rounded(max(run.end for run in moving), DIGITS["time"]),
         "runs": [_track(run) for run in moving],
     }
