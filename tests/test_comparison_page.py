@@ -86,6 +86,8 @@ def test_many_runs_stand_below_each_other_a_few_numbers_to_a_table():
     shown = [code.text for one in tables for code in one.all("code")]
     assert sorted(shown) == sorted(names)
     few = section("comparison", table=frame[labels[: report.MANY]])
+    assert "Below each column's heading" in told.text
+    assert "Below each row's name" in few.text
     assert few.all("table")[0].rows()[0][2:] == labels[: report.MANY]
 
 
