@@ -55,6 +55,27 @@ def test_runs_are_chosen_by_their_scenario_and_sorted_by_a_metric(
     assert [float(row[-2]) for row in rows] == pytest.approx(energies, rel=1e-4)
 
 
+def test_numbers_of_where_are_those_of_scenarios(results: Path) -> None:
+    assert len(runs.runs(results, ["simulation.duration=1e0"])) == 3
+
+
+DAMAGE = {
+    "metrics.json": ['{"metrics": {"iae": "x"}}', '{"metrics": []}', "[]", "{", '{"name": 1}'],
+    "manifest.json": ["null", '{"status": 3}'],
+    "provenance.json": ['{"duration_s": "long"}', '{"sittings": [1]}', '{"started": null}'],
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "text"), [(n, text) for n, each in DAMAGE.items() for text in each]
+)
+def test_a_damaged_file_is_told_as_such(name: str, text: str, podusv: Command) -> None:
+    podusv_python.run("podusv:own_vessel.yaml", SHORT, out="r/m", figures=False)
+    Path("r/m", name).write_text(text)
+    (row,) = listed(podusv)
+    assert "damaged" in row
+
+
 @pytest.mark.parametrize(
     ("words", "why"),
     [
@@ -62,6 +83,7 @@ def test_runs_are_chosen_by_their_scenario_and_sorted_by_a_metric(
         (("r", "--sort", "enrgy"), "unknown metric 'enrgy'; did you mean 'energy'?"),
         (("r", "--where", "vessel.mm=1"), "unknown key 'vessel.mm'; did you mean 'vessel.m'?"),
         (("r", "--where", "vessel.m"), "write key=value"),
+        (("r", "--where", "vessel.m=["), "write key=value"),
         (("r/s", "--sort", "iae"), "only runs have metrics"),
     ],
 )

@@ -6,26 +6,55 @@ import math
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import yaml
+from pydantic import BaseModel
 
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.scenario.phrases import unknown
+from podusv_cli.scenario.yaml_text import read
+from podusv_cli.scenario.yaml_tree import Node, find, plain, route
 from podusv_cli.storage import files, json_files
 from podusv_cli.storage.run_folder import STUDY
 
-# A file that only folders of this kind have, and the file with their scenario.
-KINDS = {
-    "metrics.json": ("run", "resolved.yaml"), STUDY: ("study", "scenario.yaml"),
-    "tune.json": ("search", "scenario.yaml"), "runs.csv": ("bench", ""),
-}  # fmt: skip
 MANIFEST, PROVENANCE = "manifest.json", "provenance.json"
 UNFINISHED, DAMAGED = "unfinished", "damaged"
-STEP = re.compile(r"[^.\[\]]+")
 NAME = re.compile(r"^name: *[\"']?([^\"'\n]+)", re.MULTILINE)
+
+
+class _Told(BaseModel):
+    """What is read of the file that only folders of one kind have."""
+
+    name: str = ""
+    laws: list[str] | dict[str, Any] = []
+    controller: str | None = None
+
+
+class _OfRun(_Told):
+    metrics: dict[str, float | None] = {}
+
+
+class _Ending(BaseModel):
+    status: str = UNFINISHED
+
+
+class _Session(BaseModel):
+    started: str = ""
+    duration_s: float = 0.0
+
+
+class _Origin(_Session):
+    sittings: list[_Session] = []
+
+
+# A file that only folders of this kind have, the file with their scenario, what is read of it.
+KINDS = {
+    "metrics.json": ("run", "resolved.yaml", _OfRun), STUDY: ("study", "scenario.yaml", _Told),
+    "tune.json": ("search", "scenario.yaml", _Told), "runs.csv": ("bench", "", None),
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -86,66 +115,57 @@ def _below(root: Path) -> Iterator[Found]:
 
 
 def _read(folder: Path, mark: str) -> Found:
-    kind, scenario = KINDS[mark]
+    kind, scenario, model = KINDS[mark]
     try:
-        told = json_files.read(folder / mark) if mark.endswith(".json") else {}
-        ending = json_files.read(folder / MANIFEST) if (folder / MANIFEST).exists() else {}
-        origin = json_files.read(folder / PROVENANCE) if (folder / PROVENANCE).exists() else {}
+        told = json_files.read_as(folder / mark, model) if model else _Told()
+        ending, origin = (
+            _if_there(folder / MANIFEST, _Ending),
+            _if_there(folder / PROVENANCE, _Origin),
+        )
         text = files.read_text(folder / scenario) if scenario else ""
     except StorageError:
         return Found(folder, kind, status=DAMAGED)
-    sessions = [*origin.get("sittings", []), origin]
+    sessions = [*origin.sittings, origin]
     named = NAME.search(text)
-    laws = told.get("laws") or [told[key] for key in ("controller",) if key in told]
-    numbers = (
-        {n: math.nan if x is None else x for n, x in told.get("metrics", {}).items()}
-        if kind == "run"
-        else {}
-    )
+    metrics = told.metrics if isinstance(told, _OfRun) else {}
     return Found(
-        folder, kind, told.get("name") or (named[1] if named else folder.name), [*map(str, laws)],
-        ending.get("status", UNFINISHED), sessions[0].get("started", ""),
-        sum(one.get("duration_s", 0.0) for one in sessions), numbers, scenario,
+        folder, kind, told.name or (named[1] if named else folder.name),
+        [*told.laws] or [*filter(None, [told.controller])], ending.status, sessions[0].started,
+        sum(one.duration_s for one in sessions),
+        {name: math.nan if x is None else x for name, x in metrics.items()}, scenario,
     )  # fmt: skip
+
+
+def _if_there(path: Path, model: type[json_files.Model]) -> json_files.Model:
+    return json_files.read_as(path, model) if path.exists() else model()
 
 
 def _holding(every: Sequence[Found], condition: str) -> list[Found]:
     """Those whose scenario has this value. Raises UsageError where none has the key."""
     key, equals, text = condition.partition("=")
-    if not equals:
+    wanted = read(text, condition, [], placed=False) if equals and text else None
+    if wanted is None:
         raise UsageError(f"--where {condition}: write key=value, as --where controller.kind=pid")
-    wanted, absent = yaml.safe_load(text), object()
-    trees = {one.folder: _tree(one) for one in every if one.scenario}
-    values = {folder: _at(tree, key, absent) for folder, tree in trees.items()}
-    if trees and all(value is absent for value in values.values()):
+    trees = {one.folder: tree for one in every if (tree := _tree(one))}
+    values = {folder: find(tree, route(key)) for folder, tree in trees.items()}
+    if trees and not any(values.values()):
         known = dict.fromkeys(name for tree in trees.values() for name in _keys(tree))
         wrong = unknown(f"key {key!r}", key, known, "podusv explain")
         raise UsageError(f"--where {condition}: {wrong}")
-    return [one for one in every if values.get(one.folder, absent) == wanted]
+    return [
+        one for one in every if (node := values.get(one.folder)) and plain(node) == plain(wanted)
+    ]
 
 
-def _tree(one: Found) -> Any:
-    try:
-        return yaml.load(
-            files.read_text(one.folder / one.scenario),
-            getattr(yaml, "CSafeLoader", yaml.SafeLoader),
-        )
-    except (StorageError, yaml.YAMLError):
-        return {}
+def _tree(one: Found) -> Node | None:
+    """Its scenario; None where there is none, or none that can be read."""
+    with suppress(StorageError):
+        if one.scenario:
+            return read(files.read_text(one.folder / one.scenario), str(one.folder), [])
+    return None
 
 
-def _at(tree: Any, key: str, absent: object) -> Any:
-    for step in STEP.findall(key):
-        if isinstance(tree, Mapping):
-            tree = tree.get(step, absent)
-        elif isinstance(tree, list) and step.isdigit() and int(step) < len(tree):
-            tree = tree[int(step)]
-        else:
-            return absent
-    return tree
-
-
-def _keys(tree: Any, prefix: str = "") -> Iterator[str]:
-    for name, value in tree.items() if isinstance(tree, Mapping) else ():
+def _keys(tree: Node, prefix: str = "") -> Iterator[str]:
+    for name, entry in tree.mapping.items():
         yield f"{prefix}{name}"
-        yield from _keys(value, f"{prefix}{name}.")
+        yield from _keys(entry, f"{prefix}{name}.")
