@@ -3,6 +3,7 @@
 import errno
 import json
 import math
+import multiprocessing
 import os
 import re
 import shutil
@@ -248,6 +249,18 @@ def test_what_is_missing_is_compiled_before_it_is_asked_for(cache, monkeypatch, 
     fractions.clear()
     compile.prepare(pieces[1:], fractions.append)
     assert not fractions
+
+
+def _prepare_two() -> None:
+    compile.prepare([compile.Piece(function, ONE_TO_ONE) for function in (ready, doubled)])
+
+
+def test_a_worker_of_a_pool_which_may_start_no_process_compiles_by_itself(cache, monkeypatch):
+    monkeypatch.setattr(os, "sched_getaffinity", lambda pid: {0, 1}, raising=False)
+    monkeypatch.setattr(compile, "SHARE", 1)
+    with multiprocessing.get_context("fork").Pool(1) as pool:
+        pool.apply(_prepare_two)
+    assert object_cache.is_kept(compile.Piece(doubled, ONE_TO_ONE).name)
 
 
 def test_a_full_disk_costs_time_only(cache, monkeypatch):

@@ -50,7 +50,12 @@ class Outcome:
 
 
 def available_workers() -> int:
-    """How many worker processes to use: the cores that this process may run on."""
+    """How many worker processes to use: the cores that this process may run on.
+
+    One where Python lets this process start none, as in a worker of `multiprocessing.Pool`.
+    """
+    if multiprocessing.current_process().daemon:
+        return 1
     try:
         return len(os.sched_getaffinity(0))
     except AttributeError:  # not on every system
