@@ -14,13 +14,18 @@ from pathlib import Path
 
 import pytest
 import typer
+import typer.core
 from conftest import kinds
 from scenario_samples import SOUND, write
 
 import podusv_cli
 from podusv_cli import cli
+from podusv_cli.cli import completion
 from podusv_cli.cli.exit_codes import PLEASE_REPORT, with_exit_codes
-from podusv_cli.core.errors import ScenarioError, StorageError
+from podusv_cli.core.errors import LawError, ScenarioError, StorageError
+from podusv_cli.metrics.table import METRICS
+from podusv_cli.scenario import model as scenario_model
+from podusv_cli.scenario import shipped
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.presets import preset_about, preset_names, preset_text, with_presets
 
@@ -359,6 +364,29 @@ def test_what_was_completed_is_kept_until_podusv_changes(tmp_path: Path, monkeyp
     stale = {**json.loads(kept.read_text()), "state": "of an older podusv", "known": {}}
     kept.write_text(json.dumps(stale))
     assert offered_for(typed, tmp_path, LOADED)[:-1] == first[:-1]
+
+
+def test_a_new_scenario_is_offered(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr(shipped, "folder", lambda: tmp_path)
+    before = completion._state()
+    (tmp_path / "new.yaml").write_text("name: new\n")
+    assert completion._state() != before
+
+
+def test_what_lacks_a_plug_in_that_failed_is_not_kept(tmp_path: Path, monkeypatch) -> None:
+    def fails(plugins: object) -> None:
+        raise LawError("cannot be imported")
+
+    monkeypatch.setenv("PODUSV_CACHE", str(tmp_path))
+    monkeypatch.setattr(scenario_model, "scenario_class", fails)
+    assert ("iae", METRICS["iae"].meaning) in completion.metrics(
+        typer.Context(typer.core.TyperCommand("plot")), "ia"
+    )
+    assert not [*tmp_path.rglob("metrics.json")]
+    monkeypatch.undo()
+    monkeypatch.setenv("PODUSV_CACHE", str(tmp_path))
+    completion.metrics(typer.Context(typer.core.TyperCommand("plot")), "ia")
+    assert [*tmp_path.rglob("metrics.json")]
 
 
 def test_a_listed_vessel_has_its_size_and_a_sentence_that_tells_it_from_its_neighbours(podusv):

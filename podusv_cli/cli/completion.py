@@ -33,7 +33,7 @@ def kept(known: Callable[[Plugins], Mapping[str, str]]) -> Callable[[typer.Conte
     @wraps(known, assigned=("__name__", "__doc__"), updated=())
     def complete(context: typer.Context, incomplete: str) -> Offered:
         if context.params.get("plugin"):
-            return _beginning(incomplete, known(_plugins(context)))
+            return _beginning(incomplete, known(_plugins(context) or ()))
         from podusv_cli.engine.machine.code_folder import write
 
         folder, state = _folder(), _state()
@@ -42,9 +42,10 @@ def kept(known: Callable[[Plugins], Mapping[str, str]]) -> Callable[[typer.Conte
             there = json.loads(place.read_text("utf-8")) if place else {}
             if there["state"] == state:
                 return _beginning(incomplete, there["known"])
-        found = dict(known(_plugins(context)))
+        plugins = _plugins(context)
+        found = dict(known(plugins or ()))
         with suppress(OSError):
-            if place:
+            if place and plugins is not None:  # one that fails today may be loaded tomorrow
                 write(place, json.dumps({"state": state, "known": found}).encode())
         return _beginning(incomplete, found)
 
@@ -63,16 +64,19 @@ def _folder() -> Path | None:
 
 
 def _state() -> str:
-    """A digest of what podusv and the installed plug-ins are now."""
+    """A digest of what podusv, its scenarios and the installed plug-ins are now."""
     import hashlib
     from pathlib import Path
 
     import podusv_cli
     from podusv_cli.core.plugins import installed
+    from podusv_cli.scenario import shipped
 
-    package = Path(podusv_cli.__file__).parent
-    times = [(str(path), path.stat().st_mtime_ns) for path in package.rglob("*.py")]
-    times += [(str(path), path.stat().st_mtime_ns) for path in package.rglob("*.yaml")]
+    folders = (Path(podusv_cli.__file__).parent, shipped.folder())  # no link is followed
+    files = (
+        path for folder in folders for end in ("py", "yaml") for path in folder.rglob(f"*.{end}")
+    )
+    times = [(str(path), path.stat().st_mtime_ns) for path in files]
     plugins = [(plugin.name, plugin.sha256) for plugin in installed()]
     return hashlib.sha256(repr((sorted(times), plugins)).encode()).hexdigest()
 
@@ -160,8 +164,8 @@ def names(plugins: Plugins) -> Mapping[str, str]:
     return found | {name: finding.meaning for name, finding in finding_kinds(plugins).items()}
 
 
-def _plugins(context: typer.Context) -> Plugins:
-    """Those on the line and installed ones; none where one of them cannot be loaded.
+def _plugins(context: typer.Context) -> Plugins | None:
+    """Those on the line and installed ones; None where one of them cannot be loaded.
 
     A shell has no place for a message; the command itself will tell.
     """
@@ -173,7 +177,7 @@ def _plugins(context: typer.Context) -> Plugins:
         plugins = on_hand(context.params.get("plugin") or ())
         scenario_class(plugins)
     except PodusvError:
-        return ()
+        return None
     return plugins
 
 
