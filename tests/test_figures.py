@@ -9,13 +9,14 @@ import pytest
 from drawn_samples import CENTER, WIDTH, drawn, line, panels, recording, scenario, shown
 from known_signals import ABOUT
 from matplotlib.cbook import is_math_text
+from matplotlib.text import Text
 from rerun_samples import made
 from scenario_samples import SOUND
 
 from podusv_cli.comparison.claims import parse_claims, peaks
 from podusv_cli.core import escaping
 from podusv_cli.core.spectrum import periodogram
-from podusv_cli.figures import style
+from podusv_cli.figures import card, style
 from podusv_cli.figures.animation import stage
 from podusv_cli.figures.curves import thinned
 from podusv_cli.figures.drawing import FIGURES, draw
@@ -220,6 +221,34 @@ def test_no_text_leaves_the_page_and_no_label_title_or_name_covers_another(two, 
         assert not box.padded(-2.0).overlaps(beside), (one, other)
 
 
+SPREAD = {
+    "within a decade": {"z_e": lambda t: 1.6 + 0.03 * t},
+    "far from zero": {"psi_e": lambda t: -1.234567e8 + 1e-3 * t},
+}
+
+
+@pytest.mark.parametrize("columns", [1, 2])
+@pytest.mark.parametrize("case", SPREAD)
+def test_numbers_have_room_beside_labels(case, columns, monkeypatch):
+    """Ticks on a logarithmic axis within a decade have numbers too, and some axes a factor."""
+    boxes, draw_text = {}, Text.draw
+
+    def drawn_text(text, renderer):
+        if text.get_visible() and text.get_text():
+            boxes.setdefault(text.get_text(), []).append(text.get_window_extent(renderer))
+        draw_text(text, renderer)
+
+    monkeypatch.setattr(Text, "draw", drawn_text)
+    page = drawn("errors", shown(*((name, recording(**SPREAD[case])) for name in "ab")), columns)
+    with house_style():
+        image(page, "png")
+    labels = {words: boxes.pop(words) for words in [axes.get_ylabel() for axes in page.axes]}
+    for text, each in boxes.items():
+        for box in each:
+            assert box.x0 >= page.bbox.x0 - 1.0, text
+            assert not any(box.overlaps(label) for (label,) in labels.values()), text
+
+
 def test_a_figure_whose_signals_no_run_has_is_not_drawn():
     runs = shown(("a", recording(without=FIGURES["filters"].signals)))
     assert not FIGURES["filters"].fits(runs)
@@ -295,6 +324,17 @@ def test_an_animation_shows_labels_as_they_are(runs):
         stage(figure.add_subplot(), runs)(0.05)
         figure.legend()
         assert image(figure, "png")
+
+
+def test_a_long_name_without_a_space_is_cut_where_there_is_no_room():
+    long = "a_law_with_" + 20 * "many_words_"
+    runs = shown((long, recording()), ("b", recording(shift=0.1)))
+    titles = [axes.get_title(loc="left") for axes in drawn("trajectory", runs).axes]
+    (told,) = (title for title in titles if "from a_law" in title)
+    assert told.endswith("...")
+    assert len(told) < 60
+    written = [text.get_text() for text in card.figure(runs, card.Words(long)).texts]
+    assert any(text.startswith("a_law") and text.endswith("...") for text in written)
 
 
 @pytest.mark.parametrize("text", [*ODD, "", "_", "$", "a\\$b", "50$ or 60$", "ψ _ x"], ids=ascii)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from podusv_cli.core import escaping
 from podusv_cli.figures.page import EDGE, Page
-from podusv_cli.figures.shown import Shown
+from podusv_cli.figures.shown import Shown, shortened
 from podusv_cli.figures.style import house_style, image, legend
 from podusv_cli.figures.trajectory import close_up, distances, views
 
@@ -72,4 +72,4 @@ def _frame(figure: Page, words: Words) -> None:
 
 def _cut(text: str, size: float) -> str:
     """As much of a line as a card has room for."""
-    return escaping.figure(textwrap.shorten(text, LETTERS[size], placeholder=" ..."))
+    return escaping.figure(shortened(" ".join(text.split()), LETTERS[size]))

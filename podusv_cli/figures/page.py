@@ -100,6 +100,8 @@ class Page(Figure):
         for axis in (axis for axes in panels for axis in (axes.xaxis, axes.yaxis)):
             if plain := PLAIN.get(type(axis.get_major_formatter())):
                 axis.set_major_formatter(plain())
+            if plain := PLAIN.get(type(axis.get_minor_formatter())):
+                axis.set_minor_formatter(plain())
         specs = [spec for axes in panels if (spec := axes.get_subplotspec())]
         grid = specs[0].get_gridspec()
         rows, columns = [spec.rowspan for spec in specs], [spec.colspan for spec in specs]
@@ -192,7 +194,7 @@ def _numbers(axes: Axes, most: float) -> float:
         return 0.0
     size = _size(axes.yaxis)
     texts = [line for text in _texts(axes.yaxis) for line in text.split("\n")]
-    if not texts:
+    if not any(texts):
         return 0.0
     widest = max(text_width("0" * FIGURES, size), *(text_width(text, size) for text in texts))
     return min(widest, most) + _reach(axes.yaxis) * POINT
@@ -211,11 +213,15 @@ def _reach(axis: Axis) -> float:
 
 
 def _texts(axis: Axis) -> list[str]:
-    """What stands at the ticks that are seen."""
-    locations = np.asarray(axis.get_majorticklocs())
-    texts = axis.get_major_formatter().format_ticks(list(locations))
-    seen = _seen(axis, locations)
-    return [text for text, shown in zip(texts, seen, strict=True) if shown]
+    """What stands at the ticks that are seen, and the factor of all numbers."""
+    found: list[str] = []
+    for locations, formatter in (
+        (axis.get_majorticklocs(), axis.get_major_formatter()),
+        (axis.get_minorticklocs(), axis.get_minor_formatter()),
+    ):
+        texts = formatter.format_ticks(list(locations))
+        found += [t for t, seen in zip(texts, _seen(axis, locations), strict=True) if seen]
+    return [*found, axis.get_major_formatter().get_offset()]  # which depends on the numbers
 
 
 def _seen(axis: Axis, locations: Locations) -> Any:

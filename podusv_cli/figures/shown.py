@@ -119,6 +119,11 @@ class Shown:
         return float(self.signal(name)[self.row(t)])
 
 
+def shortened(text: str, most: int) -> str:
+    """A text, or as much of it as so many letters and three dots are."""
+    return text if len(text) <= most else f"{text[: most - 3]}..."
+
+
 def nth_style(place: int) -> tuple[str, Any, str]:
     """Colour, line style and marker of the run in this place; the first 100 differ."""
     count = len(LOOKS)

@@ -11,11 +11,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon, Rectangle
 
+from podusv_cli.core import escaping
 from podusv_cli.core.kernel import Vector
 from podusv_cli.figures.curves import CUT, Span, draw_run, scaling
 from podusv_cli.figures.page import Page
 from podusv_cli.figures.sheet import figure
-from podusv_cli.figures.shown import Shown
+from podusv_cli.figures.shown import Shown, shortened
 from podusv_cli.figures.style import WIDTHS, legend, new_figure, remark
 from podusv_cli.figures.tracks import Target, bounds, rows_of, targets
 
@@ -28,6 +29,7 @@ BROAD = (2.2, 0.8)  # points, the first and the last track
 HIGH_MAP = 3.1  # inches, the height of a map beside close-ups
 MAP_WIDTHS = (1.0, 3.6)  # inches, of such a map
 WIDE_MAP = 1.6  # times as wide as high, from where a map stands above the close-ups
+NAME = 36  # letters of a run's name in a title
 DEVIATION = "e_ct"  # from a path that is followed
 FRAME: dict[str, Any] = {"fill": False, "edgecolor": "#444444", "linewidth": 0.5}
 LEAST_DISTANCE = 1e-4  # m, on a logarithmic axis
@@ -137,7 +139,8 @@ def distances(axes: Axes, runs: Sequence[Shown]) -> None:
         axes.set_title("from the path" if name == DEVIATION else "from the target", loc="left")
     else:
         curves = {run: _between(first, run) for run in others}
-        axes.set_title(f"from {first.name}", loc="left")
+        words = escaping.figure(shortened(first.label, NAME))
+        axes.set_title(f"from {words}", loc="left")
     if not curves:
         remark(axes, "one run, and no target")
         return
