@@ -332,13 +332,16 @@ def test_a_card_says_the_first_claim_that_was_decided_with_seed_and_digest(place
     plan = scenario("waves").model_copy(update={"description": "In waves."})
     folder = keep(place / "decided", pid(), plan)
     claims = [
-        {"says": "A.", "verdict": "cannot tell", "numbers": {}},
-        {"says": "B.", "verdict": "reproduced", "numbers": {"pid.iae": 2.0}},
-    ]
+        {"says": "A.", "source": "ours", "verdict": "cannot tell", "numbers": {}},
+        {
+            "says": "B.", "source": "ours", "verdict": "reproduced",
+            "numbers": {"pid.iae": 2.0, "pid.delay_margin": None},
+        },
+    ]  # fmt: skip
     (tmp_path / "claims.json").write_text(json.dumps({"format": 1, "claims": claims}))
     (member,) = plotting.from_folder(folder)
     words = plotting._words([tmp_path], [member])
-    assert (words.claim, words.verdict, words.numbers) == ("B.", "reproduced", "pid.iae = 2")
+    assert (words.claim, words.verdict, words.numbers) == ("B.", "holds", "pid.iae = 2")
     assert words.title == member.scenario.description
     digest = hashlib.sha256(resolved_yaml(member.scenario).encode()).hexdigest()[:8]
     assert words.origin.endswith(f"seed none (nothing is random), scenario {digest}")
@@ -350,6 +353,8 @@ def test_long_words_stay_on_the_card(two_shown):
     with house_style():
         figure = card.figure(two_shown, words)
         image(figure, "png")
+        written = [text.get_text().partition(" ")[0] for text in figure.texts]
+        assert written == ["title", "origin", "number", "claim", "reproduced:"]
         for text in figure.texts:
             box = text.get_window_extent()
             assert box.x0 >= 0.0

@@ -19,6 +19,16 @@ OF_OWN: dict[bool | None, str] = {True: "holds", False: "fails", None: "cannot t
 OWN = "ours"  # begins the source of a claim that was not published
 
 
+def is_published(source: str) -> bool:
+    """Whether this is the source of a claim that runs can reproduce, and not somebody's own."""
+    return not source.startswith(OWN)
+
+
+def words(answer: bool | None, *, published: bool) -> str:
+    """An answer as readers see it."""
+    return (ANSWERS if published else OF_OWN)[answer]
+
+
 @dataclass(frozen=True)
 class Verdict(ABC):
     """The verdict on a claim as it stands in a scenario; the answer is None where none is known."""
@@ -40,11 +50,11 @@ class Verdict(ABC):
     @property
     def published(self) -> bool:
         """Whether the claim has a published source, which runs can reproduce."""
-        return not self.claim.source.startswith(OWN)
+        return is_published(self.claim.source)
 
     def word_for(self, answer: bool | None) -> str:
         """An answer on this claim as readers see it."""
-        return (ANSWERS if self.published else OF_OWN)[answer]
+        return words(answer, published=self.published)
 
     @property
     def preliminary(self) -> bool:
@@ -97,7 +107,7 @@ def by_answer(verdicts: Sequence[AnyVerdict]) -> list[Answered[AnyVerdict]]:
     numbered = [*enumerate(verdicts, 1)]
     kinds = [kind for kind in (True, False) if kind in {v.published for v in verdicts}]
     groups = [
-        Answered(answer, (ANSWERS if kind else OF_OWN)[answer],
+        Answered(answer, words(answer, published=kind),
                  [one for one in numbered if (one[1].answer, one[1].published) == (answer, kind)])
         for kind in kinds for answer in (True, False)
     ]  # fmt: skip

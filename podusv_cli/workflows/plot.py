@@ -21,7 +21,7 @@ from podusv_cli.comparison.differences import differences
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.core.escaping import visible
 from podusv_cli.core.recording import Recording
-from podusv_cli.expressions.verdict import ANSWERS
+from podusv_cli.expressions.verdict import ANSWERS, is_published, words
 from podusv_cli.figures import card, panels
 from podusv_cli.figures.animation import animate, file_name
 from podusv_cli.figures.drawing import SCREEN, check_names, draw_in_parallel, figures_of
@@ -146,8 +146,10 @@ def _words(folders: Sequence[Path], members: Sequence[Member]) -> card.Words:
     if not decided:
         return card.Words(title, origin=origin)
     claim = decided[0]
-    told = ", ".join(f"{name} = {value:.4g}" for name, value in claim["numbers"].items())
-    return card.Words(title, claim["says"], claim["verdict"], told, origin)
+    known = {name: value for name, value in claim["numbers"].items() if value is not None}
+    told = ", ".join(f"{name} = {value:.4g}" for name, value in known.items())
+    answer = words(claim["verdict"] == ANSWERS[True], published=is_published(claim["source"]))
+    return card.Words(title, claim["says"], answer, told, origin)
 
 
 def _named(members: Sequence[Member], labels: Sequence[str]) -> list[Member]:
