@@ -40,10 +40,15 @@ def test_a_heading_is_shown_with_what_is_below_it(podusv: Command) -> None:
     said = podusv("docs", "docs/studies.md#on-many-machines").out
     assert said.startswith("## On many machines\n")
     assert "\n### Dask\n" in said
-    assert "## Kept logs" not in said
+    assert len(re.findall(r"^## ", said, re.M)) == 1
     wrong = podusv("docs", "studies#dusk")
     assert (wrong.code, wrong.out) == (2, "")
     assert "unknown heading 'dusk' of studies; did you mean 'dask'?" in wrong.err
+
+
+def test_a_comment_in_code_is_no_heading() -> None:
+    text = "# Page\n```\n# a comment\n```\n## Heading\n"
+    assert [part.heading for part in docs._sections("page", text)] == ["Page", "Heading"]
 
 
 @pytest.mark.parametrize(

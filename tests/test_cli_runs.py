@@ -41,6 +41,8 @@ def test_a_line_each_the_latest_first_with_what_it_is(podusv: Command, results: 
         "r/m/50": ("run", "finished", ["pid"]), "r/m/70": ("run", "damaged", []),
     }  # fmt: skip
     assert told[0]["folder"] == "r/s"
+    origin = json.loads(Path("r/m/60/provenance.json").read_text())
+    assert (told[1]["seconds"], told[1]["started"]) == (origin["duration_s"], origin["started"])
     assert told[1]["metrics"]["iae"] == podusv_python.open_run("r/m/60").metrics["iae"]
 
 

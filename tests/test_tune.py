@@ -6,6 +6,7 @@ import json
 import math
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -55,6 +56,22 @@ def test_a_law_that_does_not_end_at_its_target_has_no_rank(done):
     results = replace(done.results, plan=replace(done.results.plan, scenario=far))
     assert results.laws.rank_after.isna().all()
     assert results.laws.place_low.isna().all()
+
+
+def test_failed_draws_count_as_not_settled_and_half_of_the_draws_are_enough(done, monkeypatch):
+    """Whatever the numbers of a run that failed are."""
+    draws = [
+        SimpleNamespace(failed=np.array(f), metrics={"x": np.zeros(4)}) for f in FAILED.values()
+    ]
+    monkeypatch.setattr(
+        type(done.results.plan.scenario), "at_target", lambda scenario, numbers: True
+    )
+    for name, one in zip(FAILED, draws, strict=True):
+        monkeypatch.setattr(type(done.results), "met", lambda results, law, one=one: one)
+        assert done.results.settles("toy", "before") == (name == "half")
+
+
+FAILED = {"half": [True, True, False, False], "most": [True, True, True, False]}
 
 
 def test_every_search_spends_the_whole_budget_and_counts_pruned_trials(done):
