@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import podusv
-from podusv_cli.core.errors import UsageError
+from podusv_cli.core.errors import ScenarioError, UsageError
 from podusv_cli.interface.session import Observation, Session
 from podusv_cli.workflows import rerun as repeating
 from podusv_cli.workflows.run import Request
@@ -108,6 +108,32 @@ def test_a_session_goes_back_and_on_with_the_same_bits():
         np.testing.assert_array_equal(values, once[signal], signal)
 
 
+def test_a_place_keeps_the_log_that_led_to_it():
+    """Whatever was steered from an earlier place meanwhile."""
+    session = opened("podusv:own_vessel.yaml", 2.0)
+    session.step((1.0, 0.0))
+    early = session.state()
+    steered(session, 5)
+    place, log = session.state(), session.log["u"].copy()
+    session.restore(early)
+    for _ in range(7):
+        session.step((-50.0, 0.0))
+    session.restore(place)
+    np.testing.assert_array_equal(session.log["u"], log)
+    with pytest.raises(UsageError, match="back to a place in the same session"):
+        opened("podusv:own_vessel.yaml", 2.0).restore(place)
+
+
+def test_the_run_of_a_session_is_as_long_as_the_session():
+    """Where the last demand is cut short, and where no instant but the first is logged."""
+    session = opened("podusv:own_vessel.yaml", 0.25)
+    assert steered(session).time == 0.25
+    assert session.close("cut", figures=False)["time"][-1] == 0.25
+    session = opened("podusv:own_vessel.yaml", 2.0, **{"log.every": 100})
+    steered(session, 3)
+    assert session.close("short", figures=False)["time"].tolist() == [0.0, 0.3]
+
+
 @pytest.mark.parametrize(
     "demand", [(math.nan, 0.0), (0.0, math.inf), (1.0,), (1.0, 2.0, 3.0), None, "ab", ("a", "b")]
 )
@@ -143,6 +169,9 @@ def test_a_session_that_diverges_keeps_what_it_has():
 def test_without_a_period_or_with_too_many_there_is_no_session():
     with pytest.raises(UsageError, match=r"give period=0\.1 \[s\], or the scenario a control\.per"):
         podusv.open_session("podusv:own_vessel.yaml")
+    for period, says in ((0.0, "for how long does a demand hold"), (math.nan, "must be finite")):
+        with pytest.raises((UsageError, ScenarioError), match=says):
+            podusv.open_session("podusv:own_vessel.yaml", period=period)
     with pytest.raises(
         UsageError, match=r"more than 15,000 demands of 0\.1 s; ask for at most 1500"
     ):

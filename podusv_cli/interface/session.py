@@ -45,6 +45,7 @@ class Observation(NamedTuple):
 class Bookmark:
     """A place in a session, to come back to."""
 
+    session: Session
     mark: Mark
     demands: tuple[tuple[float, float], ...]
     status: Status
@@ -68,7 +69,7 @@ def open_session(
     """
     scenario = loaded(source, changes).scenario
     scenario = next(iter(scenario.singles().values())) if scenario.open_choice else scenario.alone()
-    period = period or scenario.control.period
+    period = scenario.control.period if period is None else period
     if not period:
         raise UsageError(
             "open_session: for how long does a demand hold? give period=0.1 [s], or the scenario "
@@ -144,10 +145,19 @@ class Session:
 
     def state(self) -> Bookmark:
         """The place in the run, for `restore`."""
-        return Bookmark(self._pieces.mark(), tuple(self._demands), self._status)
+        return Bookmark(self, self._pieces.mark(), tuple(self._demands), self._status)
 
+    @explained
     def restore(self, place: Bookmark) -> Observation:
-        """Go on from a place in this run; what came after it is forgotten."""
+        """Go on from a place in this run; what came after it is forgotten.
+
+        Raises UsageError for a place in another session.
+        """
+        if place.session is not self:
+            raise UsageError(
+                "session: restore goes back to a place in the same session; this place is in "
+                "another one, so restore it there"
+            )
         self._pieces.back(place.mark)
         self._demands, self._status = [*place.demands], place.status
         return self.observe()
@@ -181,14 +191,16 @@ def _scheduled(
     Without demands it is as long as it was, with a demand that the session changes.
     """
     changes: dict[str, Any] = {"control.period": period}
-    step, every = scenario.simulation.step, round(period / scenario.simulation.step)
+    run, every = scenario.simulation, scenario.time_grid().hold_every
     if demands:
-        changes["simulation.duration"] = len(demands) * every * step
+        steps = min(len(demands) * every, scenario.time_grid().steps)
+        changes["simulation.duration"] = min(len(demands) * every * run.step, run.duration)
+        changes["log.every"] = min(scenario.log.every, steps)
     # The last demand has rows at the end and after it, so that the end is no end of the schedule.
     held = [*demands, demands[-1], demands[-1]] if demands else [(0.0, 0.0)]
-    times = [k * every * step for k in range(len(held))]
+    times = [k * every * run.step for k in range(len(held))]
     rows = [f"{t!r}, {tau_u!r}, {tau_r!r}" for t, (tau_u, tau_r) in zip(times, held, strict=True)]
     if not demands:
-        rows.append(f"{2.0 * scenario.simulation.duration!r}, 0, 0")
+        rows.append(f"{2.0 * run.duration!r}, 0, 0")
     changes["controller"] = {"kind": "schedule", "between": "hold", "rows": "\n".join(rows)}
     return loaded(scenario, changes).scenario

@@ -16,15 +16,16 @@ from podusv_cli.engine.running.simulate import marcher, recorded
 from podusv_cli.engine.running.watch import Ending
 from podusv_cli.engine.step.grid import TimeGrid
 
-# The vectors that a march writes to, beside the log, whose later rows it writes again.
+# The vectors that a march writes to, beside the log.
 CHANGING = ("s", "row", "stages", "sensed", "relay", "held", "work", "seen", "under_way")
 
 
 class Mark(NamedTuple):
-    """Where a march is: its next instant, and the vectors that change."""
+    """Where a march is: its next instant, the vectors that change, and the log so far."""
 
     reached: int
     vectors: tuple[Vector, ...]
+    log: Vector
 
 
 class Pieces:
@@ -79,11 +80,15 @@ class Pieces:
 
     def mark(self) -> Mark:
         """Where the march is, to come back to it."""
-        return Mark(self.reached, tuple(getattr(self.vectors, name).copy() for name in CHANGING))
+        rows = -(-self.reached // self.grid.log_every)
+        log = self.vectors.log[: rows * self._layout.width].copy()
+        vectors = tuple(getattr(self.vectors, name).copy() for name in CHANGING)
+        return Mark(self.reached, vectors, log)
 
     def back(self, mark: Mark) -> None:
         """Go on from a mark of this march."""
         self.reached = mark.reached
+        self.vectors.log[: len(mark.log)] = mark.log
         for name, vector in zip(CHANGING, mark.vectors, strict=True):
             getattr(self.vectors, name)[:] = vector
 
