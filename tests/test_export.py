@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import xml.etree.ElementTree as ET
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +18,10 @@ import podusv
 from podusv_cli.components.controllers.base import Controller
 from podusv_cli.core import registry
 from podusv_cli.core.errors import UsageError
-from podusv_cli.engine.machine import compile, signatures
 from podusv_cli.export import c, link, objects
 from podusv_cli.export.check import check
 from podusv_cli.export.fmu import variables
-from podusv_cli.export.law import PARTS, STEP, ExportedLaw
+from podusv_cli.export.law import ExportedLaw
 from podusv_cli.workflows import export as workflow
 
 SOURCE = "podusv:mu_2017/corrected.yaml"
@@ -45,37 +45,102 @@ def exported(to: Path, **options: Any) -> Path:
     return workflow.export(Path(SOURCE), workflow.Request(to, changes, **options))
 
 
-def alone(law: ExportedLaw) -> Any:
-    """What steps a law in this process as the C files do: from a sample to what comes out."""
-    parts = [compile.routine(law.pieces[name]) for name in PARTS.values()]
-    step, n = compile.routine(law.pieces[STEP]), law.layout
-    state, row = law.vectors.s, law.vectors.row
-    vectors, layout = signatures.pointers(law.vectors), signatures.whole_numbers(n)
-
-    def stepped(sample: int, given: Any) -> list[float]:
-        state[:6], row[:6], row[n.tau : n.tau + 3] = given[1:7], given[7:13], given[13:16]
-        step(*parts, sample * n.hold_every, law.grid.step, vectors, layout)
-        return [*row[n.demand : n.demand + 2], *row[n.signals : n.demand], *state[6:]]
-
-    return stepped
-
-
 @pytest.mark.parametrize("update", ["after", "before"])
 @pytest.mark.parametrize("kind", LAWS)
 def test_a_law_by_itself_has_the_bits_of_its_run(kind, update):
     """Demand, signals and memory of every sample, called as the C files call it."""
     law = ExportedLaw.of(scenario(kind, **{"control.update": update}))
-    rows, stepped = law.samples(podusv.simulate(law.scenario).recording), alone(law)
-    for sample, given in enumerate(rows):
-        np.testing.assert_array_equal(stepped(sample, given), given[16:], f"sample {sample}")
+    rows = law.samples(podusv.simulate(law.scenario).recording)
+    np.testing.assert_array_equal(law.by_itself(rows), rows)
     assert len(rows) == 301
+
+
+TASKS: dict[str, tuple[str, dict[str, Any]]] = {
+    "an estimate in place of the state": ("podusv:sea/sensors.yaml", {}),
+    "an estimate on a path that is followed": (
+        "podusv:laws/legs.yaml",
+        {"controllers": None, "controller": {"kind": "los_pid"},
+         "measurement": {"kind": "sensors"}, "estimator": {"kind": "ekf"}},
+    ),
+    "a command path": ("podusv:sea/delay.yaml", {}),
+    "rounded corners": (
+        "podusv:laws/corners.yaml", {"controllers": None, "controller": {"kind": "hand_position"}}
+    ),
+    "a log of some steps": (SOURCE, {"log.every": 7, "controller": {"kind": "momentum_vector"}}),
+    "no whole number of periods": (SOURCE, {"simulation.duration": 4.07}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_it_has_them_whatever_is_around_it(task):
+    source, changes = TASKS[task]
+    base = {"control.period": 0.1, "simulation.duration": 5.0}
+    law = ExportedLaw.of(podusv.load(source, {**base, **changes}))
+    rows = law.samples(podusv.simulate(law.scenario).recording)
+    np.testing.assert_array_equal(law.by_itself(rows), rows)
+    assert len(rows) == int(law.scenario.simulation.duration / 0.1) + 1
+
+
+def test_a_law_that_loads_between_samples_change_is_held_against_itself(tmp_path):
+    """The C files are given the loads at samples only, so they cannot have the bits of the run."""
+    pods = "actuator={kind: pod, preset: otter}"
+    said: list[str] = []
+    changes = ["control.period=0.1", "simulation.duration=2", "controller={kind: momentum_vector}",
+               pods, "vessel={preset: otter}"]  # fmt: skip
+    request = workflow.Request(
+        tmp_path / "law", changes, fmu=False, platforms=[link.this_machine()], say=said.append
+    )
+    folder = workflow.export(Path(SOURCE), request)
+    assert any("not what it said in the run" in text for text in said)
+    assert not json.loads((folder / "law.json").read_text())["of_run"]
+    if shutil.which("cc"):
+        (found,) = check(folder)
+        assert (found.whose, found.differs) == ("the law by itself in podusv", "")
+
+
+def test_a_run_that_diverges_is_told_and_one_that_is_interrupted_exports_nothing(
+    tmp_path, monkeypatch
+):
+    said: list[str] = []
+    exported(tmp_path / "law", say=said.append)
+    assert not any("the run" in text and "diverged" in text for text in said)
+    simulated = workflow.simulated
+
+    def ended(status):
+        monkeypatch.setattr(
+            workflow, "simulated",
+            lambda *given: replace(simulated(*given), status=status, message="diverged at once"),
+        )  # fmt: skip
+
+    ended("diverged")
+    exported(tmp_path / "far", say=said.append)
+    assert "the run diverged at once; check.csv has the samples before" in said
+    ended("interrupted")
+    with pytest.raises(KeyboardInterrupt):
+        exported(tmp_path / "left")
+    assert not (tmp_path / "left").exists()
+
+
+def test_the_period_keeps_its_digits():
+    law = ExportedLaw.of(
+        scenario(
+            "pid",
+            **{
+                "simulation.step": 0.0123456789,
+                "control.period": 0.123456789,
+                "simulation.duration": 1.23456789,
+            },
+        )
+    )
+    (period,) = re.findall(r"#define PODUSV_LAW_PERIOD (\S+)", c.sources(law)["law.h"])
+    assert float(period) == pytest.approx(0.123456789, rel=1e-14)
 
 
 @needs_cc
 def test_the_c_files_have_the_bits_of_the_run_and_tell_where_they_have_not(tmp_path, podusv):
     folder = exported(tmp_path / "law")
     (found,) = check(folder)
-    assert (found.samples, found.differs) == (51, "")
+    assert (found.samples, found.whose, found.differs) == (51, "the run", "")
     samples = folder / "check.csv"
     names, first, *rest = samples.read_text().splitlines()
     place = names.split(",").index("tau_u_cmd")
@@ -84,7 +149,7 @@ def test_the_c_files_have_the_bits_of_the_run_and_tell_where_they_have_not(tmp_p
     samples.write_text("\n".join([names, ",".join(cells), *rest]) + "\n")
     said = podusv("export", "--check", str(folder))
     assert said.code == 3
-    assert re.match(r"library: t = 0 s: tau_u_cmd is .* and was .* in the run\n", said.out)
+    assert re.match(r"library: t = 0 s: tau_u_cmd is .*, and is .* in check\.csv\n", said.out)
 
 
 @needs_cc
@@ -98,12 +163,12 @@ def test_the_program_in_the_documentation_runs(tmp_path):
     )
     out = subprocess.run([folder / "a.out"], capture_output=True, text=True, check=True).stdout
     demands = np.array([line.split() for line in out.splitlines()], dtype=float)
-    stepped = alone(ExportedLaw.of(scenario("pid")))
-    row = np.array([0.0, -10.0, -10.0, *[0.0] * 4, 0.0, 0.0, 0.5, *[0.0] * 6])
+    stepped = ExportedLaw.of(scenario("pid")).stepper()
+    row = np.array([-10.0, -10.0, *[0.0] * 4, 0.0, 0.0, 0.5, *[0.0] * 6])
     for sample, demand in enumerate(demands):
         np.testing.assert_array_equal(stepped(sample, row)[:2], demand)
-        row[7] += 0.5 * 0.1
-        row[13], row[15] = np.clip(demand, [-8.0, -2.5], [8.0, 2.5])  # as the actuator cuts them
+        row[6] += 0.5 * 0.1
+        row[12], row[14] = np.clip(demand, [-8.0, -2.5], [8.0, 2.5])  # as the actuator cuts them
     assert demands.shape == (3, 2)
     assert (demands[:, 0] > 0.0).all()  # towards the target
 
@@ -128,7 +193,7 @@ def test_the_description_of_the_fmu_names_every_variable_once():
     law = ExportedLaw.of(scenario("momentum_vector"))
     about = {
         **c.told(law), "guid": "g", "outputs": [13, 14], "stop": "30.0",
-        "variables": variables(law, loads=True),
+        "variables": variables(law, loads=True), "loads": True,
     }  # fmt: skip
     tree = ET.fromstring(c.rendered("modelDescription.xml", about))
     found = [one.get("name") for one in tree.iter("ScalarVariable")]
@@ -156,6 +221,7 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
     ({"overrides": ()}, r"acts continuously in this scenario.*set control\.period"),
     ({"platforms": ["linux"]}, r"unknown platform 'linux'; did you mean 'linux64'\? \(allowed: "),
     ({"platforms": ["thumbv7em"], "fmu": True}, "thumbv7em has no shared libraries.*--no-fmu"),
+    ({"c": False, "fmu": False}, "leave nothing to export; give one of them only"),
 ]
 
 
@@ -170,6 +236,14 @@ def test_what_cannot_be_exported_gets_a_sentence(tmp_path, options, says):
 def test_without_a_linker_or_an_export_the_check_says_what_is_missing(tmp_path, monkeypatch):
     with pytest.raises(UsageError, match=r"is no exported law: it has no law\.json"):
         check(tmp_path)
+    (tmp_path / "law.json").write_text("{}")
+    (tmp_path / "check.csv").write_text("time\n")
+    with pytest.raises(UsageError, match=r"exported with --no-c, and FMPy.*podusv\[export\]"):
+        check(tmp_path)
+    monkeypatch.setattr(workflow, "this_machine", lambda: "")
+    monkeypatch.setattr(workflow, "find_spec", lambda name: None)
+    with pytest.raises(UsageError, match=r"no export for this machine.*--no-fmu"):
+        workflow.export(Path(SOURCE), workflow.Request(tmp_path / "law"))
     monkeypatch.setattr(link.shutil, "which", lambda name: None)
     monkeypatch.setattr(link, "find_spec", lambda name: None)
     with pytest.raises(UsageError, match=r"no linker for .*podusv\[export\]"):

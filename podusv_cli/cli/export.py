@@ -77,5 +77,5 @@ def _check(folder: Path) -> None:
 
     found = check(folder)
     for one in found:
-        echo(f"{one.what}: {one.differs or f'{one.samples} samples with the bits of the run'}")
+        echo(f"{one.what}: {one.differs or f'{one.samples} samples with the bits of {one.whose}'}")
     raise typer.Exit(DIFFERS if any(one.differs for one in found) else 0)

@@ -54,7 +54,7 @@ def told(law: ExportedLaw) -> dict[str, Any]:
     vectors, layout = law.vectors, law.layout
     return {
         "label": law.loop.controller.label, "name": _comment(law.scenario.name),
-        "version": __version__, "period": f"{law.period:g}", "signals": law.signals,
+        "version": __version__, "period": f"{law.period:.15g}", "signals": law.signals,
         "memory": law.memory, "layout": layout, "texts": _texts(law), "parts": list(PARTS.values()),
         "step": STEP, "h": literal(law.grid.step), "every": layout.hold_every, "tau": layout.tau,
         "demand": layout.demand, "assumed": _assumed(law),

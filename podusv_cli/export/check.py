@@ -27,10 +27,14 @@ Step = Callable[[Vector], Sequence[float]]  # from time and inputs of a sample t
 
 @dataclass(frozen=True)
 class Checked:
-    """How many samples of an exported law were stepped, and the first that came out otherwise."""
+    """How many samples of an exported law were stepped, and the first that came out otherwise.
+
+    `whose` are the bits that it was held against.
+    """
 
     what: str
     samples: int
+    whose: str
     differs: str = ""
 
 
@@ -48,10 +52,18 @@ def check(folder: Path) -> list[Checked]:
     with (folder / SAMPLES).open(newline="") as lines:
         names, *rows = csv.reader(lines)
     samples = np.array([[float(word) for word in row] for row in rows])
-    with TemporaryDirectory() as place:
-        found = [_compared("library", samples, names, about, _library(folder, Path(place), about))]
+    found = []
+    if (folder / "law.c").is_file():
+        with TemporaryDirectory() as place:
+            library = _library(folder, Path(place), about)
+            found.append(_compared("library", samples, names, about, library))
     if (folder / FMU).is_file() and find_spec("fmpy"):
         found.append(_compared(FMU, samples, names, about, _fmu(folder / FMU, about)))
+    if not found:
+        raise UsageError(
+            f"{folder} was exported with --no-c, and FMPy, which steps its {FMU}, is not there; "
+            "install it with pip install 'podusv[export]'"
+        )
     return found
 
 
@@ -59,13 +71,14 @@ def _compared(
     what: str, samples: Vector, names: Sequence[str], about: dict[str, Any], step: Step
 ) -> Checked:
     inputs = 1 + STATE + TARGET + LOADS
+    whose = "the run" if about["of_run"] else "the law by itself in podusv"
     for row in samples:
         out = step(row[:inputs])
         for name, one, other in zip(names[inputs:], out, row[inputs:], strict=True):
             if struct.pack("d", one) != struct.pack("d", other):
-                told = f"t = {row[0]:g} s: {name} is {one!r} and was {float(other)!r} in the run"
-                return Checked(what, len(samples), told)
-    return Checked(what, len(samples))
+                told = f"t = {row[0]:g} s: {name} is {one!r}, and is {float(other)!r} in {SAMPLES}"
+                return Checked(what, len(samples), whose, told)
+    return Checked(what, len(samples), whose)
 
 
 def _library(folder: Path, place: Path, about: dict[str, Any]) -> Step:

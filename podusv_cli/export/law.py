@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from ctypes import CFUNCTYPE, POINTER
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,7 +20,7 @@ from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import LOOP, STATE, Signal
 from podusv_cli.engine.loop.closed_loop import DEMAND, ClosedLoop, entries
 from podusv_cli.engine.machine import signatures
-from podusv_cli.engine.machine.compile import Piece, adapter
+from podusv_cli.engine.machine.compile import Piece, adapter, routine
 from podusv_cli.engine.step import law_alone
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.engine.step.layout import HELD_SIGNALS, Layout, Vectors
@@ -75,7 +75,7 @@ LOAD_NUMBERS = tuple(
 class ExportedLaw:
     """A sampled law as values: a state (x, memory), a row (target, distance, signals, demand, tau).
 
-    `vectors` are at the start of the scenario's run.
+    `vectors` are at the start of the scenario's run, which logs every step.
     """
 
     scenario: Scenario
@@ -87,6 +87,8 @@ class ExportedLaw:
     @classmethod
     def of(cls, scenario: Scenario) -> ExportedLaw:
         """The law of a scenario with one. Raises UsageError where it takes no samples."""
+        every = scenario.log.model_copy(update={"every": 1})
+        scenario = scenario.model_copy(update={"log": every})
         loop, grid = scenario.closed_loop(), scenario.time_grid()
         if not grid.hold_every:
             raise UsageError(f"{scenario.name}: {NOT_SAMPLED}")
@@ -124,6 +126,11 @@ class ExportedLaw:
     def _entries(self) -> Iterator[tuple[str, Any, tuple[str, ...]]]:
         yield from (e for e in entries(self.loop, self.scenario.observer()) if e[0] != "path")
         yield "path", law_alone.target_is_there, ()
+
+    @property
+    def _given(self) -> tuple[Signal, ...]:
+        """The state that the law is given: the vessel's own, or the estimate."""
+        return self.loop.estimated()[: len(STATE)] or STATE
 
     @property
     def _slots(self) -> Slots:
@@ -183,19 +190,45 @@ class ExportedLaw:
         """
         rows = np.arange(0, len(log["time"]), self.layout.hold_every)
         before = np.maximum(rows - 1, 0)
-        state = [log[one.name][rows] for one in STATE]
+        state = [log[one.name][rows] for one in self._given]
         loads = [np.where(rows > 0, log[one.name][before], 0.0) for one in LOAD_NUMBERS]
         said = [log[one.name][rows] for one in (*DEMAND_NUMBERS, *self.signals)]
         memory = [log[one.name][rows].reshape(len(rows), -1) for one, _ in self._slots]
         time = log["time"][rows]
         return np.column_stack([time, *state, self._targets(log, rows), *loads, *said, *memory])
 
+    def stepper(self) -> Callable[[int, Vector], list[float]]:
+        """What steps the law in this process as its C files do.
+
+        It takes a sample's number and inputs, and returns demand, signals and memory.
+        """
+        c, n = Vectors(*(vector.copy() for vector in self.vectors)), self.layout
+        parts = [routine(self.pieces[name]) for name in PARTS.values()]
+        step, given = routine(self.pieces[STEP]), len(STATE) + len(TARGET)
+        pointers, sizes = signatures.pointers(c), signatures.whole_numbers(n)
+
+        def stepped(sample: int, inputs: Vector) -> list[float]:
+            c.s[: len(STATE)], c.row[: len(TARGET)] = np.split(inputs[:given], [len(STATE)])
+            c.row[n.tau :] = inputs[given:]
+            step(*parts, sample * n.hold_every, self.grid.step, pointers, sizes)
+            return [*c.row[n.demand : n.tau], *c.row[n.signals : n.demand], *c.s[n.memory :]]
+
+        return stepped
+
+    def by_itself(self, samples: Vector) -> Vector:
+        """These samples with what comes out of the law by itself."""
+        own, step = samples.copy(), self.stepper()
+        inputs = 1 + len(STATE) + len(TARGET) + len(LOAD_NUMBERS)
+        for sample, row in enumerate(own):
+            row[inputs:] = step(sample, row[1:inputs])
+        return own
+
     def _targets(self, log: Recording, rows: npt.NDArray[np.int_]) -> Vector:
         """The target at these rows of a log; on a path that is followed it is beside the vessel."""
         path, out = self.loop.path, np.zeros((len(rows), len(TARGET)))
         k, table = bundle(self.loop.path_constants()), path.table()
         for row, target in zip(rows, out, strict=True):
-            x = np.array([log[one.name][row] for one in STATE])
+            x = np.array([log[one.name][row] for one in self._given])
             place = np.array([log[one.name][row] for one in path.places])
             call(
                 path.evaluate, t=log["time"][row], x=x, place=place, k=k, table=table, target=target

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.util import find_spec
 from pathlib import Path
 
+import numpy as np
+
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector
+from podusv_cli.core.recording import Recording
 from podusv_cli.export import c, objects
 from podusv_cli.export.check import ABOUT, FMU, SAMPLES
 from podusv_cli.export.fmu import fmu
@@ -46,17 +49,21 @@ class Request:
 def export(config: Path, request: Request) -> Path:
     """Write the law into a folder. Raises ScenarioError, UsageError, LawError, StorageError."""
     started = datetime.now(UTC)
-    for name in request.platforms:
-        if name not in objects.PLATFORMS:
-            raise UsageError(unknown(f"platform {name!r}", name, objects.PLATFORMS))
+    platforms, linked = _platforms(request), _linked(request) if request.fmu else {}
     checks = (unknown_codes, limits(allow_large=False))
     loaded = load(config, request.overrides, checks, request.plugins)
     scenario = single(loaded, request.controller)
     law = ExportedLaw.of(scenario)
     with RunWriter(request.to, force=request.force) as writer:
         request.say("simulating the run that the law is checked against")
-        samples = law.samples(simulated(scenario, Stopwatch()))
-        platforms = request.platforms or tuple(objects.PLATFORMS)
+        run = simulated(law.scenario, Stopwatch())
+        if run.status == "interrupted":
+            raise KeyboardInterrupt
+        seen = law.samples(run)
+        samples = law.by_itself(seen)
+        of_run = np.array_equal(samples, seen)
+        for note in _notes(run, of_run):
+            request.say(note)
         request.say(f"compiling {law.loop.controller.label} for {', '.join(platforms)}")
         text = objects.together(law.pieces)
         if request.c:
@@ -65,19 +72,45 @@ def export(config: Path, request: Request) -> Path:
             for name in platforms:
                 writer.add(f"{name}/law.o", objects.object_file(text, objects.PLATFORMS[name]))
         if request.fmu:
-            linked = _linked(request)
             request.say(f"linking an FMU for {', '.join(linked)}")
-            writer.add(FMU, fmu(law, text, linked, loads=not law.assumes(samples)))
+            writer.add(FMU, fmu(law, text, linked, loads=not law.assumes(seen)))
         writer.add(SAMPLES, _table(law, samples).encode())
-        writer.add_json(ABOUT, law.as_json(platforms, objects.library_functions(text)))
+        about = law.as_json(platforms, objects.library_functions(text))
+        writer.add_json(ABOUT, {**about, "of_run": of_run})
         origin = provenance.collect(request.argv, started, datetime.now(UTC), scenario.plugged)
         writer.add_json("provenance.json", origin)
         return writer.finish("finished")
 
 
+def _platforms(request: Request) -> Sequence[str]:
+    """The platforms of the object files. Raises UsageError for an unknown one, or for no files."""
+    for name in request.platforms:
+        if name not in objects.PLATFORMS:
+            raise UsageError(unknown(f"platform {name!r}", name, objects.PLATFORMS))
+    if not (request.c or request.fmu):
+        raise UsageError("--no-c and --no-fmu leave nothing to export; give one of them only")
+    return tuple(dict.fromkeys(request.platforms)) or tuple(objects.PLATFORMS)
+
+
+def _notes(run: Recording, of_run: bool) -> Iterator[str]:
+    """What somebody should know of the run and of the law by itself."""
+    if run.status != "finished":
+        yield f"the run {run.message}; {SAMPLES} has the samples before"
+    if not of_run:
+        yield (
+            "the loads change between two samples of this run, which the law by itself is not "
+            f"given; {SAMPLES} has what it says by itself, not what it said in the run"
+        )
+
+
 def _linked(request: Request) -> Mapping[str, objects.Platform]:
     """The platforms of the FMU. Raises UsageError for one that has no libraries."""
     names = request.platforms or (IN_FMU if find_spec("ziglang") else (this_machine(),))
+    if "" in names:
+        raise UsageError(
+            "there is no export for this machine, so no FMU without zig: install it with pip "
+            "install 'podusv[export]', or export with --no-fmu"
+        )
     found = {name: objects.PLATFORMS[name] for name in names}
     if alone := [name for name, platform in found.items() if not platform.library]:
         raise UsageError(
