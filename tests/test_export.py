@@ -237,7 +237,11 @@ def test_without_a_linker_or_an_export_the_check_says_what_is_missing(tmp_path, 
     with pytest.raises(UsageError, match=r"is no exported law: it has no law\.json"):
         check(tmp_path)
     (tmp_path / "law.json").write_text("{}")
-    (tmp_path / "check.csv").write_text("time\n")
+    with pytest.raises(UsageError, match=r"check\.csv is not the table .* law\.json describes"):
+        check(tmp_path)
+    parts = dict.fromkeys(("inputs", "demand", "signals", "memory"), ())
+    (tmp_path / "law.json").write_text(json.dumps(parts))
+    (tmp_path / "check.csv").write_text("time\n0.0\n")
     with pytest.raises(UsageError, match=r"exported with --no-c, and FMPy.*podusv\[export\]"):
         check(tmp_path)
     monkeypatch.setattr(workflow, "this_machine", lambda: "")
@@ -248,6 +252,15 @@ def test_without_a_linker_or_an_export_the_check_says_what_is_missing(tmp_path, 
     monkeypatch.setattr(link, "find_spec", lambda name: None)
     with pytest.raises(UsageError, match=r"no linker for .*podusv\[export\]"):
         link.shared_library({}, link.this_machine(), objects.PLATFORMS[link.this_machine()])
+
+
+@pytest.mark.parametrize("table", ["", "time\n", "time\nzero\n", "time\n0\n0,1\n", "time,x\n0,1\n"])
+def test_a_table_that_is_not_the_one_described_gets_a_sentence(tmp_path, table):
+    parts = dict.fromkeys(("inputs", "demand", "signals", "memory"), ())
+    (tmp_path / "law.json").write_text(json.dumps(parts))
+    (tmp_path / "check.csv").write_text(table)
+    with pytest.raises(UsageError, match=r"export the law again"):
+        check(tmp_path)
 
 
 @pytest.mark.slow

@@ -6,11 +6,13 @@ import csv
 import ctypes
 import struct
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -20,6 +22,7 @@ from podusv_cli.export.link import shared_library, this_machine
 from podusv_cli.export.objects import PLATFORMS
 from podusv_cli.storage import json_files
 
+PARTS = ("inputs", "demand", "signals", "memory")  # of law.json, in the order of the columns
 SAMPLES, ABOUT, FMU = "check.csv", "law.json", "law.fmu"
 STATE, TARGET, LOADS = 6, 6, 3
 Step = Callable[[Vector], Sequence[float]]  # from time and inputs of a sample to what comes out
@@ -48,23 +51,38 @@ def check(folder: Path) -> list[Checked]:
         raise UsageError(
             f"{folder} is no exported law: it has no {ABOUT}; make one with podusv export"
         )
-    about = json_files.read(folder / ABOUT)
-    with (folder / SAMPLES).open(newline="") as lines:
-        names, *rows = csv.reader(lines)
-    samples = np.array([[float(word) for word in row] for row in rows])
-    found = []
-    if (folder / "law.c").is_file():
-        with TemporaryDirectory() as place:
+    about, names, samples = _read(folder)
+    found, unit = [], folder / FMU
+    # A library that is loaded cannot be deleted on every machine.
+    with TemporaryDirectory(ignore_cleanup_errors=True) as place:
+        if (folder / "law.c").is_file():
             library = _library(folder, Path(place), about)
             found.append(_compared("library", samples, names, about, library))
-    if (folder / FMU).is_file() and find_spec("fmpy"):
-        found.append(_compared(FMU, samples, names, about, _fmu(folder / FMU, about)))
+        if unit.is_file() and find_spec("fmpy"):
+            found.append(_compared(FMU, samples, names, about, _fmu(unit, Path(place), about)))
     if not found:
         raise UsageError(
             f"{folder} was exported with --no-c, and FMPy, which steps its {FMU}, is not there; "
             "install it with pip install 'podusv[export]'"
         )
     return found
+
+
+def _read(folder: Path) -> tuple[dict[str, Any], list[str], Vector]:
+    """What law.json says, names of the samples' columns, and the samples."""
+    about = json_files.read(folder / ABOUT)
+    try:
+        with (folder / SAMPLES).open(newline="") as lines:
+            names, *rows = csv.reader(lines)
+        numbers = [one for part in PARTS for one in about[part]]
+        if names != ["time", *(one["name"] for one in numbers)] or not rows:
+            raise ValueError
+        return about, names, np.array(rows, dtype=float)
+    except (OSError, KeyError, TypeError, ValueError):
+        raise UsageError(
+            f"{folder}: {SAMPLES} is not the table of samples that {ABOUT} describes; export the "
+            "law again with podusv export"
+        ) from None
 
 
 def _compared(
@@ -112,14 +130,18 @@ def _vector(numbers: Vector) -> Any:
     return (ctypes.c_double * len(numbers))(*numbers.tolist())
 
 
-def _fmu(path: Path, about: dict[str, Any]) -> Step:
-    """The FMU, stepped by FMPy."""
+def _fmu(path: Path, place: Path, about: dict[str, Any]) -> Step:
+    """The FMU, unpacked here and stepped by FMPy."""
     import fmpy  # is not installed with podusv
     from fmpy.fmi2 import FMU2Slave
 
-    description = fmpy.read_model_description(str(path))
+    with suppress(BadZipFile):
+        fmpy.extract(str(path), str(place))
+    if not (place / "binaries" / this_machine()).is_dir():
+        raise UsageError(f"{path} has no library for this machine, or is damaged")
+    description = fmpy.read_model_description(str(place))
     slave = FMU2Slave(
-        guid=description.guid, unzipDirectory=fmpy.extract(str(path)),
+        guid=description.guid, unzipDirectory=str(place),
         modelIdentifier=description.coSimulation.modelIdentifier, instanceName="law",
     )  # fmt: skip
     slave.instantiate()
