@@ -219,6 +219,10 @@ def test_every_platform_gets_object_code_and_nothing_of_this_machine():
 
 REFUSED: list[tuple[dict[str, Any], str]] = [
     ({"overrides": ()}, r"acts continuously in this scenario.*set control\.period"),
+    (
+        {"overrides": ["control.period=0.1", "simulation.duration=700000", "log.every=10000"]},
+        r"logs every step, too many of them in 700000 s; simulate less",
+    ),
     ({"platforms": ["linux"]}, r"unknown platform 'linux'; did you mean 'linux64'\? \(allowed: "),
     ({"platforms": ["thumbv7em"], "fmu": True}, "thumbv7em has no shared libraries.*--no-fmu"),
     ({"c": False, "fmu": False}, "leave nothing to export; give one of them only"),

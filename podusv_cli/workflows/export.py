@@ -50,10 +50,16 @@ def export(config: Path, request: Request) -> Path:
     """Write the law into a folder. Raises ScenarioError, UsageError, LawError, StorageError."""
     started = datetime.now(UTC)
     platforms, linked = _platforms(request), _linked(request) if request.fmu else {}
-    checks = (unknown_codes, limits(allow_large=False))
-    loaded = load(config, request.overrides, checks, request.plugins)
+    too_large = limits(allow_large=False)
+    loaded = load(config, request.overrides, (unknown_codes, too_large), request.plugins)
     scenario = single(loaded, request.controller)
     law = ExportedLaw.of(scenario)
+    if too_large(law.scenario):
+        raise UsageError(
+            f"{scenario.name}: the run that an exported law is checked against logs every step, "
+            f"too many of them in {scenario.simulation.duration:g} s; simulate less, as --set "
+            "simulation.duration=100 [s]"
+        )
     with RunWriter(request.to, force=request.force) as writer:
         request.say("simulating the run that the law is checked against")
         run = simulated(law.scenario, Stopwatch())
