@@ -38,9 +38,9 @@ def scenario(kind: str, **changes: Any) -> Any:
     return podusv.load(SOURCE, {**base, **changes})
 
 
-def exported(to: Path, **options: Any) -> Path:
+def exported(to: Path, law: str = "pid", **options: Any) -> Path:
     """The folder of a small export for this machine."""
-    changes = ("control.period=0.1", "simulation.duration=5", "controller={kind: pid}")
+    changes = ("control.period=0.1", "simulation.duration=5", f"controller={{kind: {law}}}")
     options = {"fmu": False, "platforms": [link.this_machine()]} | options
     return workflow.export(Path(SOURCE), workflow.Request(to, changes, **options))
 
@@ -154,7 +154,7 @@ def test_the_c_files_have_the_bits_of_the_run_and_tell_where_they_have_not(tmp_p
 
 @needs_cc
 def test_the_program_in_the_documentation_runs(tmp_path):
-    folder = exported(tmp_path / "law")
+    folder = exported(tmp_path / "law", "momentum_vector")  # it asks for the loads
     (program,) = re.findall(r"```c\n(.*?)```", (ROOT / "docs/export.md").read_text(), re.DOTALL)
     (folder / "program.c").write_text(program)
     command = "cc -std=c99 -Wall -Wextra -pedantic -Werror -O2 -ffp-contract=off program.c law.c "
@@ -163,7 +163,7 @@ def test_the_program_in_the_documentation_runs(tmp_path):
     )
     out = subprocess.run([folder / "a.out"], capture_output=True, text=True, check=True).stdout
     demands = np.array([line.split() for line in out.splitlines()], dtype=float)
-    stepped = ExportedLaw.of(scenario("pid")).stepper()
+    stepped = ExportedLaw.of(scenario("momentum_vector")).stepper()
     row = np.array([-10.0, -10.0, *[0.0] * 4, 0.0, 0.0, 0.5, *[0.0] * 6])
     for sample, demand in enumerate(demands):
         np.testing.assert_array_equal(stepped(sample, row)[:2], demand)
