@@ -379,12 +379,12 @@ def test_code_compiled_after_its_source_was_edited_is_not_left_for_the_new_sourc
 
 
 def test_what_translates_is_in_the_digest_of_the_folder():
-    """Whatever imports numba or llvmlite, but for the thread that merely watches machine code."""
+    """Whatever imports numba or llvmlite, but for what exports laws and keeps no code there."""
     files = {path for pattern in object_cache.TRANSLATORS for path in PACKAGE.glob(pattern)}
     marks = re.compile("^(from|import) (numba|llvmlite)", re.M)
     found = {path for path in PACKAGE.rglob("*.py") if marks.search(path.read_text())}
     assert len(found) > 2
-    assert found <= files
+    assert found <= files | {PACKAGE / "export/objects.py"}
 
 
 def test_without_one_of_them_the_digest_is_another(monkeypatch):

@@ -59,8 +59,12 @@ def _folder() -> Path | None:
 
     from podusv_cli.engine.machine.code_folder import code_folder
 
+    before = logging.root.manager.disable
     logging.disable()  # a shell has no place for a message
-    return code_folder("completion")
+    try:
+        return code_folder("completion")
+    finally:
+        logging.disable(before)
 
 
 def _state() -> str:
