@@ -204,7 +204,10 @@ def test_the_description_of_the_fmu_names_every_variable_once():
 
 
 def test_every_platform_gets_object_code_and_nothing_of_this_machine():
-    text = objects.together(ExportedLaw.of(scenario("velocity_vector")).pieces)
+    pieces = ExportedLaw.of(scenario("velocity_vector")).pieces
+    text = objects.together(pieces)
+    seen = re.findall(r"^define (?!internal)[^@]*@(\w+)", text, re.MULTILINE)
+    assert sorted(seen) == sorted(pieces)
     assert objects.library_functions(text) == []
     assert objects.library_functions("declare double @llvm.sin.f64(double) #1\n") == ["sin"]
     magic = {

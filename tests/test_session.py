@@ -92,8 +92,9 @@ def test_the_run_of_a_session_repeats():
     assert repeating.rerun(run.folder, Request()).identical
 
 
-def test_a_session_goes_back_and_on_with_the_same_bits():
-    session = opened("podusv:sea/sensors.yaml", 3.0)
+@pytest.mark.parametrize("name", ["sensors, filter and sea", "pods behind a delay"])
+def test_a_session_goes_back_and_on_with_the_same_bits(name):
+    session = opened(SCENARIOS[name][0], 3.0)
     steered(session, 10)
     place, before = session.state(), session.observe()
     seen = steered(session)
@@ -101,7 +102,8 @@ def test_a_session_goes_back_and_on_with_the_same_bits():
     again = session.restore(place)
     np.testing.assert_array_equal(again.state, before.state)
     assert again.status == "running"
-    steered(session, 10)
+    for _ in range(7):
+        session.step((50.0, 5.0))
     session.restore(place)
     assert steered(session).time == seen.time
     for signal, values in session.log.items():
