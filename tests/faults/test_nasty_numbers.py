@@ -30,10 +30,11 @@ VALUES = (
     "-1e308",
 )  # fmt: skip
 SHORT = "simulation.duration=0.5"
-EXTENDED = ("base.yaml", "claims.yaml", "ablation_laws.yaml")  # no scenarios in themselves
+EXTENDED = ("claims.yaml", "ablation_laws.yaml")  # no scenarios in themselves
 PARTS = [
     *(ROOT / "configs/mu_2017" / name for name in EXTENDED),
-    *(ROOT / "configs/bench").rglob("*.yaml"),
+    *(ROOT / "configs").rglob("base.yaml"),
+    *(ROOT / "configs").glob("bench*/**/*.yaml"),
 ]
 MOST = count(16, 10**9)  # commands
 COMPARED, DRAWN = 100, 10  # one command in so many compares, or draws figures as well
