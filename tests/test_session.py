@@ -116,7 +116,7 @@ def test_a_place_keeps_the_log_that_led_to_it():
     session.step((1.0, 0.0))
     early = session.state()
     steered(session, 5)
-    place, log = session.state(), session.log["u"].copy()
+    place, log = session.state(), session.log["u"]
     session.restore(early)
     for _ in range(7):
         session.step((-50.0, 0.0))

@@ -164,8 +164,8 @@ class Session:
 
     @property
     def log(self) -> dict[str, Vector]:
-        """Every signal that is logged so far, by name."""
-        return dict(self._pieces.recording().signals)
+        """Every signal that is logged so far, by name; a copy, which `restore` does not change."""
+        return {name: one.copy() for name, one in self._pieces.recording().signals.items()}
 
     @explained
     def close(
