@@ -25,7 +25,7 @@ def test_the_description_has_no_link_that_only_a_checkout_has() -> None:
 
 @pytest.mark.parametrize("page", [DESCRIPTION, (ROOT / "README.md").read_text()])
 def test_where_podusv_runs_is_said_beside_how_to_get_it(page: str) -> None:
-    before, _, after = page.partition("pip install podusv ")
+    before, _, after = page.partition("pip install podusv")
     assert "Windows in WSL" in before
     assert "pipx run podusv" in after
     assert "uvx podusv" in after
