@@ -30,7 +30,7 @@ TRAIN, VALIDATE = "tune", "tune validation"  # streams of draws, beside a sweep'
 # Settings that change no trial: more of them continues a search.
 OPEN = ("budget", "validate", "repeats")
 # Rough costs [s]: of a trial for Optuna, processes and files; of what comes before and after.
-TRIAL, AROUND = 0.1, 10.0
+TRIAL, AROUND = 0.1, 4.0
 ENOUGH = 10  # whole trials for each gain; with fewer, repeats end in different places
 Named = tuple[str, Mapping[str, Any]]  # a law of the scenario, and its numbers that are others
 
