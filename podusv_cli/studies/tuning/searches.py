@@ -38,7 +38,7 @@ def ratios(runs: Mapping[str, Vector], level: float, seed: int) -> pd.DataFrame:
     with np.errstate(invalid="ignore", divide="ignore"):
         found = [np.log(reached[a]) - np.log(reached[b]) for a, b in pairs]
         spread = [np.log(samples[a]) - np.log(samples[b]) for a, b in pairs]
-    width = _width([s - f for s, f in zip(spread, found, strict=True)], level)
+        width = _width([s - f for s, f in zip(spread, found, strict=True)], level)
     rows = [
         (*pair, np.exp(ratio) if np.isfinite(ratio) else _sided(ratio), *_ends(ratio, each, width))
         for pair, ratio, each in zip(pairs, found, spread, strict=True)
