@@ -3,27 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 from command_samples import commanded
+from test_interface import TWO
 
 import podusv
 
 SWEEP = {"draws": 4, "seed": 1, "vary": {"start.x": {"uniform": [-6.0, -4.0]}}}
-SHORT: dict[str, Any] = {
-    "vessel": {"preset": "paper_nonlinear"},
-    "path": {"kind": "line"},
-    "disturbance": {"kind": "none"},
-    "actuator": {"kind": "saturated"},
-    "start": {"x": -5.0, "y": -2.0, "u": 0.3},
-    "simulation": {"duration": 1.0},
-    "controller": {"kind": "pid"},
-    "controllers": {"stiff": {"K_Pu": 200.0}, "soft": {"K_Pu": 5.0}},
-    "silence": ["saturated", "never-settles"],
-}
+SHORT = {**TWO, "controller": {"kind": "pid"}}
 CLAIM = {"says": "s", "source": "p", "expect": "share(stiff.iae < soft.iae) > 0.1"}
 
 

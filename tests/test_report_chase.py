@@ -1,5 +1,6 @@
 """The report's animation: what it is given, and in a browser, what it shows."""
 
+import io
 import json
 import re
 import shutil
@@ -12,6 +13,7 @@ import pytest
 from comparison_samples import FRAME
 from drawn_samples import recording, scenario, shown
 from html_tree import tree
+from PIL import Image
 from test_comparison_page import ERRORS, page, theory
 
 from podusv_cli.comparison import chase
@@ -173,15 +175,15 @@ addEventListener("load", async () => {
 """
 
 
-def browsed(tmp_path, html, *options):
-    """What the probe finds at every width, and what the browser's console says."""
+def browsed(tmp_path, html, *options, probe=PROBE):
+    """What a probe finds at every width, and what the browser's console says."""
     html = html.replace("<head>", f"<head>{TICKING}")
     frames = "".join(
         f'<iframe id="w{width}" width="{width}" height="900" srcdoc="{escape(html)}"></iframe>'
         for width in WIDTHS
     )
     path = tmp_path / "frames.html"
-    path.write_text(f"<!doctype html><body>{PROBE}{frames}</body>")
+    path.write_text(f"<!doctype html><body>{probe}{frames}</body>")
     own = (*options, f"--user-data-dir={tmp_path}/browser", "--dump-dom", path.as_uri())
     made = subprocess.run(
         [str(BROWSER), *QUIET, *own],
@@ -198,19 +200,23 @@ needs_browser = pytest.mark.skipif(
 )
 
 
+def picture() -> bytes:
+    """A PNG that is wider than a phone."""
+    file = io.BytesIO()
+    Image.new("P", (700, 300)).save(file, "PNG")
+    return file.getvalue()
+
+
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory):
     wide = {f"a_long_label_of_a_run_{i}": FRAME["a"] for i in range(8)}
     html = page(
         chase=chase.chase(runs()), theories={"a": theory(2.5, True)},
-        table=FRAME.assign(**wide), figures=[ERRORS._replace(file=SVG)] * 4,
+        table=FRAME.assign(**wide), figures=[ERRORS._replace(file=picture())] * 4,
         provenance={"argv": ["podusv", "x" * 300]}, title="long" * 60,
         scenario=scenario().model_copy(update={"description": "word/" * 90}),
     )  # fmt: skip
     return browsed(tmp_path_factory.mktemp("browser"), html)
-
-
-SVG = b'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 700 300"><path d="M0 0H9"/></svg>'
 
 
 @needs_browser

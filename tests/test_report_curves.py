@@ -3,15 +3,13 @@
 import base64
 import json
 import re
-import subprocess
-from html import escape, unescape
 
 import numpy as np
 import pytest
 from drawn_samples import recording, shown
 from html_tree import tree
 from test_comparison_page import page
-from test_report_chase import BROWSER, QUIET, WIDTHS, needs_browser
+from test_report_chase import browsed, needs_browser
 
 from podusv_cli.comparison import traces
 
@@ -119,20 +117,9 @@ def test_curves_zoom_tell_values_and_can_be_taken_out(tmp_path):
     gap = recording(z_e=lambda t: np.where(t < 30.0, np.nan, 1.0))
     both = shown(("whole", recording()), ("gap", gap))
     html = page(traces=traces.traces(both))
-    frames = "".join(
-        f'<iframe id="w{width}" width="{width}" height="900" srcdoc="{escape(html)}"></iframe>'
-        for width in WIDTHS
-    )
-    path = tmp_path / "frames.html"
-    path.write_text(f"<!doctype html><body>{PROBE}{frames}</body>")
-    words = (*QUIET, f"--user-data-dir={tmp_path}/browser", "--dump-dom", path.as_uri())
-    made = subprocess.run(
-        [str(BROWSER), *words], capture_output=True, text=True, timeout=120, check=True
-    )
-    assert "CONSOLE" not in made.stderr
-    said = re.search(r'<output id="said">(.*?)</output>', made.stdout, re.DOTALL)
-    assert said, made.stderr[-2000:]
-    for width, told in json.loads(unescape(said[1])).items():
+    said, console = browsed(tmp_path, html, probe=PROBE)
+    assert not console
+    for width, told in said.items():
         assert told["paths"] == len(both), width
         assert told["off"] == len(both) - 1
         time = float(re.fullmatch(r"t = ([\d.]+) s", told["time"])[1])

@@ -1,18 +1,14 @@
 """A study's report, figures and words, from a small study and from numbers planted by hand."""
 
-import json
 import math
-import re
 import shutil
-import subprocess
-from html import escape, unescape
 
 import numpy as np
 import pytest
 from html_tree import tree
 from small_study import written
 from study_samples import claim, judged, study
-from test_report_chase import BROWSER, QUIET, WIDTHS, needs_browser
+from test_report_chase import WIDTHS, browsed, needs_browser
 
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.process.extras import Extras
@@ -288,16 +284,5 @@ addEventListener("load", () => {
 @pytest.mark.parametrize("kind", ["whole", "drawn"])
 def test_nothing_is_wider_than_the_page(kind, request, tmp_path):
     page = (request.getfixturevalue(kind).folder / "report.html").read_text()
-    frames = "".join(
-        f'<iframe id="w{width}" width="{width}" height="900" srcdoc="{escape(page)}"></iframe>'
-        for width in WIDTHS
-    )
-    path = tmp_path / "frames.html"
-    path.write_text(f"<!doctype html><body>{PROBE}{frames}</body>")
-    words = (*QUIET, f"--user-data-dir={tmp_path}/browser", "--dump-dom", path.as_uri())
-    made = subprocess.run(
-        [str(BROWSER), *words], capture_output=True, text=True, timeout=120, check=True
-    )
-    said = re.search(r'<output id="said">(.*?)</output>', made.stdout, re.DOTALL)
-    assert said, made.stderr[-2000:]
-    assert json.loads(unescape(said[1])) == {f"w{width}": [0, 0] for width in WIDTHS}
+    said, _ = browsed(tmp_path, page, probe=PROBE)
+    assert said == {f"w{width}": [0, 0] for width in WIDTHS}

@@ -6,6 +6,7 @@ tick. Together they take three quarters of the time of a figure.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -254,7 +255,7 @@ class Panel(Axes):
             self.spines[place].register_axis(axis)
 
 
-class _Stamped(Axis):
+class _Stamped(Axis, ABC):
     """An axis that moves one tick of each kind from place to place, drawing it there."""
 
     def set_clip_path(self, path: Any, transform: Any = None) -> None:
@@ -305,17 +306,17 @@ class _Stamped(Axis):
                     tick.label1.set_text(text)
                     tick.label1.draw(renderer)
 
+    @abstractmethod
     def ordered(self, along: Vector, across: Vector) -> tuple[Vector, Vector]:
         """Horizontal and vertical positions."""
-        raise NotImplementedError
 
+    @abstractmethod
     def move(self, tick: Tick, place: float) -> None:
         """Move a tick's text."""
-        raise NotImplementedError
 
+    @abstractmethod
     def place_factor(self) -> None:
         """Place the factor that all numbers of the axis have."""
-        raise NotImplementedError
 
 
 class Across(_Stamped, XAxis):

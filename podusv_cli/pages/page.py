@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from podusv_cli.core import quantities
 from podusv_cli.core.escaping import lines
 
 if TYPE_CHECKING:
@@ -14,7 +15,6 @@ if TYPE_CHECKING:
 
 NO_BREAK = "\N{NO-BREAK SPACE}"
 MOST_LINES = 3  # of a text that is shown as it is
-POWERS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 class Picture(NamedTuple):
@@ -70,7 +70,7 @@ def sentence(text: str) -> str:
 
 def _raised(unit: str) -> str:
     """The unit with its powers raised."""
-    return re.sub(r"(?<=[A-Za-z])\d", lambda power: power[0].translate(POWERS), unit)
+    return re.sub(r"(?<=[A-Za-z])\d", lambda power: power[0].translate(quantities.RAISED), unit)
 
 
 def _number(text: object) -> str:
