@@ -20,33 +20,34 @@ from podusv_cli.engine.step.layout import (
 def held_rates(
     t: float, memory: Vector, rate: Vector, law: Function, after: Function, c: Vectors, n: Layout
 ) -> None:
-    """Rates of the law's memory with the sample at t held, and the loads of the period before."""
+    """Rates of the law's memory at t with the last sample held, while the loads in the row act."""
     row, held = c.row, c.held
     law(
-        t, tail(c.s, n.estimate), memory, row, c.law, c.law_table, tail(held, HELD_DEMAND), rate,
-        tail(held, HELD_SIGNALS), c.work,
+        shared(held[0]), tail(held, HELD_X), memory, tail(held, HELD_TARGET), c.law, c.law_table,
+        tail(held, HELD_DEMAND), rate, tail(held, HELD_SIGNALS), c.work,
     )  # fmt: skip
     if n.wants_loads > 0:
         after(t, memory, tail(row, n.demand), tail(row, n.tau), c.law, c.law_table, rate)
 
 
 @kernel
-def update(t: float, h: float, law: Function, after: Function, c: Vectors, n: Layout) -> None:
-    """Take the sample at t into the law's memory: RK4 over the period that ends, sample held."""
+def remember(
+    t: float, passing: float, h: float, law: Function, after: Function, c: Vectors, n: Layout
+) -> None:
+    """A step h of RK4 of the law's memory, with the sample held; the time goes on by `passing`."""
     count, memory = n.states - n.memory, tail(c.s, n.memory)
     k1 = tail(c.stages, n.memory)
     k2, k3, k4 = tail(k1, n.states), tail(k1, 2 * n.states), tail(k1, 3 * n.states)
     y = tail(k1, 4 * n.states)
-    for _ in range(n.hold_every):
-        held_rates(t, memory, k1, law, after, c, n)
-        shifted(count, memory, 0.5 * h, k1, y)
-        held_rates(t, y, k2, law, after, c, n)
-        shifted(count, memory, 0.5 * h, k2, y)
-        held_rates(t, y, k3, law, after, c, n)
-        shifted(count, memory, h, k3, y)
-        held_rates(t, y, k4, law, after, c, n)
-        for i in range(count):
-            memory[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
+    held_rates(t, memory, k1, law, after, c, n)
+    shifted(count, memory, 0.5 * h, k1, y)
+    held_rates(t + 0.5 * passing, y, k2, law, after, c, n)
+    shifted(count, memory, 0.5 * h, k2, y)
+    held_rates(t + 0.5 * passing, y, k3, law, after, c, n)
+    shifted(count, memory, h, k3, y)
+    held_rates(t + passing, y, k4, law, after, c, n)
+    for i in range(count):
+        memory[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
 
 
 @kernel
@@ -62,12 +63,13 @@ def sample_and_hold(
     if n.sample_every > 0 and k % n.sample_every == 0:
         sample(t, given, memory, row, p, table)
     if n.hold_every > 0 and k % n.hold_every == 0:
-        if n.update_first > 0 and k > 0:
-            update(t, h, law, after, c, n)
         held[0] = t
         for i in range(6):
             held[HELD_X + i] = given[i]
             held[HELD_TARGET + i] = row[i]
+        if n.update_first > 0 and k > 0:
+            for _ in range(n.hold_every):  # the period that ends, with its loads
+                remember(t, 0.0, h, law, after, c, n)
         law(
             t, given, memory, row, p, table, tail(row, n.demand), tail(c.stages, n.memory),
             tail(row, n.signals), c.work,
