@@ -86,7 +86,7 @@ def gallery_pictures() -> Iterable[tuple[str, bytes]]:
             for label, one in singles.items()
             if label in (laws or singles)
         ]
-        for _, picture in draw(dressed(runs), ["trajectory"], ["png"]):
+        for _, picture in draw(dressed(runs), [FIGURES["trajectory"]], ["png"]):
             yield f"{_picture(shown)}.png", picture
 
 
