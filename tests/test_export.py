@@ -2,12 +2,15 @@
 
 import json
 import re
+import runpy
 import shutil
+import struct
 import subprocess
 import xml.etree.ElementTree as ET
 import zipfile
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -29,6 +32,9 @@ LAWS = sorted(
     set(registry.kinds("podusv_cli.components.controllers", Controller)) - {"schedule"}
 )  # a schedule is the demand itself
 PODS = {"actuator": {"kind": "pod", "preset": "otter"}, "vessel": {"preset": "otter"}}
+CC = "cc -std=c99 -Wall -Wextra -pedantic -Werror -O2 -ffp-contract=off"
+HARDWARE = ROOT / "examples/hardware_in_the_loop"
+steer = runpy.run_path(str(HARDWARE / "hardware.py"))["steer"]
 needs_cc = pytest.mark.skipif(not shutil.which("cc"), reason="needs a C compiler")
 
 
@@ -157,10 +163,8 @@ def test_the_program_in_the_documentation_runs(tmp_path):
     folder = exported(tmp_path / "law", "momentum_vector")  # it asks for the loads
     (program,) = re.findall(r"```c\n(.*?)```", (ROOT / "docs/export.md").read_text(), re.DOTALL)
     (folder / "program.c").write_text(program)
-    command = "cc -std=c99 -Wall -Wextra -pedantic -Werror -O2 -ffp-contract=off program.c law.c "
-    subprocess.run(
-        [*command.split(), f"{link.this_machine()}/law.o", "-lm"], cwd=folder, check=True
-    )
+    sources = ["program.c", "law.c", f"{link.this_machine()}/law.o"]
+    subprocess.run([*CC.split(), *sources, "-lm"], cwd=folder, check=True)
     out = subprocess.run([folder / "a.out"], capture_output=True, text=True, check=True).stdout
     demands = np.array([line.split() for line in out.splitlines()], dtype=float)
     stepped = ExportedLaw.of(scenario("momentum_vector")).stepper()
@@ -171,6 +175,76 @@ def test_the_program_in_the_documentation_runs(tmp_path):
         row[12], row[14] = np.clip(demand, [-8.0, -2.5], [8.0, 2.5])  # as the actuator cuts them
     assert demands.shape == (3, 2)
     assert (demands[:, 0] > 0.0).all()  # towards the target
+
+
+@pytest.fixture
+def boat(tmp_path):
+    """The port of the example's program with the exported law, while it runs."""
+    folder, program = exported(tmp_path / "law"), tmp_path / "boat"
+    sources = [HARDWARE / "boat.c", "law.c", f"{link.this_machine()}/law.o"]
+    subprocess.run([*CC.split(), "-I.", *sources, "-lm", "-o", program], cwd=folder, check=True)
+    with subprocess.Popen([program], stdout=subprocess.PIPE, text=True) as running:
+        assert running.stdout
+        yield int(running.stdout.readline())
+        running.kill()
+
+
+@needs_cc
+def test_the_law_on_another_computer_has_the_demands_of_the_law_inside(boat):
+    """So it has in a second run, which begins anew."""
+    changes = {"control.period": 0.1, "simulation.duration": 5.0, "controller": {"kind": "pid"}}
+    inside = podusv.simulate(SOURCE, changes)
+    for _ in range(2):
+        session = podusv.open_session(SOURCE, changes)
+        assert steer(session, ("127.0.0.1", boat), wait=30.0) == 0
+        log = session.log
+        for name in ("tau_u_cmd", "tau_r_cmd", "x", "y", "psi", "u", "v", "r"):
+            # At the last instant the law inside takes a sample more.
+            np.testing.assert_array_equal(log[name][:-1], inside[name][:-1], name)
+    assert len(set(log["tau_r_cmd"])) == 50
+
+
+class Network:
+    """A socket and a clock: after each datagram, which answers arrive."""
+
+    def __init__(self, arriving):
+        self.arriving, self.here, self.now = arriving, [], 100.0
+
+    def socket(self, *kind):
+        """Itself."""
+        return self
+
+    def sendto(self, datagram, address):
+        """The next answers arrive."""
+        self.here += self.arriving.pop(0)
+
+    def select(self, links, *others):
+        """Itself where an answer is here."""
+        return [links if self.here else []]
+
+    def recv(self, size):
+        """The answer that arrived first."""
+        return struct.pack("<3d", *self.here.pop(0))
+
+    def sleep(self, seconds):
+        """The clock goes on."""
+        self.now += seconds
+
+
+def test_a_lost_demand_and_a_late_one_are_counted_and_the_last_one_holds(monkeypatch):
+    """In real time: a period of the vessel is a period of the clock."""
+    arriving = [[(0.0, 1.0, 0.1)], [], [(0.1, 2.0, 0.2), (0.2, 3.0, 0.3)], [(0.2, 4.0, 0.4)]]
+    network = Network(arriving)
+    faked = {"socket": SimpleNamespace(socket=network.socket, AF_INET=0, SOCK_DGRAM=0)}
+    faked |= {"select": network.select, "sleep": network.sleep, "monotonic": lambda: network.now}
+    for name, one in faked.items():
+        monkeypatch.setitem(steer.__globals__, name, one)
+    session = podusv.open_session(HARDWARE / "boat.yaml", {"simulation.duration": 0.4})
+    assert steer(session, ("boat", 4000)) == 2
+    held = slice(0, 40, 10)
+    assert session.log["tau_u_cmd"][held].tolist() == [1.0, 1.0, 3.0, 3.0]
+    assert session.log["tau_r_cmd"][held].tolist() == [0.1, 0.1, 0.3, 0.3]
+    assert network.now == pytest.approx(100.4)
 
 
 def test_the_table_of_samples_has_what_the_law_was_given(tmp_path):
