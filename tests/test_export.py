@@ -6,6 +6,7 @@ import runpy
 import shutil
 import struct
 import subprocess
+import sys
 import xml.etree.ElementTree as ET
 import zipfile
 from dataclasses import replace
@@ -245,6 +246,68 @@ def test_a_lost_demand_and_a_late_one_are_counted_and_the_last_one_holds(monkeyp
     assert session.log["tau_u_cmd"][held].tolist() == [1.0, 1.0, 3.0, 3.0]
     assert session.log["tau_r_cmd"][held].tolist() == [0.1, 0.1, 0.3, 0.3]
     assert network.now == pytest.approx(100.4)
+
+
+def stand_ins(messages: list[Any]) -> dict[str, Any]:
+    """Modules of ROS with as much as the node of the documentation takes from them."""
+
+    class Node:
+        def __init__(self, name):
+            self.name = name
+
+        def create_subscription(self, *given):
+            """Nothing: the test calls the node itself."""
+
+        def create_publisher(self, *given):
+            return SimpleNamespace(publish=messages.append)
+
+        create_timer = create_subscription
+
+    def wrench():
+        parts = {"force": SimpleNamespace(), "torque": SimpleNamespace()}
+        return SimpleNamespace(wrench=SimpleNamespace(**parts))
+
+    return {
+        "rclpy": SimpleNamespace(), "rclpy.node": SimpleNamespace(Node=Node),
+        "geometry_msgs.msg": SimpleNamespace(WrenchStamped=wrench),
+        "nav_msgs.msg": SimpleNamespace(Odometry=None),
+        "std_msgs.msg": SimpleNamespace(Float64MultiArray=None),
+    }  # fmt: skip
+
+
+def odometry(x: float, y: float, psi: float, u: float, v: float, r: float) -> Any:
+    """The vessel's state as ROS has it: x east, y north, counterclockwise, y to port."""
+    yaw, some = np.pi / 2 - psi, SimpleNamespace
+    turned = some(w=np.cos(yaw / 2), x=0.0, y=0.0, z=np.sin(yaw / 2))
+    pose = some(pose=some(position=some(x=y, y=x), orientation=turned))
+    return some(pose=pose, twist=some(twist=some(linear=some(x=u, y=-v), angular=some(z=-r))))
+
+
+@needs_cc
+def test_the_node_in_the_documentation_demands_what_the_law_inside_demands(tmp_path, monkeypatch):
+    """But for the digits that are lost in ROS's angles; ROS itself is not there."""
+    folder, messages = exported(tmp_path / "law"), list[Any]()
+    page = (ROOT / "docs/export.md").read_text()
+    (build,) = re.findall(r"^    (cc -shared.*)$", page, re.MULTILINE)
+    subprocess.run(build.replace("linux64", link.this_machine()).split(), cwd=folder, check=True)
+    (program,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    monkeypatch.chdir(folder)
+    for name, module in stand_ins(messages).items():
+        monkeypatch.setitem(sys.modules, name, module)
+    names: dict[str, Any] = {"__name__": "node"}
+    exec(program, names)  # noqa: S102
+    assert names["PERIOD"] == json.loads(Path("law.json").read_text())["period"]
+    node = names["Law"]()
+    node.step()  # nothing is known yet
+    rows = np.genfromtxt("check.csv", delimiter=",", names=True)
+    for row in rows:
+        node.measure(odometry(*(row[name] for name in ("x", "y", "psi", "u", "v", "r"))))
+        node.aim(SimpleNamespace(data=[*row][7:13]))
+        node.step()
+    surge = [one.wrench.force.x for one in messages]
+    yaw = [-one.wrench.torque.z for one in messages]
+    np.testing.assert_allclose(surge, rows["tau_u_cmd"], rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(yaw, rows["tau_r_cmd"], rtol=1e-9, atol=1e-9)
 
 
 def test_the_table_of_samples_has_what_the_law_was_given(tmp_path):
