@@ -6,6 +6,7 @@ import math
 from functools import partial
 from typing import Any
 
+from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.interpolation import linear, passed
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.metrics.metric import Accumulator, Measured, Metric
@@ -45,7 +46,7 @@ def last_part(share: float, t: float, before: float, seen: Vector) -> float:
 def watch_turn(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
     """Gather the way along and across the approach at turns by 90 and 180 degrees."""
     if begin(t, s, k, seen):
-        cosine, sine = math.cos(seen[PSI_0]), math.sin(seen[PSI_0])
+        cosine, sine = cos_sin(seen[PSI_0])
         x, y, changed = s[0] - seen[X_0], s[1] - seen[Y_0], s[2] - seen[PSI_0]
         along, across = x * cosine + y * sine, y * cosine - x * sine
         if changed >= 0.5 * math.pi and seen[ADVANCE] == 0.0:
@@ -95,7 +96,8 @@ def watch_stop(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Ve
     before, way = seen[SPEED], seen[WAY]
     if begin(t, s, k, seen):
         x, y = s[0] - seen[X_0], s[1] - seen[Y_0]
-        ahead = x * math.cos(seen[PSI_0]) + y * math.sin(seen[PSI_0])
+        cosine, sine = cos_sin(seen[PSI_0])
+        ahead = x * cosine + y * sine
         if s[3] <= 0.0 and seen[SURGE] > 0.0:
             share, step = passed(0.0, seen[SURGE], s[3]), t - seen[LATEST]
             # The speed is that of sway there, and the way along a parabola between the instants.

@@ -31,9 +31,11 @@ from podusv_cli.components.actuators.propeller import (
     WIDTH,
     X,
     Y,
+    force,
     speed_for,
     thrust,
 )
+from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import Vector, kernel, scratch, tail
 from podusv_cli.core.kinematics import direction
 
@@ -130,8 +132,8 @@ def by_least_squares(
 @kernel
 def shape(at: Reach, pod: Vector, most: float, sector: Vector) -> None:
     """The pod's sector, in parts of its `most` thrust."""
-    sector[LOW_COS], sector[LOW_SIN] = math.cos(at.low), math.sin(at.low)
-    sector[HIGH_COS], sector[HIGH_SIN] = math.cos(at.high), math.sin(at.high)
+    sector[LOW_COS], sector[LOW_SIN] = cos_sin(at.low)
+    sector[HIGH_COS], sector[HIGH_SIN] = cos_sin(at.high)
     sector[MOST_ASTERN], sector[MOST_AHEAD] = at.most_astern / most, at.most_ahead / most
     sector[FIXED] = 1.0 if at.high <= at.low else 0.0
 
@@ -144,7 +146,7 @@ def made(
     tau_u, tau_r = 0.0, 0.0
     for i in range(int(k.count)):
         pod = tail(table, i * WIDTH)
-        along, across = T[i] * math.cos(delta[i]), T[i] * math.sin(delta[i])
+        along, across = force(T[i], delta[i])
         tau_u += along
         tau_r += pod[X] * across - pod[Y] * along
     met_u = abs(tau_u - demand[0]) <= MET * abs(demand[0]) + MET_OF_ALL * all_u

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.kinematics import direction
 
@@ -31,30 +32,36 @@ def one_pod(
     side = 1.0 if X >= 0.0 else -1.0
     most = most_ahead if X >= 0.0 else most_astern
     along, across = side * X, side * Y
+    cos_low, sin_low = cos_sin(low)
+    cos_high, sin_high = cos_sin(high)
+    tan_low, tan_high = sin_low / cos_low, sin_high / cos_high
     if priority == YAW:
-        across = within(across, min(0.0, most * math.sin(low)), max(0.0, most * math.sin(high)))
-        along = _along_beside(along, across, low, high, most)
+        across = within(across, min(0.0, most * sin_low), max(0.0, most * sin_high))
+        along = _along_beside(along, across, tan_low, tan_high, most)
     else:
-        along = min(along, most * math.cos(within(0.0, low, high)))
+        cosine, _ = cos_sin(within(0.0, low, high))
+        along = min(along, most * cosine)
         room = math.sqrt(max(0.0, most * most - along * along))
-        least = max(along * math.tan(low), -room)
-        across = within(across, least, min(along * math.tan(high), room))
+        least = max(along * tan_low, -room)
+        across = within(across, least, min(along * tan_high, room))
     out[0] = side * math.sqrt(along * along + across * across)
     out[1] = within(direction(along, across), low, high)
 
 
 @kernel
-def _along_beside(along: float, across: float, low: float, high: float, most: float) -> float:
+def _along_beside(
+    along: float, across: float, tan_low: float, tan_high: float, most: float
+) -> float:
     """The nearest force along that the sector allows beside this force across."""
     least, largest = 0.0, math.sqrt(max(0.0, most * most - across * across))
     if across > 0.0:
-        least = across / math.tan(high)
-        if low > 0.0:
-            largest = min(largest, across / math.tan(low))
+        least = across / tan_high
+        if tan_low > 0.0:
+            largest = min(largest, across / tan_low)
     if across < 0.0:
-        least = across / math.tan(low)
-        if high < 0.0:
-            largest = min(largest, across / math.tan(high))
-    if across == 0.0 and (low > 0.0 or high < 0.0):
+        least = across / tan_low
+        if tan_high < 0.0:
+            largest = min(largest, across / tan_high)
+    if across == 0.0 and (tan_low > 0.0 or tan_high < 0.0):
         largest = 0.0
     return within(along, least, max(least, largest))

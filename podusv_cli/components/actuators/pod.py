@@ -31,6 +31,7 @@ from podusv_cli.components.actuators.propeller import (
     WIDTH,
     X,
     Y,
+    force,
     inflow,
     thrust,
 )
@@ -53,7 +54,7 @@ def act(state: Vector, flows: Vector, k: Any, table: Vector, tau: Vector, thrust
     for i in range(count):
         pod, delta = tail(table, i * WIDTH), state[count + i]
         T = thrust(state[i], flows[i], pod, k)
-        along, across = T * math.cos(delta), T * math.sin(delta)
+        along, across = force(T, delta)
         thrusts[i] = T
         tau[0] += along
         tau[1] += 0.0 if k.neglect_sway_force > 0.0 else across
@@ -246,7 +247,7 @@ class Pods(Actuator):
         count, i = int(k.count), int(k.failure_pod)
         thrusts, pod = tail(signals, FLAGS + 2 * count), tail(table, i * WIDTH)
         lost = (1.0 - k.failure_effectiveness) * thrusts[i]
-        along, across = lost * math.cos(state[count + i]), lost * math.sin(state[count + i])
+        along, across = force(lost, state[count + i])
         thrusts[i] -= lost
         tau[0] -= along
         tau[1] -= 0.0 if k.neglect_sway_force > 0.0 else across

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.signal import Signal
 
@@ -53,7 +54,8 @@ def inflow(x: Vector, pod: Vector, delta: float, k: Any) -> float:
     """
     if k.thrust_form == PHYSICAL:
         ahead, aside = x[3] - pod[Y] * x[5], x[4] + pod[X] * x[5]
-        return float(-(ahead * math.cos(delta) + aside * math.sin(delta)))
+        cosine, sine = cos_sin(delta)
+        return float(-(ahead * cosine + aside * sine))
     return math.sqrt(x[3] * x[3] + x[4] * x[4])
 
 
@@ -63,6 +65,13 @@ def thrust(n: float, flow: float, pod: Vector, k: Any) -> float:
     T_nn = pod[T_AHEAD] if n >= 0.0 else pod[T_ASTERN]
     gain = (pod[T_NV] if n >= 0.0 else pod[T_NV_ASTERN]) * flow
     return float(T_nn * abs(n) * n + gain * (abs(n) if k.thrust_form == PHYSICAL else n))
+
+
+@kernel
+def force(T: float, delta: float) -> tuple[float, float]:
+    """Force [N] along and across the vessel of the thrust T [N] at the angle delta [rad]."""
+    cosine, sine = cos_sin(delta)
+    return T * cosine, T * sine
 
 
 @kernel

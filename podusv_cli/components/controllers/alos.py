@@ -29,6 +29,7 @@ from podusv_cli.components.controllers.observer import B_R, B_U, ObservingContro
 from podusv_cli.components.controllers.velocity_loop import Axis
 from podusv_cli.components.vessels.plant import surge_force, yaw_moment
 from podusv_cli.core.component import value
+from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.kinematics import wrap
 from podusv_cli.core.signal import Signal
@@ -111,7 +112,8 @@ class Alos(LineOfSight, ObservingController):
         yaw = k.k_psi * (turn - r) + k.k_r * (r_d - r)
         tau[1] = k.m33 * yaw - yaw_moment(u, v, r, k) - memory[B_R]
 
-        u_d = wanted_speed(x, at, k) * max(math.cos(psi_e), 0.0) * k.N_m / max(abs(tau[1]), k.N_m)
+        cos_e, _ = cos_sin(psi_e)
+        u_d = wanted_speed(x, at, k) * max(cos_e, 0.0) * k.N_m / max(abs(tau[1]), k.N_m)
         tau[0] = k.m11 * k.k_u * (u_d - u) - surge_force(u, v, r, k) - memory[B_U]
         signals[0], signals[1], signals[2], signals[3] = at.along, at.across, psi_r, u_d
         observe(x, memory, tau, k, rate)

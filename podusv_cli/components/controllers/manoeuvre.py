@@ -6,11 +6,11 @@ MSC.137(76) of 2002, with a thrust that is turned in place of a rudder.
 
 from __future__ import annotations
 
-import math
 from typing import Any, ClassVar
 
 from podusv_cli.components.controllers.base import Controller
 from podusv_cli.core.component import value
+from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.signal import Signal
 
@@ -31,8 +31,9 @@ def steered(angle: float, side: float, k: Any, tau: Vector, signals: Vector) -> 
     A side of 1 is starboard, -1 port; between them it is the mean over a step in which the side
     changes.
     """
-    tau[0] = k.thrust * math.cos(angle)
-    tau[1] = k.thrust * k.lever * math.sin(angle) * side
+    cosine, sine = cos_sin(angle)
+    tau[0] = k.thrust * cosine
+    tau[1] = k.thrust * k.lever * sine * side
     signals[0] = angle * side
 
 

@@ -95,7 +95,8 @@ def bearing(x: Vector, memory: Vector, target: Vector, k: Any) -> Bearing:
     distance = math.sqrt(x_e * x_e + y_e * y_e)
     if distance <= k.hold_below:
         psi_d = memory[PSI_D_HELD]
-        return Bearing(distance, psi_d, math.cos(psi_d), math.sin(psi_d), True)
+        cos_d, sin_d = cos_sin(psi_d)
+        return Bearing(distance, psi_d, cos_d, sin_d, True)
     return Bearing(distance, direction(x_e, y_e), x_e / distance, y_e / distance, False)
 
 

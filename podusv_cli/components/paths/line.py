@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, Literal
 
 from podusv_cli.components.paths.base import Path
 from podusv_cli.core.component import value
+from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import Vector, kernel
 
 
@@ -23,8 +23,9 @@ class Line(Path):
     @kernel
     def evaluate(t: float, k: Any, target: Vector) -> None:
         """Uniform motion."""
-        target[2] = k.speed * math.cos(k.course)
-        target[3] = k.speed * math.sin(k.course)
+        cosine, sine = cos_sin(k.course)
+        target[2] = k.speed * cosine
+        target[3] = k.speed * sine
         target[0] = k.x + target[2] * t
         target[1] = k.y + target[3] * t
         target[4] = 0.0

@@ -8,6 +8,7 @@ from typing import Any, Literal
 from podusv_cli.components.paths.base import Break, Path
 from podusv_cli.components.paths.circle import on_circle
 from podusv_cli.core.component import value
+from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import Vector, kernel
 
 LITERAL, VELOCITY, SINE = range(3)
@@ -40,9 +41,10 @@ def _velocity(s: float, k: Any, target: Vector) -> None:
 @kernel
 def _sine(s: float, k: Any, target: Vector) -> None:
     _straight(k.switch + s, k, target)
-    target[1] = k.amplitude * math.sin(k.rate * s)
-    target[3] = k.amplitude * k.rate * math.cos(k.rate * s)
-    target[5] = -k.amplitude * k.rate * k.rate * math.sin(k.rate * s)
+    cosine, sine = cos_sin(k.rate * s)
+    target[1] = k.amplitude * sine
+    target[3] = k.amplitude * k.rate * cosine
+    target[5] = -k.amplitude * k.rate * k.rate * sine
 
 
 class LineCircle(Path):
