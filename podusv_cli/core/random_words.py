@@ -14,6 +14,7 @@ from hashlib import sha256
 import numpy as np
 import numpy.typing as npt
 
+from podusv_cli.core.elementary import exponential
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.portable import standard_normal
 
@@ -45,7 +46,7 @@ def gauss_markov(stream: tuple[int | str, ...], count: int, lag: float) -> Vecto
     `lag` is the time between two of its numbers in time constants. The steps are exact for any
     lag: x+ = exp(-lag) x + sqrt(1 - exp(-2 lag)) n.
     """
-    kept, process = math.exp(-lag), normals(stream, 0, count)
+    kept, process = exponential(-lag), normals(stream, 0, count)
     process[1:] *= math.sqrt(1.0 - kept * kept)
     for i in range(1, count):
         process[i] += kept * process[i - 1]

@@ -25,8 +25,8 @@ def collect(
     """The content of provenance.json; times are aware datetimes.
 
     `git` is None where podusv does not run from a git checkout or git is missing; a version is
-    None where a package is not installed. Processor and C library are noted because the library's
-    sine, cosine and arctangent may depend on both in the last bit.
+    None where a package is not installed. Processor and C library are noted because functions of
+    the library, which a component of one's own may call, depend on both in the last bit.
     """
     return {
         "podusv": podusv_cli.__version__,
