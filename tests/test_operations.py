@@ -10,7 +10,9 @@ import numpy as np
 
 from podusv_cli.components.paths.line import Line
 from podusv_cli.components.paths.sinusoid import Sinusoid
+from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import kernel, scratch
+from podusv_cli.core.kinematics import direction
 from podusv_cli.engine.loop.recent import Recent
 from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.metrics.operations import Tally, operations
@@ -22,14 +24,14 @@ CONFIGS = Path(__file__).parents[1] / "configs"
 @kernel
 def slope(x, k):
     """Two operations, and a square root."""
-    return math.sqrt(k.slope * x + 1.0)
+    return float(math.sqrt(k.slope * x + 1.0))
 
 
 @kernel
 def sample(x, k, out):
     room = scratch(2)
     room[0] = slope(x[0], k)  # 3
-    room[1] = 2.0 * room[0] if x[1] > 0.0 else room[0]  # 1
+    room[1] = 2.0 * slope(x[0], k) if x[1] > 0.0 else room[0]  # 4
     out[0] = abs(-room[1]) / math.pi - max(x[0], x[1])  # 2
     for i in range(int(k.slope)):
         out[0] = out[0] + x[i]  # 1 each time
@@ -40,7 +42,17 @@ def test_every_operation_is_counted_once_and_the_numbers_stay():
     sample(np.array([4.0, 5.0]), SimpleNamespace(slope=2.0), plain)
     x, out = tally.vector([4.0, 5.0]), tally.vector([0.0])
     tally.kernel(sample)(x, SimpleNamespace(slope=tally.vector([2.0])[0]), out)
-    assert (tally.count, float(out[0])) == (3 + 1 + 2 + 2, plain[0])
+    assert (tally.count, float(out[0])) == (3 + 4 + 2 + 2, plain[0])
+
+
+def test_cosine_and_sine_count_their_arithmetic_and_a_direction_once():
+    tally = Tally()
+    cosine, sine = tally.kernel(cos_sin)(tally.number(2.0))
+    assert (float(cosine), float(sine)) == cos_sin(2.0)
+    assert tally.count > 30
+    tally = Tally()
+    angle = tally.kernel(direction)(tally.number(1.0), tally.number(2.0))
+    assert (tally.count, float(angle)) == (3, math.atan2(2.0, 1.0))  # two sums beside
 
 
 def counts(*keys):

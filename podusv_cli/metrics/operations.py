@@ -56,9 +56,10 @@ class Tally:
     def kernel(self, function: Any) -> Any:
         """The kernel, and all that it calls, with arithmetic that counts.
 
-        A direction counts as one operation, as the functions of the module math do.
+        A direction counts as one operation, as the functions of the module math do; a cosine with
+        its sine, and an exponential, count as the arithmetic that they are.
         """
-        parts = {math: self, scratch: partial(np.empty, dtype=object)}
+        parts = {math: self, float: lambda x: x, scratch: partial(np.empty, dtype=object)}
         return transplanted(function, parts | {arctangent: partial(self.apply, math.atan2)})
 
 
