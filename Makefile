@@ -83,7 +83,7 @@ sea: $(VENV)/run.done ## single runs in a sea and through sensors, into results/
 bench-laws: $(VENV)/run.done ## all laws over standard tasks, into results/bench/
 	@$(BIN)/podusv bench --force --out results/.bench && mkdir -p results/bench && \
 	    cp results/.bench/leaderboard.md results/.bench/runs.csv results/bench && \
-	    cp results/.bench/figures/profiles.svg results/bench/figures
+	    cp results/.bench/figures/profiles.png results/bench/figures
 	@echo "what was found: results/bench.md; the page: results/.bench/report.html"
 
 docs: $(VENV)/dev.done ## the documentation as a site, into site/index.html
