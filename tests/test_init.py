@@ -115,6 +115,30 @@ def test_init_lists_every_scenario_that_is_meant_to_be_run(podusv):
     )
 
 
+NUMBERS = ("two", "three", "four", "five", "six")
+DESCRIBED = {
+    r"\bpods?\b": lambda scenario, _: scenario.actuator.kind == "pod",
+    r"\bcalm water\b": lambda scenario, _: scenario.disturbance.kind == "none",
+    r"\bsea state (\d)\b": lambda scenario, state: (
+        scenario.disturbance == load(CONFIGS / f"sea/state_{state}.yaml").scenario.disturbance
+    ),
+    rf"^({'|'.join(NUMBERS)}) laws\b": lambda scenario, number: (
+        len(scenario.controllers) == NUMBERS.index(number) + 2
+    ),
+}
+
+
+@pytest.mark.parametrize("words", DESCRIBED)
+def test_a_scenario_has_what_its_description_names(words):
+    """A later base replaces what an earlier one was named for, and nothing says so."""
+    found = {name: re.search(words, text.lower()) for name, text in starting_points().items()}
+    named = {name: one for name, one in found.items() if one}
+    assert len(named) > 3
+    for name, one in named.items():
+        scenario = load(CONFIGS / f"{name}.yaml").scenario
+        assert DESCRIBED[words](scenario, one[one.re.groups]), name
+
+
 @pytest.mark.parametrize(
     "name",
     [

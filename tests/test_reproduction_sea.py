@@ -136,7 +136,55 @@ def test_what_actuators_cost_is_as_in_the_comparisons(law):
         else "-"
         for name in names
     ]
-    assert row(law, -1) == told
+    assert row(law, -2) == told
+
+
+SEA = ROOT / "configs/sea"
+
+
+def test_the_sea_with_pods_has_the_pods_and_laws_of_one_scenario_and_the_sea_of_another():
+    pods, kept, sea = (
+        load(SEA / name).scenario.singles()
+        for name in ("pods.yaml", "../pod/kept.yaml", "state_4.yaml")
+    )
+    assert set(pods) == {*kept, "velocity_vector"}
+    for law, scenario in pods.items():
+        assert scenario.actuator == kept["pid"].actuator
+        assert (
+            scenario.controller
+            == (kept | {"velocity_vector": sea["velocity_vector"]})[law].controller
+        )
+        for part in ("vessel", "path", "disturbance", "measurement", "estimator"):
+            assert getattr(scenario, part) == getattr(sea[law], part), part
+
+
+SEEDED = "disturbance[0].seed={0} disturbance[2].seed={0} measurement.seed={0}"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", SINGLE["pods"].columns.intersection(LAWS))
+def test_what_other_seas_and_the_true_state_do_behind_pods_is_what_comes_out(law):
+    def worst(*sets):
+        one = load(SEA / "pods.yaml", sets).scenario.singles()[law]
+        return f"{1000 * rerun(one).run.metrics['e_after_max']:.0f}"
+
+    seeds, true, plain = row(law, -1)
+    assert seeds.split(", ") == [worst(*SEEDED.format(seed).split()) for seed in range(1, 5)]
+    assert true == worst("measurement={kind: exact}", "estimator={kind: none}")
+    assert plain == worst("controller.anti_windup=none")
+    if law == "velocity_vector":
+        lever = worst("controllers.velocity_vector.thrust_lever=0.5")
+        assert f"its `thrust_lever: 0.5` makes {lever} mm of the {seeds.split(', ')[0]} mm" in WORDS
+
+
+def test_what_is_said_of_pods_is_as_in_the_tables():
+    runs = {law: row(law, -1)[0].split(", ") for law in SINGLE["pods"].columns.intersection(LAWS)}
+    for law, (first, *_) in runs.items():
+        assert first == f"{1000 * number('pods', law, 'e_after_max'):.0f}"
+    lost = [int(cell) / 1000 for law in LAWS[1:4] for cell in runs[law]]
+    assert f"are {min(lost):.1f} to {max(lost):.1f} m beyond their standoff at worst" in WORDS
+    share = 100 * number("pods", "velocity_vector", "at_angle_limit")
+    assert f"at their angle limit for {share:.0f} % of the time" in WORDS
 
 
 def test_the_loads_are_those_of_the_logs():
