@@ -112,6 +112,15 @@ def test_of_several_bases_the_later_goes_over_the_earlier():
     assert (scenario.start.x, scenario.start.y) == (7.0, 8.0)
 
 
+def test_what_two_bases_share_goes_over_the_first_of_them():
+    write("shared.yaml", SOUND + "start: {x: 1.0}\nname: shared\n")
+    write("first.yaml", "extends: shared.yaml\nstart: {x: 2.0, y: 3.0}\n")
+    write("second.yaml", "extends: shared.yaml\nname: second\n")
+    write("a.yaml", "extends: [first.yaml, second.yaml]\n")
+    got = load("a.yaml").scenario
+    assert (got.start.x, got.start.y, got.name) == (1.0, 3.0, "second")
+
+
 def test_each_of_several_bases_is_a_file_name():
     write("a.yaml", "extends: [none.yaml, 3]\n")
     assert findings("a.yaml") == [

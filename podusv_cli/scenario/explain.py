@@ -51,7 +51,8 @@ class Row:
 EXTENDS = Row(
     "extends",
     "scenario that this one changes: a file name relative to it, podusv:NAME.yaml for one "
-    "that comes with podusv (`podusv init` lists them), or a list of these",
+    "that comes with podusv (`podusv init` lists them), or a list of these: a later one, "
+    "with all that it extends, overrides the earlier",
     "text",
 )
 
