@@ -157,6 +157,17 @@ def test_a_law_s_python_file_in_place_of_a_scenario_is_told(bench):
         list(cases(Selection(bench, laws=[Path("my_law.py")])))
 
 
+def test_a_scenario_in_place_of_laws_is_refused_for_it_would_replace_every_task(bench, tmp_path):
+    given = tmp_path / "mine.yaml"
+    given.write_text("extends: podusv:mu_2017/corrected.yaml\ncontrollers: {mine: {kind: pid}}\n")
+    with pytest.raises(
+        UsageError, match=r"mine.yaml has vessel, path, disturbance, start, and with"
+    ):
+        list(cases(Selection(bench, laws=[given])))
+    given.write_text("controllers: {mine: {kind: pid}}\nmetrics: {settling_radius: 2.0}\n")
+    assert "mine" in next(cases(Selection(bench, laws=[given]))).laws
+
+
 def test_a_long_name_may_be_broken_in_the_head_of_the_case_table():
     made = table([made_up("hand_position", "one", 10.0)])
     assert '<th class="number">hand_<wbr>position</th>' in page(made, [], {})

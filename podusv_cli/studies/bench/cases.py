@@ -12,13 +12,17 @@ from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 
-from podusv_cli.core.errors import UsageError
+from podusv_cli.core.errors import ScenarioError, UsageError
 from podusv_cli.scenario import shipped
+from podusv_cli.scenario.layers import composed
 from podusv_cli.scenario.load import load_text
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import unknown
+from podusv_cli.scenario.yaml_text import read_text
+from podusv_cli.scenario.yaml_tree import Fault, Mark
 
 LAWS = "laws.yaml"
+OF_CASES = ("vessel", "path", "disturbance", "start")  # what tasks, vessels and conditions set
 AXES = ("vessels", "tasks", "conditions")  # folders, in the order in which cases are numbered
 
 
@@ -58,11 +62,7 @@ def shipped_bench() -> Path:
 def cases(wanted: Selection) -> Iterator[Case]:
     """All cases, one by one. Raises UsageError for a folder or a name, ScenarioError for a file."""
     for path in wanted.laws:
-        if path.suffix == ".py":
-            raise UsageError(
-                f"{path} is Python; write a YAML file with `plugins: [{path.name}]` and the law "
-                "under `controllers`, and give that file to --laws"
-            )
+        _check_laws(path)
     vessels, tasks, conditions = (_chosen(wanted, axis) for axis in AXES)
     for vessel, task, condition in product(vessels, tasks, conditions):
         layers = [
@@ -81,6 +81,26 @@ def cases(wanted: Selection) -> Iterator[Case]:
             text, str(wanted.folder / f"{task}, {condition}, {vessel}"), wanted.overrides
         )
         yield Case(vessel, task, condition, loaded.scenario.singles())
+
+
+def _check_laws(path: Path) -> None:
+    """Raise UsageError for a file that has more than laws: it would be in place of every case's."""
+    if path.suffix == ".py":
+        raise UsageError(
+            f"{path} is Python; write a YAML file with `plugins: [{path.name}]` and the law "
+            "under `controllers`, and give that file to --laws"
+        )
+    faults: list[Fault] = []
+    text = read_text(str(path), Mark(str(path)), "", faults)
+    root = text and composed(text, str(path), (), faults)
+    if not root or faults:
+        raise ScenarioError(faults)
+    if taken := [key for key in OF_CASES if root.get(key)]:
+        raise UsageError(
+            f"{path} has {', '.join(taken)}, and with them all tasks and vessels of the bench "
+            "would be the same; give --laws a file with `controllers` (and `plugins`) that extends "
+            "no scenario"
+        )
 
 
 def _chosen(wanted: Selection, axis: str) -> dict[str, Path]:
