@@ -14,6 +14,7 @@ import yaml
 from command_samples import commanded, write
 from hypothesis import settings
 from old_results import among_old_results
+from policy_samples import content, symmetric
 
 import podusv_cli
 from podusv_cli.components.actuators.base import Actuator
@@ -57,6 +58,7 @@ REQUIRED: dict[str, dict[str, Any]] = {
     "waves": {"height": 0.1, "period": 1.5},
     "file": {"rows": "0, 1, 0.5, 0\n10, -1, 0.2, 0.1\n"},
     "schedule": {"rows": "0, 1, 0\n200, 2, 0.5\n"},
+    "policy": {"content": content(symmetric())},
 }
 # Slow enough an adaptation for a law that is evaluated only now and then.
 GENTLE = AdaptiveNeural(Gamma_u=1.0, Gamma_r=1.0, gamma_u=10.0, gamma_r=10.0)

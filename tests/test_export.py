@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import pytest
 from command_samples import ROOT
+from conftest import REQUIRED
 
 import podusv
 from podusv_cli.components.controllers.base import Controller
@@ -40,15 +41,20 @@ steer = runpy.run_path(str(HARDWARE / "hardware.py"))["steer"]
 needs_cc = pytest.mark.skipif(not shutil.which("cc"), reason="needs a C compiler")
 
 
+def law(kind: str) -> dict[str, Any]:
+    """A law with what it has no defaults for."""
+    return {"kind": kind, **REQUIRED.get(kind, {})}
+
+
 def scenario(kind: str, **changes: Any) -> Any:
     """The paper's task with a law that takes samples."""
-    base = {"control.period": 0.1, "simulation.duration": 30.0, "controller": {"kind": kind}}
+    base = {"control.period": 0.1, "simulation.duration": 30.0, "controller": law(kind)}
     return podusv.load(SOURCE, {**base, **changes})
 
 
-def exported(to: Path, law: str = "pid", **options: Any) -> Path:
+def exported(to: Path, kind: str = "pid", **options: Any) -> Path:
     """The folder of a small export for this machine."""
-    changes = ("control.period=0.1", "simulation.duration=5", f"controller={{kind: {law}}}")
+    changes = ("control.period=0.1", "simulation.duration=5", f"controller={json.dumps(law(kind))}")
     options = {"fmu": False, "platforms": [link.this_machine()]} | options
     return workflow.export(Path(SOURCE), workflow.Request(to, changes, **options))
 

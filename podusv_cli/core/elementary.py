@@ -1,4 +1,4 @@
-"""Exponential, cosine, sine and direction in plain arithmetic.
+"""Exponential, hyperbolic tangent, cosine, sine and direction in plain arithmetic.
 
 The library's functions are calls, one number at a time. These are merged into the loops that use
 them, which then work on several numbers at once, and they give the same bits on every machine and
@@ -88,6 +88,14 @@ def exponential(x: float) -> float:
     # The last bits of z are n; in the place of the exponent they make 2^n.
     power = of_bits((bits(z) + 1023) << 52)
     return 0.0 if x < SMALLEST else series * power
+
+
+@kernel
+def hyperbolic_tangent(x: float) -> float:
+    """tanh x, to two units in the last place of 1."""
+    e = exponential(-2.0 * abs(x))
+    size = (1.0 - e) / (1.0 + e)
+    return -size if x < 0.0 else size
 
 
 @kernel

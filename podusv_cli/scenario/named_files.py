@@ -1,15 +1,16 @@
-"""What fields of a scenario take from files beside it: the pairs in a CSV file, or a whole text."""
+"""What fields of a scenario take from files beside it: pairs of a CSV file, text, or bytes."""
 
 from __future__ import annotations
 
+import base64
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import partial
+from typing import Any
 
 from podusv_cli.core.component import Component
 from podusv_cli.core.timed_rows import Line, columns, lines_of
 from podusv_cli.scenario.shipped import relative_to
-from podusv_cli.scenario.yaml_text import MAX_NODES, read_text, resolve, text_node
+from podusv_cli.scenario.yaml_text import MAX_NODES, read_bytes, read_text, resolve, text_node
 from podusv_cli.scenario.yaml_tree import Fault, Mark, Node
 
 MAX_POINTS = MAX_NODES // 4  # a point is three values, and the resolved scenario has to be readable
@@ -18,16 +19,20 @@ COLUMNS = ("x [m]", "y [m]")
 
 ELSEWHERE = "refers to another file; the scenario that podusv keeps in a folder never does"
 
-Form = Callable[[str, str, list[Fault]], Node]  # of a file's text and name
+Read = Callable[[str, Mark, str, list[Fault]], Any]  # a file, named at a mark under a key
+Form = Callable[[Any, str, str, list[Fault]], Node]  # of what is read, the file's name, the key
 
 
 def with_files(given: Node, section: str, model: type[Component], faults: list[Fault]) -> Node:
     """A section of class `model` with what its files hold in place of their names."""
-    forms: dict[str, tuple[str, Form]] = {k: (rows, _points) for k, rows in model.rows_of.items()}
-    for key, taker in model.texts_of.items():
-        forms[key] = taker, partial(_whole, f"{section}.{key}")
-    for key, (taker, form) in forms.items():
-        given = _read_in(given, section, key, taker, form, faults)
+    ways: list[tuple[dict[str, str], Read, Form]] = [
+        (model.rows_of, read_text, _points),
+        (model.texts_of, read_text, _whole),
+        (model.bytes_of, read_bytes, _bytes),
+    ]
+    for fields, read, form in ways:
+        for key, taker in fields.items():
+            given = _read_in(given, section, key, taker, read, form, faults)
     return given
 
 
@@ -35,7 +40,7 @@ def without_files(
     given: Node, section: str, model: type[Component], faults: list[Fault]
 ) -> Node:  # fmt: skip
     """The section as it is; a fault for every file that it names itself, not with `--set`."""
-    for key in (*model.rows_of, *model.texts_of):
+    for key in (*model.rows_of, *model.texts_of, *model.bytes_of):
         file = given.mapping.get(key)
         if file and file.mark.line and file.content is not None:
             faults.append(Fault(file.mark, f"{section}.{key}", ELSEWHERE))
@@ -43,7 +48,7 @@ def without_files(
 
 
 def _read_in(
-    given: Node, section: str, key: str, taker: str, form: Form, faults: list[Fault]
+    given: Node, section: str, key: str, taker: str, read: Read, form: Form, faults: list[Fault]
 ) -> Node:  # fmt: skip
     """The content of the file that one key names, under the key `taker` in place of the name."""
     file = given.mapping.get(key)
@@ -55,18 +60,24 @@ def _read_in(
         return given
     name = relative_to(file.mark.source if file.mark.line else "", file.content)
     before = len(faults)
-    content = form(read_text(name, file.mark, f"{section}.{key}", faults) or "", name, faults)
+    dotted = f"{section}.{key}"
+    data = read(name, file.mark, dotted, faults)
+    content = Node("", file.mark) if data is None else form(data, name, dotted, faults)
     content = replace(content, faulty=len(faults) > before)
     rest = {name: entry for name, entry in given.mapping.items() if name != key}
     return replace(given, content=rest | {taker: content}, faulty=given.faulty or content.faulty)
 
 
-def _whole(key: str, text: str, name: str, faults: list[Fault]) -> Node:
+def _whole(text: str, name: str, key: str, faults: list[Fault]) -> Node:
     lines = text.removeprefix("\ufeff").replace("\r\n", "\n")
     return text_node(lines, Mark(name), key, faults, text=lines)
 
 
-def _points(text: str, name: str, faults: list[Fault]) -> Node:
+def _bytes(data: bytes, name: str, key: str, faults: list[Fault]) -> Node:
+    return Node(base64.b64encode(data).decode("ascii"), Mark(name))
+
+
+def _points(text: str, name: str, key: str, faults: list[Fault]) -> Node:
     return Node(tuple(_rows(text, name, faults)), Mark(name))
 
 

@@ -60,8 +60,8 @@ SYNTAX = {
 OPENING = ("unexpected end of stream", "but got '<stream end>'")
 
 
-def read_text(path: str, mark: Mark, key: str, faults: list[Fault]) -> str | None:
-    """The file's text, or None and a fault at `mark` or at the byte that is no UTF-8."""
+def read_bytes(path: str, mark: Mark, key: str, faults: list[Fault]) -> bytes | None:
+    """What a file holds, or None and a fault at `mark`."""
     named = "" if mark == Mark(path) else f"{quoted(path)} "
     try:
         with open(file_of(path), "rb", opener=_nonblocking_opener) as file:
@@ -77,6 +77,14 @@ def read_text(path: str, mark: Mark, key: str, faults: list[Fault]) -> str | Non
         return None
     if len(data) > MAX_BYTES:
         faults.append(Fault(mark, key, f"{named}is larger than {MAX_BYTES:,} bytes"))
+        return None
+    return data
+
+
+def read_text(path: str, mark: Mark, key: str, faults: list[Fault]) -> str | None:
+    """The file's text, or None and a fault at `mark` or at the byte that is no UTF-8."""
+    data = read_bytes(path, mark, key, faults)
+    if data is None:
         return None
     try:
         return data.decode("utf-8")

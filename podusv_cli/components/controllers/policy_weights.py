@@ -1,0 +1,150 @@
+"""The weights of a policy: a safetensors file, read and checked.
+
+The format: eight bytes with the length of a header (little-endian), the header as JSON, then the
+numbers of all tensors (https://huggingface.co/docs/safetensors).
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import math
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from pydantic import BaseModel, Field, NonNegativeInt, ValidationError
+
+from podusv_cli.core.kernel import Vector
+
+LENGTH = 8  # bytes of the header's length
+KINDS: dict[str, np.dtype[Any]] = {"F32": np.dtype("<f4"), "F64": np.dtype("<f8")}
+# As torch names what its Sequential holds
+LAYER = re.compile(r"(?P<of>.+\.)?(?P<number>\d+)\.(weight|bias)")
+
+
+class Network(NamedTuple):
+    """Weights as a kernel takes them; narrower hidden layers are filled up with zeros."""
+
+    hidden: int
+    width: int
+    table: Vector
+
+
+class Tensor(BaseModel):
+    """What the header says of a tensor; the offsets are from its end [bytes]."""
+
+    dtype: str
+    shape: tuple[NonNegativeInt, ...]
+    data_offsets: tuple[NonNegativeInt, NonNegativeInt]
+
+
+class Header(BaseModel, extra="allow"):
+    """A safetensors file's header: its tensors by name, and a user's remarks."""
+
+    __pydantic_extra__: dict[str, Tensor] = Field(init=False)
+    remarks: dict[str, str] = Field({}, alias="__metadata__")
+
+
+def tensors(data: bytes) -> dict[str, Vector]:
+    """The tensors of a safetensors file by name. Raises ValueError."""
+    size = int.from_bytes(data[:LENGTH], "little")
+    try:
+        header = Header.model_validate_json(data[LENGTH : LENGTH + size])
+    except ValidationError:
+        raise ValueError(
+            "is no safetensors file; write it with safetensors.numpy.save_file"
+        ) from None
+    numbers = data[LENGTH + size :]
+    return {name: _numbers(name, one, numbers) for name, one in header.__pydantic_extra__.items()}
+
+
+def _numbers(name: str, tensor: Tensor, numbers: bytes) -> Vector:
+    begin, end = tensor.data_offsets
+    if tensor.dtype not in KINDS:
+        raise ValueError(f"{name} has numbers {tensor.dtype}; save it as {' or '.join(KINDS)}")
+    kind = KINDS[tensor.dtype]
+    if end > len(numbers) or end - begin != math.prod(tensor.shape) * kind.itemsize:
+        raise ValueError(f"the file ends within {name}, or its header does not fit; save it again")
+    found = np.frombuffer(numbers[begin:end], kind).astype(float).reshape(tensor.shape)
+    if not np.isfinite(found).all():
+        raise ValueError(f"{name} has a number that is not finite; train again, or save it again")
+    return found
+
+
+def network(content: str, inputs: int, outputs: int, names: tuple[str, ...]) -> Network:
+    """The network in base64 of a safetensors file; `names` are those of its inputs.
+
+    Raises ValueError for what is no network from so many inputs to so many outputs.
+    """
+    try:
+        found = tensors(base64.b64decode("".join(content.split()), validate=True))
+    except binascii.Error:
+        raise ValueError("is no base64") from None
+    given = _normal(found, inputs)
+    layers = list(_layers(found))
+    _check_shapes(layers, inputs, outputs, names)
+    width = max((len(bias) for _, _, bias in layers[:-1]), default=0)
+    sizes = [inputs, *[width] * (len(layers) - 1), outputs]
+    filled = [
+        np.concatenate([_filled(bias, (after,)), _filled(weight, (after, before)).T.ravel()])
+        for (_, weight, bias), before, after in zip(layers, sizes, sizes[1:], strict=False)
+    ]
+    return Network(len(layers) - 1, width, np.concatenate([*given, *filled]))
+
+
+def _normal(found: dict[str, Vector], inputs: int) -> tuple[Vector, Vector]:
+    """Mean and scale of the inputs, taken out of the tensors."""
+    mean, scale = found.pop("mean", np.zeros(inputs)), found.pop("scale", np.ones(inputs))
+    for name, vector in (("mean", mean), ("scale", scale)):
+        if vector.shape != (inputs,):
+            raise ValueError(f"{name} has shape {vector.shape}, must be {(inputs,)}")
+    if not (scale > 0.0).all():
+        raise ValueError("scale has a number that is not above 0; it divides the observation")
+    return mean, scale
+
+
+def _layers(found: Mapping[str, Vector]) -> Iterator[tuple[str, Vector, Vector]]:
+    """Name, weight and bias of every layer, in the order of their numbers."""
+    named = {name: LAYER.fullmatch(name) for name in found}
+    if strange := [name for name, match in named.items() if not match]:
+        raise ValueError(
+            f"{strange[0]!r} is no tensor of a policy; it has mean, scale, and of every layer "
+            "0.weight and 0.bias, 2.weight and 2.bias, ..., numbered as in torch's Sequential"
+        )
+    places = {(match["of"] or "", int(match["number"])) for match in named.values() if match}
+    if len(networks := sorted({of for of, _ in places})) != 1:
+        found_in = " and ".join(map(repr, networks)) or "none"
+        raise ValueError(f"must have the layers of one network, found {found_in}; save that alone")
+    for of, number in sorted(places):
+        name = f"{of}{number}"
+        for part in (f"{name}.weight", f"{name}.bias"):
+            if part not in found:
+                raise ValueError(f"{part} is missing; every layer has a weight and a bias")
+        yield name, found[f"{name}.weight"], found[f"{name}.bias"]
+
+
+def _check_shapes(
+    layers: list[tuple[str, Vector, Vector]], inputs: int, outputs: int, names: tuple[str, ...]
+) -> None:
+    before, who = inputs, f"the observation ({', '.join(names)})"
+    for name, weight, bias in layers:
+        if weight.ndim != 2 or weight.shape[1] != before:
+            raise ValueError(
+                f"{name}.weight has shape {weight.shape}, must be (any, {before}): {who} has "
+                f"{before} numbers"
+            )
+        if bias.shape != weight.shape[:1]:
+            raise ValueError(f"{name}.bias has shape {bias.shape}, must be {weight.shape[:1]}")
+        before, who = len(bias), name
+    if before != outputs:
+        raise ValueError(
+            f"{who} has {before} outputs, must have {outputs}: shares of surge force and yaw moment"
+        )
+
+
+def _filled(part: Vector, shape: tuple[int, ...]) -> Vector:
+    whole = np.zeros(shape)
+    whole[tuple(slice(size) for size in part.shape)] = part
+    return whole

@@ -1,0 +1,179 @@
+"""The law `policy`: its network, what it sees, and the file that its weights come from."""
+
+import base64
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_samples import write
+from policy_samples import content, drawn, packed, symmetric
+
+import podusv
+from podusv_cli.components.controllers.policy import INPUTS, OBSERVED, Policy, observed
+from podusv_cli.components.controllers.policy_weights import tensors
+from podusv_cli.core.errors import ScenarioError
+from podusv_cli.core.kernel import bundle, call
+from podusv_cli.scenario.model import Scenario
+
+STATE = np.array([1.0, -2.0, 0.7, 0.4, -0.1, 0.2])
+TARGET = np.array([4.0, 3.0, 0.5, -0.2, 9.0, 9.0])
+POLICY = "controller: {kind: policy, weights: sub/policy.safetensors}\n"
+
+
+@pytest.fixture(autouse=True)
+def _in_an_empty_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+def seen(x, target):
+    out = np.zeros(INPUTS)
+    observed(np.asarray(x, float), np.asarray(target, float), out)
+    return dict(zip(OBSERVED, out, strict=True))
+
+
+def demand(law, x=STATE, target=TARGET):
+    tau, work = np.zeros(2), np.full(law.workspace(), np.nan)
+    k, table = bundle(law.constants()), law.table()
+    call(law.law, x=x, target=target, k=k, table=table, tau=tau, work=work)
+    return tau
+
+
+def test_a_target_is_seen_from_the_vessel():
+    """Rotations as complex numbers, by the library's functions."""
+    x, y, psi = STATE[:3]
+    turned = complex(math.cos(psi), -math.sin(psi))
+    there = complex(TARGET[0] - x, TARGET[1] - y) * turned
+    moving = complex(TARGET[2], TARGET[3]) * turned
+    angle = math.atan2(there.imag, there.real)
+    wanted = [there.real, there.imag, *STATE[3:], moving.real, moving.imag, angle]
+    np.testing.assert_allclose(list(seen(STATE, TARGET).values()), wanted, rtol=1e-14)
+
+
+def test_abeam_to_starboard_is_a_quarter_turn():
+    found = seen([0.0, 0.0, math.pi / 2, 0, 0, 0], [-5.0, 0.0, 0, 0, 0, 0])
+    assert found["target to starboard [m]"] == pytest.approx(5.0)
+    assert found["heading error [rad]"] == pytest.approx(math.pi / 2)
+
+
+@pytest.mark.parametrize("activation", ["tanh", "relu"])
+@pytest.mark.parametrize("squash", ["tanh", "clip"])
+@pytest.mark.parametrize("sizes", [[8, 2], [8, 5, 2], [8, 16, 12, 2], [8, 3, 7, 6, 2]], ids=str)
+def test_a_network_is_what_numpy_makes_of_its_layers(activation, squash, sizes):
+    """Widths differ from layer to layer; the kernel has all hidden layers as wide as the widest."""
+    random = np.random.default_rng(1)
+    given = drawn(sizes) | {"mean": random.normal(size=8), "scale": random.uniform(0.5, 4.0, 8)}
+    law = Policy(
+        content=content(given), activation=activation, squash=squash, surge=5.0, yaw=3.0
+    )  # fmt: skip
+    between = np.tanh if activation == "tanh" else lambda h: np.maximum(h, 0.0)
+    last = np.tanh if squash == "tanh" else lambda h: np.clip(h, -1.0, 1.0)
+    layers = len(sizes) - 1
+    for _ in range(20):
+        x, target = random.normal(0.0, 2.0, 6), random.normal(0.0, 2.0, 6)
+        h = (np.array(list(seen(x, target).values())) - given["mean"]) / given["scale"]
+        for i in range(layers):
+            h = given[f"{2 * i}.weight"] @ h + given[f"{2 * i}.bias"]
+            h = between(h) if i < layers - 1 else last(h)
+        np.testing.assert_allclose(demand(law, x, target), h * [5.0, 3.0], rtol=0, atol=1e-13)
+
+
+def test_numbers_of_half_the_bits_are_taken_as_they_are():
+    short = drawn([8, 6, 2], dtype=np.float32)
+    long = {name: tensor.astype(float) for name, tensor in short.items()}
+    np.testing.assert_array_equal(
+        demand(Policy(content=content(short))), demand(Policy(content=content(long)))
+    )
+
+
+def test_a_file_of_the_format_s_own_library_is_read():
+    library = pytest.importorskip("safetensors.numpy", reason="podusv[gym] is not installed")
+    given = drawn([8, 4, 2], dtype=np.float32) | {"mean": np.arange(8.0), "scale": np.ones(8)}
+    found = tensors(library.save(given, metadata={"trained": "by hand"}))
+    assert found.keys() == given.keys()
+    for name, tensor in found.items():
+        np.testing.assert_array_equal(tensor, given[name])
+    np.testing.assert_array_equal(library.load(packed(given))["2.weight"], given["2.weight"])
+
+
+def test_layers_of_a_module_with_a_name_are_read():
+    given = {f"actor.{name}": tensor for name, tensor in drawn([8, 4, 2]).items()}
+    np.testing.assert_array_equal(
+        demand(Policy(content=content(given))),
+        demand(Policy(content=content(drawn([8, 4, 2])))),
+    )
+
+
+def scenario(data: bytes) -> Scenario:
+    """A scenario beside a folder with this file of weights."""
+    Path("sub").mkdir(exist_ok=True)
+    Path("sub/policy.safetensors").write_bytes(data)
+    write("a.yaml", "extends: podusv:mu_2017/corrected.yaml\n" + POLICY)
+    return podusv.load("a.yaml", {"simulation.duration": 2.0})
+
+
+def test_a_run_has_its_weights_in_its_folder():
+    given = scenario(packed(symmetric()))
+    run = podusv.run(given, out="first", figures=False)
+    Path("sub/policy.safetensors").unlink()
+    again = podusv.run("first/resolved.yaml", out="again", figures=False)
+    np.testing.assert_array_equal(run["psi"], again["psi"])
+    assert run.scenario.controller.content == base64.b64encode(packed(symmetric())).decode()
+
+
+def layers(**changes):
+    return packed(drawn([8, 4, 2]) | {name.replace("_", "."): t for name, t in changes.items()})
+
+
+BAD = {
+    "no file of the format": (b"hello, this is text", "is no safetensors file"),
+    "empty": (b"", "is no safetensors file"),
+    "cut off": (layers()[:-8], "the file ends within 2.bias"),
+    "not finite": (layers(**{"2_bias": np.array([1.0, np.nan])}), "2.bias has a number that is n"),
+    "other input": (layers(**{"0_weight": np.ones((4, 6))}), r"0.weight has shape \(4, 6\), must "
+                    r"be \(any, 8\): the observation \(target ahead \[m\]"),
+    "layers that do not fit": (layers(**{"2_weight": np.ones((2, 5))}), r"2.weight has shape "
+                               r"\(2, 5\), must be \(any, 4\): 0 has 4 numbers"),
+    "bias": (layers(**{"2_bias": np.ones(3)}), r"2.bias has shape \(3,\), must be \(2,\)"),
+    "three outputs": (packed(drawn([8, 4, 3])), "2 has 3 outputs, must have 2: shares of surge"),
+    "scale": (packed(drawn([8, 2]) | {"scale": np.zeros(8)}), "scale has a number that is not abo"),
+    "mean": (packed(drawn([8, 2]) | {"mean": np.zeros(7)}), r"mean has shape \(7,\), must be \(8,"),
+    "half a layer": (packed({"0.weight": np.ones((2, 8))}), "0.bias is missing"),
+    "no layers": (packed({"mean": np.ones(8)}), "must have the layers of one network, found none"),
+    "two networks": (packed({f"{part}.{name}": tensor for part in ("pi", "vf")
+                             for name, tensor in drawn([8, 2]).items()}), "found 'pi.' and 'vf.'"),
+    "something else": (layers(log_std=np.ones(2)), "'log.std' is no tensor of a policy"),
+    "whole numbers": (layers(**{"2_bias": np.array([1, 2])}), "2.bias has numbers I64; save it as"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_weights_that_are_no_policy_are_a_sentence_with_their_place(case):
+    data, says = BAD[case]
+    with pytest.raises(ScenarioError, match=rf"sub/policy.safetensors: controller.cont.*{says}"):
+        scenario(data)
+
+
+@pytest.mark.parametrize(
+    ("controller", "says"),
+    [
+        ("{kind: policy}", "weights is missing; name a safetensors file"),
+        ("{kind: policy, weights: none.safetensors}", "controller.weights: .*none.safetenso"),
+        ("{kind: policy, content: '?!'}", "is no base64"),
+    ],
+)
+def test_a_policy_without_weights_is_a_sentence(controller, says):
+    write("a.yaml", f"extends: podusv:mu_2017/corrected.yaml\ncontroller: {controller}\n")
+    with pytest.raises(ScenarioError, match=says):
+        podusv.load("a.yaml")
+
+
+@pytest.mark.parametrize("activation", ["tanh", "relu"])
+def test_runs_side_by_side_have_the_bits_of_runs_alone(activation):
+    base = podusv.load(scenario(packed(drawn([8, 6, 5, 2]))), {"controller.activation": activation})
+    many = {"vessel.m": [20.0, 23.8, 26.0, 30.0], "start.psi": [0.0, 1.0, -2.0, 3.0]}
+    alone, abreast = (
+        podusv.simulate_many(base, many, side_by_side=beside) for beside in (False, True)
+    )
+    assert alone.equals(abreast)
+    assert alone["iae"].nunique() == 4
