@@ -12,6 +12,7 @@ from typing import Any
 
 from benchmarks.alternatives import plain_engine, python_alternatives
 from benchmarks.batch import batch_costs, hours_for_a_million, side_by_side_laws
+from benchmarks.by_steps import step_costs
 from benchmarks.c_program import build
 from benchmarks.commands import commands
 from benchmarks.engine import actuators, all_beside_c, growth, law_costs, log_megabytes, seas
@@ -45,6 +46,7 @@ PARTS: dict[str, Callable[[], Any]] = {
     "law": law_costs,
     "actuators": actuators,
     "seas": seas,
+    "by_steps": step_costs,
     "plain_engine": plain_engine,
     "alternatives": python_alternatives,
     "commands": commands,

@@ -43,6 +43,10 @@ SIDE_BY_SIDE = """\
 arrays, with -O3 and without -ffast-math, and integrates the distance only. All integrals agree to
 1e-9 relative. podusv is timed with all that Python does for a run, in processor time.
 """
+BY_STEPS = """\
+Control steps of ten integration steps each, episodes of 200 of them and their begin: a session of
+Python, environments of Gymnasium with a reward, and `VectorEnv`, whose runs march side by side.
+"""
 BATCH = """\
 `simulate_many` beside `simulate` for one loop after another: adaptive_neural with 27 nodes, another
 disturbance in every run, all metrics, no log. The cost is the time of N runs over N / cores times
@@ -103,6 +107,9 @@ def markdown(results: Results) -> str:
             ["run", "of the time in calm water"],
             ([name, spread(q)] for name, q in results["seas"].items() if name != "calm"),
         ),
+        "## Runs that wait for demands\n",
+        BY_STEPS,
+        _by_steps(results["by_steps"]),
         "## Without compiled code\n",
         _plain(results["plain_engine"]),
         _alternatives(results["alternatives"]),
@@ -176,6 +183,19 @@ def _side_by_side(found: Results) -> str:
         for name, relative in found["ratios"].items()
     ]
     return table(["eight runs side by side", "ms a run", "podusv / C"], [*ours, *others])
+
+
+def _by_steps(found: Results) -> str:
+    rows = (
+        [
+            name,
+            spread(one["seconds"], 1e6),
+            _rounded(1.0 / one["seconds"][1]),
+            spread(one["faster"]),
+        ]
+        for name, one in found.items()
+    )
+    return table(["", "us a step", "steps a second", "times as many as one by one"], rows)
 
 
 def _growth(growth: Results) -> list[str]:

@@ -180,3 +180,18 @@ def test_without_a_period_or_with_too_many_there_is_no_session():
         opened("podusv:own_vessel.yaml", 2000.0)
     with pytest.raises(UsageError, match="nothing has been simulated yet"):
         opened("podusv:own_vessel.yaml", 1.0).close()
+
+
+def test_a_metric_so_far_is_that_of_the_run_that_is_left_there():
+    session = opened("podusv:mu_2017/corrected.yaml", 2.0)
+    assert math.isnan(session.metric("iae"))  # nothing is simulated yet
+    steered(session, 7)
+    half = session.metric("iae")
+    run = session.close("half", figures=False)
+    last = run["z_e"][-2:].mean() * 0.01  # the last instant is not yet in it
+    assert half == pytest.approx(run.metrics["iae"] - last, rel=1e-9)
+    steered(session)
+    assert session.metric("iae") == session.close("whole", figures=False).metrics["iae"] > half
+    assert math.isnan(session.metric("settling_time"))
+    with pytest.raises(UsageError, match="session: unknown metric 'iea'"):
+        session.metric("iea")

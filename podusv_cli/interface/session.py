@@ -13,11 +13,13 @@ import numpy as np
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector
 from podusv_cli.engine.running.pieces import Mark, Pieces
+from podusv_cli.engine.running.simulate import Marcher, marcher
 from podusv_cli.interface.border import explained
 from podusv_cli.interface.functions import open_run, request
 from podusv_cli.interface.results import Run
 from podusv_cli.interface.scenarios import Changes, Source, loaded
 from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.phrases import unknown
 from podusv_cli.workflows import run as running
 
 Status = Literal["running", "finished", "diverged"]
@@ -67,15 +69,29 @@ def open_session(
     >>> session.close("straight_on", figures=False)
     <podusv run schedule: finished at 20 s, straight_on>
     """
-    scenario = loaded(source, changes).scenario
-    scenario = next(iter(scenario.singles().values())) if scenario.open_choice else scenario.alone()
-    period = scenario.control.period if period is None else period
+    scenario, period = waiting(loaded(source, changes).scenario, period)
+    scenario.ready()
+    return Session(scenario, period, marcher_of(scenario))
+
+
+def marcher_of(scenario: Scenario) -> Marcher:
+    """What makes the march of a scenario, and of others that differ in numbers."""
+    compiled = scenario.simulation.compiled
+    return marcher(scenario.closed_loop(), scenario.observer(), compiled)
+
+
+def waiting(scenario: Scenario, period: float | None) -> tuple[Scenario, float]:
+    """One run of a scenario, with demands in place of its controller; how long they hold [s].
+
+    Raises UsageError where neither `period` nor the scenario says how long.
+    """
+    one = next(iter(scenario.singles().values())) if scenario.open_choice else scenario.alone()
+    period = one.control.period if period is None else period
     if not period:
         raise UsageError(
-            "open_session: for how long does a demand hold? give period=0.1 [s], or the scenario "
-            "a control.period"
+            "for how long does a demand hold? give period=0.1 [s], or the scenario a control.period"
         )
-    return Session(_scheduled(scenario, period), period)
+    return scheduled(one, period), period
 
 
 class Session:
@@ -85,8 +101,8 @@ class Session:
     `close` writes.
     """
 
-    def __init__(self, scenario: Scenario, period: float) -> None:
-        """The run is at its begin."""
+    def __init__(self, scenario: Scenario, period: float, march: Marcher) -> None:
+        """The run is at its begin; the scenario is ready, and `march` that of one like it."""
         self.scenario, self.period = scenario, period
         grid = scenario.time_grid()
         self._status: Status = "running"
@@ -98,10 +114,26 @@ class Session:
                 f"than {MOST:,} demands of {period:g} s; ask for at most {longest:g} s, or for a "
                 "longer period"
             )
-        scenario.ready()
-        loop, observer = scenario.closed_loop(), scenario.observer()
-        self._pieces = Pieces(loop, grid, observer, compiled=scenario.simulation.compiled)
+        self._metrics = scenario.observer()
+        self._pieces = Pieces(
+            scenario.closed_loop(), grid, self._metrics, march,
+            compiled=scenario.simulation.compiled,
+        )  # fmt: skip
         self._demand = self._pieces.vectors.law_table[DEMAND]
+
+    @property
+    def status(self) -> Status:
+        """As in an `Observation`."""
+        return self._status
+
+    def metric(self, name: str) -> float:
+        """A metric of the run so far, up to the last step of the integration; NaN where undefined.
+
+        Raises UsageError for a name that is no metric.
+        """
+        if name not in self._metrics.known:
+            raise UsageError(f"session: {unknown(f'metric {name!r}', name, self._metrics.known)}")
+        return float(self._metrics.one(name, self._pieces.vectors.seen[:, np.newaxis])[0])
 
     def observe(self) -> Observation:
         """The instant at which the next demand begins to act."""
@@ -179,11 +211,11 @@ class Session:
         """
         if not self._demands:
             raise UsageError("session: nothing has been simulated yet; give it a demand with step")
-        given = loaded(_scheduled(self.scenario, self.period, self._demands))
+        given = loaded(scheduled(self.scenario, self.period, self._demands))
         return open_run(running.run_loaded(given, request(out, force, figures)).folder)
 
 
-def _scheduled(
+def scheduled(
     scenario: Scenario, period: float, demands: Sequence[tuple[float, float]] = ()
 ) -> Scenario:
     """The scenario with a law that holds each of these demands for a period, and then ends.

@@ -49,14 +49,16 @@ def add(seen: Vector, integrals: int, position: int, amount: float) -> None:
 def close_integrals(seen: Vector, integrals: int, step: float) -> Vector:
     """The gathered numbers, with half a weight for the last instant of a run that was cut short.
 
-    The engine gives half a weight only to the last instant of the grid.
+    The engine gives half a weight only to the last instant of the grid. `seen` are the numbers of a
+    run, or of several, a column each.
     """
     whole, added = seen.copy(), seen[integrals : 2 * integrals]
-    if not integrals or whole[0] > added[0] == 0.5 * step:
-        return whole
-    with np.errstate(all="ignore"):  # nothing was added, or the run diverged
-        less = whole[:integrals] - 0.5 * step / added[0] * added
-        whole[:integrals] = np.where(np.isinf(whole[:integrals]), np.inf, less)
+    if integrals:
+        at_end = (whole[0] > added[0]) & (added[0] == 0.5 * step)
+        sums = whole[:integrals]
+        with np.errstate(all="ignore"):  # nothing was added, or the run diverged
+            less = np.where(np.isinf(sums), np.inf, sums - 0.5 * step / added[0] * added)
+        whole[:integrals] = np.where(at_end, sums, less)
     return whole
 
 

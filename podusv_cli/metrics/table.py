@@ -130,6 +130,16 @@ class Metrics(Observer):
                     numbers[metric.name] = number
         return numbers
 
+    def one(self, name: str, seen: Vector) -> Vector:
+        """The metric of this name from gathered numbers, a column a run; NaN where undefined."""
+        metric, begin = self.known[name], 0
+        for part, size in self.parts:
+            if part is metric.accumulator:
+                own = close_integrals(seen[begin : begin + size], part.integrals, self.step)
+                return np.array([float(metric.result(run, self.step)) for run in own.T])
+            begin += size
+        return np.full(seen.shape[1], np.nan)
+
     def summaries(self, seen: Vector) -> dict[str, Vector]:
         """Metrics by name, with one number per run, from rows of gathered numbers (`Batch.seen`).
 

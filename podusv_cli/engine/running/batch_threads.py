@@ -94,11 +94,12 @@ class Common:
 
         return Group([run], work, endings)
 
-    def together(self, runs: list[BatchRun], advance: Callable[..., int]) -> Group:
+    def together(self, runs: list[BatchRun], advance: Callable[[Lanes, float], March]) -> Group:
         """The thread of runs side by side."""
         last = self.grid.steps + 1
         lanes = Lanes.of([run.vectors for run in runs], self.structure[0])
-        work = Work(lanes.march(advance, self.grid), lanes.under_way, self.bell)
+        march = partial(advance(lanes, self.grid.step), 0, last)
+        work = Work(march, lanes.under_way, self.bell)
         return Group(runs, work, lambda stopped: lanes.endings(work.reached, last))
 
 

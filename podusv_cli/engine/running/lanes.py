@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,8 +17,8 @@ from podusv_cli.components.measurements.base import KNOWN, OWN
 from podusv_cli.core.kernel import LANES, Vector, whole_numbers
 from podusv_cli.engine.loop.closed_loop import ClosedLoop, Observer, entries
 from podusv_cli.engine.machine import signatures
+from podusv_cli.engine.running.simulate import March
 from podusv_cli.engine.running.watch import Ending
-from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.engine.step.lane_march import REACHED, advance_lanes
 from podusv_cli.engine.step.layout import Layout, Vectors
 from podusv_cli.engine.step.relay import COUNT
@@ -59,8 +58,8 @@ def alike(loop: ClosedLoop, observer: Observer) -> dict[str, frozenset[str]]:
 
 def marcher(
     loop: ClosedLoop, observer: Observer, compiling: Callable[[float], None] | None = None
-) -> Callable[..., int]:
-    """The compiled march of runs like this loop, side by side.
+) -> Callable[[Lanes, float], March]:
+    """What makes the compiled march of runs like this loop, side by side, with a step [s].
 
     Raises TypeError where a part cannot go another way in every lane, LawError for a kernel that
     would read what is not there.
@@ -71,21 +70,19 @@ def marcher(
     compile.prepare(pieces, compiling)
     *adapters, march = map(compile.routine, pieces)
 
-    def compiled_march(
-        last: int, h: float, vectors: list[Vector], layout: Layout, under_way: Vector, ends: Vector
-    ) -> int:
+    def ready(lanes: Lanes, h: float) -> March:
+        vectors = lanes.vectors
         pointers = (signatures.LANE_VECTOR * len(vectors))(
             *(vector.ctypes.data_as(signatures.LANE_VECTOR) for vector in vectors)
         )
-        return int(
-            march(
-                *adapters, 0, last, h, pointers, signatures.whole_numbers(layout),
-                len(vectors[Vectors._fields.index("seen")]) // LANES,
-                signatures.pointer(under_way), signatures.pointer(ends),
-            )
+        given = (
+            pointers, signatures.whole_numbers(lanes.layout),
+            len(vectors[Vectors._fields.index("seen")]) // LANES,
+            signatures.pointer(lanes.under_way), signatures.pointer(lanes.ends),
         )  # fmt: skip
+        return lambda first, last: int(march(*adapters, first, last, h, *given))
 
-    return compiled_march
+    return ready
 
 
 def is_compiled(loop: ClosedLoop, observer: Observer) -> bool:
@@ -131,19 +128,19 @@ def places(loop: ClosedLoop, observer: Observer) -> list[tuple[int, list[int]]]:
     return [(Vectors._fields.index(vector), inside) for vector, inside in found.items()]
 
 
-def _room(count: int) -> Vector:
+def room(count: int) -> Vector:
     """Zeros that begin at a whole register."""
-    room = np.zeros(count + LANES)
-    return room[-(room.ctypes.data // NUMBER) % LANES :][:count]
+    more = np.zeros(count + LANES)
+    return more[-(more.ctypes.data // NUMBER) % LANES :][:count]
 
 
 def _side_by_side(vectors: Sequence[Vector]) -> Vector:
     """One vector of several, a lane each; the lanes that are left repeat the first."""
-    room = _room(LANES * max(map(len, vectors)))
+    together = room(LANES * max(map(len, vectors)))
     for lane in range(LANES):
         vector = vectors[lane if lane < len(vectors) else 0]
-        room[lane::LANES][: len(vector)] = vector
-    return room
+        together[lane::LANES][: len(vector)] = vector
+    return together
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,13 +161,6 @@ class Lanes:
         under_way[REACHED : REACHED + len(runs)] = MARCHING
         vectors = [_side_by_side(several) for several in zip(*runs, strict=True)]
         return cls(runs, vectors, layout, under_way, np.zeros(LANES * size))
-
-    def march(self, advance: Callable[..., int], grid: TimeGrid) -> Callable[[], int]:
-        """A function that marches over the grid."""
-        last = grid.steps + 1
-        return partial(
-            advance, last, grid.step, self.vectors, self.layout, self.under_way, self.ends
-        )
 
     def endings(self, reached: int, last: int) -> list[Ending]:
         """How each run ended, where the march stopped at `reached`; its vectors are filled in."""
@@ -198,7 +188,7 @@ class Sorter:
 
     def __init__(self, observer: Observer, instants: int, wanted: bool | None) -> None:
         """`instants` are those of all runs; `wanted` says whether to march side by side at all."""
-        self.advance: Callable[..., int] | None = None
+        self.advance: Callable[[Lanes, float], March] | None = None
         self._observer, self._instants, self._wanted = observer, instants, wanted
         self._places: list[tuple[int, list[int]]] = []
         self._waiting: dict[tuple[float, ...], list[Any]] = {}
@@ -230,8 +220,10 @@ class Sorter:
         return ready
 
     def rest(self) -> list[list[Any]]:
-        """The runs that still wait for others."""
-        return [runs for runs in self._waiting.values() if runs]
+        """The runs that still wait for others; none of them waits any more."""
+        ready = [runs for runs in self._waiting.values() if runs]
+        self._waiting.clear()
+        return ready
 
 
 def prepare(

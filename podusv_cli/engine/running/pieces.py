@@ -12,7 +12,7 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
 from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop, Observer, entries, vectors_of
 from podusv_cli.engine.machine import signatures
-from podusv_cli.engine.running.simulate import marcher, recorded
+from podusv_cli.engine.running.simulate import Marcher, recorded
 from podusv_cli.engine.running.watch import Ending
 from podusv_cli.engine.step.grid import TimeGrid
 
@@ -32,16 +32,17 @@ class Pieces:
     """The march of a loop over a grid, some instants at a time."""
 
     def __init__(
-        self, loop: ClosedLoop, grid: TimeGrid, observer: Observer, *, compiled: bool = True
-    ) -> None:
-        """Nothing is marched yet. Raises LawError as `simulate`."""
+        self, loop: ClosedLoop, grid: TimeGrid, observer: Observer, march: Marcher, *,
+        compiled: bool = True,
+    ) -> None:  # fmt: skip
+        """Nothing is marched yet; `march` is that of a loop like this. Raises as `simulate`."""
         loop.check_fit(grid.step)
         self.loop, self.grid, self.reached = loop, grid, 0
         self._layout = loop.layout(grid)
         self.vectors = vectors_of(loop, self._layout, observer, grid, grid.rows)
         self._given = self.vectors.s[self._layout.estimate :]
         self._target = np.zeros(len(TARGET))
-        self._advance = marcher(loop, observer, compiled)(self.vectors, self._layout, grid.step)
+        self._advance = march(self.vectors, self._layout, grid.step)
         self._aim = self._path(next(iter(entries(loop, observer))), compiled)
 
     def to(self, instant: int) -> bool:

@@ -29,6 +29,7 @@ from podusv_cli.engine.step.layout import Layout, Vectors
 from podusv_cli.process.interrupts import interrupts_deferred
 
 March = Callable[[int, int], int]  # over instants first .. last - 1, see `rk4.advance`
+Marcher = Callable[[Vectors, Layout, float], March]  # of vectors, with a step [s]
 # What a log says of a run, by how its march ended.
 RECORDED: dict[Word, Status] = {
     "finished": "finished", "interrupted": "interrupted",
@@ -82,7 +83,7 @@ def ready(
 def marcher(
     loop: ClosedLoop, observer: Observer, compiled: bool,
     compiling: Callable[[float], None] | None = None,
-) -> Callable[[Vectors, Layout, float], March]:  # fmt: skip
+) -> Marcher:  # fmt: skip
     """What makes the march of loops like this one over such vectors, with a step [s].
 
     It is compiled if need be. The vectors have to outlive the march.

@@ -86,7 +86,7 @@ def _metric_names(scenario: Scenario) -> Faults:
 
 
 def _vary(laws: Mapping[str, Scenario], sweep: Sweep) -> Faults:
-    taken = {*AXES, *ENDING, *(name for one in laws.values() for name in _metrics(one))}
+    taken = {*AXES, *ENDING, *(name for one in laws.values() for name in gathered_metrics(one))}
     for name, quantity in sweep.vary.items():
         if wrong := _wrong_name(name, quantity, taken):
             yield ("sweep", "vary", name), wrong
@@ -253,7 +253,7 @@ def _by(others: list[str]) -> str:
     return f", by {' and '.join(others)} too" if others else ""
 
 
-def _metrics(scenario: Scenario) -> dict[str, Metric]:
+def gathered_metrics(scenario: Scenario) -> dict[str, Metric]:
     """The metrics that are gathered during a run; none of a target where a path is followed."""
     followed = not scenario.path.is_recorded and scenario.path.follows
     return {
@@ -264,7 +264,7 @@ def _metrics(scenario: Scenario) -> dict[str, Metric]:
 
 
 def _keep(scenario: Scenario, sweep: Sweep) -> Faults:
-    metrics = _metrics(scenario)
+    metrics = gathered_metrics(scenario)
     for name in sweep.keep.worst:
         if name not in metrics:
             yield (
@@ -285,7 +285,7 @@ def _claims(scenario: Scenario, sweep: Sweep) -> Faults:
             "Sobol' points are not independent, so the intervals that judge claims do not hold for "
             f"them; write design: random, or take out each claim, as in {remedy}",
         )
-    metrics, laws = _metrics(scenario), tuple(singles(scenario))
+    metrics, laws = gathered_metrics(scenario), tuple(singles(scenario))
     try:
         parse_success(sweep.success, metrics)
     except ExpressionError as error:

@@ -1,0 +1,308 @@
+"""Scenarios as environments of Gymnasium, in which a controller is learned."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from podusv_cli.components.controllers.policy import INPUTS, OUTPUTS, observed
+from podusv_cli.core.errors import UsageError
+from podusv_cli.core.kernel import LANES, Vector
+from podusv_cli.engine.running.abreast import Abreast
+from podusv_cli.engine.running.batch_threads import Common
+from podusv_cli.engine.running.lanes import Sorter, why_alone
+from podusv_cli.interface.border import explained
+from podusv_cli.interface.scenarios import CHECKS, Changes, Source, loaded
+from podusv_cli.interface.session import DEMAND, Session, marcher_of, waiting
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.phrases import unknown
+from podusv_cli.scenario.sweep import Sweep
+from podusv_cli.studies.study.check import gathered_metrics, sweep_faults
+from podusv_cli.studies.study.draws import SWEEP, drawn, draws
+
+try:
+    import gymnasium
+    from gymnasium.spaces import Box
+    from gymnasium.vector import AutoresetMode
+    from gymnasium.vector.utils import batch_space
+except ImportError as error:
+    raise ImportError("podusv.gym needs Gymnasium: pip install 'podusv[gym]'") from error
+
+LEARNING = "learning"  # the stream of draws that no study has
+Info = dict[str, Any]
+Flags = npt.NDArray[np.bool_]
+Limits = tuple[float, float]
+
+
+class Task:
+    """What the episodes of an environment have in common: a scenario, and what is drawn in it."""
+
+    def __init__(
+        self, source: Source, changes: Changes | None, period: float | None, reward: str,
+        limits: Limits | None,
+    ) -> None:  # fmt: skip
+        """Raises ScenarioError, and UsageError for what no environment can be made of."""
+        whole = loaded(source, changes, (*CHECKS, sweep_faults)).scenario
+        self.sweep = whole.sweep or Sweep(draws=1)
+        self._check_sweep()
+        self.scenario, self.period = waiting(whole, period)
+        known = gathered_metrics(self.scenario)
+        if reward not in known:
+            told = unknown(f"reward {reward!r}", reward, known, "podusv list")
+            raise UsageError(f"podusv.gym: {told}")
+        self.reward, self.limits = reward, np.array(limits or self.scenario.actuator.limits())
+        if not np.isfinite(self.limits).all():
+            raise UsageError(
+                "podusv.gym: the actuator does not say how large a demand may be; give "
+                "limits=(8.0, 2.5) [N, N m]"
+            )
+
+    def _check_sweep(self) -> None:
+        if self.sweep.grid:
+            raise UsageError(
+                f"podusv.gym: sweep.grid has several values of {', '.join(self.sweep.grid)}; an "
+                "environment has a single cell, so set the value and take the grid out"
+            )
+        for name, quantity in self.sweep.vary.items():
+            for key in quantity.targets(name):
+                if key.partition(".")[0] in ("controller", "controllers"):
+                    raise UsageError(
+                        f"podusv.gym: sweep.vary.{name} draws {key}, and in an environment the "
+                        f"controller is learned; take it out with sweep.vary: {{{name}: null}}"
+                    )
+
+    def drawn(self, seed: int | None, random: np.random.Generator) -> Scenario:
+        """The scenario with the draw of a study whose number is the seed, or with one of no study.
+
+        Draws of no study are independent, also where those of the study are Sobol' points.
+        """
+        if seed is not None:
+            return drawn(self.scenario, self.sweep.vary, next(draws(self.sweep, seed, 1, SWEEP)))
+        sweep = self.sweep.model_copy(update={"design": "random"})
+        draw = next(draws(sweep, int(random.integers(2**53)), 1, LEARNING))
+        return drawn(self.scenario, sweep.vary, draw)
+
+    def check_reward(self, gathered: Vector | float, time: float) -> None:
+        """Raise UsageError for a metric that is not defined at this time [s]."""
+        if not np.isfinite(gathered).all():
+            raise UsageError(
+                f"podusv.gym: the metric {self.reward} is not defined at {time:g} s; a reward "
+                "needs one that is at every instant, such as iae"
+            )
+
+    def action_space(self) -> Any:
+        """Demands (tau_u [N], tau_r [N m]) within the actuator's limits."""
+        return Box(-self.limits, self.limits, dtype=np.float64)
+
+    def observation_space(self) -> Any:
+        """As `OBSERVED`; the last number is an angle."""
+        high = np.append(np.full(INPUTS - 1, np.inf), np.pi)
+        return Box(-high, high, dtype=np.float64)
+
+
+class Env(gymnasium.Env[Vector, Vector]):
+    """A scenario as an environment of Gymnasium: an agent in place of its controller.
+
+    An action is a demand (tau_u [N], tau_r [N m]) that holds for `period` [s], by default
+    `control.period`; `limits` are its largest numbers, by default the actuator's. An observation
+    has eight numbers in the vessel's own frame: the target ahead and to starboard [m], u, v [m/s],
+    r [rad/s], the target's velocity ahead and to starboard [m/s], and the heading error [rad]. The
+    rewards of an episode add up to the metric `reward` of its run, with a minus. An episode is
+    truncated when `simulation.duration` is over, and terminated where a number is not finite.
+
+    `reset(seed=i)` begins the run of draw i of the scenario's `sweep.vary`, as `podusv sweep` has
+    it; `reset()` one that no study has. `session` is the run under way, and its `close("folder")`
+    writes it as a run folder. Raises ScenarioError, and UsageError for what no environment can be
+    made of.
+
+    >>> import podusv.gym
+    >>> env = podusv.gym.Env("podusv:mu_2017/corrected.yaml", period=0.1)
+    >>> seen, _ = env.reset(seed=0)
+    >>> seen, reward, terminated, truncated, info = env.step((8.0, 0.5))
+    >>> seen.shape, terminated, truncated, info
+    ((8,), False, False, {'time': 0.1})
+    """
+
+    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - as Gymnasium's own class
+
+    def __init__(
+        self, source: Source, changes: Changes | None = None, *, period: float | None = None,
+        reward: str = "iae", limits: Limits | None = None,
+    ) -> None:  # fmt: skip
+        """No episode has begun."""
+        self._task = Task(source, changes, period, reward, limits)
+        self.action_space = self._task.action_space()
+        self.observation_space = self._task.observation_space()
+        self._task.scenario.ready()
+        self._march = marcher_of(self._task.scenario)
+        self._session: Session | None = None
+        self._gathered = 0.0
+
+    @property
+    def session(self) -> Session:
+        """The run under way. Raises UsageError before the first `reset`."""
+        if self._session is None:
+            raise UsageError("podusv.gym: no episode has begun; call reset first")
+        return self._session
+
+    @explained
+    def reset(
+        self, *, seed: int | None = None, options: Info | None = None
+    ) -> tuple[Vector, Info]:  # fmt: skip
+        """Begin a run; see the class. `options` change nothing."""
+        super().reset(seed=seed)
+        scenario = self._task.drawn(seed, self.np_random)
+        self._session = Session(scenario, self._task.period, self._march)
+        self._gathered = 0.0
+        return self._seen(), {"time": 0.0}
+
+    @explained
+    def step(self, action: Vector) -> tuple[Vector, float, bool, bool, Info]:
+        """Hold a demand for a period: observation, reward, terminated, truncated, and the time [s].
+
+        Raises UsageError for a demand that is not two finite numbers, and after an episode's end.
+        """
+        session, task = self.session, self._task
+        if session.status != "running":
+            raise UsageError("podusv.gym: the episode is over; call reset")
+        after = session.step(action)
+        gathered = session.metric(task.reward)
+        task.check_reward(gathered, after.time)
+        reward, self._gathered = self._gathered - gathered, gathered
+        ended = after.status == "diverged", after.status == "finished"
+        return self._seen(), reward, *ended, {"time": after.time}
+
+    def _seen(self) -> Vector:
+        now, seen = self.session.observe(), np.zeros(INPUTS)
+        observed(now.state, now.target, seen)
+        return seen
+
+
+class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any]):
+    """`count` environments like `Env`, whose runs march side by side: a march for eight of them.
+
+    Runs that share a march have the same time. When their episodes end, the next `step` begins
+    others without looking at the actions, as Gymnasium's `AutoresetMode.NEXT_STEP` says. Where one
+    of them is terminated, the others of its march are truncated. `reset(seed=i)` takes the draws
+    i, i + 1, ... of a study, `reset(seed=[...])` these; `reset()`, and what begins by itself, takes
+    draws that no study has. Runs are not logged. Raises as `Env`, and UsageError for parts that
+    cannot march side by side.
+    """
+
+    metadata: dict[str, Any] = {"autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
+
+    def __init__(
+        self, source: Source, changes: Changes | None = None, *, count: int = LANES,
+        period: float | None = None, reward: str = "iae", limits: Limits | None = None,
+    ) -> None:  # fmt: skip
+        """No episode has begun."""
+        self._task = task = Task(source, changes, period, reward, limits)
+        self.num_envs = count
+        self.single_action_space = task.action_space()
+        self.single_observation_space = task.observation_space()
+        self.action_space = batch_space(self.single_action_space, count)
+        self.observation_space = batch_space(self.single_observation_space, count)
+        loop, observer = task.scenario.closed_loop(), task.scenario.observer()
+        if why := why_alone(loop, observer):
+            raise UsageError(
+                f"podusv.gym: these runs cannot march side by side ({why}); take Gymnasium's "
+                "SyncVectorEnv of podusv.gym.Env"
+            )
+        self._metrics, grid = observer, task.scenario.time_grid()
+        self._common = Common(loop, replace(grid, log_every=grid.steps + 1), observer)
+        self._sorter = Sorter(observer, 0, True)
+        self._sorter.choose(loop)
+        self._marches: list[Abreast] = []
+        self._views = np.zeros((INPUTS, count))
+        self._times, self._gathered = np.zeros((2, count))
+
+    @explained
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: Info | None = None
+    ) -> tuple[Vector, Info]:
+        """Begin a run in every environment; `options` change nothing."""
+        seeds = _seeds(seed, self.num_envs)
+        super().reset(seed=seeds[0])
+        self._marches = self._begun(range(self.num_envs), seeds)
+        return self._observed()
+
+    @explained
+    def step(self, actions: Vector) -> tuple[Vector, Vector, Flags, Flags, Info]:
+        """As `Env.step`, for all environments: arrays with a row, or an entry, for each of them.
+
+        Raises UsageError for demands that are not two finite numbers each; no run goes on then.
+        """
+        demands, ended = self._checked(actions).T, [one for one in self._marches if one.over]
+        self._marches = [one for one in self._marches if not one.over]
+        dead, cut = np.zeros((2, self.num_envs), bool)
+        for march in self._marches:
+            march.law_table[DEMAND] = demands[:, march.places]
+            march.advance(march.grid.hold_every)
+            dead[march.places], cut[march.places] = ~march.alive, march.over & march.alive
+        rewards = self._rewards()
+        again = [place for march in ended for place in march.places]
+        self._marches += self._begun(again, [None] * len(again))
+        seen, info = self._observed()
+        return seen, rewards, dead, cut, info
+
+    def _rewards(self) -> Vector:
+        """What runs gained since they were asked last."""
+        rewards = np.zeros(self.num_envs)
+        for march in self._marches:
+            gathered = self._metrics.one(self._task.reward, march.seen())
+            self._task.check_reward(gathered, march.time)
+            rewards[march.places] = self._gathered[march.places] - gathered
+            self._gathered[march.places] = gathered
+        return rewards
+
+    def _begun(self, places: Sequence[int], seeds: Sequence[int | None]) -> list[Abreast]:
+        """Runs for these environments, in marches."""
+        groups, advance = [], self._sorter.advance
+        assert advance is not None
+        for place, seed in zip(places, seeds, strict=True):
+            loop = self._task.drawn(seed, self.np_random).closed_loop()
+            self._common.check(loop)
+            run = self._common.run(place, loop)
+            groups.append(self._sorter.sorted(run.vectors, run))
+        groups += self._sorter.rest()
+        self._gathered[places] = 0.0
+        layout, grid = self._common.structure[0], self._common.grid
+        return [Abreast(g, advance, layout, grid, observed, INPUTS) for g in groups if g]
+
+    def _observed(self) -> tuple[Vector, Info]:
+        """What all see, where a run is terminated what it saw last; the time of every run [s]."""
+        for march in self._marches:
+            places = np.array(march.places)[march.alive]
+            self._views[:, places] = march.view()[:, march.alive]
+            self._times[march.places] = march.time
+        info = {"time": self._times.copy(), "_time": np.ones(self.num_envs, bool)}
+        return self._views.T.copy(), info
+
+    def _checked(self, actions: Vector) -> Vector:
+        if not self._marches:
+            raise UsageError("podusv.gym: no episode has begun; call reset first")
+        try:
+            demands = np.asarray(actions, float)
+        except (TypeError, ValueError):
+            demands = np.zeros(0)
+        if demands.shape != (self.num_envs, OUTPUTS) or not np.isfinite(demands).all():
+            raise UsageError(
+                f"podusv.gym: the actions are {actions!r}; give {self.num_envs} rows of two finite "
+                "numbers, tau_u [N] and tau_r [N m]"
+            )
+        return demands
+
+
+def _seeds(seed: int | Sequence[int | None] | None, count: int) -> Sequence[int | None]:
+    """A seed for every environment. Raises UsageError."""
+    if seed is None:
+        return [None] * count
+    if isinstance(seed, int):
+        return range(seed, seed + count)
+    if len(seed) != count:
+        raise UsageError(f"podusv.gym: {len(seed)} seeds for {count} environments; give {count}")
+    return seed

@@ -1,0 +1,256 @@
+"""Environments of Gymnasium: the draws, the bits and the metrics of podusv's own runs."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from policy_samples import content, drawn, symmetric
+
+import podusv
+from podusv_cli.components.controllers.policy import Policy
+from podusv_cli.core.errors import UsageError
+from podusv_cli.core.kernel import bundle, call
+from podusv_cli.studies.study import draws
+
+pytest.importorskip("gymnasium", reason="Gymnasium is not installed: podusv[gym]")
+import gymnasium.utils.env_checker
+
+import podusv.gym
+
+PERIOD = 0.1  # s
+SCENARIO: dict[str, Any] = {
+    "extends": "podusv:mu_2017/corrected.yaml",
+    "control": {"period": PERIOD},
+    "simulation": {"duration": 3.0},
+    "sweep": {
+        "seed": 5, "draws": 20,
+        "vary": {
+            "vessel.m": {"times": {"uniform": [0.8, 1.2]}},
+            "start.x": {"uniform": [-12.0, 12.0]},
+            "start.psi": {"angle": "all"},
+            "path.speed": {"uniform": [0.0, 0.6]},
+        },
+    },
+}  # fmt: skip
+LAW = Policy(content=content(symmetric()))
+
+
+@pytest.fixture(autouse=True)
+def _in_an_empty_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+def single(**changes: Any) -> podusv.gym.Env:
+    return podusv.gym.Env(SCENARIO, changes)
+
+
+def several(count: int, **changes: Any) -> podusv.gym.VectorEnv:
+    return podusv.gym.VectorEnv(SCENARIO, changes, count=count)
+
+
+def demanded(env: podusv.gym.Env) -> Any:
+    """What the law `policy` asks for where the session is."""
+    now, tau, work = env.session.observe(), np.zeros(2), np.zeros(LAW.workspace())
+    k = bundle(LAW.constants())
+    call(LAW.law, x=now.state, target=now.target, k=k, table=LAW.table(), tau=tau, work=work)
+    return tau
+
+
+def steered(env: podusv.gym.Env, seed: int) -> float:
+    """The rewards of an episode under the policy."""
+    env.reset(seed=seed)
+    total, over = 0.0, False
+    while not over:
+        _, reward, terminated, over, _ = env.step(demanded(env))
+        assert not terminated
+        total += reward
+    return total
+
+
+@pytest.mark.filterwarnings("ignore:.*(infinity|symmetric|spec):UserWarning")
+def test_gymnasium_finds_no_fault():
+    gymnasium.utils.env_checker.check_env(single())
+
+
+def test_an_agent_that_does_what_the_law_does_is_rewarded_as_the_study_judges_it():
+    """Draw for draw: what `reset(seed=i)` begins is the run i of the study, to the bit."""
+    law = {"controllers": None, "controller": LAW.model_dump(exclude_none=True)}
+    study = podusv.sweep(SCENARIO, {**law, "sweep.draws": 4}, out="study", figures=False)
+    table, env = study.table, single()
+    for i in range(4):
+        assert steered(env, i) == pytest.approx(-table["iae"][i], rel=1e-12)
+        assert env.session.metric("iae") == table["iae"][i]
+        assert env.session.scenario.vessel.m == 23.8 * table["vessel.m"][i]
+
+
+def test_an_episode_is_a_run_of_its_own():
+    env = single()
+    total = steered(env, 3)
+    run = env.session.close("episode", figures=False)
+    assert run.metrics["iae"] == env.session.metric("iae") == pytest.approx(-total)
+    assert run.scenario.start.x == env.session.scenario.start.x
+
+
+def test_without_a_seed_no_draw_of_the_study_comes_up():
+    env, sweep = single(), podusv.load(SCENARIO).sweep
+    judged = set(draws.table(sweep, 0, 1000)["start.x"])
+    env.reset(seed=7)
+    assert env.session.scenario.start.x in judged
+    starts = []
+    for _ in range(30):
+        env.reset()
+        starts.append(env.session.scenario.start.x)
+    assert len(set(starts)) == 30
+    assert judged.isdisjoint(starts)
+    assert min(starts) < -6.0 < 6.0 < max(starts)
+    again = single()
+    again.reset(seed=7)
+    again.reset()
+    assert again.session.scenario.start.x == starts[0]
+
+
+def test_draws_of_no_study_are_independent_where_those_of_the_study_are_not():
+    env = single(**{"sweep.design": "sobol"})
+    env.reset(seed=2)
+    assert env.session.scenario.start.x in draws.table(env._task.sweep, 0, 4)["start.x"]
+    env.reset()
+
+
+@pytest.mark.parametrize("reward", ["iae", "energy", "peak_tau_u"])
+def test_environments_side_by_side_have_the_bits_of_single_ones(reward):
+    """Eleven of them take two marches; the last steps are a second episode."""
+    many = podusv.gym.VectorEnv(SCENARIO, count=11, reward=reward)
+    ones = [podusv.gym.Env(SCENARIO, reward=reward) for _ in range(11)]
+    seen, _ = many.reset(seed=4)
+    np.testing.assert_array_equal(seen, [one.reset(seed=4 + i)[0] for i, one in enumerate(ones)])
+    random = np.random.default_rng(0)
+    for step in range(30):
+        actions = random.normal(0.0, 2.0, (11, 2))
+        seen, gained, dead, cut, info = many.step(actions)
+        each = [one.step(action) for one, action in zip(ones, actions, strict=True)]
+        np.testing.assert_array_equal(seen, [one[0] for one in each])
+        np.testing.assert_array_equal(gained, [one[1] for one in each])
+        assert not dead.any()
+        assert set(cut) == {step == 29} == {one[3] for one in each}
+        assert set(info["time"]) == {each[0][4]["time"]}
+    seen, gained, dead, cut, info = many.step(np.full((11, 2), 9.0))
+    assert not np.concatenate([gained, dead, cut, info["time"]]).any()
+    assert len(np.unique(seen[:, 0])) == 11
+    _, gained, *_ = many.step(np.zeros((11, 2)))
+    assert (gained < 0.0).all() or reward != "iae"
+
+
+def test_where_one_diverges_the_others_of_its_march_are_truncated():
+    """The actuator has no limits; one of nine is asked for more than a number can be."""
+    free = {"actuator": {"kind": "ideal"}, "vessel": {"preset": "paper"}}
+    many = podusv.gym.VectorEnv(SCENARIO, free, count=9, limits=(1e300, 1e300))
+    before, _ = many.reset(seed=0)
+    actions = np.zeros((9, 2))
+    actions[2] = 1e200
+    seen, gained, dead, cut, info = many.step(actions)
+    assert list(np.flatnonzero(dead)) == [2]
+    assert list(np.flatnonzero(cut)) == [0, 1, 3, 4, 5, 6, 7]  # 8 is alone in its march
+    np.testing.assert_array_equal(seen[2], before[2])
+    assert np.isfinite(gained).all()
+    assert info["time"][8] == PERIOD
+    seen, gained, dead, cut, info = many.step(np.zeros((9, 2)))
+    assert not np.concatenate([dead, cut, gained[:8]]).any()
+    assert gained[8] < 0.0
+    assert list(info["time"]) == [0.0] * 8 + [2 * PERIOD]
+    one = podusv.gym.Env(SCENARIO, free, limits=(1e300, 1e300))
+    one.reset(seed=2)
+    assert one.step(np.array([1e200, 1e200]))[2:4] == (True, False)
+    with pytest.raises(UsageError, match="the episode is over; call reset"):
+        one.step(np.zeros(2))
+
+
+def test_spaces_are_the_actuator_s_limits_or_those_that_are_given():
+    np.testing.assert_array_equal(single().action_space.high, [8.0, 2.5])
+    own = podusv.gym.Env(SCENARIO, limits=(3.0, 1.0))
+    np.testing.assert_array_equal(own.action_space.low, [-3.0, -1.0])
+    assert several(3).action_space.shape == (3, 2)
+    assert several(3).observation_space.shape == (3, 8)
+
+
+def test_plain_python_has_the_bits_of_machine_code():
+    changes = {"simulation.duration": 0.2}
+    compiled, plain = single(**changes), single(**changes, **{"simulation.compiled": False})
+    for env in (compiled, plain):
+        env.reset(seed=1)
+    for _ in range(2):
+        one, other = (env.step((3.0, 0.5)) for env in (compiled, plain))
+        np.testing.assert_array_equal(one[0], other[0])
+        assert one[1:] == other[1:]
+
+
+VARIED = "sweep.vary"
+REFUSED: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
+    "no limits": ({"actuator": {"kind": "ideal"}}, {}, r"actuator does not say .* limits=\(8"),
+    "no metric": ({}, {"reward": "iea"}, "unknown reward 'iea'; did you mean 'i"),
+    "a grid": ({"sweep.grid": {"path.course": [0.1, 0.2]}}, {}, "sweep.grid has several"),
+    "a gain": (
+        {"controller": {"kind": "pid"}, VARIED: {"controller.K_Pu": {"uniform": [1.0, 2.0]}}}, {},
+        "sweep.vary.controller.K_Pu draws controller.K_Pu, and in an environment the controller",
+    ),
+    "no period": ({"control.period": 0.0}, {}, "for how long does a demand hold"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("make", [podusv.gym.Env, podusv.gym.VectorEnv])
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_no_environment_can_be_made_of_is_a_sentence(make, case):
+    changes, options, says = REFUSED[case]
+    with pytest.raises(UsageError, match=says):
+        make(SCENARIO, changes, **options)
+
+
+def test_a_reward_that_is_not_defined_at_every_instant_is_a_sentence():
+    for env, action in ((single, np.zeros(2)), (lambda: several(2), np.zeros((2, 2)))):
+        made = env()
+        made._task.reward = "settling_time"
+        made.reset(seed=0)
+        with pytest.raises(UsageError, match=r"settling_time is not defined at 0\.1 s; a reward"):
+            made.step(action)
+
+
+def test_an_action_that_is_no_demand_is_a_sentence_and_nothing_is_lost():
+    env, many = single(), several(2)
+    with pytest.raises(UsageError, match="no episode has begun; call reset first"):
+        env.step((0.0, 0.0))
+    with pytest.raises(UsageError, match="no episode has begun; call reset first"):
+        many.step(np.zeros((2, 2)))
+    env.reset(seed=0)
+    many.reset(seed=0)
+    for wrong in ((math.nan, 0.0), (1.0,), "ab"):
+        with pytest.raises(UsageError, match="give two finite numbers"):
+            env.step(wrong)
+    for wrong in (np.full((2, 2), math.inf), np.zeros(2), [[0.0], [0.0, 0.0]]):
+        with pytest.raises(UsageError, match="give 2 rows of two finite numbers"):
+            many.step(wrong)
+    after, together = env.step((1.0, 0.2)), many.step(np.array([[1.0, 0.2], [0.0, 0.0]]))
+    assert after[4] == {"time": PERIOD}
+    np.testing.assert_array_equal(after[0], together[0][0])
+    with pytest.raises(UsageError, match="3 seeds for 2 environments; give 2"):
+        many.reset(seed=[1, 2, 3])
+
+
+def test_what_cannot_march_side_by_side_is_a_sentence(monkeypatch):
+    monkeypatch.setattr("podusv_cli.interface.gym.why_alone", lambda *given: "a part prints")
+    with pytest.raises(UsageError, match=r"side by side \(a part prints\); take Gymnasium's SyncV"):
+        several(2)
+
+
+def test_a_drawn_network_and_the_environment_see_the_same(tmp_path):
+    """The law inside a run and an agent outside: the same demands in the same observations."""
+    law = Policy(content=content(drawn([8, 6, 2])))
+    made = {"controllers": None, "controller": law.model_dump(exclude_none=True), "sweep": None}
+    run = podusv.simulate({**SCENARIO, "sweep": None}, made)
+    env = podusv.gym.Env({**SCENARIO, "sweep": None})
+    env.reset()
+    tau, work, k = np.zeros(2), np.zeros(law.workspace()), bundle(law.constants())
+    for i in range(30):
+        now = env.session.observe()
+        call(law.law, x=now.state, target=now.target, k=k, table=law.table(), tau=tau, work=work)
+        np.testing.assert_array_equal(tau, [run["tau_u_cmd"][10 * i], run["tau_r_cmd"][10 * i]])
+        env.step(tau)
