@@ -25,7 +25,7 @@ ABLATIONS := ablation ablation_figures ablation_standoff ablation_gains ablation
     ablation_gains_standoff ablation_pid
 TABLES := unknown:unknown_dynamics discrete:discrete_signals limits:period_limits learnt:learnt gains:fixed_gains networks:networks
 SEAS := exact sensors sensors_alone current state_3 state_5 state_6 rare untold rare_untold pods delay thruster_failure dead_zone
-STUDIES := hull_and_sea unknown_dynamics rivals rivals_earth rivals_cybership2 sea_state_4 sea_state_6 sea_untold
+STUDIES := hull_and_sea unknown_dynamics rivals rivals_earth rivals_cybership2 sea_state_4 sea_state_6 sea_untold learned
 SEARCHES := hull network
 JUDGES := fresh cybership2 otter
 LEFEBER := circle line port load damping

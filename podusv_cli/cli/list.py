@@ -24,6 +24,13 @@ class Part(NamedTuple):
     words: tuple[str, ...]
     heading: str
     entries: Entries
+    then: str = ""  # what one does with them
+
+
+THEN = {
+    "controller": "podusv compare, sweep and bench hold laws beside each other, podusv tune finds "
+    "their gains, and podusv export takes one of them to a boat's computer"
+}  # by section
 
 
 def list(
@@ -53,6 +60,8 @@ def list(
         echo(f"{one.heading}:")
         for name, text, facts in one.entries:
             echo_entry(f"  {name}", text, facts=facts)
+        if one.then:
+            echo(one.then, err=True)
 
 
 def parts(plugins: Known) -> Iterator[Part]:
@@ -64,7 +73,8 @@ def parts(plugins: Known) -> Iterator[Part]:
 
     for section, summaries in kinds(plugins).items():
         words = (f"{section}s", f"{BASES[section].noun}s")
-        yield Part(words, section, ((kind, text, "") for kind, text in summaries.items()))
+        entries = ((kind, text, "") for kind, text in summaries.items())
+        yield Part(words, section, entries, THEN.get(section, ""))
     for key, (_, presets) in with_presets().items():
         texts = [
             (

@@ -1,4 +1,4 @@
-"""The scenarios that come with podusv, by name: `podusv:mu_2017/corrected.yaml`."""
+"""The files that come with podusv, by name: `podusv:mu_2017/corrected.yaml`."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ def folder() -> Path:
 
 
 @cache
-def names() -> tuple[str, ...]:
+def names(form: str = "yaml") -> tuple[str, ...]:
     """Every shipped file as a scenario names it, sorted: `podusv:mu_2017/base.yaml`."""
-    paths = folder().rglob("*.yaml")
+    paths = folder().rglob(f"*.{form}")
     return tuple(sorted(PREFIX + path.relative_to(folder()).as_posix() for path in paths))
 
 
@@ -49,7 +49,7 @@ def file_of(name: str) -> str:
     """
     if not name.startswith(PREFIX):
         return name
-    if present(name) not in names():
+    if present(name) not in (*names(), *names("safetensors")):
         hint = did_you_mean(name, names())
         raise ValueError(f"podusv has no scenario of this name{hint} (`podusv init` lists them)")
     return str(folder() / present(name).removeprefix(PREFIX))
