@@ -31,9 +31,7 @@ from podusv_cli.export.law import ExportedLaw
 from podusv_cli.workflows import export as workflow
 
 SOURCE = "podusv:mu_2017/corrected.yaml"
-LAWS = sorted(
-    set(registry.kinds("podusv_cli.components.controllers", Controller)) - {"schedule"}
-)  # a schedule is the demand itself
+LAWS = sorted(registry.kinds("podusv_cli.components.controllers", Controller))
 PODS = {"actuator": {"kind": "pod", "preset": "otter"}, "vessel": {"preset": "otter"}}
 CC = "cc -std=c99 -Wall -Wextra -pedantic -Werror -O2 -ffp-contract=off"
 HARDWARE = ROOT / "examples/hardware_in_the_loop"
@@ -52,11 +50,16 @@ def scenario(kind: str, **changes: Any) -> Any:
     return podusv.load(SOURCE, {**base, **changes})
 
 
+def task(kind: str, seconds: int = 300) -> tuple[str, str, str]:
+    """What makes of the paper's task one for a law that takes samples."""
+    given = f"controller={json.dumps(law(kind))}"
+    return "control.period=0.1", f"simulation.duration={seconds}", given
+
+
 def exported(to: Path, kind: str = "pid", **options: Any) -> Path:
     """The folder of a small export for this machine."""
-    changes = ("control.period=0.1", "simulation.duration=5", f"controller={json.dumps(law(kind))}")
     options = {"fmu": False, "platforms": [link.this_machine()]} | options
-    return workflow.export(Path(SOURCE), workflow.Request(to, changes, **options))
+    return workflow.export(Path(SOURCE), workflow.Request(to, task(kind, 5), **options))
 
 
 @pytest.mark.parametrize("update", ["after", "before"])
@@ -421,11 +424,10 @@ def test_a_table_that_is_not_the_one_described_gets_a_sentence(tmp_path, table):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["momentum_vector", "adaptive_neural"])
+@pytest.mark.parametrize("kind", LAWS)
 def test_fmpy_finds_no_fault_and_the_bits_of_the_run(tmp_path, kind):
     validation = pytest.importorskip("fmpy.validation")
-    changes = ("control.period=0.1", "simulation.duration=300", f"controller={{kind: {kind}}}")
-    request = workflow.Request(tmp_path / "law", changes, platforms=[link.this_machine()])
+    request = workflow.Request(tmp_path / "law", task(kind), platforms=[link.this_machine()])
     folder = workflow.export(Path(SOURCE), request)
     assert validation.validate_fmu(str(folder / "law.fmu")) == []
     found = check(folder)
@@ -467,8 +469,8 @@ int main(void)
 )
 @pytest.mark.parametrize("kind", LAWS)
 def test_other_processors_have_the_bits_of_the_run(tmp_path, kind):
-    changes = ("control.period=0.1", "simulation.duration=300", f"controller={{kind: {kind}}}")
-    request = workflow.Request(tmp_path / "law", changes, fmu=False, platforms=list(EMULATED))
+    platforms = list(EMULATED)
+    request = workflow.Request(tmp_path / "law", task(kind), fmu=False, platforms=platforms)
     folder = workflow.export(Path(SOURCE), request)
     (folder / "steps.c").write_text(STEPS)
     samples = np.loadtxt(folder / "check.csv", delimiter=",", skiprows=1)
