@@ -15,6 +15,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import cortex_m7
 import numpy as np
 import pytest
 from command_samples import ROOT
@@ -440,6 +441,7 @@ def test_fmpy_finds_no_fault_and_the_bits_of_the_run(tmp_path, kind):
 EMULATED = {  # how qemu calls a platform, and zig
     "aarch64-linux": ("qemu-aarch64", "aarch64-linux-musl"),
     "armv7": ("qemu-arm", "arm-linux-musleabihf"),
+    "riscv64": ("qemu-riscv64", "riscv64-linux-musl"),
 }
 STEPS = """
 #include <stdio.h>
@@ -487,3 +489,18 @@ def test_other_processors_have_the_bits_of_the_run(tmp_path, kind):
         ).stdout  # fmt: skip
         said = np.frombuffer(out).reshape(len(samples), -1)
         np.testing.assert_array_equal(said.view(int), samples[:, 16:].copy().view(int))
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(
+    not find_spec("ziglang") or not shutil.which(cortex_m7.BOARD),
+    reason=f"needs ziglang and {cortex_m7.BOARD}",
+)
+@pytest.mark.parametrize("kind", LAWS)
+def test_a_bare_cortex_m7_has_the_bits_of_the_run(tmp_path, kind):
+    request = workflow.Request(tmp_path / "law", task(kind), fmu=False, platforms=["thumbv7em"])
+    folder = workflow.export(Path(SOURCE), request)
+    samples = np.loadtxt(folder / "check.csv", delimiter=",", skiprows=1)
+    out = cortex_m7.stepped(folder, samples[:, 1:16].tobytes())
+    said = np.frombuffer(out).reshape(len(samples), -1)
+    np.testing.assert_array_equal(said.view(int), samples[:, 16:].copy().view(int))

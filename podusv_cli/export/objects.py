@@ -47,7 +47,7 @@ PLATFORMS: Mapping[str, Platform] = {
         "armv7-unknown-linux-gnueabihf", "generic", "+vfp3", zig="arm-linux-gnueabihf",
         library=".so",
     ),
-    "thumbv7em": Platform("thumbv7em-none-eabihf", "cortex-m7"),
+    "thumbv7em": Platform("thumbv7em-unknown-none-eabihf", "cortex-m7"),
     "riscv64": Platform(
         "riscv64-unknown-linux-gnu", "generic-rv64", "+m,+a,+f,+d,+c", zig="riscv64-linux-gnu",
         library=".so",
