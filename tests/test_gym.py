@@ -1,10 +1,13 @@
 """Environments of Gymnasium: the draws, the bits and the metrics of podusv's own runs."""
 
 import math
+import re
 from typing import Any
 
 import numpy as np
 import pytest
+import yaml
+from command_samples import ROOT
 from policy_samples import content, drawn, symmetric
 
 import podusv
@@ -225,14 +228,21 @@ def test_an_action_that_is_no_demand_is_a_sentence_and_nothing_is_lost():
     for wrong in ((math.nan, 0.0), (1.0,), "ab"):
         with pytest.raises(UsageError, match="give two finite numbers"):
             env.step(wrong)
-    for wrong in (np.full((2, 2), math.inf), np.zeros(2), [[0.0], [0.0, 0.0]]):
+    for wrong in (np.zeros(2), [[0.0], [0.0, 0.0]]):
         with pytest.raises(UsageError, match="give 2 rows of two finite numbers"):
             many.step(wrong)
+    with pytest.raises(UsageError, match=r"environment 1 is \(nan, 0\.0\); give two"):
+        many.step(np.array([[1.0, 0.2], [math.nan, 0.0]]))
     after, together = env.step((1.0, 0.2)), many.step(np.array([[1.0, 0.2], [0.0, 0.0]]))
     assert after[4] == {"time": PERIOD}
     np.testing.assert_array_equal(after[0], together[0][0])
     with pytest.raises(UsageError, match="3 seeds for 2 environments; give 2"):
         many.reset(seed=[1, 2, 3])
+
+
+def test_no_environments_at_all_are_a_sentence():
+    with pytest.raises(UsageError, match="count is 0; must be 1 or more"):
+        several(0)
 
 
 def test_what_cannot_march_side_by_side_is_a_sentence(monkeypatch):
@@ -254,3 +264,16 @@ def test_a_drawn_network_and_the_environment_see_the_same(tmp_path):
         call(law.law, x=now.state, target=now.target, k=k, table=law.table(), tau=tau, work=work)
         np.testing.assert_array_equal(tau, [run["tau_u_cmd"][10 * i], run["tau_r_cmd"][10 * i]])
         env.step(tau)
+
+
+def test_the_page_runs_from_an_environment_to_a_network_in_a_scenario(tmp_path):
+    text = (ROOT / "docs/learning.md").read_text()
+    known: dict[str, Any] = {}
+    for code in re.findall(r"```python\n(.*?)```", text, re.DOTALL):
+        exec(code.replace("count=64", "count=8"), known)  # noqa: S102
+    assert (tmp_path / "episode/log.h5").exists()
+    for shown in re.findall(r"```yaml\n(.*?)```", text, re.DOTALL):
+        changes = {"controllers": None, "simulation.duration": 1.0, **yaml.safe_load(shown)}
+        loaded = podusv.load("podusv:laws/learned.yaml", changes)
+        laws = [loaded.controller, *loaded.controllers.values()]
+        assert any(law.kind == "policy" and law.content for law in laws)

@@ -200,6 +200,8 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any]):
         period: float | None = None, reward: str = "iae", limits: Limits | None = None,
     ) -> None:  # fmt: skip
         """No episode has begun."""
+        if count < 1:
+            raise UsageError(f"podusv.gym: count is {count}; must be 1 or more")
         self._task = task = Task(source, changes, period, reward, limits)
         self.num_envs = count
         self.single_action_space = task.action_space()
@@ -289,10 +291,16 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any]):
             demands = np.asarray(actions, float)
         except (TypeError, ValueError):
             demands = np.zeros(0)
-        if demands.shape != (self.num_envs, OUTPUTS) or not np.isfinite(demands).all():
+        if demands.shape != (self.num_envs, OUTPUTS):
             raise UsageError(
-                f"podusv.gym: the actions are {actions!r}; give {self.num_envs} rows of two finite "
-                "numbers, tau_u [N] and tau_r [N m]"
+                f"podusv.gym: the actions have shape {demands.shape}; give {self.num_envs} rows of "
+                "two finite numbers, tau_u [N] and tau_r [N m]"
+            )
+        if (wrong := np.flatnonzero(~np.isfinite(demands).all(axis=1))).size:
+            raise UsageError(
+                f"podusv.gym: the action of environment {wrong[0]} is "
+                f"{tuple(demands[wrong[0]].tolist())}; give two finite numbers, tau_u [N] and "
+                "tau_r [N m]"
             )
         return demands
 
